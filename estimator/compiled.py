@@ -59,7 +59,7 @@ def inlined(function: Function) -> Function:
     """Compile a function into whatever calls it: what is constant there is worked out once, and no call is left.
 
     Of an array that is handed over, references are still counted, two atomic operations per array and call. A loop
-    hands over what owns nothing: borrowed arrays (``estimator.lanes.borrowed``), or parts of a record
+    hands over what owns nothing: borrowed arrays (``estimator.lanes.columns``), or parts of a record
     (``estimator.identification.online.memory``).
     """
     return cast(Function, numba.njit(cache=True, nogil=True, error_model="numpy", forceinline=True)(function))

@@ -21,7 +21,7 @@ from estimator.diagnosis.intervals import (
 )
 from estimator.diagnosis.result import Estimated, Evidence, FoundEffect, Interval, Profile, Retuned
 from estimator.physics.catalogue import EFFECTS
-from estimator.physics.effects import road_grade
+from estimator.physics.effects.load import ROAD_GRADE, grade_basis
 from estimator.physics.fit import FitResult
 from estimator.physics.layout import LOAD, slot
 from estimator.physics.model import DrivelineModel, EffectValue, parameter_unit, unit
@@ -133,7 +133,7 @@ def profiles_of(result: FitResult, cov: FloatArray, model: DrivelineModel) -> di
         rows = slice(first + local.size - basis.profile.shape[0], first + local.size)
         first += local.size
         times = np.arange(record.time_s[0], record.time_s[-1], PROFILE_POINTS_S)
-        weights = (road_grade.basis(record.time_s, times) * basis.scale[-basis.profile.shape[0] :, None]).T
+        weights = (grade_basis(record.time_s, times) * basis.scale[-basis.profile.shape[0] :, None]).T
         weights = weights - weights.mean(axis=0)  # the mean is the constant load's
         value = weights @ result.x[rows]
         spread = Z95 * np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", weights, cov[rows, rows], weights), 0.0))
@@ -148,7 +148,7 @@ def profile_size(result: FitResult, cov: FloatArray, model: DrivelineModel) -> d
     half = np.concatenate([0.5 * (profile.high - profile.low) for profile in profiles])
     size = float(np.sqrt(np.mean(value**2)))
     spread = float(np.sqrt(np.mean(half**2) / max(len(value), 1)))
-    name = road_grade.EFFECT.parameters[0].name
+    name = ROAD_GRADE.parameters[0].name
     return {name: Estimated(size, (max(size - spread, 0.0), size + spread), unit("torque", model.motion))}
 
 

@@ -21,14 +21,14 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from estimator.physics.catalogue import BUILT_IN
+from estimator.physics.driveline import Case, Start
 from estimator.physics.effect import Effect, Element
 from estimator.physics.grid import Grid, grid_for
-from estimator.physics.inputs import Case, load_of
+from estimator.physics.inputs import load_of
 from estimator.physics.kernel import state_vector
 from estimator.physics.layout import LOAD, NOMINAL, flat, slot
 from estimator.physics.model import DrivelineModel, Parameter, Structure
 from estimator.physics.simulate import simulate, simulate_each
-from estimator.physics.start import Start
 from estimator.signals.once import once
 from estimator.signals.record import FloatArray, OutputKind, Record
 

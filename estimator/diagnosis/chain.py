@@ -19,10 +19,9 @@ from estimator.diagnosis.acquisition import (
 from estimator.diagnosis.noise import noise_floor
 from estimator.diagnosis.segments import tiles
 from estimator.physics.catalogue import EFFECTS
-from estimator.physics.fit import FitResult
+from estimator.physics.fit import FitResult, rates
 from estimator.physics.free_run import NOTHING_KNOWN, FreeRun, Own, free_run
 from estimator.physics.model import DrivelineModel
-from estimator.physics.rates import rates
 from estimator.signals.outputs import outputs_apart
 from estimator.signals.record import BoolArray, FloatArray, Record
 

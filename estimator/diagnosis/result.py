@@ -100,6 +100,7 @@ class FoundEffect:
     alternatives: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     share: float = math.nan
     probability: float = math.nan
+    form: str = ""
 
 
 @dataclass(frozen=True, slots=True)

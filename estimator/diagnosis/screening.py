@@ -14,13 +14,22 @@ from functools import partial
 import numpy as np
 
 from estimator.physics.catalogue import EFFECTS
+from estimator.physics.driveline import Case
 from estimator.physics.effect import Effect
 from estimator.physics.fit import FitResult
-from estimator.physics.inputs import Case
 from estimator.physics.model import DrivelineModel
-from estimator.physics.own_scan import Cells, Simulate, Stretch, Wave, answers_to, cells, scanned, small_waves
+from estimator.physics.own_scan import (
+    Cells,
+    Projector,
+    Simulate,
+    Stretch,
+    Wave,
+    answers_to,
+    cells,
+    scanned,
+    small_waves,
+)
 from estimator.physics.problem import simulated_cases, start_of
-from estimator.physics.projector import Projector
 from estimator.physics.unknowns import Release, Shared, effect_unknowns
 from estimator.signals.record import FloatArray
 

@@ -3,10 +3,48 @@
 from __future__ import annotations
 
 import operator
-from typing import Any
+from typing import Any, TypeVar
 
-from estimator.lanes.tools import intrinsic, lower_builtin, signature, type_callable, types
-from estimator.lanes.types import ADDRESS, LANES, NUMBERS, ColumnsType, columns, lanes
+from estimator.lanes.types import (
+    ADDRESS,
+    LANES,
+    NUMBERS,
+    ColumnsType,
+    cgutils,
+    columns,
+    intrinsic,
+    lanes,
+    lower_builtin,
+    overload,
+    signature,
+    type_callable,
+    types,
+)
+
+Borrowed = TypeVar("Borrowed")
+
+
+def borrowed(array: Borrowed) -> Borrowed:
+    """Return an array without its owner, who keeps it until compiled code is done with it; of Python, the array."""
+    return array
+
+
+@intrinsic
+def _without_owner(typingctx: Any, array: Any) -> Any:
+    def made(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        owner = context.data_model_manager[array].get_field_position("meminfo")
+        nobody = cgutils.get_null_value(args[0].type.elements[owner])
+        return builder.insert_value(args[0], nobody, owner)
+
+    return array(array), made
+
+
+@overload(borrowed, strict=False)
+def _borrowed(array: Any) -> Any:
+    if isinstance(array, types.Array):
+        return lambda array: _without_owner(array)
+    return None
+
 
 BYTES = 8
 

@@ -5,8 +5,25 @@ from __future__ import annotations
 from typing import Any
 
 from llvmlite import ir
+from numba import extending
+from numba.core import cgutils as core_cgutils
+from numba.core import datamodel, typeconv, typing
+from numba.core import types as core_types
 
-from estimator.lanes.tools import Conversion, PrimitiveModel, lower_cast, register_model, types
+types: Any = core_types
+cgutils: Any = core_cgutils
+PrimitiveModel: Any = datamodel.models.PrimitiveModel
+Conversion: Any = vars(typeconv)["Conversion"]
+signature: Any = vars(typing)["signature"]
+defined_once: Any = core_cgutils.get_or_insert_function
+intrinsic: Any = extending.intrinsic
+overload: Any = extending.overload
+type_callable: Any = extending.type_callable
+lower_builtin: Any = extending.lower_builtin
+lower_cast: Any = extending.lower_cast
+register_jitable: Any = extending.register_jitable
+register_model: Any = extending.register_model
+
 
 LANES = 8
 """Numbers in lanes: one register of the widest instructions there are today, two or four of others."""

@@ -6,97 +6,53 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
-from typing import TYPE_CHECKING
 
-from estimator.physics.effects import (
-    actuator_lag,
-    aerodynamic_drag,
-    asymmetric_friction,
-    backlash,
-    brake_drag,
-    cardan_second_order,
-    clock_drift,
-    coulomb_friction_load,
-    coulomb_friction_motor,
-    eddy_drag,
-    extra_torsional_mode,
-    gear_losses,
-    generator_coupled,
-    gravity,
-    grounded_spring,
-    inertia_change,
-    inverter_gain_mismatch,
-    load_imbalance,
-    lost_samples,
-    quadratic_friction,
-    resolver_error,
-    road_grade,
-    sample_jitter,
-    shaft_hysteresis,
-    speed_filter,
-    speed_quantisation,
-    speed_sign_blind,
-    stale_samples,
-    stiffness_change,
-    stiffness_nonlinearity,
-    stribeck_friction,
-    torque_bias,
-    torque_derating,
-    torque_nonlinearity,
-    torque_ripple,
-    torque_saturation,
-    transport_delay,
-    tyre_slip,
-    viscoelastic_shaft,
-    warming_friction,
-)
-from estimator.physics.law_name import LawName
-
-if TYPE_CHECKING:
-    from estimator.physics.effect import Effect
-    from estimator.physics.model import DrivelineModel, EffectValue
+from estimator.physics.driveline import EffectValue, Structure
+from estimator.physics.effect import Effect
+from estimator.physics.effects import drag, dry_friction, inertia, load, sensor, shaft, timing, torque
+from estimator.physics.own_law import LawName
 
 _ENTRIES = (
-    inverter_gain_mismatch.EFFECT,
-    torque_derating.EFFECT,
-    torque_saturation.EFFECT,
-    torque_nonlinearity.EFFECT,
-    torque_bias.EFFECT,
-    actuator_lag.EFFECT,
-    transport_delay.EFFECT,
-    torque_ripple.EFFECT,
-    coulomb_friction_motor.EFFECT,
-    stribeck_friction.EFFECT,
-    quadratic_friction.EFFECT,
-    eddy_drag.EFFECT,
-    asymmetric_friction.EFFECT,
-    generator_coupled.EFFECT,
-    backlash.EFFECT,
-    stiffness_nonlinearity.EFFECT,
-    stiffness_change.EFFECT,
-    shaft_hysteresis.EFFECT,
-    viscoelastic_shaft.EFFECT,
-    gear_losses.EFFECT,
-    cardan_second_order.EFFECT,
-    extra_torsional_mode.EFFECT,
-    coulomb_friction_load.EFFECT,
-    aerodynamic_drag.EFFECT,
-    road_grade.EFFECT,
-    brake_drag.EFFECT,
-    tyre_slip.EFFECT,
-    load_imbalance.EFFECT,
-    gravity.EFFECT,
-    grounded_spring.EFFECT,
-    inertia_change.EFFECT,
-    warming_friction.EFFECT,
-    resolver_error.EFFECT,
-    speed_filter.EFFECT,
-    speed_sign_blind.EFFECT,
-    speed_quantisation.EFFECT,
-    stale_samples.EFFECT,
-    lost_samples.EFFECT,
-    sample_jitter.EFFECT,
-    clock_drift.EFFECT,
+    torque.INVERTER_GAIN_MISMATCH,
+    torque.TORQUE_DERATING,
+    torque.TORQUE_SATURATION,
+    torque.TORQUE_NONLINEARITY,
+    torque.TORQUE_BIAS,
+    timing.ACTUATOR_LAG,
+    timing.TRANSPORT_DELAY,
+    torque.TORQUE_RIPPLE,
+    dry_friction.COULOMB_FRICTION_MOTOR,
+    dry_friction.STRIBECK_FRICTION,
+    drag.QUADRATIC_FRICTION,
+    drag.EDDY_DRAG,
+    drag.ASYMMETRIC_FRICTION,
+    inertia.GENERATOR_COUPLED,
+    shaft.BACKLASH,
+    shaft.STIFFNESS_NONLINEARITY,
+    shaft.STIFFNESS_CHANGE,
+    shaft.SHAFT_HYSTERESIS,
+    shaft.VISCOELASTIC_SHAFT,
+    drag.GEAR_LOSSES,
+    shaft.CARDAN_SECOND_ORDER,
+    inertia.EXTRA_TORSIONAL_MODE,
+    dry_friction.COULOMB_FRICTION_LOAD,
+    drag.AERODYNAMIC_DRAG,
+    load.ROAD_GRADE,
+    dry_friction.BRAKE_DRAG,
+    load.TYRE_SLIP,
+    load.LOAD_IMBALANCE,
+    load.GRAVITY,
+    load.GROUNDED_SPRING,
+    inertia.INERTIA_CHANGE,
+    drag.WARMING_FRICTION,
+    sensor.RESOLVER_ERROR,
+    timing.SPEED_FILTER,
+    sensor.SPEED_SIGN_BLIND,
+    sensor.SPEED_QUANTISATION,
+    sensor.STALE_SAMPLES,
+    sensor.LOST_SAMPLES,
+    sensor.SAMPLE_JITTER,
+    timing.CLOCK_DRIFT,
 )
 
 
@@ -120,7 +76,7 @@ BUILT_IN: Mapping[str, Effect] = MappingProxyType(_mutual(_ENTRIES))
 """The entries that the kernel has."""
 
 
-class _Effects(Mapping[str, "Effect"]):
+class _Effects(Mapping[str, Effect]):
     """The catalogue, in which the name of a user's own law finds its law, too."""
 
     def __getitem__(self, name: str) -> Effect:
@@ -137,15 +93,17 @@ EFFECTS: Mapping[str, Effect] = _Effects()
 """Name to entry, along the chain from torque command to load."""
 
 
-def effect_problems(name: str, values: Mapping[str, EffectValue], model: DrivelineModel) -> list[str]:
-    """Return what is wrong with an effect of a model, one line per fault; empty where nothing is."""
+def effect_problems(
+    name: str, values: Mapping[str, EffectValue], structure: Structure, laws: Sequence[LawName]
+) -> list[str]:
+    """Return what is wrong with an effect of a model that has these laws of its own, one line per fault."""
     entry = EFFECTS.get(name)
     if entry is None:
-        return [f"effects.{name}: unknown effect, expected one of {', '.join([*EFFECTS, *model.laws])}"]
+        return [f"effects.{name}: unknown effect, expected one of {', '.join([*EFFECTS, *laws])}"]
     problems = []
-    if model.structure not in entry.structures:
-        fits = ", ".join(sorted(structure.value for structure in entry.structures))
-        problems.append(f"effects.{name}: makes no sense in {model.structure.value}, expected {fits}")
+    if structure not in entry.structures:
+        fits = ", ".join(sorted(each.value for each in entry.structures))
+        problems.append(f"effects.{name}: makes no sense in {structure.value}, expected {fits}")
     expected = [parameter.name for parameter in entry.parameters]
     listed = ", ".join(expected)
     required = [parameter.name for parameter in entry.parameters if not parameter.optional]

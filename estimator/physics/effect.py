@@ -1,7 +1,7 @@
 """What an entry of the catalogue is: a law that can be released from its null, and what is known of it.
 
 A missing effect is a constraint of the superset model to release: at ``null`` its law does nothing. A law
-that acts at one of the places of ``estimator.physics.acting`` is taken into the one kernel from its entry; one that
+that acts at one of the places of ``estimator.physics.effect`` is taken into the one kernel from its entry; one that
 changes the line itself is written into the kernel. Everything else about it stands in its entry.
 """
 
@@ -11,10 +11,47 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
+from typing import Any
 
-from estimator.physics.acting import Acting
-from estimator.physics.model import DrivelineModel, Motion, Structure, unit
+from estimator.physics.driveline import UNITS, Driveline, Motion, Structure, unit
 from estimator.signals.record import OutputKind, Record
+
+
+class Place(Enum):
+    """Where a law acts, and so what it is given before its parameters, and what it returns.
+
+    Those of a speed or an angle are compiled: for one simulation and for several side by side (``estimator.lanes``).
+
+    Attributes
+    ----------
+    TORQUE
+        ``law(torque, since_start_s, ...)``, arrays of shape (N,): reading of all inputs together [Nm] to the torque
+        that acts.
+    MOTOR, LOAD
+        ``law(speed, ...)``: speed [rad/s] to the torque against a motion forward [Nm].
+    LOAD_ANGLE
+        ``law(angle, ...)``: simulated angle of the load [rad] to the torque against it [Nm].
+    RECORDED_ANGLE
+        The same of the motor's angle as recorded, from 0 at the start: where a simulated one would drift away.
+    SHAFT_LOSS
+        ``law(torque, sign, ...)``: torque of the shaft [Nm] and the sign of the load's speed, rounded at standstill, to
+        what of it does not reach the load [Nm].
+    """
+
+    TORQUE = "torque"
+    MOTOR = "motor"
+    LOAD = "load"
+    LOAD_ANGLE = "load_angle"
+    RECORDED_ANGLE = "recorded_angle"
+    SHAFT_LOSS = "shaft_loss"
+
+
+@dataclass(frozen=True, slots=True)
+class Acting:
+    """A law at a place: it takes all parameters of its entry, in their order, behind what the place gives."""
+
+    place: Place
+    law: Callable[..., Any]
 
 
 class Element(Enum):
@@ -63,6 +100,8 @@ class EffectParameter:
         with the recording's initial state and belongs to no model.
     most : float
         Largest value that makes sense in a model, whatever the data: a share has no more than 1.
+    form : str
+        Name of the law's form where this parameter shapes it: of one that is not at its null.
     """
 
     name: str
@@ -74,6 +113,7 @@ class EffectParameter:
     optional: bool = False
     own: bool = False
     most: float = math.inf
+    form: str = ""
 
     def unit(self, motion: Motion) -> str:
         """Return the parameter's unit in a kind of motion."""
@@ -108,7 +148,7 @@ class Untestable:
     needs: str = ""
 
 
-Scales = Callable[[DrivelineModel, Sequence[Record]], tuple[float, ...]]
+Scales = Callable[[Driveline, Sequence[Record]], tuple[float, ...]]
 Start = tuple[float | Held | Within, ...]
 
 
@@ -128,12 +168,12 @@ class Retelling:
     line: Mapping[str, float]
 
 
-Retold = Callable[[DrivelineModel, Sequence[Record], Mapping[str, float], Mapping[str, float]], list[Retelling]]
+Retold = Callable[[Driveline, Sequence[Record], Mapping[str, float], Mapping[str, float]], list[Retelling]]
 Span = tuple[float, float]
-Spans = Callable[[DrivelineModel, Mapping[str, float], Mapping[str, float]], Mapping[str, tuple[Span, ...]]]
-Starts = Callable[[DrivelineModel, Sequence[Record]], list[Start]]
-Testable = Callable[[DrivelineModel, Sequence[Record]], Untestable | None]
-Objection = Callable[[DrivelineModel, Sequence[Record], Mapping[str, float]], str]
+Spans = Callable[[Driveline, Mapping[str, float], Mapping[str, float]], Mapping[str, tuple[Span, ...]]]
+Starts = Callable[[Driveline, Sequence[Record]], list[Start]]
+Testable = Callable[[Driveline, Sequence[Record]], Untestable | None]
+Objection = Callable[[Driveline, Sequence[Record], Mapping[str, float]], str]
 
 
 MOMENTS = (
@@ -143,10 +183,10 @@ MOMENTS = (
 """Own parameters of an event: from when to when it acts, since the recording began."""
 
 
-def long_enough(key: str) -> Callable[[DrivelineModel, Sequence[Record], Mapping[str, float]], str]:
+def long_enough(key: str) -> Callable[[Driveline, Sequence[Record], Mapping[str, float]], str]:
     """Return a check that a time is at least a tenth of the sampling period: shorter ones can't be reported."""
 
-    def check(_model: DrivelineModel, records: Sequence[Record], values: Mapping[str, float]) -> str:
+    def check(_model: Driveline, records: Sequence[Record], values: Mapping[str, float]) -> str:
         least = 0.1 * min(record.sample_time_s for record in records)
         if values[key] >= least:
             return ""
@@ -168,7 +208,7 @@ class Step:
         True where it does not go back within a recording.
     """
 
-    of: Callable[[DrivelineModel], str]
+    of: Callable[[Driveline], str]
     relative: bool = False
     lasting: bool = False
 
@@ -215,8 +255,9 @@ class Effect:
         recordings share; ``Held`` values are not fitted, those ``Within`` bounds of their own stay there.
     testable : callable
         Model and records to None, or to the reason why they can't tell; by default any recording can.
-    sentence : callable
-        Parameter values to the statement a driveline engineer would write.
+    text : str or callable
+        The statement a driveline engineer would write: a format string of the parameters, of times in ms, too
+        (``time_constant_ms``), and of units (``unit[torque]``); or a function of the values and the kind of motion.
     kinds : frozenset[OutputKind]
         Measured outputs it makes sense with.
     profile : bool
@@ -275,7 +316,7 @@ class Effect:
     parameters: tuple[EffectParameter, ...]
     structures: frozenset[Structure]
     resembles: tuple[str, ...]
-    sentence: Callable[[Mapping[str, float], Motion], str]
+    text: str | Callable[[Mapping[str, float], Motion], str]
     equivalent: tuple[str, ...] = ()
     contains: tuple[str, ...] = ()
     acting: Acting | None = None
@@ -308,6 +349,18 @@ class Effect:
     def lasting(self) -> bool:
         """Whether it is a step that does not go back within a recording."""
         return self.step is not None and self.step.lasting
+
+    def sentence(self, values: Mapping[str, float], motion: Motion) -> str:
+        """Return what was found, as a statement."""
+        if not isinstance(self.text, str):
+            return self.text(values, motion)
+        times_ms = {name.removesuffix("_s") + "_ms": 1e3 * value for name, value in values.items()}
+        return self.text.format(**{**times_ms, **values}, unit=UNITS[motion])
+
+    def form(self, values: Mapping[str, float]) -> str:
+        """Return the name of the law's form at some values; "" where it has no other one, or is in its plain one."""
+        shaped = (each for each in self.parameters if each.form and values.get(each.name, each.null) != each.null)
+        return next((each.form for each in shaped), "")
 
     @property
     def shared_parameters(self) -> tuple[EffectParameter, ...]:

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from estimator.physics.effect import MOMENTS
 from estimator.physics.jacobian import jacobian_at
 from estimator.physics.least_squares import Solution, minimise
+from estimator.physics.model import Structure
+from estimator.physics.parallel import concurrently
 from estimator.physics.problem import (
     Problem,
     bounds,
@@ -19,7 +23,7 @@ from estimator.physics.problem import (
     start_vector,
 )
 from estimator.physics.problem import make_problem as make_problem  # where users have always found it
-from estimator.signals.record import BoolArray, FloatArray
+from estimator.signals.record import BoolArray, FloatArray, IntArray
 
 ITERATIONS = 50
 """Jacobians at most; a fit that needs more is not converged."""
@@ -184,3 +188,108 @@ def fit(problem: Problem, x0: FloatArray | None = None, iterations: int = ITERAT
         x = least(x, np.where(moments, x, low), np.where(moments, x, high)).x
         solution = least(x, low, high)
     return FitResult(problem, solution.x, outputs(solution.x), solution.residual, solution.jacobian, solution.converged)
+
+
+HEAT = 3
+"""Jacobians that each of several starts gets before only the best ones continue."""
+
+CLOSE = 1.1
+"""Squared error, over the best start's, up to which a start continues."""
+
+Name = tuple[object, ...]
+
+
+def best_fit(problems: Sequence[Problem], warm: FitResult | None = None, iterations: int = ITERATIONS) -> FitResult:
+    """Fit from several starts and return the best; what a fit ``warm`` has in common starts where that one ended.
+
+    Every start gets a few steps; those that are then close to the best continue.
+    """
+    if len(problems) == 1:
+        return _begun(problems[0], warm, iterations)
+    heat = begun(problems, warm, min(HEAT, iterations))
+    finals = concurrently(partial(converge, iterations=iterations), [heat[i] for i in close(heat)])
+    return min(finals, key=lambda result: result.squares)
+
+
+def begun(problems: Sequence[Problem], warm: FitResult | None = None, iterations: int = HEAT) -> list[FitResult]:
+    """Fit a few steps from each of several starts."""
+    return concurrently(partial(_begun, warm=warm, iterations=iterations), problems)
+
+
+def close(heat: Sequence[FitResult]) -> list[int]:
+    """Return which of several fits are close to the best, that first; the others were tried in vain."""
+    least = min(result.squares for result in heat)
+    order = sorted(range(len(heat)), key=lambda i: heat[i].squares)
+    return [i for i in order if heat[i].squares <= CLOSE * least]
+
+
+def converge(result: FitResult, iterations: int = ITERATIONS) -> FitResult:
+    """Continue with a fit that its iteration limit ended."""
+    return result if result.converged or iterations <= HEAT else fit(result.problem, result.x, iterations)
+
+
+def _begun(problem: Problem, warm: FitResult | None, iterations: int) -> FitResult:
+    return fit(problem, None if warm is None else warm_start(problem, warm), iterations)
+
+
+def warm_start(problem: Problem, warm: FitResult) -> FloatArray:
+    """Return scaled unknowns, shape (U,): where a fit left them, and those that it lacks where a fit starts."""
+    x = start_vector(problem)
+    columns, taken, ratio = in_common(problem, warm.problem)
+    x[columns] = warm.x[taken] / ratio
+    return x
+
+
+def in_common(problem: Problem, other: Problem) -> tuple[IntArray, IntArray, FloatArray]:
+    """Return where the unknowns that two problems have in common stand in each, and the ratio of their scales."""
+    place = {name: column for column, name in enumerate(_names(other))}
+    pairs = [(column, place[name]) for column, name in enumerate(_names(problem)) if name in place]
+    columns, taken = np.array(pairs, dtype=np.int64).reshape(-1, 2).T
+    return columns, taken, _scales(problem)[columns] / _scales(other)[taken]
+
+
+def _names(problem: Problem) -> list[Name]:
+    """Return what tells each unknown from all others."""
+    names: list[Name] = [(shared.effect, shared.name) for shared in problem.shared]
+    for i, basis in enumerate(problem.bases):
+        names += [(i, row) for row in range(basis.own_rows.start)]
+        names += [(i, own.effect, own.name) for own in basis.own]
+        names += [(i, *basis.profile.shape, row) for row in range(basis.profile.shape[0])]
+    return names
+
+
+def _scales(problem: Problem) -> FloatArray:
+    return np.concatenate([[shared.scale for shared in problem.shared], *(basis.scale for basis in problem.bases)])
+
+
+def rates(result: FitResult) -> list[FloatArray]:
+    """Return the rates of the simulated outputs before and after each sample, shape (2, N) for each recording.
+
+    A torque that steps at a sample makes two of them; what was before the first one is unknown, and taken for what
+    follows. A joint follows an imposed motion, which is known at the samples alone: its rates are those of straight
+    lines to the neighbours.
+    """
+    if result.problem.grid.structure is Structure.JOINT:
+        pairs = zip(result.outputs, result.problem.records, strict=True)
+        return [_secants(output, record.sample_time_s) for output, record in pairs]
+    at, before, after = (_sampled(result, periods) for periods in (0.0, -1.0, 1.0))
+    return [
+        _both_sides(now - was, will_be - now) / record.sample_time_s
+        for now, was, will_be, record in zip(at, before, after, result.problem.records, strict=True)
+    ]
+
+
+def _sampled(result: FitResult, periods: float) -> tuple[FloatArray, ...]:
+    """Return the outputs, each followed along its tangent for so many sampling periods."""
+    problem = result.problem
+    moved = [replace(r, offset_s=np.full(r.output.shape, periods * r.sample_time_s)) for r in problem.records]
+    return outputs_at(replace(problem, records=tuple(moved)), result.x)
+
+
+def _secants(output: FloatArray, sample_time_s: float) -> FloatArray:
+    steps = np.diff(output) / sample_time_s
+    return _both_sides(np.append(0.0, steps), np.append(steps, steps[-1:]))
+
+
+def _both_sides(before: FloatArray, after: FloatArray) -> FloatArray:
+    return np.stack([np.append(after[:1], before[1:]), after])

@@ -9,16 +9,14 @@ from types import MappingProxyType
 import numpy as np
 
 from estimator.physics.catalogue import EFFECTS
+from estimator.physics.driveline import Case, Start
 from estimator.physics.fit import FitResult, fit
 from estimator.physics.grid import Grid
-from estimator.physics.inputs import Case
 from estimator.physics.layout import LOAD, slot
 from estimator.physics.model import DrivelineModel
-from estimator.physics.own_scan import cells, scan, waves
+from estimator.physics.own_scan import Projector, cells, scan, waves
 from estimator.physics.problem import Problem, case_of, make_problem, start_of, start_vector
-from estimator.physics.projector import Projector
 from estimator.physics.simulate import simulate_each
-from estimator.physics.start import Start
 from estimator.physics.unknowns import own_unknowns
 from estimator.signals.outputs import outputs_apart
 from estimator.signals.record import BoolArray, FloatArray, Record
@@ -56,16 +54,6 @@ def free_run(model: DrivelineModel, record: Record, known: Own = NOTHING_KNOWN) 
 
     Besides load torque and initial state, what the model's effects leave to every recording is estimated from it:
     phases of angles, moments of events, the load profile of a road.
-
-    Parameters
-    ----------
-    known : mapping of (str, str) to float
-        Effect and parameter to what is known of these: the estimate starts there, and nothing is sought.
-
-    Raises
-    ------
-    BadModel
-        Where the model's structure does not have the recorded output.
     """
     profile = any(EFFECTS[name].profile for name in model.effects)
     problem = make_problem(model, [record], (), profile=profile)
@@ -149,21 +137,7 @@ def simulate_foreign(
     use: BoolArray,
     effects: Iterable[str] = (),
 ) -> FloatArray:
-    """Simulate a recording with a parameter vector that was fitted to others.
-
-    Parameters
-    ----------
-    p : ndarray, shape (layout.SIZE,)
-        Parameters.
-    use : ndarray of bool, shape (N,)
-        Samples from which what is the recording's own is estimated.
-    effects : iterable of str
-        Effects that were fitted next to the model's: what they leave to every recording is estimated too.
-
-    Returns
-    -------
-    ndarray, shape (N,)
-    """
+    """Simulate a recording with a parameter vector that was fitted to others."""
     names = {*model.effects, *effects}
     profile = any(EFFECTS[name].profile for name in names)
     problem = make_problem(

@@ -7,10 +7,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from estimator.errors import BadModel
-from estimator.physics.law_name import LawName
 from estimator.physics.model import DrivelineModel, Plant, Structure, natural_frequencies_rad_s
 from estimator.physics.motion import reverses, speed_scale
-from estimator.physics.own_forces import Forces
+from estimator.physics.own_law import Forces, LawName
 from estimator.signals.record import FloatArray, Record
 
 RADIANS_PER_STEP = 0.2
@@ -60,13 +59,7 @@ class Grid:
 
 
 def substeps_for(values: Mapping[str, float], period_s: float) -> int:
-    """Return the integration steps per period that the line's natural frequency, or its fastest decay, needs.
-
-    Raises
-    ------
-    BadModel
-        Where that is beyond `FASTEST_IN_NYQUIST`.
-    """
+    """Return the integration steps per period that the line's natural frequency, or its fastest decay, needs."""
     if "J_M" not in values:
         return 1
     motor = (values["b_M"] + values.get("c", 0.0)) / values["J_M"]

@@ -2,36 +2,142 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Hashable, Sequence
-from dataclasses import dataclass
 from functools import partial
 from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
 
+from estimator.compiled import compiled, inlined
+from estimator.physics.catalogue import BUILT_IN
+from estimator.physics.driveline import Case, Start
+from estimator.physics.effect import Place
+from estimator.physics.effects.torque import EDGE
+from estimator.physics.kernel import bristles, sensing, slots, state_vector
+from estimator.physics.kernel.conditions import branch_frequency, branch_inertia, is_bristled, is_within
 from estimator.physics.layout import LOAD, slot
-from estimator.physics.start import Start, initial_states
-from estimator.physics.torque_path import path_of, recorded_shaft_torque
+from estimator.signals.once import MOST_BYTES, once
 from estimator.signals.record import FloatArray, IntArray, Record
 
-Key = TypeVar("Key", bound=Hashable)
+_GAIN_M1 = slot("inverter_gain_mismatch", "gain_m1")
+_GAIN_M2 = slot("inverter_gain_mismatch", "gain_m2")
+_LIMIT_M1 = slot("torque_saturation", "limit_m1_nm")
+_LIMIT_M2 = slot("torque_saturation", "limit_m2_nm")
+_SHARPNESS = slot("torque_saturation", "sharpness")
+_LIMIT_SUM = slot("torque_saturation", "limit_sum_nm")
+_DEPTH = slot("torque_derating", "depth")
+_DERATING_TIME = slot("torque_derating", "time_constant_s")
+_HEATED = slot("torque_derating", "heating_nm")
+DECLARED = [
+    (e.acting.law, [slot(e.name, each.name) for each in e.parameters], e.parameters[0].null)
+    for e in BUILT_IN.values()
+    if e.acting is not None and e.acting.place is Place.TORQUE
+]
+"""Laws of entries at this place, where their parameters are, and at which value of the first they do nothing."""
+
+_WRITTEN = [_GAIN_M1, _GAIN_M2, _LIMIT_M1, _LIMIT_M2, _SHARPNESS, _LIMIT_SUM, _DEPTH, _DERATING_TIME, _HEATED]
+_PATH = np.array([*_WRITTEN, *(place for _, places, _ in DECLARED for place in places)])
+"""Where all stands that ``shaft_torque`` depends on."""
 
 
-@dataclass(frozen=True, slots=True)
-class Case:
-    """One simulation of a recording.
+def limited(torque: FloatArray, limit: float, sharpness: float) -> FloatArray:
+    """Return a torque that stops at a limit [Nm], at an edge or in a knee: ``T / (1 + |T/L|^n)^(1/n)``."""
+    if not np.isfinite(limit):
+        return torque
+    if sharpness >= EDGE:
+        return np.clip(torque, -limit, limit)
+    ratio = np.abs(torque) / limit
+    small, large = np.minimum(ratio, 1.0), np.maximum(ratio, 1.0)
+    size = np.where(
+        ratio <= 1.0,
+        small / (1.0 + small**sharpness) ** (1.0 / sharpness),
+        (1.0 + large**-sharpness) ** (-1.0 / sharpness),
+    )
+    return np.asarray(np.copysign(limit * size, torque))
 
-    Attributes
-    ----------
-    p : ndarray, shape (layout.SIZE,)
-        Parameters of the superset model, the recording's own among them.
-    extra_load_nm : ndarray, shape (N,), optional
-        Load torque over time, next to the constant one.
+
+def warmth(torque: FloatArray, since_start_s: FloatArray, period_s: float, p: FloatArray, begun: float) -> FloatArray:
+    """Return how warm the windings are when each row begins and behind the last, 1 with the full loss; shape (N + 1,).
+
+    By time alone, or, where they are heated, by the torque's own losses: ``tau dh/dt + h = (T / T_n)^2``, held over
+    each period; ``begun`` is the first row's then.
     """
+    if p[_HEATED] <= 0.0:
+        rows_and_end = np.append(since_start_s, since_start_s[-1] + period_s)
+        return np.asarray(-np.expm1(-rows_and_end / p[_DERATING_TIME]))
+    from scipy.signal import lfilter  # half a second that few need
 
-    p: FloatArray
-    start: Start
-    extra_load_nm: FloatArray | None = None
+    kept = float(np.exp(-period_s / p[_DERATING_TIME]))
+    heat = (1.0 - kept) * (torque / p[_HEATED]) ** 2
+    warm, _ = lfilter([1.0], [1.0, -kept], heat, zi=[kept * begun])
+    return np.concatenate([[begun], warm])
+
+
+def shaft_torque(torque_nm: FloatArray, since_start_s: FloatArray, p: FloatArray) -> FloatArray:
+    """Return the torque on the motor shaft, shape (N,) [Nm], of a recording; see ``shaft_torque_from``."""
+    period_s = float(since_start_s[1] - since_start_s[0]) if since_start_s.size > 1 else 0.0
+    return shaft_torque_from(torque_nm, since_start_s, period_s, p, 0.0)[0]
+
+
+def shaft_torque_from(
+    torque_nm: FloatArray, since_start_s: FloatArray, period_s: float, p: FloatArray, begun: float
+) -> tuple[FloatArray, float]:
+    """Return the torque on the motor shaft, shape (N,) [Nm], and how warm the windings are behind it."""
+    gains = np.array([p[_GAIN_M1], p[_GAIN_M2]])
+    if (gains != 1.0).any():
+        torque_nm = torque_nm.copy()
+        count = min(torque_nm.shape[1], gains.size)
+        torque_nm[:, :count] *= gains[:count]
+    limits = np.array([p[_LIMIT_M1], p[_LIMIT_M2]])[: torque_nm.shape[1]]
+    if np.isfinite(limits).any():
+        columns = [limited(torque, limit, p[_SHARPNESS]) for torque, limit in zip(torque_nm.T, limits, strict=False)]
+        torque_nm = np.column_stack([*columns, torque_nm[:, limits.size :]])
+    total: FloatArray = limited(functools.reduce(np.add, torque_nm.T), p[_LIMIT_SUM], p[_SHARPNESS])
+    for law, places, null in DECLARED:
+        if p[places[0]] != null:
+            total = law(total, since_start_s, *p[places])
+    if p[_DEPTH] == 0.0:
+        return total, 0.0
+    warm = warmth(total, since_start_s, period_s, p, begun)
+    return total * (1.0 - p[_DEPTH] * warm[:-1]), float(warm[-1])
+
+
+class _Kept:
+    """What the last torques of a recording were worked out from, and these: most simulations ask for one of them."""
+
+    def __init__(self) -> None:
+        self.torques: tuple[tuple[bytes, FloatArray], ...] = ()
+
+
+MOST_KEPT = 2
+"""Torques that are kept: that of a fit, and one with something moved."""
+
+
+@once
+def _kept(record: Record) -> _Kept:
+    return _Kept()
+
+
+def recorded_shaft_torque(record: Record, p: FloatArray) -> FloatArray:
+    """Return ``shaft_torque`` of a recording, which nobody may write to."""
+    kept, key = _kept(record), path_of(p)
+    for known, torque in kept.torques:
+        if known == key:
+            return torque
+    torque = shaft_torque(record.torque_nm, record.since_start_s, p)
+    if torque.nbytes <= MOST_BYTES:
+        kept.torques = ((key, torque), *kept.torques)[:MOST_KEPT]
+    return torque
+
+
+def path_of(p: FloatArray) -> bytes:
+    """Return what the torque on the shaft depends on: of most lines it is the same."""
+    path: FloatArray = p[_PATH]
+    return path.tobytes()
+
+
+Key = TypeVar("Key", bound=Hashable)
 
 
 class Inputs(NamedTuple):
@@ -105,3 +211,51 @@ class _Rows(Generic[Key]):
         for row, values in zip(rows, self._rows, strict=True):
             row[: values.size], row[values.size :] = values, values[-1]
         return rows, np.array(self._chosen)
+
+
+def initial_state(start: Start, torque_nm: float, angle_rad: float, p: FloatArray) -> FloatArray:
+    """Return the kernel's state at the start: what is not unknown follows from the rest as if it were steady."""
+    only: FloatArray = initial_states([start], np.array([torque_nm]), angle_rad, p[np.newaxis])[0]
+    return only
+
+
+def initial_states(starts: Sequence[Start], torque_nm: FloatArray, angle_rad: float, p: FloatArray) -> FloatArray:
+    """Return ``initial_state`` of K simulations with these torques, (K,), and parameters, (K, layout.SIZE)."""
+    states = np.zeros((len(starts), state_vector.STATES))
+    for row, start in zip(states, starts, strict=True):
+        row[state_vector.ANGLE] = start.angle_rad
+        row[state_vector.SPEED] = start.speed_rad_s
+        row[state_vector.TWIST] = start.twist_rad
+        row[state_vector.LOAD_SPEED] = start.load_speed_rad_s
+        row[state_vector.MIDDLE_TWIST] = start.middle_twist_rad
+        row[state_vector.MIDDLE_SPEED] = start.middle_speed_rad_s
+        row[state_vector.TRACTION] = start.load_torque_nm
+    _follow(states, torque_nm, angle_rad, p)
+    return states
+
+
+@compiled
+def _follow(states: FloatArray, torque_nm: FloatArray, angle_rad: float, p: FloatArray) -> None:
+    """Fill in what follows from the rest, a row per simulation."""
+    for row in range(states.shape[0]):
+        follow(states[row], torque_nm[row], angle_rad, p[row])
+
+
+@inlined
+def follow(x: FloatArray, torque_nm: float, angle_rad: float, p: FloatArray) -> None:
+    """Fill in what follows from the rest of a state, shape (STATES,)."""
+    speed, carried = x[state_vector.SPEED], x[state_vector.LOAD_SPEED]
+    x[state_vector.VEHICLE_SPEED] = carried
+    x[state_vector.BRANCH_SPEED] = carried if p[slots.BEHIND] > 0.0 else speed
+    if is_within(p):  # another spring of the line carries what the shaft does
+        x[state_vector.BRANCH_TWIST] = (
+            p[slots.K] * x[state_vector.TWIST] / (branch_inertia(p) * branch_frequency(p) ** 2)
+        )
+    x[state_vector.LAGGED] = torque_nm + p[slots.LAGGED_BEFORE]
+    x[state_vector.LAG_RISE] = -p[slots.LAGGED_BEFORE]
+    x[state_vector.FILTERED] = sensing.reading(speed, angle_rad, p) + p[slots.FILTERED_BEFORE]
+    x[state_vector.FILTER_RISE] = -p[slots.FILTERED_BEFORE]
+    if is_bristled(p):  # of friction that has slid for long
+        x[state_vector.BRISTLES_MOTOR] = bristles.slid(speed, bristles.sliding(speed, p))
+        loaded = carried if p[slots.J_L] > 0.0 else speed
+        x[state_vector.BRISTLES_LOAD] = bristles.slid(loaded, p[slots.COULOMB_LOAD])

@@ -12,15 +12,43 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from estimator.compiled import compiled
 from estimator.lanes import LANES
-from estimator.physics.differences import fill_differences
-from estimator.physics.inputs import Case
+from estimator.physics.driveline import Case
 from estimator.physics.parallel import concurrently
 from estimator.physics.problem import Problem, bounds, case_of, far_away, local_part, own_part, parameters
-from estimator.physics.simulate import simulate_outputs
-from estimator.physics.together import are_of_a_length, go_together, lanes_filled, simulate_together
+from estimator.physics.simulate import are_of_a_length, go_together, lanes_filled, simulate_outputs, simulate_together
 from estimator.physics.unknowns import Shared
 from estimator.signals.record import BoolArray, FloatArray, IntArray
+
+
+@compiled
+def fill_differences(
+    moved: FloatArray,
+    of: IntArray,
+    outputs: FloatArray,
+    use: BoolArray,
+    steps: FloatArray,
+    limits: FloatArray,
+    least: FloatArray,
+    columns: IntArray,
+    firsts: IntArray,
+    found: FloatArray,
+) -> None:
+    """Fill in the derivatives of the samples that count."""
+    for k, c in np.ndindex(of.shape):
+        i = of[k, c]
+        row, largest = firsts[i], 0.0
+        for n in range(outputs.shape[1]):
+            if use[i, n]:
+                value = limits[i] if np.isnan(moved[k, c, n]) else min(max(moved[k, c, n], -limits[i]), limits[i])
+                change = value - outputs[i, n]
+                found[columns[k], row] = change / steps[k]
+                largest = max(largest, abs(change))
+                row += 1
+        if largest <= least[i]:
+            found[columns[k], firsts[i] : row] = 0.0
+
 
 STEP = 1e-5
 """Finite-difference step in scaled unknowns: the simulation is smooth to about 1e-10 of its size."""
@@ -35,13 +63,7 @@ ROOM = 2**20
 
 @dataclass(frozen=True, slots=True)
 class _Moved:
-    """K simulations with one unknown moved each.
-
-    Attributes
-    ----------
-    of, columns : ndarray of int, shape (K,)
-        Which of the drives each is of, and which unknown is moved.
-    """
+    """K simulations with one unknown moved each."""
 
     of: IntArray
     columns: IntArray

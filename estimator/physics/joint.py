@@ -24,8 +24,7 @@ from typing import NamedTuple
 import numpy as np
 
 from estimator.compiled import compiled
-from estimator.physics.effects import backlash, stiffness_nonlinearity
-from estimator.physics.effects.shaft_hysteresis import loading_rate
+from estimator.physics.effects.shaft import damping_share, loaded_twist, loading_rate
 from estimator.physics.kernel import slots, state_vector
 from estimator.physics.laws import beyond_gap, share_inside
 from estimator.physics.motion import measured_speed
@@ -133,7 +132,8 @@ def respond(
         if p[slots.GAP] > 0.0:
             moved = twist[k] - twist[k - 1] if k > 0 else 0.0
             share = min(max((inside - before) / moved, 0.0), 1.0) if moved != 0.0 else 0.0
-            share *= backlash.damping_share(inside, p[slots.CONTACT])
+            share *= damping_share(inside, p[slots.CONTACT])
+            share += p[slots.ACROSS] * (1.0 - share)
         out[k] = carried(inside, loading, stiffness, preload, p) + share * p[slots.C] * rate[k]
 
 
@@ -195,4 +195,4 @@ def carried(inside: float, loading: float, stiffness: float, preload: float, p: 
     if p[slots.SLIDER_INSIDE] > 0.0:
         stiffness = max(stiffness - float(p[slots.SLIDER_INSIDE] * p[slots.SLIDER] / p[slots.YIELD]), 0.0)
     law = p[slots.HARDENING], p[slots.SHAPE], p[slots.STAGE], p[slots.STAGE_FROM]
-    return stiffness * stiffness_nonlinearity.loaded_twist(inside, *law) + float(p[slots.SLIDER]) * loading - preload
+    return stiffness * loaded_twist(inside, *law) + float(p[slots.SLIDER]) * loading - preload

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
+from estimator.errors import BadModel
 from estimator.physics.catalogue import BUILT_IN
-from estimator.physics.law_name import LawName
 from estimator.physics.model import DrivelineModel, Load, Structure
+from estimator.physics.own_law import LawName, OwnLaw
 from estimator.signals.record import FloatArray
 
 NOMINAL = Structure.THREE_MASS.parameter_names
@@ -62,3 +64,20 @@ def flat_values(
         for name, value in values.items():
             vector[slot(own.get(effect, effect), name)] = value
     return vector
+
+
+def named(laws: Sequence[OwnLaw]) -> tuple[LawName, ...]:
+    """Return the names of the laws of one model, which know the laws and their places in its parameter vector."""
+    names = [law.name for law in laws]
+    taken = [name for name in names if name in BUILT_IN or names.count(name) > 1]
+    if taken:
+        raise BadModel(f"laws.{taken[0]}: expected a name that is not in the catalogue and comes once. Rename it.")
+    found, size = [], SIZE
+    for law in laws:
+        name = LawName(law.name)
+        name.law, name.entry = law, replace(law.effect(), name=name)
+        name.compiled = {}
+        name.places = {each.name: size + i for i, each in enumerate(law.parameters)}
+        size += len(law.parameters)
+        found.append(name)
+    return tuple(found)

@@ -3,7 +3,7 @@
 ``scipy.optimize.least_squares`` decomposes the whole Jacobian at every step; with ten thousand errors and twenty
 unknowns that costs more than the simulations that made it. Here the step comes from the normal equations, with
 Marquardt's scaling (SIAM J. Appl. Math. 11, 1963), and is the least of the damped quadratic inside the bounds
-(``estimator.physics.bounded``). Near the end, where steps keep what they promise, the Jacobian is carried on by
+(``estimator.physics.least_squares``). Near the end, where steps keep what they promise, the Jacobian is carried on by
 Broyden's update (Math. Comp. 19, 1965; with Marquardt's method: Madsen, Nielsen and Tingleff, Methods for Non-Linear
 Least Squares Problems, DTU 2004, 3.5): it costs a simulation per unknown, a step one. A fit ends a last small step from
 a Jacobian found anew.
@@ -15,10 +15,115 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import lsq_linear
 
-from estimator.physics.bounded import least_of_quadratic, unbounded_first
+from estimator.compiled import compiled
 from estimator.signals.correlation import effective_samples
-from estimator.signals.record import FloatArray
+from estimator.signals.record import BoolArray, FloatArray, IntArray
+
+TINY = 1e-12
+"""Room that a bound always leaves: an interval of no length is none."""
+
+EXCHANGES = 10
+"""Exchanges after which pivoting is taken to go round in circles."""
+
+
+def unbounded_first(low: FloatArray, high: FloatArray, among: BoolArray) -> IntArray:
+    """Return the indices of some unknowns, those without any bound first; otherwise in order."""
+    chosen = np.flatnonzero(among)
+    return chosen[np.argsort(_bounded(low[chosen], high[chosen]), kind="stable")]
+
+
+def least_inside(triangle: FloatArray, target: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
+    """Return the least of ``|triangle @ x - target|`` with ``low <= x <= high``, shape (U,)."""
+    free = int(_bounded(low, high).argmax())
+    x, ended = least(np.ascontiguousarray(triangle), target, low, high, free, EXCHANGES)
+    if not ended:
+        rest = slice(free, None)
+        x[rest] = _one_by_one(triangle[rest, rest], target[rest], low[rest], high[rest])
+        x[:free] = substituted(triangle[:free, :free], target[:free] - triangle[:free, rest] @ x[rest])
+    return x
+
+
+def least_of_quadratic(curvature: FloatArray, gradient: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
+    """Return the least of ``x' curvature x / 2 + gradient' x`` with ``low <= x <= high``, shape (U,).
+
+    ``curvature``, shape (U, U), is positive definite; unknowns without bounds come first, as in ``least_inside``.
+    """
+    return least_inside(*_factored(curvature, gradient), low, high)
+
+
+@compiled
+def _factored(curvature: FloatArray, gradient: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return triangle and target of a quadratic: its least is that of ``|triangle @ x - target|``."""
+    lower = np.linalg.cholesky(curvature)
+    target = np.empty_like(gradient)
+    for i in range(target.size):
+        left = -gradient[i]
+        for j in range(i):
+            left -= lower[i, j] * target[j]
+        target[i] = left / lower[i, i]
+    return np.ascontiguousarray(lower.T), target
+
+
+@compiled
+def least(
+    triangle: FloatArray, target: FloatArray, low: FloatArray, high: FloatArray, free: int, exchanges: int
+) -> tuple[FloatArray, bool]:
+    """Return the least and whether pivoting came to an end, of unknowns of which the first ``free`` have no bounds."""
+    x = substituted(triangle, target)
+    if not np.any((x < low) | (x > high)):
+        return x, True
+    rest = np.ascontiguousarray(triangle[free:, free:])
+    x[free:], ended = _pivoted(rest, target[free:], low[free:], high[free:], exchanges)
+    across = np.ascontiguousarray(triangle[:free, free:])
+    x[:free] = substituted(triangle[:free, :free], target[:free] - across @ x[free:])
+    return x, ended
+
+
+@compiled
+def substituted(triangle: FloatArray, target: FloatArray) -> FloatArray:
+    """Return x with ``triangle @ x = target``, of an upper triangle."""
+    x = np.empty_like(target)
+    for i in range(x.size - 1, -1, -1):
+        left = target[i]
+        for j in range(i + 1, x.size):
+            left -= triangle[i, j] * x[j]
+        x[i] = left / triangle[i, i]
+    return x
+
+
+@compiled
+def _pivoted(
+    triangle: FloatArray, target: FloatArray, low: FloatArray, high: FloatArray, exchanges: int
+) -> tuple[FloatArray, bool]:
+    """Return the least by block principal pivoting, and whether that came to an end."""
+    curvature, slope = triangle.T @ triangle, triangle.T @ target
+    down, up, x = np.zeros(low.size, np.bool_), np.zeros(low.size, np.bool_), np.zeros(low.size)
+    for _ in range(exchanges):
+        free = ~(down | up)
+        x = np.where(down, low, np.where(up, high, 0.0))
+        which = np.flatnonzero(free)
+        if which.size > 0:
+            x[which] = np.linalg.lstsq(triangle[:, which], target - triangle @ x)[0]  # two may be alike
+        pull = slope - curvature @ x  # where the error would fall
+        inward = (down & (pull > 0.0)) | (up & (pull < 0.0))
+        below, above = free & (x < low), free & (x > high)
+        if not np.any(inward | below | above):
+            return x, True
+        down, up = (down & ~inward) | below, (up & ~inward) | above
+    return x, False
+
+
+def _one_by_one(triangle: FloatArray, target: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
+    inside: FloatArray = lsq_linear(triangle, target, (low, high + TINY), method="bvls").x
+    return np.clip(inside, low, high)
+
+
+def _bounded(low: FloatArray, high: FloatArray) -> BoolArray:
+    bounded: BoolArray = np.isfinite(low) | np.isfinite(high)
+    return bounded
+
 
 CONVERGED = 0.1
 """A step that promises less than this in log-likelihood ratio, ``n dS/S``, changes no conclusion: it is the last."""
@@ -66,18 +171,7 @@ def minimise(
     iterations: int = 50,
     smooth: bool = True,
 ) -> Solution:
-    """Minimise ``sum(residual(x)**2)`` subject to ``low <= x <= high`` from one start.
-
-    Parameters
-    ----------
-    residual, jacobian : callable
-        Unknowns (U,) to errors (R,), in the order of time (one recording after the other), and to their derivatives
-        (R, U).
-    iterations : int
-        Jacobians at most; ``converged`` is False when they were used up.
-    smooth : bool
-        False where the errors have kinks, over which no Jacobian is carried on.
-    """
+    """Minimise ``sum(residual(x)**2)`` subject to ``low <= x <= high`` from one start."""
     x = np.clip(x0, low, high)
     errors, damping = residual(x), FIRST_DAMPING
     for _ in range(iterations):

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from estimator.physics.model import DrivelineModel, Load
+from estimator.physics.driveline import Driveline, Load
 from estimator.signals.once import once
 from estimator.signals.record import FloatArray, OutputKind, Record
 
@@ -75,7 +75,7 @@ def reverses(record: Record) -> bool:
     return bool(np.sum(speed > threshold) >= 10 and np.sum(speed < -threshold) >= 10)
 
 
-def turns(model: DrivelineModel, records: Sequence[Record]) -> bool:
+def turns(model: Driveline, records: Sequence[Record]) -> bool:
     """Tell whether the speed's sign can be distinguished from a constant load torque.
 
     In a recording with both signs; in several of one sign each, where they share the load; in any, where it is known.

@@ -54,13 +54,7 @@ def workers() -> int:
 
 
 def work_on(cores: int) -> None:
-    """Work on so many cores from the next call on; what is under way continues as it began.
-
-    Raises
-    ------
-    ValueError
-        Where they are fewer than 1.
-    """
+    """Work on so many cores from the next call on; what is under way continues as it began."""
     global _cores
     if cores < 1:
         raise ValueError(f"cores: expected 1 or more, got {cores}")

@@ -11,13 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from estimator.physics.driveline import Case, Start
 from estimator.physics.grid import Grid, grid_for
-from estimator.physics.inputs import Case
 from estimator.physics.layout import LOAD, flat, slot
 from estimator.physics.model import DrivelineModel, Load
-from estimator.physics.simulate import simulate_outputs
-from estimator.physics.start import Start
-from estimator.physics.together import simulate_records
+from estimator.physics.simulate import simulate_outputs, simulate_records
 from estimator.physics.unknowns import LocalBasis, Shared, local_basis, own_unknowns, shared_load
 from estimator.signals.once import once
 from estimator.signals.outputs import leads

@@ -2,24 +2,29 @@
 
 from __future__ import annotations
 
+import math
+import sys
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from estimator.errors import BadModel
+from estimator.lanes import LANES
 from estimator.physics import catalogue, joint
+from estimator.physics.driveline import Case, Start
 from estimator.physics.effect import Element
 from estimator.physics.grid import Grid
-from estimator.physics.inputs import Case, inputs_of, load_of
-from estimator.physics.kernel import many, state_vector
-from estimator.physics.kernel.makes import Masses
+from estimator.physics.inputs import inputs_of, load_of
+from estimator.physics.kernel import side_by_side, state_vector
+from estimator.physics.kernel import side_by_side as many
+from estimator.physics.kernel.integration import Masses
 from estimator.physics.layout import slot
 from estimator.physics.model import Structure
 from estimator.physics.motion import motor_angle
-from estimator.physics.own_forces import FORCES
-from estimator.physics.start import Start
-from estimator.physics.work import count
+from estimator.physics.own_law import FORCES
+from estimator.physics.parallel import PARTS, concurrently
+from estimator.physics.work import count_samples
 from estimator.signals.record import FloatArray, IntArray, Location, OutputKind, Record
 
 MASSES: dict[Structure, Masses] = {
@@ -46,13 +51,7 @@ _SENSED = (state_vector.SPEED, state_vector.LOAD_SPEED)
 
 
 def output_state(record: Record, structure: Structure) -> int:
-    """Return the index of the state a recording measures.
-
-    Raises
-    ------
-    BadModel
-        Where the structure has no such output.
-    """
+    """Return the index of the state a recording measures."""
     if (record.imposed is not None) != (structure is Structure.JOINT):
         got = "an imposed motion" if record.imposed is not None else f"{record.kind.value} as the output"
         raise BadModel(
@@ -108,17 +107,7 @@ def simulate_each(
     output: int | None = None,
     alike_s: FloatArray | None = None,
 ) -> FloatArray:
-    """Simulate a recording several times; see ``simulate``.
-
-    Parameters
-    ----------
-    alike_s : ndarray, shape (len(cases),), optional
-        Time since the recording began up to which each case is as the first one [s]: it is simulated from there on.
-
-    Returns
-    -------
-    ndarray, shape (len(cases), N)
-    """
+    """Simulate a recording several times; see ``simulate``."""
     if output is not None:
         return _simulated(grid, [record], cases, np.array([output]), False, alike_s)[:, 0]
     return simulate_outputs(grid, [record], cases, alike_s)[:, 0]
@@ -127,14 +116,9 @@ def simulate_each(
 def simulate_outputs(
     grid: Grid, outputs: Sequence[Record], cases: Sequence[Case], alike_s: FloatArray | None = None
 ) -> FloatArray:
-    """Simulate several measured outputs of one recording (``signals.outputs``), each as its sensor shows it.
-
-    Returns
-    -------
-    ndarray, shape (len(cases), len(outputs), N)
-    """
+    """Simulate several measured outputs of one recording (``signals.outputs``), each as its sensor shows it."""
     if grid.plant is not None:
-        count(len(cases) * outputs[0].time_s.size)
+        count_samples(len(cases) * outputs[0].time_s.size)
         return np.stack([grid.plant.simulated(record, cases) for record in outputs], axis=1)
     if len(outputs) > 1 and any(map(is_steep, outputs)):  # the kernel leaves the slopes of one output
         return np.concatenate([simulate_outputs(grid, [record], cases, alike_s) for record in outputs], axis=1)
@@ -162,7 +146,7 @@ def _simulated(
 ) -> FloatArray:
     """Return states ``wanted``, shape (C,), of cases of one recording, as they are ``recorded`` or as they are."""
     record = outputs[0]
-    count(len(cases) * record.time_s.size)
+    count_samples(len(cases) * record.time_s.size)
     if grid.structure is Structure.JOINT:
         imposed = joint.imposed_in(record)
         return np.array([[_joint_output(record, imposed, case, int(state)) for state in wanted] for case in cases])
@@ -265,3 +249,86 @@ TIMED = np.array([slot(e.name, e.parameters[0].name) for e in catalogue.BUILT_IN
 
 PERIODIC = np.array([slot(e.name, size) for e in catalogue.BUILT_IN.values() for size in e.phases.values()])
 """Amplitudes of the laws that are periodic in the motor's angle."""
+
+
+LENGTHS_DIFFER = 1.1
+"""Length of the longest recording over the mean of all from which they go each by itself: the others would continue to
+its end."""
+
+Outputs = Sequence[Record]
+"""A recording's measured outputs, each as a recording of one output (``signals.outputs``)."""
+
+
+def simulate_records(grid: Grid, drives: Sequence[Outputs], cases: Sequence[Case]) -> list[FloatArray]:
+    """Simulate every output of several recordings, a case of each: side by side or on all cores."""
+    count = len(drives)
+    fill_lanes = 1 < count <= LANES or (count > LANES and are_of_a_length(drives))
+    if not fill_lanes or not go_together(grid, drives, [case.p for case in cases]):
+        return concurrently(lambda i: simulate_outputs(grid, drives[i], [cases[i]])[0], range(count))
+    parts = [range(count)[part] for part in lanes_filled(count)]
+    runs = concurrently(lambda part: simulate_together(grid, drives, part, [cases[i] for i in part]), parts)
+    found = (each for run in runs for each in run)
+    return [each[:, : outputs[0].time_s.size] for each, outputs in zip(found, drives, strict=True)]
+
+
+def lanes_filled(count: int, most: int = sys.maxsize) -> list[slice]:
+    """Return so many simulations in parts that fill the lanes, more where only ``most`` lanefuls fit."""
+    width = LANES * min(math.ceil(count / (PARTS * LANES)), most)
+    return [slice(first, first + width) for first in range(0, count, width)]
+
+
+def are_of_a_length(drives: Sequence[Outputs]) -> bool:
+    """Tell whether recordings that are simulated as if they were one all end at about the same time."""
+    sizes = [outputs[0].time_s.size for outputs in drives]
+    return max(sizes) * len(sizes) <= LENGTHS_DIFFER * sum(sizes)
+
+
+def go_together(grid: Grid, drives: Sequence[Outputs], lines: Sequence[FloatArray], moved: Sequence[int] = ()) -> bool:
+    """Tell whether several recordings can be simulated as if they were one."""
+    if grid.structure is Structure.JOINT or grid.plant is not None or any(grid.active(p) for p in lines):
+        return False
+    p = np.array(lines)
+    acts = (p != 0.0).any(axis=0)
+    acts[list(moved)] = True
+    if len({_make(outputs) for outputs in drives}) > 1 or any(is_steep(each) for outputs in drives for each in outputs):
+        return False
+    begin_alike = len({outputs[0].since_start_s[0] for outputs in drives}) == 1
+    if acts[PERIODIC].any() or not (begin_alike or not acts[TIMED].any()):
+        return False
+    return side_by_side.go_side_by_side(MASSES[grid.structure], p, np.arange(len(lines)))
+
+
+def _make(outputs: Outputs) -> tuple[object, ...]:
+    """Return what recordings that are simulated as if they were one have in common."""
+    return outputs[0].sample_time_s, *((each.kind, each.location, each.lead is None) for each in outputs)
+
+
+def simulate_together(grid: Grid, drives: Sequence[Outputs], of: Sequence[int], cases: Sequence[Case]) -> FloatArray:
+    """Simulate cases of several recordings as if these were one (``go_together``)."""
+    records, first = [outputs[0] for outputs in drives], drives[0][0]
+    wanted = np.array([output_state(each, grid.structure) for each in drives[0]])
+    given = inputs_of(records, of, cases)
+    count_samples(len(cases) * given.torque.shape[1])
+    out = np.empty((len(cases), wanted.size, given.torque.shape[1]))
+    many.integrate_each(
+        MASSES[grid.structure],
+        (),
+        first.sample_time_s,
+        grid.substeps,
+        grid.sign_width,
+        first.since_start_s[0],
+        given.torque,
+        given.load,
+        given.fed_by,
+        given.loaded_by,
+        np.zeros(out.shape[-1]),
+        given.p,
+        given.state,
+        wanted,
+        is_sensed(first, wanted[0]),
+        out,
+        np.zeros((len(cases), 2, 0)),
+        np.zeros(len(cases), dtype=np.int64),
+    )
+    out /= np.array([[each.unit for each in drives[i]] for i in of])[:, :, np.newaxis]
+    return out

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from estimator.errors import BadModel
-from estimator.physics.effects import transport_delay
+from estimator.physics.driveline import Start
+from estimator.physics.effects.timing import TRANSPORT_DELAY
 from estimator.physics.grid import substeps_for
+from estimator.physics.inputs import initial_state, shaft_torque_from
 from estimator.physics.kernel import integration, sensing, state_vector
 from estimator.physics.layout import flat, slot
 from estimator.physics.model import DrivelineModel
 from estimator.physics.simulate import MASSES
-from estimator.physics.start import Start, initial_state
-from estimator.physics.torque_path import shaft_torque_from
 
 SIGN_WIDTH_RAD_S = 0.02
 """Dry friction of a simulated rig changes sign within this speed; its noise is larger."""
@@ -48,7 +48,7 @@ class Stepper:
             )
         self._period_s = period_s
         self._substeps = FINER * substeps_for(model.values(), period_s)
-        history = int(np.ceil(self._p[slot(transport_delay.EFFECT.name, "delay_s")] / period_s)) + 2
+        history = int(np.ceil(self._p[slot(TRANSPORT_DELAY.name, "delay_s")] / period_s)) + 2
         self._steps = 0
         self._warmth = 0.0
         self._torque = np.zeros(history)

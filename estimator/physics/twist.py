@@ -113,20 +113,7 @@ class TwistFilter:
         self.twist_std_rad = math.sqrt(max(0.0, float(P[TWIST, TWIST] - gain[TWIST] * P[0, TWIST])))
 
     def step(self, torque_nm: float, speed_rad_s: float, okay: bool) -> float:
-        """Take one sample.
-
-        Parameters
-        ----------
-        torque_nm, speed_rad_s
-            Total torque and motor speed [Nm, rad/s].
-        okay
-            False where they are not to be trusted: the model alone continues, with the last good torque.
-
-        Returns
-        -------
-        float
-            Twist [rad]; NaN before the first good sample.
-        """
+        """Take one sample."""
         if okay:
             if not self._begun:
                 self._begun = True

@@ -12,12 +12,12 @@ import numpy as np
 
 from estimator.physics import effect
 from estimator.physics.catalogue import EFFECTS
+from estimator.physics.driveline import Start
 from estimator.physics.effect import Effect, EffectParameter, Held, Within
-from estimator.physics.effects import road_grade
+from estimator.physics.effects.load import grade_basis
 from estimator.physics.layout import LOAD, slot
 from estimator.physics.model import DrivelineModel, Structure, natural_frequencies_rad_s
 from estimator.physics.motion import measured_speed, motor_angle, speed_scale, torque_scale
-from estimator.physics.start import Start
 from estimator.signals.record import FloatArray, OutputKind, Record
 
 
@@ -262,7 +262,7 @@ def local_basis(
             swing = t_scale / (values["J_M"] * float(natural_frequencies_rad_s(values)[0]))
             scale += [0.1 * t_scale / values[spring], 0.1 * swing]
             guess += [load / values[spring], first]
-    shape = road_grade.basis(record.time_s) if profile else np.empty((0, record.time_s.size))
+    shape = grade_basis(record.time_s) if profile else np.empty((0, record.time_s.size))
     count = shape.shape[0]
     all_scales = np.array(scale + [1.0] * len(own) + [0.05 * t_scale] * count)
     all_guesses = np.array(guess + [unknown.start for unknown in own] + [0.0] * count)

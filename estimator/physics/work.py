@@ -57,7 +57,7 @@ def counted(work: Work) -> Iterator[Work]:
         _work.reset(token)
 
 
-def count(samples: int) -> None:
+def count_samples(samples: int) -> None:
     """Count samples that are to be simulated, where somebody counts."""
     work = _work.get()
     if work is not None:

@@ -20,8 +20,8 @@ from pydantic import Field
 
 from estimator.errors import BadModel
 from estimator.physics.effect import Element
-from estimator.physics.law_name import LawName
-from estimator.physics.own_law import OwnLaw, OwnParameter, named
+from estimator.physics.layout import named
+from estimator.physics.own_law import LawName, OwnLaw, OwnParameter
 from hil.config.table import Table, Text
 from hil.errors import ModelFileError
 

@@ -19,8 +19,8 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from estimator.errors import BadModel
-from estimator.physics.law_name import LawName
 from estimator.physics.model import DrivelineModel, EffectValue, Load, Motion, Parameter, Structure
+from estimator.physics.own_law import LawName
 from hil.config.laws import LawTable, laws_of, moved
 from hil.config.model_tables import ModelDocument, Prepared
 from hil.config.model_text import as_toml

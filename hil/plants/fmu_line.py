@@ -10,8 +10,8 @@ import numpy as np
 from estimator.diagnosis.black_box import BlackBox
 from estimator.diagnosis.equivalent_line import equivalent_line
 from estimator.diagnosis.preconditions import thin
+from estimator.physics.driveline import Start
 from estimator.physics.model import DrivelineModel, Load
-from estimator.physics.start import Start
 from estimator.signals.record import FloatArray, OutputKind, Record
 from hil.plants.fmu_plant import FmuPlant
 from hil.plants.names import OF_A_POSITION, Names

@@ -18,9 +18,9 @@ from typing import Any
 import numpy as np
 
 from estimator.diagnosis.segments import tiles
+from estimator.physics.driveline import Start
 from estimator.physics.free_run import FreeRun
 from estimator.physics.model import Motion
-from estimator.physics.start import Start
 from estimator.signals.record import FloatArray, OutputKind, Record
 from estimator.undisturbed import Deferred
 from hil.errors import UsageError

@@ -180,6 +180,7 @@ def _picture(picture: LawPicture) -> Json:
 def _effect(effect: FoundEffect) -> Json:
     content = {
         "name": effect.name,
+        **({"form": effect.form} if effect.form else {}),
         "element": effect.element.value,
         "statement": effect.statement,
         "parameters": {name: _estimated(value) for name, value in effect.parameters.items()},

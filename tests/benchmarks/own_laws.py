@@ -7,9 +7,9 @@ import sys
 from collections.abc import Callable, Sequence
 
 from estimator.physics.grid import Grid
-from estimator.physics.layout import flat_values
+from estimator.physics.layout import flat_values, named
 from estimator.physics.model import Structure
-from estimator.physics.own_law import OwnLaw, named
+from estimator.physics.own_law import OwnLaw
 from estimator.physics.simulate import simulate
 from tests.benchmarks.ratios import compare, machine, table
 from tests.estimator.physics import bench

@@ -18,11 +18,11 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 from scipy.optimize import least_squares
 
+from estimator.physics.driveline import Start
 from estimator.physics.layout import slot
 from estimator.physics.least_squares import CONVERGED
 from estimator.physics.model import Structure
 from estimator.physics.problem import Problem, bounds, local_part, parameters, residual_at, start_of, start_vector
-from estimator.physics.start import Start
 from estimator.signals.record import FloatArray, Record
 
 METHOD: Final = "RK45"

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from estimator.physics.effects.shaft_hysteresis import loading_rate
+from estimator.physics.effects.shaft import loading_rate
+from estimator.physics.inputs import shaft_torque
 from estimator.physics.kernel import conditions, rates, sensing, slots
 from estimator.physics.layout import flat_values
-from estimator.physics.torque_path import shaft_torque
 from estimator.signals.record import FloatArray
 from tests.docs.bus import BUS, TIME_S, Values
 

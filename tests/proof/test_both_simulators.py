@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from estimator.physics.driveline import Start
 from estimator.physics.grid import grid_for
 from estimator.physics.layout import flat_values
 from estimator.physics.model import DrivelineModel, Parameter, Structure
 from estimator.physics.simulate import simulate
-from estimator.physics.start import Start
 from estimator.signals.record import Record
 from hil.proof.truth.driver import bring_to_speed
 from hil.proof.truth.physics import Physics

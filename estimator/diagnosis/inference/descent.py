@@ -14,11 +14,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from estimator.physics.bounded import least_of_quadratic, unbounded_first
-from estimator.physics.fit import FitResult
+from estimator.physics.fit import FitResult, in_common
 from estimator.physics.jacobian import jacobian_at
+from estimator.physics.least_squares import least_of_quadratic, unbounded_first
 from estimator.physics.problem import Problem, bounds, outputs_at, residual_at
-from estimator.physics.starts import in_common
 from estimator.signals.record import FloatArray
 
 Weigh = Callable[[FloatArray], FloatArray]

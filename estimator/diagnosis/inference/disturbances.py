@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from estimator.diagnosis.inference.whitener import READING, Size, Whitener, of_first, readings, whitening_of
+from estimator.diagnosis.inference.whitener import READING, Size, Whitener, changes_of, of_first, readings, whitening_of
 from estimator.diagnosis.noise import noise_floor
 from estimator.physics.fit import FitResult
 from estimator.physics.motion import torque_scale
@@ -29,6 +29,9 @@ from estimator.signals.record import FloatArray, OutputKind, Record
 TORQUE_SHARE, DRIFT_SHARE, WALK_SHARE = 2e-3, 2e-3, 5e-4
 """Usual sizes as shares of the torque in use: a reading of a per mille of the rated torque, its drift, and the change
 of the load in a second (a grade of half a per mille, a breath of wind)."""
+
+FORM_SHARE, MOST_FORM = 0.1, 0.5
+"""Usual share of a law's change by which its form is off, and the share beyond which it is another law."""
 
 MOST_TORQUE, MOST_DRIFT, MOST_WALK = 2e-2, 2e-2, 5e-3
 """Sizes beyond which such a disturbance is physics to be named."""
@@ -53,6 +56,12 @@ class Limits:
         high = self.high.copy()
         high[Size.WALK] += np.log(100.0)
         return replace(self, high=high)
+
+    def without_forms(self) -> Limits:
+        """Return limits that hold the error of laws' forms as usual: of a line without such a law."""
+        low, high = self.low.copy(), self.high.copy()
+        low[Size.FORM] = high[Size.FORM] = self.usual[Size.FORM]
+        return replace(self, low=low, high=high)
 
     def of_first(self) -> Limits:
         """Return those of the first output alone."""
@@ -82,11 +91,21 @@ def limits_for(records: Sequence[Record], white: float) -> Limits:
     torque, period_s = torque_scale(records), records[0].sample_time_s
     in_output = records[0].kind is OutputKind.FORCE
     usual = np.log(
-        [white, 0.5 * white, COLOUR_S, TORQUE_SHARE * torque, DRIFT_SHARE * torque, DRIFT_S, WALK_SHARE * torque]
+        [
+            white,
+            0.5 * white,
+            COLOUR_S,
+            TORQUE_SHARE * torque,
+            DRIFT_SHARE * torque,
+            DRIFT_S,
+            WALK_SHARE * torque,
+            FORM_SHARE,
+        ]
     )
     low, high = usual - np.log(1e3), usual + np.log(1e3)
     low[Size.COLOUR_S], high[Size.COLOUR_S] = np.log([0.5 * period_s, max(0.3, 4.0 * period_s)])
     low[Size.DRIFT_S], high[Size.DRIFT_S] = np.log([max(0.5, 4.0 * period_s), 20.0])
+    high[Size.FORM] = np.log(MOST_FORM)
     high[Size.TORQUE] = np.log(MOST_TORQUE * torque)
     high[Size.DRIFT] = np.log(MOST_DRIFT * torque)
     high[Size.WALK] = np.log(MOST_WALK * torque)
@@ -126,6 +145,7 @@ def estimated(
     """
     check_time()
     whitened = whitening_of(result)
+    limits = limits if changes_of(result) else limits.without_forms()
     begun = starts(sizes, limits) if is_anew else [sizes]
     return min((estimate(whitened, error, each, limits, rounds) for each in begun), key=lambda each: each[1])
 
@@ -155,8 +175,8 @@ def estimate(
     value, innovations, logs = at(sizes)
     damping = 1e-2
     for _ in range(rounds):
-        by_log, by_error = np.empty((sizes.size, error.size)), np.empty((sizes.size, error.size))
-        for i in range(sizes.size):
+        by_log, by_error = np.zeros((sizes.size, error.size)), np.zeros((sizes.size, error.size))
+        for i in np.flatnonzero(limits.low < limits.high):
             moved = sizes.copy()
             moved[i] += STEP if sizes[i] + STEP <= limits.high[i] else -STEP
             step = moved[i] - sizes[i]
@@ -169,7 +189,8 @@ def estimate(
         information = 4.0 * by_log @ by_log.T + 2.0 * pure @ pure.T + 2.0 * np.eye(sizes.size) / PRIOR_SPREAD**2
         promised = 0.0
         while damping < 1e6:
-            free = ~(((sizes <= limits.low) & (gradient > 0.0)) | ((sizes >= limits.high) & (gradient < 0.0)))
+            at_bound = ((sizes <= limits.low) & (gradient > 0.0)) | ((sizes >= limits.high) & (gradient < 0.0))
+            free = (limits.low < limits.high) & ~at_bound
             damped = (information + damping * np.diag(np.diag(information)))[np.ix_(free, free)]
             step = np.zeros(sizes.size)
             step[free] = -np.linalg.solve(damped, gradient[free])

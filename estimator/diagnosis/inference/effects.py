@@ -10,10 +10,9 @@ from estimator.diagnosis.inference.plausible import GRADE
 from estimator.diagnosis.intervals import reported_covariance
 from estimator.diagnosis.result import Evidence, FoundEffect
 from estimator.physics.catalogue import EFFECTS
-from estimator.physics.fit import FitResult, fit
+from estimator.physics.fit import FitResult, fit, warm_start
 from estimator.physics.model import DrivelineModel
 from estimator.physics.problem import make_problem
-from estimator.physics.starts import warm_start
 from estimator.signals.record import FloatArray
 
 SMALLEST_P = 1e-300
@@ -57,4 +56,5 @@ def _found(
         profiles=profiles,
         share=belief.share,
         probability=belief.probability,
+        form=entry.form({name: p.value for name, p in parameters.items()}),
     )

@@ -18,10 +18,9 @@ from estimator.diagnosis.holdout import blocks, foreign_outputs
 from estimator.diagnosis.inference.descent import descended
 from estimator.diagnosis.inference.likelihood import THOROUGH, Hypothesis, refitted
 from estimator.diagnosis.inference.plausible import GRADE
-from estimator.physics.fit import FitResult, fit
+from estimator.physics.fit import FitResult, fit, warm_start
 from estimator.physics.model import DrivelineModel
 from estimator.physics.problem import Problem, make_problem, parameters
-from estimator.physics.starts import warm_start
 from estimator.physics.unknowns import LocalBasis
 from estimator.signals.record import BoolArray, FloatArray, Record
 

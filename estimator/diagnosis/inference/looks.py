@@ -16,8 +16,7 @@ from estimator.diagnosis.inference.whitener import Whitener
 from estimator.diagnosis.screening import Look, Screen
 from estimator.physics.fit import FitResult
 from estimator.physics.model import DrivelineModel
-from estimator.physics.own_scan import Simulate
-from estimator.physics.projector import Projector
+from estimator.physics.own_scan import Projector, Simulate
 from estimator.signals.record import FloatArray
 
 SAME_MOTION = 0.02

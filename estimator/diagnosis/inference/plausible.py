@@ -15,10 +15,10 @@ from estimator.diagnosis.inherit import line_values
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Element, Span
 from estimator.physics.fit import FitResult
+from estimator.physics.inputs import shaft_torque
 from estimator.physics.model import DrivelineModel
 from estimator.physics.motion import longest_s
 from estimator.physics.steps import has_edge
-from estimator.physics.torque_path import shaft_torque
 from estimator.physics.unknowns import Shared
 from estimator.signals.record import Record
 

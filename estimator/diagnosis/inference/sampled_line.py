@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.linalg import expm
@@ -22,8 +22,8 @@ class Line:
     Attributes
     ----------
     f : ndarray, shape (n, n)
-    torque, load : ndarray, shape (n,)
-        How a torque held for a sample, at the motor and against the load, moves the state.
+    torque, load, shaft : ndarray, shape (n,)
+        How a torque held for a sample, at the motor, against the load and more in the first shaft, moves the state.
     h : ndarray, shape (C, n)
         How each output shows the state.
     direct : float
@@ -35,6 +35,7 @@ class Line:
     load: FloatArray
     h: FloatArray
     direct: float = 0.0
+    shaft: FloatArray = field(default_factory=lambda: np.zeros(0))
 
 
 def line_of(result: FitResult) -> Line:
@@ -51,11 +52,11 @@ def line_of(result: FitResult) -> Line:
     a, at_motor, at_load = _continuous(values)
     n = a.shape[0]
     h = np.array([_seen(record, a, values) / record.unit for record in outputs])
-    joined = np.zeros((n + 2, n + 2))
-    joined[:n, :n], joined[:n, n], joined[:n, n + 1] = a, at_motor, at_load
+    joined = np.zeros((n + 3, n + 3))
+    joined[:n, :n], joined[:n, n], joined[:n, n + 1], joined[:n, n + 2] = a, at_motor, at_load, _in_shaft(values)
     moved = expm(joined * outputs[0].sample_time_s)
     keep = list(range(n if h[:, -1].any() else n - 1))  # the angle stands last
-    return Line(moved[np.ix_(keep, keep)], moved[keep, n], moved[keep, n + 1], h[:, keep])
+    return Line(moved[np.ix_(keep, keep)], moved[keep, n], moved[keep, n + 1], h[:, keep], 0.0, moved[keep, n + 2])
 
 
 def _seen(record: Record, a: FloatArray, values: Mapping[str, float]) -> FloatArray:
@@ -71,6 +72,15 @@ def _seen(record: Record, a: FloatArray, values: Mapping[str, float]) -> FloatAr
     else:
         h[speed] = 1.0
     return h
+
+
+def _in_shaft(values: Mapping[str, float]) -> FloatArray:
+    """Return how a torque more in the first shaft drives a chain: back on the motor, and on what is behind it."""
+    inertias = [values[name] for name in ("J_M", "J_2", "J_L") if name in values]
+    at_shaft = np.zeros(2 * len(inertias))
+    if len(inertias) > 1:
+        at_shaft[[0, 2]] = -1.0 / inertias[0], 1.0 / inertias[1]
+    return at_shaft
 
 
 def _continuous(values: dict[str, float]) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -19,14 +19,13 @@ from estimator.diagnosis.inference.plausible import GRADE, is_plausible, loosene
 from estimator.diagnosis.inherit import forgetting, inheriting, kept, line_values, placed
 from estimator.diagnosis.screening import promising
 from estimator.physics.catalogue import EFFECTS
-from estimator.physics.fit import FitResult, not_fitted
+from estimator.physics.fit import FitResult, not_fitted, warm_start
 from estimator.physics.grid import Grid, grid_for
 from estimator.physics.layout import slot
 from estimator.physics.model import DrivelineModel
 from estimator.physics.parallel import concurrently
 from estimator.physics.problem import Problem, make_problem, start_of, start_vector
 from estimator.physics.simulate import simulate
-from estimator.physics.starts import warm_start
 from estimator.physics.unknowns import Release, nominal_unknowns, own_unknowns, released
 from estimator.physics.work import Work
 from estimator.signals.record import BoolArray, Record

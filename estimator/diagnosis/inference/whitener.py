@@ -10,6 +10,7 @@ from functools import partial
 import numpy as np
 
 from estimator.diagnosis.inference.sampled_line import Line, line_of
+from estimator.diagnosis.line.motion import LASTS, FormPlace, form_changes
 from estimator.diagnosis.line.whitening import Gains, Terms, fill_gains, innovate, terms_of
 from estimator.physics.fit import FitResult
 from estimator.physics.problem import Rows
@@ -31,6 +32,7 @@ class Size(IntEnum):
     DRIFT = 4
     DRIFT_S = 5
     WALK = 6
+    FORM = 7
 
 
 READING = 3
@@ -38,7 +40,7 @@ READING = 3
 
 
 def of_first(sizes: FloatArray) -> FloatArray:
-    """Return the noise model of the first output alone, shape (7,)."""
+    """Return the noise model of the first output alone, shape (8,)."""
     return sizes[: len(Size)]
 
 
@@ -109,7 +111,14 @@ def whitening_of(result: FitResult) -> Callable[[FloatArray], Whitener]:
         for i in range(part.start, part.stop):
             use[problem.leads[i]][:, output] = problem.use[i]
     unread = [stand_in_variance(record) for record in firsts]
-    return partial(whitener, line_of(result), firsts[0].sample_time_s, use, unread, problem.rows)
+    changes = changes_of(result)
+    return partial(whitener, line_of(result), firsts[0].sample_time_s, use, unread, problem.rows, changes=changes)
+
+
+def changes_of(result: FitResult) -> tuple[FloatArray, ...]:
+    """Return how much laws change in each recording at each place, shape (3, N_i); nothing where none does."""
+    each = tuple(form_changes(result, i) for i in range(len(result.problem.bases)))
+    return each if any(change.any() for change in each) else ()
 
 
 def whitener(
@@ -119,6 +128,7 @@ def whitener(
     unread: Sequence[FloatArray],
     rows: Sequence[Rows],
     sizes: FloatArray,
+    changes: Sequence[FloatArray] = (),
 ) -> Whitener:
     """Return the filters of recordings under a noise model, ``sizes`` as `Size` says.
 
@@ -129,11 +139,15 @@ def whitener(
         Variance of each recording's torque where it was not read.
     rows : sequence of Rows
         See `Whitener`.
+    changes : sequence of ndarray, shapes (3, N_i)
+        By how much laws change at each place [Nm]; empty where none does (``form_error``).
     """
-    torque, drift, drift_s, walk = np.exp(sizes[READING : len(Size)])
+    torque, drift, drift_s, walk, share = np.exp(sizes[READING : len(Size)])
     white, coloured, colour_s = np.exp(readings(sizes)).T
     count, n = line.h.shape
-    m = n + 2 + count  # drift, walk, coloured of each output
+    off = [place for place in FormPlace if any(change[place].any() for change in changes)]
+    m = n + 2 + count + len(off)  # drift, walk, coloured of each output, laws off by their forms
+    forms = n + 2 + count + np.arange(len(off))
     colours = n + 2 + np.arange(count)
     f, q, prior, h = np.zeros((m, m)), np.zeros((m, m)), np.zeros((m, m)), np.zeros((count, m))
     kept_drift, kept_colour = np.exp(-period_s / drift_s), np.exp(-period_s / colour_s)
@@ -144,11 +158,18 @@ def whitener(
     q[colours, colours] = coloured**2 * (1.0 - kept_colour**2)
     prior[n, n], prior[colours, colours] = drift**2, coloured**2
     h[:, :n], h[:, n + 1], h[np.arange(count), colours] = line.h, line.direct, 1.0
-    at_input = np.concatenate([line.torque, np.zeros(m - n)])
+    at_input = np.zeros((1 + len(off), m))
+    at_input[0, :n], at_input[1:, forms] = line.torque, np.eye(len(off))
+    kept_form = np.exp(-1.0 / LASTS)
+    f[forms, forms] = kept_form
+    for place, state in zip(off, forms, strict=True):
+        f[:n, state] = (line.torque, line.load, line.shaft)[place]
     terms = terms_of(f)
     seen: dict[tuple[bytes, bytes], Gains] = {}
     each = []
-    for mask, variance in zip(use, unread, strict=True):
+    for i, (mask, own) in enumerate(zip(use, unread, strict=True)):
+        of_forms = [(1.0 - kept_form**2) * (share * changes[i][place]) ** 2 for place in off]
+        variance = np.column_stack([own, *of_forms])
         key = mask.tobytes(), variance.tobytes()
         if key not in seen:
             seen[key] = Gains(np.empty((*mask.shape, m)), np.empty((*mask.shape, count)), np.empty(mask.shape))

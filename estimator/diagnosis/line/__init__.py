@@ -1,10 +1,8 @@
 """The line of a fit, linearised and cut into blocks: what small torques do to it, and which would explain its error."""
 
-from estimator.diagnosis.line.averages import block_mean_of
-from estimator.diagnosis.line.blocks import Line, lines
+from estimator.diagnosis.line.blocks import DRIVES, FORCES, PLACES, Line, Place, lines, size_at
 from estimator.diagnosis.line.equivalent import Explanation, Input, explain, explain_all, smooth
-from estimator.diagnosis.line.motion import NO_FORCE, Force, Motion, motion_of, simulated, simulated_each
-from estimator.diagnosis.line.places import DRIVES, FORCES, PLACES, Place, size_at
+from estimator.diagnosis.line.motion import NO_FORCE, Force, Motion, block_mean_of, motion_of, simulated, simulated_each
 
 __all__ = [
     "DRIVES",

@@ -110,6 +110,14 @@ def is_as_before(observed: BoolArray, t: int) -> bool:
     return same
 
 
+@inlined
+def add_input(at_input: FloatArray, n: int, variance: float, p: FloatArray) -> None:
+    """Add to a covariance what input n of this variance does to it."""
+    for i in range(p.shape[0]):
+        for k in range(p.shape[0]):
+            p[i, k] += variance * at_input[n, i] * at_input[n, k]
+
+
 @compiled
 def fill_gains(
     f: Terms,
@@ -135,10 +143,10 @@ def fill_gains(
     r : ndarray, shape (C,)
         Variance of each reading.
     observed : ndarray of bool, shape (N, C)
-    at_input : ndarray, shape (m,)
-        How an input held for a sample moves the state.
-    unread : ndarray, shape (N,)
-        Variance of the input where it was not read; 0 elsewhere.
+    at_input : ndarray, shape (E, m)
+        How each of E inputs held for a sample moves the state.
+    unread : ndarray, shape (N, E)
+        Variance of each of them where it is known no better: of a torque that was not read, of a law's form; else 0.
     """
     count, m = h.shape
     room = (np.empty((m, m)), np.empty((count, m)), np.empty((count, m)), np.zeros(m), np.empty(count))
@@ -185,11 +193,10 @@ def fill_gains_in(
                 cross[t, i, j] = shown_by(j, i, h, ph, s) if observed[t, i] and observed[t, j] else 0.0
         if not settled:
             settled = predict(f, q, p, half, before) and is_any
-        if unread[t] > 0.0:
-            settled = False
-            for i in range(m):
-                for k in range(m):
-                    p[i, k] += unread[t] * at_input[i] * at_input[k]
+        for n in range(at_input.shape[0]):
+            if unread[t, n] > 0.0:
+                settled = False
+                add_input(at_input, n, unread[t, n], p)
 
 
 @inlined

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 from scipy.signal import detrend
 
+from estimator.physics.driveline import Start
 from estimator.physics.grid import Grid
 from estimator.physics.layout import flat
 from estimator.physics.model import DrivelineModel
 from estimator.physics.simulate import simulate
-from estimator.physics.start import Start
 from estimator.signals.record import FloatArray, Record
 
 

@@ -19,9 +19,9 @@ from estimator.diagnosis.unnamed.ground import Ground
 from estimator.diagnosis.unnamed.hunt import NO_LAW, RIDGE, Found, Hunt, cost, terms_of, weights_of, worthwhile
 from estimator.diagnosis.unnamed.pursuit import factored, pursue
 from estimator.diagnosis.unnamed.scene import Scene
-from estimator.physics.bounded import least_inside, unbounded_first
 from estimator.physics.fit import FitResult
 from estimator.physics.jacobian import STEP
+from estimator.physics.least_squares import least_inside, unbounded_first
 from estimator.physics.parallel import concurrently
 from estimator.physics.problem import bounds, own_part, residual_at
 from estimator.signals.record import FloatArray

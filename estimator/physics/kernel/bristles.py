@@ -16,8 +16,7 @@ from __future__ import annotations
 from estimator.compiled import inlined
 from estimator.lanes import choose, like, some
 from estimator.physics.kernel import slots
-from estimator.physics.kernel.conditions import with_friction
-from estimator.physics.kernel.line import Line, is_bristled_at_load, is_bristled_at_motor
+from estimator.physics.kernel.conditions import Line, is_bristled_at_load, is_bristled_at_motor, with_friction
 from estimator.physics.kernel.state_vector import Bristles, Conditions, State
 from estimator.physics.laws import LEAST, fading
 from estimator.signals.record import FloatArray

@@ -3,20 +3,153 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from estimator.compiled import inlined
+from estimator.compiled import assembled, inlined
 from estimator.lanes import choose, every, like, some
 from estimator.physics.catalogue import BUILT_IN
-from estimator.physics.effects import extra_torsional_mode, warming_friction
+from estimator.physics.effect import Place
+from estimator.physics.effects.drag import cold_part
+from estimator.physics.effects.inertia import frequency_within
 from estimator.physics.kernel import slots
-from estimator.physics.kernel.declared import over_recorded_angle
-from estimator.physics.kernel.line import is_within
 from estimator.physics.kernel.state_vector import Conditions, Tyre
 from estimator.physics.laws import inertia_while, overtoned_wave, share_inside, wave
 from estimator.physics.layout import slot
 from estimator.signals.record import FloatArray
+
+
+class Line(NamedTuple):
+    """What a line is made of.
+
+    Attributes
+    ----------
+    masses : int
+        1, 2 or 3.
+    elastic : bool
+        Whether the first shaft is a spring and a damper, and no law next to them.
+    sliding : bool
+        Whether there may be a slider inside that shaft.
+    extended : bool
+        Whether it has states beyond those of its masses and a slider: an extra mode, a tyre that slips, a shaft that
+        relaxes.
+    own : tuple
+        Empty, or the torque readings, a user's own laws as one function, and what they are given of the moment: time
+        [s] and torque reading [Nm].
+    """
+
+    masses: int
+    elastic: bool
+    sliding: bool
+    extended: bool
+    own: tuple[Any, ...]
+
+
+@inlined
+def is_elastic(p: FloatArray) -> bool:
+    """Tell whether the first shaft is a spring and a damper, and no law next to them."""
+    bent = p[slots.GAP] > 0.0 or p[slots.HARDENING] != 0.0 or p[slots.STAGE] != 0.0
+    sliding = p[slots.SLIDER] != 0.0 or p[slots.SLIDER_INSIDE] > 0.0
+    jointed = p[slots.CARDAN] != 0.0 or p[slots.CARDAN_ANGLE] != 0.0 or p[slots.CARDAN_SHARE] != 0.0
+    return not (bent or sliding or jointed)
+
+
+@inlined
+def is_bristled(p: FloatArray) -> bool:
+    """Tell whether dry friction, at the motor or at the load, deflects before it slides."""
+    return is_bristled_at_motor(p) or is_bristled_at_load(p)
+
+
+@inlined
+def is_bristled_at_motor(p: FloatArray) -> bool:
+    """Tell whether dry friction at the motor deflects before it slides."""
+    return some(p[slots.COULOMB_PRESLIDING] > 0.0) or some(p[slots.STRIBECK_PRESLIDING] > 0.0)
+
+
+@inlined
+def is_bristled_at_load(p: FloatArray) -> bool:
+    """Tell whether dry friction at the load deflects before it slides, that of a brake included."""
+    return some(p[slots.COULOMB_LOAD_PRESLIDING] > 0.0) or some(p[slots.BRAKE_PRESLIDING] > 0.0)
+
+
+@inlined
+def is_extended(p: FloatArray) -> bool:
+    """Tell whether a line has states beyond those of its masses and a slider."""
+    return bool(p[slots.BRANCH_INERTIA] > 0.0 or is_within(p) or p[slots.SLIP] > 0.0 or p[slots.RELAXING] > 0.0)
+
+
+@inlined
+def is_within(p: FloatArray) -> bool:
+    """Tell whether the inertia of an extra mode is in the line, before the shaft or behind it, and not next to it."""
+    return some(p[slots.BETWEEN] > 0.0) or some(p[slots.BEHIND] > 0.0)
+
+
+Total = Callable[..., float]
+"""What the place gives, and parameters of the superset model, to the sum of the place's laws [Nm]."""
+
+
+Term = tuple[Callable[..., float], tuple[int, ...]]
+"""A law, and the places of its parameters."""
+
+
+class Sum(NamedTuple):
+    """What a function that is put together adds up: laws of a place, which are given one quantity or two."""
+
+    place: Place
+    given: int
+    terms: tuple[Term, ...]
+
+
+SUMS: dict[Total, Sum] = {}
+"""Of each function that is put together here, for who has to write it in another language."""
+
+
+def taken(places: Sequence[int]) -> Callable[..., Any]:
+    """Return the compiled function that takes these places out of the parameters, as a tuple."""
+    first, rest = places[0], places[1:]
+    if not rest:
+        return assembled(lambda p: (p[first],))
+    others = taken(rest)
+    return assembled(lambda p: (p[first], *others(p)))
+
+
+def with_law(before: Total, law: Callable[..., float], values: Callable[..., Any], given: int) -> Total:
+    """Return the sum of a function and a law, of as many quantities as are ``given``."""
+    if given == 1:
+        return assembled(lambda x, p: before(x, p) + law(x, *values(p)))
+    return assembled(lambda x, y, p: before(x, y, p) + law(x, y, *values(p)))
+
+
+def total(place: Place, given: int = 1) -> Total:
+    """Return the sum of all laws of a place, which are given one quantity or two."""
+    if given == 1:
+        summed: Total = assembled(lambda x, p: like(0.0, x))
+    else:
+        summed = assembled(lambda x, y, p: like(0.0, x))
+    terms = terms_of(place)
+    for law, places in terms:
+        summed = with_law(summed, law, taken(places), given)
+    SUMS[summed] = Sum(place, given, terms)
+    return summed
+
+
+def terms_of(place: Place) -> tuple[Term, ...]:
+    """Return the laws that entries declare for a place, each with the places of its parameters."""
+    return tuple(
+        (entry.acting.law, tuple(slot(entry.name, parameter.name) for parameter in entry.parameters))
+        for entry in BUILT_IN.values()
+        if entry.acting is not None and entry.acting.place is place
+    )
+
+
+motor_drag = total(Place.MOTOR)
+load_drag = total(Place.LOAD)
+held_by_angle = total(Place.LOAD_ANGLE)
+over_recorded_angle = total(Place.RECORDED_ANGLE)
+shaft_loss = total(Place.SHAFT_LOSS, given=2)
+
 
 STICK_STABILITY = 1.5
 """Runge-Kutta is stable to h * slope / J = 2.78; friction's slope at standstill is held to about half of it."""
@@ -84,7 +217,7 @@ def branch_inertia(p: FloatArray) -> float:
 def branch_frequency(p: FloatArray) -> float:
     """Return the frequency of the extra mode on its own spring [rad/s]; within the line that follows."""
     if is_within(p):
-        return extra_torsional_mode.frequency_within(branch_inertia(p), p[slots.K], p[slots.LINE_SHARE])
+        return frequency_within(branch_inertia(p), p[slots.K], p[slots.LINE_SHARE])
     return 2.0 * math.pi * float(p[slots.BRANCH_FREQUENCY])
 
 
@@ -137,17 +270,29 @@ def conditions(
         inertia_load,
         1.0 / inertia_load if masses > 1 else 0.0,
         stiffness,
-        p[slots.B_L] + warming_friction.cold_part(time_s, p[slots.WARMING], p[slots.WARMING_TIME]),
+        p[slots.B_L] + cold_part(time_s, p[slots.WARMING], p[slots.WARMING_TIME]),
         dry_motor,
         dry_load,
-        max(sign_width, dry_motor / (fastest * inertia_motor)),
-        max(sign_width, dry_load / (fastest * carried)),
+        max(
+            changing_sign(sign_width, p[slots.COULOMB_CREEP], p[slots.STRIBECK_CREEP]),
+            dry_motor / (fastest * inertia_motor),
+        ),
+        max(
+            changing_sign(sign_width, p[slots.COULOMB_LOAD_CREEP], p[slots.BRAKE_CREEP]), dry_load / (fastest * carried)
+        ),
         branch_inertia(p),
         branch_frequency(p),
         fastest,
         inverse_yield,
         tyre(inertia_load, fastest, p),
     )
+
+
+@inlined
+def changing_sign(width: float, creep: float, other: float) -> float:
+    """Return the speed within which dry friction changes sign [rad/s]: the usual one where no law creeps."""
+    widest = max(creep, other)
+    return choose(widest > 0.0, widest, width)
 
 
 @inlined

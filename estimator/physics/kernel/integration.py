@@ -9,26 +9,29 @@ sub-step. A line that is linear takes the same steps as sums (``linear``).
 from __future__ import annotations
 
 import math
-from typing import Any
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
-from estimator.compiled import brief, compiled, inlined
+from estimator.compiled import brief, compiled, inlined, ir_inlined
 from estimator.lanes import borrowed
+from estimator.physics.effects.timing import LowPass, delayed, lag_step, low_pass
 from estimator.physics.kernel import slots
 from estimator.physics.kernel.bristles import bent, rubbed
 from estimator.physics.kernel.conditions import (
+    Line,
     branch_frequency,
     branch_inertia,
     conditions,
+    is_bristled,
     is_changing,
+    is_elastic,
+    is_extended,
     is_waving,
+    is_within,
     with_torques,
 )
-from estimator.physics.kernel.feed import begun_feed, fed, is_late
-from estimator.physics.kernel.line import Line, is_bristled, is_within
 from estimator.physics.kernel.linear import WORTHWHILE_SAMPLES, Answers, answers, has_dry_friction, is_linear, led_on
-from estimator.physics.kernel.makes import Masses, for_its_make
-from estimator.physics.kernel.own import at_moment
-from estimator.physics.kernel.rates import read_out
+from estimator.physics.kernel.rates import at_moment, read_out
 from estimator.physics.kernel.sensing import entry, reading, shown, smoothed
 from estimator.physics.kernel.state_vector import (
     BRISTLES_LOAD,
@@ -42,8 +45,107 @@ from estimator.physics.kernel.state_vector import (
     State,
     unpacked,
 )
-from estimator.physics.low_pass import low_pass
 from estimator.signals.record import FloatArray, IntArray
+
+
+class Feed(NamedTuple):
+    """What is known of a torque's way before it begins.
+
+    Attributes
+    ----------
+    shifted : bool
+        Whether it is delayed, or its clock another.
+    delay, begun : float
+        The delay, and the time at sample 0 [samples].
+    before_all : float
+        The torque before the first sample [Nm].
+    lag : LowPass
+        What it lags behind.
+    """
+
+    shifted: bool
+    delay: float
+    begun: float
+    before_all: float
+    lag: LowPass
+
+
+@inlined
+def is_late(p: FloatArray) -> bool:
+    """Tell whether a torque reaches the shaft otherwise than it was read."""
+    return bool(p[slots.DELAY] != 0.0 or p[slots.DRIFT] != 0.0 or p[slots.LAG] > 0.0)
+
+
+@inlined
+def begun_feed(torque: FloatArray, begun: float, sample_time_s: float, p: FloatArray, h: float) -> Feed:
+    """Return what is known of the way of a torque, shape (N,), to sub-steps of ``h`` [s].
+
+    Its sample 0 is at ``begun`` [samples].
+    """
+    shifted, before_all = p[slots.DELAY] != 0.0 or p[slots.DRIFT] != 0.0, torque[0] + p[slots.DELAYED_BEFORE]
+    lag = low_pass(p[slots.LAG], p[slots.LAG_SHAPE], h)
+    return Feed(shifted, p[slots.DELAY] / sample_time_s, begun, before_all, lag)
+
+
+@inlined
+def fed(
+    torque: FloatArray,
+    feed: Feed,
+    k: int,
+    part: float,
+    length: float,
+    lagged: float,
+    lag_rise: float,
+    p: FloatArray,
+) -> tuple[float, float, float, float]:
+    """Return mean and rise of the torque on the shaft [Nm] over a sub-step, and the lag's state at its end.
+
+    The sub-step begins a ``part`` of a sample behind sample k and is ``length`` samples long.
+    """
+    place = k + part
+    supplied, rise = torque[k], 0.0
+    if feed.shifted:
+        source = place + (place + feed.begun) * p[slots.DRIFT] - feed.delay
+        supplied, rise = delayed(torque, feed.before_all, source, length)
+    return lag_step(supplied, rise, lagged, lag_rise, feed.lag)
+
+
+Made = Callable[..., None]
+
+Masses = tuple[int, ...]
+"""An entry for each mass. Its length is a part of its type, so that only makes of so many masses are compiled."""
+
+
+@ir_inlined
+def for_its_make(masses: int, own: tuple[Any, ...], made: Made, p: FloatArray, given: tuple[Any, ...]) -> None:
+    """Call what is compiled for the make of the line that has these parameters, of 1, 2 or 3 masses."""
+    if masses == 1:
+        _for_its_states(1, True, own, made, p, given)
+    elif masses == 2:
+        _for_its_shaft(2, own, made, p, given)
+    else:
+        _for_its_shaft(3, own, made, p, given)
+
+
+@ir_inlined
+def _for_its_shaft(masses: int, own: tuple[Any, ...], made: Made, p: FloatArray, given: tuple[Any, ...]) -> None:
+    if is_elastic(p):
+        _for_its_states(masses, True, own, made, p, given)
+    else:
+        _for_its_states(masses, False, own, made, p, given)
+
+
+@ir_inlined
+def _for_its_states(
+    masses: int, elastic: bool, own: tuple[Any, ...], made: Made, p: FloatArray, given: tuple[Any, ...]
+) -> None:
+    if is_extended(p):
+        made(Line(masses, elastic, not elastic, True, own), *given)
+    elif not elastic and p[slots.SLIDER] != 0.0:
+        made(Line(masses, elastic, True, False, own), *given)
+    else:
+        made(Line(masses, elastic, False, False, own), *given)
+
 
 RADIANS_PER_STEP_OF_MODE = 0.6
 """Integration step in radians of the extra mode, which is seen through the motor's inertia only."""

@@ -17,11 +17,8 @@ import numpy as np
 from estimator.compiled import compiled, inlined
 from estimator.physics.catalogue import BUILT_IN
 from estimator.physics.kernel import slots
-from estimator.physics.kernel.conditions import with_friction, with_torques
-from estimator.physics.kernel.contact import stepped
-from estimator.physics.kernel.line import Line, is_bristled, is_bristled_at_motor
-from estimator.physics.kernel.rates import dry_at_load
-from estimator.physics.kernel.runge_kutta import moved, runge_kutta
+from estimator.physics.kernel.conditions import Line, is_bristled, is_bristled_at_motor, with_friction, with_torques
+from estimator.physics.kernel.rates import dry_at_load, moved, runge_kutta, stepped
 from estimator.physics.kernel.state_vector import Conditions, State
 from estimator.physics.laws import BEYOND, dry_friction
 from estimator.physics.layout import slot

@@ -2,25 +2,63 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from estimator.compiled import inlined
-from estimator.lanes import every, like, some
-from estimator.physics.effects import (
-    backlash,
-    shaft_hysteresis,
-    stiffness_nonlinearity,
-    stribeck_friction,
-    tyre_slip,
-    viscoelastic_shaft,
-)
+from estimator.lanes import choose, every, like, some
+from estimator.lanes.types import overload
+from estimator.physics.effects.dry_friction import stribeck_law
+from estimator.physics.effects.load import build_up, carcass, coupling, gripped
+from estimator.physics.effects.shaft import damping_share, loaded_twist, loading_rate, pressed, relaxing_rate
 from estimator.physics.kernel import slots
-from estimator.physics.kernel.conditions import line_share
-from estimator.physics.kernel.declared import held_by_angle, load_drag, motor_drag, shaft_loss
-from estimator.physics.kernel.line import Line, is_within
-from estimator.physics.kernel.own import under_own
+from estimator.physics.kernel.conditions import (
+    Line,
+    held_by_angle,
+    is_within,
+    line_share,
+    load_drag,
+    motor_drag,
+    shaft_loss,
+    with_torque,
+    with_torques,
+)
 from estimator.physics.kernel.sensing import entry
 from estimator.physics.kernel.state_vector import SHAFT_TORQUE, Conditions, State
 from estimator.physics.laws import beyond_gap, dry_friction, smooth_sign
 from estimator.signals.record import FloatArray
+
+
+def at_moment(line: Line, time_s: float, k: int) -> Line:
+    """Return a line whose own laws are given this time [s] and the torque reading of sample k."""
+    if len(line.own) == 0:
+        return line
+    readings, forces = line.own[0], line.own[1]
+    return Line(line.masses, line.elastic, line.sliding, line.extended, (readings, forces, time_s, readings[k]))
+
+
+@overload(at_moment, strict=False)
+def _at_moment(line: Any, time_s: Any, k: Any) -> Any:
+    if len(line.types[-1]) == 0:
+        return lambda line, time_s, k: line
+    return at_moment
+
+
+def under_own(now: Conditions, line: Line, x: State, p: FloatArray) -> Conditions:
+    """Return the conditions with the torques of a line's own laws on the motor and against the load."""
+    if len(line.own) == 0:
+        return now
+    if line.masses == 1:
+        motor, load = line.own[1](line.own[2], x.speed, x.speed, 0.0, line.own[3], p)
+    else:
+        motor, load = line.own[1](line.own[2], x.speed, x.load_speed, x.twist, line.own[3], p)
+    return with_torques(now, now.torque + motor, now.load + load)
+
+
+@overload(under_own, strict=False)
+def _under_own(now: Any, line: Any, x: Any, p: Any) -> Any:
+    if len(line.types[-1]) == 0:
+        return lambda now, line, x, p: now
+    return under_own
 
 
 @inlined
@@ -32,7 +70,7 @@ def motor_friction(speed: float, p: FloatArray, width: float, dry: float) -> flo
         return friction
     coulomb, excess = p[slots.STRIBECK_COULOMB], p[slots.STRIBECK]
     friction += dry_friction(speed, p[slots.COULOMB], width)
-    return friction + stribeck_friction.law(speed, excess, coulomb, p[slots.STRIBECK_SPEED], width)
+    return friction + stribeck_law(speed, excess, coulomb, p[slots.STRIBECK_SPEED], width)
 
 
 @inlined
@@ -46,14 +84,16 @@ def damping_torque(rate: float, p: FloatArray) -> float:
 def shaft_torque(twist: float, rate: float, loading: float, p: FloatArray, stiffness: float) -> float:
     """Return the torque the shaft carries [Nm] at a twist [rad], its rate [rad/s] and the hysteresis' loading [-]."""
     damping = damping_torque(rate, p)
+    across = like(0.0, damping)
     loaded, closed = twist, every(p[slots.GAP] <= 0.0)
     if not closed:
         loaded = beyond_gap(twist, p[slots.GAP])
-        damping *= backlash.damping_share(loaded, p[slots.CONTACT])
+        across = damping * p[slots.ACROSS]
+        damping = (damping - across) * damping_share(loaded, p[slots.CONTACT])
     law = p[slots.HARDENING], p[slots.SHAPE], p[slots.STAGE], p[slots.STAGE_FROM]
-    elastic = stiffness * stiffness_nonlinearity.loaded_twist(loaded, *law)
+    elastic = stiffness * loaded_twist(loaded, *law)
     torque = float(elastic) + damping + float(p[slots.SLIDER]) * loading
-    return torque if closed else backlash.pressed(torque, loaded, p[slots.PULL])
+    return torque if closed else pressed(torque, loaded, p[slots.PULL]) + across
 
 
 @inlined
@@ -129,7 +169,7 @@ def rates(line: Line, now: Conditions, x: State, p: FloatArray) -> State:
     if line.extended and some(p[slots.RELAXING] > 0.0):
         shaft, reaction = shaft + x.relaxing, reaction + x.relaxing
         stiffness = p[slots.RELAXING] * p[slots.K]
-        relaxing = viscoelastic_shaft.relaxing_rate(x.relaxing, rate, stiffness, now.fastest, p[slots.RELAXATION_TIME])
+        relaxing = relaxing_rate(x.relaxing, rate, stiffness, now.fastest, p[slots.RELAXATION_TIME])
     pull = shaft
     if line.extended:
         branch = branch_rate(x.branch_twist, own_rate, now, p)
@@ -169,7 +209,7 @@ def sliding(loading: float, rate: float, now: Conditions, p: FloatArray) -> floa
     if every(p[slots.SLIDER] == 0.0):
         return 0.0
     sharpness, unloading = p[slots.SHARPNESS], p[slots.UNLOADING]
-    return shaft_hysteresis.loading_rate(loading, rate * now.inverse_yield, sharpness, unloading, now.fastest)
+    return loading_rate(loading, rate * now.inverse_yield, sharpness, unloading, now.fastest)
 
 
 @inlined
@@ -217,14 +257,106 @@ def load_rates(line: Line, pull: float, now: Conditions, x: State, p: FloatArray
     if every(p[slots.RELAXATION] > 0.0):
         traction, roll = x.traction, abs(vehicle)
         relaxation = max(p[slots.RELAXATION], max(roll / now.fastest, tyre.least_relaxation))
-        rate = tyre_slip.build_up(slide, roll, traction, tyre.tread, relaxation)
-        traction += tyre_slip.carcass(slide, vehicle, tyre.winding, tyre.inverse_creep)
+        rate = build_up(slide, roll, traction, tyre.tread, relaxation)
+        traction += carcass(slide, vehicle, tyre.winding, tyre.inverse_creep)
     else:
         steepest = now.fastest * now.inertia_load
-        slope, share = tyre_slip.coupling(vehicle, p[slots.SLIP], p[slots.SLIP_SPEED], p[slots.SLIP_WHEEL], steepest)
+        slope, share = coupling(vehicle, p[slots.SLIP], p[slots.SLIP_SPEED], p[slots.SLIP_WHEEL], steepest)
         inverse_wheel, inverse_vehicle = now.inverse_load / share, now.inverse_load / (1.0 - share)
         traction = slope * slide
-    traction = tyre_slip.gripped(traction, p[slots.GRIP], tyre.inverse_grip)
+    traction = gripped(traction, p[slots.GRIP], tyre.inverse_grip)
     dry = dry_at_load(wheel, now)
     drag = load_friction(wheel, vehicle, now, p) - dry
     return (pull - dry - traction) * inverse_wheel, (traction - drag - load) * inverse_vehicle, rate
+
+
+@inlined
+def moved(line: Line, x: State, dx: State, h: float) -> State:
+    """Return a state moved along its derivative for a time [s]; what a line lacks stays where it is, at no cost."""
+    twist, load_speed, middle_twist, middle_speed = x.twist, x.load_speed, x.middle_twist, x.middle_speed
+    if line.masses > 1:
+        twist, load_speed = twist + h * dx.twist, load_speed + h * dx.load_speed
+    if line.masses == 3:
+        middle_twist, middle_speed = middle_twist + h * dx.middle_twist, middle_speed + h * dx.middle_speed
+    loading, vehicle_speed, traction = x.loading, x.vehicle_speed, x.traction
+    branch_twist, branch_speed, relaxing = x.branch_twist, x.branch_speed, x.relaxing
+    if line.sliding:
+        loading += h * dx.loading
+    if line.extended:
+        vehicle_speed, traction = vehicle_speed + h * dx.vehicle_speed, traction + h * dx.traction
+        branch_twist, branch_speed = branch_twist + h * dx.branch_twist, branch_speed + h * dx.branch_speed
+        relaxing += h * dx.relaxing
+    return State(
+        x.angle + h * dx.angle,
+        x.speed + h * dx.speed,
+        twist,
+        load_speed,
+        loading,
+        vehicle_speed,
+        branch_twist,
+        branch_speed,
+        middle_twist,
+        middle_speed,
+        traction,
+        relaxing,
+    )
+
+
+@inlined
+def runge_kutta(line: Line, now: Conditions, torque: float, rise: float, x: State, p: FloatArray, h: float) -> State:
+    """Return the state after one sub-step under constant conditions and a torque of this mean and rise [Nm]."""
+    begin = with_torque(now, torque - 0.5 * rise)
+    middle = with_torque(now, torque)
+    end = with_torque(now, torque + 0.5 * rise)
+    first = rates(line, begin, x, p)
+    second = rates(line, middle, moved(line, x, first, 0.5 * h), p)
+    third = rates(line, middle, moved(line, x, second, 0.5 * h), p)
+    fourth = rates(line, end, moved(line, x, third, h), p)
+    x = moved(line, x, first, h / 6.0)
+    x = moved(line, x, second, h / 3.0)
+    x = moved(line, x, third, h / 3.0)
+    return moved(line, x, fourth, h / 6.0)
+
+
+PARTS = 8
+"""Steps that are taken in place of one."""
+
+DEPTHS, FAST = 4.0, 0.25
+"""Depths of contact, ``e_c``, beyond the edge of a gap in which its damping sets in, where a step covers this share of
+one: the damping is smooth, but not over such a step."""
+
+
+@inlined
+def met(begun: float, ended: float, gap: float, contact: float) -> bool:
+    """Tell whether the faces of a gap met or parted between two twists, or squeezed out their play."""
+    half = 0.5 * gap
+    first, last = abs(begun) - half, abs(ended) - half
+    least = choose(begun * ended < 0.0, -half, min(first, last))
+    edge = choose(abs(ended - begun) > FAST * contact, DEPTHS * contact, 0.0)
+    return min(max(first, last), edge - least) > 0.0
+
+
+@inlined
+def stepped(line: Line, now: Conditions, torque: float, rise: float, x: State, p: FloatArray, h: float) -> State:
+    """Do what ``runge_kutta`` does, in smaller steps where the faces of a gap meet or part.
+
+    Each lane takes those it needs by itself: the others stand still when they are there.
+    """
+    if line.elastic:
+        return runge_kutta(line, now, torque, rise, x, p, h)
+    closed = every(p[slots.GAP] <= 0.0)
+    parts, done, length = 1, 0, like(h, x.speed)
+    rest, share = length, like(1.0, x.speed)
+    while done < parts:
+        along = rise * ((done + 0.5) * share - 0.5)
+        ahead = runge_kutta(line, now, torque + along, rise * share, x, p, length)
+        if parts == 1 and not closed:
+            begun, ended = x.twist + now.joint_angle, ahead.twist + now.joint_angle
+            meeting = met(begun, ended, p[slots.GAP], p[slots.CONTACT])
+            if some(meeting):
+                parts = PARTS
+                length, rest = choose(meeting, h / PARTS, h), choose(meeting, h / PARTS, 0.0)
+                share = choose(meeting, 1.0 / PARTS, 1.0)
+                continue
+        x, done, length = ahead, done + 1, rest
+    return x

@@ -6,11 +6,11 @@ import math
 
 from estimator.compiled import inlined
 from estimator.lanes import every
-from estimator.physics.effects import resolver_error, speed_filter
+from estimator.physics.effects.sensor import resolver_error, resolver_slope, true_angle
+from estimator.physics.effects.timing import LowPass, filter_step
 from estimator.physics.kernel import slots
-from estimator.physics.kernel.line import is_within
+from estimator.physics.kernel.conditions import is_within
 from estimator.physics.kernel.state_vector import LOAD_ANGLE, LOAD_SPEED, SPEED, TWIST, State
-from estimator.physics.low_pass import LowPass
 from estimator.signals.record import FloatArray
 
 
@@ -44,7 +44,7 @@ def travelled(x: State, output: int, p: FloatArray) -> float:
 def read_angle(angle: float, p: FloatArray) -> float:
     """Return the angle that the resolver gives at a motor angle [rad]."""
     once, twice = p[slots.RESOLVER_ONCE], p[slots.RESOLVER_TWICE]
-    return angle + resolver_error.error(angle, once, p[slots.RESOLVER_ONCE_PHASE], twice, p[slots.RESOLVER_TWICE_PHASE])
+    return angle + resolver_error(angle, once, p[slots.RESOLVER_ONCE_PHASE], twice, p[slots.RESOLVER_TWICE_PHASE])
 
 
 @inlined
@@ -54,8 +54,8 @@ def reading(speed: float, angle: float, p: FloatArray) -> float:
     if every(once == 0.0) and every(twice == 0.0):
         return speed
     phases = p[slots.RESOLVER_ONCE_PHASE], p[slots.RESOLVER_TWICE_PHASE]
-    true = resolver_error.true_angle(angle, once, phases[0], twice, phases[1])
-    return speed * resolver_error.slope(true, once, phases[0], twice, phases[1])
+    true = true_angle(angle, once, phases[0], twice, phases[1])
+    return speed * resolver_slope(true, once, phases[0], twice, phases[1])
 
 
 @inlined
@@ -78,7 +78,7 @@ def smoothed(
     begin, end = entry(before, output, p), entry(after, output, p)
     bow = travelled(after, output, p) / h - travelled(before, output, p) / h - 0.5 * (begin + end)
     read, ends = reading(begin + bow, angle_before, p), reading(end + bow, angle_after, p)
-    return speed_filter.step(read, ends, filtered, rise, low, h)
+    return filter_step(read, ends, filtered, rise, low, h)
 
 
 @inlined

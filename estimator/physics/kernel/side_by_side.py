@@ -7,20 +7,28 @@ one by one, and so does a linear one: it adds up what it knows.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from estimator.compiled import IS_COMPILED, compiled, inlined
 from estimator.lanes import LANES, as_lanes, borrowed
 from estimator.physics.catalogue import BUILT_IN
+from estimator.physics.effects.timing import LowPass, low_pass
 from estimator.physics.kernel import slots
 from estimator.physics.kernel.bristles import bent, rubbed
-from estimator.physics.kernel.conditions import conditions, is_changing, is_waving, with_torques
-from estimator.physics.kernel.contact import stepped
-from estimator.physics.kernel.feed import begun_feed, fed, is_late
-from estimator.physics.kernel.line import Line, is_bristled, is_elastic
+from estimator.physics.kernel.conditions import (
+    Line,
+    conditions,
+    is_bristled,
+    is_changing,
+    is_elastic,
+    is_waving,
+    with_torques,
+)
+from estimator.physics.kernel.integration import Masses, begun_feed, fed, for_its_make, integrate, is_late, with_mode
 from estimator.physics.kernel.linear import is_linear
-from estimator.physics.kernel.makes import Masses, for_its_make
-from estimator.physics.kernel.rates import read_out
+from estimator.physics.kernel.rates import read_out, stepped
 from estimator.physics.kernel.sensing import reading, shown, smoothed
 from estimator.physics.kernel.state_vector import (
     BRISTLES_LOAD,
@@ -33,7 +41,6 @@ from estimator.physics.kernel.state_vector import (
     unpacked,
 )
 from estimator.physics.layout import slot
-from estimator.physics.low_pass import LowPass, low_pass
 from estimator.signals.record import FloatArray, IntArray
 
 MAKING = np.array(
@@ -235,19 +242,7 @@ def integrate_side_by_side(
     sensor: bool,
     out: FloatArray,
 ) -> None:
-    """Do what ``integration.integrate`` does for some rows, at most `LANES`; their states stay as they are.
-
-    Parameters
-    ----------
-    rows : ndarray of int
-        Which of the K.
-    torque, load : ndarray, shape (T, N) and (L, N)
-        As there, each that drives any of them.
-    fed_by, loaded_by : ndarray of int, shape (K,)
-        Which of these drives each.
-    p, state, out
-        As there, a row each: (K, layout.SIZE), (K, STATES), (K, C, N).
-    """
+    """Do what ``integration.integrate`` does for some rows, at most `LANES`; their states stay as they are."""
     rows, torque, load, angle = borrowed(rows), borrowed(torque), borrowed(load), borrowed(angle)
     fed_by, loaded_by, outputs = borrowed(fed_by), borrowed(loaded_by), borrowed(outputs)
     p, state, out = borrowed(p), borrowed(state), borrowed(out)
@@ -266,3 +261,69 @@ def integrate_side_by_side(
                 value = values[k * count + i, lane]
                 read = value if filtering else reading(value, angle[k], own)
                 out[rows[lane], i, k] = shown(read, value, own) if sensor and i == 0 else value
+
+
+@compiled
+def integrate_each(
+    masses: Masses,
+    own: tuple[Any, ...],
+    sample_time_s: float,
+    substeps: int,
+    sign_width: float,
+    start_s: float,
+    torque: FloatArray,
+    load: FloatArray,
+    fed_by: IntArray,
+    loaded_by: IntArray,
+    angle: FloatArray,
+    p: FloatArray,
+    state: FloatArray,
+    outputs: IntArray,
+    sensor: bool,
+    out: FloatArray,
+    slopes: FloatArray,
+    alike: IntArray,
+) -> None:
+    """Do what ``integrate`` does for every row of ``p``, ``state``, ``out`` and ``slopes``.
+
+    Of shape (K, C, N) is ``out``: N samples of C outputs. Row i is driven by the rows ``fed_by[i]`` of ``torque`` and
+    ``loaded_by[i]`` of ``load``. It is as row 0 before sample ``alike[i]`` and is simulated from about there on;
+    ``alike[0]`` is the number of samples. Rows that are kin go side by side where they can, and leave their states as
+    they were.
+    """
+    given = (sample_time_s, substeps, sign_width)
+    apart = not np.any(alike[1:])
+    order = kin_together(p) if apart else 1 + np.argsort(alike[1:])
+    samples, reached, i = torque.shape[1], 0, 0
+    while i < order.size:
+        rows = order[i : i + LANES]
+        rows = rows[: leading_kin(p, rows)]
+        together = len(own) == 0 and slopes.shape[2] == 0 and go_side_by_side(masses, p, rows)
+        if not together:
+            rows = rows[:1]
+        i += rows.size
+        common = 0 if apart else alike[rows[0]]
+        if common > reached:
+            known = (torque[fed_by[0]], load[loaded_by[0]], angle, p[0], state[0])
+            integrate(masses, own, *given, reached, common, start_s, *known, outputs, sensor, out[0], slopes[0])
+            reached = common
+        if reached > 0:
+            for row in rows:
+                state[row] = state[0]
+                out[row, :, :reached] = out[0, :, :reached]
+                slopes[row, :, : reached + 1] = slopes[0, :, : reached + 1]
+        if together:
+            finest = substeps
+            for row in rows:
+                finest = max(finest, with_mode(substeps, sample_time_s, p[row]))
+            them = (torque, load, fed_by, loaded_by, angle, p, state)
+            integrate_side_by_side(
+                masses, sample_time_s, finest, sign_width, reached, start_s, rows, *them, outputs, sensor, out
+            )
+        else:
+            row = rows[0]
+            it = (torque[fed_by[row]], load[loaded_by[row]], angle, p[row], state[row])
+            integrate(masses, own, *given, reached, samples, start_s, *it, outputs, sensor, out[row], slopes[row])
+    if not apart:
+        rest = (torque[fed_by[0]], load[loaded_by[0]], angle, p[0], state[0])
+        integrate(masses, own, *given, reached, samples, start_s, *rest, outputs, sensor, out[0], slopes[0])

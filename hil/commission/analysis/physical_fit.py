@@ -15,12 +15,11 @@ import numpy as np
 from estimator.diagnosis.assemble import load_torques
 from estimator.diagnosis.intervals import reported_covariance
 from estimator.identification.modes.modes import Mode
-from estimator.physics.effects import coulomb_friction_motor
-from estimator.physics.fit import FitResult
+from estimator.physics.effects.dry_friction import COULOMB_FRICTION_MOTOR
+from estimator.physics.fit import FitResult, best_fit
 from estimator.physics.model import DrivelineModel, Parameter, Structure
 from estimator.physics.motion import torque_scale
 from estimator.physics.problem import make_problem
-from estimator.physics.starts import best_fit
 from estimator.physics.unknowns import Shared
 from estimator.signals.record import Record
 from hil.commission.analysis.measured import TRUSTED, Z95, Measured
@@ -64,7 +63,7 @@ def fit_rigid(records: Sequence[Record], inertia_kg_m2: float) -> PhysicalFit:
         {"J_M": Parameter(inertia_kg_m2, TRUSTED), "b_M": Parameter(FRICTION_RATE * inertia_kg_m2, TRUSTED)},
     )
     scale = 0.05 * torque_scale(records)
-    dry = Shared(coulomb_friction_motor.EFFECT.name, "friction_nm", scale, 0.0, WIDEST, 0.1)
+    dry = Shared(COULOMB_FRICTION_MOTOR.name, "friction_nm", scale, 0.0, WIDEST, 0.1)
     return _fitted([model], records, (dry,))
 
 

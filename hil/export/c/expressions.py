@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from estimator import lanes
-from estimator.physics.kernel.own import under_own
+from estimator.physics.kernel.rates import under_own
 from estimator.signals.record import FloatArray
 from hil.export.c.types import Type, c_name, fields, is_record
 

@@ -9,7 +9,7 @@ import typing
 from collections.abc import Callable
 from typing import Any
 
-from estimator.physics.kernel.declared import SUMS, Sum
+from estimator.physics.kernel.conditions import SUMS, Sum
 from estimator.signals.record import FloatArray
 from hil.export.c.expressions import Expressions, NotTranslatable, Text
 from hil.export.c.types import PRELUDE, Type, c_name, definition, fields, of_hint

@@ -8,9 +8,10 @@ from dataclasses import dataclass, replace
 from estimator.diagnosis.chain import mechanical
 from estimator.diagnosis.segments import tiles
 from estimator.physics.catalogue import EFFECTS
+from estimator.physics.driveline import Case
 from estimator.physics.free_run import settle
 from estimator.physics.grid import Grid, substeps_for
-from estimator.physics.inputs import Case, load_of
+from estimator.physics.inputs import load_of
 from estimator.physics.kernel.integration import with_mode
 from estimator.physics.layout import LOAD, flat, slot
 from estimator.physics.model import DrivelineModel, Motion, Structure

@@ -6,18 +6,19 @@ import math
 import re
 from importlib import resources
 
-from estimator.physics import low_pass, start, torque_path
-from estimator.physics.effects import actuator_lag
-from estimator.physics.kernel import bristles, conditions, contact, line, rates, sensing, slots, state_vector
+from estimator.physics import inputs
+from estimator.physics.effects.timing import FASTEST_S, lag_step, low_pass
+from estimator.physics.kernel import bristles, conditions, rates, sensing, slots, state_vector
 from estimator.physics.layout import SIZE, slot
 from hil.export.c.translation import Translation
 from hil.export.fmu import variables as places
 from hil.export.fmu.driveline import Driveline
 
 USED = (
-    conditions.conditions, conditions.with_torque, line.is_elastic, line.is_extended, line.is_bristled, bristles.bent,
-    bristles.rubbed, contact.stepped, rates.rates, rates.shaft_torques, sensing.entry, sensing.reading,
-    sensing.read_angle, sensing.smoothed, sensing.shown, low_pass.low_pass, actuator_lag.step, start.follow,
+    conditions.conditions, conditions.with_torque, conditions.is_elastic, conditions.is_extended,
+    conditions.is_bristled, bristles.bent, bristles.rubbed, rates.stepped, rates.rates, rates.shaft_torques,
+    sensing.entry, sensing.reading, sensing.read_angle, sensing.smoothed, sensing.shown, low_pass, lag_step,
+    inputs.follow,
 )  # fmt: skip
 """What driveline.c calls; what these call comes along."""
 
@@ -44,7 +45,7 @@ def laws() -> str:
     unit = Translation()
     for function in USED:
         unit.function(function)
-    unit.function(torque_path.limited, of_one_number=True)
+    unit.function(inputs.limited, of_one_number=True)
     head = "/* The laws of hil, translated from Python. The functions are named after their module. */\n"
     torque = _torque_laws(unit)  # before the text: it asks for functions
     return head + unit.text() + torque
@@ -53,7 +54,7 @@ def laws() -> str:
 def _torque_laws(unit: Translation) -> str:
     """Return the C function of the laws that entries declare for the torque, one behind the other."""
     lines = ["static double laws_torque(double torque, double time_s, Array p) {"]
-    for law, at, null in torque_path.DECLARED:
+    for law, at, null in inputs.DECLARED:
         name, _ = unit.function(law, of_one_number=True)
         values = ", ".join(["torque", "time_s", *(f"p.at[{place}]" for place in at)])
         lines.append(f"    if (p.at[{at[0]}] != {_number(null)}) torque = {name}({values});")
@@ -74,7 +75,7 @@ def model_header(d: Driveline, token: str) -> str:
         "PARAMETERS": SIZE,
         "VALUES": places.VALUES,
         "WARMTH": places.WARMTH,
-        "FASTEST_S": actuator_lag.FASTEST_S,
+        "FASTEST_S": FASTEST_S,
         "CONTINUOUS_COUNT": len(continuous),
         "CONTINUOUS_STATES": ", ".join(map(str, continuous)),
         **{name: i for i, name in enumerate(places.NAMED)},

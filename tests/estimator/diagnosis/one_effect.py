@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from estimator.diagnosis.hypotheses import everything
+from estimator.physics.driveline import Start
 from estimator.physics.grid import grid_for
 from estimator.physics.layout import flat_values
 from estimator.physics.model import DrivelineModel
 from estimator.physics.simulate import simulate
-from estimator.physics.start import Start
 from estimator.signals.record import BoolArray, FloatArray, Record
 from tests.estimator.diagnosis.planted import SIGMA, drive_torque
 from tests.estimator.physics.bench import TWO_MASS, model, random_steps, record

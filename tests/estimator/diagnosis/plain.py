@@ -9,11 +9,10 @@ from estimator.diagnosis.hypotheses import NOTHING, Effects
 from estimator.diagnosis.inherit import kept
 from estimator.diagnosis.screening import Screen, promising
 from estimator.physics.catalogue import EFFECTS
-from estimator.physics.fit import FitResult, fit, make_problem
+from estimator.physics.fit import FitResult, best_fit, fit, make_problem
 from estimator.physics.grid import Grid
 from estimator.physics.model import DrivelineModel
 from estimator.physics.problem import Problem
-from estimator.physics.starts import best_fit
 from estimator.physics.unknowns import Release, nominal_unknowns
 from estimator.signals.record import BoolArray, Record
 

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from estimator.physics.driveline import Start
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult, fit
 from estimator.physics.problem import make_problem
-from estimator.physics.start import Start
 from estimator.physics.unknowns import nominal_unknowns
 from estimator.signals.record import FloatArray, Record
 from tests.estimator.physics.bench import (

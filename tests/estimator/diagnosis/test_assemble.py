@@ -25,11 +25,11 @@ from estimator.diagnosis.hypotheses import NOTHING, everything
 from estimator.diagnosis.intervals import Z95, interval, interval_both_ways, reported_covariance
 from estimator.diagnosis.result import Evidence, FoundEffect
 from estimator.physics.catalogue import EFFECTS, effect_problems
+from estimator.physics.driveline import Start
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult
 from estimator.physics.free_run import free_run
 from estimator.physics.model import EffectValue, Motion
-from estimator.physics.start import Start
 from estimator.physics.unknowns import Shared
 from estimator.signals.correlation import effective_samples
 from estimator.signals.record import FloatArray, Record

@@ -10,13 +10,12 @@ import pytest
 from estimator.diagnosis.black_box import BlackBox
 from estimator.diagnosis.equivalent_line import equivalent_line
 from estimator.diagnosis.hypotheses import open_hypotheses
+from estimator.physics.driveline import Case, Start
 from estimator.physics.free_run import free_run
 from estimator.physics.grid import grid_for
-from estimator.physics.inputs import Case
 from estimator.physics.layout import flat, slot
 from estimator.physics.model import DrivelineModel, Parameter, Structure
 from estimator.physics.simulate import simulate, simulate_each
-from estimator.physics.start import Start
 from estimator.signals.record import FloatArray, Record
 from tests.estimator.physics.bench import ONE_MASS, TWO_MASS, random_steps, record
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from estimator.diagnosis.preconditions.channels import with_usable_channels
-from estimator.physics.start import Start
+from estimator.physics.driveline import Start
 from estimator.signals.record import Channel, FloatArray, Location, OutputKind, Record
 from tests.estimator.physics.bench import ANGLE, LOAD_SPEED, SPEED, TWO_MASS, exact_states, random_steps, record
 

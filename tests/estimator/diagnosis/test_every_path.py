@@ -17,11 +17,11 @@ import pyarrow.parquet
 import pytest
 
 from estimator.diagnosis.diagnose import diagnose
+from estimator.physics.driveline import Start
 from estimator.physics.grid import grid_for
 from estimator.physics.layout import flat_values
 from estimator.physics.model import Structure
 from estimator.physics.simulate import simulate
-from estimator.physics.start import Start
 from estimator.signals.record import FloatArray, Location, OutputKind
 from hil.config.model_file import read_model_for_recordings
 from hil.recording import read_records

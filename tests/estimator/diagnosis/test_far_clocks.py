@@ -10,11 +10,11 @@ import pytest
 
 from estimator.diagnosis.hypotheses import NOTHING, everything
 from estimator.diagnosis.screening import Screen, promising
+from estimator.physics.driveline import Start
 from estimator.physics.grid import grid_for
 from estimator.physics.layout import flat_values
 from estimator.physics.model import DrivelineModel, natural_frequencies_rad_s
 from estimator.physics.simulate import simulate
-from estimator.physics.start import Start
 from estimator.signals.record import Record
 from tests.estimator.diagnosis.plain import Bench
 from tests.estimator.physics.bench import SAMPLE_TIME_S, TWO_MASS, model, random_steps, record, scaled

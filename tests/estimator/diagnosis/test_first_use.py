@@ -14,7 +14,8 @@ import pytest
 from estimator.diagnosis import diagnose, first_use
 from estimator.diagnosis.first_use import COMPILING, is_first_use, signatures
 from estimator.physics.effect import Element
-from estimator.physics.own_law import OwnLaw, OwnParameter, named
+from estimator.physics.layout import named
+from estimator.physics.own_law import OwnLaw, OwnParameter
 from tests.estimator.diagnosis.planted import quiet
 from tests.estimator.physics.bench import ONE_MASS, model
 
@@ -36,7 +37,7 @@ for kernel in signatures(2):
 FOUND_KEPT = """
 from pathlib import Path
 from estimator.diagnosis.first_use import is_first_use
-from estimator.physics.kernel.many import integrate_each
+from estimator.physics.kernel.side_by_side import integrate_each
 here = Path(integrate_each.stats.cache_path)
 for place in (here.with_name("kernel_of_another_installation"), here):
     print(is_first_use(2))

@@ -7,9 +7,9 @@ import pytest
 
 from estimator.diagnosis.holdout import BLOCK_S, EVERY_S, blocks, foreign_outputs
 from estimator.diagnosis.hypotheses import NOTHING, Effects, everything
-from estimator.physics.effects.road_grade import KNOT_SPACING_S
+from estimator.physics.driveline import Start
+from estimator.physics.effects.load import KNOT_SPACING_S
 from estimator.physics.fit import FitResult
-from estimator.physics.start import Start
 from estimator.signals.record import Record
 from tests.estimator.diagnosis.plain import Bench
 from tests.estimator.diagnosis.planted import SIGMA, drive_torque, rubbing

@@ -8,9 +8,9 @@ import numpy as np
 
 from estimator.diagnosis.hypotheses import everything, open_hypotheses, with_effect
 from estimator.physics.catalogue import EFFECTS
+from estimator.physics.driveline import Start
 from estimator.physics.effect import Element
 from estimator.physics.model import Motion, Structure
-from estimator.physics.start import Start
 from estimator.signals.record import OutputKind
 from tests.estimator.diagnosis.planted import quiet
 from tests.estimator.physics.bench import ONE_MASS, TWO_MASS, linear_record, model, random_steps

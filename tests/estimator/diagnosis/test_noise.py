@@ -9,7 +9,7 @@ import pytest
 
 from estimator.diagnosis.noise import PREDICTOR_ORDER, noise_floor, unpredictable
 from estimator.errors import NotExciting
-from estimator.physics.start import Start
+from estimator.physics.driveline import Start
 from estimator.signals.record import Record
 from tests.estimator.diagnosis.regression import autoregressive
 from tests.estimator.physics.bench import TWO_MASS, linear_record, random_steps

@@ -11,7 +11,7 @@ from estimator.diagnosis import diagnose
 from estimator.diagnosis.preconditions import FEWEST_SAMPLES, prepare
 from estimator.diagnosis.result import Verdict
 from estimator.errors import BadModel, BadShape, NotExciting
-from estimator.physics.start import Start
+from estimator.physics.driveline import Start
 from estimator.signals.record import Location, OutputKind, Record
 from tests.estimator.physics.bench import ONE_MASS, linear_record, model, random_steps
 

@@ -11,7 +11,7 @@ from estimator.diagnosis.preconditions import prepare
 from estimator.diagnosis.preconditions.exciting import require_excitation
 from estimator.diagnosis.preconditions.model_values import model_warnings
 from estimator.errors import NotExciting
-from estimator.physics.start import Start
+from estimator.physics.driveline import Start
 from estimator.signals.record import Record
 from tests.estimator.physics.bench import ONE_MASS, TWO_MASS, linear_record, model, random_steps, record, scaled
 

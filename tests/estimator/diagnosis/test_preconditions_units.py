@@ -13,9 +13,9 @@ from estimator.diagnosis.preconditions.factors import close_factors
 from estimator.diagnosis.preconditions.inertia import as_one_body, fitted_inertia
 from estimator.diagnosis.preconditions.units import BEYOND, require_plausible_units
 from estimator.errors import Implausible
+from estimator.physics.driveline import Start
 from estimator.physics.effect import Element
 from estimator.physics.grid import grid_for
-from estimator.physics.start import Start
 from estimator.signals.record import FloatArray, OutputKind, Record
 from tests.estimator.diagnosis.planted import Moved, recordings, rubbing
 from tests.estimator.physics.bench import ONE_MASS, TWO_MASS, linear_record, model, random_steps, scaled

@@ -11,10 +11,10 @@ import pytest
 
 from estimator.diagnosis.hypotheses import NOTHING, everything
 from estimator.diagnosis.screening import Look, Screen, promising
+from estimator.physics.driveline import Start
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult
 from estimator.physics.model import DrivelineModel
-from estimator.physics.start import Start
 from estimator.physics.unknowns import Release, Shared
 from estimator.signals.record import Record
 from tests.estimator.diagnosis.plain import Bench

@@ -16,7 +16,7 @@ from estimator.diagnosis.preconditions import prepare
 from estimator.diagnosis.result import Course, Discrepancy, Equivalent, Estimated, Profile, Response, Verdict
 from estimator.diagnosis.segments import FEWEST_SAMPLES, LONG_S, LONG_SAMPLES, cut, segments, tiles
 from estimator.errors import NotExciting
-from estimator.physics.start import Start
+from estimator.physics.driveline import Start
 from estimator.signals.part import sliced
 from estimator.signals.record import Record
 from tests.estimator.physics.bench import ONE_MASS, SAMPLE_TIME_S, linear_record, model, random_steps

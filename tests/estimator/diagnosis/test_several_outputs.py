@@ -14,12 +14,12 @@ from estimator.diagnosis.preconditions.channels import with_usable_channels
 from estimator.diagnosis.preconditions.thinned import as_slow_as_needed
 from estimator.diagnosis.result import Verdict
 from estimator.errors import BadModel
+from estimator.physics.driveline import Start
 from estimator.physics.fit import fit
 from estimator.physics.grid import grid_for
 from estimator.physics.layout import flat_values
 from estimator.physics.problem import make_problem
 from estimator.physics.simulate import simulate
-from estimator.physics.start import Start
 from estimator.physics.unknowns import nominal_unknowns
 from estimator.signals.outputs import outputs_apart
 from estimator.signals.part import sliced

@@ -16,11 +16,11 @@ from estimator.diagnosis.preconditions.thinned import (
     thinned,
 )
 from estimator.diagnosis.stretches import MOST_SAMPLES
+from estimator.physics.driveline import Start
 from estimator.physics.grid import grid_for
 from estimator.physics.layout import flat
 from estimator.physics.model import DrivelineModel, Parameter, Structure
 from estimator.physics.simulate import simulate
-from estimator.physics.start import Start
 from estimator.signals.record import OutputKind
 from tests.estimator.diagnosis.plain import Bench
 from tests.estimator.physics.bench import TWO_MASS, model, random_steps, record

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from estimator.physics.driveline import Start
 from estimator.physics.effect import Element
-from estimator.physics.start import Start
 from tests.estimator.diagnosis.planted import SIGMA, disturbed, quiet, rubbing_speed
 from tests.estimator.physics.bench import ONE_MASS, SAMPLE_TIME_S, SPEED, TWO_MASS, exact_states, random_steps
 

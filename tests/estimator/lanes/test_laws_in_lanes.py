@@ -11,14 +11,10 @@ import numpy as np
 import pytest
 
 from estimator.physics import laws
-from estimator.physics.effects import (
-    backlash,
-    shaft_hysteresis,
-    stiffness_nonlinearity,
-    stribeck_friction,
-    tyre_slip,
-    warming_friction,
-)
+from estimator.physics.effects.drag import cold_part, quadratic_law
+from estimator.physics.effects.dry_friction import stribeck_law
+from estimator.physics.effects.load import carcass, coupling, gripped
+from estimator.physics.effects.shaft import damping_share, loading_rate, pressed, stiffness_factor
 from tests.estimator.lanes.bench import in_both_ways
 
 EITHER_SIDE = (-25.0, -0.7, -0.01, 0.0, 0.3, 0.625, 1.0, 45.0)
@@ -26,11 +22,11 @@ SIZES = (0.0, 1e-3, 0.4, 1.0, 3.0, 50.0)
 
 
 def _slope(vehicle: float, slip: float, creep: float, wheel: float, steepest: float) -> float:
-    return tyre_slip.coupling(vehicle, slip, creep, wheel, steepest)[0]
+    return coupling(vehicle, slip, creep, wheel, steepest)[0]
 
 
 def _share(vehicle: float, slip: float, creep: float, wheel: float, steepest: float) -> float:
-    return tyre_slip.coupling(vehicle, slip, creep, wheel, steepest)[1]
+    return coupling(vehicle, slip, creep, wheel, steepest)[1]
 
 
 LAWS: list[tuple[Callable[..., Any], Sequence[Sequence[float]]]] = [
@@ -43,16 +39,17 @@ LAWS: list[tuple[Callable[..., Any], Sequence[Sequence[float]]]] = [
     (laws.inertia_while, [(1.0, 30.0), (-0.2, 5.0), (0.0, 0.4, 1.0)]),
     (laws.overtoned_wave, [SIZES, EITHER_SIDE, (0.0, 2.0), (0.0, 0.3), (0.0, -0.2)]),
     (laws.wave, [SIZES, EITHER_SIDE, (0.0, 2.0)]),
-    (backlash.damping_share, [EITHER_SIDE, SIZES]),
-    (backlash.pressed, [EITHER_SIDE, EITHER_SIDE, (0.0, 0.5, 1.0)]),
-    (shaft_hysteresis.loading_rate, [(-1.2, -0.5, 0.0, 0.9), EITHER_SIDE, (0.3, 2.0), (0.0, 0.8), (5.0, 600.0)]),
-    (stiffness_nonlinearity.factor, [EITHER_SIDE, (-2.0, 0.0, 30.0), (0.5, 1.0, 2.0)]),
-    (stribeck_friction.law, [EITHER_SIDE, (0.0, 4.0), (3.0,), (0.0, 0.5, 2.0), (0.01, 0.5)]),
-    (tyre_slip.carcass, [EITHER_SIDE, EITHER_SIDE, (3.0,), (0.2, 5.0)]),
-    (tyre_slip.gripped, [EITHER_SIDE, (2.0,), (0.0, 0.5)]),
+    (damping_share, [EITHER_SIDE, SIZES]),
+    (quadratic_law, [EITHER_SIDE, (0.0, 3.0), (1.7, 2.0, 2.1), (0.5, 40.0)]),
+    (pressed, [EITHER_SIDE, EITHER_SIDE, (0.0, 0.5, 1.0)]),
+    (loading_rate, [(-1.2, -0.5, 0.0, 0.9), EITHER_SIDE, (0.3, 2.0), (0.0, 0.8), (5.0, 600.0)]),
+    (stiffness_factor, [EITHER_SIDE, (-2.0, 0.0, 30.0), (0.5, 1.0, 2.0)]),
+    (stribeck_law, [EITHER_SIDE, (0.0, 4.0), (3.0,), (0.0, 0.5, 2.0), (0.01, 0.5)]),
+    (carcass, [EITHER_SIDE, EITHER_SIDE, (3.0,), (0.2, 5.0)]),
+    (gripped, [EITHER_SIDE, (2.0,), (0.0, 0.5)]),
     (_slope, [EITHER_SIDE, (1e-3, 0.2), (0.1, 4.0), (0.005, 0.3), (5.0, 400.0)]),
     (_share, [EITHER_SIDE, (1e-3, 0.2), (0.1, 4.0), (0.005, 0.3), (5.0, 400.0)]),
-    (warming_friction.cold_part, [(0.0, 3.0, 600.0), SIZES, (20.0, 300.0)]),
+    (cold_part, [(0.0, 3.0, 600.0), SIZES, (20.0, 300.0)]),
 ]
 
 

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 import numpy as np
 from scipy.signal import cont2discrete
 
+from estimator.physics.driveline import Start
 from estimator.physics.model import DrivelineModel, EffectValue, Motion, Parameter, Structure
-from estimator.physics.start import Start
 from estimator.signals.record import BoolArray, FloatArray, Location, OutputKind, Record
 
 SAMPLE_TIME_S = 0.01

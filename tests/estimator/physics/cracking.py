@@ -6,13 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from estimator.physics.driveline import Start
 from estimator.physics.fit import FitResult, fit
 from estimator.physics.grid import grid_for
 from estimator.physics.layout import flat, slot
 from estimator.physics.model import DrivelineModel
 from estimator.physics.problem import make_problem
 from estimator.physics.simulate import simulate
-from estimator.physics.start import Start
 from estimator.physics.unknowns import Shared, effect_unknowns, nominal_unknowns
 from estimator.signals.record import Record
 from tests.estimator.physics.bench import TWO_MASS, model, random_steps, record

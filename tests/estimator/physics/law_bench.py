@@ -6,10 +6,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from estimator.physics.driveline import Start
 from estimator.physics.grid import Grid
 from estimator.physics.layout import flat_values
 from estimator.physics.simulate import simulate
-from estimator.physics.start import Start
 from estimator.signals.record import FloatArray, Record
 from tests.estimator.physics import reference
 from tests.estimator.physics.bench import SAMPLE_TIME_S, TWO_MASS, model, random_steps, record

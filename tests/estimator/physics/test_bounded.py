@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
-from estimator.physics import bounded
-from estimator.physics.bounded import least_inside, least_of_quadratic, unbounded_first
+from estimator.physics import least_squares as bounded
+from estimator.physics.least_squares import least_inside, least_of_quadratic, unbounded_first
 
 UNKNOWNS = 8
 NO_BOUND = np.full(UNKNOWNS, np.inf)

@@ -13,16 +13,15 @@ import numpy as np
 import pytest
 
 from estimator.diagnosis.hypotheses import open_hypotheses
-from estimator.physics import torque_path
-from estimator.physics.acting import Place
+from estimator.physics import inputs as torque_path
 from estimator.physics.catalogue import EFFECTS
-from estimator.physics.effect import Effect, Element, Held
+from estimator.physics.driveline import Start
+from estimator.physics.effect import Effect, Element, Held, Place
 from estimator.physics.grid import grid_for
 from estimator.physics.kernel import slots
 from estimator.physics.layout import flat, flat_values, slot
 from estimator.physics.model import Motion, Structure
 from estimator.physics.simulate import simulate
-from estimator.physics.start import Start
 from estimator.signals.record import FloatArray, OutputKind, Record
 from tests.estimator.physics.bench import TWO_MASS, assert_same_to_rounding, linear_record, model, random_steps, record
 
@@ -246,7 +245,7 @@ def test_every_entry_has_its_law_in_the_simulation(entry: Effect) -> None:
     missing = [each.name for each in entry.parameters if slot(entry.name, each.name) not in taken]
     assert entry.acting is not None or not missing, (
         f"{entry.name}: the simulation does not read {', '.join(missing)}. Give the entry acting=Acting(place, law) "
-        "(estimator/physics/acting.py), or a place in estimator/physics/kernel/slots.py and the law that reads it."
+        "(estimator/physics/effect.py), or a place in estimator/physics/kernel/slots.py and the law that reads it."
     )
 
 

@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from estimator.physics.driveline import Start
 from estimator.physics.grid import Grid, grid_for
-from estimator.physics.kernel.contact import met
+from estimator.physics.kernel.rates import met
 from estimator.physics.layout import flat
 from estimator.physics.model import DrivelineModel
 from estimator.physics.simulate import simulate
-from estimator.physics.start import Start
 from estimator.signals.record import FloatArray
 from tests.estimator.physics.bench import TWO_MASS, model, random_steps, record
 

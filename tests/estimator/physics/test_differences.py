@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from estimator.physics.differences import fill_differences
+from estimator.physics.jacobian import fill_differences
 
 STEPS = np.array([1e-5, -1e-5])
 

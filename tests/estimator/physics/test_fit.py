@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from estimator.physics.driveline import Start
 from estimator.physics.fit import fit
 from estimator.physics.jacobian import jacobian_at
 from estimator.physics.layout import flat
@@ -23,7 +24,6 @@ from estimator.physics.problem import (
     start_of,
     start_vector,
 )
-from estimator.physics.start import Start
 from estimator.physics.unknowns import Shared, nominal_unknowns
 from estimator.signals.record import Location, OutputKind, Record
 from tests.estimator.physics.bench import (

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from estimator.errors import BadModel
+from estimator.physics.driveline import Start
 from estimator.physics.fit import fit
 from estimator.physics.free_run import free_run
 from estimator.physics.grid import grid_for
 from estimator.physics.layout import flat
 from estimator.physics.problem import make_problem
 from estimator.physics.simulate import simulate
-from estimator.physics.start import Start
 from estimator.signals.record import Location, OutputKind
 from tests.estimator.physics.bench import ONE_MASS, TWO_MASS, linear_record, model, random_steps, record, scaled
 

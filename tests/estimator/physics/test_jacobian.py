@@ -9,7 +9,7 @@ import pytest
 
 from estimator.lanes import LANES
 from estimator.physics import simulate as simulate_module
-from estimator.physics import together as together_module
+from estimator.physics import simulate as together_module
 from estimator.physics.grid import Grid
 from estimator.physics.jacobian import changes, jacobian_at
 from estimator.physics.model import DrivelineModel

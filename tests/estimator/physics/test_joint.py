@@ -11,6 +11,7 @@ from scipy.integrate import solve_ivp
 
 from estimator.errors import BadModel, BadShape
 from estimator.physics import joint
+from estimator.physics.driveline import Start
 from estimator.physics.fit import fit
 from estimator.physics.grid import grid_for
 from estimator.physics.kernel import state_vector
@@ -25,7 +26,6 @@ from estimator.physics.model import (
 from estimator.physics.motion import motor_angle
 from estimator.physics.problem import make_problem
 from estimator.physics.simulate import output_state, simulate
-from estimator.physics.start import Start
 from estimator.physics.unknowns import nominal_unknowns
 from estimator.signals.record import FloatArray, OutputKind, Record
 

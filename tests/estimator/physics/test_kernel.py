@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from estimator.physics.driveline import Start
 from estimator.physics.grid import Grid, grid_for
 from estimator.physics.kernel import conditions, state_vector
 from estimator.physics.layout import flat
 from estimator.physics.simulate import simulate
-from estimator.physics.start import Start
 from estimator.signals.record import FloatArray, Location, OutputKind
 from tests.estimator.physics.bench import (
     ONE_MASS,

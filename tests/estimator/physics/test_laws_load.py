@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from estimator.physics.driveline import Start
 from estimator.physics.grid import Grid, grid_for
 from estimator.physics.kernel.state_vector import LOAD_SPEED
 from estimator.physics.layout import flat_values
 from estimator.physics.simulate import simulate
-from estimator.physics.start import Start
 from estimator.signals.record import FloatArray
 from tests.estimator.physics import reference
 from tests.estimator.physics.bench import SAMPLE_TIME_S, TWO_MASS, model

@@ -7,12 +7,12 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from estimator.physics.driveline import Start
 from estimator.physics.grid import Grid
 from estimator.physics.kernel import state_vector
 from estimator.physics.layout import flat_values
 from estimator.physics.model import Structure
 from estimator.physics.simulate import simulate
-from estimator.physics.start import Start
 from estimator.signals.record import FloatArray
 from tests.estimator.physics import reference
 from tests.estimator.physics.bench import ONE_MASS, SAMPLE_TIME_S, THREE_MASS

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from estimator.physics.inputs import limited, recorded_shaft_torque, shaft_torque, shaft_torque_from
 from estimator.physics.layout import flat_values
-from estimator.physics.torque_path import limited, recorded_shaft_torque, shaft_torque, shaft_torque_from
 from estimator.signals.record import FloatArray, Record
 from tests.estimator.physics import reference
 from tests.estimator.physics.bench import SAMPLE_TIME_S, TWO_MASS, random_steps

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from estimator.physics.catalogue import BUILT_IN
+from estimator.physics.driveline import Start
 from estimator.physics.grid import Grid
 from estimator.physics.kernel import linear, state_vector
-from estimator.physics.kernel.line import Line
+from estimator.physics.kernel.conditions import Line
 from estimator.physics.layout import flat, slot
 from estimator.physics.model import DrivelineModel, EffectValue, Parameter, Structure
 from estimator.physics.simulate import simulate
-from estimator.physics.start import Start
 from estimator.signals.record import FloatArray
 from tests.estimator.physics.bench import (
     ONE_MASS,

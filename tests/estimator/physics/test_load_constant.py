@@ -10,10 +10,10 @@ import pytest
 from estimator.diagnosis.assemble import load_torques
 from estimator.diagnosis.hypotheses import open_hypotheses
 from estimator.errors import BadModel
+from estimator.physics.driveline import Start
 from estimator.physics.fit import FitResult, fit, make_problem
 from estimator.physics.free_run import free_run
 from estimator.physics.model import DrivelineModel, Load
-from estimator.physics.start import Start
 from estimator.physics.unknowns import nominal_unknowns
 from estimator.signals.record import Record
 from tests.estimator.physics.bench import TWO_MASS, linear_record, model, random_steps

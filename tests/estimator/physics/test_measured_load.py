@@ -10,11 +10,11 @@ import pytest
 from estimator.diagnosis.preconditions.thinned import thin
 from estimator.diagnosis.preconditions.units import require_plausible_units
 from estimator.errors import BadShape, Implausible
+from estimator.physics.driveline import Start
 from estimator.physics.free_run import free_run
 from estimator.physics.grid import grid_for
 from estimator.physics.layout import flat_values
 from estimator.physics.simulate import simulate
-from estimator.physics.start import Start
 from estimator.signals.part import sliced
 from estimator.signals.record import Location, Record
 from tests.estimator.physics.bench import ONE_MASS, TWO_MASS, linear_record, model, random_steps

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
-from estimator.physics.projector import Projector
+from estimator.physics.own_scan import Projector
 from tests.estimator.diagnosis.regression import regression
 
 SAMPLES = 400

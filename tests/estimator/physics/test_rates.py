@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from estimator.physics.fit import FitResult, fit
+from estimator.physics.driveline import Start
+from estimator.physics.fit import FitResult, fit, rates
 from estimator.physics.model import DrivelineModel, Parameter, Structure
 from estimator.physics.problem import make_problem
-from estimator.physics.rates import rates
-from estimator.physics.start import Start
 from estimator.physics.unknowns import nominal_unknowns
 from estimator.signals.record import FloatArray, OutputKind, Record
 from tests.estimator.physics.bench import ONE_MASS, SAMPLE_TIME_S, linear_record, model, random_steps

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from estimator.physics.catalogue import EFFECTS
+from estimator.physics.driveline import Start
 from estimator.physics.effect import Held
 from estimator.physics.fit import FitResult, fit
 from estimator.physics.grid import Grid, grid_for
@@ -19,7 +20,6 @@ from estimator.physics.layout import flat_values
 from estimator.physics.model import Parameter
 from estimator.physics.problem import make_problem, start_vector
 from estimator.physics.simulate import simulate
-from estimator.physics.start import Start
 from estimator.physics.unknowns import Release, Shared, effect_unknowns, nominal_unknowns
 from estimator.signals.record import FloatArray, Record
 from tests.estimator.physics.bench import TWO_MASS, model, random_steps, record, scaled

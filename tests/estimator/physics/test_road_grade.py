@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from estimator.physics.effects import road_grade
+from estimator.physics.effects.load import DEGREE, KNOT_SPACING_S, grade_basis
 
 
 class TestRoadGradeBasis:
@@ -12,18 +12,18 @@ class TestRoadGradeBasis:
 
     def test_with_the_first_spline_they_would_sum_to_one(self) -> None:
         """A cubic B-spline over [0, d] that starts the partition of unity is (1 - t/d)^3."""
-        first = np.maximum(1.0 - self.TIME_S / road_grade.KNOT_SPACING_S, 0.0) ** 3
-        np.testing.assert_allclose(road_grade.basis(self.TIME_S).sum(axis=0) + first, 1.0, atol=1e-12)
+        first = np.maximum(1.0 - self.TIME_S / KNOT_SPACING_S, 0.0) ** 3
+        np.testing.assert_allclose(grade_basis(self.TIME_S).sum(axis=0) + first, 1.0, atol=1e-12)
 
     def test_with_a_constant_it_reproduces_every_cubic(self) -> None:
         t = self.TIME_S / 20.0
-        design = np.vstack([np.ones_like(t), road_grade.basis(self.TIME_S)]).T
+        design = np.vstack([np.ones_like(t), grade_basis(self.TIME_S)]).T
         cubic = 3.0 - 2.0 * t + 5.0 * t**2 - 4.0 * t**3
         left = cubic - design @ np.linalg.lstsq(design, cubic, rcond=None)[0]
         np.testing.assert_allclose(left, 0.0, atol=1e-10)
 
     def test_a_smooth_road_is_followed_and_a_step_is_not(self) -> None:
-        design = np.vstack([np.ones_like(self.TIME_S), road_grade.basis(self.TIME_S)]).T
+        design = np.vstack([np.ones_like(self.TIME_S), grade_basis(self.TIME_S)]).T
         hill = np.sin(2 * np.pi * self.TIME_S / 15.0)
         step = np.where(self.TIME_S > 9.0, 1.0, -1.0)
         left = [profile - design @ np.linalg.lstsq(design, profile, rcond=None)[0] for profile in (hill, step)]
@@ -31,11 +31,11 @@ class TestRoadGradeBasis:
         assert np.sqrt(np.mean(left[1] ** 2)) > 0.1
 
     def test_it_has_a_spline_per_knot_spacing_and_is_local(self) -> None:
-        splines = road_grade.basis(self.TIME_S)
-        assert splines.shape == (10 + road_grade.DEGREE - 1, self.TIME_S.size)
-        assert np.all((splines > 0).sum(axis=1) <= 4 * road_grade.KNOT_SPACING_S / 0.01 + 1)
+        splines = grade_basis(self.TIME_S)
+        assert splines.shape == (10 + DEGREE - 1, self.TIME_S.size)
+        assert np.all((splines > 0).sum(axis=1) <= 4 * KNOT_SPACING_S / 0.01 + 1)
 
     def test_it_can_be_evaluated_elsewhere_and_is_held_outside(self) -> None:
-        splines = road_grade.basis(self.TIME_S + 100.0, np.array([99.0, 100.0, 107.5, 120.0, 130.0]))
-        whole = road_grade.basis(self.TIME_S)
+        splines = grade_basis(self.TIME_S + 100.0, np.array([99.0, 100.0, 107.5, 120.0, 130.0]))
+        whole = grade_basis(self.TIME_S)
         np.testing.assert_allclose(splines, whole[:, [0, 0, 750, 2000, 2000]], atol=1e-12)

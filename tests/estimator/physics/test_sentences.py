@@ -9,7 +9,7 @@ import pytest
 
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Effect
-from estimator.physics.effects.stiffness_nonlinearity import factor
+from estimator.physics.effects.shaft import stiffness_factor
 from estimator.physics.model import Motion
 
 # What each sentence is given, and the numbers that must stand in it; the rest is reported in the table alone.
@@ -118,4 +118,4 @@ def test_the_stiffness_has_changed_by_a_tenth_at_the_twist_reported(hardening: f
     said = EFFECTS["stiffness_nonlinearity"].sentence(values, Motion.ROTATION)
     (number,) = re.findall(r"at ([0-9.]+) rad", said)
     assert word in said
-    assert factor(float(number), hardening, shape) == pytest.approx(1.1 if hardening > 0 else 0.9, rel=1e-3)
+    assert stiffness_factor(float(number), hardening, shape) == pytest.approx(1.1 if hardening > 0 else 0.9, rel=1e-3)

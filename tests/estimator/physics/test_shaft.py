@@ -5,9 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from estimator.physics.effects.backlash import damping_share
-from estimator.physics.effects.shaft_hysteresis import loading_rate
-from estimator.physics.effects.stiffness_nonlinearity import factor
+from estimator.physics.effects.shaft import damping_share, loading_rate, stiffness_factor
 from estimator.physics.kernel import rates, slots
 from estimator.physics.laws import beyond_gap, inertia_while, share_inside, smooth_sign
 from estimator.physics.layout import flat_values
@@ -36,7 +34,7 @@ def test_the_slope_at_zero_twist_is_the_stiffness(hardening: float, shape: float
 @pytest.mark.parametrize("shape", [0.5, 1.0, 3.0])
 def test_to_first_order_the_stiffness_changes_by_h_times_the_twist_squared(shape: float) -> None:
     for sign in (1.0, -1.0):
-        assert (factor(1e-3, sign * 50.0, shape) - 1.0) / 1e-6 == pytest.approx(sign * 50.0, rel=1e-3)
+        assert (stiffness_factor(1e-3, sign * 50.0, shape) - 1.0) / 1e-6 == pytest.approx(sign * 50.0, rel=1e-3)
 
 
 def test_hardening_of_shape_one_is_the_duffing_spring() -> None:
@@ -92,6 +90,14 @@ def test_faces_press_and_pull_as_much_as_the_oil_between_them(side: float, pull:
     assert spring < damping
     assert shaft_torque(side * 0.021, side * 5.0, p) == pytest.approx(side * (spring + damping), rel=1e-3)
     assert shaft_torque(side * 0.021, side * -5.0, p) == pytest.approx(side * pull * (spring - damping), rel=1e-3)
+
+
+@pytest.mark.parametrize("across", [0.4, 1.0])
+def test_a_damper_across_the_gap_acts_in_it_and_the_faces_have_the_rest(across: float) -> None:
+    values = {"gap_rad": 0.04, "contact_rad": 1e-5, "pull": 0.0, "across": across}
+    p, damping = flat_values(TWO_MASS, {"backlash": values}), 5.0 * TWO_MASS["c"]
+    assert shaft_torque(0.01, 5.0, p) == pytest.approx(across * damping)
+    assert shaft_torque(0.05, 5.0, p) == pytest.approx(0.03 * TWO_MASS["k"] + damping)
 
 
 @pytest.mark.parametrize(("twist", "share"), [(0.0, 0.0), (1e-9, 1.0), (-0.3, 1.0)])

@@ -8,14 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from estimator.physics.driveline import Case, Start
 from estimator.physics.grid import Grid
-from estimator.physics.inputs import Case
 from estimator.physics.kernel.side_by_side import go_side_by_side, kin_together, leading_kin
 from estimator.physics.layout import flat, slot
 from estimator.physics.model import DrivelineModel, EffectValue, Parameter, Structure
-from estimator.physics.simulate import simulate_each
-from estimator.physics.start import Start
-from estimator.physics.together import simulate_records
+from estimator.physics.simulate import simulate_each, simulate_records
 from estimator.signals.record import FloatArray
 from tests.estimator.physics.bench import (
     ONE_MASS,

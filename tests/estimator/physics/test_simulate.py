@@ -9,13 +9,12 @@ import numpy as np
 import pytest
 
 from estimator.errors import BadModel
+from estimator.physics.driveline import Case, Start
 from estimator.physics.grid import FASTEST_IN_NYQUIST, RADIANS_PER_STEP, SIGN_WIDTH, grid_for, substeps_for
-from estimator.physics.inputs import Case
 from estimator.physics.kernel import state_vector
 from estimator.physics.layout import flat, flat_values, slot
 from estimator.physics.model import Structure, natural_frequencies_rad_s
 from estimator.physics.simulate import output_state, simulate, simulate_each
-from estimator.physics.start import Start
 from estimator.signals.record import Location, OutputKind
 from tests.estimator.physics.bench import (
     ONE_MASS,

@@ -7,11 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.physics.fit import fit
+from estimator.physics.driveline import Start
+from estimator.physics.fit import best_fit, fit, warm_start
 from estimator.physics.layout import slot
 from estimator.physics.problem import local_part, make_problem, parameters, start_of
-from estimator.physics.start import Start
-from estimator.physics.starts import best_fit, warm_start
 from estimator.physics.unknowns import effect_unknowns, nominal_unknowns
 from tests.estimator.physics.bench import ONE_MASS, TWO_MASS, linear_record, model, random_steps
 from tests.estimator.physics.test_fit import SIGMA, STARTS, TRUE, nominal_problem, recordings

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from estimator.physics.catalogue import EFFECTS as CATALOGUE
+from estimator.physics.driveline import Start
 from estimator.physics.grid import grid_for
 from estimator.physics.kernel import state_vector
 from estimator.physics.layout import flat
 from estimator.physics.model import DrivelineModel, Parameter, Structure
 from estimator.physics.simulate import simulate
-from estimator.physics.start import Start
 from estimator.physics.stepper import FINER, SIGN_WIDTH_RAD_S, Stepper
 from estimator.signals.record import FloatArray, OutputKind, Record
 from tests.estimator.physics.bench import ONE_MASS, SAMPLE_TIME_S, THREE_MASS, TWO_MASS, model, random_steps, record

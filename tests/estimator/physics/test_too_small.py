@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from estimator.physics.catalogue import EFFECTS
-from estimator.physics.effects.tyre_slip import LIGHTEST
+from estimator.physics.effects.load import LIGHTEST
 from tests.estimator.physics.bench import TWO_MASS, model, record
 
 LINE = model(TWO_MASS)

@@ -6,13 +6,12 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from estimator.physics.effects import transport_delay
-from estimator.physics.effects.actuator_lag import step
+from estimator.physics.driveline import Start
+from estimator.physics.effects import timing
+from estimator.physics.effects.timing import lag_step, low_pass
 from estimator.physics.grid import Grid
 from estimator.physics.layout import flat
-from estimator.physics.low_pass import low_pass
 from estimator.physics.simulate import simulate
-from estimator.physics.start import Start
 from estimator.signals.record import FloatArray
 from tests.estimator.physics.bench import SAMPLE_TIME_S, model, random_steps, record
 
@@ -62,7 +61,7 @@ def test_a_held_torque_as_a_line(start: float, length: float, mean: float, jump:
     """The rise is that of the line with the jump's first moment, integral of ``jump (r - 1/2)`` behind the jump."""
     moment = jump * 0.5 * (share - share**2)
     expected = (mean, 12.0 * moment)  # a line of rise R has the first moment R / 12
-    found = transport_delay.delayed(np.array([1.0, 2.0, 4.0]), 7.0, start, length)
+    found = timing.delayed(np.array([1.0, 2.0, 4.0]), 7.0, start, length)
     assert found == pytest.approx(expected, rel=1e-12, abs=1e-12)
 
 
@@ -75,7 +74,7 @@ def test_no_sub_step_reads_beyond_the_last_sample() -> None:
         for substeps in range(1, 60):
             start = samples - 1 + (substeps - 1) * (1.0 / substeps)
             late.append(start + 1.0 / substeps > samples)
-            assert transport_delay.delayed(memory[:samples], 0.0, start, 1.0 / substeps)[0] == 7.0
+            assert timing.delayed(memory[:samples], 0.0, start, 1.0 / substeps)[0] == 7.0
     assert any(late)
 
 
@@ -83,7 +82,7 @@ def test_no_sub_step_reads_beyond_the_last_sample() -> None:
 def test_a_lagged_step_is_the_exponential(length_s: float) -> None:
     tau = 0.03
     decay = np.exp(-length_s / tau)
-    mean, rise, end, slowed = step(40.0, 0.0, 10.0, 0.0, low_pass(tau, 0.0, length_s))
+    mean, rise, end, slowed = lag_step(40.0, 0.0, 10.0, 0.0, low_pass(tau, 0.0, length_s))
     place = (np.arange(20_000) + 0.5) / 20_000
     torque = 40.0 - 30.0 * np.exp(-place * length_s / tau)
     assert rise == pytest.approx(12.0 * float(np.mean(torque * (place - 0.5))), rel=1e-4)
@@ -96,7 +95,7 @@ def test_a_lagged_step_is_the_exponential(length_s: float) -> None:
 @pytest.mark.parametrize("length_s", [0.001, 0.02, 5.0])
 def test_a_lagged_step_of_second_order_is_the_matrix_exponential(shape: float, length_s: float) -> None:
     tau, torque, lagged, rising = 0.03, 40.0, 10.0, 25.0
-    mean, rise, end, risen = step(torque, 0.0, lagged, rising, low_pass(tau, shape, length_s))
+    mean, rise, end, risen = lag_step(torque, 0.0, lagged, rising, low_pass(tau, shape, length_s))
     place = (np.arange(2000) + 0.5) / 2000
     law = np.array([[0.0, 1.0], [-1.0 / shape, -1.0 / shape]]) * length_s / tau
     off = expm(place[:, None, None] * law) @ [lagged - torque, rising]

@@ -7,12 +7,12 @@ from dataclasses import astuple, replace
 import numpy as np
 import pytest
 
+from estimator.physics.driveline import Start
 from estimator.physics.effect import Held, Within
-from estimator.physics.effects import road_grade
-from estimator.physics.effects.torque_ripple import ORDERS
+from estimator.physics.effects.load import grade_basis
+from estimator.physics.effects.torque import ORDERS
 from estimator.physics.layout import flat, slot
 from estimator.physics.model import DrivelineModel, Parameter, Structure
-from estimator.physics.start import Start
 from estimator.physics.unknowns import Release, effect_unknowns, local_basis, nominal_unknowns, own_unknowns, released
 from estimator.signals.record import OutputKind
 from tests.estimator.physics.bench import ONE_MASS, TWO_MASS, linear_record, model, random_steps
@@ -158,7 +158,7 @@ def test_a_profile_adds_a_load_over_time_and_nothing_else() -> None:
     rec = linear_record(ONE_MASS, random_steps(1000, seed=6), Start(0.0, 0.0, 10.0))
     plain = local_basis(model(ONE_MASS), rec, profile=False)
     basis = local_basis(model(ONE_MASS), rec, profile=True)
-    splines = road_grade.basis(rec.time_s)
+    splines = grade_basis(rec.time_s)
     assert plain.extra_load(plain.guess) is None
     assert basis.guess.size == plain.guess.size + splines.shape[0]
     np.testing.assert_array_equal(basis.extra_load(basis.guess), np.zeros(1000))

@@ -18,12 +18,11 @@ from fmpy import read_model_description, simulate_fmu
 from fmpy.validation import validate_fmu
 
 from estimator.physics.catalogue import BUILT_IN
+from estimator.physics.driveline import Case, Start
 from estimator.physics.grid import Grid
-from estimator.physics.inputs import Case
 from estimator.physics.layout import flat_values
 from estimator.physics.model import DrivelineModel, EffectValue, Parameter, Structure
 from estimator.physics.simulate import motor_angle, simulate
-from estimator.physics.start import Start
 from estimator.signals.record import FloatArray, Record
 from hil.export.fmu.driveline import OF_THE_RECORDER, Driveline, driveline, started
 from hil.export.fmu.package import write

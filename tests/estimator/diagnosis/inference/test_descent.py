@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from estimator.diagnosis.inference.descent import Effort, descended, extended, light
-from estimator.physics.fit import FitResult, fit, not_fitted
+from estimator.physics.fit import FitResult, fit, not_fitted, warm_start
 from estimator.physics.jacobian import jacobian_at
 from estimator.physics.problem import Problem, make_problem, start_vector
-from estimator.physics.starts import warm_start
 from estimator.physics.unknowns import effect_unknowns, nominal_unknowns
 from estimator.signals.record import FloatArray
 from tests.estimator.diagnosis.one_effect import bench_with

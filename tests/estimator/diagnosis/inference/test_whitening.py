@@ -15,9 +15,10 @@ from scipy.linalg import block_diag, cholesky, solve_triangular
 from estimator.diagnosis.inference.disturbances import Limits, estimate, limits_for, starts
 from estimator.diagnosis.inference.sampled_line import Line, line_of
 from estimator.diagnosis.inference.whitener import Size, Whitener, readings, whitener, whitener_of
+from estimator.diagnosis.line.motion import LASTS
+from estimator.physics.driveline import Start
 from estimator.physics.fit import FitResult, fit, not_fitted
 from estimator.physics.problem import make_problem, start_vector
-from estimator.physics.start import Start
 from estimator.signals.outputs import outputs_apart
 from estimator.signals.record import BoolArray, Channel, FloatArray, Location, OutputKind
 from tests.estimator.diagnosis.planted import drive_torque
@@ -25,7 +26,7 @@ from tests.estimator.physics.bench import SAMPLE_TIME_S, TWO_MASS, linear_record
 
 second = itemgetter(1)
 
-SIZES = np.log([0.05, 0.03, 0.04, 2.0, 1.5, 0.8, 3.0])
+SIZES = np.log([0.05, 0.03, 0.04, 2.0, 1.5, 0.8, 3.0, 0.1])
 
 
 @pytest.fixture(scope="module")
@@ -44,13 +45,15 @@ def of_one_output(
     return partial(whitener, line, SAMPLE_TIME_S, [use[:, None] for use in uses], unread, rows)
 
 
-def covariance(line: Line, sizes: FloatArray, count: int, unread: FloatArray | float = 0.0) -> FloatArray:
+def covariance(
+    line: Line, sizes: FloatArray, count: int, unread: FloatArray | float = 0.0, changes: FloatArray | None = None
+) -> FloatArray:
     """Covariance of the error over so many samples: what each disturbance of each sample does to all later ones.
 
     Of several outputs in turn: shape (C count, C count). ``unread`` is the variance of the torque where it was not
-    read.
+    read; ``changes``, shape (3, count), by how much laws change at the motor, at the load and in the shaft.
     """
-    torque, drift, drift_s, walk = np.exp(sizes[3:7])
+    torque, drift, drift_s, walk, share = np.exp(sizes[3:8])
     k = np.arange(count)
     apart = np.abs(k[:, None] - k[None, :]) * SAMPLE_TIME_S
 
@@ -72,7 +75,27 @@ def covariance(line: Line, sizes: FloatArray, count: int, unread: FloatArray | f
         )
     )
     found: FloatArray = at_motor @ torques @ at_motor.T + at_load @ walked @ at_load.T + noise
+    left = np.exp(-1.0 / LASTS)  # an error of form is of first order, driven while the law changes, from a sample later
+    driven = np.where(k[:, None] > k[None, :], left ** np.maximum(k[:, None] - k[None, :] - 1, 0), 0.0)
+    for place, change in enumerate(np.zeros((3, count)) if changes is None else changes):
+        drive = (line.torque, line.load, line.shaft)[place]
+        errors = (driven * (1.0 - left**2) * (share * change) ** 2) @ driven.T
+        found += answer(drive) @ errors @ answer(drive).T
     return found
+
+
+def test_laws_are_off_by_a_share_of_what_they_change_by(result: FitResult) -> None:
+    count = 80
+    use: BoolArray = np.ones(count, dtype=bool)
+    line, changes = line_of(result), np.zeros((3, count))
+    changes[0, 20:25], changes[1, 40:45], changes[2, 55:70] = 30.0, 50.0, 80.0
+    signals = np.random.default_rng(4).standard_normal((count, 3))
+    filtered = whitener(
+        line, SAMPLE_TIME_S, [use[:, None]], [np.zeros(count)], [slice(0, count)], SIZES, changes=[changes]
+    )
+    lower = cholesky(covariance(line, SIZES, count, changes=changes), lower=True)
+    np.testing.assert_allclose(filtered(signals), solve_triangular(lower, signals, lower=True), rtol=2e-4, atol=1e-4)
+    assert filtered.logs.sum() == pytest.approx(np.log(np.diag(lower)).sum(), abs=5e-4)
 
 
 @pytest.mark.parametrize("missing", [(), (3, 4, 17), tuple(range(20, 40))])

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from estimator.diagnosis.line.averages import block_mean, block_mean_of
 from estimator.diagnosis.line.blocks import lines, spread_stretches
-from estimator.diagnosis.line.linearise import block_length
+from estimator.diagnosis.line.motion import block_mean, block_mean_of
+from estimator.diagnosis.line.tangent import block_length
+from estimator.physics.driveline import Start
 from estimator.physics.fit import fit
 from estimator.physics.problem import make_problem
-from estimator.physics.start import Start
 from tests.estimator.diagnosis.planted import drive_torque
 from tests.estimator.physics.bench import SPEED, TWIST, TWO_MASS, exact_states, linear_record, model, record
 

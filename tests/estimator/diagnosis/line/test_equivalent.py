@@ -7,13 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.diagnosis.line.blocks import lines
+from estimator.diagnosis.line.blocks import Place, lines, places
 from estimator.diagnosis.line.equivalent import explain, explain_all
-from estimator.diagnosis.line.places import Place, places
+from estimator.physics.driveline import Start
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult, fit
 from estimator.physics.problem import make_problem
-from estimator.physics.start import Start
 from estimator.signals.record import FloatArray
 from tests.estimator.diagnosis.planted import SIGMA, Moved, drive_torque, recordings
 from tests.estimator.physics.bench import ONE_MASS, TWIST, TWO_MASS, exact_states, linear_record, model, random_steps

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.linalg import block_diag
 
-from estimator.diagnosis.line.kalman import Chain, Filtered, run_filter, run_smoother
+from estimator.diagnosis.line.equivalent import Chain, Filtered, run_filter, run_smoother
 
 
 def test_filter_and_smoother_are_the_conditional_normal_distribution() -> None:

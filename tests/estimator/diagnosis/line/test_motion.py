@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from estimator.diagnosis.line.motion import motion_of
+from estimator.physics.driveline import Start
 from estimator.physics.fit import fit
 from estimator.physics.problem import make_problem
-from estimator.physics.start import Start
 from tests.estimator.diagnosis.planted import drive_torque
 from tests.estimator.physics.bench import ANGLE, LOAD_SPEED, SPEED, TWIST, TWO_MASS, exact_states, linear_record, model
 

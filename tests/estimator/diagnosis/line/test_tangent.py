@@ -7,13 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.diagnosis.line.averages import block_mean
-from estimator.diagnosis.line.linearise import tangent
-from estimator.diagnosis.line.motion import simulated
+from estimator.diagnosis.line.motion import block_mean, simulated
+from estimator.diagnosis.line.tangent import tangent
+from estimator.physics.driveline import Start
 from estimator.physics.fit import FitResult, fit
 from estimator.physics.model import EffectValue
 from estimator.physics.problem import make_problem
-from estimator.physics.start import Start
 from estimator.signals.record import FloatArray
 from tests.estimator.diagnosis.planted import drive_torque
 from tests.estimator.physics.bench import SPEED, TWO_MASS, exact_states, linear_record, model

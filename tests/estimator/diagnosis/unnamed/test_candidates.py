@@ -12,10 +12,10 @@ from estimator.diagnosis.line.motion import motion_of
 from estimator.diagnosis.unnamed.candidates import candidates
 from estimator.diagnosis.unnamed.forms import STEP_EVERY_S
 from estimator.diagnosis.unnamed.scene import Scene, elements, scene
+from estimator.physics.driveline import Start
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult, fit
 from estimator.physics.problem import make_problem
-from estimator.physics.start import Start
 from estimator.signals.record import FloatArray, OutputKind
 from tests.estimator.diagnosis.planted import SIGMA, drive_torque, nominal_fit, quiet
 from tests.estimator.physics.bench import (

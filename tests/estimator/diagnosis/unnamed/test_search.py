@@ -10,8 +10,8 @@ import pytest
 from estimator.diagnosis.unnamed.hunt import Hunt
 from estimator.diagnosis.unnamed.scene import scene
 from estimator.diagnosis.unnamed.search import LEAST_ROUNDS, ROUNDS, best_unnamed, hunts_of, unnamed_laws
+from estimator.physics.driveline import Start
 from estimator.physics.effect import Element
-from estimator.physics.start import Start
 from tests.estimator.diagnosis.planted import SIGMA, Law, nominal_fit, quiet, recordings
 from tests.estimator.physics.bench import TWO_MASS, linear_record
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from estimator.diagnosis.where.locate import WINDOW_S, band_hz, intervals, region
+from estimator.physics.driveline import Start
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult, fit
 from estimator.physics.problem import make_problem
-from estimator.physics.start import Start
 from estimator.signals.record import FloatArray, Record
 from tests.estimator.physics.bench import ONE_MASS, SPEED, TWIST, TWO_MASS, exact_states, linear_record, model, record
 

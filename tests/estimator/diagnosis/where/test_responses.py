@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from estimator.diagnosis.where.responses import responses
+from estimator.physics.driveline import Start
 from estimator.physics.fit import fit
 from estimator.physics.problem import make_problem
-from estimator.physics.start import Start
 from tests.estimator.diagnosis.planted import SIGMA, drive_torque
 from tests.estimator.physics.bench import TWO_MASS, linear_record, model
 

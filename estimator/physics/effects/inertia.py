@@ -1,4 +1,4 @@
-"""One more inertia on a spring: a second resonance that the model does not have."""
+"""Inertias that come and go, and one more with a spring of its own."""
 
 from __future__ import annotations
 
@@ -8,9 +8,84 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from estimator.compiled import compiled
-from estimator.physics.effect import WITH_SHAFT, Effect, EffectParameter, Element, Held, Retelling, Span, Start, Within
-from estimator.physics.model import DrivelineModel, Motion, natural_frequencies_rad_s, unit
+from estimator.physics.driveline import Driveline, Motion, load_inertia, natural_frequencies_rad_s, unit
+from estimator.physics.effect import (
+    EVERY_LINE,
+    MOMENTS,
+    WITH_SHAFT,
+    Effect,
+    EffectParameter,
+    Element,
+    Held,
+    Retelling,
+    Span,
+    Start,
+    Step,
+    Within,
+)
 from estimator.signals.record import Record
+
+# The clutch to the generator is not open: its inertia turns with the motor for a while.
+
+
+GENERATOR_COUPLED = Effect(
+    name="generator_coupled",
+    element=Element.MOTOR,
+    title="generator coupled",
+    law="J_M becomes J_M + J_G from t_1 to t_2 of a recording",
+    source="hybrid bus whose coupling to the generator opens: Nevaranta, Montonen, Lindh, EPE'18, 2018",
+    excited_by="PRBS or torque steps while the clutch is closed",
+    parameters=(
+        EffectParameter("inertia_kg_m2", "inertia", 0.0, 0.0, 20.0, "inertia that is coupled: J_G"),
+        *MOMENTS,
+    ),
+    structures=EVERY_LINE,
+    resembles=("stiffness_change", "brake_drag", "inertia_change"),
+    event=True,
+    scales=lambda model, _records: (0.5 * model.parameters["J_M"].value,),
+    starts=lambda _model, _records: [(0.3,), (1.5,)],
+    text="an extra inertia of {inertia_kg_m2:.3g} {unit[inertia]} turns with the motor: clutch not open",
+    linear=True,
+)
+
+
+# The payload steps: people get on or off.
+
+
+def payload_described(
+    model: Driveline, values: Mapping[str, float], line: Mapping[str, float]
+) -> Mapping[str, tuple[Span, ...]]:
+    """Return the load's inertia before and after."""
+    name = load_inertia(model)
+    before, after = line[name], line[name] + values["change_kg_m2"]
+    return {name: ((before, before), (after, after))}
+
+
+INERTIA_CHANGE = Effect(
+    name="inertia_change",
+    element=Element.LOAD,
+    title="step of the payload",
+    law="J_L becomes J_L + delta from t_1 to t_2 of a recording",
+    source="the vehicle's mass at the wheel, m r^2: Gillespie, Fundamentals of Vehicle Dynamics, SAE 1992",
+    excited_by="acceleration before and after the change",
+    parameters=(
+        EffectParameter("change_kg_m2", "inertia", 0.0, -7.0, 40.0, "change of the inertia: delta"),
+        *MOMENTS,
+    ),
+    structures=EVERY_LINE,
+    resembles=("generator_coupled", "road_grade"),
+    event=True,
+    step=Step(load_inertia),
+    scales=lambda model, _records: (0.1 * model.parameters[load_inertia(model)].value,),
+    starts=lambda _model, _records: [(-1.0,), (1.0,)],
+    text="the load's inertia changes by {change_kg_m2:+.3g} {unit[inertia]} during the recording",
+    described=payload_described,
+    linear=True,
+)
+
+
+# One more inertia on a spring: a second resonance that the model does not have.
+
 
 MOST_DAMPING = 0.15
 """Steel shafts and their rubber couplings stay below this damping ratio of their own."""
@@ -44,27 +119,27 @@ def frequency_within(inertia: float, stiffness: float, line_share: float) -> flo
     return math.sqrt(stiffness * line_share / ((1.0 - line_share) * inertia))
 
 
-def within(values: Mapping[str, float]) -> float:
+def mode_within(values: Mapping[str, float]) -> float:
     """Return the inertia within the line [kg m^2], before the shaft or behind it; 0 for one next to it."""
     return values.get("between_kg_m2", 0.0) + values.get("behind_kg_m2", 0.0)
 
 
-def derived(values: Mapping[str, float], nominal: Mapping[str, float]) -> Mapping[str, float]:
+def mode_derived(values: Mapping[str, float], nominal: Mapping[str, float]) -> Mapping[str, float]:
     """Return the frequency [Hz] of an inertia within the line: it is not fitted but follows."""
-    if not within(values):
+    if not mode_within(values):
         return {}
-    fastest = frequency_within(within(values), nominal["k"], values["line_share"])
+    fastest = frequency_within(mode_within(values), nominal["k"], values["line_share"])
     return {"frequency_hz": fastest / (2.0 * math.pi)}
 
 
-def scales(model: DrivelineModel, records: Sequence[Record]) -> tuple[float, ...]:
+def mode_scales(model: Driveline, records: Sequence[Record]) -> tuple[float, ...]:
     """Return a tenth of the motor's inertia, the line's own frequency, 1, a usual damping, and that inertia twice."""
     frequency = float(natural_frequencies_rad_s(model.values())[0]) / (2.0 * math.pi)
     tenth = 0.1 * model.parameters["J_M"].value
     return (tenth, frequency, 1.0, 0.05, tenth, tenth)
 
 
-def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
+def mode_starts(model: Driveline, records: Sequence[Record]) -> list[Start]:
     """Return heavy modes far above the first resonance, and light ones below, around and above it, as close as narrow.
 
     The heavy ones come first: where only what their spring does to the line shows, nothing else distinguishes them. An
@@ -76,8 +151,8 @@ def starts(model: DrivelineModel, records: Sequence[Record]) -> list[Start]:
     return [*heavy, *light]
 
 
-def retold(
-    model: DrivelineModel, records: Sequence[Record], values: Mapping[str, float], line: Mapping[str, float]
+def mode_retold(
+    model: Driveline, records: Sequence[Record], values: Mapping[str, float], line: Mapping[str, float]
 ) -> list[Retelling]:
     """Return an inertia before the shaft and one behind it that leave the line as compliant and as heavy as a branch.
 
@@ -85,14 +160,14 @@ def retold(
     by s with the side of its own spring, by 1 - s with the other. One behind the shaft swings against both springs
     while the motor stands: at the branch's frequency.
     """
-    if within(values):
+    if mode_within(values):
         return []
     trusted, stiffness = model.parameters["k"], line["k"] * values["line_share"]
     low = max(stiffness / (trusted.value * (1.0 + trusted.tolerance)), SOFTEST)
     high = min(stiffness / (trusted.value * max(1.0 - trusted.tolerance, SOFTEST)), STIFFEST)
     if low >= high:
         low, high = SOFTEST, STIFFEST
-    *_, usual, tenth, _ = scales(model, records)
+    *_, usual, tenth, _ = mode_scales(model, records)
     share = 0.5 * (low + high)
     own, branch = float(natural_frequencies_rad_s(model.values())[0]), 2.0 * math.pi * values["frequency_hz"]
     slowest = max(record.sample_time_s for record in records)
@@ -111,19 +186,19 @@ def retold(
     return [retelling(before, at_motor=True), retelling(behind, at_motor=False)]
 
 
-def described(
-    model: DrivelineModel, values: Mapping[str, float], line: Mapping[str, float]
+def mode_described(
+    model: Driveline, values: Mapping[str, float], line: Mapping[str, float]
 ) -> Mapping[str, tuple[Span, ...]]:
     """Return the shaft's stiffness and that of the whole line, any damping, and the inertias with the further one."""
-    more = within(values) or values["inertia_kg_m2"]
+    more = mode_within(values) or values["inertia_kg_m2"]
     whole = line["k"] * values["line_share"]
     inertias = {name: ((line[name], line[name] + more),) for name in ("J_M", "J_L")}
     return {"k": ((whole, line["k"]),), "c": ((0.0, math.inf),), **inertias}
 
 
-def sentence(values: Mapping[str, float], motion: Motion) -> str:
+def mode_sentence(values: Mapping[str, float], motion: Motion) -> str:
     """Say what was found."""
-    place = f"{within(values) or values['inertia_kg_m2']:.3g} {unit('inertia', motion)} on a spring"
+    place = f"{mode_within(values) or values['inertia_kg_m2']:.3g} {unit('inertia', motion)} on a spring"
     if values.get("between_kg_m2"):
         place += " between motor and shaft"
     if values.get("behind_kg_m2"):
@@ -134,13 +209,13 @@ def sentence(values: Mapping[str, float], motion: Motion) -> str:
     )
 
 
-def implausible(model: DrivelineModel, records: Sequence[Record], values: Mapping[str, float]) -> str:
+def mode_implausible(model: Driveline, records: Sequence[Record], values: Mapping[str, float]) -> str:
     """Object to a mode damped so much that it has no resonance to speak of, and to one too light or stiff to follow.
 
     A branch that stands for an inertia within the line is damped by the shaft next to it, too: ``c / (2 J_X w)`` comes
     on top of its own.
     """
-    if inertia := within(values):
+    if inertia := mode_within(values):
         if inertia <= 1.01 * LIGHTEST * model.parameters["J_M"].value:
             return f"{inertia:.2g} {unit('inertia', model.motion)} within the line are too little to be reported"
         belongs = "motor" if values.get("between_kg_m2") else "load"
@@ -155,7 +230,7 @@ def implausible(model: DrivelineModel, records: Sequence[Record], values: Mappin
     return f"a branch with damping ratio {values['damping_ratio']:.2g} is no mode"
 
 
-EFFECT = Effect(
+EXTRA_TORSIONAL_MODE = Effect(
     name="extra_torsional_mode",
     element=Element.SHAFT,
     title="one more torsional mode",
@@ -179,13 +254,13 @@ EFFECT = Effect(
     ),
     structures=WITH_SHAFT,
     resembles=("actuator_lag", "stiffness_nonlinearity", "tyre_slip", "speed_filter"),
-    scales=scales,
-    starts=starts,
-    sentence=sentence,
+    scales=mode_scales,
+    starts=mode_starts,
+    text=mode_sentence,
     loosens=frozenset({"k", "c"}),  # a spring in the line softens it by s and lowers its damping by s^2
-    described=described,
-    implausible=implausible,
-    retold=retold,
-    derived=derived,
+    described=mode_described,
+    implausible=mode_implausible,
+    retold=mode_retold,
+    derived=mode_derived,
     linear=True,
 )
