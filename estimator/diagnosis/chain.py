@@ -73,17 +73,17 @@ class Chain:
         """Return what was recognised as effects of a model: name to parameter values."""
         return {f.name: {name: sized.value for name, sized in f.parameters.items()} for f in self.findings}
 
-    def errors(self, outputs: Sequence[FloatArray]) -> list[FloatArray]:
+    def errors(self, outputs: Sequence[FloatArray], within: Sequence[BoolArray] | None = None) -> list[FloatArray]:
         """Return simulated, as this chain would have read it, less recorded; the good rows of each raw recording.
 
-        Readings that were lost without a flag are no good rows: nothing was read there.
+        Readings that were lost without a flag are no good rows: nothing was read there. Only rows ``within`` count.
         """
         read = [as_read(output, record, self.effects()) for output, record in zip(outputs, self.raw, strict=True)]
         shifted = [each + shift for each, shift in zip(read, self.shifts, strict=True)] if self.shifts else read
-        return [
-            (each - record.output)[_read_rows(record, self.findings)]
-            for each, record in zip(shifted, self.raw, strict=True)
-        ]
+        rows = [_read_rows(record, self.findings) for record in self.raw]
+        if within is not None:
+            rows = [read & inside for read, inside in zip(rows, within, strict=True)]
+        return [(each - record.output)[good] for each, record, good in zip(shifted, self.raw, rows, strict=True)]
 
 
 def read_through(records: Sequence[Record]) -> Chain:

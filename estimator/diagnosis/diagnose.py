@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from threadpoolctl import threadpool_limits
@@ -13,10 +14,15 @@ from estimator.diagnosis.preconditions import prepare
 from estimator.diagnosis.result import Diagnosis
 from estimator.physics.model import DrivelineModel
 from estimator.physics.simulate import MASSES
+from estimator.physics.work import Work
 from estimator.signals.record import Record
 
-BUDGET_S = 30.0
-"""Time after which the best set of effects so far is the answer [s]."""
+BUDGET_S = math.inf
+"""Time after which a diagnosis is ended undecided [s]: none, so that the answer depends on no machine."""
+
+
+TO_SEARCH = 0.92
+"""Share of a limit of time after which no simulation is begun: the rest is for saying so."""
 
 
 def diagnose(
@@ -25,6 +31,7 @@ def diagnose(
     holdout: Sequence[Record] = (),
     progress: Progress = silent,
     budget_s: float | None = None,
+    effort: str = "normal",
 ) -> Diagnosis:
     """Find out whether physics is missing from a model, where, which, and how large it is.
 
@@ -42,8 +49,10 @@ def diagnose(
     progress : callable, optional
         Called with a message and the share of work done; an exception it raises cancels the diagnosis.
     budget_s : float, optional
-        Time [s] after which no further set of effects is tried: the best so far is the answer, with a warning that
-        says what was not tried. By default ``BUDGET_S``.
+        Time [s] after which the diagnosis is ended, whatever it does: nothing is decided then, and the answer says what
+        was not tried. By default there is none, and the answer is the same on every machine.
+    effort : {"quick", "normal", "thorough"}
+        How much work the search may cost, in simulations.
 
     Returns
     -------
@@ -69,8 +78,9 @@ def diagnose(
         compile_laws(model, records[0].sample_time_s)
     with threadpool_limits(1, user_api="blas"):  # on tall, thin matrices more threads only wait for each other
         progress("checking the recordings", 0.0)
+        work = Work(BUDGET_S if budget_s is None else budget_s, TO_SEARCH)
         ready = prepare(records, model, holdout)
-        return ready.finished(answer(ready, model, progress, BUDGET_S if budget_s is None else budget_s))
+        return ready.finished(answer(ready, model, progress, effort, work))
 
 
 def _telling(progress: Progress) -> Progress:

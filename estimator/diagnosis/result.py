@@ -97,6 +97,7 @@ class FoundEffect:
     indistinguishable_from: tuple[str, ...]
     evidence: Evidence
     profiles: Mapping[str, Profile] = field(default_factory=dict)
+    alternatives: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     share: float = math.nan
     probability: float = math.nan
     form: str = ""
@@ -111,6 +112,13 @@ class Remainder:
     element: Element | None
     band_hz: Interval | None
     law: str
+    tests: str = ""
+
+    @property
+    def says(self) -> str:
+        """What it does that noise does not, and the law it follows; the end of a sentence that begins with "it"."""
+        law = self.law if self.element is not None else ""
+        return "; it ".join(said for said in (self.tests or self.law, law) if said)
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,6 +137,33 @@ class RejectedEffect:
     name: str
     reason: str
     delta_bic: float
+
+
+@dataclass(frozen=True, slots=True)
+class Effort:
+    """What the search cost, in work that is the same on every machine, and what it did not get to.
+
+    Attributes
+    ----------
+    level : str
+        ``quick``, ``normal`` or ``thorough``.
+    simulations : int
+        Free runs of all recordings.
+    finished : bool
+        False where a limit of time ended it.
+    untried : tuple of str
+        Effects that were promising, or not looked at, and not fitted.
+    candidates : int
+        Effects that these recordings can show.
+    limit_s : float
+    """
+
+    level: str = "normal"
+    simulations: int = 0
+    finished: bool = True
+    untried: tuple[str, ...] = ()
+    candidates: int = 0
+    limit_s: float = math.inf
 
 
 @dataclass(frozen=True, slots=True)
@@ -369,11 +404,15 @@ class Stray:
         Its value there over the nominal one.
     tolerance : float
         Share of the nominal value that it is trusted to.
+    nominal : float or None
+    unit : str
     """
 
     name: str
     ratio: float
     tolerance: float
+    nominal: float | None = None
+    unit: str = ""
 
     @property
     def element(self) -> Element:
@@ -408,3 +447,4 @@ class Diagnosis:
     strays: tuple[Stray, ...] = ()
     remainder: Remainder | None = None
     slight: tuple[Slight, ...] = ()
+    effort: Effort = field(default_factory=Effort)

@@ -12,6 +12,7 @@ import threading
 from collections import deque
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextvars import copy_context
 from itertools import takewhile
 from typing import TypeVar
 
@@ -83,7 +84,7 @@ def concurrently(function: Callable[[Item], Result], items: Sequence[Item]) -> l
             except IndexError:  # another core took the last one
                 return
             if recruit:
-                helpers.extend(cores.pool.submit(help_out) for _ in range(cores.taken(len(todo))))
+                helpers.extend(cores.pool.submit(copy_context().run, help_out) for _ in range(cores.taken(len(todo))))
             try:
                 results[i] = function(item)
             except BaseException:

@@ -24,6 +24,7 @@ from estimator.physics.model import Structure
 from estimator.physics.motion import motor_angle
 from estimator.physics.own_law import FORCES
 from estimator.physics.parallel import PARTS, concurrently
+from estimator.physics.work import count_samples
 from estimator.signals.record import FloatArray, IntArray, Location, OutputKind, Record
 
 MASSES: dict[Structure, Masses] = {
@@ -117,6 +118,7 @@ def simulate_outputs(
 ) -> FloatArray:
     """Simulate several measured outputs of one recording (``signals.outputs``), each as its sensor shows it."""
     if grid.plant is not None:
+        count_samples(len(cases) * outputs[0].time_s.size)
         return np.stack([grid.plant.simulated(record, cases) for record in outputs], axis=1)
     if len(outputs) > 1 and any(map(is_steep, outputs)):  # the kernel leaves the slopes of one output
         return np.concatenate([simulate_outputs(grid, [record], cases, alike_s) for record in outputs], axis=1)
@@ -144,13 +146,14 @@ def _simulated(
 ) -> FloatArray:
     """Return states ``wanted``, shape (C,), of cases of one recording, as they are ``recorded`` or as they are."""
     record = outputs[0]
+    count_samples(len(cases) * record.time_s.size)
     if grid.structure is Structure.JOINT:
         imposed = joint.imposed_in(record)
         return np.array([[_joint_output(record, imposed, case, int(state)) for state in wanted] for case in cases])
     own, given = _own_of(grid, record, cases), inputs_of([record], [0] * len(cases), cases)
-    count, samples = len(cases), record.time_s.size
-    slopes = np.zeros((count, 2, samples if recorded and is_steep(record) else 0))
-    out = np.empty((count, wanted.size, samples))
+    rows, samples = len(cases), record.time_s.size
+    slopes = np.zeros((rows, 2, samples if recorded and is_steep(record) else 0))
+    out = np.empty((rows, wanted.size, samples))
     many.integrate_each(
         MASSES[grid.structure],
         own,
@@ -169,7 +172,7 @@ def _simulated(
         recorded and is_sensed(record, wanted[0]),
         out,
         slopes,
-        _samples_alike(record, count, alike_s),
+        _samples_alike(record, rows, alike_s),
     )
     if own:
         own[1].finish()
@@ -305,6 +308,7 @@ def simulate_together(grid: Grid, drives: Sequence[Outputs], of: Sequence[int], 
     records, first = [outputs[0] for outputs in drives], drives[0][0]
     wanted = np.array([output_state(each, grid.structure) for each in drives[0]])
     given = inputs_of(records, of, cases)
+    count_samples(len(cases) * given.torque.shape[1])
     out = np.empty((len(cases), wanted.size, given.torque.shape[1]))
     many.integrate_each(
         MASSES[grid.structure],

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from enum import Enum
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -20,6 +21,14 @@ from hil.cli.trust_option import TrustLaws
 HOLDOUT = "--holdout"
 
 Progress = Callable[[str, float], None]
+
+
+class Effort(Enum):
+    """How much work a search may cost."""
+
+    QUICK = "quick"
+    NORMAL = "normal"
+    THOROUGH = "thorough"
 
 
 class SeveralHoldouts(TyperCommand):
@@ -65,9 +74,12 @@ def diagnose(
             "--budget-s",
             min=0.0,
             metavar="S",
-            help="Time after which the best answer so far is given \\[s]; 30 by default.",
+            help="Time after which it is ended, undecided \\[s]; by default there is no limit.",
         ),
     ] = None,
+    effort: Annotated[
+        Effort, typer.Option("--effort", help="Work the search may cost, the same on every machine.")
+    ] = Effort.NORMAL,
     dbc: Dbc = None,
     signals: Annotated[
         Path | None,
@@ -107,7 +119,7 @@ def diagnose(
     file, records = questioned(asked, every, dbc, tell)
     training, kept_back = records[: len(recordings)], records[len(recordings) :]
     with with_the_line_to_write(every, file.signals, dbc), progress_bar() as progress:
-        diagnosis = diagnose_records(training, file.model, kept_back, progress, budget_s)
+        diagnosis = diagnose_records(training, file.model, kept_back, progress, budget_s, effort.value)
     made = provenance([model], every)
     text = diagnosis_text(diagnosis, made)
     try:

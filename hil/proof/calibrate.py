@@ -25,7 +25,7 @@ from threadpoolctl import threadpool_limits
 
 from estimator.diagnosis.chain import mechanical, read_through
 from estimator.diagnosis.inference.calibration import LEAST_SHARE, TEST_LIMITS, THRESHOLDS_FILE
-from estimator.diagnosis.inference.posterior import Score, probability_of
+from estimator.diagnosis.inference.judge import Score, probability_of
 from estimator.diagnosis.inference.read_again import searched as searched_for
 from estimator.diagnosis.inference.remainder import chance
 from estimator.diagnosis.preconditions import prepare

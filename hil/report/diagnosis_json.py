@@ -71,6 +71,12 @@ def diagnosis_json(diagnosis: Diagnosis) -> Json:
         ],
         "remainder": None if diagnosis.remainder is None else _remainder(diagnosis.remainder),
         "traces": [_slight(each) for each in diagnosis.slight],
+        "effort": {
+            "level": diagnosis.effort.level,
+            "simulations": diagnosis.effort.simulations,
+            "finished": diagnosis.effort.finished,
+            "untried": list(diagnosis.effort.untried),
+        },
     }
 
 
@@ -180,6 +186,10 @@ def _effect(effect: FoundEffect) -> Json:
         "parameters": {name: _estimated(value) for name, value in effect.parameters.items()},
         "time_s": _times(effect.time_s),
         "indistinguishable_from": list(effect.indistinguishable_from),
+        "alternatives": {
+            name: {key: json_number(value) for key, value in values.items()}
+            for name, values in effect.alternatives.items()
+        },
         "share": json_number(effect.share),
         "probability": json_number(effect.probability),
         "evidence": _evidence(effect.evidence),

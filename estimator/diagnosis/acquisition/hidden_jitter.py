@@ -175,6 +175,8 @@ def _rest(error: FloatArray, slopes: FloatArray, okay: BoolArray, block: int | N
             a, now = regressors[rows], filled[first:last][rows]
             left[rows] = now - a @ np.linalg.lstsq(a, now, rcond=None)[0]
     pairs = np.isfinite(left[:-1]) & np.isfinite(left[1:])
+    if not pairs.any():
+        return None
     this, following = slice(first, last - 1), slice(first + 1, last)
     return _Rest(
         lengths=(int(pairs.sum()),),
@@ -218,6 +220,8 @@ def _likeliest(error: FloatArray, steepness: FloatArray) -> _Jitter | None:
         return float(np.sum(np.log(variance) + error**2 / variance))
 
     size, steep = float(np.std(error)), float(np.sqrt(np.mean(steepness**2)))
+    if not (size > 0.0 and steep > 0.0):  # nothing varies, or nothing moves: no reading is off its time
+        return None
     start = np.array([np.log(size), np.log(0.5 * size / steep)])
     best = optimize.minimize(cost, start, method="Nelder-Mead", options={"xatol": 1e-5, "fatol": 1e-4})
     noise, jitter = (float(value) for value in np.exp(best.x))
@@ -247,7 +251,7 @@ def _crossing(excess: Callable[[float], float], inside: float, outside: float) -
 
 def _of_the_many(rest: _Rest, found: _Jitter) -> bool:
     """Tell whether the typical row shows the jitter, by the median absolute error of the steep half of the rows."""
-    steep = rest.steepness > np.median(rest.steepness)
+    steep = rest.steepness >= np.median(rest.steepness)
     mad_to_sigma = 1.0 / float(stats.norm.ppf(0.75))
     typical = (mad_to_sigma * np.median(np.abs(rest.error[steep]))) ** 2
     expected = found.noise**2 + found.jitter_s**2 * float(np.median(rest.steepness[steep] ** 2))

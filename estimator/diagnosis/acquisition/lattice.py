@@ -88,13 +88,15 @@ def chance_repeats(differences: FloatArray, step: float) -> ChanceRepeats:
     moving = size[size > 0.5 * step] if step > 0.0 else size[size > 0.0]
     if moving.size == 0:
         return ChanceRepeats(float(size.size), float(size.size))
-    points = max(1, math.floor(float(np.quantile(moving, CORE_QUANTILE)) / max(step, np.finfo(float).tiny) + 0.5))
+    if step <= 0.0:  # without a lattice none is zero by chance
+        return ChanceRepeats(0.0, _most_common(differences, step))
+    points = max(1, math.floor(float(np.quantile(moving, CORE_QUANTILE)) / step + 0.5))
     near = float(np.sum(moving <= (points + 0.5) * step))
     far = float(np.sum(moving <= (2 * points + 0.5) * step)) - near
     # Half an event more keeps the logarithms finite where a band is empty.
     near_rate, far_rate = (near + 0.5) / (2 * points), (far + 0.5) / (2 * points)
-    lags = np.arange(1, 2 * points + 1, dtype=np.float64) ** 2
-    lever = lags[:points].mean() / (lags[points:].mean() - lags[:points].mean())
+    inner, whole = ((n + 1) * (2 * n + 1) / 6.0 for n in (points, 2 * points))  # mean squares of the lags up to n
+    lever = inner / (2.0 * (whole - inner))
     slope = max(math.log(near_rate / far_rate), 0.0)
     expected = near_rate * math.exp(lever * slope)
     sampling = math.hypot((1.0 + lever) / math.sqrt(near + 0.5), lever / math.sqrt(far + 0.5))
@@ -104,7 +106,7 @@ def chance_repeats(differences: FloatArray, step: float) -> ChanceRepeats:
 
 def _most_common(differences: FloatArray, step: float) -> float:
     """Return how often the most common change other than none occurs."""
-    counts = np.round(differences / max(step, np.finfo(float).tiny))
+    counts = np.round(differences / step) if step > 0.0 else differences
     _, times = np.unique(counts[counts != 0.0], return_counts=True)
     return float(times.max()) if times.size else 0.0
 

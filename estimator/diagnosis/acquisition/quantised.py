@@ -45,6 +45,10 @@ ABOVE_LUMPS = 3.0
 """R of the readings must be this many times that of their moving mean."""
 
 
+MOST_BINS = 2**22
+"""Bins of a spectrum of levels: a finer noise in a wider range shows no lattice that matters."""
+
+
 def speed_quantisation(records: Sequence[Record]) -> Finding | None:
     """Recognise a speed lattice that is not small against the noise; None where there is none."""
     records = [record for record in records if record.kind is OutputKind.SPEED]
@@ -87,13 +91,18 @@ def _step(moving: Sequence[FloatArray], sigma: float) -> _Step | None:
     values = np.concatenate(moving)
     spread = float(np.median([np.ptp(one) for one in moving if one.size]))
     finest, coarsest = NOISE_PER_STEP * sigma, spread / LEVELS
+    if not finest <= coarsest:
+        return None
     candidates = [lattice_step(values), _by_spectrum(values, finest, coarsest)]
     fits = [_refined(values, q) for q in candidates if q is not None and finest <= q <= coarsest]
     best = max(fits, key=lambda fit: fit[1], default=None)
     if best is None:
         return None
     q, regularity, error = best
-    lumps = _regularity(np.concatenate([_smooth(one) for one in moving if one.size > SMOOTHING]), q)
+    smooth = [_smooth(one) for one in moving if one.size > SMOOTHING]
+    if not smooth:
+        return None
+    lumps = _regularity(np.concatenate(smooth), q)
     p_value = float(np.exp(-values.size * regularity**2)) * PADDING * float(np.ptp(values)) / finest
     if p_value > LEVEL or regularity < max(REGULAR, ABOVE_LUMPS * lumps):
         return None
@@ -103,6 +112,8 @@ def _step(moving: Sequence[FloatArray], sigma: float) -> _Step | None:
 def _by_spectrum(values: FloatArray, finest: float, coarsest: float) -> float | None:
     """Return the coarsest step whose lattice the values keep to best; None where there is none to choose from."""
     width = finest / BINS_PER_STEP
+    if np.ptp(values) > MOST_BINS * width:
+        return None
     bins = np.floor((values - values.min()) / width).astype(np.intp)
     size = 1 << int(np.ceil(np.log2(PADDING * (int(bins.max()) + 1))))
     regularity = np.abs(np.fft.rfft(np.bincount(bins).astype(np.float64), size)) / values.size

@@ -4,40 +4,49 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
 from estimator.diagnosis.assemble import augmented_model, load_torques, retuned_parameters
-from estimator.diagnosis.chain import mechanical, read_through
+from estimator.diagnosis.chain import Chain, mechanical, read_through
 from estimator.diagnosis.hypotheses import Progress, open_hypotheses
-from estimator.diagnosis.inference.calibration import CLEARLY_BELOW
-from estimator.diagnosis.inference.data_sheet import free_line
+from estimator.diagnosis.inference.data_sheet import FreeLine, free_line
 from estimator.diagnosis.inference.disturbances import reading_noise
-from estimator.diagnosis.inference.figures import FreeRuns, courses_of, effects_of, figures_of, free_runs, traces_of
-from estimator.diagnosis.inference.free_run import Unseen
-from estimator.diagnosis.inference.likelihood import SAME, Hypothesis, fitted, of_first_outputs
-from estimator.diagnosis.inference.posterior import free_rms
-from estimator.diagnosis.inference.read_again import searched
-from estimator.diagnosis.inference.remainder import tests
-from estimator.diagnosis.inference.search import Search
-from estimator.diagnosis.inference.unnamed import (
-    Law,
-    against_rival,
-    at_place,
-    best_law,
-    hunts_around,
-    weighed_against,
+from estimator.diagnosis.inference.figures import (
+    FreeRuns,
+    acquired,
+    courses_of,
+    effects_of,
+    figures_of,
+    first_figures,
+    free_runs,
+    traces_of,
 )
-from estimator.diagnosis.inference.verdict import Decision, decide, spread, verdict_of
-from estimator.diagnosis.inference.wording import statement, tests_in_words
+from estimator.diagnosis.inference.free_run import Unseen
+from estimator.diagnosis.inference.judge import (
+    Decision,
+    Grounds,
+    Score,
+    decide,
+    error_falls,
+    free_rms,
+    spread,
+    verdict_of,
+)
+from estimator.diagnosis.inference.likelihood import SAME, Hypothesis, fitted, of_first_outputs
+from estimator.diagnosis.inference.read_again import Found, searched
+from estimator.diagnosis.inference.remainder import Test, tests, tests_in_words
+from estimator.diagnosis.inference.search import Search
+from estimator.diagnosis.inference.unnamed import Law, best_law, hunts_around, rival_laws
+from estimator.diagnosis.inference.wording import Beside, statement
 from estimator.diagnosis.phrases import law_in_words
 from estimator.diagnosis.preconditions import Prepared
 from estimator.diagnosis.result import (
     Diagnosis,
     Discrepancy,
+    Effort,
     Fit,
     FoundEffect,
     Interval,
@@ -56,67 +65,46 @@ from estimator.physics.effect import Element, Untestable
 from estimator.physics.fit import not_fitted
 from estimator.physics.model import DrivelineModel
 from estimator.physics.steps import from_their_moment
+from estimator.physics.work import TimeIsUp, Work, counted
 from estimator.signals.record import FloatArray
 
 SMALLEST_P = 1e-300
 
-SEARCH_SHARE = 0.7
-"""Share of the budget for the search; the rest is for laws without a name and the free runs of the answer."""
+LEVELS: Mapping[str, int] = {"quick": 3_000, "normal": 20_000, "thorough": 200_000}
+"""Free runs of all recordings after which a search makes no further step: a choice of how long people wait."""
 
 
-def answer(ready: Prepared, model: DrivelineModel, progress: Progress, budget_s: float) -> Diagnosis:
-    """Return the diagnosis of recordings that are fit for one; after ``budget_s`` of the best set of effects so far."""
-    began, search_s = time.perf_counter(), SEARCH_SHARE * budget_s
-
-    def is_over() -> bool:
-        spent_s = time.perf_counter() - began
-        progress("comparing hypotheses", min(0.1 + 0.7 * spent_s / max(search_s, spent_s, 1e-9), 0.8))
-        return spent_s >= search_s
-
+def answer(ready: Prepared, model: DrivelineModel, progress: Progress, level: str, work: Work) -> Diagnosis:
+    """Return the diagnosis of recordings that are fit for one; undecided where the limit of time ends it."""
+    began = time.perf_counter()
     line, chain = mechanical(model), read_through(ready.records)
-    found = searched(chain, line, is_over)
-    chain, search, untestable = found.chain, found.search, open_hypotheses(line, found.chain.records)[1]
-    decision = decide(search, found.grounds, with_findings=bool(chain.findings))
-    seen = _looked_at(search, decision, is_over)
-    progress("simulating what was found", 0.9)
-    unseen = Unseen(line, read_through(ready.holdout).records)
-    runs = free_runs(seen.decision.nothing, seen.believed, not seen.decision.failed, chain, unseen)
-    if seen.believed is not seen.decision.nothing and runs.final.rms > CLEARLY_BELOW * spread(runs.final.problem):
-        seen = _abstained(seen)  # what held on thinned samples does not at the recordings' own rate
-        runs = free_runs(seen.decision.nothing, seen.believed, False, chain, unseen)
-    said = _said(seen, runs, search, untestable, model)
+    search: Search | None = None
+
+    def watched(started: Search) -> None:
+        nonlocal search
+        search = started
+
+    with counted(work):
+        try:
+            found = searched(chain, line, work, LEVELS[level], watched, progress)
+            said = _decided(found, line, ready, model, progress, level)
+        except TimeIsUp:
+            said = None
+    if said is None:
+        said = _undecided(search, chain, line, model, level, work)
     progress("done", 1.0)
-    warnings = (_stopped(search, budget_s),) if search.stopped else ()
-    return replace(said, warnings=warnings, timing_s={"total": time.perf_counter() - began})
+    return replace(said, timing_s={"total": time.perf_counter() - began})
 
 
-def _said(
-    seen: _Seen, runs: FreeRuns, search: Search, untestable: Mapping[str, Untestable], model: DrivelineModel
+def _decided(
+    found: Found, line: DrivelineModel, ready: Prepared, model: DrivelineModel, progress: Progress, level: str
 ) -> Diagnosis:
-    decision, line = seen.decision, search.model
-    figures, effects = figures_of(runs, noise_of(decision.best)), effects_of(runs, decision)
-    blind = tuple(UntestableEffect(n, u.reason, u.suggested_test, u.needs) for n, u in untestable.items())
-    mismatch, remainder = _mismatch(seen, effects), _remainder(seen)
-    values_of = decision.best.plain.values_of
-    return Diagnosis(
-        verdict=decision.verdict,
-        statement=statement(decision, effects, figures, blind, remainder, seen.strays),
-        mismatch=mismatch,
-        effects=effects,
-        rejected=_rejected(search, decision),
-        untestable=blind,
-        unnamed=_unnamed(seen, figures),
-        fit=figures,
-        parameters=retuned_parameters(runs.estimate, line, decision.verdict is not Verdict.UNEXPLAINED),
-        load_torque=load_torques(runs.estimate, line),
-        timing_s={},
-        augmented=augmented_model(runs.estimate, model, (*effects, *traces_of(runs, decision))),
-        traces=courses_of(runs),
-        discrepancy=_discrepancy(seen, line) if mismatch.detected and line.plant is None else None,
-        remainder=remainder,
-        strays=seen.strays,
-        slight=tuple(Slight(each.name, each.share, values_of(each.name)) for each in decision.traces),
-    )
+    progress("weighing what was found", 0.8)
+    seen = _seen(found.search, found.grounds)
+    progress("simulating what was found", 0.9)
+    unseen = Unseen(line, read_through(ready.holdout))
+    runs = free_runs(seen.decision.nothing, seen.believed, not seen.failed, found.chain, unseen)
+    return _said(seen, runs, found.search, model, level)
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,65 +115,60 @@ class _Seen:
     ----------
     believed : Hypothesis
         What the answer is of, and the augmented model holds: the effects that are named, and traces.
+    failed : tuple of Test
+        What it leaves that noise has not.
     hunts : list of Hunt
         The search for a law without any effect; empty where it was not made.
-    law : Law or None
-        What is left beyond noise, as a law without a name.
+    alone, left : Law or None
+        The law without any effect, and that of what is left.
     strays : tuple of Stray
         Nominal values that alone, beyond what they are trusted to, would leave nothing but noise.
     """
 
     decision: Decision
     believed: Hypothesis
+    failed: tuple[Test, ...]
     hunts: list[Hunt]
-    law: Law | None
+    alone: Law | None
+    left: Law | None
     strays: tuple[Stray, ...] = ()
 
 
-def _looked_at(search: Search, decision: Decision, is_over: Callable[[], bool]) -> _Seen:
-    """Weigh the names against a law without one, and look for the law of what is left while there is time.
+def _seen(search: Search, ground: Grounds) -> _Seen:
+    """Weigh the names against laws without one and values off the data sheet, and fit what is believed.
 
     No name stands that was not weighed so: a law outside the catalogue is imitated by sets of those within.
     """
-    hunts: list[Hunt] = []
-    law: Law | None = None
-    if decision.failed or decision.named:
-        nothing = of_first_outputs(decision.nothing)
-        hunts = hunts_around(nothing)
-        law = best_law(nothing, hunts)
-        decision = weighed_against(decision, law, partial(at_place, search, decision))
-    line = free_line(search) if decision.failed or decision.named else None
-    if line is not None:
-        decision = against_rival(decision, line.score, lambda each: True)
-    believed = decision.nothing
-    if decision.verdict in (Verdict.EXPLAINED, Verdict.PARTLY_EXPLAINED):
-        decision, believed = _without_doubted(search, decision)
-    if decision.verdict not in (Verdict.EXPLAINED, Verdict.PARTLY_EXPLAINED):
-        strays = line.strays if line is not None and line.leaves_noise else ()
-        return _Seen(replace(decision, named=()), decision.nothing, hunts, law, strays)
-    is_left = bool(decision.failed) and not is_over()
-    first = of_first_outputs(believed)
-    left = best_law(first, hunts_around(first)) if is_left else None
-    return _Seen(decision, believed, hunts, left)
+    failed = tuple(test for test in ground.tests if test.failed)
+    if not failed and not ground.best.effects:
+        return _Seen(decide(search, ground), ground.nothing, (), [], None, None)
+    nothing, best = of_first_outputs(ground.nothing), of_first_outputs(ground.best)
+    hunts = hunts_around(nothing)
+    alone = best_law(nothing, hunts)
+    beside = alone if ground.best is ground.nothing else best_law(best, hunts_around(best))
+    sheet = free_line(search)
+    decision = decide(search, ground, (*rival_laws(ground, alone, beside), *_off_the_sheet(sheet)))
+    believed = _without_doubted(search, decision)
+    if not decision.named:
+        strays = sheet.strays if sheet is not None and sheet.leaves_noise else ()
+        return _Seen(decision, ground.nothing, failed or (), hunts, alone, alone, strays)
+    if believed is ground.best:
+        return _Seen(decision, believed, failed, hunts, alone, beside if failed else None)
+    failed, first = tuple(test for test in tests(believed) if test.failed), of_first_outputs(believed)
+    left = best_law(first, hunts_around(first)) if failed else None
+    return _Seen(decision, believed, failed, hunts, alone, left)
 
 
-def _abstained(seen: _Seen) -> _Seen:
-    """Return what is left to say where what is believed leaves as much as the signal itself."""
-    decision = replace(seen.decision, verdict=Verdict.UNEXPLAINED, named=(), traces=())
-    law = best_law(of_first_outputs(decision.nothing), seen.hunts) if seen.hunts else None
-    return _Seen(decision, decision.nothing, seen.hunts, law)
+def _off_the_sheet(sheet: FreeLine | None) -> tuple[Score, ...]:
+    return () if sheet is None else (Score(frozenset(), sheet.score),)
 
 
-def _without_doubted(search: Search, decision: Decision) -> tuple[Decision, Hypothesis]:
-    """Return a decision on the effects that are established, traces among them, and the set of these."""
-    established = decision.best
-    for name in sorted(established.effects - {each.name for each in (*decision.named, *decision.traces)}):
-        established = search.without(established, name)
-    if established is not decision.best:
-        failed = tuple(test for test in tests(established) if test.failed)
-        of_spread = free_rms(established) / spread(established.plain.problem)
-        decision = replace(decision, verdict=verdict_of(of_spread, True, bool(failed)), failed=failed)
-    return decision, _steps_from_their_moment(search, established)
+def _without_doubted(search: Search, decision: Decision) -> Hypothesis:
+    """Return the set of the effects that are established, traces among them."""
+    believed = decision.best
+    for name in sorted(believed.effects - {each.name for each in (*decision.named, *decision.traces)}):
+        believed = search.without(believed, name)
+    return _steps_from_their_moment(search, believed)
 
 
 def _steps_from_their_moment(search: Search, believed: Hypothesis) -> Hypothesis:
@@ -193,24 +176,130 @@ def _steps_from_their_moment(search: Search, believed: Hypothesis) -> Hypothesis
     turned = from_their_moment(believed.plain, search.model)
     if turned is believed.plain:
         return believed
-    found = fitted(
-        believed.effects,
-        not_fitted(turned.problem, turned.x),
-        believed.sizes,
-        believed.limits,
-        len(search.names),
-        believed.minus_twice_log,
-    )
+    begun = not_fitted(turned.problem, turned.x)
+    names = len(search.names)
+    found = fitted(believed.effects, begun, believed.sizes, believed.limits, names, believed.minus_twice_log)
     return found if found.score <= believed.score + SAME else believed
 
 
-def _stopped(search: Search, budget_s: float) -> str:
-    untried = sorted({*search.names} - {*search.rivals} - {name for effects in search.visited for name in effects})
-    fitted = f"; no fit was made of {', '.join(untried)}" if untried else ""
+def _said(seen: _Seen, runs: FreeRuns, search: Search, model: DrivelineModel, level: str) -> Diagnosis:
+    """Return the diagnosis: names only where the error falls, on data not used for the fit, too."""
+    decision, findings, chain = seen.decision, acquired(runs), runs.chain
+    figures = figures_of(runs, noise_of(decision.best), findings)
+    is_named = bool(decision.named or findings)
+    of_spread = runs.final.rms / spread(runs.final.problem)
+    verdict = verdict_of(of_spread, is_named, bool(seen.failed), error_falls(figures))
+    if decision.named and verdict is Verdict.UNEXPLAINED:
+        reason = "it leaves as much as the signal itself" if error_falls(figures) else _does_not_fall(figures)
+        return _said(*_abstained(seen, runs, reason), search, model, level)
+    effects = (*effects_of(runs, decision), *findings) if verdict is not Verdict.UNEXPLAINED else ()
+    line, effort = search.model, _effort(search, level, decision)
+    blind = _untestable(open_hypotheses(line, chain.records)[1])
+    mismatch, remainder = _mismatch(seen, verdict, effects), _remainder(seen)
+    traces = (*decision.traces,) if verdict is not Verdict.UNEXPLAINED else ()
+    named = {each.name for each in effects} | {each.name for each in traces}
+    named |= {name for each in effects for name in each.indistinguishable_from}
+    slight = tuple(Slight(each.name, each.share, decision.best.plain.values_of(each.name)) for each in traces)
+    beside = Beside(
+        remainder,
+        [each.name for each in traces],
+        seen.strays,
+        blind,
+        decision.nothing.plain.problem.grid.plant is None,
+    )
+    return Diagnosis(
+        verdict=verdict,
+        statement=statement(verdict, figures, effects, effort, beside),
+        mismatch=mismatch,
+        effects=effects,
+        rejected=_rejected(search, decision, named, {*effort.untried}),
+        untestable=blind,
+        unnamed=_unnamed(seen, verdict, figures),
+        fit=figures,
+        parameters=retuned_parameters(runs.estimate, line, verdict is not Verdict.UNEXPLAINED),
+        load_torque=load_torques(runs.estimate, line),
+        timing_s={},
+        augmented=augmented_model(runs.estimate, model, (*effects, *(traces_of(runs, decision) if traces else ()))),
+        traces=courses_of(runs),
+        warnings=_warnings(search, level),
+        discrepancy=_discrepancy(seen, line) if mismatch.detected and line.plant is None else None,
+        remainder=remainder,
+        strays=seen.strays,
+        slight=slight,
+        effort=effort,
+    )
+
+
+def _does_not_fall(fit: Fit) -> str:
     return (
-        f"the search ended after its {budget_s:g} s with the best set of effects so far; further effects, and "
-        f"look-alikes of those named, were not tried{fitted}. Give it more time (--budget-s), or fewer or shorter "
-        "recordings."
+        f"with it the free-run error goes from {fit.retuned:.4g} to {fit.augmented:.4g} {fit.unit}, on samples "
+        f"not used for the fit from {fit.holdout_retuned:.4g} to {fit.holdout_augmented:.4g}"
+    )
+
+
+def _abstained(seen: _Seen, runs: FreeRuns, reason: str) -> tuple[_Seen, FreeRuns]:
+    """Return what is left to say where what is believed does not carry over: nothing is named."""
+    decision = seen.decision
+    doubted = tuple(replace(each, objection=reason) for each in (*decision.named, *decision.traces))
+    decision = replace(decision, named=(), traces=(), doubted=(*doubted, *decision.doubted))
+    nothing = decision.nothing
+    failed = tuple(test for test in tests(nothing) if test.failed)
+    runs = replace(runs, believed=nothing, is_whole=False, after=runs.before, held_after=runs.held_before)
+    return _Seen(decision, nothing, failed or seen.failed, seen.hunts, seen.alone, seen.alone, seen.strays), runs
+
+
+def _undecided(
+    search: Search | None, chain: Chain, line: DrivelineModel, model: DrivelineModel, level: str, work: Work
+) -> Diagnosis:
+    """Return the answer of a search that the limit of time has ended: nothing is decided, and nothing rejected."""
+    names, blind = open_hypotheses(line, chain.records)
+    fit, estimate = first_figures(chain, line, None if search is None else search.visited.get(frozenset()))
+    tried = set() if search is None else {*search.rivals, *search.implausible}
+    untried = tuple(name for name in names if name not in tried)
+    simulations = 0 if search is None else search.simulations
+    effort = Effort(level, simulations, False, untried, len(names), work.limit_s)
+    untestable = _untestable(blind)
+    can_be_retuned = line.plant is None
+    beside = Beside(untestable=untestable, can_be_retuned=can_be_retuned)
+    return Diagnosis(
+        verdict=Verdict.UNEXPLAINED,
+        statement=statement(Verdict.UNEXPLAINED, fit, (), effort, beside),
+        mismatch=Mismatch(True, None, {}, None, None, math.nan),
+        effects=(),
+        rejected=(),
+        untestable=untestable,
+        unnamed=None,
+        fit=fit,
+        parameters=retuned_parameters(estimate, line, False),
+        load_torque=load_torques(estimate, line),
+        timing_s={},
+        augmented=augmented_model(estimate, model, ()),
+        traces=(),
+        effort=effort,
+    )
+
+
+def _untestable(blind: Mapping[str, Untestable]) -> tuple[UntestableEffect, ...]:
+    return tuple(UntestableEffect(n, u.reason, u.suggested_test, u.needs) for n, u in blind.items())
+
+
+def _effort(search: Search, level: str, decision: Decision) -> Effort:
+    """Return what the search cost; ``untried`` is what looked worth a fit and had none."""
+    settled = {*search.rivals, *search.implausible, *decision.best.effects}
+    best = decision.best.score
+    untried = tuple(
+        name for name in search.names if name not in settled and search.foreseen.get(name, -math.inf) < best
+    )
+    return Effort(level, search.simulations, True, untried, len(search.names))
+
+
+def _warnings(search: Search, level: str) -> tuple[str, ...]:
+    if not search.stopped:
+        return ()
+    return (
+        f"the search ended with the best set of effects so far, after the {LEVELS[level]:,} simulations of its effort "
+        f"({level}); further effects, and look-alikes of those named, were not tried. Try --effort thorough, or fewer "
+        "recordings.",
     )
 
 
@@ -230,12 +319,13 @@ def _band_hz(hypothesis: Hypothesis, noise: float) -> Interval | None:
     return locate.band_hz(errors, [hypothesis.plain.problem.records[0].sample_time_s] * len(errors), noise)
 
 
-def _mismatch(seen: _Seen, effects: Sequence[FoundEffect]) -> Mismatch:
+def _mismatch(seen: _Seen, verdict: Verdict, effects: Sequence[FoundEffect]) -> Mismatch:
     decision = seen.decision
-    if decision.verdict is Verdict.NO_MISMATCH:
+    if verdict is Verdict.NO_MISMATCH:
         return Mismatch(False, None, {}, None, None, 1.0)
     nothing, noise = decision.nothing.plain.first_outputs(), noise_of(decision.best)
-    element: Element | None = None if seen.law is None else seen.law.element
+    law = seen.alone if seen.left is None else seen.left
+    element: Element | None = None if law is None else law.element
     if effects or seen.strays:
         element = (effects or seen.strays)[0].element
     gained = max(decision.nothing.score - decision.best.score, 0.0)
@@ -258,48 +348,56 @@ def _discrepancy(seen: _Seen, line: DrivelineModel) -> Discrepancy:
     )
 
 
-def _rejected(search: Search, decision: Decision) -> tuple[RejectedEffect, ...]:
-    """Return the rivals that were fitted, the nearest first, and then those that were looked at only.
+def _rejected(search: Search, decision: Decision, named: set[str], untried: set[str]) -> tuple[RejectedEffect, ...]:
+    """Return the rivals that lost, the nearest first, each with what was done and by how much it is worse.
 
-    ``delta_bic`` is by how much the best set with a rival is less probable than the best of all; of one that was not
-    fitted, as if it gained nothing. A rough fit can seem more probable than it is.
+    ``delta_bic`` is by how much the best set with a rival is less probable than the best of all: fitted, or as a score
+    test foresees it at most.
     """
-    named = {each.name for each in (*decision.named, *decision.traces)}
-    best, nothing = decision.best.score, decision.nothing.score
-    fitted = [
-        RejectedEffect(
-            name,
-            "tried instead of what was found and in addition to it: the recordings are explained no better",
-            min(best - score, 0.0) if name not in decision.best.effects else 0.0,
-        )
-        for name, score in sorted(search.rivals.items(), key=lambda item: item[1])
-        if name not in named
-    ]
-    looked_at = [
-        RejectedEffect(name, "not fitted: alone it would remove next to nothing of the error", best - nothing)
-        for name in search.names
-        if name not in named and name not in search.rivals and name not in decision.best.effects
-    ]
-    return (*fitted, *looked_at)
+    best = decision.best.score
+    doubted = {each.name: RejectedEffect(each.name, each.reason, 0.0) for each in decision.doubted}
+    scores = (
+        (search.rivals, "fitted: the best set with it is {} in minus twice the log-probability"),
+        (
+            search.implausible,
+            "fitted, and ended at values that are no case of it: {} in minus twice the log-probability",
+        ),
+        (search.foreseen, "not fitted: a score test foresees that on top of what was found it makes that {} at best"),
+    )
+    found = dict(doubted)
+    for known, reason in scores:
+        for name, score in known.items():
+            if name not in found:
+                found[name] = RejectedEffect(name, reason.format(_compared(score - best)), min(best - score, 0.0))
+    found = {name: each for name, each in found.items() if name not in named and name not in untried}
+    return tuple(sorted(found.values(), key=lambda each: -each.delta_bic))
+
+
+def _compared(worse: float) -> str:
+    """Say by how much a score is worse than that of the best set; as good where it differs by less than a tenth."""
+    if abs(worse) < 0.1:
+        return "as good as without"
+    return f"{'worse' if worse > 0.0 else 'better'} by {abs(worse):.3g}"
 
 
 def _remainder(seen: _Seen) -> Remainder | None:
     """Return what is left beyond noise and drift; None where nothing is."""
-    decision, believed, law = seen.decision, seen.believed, seen.law
-    if not decision.failed:
+    believed, law = seen.believed, seen.left
+    if not seen.failed:
         return None
-    noise, left = noise_of(decision.best), free_rms(believed)
-    said = tests_in_words(decision.failed) if law is None else law_in_words(law.element, law.terms)
+    noise, left, failed = noise_of(seen.decision.best), free_rms(believed), tests_in_words(seen.failed)
     return Remainder(
-        share=max(left**2 - noise**2, 0.0) / free_rms(decision.nothing) ** 2,
+        share=min(max(left**2 - noise**2, 0.0) / free_rms(seen.decision.nothing) ** 2, 1.0),
         times_noise=left / noise,
         element=None if law is None else law.element,
         band_hz=_band_hz(believed, noise),
-        law=said,
+        law=failed if law is None else law_in_words(law.element, law.terms),
+        tests=failed,
     )
 
 
-def _unnamed(seen: _Seen, figures: Fit) -> UnnamedLaw | None:
-    if seen.decision.verdict is not Verdict.UNEXPLAINED or seen.law is None:
+def _unnamed(seen: _Seen, verdict: Verdict, figures: Fit) -> UnnamedLaw | None:
+    law = seen.alone
+    if verdict is not Verdict.UNEXPLAINED or law is None:
         return None
-    return UnnamedLaw(seen.law.element, seen.law.terms, figures.retuned, seen.law.rms)
+    return UnnamedLaw(law.element, law.terms, figures.retuned, law.rms)

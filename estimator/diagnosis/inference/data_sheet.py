@@ -6,7 +6,6 @@ recordings more probable than the line itself does with its values free.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,6 +16,7 @@ from estimator.diagnosis.inference.remainder import tests
 from estimator.diagnosis.inference.search import Search
 from estimator.diagnosis.result import Stray
 from estimator.physics.fit import not_fitted
+from estimator.physics.model import parameter_unit
 
 FREELY = 3.0
 """Factor, either way, within which a nominal parameter is looked for: beyond it a value is no slip of a data sheet, and
@@ -59,30 +59,21 @@ def free_line(search: Search) -> FreeLine | None:
     sizes, hypotheses = search.nothing().sizes, len(search.names)
     begun = not_fitted(problem, nothing.x)
     found = fitted(NOTHING, begun, sizes, search.limits, hypotheses, search.nothing().minus_twice_log)
-    strays = _strays(search.nothing(), found)
+    strays = _strays(search, found)
     if not strays:
         return None
     chosen = choices_of(frozenset(stray.name for stray in strays), hypotheses + sum(trusted))
     return FreeLine(found.score + 2.0 * chosen, not any(test.failed for test in tests(found)), strays)
 
 
-def _strays(nothing: Hypothesis, found: Hypothesis) -> tuple[Stray, ...]:
+def _strays(search: Search, found: Hypothesis) -> tuple[Stray, ...]:
     spread = np.sqrt(np.maximum(np.diag(covariance(found)), 0.0))
     clear = []
-    for i, trusted in enumerate(nothing.plain.problem.shared):
+    for i, trusted in enumerate(search.nothing().plain.problem.shared):
         ratio = float(found.plain.x[i])
         by = max(trusted.low - ratio, ratio - trusted.high)
         if not trusted.effect and trusted.low < trusted.high and by > CLEARLY * spread[i]:
             sureness = by / max(float(spread[i]), np.finfo(float).tiny)
-            clear.append((sureness, Stray(trusted.name, ratio, trusted.high - 1.0)))
+            given, unit = search.model.parameters[trusted.name], parameter_unit(trusted.name, search.model.motion)
+            clear.append((sureness, Stray(trusted.name, ratio, trusted.high - 1.0, given.value, unit)))
     return tuple(stray for _, stray in sorted(clear, key=lambda each: -each[0]))
-
-
-def in_words(strays: Sequence[Stray]) -> str:
-    """Say which values are how far from nominal, and how far they are trusted to be."""
-    said = []
-    for stray in strays:
-        side = "above" if stray.ratio > 1.0 else "below"
-        away, trusted = 100.0 * abs(stray.ratio - 1.0), 100.0 * stray.tolerance
-        said.append(f"{stray.name} {away:.2g} % {side} its nominal value (trusted to {trusted:.2g} %)")
-    return " and ".join(said)

@@ -22,6 +22,7 @@ from estimator.diagnosis.inference.whitener import READING, Size, Whitener, chan
 from estimator.diagnosis.noise import noise_floor
 from estimator.physics.fit import FitResult
 from estimator.physics.motion import torque_scale
+from estimator.physics.work import check_time
 from estimator.signals.outputs import by_output
 from estimator.signals.record import FloatArray, OutputKind, Record
 
@@ -142,6 +143,7 @@ def estimated(
 
     ``is_anew`` where it is begun from elsewhere, too (``starts``).
     """
+    check_time()
     whitened = whitening_of(result)
     limits = limits if changes_of(result) else limits.without_forms()
     begun = starts(sizes, limits) if is_anew else [sizes]

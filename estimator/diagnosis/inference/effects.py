@@ -5,9 +5,8 @@ from __future__ import annotations
 import math
 
 from estimator.diagnosis.assemble import moments_in, parameters_of, profile_size, profiles_of
+from estimator.diagnosis.inference.judge import Belief, Decision, free_rms
 from estimator.diagnosis.inference.plausible import GRADE
-from estimator.diagnosis.inference.posterior import Belief, free_rms
-from estimator.diagnosis.inference.verdict import Decision
 from estimator.diagnosis.intervals import reported_covariance
 from estimator.diagnosis.result import Evidence, FoundEffect
 from estimator.physics.catalogue import EFFECTS
@@ -46,7 +45,8 @@ def _found(
         statement=entry.sentence(nulls | {name: p.value for name, p in parameters.items()}, model.motion),
         parameters=parameters,
         time_s=moments_in(belief.name, estimate) if entry.event else {},
-        indistinguishable_from=belief.alike,
+        indistinguishable_from=tuple(belief.alike),
+        alternatives=belief.alike,
         evidence=Evidence(
             belief.score,
             free_rms(decision.nothing),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -12,16 +13,19 @@ from estimator.diagnosis.assemble import acquired_effects, rms_of
 from estimator.diagnosis.chain import Chain
 from estimator.diagnosis.holdout import foreign_outputs
 from estimator.diagnosis.hypotheses import NOTHING, everything
+from estimator.diagnosis.inference.calibration import LEAST_SHARE
+from estimator.diagnosis.inference.descent import descended
 from estimator.diagnosis.inference.disturbances import reading_noise
 from estimator.diagnosis.inference.effects import found_effects
 from estimator.diagnosis.inference.free_run import Unseen, on_recordings
-from estimator.diagnosis.inference.likelihood import Hypothesis, covariance
-from estimator.diagnosis.inference.verdict import Decision
+from estimator.diagnosis.inference.judge import Decision
+from estimator.diagnosis.inference.likelihood import THOROUGH, Hypothesis, covariance
 from estimator.diagnosis.intervals import reported_covariance
 from estimator.diagnosis.result import Fit, FoundEffect, OutputFit, Trace
-from estimator.physics.fit import FitResult, fit
-from estimator.physics.model import unit
-from estimator.physics.problem import make_problem
+from estimator.physics.fit import FitResult, fit, not_fitted
+from estimator.physics.model import DrivelineModel, unit
+from estimator.physics.problem import make_problem, start_vector
+from estimator.physics.unknowns import Shared
 from estimator.signals.outputs import by_output
 from estimator.signals.record import FloatArray, OutputKind, Record
 
@@ -83,16 +87,57 @@ def free_runs(nothing: Hypothesis, believed: Hypothesis, is_whole: bool, chain: 
 
     The re-tuned model leaves the least that it can: an error that it need not have is no mismatch.
     """
-    before = on_recordings(nothing, unseen.line, chain.apart, is_whole=False)
-    held_before = unseen.rms(nothing, before, is_whole=False)
+    before = _least(on_recordings(nothing, unseen.line, chain.apart, is_whole=False), unseen.line)
+    held_before = unseen.rms(nothing, before, False, chain, is_as_read=False)
     if believed is nothing:
-        return FreeRuns(chain, unseen, believed, is_whole, before, before, held_before, held_before)
+        held_after = unseen.rms(nothing, before, False, chain, is_as_read=True) if chain.findings else held_before
+        return FreeRuns(chain, unseen, believed, is_whole, before, before, held_before, held_after)
     after = on_recordings(believed, unseen.line, chain.apart, is_whole)
-    held_after = unseen.rms(believed, after, is_whole)
+    held_after = unseen.rms(believed, after, is_whole, chain, is_as_read=True)
     return FreeRuns(chain, unseen, believed, is_whole, before, after, held_before, held_after)
 
 
-def figures_of(runs: FreeRuns, noise: float) -> Fit:
+def _least(retuned: FitResult, line: DrivelineModel) -> FitResult:
+    """Return the re-tuned model, or a fit that begins at the nominal values where that one ends lower.
+
+    The likelihood's optimum may be far from that of the free-run error: re-tuned, a model is never worse than as given.
+    """
+    problem = retuned.problem
+    nominal = fit(
+        replace(problem, shared=tuple(_held_at_start(each) for each in problem.shared)), start_vector(problem)
+    )
+    if nominal.squares >= retuned.squares:
+        return retuned
+    begun = not_fitted(problem, nominal.x)
+    return descended(begun, lambda errors: errors / begun.rms, THOROUGH).light()
+
+
+def _held_at_start(unknown: Shared) -> Shared:
+    return replace(unknown, low=unknown.start, high=unknown.start)
+
+
+def first_figures(chain: Chain, line: DrivelineModel, nothing: Hypothesis | None) -> tuple[Fit, FitResult]:
+    """Return the errors that are known where a search was ended at once: of the model as given, and re-tuned."""
+    nominal = not_fitted(problem := make_problem(line, chain.apart, ()), start_vector(problem)).first_outputs()
+    estimate = nominal if nothing is None else nothing.plain.first_outputs()
+    noise = math.nan if nothing is None else float(reading_noise(nothing.sizes)[0])
+    of = unit(DIMENSIONS[chain.raw[0].kind], line.motion)
+    return Fit(of, nominal.rms, estimate.rms, estimate.rms, math.nan, math.nan, noise), estimate
+
+
+def acquired(runs: FreeRuns) -> tuple[FoundEffect, ...]:
+    """Return faults of the acquisition that matter: with which the squared error falls by more than a trace."""
+    chain = runs.chain
+    if not chain.findings:
+        return ()
+    before = [(out - raw.output)[raw.okay] for out, raw in zip(runs.final.outputs, chain.raw, strict=True)]
+    after = chain.errors(runs.final.outputs)
+    if rms_of(after) ** 2 > (1.0 - LEAST_SHARE) * rms_of(before) ** 2:
+        return ()
+    return acquired_effects(chain, before, after)
+
+
+def figures_of(runs: FreeRuns, noise: float, findings: Sequence[FoundEffect]) -> Fit:
     """Return the errors of free runs of the recordings as they were read, faults of the acquisition and all."""
     chain, line, retuned = runs.chain, runs.unseen.line, runs.retuned
     as_read = fit(replace(retuned.problem, records=chain.raw), retuned.x) if chain.findings else retuned
@@ -100,7 +145,7 @@ def figures_of(runs: FreeRuns, noise: float) -> Fit:
         unit=unit(DIMENSIONS[chain.raw[0].kind], line.motion),
         nominal=fit(make_problem(line, chain.raw, (), grid=retuned.problem.grid)).rms,
         retuned=as_read.rms,
-        augmented=rms_of(chain.errors(runs.final.outputs)),
+        augmented=rms_of(chain.errors(runs.final.outputs)) if chain.findings else runs.final.rms,
         holdout_retuned=runs.held_before,
         holdout_augmented=runs.held_after,
         noise_floor=noise,
@@ -128,13 +173,11 @@ def _rms(fit: FitResult, part: slice) -> float:
 
 
 def effects_of(runs: FreeRuns, decision: Decision) -> tuple[FoundEffect, ...]:
-    """Return the effects that are named, the weightiest first, and the faults of the acquisition."""
+    """Return the effects that are named, the weightiest first."""
     known = replace(decision, best=runs.believed)
     found = found_effects(known, runs.estimate, runs.covariance, runs.unseen.line) if decision.named else ()
     held = {"holdout_rms_before": runs.held_before, "holdout_rms_after": runs.held_after}
-    named = tuple(replace(each, evidence=replace(each.evidence, **held)) for each in found)
-    before = [(out - raw.output)[raw.okay] for out, raw in zip(runs.final.outputs, runs.chain.raw, strict=True)]
-    return (*named, *acquired_effects(runs.chain, before, runs.chain.errors(runs.final.outputs)))
+    return tuple(replace(each, evidence=replace(each.evidence, **held)) for each in found)
 
 
 def traces_of(runs: FreeRuns, decision: Decision) -> tuple[FoundEffect, ...]:
@@ -149,7 +192,7 @@ def traces_of(runs: FreeRuns, decision: Decision) -> tuple[FoundEffect, ...]:
 
 def courses_of(runs: FreeRuns) -> tuple[Trace, ...]:
     """Return the simulations of every recording, for plots; those kept out of the fit last."""
-    line, kept_out, grid = runs.unseen.line, runs.unseen.records, runs.retuned.problem.grid
+    line, kept_out, grid = runs.unseen.line, runs.unseen.chain.records, runs.retuned.problem.grid
 
     def nominal(records: Sequence[Record]) -> tuple[FloatArray, ...]:
         return fit(make_problem(line, records, (), grid=grid)).outputs

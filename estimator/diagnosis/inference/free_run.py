@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from estimator.diagnosis.chain import Chain
 from estimator.diagnosis.holdout import blocks, foreign_outputs
 from estimator.diagnosis.inference.descent import descended
 from estimator.diagnosis.inference.likelihood import THOROUGH, Hypothesis, refitted
@@ -80,27 +81,41 @@ class Unseen:
     Attributes
     ----------
     line : DrivelineModel
-    records : sequence of Record
-        Kept out of every fit; empty where there are none.
+    chain : Chain
+        Of recordings kept out of every fit; empty where there are none.
     """
 
     line: DrivelineModel
-    records: Sequence[Record]
+    chain: Chain
 
-    def rms(self, hypothesis: Hypothesis, whole: FitResult, is_whole: bool) -> float:
+    def rms(self, hypothesis: Hypothesis, whole: FitResult, is_whole: bool, seen: Chain, is_as_read: bool) -> float:
         """Return the RMS of a hypothesis' free-run error in blocks of 0.6 s every 2 s [unit of the output].
 
         What is between the blocks tells what is a recording's own. Without recordings kept out the hypothesis is
         fitted once more to what is between them; ``whole`` is its free run with the values of the whole fit.
+        Where faults of the acquisition were recognised the readings judge: simulated ``as_read``, or as it is.
         """
-        records = self.records or hypothesis.plain.problem.records
+        judging = self.chain if self.chain.records else seen
+        records: Sequence[Record] = judging.records if self.chain.records else hypothesis.plain.problem.records
+        if judging.findings and not self.chain.records:
+            records = seen.apart
         between = [record.okay & ~blocks(record) for record in records]
-        if self.records:
-            outputs = foreign_outputs(whole, self.line, self.records, between, hypothesis.effects)
+        if self.chain.records:
+            outputs = foreign_outputs(whole, self.line, records, between, hypothesis.effects)
         else:
-            problem = replace(hypothesis.plain.problem, use=tuple(between))
-            plain = refitted(hypothesis, problem) if is_whole else hypothesis.plain
+            plain = hypothesis.plain
+            if is_whole:
+                of = plain.problem
+                use = tuple(record.okay & ~blocks(record) for record in of.records)
+                plain = refitted(hypothesis, replace(of, use=use))
             outputs = on_recordings(replace(hypothesis, plain=plain), self.line, records, is_whole, between).outputs
-        pairs = [(out, record) for out, record in zip(outputs, records, strict=True) if record.lead is None]
-        errors = [(out - record.output)[record.okay & blocks(record)] for out, record in pairs]
+        firsts = [(out, record) for out, record in zip(outputs, records, strict=True) if record.lead is None]
+        inside = [blocks(record) for _, record in firsts]
+        if not judging.findings:
+            errors = [(out - r.output)[r.okay & held] for (out, r), held in zip(firsts, inside, strict=True)]
+        elif is_as_read:
+            errors = judging.errors([out for out, _ in firsts], inside)
+        else:
+            pairs = zip(firsts, judging.raw, inside, strict=True)
+            errors = [(out - raw.output)[raw.okay & held] for (out, _), raw, held in pairs]
         return float(np.sqrt(np.mean(np.concatenate(errors) ** 2)))

@@ -37,8 +37,17 @@ class Answers:
         for other, known in self.around:
             if _difference(fit, other) < SAME_MOTION:
                 return known
-        self.around.append((fit, [{} for _ in fit.problem.drives]))
-        return self.around[-1][1]
+        return [{} for _ in fit.problem.drives]
+
+    def learn(self, fit: FitResult, found: Sequence[dict[bytes, FloatArray]]) -> None:
+        """Keep what was found around a fit; called in a fixed order: results depend on no number of cores."""
+        if self.is_full() or not any(found):
+            return
+        known = self.near(fit)
+        if not any(known is each for _, each in self.around):
+            self.around.append((fit, known))
+        for old, new in zip(known, found, strict=True):
+            old.update(new)
 
     def is_full(self) -> bool:
         """Tell whether the answers take all the room there is for them."""
@@ -67,16 +76,16 @@ class _Weighted(Projector):
         return super().promise(white, low, high) if np.isfinite(white @ white) else (0.0, 0.0)
 
 
-class _Remembering(Screen):
+class Remembering(Screen):
     """Looks at effects around a hypothesis with answers found around others where these will do."""
 
     def __init__(self, hypothesis: Hypothesis, model: DrivelineModel, answers: Answers) -> None:
         super().__init__(hypothesis.white, model, _Weighted(hypothesis))
         self._known = answers.near(hypothesis.plain)
-        self._keeps = not answers.is_full()
+        self.found: list[dict[bytes, FloatArray]] = [{} for _ in self._known]
 
     def _runner(self, index: int) -> Simulate:
-        simulate, known = super()._runner(index), self._known[index]
+        simulate, known, found_here = super()._runner(index), self._known[index], self.found[index]
         base, still = self._result.p_of(index), self._output(index)
 
         def run(parameters: Sequence[FloatArray], alike_s: FloatArray | None = None) -> FloatArray:
@@ -84,8 +93,7 @@ class _Remembering(Screen):
             if all(key in known for key in keys):
                 return np.array([still + known[key] for key in keys])
             found = simulate(parameters, alike_s)
-            if self._keeps:
-                known.update((key, (out - still).astype(np.float32)) for key, out in zip(keys, found, strict=True))
+            found_here.update((key, (out - still).astype(np.float32)) for key, out in zip(keys, found, strict=True))
             return found
 
         return run
@@ -97,9 +105,9 @@ def _changed(base: FloatArray, p: FloatArray) -> bytes:
     return places.tobytes() + p[places].tobytes()
 
 
-def screen(hypothesis: Hypothesis, model: DrivelineModel, answers: Answers) -> Screen:
+def screen(hypothesis: Hypothesis, model: DrivelineModel, answers: Answers) -> Remembering:
     """Return a first look at effects around a hypothesis; promises are falls of the squared innovations."""
-    return _Remembering(hypothesis, model, answers)
+    return Remembering(hypothesis, model, answers)
 
 
 __all__ = ["Answers", "Look", "screen"]

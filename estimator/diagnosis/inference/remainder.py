@@ -88,6 +88,12 @@ def tests(best: Hypothesis) -> tuple[Test, ...]:
     )
 
 
+def tests_in_words(failed: Sequence[Test]) -> str:
+    """Say what an error does that noise does not, as the end of a sentence that begins with "it"."""
+    names = [test.name for test in failed]
+    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
+
+
 def chance(key: str, samples: int) -> float:
     """Return how large a share of so many samples' variance a test finds in noise by chance; 0 where it is no share."""
     return CHANCE * math.sqrt(2.0 * COLUMNS[key]) / samples if key in COLUMNS else 0.0

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from collections import defaultdict
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from threading import Lock
 
 import numpy as np
 
-from estimator.diagnosis.hypotheses import NOTHING, Effects, open_hypotheses, with_effect
+from estimator.diagnosis.hypotheses import NOTHING, Effects, Progress, open_hypotheses, silent, with_effect
 from estimator.diagnosis.inference.descent import extended
 from estimator.diagnosis.inference.disturbances import Limits, limits_of
 from estimator.diagnosis.inference.likelihood import Hypothesis, compared, fitted
-from estimator.diagnosis.inference.looks import Answers, Look, screen
-from estimator.diagnosis.inference.plausible import GRADE, is_plausible, is_possible, loosened, may_be_loose
-from estimator.diagnosis.inference.posterior import Score
+from estimator.diagnosis.inference.looks import Answers, Look, Remembering, screen
+from estimator.diagnosis.inference.plausible import GRADE, is_plausible, loosened, may_be_loose
 from estimator.diagnosis.inherit import forgetting, inheriting, kept, line_values, placed
 from estimator.diagnosis.screening import promising
 from estimator.physics.catalogue import EFFECTS
@@ -26,6 +27,7 @@ from estimator.physics.parallel import concurrently
 from estimator.physics.problem import Problem, make_problem, start_of, start_vector
 from estimator.physics.simulate import simulate
 from estimator.physics.unknowns import Release, nominal_unknowns, own_unknowns, released
+from estimator.physics.work import Work
 from estimator.signals.record import BoolArray, Record
 
 BLIND = "speed_sign_blind"
@@ -47,12 +49,10 @@ NEARLY = 0.3
 FINISHED = 2
 """Best of these that are fitted to their end."""
 
+STARTS = 5
+"""Effects from each of which a search begins, the most promising."""
+
 MOST_EFFECTS = 8
-
-
-def never() -> bool:
-    """Leave a search all the time it needs."""
-    return False
 
 
 @dataclass
@@ -66,9 +66,13 @@ class Search:
     path : list of Hypothesis
         Each better than the one before, from the nominal model to the best.
     rivals : dict of str to float
-        Best score of a set with each effect that was fitted at all.
-    is_over : callable
-        Tells when no further change is to be tried: ``stopped`` says that it was so.
+        Best score of a set with each effect that was fitted at all, to values that are a case of it.
+    implausible : dict of str to float
+        The same of others.
+    foreseen : dict of str to float
+        The least score that a score test promises for each effect on top of the set that was looked at last.
+    work : Work
+        What was simulated so far; no further change is tried after ``most`` free runs of all recordings: ``stopped``.
     """
 
     model: DrivelineModel
@@ -77,14 +81,20 @@ class Search:
     names: Sequence[str]
     grid: Grid | None = None
     visited: dict[Effects, Hypothesis] = field(default_factory=dict)
+    rough: dict[Effects, Hypothesis] = field(default_factory=dict)
     path: list[Hypothesis] = field(default_factory=list)
     rivals: dict[str, float] = field(default_factory=dict)
-    is_over: Callable[[], bool] = never
+    implausible: dict[str, float] = field(default_factory=dict)
+    foreseen: dict[str, float] = field(default_factory=dict)
+    work: Work = field(default_factory=Work)
+    most: float = math.inf
+    progress: Progress = silent
     stopped: bool = False
     answers: Answers = field(default_factory=Answers)
     _lessened: set[tuple[Effects, str]] = field(default_factory=set)
     _restarted: defaultdict[Effects, set[str]] = field(default_factory=lambda: defaultdict(set))
     _limits: Limits | None = None
+    _lock: Lock = field(default_factory=Lock)
 
     @property
     def limits(self) -> Limits:
@@ -94,20 +104,48 @@ class Search:
         return self._limits
 
     def run(self) -> Hypothesis:
-        """Return the best set of effects found."""
-        current = self.nothing()
-        self.path = [current]
+        """Return the best set of effects found, begun from each of the most promising effects.
+
+        One effect that imitates another may be the better one as long as it is alone, and what remains of it in the way
+        of the true one.
+        """
+        self.path = self._climbed([self.nothing()])
+        firsts = sorted((each for effects, each in self.visited.items() if len(effects) == 1), key=lambda h: h.score)
+        for first in firsts[:STARTS]:
+            if len(self.path[-1].effects) < 2:
+                break
+            if first.effects <= self.path[-1].effects or not self.is_plausible(first):
+                continue
+            path = self._climbed([self.nothing(), first], self.path)
+            if path[-1].score < self.path[-1].score:
+                self.path = path
+        return self.path[-1]
+
+    def _climbed(self, path: list[Hypothesis], rival: Sequence[Hypothesis] = ()) -> list[Hypothesis]:
+        """Return a way on which each set is better than the one before, to where no change lowers the score.
+
+        It is given up where, from its second effect on, a set is worse than one of as few effects on a rival's way.
+        """
         for _ in range(2 * MOST_EFFECTS):
-            if self.is_over():
+            current = path[-1]
+            self.progress("comparing hypotheses", 0.1 + 0.7 * len(path) / (len(path) + 3))
+            if self.simulations >= self.most:
                 self.stopped = True
                 break
-            better = self._best_addition(current) if len(current.effects) < MOST_EFFECTS else None
+            count = len(current.effects)
+            if count > 1 and any(len(r.effects) <= count and r.score < current.score for r in rival):
+                break
+            better = self._best_addition(current) if count < MOST_EFFECTS else None
             better = better or self._best_drop(current) or self._best_exchange(current) or self._graded(current)
             if better is None:
                 break
-            current = better
-            self.path.append(current)
-        return current
+            path = [*path, better]
+        return path
+
+    @property
+    def simulations(self) -> int:
+        """Free runs of all recordings so far."""
+        return round(self.work.samples / sum(r.time_s.size for r in self.records if r.lead is None))
 
     def nothing(self) -> Hypothesis:
         """Fit the nominal model."""
@@ -119,13 +157,21 @@ class Search:
         return self.visited[NOTHING]
 
     def _best_addition(self, current: Hypothesis) -> Hypothesis | None:
-        looks = self._looks(current, [name for name in self._open(current) if name not in current.effects])
+        looks, view = self._looks(current, [name for name in self._open(current) if name not in current.effects])
+        self._learn(current, view)
         rough = concurrently(lambda name: self._added(current, name, looks[name]), list(looks))
         found = [each for each in rough if each is not None] + self._begun_anew(current)
         found.sort(key=lambda each: each.score)
-        near = [each for each in found[:FINISHED] if each.score <= found[0].score + NEARLY * _gain(found[0], current)]
+        most = FINISHED if current.effects else STARTS
+        near = [each for each in found[:most] if self._may_be_best(each, found[0], current)]
+        near = list({each.effects: each for each in reversed(near)}.values())  # of one set the best
         finished = concurrently(lambda each: self.finish(each, current), near)
         return self._better(finished, current)
+
+    def _may_be_best(self, each: Hypothesis, best: Hypothesis, current: Hypothesis) -> bool:
+        """Tell whether a fit of a few steps may end as the best: near it, or an event whose moments are not found."""
+        is_event = any(EFFECTS[name].event for name in each.effects - current.effects)
+        return each.score <= best.score + NEARLY * _gain(best, current) or (is_event and not current.effects)
 
     def _begun_anew(self, current: Hypothesis) -> list[Hypothesis]:
         """Fit a hypothesis' effects from other starts a few steps, once for each set of other effects.
@@ -158,7 +204,7 @@ class Search:
         problem = self._problem(effects, kept(plain, (effects - {GRADE}) | set(self.model.effects)))
         without = extended(problem, warm_start(problem, forgetting(plain, name)), plain)
         base = replace(current, effects=effects, plain=replace(without, converged=without.derivative is not None))
-        return self._added(base, name, promising(screen(base, self.model, self.answers).looks(name)), current)
+        return self._added(base, name, self._look(base, name), current)
 
     def _open(self, current: Hypothesis) -> Sequence[str]:
         """Return the testable effects; behind a sensor blind for the sign, reversals are those of the motion."""
@@ -184,7 +230,18 @@ class Search:
         better = [each for each in found if each.score < current.score and self.is_plausible(each)]
         return min(better, key=lambda each: each.score, default=None)
 
-    def _looks(self, current: Hypothesis, names: Sequence[str], rival: str = "") -> dict[str, list[Look]]:
+    def _look(self, base: Hypothesis, name: str) -> list[Look]:
+        view = screen(base, self.model, self.answers)
+        looks = promising(view.looks(name))
+        self._learn(base, view)
+        return looks
+
+    def _learn(self, around: Hypothesis, view: Remembering) -> None:
+        self.answers.learn(around.plain, view.found)
+
+    def _looks(
+        self, current: Hypothesis, names: Sequence[str], rival: str = ""
+    ) -> tuple[dict[str, list[Look]], Remembering]:
         """Return the starts of the effects that are worth a fit, the most promising effect first.
 
         With a ``rival`` those are worth it that promise nearly as much.
@@ -193,6 +250,9 @@ class Search:
         contained = {special for have in current.effects for special in EFFECTS[have].contains}
         tried = [name for name in names if name != GRADE and name not in contained]
         looks = dict(zip(tried, concurrently(view.looks, tried), strict=True))
+        price = float(np.log(current.plain.residual.size))
+        if not rival:
+            self.foreseen.update({name: current.score - looks[name][0].promise + price for name in tried})
         order = sorted(tried, key=lambda name: -looks[name][0].promise)
         least = max(WORTH_FITTING * looks[order[0]][0].promise, np.log(current.plain.residual.size)) if order else 0.0
         if rival and rival != GRADE:
@@ -203,10 +263,8 @@ class Search:
         equals = {name: EFFECTS[name].equivalent if current.outputs == 1 else () for name in worth}
         twins = {twin for name in worth for twin in equals[name] if precedes(name, twin)}
         worth = [name for name in worth if name not in twins][:MOST_FITS]
-        return {
-            name: promising(looks[name])
-            for name in dict.fromkeys([*worth, *(loose if not current.effects and not rival else [])])
-        }
+        chosen = dict.fromkeys([*worth, *(loose if not current.effects and not rival else [])])
+        return {name: promising(looks[name]) for name in chosen}, view
 
     def _added(
         self, current: Hypothesis, name: str, looks: Sequence[Look], instead: Hypothesis | None = None
@@ -220,9 +278,6 @@ class Search:
         is_again = instead is not None and name in instead.effects
         if effects in self.visited and not is_again:
             return self.visited[effects]
-        if self.is_over():
-            self.stopped = True
-            return None
         rival = instead or current
         warm = current.plain if is_again else rival.plain
         for gone in rival.effects - effects - {GRADE}:
@@ -236,8 +291,13 @@ class Search:
         loose = loosened(best, self.model)
         if loose is not None:
             best = self._more_plausible(best, self._compared(effects, loose, rival))
-        self.rivals[name] = min(best.score, self.rivals.get(name, best.score))
-        return best if self.is_plausible(best) else None
+        is_plausible = self.is_plausible(best)
+        with self._lock:
+            scores = self.rivals if is_plausible else self.implausible
+            scores[name] = min(best.score, scores.get(name, math.inf))
+            if is_plausible and (effects not in self.rough or best.score < self.rough[effects].score):
+                self.rough[effects] = best
+        return best if is_plausible else None
 
     def _compared(self, effects: Effects, begun: FitResult, rival: Hypothesis) -> Hypothesis:
         return compared(effects, begun, rival, self._limits_of(effects), len(self.names))
@@ -273,12 +333,6 @@ class Search:
         """Tell whether the values of every effect are a case of it."""
         return is_plausible(hypothesis, self.model, self.records)
 
-    @property
-    def scores(self) -> tuple[Score, ...]:
-        """Of all sets that were fitted to their end and that a machine can be."""
-        possible = {effects: each for effects, each in self.visited.items() if is_possible(each, self.records)}
-        return tuple(Score(effects, each.score, self.is_plausible(each)) for effects, each in possible.items())
-
     def is_resolved(self, hypothesis: Hypothesis, name: str) -> bool:
         """Tell whether an effect is large enough to be distinguished from another way of sampling."""
         values = hypothesis.plain.values_of(name)
@@ -307,8 +361,17 @@ class Search:
     def exchanged(self, current: Hypothesis, name: str, other: str) -> Hypothesis | None:
         """Fit another effect in the place of one; None where no value is one."""
         base = self.without(current, name)
-        rough = self._added(base, other, promising(screen(base, self.model, self.answers).looks(other)), current)
+        rough = self._added(base, other, self._look(base, other), current)
         return None if rough is None else self.finish(rough, current)
+
+    def fit_look_alikes(self, best: Hypothesis) -> None:
+        """Fit to their end what came near in the place of an effect, so that each look-alike has its own values."""
+        for effects, rough in sorted(self.rough.items(), key=lambda item: sorted(item[0])):
+            exchanged = len(effects) == len(best.effects) and len(effects & best.effects) == len(effects) - 1
+            if exchanged and effects not in self.visited:
+                gone = next(iter(best.effects - effects))
+                if rough.score < best.score + NEARLY * _gain(best, self.without(best, gone)):
+                    self.finish(rough, best)
 
     def _best_drop(self, current: Hypothesis) -> Hypothesis | None:
         """Return a hypothesis without an effect that others made superfluous; None where there is none."""
@@ -317,23 +380,25 @@ class Search:
     def _best_exchange(self, current: Hypothesis) -> Hypothesis | None:
         """Return the best hypothesis with a look-alike in the place of one effect; None where none is better."""
         nearest = concurrently(lambda name: self._nearest(current, name), sorted(current.effects))
-        return self._better([each for each in nearest if each is not None], current)
+        for _, base, view in nearest:
+            self._learn(base, view)
+        return self._better([each for each, _, _ in nearest if each is not None], current)
 
-    def _nearest(self, current: Hypothesis, name: str) -> Hypothesis | None:
+    def _nearest(self, current: Hypothesis, name: str) -> tuple[Hypothesis | None, Hypothesis, Remembering]:
         """Fit the look-alike that explains most in an effect's place to its end; None where none comes near.
 
         A load that walks far has no law for a first look to judge it by: it is fitted to its end.
         """
         base = self.without(current, name)
         alike = [other for other in self.names if other not in current.effects and are_alike(name, other)]
-        looks = self._looks(base, alike, name)
+        looks, view = self._looks(base, alike, name)
         rough = [self._added(base, other, looks[other], current) for other in looks]
         near = current.score + NEARLY * _gain(current, base)
         found = [each for each in rough if each is not None and each.score < near]
         best = [self.finish(min(found, key=lambda each: each.score), current)] if found else []
-        if GRADE in alike and not self.is_over():
+        if GRADE in alike:
             best.append(self._with_grade(base))
-        return min(best, key=lambda each: each.score, default=None)
+        return min(best, key=lambda each: each.score, default=None), base, view
 
     def _extended(self, warm: FitResult, effects: Effects, release: Release) -> Problem:
         common = kept(warm, (effects - {GRADE}) | set(self.model.effects))

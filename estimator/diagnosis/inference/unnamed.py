@@ -9,26 +9,17 @@ elements.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from estimator.diagnosis.inference.calibration import (
-    LEAST_PROBABILITY,
-    LEAST_SHARE,
-    MOST_AT_PLACE,
-    MOST_ELSEWHERE,
-    TEMPERED,
-)
+from estimator.diagnosis.hypotheses import NOTHING
+from estimator.diagnosis.inference.calibration import LEAST_SHARE
 from estimator.diagnosis.inference.disturbances import estimated, reading_noise
+from estimator.diagnosis.inference.judge import Grounds, Score, free_rms
 from estimator.diagnosis.inference.likelihood import ROUNDS, Hypothesis, of_first_outputs
-from estimator.diagnosis.inference.posterior import Belief, free_rms
-from estimator.diagnosis.inference.search import Search
-from estimator.diagnosis.inference.verdict import Decision, tempered_by
-from estimator.diagnosis.result import Verdict
 from estimator.diagnosis.unnamed import Hunt, hunts_of, scene
-from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Element
 from estimator.physics.jacobian import changes
 from estimator.physics.problem import outputs_at, own_part
@@ -117,76 +108,18 @@ def _rms(hunt: Hunt) -> float:
     return math.sqrt(max(left, 0.0) / count)
 
 
-def at_place(search: Search, decision: Decision, element: Element) -> Hypothesis:
-    """Return the best set without the effects that act elsewhere or are doubted; of the first output."""
-    best = decision.best
-    here = {each.name for each in (*decision.named, *decision.traces) if element in _elements(each)}
-    for name in sorted(best.effects - here):
-        best = search.without(best, name)
-    return of_first_outputs(best)
+def rival_laws(ground: Grounds, alone: Law | None, beside: Law | None) -> tuple[Score, ...]:
+    """Return laws without a name as hypotheses: one instead of all effects, and one beside the best set of these.
 
-
-def acts_at(beliefs: Sequence[Belief], element: Element) -> bool:
-    """Tell whether one of some effects acts at an element, or one that it can't be distinguished from."""
-    return any(element in _elements(each) for each in beliefs)
-
-
-def gain_of_names(alone: Hypothesis, nothing: Hypothesis, law: Law) -> float:
-    """Return what a set of names gains over nothing, as a share of what a law without a name gains.
-
-    ``alone`` is that set: the best one, or what of it acts at the law's place.
+    Where the law alone is more probable than names and a law for what they leave, the names imitate it. Laws are sought
+    in the first output alone: what they gain over the same set without them counts there. One that leaves the free-run
+    error as it was is a trace, and no other explanation of what the names explain.
     """
-    return (nothing.score - alone.score) / (nothing.score - law.score)
-
-
-def weighed_against(decision: Decision, law: Law | None, alone: Callable[[Element], Hypothesis]) -> Decision:
-    """Return a decision in which a law without a name has its share of the probability.
-
-    ``law`` is the best without any effect; ``alone`` returns the best set without what acts elsewhere. In as far
-    as the law makes the recordings more probable than the best set of names, what these explain is there, and they are
-    not, unless they gain nearly as much. At its own place a law without a name is a name's law in another form, where
-    the names there gain most of what it gains. One that leaves the free-run error as it was is a trace, and no other
-    explanation of what the names explain. Laws without a name are sought in the first output alone, and weighed by what
-    it says.
-    """
-    best, nothing = of_first_outputs(decision.best), of_first_outputs(decision.nothing)
-    if law is None or law.score >= nothing.score or 1.0 - (law.rms / free_rms(nothing)) ** 2 < LEAST_SHARE:
-        return decision
-    if gain_of_names(best, nothing, law) >= MOST_ELSEWHERE:
-        return decision
-    same = acts_at(decision.named, law.element) and gain_of_names(alone(law.element), nothing, law) >= MOST_AT_PLACE
-    first = replace(decision, best=best, nothing=nothing)
-    weighed = against_rival(first, law.score, lambda each: not (same and law.element in _elements(each)))
-    return replace(weighed, best=decision.best, nothing=decision.nothing)
-
-
-def against_rival(decision: Decision, score: float, falls: Callable[[Belief], bool]) -> Decision:
-    """Return a decision in which a hypothesis of a score, without names, has its share of the probability.
-
-    ``falls`` tells which names it stands against. Those left with too little are doubted.
-    """
-    share = _share_of_names(decision, score)
-    weighed = [replace(each, probability=each.probability * share) if falls(each) else each for each in decision.named]
-    named = tuple(each for each in weighed if each.probability >= LEAST_PROBABILITY)
-    doubted = tuple(each for each in weighed if each not in named)
-    verdict = Verdict.UNEXPLAINED if doubted and not named else decision.verdict
-    return replace(decision, verdict=verdict, named=named, doubted=(*doubted, *decision.doubted))
-
-
-def _share_of_names(decision: Decision, score: float) -> float:
-    """Return the probability of the best set of names, of the two.
-
-    A law of size zero is no law, and values at their bounds are the nominal line: what a rival has of the probability
-    is what it has beyond the nominal model, which has had its share of the posterior already.
-    """
-    best = decision.best
-    tempered = tempered_by(decision.failed, best.plain.residual.size, TEMPERED)
-    rival, nominal = (
-        math.exp(min(0.5 * (decision.best.score - each) / tempered, 700.0)) for each in (score, decision.nothing.score)
-    )
-    return 1.0 / (1.0 + max(rival - nominal, 0.0))
-
-
-def _elements(belief: Belief) -> set[Element]:
-    """Return where an effect acts, or one that it can't be distinguished from."""
-    return {EFFECTS[name].element for name in (belief.name, *belief.alike)}
+    best, first = of_first_outputs(ground.best), of_first_outputs(ground.nothing)
+    offset = ground.best.score - best.score
+    found = []
+    if alone is not None and 1.0 - (alone.rms / free_rms(first)) ** 2 >= LEAST_SHARE:
+        found.append(Score(NOTHING, offset + alone.score))
+    if beside is not None and best.effects:
+        found.append(Score(best.effects, offset + beside.score))
+    return tuple(found)

@@ -1,43 +1,119 @@
-"""A decision in the words of a driveline engineer."""
+"""The statement: one paragraph made from verdict, errors, effects and effort, and from nothing else.
+
+What it says of an error follows from the numbers that stand beside it: an error that does not fall is never said to.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
-from estimator.diagnosis.inference.data_sheet import in_words
-from estimator.diagnosis.inference.remainder import Test
-from estimator.diagnosis.inference.verdict import Decision
 from estimator.diagnosis.phrases import times
-from estimator.diagnosis.result import Fit, FoundEffect, Remainder, Stray, UntestableEffect, Verdict
+from estimator.diagnosis.result import Effort, Fit, FoundEffect, Remainder, Stray, UntestableEffect, Verdict
 
 SURE = 0.999
 """Probability from which a sentence gives no more digits."""
 
+MOST_NAMES = 4
+"""Untried effects that a headline lists."""
+
+
+@dataclass(frozen=True, slots=True)
+class Beside:
+    """What a statement adds to the verdict.
+
+    Attributes
+    ----------
+    can_be_retuned : bool
+        False for a plant whose parameters are not fitted.
+    """
+
+    remainder: Remainder | None = None
+    traces: Sequence[str] = ()
+    strays: Sequence[Stray] = ()
+    untestable: Sequence[UntestableEffect] = ()
+    can_be_retuned: bool = True
+
 
 def statement(
-    decision: Decision,
-    effects: Sequence[FoundEffect],
-    fit: Fit,
-    untestable: Sequence[UntestableEffect],
-    remainder: Remainder | None,
-    strays: Sequence[Stray] = (),
+    verdict: Verdict, fit: Fit, effects: Sequence[FoundEffect], effort: Effort, beside: Beside = Beside()
 ) -> str:
     """Return one paragraph: verdict, figures, and what to do next."""
-    parts = [_wrong_values(fit, strays) if strays else _headline(decision, effects, fit)]
-    if remainder is not None and not strays:
-        parts.append(_left(decision, remainder))
-    if decision.traces:
-        parts.append(f"Seen, but too small to matter: {', '.join(each.name for each in decision.traces)}.")
+    parts = [] if effort.finished else [_not_decided(effort)]
+    parts.append(_headline(verdict, fit, effects, effort, beside))
+    if beside.remainder is not None and not beside.strays:
+        parts.append(_left(verdict, beside.remainder))
+    if beside.traces:
+        parts.append(f"Seen, but too small to matter: {', '.join(beside.traces)}.")
     twins = sorted({twin for effect in effects for twin in effect.indistinguishable_from})
     if twins:
         parts.append(f"These recordings could as well be explained by {' or '.join(twins)}.")
-    tests = sorted({entry.suggested_test for entry in untestable if not entry.needs})
+    tests = sorted({entry.suggested_test for entry in beside.untestable if not entry.needs})
     if tests:
-        names = ", ".join(entry.name for entry in untestable if not entry.needs)
+        names = ", ".join(entry.name for entry in beside.untestable if not entry.needs)
         parts.append(f"Neither found nor excluded by these recordings: {names}. Record a {' or a '.join(tests)}.")
-    parts += [f"Neither found nor excluded without {e.needs}: {e.name}." for e in untestable if e.needs]
+    parts += [f"Neither found nor excluded without {e.needs}: {e.name}." for e in beside.untestable if e.needs]
     return " ".join(parts)
+
+
+def _not_decided(effort: Effort) -> str:
+    count = len(effort.untried)
+    among = ", ".join(effort.untried[:MOST_NAMES]) + (", …" if count > MOST_NAMES else "")
+    left = f", {count} of {effort.candidates} effects untried, among them {among}" if count else ""
+    return f"Not decided: the search was ended after {effort.limit_s:.3g} s{left}."
+
+
+def _headline(verdict: Verdict, fit: Fit, effects: Sequence[FoundEffect], effort: Effort, beside: Beside) -> str:
+    model = "re-tuned inside its tolerances, the nominal model" if beside.can_be_retuned else "the model"
+    noise = f" at a noise of {fit.noise_floor:.3g} {fit.unit}" if math.isfinite(fit.noise_floor) else ""
+    left = f"{model} leaves a free-run error of {fit.retuned:.3g} {fit.unit}{noise}"
+    if not effort.finished:
+        return f"So far {left}. Give it more time (--budget-s), or fewer or shorter recordings."
+    if verdict is Verdict.NO_MISMATCH:
+        return (
+            f"Nothing is missing: {model} leaves nothing but the noise and slow drift of the readings ({_noise(fit)})."
+        )
+    found = "; ".join(effect.statement for effect in effects)
+    if beside.strays and verdict is Verdict.UNEXPLAINED:
+        return _wrong_values(left, beside.strays)
+    if verdict is Verdict.UNEXPLAINED:
+        also = f" Found in the acquisition, and not the cause: {found}." if effects else ""
+        return f"Something is missing in the model, and no effect of the catalogue explains it: {left}.{also}"
+    part = "the mismatch" if verdict is Verdict.EXPLAINED else "part of the mismatch"
+    return f"Missing in the model{_sure(effects)}: {found}. This explains {part}: {_fall(fit)}."
+
+
+def _fall(fit: Fit) -> str:
+    """Say what becomes of the error, on the recordings and on samples not used for the fit."""
+    said = f"the free-run error {_change(fit.retuned, fit.augmented)} {fit.unit}"
+    if math.isfinite(fit.holdout_retuned) and math.isfinite(fit.holdout_augmented):
+        said += f", on samples not used for the fit it {_change(fit.holdout_retuned, fit.holdout_augmented)} {fit.unit}"
+    return said
+
+
+def _change(before: float, after: float) -> str:
+    one, other = _pair(before, after)
+    if one == other:
+        return f"stays at {one}"
+    return f"{'falls' if after < before else 'rises'} from {one} to {other}"
+
+
+def _pair(before: float, after: float) -> tuple[str, str]:
+    """Return two numbers with as many digits as it takes to tell them from each other, up to six."""
+    for digits in range(3, 7):
+        one, other = (f"{value:.{digits}g}" for value in (before, after))
+        if one != other:
+            break
+    return one, other
+
+
+def _round(value: float) -> str:
+    return f"{float(f'{value:.3g}'):g}"
+
+
+def _noise(fit: Fit) -> str:
+    return f"free-run error {fit.retuned:.3g} {fit.unit}, noise {fit.noise_floor:.3g} {fit.unit}"
 
 
 def _sure(effects: Sequence[FoundEffect]) -> str:
@@ -48,50 +124,35 @@ def _sure(effects: Sequence[FoundEffect]) -> str:
     return f" (probability {least:.3f})" if least < SURE else f" (probability above {SURE})"
 
 
-def _errors(fit: Fit) -> str:
-    """Say what the re-tuned nominal model leaves."""
-    return f"a free-run error of {fit.retuned:.3g} {fit.unit} at a noise of {fit.noise_floor:.3g} {fit.unit}"
-
-
-def _wrong_values(fit: Fit, strays: Sequence[Stray]) -> str:
+def _wrong_values(left: str, strays: Sequence[Stray]) -> str:
     return (
-        f"No physics need be missing, but the data sheet is off: with {in_words(strays)} the nominal model explains "
-        f"the recordings down to the noise. Inside its tolerances it leaves {_errors(fit)}. Check the data sheet, or "
-        "widen the tolerance where it is a guess, and diagnose again."
+        f"No physics need be missing, but the data sheet is off: {off_the_sheet(strays)}. With that the nominal model "
+        f"explains the recordings down to the noise; {left}. Check the data sheet, or widen the tolerance where it is "
+        "a guess, and diagnose again."
     )
 
 
-def tests_in_words(failed: Sequence[Test]) -> str:
-    """Say what an error does that noise does not, as the end of a sentence that begins with "it"."""
-    names = [test.name for test in failed]
-    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
+def off_the_sheet(strays: Sequence[Stray]) -> str:
+    """Say which values are what, and what the data sheet says."""
+    said = []
+    for stray in strays:
+        trusted = f"{100.0 * stray.tolerance:.2g} %"
+        if stray.nominal is None:
+            side = "above" if stray.ratio > 1.0 else "below"
+            said.append(f"{stray.name} {100.0 * abs(stray.ratio - 1.0):.2g} % {side} its nominal value (± {trusted})")
+        else:
+            value, unit = stray.ratio * stray.nominal, f" {stray.unit}" if stray.unit else ""
+            said.append(
+                f"{stray.name} is {_round(value)}{unit}, the data sheet says {_round(stray.nominal)} ± {trusted}"
+            )
+    return " and ".join(said)
 
 
-def _left(decision: Decision, remainder: Remainder) -> str:
-    share, noise = f"{remainder.share:.0%}".replace("%", " %"), times(remainder.times_noise)
-    law = "" if remainder.element is None else f"; it {remainder.law}"
-    return (
-        f"{share} of the squared error is left, {noise} times the noise, and it is not noise: it "
-        f"{tests_in_words(decision.failed)}{law}."
-    )
-
-
-def _headline(decision: Decision, effects: Sequence[FoundEffect], fit: Fit) -> str:
-    is_fixed = decision.nothing.plain.problem.grid.plant is not None
-    model = "the model" if is_fixed else "re-tuned inside its tolerances, the nominal model"
-    if decision.verdict is Verdict.NO_MISMATCH:
+def _left(verdict: Verdict, remainder: Remainder) -> str:
+    noise = times(remainder.times_noise)
+    if verdict is Verdict.PARTLY_EXPLAINED:
+        share = f"{remainder.share:.0%}".replace("%", " %")
         return (
-            f"Nothing is missing: {model} leaves nothing but the noise and slow drift of the readings (free-run error "
-            f"{fit.retuned:.3g} {fit.unit}, noise {fit.noise_floor:.3g} {fit.unit})."
+            f"{share} of the squared error is left, {noise} times the noise, and it is not noise: it {remainder.says}."
         )
-    if effects:
-        found = "; ".join(effect.statement for effect in effects)
-        part = "part of the mismatch" if decision.verdict is Verdict.PARTLY_EXPLAINED else "the mismatch"
-        return (
-            f"Missing in the model{_sure(effects)}: {found}. This explains {part}: the free-run error falls from "
-            f"{fit.retuned:.3g} to {fit.augmented:.3g} {fit.unit}, on samples not used for the fit from "
-            f"{fit.holdout_retuned:.3g} to {fit.holdout_augmented:.3g} {fit.unit}."
-        )
-    return (
-        f"Something is missing in the model, and no effect of the catalogue explains it: {model} leaves {_errors(fit)}."
-    )
+    return f"What is left is {noise} times the noise, and it is not noise: it {remainder.says}."

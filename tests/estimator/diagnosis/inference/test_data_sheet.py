@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 
 import pytest
 
 from estimator.diagnosis.diagnose import diagnose
 from estimator.diagnosis.hypotheses import everything, open_hypotheses
-from estimator.diagnosis.inference.data_sheet import FREELY, free_line, in_words
+from estimator.diagnosis.inference.data_sheet import FREELY, free_line
 from estimator.diagnosis.inference.search import Search
+from estimator.diagnosis.inference.wording import off_the_sheet
 from estimator.diagnosis.result import Stray, Verdict
 from estimator.physics.effect import Element
 from estimator.physics.model import DrivelineModel
@@ -53,11 +55,9 @@ def test_no_value_is_sought_that_is_no_slip_of_a_data_sheet() -> None:
     assert not line.leaves_noise
 
 
-def test_a_stray_is_said_with_its_tolerance() -> None:
-    said = in_words([Stray("k", 1.166, 0.04), Stray("J_L", 0.9, 0.05)])
-    assert said == (
-        "k 17 % above its nominal value (trusted to 4 %) and J_L 10 % below its nominal value (trusted to 5 %)"
-    )
+def test_a_value_off_its_sheet_is_said_with_what_the_sheet_says() -> None:
+    said = off_the_sheet([Stray("k", 1.166, 0.04, 4000.0, "Nm/rad"), Stray("J_L", 0.9, 0.05)])
+    assert said == ("k is 4660 Nm/rad, the data sheet says 4000 ± 4 % and J_L 10 % below its nominal value (± 5 %)")
 
 
 def test_a_wrong_stiffness_is_no_missing_physics() -> None:
@@ -66,4 +66,4 @@ def test_a_wrong_stiffness_is_no_missing_physics() -> None:
     assert (found.verdict, found.effects) == (Verdict.UNEXPLAINED, ())
     assert found.mismatch.element is Element.SHAFT
     assert "No physics need be missing, but the data sheet is off" in found.statement
-    assert "k 30 % above its nominal value (trusted to 5 %)" in found.statement
+    assert re.search(r"k is \S+ Nm/rad, the data sheet says \S+ ± 5 %", found.statement)

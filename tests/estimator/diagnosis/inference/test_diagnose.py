@@ -9,6 +9,7 @@ from estimator.diagnosis.diagnose import diagnose
 from estimator.diagnosis.result import Verdict
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Element
+from estimator.physics.parallel import available_cores, work_on
 from hil.report.diagnosis_json import diagnosis_json
 from tests.estimator.diagnosis.one_effect import bench_with
 from tests.estimator.diagnosis.planted import SIGMA, TIGHT, recordings
@@ -33,7 +34,9 @@ def test_a_named_effect_has_its_share_and_probability_and_the_model_has_it() -> 
     assert content["traces"] == []
     assert content["mismatch"]["element"] == "motor"
     rejected = [rival["name"] for rival in content["rejected"]]
-    reported = ["coulomb_friction_motor", *rejected, *(entry["name"] for entry in content["untestable"])]
+    left = [*(entry["name"] for entry in content["untestable"]), *content["effort"]["untried"]]
+    left += content["effects"][0]["indistinguishable_from"]
+    reported = ["coulomb_friction_motor", *rejected, *left]
     can_be = [n for n, entry in EFFECTS.items() if bench.model.structure in entry.structures and not entry.recognised]
     assert sorted(reported) == sorted(can_be)
     assert all(rival["delta_bic"] <= 0.0 for rival in content["rejected"])
@@ -61,7 +64,7 @@ def test_recordings_kept_out_of_the_fit_are_simulated_with_what_was_found() -> N
         answer.fit.holdout_retuned,
         answer.fit.holdout_augmented,
     )
-    assert "on samples not used for the fit from" in answer.statement
+    assert "on samples not used for the fit it falls from" in answer.statement
 
 
 def test_without_recordings_kept_out_blocks_of_the_others_are() -> None:
@@ -91,11 +94,23 @@ def test_a_law_of_no_entry_is_located_and_described_without_a_name() -> None:
     assert f"; it {said}." in answer.statement
 
 
-def test_when_its_time_is_up_the_answer_says_what_was_not_tried() -> None:
+def test_when_its_time_is_up_nothing_is_decided_and_nothing_rejected() -> None:
     bench = bench_with("coulomb_friction_motor", {"friction_nm": 8.0})
     answer = diagnose(bench.records, bench.model, budget_s=0.0)
     assert answer.verdict is Verdict.UNEXPLAINED
-    assert answer.effects == ()
-    (warning,) = answer.warnings
-    assert "ended after its 0 s" in warning
-    assert "coulomb_friction_motor" in warning.split("no fit was made of")[1]
+    assert (answer.effects, answer.rejected) == ((), ())
+    assert answer.statement.startswith("Not decided: the search was ended after 0 s")
+    effort = diagnosis_json(answer)["effort"]
+    assert effort["finished"] is False
+    assert "coulomb_friction_motor" in effort["untried"]
+
+
+def test_the_effort_is_the_same_on_any_number_of_cores() -> None:
+    bench = bench_with("coulomb_friction_motor", {"friction_nm": 8.0})
+    contents = []
+    for cores in (1, 3):
+        work_on(cores)
+        contents.append(diagnosis_json(diagnose(bench.records, bench.model)) | {"timing_s": None})
+    work_on(available_cores())
+    assert contents[0]["effort"]["simulations"] > 0
+    assert contents[0] == contents[1]

@@ -9,13 +9,9 @@ import numpy as np
 import pytest
 
 from estimator.diagnosis.hypotheses import everything, open_hypotheses
-from estimator.diagnosis.inference import remainder
-from estimator.diagnosis.inference.calibration import MOST_AT_PLACE, MOST_ELSEWHERE
-from estimator.diagnosis.inference.posterior import free_rms
+from estimator.diagnosis.inference.judge import Grounds, decide, free_rms, grounds
 from estimator.diagnosis.inference.search import Search
-from estimator.diagnosis.inference.unnamed import Law, best_law, hunts_around, weighed_against
-from estimator.diagnosis.inference.verdict import Decision, decide, grounds
-from estimator.diagnosis.result import Verdict
+from estimator.diagnosis.inference.unnamed import Law, best_law, hunts_around, rival_laws
 from estimator.diagnosis.unnamed import scene
 from estimator.physics.effect import Element
 from estimator.signals.record import Record
@@ -57,59 +53,40 @@ def test_laws_are_weighed_by_the_innovations() -> None:
 
 
 @pytest.fixture(scope="module")
-def friction() -> Decision:
+def friction() -> tuple[Search, Grounds]:
     bench = bench_with("coulomb_friction_motor", {"friction_nm": 8.0})
     names = ["coulomb_friction_motor", "coulomb_friction_load"]
     search = Search(bench.model, bench.records, bench.use, names)
-    return decide(search, grounds(search))
+    return search, grounds(search)
 
 
-def weighed(decision: Decision, rival: Law | None) -> Decision:
-    return weighed_against(decision, rival, lambda _element: decision.best)
+def law(ground: Grounds, better: float) -> Law:
+    """A law that is so much more probable than the best set of names."""
+    return Law(Element.SHAFT, (("T", 1.0),), ground.best.score - better, 0.1)
 
 
-def law(decision: Decision, element: Element, better: float) -> Law:
-    return Law(element, (("T", 1.0),), decision.best.score - better, 0.1)
+def named(friction: tuple[Search, Grounds], alone: Law | None, beside: Law | None) -> list[str]:
+    search, ground = friction
+    decision = decide(search, ground, rival_laws(ground, alone, beside))
+    assert {each.name for each in (*decision.named, *decision.doubted)} == {"coulomb_friction_motor"}
+    return [each.name for each in decision.named]
 
 
-def more(decision: Decision, most: float) -> float:
-    """By how much a law gains more than the names where they gain a share ``most`` of it."""
-    return (1.0 / most - 1.0) * (decision.nothing.score - decision.best.score)
+def test_a_name_falls_to_a_law_without_one_that_is_more_probable(friction: tuple[Search, Grounds]) -> None:
+    assert named(friction, law(friction[1], 100.0), None) == []
 
 
-def test_a_name_falls_to_a_law_elsewhere_that_gains_more(friction: Decision) -> None:
-    after = weighed(friction, law(friction, Element.SHAFT, 1.1 * more(friction, MOST_ELSEWHERE)))
-    assert after.named == ()
-    assert after.verdict is Verdict.UNEXPLAINED
-    assert [each.name for each in after.doubted] == ["coulomb_friction_motor"]
-    assert after.doubted[0].probability < 0.01
+def test_a_name_stands_where_a_law_beside_it_is_more_probable_still(friction: tuple[Search, Grounds]) -> None:
+    """A law of many terms follows the form of what is there; with the name it needs fewer of them."""
+    ground = friction[1]
+    assert named(friction, None, None) == ["coulomb_friction_motor"]
+    assert named(friction, law(ground, -100.0), None) == ["coulomb_friction_motor"]
+    assert named(friction, law(ground, 100.0), law(ground, 150.0)) == ["coulomb_friction_motor"]
+    assert named(friction, law(ground, 150.0), law(ground, 100.0)) == []
 
 
-@pytest.mark.parametrize("better", [-100.0, 0.0, 100.0])
-def test_a_name_stands_against_a_law_that_gains_hardly_more(friction: Decision, better: float) -> None:
-    """A law of many terms follows the form of what is there more closely."""
-    assert better < more(friction, MOST_ELSEWHERE)
-    assert weighed(friction, None) is friction
-    assert weighed(friction, law(friction, Element.SHAFT, better)) is friction
-
-
-def test_a_name_stands_against_a_law_at_its_own_place_that_gains_somewhat_more(friction: Decision) -> None:
-    for times, stands in ((0.9, True), (1.1, False)):
-        after = weighed(friction, law(friction, Element.MOTOR, times * more(friction, MOST_AT_PLACE)))
-        assert (after.named == friction.named) is stands
-        assert (after.verdict is Verdict.UNEXPLAINED) is not stands
-
-
-def test_what_is_no_better_than_the_nominal_model_takes_nothing(friction: Decision) -> None:
-    """However little differences of scores count where much is left: the posterior has counted that already."""
-    doubtful = replace(friction, failed=(remainder.Test("predicted by its own past", 0.5, 0.03, is_share=True),))
-    for better in (0.0, -5.0):
-        rival = Law(Element.SHAFT, (("T", 1.0),), friction.nothing.score - better, 0.1)
-        (after,) = weighed(doubtful, rival).named
-        assert after.probability == pytest.approx(friction.named[0].probability)
-
-
-def test_a_law_that_leaves_the_error_as_it_is_takes_nothing(friction: Decision) -> None:
+def test_a_law_that_leaves_the_error_as_it_is_takes_nothing(friction: tuple[Search, Grounds]) -> None:
     """It makes the innovations smaller; the name explains what goes wrong over seconds."""
-    trace = replace(law(friction, Element.SHAFT, 100.0), rms=free_rms(friction.nothing))
-    assert weighed(friction, trace) is friction
+    ground = friction[1]
+    trace = replace(law(ground, 100.0), rms=free_rms(ground.nothing))
+    assert rival_laws(ground, trace, None) == ()

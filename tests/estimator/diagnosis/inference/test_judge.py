@@ -8,9 +8,16 @@ from typing import cast
 import pytest
 
 from estimator.diagnosis.inference import remainder
+from estimator.diagnosis.inference.judge import (
+    Score,
+    levels,
+    probability_of,
+    shares,
+    shares_with_grade,
+    tempered_by,
+    verdict_of,
+)
 from estimator.diagnosis.inference.likelihood import Hypothesis
-from estimator.diagnosis.inference.posterior import Score, levels, probability_of, shares, shares_with_grade
-from estimator.diagnosis.inference.verdict import tempered_by, verdict_of
 from estimator.diagnosis.result import Verdict
 
 
@@ -92,16 +99,19 @@ def test_differences_of_scores_count_by_what_is_left_beyond_what_explained_world
 
 
 @pytest.mark.parametrize(
-    ("of_spread", "is_named", "is_more_than_noise", "expected"),
+    ("of_spread", "is_named", "is_more_than_noise", "falls", "expected"),
     [
-        (0.1, True, False, Verdict.EXPLAINED),
-        (0.1, True, True, Verdict.PARTLY_EXPLAINED),
-        (0.1, False, False, Verdict.NO_MISMATCH),
-        (0.1, False, True, Verdict.UNEXPLAINED),
-        (1.2, True, True, Verdict.UNEXPLAINED),
+        (0.1, True, False, True, Verdict.EXPLAINED),
+        (0.1, True, True, True, Verdict.PARTLY_EXPLAINED),
+        (0.1, True, False, False, Verdict.UNEXPLAINED),
+        (0.1, True, True, False, Verdict.UNEXPLAINED),
+        (0.1, False, False, True, Verdict.NO_MISMATCH),
+        (0.1, False, True, True, Verdict.UNEXPLAINED),
+        (1.2, True, True, True, Verdict.UNEXPLAINED),
+        (1.2, False, False, True, Verdict.UNEXPLAINED),
     ],
 )
-def test_nothing_is_explained_that_leaves_as_much_as_the_signal_itself(
-    of_spread: float, is_named: bool, is_more_than_noise: bool, expected: Verdict
+def test_nothing_is_explained_that_leaves_as_much_as_the_signal_itself_or_an_error_that_does_not_fall(
+    of_spread: float, is_named: bool, is_more_than_noise: bool, falls: bool, expected: Verdict
 ) -> None:
-    assert verdict_of(of_spread, is_named, is_more_than_noise) is expected
+    assert verdict_of(of_spread, is_named, is_more_than_noise, falls) is expected

@@ -1,0 +1,390 @@
+"""The judge: from the sets of effects that were fitted to what is believed, and nothing after that.
+
+Every explanation is a hypothesis with a score: sets of names, a law without a name, such a law beside the names, and
+nominal values off their data sheet. A score is minus twice a log-probability, prior included, if the model were the
+world. Worlds are written in other forms than the model, and what they leave takes part in every difference of scores:
+these are divided by what is calibrated (``calibration``) and by what the best set leaves that is no noise
+(``remainder``).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from estimator.diagnosis.hypotheses import Effects
+from estimator.diagnosis.inference.calibration import (
+    ALIKE_SHARE,
+    ALIKE_WITHIN,
+    CLEARLY_BELOW,
+    LEAST_PROBABILITY,
+    LEAST_SHARE,
+    TEMPERED,
+)
+from estimator.diagnosis.inference.likelihood import Hypothesis, covariance
+from estimator.diagnosis.inference.plausible import GRADE, is_possible
+from estimator.diagnosis.inference.remainder import Test, tests
+from estimator.diagnosis.inference.search import Search
+from estimator.diagnosis.intervals import Z95
+from estimator.diagnosis.result import Fit, Verdict
+from estimator.physics.catalogue import EFFECTS
+from estimator.physics.problem import Problem
+
+
+class Score(NamedTuple):
+    """The score of a set of effects, and whether its values are all a case of their effect."""
+
+    effects: frozenset[str]
+    score: float
+    is_plausible: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Belief:
+    """What is believed of one effect of the best set.
+
+    Attributes
+    ----------
+    names : frozenset of str
+        The effect, those it can't be distinguished from, and those that hold it or are one of it.
+    probability : float
+        Of this effect or one of those it can't be distinguished from.
+    share : float
+        Share of the re-tuned model's squared free-run error that goes with it.
+    score : float
+        By which the score rises without it.
+    alike : mapping of str to mapping of str to float
+        Effects that explain as much in its place, with their values there.
+    """
+
+    name: str
+    names: frozenset[str]
+    probability: float
+    share: float
+    score: float
+    alike: Mapping[str, Mapping[str, float]]
+    objection: str = ""
+
+    @property
+    def reason(self) -> str:
+        """Why it is not named."""
+        return self.objection or f"in the most probable set, but its own probability is {self.probability:.2f} only"
+
+
+def beliefs(
+    best: Hypothesis,
+    visited: Mapping[Effects, Hypothesis],
+    scores: Sequence[Score],
+    share: Mapping[str, float],
+    tempered: float,
+    alike_within: float,
+    alike_share: float,
+) -> tuple[Belief, ...]:
+    """Return what is believed of each effect of the best set, the weightiest first.
+
+    Parameters
+    ----------
+    visited : mapping of set to Hypothesis
+        All that were fitted to their end, the sets without each effect of the best among them.
+    scores : sequence of Score
+        Of those of the same sets that a machine can be.
+    share : mapping of str to float
+        Of each effect of the best set (``shares``).
+    tempered : float
+        By which differences of scores are divided.
+    alike_within : float
+        Difference in score within which another effect in an effect's place is as good.
+    alike_share : float
+        The same over what the effect itself explains.
+    """
+    found = []
+    plausible = {each.effects: visited[each.effects] for each in scores if each.is_plausible}
+    for name in sorted(best.effects):
+        without = visited[best.effects - {name}]
+        within = max(alike_within, alike_share * (without.score - best.score))
+        alike = _alike(name, best, plausible, within)
+        names = frozenset({name, *alike, *_same_law(name)})
+        found.append(
+            Belief(
+                name,
+                names,
+                probability_of(names, scores, tempered),
+                min(max(share[name], 0.0), 1.0),
+                without.score - best.score,
+                alike,
+            )
+        )
+    return tuple(sorted(found, key=lambda belief: -belief.share))
+
+
+def fall(one: Hypothesis, other: Hypothesis, nothing: Hypothesis) -> float:
+    """Return by how much less another set leaves than one, as a share of the re-tuned model's squared error."""
+    return (one.free_squares - other.free_squares) / nothing.free_squares
+
+
+def levels(path: Sequence[Hypothesis]) -> list[float]:
+    """Return the squared free-run error that each set on a way leaves: no more than a set that it holds."""
+    found: list[float] = []
+    for each in path:
+        held = [level for level, other in zip(found, path, strict=False) if other.effects <= each.effects]
+        found.append(min(each.free_squares, *held) if held else each.free_squares)
+    return found
+
+
+def shares(path: Sequence[Hypothesis]) -> dict[str, float]:
+    """Return the share of the re-tuned model's squared free-run error that goes with each effect of the last set.
+
+    Along the way from the nominal model to the best set, each effect has what is left less from where it was added. One
+    that takes another's place has its share, too; what a step without a new effect changes all have in proportion.
+    Together they are what the last set explains.
+    """
+    found: dict[str, float] = {}
+    left = levels(path)
+    for (one, before), (other, after) in pairwise(zip(path, left, strict=True)):
+        gone = sum(found.pop(name) for name in one.effects - other.effects)
+        change, new = (before - after) / left[0] + gone, other.effects - one.effects
+        among = new or other.effects
+        whole = sum(found.values())
+        for name in among:
+            part = 1.0 / len(among) if new or whole <= 0.0 else found[name] / whole
+            found[name] = found.get(name, 0.0) + part * change
+    return found
+
+
+def shares_with_grade(best: Hypothesis, visited: Mapping[Effects, Hypothesis], nothing: Hypothesis) -> dict[str, float]:
+    """Return the same of a set in which the load walks far, which follows whatever is slow.
+
+    What another effect has is by how much more is left without it; the rest goes with the grade.
+    """
+    without = {name: visited[best.effects - {name}] for name in best.effects if name != GRADE}
+    found = {name: max(fall(each, best, nothing), 0.0) for name, each in without.items()}
+    return found | {GRADE: max(1.0 - best.free_squares / nothing.free_squares - sum(found.values()), 0.0)}
+
+
+def _same_law(name: str) -> set[str]:
+    """Return the effects that hold this one as a special case, or are one of it."""
+    return {*EFFECTS[name].contains, *(other for other, entry in EFFECTS.items() if name in entry.contains)}
+
+
+def free_rms(hypothesis: Hypothesis) -> float:
+    """Return the RMS of the free-run error, re-tuned to leave least of it."""
+    return math.sqrt(hypothesis.free_squares / hypothesis.plain.residual.size)
+
+
+def _alike(
+    name: str, best: Hypothesis, visited: Mapping[Effects, Hypothesis], within: float
+) -> dict[str, Mapping[str, float]]:
+    others = best.effects - {name}
+    exchanged = {
+        next(iter(effects - others)): each
+        for effects, each in visited.items()
+        if len(effects - others) == 1 and others <= effects
+    }
+    near = {name: best} | {other: each for other, each in exchanged.items() if each.score - best.score < within}
+    values = {other: each.plain.values_of(other) for other, each in near.items()}
+    for other in list(near):
+        for twin in EFFECTS[other].equivalent if best.outputs == 1 else ():
+            values.setdefault(twin, values[other])  # the same linear system: the same parameters
+    return {other: values[other] for other in sorted({*values} - best.effects)}
+
+
+def probability_of(names: Collection[str], scores: Sequence[Score], tempered: float) -> float:
+    """Return the probability that one of some effects is there, over all sets that were fitted.
+
+    A set with values that are no case of its effects is evidence of something else: against the effects it does
+    without, and for none that it holds.
+
+    Parameters
+    ----------
+    tempered : float
+        By which differences of scores are divided.
+    """
+    holds = [any(name in names for name in each.effects) for each in scores]
+    counted = [(each.score, has) for each, has in zip(scores, holds, strict=True) if each.is_plausible or not has]
+    values = np.array([score for score, _ in counted])
+    weights = np.exp(-0.5 * (values - values.min()) / tempered)
+    there = np.array([has for _, has in counted])
+    return float(weights[there].sum() / weights.sum())
+
+
+@dataclass(frozen=True, slots=True)
+class Grounds:
+    """What a decision rests on, before any threshold is applied.
+
+    Attributes
+    ----------
+    best, nothing : Hypothesis
+        The best set of effects, and the re-tuned model.
+    shares : mapping of str to float
+        Of each effect of the best set (``shares``).
+    tests : tuple of Test
+    scores : tuple of Score
+        Of all sets that were fitted to their end and that a machine can be.
+    beliefs : tuple of Belief
+        Of every effect of the best set that is large enough to be distinguished from another way of sampling.
+    """
+
+    best: Hypothesis
+    nothing: Hypothesis
+    shares: Mapping[str, float]
+    tests: tuple[Test, ...]
+    scores: tuple[Score, ...]
+    beliefs: tuple[Belief, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Decision:
+    """What is believed.
+
+    Attributes
+    ----------
+    named, traces : tuple of Belief
+        Effects that are established, the weightiest first; those among them that hardly move the error.
+    doubted : tuple of Belief
+        Effects of the best set that are not established.
+    failed : tuple of Test
+        What the best set leaves that noise has not.
+    """
+
+    best: Hypothesis
+    nothing: Hypothesis
+    named: tuple[Belief, ...]
+    traces: tuple[Belief, ...]
+    doubted: tuple[Belief, ...]
+    failed: tuple[Test, ...]
+
+
+def tempered_by(tests: Sequence[Test], samples: int, factor: float) -> float:
+    """Return by which differences of scores are divided: more where a test finds information that no law has used.
+
+    That is what it finds beyond what is left in worlds of which all is explained. Tests find the same information
+    again: the one that finds most of it says how much there is at least.
+    """
+    beyond = [test.value - test.most for test in tests if test.failed and test.is_share]
+    return factor + samples * max(beyond, default=0.0)
+
+
+def grounds(search: Search) -> Grounds:
+    """Search, and return what there is to decide on."""
+    nothing = search.nothing()
+    best = _with_sizes(search, _as_simple_as_will_do(search, search.run()))
+    for name in best.effects:
+        search.without(best, name)
+    search.fit_look_alikes(best)
+    share = shares_with_grade(best, search.visited, nothing) if GRADE in best.effects else shares(search.path)
+    ground = Grounds(best, nothing, share, tests(best), scores_of(search))
+    return replace(ground, beliefs=believed(search, ground))
+
+
+def scores_of(search: Search) -> tuple[Score, ...]:
+    """Return the scores of all sets that were fitted to their end and that a machine can be."""
+    possible = {effects: each for effects, each in search.visited.items() if is_possible(each, search.records)}
+    return tuple(Score(effects, each.score, search.is_plausible(each)) for effects, each in possible.items())
+
+
+def believed(search: Search, ground: Grounds, rivals: Sequence[Score] = ()) -> tuple[Belief, ...]:
+    """Return what is believed of the best set, over all sets that were fitted and ``rivals`` beyond these."""
+    best = ground.best
+    tempered = tempered_by(ground.tests, best.plain.residual.size, TEMPERED)
+    found = beliefs(
+        best,
+        search.visited,
+        (*ground.scores, *rivals),
+        ground.shares,
+        tempered,
+        max(ALIKE_WITHIN, 2.0 * tempered * math.log(1.0 / (1.0 - LEAST_PROBABILITY))),
+        ALIKE_SHARE,
+    )
+    return tuple(each for each in found if search.is_resolved(best, each.name))
+
+
+def decide(search: Search, ground: Grounds, rivals: Sequence[Score] = ()) -> Decision:
+    """Decide which effects of the best set are there, against all sets without them and ``rivals``."""
+    found = believed(search, ground, rivals) if rivals else ground.beliefs
+    established = [each for each in found if each.probability >= LEAST_PROBABILITY]
+    named = tuple(each for each in established if each.share >= LEAST_SHARE)
+    return Decision(
+        ground.best,
+        ground.nothing,
+        named,
+        tuple(each for each in established if each not in named),
+        tuple(each for each in found if each.probability < LEAST_PROBABILITY),
+        tuple(test for test in ground.tests if test.failed),
+    )
+
+
+def _as_simple_as_will_do(search: Search, best: Hypothesis) -> Hypothesis:
+    """Return the best set with special cases in the place of general laws that hardly change the error further.
+
+    What a general law has beyond its special case would be a trace, or nothing at all.
+    """
+    for name in sorted(best.effects):
+        for special in EFFECTS[name].contains:
+            simpler = search.exchanged(best, name, special)
+            if simpler is None:
+                continue
+            if holds_null(best, name) or fall(simpler, best, search.nothing()) < LEAST_SHARE:
+                best = simpler
+                search.path.append(best)
+                break
+    return best
+
+
+def _with_sizes(search: Search, best: Hypothesis) -> Hypothesis:
+    """Return the best set without effects whose interval holds their null: they may do nothing at all."""
+    for name in sorted(best.effects):
+        if holds_null(best, name):
+            best = search.without(best, name)
+            search.path.append(best)
+    return best
+
+
+def holds_null(hypothesis: Hypothesis, name: str) -> bool:
+    """Tell whether the 95 % interval of an effect's size holds the value at which the effect does nothing.
+
+    The size is its first parameter; where that may be left out, each that was fitted and does nothing at 0 or infinity.
+    """
+    entry = EFFECTS[name]
+    if entry.profile:
+        return False
+    first, plain = entry.parameters[0], hypothesis.plain
+    among = {p.name: p.null for p in entry.shared_parameters if p is first or (first.optional and p.optional)}
+    spread, pinned = np.sqrt(np.maximum(np.diag(covariance(hypothesis)), 0.0)), plain.pinned
+    held = []
+    for i, each in enumerate(plain.problem.shared):
+        null = among.get(each.name) if each.effect == name and each.low < each.high else None
+        if null is None or (first.optional and null not in (0.0, math.inf, first.null)):
+            continue
+        if math.isinf(null):
+            held.append(bool(pinned[i]) and plain.x[i] > 0.5 * each.high)
+        else:
+            held.append(abs(plain.x[i] - null / each.scale) <= Z95 * spread[i])
+    return bool(held) and all(held)
+
+
+def verdict_of(of_spread: float, is_named: bool, is_more_than_noise: bool, falls: bool = True) -> Verdict:
+    """Return the verdict on a set that leaves an error of so much of the signal's spread (CONTRACT).
+
+    ``falls`` tells whether the error falls, on the recordings and on data not used for the fit.
+    """
+    if is_named and (of_spread > CLEARLY_BELOW or not falls):
+        return Verdict.UNEXPLAINED
+    if is_named:
+        return Verdict.PARTLY_EXPLAINED if is_more_than_noise else Verdict.EXPLAINED
+    return Verdict.UNEXPLAINED if is_more_than_noise or of_spread > CLEARLY_BELOW else Verdict.NO_MISMATCH
+
+
+def error_falls(fit: Fit) -> bool:
+    """Tell whether the augmented model's error is below the re-tuned model's, also on data not used for the fit."""
+    return fit.augmented < fit.retuned and fit.holdout_augmented < fit.holdout_retuned
+
+
+def spread(problem: Problem) -> float:
+    """Return how far the output itself is spread, each recording around its mean."""
+    parts = [record.output[use] for record, use in zip(problem.records, problem.use, strict=True)]
+    return float(np.std(np.concatenate([part - part.mean() for part in parts])))

@@ -1,0 +1,71 @@
+"""Work of a computation: its simulations are counted, and a limit of time ends it between two of them.
+
+The count is the same on every machine; the limit is not, and whoever sets one catches ``TimeIsUp``.
+"""
+
+from __future__ import annotations
+
+import math
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+
+
+class TimeIsUp(Exception):
+    """The limit of time of a computation has passed."""
+
+
+class Work:
+    """Samples that were simulated, and the moment at which no further ones are."""
+
+    def __init__(self, limit_s: float = math.inf, share: float = 1.0) -> None:
+        self.samples = 0
+        self.limit_s = limit_s
+        self._end = time.perf_counter() + share * limit_s
+        self._lock = threading.Lock()
+
+    def add(self, samples: int) -> None:
+        """Count samples that are to be simulated.
+
+        Raises
+        ------
+        TimeIsUp
+            Where the limit has passed.
+        """
+        self.check()
+        with self._lock:
+            self.samples += samples
+
+    def check(self) -> None:
+        """Raise ``TimeIsUp`` where the limit has passed."""
+        if time.perf_counter() > self._end:
+            raise TimeIsUp
+
+
+_work: ContextVar[Work | None] = ContextVar("work", default=None)
+
+
+@contextmanager
+def counted(work: Work) -> Iterator[Work]:
+    """Count what is simulated in this context, and in what it shares out to other cores."""
+    token = _work.set(work)
+    try:
+        yield work
+    finally:
+        _work.reset(token)
+
+
+def count_samples(samples: int) -> None:
+    """Count samples that are to be simulated, where somebody counts."""
+    work = _work.get()
+    if work is not None:
+        work.add(samples)
+
+
+def check_time() -> None:
+    """Raise ``TimeIsUp`` where a limit of time has passed: for work that is no simulation."""
+    work = _work.get()
+    if work is not None:
+        work.check()
