@@ -16,8 +16,7 @@ from typing import Any, Final
 from hil import __version__
 from hil.commission.record import Status, StepRecord, now_utc
 from hil.errors import UsageError
-from hil.inside import is_inside
-from hil.parse_json import read_json
+from hil.files import is_inside, read_json
 
 SCHEMA: Final = "hil.commission/1"
 FILE_NAME: Final = "commission.json"
