@@ -20,8 +20,8 @@ def bugreport(
 
     Keys, passwords, certificates, folders and names of user and machine are taken out. Nothing is sent anywhere.
     """
+    from hil.files import refuse_existing, write_new
     from hil.support.bug_report import bug_report
-    from hil.support.new_file import refuse_existing, write_new
 
     refuse_existing(out)
     report = bug_report(tuple(rig or ()), runs)

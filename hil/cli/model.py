@@ -68,8 +68,8 @@ def new(
     from hil.config.new_model.text import model_text
     from hil.config.new_model.values import TOLERANCE, assignments, parameters
     from hil.errors import UsageError
+    from hil.files import refuse_existing, write_new
     from hil.recording.look import look
-    from hil.support.new_file import refuse_existing, write_new
 
     refuse_existing(file)
     may_ask = not yes and sys.stdin.isatty()

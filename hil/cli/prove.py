@@ -175,7 +175,7 @@ def real(
 def _real_cases(folder: Path) -> list[dict[str, Any]]:
     """Return what was made of real recordings; nothing where none were asked for."""
     from hil.errors import UsageError
-    from hil.parse_json import read_json
+    from hil.files import read_json
 
     path = folder / "real.json"
     if not path.exists():

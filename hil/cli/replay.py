@@ -69,7 +69,7 @@ def replay(
     from hil.rig.live import tracking_settings
     from hil.rig.live_replay import Pace
     from hil.rig.trace import is_trace
-    from hil.store.alarms import statements
+    from hil.store.entry import statements
 
     if speed is not None and not speed > 0:
         raise UsageError(f"--speed: expected a multiple of real time above 0, got {speed:g}")

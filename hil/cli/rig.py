@@ -69,7 +69,7 @@ def new(
     from hil.config.new_rig.text import rig_text
     from hil.config.schema import schema_text
     from hil.errors import UsageError
-    from hil.support.new_file import refuse_existing, write_new
+    from hil.files import refuse_existing, write_new
 
     refuse_existing(file)
     given = {

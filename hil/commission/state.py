@@ -14,8 +14,7 @@ from typing import Any, Final
 from estimator.physics.model import DrivelineModel, Parameter, Structure
 from hil import __version__
 from hil.errors import UsageError
-from hil.inside import is_inside
-from hil.parse_json import read_json
+from hil.files import is_inside, read_json
 
 
 @dataclass(frozen=True, slots=True)

@@ -28,7 +28,7 @@ from hil.rig.stop import StopRequest
 from hil.rig.timing import RunTiming
 from hil.sample import Sample
 from hil.store import register_run
-from hil.store.alarms import found_changes
+from hil.store.entry import found_changes
 from hil.store.entry import COMPLETE, ONLINE
 
 SUFFIX = ".parquet"

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from hil.errors import RecordingError
-from hil.parse_json import parse_json, read_json
+from hil.files import parse_json, read_json
 from hil.recording.bounds import no_room
 from hil.recording.table import Column, Kind, Table
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from estimator.signals.record import Record
 from hil.errors import InputError, RecordingError, UsageError
-from hil.parse_json import parse_json
+from hil.files import parse_json
 from hil.recording import columns
 from hil.recording.checksum import CHECKSUM, RIG_CHECKSUM, RIG_TEXT, SAID, require_unchanged
 from hil.recording.description import read_sidecar

@@ -162,7 +162,7 @@ class WritingThread:
             self.failed = error
 
 
-CSV = ".csv"
+CSV, PART = ".csv", ".part.csv"
 
 CAPACITY = 20_000
 """Samples that may wait for the disk: 200 s at 10 ms, some 10 MB."""
@@ -218,7 +218,7 @@ class RecordingWriter:
         channel_units: Mapping[str, str] | None = None,
     ) -> None:
         self.path = Path(path)
-        self.part_path = self.path.with_name(f"{self.path.stem}.part{CSV}")
+        self.part_path = self.path.with_name(f"{self.path.stem}{PART}")
         self._metadata = dict(metadata or {})
         self._units = {**columns.UNITS, **(channel_units or {})}
         self._file: FileIO | None = None
@@ -392,3 +392,11 @@ class RecordingWriter:
                 f"with {len(cells)}. Give the channels of the rig file that the samples are of.",
             )
         return ",".join(map(repr, cells)) + "\n"
+
+
+def is_written(path: Path) -> bool:
+    """Whether a run writes a file at this moment; where the system can't tell, it does not."""
+    if not path.name.endswith(PART):
+        return False
+    with path.open("rb", buffering=0) as file:
+        return not hold(file)

@@ -1,126 +1,252 @@
-"""Make the store again: from what can be read of it, and from the recordings, each of which explains itself."""
+"""Entering recordings and results: the one just made, or all of a folder, each of which explains itself."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
-from hil.errors import RecordingError
+from hil.errors import HilError, RecordingError
+from hil.files import read_json, remove_abandoned
 from hil.recording.formats import FORMATS, read_metadata
-from hil.store.entry import RunEntry
-from hil.store.register import entry_at, is_run
-from hil.store.replace_damaged import replace_if_damaged
-from hil.store.results import attach_results
-from hil.store.run_store import RunStore
+from hil.recording.writer import is_written
+from hil.store.entry import COMPLETE, DIAGNOSIS, IDENTIFICATION, ONLINE, Attachment, entry_at, is_run
+from hil.store.run_store import STORE_NAME, RunStore, store_of
+
+ONLINE_SCHEMA, ONLINE_SUFFIX = "hil.online/1", ".online.json"
+"""What the on-line estimate of a run is called, after the stem of its recording."""
+
+_FILES = {"diagnosis.json": DIAGNOSIS, "identification.json": IDENTIFICATION}
 
 
-@dataclass(frozen=True, slots=True)
+def register_run(
+    recording: Path | str,
+    outcome: str = COMPLETE,
+    folder: Path | str | None = None,
+    results: Mapping[str, Path] | None = None,
+) -> int:
+    """Enter a recording that was just made.
+
+    Parameters
+    ----------
+    recording : Path or str
+        The recording; what is entered is what it says of itself.
+    outcome : str
+        `COMPLETE`, or what ended the run.
+    folder : Path or str, optional
+        Of the store; by default the recording's own.
+    results : mapping of kind to Path, optional
+        What came of it so far, to be attached.
+
+    Returns
+    -------
+    int
+        The run's number in the store.
+
+    Raises
+    ------
+    RecordingError
+        If the recording can't be read.
+    StoreError
+        If the store can't be written. The recording is whole: ``hil runs rebuild`` enters it later.
+    """
+    recording = Path(recording)
+    entry = entry_at(recording, outcome)
+    with RunStore(recording.parent if folder is None else folder) as store:
+        run_id = store.add_run(entry)
+        for kind, path in (results or {}).items():
+            store.attach(run_id, kind, path)
+        return run_id
+
+
+def attach_to_runs(recordings: Iterable[Path], results: Mapping[str, Path]) -> list[str]:
+    """Attach what was computed from recordings to their runs, where the recordings' folders have a store.
+
+    Parameters
+    ----------
+    recordings : iterable of Path
+        What the results are of; those that are no runs of a store are passed over.
+    results : mapping of kind to Path
+        The files.
+
+    Returns
+    -------
+    list of str
+        What could not be attached, and why, for people: the results themselves are whole.
+    """
+    folders: dict[Path, set[Path]] = {}
+    for recording in recordings:
+        if store_of(recording.parent).exists():
+            folders.setdefault(recording.parent, set()).add(recording.resolve())
+    complaints = []
+    for folder, paths in folders.items():
+        try:
+            with RunStore(folder) as store:
+                latest = {run.entry.recording.resolve(): run.run_id for run in store.find()}
+                for recording in sorted(paths & latest.keys()):
+                    for kind, path in results.items():
+                        store.attach(latest[recording], kind, path)
+        except HilError as error:
+            complaints.append(f"{error}\nThe results are whole; they are not in the store.")
+    return complaints
+
+
+@dataclass(slots=True)
 class Rebuilt:
-    """What became of the store.
+    """What became of the list of a folder.
 
     Attributes
     ----------
     before : int
-        Runs that were in it, or could be read of it.
+        Runs that were in it.
     found : int
         Recordings that were entered now.
     moved : int
-        Runs whose recording was found under another name.
+        Runs whose recording was found under another name, or that were damaged in the list and read again.
     copies : int
         Recordings with the data of a run whose own is still there, such as conversions; they are no runs.
     attached : int
         Results (diagnosis.json, identification.json) that were attached now.
-    unreadable : tuple of str
-        What is wrong with recordings that could not be read.
-    damaged : Path or None
-        Where the damaged store was put; None where it was whole.
-    lost_notes : tuple of str
+    unreadable : list of str
+        What is wrong with recordings, or with files of the list, that could not be read.
+    lost_notes : list of str
         Notes to runs of which nothing else is left.
+    removed : list of Path
+        Unfinished files of processes that were killed.
     """
 
-    before: int
-    found: int
-    moved: int
-    copies: int
-    attached: int
-    unreadable: tuple[str, ...]
-    damaged: Path | None
-    lost_notes: tuple[str, ...]
+    before: int = 0
+    found: int = 0
+    moved: int = 0
+    copies: int = 0
+    attached: int = 0
+    unreadable: list[str] = field(default_factory=list)
+    lost_notes: list[str] = field(default_factory=list)
+    removed: list[Path] = field(default_factory=list)
 
 
-def rebuild(folder: Path, show: Callable[[Path], None] = lambda _: None) -> Rebuilt:
-    """Bring the store of a folder up to what is in the folder; a damaged one is replaced and kept aside.
-
-    Parameters
-    ----------
-    folder : Path
-        It and the folders in it are looked through.
-    show : callable
-        Called with every recording before it is read.
+def rebuild(folder: Path) -> Rebuilt:
+    """Bring the list of a folder up to what is in the folder and in those in it.
 
     Raises
     ------
     StoreError
-        If the store can't be written, or is of a newer version or another program's.
+        If the list can't be written.
     """
-    damaged = replace_if_damaged(folder)
     with RunStore(folder) as store:
-        entering = _Entering(store, show)
-        for path in recordings_in(folder):
-            entering.take(path)
-        attached = attach_results(store)
-    return Rebuilt(
-        entering.before,
-        entering.found,
-        entering.moved,
-        entering.copies,
-        attached,
-        tuple(entering.unreadable),
-        None if damaged is None else damaged.aside,
-        () if damaged is None else damaged.lost_notes,
-    )
+        done = Rebuilt(removed=[path for each in _folders(folder) for path in remove_abandoned(each)])
+        _read_again(store, done)
+        _enter(store, done)
+        done.attached = _attach_results(store)
+    return done
 
 
-class _Entering:
-    """Enters recordings that are not in the store yet, and counts."""
-
-    def __init__(self, store: RunStore, show: Callable[[Path], None]) -> None:
-        known = store.find()
-        self._store, self._show = store, show
-        self._here = {(run.entry.recording.resolve(), run.entry.data_sha256) for run in known}
-        self._data = {sha256 for _, sha256 in self._here if sha256}
-        self._lost = {run.entry.data_sha256: run.run_id for run in known if not run.entry.recording.exists()}
-        self.before = len(known)
-        self.found = self.moved = self.copies = 0
-        self.unreadable: list[str] = []
-
-    def take(self, path: Path) -> None:
-        self._show(path)
+def _read_again(store: RunStore, done: Rebuilt) -> None:
+    """Read runs again that are damaged in the list and still name their recording."""
+    for number, name in store.damaged().items():
+        path = store.folder / name
         try:
-            if is_run(read_metadata(path)):
-                self._enter(entry_at(path))
+            if name and path.is_file() and is_run(read_metadata(path)):
+                store.move(number, entry_at(path))
+                done.moved += 1
+                continue
         except RecordingError as error:
-            self.unreadable.append(str(error))
+            done.unreadable.append(str(error))
+        run = store.get(number)
+        done.unreadable.append(
+            f"{store.path}: run {number}: {run.entry.outcome.partition('. ')[0]}; its notes are kept"
+        )
+        done.lost_notes += [note.text for note in run.notes]
 
-    def _enter(self, entry: RunEntry) -> None:
+
+def _enter(store: RunStore, done: Rebuilt) -> None:
+    """Enter the recordings that are not in the list yet."""
+    known = [run for run in store.find() if run.run_id not in store.damaged()]
+    here = {(run.entry.recording.resolve(), run.entry.data_sha256) for run in known}
+    data = {sha256 for _, sha256 in here if sha256}
+    lost = {run.entry.data_sha256: run.run_id for run in known if not run.entry.recording.exists()}
+    done.before = len(known)
+    for path in _recordings_in(store.folder):
+        try:
+            if not is_run(read_metadata(path)):
+                continue
+            entry = entry_at(path)
+        except RecordingError as error:
+            done.unreadable.append(str(error))
+            continue
         sha256 = entry.data_sha256
-        if (entry.recording.resolve(), sha256) in self._here:
-            return
-        if sha256 and sha256 in self._lost:
-            self._store.move(self._lost.pop(sha256), entry.recording)
-            self.moved += 1
-        elif sha256 in self._data:
-            self.copies += 1
+        if (path.resolve(), sha256) in here:
+            continue
+        if sha256 and sha256 in lost:
+            number = lost.pop(sha256)
+            store.move(number, replace(entry, outcome=store.get(number).entry.outcome))
+            done.moved += 1
+        elif sha256 and sha256 in data:
+            done.copies += 1
         else:
-            self._store.add_run(entry)
-            self.found += 1
-            self._data |= {sha256} - {""}
+            store.add_run(entry)
+            done.found += 1
+            data |= {sha256} - {""}
 
 
-def recordings_in(folder: Path) -> Iterator[Path]:
-    """Give every file of a recording's suffix in a folder and those in it, hidden ones and unfinished ones left out."""
+def _folders(folder: Path) -> Iterator[Path]:
+    yield folder
+    yield from (path for path in sorted(folder.rglob("*")) if path.is_dir() and not path.is_symlink())
+
+
+def _recordings_in(folder: Path) -> Iterator[Path]:
+    """Give every file of a recording's suffix in a folder and those in it; not hidden ones, nor one being written."""
     for path in sorted(folder.rglob("*")):
         inside = path.relative_to(folder).parts
-        if path.suffix.lower() in FORMATS and path.is_file() and not any(part.startswith(".") for part in inside):
+        if path.suffix.lower() not in FORMATS or any(part.startswith(".") or part == STORE_NAME for part in inside):
+            continue
+        if path.is_file() and not is_written(path):
             yield path
+
+
+def _attach_results(store: RunStore) -> int:
+    """Attach the results that lie in the folder to the runs they name, once each."""
+    attached = 0
+    runs = store.find()
+    for path in sorted(store.folder.rglob("*.json")):
+        if STORE_NAME in path.relative_to(store.folder).parts:
+            continue
+        for run in runs:
+            kind = _kind(path, run.entry.recording)
+            if kind and not _has(store.get(run.run_id).attachments, kind, path):
+                store.attach(run.run_id, kind, path)
+                attached += 1
+    return attached
+
+
+def _kind(path: Path, recording: Path) -> str:
+    """Tell what a file is to a recording; empty where it is nothing to it."""
+    if path == recording.with_name(f"{recording.stem}{ONLINE_SUFFIX}"):
+        return ONLINE
+    kind = _FILES.get(path.name, "")
+    return kind if kind and recording.stem in recordings_named(path) else ""
+
+
+def _has(attachments: Iterable[Attachment], kind: str, path: Path) -> bool:
+    text = path.read_text(encoding="utf-8", errors="replace")
+    return any(entry.kind == kind and entry.document == text for entry in attachments)
+
+
+def recordings_named(path: Path) -> frozenset[str]:
+    """Return the recordings, by stem, that a diagnosis.json or identification.json speaks of."""
+    try:
+        document = read_json(path)
+    except (OSError, ValueError):  # not one of ours, or damaged: it names none
+        return frozenset()
+    return frozenset(_names(document if isinstance(document, dict) else {}))
+
+
+def _names(document: dict[str, Any]) -> Iterable[str]:
+    entries = document.get("recordings")
+    for entry in entries if isinstance(entries, list) else []:
+        if isinstance(entry, dict) and isinstance(entry.get("name"), str):
+            yield entry["name"]
+    mismatch = document.get("mismatch")
+    for table in (document.get("load_torque"), mismatch.get("time_s") if isinstance(mismatch, dict) else None):
+        yield from table if isinstance(table, dict) else ()

@@ -117,7 +117,7 @@ def _last_run(folder: Path) -> dict[str, Any]:
     """Return what the store says of the newest run, without what people wrote about it."""
     from hil.store import STORE_NAME, RunStore
 
-    if not (folder / STORE_NAME).is_file():
+    if not (folder / STORE_NAME).is_dir():
         raise UsageError(f"{folder}: expected a run store ({STORE_NAME}), got none; name its folder by --runs")
     with RunStore(folder) as store:
         found = store.find()

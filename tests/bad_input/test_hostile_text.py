@@ -21,7 +21,7 @@ from drivers.plc.register_map import RegisterMapError, load_register_map
 from drivers.resources import data_file
 from hil.cli.main import run
 from hil.errors import InputError, RecordingError, RigFileError
-from hil.parse_json import LARGEST_BYTES, parse_json, read_json
+from hil.files import LARGEST_BYTES, parse_json, read_json
 from hil.problems import read_toml
 from hil.recording import Table, read_table, write_table
 from hil.recording.description import sidecar_of
@@ -29,7 +29,7 @@ from hil.rig import replay as replaying
 from hil.rig.blf_file import CONTAINER_BYTES
 from hil.rig.replay import replay
 from hil.rig.trace_file import read_frames
-from hil.store.results import recordings_named
+from hil.store.rebuild import recordings_named
 from tests.rig.serving import small_rig
 
 DEEP = 3000

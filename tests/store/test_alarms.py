@@ -12,11 +12,9 @@ import pytest
 from estimator.identification.tracking.alarm import Alarm, Level
 from hil.recording import read_table
 from hil.store import RunStore, entry_of, register_run
-from hil.store.alarms import found_changes, statements
-from hil.store.entry import ONLINE
-from hil.store.facts import alarms_of, facts_of, results_of
-from hil.store.remove import remove_files
-from hil.store.results import ONLINE_SCHEMA
+from hil.store.entry import ONLINE, alarms_of, found_changes, results_of, run_facts, statements
+from hil.store.rebuild import ONLINE_SCHEMA
+from hil.store.run_files import remove_files
 
 Record = Callable[..., Path]
 
@@ -54,7 +52,7 @@ def test_a_change_counts_once(
     number = register_run(record("a.csv"), results={ONLINE: path})
     with RunStore(tmp_path) as store:
         (listed,), run = store.find(), store.get(number)
-    assert listed.alarms == run.alarms == facts_of(run)["alarms"] == len(changes)
+    assert listed.alarms == run.alarms == run_facts(run)["alarms"] == len(changes)
     assert results_of(run)["alarms while driving"] == len(changes)
     assert alarms_of(run) == [change.statement for change in changes]
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -14,7 +15,7 @@ from hil.recording.checksum import text_sha256
 from hil.store import RunStore, attach_to_runs, register_run, store_of
 from hil.store.entry import COMPLETE
 from hil.store.rebuild import rebuild
-from hil.store.recording_state import VERIFIED, recording_state
+from hil.store.run_files import VERIFIED, recording_state
 from tests.recording.test_writer import sample
 from tests.store.conftest import RIG
 
@@ -29,7 +30,7 @@ def test_runs_are_entered_and_everything_else_is_left_out(tmp_path: Path, record
     (tmp_path / "broken.parquet").write_bytes(b"PAR1")
     (tmp_path / ".hidden.csv").write_text("x\n", encoding="utf-8")
     result = rebuild(tmp_path)
-    assert (result.before, result.found, result.moved, result.copies, result.damaged) == (0, 2, 0, 1, None)
+    assert (result.before, result.found, result.moved, result.copies) == (0, 2, 0, 1)
     (problem,) = result.unreadable
     assert "broken.parquet" in problem
     again = rebuild(tmp_path)
@@ -114,7 +115,8 @@ def test_results_are_attached_to_the_runs_they_are_of(tmp_path: Path, record: Re
     with RunStore(tmp_path) as store:
         assert [run.verdict for run in store.find()] == ["unexplained"]
     assert not store_of(other.parent).exists()  # a result makes no store
+    shutil.rmtree(store_of(tmp_path))
     store_of(tmp_path).write_bytes(b"x" * 5000)
     (complaint,) = attach_to_runs([here], {"diagnosis": result})
-    assert "damaged" in complaint
+    assert "expected a folder, got a file of that name" in complaint
     assert "The results are whole" in complaint

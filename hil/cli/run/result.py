@@ -12,7 +12,7 @@ from hil.rig.drive import RunSummary
 from hil.rig.live_course import course_path
 from hil.rig.realtime import NOT_ASKED, RealTimeGrants
 from hil.rig.timing import timing_lines
-from hil.store.alarms import statements
+from hil.store.entry import statements
 
 
 def print_result(job: Job, summary: RunSummary, grants: RealTimeGrants, as_json: bool) -> None:

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from hil.errors import RecordingError, UsageError
-from hil.parse_json import parse_json
+from hil.files import parse_json
 from hil.proof.campaign.band import score_band
 from hil.proof.campaign.case import run_case
 from hil.proof.campaign.kinds import ALL, Group, Kind, parse_kinds, parse_seeds

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from hil.errors import RecordingError
-from hil.parse_json import read_json
+from hil.files import read_json
 from hil.proof.campaign.run import write_summary
 from hil.proof.campaign.statistics import Row
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from hil.errors import UsageError
-from hil.parse_json import parse_json
+from hil.files import parse_json
 from hil.proof.campaign.band import score_band
 from hil.proof.campaign.case import Answer
 from hil.proof.campaign.kinds import kind

@@ -14,8 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from hil.errors import UsageError
-from hil.inside import is_inside, is_plain
-from hil.parse_json import read_json
+from hil.files import is_inside, is_plain, read_json
 from hil.proof.seal import SealBroken, canonical_json
 
 CASES, SEALED, VERDICTS = "cases", "sealed", "verdicts"

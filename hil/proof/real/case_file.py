@@ -11,7 +11,7 @@ from pydantic import Field, model_validator
 
 from hil.config.table import Positive, Table, Text
 from hil.errors import FileProblem, UsageError
-from hil.inside import PLAIN
+from hil.files import PLAIN
 from hil.problems import Fault, read_toml, refuse, validate
 from hil.recording.request import FormatHints
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from estimator.diagnosis.holdout import blocks
 from estimator.signals.record import BoolArray
-from hil.parse_json import read_json
+from hil.files import read_json
 from hil.proof.command import CommandFailed
 from hil.proof.real.ask import AFTER, BEFORE, Answer, ask
 from hil.proof.real.black_box.compare import Split, compare

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from hil.parse_json import read_json
+from hil.files import read_json
 from hil.proof.real.judge import Agreement
 from hil.report.numbers import json_number
 

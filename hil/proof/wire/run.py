@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from hil.errors import UsageError
-from hil.parse_json import read_json
+from hil.files import read_json
 from hil.proof.prove.make import Progress
 from hil.proof.wire.concealed import WIRED
 from hil.proof.wire.drive import Row, drive

@@ -17,7 +17,7 @@ from estimator.identification.online.adaptation import Adaptation
 from estimator.identification.settings import Settings
 from estimator.signals.record import FloatArray
 from hil.errors import FileProblem, UsageError
-from hil.parse_json import read_json
+from hil.files import read_json
 from hil.problems import validate
 
 
