@@ -460,7 +460,7 @@ class Supervision:
             )
 
     def _compare_motion(self, one: InverterFeedback, other: InverterFeedback) -> None:
-        """See whether the speed runs away against the torque: both readings of the one, or of the other, are reversed."""
+        """See whether the speed runs away against the torque: speeds or torques are reversed."""
         inertia = self._limits.inertia_kg_m2
         if inertia is None:
             return
