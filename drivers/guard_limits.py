@@ -13,7 +13,7 @@ NS_PER_S: Final = 1_000_000_000
 
 @dataclass(frozen=True, slots=True)
 class ErrorLimits:
-    """How far the torque a drive reports may be from the one it was commanded; see `drivers.torque_error`.
+    """How far the torque a drive reports may be from the one it was commanded; see `drivers.inverter.supervision`.
 
     Attributes
     ----------

@@ -13,8 +13,7 @@ Rules, all of them on every request; one broken rule refuses the pair of both in
 9. the speed is inside the speed limit;
 10. time runs forward.
 
-What comes back is looked at too (`TorqueGuard.compare`): a torque reading too far from the command, for too long, ends
-the torque as a refusal does (`drivers.torque_error`).
+What comes back is judged by `drivers.inverter.supervision`.
 
 A refusal disables the guard and forgets what was commanded, so the way back starts at zero torque. Nothing is
 ever clamped: a clamped PRBS is no PRBS, and a clamped torque is not the one the experiment recorded.
@@ -39,9 +38,8 @@ from collections.abc import Iterator
 from dataclasses import InitVar, dataclass, fields
 from typing import Final
 
-from drivers.errors import CommandRefused, WrongTorque
+from drivers.errors import CommandRefused
 from drivers.guard_limits import NS_PER_S, ErrorLimits, GuardLimits
-from drivers.torque_error import Measured, TorqueError
 
 __all__ = [
     "ROUNDING_NM",
@@ -49,7 +47,6 @@ __all__ = [
     "Evidence",
     "GuardLimits",
     "GuardedTorque",
-    "Measured",
     "TorqueGuard",
     "TorqueRequest",
 ]
@@ -165,13 +162,12 @@ class TorqueGuard:
         The limits of the rig; they can't be changed later.
     """
 
-    __slots__ = ("_enabled", "_error", "_limits", "_past")
+    __slots__ = ("_enabled", "_limits", "_past")
 
     def __init__(self, limits: GuardLimits) -> None:
         self._limits = limits
         self._enabled = False
         self._past: _Past | None = None
-        self._error = TorqueError(limits.error, limits.period_s)
 
     @property
     def limits(self) -> GuardLimits:
@@ -234,7 +230,6 @@ class TorqueGuard:
                 f"torque guard: {'; '.join(faults)}. The guard is now disabled: send zero torque, fix the "
                 "cause, enable it again."
             )
-        self._error.commanded(request.total_m1_nm, request.total_m2_nm)
         if not self._enabled:
             return _ZERO, _ZERO
         self._past = _Past(now_ns, request.base_m1_nm, request.base_m2_nm)
@@ -242,27 +237,6 @@ class TorqueGuard:
             GuardedTorque(request.base_m1_nm, request.prbs_m1_nm, _SEAL),
             GuardedTorque(request.base_m2_nm, request.prbs_m2_nm, _SEAL),
         )
-
-    def compare(self, now_ns: int, m1: Measured | None, m2: Measured | None) -> None:
-        """Look at what came in answer to the last command.
-
-        Parameters
-        ----------
-        now_ns : int
-            Time of that command, as `check` got it [ns].
-        m1, m2 : Measured or None
-            Torque actual values; None where an inverter did not answer.
-
-        Raises
-        ------
-        WrongTorque
-            If a torque is too far from what was commanded, for too long. The guard is then disabled.
-        """
-        try:
-            self._error.compare(now_ns, m1, m2)
-        except WrongTorque:
-            self.disable()
-            raise
 
     def _faults(self, request: TorqueRequest, now_ns: int, evidence: Evidence) -> Iterator[str]:
         """Name every broken rule; see the module's list."""

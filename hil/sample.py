@@ -17,6 +17,8 @@ class SampleFlag(IntFlag):
     M1_LIMITED = 16  # an internal limit of m1 acts (statusword bit 11): less torque than asked for, read as ever
     M2_LIMITED = 32
     CHANNEL_LOST = 64  # a further channel was not read in this cycle, and is NaN
+    M1_DOUBTFUL = 128  # a reading of m1 was outside what is expected (`drivers.inverter.supervision`)
+    M2_DOUBTFUL = 256
 
 
 REMARKS = SampleFlag.M1_LIMITED | SampleFlag.M2_LIMITED | SampleFlag.CHANNEL_LOST

@@ -38,6 +38,7 @@ class NodeMonitor:
         self._past_emergency: emcy.Emergency | None = None
         self._expected: NmtState | None = None
         self._beats = 0
+        self._strayed: NmtState | None = None
 
     @property
     def emergency(self) -> emcy.Emergency | None:
@@ -61,6 +62,8 @@ class NodeMonitor:
         with self._changed:
             self._heartbeat.beat(state, t_ns)
             self._beats += 1
+            if self._expected is not None and state is not self._expected and self._strayed is None:
+                self._strayed = state
             self._changed.notify_all()
 
     def on_emergency(self, data: bytes, t_ns: int) -> None:
@@ -87,8 +90,9 @@ class NodeMonitor:
             self._emergency = None
 
     def expect(self, state: NmtState | None) -> None:
-        """Have `raise_if_unwell` refuse any other NMT state from now on."""
+        """Have `raise_if_unwell` refuse any other NMT state from now on, be it in one heartbeat between two looks."""
         self._expected = state
+        self._strayed = None
         self._past_emergency = None
 
     def await_state(self, state: NmtState, timeout_s: float, ask: Callable[[], None]) -> None:
@@ -144,9 +148,8 @@ class NodeMonitor:
             raise DeviceFault(
                 f"{self._where}: {self._emergency}, expected none. Fix the cause at the drive, reset the fault."
             )
-        with self._changed:
-            state = self._heartbeat.state
         self._heartbeat.raise_if_lost(now_ns)
+        state = self._heartbeat.state if self._strayed is None else self._strayed
         if self._expected is not None and state is not self._expected:
             cause = "Something else reset or stopped the drive"
             if self._past_emergency is not None:

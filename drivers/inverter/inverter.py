@@ -8,28 +8,33 @@ success when the drive has not followed.
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from typing import Final
 
 from drivers.canopen.can_link import CanLink
-from drivers.canopen.heartbeat import NMT_COB_ID, NmtCommand, NmtState, nmt_frame
-from drivers.errors import CommandRefused, ConfigMismatch, DriverError
+from drivers.canopen.emcy import EMCY_COB_ID
+from drivers.canopen.heartbeat import HEARTBEAT_COB_ID, NMT_COB_ID, NmtCommand, NmtState, nmt_frame
+from drivers.canopen.node_monitor import NodeMonitor
+from drivers.errors import CommandRefused, ConfigMismatch, DeviceFault, DriverError
 from drivers.inverter.check import Difference, fixed_differences
-from drivers.inverter.cia402 import Command
+from drivers.inverter.cia402 import Command, PowerState
 from drivers.inverter.feedback import InverterFeedback
-from drivers.inverter.follow_watch import FollowWatch
-from drivers.inverter.health import InverterHealth
 from drivers.inverter.inspection import InspectedInverter
 from drivers.inverter.pdo_setup import set_up_pdos
 from drivers.inverter.pdos import TARGET_TORQUE, TORQUE_OFFSET, TorqueCounts
 from drivers.inverter.power_control import PowerControl
 from drivers.inverter.settings import InverterSettings
 from drivers.inverter.stop_proof import StopProof
+from drivers.inverter.supervision import left_operation
 from drivers.torque_guard import GuardedTorque
 
 __all__ = ["Difference", "Inverter", "InverterFeedback", "InverterSettings"]
 
 NO_TORQUE: Final = TorqueCounts()
+
+SDO_REQUEST_COB_ID: Final = 0x600
+"""Plus the node id."""
 
 
 class Inverter(InspectedInverter):
@@ -54,10 +59,14 @@ class Inverter(InspectedInverter):
         self._channels = self._pdos.channel_receiver()
         for cob_id, take in (*self._feedback.subscriptions, *self._channels.subscriptions):
             link.subscribe(cob_id, take)
-        self._health = InverterHealth(link, settings, self._pdos.rpdos)
-        self._monitor = self._health.monitor
-        self._power = PowerControl(self._sdo, settings, self._torque_objects(), self._health.error_code)
-        self._following = FollowWatch(settings)
+        self._monitor = NodeMonitor(settings.where, settings.heartbeat_timeout_ms * 1_000_000)
+        link.subscribe(HEARTBEAT_COB_ID + settings.node_id, self._monitor.on_heartbeat)
+        link.subscribe(EMCY_COB_ID + settings.node_id, self._monitor.on_emergency)
+        for cob_id in self._pdos.rpdos:
+            link.strangers.claim(cob_id, f"{settings.where}: an RPDO")
+        link.strangers.claim(SDO_REQUEST_COB_ID + settings.node_id, f"{settings.where}: an SDO request")
+        self._power = PowerControl(self._sdo, settings, self._torque_objects(), self._error_code)
+        self._before_arming: InverterFeedback | None = None
         self._armed = False
 
     @property
@@ -66,20 +75,13 @@ class Inverter(InspectedInverter):
         return self._feedback.latest
 
     @property
-    def received(self) -> int:
-        """How often all TPDOs have been received; it never starts anew."""
-        return self._feedback.received
+    def count_rad_s(self) -> float:
+        """One count of its speed [rad/s]."""
+        return self._pdos.velocity.rad_s_per_count
 
-    @property
-    def follows(self) -> bool:
-        """Whether the drive has said, since `arm`, that it follows its target torque; True where it can't say."""
-        return self._following.follows(self.latest)
-
-    @property
-    def admits_less(self) -> bool:
-        """Whether the last feedback says that the torque is less than asked for: limited, or not following."""
-        latest = self.latest
-        return latest is not None and (latest.limited or self._following.is_ignored(latest))
+    def messages(self) -> tuple[int, int]:
+        """How often the seldomest and the commonest kind of its TPDOs has come since this was last asked."""
+        return self._feedback.messages()
 
     def fault(self) -> str | None:
         """Tell what fault the drive is in: power state, error code in words, what to do; None without fault.
@@ -110,7 +112,6 @@ class Inverter(InspectedInverter):
             If the drive is enabled, which this program has not done.
         """
         self._armed = False
-        self._health.frozen.start_anew()
         self._monitor.expect(None)
         self._power.require_disabled()
         self._send_nmt(NmtCommand.ENTER_PRE_OPERATIONAL)
@@ -147,7 +148,8 @@ class Inverter(InspectedInverter):
         self._power.select_mode()
         self._power.zero_targets()
         self._power.enable_operation()
-        self._following.start_anew()
+        self._before_arming = self.latest
+        self._feedback.messages()
         self._armed = True
 
     def command(self, torque: GuardedTorque) -> None:
@@ -157,6 +159,8 @@ class Inverter(InspectedInverter):
         ------
         CommandRefused
             If the drive is not armed, or the torque does not fit its object.
+        DeviceFault
+            If it has left OPERATION ENABLED since: the command would enable it again.
         BusDown
             If the bus is gone.
         """
@@ -164,10 +168,15 @@ class Inverter(InspectedInverter):
             raise CommandRefused(
                 f"{self._where}: {torque.base_nm} Nm commanded while disarmed, expected arm() before. Nothing was sent."
             )
-        counts = self._pdos.counts(torque)
-        self._health.frozen.commanded(counts.total, self.latest)
-        self._following.commanded(counts.total)
-        self._send_command(Command.ENABLE_OPERATION, counts)
+        latest = self.latest
+        if latest is not None and latest.state is not PowerState.OPERATION_ENABLED:
+            self._refuse_to_enable(latest)
+        self._send_command(Command.ENABLE_OPERATION, self._pdos.counts(torque))
+
+    def _refuse_to_enable(self, latest: InverterFeedback) -> None:
+        if latest is not self._before_arming:
+            self._power.raise_if_fault(latest.state)
+            raise DeviceFault(left_operation(self._where, latest.state))
 
     def await_feedback(self, after_ns: int, timeout_s: float) -> InverterFeedback | None:
         """Wait for the TPDOs received after ``after_ns``, the result of `CanLink.sync` [ns].
@@ -277,13 +286,12 @@ class Inverter(InspectedInverter):
         self._feedback.start_anew()
 
     def raise_if_faulted(self) -> None:
-        """Check the drive's health.
+        """Check the bus and the drive's own word: EMCY, heartbeat, NMT state, fault state.
 
         Raises
         ------
         DeviceFault
-            If the drive has sent an EMCY, is in FAULT, has left NMT OPERATIONAL, ignores its target torque, or sends
-            the same feedback again and again while its command changes.
+            If the drive has sent an EMCY, is in FAULT, or has left NMT OPERATIONAL, be it for a moment.
         DeviceTimeout
             If its heartbeat is lost, or never came.
         BusDown, ProtocolViolation
@@ -291,11 +299,17 @@ class Inverter(InspectedInverter):
         ForeignController
             If somebody else commands the drives, while the link is watched for that.
         """
-        self._health.raise_if_unwell()
+        self._link.raise_if_failed()
+        self._link.strangers.raise_if_seen()
+        self._monitor.raise_if_unwell(time.monotonic_ns())
         latest = self.latest
         if latest is not None:
             self._power.raise_if_fault(latest.state)
-        self._following.raise_if_ignored(latest)
+
+    def _error_code(self) -> int | None:
+        """Give the error code of the drive's last EMCY; None if it sent none."""
+        emergency = self._monitor.emergency
+        return None if emergency is None else emergency.code
 
     def _torque_objects(self) -> tuple[int, ...]:
         """List what has to be zero for no torque to be asked for: also an offset that no PDO carries."""

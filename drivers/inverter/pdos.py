@@ -14,9 +14,8 @@ from drivers.capability.carrier_search import MODES_OF_OPERATION
 from drivers.capability.plan import DrivePlan, plan_drive
 from drivers.capability.speed_unit import speed_scale
 from drivers.datasheet.file import EdsFile
-from drivers.inverter.channels import ChannelReceiver
 from drivers.inverter.cia402 import Command
-from drivers.inverter.feedback import FeedbackReceiver
+from drivers.inverter.feedback import ChannelReceiver, FeedbackReceiver
 from drivers.inverter.settings import InverterSettings
 from drivers.scaling import TorqueScale, VelocityScale
 from drivers.torque_guard import GuardedTorque

@@ -7,7 +7,7 @@ from contextlib import suppress
 from types import TracebackType
 from typing import Self
 
-from drivers.errors import CommandRefused
+from drivers.errors import CommandRefused, DeviceFault
 from drivers.inverter.inverter import Inverter
 from hil.errors import RunAborted
 from hil.rig.build import Devices
@@ -85,7 +85,7 @@ class ArmedDrives:
     def _zero_both(self) -> None:
         """Take both to zero with the next SYNC, so that neither waits for the other's disarming."""
         for inverter, torque in zip((self._devices.m1, self._devices.m2), self._devices.guard.zero(), strict=True):
-            with suppress(CommandRefused):  # not armed yet, so it stands still
+            with suppress(CommandRefused, DeviceFault):  # not armed yet, or not enabled any more
                 inverter.command(torque)
         self._devices.link.sync()
 

@@ -37,6 +37,7 @@ class Devices:
     plc_loop: PlcLoop
     plc: Plc
     channels: Channels
+    inertia_kg_m2: float | None = None
 
 
 @contextmanager
@@ -68,7 +69,7 @@ def open_devices(rig: Rig, least_host_timeout_ms: int = 0) -> Iterator[Devices]:
         require_sole_host(link, rig, min(m1.settings.host_heartbeat_s, m2.settings.host_heartbeat_s))
         with connected_plc(rig.plc, loop) as plc:
             channels = Channels(rig.channels, rig.register_map, {"m1": m1, "m2": m2}, loop, plc)
-            yield Devices(link, m1, m2, TorqueGuard(rig.guard_limits), loop, plc, channels)
+            yield Devices(link, m1, m2, TorqueGuard(rig.guard_limits), loop, plc, channels, rig.vehicle.inertia_kg_m2)
 
 
 def _watching(settings: InverterSettings, least_ms: int) -> InverterSettings:

@@ -1,4 +1,4 @@
-"""The 10 ms cycle: guard, both inverters' commands, SYNC, both answers, one `Sample`.
+"""The 10 ms cycle: guard, both inverters' commands, SYNC, both answers, supervision, one `Sample`.
 
 Time is the pacer's (`hil.rig.pacing.Tick`), so that a run that waits for nothing behaves as one on the wall
 clock: ages count from when a cycle really began, the guard's rate limit from when it was due, since a
@@ -8,13 +8,12 @@ torque may change by so much per cycle. Only `CanLink.sync` stamps host time, wh
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from drivers.canopen.can_link import CanLink
-from drivers.errors import DeviceTimeout
 from drivers.inverter.inverter import Inverter, InverterFeedback
-from drivers.message_rate import MessageRate
-from drivers.torque_guard import Evidence, Measured, TorqueGuard, TorqueRequest
+from drivers.inverter.supervision import CycleRecord, DriveRecord, Supervision, SupervisionLimits
+from drivers.torque_guard import Evidence, TorqueGuard, TorqueRequest
 from hil.errors import RunAborted
 from hil.rig.channels import Channels
 from hil.rig.pacing import NS_PER_S, Tick
@@ -24,34 +23,29 @@ from hil.sample import Sample, SampleFlag
 
 @dataclass(slots=True)
 class _Station:
-    """One inverter in the cycle: its last answer and the time of the cycle that got it."""
+    """One inverter in the cycle, and its last answer."""
 
-    name: str
     inverter: Inverter
     stale: SampleFlag
     limited: SampleFlag
     torque_nm: float = math.nan
     speed_rad_s: float = math.nan
-    answered_ns: int | None = None
-    measured: Measured | None = None
-    raw: tuple[int, int] | None = None
-    rate: MessageRate = field(init=False)
 
-    def __post_init__(self) -> None:
-        self.rate = MessageRate(self.inverter.settings.where)
-
-    def take(self, feedback: InverterFeedback | None, now_ns: int) -> SampleFlag:
+    def take(self, feedback: InverterFeedback | None) -> SampleFlag:
         """Keep an answer, or flag that there is none; flag a torque that a limit of the drive holds back."""
-        self.measured = None
         if feedback is None:
             return self.stale
-        raw = (feedback.torque_raw, feedback.speed_raw)
-        self.measured = Measured(feedback.torque_nm, self.inverter.admits_less, raw == self.raw)
-        self.raw = raw
         self.torque_nm = feedback.torque_nm
         self.speed_rad_s = feedback.speed_rad_s
-        self.answered_ns = now_ns
         return self.limited if feedback.limited else SampleFlag.GOOD
+
+
+_DOUBTS = {
+    (False, False): SampleFlag.GOOD,
+    (True, False): SampleFlag.M1_DOUBTFUL,
+    (False, True): SampleFlag.M2_DOUBTFUL,
+    (True, True): SampleFlag.M1_DOUBTFUL | SampleFlag.M2_DOUBTFUL,
+}
 
 
 class Cycle:
@@ -73,9 +67,11 @@ class Cycle:
         Takes note of when cycles begin and answers come; a new one by default.
     channels
         What else is read; nothing by default.
+    inertia_kg_m2
+        Vehicle and driveline at the motor shaft, as well as it is known; None if it is not [kg m²].
     """
 
-    __slots__ = ("_answer_timeout_ns", "_channels", "_first_ns", "_guard", "_link", "_m1", "_m2", "timing")
+    __slots__ = ("_answer_timeout_ns", "_channels", "_guard", "_link", "_m1", "_m2", "_supervision", "timing")
 
     def __init__(
         self,
@@ -87,15 +83,17 @@ class Cycle:
         answer_timeout_s: float,
         timing: RunTiming | None = None,
         channels: Channels | None = None,
+        inertia_kg_m2: float | None = None,
     ) -> None:
         self._link = link
-        self._m1 = _Station("m1", m1, SampleFlag.M1_STALE, SampleFlag.M1_LIMITED)
-        self._m2 = _Station("m2", m2, SampleFlag.M2_STALE, SampleFlag.M2_LIMITED)
+        self._m1 = _Station(m1, SampleFlag.M1_STALE, SampleFlag.M1_LIMITED)
+        self._m2 = _Station(m2, SampleFlag.M2_STALE, SampleFlag.M2_LIMITED)
         self._guard = guard
         self.timing = timing or RunTiming(period_ns)
         self._answer_timeout_ns = round(answer_timeout_s * NS_PER_S)
-        self._first_ns: int | None = None
         self._channels = channels
+        limits = SupervisionLimits(guard.limits, m1.count_rad_s, m2.count_rad_s, inertia_kg_m2)
+        self._supervision = Supervision(limits, m1.settings, m2.settings)
 
     @property
     def speed_rad_s(self) -> float:
@@ -111,7 +109,7 @@ class Cycle:
     @property
     def answered(self) -> bool:
         """Whether both inverters have answered at least once, and follow their target torques."""
-        return all(each.answered_ns is not None and each.inverter.follows for each in (self._m1, self._m2))
+        return self._supervision.ready
 
     def step(
         self, tick: Tick, request: TorqueRequest, time_s: float, flags: SampleFlag, permissive_age_ns: int = 0
@@ -136,14 +134,15 @@ class Cycle:
         CommandRefused
             If the guard refuses the request.
         DeviceFault
-            If an inverter reports a fault, gives another torque than it is commanded, or answers too often.
+            If an inverter reports a fault, or the cycle before has ended the run (`raise_if_ended`).
         DeviceTimeout
             If an inverter has not answered for as long as the guard's feedback time-out.
         RunAborted
             If this machine itself was late by as much.
         """
-        self._refuse_if_unfit(tick)
-        evidence = Evidence(self._age_ns(tick.now_ns), permissive_age_ns, self.fastest_rad_s)
+        self.raise_if_ended()
+        age_ns = self._age_if_fit(tick)
+        evidence = Evidence(age_ns, permissive_age_ns, self.fastest_rad_s)
         command_m1, command_m2 = self._guard.check(request, tick.due_ns, evidence)
         if self.timing.is_late(tick):
             flags |= SampleFlag.LATE
@@ -151,18 +150,38 @@ class Cycle:
         self._m2.inverter.command(command_m2)
         sync_ns = self._link.sync()
         self.timing.begin(tick, sync_ns)
-        waited_ns, stale = self._await_answers(sync_ns, tick.now_ns)
-        self._guard.compare(tick.due_ns, self._m1.measured, self._m2.measured)
+        waited_ns, m1, m2 = self._await_answers(sync_ns)
+        record = CycleRecord(
+            tick.now_ns,
+            DriveRecord(command_m1.base_nm + command_m1.prbs_nm, m1, *self._m1.inverter.messages()),
+            DriveRecord(command_m2.base_nm + command_m2.prbs_nm, m2, *self._m2.inverter.messages()),
+        )
+        flags |= self._m1.take(m1) | self._m2.take(m2) | _DOUBTS[self._supervision.take(record)]
         channels = self._read_channels(sync_ns, waited_ns)
         if any(map(math.isnan, channels)):
             flags |= SampleFlag.CHANNEL_LOST
-        return self._sample(tick, request, time_s, sync_ns, flags | stale, channels)
+        return self._sample(tick, request, time_s, sync_ns, flags, channels)
 
-    def _await_answers(self, sync_ns: int, now_ns: int) -> tuple[int, SampleFlag]:
+    def raise_if_ended(self) -> None:
+        """End the run where its last cycle has, once the sample is kept; the guard is then disabled.
+
+        Raises
+        ------
+        DriverError
+            The drive's own word on what is wrong first, then what supervision found.
+        """
+        if self._supervision.ended is None:
+            return
+        self._guard.disable()
+        self._m1.inverter.raise_if_faulted()
+        self._m2.inverter.raise_if_faulted()
+        self._supervision.raise_if_ended()
+
+    def _await_answers(self, sync_ns: int) -> tuple[int, InverterFeedback | None, InverterFeedback | None]:
         """Wait for both: they answer the same SYNC, and the time they have is one and the same."""
-        age_m1_ns, flag_m1 = self._await_answer(self._m1, sync_ns, 0, now_ns)
-        age_m2_ns, flag_m2 = self._await_answer(self._m2, sync_ns, age_m1_ns, now_ns)
-        return max(age_m1_ns, age_m2_ns), flag_m1 | flag_m2 if flag_m1 or flag_m2 else SampleFlag.GOOD
+        age_m1_ns, m1 = self._await_answer(self._m1, sync_ns, 0)
+        age_m2_ns, m2 = self._await_answer(self._m2, sync_ns, age_m1_ns)
+        return max(age_m1_ns, age_m2_ns), m1, m2
 
     def _read_channels(self, sync_ns: int, waited_ns: int) -> tuple[float, ...]:
         """Read the further channels in the time that the inverters have left."""
@@ -170,23 +189,32 @@ class Cycle:
             return ()
         return self._channels.read(sync_ns, (self._answer_timeout_ns - waited_ns) / NS_PER_S)
 
-    def _await_answer(self, station: _Station, sync_ns: int, waited_ns: int, now_ns: int) -> tuple[int, SampleFlag]:
-        """Wait for one; return how long after the SYNC the waiting ended [ns], and what is against the answer."""
+    def _await_answer(self, station: _Station, sync_ns: int, waited_ns: int) -> tuple[int, InverterFeedback | None]:
+        """Wait for one; give how long after the SYNC the waiting ended [ns], and the answer if it came in time."""
         patience_ns = self._answer_timeout_ns - waited_ns
         feedback = station.inverter.await_feedback(sync_ns, patience_ns / NS_PER_S)
         age_ns = None if feedback is None else feedback.t_ns - sync_ns
         if age_ns is None or age_ns > self._answer_timeout_ns:
             feedback, age_ns = None, None
         self.timing.answer(age_ns)
-        return self._answer_timeout_ns if age_ns is None else age_ns, station.take(feedback, now_ns)
+        return self._answer_timeout_ns if age_ns is None else age_ns, feedback
 
-    def _refuse_if_unfit(self, tick: Tick) -> None:
-        if self._first_ns is None:
-            self._first_ns = tick.now_ns
-        for station in (self._m1, self._m2):
-            station.inverter.raise_if_faulted()
-            self._refuse_if_old(station, tick)
-            station.rate.take(station.inverter.received)
+    def _age_if_fit(self, tick: Tick) -> int:
+        """Have both drives well and their feedback fresh; give its age [ns]."""
+        self._m1.inverter.raise_if_faulted()
+        self._m2.inverter.raise_if_faulted()
+        ages_ns = self._supervision.ages_ns(tick.now_ns)
+        age_ns = max(ages_ns)
+        timeout_s = self._guard.limits.feedback_timeout_s
+        if age_ns > timeout_s * NS_PER_S:
+            if tick.late_ns > self.timing.period_ns:
+                raise RunAborted(
+                    f"cycle {tick.cycle} began {tick.late_ns / NS_PER_S:.3f} s late, so that its feedback is "
+                    f"{age_ns / NS_PER_S:.3f} s old, expected at most {timeout_s:g} s (feedback_timeout_s). This "
+                    "machine was too busy: close other programs."
+                )
+            self._supervision.raise_if_old(ages_ns)
+        return age_ns
 
     @property
     def speeds_rad_s(self) -> tuple[float, float]:
@@ -214,32 +242,6 @@ class Cycle:
                 "(feedback_timeout_s). This machine was too busy, or the program was suspended: close other programs."
             )
 
-    def _refuse_if_old(self, station: _Station, tick: Tick) -> None:
-        timeout_s = self._guard.limits.feedback_timeout_s
-        age_s = (tick.now_ns - self._last_ns(station)) / NS_PER_S
-        if age_s <= timeout_s:
-            return
-        if tick.late_ns > self.timing.period_ns:
-            raise RunAborted(
-                f"cycle {tick.cycle} began {tick.late_ns / NS_PER_S:.3f} s late, so that its feedback is "
-                f"{age_s:.3f} s old, expected at most {timeout_s:g} s (feedback_timeout_s). This machine was "
-                "too busy: close other programs."
-            )
-        raise DeviceTimeout(
-            f"inverter {station.name}: no TPDO for {age_s:.3f} s, expected one per SYNC and none missing "
-            f"for more than {timeout_s:g} s (feedback_timeout_s). Check its supply and its cabling; a simulated one "
-            "answers late on a busy machine."
-        )
-
-    def _last_ns(self, station: _Station) -> int:
-        """Time of the cycle that got the last answer; of the first cycle while there is none [ns]."""
-        if station.answered_ns is not None:
-            return station.answered_ns
-        return 0 if self._first_ns is None else self._first_ns
-
-    def _age_ns(self, now_ns: int) -> int:
-        return now_ns - min(self._last_ns(self._m1), self._last_ns(self._m2))
-
     def _sample(
         self,
         tick: Tick,
@@ -259,7 +261,7 @@ class Cycle:
             torque_m1_nm=self._m1.torque_nm,
             torque_m2_nm=self._m2.torque_nm,
             speed_rad_s=self.speed_rad_s,
-            age_ns=self._age_ns(tick.now_ns),
+            age_ns=max(self._supervision.ages_ns(tick.now_ns)),
             flags=flags,
             channels=channels,
         )

@@ -154,11 +154,13 @@ class Drive:
             self._record(sample)
         else:
             self._show(sample)
+        self.cycle.raise_if_ended()
         self.progress(base.phase, time_s)
 
     def _stand_still(self) -> Tick:
         tick, flags = self._begin()
         self.cycle.step(tick, NO_TORQUE, 0.0, flags)
+        self.cycle.raise_if_ended()
         return tick
 
     def _begin(self) -> tuple[Tick, SampleFlag]:

@@ -11,12 +11,11 @@ import pytest
 from drivers.canopen.can_link import CanLink
 from drivers.canopen.heartbeat import NmtState
 from drivers.errors import ConfigMismatch, DeviceFault, DeviceTimeout
-from drivers.inverter.cia402 import PowerState, StatusBit, TorqueMode
-from drivers.inverter.follow_watch import MOST_IGNORED
-from drivers.inverter.inverter import Inverter, InverterSettings
+from drivers.inverter.cia402 import PowerState, StatusBit
+from drivers.inverter.inverter import Inverter
 from drivers.resources import data_file
 from tests.drivers.can_bench import M1, bench, guarded
-from tests.drivers.fake_drive import DEVICE_STATE, FOLLOWS, VALUE_RANGE, FakeDrive, on_bus
+from tests.drivers.fake_drive import DEVICE_STATE, VALUE_RANGE, FakeDrive, on_bus
 
 NO_RTR, INVALID = 1 << 30, 1 << 31
 
@@ -205,92 +204,11 @@ def test_frames_of_another_protocol_are_none_of_ours(number: int, data: bytes, k
         rig.m1.disarm()
 
 
-IGNORED = StatusBit.REMOTE | StatusBit.VOLTAGE_ENABLED
-
-
-class FollowsLater(FakeDrive):
-    """Magnetises its motor first: in operation, and without bit 12, for some SYNCs."""
-
-    syncs = 0
-
-    def take_sync(self, data: bytes) -> None:
-        self.syncs += self.state is PowerState.OPERATION_ENABLED
-        self.status_bits = IGNORED | (FOLLOWS if self.syncs > 20 else 0)
-        super().take_sync(data)
-
-
-class IgnoresTarget(FakeDrive):
-    """In operation, and makes nothing of its target: readings of one count of noise, bit 12 is 0."""
-
-    def take_sync(self, data: bytes) -> None:
-        self.objects[0x606C, 0] ^= 1
-        super().take_sync(data)
-
-    def torque_of(self, target: int, offset: int) -> int:
-        return self.objects[0x606C, 0]
-
-
 def driven(inverter: Inverter, link: CanLink, cycles: int, torque_nm: float = 60.0) -> None:
     for n in range(cycles):
         inverter.command(guarded(torque_nm if n % 4 < 2 else -torque_nm))
         assert inverter.await_feedback(link.sync(), 5.0) is not None
         inverter.raise_if_faulted()
-
-
-def test_drive_that_stops_following_its_target_ends_the_run_with_that_cause() -> None:
-    with on_bus(IgnoresTarget) as (drive, inverter, link):
-        inverter.configure()
-        inverter.arm()
-        driven(inverter, link, 20)
-        assert inverter.follows
-        drive.status_bits = IGNORED
-        driven(inverter, link, MOST_IGNORED - 1)
-        with pytest.raises(DeviceFault, match=r"statusword 0x6041 bit 12 is 0 .*the drive ignores the target torque"):
-            driven(inverter, link, 1)
-        inverter.disarm()
-
-
-def test_drive_may_take_its_time_before_it_follows() -> None:
-    with on_bus(FollowsLater, replace(M1, state_timeout_s=30.0)) as (_, inverter, link):
-        inverter.configure()
-        inverter.arm()
-        driven(inverter, link, 20, torque_nm=0.0)
-        assert not inverter.follows
-        driven(inverter, link, 20)
-        assert inverter.follows
-
-
-def test_drive_that_never_follows_is_given_up_after_the_time_for_a_state() -> None:
-    with on_bus(IgnoresTarget, replace(M1, state_timeout_s=0.05)) as (drive, inverter, link):
-        drive.status_bits = IGNORED
-        inverter.configure()
-        inverter.arm()
-        with pytest.raises(DeviceFault, match="bit 12 is 0"):
-            driven(inverter, link, 1_000_000, torque_nm=0.0)
-        assert not inverter.follows
-
-
-def test_drive_that_never_follows_has_no_time_once_a_torque_is_asked_for() -> None:
-    with on_bus(IgnoresTarget, replace(M1, state_timeout_s=30.0)) as (drive, inverter, link):
-        drive.status_bits = IGNORED
-        inverter.configure()
-        inverter.arm()
-        driven(inverter, link, 3 * MOST_IGNORED, torque_nm=0.0)
-        driven(inverter, link, MOST_IGNORED - 1)
-        with pytest.raises(DeviceFault, match="the drive ignores the target torque"):
-            driven(inverter, link, 1)
-
-
-@pytest.mark.parametrize(
-    "settings", [replace(M1, follow_bit=False), replace(M1, mode=TorqueMode.PROFILE_TORQUE)], ids=["without", "mode 4"]
-)
-def test_bit_12_means_nothing_where_a_drive_has_it_not(settings: InverterSettings) -> None:
-    with on_bus(IgnoresTarget, settings) as (drive, inverter, link):
-        drive.status_bits = IGNORED
-        inverter.configure()
-        inverter.arm()
-        driven(inverter, link, 3 * MOST_IGNORED)
-        assert inverter.follows
 
 
 def test_internal_limit_is_part_of_the_feedback() -> None:
@@ -303,3 +221,21 @@ def test_internal_limit_is_part_of_the_feedback() -> None:
         drive.status_bits |= StatusBit.INTERNAL_LIMIT_ACTIVE
         driven(inverter, link, 2)
         assert inverter.latest.limited
+
+
+@pytest.mark.parametrize("state", [PowerState.READY_TO_SWITCH_ON, PowerState.SWITCHED_ON, PowerState.QUICK_STOP_ACTIVE])
+def test_a_drive_that_left_its_state_is_not_enabled_again(state: PowerState) -> None:
+    with on_bus() as (drive, inverter, link):
+        inverter.configure()
+        inverter.arm()
+        driven(inverter, link, 2)
+        drive.state, drive.pending = state, {}  # as by an enable input, with the RPDO under way lost
+        assert inverter.await_feedback(link.sync(), 5.0) is not None
+        with pytest.raises(DeviceFault, match=rf"power state is {state.value} after controlword 0x000F .*not enabled"):
+            inverter.command(guarded(60.0))
+        link.sync()
+        assert drive.state is state
+        inverter.disarm()
+        inverter.arm()  # another run may
+        driven(inverter, link, 2)
+        assert drive.state is PowerState.OPERATION_ENABLED
