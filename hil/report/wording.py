@@ -91,7 +91,7 @@ def torque_axis(motion: Motion) -> str:
 
 def headline(diagnosis: Diagnosis) -> str:
     """Say the verdict in one line."""
-    found = [f"{_title(effect.name)}{_sure(effect)}" for effect in diagnosis.effects]
+    found = [f"{title_of(effect.name)}{_sure(effect)}" for effect in diagnosis.effects]
     if diagnosis.verdict is Verdict.EXPLAINED:
         return f"Missing in the model: {listed(found)}"
     if diagnosis.verdict is Verdict.PARTLY_EXPLAINED:
@@ -125,7 +125,8 @@ def belief(effect: FoundEffect) -> str:
     return f"{effect.share:.0%} of the squared error explained; probability {probability(effect.probability)}. "
 
 
-def _title(name: str) -> str:
+def title_of(name: str) -> str:
+    """Return an effect's title in words."""
     return EFFECTS[name].title if name in EFFECTS else name.replace("_", " ")
 
 
