@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -79,7 +78,7 @@ class ComparisonResult:
             for each in of_model.outputs
         ]
         table = html.table(("recording", "model", "RMS error", "NRMSE fit"), rows, numbers=(2, 3))
-        return f"<div><b>{escape(repr(self)[1:-1])}</b>{table}</div>"
+        return html.fragment(html.Heading(repr(self)[1:-1]), table)
 
 
 def compare(models: Model | Sequence[Model], recordings: Recordings) -> ComparisonResult:

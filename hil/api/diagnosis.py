@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -91,9 +90,9 @@ class DiagnosisResult:
             for effect in self.diagnosis.effects
             for name, each in effect.parameters.items()
         ]
-        found = html.table(("effect", "parameter", "value", "95 % interval"), rows, numbers=(2, 3)) if rows else ""
-        title = f"<b>{BADGES[self.diagnosis.verdict]}: {escape(headline(self.diagnosis))}</b>"
-        return f"<div>{title}{html.paragraph(self.diagnosis.statement)}{found}</div>"
+        found = html.table(("effect", "parameter", "value", "95 % interval"), rows, numbers=(2, 3)) if rows else None
+        title = html.Heading(f"{BADGES[self.diagnosis.verdict]}: {headline(self.diagnosis)}")
+        return html.fragment(title, html.paragraph(self.diagnosis.statement), found)
 
 
 def diagnose(

@@ -40,8 +40,7 @@ def compare(
     from hil.provenance import provenance
     from hil.report.compared import compared
     from hil.report.comparison import comparison_text
-    from hil.report.comparison_html import comparison_page
-    from hil.report.comparison_text import comparison_summary
+    from hil.report.comparison_html import comparison_page, comparison_summary
     from hil.report.outputs import publish, require_folder
 
     if out is not None:

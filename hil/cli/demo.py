@@ -152,9 +152,8 @@ class _Demo:
         """Write and print the verdict; a seal from an earlier run is not left next to it."""
         from hil.config.model_file import write_model
         from hil.provenance import provenance
-        from hil.report.diagnosis_html import diagnosis_page
+        from hil.report.diagnosis_html import diagnosis_page, diagnosis_summary
         from hil.report.diagnosis_json import diagnosis_text
-        from hil.report.diagnosis_text import diagnosis_summary
         from hil.report.outputs import publish
 
         made = provenance([self._nominal], recordings)

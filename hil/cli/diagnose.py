@@ -107,8 +107,8 @@ def diagnose(
         from hil.provenance import provenance
         from hil.recording.cure import with_the_line_to_write
         from hil.report.diagnosis_files import publish_diagnosis
+        from hil.report.diagnosis_html import diagnosis_summary
         from hil.report.diagnosis_json import diagnosis_text
-        from hil.report.diagnosis_text import diagnosis_summary
         from hil.report.outputs import require_folder
         from hil.store import attach_to_runs
         from hil.store.entry import DIAGNOSIS, MODEL

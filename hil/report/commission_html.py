@@ -6,20 +6,44 @@ within?), its pictures and its runs; what was decided on the way; the rig file. 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from html import escape
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from types import MappingProxyType
 from typing import Any
 
+import numpy as np
+import plotly.graph_objects as go
+from plotly.subplots import make_subplots
+
+from hil.figures.palette import BLUE, GREY, VERMILION, series_colour
 from hil.provenance import Provenance
 from hil.report import page as html
-from hil.report.commission_step import STATUSES, STYLE, badge, card_row, card_table, step_section
+from hil.report.figures import DECADES, LEGEND_PX, PANEL_PX, Line, Panel, Style, figure_block, time_figure
+from hil.report.identification.pole_map import PoleSet, pole_figure
 from hil.report.made import made_section
 from hil.report.numbers import moment, shown
 
 State = Mapping[str, Any]
+Evidence = Mapping[str, Any]
 
 MOST_NAMED = 4
 """Findings outside their limits that the head of the page names."""
+
+MARKS = MappingProxyType({True: ("no_mismatch", "✓ within"), False: ("unexplained", "✗ outside"), None: ("", "–")})
+"""CSS class and words for within, outside, and no limit: the words say it, not the colour alone."""
+
+STATUSES = MappingProxyType(
+    {
+        "done": ("explained", "done"),
+        "skipped": ("", "skipped"),
+        "blocked": ("unexplained", "blocked"),
+        "interrupted": ("unexplained", "interrupted"),
+        "running": ("", "under way"),
+        "pending": ("", "to do"),
+    }
+)
+
+COURSES = 4
+"""Figures over time that share the page."""
 
 
 def commission_page(state: State, titles: Mapping[str, str], made: Provenance | None = None) -> str:
@@ -33,22 +57,27 @@ def commission_page(state: State, titles: Mapping[str, str], made: Provenance | 
         Title of each step, by name, in order.
     """
     steps = state["steps"]
-    sections = [
-        step_section(name, titles[name], steps[name], _link(steps[name]) if name == "diagnosis" else "")
-        for name in titles
-        if steps[name]["status"] != "pending"
-    ]
-    body = [STYLE, _top(state), _overview(steps, titles), *sections, _decisions(state), _rig(state), made_section(made)]
+    begun, updated = moment(state["started_utc"]), moment(state["updated_utc"])
     return html.page(
         f"Commissioning of {state['rig_name']}",
-        (piece for piece in body if piece),
-        f"hil commission {state['hil_version']}, begun {moment(state['started_utc'])}, as of "
-        f"{moment(state['updated_utc'])}. "
+        [
+            _top(state, updated),
+            _overview(steps, titles),
+            *(_step(name, titles[name], steps[name]) for name in titles if steps[name]["status"] != "pending"),
+            _decisions(state) if state["notes"] else None,
+            html.section(
+                "The rig file",
+                html.note(state["rig_path"]),
+                html.details("show it", html.Preformatted(state["rig_text"])),
+            ),
+            made_section(made),
+        ],
+        f"hil commission {state['hil_version']}, begun {begun}, as of {updated}. "
         "Intervals are of 95 % confidence; predicted values are from the driveline as it was known before each run.",
     )
 
 
-def _top(state: State) -> str:
+def _top(state: State, updated: str) -> html.Header:
     records = state["steps"].values()
     outside = sum(finding["within"] is False for record in records for finding in record["findings"])
     to_do = [name for name, record in state["steps"].items() if record["status"] not in ("done", "skipped")]
@@ -58,12 +87,13 @@ def _top(state: State) -> str:
         kind, words = "explained", f"complete, {outside} outside their limits"
     else:
         kind, words = "no_mismatch", "complete, all within limits"
-    return (
-        f'<header class="top {kind}">\n<span class="badge {kind}">{escape(words)}</span>\n'
-        f"<h1>Commissioning of {escape(state['rig_name'])}</h1>\n"
-        + "".join(html.paragraph(text, "statement") for text in _statements(state))
-        + html.tiles(_tiles(state))
-        + "\n</header>"
+    return html.header(
+        f"Commissioning of {state['rig_name']}",
+        (html.paragraph(text, kind="statement") for text in _statements(state)),
+        html.tiles(_tiles(state)),
+        kind=kind,
+        badge=words,
+        facts=(("rig", state["rig_name"]), ("rig file", state["rig_path"]), ("as of", updated)),
     )
 
 
@@ -95,48 +125,231 @@ def _tiles(state: State) -> Iterator[tuple[str, str, str]]:
     if evidence["scales"].get("gain") and None not in evidence["scales"]["gain"]:
         gain, spread = evidence["scales"]["gain"]
         yield "m2 against m1", f"{100.0 * (gain - 1.0):+.1f} %", f"±{100.0 * spread:.1f} %, for the same reading"
-    if "inertia_kg_m2" in evidence["friction"]:
-        inertia, spread = evidence["friction"]["inertia_kg_m2"]
+    inertia, spread = evidence["friction"].get("inertia_kg_m2", (None, None))
+    if inertia is not None:
         yield "inertia", shown(inertia, "kg m²"), "" if spread is None else f"±{shown(spread)}, at the motor shaft"
     driven_s = sum(run["seconds"] for record in state["steps"].values() for run in record["runs"])
     yield "driven", f"{driven_s / 60.0:.1f} min", "of this and earlier calls, without attempts that were repeated"
 
 
-def _overview(steps: Mapping[str, Any], titles: Mapping[str, str]) -> str:
-    columns = ("step", "status", "findings", "because")
+def _overview(steps: Mapping[str, Any], titles: Mapping[str, str]) -> html.Section:
     rows = []
     for number, (name, title) in enumerate(titles.items(), start=1):
         record = steps[name]
         within = sum(finding["within"] is True for finding in record["findings"])
         outside = sum(finding["within"] is False for finding in record["findings"])
         counted = f"{within} within" + (f", {outside} outside" if outside else "") if record["findings"] else "–"
-        cells = (
-            f"{number} {escape(title)}",
-            badge(*STATUSES[record["status"]]),
-            escape(counted),
-            escape(record["because"] or "–"),
-        )
-        rows.append(card_row(columns, cells, outside > 0))
-    return html.section("Steps", card_table(columns, rows))
+        cells = (f"{number} {title}", _badge(record), counted, record["because"] or "–")
+        rows.append(html.Row(cells, "outside" if outside else ""))
+    return html.section("Steps", html.table(("step", "status", "findings", "because"), rows))
 
 
-def _link(record: Mapping[str, Any]) -> str:
-    evidence = record["evidence"]
-    if not evidence:
-        return ""
-    return (
-        f'<p>Evidence, rivals and pictures: <a href="{escape(evidence["report"])}">{escape(evidence["report"])}</a>. '
-        f"Model file: <code>{escape(evidence['model_file'])}</code>.</p>"
+def _badge(record: Mapping[str, Any]) -> html.Badge:
+    kind, words = STATUSES[record["status"]]
+    return html.Badge(words, kind)
+
+
+def _step(name: str, title: str, record: Mapping[str, Any]) -> html.Section:
+    runs, history, evidence = record["runs"], record["history"], record["evidence"]
+    draw = _FIGURES.get(name)
+    return html.section(
+        title,
+        _status(record),
+        html.table(("what", "expected", "measured", "within?"), map(_finding, record["findings"]))
+        if record["findings"]
+        else None,
+        draw(evidence) if draw is not None and evidence else None,
+        html.details(f"Runs ({len(runs)}): predicted and measured", _runs(runs)) if runs else None,
+        html.details(f"Earlier attempts ({len(history)})", _history(history)) if history else None,
     )
 
 
-def _decisions(state: State) -> str:
-    if not state["notes"]:
-        return ""
+def _status(record: Mapping[str, Any]) -> html.Paragraph:
+    because = f" because: {record['because']}" if record["because"] else ""
+    when = f" {moment(record['ended_utc'])}" if record["ended_utc"] else ""
+    attempt = f", attempt {record['attempt']}" if record["attempt"] > 1 else ""
+    return html.paragraph(_badge(record), f" {when}{attempt}{because}")
+
+
+def _finding(finding: Mapping[str, Any]) -> html.Row:
+    within = finding["within"]
+    kind, words = MARKS[within]
+    if within is None and finding["expected"] != "–":
+        words = "? can't tell"
+    has_advice = finding["advice"] and within is not True
+    measured = html.Advised(finding["measured"], finding["advice"]) if has_advice else finding["measured"]
+    verdict = html.Badge(words, kind) if within is not None else words
+    cells = (finding["what"], finding["expected"], measured, verdict)
+    return html.Row(cells, "outside" if within is False else "")
+
+
+def _runs(runs: Sequence[Mapping[str, Any]]) -> html.Table:
+    headings = ("run", "recording", "s", "m1 [Nm]", "predicted", "m2 [Nm]", "predicted", "speed [rad/s]", "predicted")
+    rows = [
+        (
+            run["name"] + ("" if run["whole"] else " (ended early)"),
+            run["recording"] or "none",
+            f"{run['seconds']:.1f}",
+            *_both(run, "torque_m1_nm", 0),
+            *_both(run, "torque_m2_nm", 0),
+            *_both(run, "speed_rad_s", 1),
+        )
+        for run in runs
+    ]
+    return html.table(headings, rows, numbers=range(2, len(headings)))
+
+
+def _both(run: Mapping[str, Any], key: str, digits: int) -> Iterator[str]:
+    for ranges in (run["measured"], run["predicted"]):
+        yield f"{ranges[key][0]:z.{digits}f} … {ranges[key][1]:z.{digits}f}" if key in ranges else "–"
+
+
+def _history(history: Sequence[Mapping[str, Any]]) -> html.Table:
+    rows = [
+        (
+            str(each["attempt"]),
+            each["status"],
+            moment(each["ended_utc"]) if each["ended_utc"] else "",
+            each["because"],
+            str(sum(finding["within"] is False for finding in each["findings"])),
+            ", ".join(each["recordings"]),
+        )
+        for each in history
+    ]
+    return html.table(("attempt", "ended as", "at", "because", "outside", "recordings"), rows)
+
+
+def _decisions(state: State) -> html.Section:
     rows = [(moment(note["at_utc"]), note["what"], note["changes"], note["steps"]) for note in state["notes"]]
     return html.section("Decisions on the way", html.table(("at", "what", "changes", "steps done before"), rows))
 
 
-def _rig(state: State) -> str:
-    text = f"<pre>{escape(state['rig_text'])}</pre>"
-    return html.section("The rig file", html.paragraph(state["rig_path"], "note"), html.details("show it", text))
+def _array(values: Sequence[float | None]) -> np.ndarray:
+    return np.array(values, dtype=np.float64)
+
+
+def _course(name: str, course: Mapping[str, Any], *panels: tuple[str, Sequence[tuple[str, str, Style]]]) -> list[Any]:
+    """Draw a course: for each panel its axis, and its lines as (name, key of the course, style)."""
+    drawn = [
+        Panel(axis, tuple(Line(line, _array(course[key]), style) for line, key, style in lines))
+        for axis, lines in panels
+    ]
+    return list(time_figure(name, _array(course["time_s"]), drawn, COURSES))
+
+
+SPEED = ("speed [rad/s]", [("speed", "speed_rad_s", Style.AFTER)])
+
+
+def _noise(evidence: Evidence) -> list[Any]:
+    return _course(
+        "noise-course",
+        evidence["course"],
+        ("speed [rad/s]", [("speed at zero torque", "speed_rad_s", Style.AFTER)]),
+    )
+
+
+def _signs(evidence: Evidence) -> list[Any]:
+    torque = ("torque [Nm]", [("reading", "reading_nm", Style.MEASURED), ("reference", "reference_nm",
+                                                                         Style.FIRST_INPUT)])  # fmt: skip
+    return [
+        (html.Heading(f"Pulses of {name}"), _course(f"signs-{name}", evidence[name]["course"], torque, SPEED))
+        for name in ("m1", "m2")
+        if name in evidence
+    ]
+
+
+def _friction(evidence: Evidence) -> list[Any]:
+    torque = ("torque [Nm]", [("torque of both", "torque_nm", Style.FIRST_INPUT)])
+    return _course("friction-course", evidence["course"], torque, SPEED)
+
+
+def _identification(evidence: Evidence) -> list[Any]:
+    runs = evidence["runs"]
+    sets = [
+        PoleSet(name, _roots(runs, how, "poles"), _roots(runs, how, "zeros"), colour)
+        for name, how, colour in (("best off line", "best", BLUE), ("on line, last estimates", "online", VERMILION))
+    ]
+    return [
+        html.Heading("Frequency responses, torque to speed"),
+        _responses(runs),
+        html.Heading("Resonance of each run"),
+        _resonances(runs),
+        html.Heading("Poles and zeros"),
+        pole_figure("identification-poles", sets, runs[0]["online"]["sample_time_s"]),
+    ]
+
+
+def _roots(runs: list[Evidence], how: str, which: str) -> np.ndarray:
+    """Return the roots of all runs at the on-line period: a pole sampled k times as slowly is its k-th power."""
+    k = runs[0]["online"]["sample_time_s"] / runs[0][how]["sample_time_s"]
+    roots = np.array([complex(*root) for run in runs for root in run[how][which]], dtype=np.complex128)
+    with np.errstate(over="ignore", invalid="ignore"):
+        return np.asarray(roots**k)
+
+
+def _responses(runs: list[Evidence]) -> html.Figure:
+    """Draw every off-line model, over the estimate without a model of the first run, and the coherence below."""
+    figure = make_subplots(rows=2, cols=1, shared_xaxes=True, vertical_spacing=0.05, row_heights=[0.7, 0.3])
+    for number, run in enumerate(runs):
+        look = {"color": series_colour(number), "width": 1.4}
+        line = {"mode": "lines", "line": look, "name": run["run"], "legendgroup": run["run"]}
+        figure.add_trace(go.Scatter(x=run["frequency_hz"], y=run["magnitude"], **line), row=1, col=1)
+        if run["spectral"] is not None:
+            x, y = run["spectral"]["frequency_hz"], run["spectral"]["coherence"]
+            figure.add_trace(go.Scatter(x=x, y=y, showlegend=False, **line), row=2, col=1)
+    if runs[0]["spectral"] is not None:
+        x, y = runs[0]["spectral"]["frequency_hz"], runs[0]["spectral"]["magnitude"]
+        dots = {"mode": "markers", "marker": {"color": GREY, "size": 5, "symbol": "circle-open"}}
+        figure.add_trace(go.Scatter(x=x, y=y, name=f"without a model, {runs[0]['run']}", **dots), row=1, col=1)
+    figure.update_xaxes(**DECADES)
+    figure.update_xaxes(title_text="frequency [Hz]", row=2, col=1)
+    figure.update_yaxes(title_text="rad/s per Nm", **DECADES, row=1, col=1)
+    figure.update_yaxes(title_text="coherence", range=[0.0, 1.05], row=2, col=1)
+    return figure_block(figure, "identification-responses", 2 * PANEL_PX + LEGEND_PX)
+
+
+def _resonances(runs: list[Evidence]) -> html.Figure:
+    figure = make_subplots(rows=2, cols=1, shared_xaxes=True, vertical_spacing=0.08)
+    names = [run["run"] for run in runs]
+    looks = (("best off line", "best", BLUE, "circle"), ("on line", "online", VERMILION, "diamond-open"))
+    for name, how, colour, symbol in looks:
+        for row in (1, 2):
+            values = [None if run[how]["resonance"] is None else run[how]["resonance"][row - 1] for run in runs]
+            dots = {"mode": "markers", "marker": {"color": colour, "size": 10, "symbol": symbol}}
+            figure.add_trace(
+                go.Scatter(x=names, y=values, name=name, legendgroup=name, showlegend=row == 1, **dots), row=row, col=1
+            )
+    figure.update_xaxes(type="category")
+    figure.update_yaxes(title_text="resonance [Hz]", row=1, col=1)
+    figure.update_yaxes(title_text="damping", row=2, col=1)
+    return figure_block(figure, "identification-resonances", 2 * PANEL_PX + LEGEND_PX)
+
+
+def _validation(evidence: Evidence) -> list[Any]:
+    worst = dict(evidence["worst"])
+    worst["error"] = _array(worst["measured_rad_s"]) - _array(worst["simulated_rad_s"])
+    speed = (
+        "speed [rad/s]",
+        [("measured", "measured_rad_s", Style.MEASURED), ("simulated", "simulated_rad_s", Style.AFTER)],
+    )
+    error = ("error [rad/s]", [("error", "error", Style.BEFORE)])
+    title = html.Heading(f"Worst of the unseen runs: {worst['name']}")
+    return [title, *_course("validation-course", worst, speed, error)]
+
+
+def _diagnosis(evidence: Evidence) -> list[Any]:
+    report = html.Link(evidence["report"], evidence["report"])
+    model = html.Code(evidence["model_file"])
+    return [html.paragraph("Evidence, rivals and pictures: ", report, ". Model file: ", model, ".")]
+
+
+_FIGURES: Mapping[str, Callable[[Evidence], list[Any]]] = MappingProxyType(
+    {
+        "noise": _noise,
+        "signs": _signs,
+        "friction": _friction,
+        "identification": _identification,
+        "validation": _validation,
+        "diagnosis": _diagnosis,
+    }
+)

@@ -1,4 +1,4 @@
-"""``report.html``: a diagnosis as one self-contained page.
+"""``report.html`` and the terminal's summary of a diagnosis, from one list of sections.
 
 From the top: verdict and statement, the fit in figures, what was recognised in the acquisition, the physics found with
 its law over its data, where the mismatch is (place, time, frequency), the recordings with their simulations and errors,
@@ -7,18 +7,31 @@ the effects that were rejected and why, those that these tests neither find nor 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from html import escape
+import math
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
+from rich.console import RenderableType
 
-from estimator.diagnosis.result import Diagnosis, Fit, FoundEffect, Trace, UnnamedLaw
+from estimator.diagnosis.result import (
+    Diagnosis,
+    Discrepancy,
+    Equivalent,
+    Fit,
+    FoundEffect,
+    Interval,
+    Trace,
+    UnnamedLaw,
+    Verdict,
+)
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Element
 from estimator.signals.record import FloatArray
 from hil.provenance import Provenance
 from hil.report import page as html
-from hil.report.discrepancy_html import frequency, law_pictures, location, worth_marking
+from hil.report.discrepancy_figures import course_figure, error_spectrum_figure, law_figure, response_figure
 from hil.report.figures import (
     Line,
     Panel,
@@ -26,13 +39,25 @@ from hil.report.figures import (
     band_figure,
     input_lines,
     spectrum_figure,
+    stretches_for,
     time_figure,
 )
-from hil.report.interval_bar import interval_bar
-from hil.report.made import made_section
-from hil.report.numbers import p_statement, shown, shown_interval, shown_ratio, shown_times
+from hil.report.made import facts, made_section
+from hil.report.numbers import p_statement, shown, shown_interval, shown_p, shown_ratio, shown_times
 from hil.report.sentence import listed
-from hil.report.wording import BADGES, ELEMENTS, belief, headline, quantity, torque_axis
+from hil.report.terminal import rendered
+from hil.report.wording import (
+    BADGES,
+    CHECKS,
+    ELEMENTS,
+    PLACES,
+    belief,
+    headline,
+    location_rows,
+    quantity,
+    title_of,
+    torque_axis,
+)
 
 MOST_DRAWN = 20
 """Recordings drawn at most; beyond, those with the largest error of the re-tuned model."""
@@ -41,76 +66,101 @@ RETUNED = "nominal re-tuned"
 AUGMENTED = "augmented"
 KEPT_BACK = "stretches kept back as unseen data"
 
+SIGNIFICANT_P = 0.01
+
+WHOLE = 0.95
+"""From this share on, a mismatch is everywhere in a recording."""
+
+FEWEST_ALIKE = 3
+"""Rejected effects with the same reason from which on they share a line."""
+
+REJECTED = ("rejected", "why", "ΔBIC to the explanation")
+
+LEAST_RANGE = 0.05
+"""Of the nominal value: half the width of a parameter's drawing at least."""
+
 
 def diagnosis_page(diagnosis: Diagnosis, made: Provenance | None = None, one_in: int = 1) -> str:
     """Return the text of the page; ``one_in`` tells to one in how many samples recordings were thinned."""
     drawn = _drawn(diagnosis.traces)
-    body = [
-        _top(diagnosis, one_in),
-        _fit(diagnosis),
-        _acquired(diagnosis),
-        _found(diagnosis),
-        location(diagnosis, [trace for trace in drawn if not trace.holdout]),
-        frequency(diagnosis),
-        *_recordings(diagnosis, drawn),
-        _rivals(diagnosis),
-        _untestable(diagnosis),
-        _parameters(diagnosis),
-        made_section(made),
-    ]
     seconds = shown(diagnosis.timing_s.get("total", float("nan")), "s")
     return html.page(
         f"Diagnosis: {headline(diagnosis)}",
-        (piece for piece in body if piece),
+        [
+            html.header(
+                headline(diagnosis), *_statement(diagnosis, one_in), _tiles(diagnosis), kind=diagnosis.verdict.value,
+                badge=BADGES[diagnosis.verdict], facts=facts(made),
+            ),
+            html.section("Fit", _fit(diagnosis.fit), _further_outputs(diagnosis.fit)),
+            _acquired(diagnosis),
+            _found(diagnosis),
+            _location(diagnosis, [trace for trace in drawn if not trace.holdout]),
+            _frequency(diagnosis),
+            *_recordings(diagnosis, drawn),
+            _rejected_section(diagnosis) if diagnosis.rejected else None,
+            html.section("Neither found nor excluded", _untestable(diagnosis)) if diagnosis.untestable else None,
+            html.section(
+                "Parameters of the model",
+                _parameters(diagnosis),
+                html.note("Bar: tolerance grey, nominal value as a line, value found as a dot with its interval. Grey "
+                          "rows: these recordings do not determine the value."),
+            ),
+            made_section(made),
+        ],
         f"hil diagnose, computed in {seconds}. Errors are those of free-run simulations: measured torque in, "
         "nothing fed back; constant load torque and initial state estimated in each recording.",
-    )
+    )  # fmt: skip
 
 
-def _top(diagnosis: Diagnosis, one_in: int) -> str:
-    verdict, fit = diagnosis.verdict, diagnosis.fit
+def diagnosis_summary(diagnosis: Diagnosis) -> RenderableType:
+    """Return what a terminal shows of a diagnosis: the verdict first, then what it rests on."""
+    found = [html.paragraph(f"{title_of(e.name)}: {said}") for e in diagnosis.effects if (said := belief(e).rstrip())]
+    return rendered(
+        [
+            html.header(
+                headline(diagnosis), html.paragraph(diagnosis.statement), kind=diagnosis.verdict.value,
+                badge=BADGES[diagnosis.verdict],
+            ),
+            _fit(diagnosis.fit),
+            _further_outputs(diagnosis.fit),
+            _effects(diagnosis.effects),
+            *found,
+            _parameters(diagnosis),
+            _rejected(diagnosis) if diagnosis.rejected else None,
+            _untestable(diagnosis) if diagnosis.untestable else None,
+            *(html.warning(f"Note: {text}") for text in diagnosis.warnings),
+        ]
+    )  # fmt: skip
+
+
+def _statement(diagnosis: Diagnosis, one_in: int) -> Iterator[html.Paragraph]:
+    yield html.paragraph(diagnosis.statement, kind="statement")
+    for text in diagnosis.warnings:
+        yield html.warning(f"Note: {text}")
+    if one_in > 1:
+        yield html.note(
+            f"One in {one_in} samples was used, with the mean torque in between: the line responds to nothing faster. "
+            "All figures and plots are of these samples."
+        )
+
+
+def _tiles(diagnosis: Diagnosis) -> html.Tiles:
+    fit = diagnosis.fit
     training = [trace.name for trace in diagnosis.traces if not trace.holdout]
     held_out = len(diagnosis.traces) - len(training)
-    warnings = "".join(html.paragraph(f"Note: {text}", "warning") for text in diagnosis.warnings)
-    if one_in > 1:
-        warnings += html.paragraph(
-            f"One in {one_in} samples was used, with the mean torque in between: the line responds to nothing faster. "
-            "All figures and plots are of these samples.",
-            "note",
-        )
-    figures = html.tiles(
+    before, after = (f"{shown_ratio(each, fit.noise_floor)} noise floor" for each in (fit.retuned, fit.augmented))
+    unseen = f"before: {shown(fit.holdout_retuned, fit.unit)}"
+    return html.tiles(
         [
-            (
-                "error before",
-                shown(fit.retuned, fit.unit),
-                f"model re-tuned, {shown_ratio(fit.retuned, fit.noise_floor)} noise floor",
-            ),
-            (
-                "error after",
-                shown(fit.augmented, fit.unit),
-                f"augmented model, {shown_ratio(fit.augmented, fit.noise_floor)} noise floor",
-            ),
-            (
-                "on unseen data",
-                shown(fit.holdout_augmented, fit.unit),
-                f"before: {shown(fit.holdout_retuned, fit.unit)}",
-            ),
+            ("error before", shown(fit.retuned, fit.unit), f"model re-tuned, {before}"),
+            ("error after", shown(fit.augmented, fit.unit), f"augmented model, {after}"),
+            ("on unseen data", shown(fit.holdout_augmented, fit.unit), unseen),
             ("recordings", str(len(training)), f"and {held_out} held out" if held_out else KEPT_BACK),
         ]
     )
-    return (
-        f'<header class="top {verdict.value}">\n'
-        f'<span class="badge {verdict.value}">{BADGES[verdict]}</span>\n'
-        f"<h1>{escape(headline(diagnosis))}</h1>\n"
-        + html.paragraph(diagnosis.statement, "statement")
-        + warnings
-        + figures
-        + "\n</header>"
-    )
 
 
-def _fit(diagnosis: Diagnosis) -> str:
-    fit = diagnosis.fit
+def _fit(fit: Fit) -> html.Table:
     rows = (
         ("nominal, as given", fit.nominal, float("nan"), ""),
         ("nominal, re-tuned", fit.retuned, fit.holdout_retuned, "before"),
@@ -119,112 +169,235 @@ def _fit(diagnosis: Diagnosis) -> str:
     )
     largest = np.nanmax([value for _, value, _, _ in rows])
     cells = [
-        [
-            escape(name),
+        (
+            name,
             shown(value),
             shown_ratio(value, fit.noise_floor),
             shown(unseen),
-            html.bar(value / largest if largest > 0 and np.isfinite(value) else 0.0, kind),
-        ]
+            html.Bar(value / largest if largest > 0 and np.isfinite(value) else 0.0, kind),
+        )
         for name, value, unseen, kind in rows
     ]
     headings = ("model", f"RMS error [{fit.unit}]", "to noise floor", f"on unseen data [{fit.unit}]", "")
-    table = html.html_table(headings, cells, numbers=(1, 2, 3))
-    return html.section("Fit", table + _further_outputs(fit) if fit.outputs else table)
+    return html.table(headings, cells, numbers=(1, 2, 3))
 
 
-def _further_outputs(fit: Fit) -> str:
+def _further_outputs(fit: Fit) -> html.Table | None:
     headings = ("further output", "where", "re-tuned", "augmented", "noise of its reading", "augmented to noise")
     cells = [
-        [
-            escape(each.name),
-            escape(f"{each.kind} at the {each.at}"),
+        (
+            each.name,
+            f"{each.kind} at the {each.at}",
             *(shown(value, each.unit) for value in (each.retuned, each.augmented, each.noise)),
             shown_ratio(each.augmented, each.noise),
-        ]
+        )
         for each in fit.outputs
     ]
-    return html.html_table(headings, cells, numbers=(2, 3, 4, 5))
+    return html.table(headings, cells, numbers=(2, 3, 4, 5)) if cells else None
 
 
-def _acquired(diagnosis: Diagnosis) -> str:
+def _effects(effects: Sequence[FoundEffect]) -> html.Table | None:
+    """Return the values of effects, a row each; what is not determined is grey."""
+    rows = [
+        _determined(
+            p.ci95, title_of(effect.name), ELEMENTS[effect.element], html.Code(name), shown(p.value, p.unit),
+            shown_interval(p.ci95),
+        )
+        for effect in effects
+        for name, p in effect.parameters.items()
+    ]  # fmt: skip
+    return html.table(("found", "element", "parameter", "value", "95 % interval"), rows, (3, 4)) if rows else None
+
+
+def _determined(ci95: Interval, *cells: Any) -> html.Row:
+    """Return a row, grey where the interval has no end."""
+    return html.Row(cells, "" if all(map(math.isfinite, ci95)) else "undetermined")
+
+
+def _acquired(diagnosis: Diagnosis) -> html.Section | None:
     """Return what was recognised in the raw data, before any fit, and taken into account."""
     found = [effect for effect in diagnosis.effects if _is_acquired(effect)]
-    if not found:
-        return ""
-    pieces = [piece for effect in found for piece in _effect(diagnosis, effect)]
-    return html.section("Recognised in the recordings themselves", *pieces)
+    blocks = [_effect(diagnosis, effect) for effect in found]
+    return html.section("Recognised in the recordings themselves", *blocks) if found else None
 
 
 def _is_acquired(effect: FoundEffect) -> bool:
     return effect.element is Element.ACQUISITION or (effect.name in EFFECTS and EFFECTS[effect.name].recognised)
 
 
-def _found(diagnosis: Diagnosis) -> str:
+def _found(diagnosis: Diagnosis) -> html.Section | None:
     if diagnosis.unnamed is not None:
         return _unnamed(diagnosis, diagnosis.unnamed)
     effects = [effect for effect in diagnosis.effects if not _is_acquired(effect)]
-    if not effects:
-        return ""
-    pieces = [piece for effect in effects for piece in _effect(diagnosis, effect)]
-    return html.section("The physics found", *pieces)
+    return html.section("The physics found", *(_effect(diagnosis, effect) for effect in effects)) if effects else None
 
 
-def _unnamed(diagnosis: Diagnosis, law: UnnamedLaw) -> str:
+def _unnamed(diagnosis: Diagnosis, law: UnnamedLaw) -> html.Section:
     unit = diagnosis.fit.unit
-    rows = [(name, shown(coefficient)) for name, coefficient in law.terms]
+    seen = diagnosis.discrepancy
+    names = [picture.name for picture in seen.pictures if picture.element is law.element] if seen is not None else []
     return html.section(
         "A law without a name",
         html.paragraph(
             f"At the {ELEMENTS[law.element]} these terms follow the mismatch best; with them the error falls from "
             f"{shown(law.rms_before, unit)} to {shown(law.rms_after, unit)}. It is a description, not a cause."
         ),
-        html.table(("term", "coefficient, or RMS where it has several"), rows, numbers=(1,)),
-        *_pictures_at(diagnosis, law.element),
+        html.table(
+            ("term", "coefficient, or RMS where it has several"), [(name, shown(c)) for name, c in law.terms], (1,)
+        ),
+        *(_law_pictures(diagnosis, name) for name in names),
     )
 
 
-def _pictures_at(diagnosis: Diagnosis, element: Element) -> list[str]:
-    seen = diagnosis.discrepancy
-    names = [picture.name for picture in seen.pictures if picture.element is element] if seen is not None else []
-    return [piece for name in names for piece in law_pictures(diagnosis, name)]
-
-
-def _effect(diagnosis: Diagnosis, effect: FoundEffect) -> list[str]:
-    evidence = effect.evidence
-    pieces = [
-        f"<h3>{escape(effect.name)} <small>({ELEMENTS[effect.element]})</small></h3>",
-        html.paragraph(effect.statement),
-    ]
-    if entry := EFFECTS.get(effect.name):
-        pieces += [html.paragraph(entry.law, "law"), html.paragraph(f"Law: {entry.source}", "note")]
-    if effect.parameters:
-        rows = [(name, shown(p.value), shown_interval(p.ci95), p.unit) for name, p in effect.parameters.items()]
-        pieces.append(html.table(("parameter", "value", "95 % interval", "unit"), rows, numbers=(1, 2)))
-    pieces += law_pictures(diagnosis, effect.name)
-    pieces.append(
-        html.paragraph(
-            f"{belief(effect)}Evidence: information criterion {_bettered(evidence.delta_bic)}; error on unseen "
-            f"data {shown(evidence.holdout_rms_before)} → {shown(evidence.holdout_rms_after)}; "
-            f"{p_statement(evidence.p_value)}."
-        )
+def _effect(diagnosis: Diagnosis, effect: FoundEffect) -> Iterator[Any]:
+    evidence, entry = effect.evidence, EFFECTS.get(effect.name)
+    yield html.Heading(title_of(effect.name), ELEMENTS[effect.element])
+    yield html.paragraph(effect.statement)
+    if entry:
+        yield html.paragraph(entry.law, kind="law")
+        yield html.note("Law: ", entry.source, ". In files: ", html.Code(effect.name), ".")
+    yield _effects([effect])
+    yield _law_pictures(diagnosis, effect.name)
+    yield html.paragraph(
+        f"{belief(effect)}Evidence: information criterion {_bettered(evidence.delta_bic)}; error on unseen "
+        f"data {shown(evidence.holdout_rms_before)} → {shown(evidence.holdout_rms_after)}; "
+        f"{p_statement(evidence.p_value)}."
     )
-    pieces += [
-        html.paragraph(f"Acts in {name}: {shown_times(spans)}.") for name, spans in effect.time_s.items() if spans
-    ]
+    for name, spans in effect.time_s.items():
+        if spans:
+            yield html.paragraph(f"Acts in {name}: {shown_times(spans)}.")
     if effect.indistinguishable_from:
-        rivals = listed(effect.indistinguishable_from)
-        pieces.append(html.paragraph(f"These recordings could as well be explained by {rivals}.", "warning"))
+        rivals = listed([title_of(name) for name in effect.indistinguishable_from])
+        yield html.warning(f"These recordings could as well be explained by {rivals}.")
     for number, (name, profile) in enumerate(effect.profiles.items()):
-        pieces.append(f"<h3>{escape(effect.name)} over time in {escape(name)}</h3>")
-        div = f"profile-{effect.name}-{number}"
-        axis = f"{effect.name} [{profile.unit}]"
-        pieces.append(band_figure(div, profile.time_s, profile.value, profile.low, profile.high, axis))
-    return pieces
+        yield html.Heading(f"{title_of(effect.name)} over time in {name}")
+        axis = f"{title_of(effect.name)} [{profile.unit}]"
+        figure = f"profile-{effect.name}-{number}"
+        yield band_figure(figure, profile.time_s, profile.value, profile.low, profile.high, axis)
 
 
 def _bettered(delta_bic: float) -> str:
     return f"better by {shown(delta_bic)}" if not delta_bic < 0.0 else f"worse by {shown(-delta_bic)}"
+
+
+def _law_pictures(diagnosis: Diagnosis, name: str) -> list[Any]:
+    """Return the pictures of one law over its data, with a line on how to read them."""
+    seen = diagnosis.discrepancy
+    return [
+        [
+            law_figure(f"law-{number}", picture),
+            html.note(
+                f"Over {picture.signal}: the line is the law, the points are estimates from the recordings that do "
+                "not assume its form. Bars are their 95 % intervals, from the spread between passes."
+            ),
+        ]
+        for number, picture in enumerate(seen.pictures if seen is not None else ())
+        if picture.name == name
+    ]
+
+
+def _location(diagnosis: Diagnosis, drawn: Sequence[Trace]) -> html.Section | None:
+    """Return where simulation and recordings differ; ``drawn`` are the recordings of the fit that are drawn."""
+    mismatch, seen = diagnosis.mismatch, diagnosis.discrepancy
+    if not mismatch.detected:
+        return None
+    check = None
+    if diagnosis.verdict is Verdict.UNEXPLAINED and mismatch.element is not None:
+        check = html.warning(f"What to check: {CHECKS[mismatch.element]}")
+    return html.section(
+        "Where simulation and recording differ",
+        html.table(("", ""), location_rows(mismatch)),
+        check,
+        [] if seen is None else [_places(diagnosis, seen, drawn), _laws(seen, diagnosis.fit.unit)],
+    )
+
+
+def _worth_marking(trace: Trace, spans: Sequence[Interval]) -> Sequence[Interval]:
+    """Return the intervals to shade: none where they are the whole recording, which says nothing."""
+    covered = sum(high - low for low, high in spans)
+    return spans if covered < WHOLE * float(trace.time_s[-1] - trace.time_s[0]) else ()
+
+
+def _places(diagnosis: Diagnosis, seen: Discrepancy, drawn: Sequence[Trace]) -> list[Any]:
+    names = [trace.name for trace in drawn if all(trace.name in each.courses for each in seen.equivalents)]
+    if not names:
+        return []
+    most = max(each.log_likelihood for each in seen.equivalents)
+    rows = [
+        (
+            f"{'●' if each.plausible else '○'}\u00a0{PLACES[each.place]}",
+            shown(_size(each), each.unit),
+            shown(most - each.log_likelihood),
+        )
+        for each in sorted(seen.equivalents, key=lambda each: -each.log_likelihood)
+    ]
+    text = (
+        "What would have to act at one place to explain the error of the re-tuned model by itself, with its 95 % band. "
+        "At the true place a simple input explains it; at the others it must vary wildly and is less likely. "
+        "● the likeliest places. A constant shaft torque does not show in the output and decays to zero here."
+    )
+    marked = {trace.name: _worth_marking(trace, diagnosis.mismatch.time_s.get(trace.name, ())) for trace in drawn}
+    return [
+        html.Heading("What would have to act, and where"),
+        html.note(text),
+        html.table(("place", "size (RMS)", "log-likelihood, difference to the likeliest place"), rows, numbers=(1, 2)),
+        course_figure("equivalent", seen.equivalents, names, marked, stretches_for(3 * len(names))),
+    ]
+
+
+def _size(equivalent: Equivalent) -> float:
+    values = np.concatenate([course.value for course in equivalent.courses.values()])
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def _laws(seen: Discrepancy, unit: str) -> list[Any]:
+    if not seen.laws:
+        return []
+    rows = [
+        (
+            ELEMENTS[law.element],
+            " + ".join(name for name, _ in law.terms),
+            shown(law.rms, unit),
+            shown(law.delta_bic),
+            shown_p(law.p_value),
+        )
+        for law in seen.laws
+    ]
+    headings = ("element", "best law without a name there", "RMS error with it", "ΔBIC", "p")
+    return [html.Heading("Laws without a name, element by element"), html.table(headings, rows, numbers=(2, 3, 4))]
+
+
+def _frequency(diagnosis: Diagnosis) -> html.Section | None:
+    seen, unit = diagnosis.discrepancy, diagnosis.fit.unit
+    if seen is None:
+        return None
+    loud = [band for band in seen.spectrum.bands if band.p_value < SIGNIFICANT_P]
+    bands = ", ".join(f"{b.low_hz:.3g} to {b.high_hz:.3g} Hz ({shown_ratio(b.ratio, 1.0)})" for b in loud)
+    return html.section(
+        "Over frequency",
+        html.paragraph(
+            f"Above the noise floor's power, p < {SIGNIFICANT_P:g} after correction for the number of bands: {bands}."
+            if loud
+            else "In no band is the error of the re-tuned model above the noise floor beyond chance.",
+        ),
+        error_spectrum_figure("error-spectrum", seen.spectrum, unit, diagnosis.mismatch.band_hz),
+        _responses(diagnosis, seen) if seen.responses else None,
+    )
+
+
+def _responses(diagnosis: Diagnosis, seen: Discrepancy) -> list[Any]:
+    unit, axis = diagnosis.fit.unit, torque_axis(diagnosis.augmented.motion)
+    of_torque = axis.split("[")[1].rstrip("]")
+    tests = [(name, p_statement(each.p_before), p_statement(each.p_after)) for name, each in seen.responses.items()]
+    return [
+        html.Heading(f"Response from {axis.split(' [')[0]} to {quantity(unit)}"),
+        html.note(
+            f"The spectral estimate needs no model. Where a model leaves its band, its dynamics are wrong there. "
+            f"0 dB is 1 {unit} per {of_torque}."
+        ),
+        response_figure("response", seen.responses),
+        html.table(("p-value of the difference", RETUNED, AUGMENTED), tests, numbers=(1, 2)),
+    ]
 
 
 def _drawn(traces: Sequence[Trace]) -> list[Trace]:
@@ -233,13 +406,13 @@ def _drawn(traces: Sequence[Trace]) -> list[Trace]:
     return [trace for trace in traces if any(trace is each for each in largest)]
 
 
-def _recordings(diagnosis: Diagnosis, drawn: Sequence[Trace]) -> list[str]:
-    sections = [_recording(diagnosis, trace, i, len(drawn)) for i, trace in enumerate(drawn)]
+def _recordings(diagnosis: Diagnosis, drawn: Sequence[Trace]) -> Iterator[html.Section]:
+    for number, trace in enumerate(drawn):
+        yield _recording(diagnosis, trace, number, len(drawn))
     left_out = len(diagnosis.traces) - len(drawn)
     if left_out:
         text = f"{left_out} more recordings, with smaller errors of the re-tuned model, are not drawn."
-        sections.append(html.section("More recordings", html.paragraph(text, "note")))
-    return sections
+        yield html.section("More recordings", html.note(text))
 
 
 def _rms(error: FloatArray) -> float:
@@ -247,24 +420,23 @@ def _rms(error: FloatArray) -> float:
     return float(np.sqrt(np.mean(finite**2))) if finite.size else 0.0
 
 
-def _recording(diagnosis: Diagnosis, trace: Trace, number: int, recordings: int) -> str:
+def _recording(diagnosis: Diagnosis, trace: Trace, number: int, recordings: int) -> html.Section:
     fit = diagnosis.fit
     measured = np.where(trace.okay, trace.measured, np.nan)
     before, after = measured - trace.retuned, measured - trace.augmented
     panels = course_panels(diagnosis, trace)
-    shaded = worth_marking(trace, diagnosis.mismatch.time_s.get(trace.name, ()))
+    shaded = _worth_marking(trace, diagnosis.mismatch.time_s.get(trace.name, ()))
     sample_time_s = float(np.median(np.diff(trace.time_s)))
     kind = "held out" if trace.holdout else "used for the fit"
-    figures = f"RMS error {shown(_rms(before))} → {shown(_rms(after))} {fit.unit}; {kind}."
     marked = " Shaded: where the mismatch is." if shaded else ""
     return html.section(
         f"Recording {trace.name}",
-        html.paragraph(
-            f"{figures} Drag to zoom, double click to go back; the dotted pair of lines is the noise floor.{marked}",
-            "note",
+        html.note(
+            f"RMS error {shown(_rms(before))} → {shown(_rms(after))} {fit.unit}; {kind}. Drag to zoom, double click "
+            f"to go back; the dotted pair of lines is the noise floor.{marked}"
         ),
         time_figure(f"time-{number}", trace.time_s, panels, recordings, shaded),
-        "<h3>Spectrum of the error</h3>",
+        html.Heading("Spectrum of the error"),
         spectrum_figure(f"spectrum-{number}", sample_time_s, panels[-1].lines, fit.unit, fit.noise_floor),
     )
 
@@ -273,61 +445,66 @@ def course_panels(diagnosis: Diagnosis, trace: Trace) -> tuple[Panel, ...]:
     """Return torques, measured and simulated outputs, and the errors of a recording."""
     fit = diagnosis.fit
     measured = np.where(trace.okay, trace.measured, np.nan)
-    before, after = measured - trace.retuned, measured - trace.augmented
-    inputs = input_lines(trace.torque_nm)
-    errors = [Line(RETUNED, before, Style.BEFORE)]
+    errors = [Line(RETUNED, measured - trace.retuned, Style.BEFORE)]
     models = [Line(RETUNED, trace.retuned, Style.BEFORE)]
     if not np.array_equal(trace.retuned, trace.augmented):
-        errors.append(Line(AUGMENTED, after, Style.AFTER))
+        errors.append(Line(AUGMENTED, measured - trace.augmented, Style.AFTER))
         models.append(Line(AUGMENTED, trace.augmented, Style.AFTER))
+    seen = Line("measured", measured, Style.MEASURED)
+    given = Line("nominal as given", trace.nominal, Style.NOMINAL, hidden=True)
     return (
-        Panel(torque_axis(diagnosis.augmented.motion), inputs),
-        Panel(
-            f"{quantity(fit.unit)} [{fit.unit}]",
-            (
-                Line("measured", measured, Style.MEASURED),
-                Line("nominal as given", trace.nominal, Style.NOMINAL, hidden=True),
-                *models,
-            ),
-        ),
+        Panel(torque_axis(diagnosis.augmented.motion), input_lines(trace.torque_nm)),
+        Panel(f"{quantity(fit.unit)} [{fit.unit}]", (seen, given, *models)),
         Panel(f"error [{fit.unit}]", tuple(errors), band=fit.noise_floor),
     )
 
 
-def _rivals(diagnosis: Diagnosis) -> str:
-    if not diagnosis.rejected:
-        return ""
-    rows = [(rival.name, rival.reason, shown(rival.delta_bic)) for rival in diagnosis.rejected]
-    return html.section(
-        "Rejected effects",
-        html.table(("effect", "why it was rejected", "ΔBIC to the explanation"), rows, numbers=(2,)),
-    )
+def _rejected_section(diagnosis: Diagnosis) -> html.Section:
+    rows = [(title_of(each.name), each.reason, shown(each.delta_bic)) for each in diagnosis.rejected]
+    everyone = html.details("Each of them", html.table(REJECTED, rows, numbers=(2,)))
+    return html.section("Rejected effects", _rejected(diagnosis), everyone)
 
 
-def _untestable(diagnosis: Diagnosis) -> str:
-    if not diagnosis.untestable:
-        return ""
-    rows = [(entry.name, entry.reason, entry.cure) for entry in diagnosis.untestable]
-    return html.section("Neither found nor excluded", html.table(("effect", "why", "what would show it"), rows))
+def _rejected(diagnosis: Diagnosis) -> html.Table:
+    """Return why effects were rejected; many with one reason share a line."""
+    counts = Counter(each.reason for each in diagnosis.rejected)
+    alike = {reason for reason, count in counts.items() if count >= FEWEST_ALIKE}
+    rows = [(title_of(e.name), e.reason, shown(e.delta_bic)) for e in diagnosis.rejected if e.reason not in alike]
+    rows += [(f"{counts[reason]} others tested, none better", reason, "") for reason in sorted(alike)]
+    return html.table(REJECTED, rows, numbers=(2,))
 
 
-def _parameters(diagnosis: Diagnosis) -> str:
+def _untestable(diagnosis: Diagnosis) -> html.Table:
+    rows = [(title_of(entry.name), entry.reason, entry.cure) for entry in diagnosis.untestable]
+    return html.table(("neither found nor excluded", "why", "what would show it"), rows)
+
+
+def _parameters(diagnosis: Diagnosis) -> html.Table:
     rows = []
     for name, p in diagnosis.parameters.items():
         known = diagnosis.augmented.parameters.get(name)
         bar = interval_bar(p.nominal, p.value, *p.ci95, known.tolerance if known is not None else 0.0)
-        cells = (name, shown(p.nominal), shown(p.value), shown_interval(p.ci95), _change(p.nominal, p.value), p.unit)
-        rows.append([*map(escape, cells), bar])
+        change = f"{100 * (p.value / p.nominal - 1):+.1f} %" if p.nominal else "–"
+        rows.append(
+            _determined(p.ci95, name, shown(p.nominal), shown(p.value), shown_interval(p.ci95), change, p.unit, bar)
+        )
     for name, load in diagnosis.load_torque.items():
-        cells = (f"constant load in {name}", "–", shown(load.value), shown_interval(load.ci95), "–", load.unit)
-        rows.append([*map(escape, cells), ""])
-    headings = ("parameter", "nominal", "found", "95 % interval", "change", "unit", "nominal, tolerance and interval")
-    return html.section(
-        "Parameters of the model",
-        html.html_table(headings, rows, numbers=(1, 2, 3, 4)),
-        html.paragraph("Bar: tolerance grey, nominal value as a line, value found as a dot with its interval.", "note"),
-    )
+        cells = (f"constant load in {name}", "–", shown(load.value), shown_interval(load.ci95), "–", load.unit, "")
+        rows.append(_determined(load.ci95, *cells))
+    headings = ("parameter", "nominal", "found", "95 % interval", "change", "unit", "")
+    return html.table(headings, rows, numbers=(1, 2, 3, 4))
 
 
-def _change(nominal: float, value: float) -> str:
-    return f"{100 * (value / nominal - 1):+.1f} %" if nominal else "–"
+def interval_bar(nominal: float, value: float, low: float, high: float, tolerance: float) -> html.IntervalBar | str:
+    """Return a drawing relative to the nominal value; "" where that is zero or the value is not known."""
+    if nominal == 0.0 or not math.isfinite(value):
+        return ""
+    found = value / nominal - 1.0
+    ends = sorted(each / nominal - 1.0 if math.isfinite(each) else found for each in (low, high))
+    reach = 1.2 * max(tolerance, LEAST_RANGE, abs(found), *(abs(each) for each in ends))
+
+    def x(share: float) -> float:
+        return 50.0 * (1.0 + share / reach)
+
+    label = f"{100 * found:+.1f} % of nominal, interval {100 * ends[0]:+.1f} to {100 * ends[1]:+.1f} %"
+    return html.IntervalBar(label, (x(-tolerance), x(tolerance)), (x(ends[0]), x(ends[1])), x(found))

@@ -13,7 +13,8 @@ from estimator.signals.record import FloatArray
 from hil.figures.palette import GREY
 from hil.report import bode
 from hil.report.decimate import extremes
-from hil.report.figures import DECADES, LEGEND_PX, PANEL_PX, SHADE, Style, figure_html
+from hil.report.figures import DECADES, LEGEND_PX, PANEL_PX, SHADE, Style, figure_block
+from hil.report.page import Figure
 from hil.report.wording import PLACES
 
 CHOICE_PX = 46
@@ -26,7 +27,7 @@ BAND = "rgba(0,114,178,0.18)"
 FLOOR = {"color": "#777777", "width": 1.2, "dash": "dot"}
 
 
-def law_figure(name: str, picture: LawPicture) -> str:
+def law_figure(name: str, picture: LawPicture) -> Figure:
     """Draw a law over its signal with the data it was found from."""
     colour, width, _ = Style.AFTER.value
     order = np.argsort(picture.x)
@@ -55,7 +56,7 @@ def law_figure(name: str, picture: LawPicture) -> str:
     figure.add_hline(y=0.0, line={"color": "#b4bac1", "width": 1})
     figure.update_xaxes(title_text=f"{picture.signal} [{picture.signal_unit}]")
     figure.update_yaxes(title_text=f"{_what(picture)} [{picture.unit}]")
-    return figure_html(figure, name, PANEL_PX + 90 + LEGEND_PX)
+    return figure_block(figure, name, PANEL_PX + 90 + LEGEND_PX)
 
 
 def _broken(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -76,7 +77,7 @@ def course_figure(
     recordings: Sequence[str],
     marked: Mapping[str, Sequence[Interval]],
     stretches: int,
-) -> str:
+) -> Figure:
     """Draw the input at every place over time, a panel each, one recording at a time."""
     count = len(equivalents)
     figure = make_subplots(rows=count, cols=1, shared_xaxes=True, vertical_spacing=0.05)
@@ -93,7 +94,7 @@ def course_figure(
     shapes = {recording: [_shade(low, high) for low, high in marked.get(recording, ())] for recording in recordings}
     _choose(figure, recordings, shown, shapes)
     figure.update_layout(shapes=shapes[recordings[0]])
-    return figure_html(figure, name, 170 * count + LEGEND_PX + CHOICE_PX, top_px=34 + CHOICE_PX)
+    return figure_block(figure, name, 170 * count + LEGEND_PX + CHOICE_PX, top_px=34 + CHOICE_PX)
 
 
 def _shade(low: float, high: float) -> dict[str, object]:
@@ -154,7 +155,7 @@ def _choose(
     figure.update_layout(updatemenus=[menu])
 
 
-def error_spectrum_figure(name: str, spectrum: ErrorSpectrum, unit: str, band_hz: Interval | None) -> str:
+def error_spectrum_figure(name: str, spectrum: ErrorSpectrum, unit: str, band_hz: Interval | None) -> Figure:
     """Draw the error's density before and after, with the floor and the band that holds most of the mismatch."""
     figure = go.Figure()
     lines = [("nominal re-tuned", spectrum.before, Style.BEFORE)]
@@ -171,10 +172,10 @@ def error_spectrum_figure(name: str, spectrum: ErrorSpectrum, unit: str, band_hz
         figure.add_vrect(x0=band_hz[0], x1=band_hz[1], fillcolor=SHADE, opacity=0.18, line_width=0, layer="below")
     figure.update_xaxes(title_text="frequency [Hz]", **DECADES)
     figure.update_yaxes(title_text=f"error [{unit}/√Hz]", **DECADES)
-    return figure_html(figure, name, PANEL_PX + 40 + LEGEND_PX)
+    return figure_block(figure, name, PANEL_PX + 40 + LEGEND_PX)
 
 
-def response_figure(name: str, responses: Mapping[str, Response]) -> str:
+def response_figure(name: str, responses: Mapping[str, Response]) -> Figure:
     """Draw the response of a recording with its confidence, and of both models, one recording at a time."""
     figure = bode.panels()
     recordings, shown = list(responses), list[str]()
@@ -185,7 +186,7 @@ def response_figure(name: str, responses: Mapping[str, Response]) -> str:
             shown.append(recording)
     bode.fix_scale(figure, [each.before for each in responses.values()] + [each.after for each in responses.values()])
     _choose(figure, recordings, shown)
-    return figure_html(figure, name, bode.HEIGHT_PX + CHOICE_PX, top_px=34 + CHOICE_PX)
+    return figure_block(figure, name, bode.HEIGHT_PX + CHOICE_PX, top_px=34 + CHOICE_PX)
 
 
 def _response(figure: go.Figure, response: Response) -> None:

@@ -1,4 +1,4 @@
-"""Plotly figures as pieces of HTML: signals over time in panels that zoom together, and spectra.
+"""Figures of a page, by plotly: signals over time in panels that zoom together, and spectra.
 
 Colours are those of `hil.figures.palette`, safe for the colour-blind. A model has one colour throughout, in the
 signals, their errors and the spectra.
@@ -7,23 +7,22 @@ signals, their errors and the spectra.
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
-from functools import cache
 from typing import Any
 
 import numpy as np
 import plotly.graph_objects as go
 import plotly.io
 import scipy.signal
-from plotly.offline import get_plotlyjs
 from plotly.subplots import make_subplots
 from plotly.utils import PlotlyJSONEncoder
 
 from estimator.signals.record import FloatArray
 from hil.figures.palette import BLACK, BLUE, GREEN, GREY, ORANGE, PALE, PURPLE, VERMILION, faded
 from hil.report.decimate import extremes
+from hil.report.page import Figure, Paragraph, note
 from hil.report.samples import packed
 
 Interval = tuple[float, float]
@@ -43,7 +42,7 @@ class Style(Enum):
     FOURTH_MODEL = (PURPLE, 1.3, "solid")
 
 
-plotly.io.templates.default = "none"  # copied into every figure at each change of it; `figure_html` gives it once
+plotly.io.templates.default = "none"  # copied into every figure at each change of it; `page.js` gives the look
 
 INPUT_STYLES = (Style.FIRST_INPUT, Style.SECOND_INPUT, Style.THIRD_INPUT)
 MODEL_STYLES = (Style.AFTER, Style.BEFORE, Style.THIRD_MODEL, Style.FOURTH_MODEL)
@@ -53,13 +52,8 @@ PANEL_PX = 230
 LEGEND_PX = 130
 AXIS_TITLE_PX = 54
 TOP_PX = 34
-DECADES = {
-    "type": "log",
-    "dtick": 1,
-    "exponentformat": "power",
-    "minor": {"dtick": "D1", "showgrid": True},
-}
-"""A logarithmic axis."""
+DECADES = {"type": "log", "exponentformat": "power", "minor": {"dtick": "D1", "showgrid": True}}
+"""A logarithmic axis; its ticks are plotly's own choice: 1, 2 and 5 of each decade where there are few."""
 
 CONFIG = {"responsive": True, "displaylogo": False, "modeBarButtonsToRemove": ["select2d", "lasso2d"]}
 
@@ -116,21 +110,13 @@ def input_lines(torque_nm: FloatArray) -> tuple[Line, ...]:
     )
 
 
-def plotly_script() -> str:
-    """Return plotly itself as an element, to stand in the page once.
-
-    It is no script yet: `page.js` makes it one when the page stands, for its megabytes take a browser a second or two.
-    """
-    return f'<script type="text/plain" id="plotly">{get_plotlyjs()}</script>'
-
-
 def time_figure(
     name: str,
     time_s: FloatArray,
     panels: Sequence[Panel],
     recordings: int,
     shaded: Sequence[Interval] = (),
-) -> str:
+) -> list[Paragraph | Figure]:
     """Draw panels over a common time axis; zoomed in, every sample is drawn.
 
     Parameters
@@ -148,15 +134,14 @@ def time_figure(
     figure = time_panels(time_s, panels, stretches, shaded)
     height_px = PANEL_PX * len(panels) + LEGEND_PX
     if time_s.size <= 2 * stretches:
-        return figure_html(figure, name, height_px)
+        return [figure_block(figure, name, height_px)]
     samples, every = packed(time_s, [line.y for panel in panels for line in panel.lines], recordings)
     finest = "every sample" if every == 1 else f"the lowest and the highest of {2 * every} samples"
-    said = (
+    drawn = (
         f"Drawn: the lowest and the highest of each {-(-time_s.size // stretches)} samples; zoomed in, {finest}. "
         f"{time_s.size} samples in all."
     )
-    note = f'<p class="note thinned" id="{name}-thinned">{said}</p>'
-    return note + figure_html(figure, name, height_px, samples=samples)
+    return [note(drawn), figure_block(figure, name, height_px, samples=samples)]
 
 
 def time_panels(
@@ -182,7 +167,7 @@ def time_panels(
 
 def spectrum_figure(
     name: str, sample_time_s: float, lines: Sequence[Line], unit: str, floor: float | None = None
-) -> str:
+) -> Figure:
     """Draw amplitude spectral densities (Welch, Hann window); a gap counts as zero error.
 
     ``floor`` is the RMS of white noise, whose density is drawn as a dotted line.
@@ -199,10 +184,10 @@ def spectrum_figure(
         figure.add_hline(y=level, line={"color": "#777777", "width": 1, "dash": "dot"})
     figure.update_xaxes(title_text="frequency [Hz]", **DECADES)
     figure.update_yaxes(title_text=f"{unit}/√Hz", **DECADES)
-    return figure_html(figure, name, PANEL_PX + LEGEND_PX)
+    return figure_block(figure, name, PANEL_PX + LEGEND_PX)
 
 
-def band_figure(name: str, x: FloatArray, y: FloatArray, low: FloatArray, high: FloatArray, axis: str) -> str:
+def band_figure(name: str, x: FloatArray, y: FloatArray, low: FloatArray, high: FloatArray, axis: str) -> Figure:
     """Draw a course over time with its confidence band; all shapes (K,)."""
     figure = go.Figure()
     colour, width, _ = Style.AFTER.value
@@ -214,7 +199,7 @@ def band_figure(name: str, x: FloatArray, y: FloatArray, low: FloatArray, high: 
     )
     figure.update_xaxes(title_text="time [s]")
     figure.update_yaxes(title_text=axis)
-    return figure_html(figure, name, PANEL_PX + LEGEND_PX)
+    return figure_block(figure, name, PANEL_PX + LEGEND_PX)
 
 
 def _scatter(line: Line, x: FloatArray, y: FloatArray, *, first: bool) -> go.Scatter:
@@ -231,22 +216,15 @@ def _scatter(line: Line, x: FloatArray, y: FloatArray, *, first: bool) -> go.Sca
     )
 
 
-@cache
-def _template() -> dict[str, Any]:
-    """Return plotly's look without a background, as it stands in a figure."""
-    look: dict[str, Any] = plotly.io.templates["plotly_white"].to_plotly_json()
-    return look
-
-
-def figure_html(
+def figure_block(
     figure: go.Figure,
     name: str,
     height_px: int,
     top_px: int = TOP_PX,
     hover: str = "x unified",
     samples: dict[str, Any] | None = None,
-) -> str:
-    """Return a figure as a piece of HTML with the page's look; ``name`` is unique in the page.
+) -> Figure:
+    """Return a figure as a block of a page; ``name`` is unique in the page. Its look is `page.js`'s.
 
     ``hover`` is what a pointer shows: all of one abscissa, or the ``closest`` point. ``samples`` are those to zoom to.
     """
@@ -259,12 +237,16 @@ def figure_html(
         font={"family": "system-ui, sans-serif", "size": 13},
     )
     drawn = figure.to_plotly_json()
-    drawn["layout"]["template"] = _template()
+    drawn["layout"].pop("template", None)
     more = {} if samples is None else {"samples": samples}
-    text = json.dumps({**drawn, "config": CONFIG, **more}, cls=PlotlyJSONEncoder, separators=(",", ":"))
-    data = text.replace("<", "\\u003c")  # no text of a figure can end the script element it stands in
-    return (
-        f'<figure class="plot"><div class="plotly-graph-div" id="{name}" data-figure="{name}-data" tabindex="0" '
-        f'role="group" aria-label="figure {name}" style="height:{height_px}px"></div>'
-        f'<script type="application/json" id="{name}-data">{data}</script></figure>'
-    )
+    content = _as_text({**drawn, "config": CONFIG, **more})
+    return Figure(name, height_px, json.dumps(content, cls=PlotlyJSONEncoder, separators=(",", ":")))
+
+
+def _as_text(value: Any) -> Any:
+    """Return a figure's content with texts that plotly shows as they are: it takes markup in them for its own."""
+    if isinstance(value, str):
+        return value.replace("<", "&lt;")
+    if isinstance(value, Mapping):
+        return {key: each if key == "hovertemplate" else _as_text(each) for key, each in value.items()}
+    return [_as_text(each) for each in value] if isinstance(value, list | tuple) else value

@@ -1,17 +1,24 @@
-"""One self-contained HTML page from pieces: style and scripts inside, nothing is fetched.
+"""A page's content as data, and the one self-contained HTML file that a template makes of it.
 
-A page can be read with a keyboard alone: a link over what is the same on every page, a list of its sections, figures
-that take keys (`page.js`). Figures are drawn one by one, those in view first, so that a long page opens at once.
+Pages are lists of blocks (headings, paragraphs, tables, figures); nobody but the templates writes markup. Jinja2
+escapes every text in them, links keep to `is_allowed`, and the page's policy lets no script run but its own two, by
+their hashes. The same blocks are shown on a terminal by `hil.report.terminal`.
 """
 
 from __future__ import annotations
 
+import base64
+import gzip
+import hashlib
 import re
-from collections.abc import Iterable, Sequence
-from html import escape
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cache
 from importlib.resources import files
+from typing import Any
 
-from hil.report.figures import plotly_script
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
 
 FEWEST_LISTED = 3
 """Sections from which on a page begins with a list of them."""
@@ -19,102 +26,328 @@ FEWEST_LISTED = 3
 LONGEST_WORDS = 30
 """Characters of a cell that fit a line of a narrow screen; longer ones are sentences and get room for some words."""
 
-KEYS = (
-    "A figure that has the focus takes keys: + and - zoom, the arrows move, 1 to 9 show or hide a line, 0 shows all "
-    "again."
-)
+MOST_BESIDE = 2
+"""Columns of a table that fit beside one another on a narrow screen; with more each row becomes a card."""
+
+SCHEMES = ("https", "http")
+"""What a link may begin with, besides a path of a file next to the page."""
 
 
-def page(title: str, body: Iterable[str], footer: str, *, plots: bool = True) -> str:
-    """Put sections into a page; ``body`` is HTML already, ``title`` and ``footer`` are text.
+@dataclass(frozen=True, slots=True)
+class Link:
+    """A link; one that may not be followed (`is_allowed`) is shown as its text."""
 
-    ``plots`` brings the script that draws figures along, which is megabytes.
-    """
-    style, behaviour = (_file(name) for name in ("page.css", "page.js"))
-    script = plotly_script() if plots else ""
-    sections = "\n".join(body)
-    keys = f'<p class="note keys">{escape(KEYS)}</p>\n' if plots else ""
-    return (
-        '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f"<title>{escape(title)}</title>\n<style>\n{style}</style>\n</head>\n<body>\n"
-        '<a class="skip" href="#main">Skip to the content</a>\n'
-        f'{_contents(sections)}<main id="main" tabindex="-1">\n{sections}\n'
-        f"<footer>{keys}<p>{escape(footer)}</p></footer>\n</main>\n{script}<script>\n{behaviour}</script>\n</body>\n</html>\n"
-    )
+    text: str
+    href: str
+
+    def __str__(self) -> str:
+        return self.text
 
 
-def _file(name: str) -> str:
-    return files("hil.report").joinpath(name).read_text(encoding="utf-8")
+@dataclass(frozen=True, slots=True)
+class Badge:
+    """A word on a coloured ground."""
+
+    text: str
+    kind: str = ""
+
+    def __str__(self) -> str:
+        return self.text
 
 
-def _contents(sections: str) -> str:
-    """List the sections of a page as links; nothing where there are few."""
-    found = re.findall(r'<section id="([^"]+)">\n<h2>(.*?)</h2>', sections)  # as `section` makes them
-    if len(found) < FEWEST_LISTED:
+@dataclass(frozen=True, slots=True)
+class Code:
+    """A name as it stands in a file."""
+
+    text: str
+
+    def __str__(self) -> str:
+        return self.text
+
+
+@dataclass(frozen=True, slots=True)
+class Advised:
+    """A value, and what to do about it."""
+
+    text: str
+    advice: str
+
+    def __str__(self) -> str:
+        return f"{self.text} → {self.advice}"
+
+
+@dataclass(frozen=True, slots=True)
+class Bar:
+    """A bar of a share, from 0 to 1, of its cell."""
+
+    share: float
+    kind: str
+
+    @property
+    def percent(self) -> float:
+        """How much of the cell it fills."""
+        return 100.0 * min(max(self.share, 0.0), 1.0)
+
+    def __str__(self) -> str:
         return ""
-    links = "".join(f'<li><a href="#{name}">{title}</a></li>' for name, title in found)
-    return f'<nav aria-label="Sections"><ul>{links}</ul></nav>\n'
 
 
-def section(title: str, *pieces: str) -> str:
-    """Frame pieces of HTML under a heading; the page's titles must differ, its addresses are made of them."""
-    inside = "\n".join(pieces)
-    return f'<section id="{_address(title)}">\n<h2>{escape(title)}</h2>\n{inside}\n</section>'
+@dataclass(frozen=True, slots=True)
+class IntervalBar:
+    """A parameter's tolerance, nominal value, value and interval as a drawing; x from 0 to 100 per cent."""
+
+    label: str
+    tolerance: tuple[float, float]
+    interval: tuple[float, float]
+    value: float
+
+    def __str__(self) -> str:
+        return ""
 
 
-def _address(title: str) -> str:
-    return re.sub(r"[^a-z0-9]+", "-", title.lower()).strip("-") or "section"
+@dataclass(frozen=True, slots=True)
+class Row:
+    """A row of a table; ``kind`` is a class of the style sheet (outside, undetermined)."""
+
+    cells: tuple[Any, ...]
+    kind: str = ""
 
 
-def paragraph(text: str, kind: str = "") -> str:
-    """Put text into a paragraph of a CSS class."""
-    return f'<p class="{kind}">{escape(text)}</p>' if kind else f"<p>{escape(text)}</p>"
+@dataclass(frozen=True, slots=True)
+class Heading:
+    """A heading within a section, with a remark after it."""
+
+    text: str
+    remark: str = ""
 
 
-def details(summary: str, *pieces: str) -> str:
-    """Fold pieces of HTML away under a line that opens them; on paper they are open."""
-    inside = "\n".join(pieces)
-    return f"<details>\n<summary>{escape(summary)}</summary>\n{inside}\n</details>"
+@dataclass(frozen=True, slots=True)
+class Paragraph:
+    """A paragraph of texts and inline pieces."""
+
+    pieces: tuple[Any, ...]
+    kind: str = ""
 
 
-def table(headings: Sequence[str], rows: Iterable[Sequence[str]], numbers: Sequence[int] = ()) -> str:
-    """Make a table of text; columns in ``numbers`` (from 0) are flush right; no headings, no head."""
-    return html_table(headings, [[escape(cell) for cell in row] for row in rows], numbers)
+@dataclass(frozen=True, slots=True)
+class Preformatted:
+    """A text whose lines stay as they are."""
+
+    text: str
 
 
-def html_table(headings: Sequence[str], rows: Iterable[Sequence[str]], numbers: Sequence[int] = ()) -> str:
-    """Make a table of cells that are HTML already; a column with sentences in it is marked as prose."""
-    rows = list(rows)
-    kinds = dict.fromkeys(_prose(rows), "prose") | dict.fromkeys(numbers, "number")
+@dataclass(frozen=True, slots=True)
+class Table:
+    """A table; columns in ``numbers`` (from 0) are flush right, one with sentences in it is prose."""
 
-    def cell(tag: str, column: int, content: str) -> str:
-        kind = f' class="{kinds[column]}"' if column in kinds else ""
-        return f"<{tag}{kind}>{content}</{tag}>"
+    headings: tuple[str, ...]
+    rows: tuple[Row, ...]
+    numbers: frozenset[int] = frozenset()
 
-    titles = "".join(cell("th", i, escape(text)) for i, text in enumerate(headings))
-    head = f"<thead><tr>{titles}</tr></thead>\n" if any(headings) else ""
-    lines = ["<tr>" + "".join(cell("td", i, text) for i, text in enumerate(row)) + "</tr>" for row in rows]
-    return f'<div class="wide"><table>\n{head}<tbody>\n' + "\n".join(lines) + "\n</tbody></table></div>"
+    @property
+    def is_wide(self) -> bool:
+        """Whether a row becomes a card on a narrow screen."""
+        return any(self.headings) and len(self.headings) > MOST_BESIDE
+
+    def kind(self, column: int) -> str:
+        """Return the class of a column."""
+        if column in self.numbers:
+            return "number"
+        is_prose = column and any(len(str(row.cells[column])) > LONGEST_WORDS for row in self.rows)
+        return "prose" if is_prose else ""
 
 
-def _prose(rows: Sequence[Sequence[str]]) -> set[int]:
-    """Return the columns, but the first, with cells too long for one line of a narrow screen."""
-    cells = ((i, re.sub(r"<[^>]*>", "", text)) for row in rows for i, text in enumerate(row))
-    return {i for i, text in cells if i and len(text) > LONGEST_WORDS}
+@dataclass(frozen=True, slots=True)
+class Details:
+    """Blocks folded away under a line that opens them; on paper they are open."""
+
+    summary: str
+    blocks: tuple[Any, ...]
 
 
-def tiles(entries: Iterable[tuple[str, str, str]]) -> str:
-    """Show a few figures large: name, value, remark."""
-    boxes = "".join(
-        f'<div class="tile"><span class="name">{escape(name)}</span>'
-        f'<span class="value">{escape(value)}</span><span class="remark">{escape(remark)}</span></div>'
-        for name, value, remark in entries
+@dataclass(frozen=True, slots=True)
+class Tiles:
+    """A few figures, large: name, value, remark."""
+
+    entries: tuple[tuple[str, str, str], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """A figure that `page.js` draws: plotly's data and layout, and the samples to zoom to."""
+
+    name: str
+    height_px: int
+    content: str
+
+    @property
+    def packed(self) -> str:
+        """The content as gzip in base64."""
+        return _packed(self.content.encode())
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """An SVG drawing, shown as an image: nothing in it can run."""
+
+    svg: str
+    label: str
+
+    @property
+    def address(self) -> str:
+        """The drawing as an address."""
+        return f"data:image/svg+xml;base64,{base64.b64encode(self.svg.encode()).decode('ascii')}"
+
+
+@dataclass(frozen=True, slots=True)
+class Header:
+    """The head of a page: its badge, title, what it is of, and the blocks that come first."""
+
+    title: str
+    kind: str
+    badge: str
+    facts: tuple[tuple[str, str], ...]
+    blocks: tuple[Any, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Section:
+    """Blocks under a heading; the page's titles must differ, its addresses are made of them."""
+
+    title: str
+    blocks: tuple[Any, ...]
+
+    @property
+    def address(self) -> str:
+        """Where in the page it is."""
+        return re.sub(r"[^a-z0-9]+", "-", self.title.lower()).strip("-") or "section"
+
+
+def header(title: str, *blocks: Any, kind: str = "", badge: str = "", facts: Iterable[tuple[str, str]] = ()) -> Header:
+    """Make the head of a page; blocks that are empty are left out."""
+    return Header(title, kind, badge, tuple(fact for fact in facts if fact[1]), _kept(blocks))
+
+
+def section(title: str, *blocks: Any) -> Section:
+    """Frame blocks under a heading; blocks that are empty are left out."""
+    return Section(title, _kept(blocks))
+
+
+def paragraph(*pieces: Any, kind: str = "") -> Paragraph:
+    """Put texts and inline pieces into a paragraph of a class of the style sheet."""
+    return Paragraph(pieces, kind)
+
+
+def note(*pieces: Any) -> Paragraph:
+    """Put a remark for the reader into a paragraph."""
+    return Paragraph(pieces, "note")
+
+
+def warning(*pieces: Any) -> Paragraph:
+    """Put what a reader must know into a paragraph."""
+    return Paragraph(pieces, "warning")
+
+
+def details(summary: str, *blocks: Any) -> Details:
+    """Fold blocks away under a line that opens them."""
+    return Details(summary, _kept(blocks))
+
+
+def table(headings: Sequence[str], rows: Iterable[Sequence[Any] | Row], numbers: Iterable[int] = ()) -> Table:
+    """Make a table of texts and inline pieces; no headings, no head."""
+    made = tuple(row if isinstance(row, Row) else Row(tuple(row)) for row in rows)
+    return Table(tuple(headings), made, frozenset(numbers))
+
+
+def tiles(entries: Iterable[tuple[str, str, str]]) -> Tiles:
+    """Show a few figures large."""
+    return Tiles(tuple(entries))
+
+
+def _kept(blocks: Iterable[Any]) -> tuple[Any, ...]:
+    """Leave out blocks that are empty; what comes as a list or one by one is put in its place."""
+    kept: list[Any] = []
+    for block in blocks:
+        kept += _kept(block) if isinstance(block, list | tuple | Iterator) else [block] if block else []
+    return tuple(kept)
+
+
+def page(title: str, blocks: Iterable[Any], footer: str) -> str:
+    """Return the HTML of a page; a script that draws is brought along where a figure is."""
+    kept = _kept(blocks)
+    has_figures = any(_figures(kept))
+    sections = [block for block in kept if isinstance(block, Section)]
+    behaviour = Markup(_text("page.js"))
+    scripts = [str(behaviour), *([_plotly()] if has_figures else [])]
+    return (
+        _environment()
+        .get_template("page.html")
+        .render(
+            title=title,
+            blocks=kept,
+            listed=sections if len(sections) >= FEWEST_LISTED else [],
+            footer=footer,
+            style=Markup(_text("page.css")),
+            behaviour=behaviour,
+            plotly=_packed(_plotly().encode()) if has_figures else "",
+            hashes=" ".join(f"'sha256-{_hash(script)}'" for script in scripts),
+        )
     )
-    return f'<div class="tiles">{boxes}</div>'
 
 
-def bar(share: float, kind: str) -> str:
-    """Draw a bar of a share from 0 to 1 of its cell."""
-    percent = 100.0 * min(max(share, 0.0), 1.0)
-    return f'<div class="bar {kind}" style="width:{percent:.1f}%"></div>'
+def fragment(*blocks: Any) -> str:
+    """Return the HTML of blocks alone, for a notebook's cell."""
+    return _environment().get_template("fragment.html").render(blocks=_kept(blocks))
+
+
+def _figures(blocks: Iterable[Any]) -> Iterable[Figure]:
+    for block in blocks:
+        if isinstance(block, Figure):
+            yield block
+        elif isinstance(block, Section | Header | Details):
+            yield from _figures(block.blocks)
+
+
+def is_allowed(href: str) -> bool:
+    """Whether a link may be followed: a path of a file next to the page, or an address of an allowed scheme.
+
+    Browsers skip control characters in an address, so one with any of them, or a space, is none.
+    """
+    if re.search(r"[\x00-\x20\x7f\\]", href) or href.startswith("//"):
+        return False
+    scheme, colon, rest = href.partition(":")
+    if not colon or re.search(r"[/?#]", scheme):
+        return True
+    return scheme.lower() in SCHEMES and rest.startswith("//")
+
+
+@cache
+def _environment() -> Environment:
+    environment = Environment(
+        loader=PackageLoader("hil.report"), autoescape=True, undefined=StrictUndefined, trim_blocks=True,
+        lstrip_blocks=True,
+    )  # fmt: skip
+    environment.filters["kind"] = lambda block: type(block).__name__
+    environment.tests["allowed"] = is_allowed
+    return environment
+
+
+@cache
+def _text(name: str) -> str:
+    return files("hil.report").joinpath("templates", name).read_text(encoding="utf-8")
+
+
+@cache
+def _plotly() -> str:
+    """Return plotly's basic bundle, which draws all figures here: scatter and bars."""
+    packed = files("hil.report").joinpath("templates", "plotly-basic.min.js.gz").read_bytes()
+    return gzip.decompress(packed).decode("utf-8")
+
+
+@cache
+def _packed(content: bytes) -> str:
+    return base64.b64encode(gzip.compress(content, 9, mtime=0)).decode("ascii")
+
+
+def _hash(script: str) -> str:
+    return base64.b64encode(hashlib.sha256(script.encode()).digest()).decode("ascii")

@@ -91,15 +91,15 @@ def torque_axis(motion: Motion) -> str:
 
 def headline(diagnosis: Diagnosis) -> str:
     """Say the verdict in one line."""
-    if not diagnosis.effort.finished:
-        return f"Not decided: the search was ended after {diagnosis.effort.limit_s:.3g} s"
-    found = [f"{_title(effect.name)}{_sure(effect)}" for effect in diagnosis.effects]
+    found = [f"{title_of(effect.name)}{_sure(effect)}" for effect in diagnosis.effects]
     if diagnosis.verdict is Verdict.EXPLAINED:
         return f"Missing in the model: {listed(found)}"
     if diagnosis.verdict is Verdict.PARTLY_EXPLAINED:
         return f"Missing in the model: {listed(found)}; what is left is more than noise"
     if diagnosis.verdict is Verdict.NO_MISMATCH:
         return "Nothing is missing: the nominal model, re-tuned, explains the recordings"
+    if found:
+        return f"Missing in the model: {listed(found)}; the rest no effect of the catalogue explains"
     if diagnosis.strays:
         return f"No physics need be missing, but the data sheet is off: {listed([s.name for s in diagnosis.strays])}"
     return "Something is missing, and no effect of the catalogue explains it"
@@ -125,7 +125,8 @@ def belief(effect: FoundEffect) -> str:
     return f"{effect.share:.0%} of the squared error explained; probability {probability(effect.probability)}. "
 
 
-def _title(name: str) -> str:
+def title_of(name: str) -> str:
+    """Return an effect's title in words."""
     return EFFECTS[name].title if name in EFFECTS else name.replace("_", " ")
 
 

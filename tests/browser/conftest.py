@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -16,6 +17,9 @@ CHROMIUM = next(
 
 DRAWN = "[...document.querySelectorAll('.plotly-graph-div')].every((each) => each.querySelector('svg.main-svg'))"
 """True once every figure is there."""
+
+
+LONGEST_S = 60.0
 
 
 @pytest.fixture(scope="module")
@@ -54,7 +58,15 @@ class Opened:
             self.complaints.append(f"fetched: {request.url}")
 
     def wait_until_drawn(self) -> None:
-        self.page.wait_for_function(DRAWN, timeout=60_000)
+        self.wait_for(DRAWN)
+
+    def wait_for(self, expression: str) -> None:
+        """Wait until an expression is true; the page's policy allows none that is kept there, so it is asked anew."""
+        end = time.monotonic() + LONGEST_S
+        while not self.page.evaluate(expression):
+            if time.monotonic() > end:
+                pytest.fail(f"not true after {LONGEST_S:g} s: {expression}; complaints: {self.complaints}")
+            self.page.wait_for_timeout(20)
 
 
 @contextmanager

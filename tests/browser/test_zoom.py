@@ -10,6 +10,7 @@ import pytest
 
 from hil.report import page as html
 from hil.report.figures import Line, Panel, Style, input_lines, time_figure
+from hil.report.page import Figure
 from tests.browser.conftest import opened
 
 SAMPLES, PERIOD_S = 40_000, 1e-3
@@ -67,7 +68,9 @@ def test_thinning_is_said_and_torque_is_drawn_in_steps(page: Path) -> None:
     assert (
         "Drawn: the lowest and the highest of each 27 samples; zoomed in, every sample. 40000 samples in all." in text
     )
-    assert '"shape":"hv"' in text
+    figure = time_figure("run", TIME_S, [Panel("torque [Nm]", input_lines(TORQUE[:, np.newaxis]))], 1)[-1]
+    assert isinstance(figure, Figure)
+    assert '"shape":"hv"' in figure.content
 
 
 def test_five_minutes_at_a_kilohertz_are_a_page_of_fifteen_megabytes() -> None:

@@ -19,7 +19,7 @@ from estimator.signals.record import OutputKind
 from hil.errors import UsageError
 from hil.report.catalogue import catalogue_table, effect_details, entries_text, select
 from hil.report.decimate import extremes
-from hil.report.diagnosis_text import diagnosis_summary
+from hil.report.diagnosis_html import diagnosis_summary
 from hil.report.figures import LONGEST_STRETCHES, input_lines, stretches_for
 from hil.report.numbers import p_statement, shown, shown_interval, shown_p, shown_ratio
 from hil.report.outputs import publish, require_folder
@@ -110,9 +110,9 @@ def test_a_simulated_column_names_its_unit(kind: OutputKind, motion: Motion, col
 def test_the_terminal_tells_the_verdict_and_what_it_rests_on(diagnosis: Diagnosis) -> None:
     text = rendered(diagnosis_summary(diagnosis))
     expected = ("✓ explained", diagnosis.statement, "[rad/s]", "gap_rad", "0.021 rad", "J_M", "1.51 … 1.53")
-    expected += ("rejected: stiffness_nonlinearity", "can't tell: coulomb_friction_motor", "note: run_2")
-    expected += ("backlash: 94% of the squared error explained; probability 99.9 %.",)
-    assert "road_grade: " not in text  # of which neither is known
+    expected += ("hardening or softening shaft", "dry friction at the motor", "Note: run_2")
+    expected += ("backlash in the shaft line: 94% of the squared error explained; probability 99.9 %.",)
+    assert "road grade: " not in text  # of which neither is known
     assert [part for part in expected if part not in text] == []
 
 
@@ -186,5 +186,5 @@ def test_a_probability_is_stated_as_far_as_it_means_something(value: float, expe
 
 def test_a_column_of_sentences_is_prose_and_one_of_words_is_not() -> None:
     long = "explains 74 % of what backlash explains"
-    assert f'<td class="prose">{long}</td>' in table(("effect", "why not"), [("stiffness_nonlinearity", long)])
-    assert 'class="prose"' not in table(("recording", "parameter", "value"), [("cruise", "J_M", long)], numbers=[2])
+    assert table(("effect", "why not"), [("stiffness_nonlinearity", long)]).kind(1) == "prose"
+    assert table(("recording", "parameter", "value"), [("cruise", "J_M", long)], numbers=[2]).kind(2) == "number"

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -86,16 +85,16 @@ def scoreboard_page(board: Board) -> str:
     misses = [row for row in rows if not row["success"]]
     title = f"{len(rows) - len(misses)} of {len(rows)} sealed cases answered as they should be"
     sections = [
-        f'<header class="top">\n<h1>{escape(title)}</h1>\n{html.tiles(_tiles(rows))}\n</header>',
+        html.header(title, html.tiles(_tiles(rows))),
         html.section("By what was hidden", _groups(rows)),
         html.section("Misses", cases_table(misses) if misses else html.paragraph("None.")),
         *([wire_section(board.wire, WIRE)] if board.wire else []),
         *([real_section(board.real, REAL)] if board.real else []),
-        html.section("What was named", f'<div class="wide">{confusion_of(rows)}</div>'),
+        html.section("What was named", html.Picture(confusion_of(rows), "what was hidden against what was named")),
         html.section("Every case", cases_table(rows)),
         made_section(board.made),
     ]
-    return html.page("Scoreboard", sections, FOOTER, plots=False)
+    return html.page("Scoreboard", sections, FOOTER)
 
 
 def _tiles(rows: Sequence[Row]) -> list[tuple[str, str, str]]:
@@ -122,7 +121,7 @@ def _tiles(rows: Sequence[Row]) -> list[tuple[str, str, str]]:
     ]
 
 
-def _groups(rows: Sequence[Row]) -> str:
+def _groups(rows: Sequence[Row]) -> html.Table:
     lines = []
     for group in Group:
         members = [row for row in rows if row["group"] == group.value]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from html import escape
 from typing import Any
 
 from hil.proof.campaign.statistics import Row, quantiles
@@ -25,26 +24,26 @@ HEADINGS = (
 )
 
 
-def cases_table(rows: Sequence[Row]) -> str:
+def cases_table(rows: Sequence[Row]) -> html.Table:
     """Return the table of cases; the page stands next to the folder of verdicts."""
-    return html.html_table(HEADINGS, [_case(row) for row in rows], numbers=(5, 6, 7, 8))
+    return html.table(HEADINGS, [_case(row) for row in rows], numbers=(5, 6, 7, 8))
 
 
-def _case(row: Row) -> list[str]:
+def _case(row: Row) -> list[Any]:
     fit: Mapping[str, Any] = row.get("fit", {})
     errors = [_number(fit.get(name)) for name in ("retuned", "augmented", "noise_floor")]
     fresh = quantiles(row["fresh_over_floor"], (0.5,))[0]
-    report = f'<a href="{VERDICTS}/{escape(row["case"])}/report.html">report</a>'
+    report = html.Link("report", f"{VERDICTS}/{row['case']}/report.html")
     mark = "✓" if row["success"] else "✗"
     return [
         _unbroken(row["case"]),
-        escape(row["kind"]).replace(PAIR_SIGN, f"{PAIR_SIGN}<wbr>"),
-        escape(_found(row)),
+        str(row["kind"]).replace(PAIR_SIGN, f"{PAIR_SIGN}\u200b"),  # a line may break there
+        _found(row),
         _unbroken(f"{mark} {row['outcome']}"),
         _band(row),
         *errors,
         _number(fresh),
-        report if "verdict" in row else escape(row["fault"] or ""),
+        report if "verdict" in row else row["fault"] or "",
     ]
 
 
@@ -71,7 +70,7 @@ def _range(band_hz: Sequence[float]) -> str:
 
 
 def _unbroken(text: str) -> str:
-    return f'<span style="white-space: nowrap">{escape(text)}</span>'
+    return text.replace(" ", "\u00a0")
 
 
 def _number(value: float | None) -> str:

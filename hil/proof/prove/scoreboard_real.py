@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from html import escape
 from statistics import median
 from typing import Any
 
@@ -15,7 +14,7 @@ AGREEMENTS = ("besides what is known", "found", "known", "95 % interval", "asked
 HEADINGS = ("recording", "found", "held-out error before", "after", "black boxes", "report")
 
 
-def real_section(cases: Sequence[Json], folder: str) -> str:
+def real_section(cases: Sequence[Json], folder: str) -> html.Section:
     """Return the section.
 
     Parameters
@@ -25,33 +24,33 @@ def real_section(cases: Sequence[Json], folder: str) -> str:
     folder
         Where that file is, seen from the page.
     """
-    pieces = [
+    pieces: list[Any] = [
         html.paragraph(
             "Recordings of real machines. What is concealed was taken out of the files, or left out of the nominal "
             "model, before the tool read them; the truth withheld was read after its verdict."
         )
     ]
     for case in cases:
-        pieces += [f"<h3>{escape(case['title'])}</h3>", html.paragraph(f"Concealed: {case['conceals']}")]
+        pieces += [html.Heading(case["title"]), html.paragraph(f"Concealed: {case['conceals']}")]
         rows = [_run(run, case, folder) for run in case["runs"]]
-        pieces.append(html.html_table(HEADINGS, rows, numbers=(2, 3)))
+        pieces.append(html.table(HEADINGS, rows, numbers=(2, 3)))
         agreements = [*case["agreements"], *(each for run in case["runs"] for each in run["agreements"])]
         if agreements:
             pieces.append(html.table(AGREEMENTS, map(_agreement, agreements), (1, 2)))
     return html.section("Real recordings", *pieces)
 
 
-def _run(run: Json, case: Json, folder: str) -> list[str]:
+def _run(run: Json, case: Json, folder: str) -> list[Any]:
     found = run["fault"] or ", ".join(run["named"]) or str(run["verdict"]).replace("_", " ")
     mark = "✓" if run["fault"] is None and set(run["named"]) == set(case["concealed"]) else "✗"
-    report = f'<a href="{escape(folder)}/{escape(run["report"])}">report</a>' if run["report"] else ""
+    report = html.Link("report", f"{folder}/{run['report']}") if run["report"] else ""
     boxes = "; ".join(f"{box['name']}: {_box(box)}" for box in run["black_boxes"])
     return [
-        escape(run["name"]),
-        f"{mark} {escape(found)}",
+        run["name"],
+        f"{mark} {found}",
         _median(run["held_out"]["before"]),
         _median(run["held_out"]["after"]),
-        escape(boxes),
+        boxes,
         report,
     ]
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from html import escape
+from typing import Any
 
 from hil.proof.campaign.statistics import Row
 from hil.report import page as html
@@ -11,7 +11,7 @@ from hil.report import page as html
 HEADINGS = ("rig", "concealed in", "found", "outcome", "error before", "after", "noise", "report")
 
 
-def wire_section(rows: Sequence[Row], folder: str) -> str:
+def wire_section(rows: Sequence[Row], folder: str) -> html.Section:
     """Return the section; ``folder`` is where the rigs' folders are, seen from the page."""
     right = sum(bool(row["success"]) for row in rows)
     title = f"Over the wire: {right} of {len(rows)}"
@@ -19,17 +19,17 @@ def wire_section(rows: Sequence[Row], folder: str) -> str:
         "The effect sits in simulated slaves served by a process of its own; the tool has CANopen and Modbus, runs its "
         "own tests, and the seal is opened once its verdict is written."
     )
-    table = html.html_table(HEADINGS, [_cells(row, folder) for row in rows], numbers=(4, 5, 6))
+    table = html.table(HEADINGS, [_cells(row, folder) for row in rows], numbers=(4, 5, 6))
     return html.section(title, html.paragraph(sentence), table)
 
 
-def _cells(row: Row, folder: str) -> list[str]:
+def _cells(row: Row, folder: str) -> list[Any]:
     fit = row.get("fit", {})
     errors = [_number(fit.get(name)) for name in ("retuned", "augmented", "noise_floor")]
     mark = "✓" if row["success"] else "✗"
-    name = escape(row["case"])
-    report = f'<a href="{escape(folder)}/{name}/report.html">report</a>' if "verdict" in row else ""
-    return [name, escape(row["where"]), escape(_found(row)), f"{mark} {escape(row['outcome'])}", *errors, report]
+    name = row["case"]
+    report = html.Link("report", f"{folder}/{name}/report.html") if "verdict" in row else ""
+    return [name, row["where"], _found(row), f"{mark} {row['outcome']}", *errors, report]
 
 
 def _found(row: Row) -> str:

@@ -14,7 +14,8 @@ from estimator.signals.record import FloatArray, IntArray
 from hil.figures.local_model import LocalModel
 from hil.figures.palette import BLACK, BLUE, VERMILION, faded, series_colour
 from hil.report.decimate import extremes
-from hil.report.figures import figure_html
+from hil.report.figures import figure_block
+from hil.report.page import Figure
 
 HEIGHT_PX = 780
 STRETCHES = 400
@@ -24,7 +25,7 @@ VIEW_SHARE = {"hz": 0.1, "damping": 0.6}
 """First view about the last estimate, to either side, in parts of it: the start-up is far outside."""
 
 
-def course_figure(name: str, course: OnlineTrajectory, model: LocalModel) -> str:
+def course_figure(name: str, course: OnlineTrajectory, model: LocalModel) -> Figure:
     """Draw frequency, damping and theta over time; the off-line model and the reference are horizontal lines."""
     figure = make_subplots(rows=3, cols=1, shared_xaxes=True, vertical_spacing=0.04, row_heights=[0.33, 0.33, 0.34])
     _followed(figure, 1, course.time_s, course.frequency_hz, course.frequency_std_hz, "frequency [Hz]", first=True)
@@ -39,7 +40,7 @@ def course_figure(name: str, course: OnlineTrajectory, model: LocalModel) -> str
         figure.add_trace(_line(course.time_s[kept], y[kept], parameter, look), row=3, col=1)
     figure.update_yaxes(title_text="theta", row=3, col=1)
     figure.update_xaxes(title_text="time [s]", row=3, col=1)
-    return figure_html(figure, name, HEIGHT_PX)
+    return figure_block(figure, name, HEIGHT_PX)
 
 
 def _followed(

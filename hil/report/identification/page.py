@@ -7,7 +7,6 @@ recordings over one another, and for each its frequency response, poles and zero
 from __future__ import annotations
 
 from collections.abc import Sequence
-from html import escape
 
 from estimator.identification.compare import Compared
 from estimator.identification.offline.orders import OrderChoice
@@ -21,8 +20,13 @@ from hil.report.identification.recording_section import MOST_DRAWN, recording_se
 from hil.report.identification.responses import responses_figure
 from hil.report.identification.tables import compared_table, numbers_table, orders_table, physical_tables
 from hil.report.identification.wording import headline, plus_minus, statement, verdict, warnings
-from hil.report.made import made_section
+from hil.report.made import facts, made_section
 from hil.report.numbers import shown
+
+PHYSICAL = (
+    "The two-mass drive, at the motor shaft, that has the response of the third-order Box-Jenkins model. "
+    "Sums are often known where their parts are not. Grey: these recordings do not determine the value."
+)
 
 FOOTER = (
     "hil identify. High-passed and decimated; errors and fits are those of free-run simulations: measured torque in, "
@@ -49,31 +53,28 @@ def identification_page(
         Other recursive estimators on the same data.
     """
     drawn = list(zip(models, studies, strict=True))[:MOST_DRAWN]
-    sections = [
-        _top(models, studies),
-        html.section("Resonance and damping", numbers_table(models, studies)),
-        _physical(studies),
-        *([html.section("Order and delay", orders_table(choice))] if choice is not None else []),
-        *([html.section("Recursive estimators compared", compared_table(compared))] if compared else []),
-        *([_together(models)] if len(models) > 1 else []),
-        *(recording_section(model, each, number) for number, (model, each) in enumerate(drawn)),
-    ]
-    if left := len(models) - len(drawn):
-        sections.append(html.section("More recordings", html.paragraph(f"{left} more are only in the tables.", "note")))
-    sections.append(made_section(made))
-    return html.page(f"Identification: {headline(studies)}", sections, FOOTER)
-
-
-def _top(models: Sequence[LocalModel], studies: Sequence[Study]) -> str:
-    notes = "".join(html.paragraph(f"Note: {text}", "warning") for text in warnings(studies))
-    verdicts = "".join(html.paragraph(verdict(each), "statement") for each in studies)
-    return (
-        f'<header class="top">\n<h1>{escape(headline(studies))}</h1>\n'
-        + verdicts
-        + html.paragraph(statement(models, studies))
-        + notes
-        + html.tiles(_tiles(studies))
-        + "\n</header>"
+    left = len(models) - len(drawn)
+    return html.page(
+        f"Identification: {headline(studies)}",
+        [
+            html.header(
+                headline(studies),
+                [html.paragraph(verdict(each), kind="statement") for each in studies],
+                html.paragraph(statement(models, studies)),
+                [html.warning(f"Note: {text}") for text in warnings(studies)],
+                html.tiles(_tiles(studies)),
+                facts=facts(made),
+            ),
+            html.section("Resonance and damping", numbers_table(models, studies)),
+            html.section("Physical parameters", html.note(PHYSICAL), physical_tables(studies)),
+            html.section("Order and delay", orders_table(choice)) if choice is not None else None,
+            html.section("Recursive estimators compared", compared_table(compared)) if compared else None,
+            _together(models) if len(models) > 1 else None,
+            *(recording_section(model, each, number) for number, (model, each) in enumerate(drawn)),
+            html.section("More recordings", html.note(f"{left} more are only in the tables.")) if left else None,
+            made_section(made),
+        ],
+        FOOTER,
     )
 
 
@@ -95,25 +96,17 @@ def _tiles(studies: Sequence[Study]) -> list[tuple[str, str, str]]:
     return tiles
 
 
-def _physical(studies: Sequence[Study]) -> str:
-    note = (
-        "The two-mass drive, at the motor shaft, that has the response of the third-order Box-Jenkins model. "
-        "Sums are often known where their parts are not."
-    )
-    return html.section("Physical parameters", html.paragraph(note, "note"), *physical_tables(studies))
-
-
-def _together(models: Sequence[LocalModel]) -> str:
+def _together(models: Sequence[LocalModel]) -> html.Section:
     sets = [
         PoleSet(model.name, model.online.poles, model.online.zeros, series_colour(number))
         for number, model in enumerate(models)
     ]
-    note = "Lines: on-line models. Dots: spectral estimates. Click a name to hide it, double click to see it alone."
     return html.section(
         "All recordings",
-        html.paragraph(note, "note"),
-        "<h3>Frequency responses</h3>",
+        html.note("Lines: on-line models. Dots: spectral estimates. Click a name to hide it, double click to see it "
+                  "alone."),
+        html.Heading("Frequency responses"),
         responses_figure("all-responses", models),
-        "<h3>Poles and zeros of the on-line models</h3>",
+        html.Heading("Poles and zeros of the on-line models"),
         pole_figure("all-poles", [*sets, *known_sets(models)], models[0].online.sample_time_s),
-    )
+    )  # fmt: skip

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from html import escape
+from typing import Any
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from hil.report import page as html
 from hil.report.figures import Line, Panel, Style, time_figure
 from hil.report.identification.pole_map import PoleSet, known_sets, pole_figure
 from hil.report.identification.responses import responses_figure
-from hil.report.made import made_section
+from hil.report.made import facts, made_section
 from hil.report.numbers import shown
 
 SHOWN_SIGNALS = 3
@@ -44,18 +44,20 @@ def paper_page(
         Conditions they were driven under; empty where recordings were given.
     """
     sections = [
-        _top(models, rows, driven),
+        _top(models, rows, driven, made),
         html.section("Resonance and damping", _numbers(rows)),
         _signals(models),
         _responses(models),
         _poles(models),
         *([html.section("What was driven", *_conditions(models, driven))] if driven else []),
-        *([made_section(made)] if made is not None else []),
+        made_section(made),
     ]
     return html.page("The paper's figures", sections, f"hil paper. After {SOURCE}.")
 
 
-def _top(models: Sequence[LocalModel], rows: Sequence[Row], driven: Sequence[Conditions]) -> str:
+def _top(
+    models: Sequence[LocalModel], rows: Sequence[Row], driven: Sequence[Conditions], made: Provenance | None
+) -> html.Header:
     count = f"{len(models)} experiment{'s' if len(models) > 1 else ''}"
     first = models[0].found
     orders, reference = first.online.orders, models[0].reference
@@ -75,12 +77,8 @@ def _top(models: Sequence[LocalModel], rows: Sequence[Row], driven: Sequence[Con
             ("frequency, worst error", _worst(rows, "hz"), f"on line, to the {reference.name}"),
             ("damping, worst error", _worst(rows, "damping"), f"on line, to the {reference.name}"),
         ]
-    return (
-        f'<header class="top">\n<h1>The driveline of the paper, from {escape(count)}</h1>\n'
-        + html.paragraph(f"{how} {settings}", "statement")
-        + html.tiles(tiles)
-        + "\n</header>"
-    )
+    said = html.paragraph(f"{how} {settings}", kind="statement")
+    return html.header(f"The driveline of the paper, from {count}", said, html.tiles(tiles), facts=facts(made))
 
 
 def _worst(rows: Sequence[Row], what: str) -> str:
@@ -90,7 +88,7 @@ def _worst(rows: Sequence[Row], what: str) -> str:
     return f"{text}, {missing} without" if missing else text
 
 
-def _numbers(rows: Sequence[Row]) -> str:
+def _numbers(rows: Sequence[Row]) -> list[Any]:
     headings = (
         "experiment",
         "on line [Hz]",
@@ -130,7 +128,7 @@ def _numbers(rows: Sequence[Row]) -> str:
         "band around the resonance in which on-line model and spectral estimate differ by 3 dB at most. Fit: free run "
         "of the off-line model over the whole recording, after the high-pass."
     )
-    return html.table(headings, cells, numbers=range(1, 12)) + html.paragraph(note, "note")
+    return [html.table(headings, cells, numbers=range(1, 12)), html.note(note)]
 
 
 def _band(band_hz: tuple[float, float] | None) -> str:
@@ -141,9 +139,9 @@ def _percent(share: float) -> str:
     return "–" if np.isnan(share) else f"{100.0 * share:+.2f} %"
 
 
-def _signals(models: Sequence[LocalModel]) -> str:
+def _signals(models: Sequence[LocalModel]) -> html.Section:
     drawn = models[:SHOWN_SIGNALS]
-    pieces = []
+    pieces: list[Any] = []
     for number, model in enumerate(drawn):
         record = model.record
         speed = np.where(record.okay, record.output, np.nan)
@@ -152,26 +150,26 @@ def _signals(models: Sequence[LocalModel]) -> str:
             Panel("ω_M [rad/s]", (Line("motor speed", speed, Style.AFTER),)),
         )
         pieces += [
-            f"<h3>{escape(model.name)}</h3>",
+            html.Heading(model.name),
             time_figure(f"signals-{number}", record.time_s, panels, 4 * len(drawn)),
         ]
     text = f"As recorded, every {1e3 * drawn[0].record.sample_time_s:g} ms. Drag to zoom, double click to go back."
-    return html.section("Fig. 2: total torque and motor speed", html.paragraph(text, "note"), *pieces)
+    return html.section("Fig. 2: total torque and motor speed", html.note(text), *pieces)
 
 
-def _responses(models: Sequence[LocalModel]) -> str:
+def _responses(models: Sequence[LocalModel]) -> html.Section:
     text = (
         "Lines: on-line models. Dots: spectral estimates of the same data. Click a name in the legend to hide a line, "
         "double click to see it alone; the off-line models are hidden at first."
     )
     return html.section(
         "Fig. 4: on-line models against spectral estimates",
-        html.paragraph(text, "note"),
+        html.note(text),
         responses_figure("responses", models),
     )
 
 
-def _poles(models: Sequence[LocalModel]) -> str:
+def _poles(models: Sequence[LocalModel]) -> html.Section:
     whole = [_set(model, number) for number, model in enumerate(models)]
     third = [
         PoleSet(model.name, low.poles, low.zeros, series_colour(number))
@@ -183,14 +181,13 @@ def _poles(models: Sequence[LocalModel]) -> str:
     order = models[0].online.orders.na
     return html.section(
         "Fig. 5: poles and zeros",
-        html.paragraph(
+        html.note(
             "Crosses are poles, circles zeros, in the plane of z; what is known is black. Dotted: damping 0.1, 0.3, "
             "0.6. The zeros of a sampled model are only roughly those of the continuous one.",
-            "note",
         ),
-        f"<h3>As identified, nA = {order}</h3>",
+        html.Heading(f"As identified, nA = {order}"),
         pole_figure("poles", [*whole, *known], period_s),
-        "<h3>Their third-order equivalents</h3>",
+        html.Heading("Their third-order equivalents"),
         pole_figure("poles-third", [*third, *known], period_s),
     )
 
@@ -199,7 +196,7 @@ def _set(model: LocalModel, number: int) -> PoleSet:
     return PoleSet(model.name, model.online.poles, model.online.zeros, series_colour(number))
 
 
-def _conditions(models: Sequence[LocalModel], driven: Sequence[Conditions]) -> list[str]:
+def _conditions(models: Sequence[LocalModel], driven: Sequence[Conditions]) -> list[Any]:
     headings = (
         "experiment",
         "speed [rad/s]",
@@ -226,4 +223,4 @@ def _conditions(models: Sequence[LocalModel], driven: Sequence[Conditions]) -> l
         "some. Surface: RMS of what its unevenness adds to the load torque at the motor shaft; pedal: standard "
         "deviation of the driver's corrections."
     )
-    return [html.table(headings, rows, numbers=range(1, 7)), html.paragraph(note, "note")]
+    return [html.table(headings, rows, numbers=range(1, 7)), html.note(note)]

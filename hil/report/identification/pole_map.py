@@ -13,7 +13,8 @@ from estimator.signals.record import FloatArray
 from hil.figures.local_model import LocalModel
 from hil.figures.palette import BLACK, faded
 from hil.figures.z_plane import damping_lines, frequency_marks, unit_circle
-from hil.report.figures import figure_html
+from hil.report.figures import figure_block
+from hil.report.page import Figure
 
 HEIGHT_PX = 640
 GUIDE = "#c5ccd4"
@@ -50,7 +51,7 @@ class PoleSet:
     hidden: bool = False
 
 
-def pole_figure(name: str, sets: Sequence[PoleSet], sample_time_s: float) -> str:
+def pole_figure(name: str, sets: Sequence[PoleSet], sample_time_s: float) -> Figure:
     """Draw poles as crosses and zeros as circles; those of one model share a colour and a legend entry."""
     figure = go.Figure()
     _guides(figure, sample_time_s)
@@ -59,7 +60,7 @@ def pole_figure(name: str, sets: Sequence[PoleSet], sample_time_s: float) -> str
     figure.update_xaxes(title_text="real part", range=[-MARGIN, MARGIN], zeroline=True, constrain="domain")
     figure.update_yaxes(title_text="imaginary part", range=[-MARGIN, MARGIN], scaleanchor="x", zeroline=True)
     figure.update_layout(hovermode="closest")
-    return figure_html(figure, name, HEIGHT_PX, hover="closest")
+    return figure_block(figure, name, HEIGHT_PX, hover="closest")
 
 
 def _guides(figure: go.Figure, sample_time_s: float) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from estimator.identification.modes.uncertainty import UncertainRoot
@@ -26,24 +28,24 @@ LARGEST_REGION = 1.0
 """Regions wider than this in z say only that the data know nothing of the root; they would hide the others."""
 
 
-def recording_section(model: LocalModel, study: Study, number: int) -> str:
+def recording_section(model: LocalModel, study: Study, number: int) -> html.Section:
     """Return the section; ``number`` makes its figures' names unique in the page."""
     return html.section(
         f"Recording {model.name}",
         html.paragraph(best_statement(study)),
         html.paragraph(study.validation.statement),
         *_regional(study),
-        "<h3>Frequency response</h3>",
-        html.paragraph(_spectral(study), "note"),
+        html.Heading("Frequency response"),
+        html.note(_spectral(study)),
         response_figure(f"response-{number}", model, study.best.fit),
-        "<h3>Poles and zeros</h3>",
+        html.Heading("Poles and zeros"),
         *_roots(model, study, number),
-        "<h3>Free run of the output-error model</h3>",
+        html.Heading("Free run of the output-error model"),
         _free_run(study, number),
-        "<h3>Residual tests</h3>",
+        html.Heading("Residual tests"),
         _tests(study),
         residual_figure(f"residuals-{number}", study.validation),
-        "<h3>Course of the on-line estimate</h3>",
+        html.Heading("Course of the on-line estimate"),
         course_figure(f"course-{number}", study.course, model),
     )
 
@@ -60,7 +62,7 @@ def _spectral(study: Study) -> str:
     )
 
 
-def _regional(study: Study) -> list[str]:
+def _regional(study: Study) -> list[Any]:
     """Return the table of what the resonance depends on; nothing where the drive is linear."""
     if not study.best.regions:
         return []
@@ -72,10 +74,13 @@ def _regional(study: Study) -> list[str]:
         )
         for one in study.best.regions
     ]
-    return ["<h3>What the resonance depends on</h3>", html.table(("torque in the shaft [Nm]", "[Hz]", "damping"), rows)]
+    return [
+        html.Heading("What the resonance depends on"),
+        html.table(("torque in the shaft [Nm]", "[Hz]", "damping"), rows),
+    ]
 
 
-def _roots(model: LocalModel, study: Study, number: int) -> list[str]:
+def _roots(model: LocalModel, study: Study, number: int) -> list[Any]:
     offline, best = study.found.batch.model, study.best.fit.model
     third = study.third_order.model
     k = model.online.sample_time_s / offline.sample_time_s  # a pole sampled k times as slowly is its k-th power
@@ -94,7 +99,7 @@ def _roots(model: LocalModel, study: Study, number: int) -> list[str]:
         f"out where they would cover the map. The third-order equivalent changes the response by {bound} at most."
     )
     return [
-        html.paragraph(note, "note"),
+        html.note(note),
         *cancellations,
         pole_figure(f"poles-{number}", sets, model.online.sample_time_s),
     ]
@@ -110,7 +115,7 @@ def _outline(root: UncertainRoot, k: float) -> FloatArray:
     return np.column_stack([around.real, around.imag])
 
 
-def _free_run(study: Study, number: int) -> str:
+def _free_run(study: Study, number: int) -> list[Any]:
     data, error = study.found.offline, study.validation.own.error
     measured = np.where(data.okay, data.output, np.nan)
     panels = (
@@ -123,7 +128,7 @@ def _free_run(study: Study, number: int) -> str:
     return time_figure(f"free-run-{number}", data.time_s, panels, MOST_DRAWN)
 
 
-def _tests(study: Study) -> str:
+def _tests(study: Study) -> html.Table:
     tests = study.validation
     best, linearity = study.best, study.best.linearity
     past = best.validation.independence

@@ -9,12 +9,13 @@ from plotly.subplots import make_subplots
 
 from estimator.identification.offline.validation import CorrelationTest, Validation
 from hil.figures.palette import BLUE, GREY, VERMILION, faded
-from hil.report.figures import figure_html
+from hil.report.figures import figure_block
+from hil.report.page import Figure
 
 PANEL_PX, AROUND_PX = 160, 140
 
 
-def residual_figure(name: str, validation: Validation) -> str:
+def residual_figure(name: str, validation: Validation) -> Figure:
     """Draw residual against past input, against later input, and against itself, over one another."""
     panels = (
         ("with past input", validation.independence, VERMILION),
@@ -24,12 +25,12 @@ def residual_figure(name: str, validation: Validation) -> str:
     return _stacked(name, panels)
 
 
-def correlation_figure(name: str, tests: Sequence[tuple[str, CorrelationTest]]) -> str:
+def correlation_figure(name: str, tests: Sequence[tuple[str, CorrelationTest]]) -> Figure:
     """Draw correlations by lag over one another, each under its title."""
     return _stacked(name, [(title, test, BLUE) for title, test in tests])
 
 
-def _stacked(name: str, panels: Sequence[tuple[str, CorrelationTest, str]]) -> str:
+def _stacked(name: str, panels: Sequence[tuple[str, CorrelationTest, str]]) -> Figure:
     titles = [title for title, _, _ in panels]
     figure = make_subplots(
         rows=len(panels), cols=1, subplot_titles=titles, vertical_spacing=min(0.13, 0.3 / len(panels))
@@ -38,7 +39,7 @@ def _stacked(name: str, panels: Sequence[tuple[str, CorrelationTest, str]]) -> s
         _stems(figure, row, title, test, colour)
     figure.update_xaxes(title_text="lag [samples]", row=len(panels), col=1)
     figure.update_annotations(font_size=13, x=0.0, xanchor="left")
-    return figure_html(figure, name, AROUND_PX + PANEL_PX * len(panels), hover="closest")
+    return figure_block(figure, name, AROUND_PX + PANEL_PX * len(panels), hover="closest")
 
 
 def _stems(figure: go.Figure, row: int, title: str, test: CorrelationTest, colour: str) -> None:

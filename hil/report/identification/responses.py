@@ -13,7 +13,8 @@ from estimator.signals.record import FloatArray, IntArray
 from hil.figures.local_model import LocalModel
 from hil.figures.palette import BLACK, BLUE, GREY, VERMILION, series_colour
 from hil.report.bode import HEIGHT_PX, curve, estimate, fix_scale, panels
-from hil.report.figures import figure_html
+from hil.report.figures import figure_block
+from hil.report.page import Figure
 
 LOWEST_HZ = 0.5
 """Below, the high-pass has taken away what the models could be held against."""
@@ -24,7 +25,7 @@ HIGHEST_HZ = 50.0
 POINTS = 300
 
 
-def response_figure(name: str, model: LocalModel, best: LinearFit | None = None) -> str:
+def response_figure(name: str, model: LocalModel, best: LinearFit | None = None) -> Figure:
     """Draw one experiment: spectral estimate and models with their 95 % intervals, and the reference."""
     figure = panels()
     f = frequencies_hz(model)
@@ -38,10 +39,10 @@ def response_figure(name: str, model: LocalModel, best: LinearFit | None = None)
     curve(figure, below, model.online.response(below), "on line", {"color": BLUE, "width": 2.2})
     _reference(figure, model, f)
     fix_scale(figure, _levels([model]))
-    return figure_html(figure, name, HEIGHT_PX)
+    return figure_block(figure, name, HEIGHT_PX)
 
 
-def responses_figure(name: str, models: Sequence[LocalModel]) -> str:
+def responses_figure(name: str, models: Sequence[LocalModel]) -> Figure:
     """Draw the on-line models of several experiments over their spectral estimates, as the paper's Fig. 4 does.
 
     The off-line models wait in the legend.
@@ -57,7 +58,7 @@ def responses_figure(name: str, models: Sequence[LocalModel]) -> str:
     for number, model in enumerate(models):
         _reference(figure, model, frequencies_hz(model), first=number == 0)
     fix_scale(figure, _levels(models))
-    return figure_html(figure, name, HEIGHT_PX)
+    return figure_block(figure, name, HEIGHT_PX)
 
 
 def frequencies_hz(model: LocalModel) -> FloatArray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 from estimator.identification.compare import Compared
 from estimator.identification.offline.orders import OrderChoice
@@ -16,7 +17,7 @@ MOST_CANDIDATES = 8
 """Structures shown of an order selection."""
 
 
-def numbers_table(models: Sequence[LocalModel], studies: Sequence[Study]) -> str:
+def numbers_table(models: Sequence[LocalModel], studies: Sequence[Study]) -> list[Any]:
     """Return resonance and damping on line and off line, and how well the models do, of every recording."""
     headings = (
         "recording",
@@ -38,7 +39,7 @@ def numbers_table(models: Sequence[LocalModel], studies: Sequence[Study]) -> str
         "the simulation error over the output's own variation; one step ahead uses the measured output and does not "
         "measure a model. Unseen: free run on the others."
     )
-    return html.table(headings, rows, numbers=range(1, 8)) + html.paragraph(note, "note")
+    return [html.table(headings, rows, numbers=range(1, 8)), html.note(note)]
 
 
 def _numbers(each: Study) -> tuple[str, ...]:
@@ -57,34 +58,35 @@ def _numbers(each: Study) -> tuple[str, ...]:
     )
 
 
-def physical_tables(studies: Sequence[Study]) -> list[str]:
+def physical_tables(studies: Sequence[Study]) -> list[Any]:
     """Return the drive's parameters of every recording: one row each, then what is open and why."""
     rows, warnings, is_open = [], [], []
     for each in studies:
         if each.physical is None:
-            warnings.append(html.paragraph(f"{each.name}: no two-mass drive. {each.not_physical}", "warning"))
+            warnings.append(html.warning(f"{each.name}: no two-mass drive. {each.not_physical}"))
             continue
         both = {**each.physical.parameters, **each.physical.sums}
         rows += [
-            (
-                each.name,
-                name,
-                shown(one.estimate.value),
-                shown_interval(one.estimate.ci95),
-                one.unit,
-                "determined" if one.is_determined else "open",
+            html.Row(
+                (
+                    each.name,
+                    name,
+                    shown(one.estimate.value),
+                    shown_interval(one.estimate.ci95),
+                    one.unit,
+                    "determined" if one.is_determined else "open",
+                ),
+                "" if one.is_determined else "undetermined",
             )
             for name, one in both.items()
         ]
-        is_open += [
-            html.paragraph(f"{each.name}: {one.statement}", "note") for one in both.values() if not one.is_determined
-        ]
+        is_open += [html.note(f"{each.name}: {one.statement}") for one in both.values() if not one.is_determined]
     headings = ("recording", "parameter", "value", "95 % interval", "unit", "")
-    table = html.table(headings, rows, numbers=(2, 3)) if rows else ""
-    return [table, *warnings, html.details("What is open, and what would determine it", *is_open) if is_open else ""]
+    table = html.table(headings, rows, numbers=(2, 3)) if rows else None
+    return [table, *warnings, html.details("What is open, and what would determine it", *is_open) if is_open else None]
 
 
-def orders_table(choice: OrderChoice) -> str:
+def orders_table(choice: OrderChoice) -> list[Any]:
     """Return the best structures of an order selection, the chosen one first."""
     rows = [
         (
@@ -98,10 +100,10 @@ def orders_table(choice: OrderChoice) -> str:
         for each in choice.candidates[:MOST_CANDIDATES]
     ]
     headings = ("nA", "nB", "delay", "BIC above the best", "RMS of the whitened error", "fit on unseen")
-    return html.paragraph(choice.statement) + html.table(headings, rows, numbers=range(6))
+    return [html.paragraph(choice.statement), html.table(headings, rows, numbers=range(6))]
 
 
-def compared_table(compared: Sequence[Compared]) -> str:
+def compared_table(compared: Sequence[Compared]) -> html.Table:
     """Return what several recursive estimators made of the same data."""
     rows = [
         (

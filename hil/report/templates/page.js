@@ -1,9 +1,8 @@
 "use strict";
 /* What a page does by itself: draw its figures, those in view first, take keys, and go to paper.
 
-   A figure is a div of that class with the ID of its data in data-figure; they stand in a
-   script element of type application/json. Drawing all at once would keep a long page from opening, and so would the
-   library that draws: it stands in the page as text, and is run when the page is there to be read. */
+   A figure is a div of that class with the ID of its data in data-figure; data and the library that draws stand in the
+   page as packed text, unpacked when the page is there to be read: drawing all at once would keep it from opening. */
 (() => {
   const PRINT_WIDTH_PX = 690; // A4 less its margins, at 96 px to the inch
   const PRINT_HEIGHT = 0.75; // of the height on a screen, of figures that are tall there
@@ -11,33 +10,83 @@
   const ZOOM = 0.25;
   const PAN = 0.1;
   const figures = [...document.querySelectorAll(".plotly-graph-div[data-figure]")];
+  const dark = window.matchMedia("(prefers-color-scheme: dark)");
+  const contents = new Map(); // what each figure holds
+  const zooms = new Map(); // what draws the samples in view of each that stands on more than are drawn
+  let printing = false;
 
-  function load() {
-    const text = document.getElementById("plotly");
-    if (window.Plotly || !text) return;
+  /* What stands in the page packed: gzip in base64. */
+  async function unpackedText(id) {
+    const element = document.getElementById(id);
+    const bytes = Uint8Array.from(atob(element.textContent), (each) => each.charCodeAt(0));
+    element.remove();
+    return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"))).text();
+  }
+
+  async function load() {
+    for (const div of figures) contents.set(div, JSON.parse(await unpackedText(div.dataset.figure)));
     const script = document.createElement("script");
-    script.textContent = text.textContent;
+    script.textContent = await unpackedText("plotly");
     document.head.append(script); // runs at once
-    text.remove();
+  }
+
+  /* Colours of the light look, and what stands for them on a dark ground. */
+  const ON_DARK = {
+    "#111111": "#e8eaed", "#666666": "#a9b2bc", "#777777": "#9aa4af", "#b4bac1": "#66717d", "#7c8590": "#8d97a2",
+    "#c5ccd4": "#4a545f", "#5a6470": "#a9b2bc", "#0072b2": "#4fb0ea", "#d55e00": "#ff8a3c", "#332288": "#9d8ff2",
+    "#882255": "#e0739f", "#009e73": "#2cc596",
+  };
+
+  function recoloured(value) {
+    if (typeof value === "string") return ON_DARK[value] || value;
+    if (Array.isArray(value)) return value.map(recoloured);
+    if (value === null || typeof value !== "object" || "bdata" in value) return value;
+    return Object.fromEntries(Object.entries(value).map(([key, each]) => [key, recoloured(each)]));
+  }
+
+  function look(isDark) {
+    const [ink, grid, ground] = isDark ? ["#d5dae0", "#363e47", "#20262d"] : ["#2a3038", "#e6eaef", "#ffffff"];
+    const axis = { gridcolor: grid, linecolor: grid, zerolinecolor: grid, automargin: true, title: { standoff: 12 } };
+    const clear = "rgba(0,0,0,0)";
+    const menu = { bgcolor: ground, bordercolor: grid };
+    const hoverlabel = { bgcolor: ground, bordercolor: grid };
+    const layout = { font: { color: ink }, paper_bgcolor: clear, plot_bgcolor: clear, xaxis: axis, yaxis: axis };
+    return { layout: { ...layout, hoverlabel, updatemenudefaults: menu, modebar: { color: "#8a929b" } } };
+  }
+
+  function specification(div) {
+    const { data, layout, config } = contents.get(div);
+    const isDark = dark.matches && !printing;
+    const size = printing ? onPaper(div) : { width: undefined, height: layout.height, autosize: true };
+    div.style.height = `${size.height}px`;
+    const coloured = isDark ? recoloured({ data, layout }) : structuredClone({ data, layout });
+    const legend = { ...coloured.layout.legend, ...size.legend };
+    const shown = { ...coloured.layout, ...size, legend, template: look(isDark), uirevision: "kept" };
+    return [coloured.data, shown, config];
   }
 
   function draw(div) {
-    if (div.dataset.drawn) return;
-    load();
+    if (div.dataset.drawn || !window.Plotly) return;
     div.dataset.drawn = "yes";
-    const figure = JSON.parse(document.getElementById(div.dataset.figure).textContent);
-    screens.set(div, { height: figure.layout.height, legend: figure.layout.legend.y, margin: figure.layout.margin });
-    Plotly.newPlot(div, figure.data, figure.layout, figure.config);
-    if (printing) Plotly.relayout(div, onPaper(div));
-    if (figure.samples) zoomable(div, figure);
+    Plotly.newPlot(div, ...specification(div));
+    if (contents.get(div).samples) zoomable(div, contents.get(div));
     div.addEventListener("keydown", (event) => onKey(div, event));
     reachable(div);
   }
 
+  function drawAgain() {
+    for (const div of figures) {
+      if (!div.dataset.drawn) continue;
+      Plotly.react(div, ...specification(div));
+      if (zooms.has(div)) zooms.get(div)();
+    }
+  }
+  dark.addEventListener("change", drawAgain);
+
   const DRAWN = 3000; // samples of a line in view beyond which its extremes are drawn
   const GAP = -32768;
 
-  function unpacked(text, Kind) {
+  function numbers(text, Kind) {
     const bytes = Uint8Array.from(atob(text), (each) => each.charCodeAt(0));
     return new Kind(bytes.buffer);
   }
@@ -45,8 +94,8 @@
   /* A figure over time that stands on more samples than are drawn: what comes into view is drawn from them. */
   function zoomable(div, figure) {
     const samples = figure.samples;
-    const stamps = samples.stamps ? unpacked(samples.stamps, Float64Array) : null;
-    const lines = samples.lines.map((line) => ({ ...line, codes: unpacked(line.codes, Int16Array) }));
+    const stamps = samples.stamps ? numbers(samples.stamps, Float64Array) : null;
+    const lines = samples.lines.map((line) => ({ ...line, codes: numbers(line.codes, Int16Array) }));
     const whole = figure.data.map((trace) => ({ x: trace.x, y: trace.y }));
     const time = (i) => (stamps ? stamps[i] : samples.start + i * samples.step);
     const value = (line, i) => (line.codes[i] === GAP ? null : line.offset + line.scale * line.codes[i]);
@@ -91,6 +140,10 @@
       return { x, y };
     }
     div.on("plotly_relayout", redraw);
+    zooms.set(div, () => {
+      shown = "";
+      redraw();
+    });
   }
 
   /* Buttons of a figure's own bar, for those without a pointer. */
@@ -159,34 +212,23 @@
     }
   }
 
-  const screens = new Map(); // what each figure is like on a screen
-  let printing = false;
   function onPaper(div) {
-    const screen = screens.get(div);
+    const screen = contents.get(div).layout;
     const height = screen.height > TALL_PX ? Math.round(PRINT_HEIGHT * screen.height) : screen.height;
     const around = screen.margin.t + screen.margin.b;
-    div.style.height = `${height}px`;
     // Plotly takes the legend's place as a fraction of the height between the margins: keep its distance in pixels.
-    const y = (screen.legend * (screen.height - around)) / (height - around);
-    return { width: PRINT_WIDTH_PX, height, "legend.y": y };
-  }
-  function onScreen(div) {
-    const screen = screens.get(div);
-    div.style.height = `${screen.height}px`;
-    return { width: null, height: screen.height, "legend.y": screen.legend, autosize: true };
-  }
-  function resize(size) {
-    for (const div of figures) if (div.dataset.drawn) Plotly.relayout(div, size(div));
+    const y = (screen.legend.y * (screen.height - around)) / (height - around);
+    return { width: PRINT_WIDTH_PX, height, autosize: false, legend: { y } };
   }
   window.addEventListener("beforeprint", () => {
     printing = true;
     document.querySelectorAll("details").forEach((each) => each.setAttribute("open", ""));
-    resize(onPaper);
+    drawAgain();
     figures.forEach(draw);
   });
   window.addEventListener("afterprint", () => {
     printing = false;
-    resize(onScreen);
+    drawAgain();
   });
 
   const watcher = new IntersectionObserver(
@@ -206,7 +248,8 @@
   }
   window.addEventListener("load", () => {
     if (!figures.length) return;
-    setTimeout(() => {
+    setTimeout(async () => {
+      await load();
       figures.forEach((div) => watcher.observe(div));
       drawRest();
     }, 100);
