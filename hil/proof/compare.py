@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from hil.proof.truth.registry import EFFECTS
+from hil.proof.truth.specimen import EFFECTS
 
 Json = Mapping[str, Any]
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hil.proof.command import run_hil
-from hil.proof.truth.sensors import SPEED_NOISE_RAD_S
+from hil.proof.truth.recording import SPEED_NOISE_RAD_S
 
 SIMULATED = "speed_sim_rad_s"
 """Column of ``hil simulate`` (CONTRACT)."""

@@ -18,7 +18,7 @@ from hil.errors import UsageError
 from hil.proof.nominal_file import model_toml
 from hil.proof.truth.bus import NOMINAL_ERROR
 from hil.proof.truth.case import Case, TruthRecording, make_case
-from hil.proof.truth.registry import EFFECTS
+from hil.proof.truth.specimen import EFFECTS
 
 _COLUMNS = (
     ("time_s", "%.6f"),

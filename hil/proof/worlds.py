@@ -30,7 +30,7 @@ from hil.proof.truth.bus import NOMINAL_TOLERANCE
 from hil.proof.truth.case import Case, make_case
 from hil.proof.truth.dirty import Known, make_dirty
 from hil.proof.truth.hidden import same_recording
-from hil.proof.truth.registry import EFFECTS
+from hil.proof.truth.specimen import EFFECTS
 from hil.recording import read_records
 from hil.report.diagnosis_json import diagnosis_json
 

@@ -8,7 +8,7 @@ from hil.proof.campaign.case import Answer
 from hil.proof.campaign.kinds import PAIRS, Group, kind, parse_kinds, parse_seeds
 from hil.proof.campaign.score import ALIKE, FAILED, iou, right_columns, score
 from hil.proof.compare import compare
-from hil.proof.truth.registry import EFFECTS
+from hil.proof.truth.specimen import EFFECTS
 from hil.proof.truth.specimen import draw_specimen
 
 

@@ -6,7 +6,7 @@ import pytest
 
 from hil.errors import UsageError
 from hil.proof.seal import verify
-from hil.proof.truth.registry import EFFECTS
+from hil.proof.truth.specimen import EFFECTS
 from hil.proof.truth.specimen import choose_effect, draw_specimen
 from hil.proof.wire.challenge import CONCEALED, draw_challenge
 

@@ -8,7 +8,7 @@ from enum import Enum
 
 from hil.errors import UsageError
 from hil.proof.truth.bus import NOMINAL_ERROR
-from hil.proof.truth.registry import EFFECTS, PAIR_SIGN, find
+from hil.proof.truth.specimen import EFFECTS, PAIR_SIGN, find
 
 
 class Group(Enum):

@@ -8,7 +8,7 @@ from typing import Any
 
 from hil.proof.campaign.statistics import Row, quantiles
 from hil.proof.prove.manifest import VERDICTS
-from hil.proof.truth.registry import PAIR_SIGN
+from hil.proof.truth.specimen import PAIR_SIGN
 from hil.report import page as html
 
 HEADINGS = (

@@ -7,19 +7,24 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from hil.proof.truth.acquisition import Acquisition
 from hil.proof.truth.bus import NOMINAL_ERROR
-from hil.proof.truth.driveline import TruthDriveline
-from hil.proof.truth.driver import bring_to_speed
+from hil.proof.truth.driveline import TruthDriveline, bring_to_speed, observed
 from hil.proof.truth.experiments import PERIOD_S, Plan, Test, draw_plan, sample_times_s
 from hil.proof.truth.hidden import Interval
-from hil.proof.truth.observed import observed
-from hil.proof.truth.physics import FloatArray, Physics
-from hil.proof.truth.readings import sampling_instants_s, speed_as_read
-from hil.proof.truth.rows import IntArray, Rows, as_recorded
-from hil.proof.truth.sensors import USUAL, Noise, speed_reading, torque_reading
+from hil.proof.truth.physics import FloatArray, Physics, State
+from hil.proof.truth.recording import (
+    USUAL,
+    Acquisition,
+    IntArray,
+    Noise,
+    Rows,
+    as_recorded,
+    sampling_instants_s,
+    speed_as_read,
+    speed_reading,
+    torque_reading,
+)
 from hil.proof.truth.specimen import Specimen, Stream, draw_specimen, stream
-from hil.proof.truth.state import State
 
 TESTS = tuple(Test)
 

@@ -15,8 +15,8 @@ import numpy as np
 from hil.proof.truth.bus import NOMINAL_ERROR
 from hil.proof.truth.case import TESTS, Case, record
 from hil.proof.truth.hidden import HiddenEffect, Sizes, log_uniform
-from hil.proof.truth.registry import EFFECTS, PAIR_SIGN
-from hil.proof.truth.sensors import Noise
+from hil.proof.truth.recording import Noise
+from hil.proof.truth.specimen import EFFECTS, PAIR_SIGN
 from hil.proof.truth.specimen import Stream, draw_specimen, stream
 
 IMPERFECTIONS = (

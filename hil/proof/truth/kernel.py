@@ -11,11 +11,11 @@ import math
 
 import numpy as np
 
-from hil.proof.truth import iwan, laws, laws_in_angle, laws_in_time, tyre
+from hil.proof.truth import laws
 from hil.proof.truth.compiled import compiled
 from hil.proof.truth.line import accelerations, breakaway_limit, disturbance, shaft_ends, shaft_twist, speeds_of
 from hil.proof.truth.physics import FloatArray, Physics
-from hil.proof.truth.state import STATES, State
+from hil.proof.truth.physics import STATES, State
 
 MAX_STEP_S = 1e-4
 """The shaft mode (51 rad/s) moves by 0.005 rad of phase in it: relative error of its period 1e-6. Against the
@@ -37,7 +37,7 @@ def _turn(state: FloatArray, p: Physics, h: float) -> None:
     if p.hysteresis_stiffness > 0.0:
         behind, _ = shaft_twist(state, p)
         change = laws.beyond_gap(p, behind) - laws.beyond_gap(p, before)
-        iwan.follow(state[State.SLIDERS : STATES], p, change)
+        laws.follow_twist(state[State.SLIDERS : STATES], p, change)
 
 
 @compiled
@@ -57,7 +57,7 @@ def _relax(state: FloatArray, p: Physics, h: float) -> None:
         left = math.exp(-h * FASTER / p.maxwell_time_s)
         state[State.MAXWELL_FAST_NM] = quick + (state[State.MAXWELL_FAST_NM] - quick) * left
     if p.wheel_inertia > 0.0:
-        state[State.SLIP] = tyre.slip_after(state[State.SLIP], p, speed_l, state[State.SPEED_V], h)
+        state[State.SLIP] = laws.slip_after(state[State.SLIP], p, speed_l, state[State.SPEED_V], h)
 
 
 @compiled
@@ -95,7 +95,7 @@ def _couple_generator(state: FloatArray, p: Physics, h: float) -> None:
 
     With the clutch open the generator is kept near the motor's speed by its own control.
     """
-    clutch_nm = laws_in_time.clutch_torque(p, state[State.TIME_S])
+    clutch_nm = laws.clutch_torque(p, state[State.TIME_S])
     motor, generator = state[State.SPEED_M], state[State.SPEED_G]
     if clutch_nm <= 0.0:
         state[State.SPEED_G] = (1.0 - p.generator_lag) * motor
@@ -109,7 +109,7 @@ def _couple_generator(state: FloatArray, p: Physics, h: float) -> None:
 @compiled
 def _filter_speed(state: FloatArray, p: Physics, h: float) -> None:
     """One cycle of the speed filter: backward Euler (first order), semi-implicit Euler (second order)."""
-    speed = laws_in_angle.resolver_speed(p, state[State.ANGLE_M], state[State.SPEED_M])
+    speed = laws.resolver_speed(p, state[State.ANGLE_M], state[State.SPEED_M])
     if p.filter_time_s > 0.0:
         state[State.FILTERED] += h / (p.filter_time_s + h) * (speed - state[State.FILTERED])
     else:

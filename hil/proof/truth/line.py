@@ -6,10 +6,10 @@ behind a tyre that slips (the load is then the wheels).
 
 from __future__ import annotations
 
-from hil.proof.truth import iwan, laws, laws_in_angle, laws_in_time, tyre
+from hil.proof.truth import laws
 from hil.proof.truth.compiled import compiled
 from hil.proof.truth.physics import FloatArray, Physics
-from hil.proof.truth.state import STATES, State
+from hil.proof.truth.physics import STATES, State
 
 Speeds = tuple[float, float, float, float]
 """Of motor, extra inertia, load (wheels), vehicle [rad/s]; also used for accelerations."""
@@ -33,7 +33,7 @@ def shaft_ends(p: Physics, motor: float, extra: float, load: float) -> tuple[flo
 def shaft_twist(state: FloatArray, p: Physics) -> tuple[float, float]:
     """Return the shaft's twist behind its Cardan joint [rad], and that joint's slope."""
     driving, driven = shaft_ends(p, state[State.ANGLE_M], state[State.ANGLE_X], state[State.ANGLE_L])
-    behind, slope = laws_in_angle.through_joint(p, driving)
+    behind, slope = laws.through_joint(p, driving)
     return behind - driven, slope
 
 
@@ -49,7 +49,7 @@ def breakaway_limit(p: Physics, speed: float) -> float:
 @compiled
 def disturbance(state: FloatArray, p: Physics) -> float:
     """Return the torque against the vehicle that depends on place and time alone [Nm]."""
-    hill = laws_in_angle.gravity_torque(p, state[State.ANGLE_L]) * laws_in_time.mass_over_empty(p, state[State.TIME_S])
+    hill = laws.gravity_torque(p, state[State.ANGLE_L]) * laws.mass_over_empty(p, state[State.TIME_S])
     disturbance_nm: float = p.load_torque_nm + hill
     return disturbance_nm
 
@@ -60,7 +60,7 @@ def _on_motor(state: FloatArray, p: Physics, speed: float) -> float:
     given = state[State.INVERTER_NM]
     torque: float = given - p.b_M * speed - p.quadratic_motor * speed * abs(speed) - laws.eddy_torque(p, speed)
     torque -= laws.torque_by_direction(p, speed)
-    torque += laws_in_angle.ripple_torque(p, state[State.ANGLE_M], given)
+    torque += laws.ripple_torque(p, state[State.ANGLE_M], given)
     if p.friction_motor_nm > 0.0:
         limit = breakaway_limit(p, speed)
         torque -= laws.friction_torque(p.friction_motor_nm, limit, state[State.BRISTLE_M], speed)
@@ -70,9 +70,9 @@ def _on_motor(state: FloatArray, p: Physics, speed: float) -> float:
 @compiled
 def _on_load(state: FloatArray, p: Physics, speed: float) -> float:
     """Torque of wheels, axle, bearings and brake on the load inertia."""
-    torque = -p.b_L * laws_in_time.viscosity_over_warm(p, state[State.TIME_S]) * speed
-    torque -= laws_in_angle.imbalance_torque(p, state[State.ANGLE_L])
-    held = p.friction_load_nm + laws_in_time.brake_torque(p, state[State.TIME_S])
+    torque = -p.b_L * laws.viscosity_over_warm(p, state[State.TIME_S]) * speed
+    torque -= laws.imbalance_torque(p, state[State.ANGLE_L])
+    held = p.friction_load_nm + laws.brake_torque(p, state[State.TIME_S])
     if held > 0.0:
         torque -= laws.friction_torque(held, 1.0, state[State.BRISTLE_L], speed)
     return torque
@@ -84,8 +84,8 @@ def _through_shaft(state: FloatArray, p: Physics, speeds: Speeds) -> tuple[float
     motor, extra, load, _ = speeds
     twist, slope = shaft_twist(state, p)
     driving, driven = shaft_ends(p, motor, extra, load)
-    stiffness = laws_in_time.stiffness_over_k(p, state[State.TIME_S], driving)
-    slider_nm = iwan.torque(state[State.SLIDERS : STATES], p) if p.hysteresis_stiffness > 0.0 else 0.0
+    stiffness = laws.stiffness_over_k(p, state[State.TIME_S], driving)
+    slider_nm = laws.slider_torque(state[State.SLIDERS : STATES], p) if p.hysteresis_stiffness > 0.0 else 0.0
     torque: float = laws.shaft_torque(p, twist, slope * driving - driven, stiffness, slider_nm)
     torque += state[State.MAXWELL_NM] + state[State.MAXWELL_FAST_NM]
     return slope * torque, laws.behind_gears(p, torque, driven)
@@ -97,11 +97,11 @@ def _of_wheels_and_vehicle(
 ) -> tuple[float, float]:
     """Accelerations of the wheels and of the vehicle, which are one where the tyre can't slip."""
     _, _, wheels, vehicle = speeds
-    inertia = p.J_L * laws_in_time.mass_over_empty(p, state[State.TIME_S])
+    inertia = p.J_L * laws.mass_over_empty(p, state[State.TIME_S])
     if p.wheel_inertia <= 0.0:
         both = (wheels_nm + vehicle_nm) / inertia
         return both, both
-    tyre_nm = tyre.torque(p, state[State.SLIP], wheels, vehicle)
+    tyre_nm = laws.tyre_torque(p, state[State.SLIP], wheels, vehicle)
     return (wheels_nm - tyre_nm) / p.wheel_inertia, (tyre_nm + vehicle_nm) / (inertia - p.wheel_inertia)
 
 

@@ -14,11 +14,50 @@ from enum import IntEnum
 import numpy as np
 
 from hil.errors import UsageError
-from hil.proof.truth.acquisition import FAULTLESS, Acquisition
+from hil.proof.truth import effects_chain, effects_line
 from hil.proof.truth.bus import NOMINAL_ERROR, Bus, draw_bus, draw_nominal
-from hil.proof.truth.hidden import HiddenEffect, Interval, Sizes
+from hil.proof.truth.hidden import HiddenEffect, Interval, Place, Sizes
 from hil.proof.truth.physics import Physics
-from hil.proof.truth.registry import find
+from hil.proof.truth.recording import FAULTLESS, Acquisition
+
+
+NOTHING = "none"
+
+EFFECTS: Mapping[str, HiddenEffect] = {
+    effect.name: effect
+    for effect in (
+        HiddenEffect(NOTHING, Place.NOWHERE, lambda rng, bus: {}),
+        *effects_chain.TORQUE_PATH,
+        *effects_line.MOTOR,
+        *effects_line.SHAFT,
+        *effects_line.LOAD,
+        *effects_chain.SPEED_SENSOR,
+        *effects_chain.ACQUISITION,
+        *effects_line.FURTHER,
+        *effects_chain.FURTHER,
+        *effects_chain.OUTSIDE,
+    )
+}
+"""Nothing; the contract's catalogue in its order; what no entry of it describes."""
+
+PAIR_SIGN = "+"
+
+
+def find(names: str) -> tuple[HiddenEffect, ...]:
+    """Return the effects of a name or of several joined by ``+`` (``backlash+road_grade``).
+
+    Raises
+    ------
+    UsageError
+        If one of them is not registered.
+    """
+    wanted = names.split(PAIR_SIGN)
+    for name in wanted:
+        if name not in EFFECTS:
+            raise UsageError(
+                f"effect {name!r}: expected one of {', '.join(EFFECTS)}, or several joined by {PAIR_SIGN!r}"
+            )
+    return tuple(EFFECTS[name] for name in wanted)
 
 
 class Stream(IntEnum):

@@ -5,7 +5,7 @@ import pytest
 
 from hil.proof.truth.driveline import TruthDriveline
 from hil.proof.truth.physics import Physics
-from hil.proof.truth.state import State
+from hil.proof.truth.physics import State
 
 
 @pytest.fixture

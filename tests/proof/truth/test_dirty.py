@@ -7,8 +7,8 @@ import pytest
 
 from hil.errors import UsageError
 from hil.proof.truth.dirty import FEWEST, IMPERFECTIONS, LEAST_PART, MOST, MOST_PART, Known, in_a_model_file, make_dirty
-from hil.proof.truth.registry import EFFECTS
-from hil.proof.truth.sensors import USUAL, coloured, speed_reading
+from hil.proof.truth.recording import USUAL, coloured, speed_reading
+from hil.proof.truth.specimen import EFFECTS
 from hil.proof.truth.specimen import draw_specimen
 
 
