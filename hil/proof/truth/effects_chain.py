@@ -79,7 +79,9 @@ def _draw_bias(rng: np.random.Generator, bus: Bus) -> Sizes:
 
 TORQUE_PATH = (
     # Current sensor, magnet temperature of one inverter.
-    HiddenEffect("inverter_gain_mismatch", Place.TORQUE_PATH, _draw_gain, sets("gain_m1"), fitted={"gain_m1": "gain_m1"}),
+    HiddenEffect(
+        "inverter_gain_mismatch", Place.TORQUE_PATH, _draw_gain, sets("gain_m1"), fitted={"gain_m1": "gain_m1"}
+    ),
     # As magnets and current sensors warm up: exponentially, or evenly, which has no depth. Recordings begin cold.
     HiddenEffect(
         "torque_derating",
@@ -219,7 +221,13 @@ SPEED_SENSOR = (
     ),
 )
 
-LOST_TOGETHER = ((True, True, True), (True, True, False), (True, False, True), (False, True, False), (False, False, True))
+LOST_TOGETHER = (
+    (True, True, True),
+    (True, True, False),
+    (True, False, True),
+    (False, True, False),
+    (False, False, True),
+)
 """What one loss takes along: torque of m1, torque of m2, speed."""
 
 MOST_STAMPED_S = 0.0024

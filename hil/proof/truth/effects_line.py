@@ -179,9 +179,7 @@ def _draw_gear_losses(rng: np.random.Generator, bus: Bus) -> Sizes:
 
 SHAFT = (
     # Free play in the line: gear teeth, splines, worn joints.
-    HiddenEffect(
-        "backlash", Place.SHAFT, size("gap_rad", 0.004, 0.04), sets("gap_rad"), fitted={"gap_rad": "gap_rad"}
-    ),
+    HiddenEffect("backlash", Place.SHAFT, size("gap_rad", 0.004, 0.04), sets("gap_rad"), fitted={"gap_rad": "gap_rad"}),
     # Hardens or softens with twist; rubber couplings do both.
     HiddenEffect(
         "stiffness_nonlinearity",

@@ -14,8 +14,7 @@ import numpy as np
 from hil.proof.truth import laws
 from hil.proof.truth.compiled import compiled
 from hil.proof.truth.line import accelerations, breakaway_limit, disturbance, shaft_ends, shaft_twist, speeds_of
-from hil.proof.truth.physics import FloatArray, Physics
-from hil.proof.truth.physics import STATES, State
+from hil.proof.truth.physics import STATES, FloatArray, Physics, State
 
 MAX_STEP_S = 1e-4
 """The shaft mode (51 rad/s) moves by 0.005 rad of phase in it: relative error of its period 1e-6. Against the

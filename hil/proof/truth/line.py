@@ -8,8 +8,7 @@ from __future__ import annotations
 
 from hil.proof.truth import laws
 from hil.proof.truth.compiled import compiled
-from hil.proof.truth.physics import FloatArray, Physics
-from hil.proof.truth.physics import STATES, State
+from hil.proof.truth.physics import STATES, FloatArray, Physics, State
 
 Speeds = tuple[float, float, float, float]
 """Of motor, extra inertia, load (wheels), vehicle [rad/s]; also used for accelerations."""

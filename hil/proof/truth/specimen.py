@@ -20,7 +20,6 @@ from hil.proof.truth.hidden import HiddenEffect, Interval, Place, Sizes
 from hil.proof.truth.physics import Physics
 from hil.proof.truth.recording import FAULTLESS, Acquisition
 
-
 NOTHING = "none"
 
 EFFECTS: Mapping[str, HiddenEffect] = {
