@@ -45,14 +45,7 @@ LARGEST_TRUTH_BYTES = 1 << 28
 
 
 def answer(folder: Path, jobs: int, progress: Progress, limit_s: float = LIMIT_S) -> str:
-    """Answer every case of a set that has no answer yet; return one digest of all answers.
-
-    Raises
-    ------
-    UsageError, SealBroken
-        If the folder has no set, a case has changed since it was made, or its answer would take the place of something
-        else.
-    """
+    """Answer every case of a set that has no answer yet; return one digest of all answers."""
     cases = read_commitments(folder)
     answered = work_on(
         list(cases),
@@ -101,25 +94,7 @@ def _answer_one(folder: Path, name: str, shown: Shown, limit_s: float) -> dict[s
 
 
 def judge_set(folder: Path, key: bytes, jobs: int, progress: Progress, verdicts: str | None = None) -> list[Row]:
-    """Open a set and score its verdicts.
-
-    Parameters
-    ----------
-    verdicts
-        The digest that ``answer`` returned, where it was kept: verdicts and their list can't both be changed then.
-
-    Returns
-    -------
-    list of dict
-        One row per case (`hil.proof.score.score`), with ``case``, its name, next to.
-
-    Raises
-    ------
-    SealBroken
-        If a truth, a case or a verdict is not what it was; naming it.
-    UsageError
-        If a case has no verdict yet.
-    """
+    """Open a set and score its verdicts."""
     cases = read_commitments(folder)
     answered = read_list(folder / VERDICTS_LIST, "hil prove run DIR writes it")
     if verdicts is not None and digest_of(answered) != verdicts:

@@ -35,18 +35,7 @@ class CommandFailed(Exception):
 
 
 def run_hil(arguments: Sequence[str], folder: Path, limit_s: float) -> None:
-    """Run ``hil`` in a folder.
-
-    Parameters
-    ----------
-    limit_s
-        Time it may take [s]; then it is ended and counts as failed.
-
-    Raises
-    ------
-    CommandFailed
-        With the last line it wrote, or that it took too long. All it wrote is next to the folder.
-    """
+    """Run ``hil`` in a folder."""
     try:
         done = subprocess.run(
             python("-m", "hil", *arguments),
@@ -67,13 +56,7 @@ def run_hil(arguments: Sequence[str], folder: Path, limit_s: float) -> None:
 
 
 def replace_own(folder: Path, built: Path) -> None:
-    """Copy a folder to where it belongs, in place of the one that was made there before.
-
-    Raises
-    ------
-    UsageError
-        If there is something that this program did not make; it is left as it is.
-    """
+    """Copy a folder to where it belongs, in place of the one that was made there before."""
     if folder.is_symlink() or folder.exists():
         if folder.is_symlink() or not (folder / MARK).is_file():
             raise UsageError(
@@ -90,11 +73,6 @@ def fresh_over_floor(recording: Path, model: Path, limit_s: float) -> float:
     """Return the free-run RMS error of a model file on a recording of the truth, over the noise of its speed reading.
 
     The public command simulates, in a place of its own.
-
-    Raises
-    ------
-    CommandFailed
-        If it does not, within ``limit_s`` [s].
     """
     with tempfile.TemporaryDirectory(prefix="hil-fresh-") as neutral:
         place = Path(neutral) / "fresh"

@@ -74,32 +74,7 @@ def run_real(
     progress: Progress = silent,
     room: Path = ROOM,
 ) -> list[Json]:
-    """Run real recordings through the public command and judge what it says.
-
-    Parameters
-    ----------
-    data
-        Folder of the recordings.
-    out
-        Gets ``real.json`` and a folder for each case and run.
-    names
-        Cases; all where none is named.
-    room
-        Folder of the cases.
-
-    Returns
-    -------
-    list of dict
-        The entries of ``real.json``, one per case, in the order asked for; ``named_right`` says whether every run named
-        what is concealed and nothing else.
-
-    Raises
-    ------
-    UsageError
-        If there is no such case.
-    RealFileError
-        If a case's file is wrong, or a recording is not there or not the one that was meant.
-    """
+    """Run real recordings through the public command and judge what it says."""
     folders = case_folders(list(names), room)
     cases = {name: read_case(folder) for name, folder in folders.items()}
     for name, case in cases.items():
@@ -128,13 +103,7 @@ def run_real(
 
 
 def read_real(out: Path) -> list[Json]:
-    """Return the entries that an earlier run has left; none where there was none.
-
-    Raises
-    ------
-    UsageError
-        If they can't be read.
-    """
+    """Return the entries that an earlier run has left; none where there was none."""
     path = out / FILE_NAME
     if not path.exists():
         return []

@@ -149,25 +149,13 @@ class TruthFile(Table):
 
 
 def read_case(folder: Path) -> CaseFile:
-    """Read a case's ``case.toml``.
-
-    Raises
-    ------
-    RealFileError
-        With one line for every fault.
-    """
+    """Read a case's ``case.toml``."""
     path = folder / CASE
     return validate(CaseFile, read_toml(path, RealFileError), path, RealFileError)
 
 
 def read_truth(folder: Path) -> TruthFile:
-    """Read a case's ``truth.toml``.
-
-    Raises
-    ------
-    RealFileError
-        With one line for every fault.
-    """
+    """Read a case's ``truth.toml``."""
     path = folder / TRUTH
     return validate(TruthFile, read_toml(path, RealFileError), path, RealFileError)
 
@@ -178,13 +166,7 @@ def known_cases(room: Path = ROOM) -> dict[str, Path]:
 
 
 def case_folders(names: list[str] | tuple[str, ...], room: Path = ROOM) -> dict[str, Path]:
-    """Return the folders of the cases of these names, of all where there are none.
-
-    Raises
-    ------
-    UsageError
-        If there is no such case.
-    """
+    """Return the folders of the cases of these names, of all where there are none."""
     known = known_cases(room)
     unknown = sorted(set(names) - set(known))
     if unknown:
@@ -199,13 +181,7 @@ def sha256_of(path: Path) -> str:
 
 
 def require_recording(data: Path, entry: RecordingEntry) -> Path:
-    """Return the path of a recording that is there and is the one that was meant.
-
-    Raises
-    ------
-    RealFileError
-        If it is not.
-    """
+    """Return the path of a recording that is there and is the one that was meant."""
     path = data / entry.path
     if not path.is_file():
         raise RealFileError(path, f"expected a recording, got nothing. It is published at {entry.origin.page}")
@@ -218,13 +194,7 @@ def require_recording(data: Path, entry: RecordingEntry) -> Path:
 
 
 def write_shown(case: CaseFile, name: str, data: Path, place: Path) -> Path:
-    """Write what is shown of a recording as ``place/NAME.csv``: cut to its rows, numbers to the last bit.
-
-    Raises
-    ------
-    RealFileError
-        If the recording is not there or not the one that was meant, or a channel that is to be shown is not in it.
-    """
+    """Write what is shown of a recording as ``place/NAME.csv``: cut to its rows, numbers to the last bit."""
     entry = case.recordings[name]
     table = read_table(require_recording(data, entry), Request(case.format))
     missing = [column for column in case.shown if column not in table.columns]

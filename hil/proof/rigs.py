@@ -115,13 +115,7 @@ class SealedProcess:
     _pipes: _Pipes
 
     def open(self) -> object:
-        """Have the seal opened; return it as read from JSON, to be verified against the commitment.
-
-        Raises
-        ------
-        RunAborted
-            If the rig is no longer there.
-        """
+        """Have the seal opened; return it as read from JSON, to be verified against the commitment."""
         return json.loads(self._pipes.ask(OPEN))
 
 
@@ -172,16 +166,6 @@ def sealed_process(*arguments: str) -> Iterator[SealedProcess]:
 
     It is in a session of its own: Ctrl-C at the terminal must reach the drives' master first, which then
     still has a rig to disarm. If this process dies, the end of its input ends the rig too.
-
-    Parameters
-    ----------
-    *arguments
-        Those of ``python -m hil.proof.sealed_rig``.
-
-    Raises
-    ------
-    RunAborted
-        If the rig does not come up; with what it said.
     """
     with tempfile.TemporaryFile() as complaints, tempfile.TemporaryDirectory(prefix="hil-sealed-") as folder:
         pipes = _start(arguments, complaints, folder)
@@ -224,22 +208,7 @@ def rig_text(sealed: SealedProcess) -> str:
 
 
 def drive(name: str, concealed: Concealed, seed: int, out: Path, limit_s: float) -> Row:
-    """Drive one rig and judge what the tool makes of it.
-
-    Parameters
-    ----------
-    seed
-        What bus and sizes are drawn from.
-    out
-        Gets the recordings and the report, in a folder of the rig's name.
-    limit_s
-        Time for one command [s].
-
-    Returns
-    -------
-    dict
-        A row as a campaign's, with ``case`` (the rig's name), ``where`` and ``said`` (a refusal) next to.
-    """
+    """Drive one rig and judge what the tool makes of it."""
     arguments = ["--seed", str(seed), "--effect", concealed.effect]
     for fault in concealed.faults:
         arguments += ["--fault", fault]
@@ -290,18 +259,7 @@ def _refusal(concealed: Concealed, seed: int, answer: Answer) -> Row:
 
 
 def run_wire(out: Path, seed: int, names: Sequence[str], progress: Progress, limit_s: float = LIMIT_S) -> list[Row]:
-    """Drive rigs, one after the other; returns their rows, also written to ``out/wire.json``.
-
-    Parameters
-    ----------
-    names
-        Of `WIRED`.
-
-    Raises
-    ------
-    UsageError
-        If a name is none of them.
-    """
+    """Drive rigs, one after the other; returns their rows, also written to ``out/wire.json``."""
     for name in names:
         if name not in WIRED:
             raise UsageError(f"rig {name!r}: expected one of {', '.join(WIRED)}")
@@ -319,13 +277,7 @@ def run_wire(out: Path, seed: int, names: Sequence[str], progress: Progress, lim
 
 
 def read_rows(out: Path) -> list[Row]:
-    """Return the rows that an earlier run has left; none where there was none.
-
-    Raises
-    ------
-    UsageError
-        If they can't be read.
-    """
+    """Return the rows that an earlier run has left; none where there was none."""
     path = out / RESULTS
     if not path.exists():
         return []

@@ -42,13 +42,7 @@ class SealBroken(InputError):
 
 
 def canonical_json(value: object) -> bytes:
-    """Return one and the same bytes for equal JSON values.
-
-    Raises
-    ------
-    ValueError
-        If a number is NaN or infinite: JSON has none.
-    """
+    """Return one and the same bytes for equal JSON values."""
     text = json.dumps(value, sort_keys=True, separators=(",", ":"), ensure_ascii=True, allow_nan=False)
     return text.encode("ascii")
 
@@ -94,20 +88,7 @@ def seal(truth: Truth) -> Seal:
 
 
 def verify(commitment: str, opened: object) -> dict[str, object]:
-    """Return the truth of an opened seal after checking it against the commitment.
-
-    Parameters
-    ----------
-    commitment
-        As published before the verdict.
-    opened
-        What ``Seal.opened`` gave, as read back from JSON.
-
-    Raises
-    ------
-    SealBroken
-        Naming the entries that were changed, or that the seal is another one altogether.
-    """
+    """Return the truth of an opened seal after checking it against the commitment."""
     nonce, digests, truth = _fields(opened)
     got = _sha256(canonical_json(digests))
     if got != commitment:
@@ -152,13 +133,7 @@ def new_key() -> str:
 
 
 def parse_key(text: str) -> bytes:
-    """Read a key as it is printed.
-
-    Raises
-    ------
-    UsageError
-        If it is none.
-    """
+    """Read a key as it is printed."""
     try:
         key = bytes.fromhex(text.strip())
     except ValueError:
@@ -178,13 +153,7 @@ def lock(key: bytes, name: str, content: bytes) -> bytes:
 
 
 def unlock(key: bytes, name: str, path: Path) -> bytes:
-    """Decrypt a file that belongs to the case of a name.
-
-    Raises
-    ------
-    SealBroken
-        If it is not there, no sealed file, changed since it was sealed, or sealed with another key.
-    """
+    """Decrypt a file that belongs to the case of a name."""
     try:
         locked = path.read_bytes()
     except OSError as error:

@@ -64,22 +64,6 @@ class Challenge:
 
 
 def draw_challenge(seed: int, effect: str | None = None, faults: Sequence[str] = ()) -> Challenge:
-    """Draw a challenge.
-
-    Parameters
-    ----------
-    seed
-        What everything is drawn from, 0 or more.
-    effect
-        The effect to conceal in the driveline; None draws one of `CONCEALED`.
-    faults
-        What is wrong with inverters, PLC and bus, as ``hil sim --fault`` takes it.
-
-    Raises
-    ------
-    UsageError
-        If the effect is not registered.
-    """
     name = choose_effect(CONCEALED, seed) if effect is None else effect
     specimen = draw_specimen(name, seed)
     physics = specimen.physics(stream(seed, Stream.RECORDING))
@@ -107,13 +91,7 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def serve(challenge: Challenge, rig: Rig, bus_url: str, modbus: str, asked: TextIO, answers: TextIO) -> None:
-    """Serve a challenge until ``asked`` ends; see the module's text for what is read and written.
-
-    Raises
-    ------
-    UsageError, BusDown
-        If an address can't be served at.
-    """
+    """Serve a challenge until ``asked`` ends; see the module's text for what is read and written."""
     compile_truth(challenge)
     faults = rig_faults(challenge.faults, rig.period_s)
     address, seed = modbus_address(modbus), challenge.specimen.seed

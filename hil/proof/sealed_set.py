@@ -41,22 +41,7 @@ Digests = Mapping[str, str]
 
 
 def make(folder: Path, cases: int, seed: int, key: bytes, jobs: int, progress: Progress) -> None:
-    """Make and seal a set of cases; the folder appears when all of it is there.
-
-    Parameters
-    ----------
-    folder
-        Must not be there yet, or be empty.
-    seed
-        What everything is drawn from.
-    key
-        Of the sealed files.
-
-    Raises
-    ------
-    UsageError
-        If there is something in the folder already.
-    """
+    """Make and seal a set of cases; the folder appears when all of it is there."""
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise UsageError(f"{folder}: expected a folder that is not there yet or is empty. Choose another.")
     folder.parent.mkdir(parents=True, exist_ok=True)
@@ -102,15 +87,7 @@ def digest_of(listed: object) -> str:
 
 
 def require_unchanged(folder: Path, digests: Digests) -> None:
-    """See that files are those a list was made of.
-
-    Raises
-    ------
-    SealBroken
-        Naming the first that is missing or has changed.
-    UsageError
-        If one is a link that leads out of the folder.
-    """
+    """See that files are those a list was made of."""
     for name, digest in digests.items():
         path = place_in(folder, name)
         if not path.is_file():
@@ -128,13 +105,7 @@ class Shown:
 
 
 def read_commitments(folder: Path) -> dict[str, Shown]:
-    """Read the cases of a set by name.
-
-    Raises
-    ------
-    UsageError
-        If the folder has no set, or its list is damaged.
-    """
+    """Read the cases of a set by name."""
     path, advice = folder / COMMITMENTS, "hil prove make DIR makes one"
     listed = read_list(path, advice)
     for name, entry in listed.items():
@@ -144,13 +115,7 @@ def read_commitments(folder: Path) -> dict[str, Shown]:
 
 
 def read_list(path: Path, advice: str) -> dict[str, Any]:
-    """Read the entries of a list by case.
-
-    Raises
-    ------
-    UsageError
-        If there is none, it is damaged, or a name in it is more than that; with advice.
-    """
+    """Read the entries of a list by case."""
     cases = read_entries(path, SCHEMA, "cases", advice)
     if not isinstance(cases, dict):
         raise UsageError(f"{path}: expected an object of schema {SCHEMA} with cases; {advice}")
@@ -166,13 +131,7 @@ def write_list(path: Path, entries: Mapping[str, Any]) -> None:
 
 
 def place_in(folder: Path, *names: str) -> Path:
-    """Return the path of a file or folder of a set.
-
-    Raises
-    ------
-    UsageError
-        If it is a link, or behind one, that leads out of the folder.
-    """
+    """Return the path of a file or folder of a set."""
     path = folder.joinpath(*names)
     if not is_inside(folder, path):
         raise UsageError(f"{path}: expected a place inside {folder}, got a link that leads out of it. Remove it.")

@@ -31,19 +31,7 @@ def work_on(
     keep: Callable[[dict[str, Result]], object] = lambda done: None,
     said: str = "done",
 ) -> dict[str, Result]:
-    """Return the result of each name, in the order given; the first error ends what has not begun.
-
-    Parameters
-    ----------
-    jobs
-        How many at a time.
-    known
-        Results of an earlier run, which are not worked on again.
-    keep
-        Called with all results so far, whenever there is one more.
-    said
-        What has become of a name, for the progress.
-    """
+    """Return the result of each name, in the order given; the first error ends what has not begun."""
     done = {name: known[name] for name in names if name in known} if known else {}
     pool = ThreadPoolExecutor(jobs)
     try:
@@ -58,13 +46,7 @@ def work_on(
 
 
 def read_entries(path: Path, schema: str, key: str, advice: str) -> Any:
-    """Return what `write_entries` has written.
-
-    Raises
-    ------
-    UsageError
-        If there is none, or it is damaged; with advice.
-    """
+    """Return what `write_entries` has written."""
     try:
         content = read_json(path)
     except OSError as error:

@@ -94,13 +94,7 @@ def _disturbances(recordings: tuple[TruthRecording, ...]) -> list[list[float]]:
 
 
 def make_case(effect: str, seed: int, nominal_error: float = NOMINAL_ERROR) -> Case:
-    """Draw a bus, hide an effect in it, record it; see `draw_specimen`.
-
-    Raises
-    ------
-    UsageError
-        If an effect is not registered or two can't be in one bus, or the seed is negative.
-    """
+    """Draw a bus, hide an effect in it, record it; see `draw_specimen`."""
     specimen = draw_specimen(effect, seed, nominal_error)
     recordings = tuple(record(specimen, number) for number in range(2 * len(TESTS)))
     return Case(specimen, recordings[: len(TESTS)], recordings[len(TESTS) :])

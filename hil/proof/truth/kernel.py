@@ -119,19 +119,7 @@ def _filter_speed(state: FloatArray, p: Physics, h: float) -> None:
 
 @compiled
 def advance(state: FloatArray, p: Physics, command_nm: float, duration_s: float) -> None:
-    """Move the state on by ``duration_s`` under a constant torque command.
-
-    Parameters
-    ----------
-    state : ndarray, shape (STATES,)
-        In the order of `State`; changed in place.
-    p : Physics
-        The driveline.
-    command_nm : float
-        Torque that reaches the current loops, both inverters together [Nm].
-    duration_s : float
-        Time to continue by [s]; divided into equal steps of at most `MAX_STEP_S`.
-    """
+    """Move the state on by ``duration_s`` under a constant torque command."""
     steps = math.ceil(duration_s / MAX_STEP_S - 1e-9)
     if steps < 1:
         return

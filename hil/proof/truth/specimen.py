@@ -43,13 +43,7 @@ PAIR_SIGN = "+"
 
 
 def find(names: str) -> tuple[HiddenEffect, ...]:
-    """Return the effects of a name or of several joined by ``+`` (``backlash+road_grade``).
-
-    Raises
-    ------
-    UsageError
-        If one of them is not registered.
-    """
+    """Return the effects of a name or of several joined by ``+`` (``backlash+road_grade``)."""
     wanted = names.split(PAIR_SIGN)
     for name in wanted:
         if name not in EFFECTS:
@@ -71,13 +65,7 @@ class Stream(IntEnum):
 
 
 def stream(seed: int, purpose: Stream, *key: int) -> np.random.Generator:
-    """Return the generator for one purpose of one seed.
-
-    Raises
-    ------
-    UsageError
-        If the seed is negative.
-    """
+    """Return the generator for one purpose of one seed."""
     if seed < 0:
         raise UsageError(f"seed: expected 0 or greater, got {seed}")
     return np.random.default_rng([seed, purpose, *key])
@@ -153,22 +141,7 @@ class Specimen:
 
 
 def draw_specimen(effect: str, seed: int, nominal_error: float = NOMINAL_ERROR) -> Specimen:
-    """Draw a bus and hide an effect in it.
-
-    Parameters
-    ----------
-    effect
-        Name, or names joined by ``+``.
-    seed
-        What everything is drawn from, 0 or more.
-    nominal_error
-        Share by which each nominal value is off at most; 0 for a data sheet that is right.
-
-    Raises
-    ------
-    UsageError
-        If an effect is not registered or two can't be in one bus, or the seed is negative.
-    """
+    """Draw a bus and hide an effect in it."""
     bus = draw_bus(stream(seed, Stream.BUS))
     specimen = Specimen(
         effect=effect,
