@@ -64,6 +64,7 @@ class Challenge:
 
 
 def draw_challenge(seed: int, effect: str | None = None, faults: Sequence[str] = ()) -> Challenge:
+    """Draw a challenge; without an effect one of `CONCEALED` is drawn."""
     name = choose_effect(CONCEALED, seed) if effect is None else effect
     specimen = draw_specimen(name, seed)
     physics = specimen.physics(stream(seed, Stream.RECORDING))

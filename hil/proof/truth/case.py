@@ -7,9 +7,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from hil.proof.truth.bus import NOMINAL_ERROR
+from hil.proof.truth.bus import NOMINAL_ERROR, PERIOD_S, Plan, Test, draw_plan, sample_times_s
 from hil.proof.truth.driveline import TruthDriveline, bring_to_speed, observed
-from hil.proof.truth.experiments import PERIOD_S, Plan, Test, draw_plan, sample_times_s
 from hil.proof.truth.hidden import Interval
 from hil.proof.truth.physics import FloatArray, Physics, State
 from hil.proof.truth.recording import (

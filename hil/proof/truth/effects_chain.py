@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -13,16 +14,25 @@ from hil.proof.truth.hidden import (
     Place,
     Sizes,
     corrupts,
-    either,
+    draws,
+    log,
     log_uniform,
     sets,
-    size,
+    signed,
     then,
+    uniform,
     unless_zero,
 )
 from hil.proof.truth.physics import Physics
 
 FULL_TURN_RAD = 2.0 * np.pi
+
+_acquisition = partial(HiddenEffect, place=Place.ACQUISITION)
+_load = partial(HiddenEffect, place=Place.LOAD)
+_motor = partial(HiddenEffect, place=Place.MOTOR)
+_shaft = partial(HiddenEffect, place=Place.SHAFT)
+_speed_sensor = partial(HiddenEffect, place=Place.SPEED_SENSOR)
+_torque_path = partial(HiddenEffect, place=Place.TORQUE_PATH)
 
 LIMITS_NM = {("m1",): (180.0, 310.0), ("m2",): (130.0, 220.0), ("m1", "m2"): (150.0, 280.0), ("sum",): (300.0, 480.0)}
 """What is limited, and to what: where the strongest of the three tests asks for somewhat more."""
@@ -73,19 +83,12 @@ def _draw_saturation(rng: np.random.Generator, bus: Bus) -> Sizes:
     return {"saturating_nm": positive, "saturating_back_nm": negative}
 
 
-def _draw_bias(rng: np.random.Generator, bus: Bus) -> Sizes:
-    return {"bias_nm": either(rng, log_uniform(rng, 6.0, 40.0)), "bias_half_s": rng.uniform(3.0, 15.0)}
-
-
 TORQUE_PATH = (
     # Current sensor, magnet temperature of one inverter.
-    HiddenEffect(
-        "inverter_gain_mismatch", Place.TORQUE_PATH, _draw_gain, sets("gain_m1"), fitted={"gain_m1": "gain_m1"}
-    ),
+    _torque_path("inverter_gain_mismatch", _draw_gain, sets("gain_m1"), fitted={"gain_m1": "gain_m1"}),
     # As magnets and current sensors warm up: exponentially, or evenly, which has no depth. Recordings begin cold.
-    HiddenEffect(
+    _torque_path(
         "torque_derating",
-        Place.TORQUE_PATH,
         _draw_derating,
         sets(derating="loss", derating_time_s="time_constant_s"),
         fitted={
@@ -94,9 +97,8 @@ TORQUE_PATH = (
         },
     ),
     # Voltage or temperature limits the torque, in a knee; the reading, a model inside the inverter, continues.
-    HiddenEffect(
+    _torque_path(
         "torque_saturation",
-        Place.TORQUE_PATH,
         _draw_limits,
         sets("limit_m1_nm", "limit_m2_nm", "limit_total_nm", limit_knee="knee"),
         fitted={
@@ -106,25 +108,17 @@ TORQUE_PATH = (
         },
     ),
     # Current loops of both inverters that are slower than the model thinks.
-    HiddenEffect(
+    _torque_path(
         "actuator_lag",
-        Place.TORQUE_PATH,
-        size("current_loop_time_s", 0.002, 0.025),
+        draws(current_loop_time_s=log(0.002, 0.025)),
         sets("current_loop_time_s"),
         fitted={"time_constant_s": "current_loop_time_s"},
     ),
     # A fixed time after its reading; any fraction of a sample.
-    HiddenEffect(
-        "transport_delay",
-        Place.TORQUE_PATH,
-        size("delay_s", 0.002, 0.04),
-        sets("delay_s"),
-        fitted={"delay_s": "delay_s"},
-    ),
+    _torque_path("transport_delay", draws(delay_s=log(0.002, 0.04)), sets("delay_s"), fitted={"delay_s": "delay_s"}),
     # Cogging is there without torque, ripple of the currents grows with it. Recordings begin at different angles.
-    HiddenEffect(
+    _torque_path(
         "torque_ripple",
-        Place.TORQUE_PATH,
         _draw_ripple,
         then(
             sets("ripple_nm", ripple_share="ripple_over_torque", ripple_order="order"),
@@ -139,11 +133,11 @@ TORQUE_PATH = (
 
 FURTHER = (
     # The machine saturates: its torque grows less than the current, of one sign more than of the other or of both.
-    HiddenEffect(
-        "torque_nonlinearity", Place.TORQUE_PATH, _draw_saturation, sets("saturating_nm", "saturating_back_nm")
-    ),
+    _torque_path("torque_nonlinearity", _draw_saturation, sets("saturating_nm", "saturating_back_nm")),
     # An offset of the reading that drifts away from the start on, as a current sensor warms.
-    HiddenEffect("torque_bias", Place.TORQUE_PATH, _draw_bias, sets("bias_nm", "bias_half_s")),
+    _torque_path(
+        "torque_bias", draws(bias_nm=signed(6.0, 40.0), bias_half_s=uniform(3.0, 15.0)), sets("bias_nm", "bias_half_s")
+    ),
 )
 """What the catalogue got later: the order of all effects is what seeds count by."""
 
@@ -186,33 +180,29 @@ def _draw_grid(rng: np.random.Generator, bus: Bus) -> Sizes:
 
 SPEED_SENSOR = (
     # An angle that is off once (eccentricity) and twice (gain) per turn; recordings begin at different angles.
-    HiddenEffect(
+    _speed_sensor(
         "resolver_error",
-        Place.SPEED_SENSOR,
         _draw_resolver,
         _misread,
         fitted={"once_rad": "resolver_once_rad", "twice_rad": "resolver_twice_rad"},
         unscaled=("resolver_once_phase_rad", "resolver_twice_phase_rad"),
     ),
     # A digital filter of first or second order at the inverter's cycle of 0.1 ms.
-    HiddenEffect(
+    _speed_sensor(
         "speed_filter",
-        Place.SPEED_SENSOR,
         _draw_filter,
         sets(filter_time_s="time_constant_s", filter_rad_s="corner_rad_s", filter_damping="damping"),
         fitted={"time_constant_s": unless_zero("time_constant_s")},
     ),
     # The sensor counts pulses: the magnitude of the speed is read.
-    HiddenEffect(
+    _speed_sensor(
         "speed_sign_blind",
-        Place.SPEED_SENSOR,
         lambda rng, bus: {},
         corrupt=lambda acquisition, sizes: replace(acquisition, sign_blind=True),
     ),
     # Of few digits, or made of few encoder counts.
-    HiddenEffect(
+    _speed_sensor(
         "speed_quantisation",
-        Place.SPEED_SENSOR,
         _draw_grid,
         corrupt=corrupts("grid_rad_s", "count_rad", "count_time_s"),
         fitted={
@@ -266,17 +256,15 @@ def _draw_jitter(rng: np.random.Generator, bus: Bus) -> Sizes:
 ACQUISITION = (
     # The previous value once more, of the speed or of the whole row; at random, or in a fixed beat of two clocks. Of
     # random ones each recording has a share of its own.
-    HiddenEffect(
+    _acquisition(
         "stale_samples",
-        Place.ACQUISITION,
         _draw_stale,
         corrupt=corrupts(stale_share="share", stale_most="most", stale_every="every", stale_rows="whole_rows"),
         fitted={"share": lambda sizes, bus: 1.0 / sizes["every"] if sizes["every"] else None},
     ),
     # NaN and a flag in their row, or a 0 that nobody flagged; single ones, or bursts.
-    HiddenEffect(
+    _acquisition(
         "lost_samples",
-        Place.ACQUISITION,
         _draw_lost,
         corrupt=corrupts(
             lost_share="share", lost_most="most", lost_m1="m1", lost_m2="m2", lost_speed="speed", lost_as_zero="as_zero"
@@ -284,18 +272,16 @@ ACQUISITION = (
     ),
     # Speeds sampled too early or too late; ``time_s`` has the nominal time, or the true one. Root mean square of a
     # uniform deviation over its greatest: 1 / sqrt(3).
-    HiddenEffect(
+    _acquisition(
         "sample_jitter",
-        Place.ACQUISITION,
         _draw_jitter,
         corrupt=corrupts("jitter_s", "stamps_told"),
         fitted={"jitter_s": lambda sizes, bus: sizes["jitter_s"] / math.sqrt(3.0)},
     ),
     # Inverter and speed sensor have clocks of their own: rows pair what is ever further from each other.
-    HiddenEffect(
+    _acquisition(
         "clock_drift",
-        Place.ACQUISITION,
-        lambda rng, bus: {"clock_error": either(rng, log_uniform(rng, 60e-6, 3000e-6))},
+        draws(clock_error=signed(60e-6, 3000e-6)),
         corrupt=corrupts("clock_error"),
         fitted={"rate": "clock_error"},
     ),
@@ -314,61 +300,42 @@ def _corrugate(physics: Physics, sizes: Sizes, rng: np.random.Generator) -> Phys
 
 OUTSIDE = (
     # Dead time of the inverters: a small torque does not come at all, a large one falls short.
-    HiddenEffect(
-        "torque_deadband", Place.TORQUE_PATH, size("deadband_nm", 4.0, 25.0), sets("deadband_nm"), catalogued=False
-    ),
+    _torque_path("torque_deadband", draws(deadband_nm=log(4.0, 25.0)), sets("deadband_nm"), catalogued=False),
     # An inverter that changes its torque no faster than so much in a second; its reading is the demand.
-    HiddenEffect(
-        "torque_slew", Place.TORQUE_PATH, size("slew_nm_s", 2500.0, 12000.0), sets("slew_nm_s"), catalogued=False
-    ),
+    _torque_path("torque_slew", draws(slew_nm_s=log(2500.0, 12000.0)), sets("slew_nm_s"), catalogued=False),
     # Protection that blocks both inverters for an instant again and again, unseen by their reading.
-    HiddenEffect(
+    _torque_path(
         "torque_dropouts",
-        Place.TORQUE_PATH,
-        lambda rng, bus: {"dropout_every_s": rng.uniform(0.7, 3.0), "dropout_s": log_uniform(rng, 0.015, 0.06)},
+        draws(dropout_every_s=uniform(0.7, 3.0), dropout_s=log(0.015, 0.06)),
         sets("dropout_every_s", "dropout_s"),
         catalogued=False,
     ),
     # Oil that the rotor draws along the faster it turns.
-    HiddenEffect(
+    _motor(
         "inertia_by_speed",
-        Place.MOTOR,
-        lambda rng, bus: {"drawn_share": log_uniform(rng, 0.08, 0.3), "drawn_half_rad_s": rng.uniform(10.0, 30.0)},
+        draws(drawn_share=log(0.08, 0.3), drawn_half_rad_s=uniform(10.0, 30.0)),
         sets("drawn_share", "drawn_half_rad_s"),
         catalogued=False,
     ),
     # Stiffer or softer at speed: centrifugal force in the couplings.
-    HiddenEffect(
+    _shaft(
         "speed_stiffened_shaft",
-        Place.SHAFT,
-        lambda rng, bus: {
-            "stiffness_share": either(rng, log_uniform(rng, 0.03, 0.3)),
-            "half_speed_rad_s": rng.uniform(20.0, 45.0),
-        },
+        draws(stiffness_share=signed(0.03, 0.3), half_speed_rad_s=uniform(20.0, 45.0)),
         sets(stiffness_speed_share="stiffness_share", stiffness_speed_rad_s="half_speed_rad_s"),
         catalogued=False,
     ),
     # A washboard road: too fast for a grade, and no whole number of waves meets a turn of wheel or motor.
-    HiddenEffect(
-        "corrugated_road",
-        Place.LOAD,
-        lambda rng, bus: {"wave_m": rng.uniform(*WAVE_M), "load_torque_nm": log_uniform(rng, 10.0, 80.0)},
-        _corrugate,
-        catalogued=False,
+    _load(
+        "corrugated_road", draws(wave_m=uniform(*WAVE_M), load_torque_nm=log(10.0, 80.0)), _corrugate, catalogued=False
     ),
     # A gain that falls with the speed: a demodulator near its end of range.
-    HiddenEffect(
-        "sensor_curvature",
-        Place.SPEED_SENSOR,
-        lambda rng, bus: {"curvature": either(rng, log_uniform(rng, 0.02, 0.15))},
-        corrupt=corrupts("curvature"),
-        catalogued=False,
+    _speed_sensor(
+        "sensor_curvature", draws(curvature=signed(0.02, 0.15)), corrupt=corrupts("curvature"), catalogued=False
     ),
     # Wrong bits on the way: single speeds that are off by far.
-    HiddenEffect(
+    _acquisition(
         "speed_spikes",
-        Place.ACQUISITION,
-        lambda rng, bus: {"spike_share": log_uniform(rng, 0.002, 0.02), "spike_rad_s": log_uniform(rng, 1.5, 8.0)},
+        draws(spike_share=log(0.002, 0.02), spike_rad_s=log(1.5, 8.0)),
         corrupt=corrupts("spike_share", "spike_rad_s"),
         catalogued=False,
     ),

@@ -4,27 +4,33 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from functools import partial
 
 import numpy as np
 
-from hil.proof.truth.bus import Bus
-from hil.proof.truth.experiments import DURATION_S
+from hil.proof.truth.bus import DURATION_S, Bus
 from hil.proof.truth.hidden import (
     HiddenEffect,
     Place,
     Sizes,
     draw_absence,
     draw_presence,
+    draws,
     either,
+    log,
     log_uniform,
     sets,
-    size,
     then,
+    uniform,
 )
 from hil.proof.truth.laws import TYRE_SHAPE
 from hil.proof.truth.physics import ELEMENTS, FloatArray, Physics
 
 FULL_TURN_RAD = 2.0 * np.pi
+
+_load = partial(HiddenEffect, place=Place.LOAD)
+_motor = partial(HiddenEffect, place=Place.MOTOR)
+_shaft = partial(HiddenEffect, place=Place.SHAFT)
 
 
 def _draw_stribeck(rng: np.random.Generator, bus: Bus) -> Sizes:
@@ -58,14 +64,6 @@ def _couple(physics: Physics, sizes: Sizes, rng: np.random.Generator) -> Physics
     )
 
 
-def _draw_eddy(rng: np.random.Generator, bus: Bus) -> Sizes:
-    return {
-        "eddy_nm": log_uniform(rng, 10.0, 60.0),
-        "eddy_speed_rad_s": log_uniform(rng, 8.0, 25.0),
-        "eddy_exponent": rng.uniform(0.88, 1.0),
-    }
-
-
 def _draw_asymmetric(rng: np.random.Generator, bus: Bus) -> Sizes:
     more = either(rng, log_uniform(rng, 0.15, 1.0))
     return {"viscous_forward_nm_s": more, "dry_forward_nm": 5.0 * more}
@@ -73,17 +71,15 @@ def _draw_asymmetric(rng: np.random.Generator, bus: Bus) -> Sizes:
 
 MOTOR = (
     # Dry friction that is the same at every speed: bearings, seals, an oil pump's preload.
-    HiddenEffect(
+    _motor(
         "coulomb_friction_motor",
-        Place.MOTOR,
-        size("coulomb_nm", 8.0, 40.0),
+        draws(coulomb_nm=log(8.0, 40.0)),
         sets(friction_motor_nm="coulomb_nm"),
         fitted={"friction_nm": "coulomb_nm"},
     ),
     # Dry friction that is higher near standstill than while sliding.
-    HiddenEffect(
+    _motor(
         "stribeck_friction",
-        Place.MOTOR,
         _draw_stribeck,
         sets("stribeck_speed_rad_s", friction_motor_nm="coulomb_nm", breakaway_motor_nm="breakaway_nm"),
         fitted={
@@ -93,17 +89,15 @@ MOTOR = (
         },
     ),
     # A fan, churned oil.
-    HiddenEffect(
+    _motor(
         "quadratic_friction",
-        Place.MOTOR,
-        size("drag_nm_s2", 0.02, 0.08),
+        draws(drag_nm_s2=log(0.02, 0.08)),
         sets(quadratic_motor="drag_nm_s2"),
         fitted={"quadratic_nm_s2": "drag_nm_s2"},
     ),
     # The generator runs nearly at the motor's speed beforehand; the closing clutch slips until both are one.
-    HiddenEffect(
+    _motor(
         "generator_coupled",
-        Place.MOTOR,
         _draw_generator,
         _couple,
         when=lambda physics: (physics.clutch_from_s, physics.clutch_to_s),
@@ -135,10 +129,6 @@ def _draw_step(rng: np.random.Generator, bus: Bus) -> Sizes:
         "rise_s": log_uniform(rng, 0.01, 0.1),
         **draw_presence(rng),
     }
-
-
-def _draw_hysteresis(rng: np.random.Generator, bus: Bus) -> Sizes:
-    return {"sliding_share": log_uniform(rng, 0.04, 0.25), "slip_rad": log_uniform(rng, 0.01, 0.06)}
 
 
 def _slide(physics: Physics, sizes: Sizes, rng: np.random.Generator) -> Physics:
@@ -179,46 +169,41 @@ def _draw_gear_losses(rng: np.random.Generator, bus: Bus) -> Sizes:
 
 SHAFT = (
     # Free play in the line: gear teeth, splines, worn joints.
-    HiddenEffect("backlash", Place.SHAFT, size("gap_rad", 0.004, 0.04), sets("gap_rad"), fitted={"gap_rad": "gap_rad"}),
+    _shaft("backlash", draws(gap_rad=log(0.004, 0.04)), sets("gap_rad"), fitted={"gap_rad": "gap_rad"}),
     # Hardens or softens with twist; rubber couplings do both.
-    HiddenEffect(
+    _shaft(
         "stiffness_nonlinearity",
-        Place.SHAFT,
         _draw_nonlinearity,
         sets("hardening_twist_rad", "softening_twist_rad"),
         fitted={"hardening_per_rad2": _hardening},
     ),
     # A crack, or a joint that settles: changed from a moment on.
-    HiddenEffect(
+    _shaft(
         "stiffness_change",
-        Place.SHAFT,
         _draw_step,
         then(sets("stiffness_step", stiffness_step_rise_s="rise_s"), "stiffness_step_at_s", 5.0, 25.0),
         when=lambda physics: (physics.stiffness_step_at_s, DURATION_S),
         fitted={"change": "stiffness_step"},
     ),
     # Splines, layered couplings: part of the stiffness slides away with the twist.
-    HiddenEffect(
+    _shaft(
         "shaft_hysteresis",
-        Place.SHAFT,
-        _draw_hysteresis,
+        draws(sliding_share=log(0.04, 0.25), slip_rad=log(0.01, 0.06)),
         _slide,
         fitted={"friction_nm": _sliding_friction},
         unscaled=("slip_rad",),
     ),
     # The shaft behind a bent joint leads and lags twice per turn; each recording begins at another angle. Its size in
     # the catalogue is the second harmonic of the lead: the square of the tangent of half the bend.
-    HiddenEffect(
+    _shaft(
         "cardan_second_order",
-        Place.SHAFT,
-        size("joint_angle_rad", 0.08, 0.25),
+        draws(joint_angle_rad=log(0.08, 0.25)),
         then(sets("joint_angle_rad"), "joint_phase_rad", 0.0, np.pi),
         fitted={"angle_rad": lambda sizes, bus: math.tan(0.5 * sizes["joint_angle_rad"]) ** 2},
     ),
     # A gearbox behind the motor, or an axle before the wheels, on top of the data sheet's inertias: 15 to 50 Hz.
-    HiddenEffect(
+    _shaft(
         "extra_torsional_mode",
-        Place.SHAFT,
         _draw_mode,
         sets(
             extra_at_motor="at_motor",
@@ -258,15 +243,6 @@ def _brake(physics: Physics, sizes: Sizes, rng: np.random.Generator) -> Physics:
     return physics._replace(brake_nm=sizes["brake_nm"], brake_from_s=from_s, brake_to_s=from_s + rng.uniform(5.0, 12.0))
 
 
-def _draw_tyre(rng: np.random.Generator, bus: Bus) -> Sizes:
-    return {
-        "wheel_inertia_kg_m2": rng.uniform(1.5, 5.0),
-        "slip_stiffness_nm": log_uniform(rng, 4e4, 3e5),
-        "grip_nm": log_uniform(rng, 1500.0, 6000.0),
-        "relaxation_m": rng.uniform(0.15, 0.5),
-    }
-
-
 def _slip(physics: Physics, sizes: Sizes, rng: np.random.Generator) -> Physics:
     return physics._replace(
         wheel_inertia=sizes["wheel_inertia_kg_m2"],
@@ -295,27 +271,24 @@ def _draw_warming(rng: np.random.Generator, bus: Bus) -> Sizes:
 
 LOAD = (
     # Dragging pads, wheel bearings, axle seals.
-    HiddenEffect(
+    _load(
         "coulomb_friction_load",
-        Place.LOAD,
-        size("coulomb_nm", 7.0, 35.0),
+        draws(coulomb_nm=log(7.0, 35.0)),
         sets(friction_load_nm="coulomb_nm"),
         fitted={"friction_nm": "coulomb_nm"},
     ),
     # Air drag, with a head wind or a roof load.
-    HiddenEffect(
+    _load(
         "aerodynamic_drag",
-        Place.LOAD,
-        size("drag_nm_s2", 0.02, 0.08),
+        draws(drag_nm_s2=log(0.02, 0.08)),
         sets(quadratic_load="drag_nm_s2"),
         fitted={"drag_nm_s2": "drag_nm_s2"},
     ),
     # The road's height over the distance driven, as a sum of waves; gravity does the rest.
-    HiddenEffect("road_grade", Place.LOAD, size("slope_rms", 0.003, 0.01), _lay_road),
+    _load("road_grade", draws(slope_rms=log(0.003, 0.01)), _lay_road),
     # Drags for some seconds in the middle of a recording.
-    HiddenEffect(
+    _load(
         "brake_drag",
-        Place.LOAD,
         _draw_brake,
         _brake,
         when=lambda physics: (physics.brake_from_s, physics.brake_to_s),
@@ -323,10 +296,14 @@ LOAD = (
     ),
     # Only the wheels turn with the shaft, the vehicle follows through the contact patch. The catalogue's G tanh(x / G)
     # levels off as D sin(C atan(x / (C D))) does where their terms in x^3 agree.
-    HiddenEffect(
+    _load(
         "tyre_slip",
-        Place.LOAD,
-        _draw_tyre,
+        draws(
+            wheel_inertia_kg_m2=uniform(1.5, 5.0),
+            slip_stiffness_nm=log(4e4, 3e5),
+            grip_nm=log(1500.0, 6000.0),
+            relaxation_m=uniform(0.15, 0.5),
+        ),
         _slip,
         fitted={
             "slip_per_nm": lambda sizes, bus: 1.0 / sizes["slip_stiffness_nm"],
@@ -336,55 +313,49 @@ LOAD = (
         },
     ),
     # A heavy or an oval wheel, once and twice per wheel turn; each recording begins at another angle.
-    HiddenEffect(
+    _load(
         "load_imbalance",
-        Place.LOAD,
         _draw_imbalance,
         then(sets("imbalance_nm", "imbalance_twice_nm"), "imbalance_phase_rad", 0.0, FULL_TURN_RAD),
         fitted={"amplitude_nm": "imbalance_nm"},
     ),
     # Sand or water runs out, or comes from a vehicle alongside, at the bus's speed: the speed continues without a step
     # and the constant load torque stays.
-    HiddenEffect(
+    _load(
         "inertia_change",
-        Place.LOAD,
         _draw_payload,
         then(sets("payload_share", payload_rise_s="rise_s"), "payload_at_s", 6.0, 22.0),
         when=lambda physics: (physics.payload_at_s, DURATION_S),
         fitted={"change_kg_m2": lambda sizes, bus: sizes["payload_share"] * bus["J_L"]},
     ),
     # Axle oil that is thick when cold; every recording begins cold.
-    HiddenEffect("warming_friction", Place.LOAD, _draw_warming, sets("cold_factor", "warming_time_s")),
+    _load("warming_friction", _draw_warming, sets("cold_factor", "warming_time_s")),
 )
 
 FURTHER = (
     # A shorted turn: greatest at one speed. Currents keep to the surface at speed (Davies, 1963).
-    HiddenEffect(
+    _motor(
         "eddy_drag",
-        Place.MOTOR,
-        _draw_eddy,
+        draws(eddy_nm=log(10.0, 60.0), eddy_speed_rad_s=log(8.0, 25.0), eddy_exponent=uniform(0.88, 1.0)),
         sets("eddy_nm", "eddy_speed_rad_s", "eddy_exponent"),
         fitted={"peak_nm": "eddy_nm", "peak_rad_s": "eddy_speed_rad_s"},
     ),
     # Rubber adds branches that relax, one slow and a smaller one fast (a Prony series).
-    HiddenEffect(
+    _shaft(
         "viscoelastic_shaft",
-        Place.SHAFT,
         _draw_viscoelastic,
         sets("maxwell_time_s", "maxwell_fast_share", maxwell_stiffness="maxwell_stiffness_nm_per_rad"),
     ),
     # A helical gear that runs up against its seal: its dry part differs as well as its viscous one.
-    HiddenEffect(
+    _motor(
         "asymmetric_friction",
-        Place.MOTOR,
         _draw_asymmetric,
         sets("dry_forward_nm", viscous_forward="viscous_forward_nm_s"),
         fitted={"difference_nm_s": "viscous_forward_nm_s"},
     ),
     # A share of the power transmitted, and more of it when the load drives them.
-    HiddenEffect(
+    _shaft(
         "gear_losses",
-        Place.SHAFT,
         _draw_gear_losses,
         sets("efficiency", "efficiency_back"),
         fitted={"driving_share": lambda sizes, bus: 1.0 - sizes["efficiency"]},

@@ -62,8 +62,6 @@ class HiddenEffect:
     ----------
     name : str
         As in the contract's catalogue, or a name of its own outside it.
-    place : Place
-        The element it belongs to.
     draw : callable
         Generator and bus to sizes; they hold for all recordings of the bus.
     apply : callable
@@ -78,18 +76,20 @@ class HiddenEffect:
         is missing has no counterpart: the truth's formulation is another one.
     unscaled : tuple of str
         Sizes that stay as they are where the effect is made smaller: they say of what kind it is, not how much.
+    place : Place
+        The element it belongs to.
     catalogued : bool
         False for what no entry of the contract's catalogue describes: a tool can only abstain.
     """
 
     name: str
-    place: Place
     draw: Draw
     apply: Apply = same_physics
     corrupt: Corrupt = same_recording
     when: When | None = None
     fitted: Mapping[str, str | Convert] = field(default_factory=dict)
     unscaled: tuple[str, ...] = ()
+    place: Place = Place.NOWHERE
     catalogued: bool = True
 
     def happens_in(self, test: int, sizes: Sizes) -> bool:
@@ -148,9 +148,22 @@ def log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
     return float(np.exp(rng.uniform(np.log(low), np.log(high))))
 
 
-def size(name: str, low: float, high: float) -> Draw:
-    """Return the draw of an effect with one size."""
-    return lambda rng, bus: {name: log_uniform(rng, low, high)}
+def log(low: float, high: float) -> Callable[[np.random.Generator], float]:
+    return lambda rng: log_uniform(rng, low, high)
+
+
+def uniform(low: float, high: float) -> Callable[[np.random.Generator], float]:
+    return lambda rng: rng.uniform(low, high)
+
+
+def signed(low: float, high: float) -> Callable[[np.random.Generator], float]:
+    """Return the draw of a size of either sign."""
+    return lambda rng: either(rng, log_uniform(rng, low, high))
+
+
+def draws(**sizes: Callable[[np.random.Generator], float]) -> Draw:
+    """Return the draw of sizes that do not depend on each other."""
+    return lambda rng, bus: {name: draw(rng) for name, draw in sizes.items()}
 
 
 def draw_absence(rng: np.random.Generator) -> Sizes:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from hil.proof.truth.experiments import PERIOD_S
+from hil.proof.truth.bus import PERIOD_S
 from hil.proof.truth.physics import FloatArray
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from hil.errors import UsageError
 from hil.proof.truth import effects_chain, effects_line
 from hil.proof.truth.bus import NOMINAL_ERROR, Bus, draw_bus, draw_nominal
-from hil.proof.truth.hidden import HiddenEffect, Interval, Place, Sizes
+from hil.proof.truth.hidden import HiddenEffect, Interval, Sizes
 from hil.proof.truth.physics import Physics
 from hil.proof.truth.recording import FAULTLESS, Acquisition
 
@@ -25,7 +25,7 @@ NOTHING = "none"
 EFFECTS: Mapping[str, HiddenEffect] = {
     effect.name: effect
     for effect in (
-        HiddenEffect(NOTHING, Place.NOWHERE, lambda rng, bus: {}),
+        HiddenEffect(NOTHING, lambda rng, bus: {}),
         *effects_chain.TORQUE_PATH,
         *effects_line.MOTOR,
         *effects_line.SHAFT,
