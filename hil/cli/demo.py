@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from estimator.diagnosis.result import Diagnosis
     from hil.config.rig_file import Rig
     from hil.proof.judge import Judgement
-    from hil.proof.wire.sealed_process import SealedProcess
+    from hil.proof.rigs import SealedProcess
     from hil.rig.check import Finding
 
 SEEDS = 1_000_000
@@ -68,8 +68,8 @@ class _Demo:
         self._rig_path = workshop / "rig.toml"
 
     def run(self) -> None:
+        from hil.proof.rigs import sealed_process
         from hil.proof.seal import verify
-        from hil.proof.wire.sealed_process import sealed_process
 
         self._say(f"1/6 a bus with a concealed effect is drawn from seed {self._seed}, in a process of its own")
         with sealed_process("--seed", str(self._seed), "--model", str(self._nominal)) as sealed:
@@ -94,7 +94,7 @@ class _Demo:
     def _rig(self, sealed: SealedProcess) -> Rig:
         """Write the rig file with the addresses of this run, and read it as any command would."""
         from hil.config.rig_file import read_rig
-        from hil.proof.wire.rig_text import rig_text
+        from hil.proof.rigs import rig_text
 
         self._rig_path.write_text(rig_text(sealed), encoding="utf-8")
         return read_rig(self._rig_path)
@@ -175,8 +175,7 @@ class _Demo:
         return verdict
 
     def _judge(self, verdict: dict[str, Any], truth: dict[str, object], opened: object, commitment: str) -> None:
-        from hil.proof.judge import judge
-        from hil.proof.judgement_text import judgement_text
+        from hil.proof.judge import judge, judgement_text
         from hil.report.outputs import publish
 
         judgement = judge(verdict, truth)

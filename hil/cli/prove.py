@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import secrets
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 if TYPE_CHECKING:
-    from hil.proof.prove.make import Progress
+    from hil.proof.work import Progress
 
 SEEDS = 2**31
 RIG_SEED = 11
@@ -72,8 +72,8 @@ def make(
     key_file: KeyFile = None,
 ) -> None:
     """Draw, record and seal a set of cases. Prints the key, or writes it to FILE."""
-    from hil.proof.prove.make import make as make_set
-    from hil.proof.prove.vault import new_key, parse_key
+    from hil.proof.seal import new_key, parse_key
+    from hil.proof.sealed_set import make as make_set
     from hil.report.outputs import require_folder
 
     require_folder(folder)
@@ -96,7 +96,7 @@ def make(
 @app.command(epilog="Example: hil prove run proof")
 def run(folder: Folder, jobs: Jobs = 2) -> None:
     """Let the public command answer every case; it sees only DIR/cases, one case at a time."""
-    from hil.proof.prove.answer import answer
+    from hil.proof.answers import answer
 
     with _progress() as progress:
         digest = answer(folder, jobs, progress)
@@ -114,11 +114,12 @@ def open_(
     jobs: Jobs = 2,
 ) -> None:
     """Open the seals, check that nothing was changed, score the verdicts; writes DIR/scoreboard.html and .json."""
-    from hil.proof.prove.judge_set import judge_set
-    from hil.proof.prove.manifest import CASES
-    from hil.proof.prove.scoreboard import PAGE, REAL, WIRE, Board, scoreboard_files
-    from hil.proof.prove.vault import parse_key
-    from hil.proof.wire.run import read_rows
+    from hil.proof.answers import judge_set
+    from hil.proof.real import read_real
+    from hil.proof.rigs import read_rows
+    from hil.proof.scoreboard import PAGE, REAL, WIRE, Board, scoreboard_files
+    from hil.proof.seal import parse_key
+    from hil.proof.sealed_set import CASES
     from hil.provenance import provenance
     from hil.report.outputs import publish
 
@@ -127,7 +128,7 @@ def open_(
         rows = judge_set(folder, secret, jobs, progress, verdicts)
     shown = folder / CASES
     made = provenance(sorted(shown.rglob("*.toml")), sorted(shown.rglob("*.csv")))
-    publish(folder, scoreboard_files(Board(rows, read_rows(folder / WIRE), _real_cases(folder / REAL), made)))
+    publish(folder, scoreboard_files(Board(rows, read_rows(folder / WIRE), read_real(folder / REAL), made)))
     for row in rows:
         if not row["success"]:
             found = row["fault"] or ", ".join(row.get("named", ())) or row.get("verdict")
@@ -143,9 +144,8 @@ def wire(
     seed: Annotated[int, typer.Option(min=0, help="Seed of buses and sizes.")] = RIG_SEED,
 ) -> None:
     """Drive rigs with something concealed in their slaves, over CANopen and Modbus; writes DIR/wire/wire.json."""
-    from hil.proof.prove.scoreboard import WIRE
-    from hil.proof.wire.concealed import WIRED
-    from hil.proof.wire.run import run_wire
+    from hil.proof.rigs import WIRED, run_wire
+    from hil.proof.scoreboard import WIRE
 
     with _progress() as progress:
         rows = run_wire(folder / WIRE, seed, only or list(WIRED), progress)
@@ -163,33 +163,13 @@ def real(
     jobs: Jobs = 1,
 ) -> None:
     """Conceal what is known of real recordings, diagnose, compare; writes DIR/real/real.json."""
-    from hil.proof.prove.scoreboard import REAL
-    from hil.proof.real.run import run_real
+    from hil.proof.real import run_real
+    from hil.proof.scoreboard import REAL
 
     with _progress() as progress:
-        results = run_real(data, folder / REAL, only or (), jobs, _in_per_cent(progress))
+        results = run_real(data, folder / REAL, only or (), jobs, progress)
     for result in results:
-        typer.echo(f"{result.name}: {'as it should be' if result.named_right else 'not as it should be'}")
-
-
-def _real_cases(folder: Path) -> list[dict[str, Any]]:
-    """Return what was made of real recordings; nothing where none were asked for."""
-    from hil.errors import UsageError
-    from hil.files import read_json
-
-    path = folder / "real.json"
-    if not path.exists():
-        return []
-    try:
-        cases: list[dict[str, Any]] = read_json(path)["cases"]
-    except (ValueError, KeyError, TypeError) as error:
-        raise UsageError(f"{path}: expected what hil prove real has written, got: {error}. Remove it.") from error
-    return cases
-
-
-def _in_per_cent(progress: Progress) -> Callable[[str, float], None]:
-    """Take the share of the work done, 0 to 1."""
-    return lambda what, share: progress(what, round(100 * share), 100)
+        typer.echo(f"{result['name']}: {'as it should be' if result['named_right'] else 'not as it should be'}")
 
 
 def _key_text(key: str | None, key_file: Path | None) -> str:

@@ -1,12 +1,33 @@
-"""The public command line, run as any user would: in a process of its own, in a folder of its own."""
+"""The public command line, run as any user would: in a process of its own, in a folder of its own.
+
+What it has written replaces earlier results, and only such as this program has made itself, by a mark in them.
+"""
 
 from __future__ import annotations
 
+import shutil
 import subprocess
+import tempfile
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
 
 from hil.child import environment, python
+from hil.errors import UsageError
+from hil.proof.truth.recording import SPEED_NOISE_RAD_S
+
+MARK: Final = ".made-by-hil"
+"""File that says that this program made a folder."""
+
+MARK_TEXT: Final = "This folder was made by hil, which replaces it when it makes the results anew.\n"
+
+SIMULATED: Final = "speed_sim_rad_s"
+"""Column of ``hil simulate`` (CONTRACT)."""
+
+FloatArray = NDArray[np.float64]
 
 
 class CommandFailed(Exception):
@@ -14,18 +35,7 @@ class CommandFailed(Exception):
 
 
 def run_hil(arguments: Sequence[str], folder: Path, limit_s: float) -> None:
-    """Run ``hil`` in a folder.
-
-    Parameters
-    ----------
-    limit_s
-        Time it may take [s]; then it is ended and counts as failed.
-
-    Raises
-    ------
-    CommandFailed
-        With the last line it wrote, or that it took too long. All it wrote is next to the folder.
-    """
+    """Run ``hil`` in a folder."""
     try:
         done = subprocess.run(
             python("-m", "hil", *arguments),
@@ -43,3 +53,45 @@ def run_hil(arguments: Sequence[str], folder: Path, limit_s: float) -> None:
         (folder.parent / f"{arguments[0]}.stderr.txt").write_text(done.stderr, encoding="utf-8")
         said = done.stderr.strip().splitlines() or ["nothing on standard error"]
         raise CommandFailed(f"hil {arguments[0]}: ended with status {done.returncode}: {said[-1].strip()}")
+
+
+def replace_own(folder: Path, built: Path) -> None:
+    """Copy a folder to where it belongs, in place of the one that was made there before."""
+    if folder.is_symlink() or folder.exists():
+        if folder.is_symlink() or not (folder / MARK).is_file():
+            raise UsageError(
+                f"{folder}: expected no such folder, or one of earlier results ({MARK} in it), got something else. "
+                "It is left as it is: move it away."
+            )
+        shutil.rmtree(folder)
+    folder.mkdir(parents=True)
+    (folder / MARK).write_text(MARK_TEXT, encoding="utf-8")  # first: half a copy is this program's too
+    shutil.copytree(built, folder, dirs_exist_ok=True)
+
+
+def fresh_over_floor(recording: Path, model: Path, limit_s: float) -> float:
+    """Return the free-run RMS error of a model file on a recording of the truth, over the noise of its speed reading.
+
+    The public command simulates, in a place of its own.
+    """
+    with tempfile.TemporaryDirectory(prefix="hil-fresh-") as neutral:
+        place = Path(neutral) / "fresh"
+        place.mkdir()
+        shutil.copyfile(recording, place / "fresh.csv")
+        shutil.copyfile(model, place / "model.toml")
+        run_hil(["simulate", "--model", "model.toml", "--input", "fresh.csv", "--out", "simulated.csv"], place, limit_s)
+        simulated = _table(place / "simulated.csv")[SIMULATED]
+    read = _table(recording)
+    flags = read["flags"] if "flags" in (read.dtype.names or ()) else np.zeros(read.size)
+    return rms_over_floor(read["speed_rad_s"], flags, simulated)
+
+
+def rms_over_floor(speed_rad_s: FloatArray, flags: FloatArray, simulated_rad_s: FloatArray) -> float:
+    """Return a simulation's RMS error over the noise of the speed reading, where that is good; all of shape (N,)."""
+    good = np.isfinite(speed_rad_s) & (flags == 0)
+    error = simulated_rad_s[good] - speed_rad_s[good]
+    return float(np.sqrt(np.mean(error**2)) / SPEED_NOISE_RAD_S)
+
+
+def _table(path: Path) -> np.ndarray[tuple[int], np.dtype[np.void]]:
+    return np.genfromtxt(path, delimiter=",", names=True)

@@ -8,6 +8,9 @@ A commitment is a digest of digests. Every entry of the truth has its own digest
 
 The commitment is published first. An opened seal carries nonce, digests and truth: who holds the commitment
 can tell that nothing was changed, or which entry was.
+
+What is sealed in a file is encrypted: AES-256 in Galois/Counter mode (NIST SP 800-38D), by ``cryptography``.
+The mode tells a changed file from a whole one; the case's name is bound in, so that no two can be exchanged.
 """
 
 from __future__ import annotations
@@ -17,8 +20,12 @@ import json
 import secrets
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 
-from hil.errors import InputError
+from cryptography.exceptions import InvalidTag
+from cryptography.hazmat.primitives.ciphers.aead import AESGCM
+
+from hil.errors import InputError, UsageError
 
 SCHEMA = "hil.seal/1"
 NONCE_BYTES = 32
@@ -35,13 +42,7 @@ class SealBroken(InputError):
 
 
 def canonical_json(value: object) -> bytes:
-    """Return one and the same bytes for equal JSON values.
-
-    Raises
-    ------
-    ValueError
-        If a number is NaN or infinite: JSON has none.
-    """
+    """Return one and the same bytes for equal JSON values."""
     text = json.dumps(value, sort_keys=True, separators=(",", ":"), ensure_ascii=True, allow_nan=False)
     return text.encode("ascii")
 
@@ -87,20 +88,7 @@ def seal(truth: Truth) -> Seal:
 
 
 def verify(commitment: str, opened: object) -> dict[str, object]:
-    """Return the truth of an opened seal after checking it against the commitment.
-
-    Parameters
-    ----------
-    commitment
-        As published before the verdict.
-    opened
-        What ``Seal.opened`` gave, as read back from JSON.
-
-    Raises
-    ------
-    SealBroken
-        Naming the entries that were changed, or that the seal is another one altogether.
-    """
+    """Return the truth of an opened seal after checking it against the commitment."""
     nonce, digests, truth = _fields(opened)
     got = _sha256(canonical_json(digests))
     if got != commitment:
@@ -132,3 +120,51 @@ def _fields(opened: object) -> tuple[str, dict[str, str], dict[str, object]]:
     if not (isinstance(digests, dict) and isinstance(truth, dict)):
         raise SealBroken("seal: digests and truth: expected an object each")
     return nonce, digests, truth
+
+
+MAGIC = b"hil.sealed/1\n"
+AES_NONCE_BYTES = 12
+KEY_BYTES = 32
+
+
+def new_key() -> str:
+    """Draw a key: 64 hexadecimal digits."""
+    return secrets.token_hex(KEY_BYTES)
+
+
+def parse_key(text: str) -> bytes:
+    """Read a key as it is printed."""
+    try:
+        key = bytes.fromhex(text.strip())
+    except ValueError:
+        key = b""
+    if len(key) != KEY_BYTES:
+        raise UsageError(
+            f"key: expected the {2 * KEY_BYTES} hexadecimal digits that hil prove make has printed, got "
+            f"{len(text.strip())} characters. Give it with --key or in a file with --key-file."
+        )
+    return key
+
+
+def lock(key: bytes, name: str, content: bytes) -> bytes:
+    """Encrypt what belongs to the case of a name."""
+    nonce = secrets.token_bytes(AES_NONCE_BYTES)
+    return MAGIC + nonce + AESGCM(key).encrypt(nonce, content, name.encode())
+
+
+def unlock(key: bytes, name: str, path: Path) -> bytes:
+    """Decrypt a file that belongs to the case of a name."""
+    try:
+        locked = path.read_bytes()
+    except OSError as error:
+        raise SealBroken(f"{path}: expected what was sealed with {name}, can't be read: {error.strerror}") from error
+    start = len(MAGIC) + AES_NONCE_BYTES
+    if not locked.startswith(MAGIC) or len(locked) < start:
+        raise SealBroken(f"{path}: expected a file sealed by hil prove make, got something else")
+    try:
+        return AESGCM(key).decrypt(locked[len(MAGIC) : start], locked[start:], name.encode())
+    except InvalidTag:
+        raise SealBroken(
+            f"{path}: changed after it was sealed, or sealed with another key or for another case. Believe no score "
+            "made from it."
+        ) from None

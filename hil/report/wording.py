@@ -91,6 +91,8 @@ def torque_axis(motion: Motion) -> str:
 
 def headline(diagnosis: Diagnosis) -> str:
     """Say the verdict in one line."""
+    if not diagnosis.effort.finished:
+        return f"Not decided: the search was ended after {diagnosis.effort.limit_s:.3g} s"
     found = [f"{title_of(effect.name)}{_sure(effect)}" for effect in diagnosis.effects]
     if diagnosis.verdict is Verdict.EXPLAINED:
         return f"Missing in the model: {listed(found)}"
@@ -98,8 +100,6 @@ def headline(diagnosis: Diagnosis) -> str:
         return f"Missing in the model: {listed(found)}; what is left is more than noise"
     if diagnosis.verdict is Verdict.NO_MISMATCH:
         return "Nothing is missing: the nominal model, re-tuned, explains the recordings"
-    if found:
-        return f"Missing in the model: {listed(found)}; the rest no effect of the catalogue explains"
     if diagnosis.strays:
         return f"No physics need be missing, but the data sheet is off: {listed([s.name for s in diagnosis.strays])}"
     return "Something is missing, and no effect of the catalogue explains it"

@@ -14,11 +14,10 @@ import numpy as np
 
 from estimator.physics.model import DrivelineModel, Parameter, Structure
 from estimator.signals.record import FloatArray, Record
-from hil.proof.truth.bus import NOMINAL_TOLERANCE
+from hil.proof.truth.bus import DURATION_S, NOMINAL_TOLERANCE, PERIOD_S, Test, draw_plan
 from hil.proof.truth.case import TESTS
-from hil.proof.truth.driver import bring_to_speed
-from hil.proof.truth.experiments import DURATION_S, PERIOD_S, Test, draw_plan
-from hil.proof.truth.sensors import speed_reading, torque_reading
+from hil.proof.truth.driveline import bring_to_speed
+from hil.proof.truth.recording import speed_reading, torque_reading
 from hil.proof.truth.specimen import Specimen, Stream, draw_specimen, stream
 
 NOTHING = "none"

@@ -15,7 +15,7 @@ from estimator.diagnosis import first_use
 from hil.child import python, safe_path
 from hil.cli.main import run
 from hil.proof.command import run_hil
-from hil.proof.wire.sealed_process import sealed_process
+from hil.proof.rigs import sealed_process
 from hil.recording import read_table
 from hil.simulator.plant import simulation_model
 from tests.cli import bench

@@ -20,7 +20,7 @@ from hil.config.experiment_tables import AnyExperiment
 from hil.config.model_file import read_model
 from hil.config.rig_file import Rig
 from hil.proof.seal import seal
-from hil.proof.wire.challenge import CONCEALED
+from hil.proof.sealed_rig import CONCEALED
 from hil.recording.columns import UNITS
 from hil.recording.formats import FORMATS
 from hil.sample import SampleFlag

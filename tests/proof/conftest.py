@@ -7,7 +7,7 @@ from contextlib import contextmanager
 
 import pytest
 
-from hil.proof.truth import experiments
+from hil.proof.truth import bus
 from tests.without_budget import all_the_time_it_needs
 
 __all__ = ["all_the_time_it_needs"]
@@ -17,7 +17,7 @@ __all__ = ["all_the_time_it_needs"]
 def recordings_of(samples: int) -> Iterator[None]:
     """Let what is recorded meanwhile have so many samples, of 10 ms each, instead of 3000."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(experiments, "SAMPLES", samples)
+        patch.setattr(bus, "SAMPLES", samples)
         yield
 
 

@@ -9,9 +9,8 @@ from estimator.physics.layout import flat_values
 from estimator.physics.model import DrivelineModel, Parameter, Structure
 from estimator.physics.simulate import simulate
 from estimator.signals.record import Record
-from hil.proof.truth.driver import bring_to_speed
-from hil.proof.truth.physics import Physics
-from hil.proof.truth.state import State
+from hil.proof.truth.driveline import bring_to_speed
+from hil.proof.truth.physics import Physics, State
 
 NOMINAL = {"J_M": 1.7, "J_L": 95.0, "k": 4200.0, "c": 11.0, "b_M": 0.35, "b_L": 0.9}
 LOAD_NM = 50.0

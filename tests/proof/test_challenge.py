@@ -6,9 +6,8 @@ import pytest
 
 from hil.errors import UsageError
 from hil.proof.seal import verify
-from hil.proof.truth.registry import EFFECTS
-from hil.proof.truth.specimen import choose_effect, draw_specimen
-from hil.proof.wire.challenge import CONCEALED, draw_challenge
+from hil.proof.sealed_rig import CONCEALED, draw_challenge
+from hil.proof.truth.specimen import EFFECTS, choose_effect, draw_specimen
 
 
 def test_the_seed_decides_and_the_commitment_does_not_tell():

@@ -17,8 +17,8 @@ from hil.cli import demo as demo_module
 from hil.cli.demo import _Demo
 from hil.cli.main import run
 from hil.config.rig_file import read_rig
+from hil.proof.rigs import sealed_process
 from hil.proof.seal import verify
-from hil.proof.wire.sealed_process import sealed_process
 
 SEED_OF_NONE = 115
 """A seed whose bus hides nothing: the quickest to diagnose."""

@@ -12,9 +12,9 @@ from drivers.plc.types import DriveMode
 from hil.config.model_file import read_model
 from hil.config.rig_file import read_rig
 from hil.errors import RunAborted
+from hil.proof.rigs import sealed_process
 from hil.proof.seal import verify
-from hil.proof.wire.sealed_process import sealed_process
-from hil.proof.wire.sealed_rig import RIG_FILE
+from hil.proof.sealed_rig import RIG_FILE
 from hil.rig.addresses import with_addresses
 from hil.rig.build import open_devices
 from hil.rig.pacing import FreePacer, heartbeat_patience_ms, period_ns
@@ -108,7 +108,7 @@ def test_something_else_than_a_ready_line_is_refused():
 @pytest.mark.parametrize("end", [signal.SIGINT, signal.SIGTERM, None])
 def test_it_ends_cleanly_by_signal_and_by_the_end_of_its_input(end):
     process = subprocess.Popen(
-        [sys.executable, "-m", "hil.proof.wire.sealed_rig", "--seed", "1"],
+        [sys.executable, "-m", "hil.proof.sealed_rig", "--seed", "1"],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,

@@ -7,19 +7,23 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from hil.proof.truth.acquisition import Acquisition
-from hil.proof.truth.bus import NOMINAL_ERROR
-from hil.proof.truth.driveline import TruthDriveline
-from hil.proof.truth.driver import bring_to_speed
-from hil.proof.truth.experiments import PERIOD_S, Plan, Test, draw_plan, sample_times_s
+from hil.proof.truth.bus import NOMINAL_ERROR, PERIOD_S, Plan, Test, draw_plan, sample_times_s
+from hil.proof.truth.driveline import TruthDriveline, bring_to_speed, observed
 from hil.proof.truth.hidden import Interval
-from hil.proof.truth.observed import observed
-from hil.proof.truth.physics import FloatArray, Physics
-from hil.proof.truth.readings import sampling_instants_s, speed_as_read
-from hil.proof.truth.rows import IntArray, Rows, as_recorded
-from hil.proof.truth.sensors import USUAL, Noise, speed_reading, torque_reading
+from hil.proof.truth.physics import FloatArray, Physics, State
+from hil.proof.truth.recording import (
+    USUAL,
+    Acquisition,
+    IntArray,
+    Noise,
+    Rows,
+    as_recorded,
+    sampling_instants_s,
+    speed_as_read,
+    speed_reading,
+    torque_reading,
+)
 from hil.proof.truth.specimen import Specimen, Stream, draw_specimen, stream
-from hil.proof.truth.state import State
 
 TESTS = tuple(Test)
 
@@ -89,13 +93,7 @@ def _disturbances(recordings: tuple[TruthRecording, ...]) -> list[list[float]]:
 
 
 def make_case(effect: str, seed: int, nominal_error: float = NOMINAL_ERROR) -> Case:
-    """Draw a bus, hide an effect in it, record it; see `draw_specimen`.
-
-    Raises
-    ------
-    UsageError
-        If an effect is not registered or two can't be in one bus, or the seed is negative.
-    """
+    """Draw a bus, hide an effect in it, record it; see `draw_specimen`."""
     specimen = draw_specimen(effect, seed, nominal_error)
     recordings = tuple(record(specimen, number) for number in range(2 * len(TESTS)))
     return Case(specimen, recordings[: len(TESTS)], recordings[len(TESTS) :])

@@ -1,15 +1,111 @@
-"""The driveline as a plant: feed it two torques for a time, read its resolver."""
+"""Driveline of the truth as a plant: inverters, transport delay, what the resolver reads, the way to the start."""
 
 from __future__ import annotations
 
+import math
+from collections import deque
+from dataclasses import dataclass
+
 import numpy as np
 
-from hil.proof.truth import kernel
-from hil.proof.truth.delay_line import DelayLine
-from hil.proof.truth.inverters import true_torque, true_torques
-from hil.proof.truth.observed import speed_as_sensed
-from hil.proof.truth.physics import FloatArray, Physics
-from hil.proof.truth.state import SPEEDS, STATES, State
+from hil.proof.truth import kernel, laws
+from hil.proof.truth.compiled import compiled
+from hil.proof.truth.laws import brake_torque, eddy_torque, gravity_torque, resolver_speed, torque_by_direction
+from hil.proof.truth.physics import FLAT_ROAD, SPEEDS, STATES, FloatArray, Physics, State
+
+
+@compiled
+def true_torques(p: Physics, m1_nm: FloatArray, m2_nm: FloatArray, times_s: FloatArray) -> FloatArray:
+    """Return `true_torque` for readings and times of shape (N,)."""
+    total_nm = np.empty(times_s.size)
+    for i in range(times_s.size):
+        total_nm[i] = true_torque(p, (m1_nm[i], m2_nm[i]), times_s[i])
+    return total_nm
+
+
+@compiled
+def true_torque(p: Physics, reading_nm: tuple[float, float], time_s: float) -> float:
+    """Return the torque of both inverters together for their readings at a time [Nm]."""
+    left = laws.torque_left(p, time_s)
+    m1 = left * _beyond(p.gain_m1 * reading_nm[0], p.deadband_nm)
+    m2 = left * _beyond(reading_nm[1], p.deadband_nm)
+    both = _limited(m1, p.limit_m1_nm, p.limit_knee) + _limited(m2, p.limit_m2_nm, p.limit_knee)
+    given = _saturated(p, _limited(both, p.limit_total_nm, p.limit_knee)) + laws.bias_torque(p, time_s)
+    return 0.0 if laws.is_blocked(p, time_s) else given
+
+
+@compiled
+def _beyond(torque_nm: float, deadband_nm: float) -> float:
+    return math.copysign(max(0.0, abs(torque_nm) - deadband_nm), torque_nm)
+
+
+@compiled
+def _saturated(p: Physics, torque_nm: float) -> float:
+    """Return ``S asinh(T / S)``: nearly T while small, growing ever less."""
+    size = p.saturating_nm if torque_nm > 0.0 else p.saturating_back_nm
+    return size * math.asinh(torque_nm / size) if size > 0.0 else torque_nm
+
+
+@compiled
+def _limited(torque_nm: float, limit_nm: float, knee: float) -> float:
+    """Return a torque below its limit, which is approached in a knee and not at an edge."""
+    if limit_nm <= 0.0:
+        return torque_nm
+    over = abs(torque_nm) / limit_nm
+    return float(torque_nm * (1.0 + over**knee) ** (-1.0 / knee))
+
+
+@dataclass(frozen=True, slots=True)
+class Piece:
+    """A constant torque over a stretch of time."""
+
+    torque_nm: float
+    duration_s: float
+
+
+class DelayLine:
+    """Hold every torque back by a fixed time.
+
+    Parameters
+    ----------
+    delay_s
+        Time a torque spends in the line [s]; any fraction of a sample.
+    """
+
+    def __init__(self, delay_s: float) -> None:
+        self._waiting: deque[Piece] = deque([Piece(0.0, delay_s)] if delay_s > 0.0 else [])
+
+    def push(self, torque_nm: float, duration_s: float) -> list[Piece]:
+        """Feed a torque for a time; return what comes out during that time, in order."""
+        self._waiting.append(Piece(torque_nm, duration_s))
+        leaving: list[Piece] = []
+        left_s = duration_s
+        while left_s > 0.0:
+            first = self._waiting.popleft()
+            if first.duration_s > left_s:
+                self._waiting.appendleft(Piece(first.torque_nm, first.duration_s - left_s))
+                first = Piece(first.torque_nm, left_s)
+            leaving.append(first)
+            left_s -= first.duration_s
+        return leaving
+
+
+@compiled
+def speed_as_sensed(p: Physics, state: FloatArray) -> float:
+    """Return the motor speed as the resolver gives it, behind its filter where it has one [rad/s]."""
+    if p.filter_time_s > 0.0 or p.filter_rad_s > 0.0:
+        return float(state[State.FILTERED])
+    return float(resolver_speed(p, state[State.ANGLE_M], state[State.SPEED_M]))
+
+
+@compiled
+def observed(p: Physics, states: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return speeds [rad/s] and torques against the load beyond the constant one [Nm] of states, shape (N, STATES)."""
+    speed, disturbance = np.empty(states.shape[0]), np.empty(states.shape[0])
+    for i in range(states.shape[0]):
+        speed[i] = speed_as_sensed(p, states[i])
+        disturbance[i] = gravity_torque(p, states[i, State.ANGLE_L]) + brake_torque(p, states[i, State.TIME_S])
+    return speed, disturbance
 
 
 class TruthDriveline:
@@ -74,3 +170,55 @@ class TruthDriveline:
     def speed_rad_s(self) -> float:
         """Motor speed as the resolver gives it, behind its filter where it has one [rad/s]."""
         return float(speed_as_sensed(self._physics, self._state))
+
+
+_SETTLING_S = 3.0
+"""The shaft's oscillation, 2.5 1/s and faster, is down to 0.06 % by then."""
+
+
+@dataclass(frozen=True, slots=True)
+class Rolling:
+    """A bus rolling steadily, and the torque reading that keeps it so [Nm]."""
+
+    driveline: TruthDriveline
+    torque_nm: float
+
+
+def holding_torque(physics: Physics, speed_rad_s: float, share_m1: float) -> float:
+    """Return the torque reading of both inverters together that holds a speed on level road [Nm].
+
+    At standstill that is the constant load torque alone: dry friction needs no pedal. Friction that varies with
+    the angle is left out: over a turn it holds nothing back.
+    """
+    p = physics
+    torque_nm = p.load_torque_nm + (p.b_M + p.b_L * p.cold_factor) * speed_rad_s
+    torque_nm += (p.quadratic_motor + p.quadratic_load) * speed_rad_s * abs(speed_rad_s)
+    if speed_rad_s:
+        torque_nm += p.friction_motor_nm + p.friction_load_nm
+    torque_nm = torque_nm / p.efficiency + eddy_torque(p, speed_rad_s) + torque_by_direction(p, speed_rad_s)
+    return torque_nm / (p.gain_m1 * share_m1 + 1.0 - share_m1) + 2.0 * p.deadband_nm
+
+
+def before_the_recording(physics: Physics) -> Physics:
+    """Return the physics of the way to the start: on level road, and before anything that time brings."""
+    return physics._replace(
+        road=FLAT_ROAD,
+        brake_nm=0.0,
+        generator_inertia=0.0,
+        stiffness_step=0.0,
+        payload_share=0.0,
+        derating=0.0,
+        bias_nm=0.0,
+        dropout_every_s=0.0,
+        b_L=physics.b_L * physics.cold_factor,
+        cold_factor=1.0,
+    )
+
+
+def bring_to_speed(physics: Physics, speed_rad_s: float, share_m1: float) -> Rolling:
+    """Let the shaft settle at a speed, with `before_the_recording`; then ``physics`` begins."""
+    torque_nm = holding_torque(physics, speed_rad_s, share_m1)
+    driveline = TruthDriveline(before_the_recording(physics), speed_rad_s)
+    driveline.advance((share_m1 * torque_nm, (1.0 - share_m1) * torque_nm), _SETTLING_S)
+    driveline.continue_with(physics)
+    return Rolling(driveline, torque_nm)

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import Any
 
 import numpy as np
 
-from hil.proof.truth.acquisition import Acquisition
 from hil.proof.truth.bus import Bus
 from hil.proof.truth.physics import Physics
+from hil.proof.truth.recording import Acquisition
 
 Sizes = Mapping[str, float]
 """Drawn sizes of an effect; named as the fields of `Physics` where one size sets one field."""
@@ -55,28 +55,6 @@ class Place(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Scale:
-    """How an effect with one size is made greater and smaller.
-
-    Attributes
-    ----------
-    unit : str
-    start : float
-        A size, in ``unit``, from which a search begins.
-    absent : float
-        Value at which the effect is not there; its size is the distance from it.
-    least : float
-        Size that stands for none. Above 0 where the truth's law does not end in the linear one when it vanishes: a
-        joint without any play still has contacts that cannot pull.
-    """
-
-    unit: str
-    start: float
-    absent: float = 0.0
-    least: float = 0.0
-
-
-@dataclass(frozen=True, slots=True)
 class HiddenEffect:
     """One effect that can be concealed in a bus.
 
@@ -84,10 +62,6 @@ class HiddenEffect:
     ----------
     name : str
         As in the contract's catalogue, or a name of its own outside it.
-    place : Place
-        The element it belongs to.
-    catalogued : bool
-        False for what no entry of the contract's catalogue describes: a tool can only abstain.
     draw : callable
         Generator and bus to sizes; they hold for all recordings of the bus.
     apply : callable
@@ -102,20 +76,21 @@ class HiddenEffect:
         is missing has no counterpart: the truth's formulation is another one.
     unscaled : tuple of str
         Sizes that stay as they are where the effect is made smaller: they say of what kind it is, not how much.
-    scale : Scale, optional
-        Of an effect with one size, for a study of how small it may be.
+    place : Place
+        The element it belongs to.
+    catalogued : bool
+        False for what no entry of the contract's catalogue describes: a tool can only abstain.
     """
 
     name: str
-    place: Place
-    catalogued: bool
     draw: Draw
     apply: Apply = same_physics
     corrupt: Corrupt = same_recording
     when: When | None = None
     fitted: Mapping[str, str | Convert] = field(default_factory=dict)
     unscaled: tuple[str, ...] = ()
-    scale: Scale | None = None
+    place: Place = Place.NOWHERE
+    catalogued: bool = True
 
     def happens_in(self, test: int, sizes: Sizes) -> bool:
         """Say whether the effect takes place in one of the three tests, counted from 0."""
@@ -136,10 +111,31 @@ def sets(*fields: str, **renamed: str) -> Apply:
     size_of = {**dict(zip(fields, fields, strict=True)), **renamed}
 
     def apply(physics: Physics, sizes: Sizes, rng: np.random.Generator) -> Physics:
-        values: dict[str, Any] = {field: sizes[size] for field, size in size_of.items()}
+        values: dict[str, Any] = {name: type(getattr(physics, name))(sizes[size]) for name, size in size_of.items()}
         return physics._replace(**values)
 
     return apply
+
+
+def then(apply: Apply, name: str, low: float, high: float) -> Apply:
+    """Return a change after which one more field is drawn for each recording: a phase, or the moment of an event."""
+
+    def applied(physics: Physics, sizes: Sizes, rng: np.random.Generator) -> Physics:
+        value: dict[str, Any] = {name: rng.uniform(low, high)}
+        return apply(physics, sizes, rng)._replace(**value)
+
+    return applied
+
+
+def corrupts(*fields: str, **renamed: str) -> Corrupt:
+    """Return the fault of the acquisition that sets fields to the sizes of their names, or of another name each."""
+    size_of = {**dict(zip(fields, fields, strict=True)), **renamed}
+
+    def corrupt(acquisition: Acquisition, sizes: Sizes) -> Acquisition:
+        values = {name: type(getattr(acquisition, name))(sizes[size]) for name, size in size_of.items()}
+        return replace(acquisition, **values)
+
+    return corrupt
 
 
 def unless_zero(size: str) -> Convert:
@@ -150,6 +146,24 @@ def unless_zero(size: str) -> Convert:
 def log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
     """Draw a size so that every factor between moderate and well visible is as likely as any other."""
     return float(np.exp(rng.uniform(np.log(low), np.log(high))))
+
+
+def log(low: float, high: float) -> Callable[[np.random.Generator], float]:
+    return lambda rng: log_uniform(rng, low, high)
+
+
+def uniform(low: float, high: float) -> Callable[[np.random.Generator], float]:
+    return lambda rng: rng.uniform(low, high)
+
+
+def signed(low: float, high: float) -> Callable[[np.random.Generator], float]:
+    """Return the draw of a size of either sign."""
+    return lambda rng: either(rng, log_uniform(rng, low, high))
+
+
+def draws(**sizes: Callable[[np.random.Generator], float]) -> Draw:
+    """Return the draw of sizes that do not depend on each other."""
+    return lambda rng, bus: {name: draw(rng) for name, draw in sizes.items()}
 
 
 def draw_absence(rng: np.random.Generator) -> Sizes:

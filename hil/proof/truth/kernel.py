@@ -1,8 +1,12 @@
-"""Time integration by Strang splitting, second order and symplectic where nothing is lost.
+"""Motion of the truth's line: which torque acts on each inertia, integrated by Strang splitting.
+
+Motor, shaft and load; next to them, where there is one, an extra inertia before or behind the shaft, and the vehicle
+behind a tyre that slips (the load is then the wheels).
 
 Half a drift (angles, bristles, relaxing torques: each solved exactly at constant speed), a kick (speeds under
-the torques at fixed angles, midpoint rule for what depends on speed), half a drift. The generator's clutch acts as
-an impulse at the end of a step (Moreau's time stepping), the speed filter as the recursion of its firmware.
+the torques at fixed angles, midpoint rule for what depends on speed), half a drift: second order, and symplectic where
+nothing is lost. The generator's clutch acts as an impulse at the end of a step (Moreau's time stepping), the speed
+filter as the recursion of its firmware.
 """
 
 from __future__ import annotations
@@ -11,11 +15,133 @@ import math
 
 import numpy as np
 
-from hil.proof.truth import iwan, laws, laws_in_angle, laws_in_time, tyre
+from hil.proof.truth import laws
 from hil.proof.truth.compiled import compiled
-from hil.proof.truth.line import accelerations, breakaway_limit, disturbance, shaft_ends, shaft_twist, speeds_of
-from hil.proof.truth.physics import FloatArray, Physics
-from hil.proof.truth.state import STATES, State
+from hil.proof.truth.physics import STATES, FloatArray, Physics, State
+
+Speeds = tuple[float, float, float, float]
+"""Of motor, extra inertia, load (wheels), vehicle [rad/s]; also used for accelerations."""
+
+
+@compiled
+def speeds_of(state: FloatArray) -> Speeds:
+    """Return the speeds of a state."""
+    return state[State.SPEED_M], state[State.SPEED_X], state[State.SPEED_L], state[State.SPEED_V]
+
+
+@compiled
+def shaft_ends(p: Physics, motor: float, extra: float, load: float) -> tuple[float, float]:
+    """Return what the shaft has at its driving and its driven end, of angles or of speeds."""
+    if p.extra_inertia <= 0.0:
+        return motor, load
+    return (extra, load) if p.extra_at_motor else (motor, extra)
+
+
+@compiled
+def shaft_twist(state: FloatArray, p: Physics) -> tuple[float, float]:
+    """Return the shaft's twist behind its Cardan joint [rad], and that joint's slope."""
+    driving, driven = shaft_ends(p, state[State.ANGLE_M], state[State.ANGLE_X], state[State.ANGLE_L])
+    behind, slope = laws.through_joint(p, driving)
+    return behind - driven, slope
+
+
+@compiled
+def breakaway_limit(p: Physics, speed: float) -> float:
+    """Return the motor's sliding friction at a speed over that at high speed."""
+    if p.breakaway_motor_nm <= p.friction_motor_nm:
+        return 1.0
+    sliding = laws.sliding_torque(p.friction_motor_nm, p.breakaway_motor_nm, p.stribeck_speed_rad_s, speed)
+    return sliding / p.friction_motor_nm
+
+
+@compiled
+def disturbance(state: FloatArray, p: Physics) -> float:
+    """Return the torque against the vehicle that depends on place and time alone [Nm]."""
+    hill = laws.gravity_torque(p, state[State.ANGLE_L]) * laws.mass_over_empty(p, state[State.TIME_S])
+    disturbance_nm: float = p.load_torque_nm + hill
+    return disturbance_nm
+
+
+@compiled
+def _on_motor(state: FloatArray, p: Physics, speed: float) -> float:
+    """Torque on the motor inertia without the line's."""
+    given = state[State.INVERTER_NM]
+    torque: float = given - p.b_M * speed - p.quadratic_motor * speed * abs(speed) - laws.eddy_torque(p, speed)
+    torque -= laws.torque_by_direction(p, speed)
+    torque += laws.ripple_torque(p, state[State.ANGLE_M], given)
+    if p.friction_motor_nm > 0.0:
+        limit = breakaway_limit(p, speed)
+        torque -= laws.friction_torque(p.friction_motor_nm, limit, state[State.BRISTLE_M], speed)
+    return torque
+
+
+@compiled
+def _on_load(state: FloatArray, p: Physics, speed: float) -> float:
+    """Torque of wheels, axle, bearings and brake on the load inertia."""
+    torque = -p.b_L * laws.viscosity_over_warm(p, state[State.TIME_S]) * speed
+    torque -= laws.imbalance_torque(p, state[State.ANGLE_L])
+    held = p.friction_load_nm + laws.brake_torque(p, state[State.TIME_S])
+    if held > 0.0:
+        torque -= laws.friction_torque(held, 1.0, state[State.BRISTLE_L], speed)
+    return torque
+
+
+@compiled
+def _through_shaft(state: FloatArray, p: Physics, speeds: Speeds) -> tuple[float, float]:
+    """Torque at the shaft's driving and at its driven end."""
+    motor, extra, load, _ = speeds
+    twist, slope = shaft_twist(state, p)
+    driving, driven = shaft_ends(p, motor, extra, load)
+    stiffness = laws.stiffness_over_k(p, state[State.TIME_S], driving)
+    slider_nm = laws.slider_torque(state[State.SLIDERS : STATES], p) if p.hysteresis_stiffness > 0.0 else 0.0
+    torque: float = laws.shaft_torque(p, twist, slope * driving - driven, stiffness, slider_nm)
+    torque += state[State.MAXWELL_NM] + state[State.MAXWELL_FAST_NM]
+    return slope * torque, laws.behind_gears(p, torque, driven)
+
+
+@compiled
+def _of_wheels_and_vehicle(
+    state: FloatArray, p: Physics, wheels_nm: float, vehicle_nm: float, speeds: Speeds
+) -> tuple[float, float]:
+    """Accelerations of the wheels and of the vehicle, which are one where the tyre can't slip."""
+    _, _, wheels, vehicle = speeds
+    inertia = p.J_L * laws.mass_over_empty(p, state[State.TIME_S])
+    if p.wheel_inertia <= 0.0:
+        both = (wheels_nm + vehicle_nm) / inertia
+        return both, both
+    tyre_nm = laws.tyre_torque(p, state[State.SLIP], wheels, vehicle)
+    return (wheels_nm - tyre_nm) / p.wheel_inertia, (tyre_nm + vehicle_nm) / (inertia - p.wheel_inertia)
+
+
+@compiled
+def _through_link(state: FloatArray, p: Physics, speeds: Speeds) -> float:
+    """Torque through the spring between the extra inertia and the motor, or the load."""
+    motor, extra, load, _ = speeds
+    if p.extra_at_motor:
+        twist, rate = state[State.ANGLE_M] - state[State.ANGLE_X], motor - extra
+    else:
+        twist, rate = state[State.ANGLE_X] - state[State.ANGLE_L], extra - load
+    torque: float = p.extra_stiffness * twist + p.extra_damping * rate
+    return torque
+
+
+@compiled
+def accelerations(state: FloatArray, p: Physics, disturbance_nm: float, speeds: Speeds) -> Speeds:
+    """Return the accelerations [rad/s^2] at the state's angles and at speeds that may be others than its own."""
+    motor, _, load, vehicle = speeds
+    driving_nm, driven_nm = _through_shaft(state, p, speeds)
+    from_motor, to_load, of_extra = driving_nm, driven_nm, 0.0
+    if p.extra_inertia > 0.0:
+        link_nm = _through_link(state, p, speeds)
+        if p.extra_at_motor:
+            from_motor, of_extra = link_nm, (link_nm - driving_nm) / p.extra_inertia
+        else:
+            to_load, of_extra = link_nm, (driven_nm - link_nm) / p.extra_inertia
+    of_motor = (_on_motor(state, p, motor) - from_motor) / (p.J_M * laws.inertia_over_rotor(p, motor))
+    on_vehicle = -disturbance_nm - p.quadratic_load * vehicle * abs(vehicle)
+    of_load, of_vehicle = _of_wheels_and_vehicle(state, p, to_load + _on_load(state, p, load), on_vehicle, speeds)
+    return of_motor, of_extra, of_load, of_vehicle
+
 
 MAX_STEP_S = 1e-4
 """The shaft mode (51 rad/s) moves by 0.005 rad of phase in it: relative error of its period 1e-6. Against the
@@ -37,7 +163,7 @@ def _turn(state: FloatArray, p: Physics, h: float) -> None:
     if p.hysteresis_stiffness > 0.0:
         behind, _ = shaft_twist(state, p)
         change = laws.beyond_gap(p, behind) - laws.beyond_gap(p, before)
-        iwan.follow(state[State.SLIDERS : STATES], p, change)
+        laws.follow_twist(state[State.SLIDERS : STATES], p, change)
 
 
 @compiled
@@ -57,7 +183,7 @@ def _relax(state: FloatArray, p: Physics, h: float) -> None:
         left = math.exp(-h * FASTER / p.maxwell_time_s)
         state[State.MAXWELL_FAST_NM] = quick + (state[State.MAXWELL_FAST_NM] - quick) * left
     if p.wheel_inertia > 0.0:
-        state[State.SLIP] = tyre.slip_after(state[State.SLIP], p, speed_l, state[State.SPEED_V], h)
+        state[State.SLIP] = laws.slip_after(state[State.SLIP], p, speed_l, state[State.SPEED_V], h)
 
 
 @compiled
@@ -95,7 +221,7 @@ def _couple_generator(state: FloatArray, p: Physics, h: float) -> None:
 
     With the clutch open the generator is kept near the motor's speed by its own control.
     """
-    clutch_nm = laws_in_time.clutch_torque(p, state[State.TIME_S])
+    clutch_nm = laws.clutch_torque(p, state[State.TIME_S])
     motor, generator = state[State.SPEED_M], state[State.SPEED_G]
     if clutch_nm <= 0.0:
         state[State.SPEED_G] = (1.0 - p.generator_lag) * motor
@@ -109,7 +235,7 @@ def _couple_generator(state: FloatArray, p: Physics, h: float) -> None:
 @compiled
 def _filter_speed(state: FloatArray, p: Physics, h: float) -> None:
     """One cycle of the speed filter: backward Euler (first order), semi-implicit Euler (second order)."""
-    speed = laws_in_angle.resolver_speed(p, state[State.ANGLE_M], state[State.SPEED_M])
+    speed = laws.resolver_speed(p, state[State.ANGLE_M], state[State.SPEED_M])
     if p.filter_time_s > 0.0:
         state[State.FILTERED] += h / (p.filter_time_s + h) * (speed - state[State.FILTERED])
     else:
@@ -120,19 +246,7 @@ def _filter_speed(state: FloatArray, p: Physics, h: float) -> None:
 
 @compiled
 def advance(state: FloatArray, p: Physics, command_nm: float, duration_s: float) -> None:
-    """Move the state on by ``duration_s`` under a constant torque command.
-
-    Parameters
-    ----------
-    state : ndarray, shape (STATES,)
-        In the order of `State`; changed in place.
-    p : Physics
-        The driveline.
-    command_nm : float
-        Torque that reaches the current loops, both inverters together [Nm].
-    duration_s : float
-        Time to continue by [s]; divided into equal steps of at most `MAX_STEP_S`.
-    """
+    """Move the state on by ``duration_s`` under a constant torque command."""
     steps = math.ceil(duration_s / MAX_STEP_S - 1e-9)
     if steps < 1:
         return

@@ -14,11 +14,43 @@ from enum import IntEnum
 import numpy as np
 
 from hil.errors import UsageError
-from hil.proof.truth.acquisition import FAULTLESS, Acquisition
+from hil.proof.truth import effects_chain, effects_line
 from hil.proof.truth.bus import NOMINAL_ERROR, Bus, draw_bus, draw_nominal
 from hil.proof.truth.hidden import HiddenEffect, Interval, Sizes
 from hil.proof.truth.physics import Physics
-from hil.proof.truth.registry import find
+from hil.proof.truth.recording import FAULTLESS, Acquisition
+
+NOTHING = "none"
+
+EFFECTS: Mapping[str, HiddenEffect] = {
+    effect.name: effect
+    for effect in (
+        HiddenEffect(NOTHING, lambda rng, bus: {}),
+        *effects_chain.TORQUE_PATH,
+        *effects_line.MOTOR,
+        *effects_line.SHAFT,
+        *effects_line.LOAD,
+        *effects_chain.SPEED_SENSOR,
+        *effects_chain.ACQUISITION,
+        *effects_line.FURTHER,
+        *effects_chain.FURTHER,
+        *effects_chain.OUTSIDE,
+    )
+}
+"""Nothing; the contract's catalogue in its order; what no entry of it describes."""
+
+PAIR_SIGN = "+"
+
+
+def find(names: str) -> tuple[HiddenEffect, ...]:
+    """Return the effects of a name or of several joined by ``+`` (``backlash+road_grade``)."""
+    wanted = names.split(PAIR_SIGN)
+    for name in wanted:
+        if name not in EFFECTS:
+            raise UsageError(
+                f"effect {name!r}: expected one of {', '.join(EFFECTS)}, or several joined by {PAIR_SIGN!r}"
+            )
+    return tuple(EFFECTS[name] for name in wanted)
 
 
 class Stream(IntEnum):
@@ -33,13 +65,7 @@ class Stream(IntEnum):
 
 
 def stream(seed: int, purpose: Stream, *key: int) -> np.random.Generator:
-    """Return the generator for one purpose of one seed.
-
-    Raises
-    ------
-    UsageError
-        If the seed is negative.
-    """
+    """Return the generator for one purpose of one seed."""
     if seed < 0:
         raise UsageError(f"seed: expected 0 or greater, got {seed}")
     return np.random.default_rng([seed, purpose, *key])
@@ -115,22 +141,7 @@ class Specimen:
 
 
 def draw_specimen(effect: str, seed: int, nominal_error: float = NOMINAL_ERROR) -> Specimen:
-    """Draw a bus and hide an effect in it.
-
-    Parameters
-    ----------
-    effect
-        Name, or names joined by ``+``.
-    seed
-        What everything is drawn from, 0 or more.
-    nominal_error
-        Share by which each nominal value is off at most; 0 for a data sheet that is right.
-
-    Raises
-    ------
-    UsageError
-        If an effect is not registered or two can't be in one bus, or the seed is negative.
-    """
+    """Draw a bus and hide an effect in it."""
     bus = draw_bus(stream(seed, Stream.BUS))
     specimen = Specimen(
         effect=effect,

@@ -12,6 +12,7 @@ from typing import Any
 
 import can
 import numpy as np
+from hil.store.row_faults import NEUTRAL
 
 from drivers.eds_check.check import check_eds
 from drivers.inverter.pdos import InverterPdos
@@ -30,7 +31,6 @@ from hil.recording.signals import read_record
 from hil.recording.table import as_text
 from hil.rig.replay import replay
 from hil.store import RunStore, register_run
-from hil.store.row_faults import NEUTRAL
 from tests.campaigns.fuzz.target import Read, Target, file_target
 
 ROOT = Path(__file__).resolve().parents[3]

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from hil.proof.truth.driveline import TruthDriveline
-from hil.proof.truth.physics import Physics
-from hil.proof.truth.state import State
+from hil.proof.truth.physics import Physics, State
 
 
 @pytest.fixture

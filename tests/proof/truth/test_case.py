@@ -9,13 +9,11 @@ import numpy as np
 import pytest
 
 from hil.errors import UsageError
-from hil.proof.truth.acquisition import FAULTLESS
 from hil.proof.truth.bus import NOMINAL_ERROR, NOMINAL_TOLERANCE
 from hil.proof.truth.case import TESTS, make_case, record
 from hil.proof.truth.hidden import ABSENT_IN, Place, same_physics, same_recording
-from hil.proof.truth.registry import EFFECTS, find
-from hil.proof.truth.sensors import SPEED_NOISE_RAD_S, TORQUE_QUANTUM_NM
-from hil.proof.truth.specimen import draw_specimen
+from hil.proof.truth.recording import FAULTLESS, SPEED_NOISE_RAD_S, TORQUE_QUANTUM_NM
+from hil.proof.truth.specimen import EFFECTS, draw_specimen, find
 
 SEED = 11
 

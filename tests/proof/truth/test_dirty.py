@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from hil.proof.truth.dirty import FEWEST, IMPERFECTIONS, LEAST_PART, MOST, MOST_PART, Known, in_a_model_file, make_dirty
 
 from hil.errors import UsageError
-from hil.proof.truth.dirty import FEWEST, IMPERFECTIONS, LEAST_PART, MOST, MOST_PART, Known, in_a_model_file, make_dirty
-from hil.proof.truth.registry import EFFECTS
-from hil.proof.truth.sensors import USUAL, coloured, speed_reading
-from hil.proof.truth.specimen import draw_specimen
+from hil.proof.truth.recording import USUAL, coloured, speed_reading
+from hil.proof.truth.specimen import EFFECTS, draw_specimen
 
 
 @pytest.mark.parametrize(("strong", "seed"), [("brake_drag", 1), ("actuator_lag", 2), ("none", 3)])

@@ -2,8 +2,8 @@
 
 import pytest
 
-from hil.proof.truth.driver import bring_to_speed
-from hil.proof.truth.state import State
+from hil.proof.truth.driveline import bring_to_speed
+from hil.proof.truth.physics import State
 
 EFFECTS = {
     "nothing": {},

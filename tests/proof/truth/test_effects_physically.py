@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from hil.proof.truth import laws, laws_in_time
+from hil.proof.truth import laws
 from hil.proof.truth.driveline import TruthDriveline
-from hil.proof.truth.state import State
+from hil.proof.truth.physics import State
 
 
 def test_a_shaft_in_dry_friction_sticks_below_it_and_slides_above(plain, trace):
@@ -135,7 +135,7 @@ def test_the_brake_takes_its_torque_in_its_time_alone(plain, trace):
     momentum = p.J_M * states[:, State.SPEED_M] + p.J_L * states[:, State.SPEED_L]
     np.testing.assert_allclose(momentum[:201], momentum[0], rtol=1e-9)
     np.testing.assert_allclose(momentum[501:], momentum[-1], rtol=1e-9)
-    assert momentum[0] - momentum[-1] == pytest.approx(100.0 * (3.0 - laws_in_time.BRAKE_RISE_S), rel=1e-3)
+    assert momentum[0] - momentum[-1] == pytest.approx(100.0 * (3.0 - laws.BRAKE_RISE_S), rel=1e-3)
 
 
 def test_a_hill_gives_back_what_it_took(lossless, trace):

@@ -7,7 +7,7 @@ import pytest
 from scipy.linalg import expm
 
 from hil.proof.truth.driveline import TruthDriveline
-from hil.proof.truth.state import State
+from hil.proof.truth.physics import State
 
 
 def _system(p):

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from hil.proof.truth import laws_in_time, tyre
+from hil.proof.truth import laws
 from hil.proof.truth.driveline import TruthDriveline
-from hil.proof.truth.state import State
+from hil.proof.truth.physics import State
 
 
 def test_dry_friction_at_the_load_holds_it_and_then_slides(plain, trace):
@@ -41,20 +41,20 @@ def test_a_small_torque_slips_by_itself_over_the_slip_stiffness(slipping, trace)
 
 def test_the_slip_builds_up_over_the_relaxation_length(slipping):
     """After rolling one relaxation length at a constant slip speed, 63 % of the steady slip is there."""
-    at_once = tyre.slip_after(0.0, slipping, 51.0, 50.0, slipping.relaxation_rad / 50.0)
+    at_once = laws.slip_after(0.0, slipping, 51.0, 50.0, slipping.relaxation_rad / 50.0)
     assert at_once == pytest.approx(0.02 * (1.0 - np.exp(-1.0)))
     in_steps = 0.0
     for _ in range(100):
-        in_steps = tyre.slip_after(in_steps, slipping, 51.0, 50.0, slipping.relaxation_rad / 5000.0)
+        in_steps = laws.slip_after(in_steps, slipping, 51.0, 50.0, slipping.relaxation_rad / 5000.0)
     assert in_steps == pytest.approx(at_once)
 
 
 def test_a_tyre_gives_no_more_than_its_grip(slipping):
-    torques = np.array([tyre.torque(slipping, slip, 60.0, 60.0) for slip in np.linspace(-1.0, 1.0, 401)])
+    torques = np.array([laws.tyre_torque(slipping, slip, 60.0, 60.0) for slip in np.linspace(-1.0, 1.0, 401)])
     assert torques.max() == pytest.approx(slipping.grip_nm, rel=1e-3)
     assert torques.min() == -torques.max()
     assert abs(torques[0]) < 0.95 * slipping.grip_nm  # and less when it spins
-    small = tyre.torque(slipping, 1e-4, 60.0, 60.0)
+    small = laws.tyre_torque(slipping, 1e-4, 60.0, 60.0)
     assert small == pytest.approx(1e-4 * slipping.slip_stiffness_nm, rel=1e-3)
 
 
@@ -111,9 +111,9 @@ def test_a_heavier_bus_is_pulled_more_by_a_hill(lossless, trace):
 
 def test_cold_oil_warms_to_the_data_sheet(plain):
     p = plain._replace(cold_factor=3.0, warming_time_s=5.0)
-    factors = [laws_in_time.viscosity_over_warm(p, time_s) for time_s in (0.0, 5.0, 100.0)]
+    factors = [laws.viscosity_over_warm(p, time_s) for time_s in (0.0, 5.0, 100.0)]
     np.testing.assert_allclose(factors, [3.0, 3.0 ** np.exp(-1.0), 1.0], rtol=1e-6)
-    assert laws_in_time.viscosity_over_warm(plain, 0.0) == 1.0
+    assert laws.viscosity_over_warm(plain, 0.0) == 1.0
 
 
 def test_cold_oil_brakes_by_its_factor(plain):

@@ -5,8 +5,8 @@ import pytest
 
 from hil.proof.truth import laws
 from hil.proof.truth.driveline import TruthDriveline
-from hil.proof.truth.laws_in_time import CLUTCH_FALL_S
-from hil.proof.truth.state import State
+from hil.proof.truth.laws import CLUTCH_FALL_S
+from hil.proof.truth.physics import State
 
 
 @pytest.fixture

@@ -3,12 +3,21 @@
 import numpy as np
 import pytest
 
-from hil.proof.truth.acquisition import FAULTLESS, Acquisition
 from hil.proof.truth.case import _sample
 from hil.proof.truth.driveline import TruthDriveline
-from hil.proof.truth.readings import CURVATURE_SPEED_RAD_S, sampling_instants_s, speed_as_read
-from hil.proof.truth.rows import FLAG_M1, FLAG_M2, Rows, as_recorded, runs
-from hil.proof.truth.sensors import SPEED_NOISE_RAD_S
+from hil.proof.truth.recording import (
+    CURVATURE_SPEED_RAD_S,
+    FAULTLESS,
+    FLAG_M1,
+    FLAG_M2,
+    SPEED_NOISE_RAD_S,
+    Acquisition,
+    Rows,
+    as_recorded,
+    runs,
+    sampling_instants_s,
+    speed_as_read,
+)
 
 N = 3000
 TIME_S = np.arange(N) * 0.01

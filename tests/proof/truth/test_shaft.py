@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from hil.proof.truth import iwan, laws_in_angle
+from hil.proof.truth import laws
 from hil.proof.truth.driveline import TruthDriveline
-from hil.proof.truth.state import State
+from hil.proof.truth.physics import State
 
 
 def _ringing_rad_s(states, period_s):
@@ -38,10 +38,10 @@ def sliding(plain):
 
 
 def _along(p, twists):
-    deflections, torques = np.zeros(iwan.ELEMENTS), []
+    deflections, torques = np.zeros(laws.ELEMENTS), []
     for change in np.diff(twists, prepend=0.0):
-        iwan.follow(deflections, p, change)
-        torques.append(iwan.torque(deflections, p))
+        laws.follow_twist(deflections, p, change)
+        torques.append(laws.slider_torque(deflections, p))
     return np.array(torques)
 
 
@@ -49,7 +49,7 @@ def test_sliders_are_stiff_for_small_twists_and_give_way_to_large_ones(sliding):
     torque = _along(sliding, np.array([0.004, 0.02, 0.04, 0.08]))
     assert torque[0] == pytest.approx(1600.0 * 0.004)
     assert torque[1] < 0.9 * 1600.0 * 0.02
-    limits = 0.04 * np.arange(1, iwan.ELEMENTS + 1) / iwan.ELEMENTS
+    limits = 0.04 * np.arange(1, laws.ELEMENTS + 1) / laws.ELEMENTS
     assert torque[2] == pytest.approx(torque[3]) == pytest.approx(1600.0 * limits.mean())
 
 
@@ -59,8 +59,8 @@ def test_a_cycle_of_large_twist_loses_four_times_limit_by_what_slides(sliding):
     there_and_back = np.concatenate([np.linspace(A, -A, 4001), np.linspace(-A, A, 4001)[1:]])
     torque = _along(sliding, np.concatenate([[A], there_and_back]))[1:]
     lost = np.sum(0.5 * (torque[1:] + torque[:-1]) * np.diff(there_and_back))
-    limits = 0.04 * np.arange(1, iwan.ELEMENTS + 1) / iwan.ELEMENTS
-    assert lost == pytest.approx(np.sum(1600.0 / iwan.ELEMENTS * limits * 4 * (A - limits)), rel=1e-3)
+    limits = 0.04 * np.arange(1, laws.ELEMENTS + 1) / laws.ELEMENTS
+    assert lost == pytest.approx(np.sum(1600.0 / laws.ELEMENTS * limits * 4 * (A - limits)), rel=1e-3)
 
 
 def test_hysteresis_damps_a_large_swing_and_leaves_a_small_one(lossless, trace, twist):
@@ -86,7 +86,7 @@ def test_a_bent_joint_leads_and_lags_twice_per_turn(plain):
     bend = 0.2
     p = plain._replace(joint_angle_rad=bend)
     angles = np.linspace(0.0, 2 * np.pi, 721)
-    behind, slope = np.array([laws_in_angle.through_joint(p, angle) for angle in angles]).T
+    behind, slope = np.array([laws.through_joint(p, angle) for angle in angles]).T
     np.testing.assert_allclose(np.tan(behind[1:80]), np.cos(bend) * np.tan(angles[1:80]), rtol=1e-12)
     np.testing.assert_allclose(np.gradient(behind, angles)[1:-1], slope[1:-1], atol=2e-5)
     assert slope.max() == pytest.approx(1 / np.cos(bend))
@@ -99,7 +99,7 @@ def test_a_bent_joint_leads_and_lags_twice_per_turn(plain):
 def test_a_joint_takes_and_gives_no_energy(lossless, trace):
     p = lossless._replace(joint_angle_rad=0.2, joint_phase_rad=0.4)
     states = trace(p, [300.0] * 10 + [0.0] * 500, speed_rad_s=20.0)[10:]
-    behind = np.array([laws_in_angle.through_joint(p, angle)[0] for angle in states[:, State.ANGLE_M]])
+    behind = np.array([laws.through_joint(p, angle)[0] for angle in states[:, State.ANGLE_M]])
     elastic = 0.5 * p.k * (behind - states[:, State.ANGLE_L]) ** 2
     energy = elastic + 0.5 * (p.J_M * states[:, State.SPEED_M] ** 2 + p.J_L * states[:, State.SPEED_L] ** 2)
     assert np.ptp(elastic) > 1.0

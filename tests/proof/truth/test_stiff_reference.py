@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from hil.proof.truth import laws, laws_in_angle, laws_in_time, tyre
-from hil.proof.truth.state import State
+from hil.proof.truth import laws
+from hil.proof.truth.physics import State
 
 
 def _rates(_, y, p, torque):
@@ -55,17 +55,17 @@ def _longer_rates(time_s, y, p, torque):
     before, behind, first, last = (motor, extra, w_m, w_x) if p.extra_at_motor else (extra, load, w_x, w_l)
     link = p.extra_stiffness * (before - behind) + p.extra_damping * (first - last)
     driving, driven, fast, slow = (extra, load, w_x, w_l) if p.extra_at_motor else (motor, extra, w_m, w_x)
-    angle, slope = laws_in_angle.through_joint(p, driving)
-    stiffness = laws_in_time.stiffness_over_k(p, time_s, fast)
+    angle, slope = laws.through_joint(p, driving)
+    stiffness = laws.stiffness_over_k(p, time_s, fast)
     shaft = laws.shaft_torque(p, angle - driven, slope * fast - slow, stiffness)
     on_motor, on_extra, on_load = (
         (-link, link - slope * shaft, shaft) if p.extra_at_motor else (-slope * shaft, shaft - link, link)
     )
-    given = torque + laws_in_angle.ripple_torque(p, motor, torque)
-    rolling = tyre.torque(p, slip, w_l, w_v)
+    given = torque + laws.ripple_torque(p, motor, torque)
+    rolling = laws.tyre_torque(p, slip, w_l, w_v)
     held = laws.friction_torque(p.friction_load_nm, 1.0, bristle, w_l)
-    axle = p.b_L * laws_in_time.viscosity_over_warm(p, time_s) * w_l + laws_in_angle.imbalance_torque(p, load)
-    vehicle = p.J_L * laws_in_time.mass_over_empty(p, time_s) - p.wheel_inertia
+    axle = p.b_L * laws.viscosity_over_warm(p, time_s) * w_l + laws.imbalance_torque(p, load)
+    vehicle = p.J_L * laws.mass_over_empty(p, time_s) - p.wheel_inertia
     return [
         w_m,
         w_x,

@@ -5,11 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from hil.proof.truth import laws_in_angle
-from hil.proof.truth.driveline import TruthDriveline
-from hil.proof.truth.inverters import true_torque
-from hil.proof.truth.laws_in_time import TIME_TO_DERATE_S
-from hil.proof.truth.state import State
+from hil.proof.truth import laws
+from hil.proof.truth.driveline import TruthDriveline, true_torque
+from hil.proof.truth.laws import TIME_TO_DERATE_S
+from hil.proof.truth.physics import State
 
 
 def test_a_torque_derates_exponentially_or_evenly(plain):
@@ -95,14 +94,14 @@ def test_the_reading_and_the_true_torque_are_the_same_without_a_fault(plain):
 def _harmonics(p, torque_nm):
     """Amplitudes of the torque over a turn, shape (65,): index is periods per turn."""
     angles = np.arange(128) * 2 * np.pi / 128
-    return 2 * np.abs(np.fft.rfft([laws_in_angle.ripple_torque(p, angle, torque_nm) for angle in angles])) / 128
+    return 2 * np.abs(np.fft.rfft([laws.ripple_torque(p, angle, torque_nm) for angle in angles])) / 128
 
 
 def test_cogging_needs_no_torque_and_current_ripple_grows_with_it(plain):
     cogging = plain._replace(ripple_nm=12.0, ripple_order=6.0)
     for torque_nm in (0.0, 300.0):
         assert _harmonics(cogging, torque_nm)[6] == pytest.approx(12.0)
-        assert _harmonics(cogging, torque_nm)[12] == pytest.approx(12.0 * laws_in_angle.RIPPLE_OVERTONE)
+        assert _harmonics(cogging, torque_nm)[12] == pytest.approx(12.0 * laws.RIPPLE_OVERTONE)
     current = plain._replace(ripple_share=0.1, ripple_order=4.0)
     assert _harmonics(current, 200.0)[4] == pytest.approx(20.0)
     assert not _harmonics(current, 0.0).any()

@@ -9,9 +9,8 @@ import numpy as np
 
 from estimator.signals.record import Record
 from hil.proof.truth import kernel
-from hil.proof.truth.driver import bring_to_speed, holding_torque
-from hil.proof.truth.observed import observed
-from hil.proof.truth.sensors import speed_reading, torque_reading
+from hil.proof.truth.driveline import bring_to_speed, holding_torque, observed
+from hil.proof.truth.recording import speed_reading, torque_reading
 from hil.proof.truth.specimen import Stream, draw_specimen, stream
 from tests.estimator.identification.tracking.roads import PERIOD_S, Course
 

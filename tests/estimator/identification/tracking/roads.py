@@ -14,7 +14,7 @@ from hil.figures.road.conditions import Conditions, draw_conditions
 from hil.figures.road.pedal import PedalCruise
 from hil.figures.road.road_load import Bus, RoadLoad
 from hil.proof.truth.bus import draw_bus
-from hil.proof.truth.sensors import speed_reading, torque_reading
+from hil.proof.truth.recording import speed_reading, torque_reading
 from hil.rig.experiments.cruise import Cruise
 
 PERIOD_S = 0.01

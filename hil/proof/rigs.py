@@ -1,0 +1,288 @@
+"""Sealed rigs: served in a process of their own, driven and diagnosed by the public command line alone.
+
+It only has CANopen and Modbus. What is concealed is in the driveline, an inverter's firmware, a sensor, or the PLC.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import tempfile
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import MappingProxyType
+from typing import IO, Any, Final, cast
+
+import tomlkit
+
+from hil.child import environment, python
+from hil.errors import RunAborted, UsageError
+from hil.proof.command import CommandFailed, replace_own, run_hil
+from hil.proof.kinds import kind
+from hil.proof.score import Answer, score
+from hil.proof.seal import verify
+from hil.proof.sealed_rig import OPEN, RIG_FILE
+from hil.proof.work import Progress, read_entries, work_on, write_entries
+
+Row = dict[str, Any]
+
+EXPERIMENTS = ("cruise", "reversal", "tip")
+
+SCHEMA = "hil.wire/1"
+RESULTS = "wire.json"
+
+LIMIT_S = 600.0
+"""Time one command may take [s]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Concealed:
+    """One rig.
+
+    Attributes
+    ----------
+    where : str
+        In words, for the scoreboard.
+    effect : str
+        In the driveline, its sensor or its torque path: an effect of the truth simulator.
+    faults : tuple of str
+        In the devices, as ``hil sim --fault`` takes them.
+    truth : mapping
+        What the faults are to a diagnosis; it replaces entries of the truth.
+    refused : str
+        Word that must stand in the reason for which the tool refuses to drive; empty where it should drive.
+    """
+
+    where: str
+    effect: str = "none"
+    faults: tuple[str, ...] = ()
+    truth: Mapping[str, Any] = field(default_factory=dict)
+    refused: str = ""
+
+
+STALE_SHARE: Final = 0.1
+
+WIRED: Final[Mapping[str, Concealed]] = MappingProxyType(
+    {
+        "nothing": Concealed("nowhere: nothing is wrong"),
+        "backlash": Concealed("the driveline: backlash", "backlash"),
+        "dry_friction": Concealed("the driveline: dry friction at the motor", "coulomb_friction_motor"),
+        "inverter_gain": Concealed(
+            "an inverter's firmware: its torque is not what it reports", "inverter_gain_mismatch"
+        ),
+        "resolver_error": Concealed("the resolver: an error that goes round with the shaft", "resolver_error"),
+        "stale_pdos": Concealed(
+            "an inverter's firmware: PDOs that repeat old values",
+            faults=(f"m1.stale_share={STALE_SHARE}",),
+            truth={
+                "effect": "stale_samples",
+                "element": ["acquisition"],
+                "hidden": {"stale_samples": {"every": 0.0, "share": STALE_SHARE}},
+            },
+        ),
+        "delayed_torque": Concealed("an inverter's torque path: it acts late", "transport_delay"),
+        "clutch_closed": Concealed(
+            "the PLC: the clutch does not open", faults=("plc.clutch_closes@0",), refused="clutch"
+        ),
+    }
+)
+"""By name. A new rig is one entry."""
+
+
+_READY = re.compile(r"ready bus=(?P<bus>\S+) modbus=(?P<modbus>\S+) commitment=(?P<commitment>[0-9a-f]{64})\n")
+
+_END_S = 5.0
+"""Time the process gets to end by itself once its input has ended [s]."""
+
+
+@dataclass(frozen=True, slots=True)
+class SealedProcess:
+    """A sealed rig that is up.
+
+    Attributes
+    ----------
+    bus, modbus, commitment : str
+        As in its ready line.
+    """
+
+    bus: str
+    modbus: str
+    commitment: str
+    _pipes: _Pipes
+
+    def open(self) -> object:
+        """Have the seal opened; return it as read from JSON, to be verified against the commitment."""
+        return json.loads(self._pipes.ask(OPEN))
+
+
+@dataclass(frozen=True, slots=True)
+class _Pipes:
+    """The process with its three standard streams."""
+
+    process: subprocess.Popen[str]
+    asked: IO[str]
+    answers: IO[str]
+    complaints: IO[bytes]
+
+    def ask(self, line: str) -> str:
+        try:
+            self.asked.write(f"{line}\n")
+            self.asked.flush()
+        except BrokenPipeError as error:
+            raise self._gone() from error
+        return self.answer()
+
+    def answer(self) -> str:
+        line = self.answers.readline()
+        if not line:
+            raise self._gone()
+        return line
+
+    def end(self) -> None:
+        """End the process: by the end of its input, or by force if that is not heard."""
+        with suppress(BrokenPipeError):  # what was still to be written to a process that is gone
+            self.asked.close()
+        try:
+            self.process.wait(_END_S)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait()
+        self.answers.close()
+
+    def _gone(self) -> RunAborted:
+        status = self.process.wait()
+        self.complaints.seek(0)
+        said = self.complaints.read().decode(errors="replace").strip() or "nothing"
+        return RunAborted(f"sealed rig: expected an answer, but it ended with status {status}; it said: {said}")
+
+
+@contextmanager
+def sealed_process(*arguments: str) -> Iterator[SealedProcess]:
+    """Serve a sealed rig in a process of its own, for the time of the block.
+
+    It is in a session of its own: Ctrl-C at the terminal must reach the drives' master first, which then
+    still has a rig to disarm. If this process dies, the end of its input ends the rig too.
+    """
+    with tempfile.TemporaryFile() as complaints, tempfile.TemporaryDirectory(prefix="hil-sealed-") as folder:
+        pipes = _start(arguments, complaints, folder)
+        try:
+            yield _meet(pipes)
+        finally:
+            pipes.end()
+
+
+def _start(arguments: tuple[str, ...], complaints: IO[bytes], folder: str) -> _Pipes:
+    process = subprocess.Popen(
+        python("-m", "hil.proof.sealed_rig", *arguments),
+        cwd=folder,
+        env=environment(),
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=complaints,
+        text=True,
+        start_new_session=True,
+    )
+    asked, answers = cast(IO[str], process.stdin), cast(IO[str], process.stdout)  # both are pipes, see above
+    return _Pipes(process, asked, answers, complaints)
+
+
+def _meet(pipes: _Pipes) -> SealedProcess:
+    line = pipes.answer()
+    ready = _READY.fullmatch(line)
+    if ready is None:
+        raise RunAborted(f"sealed rig: expected 'ready bus=... modbus=... commitment=...', got {line!r}")
+    return SealedProcess(ready["bus"], ready["modbus"], ready["commitment"], pipes)
+
+
+def rig_text(sealed: SealedProcess) -> str:
+    """Return the text of the rig file."""
+    document: Any = tomlkit.parse(RIG_FILE.read_text(encoding="utf-8"))
+    host, _, port = sealed.modbus.rpartition(":")
+    document["can"]["url"] = sealed.bus
+    document["plc"]["host"], document["plc"]["port"] = host, int(port)
+    return tomlkit.dumps(document)
+
+
+def drive(name: str, concealed: Concealed, seed: int, out: Path, limit_s: float) -> Row:
+    """Drive one rig and judge what the tool makes of it."""
+    arguments = ["--seed", str(seed), "--effect", concealed.effect]
+    for fault in concealed.faults:
+        arguments += ["--fault", fault]
+    with tempfile.TemporaryDirectory(prefix="hil-rig-") as neutral:
+        place = Path(neutral) / "rig"
+        place.mkdir()
+        with sealed_process(*arguments, "--model", str(place / "nominal.toml")) as sealed:
+            (place / "rig.toml").write_text(rig_text(sealed), encoding="utf-8")
+            answer = _work(place, limit_s)
+            truth = _truth(sealed, concealed)
+        replace_own(out / name, place)
+    about = {"case": name, "where": concealed.where, "said": answer.fault or ""}
+    if concealed.refused:
+        return {**about, **_refusal(concealed, seed, answer)}
+    return {**score(kind(str(truth["effect"])), seed, truth, answer), **about}
+
+
+def _work(place: Path, limit_s: float) -> Answer:
+    """Do what an engineer would do with a rig."""
+    began = time.perf_counter()
+    try:
+        run_hil(["check", "rig.toml"], place, limit_s)
+        for name in EXPERIMENTS:
+            run_hil(["run", "rig.toml", name, "--pace", "fast", "--out", f"{name}.csv"], place, limit_s)
+        recordings = [f"{name}.csv" for name in EXPERIMENTS]
+        run_hil(["diagnose", *recordings, "--model", "nominal.toml", "--out", "."], place, limit_s)
+    except CommandFailed as failure:
+        return Answer(None, diagnose_s=time.perf_counter() - began, fault=str(failure))
+    diagnosis = json.loads((place / "diagnosis.json").read_text(encoding="utf-8"))
+    return Answer(diagnosis, diagnose_s=time.perf_counter() - began)
+
+
+def _truth(sealed: SealedProcess, concealed: Concealed) -> dict[str, Any]:
+    return {**verify(sealed.commitment, sealed.open()), "events": {}, **concealed.truth}
+
+
+def _refusal(concealed: Concealed, seed: int, answer: Answer) -> Row:
+    right = answer.fault is not None and concealed.refused in answer.fault
+    return {
+        "kind": concealed.refused,
+        "seed": seed,
+        "outcome": "right" if right else "failed" if answer.fault else "drove all the same",
+        "success": right,
+        "fault": None if right else answer.fault,
+        "diagnose_s": round(answer.diagnose_s, 2),
+        "fresh_over_floor": [],
+    }
+
+
+def run_wire(out: Path, seed: int, names: Sequence[str], progress: Progress, limit_s: float = LIMIT_S) -> list[Row]:
+    """Drive rigs, one after the other; returns their rows, also written to ``out/wire.json``."""
+    for name in names:
+        if name not in WIRED:
+            raise UsageError(f"rig {name!r}: expected one of {', '.join(WIRED)}")
+    kept = {row["case"]: row for row in read_rows(out)}
+    known = {name: row for name, row in kept.items() if row["seed"] == seed and not row["fault"]}
+    rows = work_on(
+        names,
+        lambda name: drive(name, WIRED[name], seed, out, limit_s),
+        progress,
+        known=known,
+        keep=lambda done: write_entries(out / RESULTS, SCHEMA, "rigs", list({**known, **done}.values())),
+        said="driven",
+    )
+    return list(rows.values())
+
+
+def read_rows(out: Path) -> list[Row]:
+    """Return the rows that an earlier run has left; none where there was none."""
+    path = out / RESULTS
+    if not path.exists():
+        return []
+    rows = read_entries(path, SCHEMA, "rigs", "remove it")
+    needed = {"case", "seed", "fault"}
+    if not isinstance(rows, list) or not all(isinstance(row, dict) and needed <= set(row) for row in rows):
+        raise UsageError(f"{path}: expected rigs, a list of rows with case, seed and fault; remove it")
+    return rows

@@ -1,1 +1,0 @@
-"""What can be concealed: one file per effect, each with its draw of sizes. ``registry`` lists them."""

@@ -1,0 +1,238 @@
+"""Recording of the truth: from the true speed to the number in the file, and what goes wrong on the way."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+from hil.proof.truth.bus import PERIOD_S
+from hil.proof.truth.physics import FloatArray
+
+
+@dataclass(frozen=True, slots=True)
+class Acquisition:
+    """The chain from the resolver to the file; faultless at its defaults.
+
+    Attributes
+    ----------
+    curvature : float
+        Change of the speed's gain with speed: share that is missing at `readings.CURVATURE_SPEED_RAD_S`.
+    sign_blind : bool
+        The magnitude of the speed is read.
+    grid_rad_s : float
+        Step of the speed's number format [rad/s].
+    count_rad, count_time_s : float
+        Angle of an encoder's count, and the time over which counts are made to a speed.
+    clock_error : float
+        By how much more time passes between two speeds than between two torques, over the latter.
+    jitter_s : float
+        Greatest deviation of a speed's sampling instant from its time.
+    stamps_told : bool
+        Whether ``time_s`` has the true instants.
+    stale_share, stale_most, stale_every : float
+        Share of samples that begin a run of repeats, the longest run; or a repeat every so many samples.
+    stale_rows : bool
+        Whether torques are repeated with the speed.
+    lost_share, lost_most : float
+        Share of samples that begin a run of lost ones, the longest run.
+    lost_m1, lost_m2, lost_speed : bool
+        What is lost.
+    lost_as_zero : bool
+        Whether a lost sample is recorded as 0, without a flag.
+    spike_share, spike_rad_s : float
+        Share of the speeds with a wrong bit, and the greatest of these errors.
+    """
+
+    curvature: float = 0.0
+    sign_blind: bool = False
+    grid_rad_s: float = 0.0
+    count_rad: float = 0.0
+    count_time_s: float = 0.0
+    clock_error: float = 0.0
+    jitter_s: float = 0.0
+    stamps_told: bool = False
+    stale_share: float = 0.0
+    stale_most: int = 1
+    stale_every: int = 0
+    stale_rows: bool = False
+    lost_share: float = 0.0
+    lost_most: int = 1
+    lost_m1: bool = False
+    lost_m2: bool = False
+    lost_speed: bool = False
+    lost_as_zero: bool = False
+    spike_share: float = 0.0
+    spike_rad_s: float = 0.0
+
+
+FAULTLESS = Acquisition()
+
+
+TORQUE_QUANTUM_NM = 0.6
+"""0.1 % of a rated torque of 600 Nm: the resolution of object 0x6077."""
+
+TORQUE_NOISE_NM = 0.5
+SPEED_NOISE_RAD_S = 0.05
+
+
+@dataclass(frozen=True, slots=True)
+class Noise:
+    """What a faultless sensor adds to a quantity: standard deviations, and the resolution of the torque.
+
+    Besides the white noise of speed and torque there may be coloured noise of the speed, and a drift of each torque
+    reading: of first order, with these corner frequencies.
+    """
+
+    speed_rad_s: float = SPEED_NOISE_RAD_S
+    torque_nm: float = TORQUE_NOISE_NM
+    torque_quantum_nm: float = TORQUE_QUANTUM_NM
+    coloured_rad_s: float = 0.0
+    coloured_hz: float = 5.0
+    torque_drift_nm: float = 0.0
+    torque_drift_hz: float = 0.05
+
+
+USUAL = Noise()
+SILENT = Noise(0.0, 0.0, 0.0)
+"""Draws as many numbers as `USUAL`, so that all that is drawn after them is the same."""
+
+
+def torque_reading(torque_nm: FloatArray, rng: np.random.Generator, noise: Noise = USUAL) -> FloatArray:
+    """Return the inverter's torque actual value [Nm] for a true current torque."""
+    noisy = torque_nm + rng.normal(0.0, noise.torque_nm, torque_nm.shape)
+    noisy += coloured(noise.torque_drift_nm, noise.torque_drift_hz, torque_nm.shape, rng)
+    if noise.torque_quantum_nm <= 0.0:
+        return noisy
+    return np.round(noisy / noise.torque_quantum_nm) * noise.torque_quantum_nm
+
+
+def speed_reading(speed_rad_s: FloatArray, rng: np.random.Generator, noise: Noise = USUAL) -> FloatArray:
+    """Return the resolver's noisy speed [rad/s]."""
+    white = rng.normal(0.0, noise.speed_rad_s, speed_rad_s.shape)
+    return speed_rad_s + white + coloured(noise.coloured_rad_s, noise.coloured_hz, speed_rad_s.shape, rng)
+
+
+def coloured(size: float, corner_hz: float, shape: tuple[int, ...], rng: np.random.Generator) -> FloatArray:
+    """Return noise of first order along the first axis, of a standard deviation and corner; none draws no numbers."""
+    if size == 0.0:
+        return np.zeros(shape)
+    kept = float(np.exp(-2.0 * np.pi * corner_hz * PERIOD_S))
+    driven = rng.normal(0.0, size * np.sqrt(1.0 - kept**2), shape)
+    driven[0] = rng.normal(0.0, size, shape[1:])
+    noise: FloatArray = lfilter([1.0], [1.0, -kept], driven, axis=0)
+    return noise
+
+
+CURVATURE_SPEED_RAD_S = 100.0
+"""Speed at which the curvature's share of the reading is missing."""
+
+
+def sampling_instants_s(time_s: FloatArray, acquisition: Acquisition, rng: np.random.Generator) -> FloatArray:
+    """Return when each speed is truly sampled [s], shape (N,); none is before the recording begins."""
+    instants = time_s * (1.0 + acquisition.clock_error)
+    if acquisition.jitter_s > 0.0:
+        instants = instants + rng.uniform(-acquisition.jitter_s, acquisition.jitter_s, time_s.shape)
+    return np.maximum(instants, 0.0)
+
+
+def speed_as_read(
+    speed_rad_s: FloatArray, acquisition: Acquisition, rng: np.random.Generator, noise: Noise = USUAL
+) -> FloatArray:
+    """Return what the sensor gives for a true speed [rad/s], shape (N,)."""
+    a = acquisition
+    reading = speed_rad_s * (1.0 - a.curvature * np.abs(speed_rad_s) / CURVATURE_SPEED_RAD_S)
+    reading = speed_reading(reading, rng, noise)
+    if a.sign_blind:
+        reading = np.abs(reading)
+    if a.grid_rad_s > 0.0:
+        reading = np.round(reading / a.grid_rad_s) * a.grid_rad_s
+    if a.count_rad > 0.0:
+        reading = _counted(reading, a.count_rad, a.count_time_s, rng)
+    return reading
+
+
+def _counted(speed_rad_s: FloatArray, count_rad: float, time_s: float, rng: np.random.Generator) -> FloatArray:
+    """Return what the counts of an encoder make of a speed, in a time so short that it is constant in it.
+
+    Where in a count the shaft stands when the time begins is as good as random.
+    """
+    counts = np.floor(speed_rad_s * time_s / count_rad + rng.uniform(0.0, 1.0, speed_rad_s.shape))
+    return counts * count_rad / time_s
+
+
+IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
+
+FLAG_M1, FLAG_M2 = 1, 2
+"""Quality flags of a row: an inverter did not answer. The speed comes from m1."""
+
+
+@dataclass(frozen=True, slots=True)
+class Rows:
+    """Columns of a recording, shape (N,) each; ``flags`` is None where the recorder has none to give."""
+
+    torque_m1_nm: FloatArray
+    torque_m2_nm: FloatArray
+    speed_rad_s: FloatArray
+    flags: IntArray | None = None
+
+
+def as_recorded(rows: Rows, acquisition: Acquisition, rng: np.random.Generator) -> Rows:
+    """Return the rows as the file has them; faultless ones come back as they are."""
+    for step in (_spiked, _stale, _lost):
+        rows = step(rows, acquisition, rng)
+    return rows
+
+
+def _spiked(rows: Rows, a: Acquisition, rng: np.random.Generator) -> Rows:
+    if a.spike_share <= 0.0:
+        return rows
+    n = rows.speed_rad_s.size
+    error = rng.uniform(0.3, 1.0, n) * rng.choice([-1.0, 1.0], n) * a.spike_rad_s
+    return replace(rows, speed_rad_s=rows.speed_rad_s + np.where(rng.random(n) < a.spike_share, error, 0.0))
+
+
+def _stale(rows: Rows, a: Acquisition, rng: np.random.Generator) -> Rows:
+    n = rows.speed_rad_s.size
+    if a.stale_every > 0:
+        repeats = np.arange(n) % a.stale_every == a.stale_every - 1
+    elif a.stale_share > 0.0:
+        repeats = runs(n, a.stale_share, a.stale_most, rng)
+    else:
+        return rows
+    fresh = np.maximum.accumulate(np.where(repeats, 0, np.arange(n)))
+    if not a.stale_rows:
+        return replace(rows, speed_rad_s=rows.speed_rad_s[fresh])
+    return replace(
+        rows,
+        torque_m1_nm=rows.torque_m1_nm[fresh],
+        torque_m2_nm=rows.torque_m2_nm[fresh],
+        speed_rad_s=rows.speed_rad_s[fresh],
+    )
+
+
+def _lost(rows: Rows, a: Acquisition, rng: np.random.Generator) -> Rows:
+    if a.lost_share <= 0.0:
+        return rows
+    lost = runs(rows.speed_rad_s.size, a.lost_share, a.lost_most, rng)
+    blank = 0.0 if a.lost_as_zero else np.nan
+    from_m1 = lost & (a.lost_m1 or a.lost_speed)
+    flags = FLAG_M1 * from_m1.astype(np.int64) + FLAG_M2 * (lost & a.lost_m2).astype(np.int64)
+    return Rows(
+        torque_m1_nm=np.where(lost & a.lost_m1, blank, rows.torque_m1_nm),
+        torque_m2_nm=np.where(lost & a.lost_m2, blank, rows.torque_m2_nm),
+        speed_rad_s=np.where(lost & a.lost_speed, blank, rows.speed_rad_s),
+        flags=None if a.lost_as_zero else flags,
+    )
+
+
+def runs(n: int, share: float, most: int, rng: np.random.Generator) -> BoolArray:
+    """Return where runs of 1 to ``most`` samples are that begin at a share of the n samples; never at the first."""
+    hit = np.zeros(n, dtype=np.bool_)
+    for start in np.flatnonzero(rng.random(n) < share):
+        hit[start : start + rng.integers(1, most + 1)] = True
+    hit[0] = False
+    return hit

@@ -1,0 +1,67 @@
+"""Work on many cases: several at a time, kept as it comes, continued where it was interrupted."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from pathlib import Path
+from typing import Any, TypeVar
+
+from hil.errors import UsageError
+from hil.files import read_json
+
+Result = TypeVar("Result")
+
+Progress = Callable[[str, int, int], None]
+"""Called with what has been done, how many of it, and how many there are in all; what it raises ends the work."""
+
+
+def silent(what: str, done: int, total: int) -> None:
+    """Report nothing."""
+
+
+def work_on(
+    names: Sequence[str],
+    work: Callable[[str], Result],
+    progress: Progress = silent,
+    *,
+    jobs: int = 1,
+    known: Mapping[str, Result] | None = None,
+    keep: Callable[[dict[str, Result]], object] = lambda done: None,
+    said: str = "done",
+) -> dict[str, Result]:
+    """Return the result of each name, in the order given; the first error ends what has not begun."""
+    done = {name: known[name] for name in names if name in known} if known else {}
+    pool = ThreadPoolExecutor(jobs)
+    try:
+        running = {pool.submit(work, name): name for name in names if name not in done}
+        for finished in as_completed(running):
+            done[running[finished]] = finished.result()
+            keep(done)
+            progress(f"{running[finished]} {said}", len(done), len(names))
+    finally:
+        pool.shutdown(cancel_futures=True)
+    return {name: done[name] for name in names}
+
+
+def read_entries(path: Path, schema: str, key: str, advice: str) -> Any:
+    """Return what `write_entries` has written."""
+    try:
+        content = read_json(path)
+    except OSError as error:
+        raise UsageError(f"{path}: expected a list of cases, can't be read: {error.strerror}; {advice}") from error
+    except ValueError as error:
+        raise UsageError(f"{path}: expected JSON, got: {error}; {advice}") from error
+    if not isinstance(content, dict) or content.get("schema") != schema or key not in content:
+        raise UsageError(f"{path}: expected an object of schema {schema} with {key}; {advice}")
+    return content[key]
+
+
+def write_entries(path: Path, schema: str, key: str, entries: object) -> None:
+    """Write entries as JSON; a reader finds the old ones or the new ones."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    unfinished = path.with_name(f".{path.name}.unfinished")
+    text = json.dumps({"schema": schema, key: entries}, indent=1, ensure_ascii=False, allow_nan=False)
+    unfinished.write_text(f"{text}\n", encoding="utf-8")
+    unfinished.replace(path)

@@ -1,0 +1,124 @@
+"""Sealed rigs driven by the public command: what is written, judged and kept; the driving itself is a stand-in here."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from hil.errors import UsageError
+from hil.proof import rigs
+from hil.proof.command import CommandFailed
+from hil.proof.rigs import RESULTS, WIRED, run_wire
+from hil.simulator.fault_table import rig_faults
+
+SEED = 7
+REFUSAL = "hil run: ended with status 3: error: PLC: clutch is closed, expected open. Nothing was armed."
+
+
+def silent(what: str, done: int, total: int) -> None:
+    assert 0 < done <= total
+
+
+class Tool:
+    """Stands for the command line: finds what it is ordered to find."""
+
+    def __init__(self, named: str = "", refuses: bool = False) -> None:
+        self.named, self.refuses = named, refuses
+        self.asked: list[str] = []
+        self.seen: set[str] = set()
+
+    def __call__(self, arguments: Sequence[str], folder: Path, limit_s: float) -> None:
+        self.asked.append(arguments[0])
+        self.seen |= {path.name for path in folder.parent.rglob("*") if path.is_file()}
+        if arguments[0] == "run":
+            if self.refuses:
+                raise CommandFailed(REFUSAL)
+            (folder / arguments[-1]).write_text("a recording")
+        if arguments[0] == "diagnose":
+            (folder / "diagnosis.json").write_text(json.dumps(self._diagnosis()))
+
+    def _diagnosis(self) -> dict[str, Any]:
+        effect = {
+            "name": self.named,
+            "element": "acquisition",
+            "parameters": {},
+            "indistinguishable_from": [],
+            "time_s": {},
+        }
+        return {
+            "verdict": "explained" if self.named else "no_mismatch",
+            "mismatch": {"detected": bool(self.named), "element": "acquisition" if self.named else None},
+            "effects": [effect] if self.named else [],
+            "parameters": {},
+            "fit": {"retuned": 1.0, "augmented": 0.05, "noise_floor": 0.05},
+        }
+
+
+def use(monkeypatch: pytest.MonkeyPatch, tool: Tool) -> Tool:
+    monkeypatch.setattr(rigs, "run_hil", tool)
+    return tool
+
+
+def test_every_kind_that_must_be_found_over_the_wire_is_there() -> None:
+    assert len(WIRED) == 8
+    for concealed in WIRED.values():
+        rig_faults(concealed.faults, 0.01)  # each is one that the simulated rig knows
+
+
+def test_the_tool_gets_addresses_and_nominal_model_and_is_judged_by_the_opened_seal(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    tool = use(monkeypatch, Tool())
+    (row,) = run_wire(tmp_path, SEED, ["nothing"], silent)
+    assert tool.asked == ["check", "run", "run", "run", "diagnose"]
+    assert tool.seen <= {"rig.toml", "nominal.toml", "cruise.csv", "reversal.csv", "tip.csv"}
+    assert (row["outcome"], row["success"]) == ("right", True)
+    assert (tmp_path / "nothing" / "diagnosis.json").is_file()
+    assert json.loads((tmp_path / RESULTS).read_text())["rigs"] == [row]
+
+
+def test_a_fault_of_a_device_is_judged_by_what_it_is_to_a_diagnosis(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    use(monkeypatch, Tool("stale_samples"))
+    (row,) = run_wire(tmp_path / "right", SEED, ["stale_pdos"], silent)
+    assert row["success"]
+    use(monkeypatch, Tool("backlash"))
+    (row,) = run_wire(tmp_path / "wrong", SEED, ["stale_pdos"], silent)
+    assert (row["outcome"], row["success"]) == ("wrong", False)
+
+
+def test_a_vehicle_that_must_not_be_driven_is_right_when_it_is_refused_for_that_reason(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    use(monkeypatch, Tool(refuses=True))
+    (row,) = run_wire(tmp_path / "refused", SEED, ["clutch_closed"], silent)
+    assert row["success"]
+    assert "clutch is closed" in row["said"]
+    use(monkeypatch, Tool("backlash"))
+    (row,) = run_wire(tmp_path / "driven", SEED, ["clutch_closed"], silent)
+    assert (row["outcome"], row["success"]) == ("drove all the same", False)
+
+
+def test_rigs_that_were_driven_are_not_driven_again_but_those_that_failed_are(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    use(monkeypatch, Tool(refuses=True))
+    (row,) = run_wire(tmp_path, SEED, ["nothing"], silent)
+    assert row["outcome"] == "failed"
+    tool = use(monkeypatch, Tool())
+    assert run_wire(tmp_path, SEED, ["nothing"], silent)[0]["success"]
+    tool.asked.clear()
+    run_wire(tmp_path, SEED, ["nothing"], silent)
+    assert tool.asked == []
+    run_wire(tmp_path, SEED + 1, ["nothing"], silent)
+    assert tool.asked[0] == "check"
+
+
+def test_an_unknown_rig_is_refused_with_those_there_are(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="expected one of nothing, backlash"):
+        run_wire(tmp_path, SEED, ["rust"], silent)

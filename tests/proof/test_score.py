@@ -1,0 +1,140 @@
+"""The score of a case: what counts as right, where, when, and how large."""
+
+import pytest
+
+from estimator.physics.catalogue import EFFECTS as CATALOGUE
+from hil.proof.judge import compare
+from hil.proof.kinds import kind
+from hil.proof.score import ALIKE, FAILED, Answer, iou, score
+from hil.proof.truth.specimen import EFFECTS, draw_specimen
+
+
+def _entry(name, element="shaft", alike=(), time_s=None, **parameters):
+    return {
+        "name": name,
+        "element": element,
+        "indistinguishable_from": list(alike),
+        "time_s": time_s or {},
+        "parameters": parameters,
+    }
+
+
+def _answer(verdict, *effects, element=None, **parameters):
+    diagnosis = {
+        "verdict": verdict,
+        "mismatch": {"element": element or (effects[0]["element"] if effects else None)},
+        "effects": list(effects),
+        "parameters": parameters,
+        "fit": {"noise_floor": 0.05},
+    }
+    return Answer(diagnosis, (1.01, 1.02, 1.03), 12.0)
+
+
+def _truth(name, seed=3, **events):
+    return {**draw_specimen(name, seed).truth(), "events": events}
+
+
+def _scored(name, answer, **events):
+    chosen = kind(name)
+    return score(chosen, 3, _truth(chosen.effect, **events), answer)
+
+
+@pytest.mark.parametrize(
+    ("planted", "answer", "outcome", "success"),
+    [
+        ("backlash", _answer("explained", _entry("backlash")), "right", True),
+        ("backlash", _answer("explained", _entry("stiffness_nonlinearity")), "wrong", False),
+        ("backlash", _answer("unexplained", element="shaft"), "abstained", False),
+        ("backlash", _answer("no_mismatch"), "missed", False),
+        ("speed_filter", _answer("explained", _entry("actuator_lag", alike=["speed_filter"])), ALIKE, True),
+        ("backlash+road_grade", _answer("explained", _entry("backlash")), "incomplete", False),
+        ("none", _answer("no_mismatch"), "right", True),
+        ("off", _answer("explained", _entry("backlash")), "invented", False),
+        ("speed_stiffened_shaft", _answer("unexplained"), "abstained", True),
+        ("speed_stiffened_shaft", _answer("explained", _entry("backlash")), "wrong", False),
+        ("speed_stiffened_shaft", _answer("no_mismatch"), "missed", False),
+    ],
+)
+def test_each_group_has_its_right_answer(planted, answer, outcome, success):
+    row = _scored(planted, answer)
+    assert (row["outcome"], row["success"]) == (outcome, success)
+
+
+def test_that_one_of_two_alike_lists_the_other_is_enough():
+    one = next(name for name, entry in CATALOGUE.items() if entry.equivalent)
+    other = CATALOGUE[one].equivalent[0]
+    row = score(kind("backlash"), 3, {**_truth("backlash"), "effect": one}, _answer("explained", _entry(other)))
+    assert row["outcome"] == ALIKE
+
+
+def test_a_command_that_failed_is_no_success_and_says_why():
+    row = _scored("none", Answer(None, fault="hil diagnose: ended with status 1: boom"))
+    assert (row["outcome"], row["success"]) == (FAILED, False)
+    assert "boom" in row["fault"]
+
+
+def test_the_element_is_right_only_if_all_that_is_named_is_there():
+    assert _scored("backlash", _answer("unexplained", element="shaft"))["element_right"]
+    assert not _scored("backlash", _answer("unexplained", element="motor"))["element_right"]
+    both = _answer("explained", _entry("backlash"), _entry("road_grade", "load"))
+    assert not _scored("backlash", both)["element_right"]
+    assert _scored("backlash+road_grade", both)["element_right"]
+    assert _scored("none", _answer("no_mismatch"))["element_right"] is None
+
+
+def test_intervals_overlap_as_time_in_both_over_time_in_either():
+    assert iou([[2.0, 4.0]], [[3.0, 5.0]]) == pytest.approx(1 / 3, abs=0.01)
+    assert iou([[2.0, 3.0], [4.0, 5.0]], [[2.0, 5.0]]) == pytest.approx(2 / 3, abs=0.01)
+    assert iou([], []) == 1.0
+    assert iou([], [[1.0, 2.0]]) == 0.0
+
+
+def test_an_event_is_scored_over_the_recordings_the_tool_saw():
+    event = {"run_1": [[5.0, 10.0]], "run_2": [], "fresh_1": [[1.0, 2.0]]}
+    said = _entry("brake_drag", "load", time_s={"run_1": [[5.0, 7.5]]})
+    row = _scored("brake_drag", _answer("explained", said), brake_drag=event)
+    assert row["event_iou"]["brake_drag"] == pytest.approx((0.5 + 1.0) / 2, abs=0.01)
+    untimed = _scored("brake_drag", _answer("explained", _entry("brake_drag", "load")), brake_drag=event)
+    assert untimed["event_iou"] == {}
+
+
+def test_sizes_are_held_against_the_fitted_parameter_of_the_same_meaning():
+    truth = _truth("backlash")
+    gap, inertia = truth["hidden"]["backlash"]["gap_rad"], truth["true"]["J_M"]
+    found = _entry("backlash", gap_rad={"value": gap, "ci95": [0.9 * gap, 1.1 * gap], "unit": "rad"})
+    nominal = {"value": inertia, "ci95": [1.01 * inertia, 1.02 * inertia], "unit": "kg m^2"}
+    rows = {size.what: size.inside for size in compare(_answer("explained", found, J_M=nominal).diagnosis, truth)}
+    assert rows == {"backlash: gap_rad": True, "J_M": False}
+
+
+def test_a_parameter_without_a_number_is_not_compared():
+    answer = _answer("no_mismatch", J_M={"value": None, "ci95": None, "unit": "kg m^2"})
+    assert compare(answer.diagnosis, _truth("none")) == []
+
+
+def test_a_simulation_that_ran_away_leaves_a_gap_and_not_an_unreadable_file():
+    answer = Answer(_answer("no_mismatch").diagnosis, (1.0, float("nan"), float("inf")))
+    assert _scored("none", answer)["fresh_over_floor"] == [1.0, None, None]
+
+
+@pytest.mark.parametrize(
+    "effect", [effect for effect in EFFECTS.values() if effect.fitted], ids=lambda effect: effect.name
+)
+def test_each_counterpart_exists_on_both_sides_and_has_a_value_for_some_draw(effect):
+    fitted = {parameter.name for parameter in CATALOGUE[effect.name].parameters}
+    assert set(effect.fitted) <= fitted
+    truths = [draw_specimen(effect.name, seed).truth() for seed in range(20)]
+    for name in effect.fitted:
+        values = [effect.should_be(name, truth["hidden"][effect.name], truth["true"]) for truth in truths]
+        assert any(value is not None for value in values), name
+        assert all(isinstance(value, float) for value in values if value is not None), name
+
+
+def test_a_size_without_counterpart_in_this_draw_is_not_compared():
+    seed = next(
+        seed
+        for seed in range(20)
+        if not draw_specimen("torque_derating", seed).sizes["torque_derating"]["time_constant_s"]
+    )
+    found = _entry("torque_derating", depth={"value": 0.1, "ci95": [0.0, 0.2], "unit": ""})
+    assert compare(_answer("explained", found).diagnosis, _truth("torque_derating", seed)) == []
