@@ -28,7 +28,7 @@ from __future__ import annotations
 import numpy as np
 
 from estimator.identification.linear_model import Orders
-from estimator.identification.online import ekf_kernel as kernel
+from estimator.identification.online.ekf_kernel import FIRST_LOG, N_STATES, ORIGIN, START, block, kept, room
 from estimator.identification.online.ekf_noise import EkfNoise
 from estimator.identification.online.kernel_estimator import KernelEstimator
 from estimator.identification.online.memory import Memory
@@ -68,23 +68,23 @@ class Ekf(KernelEstimator):
         )
         noise = EkfNoise() if noise is None else noise
         orders = Orders(3, 3, nk)
-        n = kernel.N_STATES
+        n = N_STATES
         law = noise.law(start, sample_time_s)
         structure = np.array([orders.na, orders.nb, nk], dtype=np.float64)
-        memory = Memory(kernel.kept(orders), {"structure": structure, "law": law}, kernel.room())
-        memory["x"][:] = law[kernel.ORIGIN :]
+        memory = Memory(kept(orders), {"structure": structure, "law": law}, room())
+        memory["x"][:] = law[ORIGIN :]
         memory["U"][...] = np.eye(n)
-        memory["D"][:] = memory["diagonal"][:] = law[kernel.START : kernel.ORIGIN]
+        memory["D"][:] = memory["diagonal"][:] = law[START : ORIGIN]
         memory["physical"][:] = [start.J_M, start.J_L, start.k, start.c, start.b_M, start.b_L]
-        super().__init__("ekf", kernel.block, orders, memory, ESTIMATED)
+        super().__init__("ekf", block, orders, memory, ESTIMATED)
 
     @property
     def undetermined(self) -> tuple[str, ...]:
         """Names of the physical parameters the samples so far do not determine."""
         if self._stands_still:
             return ESTIMATED
-        now, start = self._memory["diagonal"][kernel.FIRST_LOG :], self._memory["law"][kernel.START : kernel.ORIGIN]
-        still = now >= LEARNT * start[kernel.FIRST_LOG :]
+        now, start = self._memory["diagonal"][FIRST_LOG :], self._memory["law"][START : ORIGIN]
+        still = now >= LEARNT * start[FIRST_LOG :]
         return tuple(name for name, is_open in zip(ESTIMATED, still, strict=True) if is_open)
 
     @property
@@ -97,4 +97,4 @@ class Ekf(KernelEstimator):
         """Covariance of ln J_M, ln J_L, ln k, ln c as the filter believes it, shape (4, 4): relative variances."""
         U = self._memory["U"].T
         whole = (U * self._memory["D"]) @ U.T
-        return np.asarray(whole[kernel.FIRST_LOG :, kernel.FIRST_LOG :], dtype=np.float64)
+        return np.asarray(whole[FIRST_LOG :, FIRST_LOG :], dtype=np.float64)

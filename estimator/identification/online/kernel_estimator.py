@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from estimator.errors import BadShape
 from estimator.identification.linear_model import LinearModel, Orders
-from estimator.identification.online import state as states
+from estimator.identification.online.state import State, restored, saved
 from estimator.identification.online.memory import Memory
 from estimator.identification.online.recursive import Estimate, Reason, Trajectory, statement
 from estimator.identification.online.regression_kernel import OUTPUT_MOVES, TORQUE_MOVES
@@ -169,9 +169,9 @@ class KernelEstimator:
         live = self._memory["live"]
         return bool(live[TORQUE_MOVES] == 0.0 or live[OUTPUT_MOVES] == 0.0)
 
-    def state(self) -> states.State:
+    def state(self) -> State:
         """Return everything it remembers, as plain arrays; see :mod:`estimator.identification.online.state`."""
-        return states.saved(self._name, self._memory)
+        return saved(self._name, self._memory)
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """Take up a saved state: what follows has the bits it would have had without the break.
@@ -181,4 +181,4 @@ class KernelEstimator:
         BadSetting
             If the state is not that of an estimator of this kind and these settings.
         """
-        states.restored(state, self._name, self._memory)
+        restored(state, self._name, self._memory)
