@@ -14,19 +14,20 @@ from enum import Enum
 import numpy as np
 
 from estimator.identification.linear_model import Orders
-from estimator.identification.modes.cancellation import Cancellation
 from estimator.identification.modes.physical import RESPONDING
-from estimator.identification.modes.uncertainty import UncertainMode, pole_zero_map, uncertain_modes
-from estimator.identification.offline.blocks import block_of, first_part
-from estimator.identification.offline.box_jenkins import fit_of, solved
-from estimator.identification.offline.feedback import Feedback, judge_feedback
-from estimator.identification.offline.linear_fit import LinearFit
-from estimator.identification.offline.linearity import Linearity, judge_linearity, shaft_torque
+from estimator.identification.modes.uncertainty import Cancellation, UncertainMode, pole_zero_map, uncertain_modes
+from estimator.identification.offline.fits import LinearFit, fit_of, solved
+from estimator.identification.offline.linearity import (
+    Linearity,
+    RegionalMode,
+    judge_linearity,
+    modes_by_region,
+    shaft_torque,
+)
 from estimator.identification.offline.orders import criterion
 from estimator.identification.offline.problem import Problem
-from estimator.identification.offline.regions import RegionalMode, modes_by_region
-from estimator.identification.offline.validation import Validation, validate
-from estimator.signals.decimate import HIGH_PASS_HZ, high_passed
+from estimator.identification.offline.validation import Feedback, Validation, judge_feedback, validate
+from estimator.signals.decimate import HIGH_PASS_HZ, block_of, first_part, high_passed
 from estimator.signals.record import FloatArray, Record
 
 RIGID = Orders(1, 1, 1)

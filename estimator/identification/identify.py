@@ -23,10 +23,10 @@ import numpy as np
 from estimator.errors import NotExciting
 from estimator.identification.linear_model import LinearModel
 from estimator.identification.modes.modes import Mode, continuous, resonance
-from estimator.identification.offline.output_error import OutputErrorFit, fit_output_error
+from estimator.identification.offline.fits import OutputErrorFit, fit_output_error
 from estimator.identification.online.recursive import Estimate, Trajectory
 from estimator.identification.settings import FilterPart, Settings
-from estimator.identification.spectral.welch import SpectralEstimate, spectral_estimate
+from estimator.identification.spectral import SpectralEstimate, spectral_estimate
 from estimator.signals.decimate import decimate
 from estimator.signals.record import FloatArray, Record
 

@@ -10,8 +10,7 @@ from estimator.physics.acting import Place
 from estimator.physics.catalogue import BUILT_IN
 from estimator.physics.effects import torque_saturation
 from estimator.physics.layout import slot
-from estimator.signals.once import MOST_BYTES, once
-from estimator.signals.record import FloatArray, Record
+from estimator.signals.record import MOST_BYTES, FloatArray, Record, once
 
 _GAIN_M1 = slot("inverter_gain_mismatch", "gain_m1")
 _GAIN_M2 = slot("inverter_gain_mismatch", "gain_m2")

@@ -17,8 +17,9 @@ from typing import Final
 import numpy as np
 
 from estimator.errors import BadModel, BadSetting
-from estimator.identification.online import gain_kernel, regression_kernel
-from estimator.signals.decimate_kernel import UNTRUSTED
+from estimator.identification.online import adaptation
+from estimator.identification.online import regression
+from estimator.signals.decimate import UNTRUSTED
 from hil import __version__
 from hil.export.plc_estimator import PlcEstimator
 from hil.export.pou import Project
@@ -52,7 +53,7 @@ class Precision(Enum):
         The largest number in the algorithm is f^2 D in Bierman's update, with D up to F(0) = 1e3 and f up to
         largest * RUNAWAY * (gain of 1 / L, taken as up to 1e3): (1e9 * 1e3 * 1e3)^2 * 1e3 = 1e33 < 3.4e38.
         """
-        return regression_kernel.LARGEST if self is Precision.DOUBLE else 1e9
+        return regression.LARGEST if self is Precision.DOUBLE else 1e9
 
     def literal(self, value: float) -> str:
         """Return the shortest literal that reads back as the same number of this type.
@@ -162,7 +163,7 @@ class _Filling:
             "adapt": _truth(self.estimator.adapts_filter),
             "depth": self.estimator.depth,
             "start_up": self.estimator.start_up_samples,
-            "settled": round(regression_kernel.SETTLING * orders.n_parameters),
+            "settled": round(regression.SETTLING * orders.n_parameters),
         }
 
     def _gain(self) -> dict[str, object]:
@@ -175,12 +176,12 @@ class _Filling:
             "lambda1": literal(law.lambda1),
             "lambda0": literal(law.lambda0),
             "is_constant": _truth(law.lambda2 == 0.0),
-            "trace": literal(float(in_loops[gain_kernel.TRACE])),
+            "trace": literal(float(in_loops[adaptation.TRACE])),
             "alpha": literal(law.alpha),
             "holds_at_once": _truth(law.holds_at_once),
-            "known_gain": literal(gain_kernel.INFORMATION_GAIN),
-            "learnt": literal(regression_kernel.LEARNT),
-            "runaway": literal(regression_kernel.RUNAWAY),
+            "known_gain": literal(adaptation.INFORMATION_GAIN),
+            "learnt": literal(regression.LEARNT),
+            "runaway": literal(regression.RUNAWAY),
         }
 
     def _literals(self, values: Iterable[float]) -> str:

@@ -7,9 +7,8 @@ from dataclasses import dataclass, field
 
 from estimator.errors import BadSetting
 from estimator.identification.chain import OnlineChain, oefo
-from estimator.identification.excitation import SAMPLES_PER_PARAMETER
 from estimator.identification.online.oefo import Oefo
-from estimator.identification.settings import Settings
+from estimator.identification.settings import SAMPLES_PER_PARAMETER, Settings
 from estimator.signals.decimate import Decimator, low_pass_length
 from estimator.signals.record import FloatArray
 

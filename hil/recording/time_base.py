@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from estimator.signals.time_stamps import uniform_period_s
+from estimator.signals.record import uniform_period_s
 from hil.errors import RecordingError
 from hil.recording.scales import Role, scale_of
 from hil.recording.signals_config import TimeSignal

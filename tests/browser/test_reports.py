@@ -9,11 +9,10 @@ from typing import Any
 
 import pytest
 
-from estimator.identification.compare import compare
 from estimator.identification.identify import identify
 from estimator.identification.online.registry import ESTIMATORS
 from estimator.identification.settings import Settings
-from estimator.identification.study import study
+from estimator.identification.study import compare, study
 from hil.figures.line import TwoMassLine
 from hil.figures.local_model import LocalModel, Reference
 from hil.figures.numbers import row_of

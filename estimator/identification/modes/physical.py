@@ -31,9 +31,8 @@ from scipy.optimize import least_squares
 
 from estimator.errors import BadModel, BadSetting
 from estimator.identification.linear_model import LinearModel, Orders
-from estimator.identification.modes.continuous import numerator_of, to_continuous
-from estimator.identification.modes.propagate import Uncertain
-from estimator.identification.modes.reduced import THIRD
+from estimator.identification.modes.reduced import THIRD, numerator_of, to_continuous
+from estimator.identification.modes.uncertainty import Uncertain
 from estimator.signals.record import FloatArray
 
 UNITS = MappingProxyType(

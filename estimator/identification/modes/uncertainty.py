@@ -1,24 +1,198 @@
 """Poles and zeros with confidence ellipses, and what cancels; resonance and damping with intervals.
 
-The covariance of theta becomes one of (Re z, Im z) through :mod:`estimator.identification.modes.roots`, and a
+The covariance of theta becomes one of (Re z, Im z) through :mod:`estimator.identification.modes.uncertainty`, and a
 chi-square quantile of it the ellipse. Frequency and damping follow through ``s = ln(z) / T``.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.optimize import linear_sum_assignment
+from scipy.stats import chi2, norm
 
 from estimator.errors import BadShape
 from estimator.identification.linear_model import ComplexArray, LinearModel
-from estimator.identification.modes.cancellation import Cancellation, cancellations
 from estimator.identification.modes.modes import Mode, continuous, modes, resonance
-from estimator.identification.modes.propagate import CONFIDENCE, Uncertain, square_root
-from estimator.identification.modes.roots import Roots, covariance_of, pole_roots, zero_roots
 from estimator.signals.record import FloatArray
+
+CONFIDENCE = 0.95
+"""Of every interval and ellipse that does not say otherwise."""
+
+QUANTILE = float(norm.ppf(0.5 + CONFIDENCE / 2.0))
+"""Half width of such an interval in standard deviations: 1.96."""
+
+STEP = 0.01
+"""Of the difference quotient, in standard deviations."""
+
+
+@dataclass(frozen=True, slots=True)
+class Uncertain:
+    """A number and its standard deviation; infinite where the data say nothing of it.
+
+    Attributes
+    ----------
+    value, std : float
+    is_reciprocal : bool
+        Whether its reciprocal is what the data determine linearly, as of an inertia: the interval is then one of the
+        reciprocal, and reaches further up than down.
+    """
+
+    value: float
+    std: float
+    is_reciprocal: bool = False
+
+    @property
+    def ci95(self) -> tuple[float, float]:
+        """Interval that holds the truth with 95 % probability."""
+        reach = QUANTILE * self.std
+        if not self.is_reciprocal or self.value <= 0.0 or not math.isfinite(reach):
+            return self.value - reach, self.value + reach
+        share = reach / self.value
+        return self.value / (1.0 + share), self.value / (1.0 - share) if share < 1.0 else math.inf
+
+    @property
+    def is_determined(self) -> bool:
+        """Tell whether the interval leaves out 0: size and sign are known."""
+        return math.isfinite(self.std) and abs(self.value) > QUANTILE * self.std
+
+    def covers(self, truth: float) -> bool:
+        """Tell whether the interval holds a value."""
+        low, high = self.ci95
+        return low <= truth <= high
+
+
+def square_root(covariance: FloatArray) -> FloatArray:
+    """Return S with ``S S^T = P``, its columns along the principal axes; rounding below zero counts as zero."""
+    variances, axes = np.linalg.eigh(0.5 * (covariance + covariance.T))
+    return np.asarray(axes * np.sqrt(np.maximum(variances, 0.0)), dtype=np.float64)
+
+
+def propagate(
+    function: Callable[[FloatArray], FloatArray], parameters: FloatArray, covariance: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return a function's value, shape (m,), and its covariance, shape (m, m).
+
+    Parameters
+    ----------
+    function
+        From parameters, shape (n,), to values, shape (m,); smooth near ``parameters``.
+    parameters : ndarray, shape (n,)
+        Estimate.
+    covariance : ndarray, shape (n, n)
+        Of the estimate; may be singular.
+    """
+    axes = square_root(covariance).T
+    value = function(parameters)
+    slopes = [(function(parameters + STEP * axis) - function(parameters - STEP * axis)) / (2.0 * STEP) for axis in axes]
+    G = np.array(slopes).reshape(axes.shape[0], value.shape[0])
+    return value, G.T @ G
+
+
+def uncertain(values: FloatArray, covariance: FloatArray) -> tuple[Uncertain, ...]:
+    """Pair each value with its standard deviation."""
+    deviations = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    return tuple(Uncertain(float(value), float(std)) for value, std in zip(values, deviations, strict=True))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Roots:
+    """Roots, shape (n,), and their derivatives by theta, shape (n, na + nb), complex."""
+
+    values: ComplexArray
+    slopes: ComplexArray
+
+
+def _roots(coefficients: FloatArray, first: int, place: int, n_parameters: int) -> Roots:
+    """Return the roots of a polynomial whose coefficients from ``first`` on are theta from ``place`` on."""
+    values = np.asarray(np.roots(coefficients), dtype=np.complex128)
+    degree = coefficients.shape[0] - 1
+    slopes = np.zeros((values.shape[0], n_parameters), dtype=np.complex128)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        p_prime = np.polyval(np.polyder(coefficients), values)
+        for i in range(first, degree + 1):
+            slopes[:, place + i - first] = -(values ** (degree - i)) / p_prime
+    return Roots(values, slopes)
+
+
+def pole_roots(model: LinearModel) -> Roots:
+    """Return the poles of a model with their derivatives."""
+    return _roots(model.A, 1, 0, model.orders.n_parameters)
+
+
+def zero_roots(model: LinearModel) -> Roots:
+    """Return the zeros of a model with their derivatives."""
+    return _roots(np.array(model.b), 0, len(model.a), model.orders.n_parameters)
+
+
+def covariance_of(slope: ComplexArray, P: FloatArray) -> FloatArray:
+    """Return the covariance of (Re, Im) of a complex number with this derivative; infinite at a double root."""
+    if not np.isfinite(slope).all():
+        return np.diag([np.inf, np.inf])
+    G = np.array([slope.real, slope.imag])
+    return np.asarray(G @ P @ G.T, dtype=np.float64)
+
+
+FAR = 1e6
+"""Squared distance, in units of its uncertainty, beyond which none is farther: a thousand standard deviations."""
+
+
+@dataclass(frozen=True, slots=True)
+class Cancellation:
+    """A pole and a zero that the data can't tell apart.
+
+    Attributes
+    ----------
+    pole, zero : complex
+        In z; of a conjugate pair the one with positive imaginary part.
+    p_value : float
+        Probability of a distance at least this large if they were one.
+    """
+
+    pole: complex
+    zero: complex
+    p_value: float
+
+    @property
+    def statement(self) -> str:
+        """What it means, in a sentence."""
+        kind = "pair" if self.pole.imag else "pole"
+        return (
+            f"The {kind} at {self.pole:.3f} and the zero at {self.zero:.3f} can't be distinguished "
+            f"(p = {self.p_value:.2g}): the data do not need this {kind}."
+        )
+
+
+def cancellations(poles: Roots, zeros: Roots, P: FloatArray, confidence: float) -> tuple[Cancellation, ...]:
+    """Pair poles and zeros of one kind, closest in units of their uncertainty first, each at most once."""
+    found = []
+    for imaginary, freedom in ((False, 1), (True, 2)):
+        p_at, z_at = (
+            np.flatnonzero(roots.values.imag > 0 if imaginary else roots.values.imag == 0) for roots in (poles, zeros)
+        )
+        distance = np.array([[_distance(poles, int(i), zeros, int(j), P, freedom) for j in z_at] for i in p_at])
+        for row, column in zip(*linear_sum_assignment(distance.reshape(len(p_at), len(z_at))), strict=True):
+            p_value = float(chi2.sf(distance[row, column], freedom))
+            if p_value > 1.0 - confidence:
+                found.append(
+                    Cancellation(complex(poles.values[p_at[row]]), complex(zeros.values[z_at[column]]), p_value)
+                )
+    return tuple(found)
+
+
+def _distance(poles: Roots, i: int, zeros: Roots, j: int, P: FloatArray, freedom: int) -> float:
+    """Return the squared distance of a pole and a zero in units of its own uncertainty."""
+    apart = zeros.values[j] - poles.values[i]
+    spread = covariance_of(zeros.slopes[j] - poles.slopes[i], P)[:freedom, :freedom]
+    d = np.array([apart.real, apart.imag])[:freedom]
+    if not np.isfinite(spread).all():
+        return 0.0
+    variances, axes = np.linalg.eigh(spread)
+    floor = max(float(variances[-1]) * np.finfo(np.float64).eps, np.finfo(np.float64).tiny)
+    return float(min(np.sum((axes.T @ d) ** 2 / np.maximum(variances, floor)), FAR))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

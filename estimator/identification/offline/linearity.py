@@ -14,17 +14,20 @@ The step that the linear parameters take when the functions are let in is what t
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
+from scipy.optimize import least_squares
 from scipy.signal import lfilter
 from scipy.stats import f as fisher
 from threadpoolctl import threadpool_limits
 
 from estimator.identification.linear_model import LinearModel
+from estimator.identification.modes.modes import Mode, resonance
 from estimator.identification.offline.problem import Problem
 from estimator.identification.offline.starts import delayed
 from estimator.signals.decimate import Decimator
-from estimator.signals.record import FloatArray, Record
+from estimator.signals.record import BoolArray, FloatArray, Record
 
 SIGNIFICANCE = 1e-4
 """Of the test: linear drives in closed loop gave p-values somewhat smaller than uniform ones, gaps below 1e-15."""
@@ -134,3 +137,61 @@ def _p_value(J: FloatArray, w: FloatArray, columns: FloatArray) -> float:
     if q == 0 or free <= 0 or total <= gained:
         return 1.0
     return float(fisher.sf(gained / q / ((total - gained) / free), q, free))
+
+
+REGIONS = 3
+"""Of equal numbers of samples: below, about and above the middle."""
+
+MOST_EVALUATIONS = 30
+
+
+@dataclass(frozen=True, slots=True)
+class RegionalMode:
+    """The resonance where a signal is between two values; None where the drive does not resonate there."""
+
+    low: float
+    high: float
+    mode: Mode | None
+
+
+def modes_by_region(
+    problem: Problem, x: FloatArray, signal: FloatArray, band_hz: tuple[float, float]
+) -> tuple[RegionalMode, ...]:
+    """Fit B / A once for each region of a signal.
+
+    Parameters
+    ----------
+    problem : Problem
+        Of a Box-Jenkins fit.
+    x : ndarray
+        Its minimum.
+    signal : ndarray, shape (N,)
+        What the regions are of, e.g. the torque in the shaft [Nm].
+    band_hz : tuple of float
+        Where the resonance is looked for [Hz].
+    """
+    value = problem.blocks.mean(signal)[problem.noise_order :]
+    edges = np.quantile(value, np.linspace(0.0, 1.0, REGIONS + 1))
+    found = []
+    for low, high in pairwise(edges.tolist()):
+        model = _model_of(problem, x, (value >= low) & (value <= high))
+        found.append(RegionalMode(low, high, resonance(model, band_hz)))
+    return tuple(found)
+
+
+def _model_of(problem: Problem, x: FloatArray, rows: BoolArray) -> LinearModel:
+    """Return the model that whitened rows alone ask for."""
+    n = problem.n_plant
+
+    def joined(plant: FloatArray) -> FloatArray:
+        return np.concatenate([plant, x[n:]])
+
+    def residual(plant: FloatArray) -> FloatArray:
+        return problem.residual(joined(plant))[rows]
+
+    def jacobian(plant: FloatArray) -> FloatArray:
+        return problem.jacobian(joined(plant))[rows, :n]
+
+    with threadpool_limits(1):
+        solution = least_squares(residual, x[:n], jac=jacobian, x_scale="jac", method="lm", max_nfev=MOST_EVALUATIONS)
+    return problem.model(joined(solution.x))

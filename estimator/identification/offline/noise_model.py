@@ -107,3 +107,24 @@ def fit_noise(e: FloatArray, okay: BoolArray, order: int) -> NoiseModel:
         D = np.concatenate([D, [0.0]]) + k * np.concatenate([[0.0], D[::-1]])
         power *= 1.0 - k * k
     return NoiseModel(D, float(np.sqrt(power)))
+
+
+def sandwich(gradient: FloatArray, okay: BoolArray, noise: NoiseModel) -> FloatArray:
+    """Return the covariance of all parameters of a least-squares fit, shape (n, n).
+
+    Parameters
+    ----------
+    gradient : ndarray, shape (N, n)
+        d prediction / d parameters.
+    okay : ndarray of bool, shape (N,)
+        Samples that were fitted.
+    noise : NoiseModel
+        Of the residual.
+    """
+    psi = np.where(okay[:, np.newaxis], gradient, 0.0)
+    n_samples = int(np.count_nonzero(okay))
+    spent = psi.shape[1] + noise.order
+    bread = np.linalg.pinv(psi.T @ psi, hermitian=True)
+    psi_h = noise.coloured_backwards(psi)
+    scale = noise.std**2 * n_samples / max(n_samples - spent, 1)
+    return np.asarray(scale * bread @ (psi_h.T @ psi_h) @ bread, dtype=np.float64)

@@ -19,9 +19,7 @@ import numpy as np
 
 from estimator.errors import BadSetting
 from estimator.identification.linear_model import LinearModel, Orders
-from estimator.identification.offline.box_jenkins import fit_box_jenkins
-from estimator.identification.offline.free_run import free_run
-from estimator.identification.offline.linear_fit import LinearFit
+from estimator.identification.offline.fits import LinearFit, fit_box_jenkins, free_run
 from estimator.signals.decimate import decimate
 from estimator.signals.record import Record
 

@@ -15,18 +15,18 @@ or later) they tell of feedback.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 from scipy.stats import chi2
 from threadpoolctl import threadpool_limits
 
-from estimator.identification.modes.propagate import CONFIDENCE, QUANTILE
-from estimator.identification.offline.blocks import Blocks
-from estimator.identification.offline.free_run import FreeRun, free_run
-from estimator.identification.offline.linear_fit import LinearFit
+from estimator.identification.modes.uncertainty import CONFIDENCE, QUANTILE
+from estimator.identification.offline.fits import FreeRun, LinearFit, free_run
 from estimator.identification.offline.noise_model import fit_noise, reach
+from estimator.signals.decimate import Blocks
 from estimator.signals.record import BoolArray, FloatArray, IntArray, Record
 
 LAGS = 25
@@ -190,3 +190,57 @@ def _product(e: FloatArray, x: FloatArray, lag: int) -> float:
     if lag >= 0:
         return float(e[lag:] @ x[: x.shape[0] - lag])
     return float(e[:lag] @ x[-lag:])
+
+
+SIGNIFICANCE = 0.01
+"""False alarms of the detection, on recordings in open loop."""
+
+CONSEQUENCES = MappingProxyType(
+    {
+        "output_error": "biased towards minus the inverse of the feedback where the noise is stronger than the PRBS",
+        "box_jenkins": "unbiased as long as its noise model is right and the loop holds at least one sample of delay",
+        "spectral": "a mean of B / A and minus the inverse of the feedback, weighted by PRBS and noise",
+        "recursive": "as output_error",
+    }
+)
+"""What feedback does to each estimate, by the name of its method."""
+
+
+@dataclass(frozen=True, slots=True)
+class Feedback:
+    """Whether there was feedback and what it means.
+
+    Attributes
+    ----------
+    detected : bool
+    p_value : float
+        Probability of a correlation with later input at least this large without feedback.
+    consequences : Mapping[str, str]
+        By method; empty if none was detected.
+    statement : str
+    """
+
+    detected: bool
+    p_value: float
+    consequences: Mapping[str, str]
+    statement: str
+
+
+def judge_feedback(validation: Validation) -> Feedback:
+    """Tell from a validated fit whether its recording was made in closed loop.
+
+    Parameters
+    ----------
+    validation : Validation
+        Of any fit of a useful order; a poor model only makes the test less sharp.
+    """
+    p_value = validation.feedback.p_value
+    if p_value > SIGNIFICANCE:
+        statement = f"No sign of the torque following the speed (p = {p_value:.2g})."
+        return Feedback(False, p_value, MappingProxyType({}), statement)
+    statement = (
+        f"The torque follows the speed (p = {p_value:.2g}): a driver or controller closes the loop. The output-error, "
+        "recursive and spectral estimates are biased by the noise it feeds back. Use the Box-Jenkins model, or "
+        "hold the torque except for the PRBS."
+    )
+    return Feedback(True, p_value, CONSEQUENCES, statement)

@@ -4,7 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from enum import IntEnum
+from functools import cache
 from typing import Any
+
+import numpy as np
+
+from estimator.errors import BadSetting
+from estimator.signals.record import FloatArray
 
 NORMAL_95 = 1.959963984540054
 """Standard deviations that hold 95 % of a normal distribution, either way."""
@@ -121,3 +128,86 @@ class Alarm:
             settled=document["settled"],
             **document["evidence"],
         )
+
+
+class TrackingState(IntEnum):
+    """State of the tracking at a sample; in files and on screens it has the name in small letters."""
+
+    STARTING = 0  # there is no resonance to be watched, yet or for a moment
+    LEARNING = 1  # what is usual is being learnt; no alarm can come
+    WATCHING = 2  # a change is alarmed
+    SETTLING = 3  # after an alarm: the estimate is on its way
+    NOT_EXCITED = 4  # the torque says nothing of the resonance: no alarm can come, and the estimate is held or none
+
+    @property
+    def word(self) -> str:
+        """The state as it stands in a file."""
+        return self.name.lower()
+
+    @property
+    def words(self) -> str:
+        """The state as it stands in a text."""
+        return self.word.replace("_", " ")
+
+
+HIGHEST = 40.0
+"""No threshold is sought above."""
+
+NODES = 200
+"""Of the Gauss-Legendre quadrature: twelve digits for thresholds from 0.1 up."""
+
+HALVINGS = 40
+"""Of the interval that holds the threshold: to below 1e-10 of `HIGHEST`."""
+
+
+@cache
+def _quadrature() -> tuple[FloatArray, FloatArray]:
+    """Return nodes and weights on the interval from 0 to 1."""
+    nodes, weights = np.polynomial.legendre.leggauss(NODES)
+    return (nodes + 1.0) / 2, weights / 2
+
+
+def false_pairs(threshold: float, n: int, freedom: int) -> float:
+    """Return the probability that two statistics in a row are beyond a threshold, on the same side.
+
+    Parameters
+    ----------
+    threshold : float
+        In standard deviations; 0 or more.
+    n : int
+        Statistics behind the mean.
+    freedom : int
+        Degrees of freedom behind the standard deviation.
+    """
+    nodes, weights = _quadrature()
+    length = np.arcsin(1.0 / (n + 1)) + np.pi / 2
+    share = 1.0 + np.sin(nodes * length - np.pi / 2)
+    density = (1.0 + 2.0 * threshold**2 / (freedom * share)) ** (-freedom / 2)
+    return float(length / np.pi * weights @ density)
+
+
+@cache
+def threshold_for(false_alarms_per_hour: float, statistics_per_hour: float, n: int, freedom: int) -> float:
+    """Return the threshold that has at most so many false alarms an hour; ``n`` and ``freedom`` of :func:`false_pairs`.
+
+    Raises
+    ------
+    BadSetting
+        If no threshold does.
+    """
+    wanted = false_alarms_per_hour / statistics_per_hour
+    if not 0.0 < wanted < false_pairs(0.0, n, freedom):
+        raise BadSetting(
+            f"alarm: false_alarms_per_hour is {false_alarms_per_hour}, expected above 0 and below "
+            f"{statistics_per_hour * false_pairs(0.0, n, freedom):.4g}, what no threshold at all has."
+        )
+    if false_pairs(HIGHEST, n, freedom) > wanted:
+        raise BadSetting(
+            f"alarm: false_alarms_per_hour is {false_alarms_per_hour}, fewer than a level of {n} blocks and a spread "
+            f"with {freedom} degrees of freedom can promise. Take a longer reference."
+        )
+    low, high = 0.0, HIGHEST
+    for _ in range(HALVINGS):  # the probability falls with the threshold
+        middle = (low + high) / 2
+        low, high = (middle, high) if false_pairs(middle, n, freedom) > wanted else (low, middle)
+    return high

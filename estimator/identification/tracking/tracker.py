@@ -1,7 +1,7 @@
 """A recursive estimator, followed and watched, block by block of samples.
 
 What a block says of the excitation decides what becomes of the next: it is learnt from, the estimator is held, or it
-begins anew (:mod:`excitation`). Blocks begin with the first sample that comes, so that samples one by one, or all at
+begins anew (:mod:`follow`). Blocks begin with the first sample that comes, so that samples one by one, or all at
 once, are cut alike.
 """
 
@@ -14,10 +14,8 @@ from typing import Any
 import numpy as np
 
 from estimator.identification.online.recursive import RecursiveEstimator, Trajectory
-from estimator.identification.tracking.alarm import Alarm, Level
-from estimator.identification.tracking.excitation import Excitation
-from estimator.identification.tracking.follow import Followed, Follower
-from estimator.identification.tracking.state import TrackingState
+from estimator.identification.tracking.alarm import Alarm, Level, TrackingState
+from estimator.identification.tracking.follow import Excitation, Followed, Follower
 from estimator.identification.tracking.watch import ChangeWatch
 from estimator.signals.record import BoolArray, FloatArray, IntArray
 

@@ -16,7 +16,7 @@ from estimator.signals.record import Record
 from hil.commission.analysis.response_ratio import HIGH_PASS_HZ
 
 if TYPE_CHECKING:
-    from estimator.identification.offline.output_error import OutputErrorFit
+    from estimator.identification.offline.fits import OutputErrorFit
 
 NATURAL_DELAY = 1
 """Samples of delay that sampling alone makes."""
@@ -43,7 +43,7 @@ def select_delay(record: Record) -> DelaySelection:
         If the recording can't determine a model.
     """
     data = decimate(record, 1, HIGH_PASS_HZ)
-    from estimator.identification.offline.output_error import fit_output_error  # a second, and the bus comes first
+    from estimator.identification.offline.fits import fit_output_error  # a second, and the bus comes first
 
     fits = [fit_output_error(data, Orders(nk=nk)) for nk in range(NATURAL_DELAY, LONGEST + 1)]
     best = min(range(len(fits)), key=lambda i: fits[i].rms)

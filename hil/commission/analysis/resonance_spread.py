@@ -12,7 +12,7 @@ from estimator.identification.modes.modes import Mode, resonance
 from estimator.signals.record import FloatArray
 
 if TYPE_CHECKING:
-    from estimator.identification.offline.output_error import OutputErrorFit
+    from estimator.identification.offline.fits import OutputErrorFit
 
 STEP = 1e-3
 """Step of the differences, in standard deviations of each direction of theta."""

@@ -6,7 +6,7 @@ With the same PRBS on one inverter and then on the other, the driveline is the s
 
 ``g`` is how much more torque inverter m2 gives for its reading than m1 does for its own, ``tau`` how much later. Both
 by weighted least squares over the lines where both tests are coherent; the weights are Bendat and Piersol's random
-errors (`estimator.identification.spectral.welch`). Which of the two is right, no such test can tell.
+errors (`estimator.identification.spectral`). Which of the two is right, no such test can tell.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from estimator.signals.record import BoolArray, FloatArray, Record
 from hil.commission.analysis.measured import Z95, Measured
 
 if TYPE_CHECKING:
-    from estimator.identification.spectral.welch import SpectralEstimate
+    from estimator.identification.spectral import SpectralEstimate
 
 HIGH_PASS_HZ = 0.3
 """As in the identification: what is slower is the road's."""
@@ -64,7 +64,7 @@ def response_ratio(first: Record, second: Record) -> ResponseRatio:
 
 
 def _response(record: Record) -> SpectralEstimate:
-    from estimator.identification.spectral.welch import spectral_estimate  # half a second, and the bus comes first
+    from estimator.identification.spectral import spectral_estimate  # half a second, and the bus comes first
 
     samples = 2 * round(SEGMENT_S / record.sample_time_s / 2)
     return spectral_estimate(decimate(record, 1, HIGH_PASS_HZ), samples)

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from estimator.identification.best import SEEN, Verdict
-from estimator.identification.modes.propagate import Uncertain
+from estimator.identification.modes.uncertainty import Uncertain
 from estimator.identification.offline.validation import Validation
 from estimator.identification.online.recursive import Status
 from estimator.identification.study import Study

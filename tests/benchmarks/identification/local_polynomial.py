@@ -21,7 +21,7 @@ import numpy as np
 
 from estimator.errors import NotExciting
 from estimator.identification.linear_model import ComplexArray
-from estimator.identification.spectral.estimate import SpectralEstimate
+from estimator.identification.spectral import SpectralEstimate
 from estimator.signals.record import BoolArray, FloatArray, Record
 from estimator.signals.settings import Requirement, require
 

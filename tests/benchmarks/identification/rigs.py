@@ -22,10 +22,9 @@ from estimator.identification.identify import identify
 from estimator.identification.linear_model import LinearModel, Orders
 from estimator.identification.modes.modes import Mode, two_mass_resonance
 from estimator.identification.modes.physical import physical_parameters
-from estimator.identification.modes.propagate import Uncertain
-from estimator.identification.modes.uncertainty import uncertain_resonance
-from estimator.identification.offline.box_jenkins import fit_box_jenkins
-from estimator.identification.spectral.estimate import SpectralEstimate
+from estimator.identification.modes.uncertainty import Uncertain, uncertain_resonance
+from estimator.identification.offline.fits import fit_box_jenkins
+from estimator.identification.spectral import SpectralEstimate
 from estimator.signals.decimate import decimate
 from estimator.signals.record import Record
 from hil.figures.road.conditions import draw_conditions

@@ -10,11 +10,8 @@ import pytest
 from estimator.identification.best import BestEstimate, Verdict, best_estimate
 from estimator.identification.linear_model import LinearModel, Orders
 from estimator.identification.modes.physical import NAMES, two_mass_model
-from estimator.identification.modes.propagate import Uncertain
-from estimator.identification.modes.uncertainty import uncertain_resonance
-from estimator.identification.offline.box_jenkins import fit_box_jenkins
-from estimator.identification.offline.linear_fit import LinearFit
-from estimator.identification.offline.output_error import fit_output_error, problem_of
+from estimator.identification.modes.uncertainty import Uncertain, uncertain_resonance
+from estimator.identification.offline.fits import LinearFit, fit_box_jenkins, fit_output_error, problem_of
 from estimator.signals.decimate import high_passed
 from estimator.signals.prbs import prbs_nm
 from estimator.signals.record import BoolArray, Record

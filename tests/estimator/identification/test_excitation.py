@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from estimator.errors import NotExciting
-from estimator.identification.excitation import excitation_order, require_excitation
 from estimator.identification.linear_model import Orders
+from estimator.identification.settings import excitation_order, require_excitation
 from estimator.signals.prbs import prbs_nm
 from estimator.signals.record import FloatArray
 

@@ -15,8 +15,7 @@ from estimator.diagnosis.unnamed.orders import LONGEST_TRAVEL, peaks
 from estimator.errors import BadSetting
 from estimator.identification.identify import identify
 from estimator.signals.decimate import MOST_FACTOR, Decimator
-from estimator.signals.part import sliced
-from estimator.signals.record import Record
+from estimator.signals.record import Record, sliced
 
 N = 3000
 RNG = np.random.default_rng(1)

@@ -6,8 +6,7 @@ import gc
 
 import numpy as np
 
-from estimator.signals.once import MOST_BYTES, once
-from estimator.signals.record import Record
+from estimator.signals.record import MOST_BYTES, Record, once
 
 
 def recording(size: int) -> Record:

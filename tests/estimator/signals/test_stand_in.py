@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from estimator.signals.correlation import stand_in_variance
 from estimator.signals.record import Record
-from estimator.signals.stand_in import stand_in_variance
 
 COUNT = 20_000
 

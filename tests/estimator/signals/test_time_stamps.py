@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from estimator.signals.time_stamps import uniform_period_s
+from estimator.signals.record import uniform_period_s
 
 
 @pytest.mark.parametrize("period_s", [0.01, 0.002, 0.0125, 0.1, 1.0 / 1024.0])

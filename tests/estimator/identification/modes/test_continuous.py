@@ -6,7 +6,7 @@ from scipy.signal import cont2discrete
 
 from estimator.errors import BadModel
 from estimator.identification.linear_model import LinearModel
-from estimator.identification.modes.continuous import state_space, to_continuous
+from estimator.identification.modes.reduced import state_space, to_continuous
 from tests.estimator.identification import driveline
 
 T_S = 0.01

@@ -6,9 +6,8 @@ import pytest
 from estimator.errors import BadModel, BadSetting
 from estimator.identification.linear_model import LinearModel, Orders
 from estimator.identification.modes.physical import NAMES, physical_parameters, two_mass_model, two_mass_start
-from estimator.identification.modes.propagate import Uncertain
-from estimator.identification.offline.box_jenkins import fit_box_jenkins
-from estimator.identification.offline.linear_fit import LinearFit
+from estimator.identification.modes.uncertainty import Uncertain
+from estimator.identification.offline.fits import LinearFit, fit_box_jenkins
 from estimator.signals.decimate import decimate
 from tests.estimator.identification import driveline
 from tests.estimator.identification.driveline import cruise

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from estimator.identification.modes.propagate import Uncertain, propagate, square_root, uncertain
+from estimator.identification.modes.uncertainty import Uncertain, propagate, square_root, uncertain
 
 
 def test_a_linear_function_has_its_exact_covariance() -> None:

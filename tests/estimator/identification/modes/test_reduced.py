@@ -7,7 +7,7 @@ from estimator.errors import BadModel, BadShape
 from estimator.identification.linear_model import LinearModel
 from estimator.identification.modes.modes import resonance
 from estimator.identification.modes.reduced import reduce_order, third_order
-from estimator.identification.offline.output_error import fit_output_error
+from estimator.identification.offline.fits import fit_output_error
 from estimator.signals.decimate import decimate
 from tests.estimator.identification.driveline import Cruise
 

@@ -11,9 +11,7 @@ import pytest
 from estimator.errors import BadSetting, NotExciting
 from estimator.identification.linear_model import Orders
 from estimator.identification.modes.uncertainty import UncertainMode, uncertain_resonance
-from estimator.identification.offline.box_jenkins import fit_box_jenkins
-from estimator.identification.offline.linear_fit import LinearFit, Method
-from estimator.identification.offline.output_error import fit_output_error
+from estimator.identification.offline.fits import LinearFit, Method, fit_box_jenkins, fit_output_error
 from estimator.signals.decimate import decimate, high_passed
 from estimator.signals.record import Record
 from tests.benchmarks.buses.bus import draw_bus

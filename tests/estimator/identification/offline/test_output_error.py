@@ -5,7 +5,7 @@ import pytest
 
 from estimator.errors import NotExciting
 from estimator.identification.linear_model import LinearModel, Orders
-from estimator.identification.offline.output_error import OutputErrorFit, fit_output_error
+from estimator.identification.offline.fits import OutputErrorFit, fit_output_error
 from estimator.identification.offline.starts import arx, candidates, stabilised, steiglitz_mcbride
 from estimator.signals.prbs import prbs_nm
 from estimator.signals.record import BoolArray, FloatArray, Record

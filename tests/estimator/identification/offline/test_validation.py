@@ -5,12 +5,9 @@ import pytest
 
 from estimator.errors import BadModel
 from estimator.identification.linear_model import LinearModel, Orders
-from estimator.identification.offline.box_jenkins import fit_box_jenkins
-from estimator.identification.offline.feedback import judge_feedback
-from estimator.identification.offline.free_run import free_run
-from estimator.identification.offline.linear_fit import LinearFit
+from estimator.identification.offline.fits import LinearFit, fit_box_jenkins, free_run
 from estimator.identification.offline.noise_model import fit_noise
-from estimator.identification.offline.validation import correlation_test, validate
+from estimator.identification.offline.validation import correlation_test, judge_feedback, validate
 from estimator.signals.decimate import decimate
 from estimator.signals.record import Record
 from tests.estimator.identification.closed_loop import controlled

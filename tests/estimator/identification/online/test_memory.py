@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from estimator.identification.linear_model import Orders
-from estimator.identification.online.memory import Memory
 from estimator.identification.online.oefo import Oefo
+from estimator.identification.online.recursive import Memory
 
 
 @pytest.fixture

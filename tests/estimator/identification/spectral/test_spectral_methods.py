@@ -9,8 +9,7 @@ import pytest
 import scipy.signal
 
 from estimator.errors import BadSetting, NotExciting
-from estimator.identification.spectral.estimate import SpectralEstimate
-from estimator.identification.spectral.welch import spectral_estimate
+from estimator.identification.spectral import SpectralEstimate, spectral_estimate
 from estimator.signals.decimate import decimate
 from estimator.signals.record import Record
 from tests.benchmarks.identification.local_polynomial import local_polynomial, longest_stretch

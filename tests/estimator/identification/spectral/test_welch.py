@@ -8,7 +8,7 @@ import scipy.signal
 
 from estimator.errors import BadSetting, NotExciting
 from estimator.identification.linear_model import LinearModel
-from estimator.identification.spectral.welch import good_segments, spectral_estimate
+from estimator.identification.spectral import good_segments, spectral_estimate
 from estimator.signals.record import FloatArray, Record
 
 MODEL = LinearModel(a=(-1.0, 0.6), b=(0.5, 0.2), nk=1, sample_time_s=0.02)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from estimator.identification.tracking.baseline import Baseline, Spread, spread_of
+from estimator.identification.tracking.watch import Baseline, Spread, spread_of
 
 NUMBER = np.arange(2.0, 23.0)
 

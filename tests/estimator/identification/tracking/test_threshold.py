@@ -8,7 +8,7 @@ from scipy.integrate import quad
 from scipy.stats import chi, norm
 
 from estimator.errors import BadSetting
-from estimator.identification.tracking.threshold import false_pairs, threshold_for
+from estimator.identification.tracking.alarm import false_pairs, threshold_for
 
 
 @pytest.mark.parametrize(("threshold", "n"), [(1.5, 21), (2.0, 10)])

@@ -12,13 +12,11 @@ import pytest
 from scipy.stats import poisson
 
 from estimator.errors import BadSetting
-from estimator.identification.chain import OnlineChain
+from estimator.identification.chain import OnlineChain, OnlineTrajectory
 from estimator.identification.online.adaptation import ConstantForgetting
-from estimator.identification.online_estimate import OnlineTrajectory
 from estimator.identification.settings import Settings
-from estimator.identification.tracking.state import TrackingState
-from estimator.identification.tracking.watch import ChangeWatch
-from estimator.identification.tracking.watch_settings import WatchSettings
+from estimator.identification.tracking.alarm import TrackingState
+from estimator.identification.tracking.watch import ChangeWatch, WatchSettings
 from estimator.signals.record import Record
 from tests.estimator.identification.tracking.drives import PRBS_NM, SAMPLE_TIME_S, Line, drives
 

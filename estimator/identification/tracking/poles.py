@@ -180,3 +180,52 @@ def mode_gradient(z: ComplexArray, i: int, sample_time_s: float, frequency: Floa
         frequency[k] = along / (2.0 * np.pi)
         damping[k] = -ds.real / magnitude + s.real * along / (magnitude * magnitude)
         power *= z[i]
+
+
+# Places in `through`: the torque's steps passed once and twice through 1 / (1 - pole q^-1), and the last torque.
+ONCE_RE, ONCE_IM, TWICE_RE, TWICE_IM, LAST = 0, 1, 2, 3, 4
+N_THROUGH = 5
+
+
+@compiled
+def pass_torque(u: float, pole: complex, through: FloatArray) -> None:
+    """Pass the next torque through a mode's pole."""
+    once = pole * complex(through[ONCE_RE], through[ONCE_IM]) + (u - through[LAST])
+    twice = pole * complex(through[TWICE_RE], through[TWICE_IM]) + once
+    through[ONCE_RE], through[ONCE_IM], through[TWICE_RE], through[TWICE_IM] = (
+        once.real,
+        once.imag,
+        twice.real,
+        twice.imag,
+    )
+    through[LAST] = u
+
+
+@compiled
+def weight_of(pole: complex, residue: complex, damping: float, sample_time_s: float) -> complex:
+    """Return rho dp/df, in the units of the output per Hz and torque."""
+    turning = complex(-damping, np.sqrt(1.0 - damping * damping)) * (2.0 * np.pi * sample_time_s)
+    return complex(residue * pole * turning)
+
+
+@compiled
+def sensitivity(weight: complex, through: FloatArray) -> float:
+    """Return psi of the next sample's steps, from the torques passed so far."""
+    return float(2.0 * (weight.real * through[TWICE_RE] - weight.imag * through[TWICE_IM]))
+
+
+@compiled
+def of_steps(pole: complex) -> float:
+    """Return |1 - q^-1|^2 at the frequency of a pole: what taking steps makes of a density there."""
+    return float(4.0 * np.sin(0.5 * np.arctan2(pole.imag, pole.real)) ** 2)
+
+
+@compiled
+def output_density(psi: float, pole: complex, half_width_hz: float) -> float:
+    """Return a sample of the density at its peak of what the torque makes of the output [output unit squared].
+
+    Over the half width zeta f, psi is the mode's own output, with the band of a pole passed twice: a white torque of
+    variance 1 gives ``|rho|^2 / (1 - r)^2``, the peak, to first order in 1 - r.
+    """
+    r = np.sqrt(squared(pole))
+    return float((half_width_hz * psi) ** 2 * (1.0 + r) / (1.0 - r) / of_steps(pole))
