@@ -116,20 +116,7 @@ class _Rung:
 
 
 def best_estimate(record: Record, high_pass_hz: float = HIGH_PASS_HZ) -> BestEstimate:
-    """Return the best estimate of a recording.
-
-    Parameters
-    ----------
-    record : Record
-        As recorded; not changed. Of a long one the first part is used (:func:`blocks.first_part`).
-    high_pass_hz : float
-        Corner of the high-pass [Hz].
-
-    Raises
-    ------
-    NotExciting
-        If the recording can't determine a third-order model.
-    """
+    """Return the best estimate of a recording."""
     record = first_part(record)
     data = high_passed(record, high_pass_hz)
     rungs = [_rung(data, RESPONDING)]

@@ -322,13 +322,7 @@ class OnlineChain:
 
 
 def decimation_factor(settings: Settings, sample_time_s: float) -> int:
-    """Return how many samples of a period [s] make one of the models'.
-
-    Raises
-    ------
-    BadSetting
-        If the models' period is no whole multiple of it.
-    """
+    """Return how many samples of a period [s] make one of the models'."""
     ratio = settings.sample_time_s / sample_time_s if sample_time_s > 0 else 0.0
     factor = round(ratio)
     if factor < 1 or abs(ratio - factor) > 1e-3 * ratio:

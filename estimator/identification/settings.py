@@ -1,4 +1,8 @@
-"""How a driveline is identified: orders, periods, filters; the defaults are the paper's where it gives them."""
+"""Settings of an identification, and whether the data can determine the model asked for, before any fit can look good.
+
+An input excites persistently of order p if its p delayed copies are linearly independent; p of them determine
+p parameters (L. Ljung, System Identification, 2nd ed., chapter 13: a sine gives 2, a constant 1, a PRBS its period).
+"""
 
 from __future__ import annotations
 
@@ -37,20 +41,7 @@ def excitation_order(u: FloatArray, highest: int) -> int:
 
 
 def require_excitation(name: str, u: FloatArray, y: FloatArray, okay: BoolArray, orders: Orders) -> None:
-    """Refuse data that can't determine a model of these orders.
-
-    Parameters
-    ----------
-    name
-        The recording, for the message.
-    u, y, okay
-        Input, output and mask, shape (N,).
-
-    Raises
-    ------
-    NotExciting
-        Naming the parameters that stay undetermined, why, and what to do.
-    """
+    """Refuse data that can't determine a model of these orders."""
     n = orders.n_parameters
     good = int(np.count_nonzero(okay))
     if good < SAMPLES_PER_PARAMETER * n:

@@ -1,14 +1,20 @@
-"""What the data say by frequency, without a model."""
+"""Spectral transfer-function estimate: what the data say by frequency without a model, to hold the models against.
+
+Welch's averaged cross-spectra with a Hann window and half overlap (P. D. Welch, IEEE Trans. Audio and
+Electroacoustics 15, 1967)::
+
+    G(f) = S_yu(f) / S_uu(f),        coherence(f) = |S_yu|^2 / (S_uu S_yy)
+
+Half-overlapping Hann segments are not independent; Welch's formula gives ``n_d = K / (1 + 2 rho^2 (K-1)/K)``
+for K of them, with rho = 1/6 the correlation of the window with itself half its length on.
+"""
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
-from enum import Enum
 
 import numpy as np
 from scipy.signal import get_window
-from scipy.stats import t as student
 
 from estimator.errors import NotExciting
 from estimator.identification.linear_model import ComplexArray
@@ -16,12 +22,6 @@ from estimator.identification.offline.problem import gaps
 from estimator.signals.decimate import Blocks, block_of
 from estimator.signals.record import BoolArray, FloatArray, Record
 from estimator.signals.settings import Requirement, require
-
-
-class SpectralMethod(Enum):
-    """Spectral estimators; the value is the name in reports."""
-
-    WELCH = "welch"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,9 +40,6 @@ class SpectralEstimate:
         phase [rad].
     n_averages : float
         Independent averages behind each value.
-    method : SpectralMethod
-    freedom : float
-        Degrees of freedom the standard deviation was estimated with: few where it comes from few periods.
     used_samples, bridged_samples : int
         Samples inside the segments, and how many of the recording were missing and bridged; 0 where not counted.
     """
@@ -52,16 +49,8 @@ class SpectralEstimate:
     coherence: FloatArray
     magnitude_std: FloatArray
     n_averages: float
-    method: SpectralMethod = SpectralMethod.WELCH
-    freedom: float = math.inf
     used_samples: int = 0
     bridged_samples: int = 0
-
-    def magnitude_interval(self, confidence: float = 0.95) -> tuple[FloatArray, FloatArray]:
-        """Return the ends of the interval of ``|response|``, each of shape (M,); by Student's t, and not below 0."""
-        reach = float(student.ppf(0.5 + confidence / 2.0, self.freedom)) * self.magnitude_std
-        magnitude = np.abs(self.response)
-        return np.maximum(magnitude - reach, 0.0), magnitude + reach
 
 
 def from_spectra(
@@ -70,7 +59,6 @@ def from_spectra(
     s_uu: FloatArray,
     s_yy: FloatArray,
     n_averages: float,
-    method: SpectralMethod,
 ) -> SpectralEstimate:
     """Return the estimate of averaged spectra.
 
@@ -78,15 +66,6 @@ def from_spectra(
     estimates"), for n_d independent averages; the same number, in radians, is that of the phase::
 
         std|G| / |G| = sqrt((1 - coherence) / (2 n_d coherence))
-
-    Parameters
-    ----------
-    frequency_hz : ndarray, shape (M,)
-    s_yu, s_uu, s_yy : ndarray, shape (M,)
-        In any one unit per frequency.
-    n_averages : float
-        n_d.
-    method : SpectralMethod
     """
     tiny = np.finfo(np.float64).tiny
     response = s_yu / np.maximum(s_uu, tiny)
@@ -94,7 +73,7 @@ def from_spectra(
     with np.errstate(divide="ignore", invalid="ignore"):
         std = np.abs(response) * np.sqrt((1.0 - coherence) / (2.0 * n_averages * coherence))
     std[coherence == 0.0] = np.inf
-    return SpectralEstimate(frequency_hz, response, coherence, std, float(n_averages), method)
+    return SpectralEstimate(frequency_hz, response, coherence, std, float(n_averages))
 
 
 __all__ = ["SpectralEstimate", "good_segments", "spectral_estimate"]
@@ -123,20 +102,6 @@ def spectral_estimate(record: Record, segment_samples: int = 256) -> SpectralEst
 
     Short gaps are bridged, segments lie between long ones; they are halved until there are three of them. Samples
     faster than 10 ms are averaged in blocks first, which changes both spectra alike.
-
-    Parameters
-    ----------
-    record : Record
-        With the slow part removed.
-    segment_samples : int
-        Length of a segment, in samples of the recording; the frequencies are the inverse of its duration apart.
-
-    Raises
-    ------
-    BadSetting
-        If a segment is shorter than 8 samples.
-    NotExciting
-        If the mask leaves fewer than three unbroken segments of one second.
     """
     block = block_of(record.sample_time_s)
     period_s = block * record.sample_time_s
@@ -195,4 +160,4 @@ def _estimate(u: ComplexArray, y: ComplexArray, length: int, sample_time_s: floa
     k = u.shape[0]
     n_averages = k / (1.0 + 2.0 * HANN_OVERLAP_CORRELATION**2 * (k - 1) / k)
     frequency_hz = np.fft.rfftfreq(length, sample_time_s)[1:].astype(np.float64)
-    return from_spectra(frequency_hz, s_yu, s_uu, s_yy, n_averages, SpectralMethod.WELCH)
+    return from_spectra(frequency_hz, s_yu, s_uu, s_yy, n_averages)

@@ -1,4 +1,4 @@
-"""Everything an expert asks of one identification: how sure, how good, in closed loop or not, and of which drive.
+"""Study of one identification: how sure, how good, in closed loop or not, of which drive; estimators side by side.
 
 What :func:`estimator.identification.identify.identify` found is taken as it is and examined; the best estimate, a
 Box-Jenkins model (:mod:`estimator.identification.best`), stands first, and physical parameters are taken from its
@@ -60,28 +60,7 @@ class Compared:
 def compare(
     record: Record, found: Identification, settings: Settings, name: str, entry: Entry, start: TwoMass | None = None
 ) -> Compared:
-    """Run an estimator through the stretch of time the recursive estimate of an identification was made from.
-
-    Parameters
-    ----------
-    record : Record
-        As recorded.
-    found : Identification
-        Of it, with the settings; its L is used where one is asked for.
-    settings : Settings
-        It was identified with.
-    name : str
-        Of the estimator.
-    entry : Entry
-        What makes it.
-    start : TwoMass, optional
-        Start values of the physical parameters.
-
-    Raises
-    ------
-    BadModel
-        If the estimator needs start values and there are none.
-    """
+    """Run an estimator through the stretch of time the recursive estimate of an identification was made from."""
     raw = entry.feed is Feed.RAW
     fed = record if raw else found.data
     n = len(found.trajectory) * (settings.factor(record) if raw else 1)

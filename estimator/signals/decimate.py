@@ -86,21 +86,7 @@ def decimate_block(
     out: FloatArray,
     out_okay: BoolArray,
 ) -> int:
-    """Run the samples of a block through high-pass, low-pass and decimation; return the number of outputs.
-
-    Parameters
-    ----------
-    u, y, okay
-        Samples of the block, shape (N,).
-    share
-        Weight of a new sample in the running means.
-    taps
-        Low-pass, shape (L,).
-    counters, level, window
-        State, shapes (3,), (5,) and (2, L).
-    out, out_okay
-        Outputs, shapes (2, n) and (n,) with n at least N / factor + 1.
-    """
+    """Run the samples of a block through high-pass, low-pass and decimation; return the number of outputs."""
     produced = 0
     for t in range(u.shape[0]):
         good = _take(u[t], y[t], okay[t], level)
@@ -230,23 +216,7 @@ class Decimator:
         return HALF_LENGTH if self._factor > 1 else 0
 
     def run(self, u: FloatArray, y: FloatArray, okay: BoolArray) -> Decimated:
-        """Take a block of samples; the block may have any length, also 1.
-
-        Parameters
-        ----------
-        u, y, okay : ndarray, shape (N,)
-            Input, output, mask. They are not changed.
-
-        Returns
-        -------
-        Decimated
-            The samples kept of this block, possibly none.
-
-        Raises
-        ------
-        BadShape
-            If the three do not have one shape (N,).
-        """
+        """Take a block of samples; the block may have any length, also 1."""
         if not (u.ndim == 1 and u.shape == y.shape == okay.shape):
             raise BadShape(
                 f"decimation: u, y and okay have the shapes {u.shape}, {y.shape}, {okay.shape}, expected one "
@@ -279,26 +249,7 @@ class Decimator:
 
 
 def high_passed(record: Record, high_pass_hz: float = HIGH_PASS_HZ) -> Record:
-    """Return a recording's total torque and output through the high-pass alone, at its own period; for use off line.
-
-    Parameters
-    ----------
-    record : Record
-        With any number of torque inputs, which are summed.
-    high_pass_hz : float
-        Corner of the high-pass [Hz].
-
-    Returns
-    -------
-    Record
-        One torque column, the same mask. What was not measured is bridged by a straight line ahead of the filter, which
-        has a memory: a value held would leave a transient behind it.
-
-    Raises
-    ------
-    BadSetting
-        As :class:`Decimator`.
-    """
+    """Return a recording's total torque and output through the high-pass alone, at its own period; for use off line."""
     good = np.flatnonzero(record.okay)
     rows = np.arange(record.okay.shape[0])
     bridged = np.interp(rows, good, record.output[good]) if good.size else np.zeros(rows.shape)
@@ -319,28 +270,7 @@ def high_passed(record: Record, high_pass_hz: float = HIGH_PASS_HZ) -> Record:
 
 
 def decimate(record: Record, factor: int, high_pass_hz: float = HIGH_PASS_HZ) -> Record:
-    """Filter a recording's total torque and output and keep one in ``factor`` samples.
-
-    Parameters
-    ----------
-    record : Record
-        Torque inputs are summed first, as in the paper: ``u = T_M1 + T_M2``.
-    factor : int
-        One in ``factor`` samples is kept.
-    high_pass_hz : float
-        Corner of the high-pass [Hz].
-
-    Returns
-    -------
-    Record
-        One torque column. The filter's delay is compensated in ``time_s``, so its first samples, which are
-        spoilt, lie before the recording's first.
-
-    Raises
-    ------
-    BadSetting
-        As :class:`Decimator`.
-    """
+    """Filter a recording's total torque and output and keep one in ``factor`` samples."""
     chain = Decimator(record.sample_time_s, factor, high_pass_hz)
     kept = chain.run(record.total_torque_nm, record.output, record.okay)
     start_s = float(record.time_s[0]) if record.time_s.size else 0.0

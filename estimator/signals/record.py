@@ -256,13 +256,7 @@ MOST = 0.005
 
 
 def uniform_period_s(time_s: FloatArray) -> float:
-    """Return the sampling period behind a recording's stamps [s].
-
-    Parameters
-    ----------
-    time_s : ndarray, shape (N,)
-        Stamps, two or more, one per period.
-    """
+    """Return the sampling period behind a recording's stamps [s]."""
     rows = np.arange(time_s.size) - 0.5 * (time_s.size - 1)
     since = time_s - time_s.mean()
     power = float(rows @ rows)

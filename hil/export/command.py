@@ -14,13 +14,7 @@ from hil.export.profiles import profile as read_profile
 def written_estimator(
     identification: Path | None, run: str | None, adaptive: bool, cycle_s: float, profile: str
 ) -> PlcEstimator:
-    """Return the estimator that the arguments of a command describe.
-
-    Raises
-    ------
-    UsageError
-        If there is neither a file nor ``adaptive``, or a recording is named without a file.
-    """
+    """Return the estimator that the arguments of a command describe."""
     adaptation = read_profile(profile)
     if identification is not None:
         return plc_estimator(identification, run, cycle_s, adaptation, adaptive)

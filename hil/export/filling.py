@@ -17,8 +17,7 @@ from typing import Final
 import numpy as np
 
 from estimator.errors import BadModel, BadSetting
-from estimator.identification.online import adaptation
-from estimator.identification.online import regression
+from estimator.identification.online import adaptation, regression
 from estimator.signals.decimate import UNTRUSTED
 from hil import __version__
 from hil.export.plc_estimator import PlcEstimator
@@ -56,13 +55,7 @@ class Precision(Enum):
         return regression.LARGEST if self is Precision.DOUBLE else 1e9
 
     def literal(self, value: float) -> str:
-        """Return the shortest literal that reads back as the same number of this type.
-
-        Raises
-        ------
-        BadSetting
-            If the type has no such number: it would be infinite, or zero.
-        """
+        """Return the shortest literal that reads back as the same number of this type."""
         with np.errstate(over="ignore", under="ignore"):
             rounded = float(value) if self is Precision.DOUBLE else np.float32(value)
         if not np.isfinite(rounded) or (rounded == 0.0) != (value == 0.0):
@@ -75,27 +68,7 @@ class Precision(Enum):
 
 
 def project(estimator: PlcEstimator, precision: Precision = Precision.DOUBLE) -> Project:
-    """Return the POUs of an estimator, and the data types they share.
-
-    Parameters
-    ----------
-    estimator : PlcEstimator
-        What is exported.
-    precision : Precision
-        LREAL, or REAL for a PLC without it.
-
-    Returns
-    -------
-    Project
-        ASCII only.
-
-    Raises
-    ------
-    BadModel
-        If the observation filter is not stable once its coefficients are rounded to this type.
-    BadSetting
-        If a number is beyond this type.
-    """
+    """Return the POUs of an estimator, and the data types they share."""
     filling = _Filling(_rounded(estimator, precision), precision)
     names = filling.names()
 

@@ -14,28 +14,7 @@ from hil.report.identification.read_back import identified
 def plc_estimator(
     path: Path, run: str | None, cycle_s: float, adaptation: Adaptation, adaptive: bool = False
 ) -> PlcEstimator:
-    """Return the estimator with the settings and the filter that identified a recording.
-
-    Parameters
-    ----------
-    path : Path
-        ``identification.json``.
-    run : str or None
-        Name of the recording; None where the file has one alone.
-    cycle_s : float
-        Period of the PLC task [s].
-    adaptation : Adaptation
-        Adaptation-gain profile.
-    adaptive : bool
-        Take the settings alone: the filter follows the estimate.
-
-    Raises
-    ------
-    UsageError
-        If the recording is not in the file, or none is named and there are several.
-    FileProblem
-        If the file is wrong, its filter could not filter, or its settings suit no PLC, or not that period.
-    """
+    """Return the estimator with the settings and the filter that identified a recording."""
     found = identified(path, run, adaptation)
     origin = f"{path.name}, recording {found.name}"
     try:

@@ -38,17 +38,7 @@ class Tc6(Enum):
 
 
 def plcopen_xml(project: Project, written: datetime, version: Tc6 = Tc6.V2_01) -> str:
-    """Return the document.
-
-    Parameters
-    ----------
-    project : Project
-        What is printed.
-    written : datetime
-        When, for the file's header.
-    version : Tc6
-        Whose namespace it gets.
-    """
+    """Return the document."""
     root = Element("project", {"xmlns": version.namespace, "xmlns:xhtml": XHTML})
     _headers(root, project.comment, written.isoformat(timespec="seconds"))
     types = SubElement(root, "types")

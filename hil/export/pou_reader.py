@@ -31,26 +31,14 @@ _ARRAY: Final = re.compile(r"ARRAY\[(?P<bounds>[^\]]+)\] OF (?P<element>\w+)")
 
 
 def read_types(text: str) -> tuple[DataType, ...]:
-    """Return the data types of a text.
-
-    Raises
-    ------
-    ValueError
-        If it holds anything else.
-    """
+    """Return the data types of a text."""
     return tuple(
         DataType(found["name"], _array(found["type"]), _plain(found["comment"])) for found in _each(_TYPE, text)
     )
 
 
 def read_pou(text: str) -> Pou:
-    """Return the one POU of a text.
-
-    Raises
-    ------
-    ValueError
-        If it holds anything else.
-    """
+    """Return the one POU of a text."""
     (found,) = _each(_POU, text)
     return Pou(
         PouKind(found["kind"]), found["name"], _sections(found["sections"]), found["body"], _plain(found["comment"])

@@ -19,15 +19,7 @@ PROFILES: Final[Mapping[str, type[Any]]] = MappingProxyType(
 
 
 def profile(text: str) -> Adaptation:
-    """Read a profile.
-
-    Raises
-    ------
-    UsageError
-        If it is unknown, or has a key it does not know, twice, or without a number.
-    BadSetting
-        If a number does not make sense.
-    """
+    """Read a profile."""
     name, _, rest = text.partition(":")
     kind = PROFILES.get(name.strip())
     if kind is None:

@@ -25,24 +25,7 @@ def drive_all(
     stop: StopRequest,
     progress: Callable[[int], Progress] = lambda number: lambda phase, time_s: None,
 ) -> list[Driven]:
-    """Drive ``count`` experiments of one seed, ``run_1.csv`` and on.
-
-    Parameters
-    ----------
-    folder
-        Gets the recordings.
-    duration_s
-        Length of each recording [s].
-    stop
-        Ends the run under way, and all, when requested.
-    progress
-        Gives the callback for every cycle of an experiment, by its number from 0.
-
-    Raises
-    ------
-    RunAborted, DriverError, KeyboardInterrupt
-        As `hil.rig.session.run_plan`.
-    """
+    """Drive ``count`` experiments of one seed, ``run_1.csv`` and on."""
     conditions = draw_conditions(seed, count)
     return [
         drive(folder / f"run_{number + 1}.csv", each, duration_s, stop, progress(number))

@@ -130,13 +130,7 @@ def two_mass_model(parameters: FloatArray, sample_time_s: float) -> LinearModel:
 
 
 def two_mass_start(model: LinearModel) -> FloatArray:
-    """Return the parameters of a third-order model with friction left out, in closed form, shape (6,).
-
-    Raises
-    ------
-    BadModel
-        If no two-mass drive responds like it.
-    """
+    """Return the parameters of a third-order model with friction left out, in closed form, shape (6,)."""
     response = to_continuous(model)
     beta_2, beta_1, beta_0 = response.numerator[1:]
     _, alpha_2, alpha_1, _ = response.denominator
@@ -156,24 +150,7 @@ def two_mass_start(model: LinearModel) -> FloatArray:
 def physical_parameters(
     model: LinearModel, covariance: FloatArray, known: Mapping[str, Uncertain] | None = None
 ) -> PhysicalEstimate:
-    """Estimate the two-mass drive behind a linear model from motor torque to motor speed.
-
-    Parameters
-    ----------
-    model : LinearModel
-        na = nb = 3, nk = 1, at the period at which the torque was held.
-    covariance : ndarray, shape (6, 6)
-        Of its theta.
-    known : Mapping[str, Uncertain], optional
-        What is known beforehand of single parameters, e.g. a friction measured by coasting down.
-
-    Raises
-    ------
-    BadModel
-        If the model is of another structure, or no two-mass drive responds like it.
-    BadSetting
-        If ``known`` names no parameter, or gives a standard deviation that is not above 0.
-    """
+    """Estimate the two-mass drive behind a linear model from motor torque to motor speed."""
     prior = _checked(model, covariance, known or {})
     start = two_mass_start(model)
     variances, axes = np.linalg.eigh(covariance)
@@ -195,13 +172,7 @@ def physical_parameters(
 
 
 def _plausible(estimate: PhysicalEstimate) -> PhysicalEstimate:
-    """Return an estimate no part of which is surely negative.
-
-    Raises
-    ------
-    BadModel
-        If the whole interval of a parameter or sum lies below 0: then the response is not that of two masses.
-    """
+    """Return an estimate no part of which is surely negative."""
     both = {**estimate.parameters, **estimate.sums}
     negative = [name for name, one in both.items() if one.estimate.ci95[1] < 0.0]
     if negative:

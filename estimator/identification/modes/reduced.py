@@ -8,6 +8,10 @@ hard to see in the output. Its error is bounded at every frequency (D. F. Enns, 
     |G(f) - G_r(f)|  <=  2 (sigma_(r+1) + ... + sigma_n)
 
 with sigma the Hankel singular values; the bound tells what the left-out order was worth.
+
+With the input held between samples, ``exp([[A_c, B_c], [0, 0]] T) = [[A, B], [0, 1]]`` (Astrom and Wittenmark,
+Computer-Controlled Systems, chapter 2); its matrix logarithm takes a sampled model back to continuous time, zeros and
+all. Signals that were decimated through a low-pass were not held: their zeros, unlike their poles, are off.
 """
 
 from __future__ import annotations
@@ -19,7 +23,6 @@ from scipy.linalg import logm
 
 from estimator.errors import BadModel, BadShape
 from estimator.identification.linear_model import ComplexArray, LinearModel
-from estimator.identification.modes.modes import Mode
 from estimator.identification.modes.uncertainty import propagate, square_root
 from estimator.signals.record import FloatArray
 
@@ -40,15 +43,6 @@ class ContinuousModel:
     def zeros(self) -> ComplexArray:
         """Roots of the numerator [1/s]."""
         return np.asarray(np.roots(self.numerator), dtype=np.complex128)
-
-    @property
-    def antiresonance(self) -> Mode | None:
-        """The least damped oscillating pair of zeros; None if no zeros oscillate."""
-        pairs = [complex(s) for s in self.zeros if s.imag > 0.0]
-        if not pairs:
-            return None
-        s = min(pairs, key=lambda pair: abs(pair.real) / abs(pair))
-        return Mode(abs(s) / (2.0 * np.pi), -s.real / abs(s))
 
 
 def state_space(model: LinearModel) -> tuple[FloatArray, FloatArray, FloatArray, float]:
@@ -73,13 +67,7 @@ def numerator_of(A: FloatArray, B: FloatArray, C: FloatArray, D: float) -> Float
 
 
 def to_continuous(model: LinearModel) -> ContinuousModel:
-    """Take a sampled model back to the continuous one with held input.
-
-    Raises
-    ------
-    BadModel
-        If a pole is 0 or real and negative, or there is none at all.
-    """
+    """Take a sampled model back to the continuous one with held input."""
     A, B, C, D = state_space(model)
     poles = np.linalg.eigvals(A)
     without = [complex(z) for z in poles if abs(z) < np.finfo(np.float64).eps or (z.imag == 0.0 and z.real < 0.0)]
@@ -126,22 +114,7 @@ class Reduced:
 
 
 def third_order(model: LinearModel, covariance: FloatArray | None = None) -> Reduced:
-    """Return the third-order equivalent of a stable model.
-
-    Parameters
-    ----------
-    model : LinearModel
-        Estimate, of any order.
-    covariance : ndarray, shape (na+nb, na+nb), optional
-        Of its theta.
-
-    Raises
-    ------
-    BadModel
-        If the model is not stable: an unstable one has no Hankel singular values.
-    BadShape
-        If the covariance is not that of theta.
-    """
+    """Return the third-order equivalent of a stable model."""
     return reduce_order(model, THIRD, covariance)
 
 

@@ -1,7 +1,13 @@
-"""Poles and zeros with confidence ellipses, and what cancels; resonance and damping with intervals.
+"""Uncertainty of what is computed from a linear model: roots with ellipses, what cancels, frequency and damping.
 
-The covariance of theta becomes one of (Re z, Im z) through :mod:`estimator.identification.modes.uncertainty`, and a
-chi-square quantile of it the ellipse. Frequency and damping follow through ``s = ln(z) / T``.
+The delta method: for a function g of parameters with covariance P, ``cov g = G P G^T``, G its derivative (L. Ljung,
+System Identification, 2nd ed., section 9.A), taken along the principal axes of P where it is taken by differences:
+where poles and zeros cancel, single coefficients may move far, but only together.
+
+A simple root z of ``c_0 z^n + ... + c_n`` moves with its coefficients by ``dz / dc_i = -z^(n-i) / p'(z)``; at a double
+root p' vanishes, and its standard deviation is infinite, which is what the data say. Frequency and damping follow
+through ``s = ln(z) / T``. A pole and a zero cancel if their difference d is no larger than its own uncertainty,
+``d^T cov(d)^-1 d`` within its chi-square quantile: both are estimated from the same data and move together.
 """
 
 from __future__ import annotations
@@ -16,7 +22,7 @@ from scipy.stats import chi2, norm
 
 from estimator.errors import BadShape
 from estimator.identification.linear_model import ComplexArray, LinearModel
-from estimator.identification.modes.modes import Mode, continuous, modes, resonance
+from estimator.identification.modes.modes import Mode, continuous, modes
 from estimator.signals.record import FloatArray
 
 CONFIDENCE = 0.95
@@ -74,28 +80,12 @@ def square_root(covariance: FloatArray) -> FloatArray:
 def propagate(
     function: Callable[[FloatArray], FloatArray], parameters: FloatArray, covariance: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return a function's value, shape (m,), and its covariance, shape (m, m).
-
-    Parameters
-    ----------
-    function
-        From parameters, shape (n,), to values, shape (m,); smooth near ``parameters``.
-    parameters : ndarray, shape (n,)
-        Estimate.
-    covariance : ndarray, shape (n, n)
-        Of the estimate; may be singular.
-    """
+    """Return a function's value, shape (m,), and its covariance, shape (m, m)."""
     axes = square_root(covariance).T
     value = function(parameters)
     slopes = [(function(parameters + STEP * axis) - function(parameters - STEP * axis)) / (2.0 * STEP) for axis in axes]
     G = np.array(slopes).reshape(axes.shape[0], value.shape[0])
     return value, G.T @ G
-
-
-def uncertain(values: FloatArray, covariance: FloatArray) -> tuple[Uncertain, ...]:
-    """Pair each value with its standard deviation."""
-    deviations = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    return tuple(Uncertain(float(value), float(std)) for value, std in zip(values, deviations, strict=True))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -251,22 +241,7 @@ def _checked(model: LinearModel, covariance: FloatArray) -> FloatArray:
 
 
 def pole_zero_map(model: LinearModel, covariance: FloatArray, confidence: float = CONFIDENCE) -> PoleZeroMap:
-    """Return every pole and zero with its uncertainty, and the pairs that cancel.
-
-    Parameters
-    ----------
-    model : LinearModel
-        Estimate.
-    covariance : ndarray, shape (na+nb, na+nb)
-        Of theta.
-    confidence : float
-        At which a pole and a zero count as different.
-
-    Raises
-    ------
-    BadShape
-        If the covariance is not that of theta.
-    """
+    """Return every pole and zero with its uncertainty, and the pairs that cancel."""
     P = _checked(model, covariance)
     poles, zeros = pole_roots(model), zero_roots(model)
     return PoleZeroMap(
@@ -283,30 +258,9 @@ def _uncertain_roots(roots: Roots, P: FloatArray) -> list[UncertainRoot]:
 
 
 def uncertain_modes(model: LinearModel, covariance: FloatArray) -> tuple[UncertainMode, ...]:
-    """Return the oscillating pairs of poles with intervals, the one with the highest peak first.
-
-    Raises
-    ------
-    BadShape
-        If the covariance is not that of theta.
-    """
+    """Return the oscillating pairs of poles with intervals, the one with the highest peak first."""
     P = _checked(model, covariance)
     return tuple(_uncertain_mode(model, P, mode) for mode in modes(model))
-
-
-def uncertain_resonance(
-    model: LinearModel, covariance: FloatArray, band_hz: tuple[float, float] = (2.0, 25.0)
-) -> UncertainMode | None:
-    """Return the dominant lightly damped pair of poles in a band [Hz] with its intervals; None if there is none.
-
-    Raises
-    ------
-    BadShape
-        If the covariance is not that of theta.
-    """
-    P = _checked(model, covariance)
-    mode = resonance(model, band_hz)
-    return None if mode is None else _uncertain_mode(model, P, mode)
 
 
 def _uncertain_mode(model: LinearModel, P: FloatArray, mode: Mode) -> UncertainMode:

@@ -1,4 +1,18 @@
-"""What an off-line fit asks of a recording beyond what its type already guarantees."""
+"""Off-line fits of a whole recording: output error and Box-Jenkins, from record to model, covariance and free run.
+
+Output error: the prediction-error method on the free-run simulation (:mod:`problem` has the equations); consistent
+whatever the colour of the noise on y as long as torque does not follow speed; its covariance takes the colour into
+account. Box-Jenkins: ``y = B / A u + 1 / D w``, w white. The sum of w^2 over A, B and D together is least at the
+maximum-likelihood estimate (Box and Jenkins, Time Series Analysis, chapter 11; Ljung, System Identification, 2nd ed.,
+section 7.4). D is long, a second: road, grade and the driver's slow changes are the noise's, and no pole of the
+driveline has to follow them. The covariance is that of the joint estimate, so that what feedback correlates, plant and
+noise, widens the intervals. On 200 buses on a road, with a driver, the errors of frequency and damping were 0.24 and
+0.38 times those of the output-error fit (``python -m tests.benchmarks.identification``).
+
+Two figures of merit, never one without the other. *Free run*: the output simulated from the input alone, which is what
+a model is for. *One step*: the next output predicted with the last measured ones at hand; on slow signals it is near
+100 % for any model.
+"""
 
 from __future__ import annotations
 
@@ -22,15 +36,7 @@ PERIOD_TOLERANCE = 0.02
 
 
 def require_identifiable(record: Record, orders: Orders) -> None:
-    """Refuse a recording that can't determine a model of these orders.
-
-    Raises
-    ------
-    BadSetting
-        If the sampling period given is not that of the time stamps: every frequency would be wrong by their ratio.
-    NotExciting
-        If the run is too short, the torque does not excite enough, or the output never changes; with their names.
-    """
+    """Refuse a recording that can't determine a model of these orders."""
     stamped_s = float(np.median(np.diff(record.time_s))) if record.time_s.shape[0] > 1 else record.sample_time_s
     if abs(stamped_s - record.sample_time_s) > PERIOD_TOLERANCE * record.sample_time_s:
         raise BadSetting(
@@ -141,13 +147,7 @@ def summary(
 
 
 def problem_of(record: Record, orders: Orders | None) -> tuple[Problem, int]:
-    """Return the output-error problem of a recording from its first good sample on, and the number of that sample.
-
-    Raises
-    ------
-    NotExciting
-        If the data do not determine a model of these orders.
-    """
+    """Return the output-error problem of a recording from its first good sample on, and the number of that sample."""
     orders = Orders() if orders is None else orders
     require_identifiable(record, orders)
     first = int(record.okay.argmax())
@@ -205,32 +205,8 @@ def summarised(
     )
 
 
-__all__ = ["OutputErrorFit", "fit_output_error", "problem_of"]
-
-OutputErrorFit = LinearFit
-"""What :func:`fit_output_error` returns: the one type of every off-line estimator."""
-
-
-def fit_output_error(record: Record, orders: Orders | None = None) -> OutputErrorFit:
-    """Fit an output-error model to a recording's total torque and output.
-
-    Parameters
-    ----------
-    record : Record
-        With the slow part removed; not changed.
-    orders : Orders, optional
-        Structure; the paper's na = nb = 4, nk = 1 by default.
-
-    Returns
-    -------
-    OutputErrorFit
-        The best of several starts.
-
-    Raises
-    ------
-    NotExciting
-        If the data do not determine a model of these orders.
-    """
+def fit_output_error(record: Record, orders: Orders | None = None) -> LinearFit:
+    """Fit an output-error model to a recording's total torque and output."""
     problem, first = problem_of(record, orders)
     x = problem.solve(starts(problem))
     noise = fit_noise(problem.blocks.mean(problem.error(x)), problem.blocks.okay, reach(problem.period_s))
@@ -245,29 +221,7 @@ MOST_STARTS = 2
 
 
 def fit_box_jenkins(record: Record, orders: Orders | None = None, memory: int | None = None) -> LinearFit:
-    """Fit a Box-Jenkins model to a recording's total torque and output.
-
-    Parameters
-    ----------
-    record : Record
-        With the slow part removed; not changed. At the period at which the torque was held, and with the orders of the
-        drive (three and three for two masses), the intervals cover the truth as often as they say.
-    orders : Orders, optional
-        Structure of B / A; na = nb = 4, nk = 1 by default.
-    memory : int, optional
-        Order of D in samples (of block means where the recording is faster); a second by default. Gaps in the
-        mask shorten it.
-
-    Returns
-    -------
-    LinearFit
-        Its noise model is D.
-
-    Raises
-    ------
-    NotExciting
-        If the data do not determine a model of these orders.
-    """
+    """Fit a Box-Jenkins model to a recording's total torque and output."""
     return fit_of(*solved(record, orders, memory))
 
 
@@ -327,22 +281,7 @@ class FreeRun:
 
 
 def free_run(model: LinearModel, record: Record, noise: NoiseModel) -> FreeRun:
-    """Simulate a recording with a model.
-
-    Parameters
-    ----------
-    model : LinearModel
-        Stable.
-    record : Record
-        Prepared as the one the model was fitted to.
-    noise : NoiseModel
-        Of the fit; for the prediction one step ahead.
-
-    Raises
-    ------
-    BadModel
-        If the recording is sampled at another period than the model, or the model is unstable.
-    """
+    """Simulate a recording with a model."""
     period_s = record.sample_time_s
     if not np.isclose(period_s, model.sample_time_s, rtol=1e-3) or not model.is_stable:
         raise BadModel(

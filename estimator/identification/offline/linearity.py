@@ -9,6 +9,9 @@ Studies 47, 1980; an LM test in its F form, which holds in closed loop as well):
     F = ((S_0 - S_1) / q) / (S_1 / (n - p - q))
 
 The step that the linear parameters take when the functions are let in is what the nonlinearity has done to them.
+
+Where the drive is not linear, its resonance is given by operating region: the whitened equations hold row by row, so
+that B / A can be fitted to the rows alone in which a signal lies in a region, D and everything before them as they are.
 """
 
 from __future__ import annotations
@@ -67,21 +70,7 @@ class Linearity:
 
 
 def judge_linearity(problem: Problem, x: FloatArray, record: Record, first: int, high_pass_hz: float) -> Linearity:
-    """Test a Box-Jenkins fit.
-
-    Parameters
-    ----------
-    problem : Problem
-        Of the high-passed recording.
-    x : ndarray
-        Its minimum.
-    record : Record
-        As recorded: where zero torque and standstill are is lost in the high-pass.
-    first : int
-        Sample of the recording that the problem begins with.
-    high_pass_hz : float
-        Corner of the high-pass [Hz].
-    """
+    """Test a Box-Jenkins fit."""
     model = problem.model(x)
     u, okay = record.total_torque_nm[first:], record.okay[first:]
     rows = np.arange(okay.shape[0])
@@ -157,19 +146,7 @@ class RegionalMode:
 def modes_by_region(
     problem: Problem, x: FloatArray, signal: FloatArray, band_hz: tuple[float, float]
 ) -> tuple[RegionalMode, ...]:
-    """Fit B / A once for each region of a signal.
-
-    Parameters
-    ----------
-    problem : Problem
-        Of a Box-Jenkins fit.
-    x : ndarray
-        Its minimum.
-    signal : ndarray, shape (N,)
-        What the regions are of, e.g. the torque in the shaft [Nm].
-    band_hz : tuple of float
-        Where the resonance is looked for [Hz].
-    """
+    """Fit B / A once for each region of a signal."""
     value = problem.blocks.mean(signal)[problem.noise_order :]
     edges = np.quantile(value, np.linspace(0.0, 1.0, REGIONS + 1))
     found = []

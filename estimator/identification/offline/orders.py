@@ -91,24 +91,7 @@ class OrderChoice:
 
 
 def select_orders(record: Record, among: Sequence[Orders] = DEFAULT, unseen: Sequence[Record] = ()) -> OrderChoice:
-    """Choose order and delay.
-
-    Parameters
-    ----------
-    record : Record
-        Of the period of the models; the slow part need not have been removed.
-    among : sequence of Orders
-        The candidates.
-    unseen : sequence of Record
-        For cross-validation; prepared alike.
-
-    Raises
-    ------
-    BadSetting
-        If there is no candidate.
-    NotExciting
-        If the data do not determine the richest candidate.
-    """
+    """Choose order and delay."""
     if not among:
         raise BadSetting("order selection: 0 candidates, expected one or more. Give the orders to choose from.")
     prepared, *others = (_prepared(one) for one in (record, *unseen))

@@ -15,9 +15,14 @@ Identification, 2nd ed., chapter 10)::
     d yhat / d c_j = q^-(j-1) delta / A
     d w    / d d_i = q^-i e
 
-A is stable by parametrisation (:mod:`estimator.identification.offline.problem`), so Levenberg and Marquardt's steps
-need no bounds. What was not measured or not read is unknown rather than left out
-(:mod:`estimator.identification.offline.problem`).
+A is a product of second-order sections, and one of first order where its order is odd. The stability triangle of
+``1 + a_1 q^-1 + a_2 q^-2`` is ``|a_2| < 1, |a_1| < 1 + a_2`` (E. I. Jury, 1964), so that all of it and nothing else is
+reached by ``a_2 = tanh x_2, a_1 = (1 + a_2) tanh x_1``: Levenberg and Marquardt's steps need no bounds.
+
+What was not measured or not read is unknown rather than left out: an unmeasured output is one unknown that enters the
+next p whitened errors through D; a torque that was not read drives the model as an input of its own. Whitened errors
+and gradients are projected onto what is orthogonal to the responses to all of these (variable projection: G. H. Golub
+and V. Pereyra, SIAM J. Numerical Analysis 10, 1973), which is the same as estimating them along.
 
 Samples that come faster than a driveline answers are simulated as they come, and their error is averaged over blocks
 before D: an average of both sides of an equation holds exactly, and D stays short.

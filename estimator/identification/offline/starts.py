@@ -1,9 +1,13 @@
-"""Start values for the output-error fit, whose cost has more than one minimum.
+"""Start values of the off-line fits, whose cost has more than one minimum.
 
-Least squares on the equation error (ARX) needs none but is biased by noise on y. The iteration of K.
-Steiglitz and L. E. McBride (IEEE Trans. Automatic Control 10, 1965) filters u and y by the last 1 / A_hat and
-repeats it; for white noise on y it converges to the output-error minimum. It is started twice: from the ARX
-model itself, and from the simulated output of an ARX model of high order, in which the noise is averaged out.
+Least squares on the equation error (ARX) needs no start but is biased by noise on y. The iteration of K. Steiglitz and
+L. E. McBride (IEEE Trans. Automatic Control 10, 1965) filters u and y by the last 1 / A_hat and repeats it; it is
+started from the ARX model itself, and from the simulated output of an ARX model of high order, in which the noise is
+averaged out.
+
+Predictor-based subspace identification has no minimum to miss and no bias by coloured noise or feedback: a long
+autoregression with input predicts y from the past; its coefficients, shifted, give the next outputs as a linear map of
+the past, whose n strongest directions are the state (A. Chiuso, Automatica 43, 2007). A, B, C follow by least squares.
 """
 
 from __future__ import annotations
@@ -85,17 +89,7 @@ def steiglitz_mcbride(u: FloatArray, y: FloatArray, okay: BoolArray, orders: Ord
 def candidates(
     u: FloatArray, y: FloatArray, okay: BoolArray, orders: Orders, sample_time_s: float
 ) -> Iterator[LinearModel]:
-    """Yield start models, all stable; always at least one.
-
-    Parameters
-    ----------
-    u, y, okay : ndarray, shape (N,)
-        Input, output, mask.
-    orders : Orders
-        Structure of the model.
-    sample_time_s : float
-        Sampling period [s].
-    """
+    """Yield start models, all stable; always at least one."""
     at_rest = LinearModel((0.0,) * orders.na, (0.0,) * orders.nb, orders.nk, sample_time_s)
     first = arx(u, y, okay, orders, sample_time_s)
     if first is not None:
@@ -118,17 +112,7 @@ FUTURE = 15
 
 
 def subspace(u: FloatArray, y: FloatArray, okay: BoolArray, orders: Orders, sample_time_s: float) -> LinearModel | None:
-    """Return the model of order na, made stable; None if too few unbroken stretches are left of the mask.
-
-    Parameters
-    ----------
-    u, y, okay : ndarray, shape (N,)
-        Input, output, mask.
-    orders : Orders
-        Only ``nk = 1, nb <= na`` can be had this way: the state starts with the sample before.
-    sample_time_s : float
-        Sampling period [s].
-    """
+    """Return the model of order na, made stable; None if too few unbroken stretches are left of the mask."""
     n = orders.na
     rows = complete_rows(okay, Orders(PAST, PAST, 1))
     if orders.nk != 1 or orders.nb > n or not 0 < n < FUTURE or np.count_nonzero(rows) < 6 * PAST:

@@ -11,13 +11,16 @@ together::
 
 From one sample of delay on (past input) they tell that B / A is wrong; below (the input answers the residual, at once
 or later) they tell of feedback.
+
+A driver, a cruise controller or an anti-jerk function that answers the speed carries noise from the output back into
+the input (ibid., section 13.4). Judge that at the recording's own period: decimated signals were low-passed, and their
+present output goes with a little of the input to come.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from types import MappingProxyType
 
 import numpy as np
 from scipy.stats import chi2
@@ -102,24 +105,7 @@ class Validation:
 
 
 def validate(fit: LinearFit, record: Record, unseen: Sequence[Record] = (), lags: int = LAGS) -> Validation:
-    """Validate a fit on its own recording and on others.
-
-    Parameters
-    ----------
-    fit : LinearFit
-        Of any off-line estimator.
-    record : Record
-        The recording it was fitted to.
-    unseen : sequence of Record
-        Prepared alike, not used for the fit.
-    lags : int
-        Lags of each test, in samples of the noise model.
-
-    Raises
-    ------
-    BadModel
-        If a recording is sampled at another period than the model, or the model is unstable.
-    """
+    """Validate a fit on its own recording and on others."""
     own = free_run(fit.model, record, fit.noise)
     tests = residual_tests(own.error, record, fit.block, min(fit.model.nk, LEAST_DELAY), lags)
     return Validation(own, tuple(free_run(fit.model, other, fit.noise) for other in unseen), *tests)
@@ -128,17 +114,7 @@ def validate(fit: LinearFit, record: Record, unseen: Sequence[Record] = (), lags
 def residual_tests(
     error: FloatArray, record: Record, block: int, first: int = LEAST_DELAY, lags: int = LAGS
 ) -> tuple[CorrelationTest, CorrelationTest, CorrelationTest]:
-    """Correlate what a simulation leaves with past input, with later input, and with itself.
-
-    Parameters
-    ----------
-    error : ndarray, shape (N,)
-        Of a free run of the recording; NaN where it is not known.
-    block : int
-        Samples of which the mean is looked at (``block_of``).
-    first : int
-        Samples from which on the input can act.
-    """
+    """Correlate what a simulation leaves with past input, with later input, and with itself."""
     blocks = Blocks(record.okay & np.isfinite(error), block)
     residual = blocks.mean(np.nan_to_num(error))
     u = Blocks(np.ones_like(record.okay), block).mean(record.total_torque_nm)
@@ -164,16 +140,7 @@ def _prewhitened(
 
 
 def correlation_test(e: FloatArray, x: FloatArray, okay: BoolArray, lags: IntArray) -> CorrelationTest:
-    """Correlate ``e(t)`` with ``x(t - lag)`` where both samples are good.
-
-    Parameters
-    ----------
-    e, x : ndarray, shape (N,)
-        At least one of them white, for bound and p-value to hold.
-    okay : ndarray of bool, shape (N,)
-    lags : ndarray of int, shape (m,)
-        Negative: x after e.
-    """
+    """Correlate ``e(t)`` with ``x(t - lag)`` where both samples are good."""
     e, x = np.where(okay, e, 0.0), np.where(okay, x, 0.0)
     n = max(int(np.count_nonzero(okay)), 1)
     size = float(np.sqrt((e @ e) * (x @ x)))
@@ -195,16 +162,6 @@ def _product(e: FloatArray, x: FloatArray, lag: int) -> float:
 SIGNIFICANCE = 0.01
 """False alarms of the detection, on recordings in open loop."""
 
-CONSEQUENCES = MappingProxyType(
-    {
-        "output_error": "biased towards minus the inverse of the feedback where the noise is stronger than the PRBS",
-        "box_jenkins": "unbiased as long as its noise model is right and the loop holds at least one sample of delay",
-        "spectral": "a mean of B / A and minus the inverse of the feedback, weighted by PRBS and noise",
-        "recursive": "as output_error",
-    }
-)
-"""What feedback does to each estimate, by the name of its method."""
-
 
 @dataclass(frozen=True, slots=True)
 class Feedback:
@@ -215,32 +172,23 @@ class Feedback:
     detected : bool
     p_value : float
         Probability of a correlation with later input at least this large without feedback.
-    consequences : Mapping[str, str]
-        By method; empty if none was detected.
     statement : str
     """
 
     detected: bool
     p_value: float
-    consequences: Mapping[str, str]
     statement: str
 
 
 def judge_feedback(validation: Validation) -> Feedback:
-    """Tell from a validated fit whether its recording was made in closed loop.
-
-    Parameters
-    ----------
-    validation : Validation
-        Of any fit of a useful order; a poor model only makes the test less sharp.
-    """
+    """Tell from a validated fit whether its recording was made in closed loop."""
     p_value = validation.feedback.p_value
     if p_value > SIGNIFICANCE:
         statement = f"No sign of the torque following the speed (p = {p_value:.2g})."
-        return Feedback(False, p_value, MappingProxyType({}), statement)
+        return Feedback(False, p_value, statement)
     statement = (
         f"The torque follows the speed (p = {p_value:.2g}): a driver or controller closes the loop. The output-error, "
         "recursive and spectral estimates are biased by the noise it feeds back. Use the Box-Jenkins model, or "
         "hold the torque except for the PRBS."
     )
-    return Feedback(True, p_value, CONSEQUENCES, statement)
+    return Feedback(True, p_value, statement)

@@ -3,7 +3,7 @@
 L. Ljung, Asymptotic Behavior of the Extended Kalman Filter as a Parameter Estimator for Linear Systems, IEEE Trans.
 Automatic Control 24 (1979); B. D. O. Anderson and J. B. Moore, Optimal Filtering (Prentice Hall, 1979), chapter 8.
 State x = [w_M, w_L, s, T_0, ln J_M, ln J_L, ln k, ln c] with the equations of motion of
-:mod:`estimator.identification.online.ekf`::
+the two masses below::
 
     K(t)      = P(t) H^T / (H P(t) H^T + R),       H = [1 0 .. 0]
     x(t|t)    = x(t) + K(t) (y(t) - w_M(t)),       P(t|t) = P(t) - K(t) H P(t)
@@ -39,9 +39,9 @@ from estimator.identification.online.recursive import (
     NOT_EXCITED,
     TOO_FEW_SAMPLES,
     USED,
-    KernelEstimator,
     Memory,
     Parts,
+    RecursiveEstimator,
     Shapes,
 )
 from estimator.identification.online.regression import (
@@ -440,7 +440,7 @@ def block(u: FloatArray, y: FloatArray, okay: BoolArray, memory: NDArray[np.void
         step(u[t], y[t], okay[t], memory[0], out[t])
 
 
-class Ekf(KernelEstimator):
+class Ekf(RecursiveEstimator):
     """The filter with its state; ``y_hat`` is the filtered motor speed.
 
     Parameters

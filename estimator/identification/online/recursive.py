@@ -1,9 +1,14 @@
-"""The one interface of every recursive estimator, and what an estimate says about itself.
+"""Recursive estimators: their one interface, and what an estimate says about itself.
 
 An estimator takes samples one by one (:meth:`RecursiveEstimator.update`, on the rig) or as a block
 (:meth:`RecursiveEstimator.run`, from a recording); both give the same bits. In the loop nothing raises: a
 sample that can't be used is masked, and an estimate that can't be trusted says so in its status, with the
 reason.
+
+An estimator is a compiled loop and its memory, a record cut into named parts of fixed shapes: its type *is* its layout,
+so a loop compiled for it knows every shape and place, unrolls what is eight long and looks up no bound. What it
+remembers is saved as plain arrays (``numpy.savez(path, **state)``, or their lists in JSON) and taken up again to the
+bit.
 """
 
 from __future__ import annotations
@@ -11,7 +16,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum, IntEnum
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -90,14 +95,7 @@ def saved(estimator: str, memory: Memory) -> State:
 
 
 def restored(state: Mapping[str, Any], estimator: str, memory: Memory) -> None:
-    """Write a state into the memory of an estimator of the same kind and settings.
-
-    Raises
-    ------
-    BadSetting
-        If the state is of another estimator, version or setting, lacks a part, or holds one of another shape or one
-        that is not finite. The memory is then as it was.
-    """
+    """Write a state into the memory of an estimator of the same kind and settings."""
     for name, expected in (("estimator", estimator), ("version", VERSION)):
         _require(str(np.asarray(_part(state, name))) == str(expected), name, state[name], repr(expected))
     for name, setting in memory.settings.items():
@@ -260,54 +258,6 @@ class Trajectory:
         )
 
 
-class RecursiveEstimator(Protocol):
-    """What every recursive estimator offers."""
-
-    @property
-    def orders(self) -> Orders:
-        """Structure of the model."""
-        ...
-
-    @property
-    def theta(self) -> FloatArray:
-        """Present parameters, shape (na+nb,), a copy."""
-        ...
-
-    @property
-    def undetermined(self) -> tuple[str, ...]:
-        """Names of the parameters the samples so far do not determine."""
-        ...
-
-    @property
-    def extra_names(self) -> tuple[str, ...]:
-        """Names of what it holds besides theta; see :attr:`Trajectory.extra`."""
-        ...
-
-    def update(self, u: float, y: float, okay: bool = True) -> Estimate:
-        """Take one sample."""
-        ...
-
-    def run(self, u: FloatArray, y: FloatArray, okay: BoolArray) -> Trajectory:
-        """Take a block of samples, each array of shape (N,)."""
-        ...
-
-    def model(self, sample_time_s: float) -> LinearModel:
-        """Return the present parameters as a model."""
-        ...
-
-    def statement(self, reason: Reason) -> str:
-        """Return what is wrong with an estimate of that reason, naming the parameters, and what to do."""
-        ...
-
-    def state(self) -> dict[str, Any]:
-        """Return everything it remembers, as plain arrays; :mod:`estimator.identification.online.recursive`."""
-        ...
-
-    def restore(self, state: Mapping[str, Any]) -> None:
-        """Take up a saved state; what follows has the bits it would have had without the break."""
-        ...
-
-
 _REASONS = tuple(Reason)
 
 
@@ -322,7 +272,7 @@ def row_type(n_parameters: int, n_extra: int) -> np.dtype[np.void]:
     return np.dtype([*vectors, *numbers, ("used", np.bool_), ("reason", np.int8)], align=True)
 
 
-class KernelEstimator:
+class RecursiveEstimator:
     """A recursive estimator around compiled loops; memory does not grow.
 
     Parameters
@@ -392,23 +342,6 @@ class KernelEstimator:
     def update(self, u: float, y: float, okay: bool = True) -> Estimate:
         """Take one sample; correct ``theta`` by the error of the prediction.
 
-        Parameters
-        ----------
-        u : float
-            Total torque of this sample [Nm].
-        y : float
-            Speed of this sample [rad/s].
-        okay : bool
-            False masks the sample: time advances, ``theta`` does not change. A value that is not finite masks
-            it too.
-
-        Returns
-        -------
-        Estimate
-            Parameters, status with reason, and errors.
-
-        Notes
-        -----
         Cost and memory do not depend on the samples before. Never raises on a value.
         """
         self._u[0], self._y[0], self._okay[0] = u, y, okay
@@ -417,23 +350,7 @@ class KernelEstimator:
         return Estimate(self._row_theta.copy(), _REASONS[reason], *rest)
 
     def run(self, u: FloatArray, y: FloatArray, okay: BoolArray) -> Trajectory:
-        """Take a block of samples, with the same bits as one by one.
-
-        Parameters
-        ----------
-        u, y, okay : ndarray, shape (N,)
-            Input, output, mask. They are not changed.
-
-        Returns
-        -------
-        Trajectory
-            Every estimate of the block.
-
-        Raises
-        ------
-        BadShape
-            If the three do not have one shape (N,).
-        """
+        """Take a block of samples, with the same bits as one by one."""
         if not (u.ndim == 1 and u.shape == y.shape == okay.shape):
             raise BadShape(
                 f"{self._name}: u, y and okay have the shapes {u.shape}, {y.shape}, {okay.shape}, expected one shape "
@@ -462,11 +379,5 @@ class KernelEstimator:
         return saved(self._name, self._memory)
 
     def restore(self, state: Mapping[str, Any]) -> None:
-        """Take up a saved state: what follows has the bits it would have had without the break.
-
-        Raises
-        ------
-        BadSetting
-            If the state is not that of an estimator of this kind and these settings.
-        """
+        """Take up a saved state: what follows has the bits it would have had without the break."""
         restored(state, self._name, self._memory)

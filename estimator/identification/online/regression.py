@@ -41,9 +41,9 @@ from estimator.identification.online.recursive import (
     UNSTABLE,
     USED,
     Block,
-    KernelEstimator,
     Memory,
     Parts,
+    RecursiveEstimator,
     Shapes,
 )
 from estimator.signals.record import FloatArray
@@ -224,7 +224,7 @@ def tell(y_hat: float, e_prior: float, e_post: float, used: bool, stable: bool, 
     row.reason = verdict(stable, m, row)
 
 
-class RegressionEstimator(KernelEstimator):
+class RegressionEstimator(RecursiveEstimator):
     """An estimator that corrects theta along F Phi; what differs is what stands in phi and Phi.
 
     Parameters
@@ -311,13 +311,7 @@ class RegressionEstimator(KernelEstimator):
 
 
 def checked_filter(name: str, L: FloatArray) -> FloatArray:
-    """Return a copy of L.
-
-    Raises
-    ------
-    BadModel
-        If L does not start with 1, is not finite, or has a root on or outside the unit circle.
-    """
+    """Return a copy of L."""
     own = np.array(L, dtype=np.float64)
     if own.ndim != 1 or own.shape[0] == 0 or not np.isfinite(own).all() or own[0] != 1.0:
         raise BadModel(f"{name}: L is {L}, expected finite coefficients 1, l_1, l_2 .. of a polynomial in q^-1.")

@@ -1,4 +1,18 @@
-"""The record of an alarm: when, what, from where to where, on what evidence."""
+"""Alarms of a change of the resonance: record, state of the tracking, and the threshold for a rate of false ones.
+
+The rule: two statistics in a row beyond a threshold h, on the same side. Each is standardised with the mean m and the
+standard deviation s of statistics before, ``tau = (x - m) / (s sqrt(1 + 1/n))``: m of n of them, s with nu degrees of
+freedom. Where nothing changes, and the statistics are independent and normal, two tau have a bivariate t distribution
+with nu degrees of freedom, correlated by ``rho = 1 / (n + 1)`` through m. By Plackett's identity for its derivative
+with respect to the correlation (Biometrika 41, 1954; A. Genz, Statistics and Computing 14, 2004), from -1, where both
+can't be beyond h, up to rho::
+
+    P(both beyond h) = 2 / (2 pi) integral (1 + 2 h^2 / (nu (1 + sin theta)))^(-nu / 2) dtheta,  -pi/2 to asin(rho)
+
+That times the statistics per hour is the expected number of false alarms in an hour, an upper bound. Two beyond a lower
+threshold instead of one beyond a higher: the rate rests on the bulk of the distribution, and not on tails that nobody
+knows.
+"""
 
 from __future__ import annotations
 
@@ -111,13 +125,7 @@ class Alarm:
 
     @classmethod
     def from_json(cls, document: Mapping[str, Any]) -> Alarm:
-        """Read what `as_json` gave.
-
-        Raises
-        ------
-        KeyError, TypeError, ValueError
-            If it is something else.
-        """
+        """Read what `as_json` gave."""
         begin_s, end_s = document["changed_between_s"]
         return cls(
             time_s=document["time_s"],
@@ -168,17 +176,7 @@ def _quadrature() -> tuple[FloatArray, FloatArray]:
 
 
 def false_pairs(threshold: float, n: int, freedom: int) -> float:
-    """Return the probability that two statistics in a row are beyond a threshold, on the same side.
-
-    Parameters
-    ----------
-    threshold : float
-        In standard deviations; 0 or more.
-    n : int
-        Statistics behind the mean.
-    freedom : int
-        Degrees of freedom behind the standard deviation.
-    """
+    """Return the probability that two statistics in a row are beyond a threshold, on the same side."""
     nodes, weights = _quadrature()
     length = np.arcsin(1.0 / (n + 1)) + np.pi / 2
     share = 1.0 + np.sin(nodes * length - np.pi / 2)
@@ -188,13 +186,7 @@ def false_pairs(threshold: float, n: int, freedom: int) -> float:
 
 @cache
 def threshold_for(false_alarms_per_hour: float, statistics_per_hour: float, n: int, freedom: int) -> float:
-    """Return the threshold that has at most so many false alarms an hour; ``n`` and ``freedom`` of :func:`false_pairs`.
-
-    Raises
-    ------
-    BadSetting
-        If no threshold does.
-    """
+    """Return the threshold that has at most so many false alarms an hour."""
     wanted = false_alarms_per_hour / statistics_per_hour
     if not 0.0 < wanted < false_pairs(0.0, n, freedom):
         raise BadSetting(

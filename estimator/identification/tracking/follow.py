@@ -27,8 +27,15 @@ in theta right after the start. Before :data:`FEWEST` samples of a usable estima
 (``python -m tests.benchmarks.tracking``). Where the residual is a deterministic error of the model, repeated with
 every period of the PRBS, the deviations are too large by up to two: they take it for noise.
 
-Without excitation the deviations grow, up to those of a value that may be anywhere in the band in
-which the resonance is looked for.
+**Excitation.** At the end of every block, what the torque makes of the output at the resonance is held against the
+density S of the residual there. *Excited* is a block in which it is the larger; to become so, and to stay so with a
+torque that has become much weaker, it takes :data:`OPENS` times as much: a torque that is nothing but the noise of its
+reading makes an output that is not there, and a single look at a narrow band of noise exceeds ln(1000) times its mean
+once in 1000. *Lacking*: the torque's steps have less than 1 / :data:`OPENS` of the power they had while excited (the
+PRBS is off); the estimator is held, for it would learn noise, and forget. *Drowned*, which two blocks in a row have to
+say: the noise is above what the model makes of the torque; what has been learnt is begun anew. An estimate that is held
+keeps its covariance, but the samples within :data:`MEMORY` say less and less: by what is left of their information the
+variances are divided, up to those of a value that may be anywhere in the band in which the resonance is looked for.
 """
 
 from __future__ import annotations
@@ -343,20 +350,7 @@ def follow_block(
     roots: ComplexArray,
     out: FloatArray,
 ) -> None:
-    """Follow the estimates of a block.
-
-    Parameters
-    ----------
-    u, okay, theta, y_hat, e_prior, used, reason
-        The block: input, which samples are good, and trajectory.
-    before, pair, P, past, heard, last_mode, through, block, lasting
-        State: theta of the last sample, shape (n,); shapes (3,), (n, n), (4, depth), (6,); those of
-        :mod:`poles` and of the excitation above.
-    work, roots
-        Room, shapes (7, n), (na,).
-    out
-        Filled, shape (N, 5).
-    """
+    """Follow the estimates of a block."""
     na, n = structure[NA], theta.shape[1]
     step, frequency, damping, mode = work[3, :n], work[4, :na], work[5, :na], work[6, :3]
     band = numbers[LOWEST_HZ : LARGEST_DAMPING + 1]
@@ -459,17 +453,7 @@ class Follower:
         return self.to_block_end == self._block
 
     def run(self, u: FloatArray, okay: BoolArray, estimates: Trajectory) -> Followed:
-        """Follow the estimates of a block, which may have any length.
-
-        Parameters
-        ----------
-        u : ndarray, shape (n,)
-            Inputs that they were made from.
-        okay : ndarray of bool, shape (n,)
-            Which samples are good, whether the estimator was held or not.
-        estimates : Trajectory
-            The estimates, length n.
-        """
+        """Follow the estimates of a block, which may have any length."""
         live, out = self._live, np.empty((len(estimates), 5))
         follow_block(
             u,

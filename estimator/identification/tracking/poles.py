@@ -7,6 +7,14 @@ Roots by simultaneous iteration (Weierstrass; E. Durand 1960, I. O. Kerner, Nume
 It converges quadratically: from the poles of the sample before in two or three rounds. Two real poles that become a
 pair can't be found so, since real values stay real; then, and at the start, the rounds begin at points that lie on no
 axis of symmetry, and take about ten.
+
+A mode is the part rho / (1 - p q^-1) and its conjugate in the partial fractions of B / A. With the residue rho held,
+its output changes with the natural frequency f by::
+
+    psi(t) = dy/df = 2 Re [ rho dp/df q^-1 / (1 - p q^-1)^2 ] u(t),      dp/df = 2 pi T p (-zeta + j sqrt(1 - zeta^2))
+
+Not u but its steps u(t) - u(t-1) are passed, and whatever psi is held against is taken in steps as well: what driver
+and grade do far below the resonance then hardly enters.
 """
 
 from __future__ import annotations
@@ -123,24 +131,7 @@ def height(b: FloatArray, nk: int, z: ComplexArray, i: int) -> float:
 def dominant(
     theta: FloatArray, na: int, nk: int, sample_time_s: float, band_hz: FloatArray, z: ComplexArray, mode: FloatArray
 ) -> int:
-    """Find the dominant lightly damped mode, as ``modes.resonance`` does.
-
-    Parameters
-    ----------
-    theta
-        ``a_1 .. a_na, b_1 .. b_nb``.
-    band_hz
-        Lowest and highest natural frequency [Hz], largest damping ratio; shape (3,).
-    z
-        Poles of the sample before; filled with the present ones, shape (na,).
-    mode
-        Filled with natural frequency [Hz], damping ratio and height, shape (3,).
-
-    Returns
-    -------
-    int
-        Place of its pole in z; -1 where there is none.
-    """
+    """Find the dominant lightly damped mode, as ``modes.resonance`` does."""
     best = -1
     if not find_poles(theta[:na], z):
         return best

@@ -13,8 +13,10 @@ move, the score has it in the first block.
 A change smaller than :attr:`WatchSettings.smallest_change` counts as none: so much is taken off d first.
 
 No noise model is believed: level and spread of d are those of :attr:`WatchSettings.reference_blocks` blocks seen
-before, a period of the PRBS and more, so that what the model lacks, which the PRBS repeats, is part of them
-. The threshold follows from the rate of false alarms (:mod:`alarm`).
+before, a period of the PRBS and more, so that what the model lacks, which the PRBS repeats, is part of them. With the
+information p = sum psi^2 of a block, x = d sqrt(p) has one spread s for every p as long as noise is what spreads it;
+what the model lacks spreads d instead. Which of the two it was is not known: the variance of d is the larger of both,
+``s^2 max(1/p, 1/p_usual)``. The threshold follows from the rate of false alarms (:mod:`alarm`).
 
 A block that is not excited is left out: the reference runs on, and with the excitation the watch is there again.
 
@@ -166,13 +168,7 @@ class WatchSettings:
         return max(round(self.block_s / sample_time_s), 1)
 
     def threshold(self, blocks: int, sample_time_s: float) -> float:
-        """Return the threshold next to a level learnt from so many blocks.
-
-        Raises
-        ------
-        BadSetting
-            If no threshold keeps the rate of false alarms.
-        """
+        """Return the threshold next to a level learnt from so many blocks."""
         per_hour = HOUR_S / (self.block_samples(sample_time_s) * sample_time_s)
         return threshold_for(self.false_alarms_per_hour, per_hour, blocks, self.reference_blocks - 2)
 
@@ -258,17 +254,7 @@ def watch_block(
     past: FloatArray,
     score: FloatArray,
 ) -> None:
-    """Run the reference through the samples of a block; without one, its outputs are those of the estimate.
-
-    Parameters
-    ----------
-    u, y, okay, y_hat
-        The block: samples, which of them are good, outputs simulated by the estimate.
-    theta, mode
-        The reference model, shapes (n,), (7,).
-    through, past, score
-        State, shapes (5,), (2, depth), (5,).
-    """
+    """Run the reference through the samples of a block; without one, its outputs are those of the estimate."""
     for t in range(u.shape[0]):
         shift_in(past[INPUT], u[t] if np.isfinite(u[t]) else past[INPUT, 0])
         value = y_hat[t]
@@ -377,26 +363,7 @@ class ChangeWatch:
     def end_block(
         self, time_s: float, theta: FloatArray, frequency: Level | None, damping: float, excited: bool
     ) -> Alarm | None:
-        """End the present block.
-
-        Parameters
-        ----------
-        time_s : float
-            Moment of its last sample [s].
-        theta : ndarray, shape (na+nb,)
-            The estimate now.
-        frequency : Level or None
-            Its resonance [Hz]; None where it has none, or it is not known how sure it is.
-        damping : float
-            Its damping ratio; NaN where it has none.
-        excited : bool
-            Whether the block was excited.
-
-        Returns
-        -------
-        Alarm or None
-            A change that was found, or once more when the estimate has settled.
-        """
+        """End the present block."""
         score = self._live["score"].tolist()
         self._live["score"][:] = 0.0
         self.statistic = np.nan

@@ -16,7 +16,7 @@ from estimator.signals.record import Record
 from hil.commission.analysis.response_ratio import HIGH_PASS_HZ
 
 if TYPE_CHECKING:
-    from estimator.identification.offline.fits import OutputErrorFit
+    from estimator.identification.offline.fits import LinearFit
 
 NATURAL_DELAY = 1
 """Samples of delay that sampling alone makes."""
@@ -30,7 +30,7 @@ class DelaySelection:
     """The delay that suits best, beyond the sample that is natural, and the model with it."""
 
     extra_samples: int
-    fit: OutputErrorFit
+    fit: LinearFit
     rms_by_delay: tuple[float, ...]
 
 

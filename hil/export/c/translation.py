@@ -26,13 +26,7 @@ class Translation:
         self._functions: list[str] = []
 
     def function(self, function: Callable[..., Any], of_one_number: bool = False) -> tuple[str, Type]:
-        """Translate a function, where it has not been, and return its name in C and the type it returns.
-
-        Parameters
-        ----------
-        of_one_number : bool
-            Whether arrays stand for one number each: of functions that numpy carries out entry by entry.
-        """
+        """Translate a function, where it has not been, and return its name in C and the type it returns."""
         if function in SUMS:
             return self._sum(SUMS[function])
         source = getattr(function, "py_func", function)

@@ -18,13 +18,7 @@ from hil.report.outputs import publish
 def written_fmu(
     model: Path, out: Path, version: str, period_s: float, recording: Path | None, sources_only: bool, dbc: Path | None
 ) -> Iterator[str]:
-    """Write an FMU and yield the lines that say so.
-
-    Raises
-    ------
-    UsageError
-        For what can't be exported, a wrong name, or without a compiler.
-    """
+    """Write an FMU and yield the lines that say so."""
     if out.suffix.lower() != ".fmu":
         raise UsageError(f"--out {out}: expected a name that ends in .fmu, got {out.suffix!r}")
     if read_toml(model, ModelFileError).get("laws"):

@@ -17,17 +17,7 @@ def description(
     version: str, name: str, token: str, made: datetime, period_s: float, sources: Sequence[str],
     variables: Sequence[Variable],
 ) -> bytes:  # fmt: skip
-    """Return the text of modelDescription.xml.
-
-    Parameters
-    ----------
-    version : str
-        ``2.0`` or ``3.0``.
-    token : str
-        Which build it belongs to (FMI 2.0: guid).
-    sources : sequence of str
-        C files that are compiled.
-    """
+    """Return the text of modelDescription.xml."""
     is_2 = version == "2.0"
     root = Element(
         "fmiModelDescription",

@@ -67,13 +67,7 @@ class Driveline:
 
 
 def driveline(name: str, model: DrivelineModel, period_s: float, sensor_at: Location = Location.MOTOR) -> Driveline:
-    """Return what of a model can be exported, at rest without a load.
-
-    Raises
-    ------
-    UsageError
-        For a joint.
-    """
+    """Return what of a model can be exported, at rest without a load."""
     if model.structure is Structure.JOINT:
         raise UsageError("structure = 'joint': expected a driveline of 1 to 3 masses to export, got a joint")
     left = [each for each in model.effects if each in OF_THE_RECORDER]

@@ -40,13 +40,7 @@ def c_files(d: Driveline, version: str) -> tuple[dict[str, str], list[str], str]
 
 
 def write(d: Driveline, version: str, path: Path, sources_only: bool = False) -> None:
-    """Write an FMU.
-
-    Raises
-    ------
-    UsageError
-        Without FMPy, whose copy of the standard's headers it takes, or without a C compiler, where a binary is wanted.
-    """
+    """Write an FMU."""
     files, compiled, token = c_files(d, version)
     described = description(version, d.name, token, datetime.now(UTC), d.period_s, compiled, variables(d))
     content: dict[str, bytes | str] = {

@@ -112,15 +112,7 @@ def interface(number: str) -> str:
 
 
 def stubs(types: str, functions: str, written: str) -> str:
-    """Return a C file with the functions of a standard that a model does not have: they answer with an error.
-
-    Parameters
-    ----------
-    types, functions : str
-        Texts of fmi?FunctionTypes.h and the name of fmi?Functions.h.
-    written : str
-        Text of the C file with those it has.
-    """
+    """Return a C file with the functions of a standard that a model does not have: they answer with an error."""
     out = [f'#include "{functions}"', ""]
     bare = re.sub(r"/\*.*?\*/", "", types, flags=re.DOTALL)
     for returned, name, given in re.findall(r"typedef\s+([\w\s*]+?)\s*\b(\w+)TYPE\s*\(([^;]*)\);", bare):

@@ -50,13 +50,7 @@ SETTINGS: Final[Mapping[Any, Any]] = {
 
 
 def require_matplotlib() -> None:
-    """Refuse before anything is driven where there is nothing to draw with.
-
-    Raises
-    ------
-    UsageError
-        If matplotlib is not installed.
-    """
+    """Refuse before anything is driven where there is nothing to draw with."""
     try:
         import matplotlib  # noqa: F401
     except ModuleNotFoundError as error:

@@ -70,26 +70,7 @@ def drive(
     stop: StopRequest,
     progress: Progress = lambda phase, time_s: None,
 ) -> Driven:
-    """Drive one experiment and record it.
-
-    Parameters
-    ----------
-    path
-        Recording to make, a new file.
-    conditions
-        To drive it under.
-    duration_s
-        Length of the recording [s].
-    stop
-        Ends it at the next cycle when requested.
-    progress
-        Called with every cycle.
-
-    Raises
-    ------
-    RunAborted, DriverError, KeyboardInterrupt
-        As `hil.rig.session.run_plan`.
-    """
+    """Drive one experiment and record it."""
     rig = read_rig(RIG_FILE)
     bus, line = _loaded(rig, conditions)
     load = RoadLoad(bus, conditions)

@@ -68,17 +68,7 @@ class RoadLoad:
         self._surface_nm = 0.0
 
     def torque_nm(self, speed_rad_s: float, distance_m: float, period_s: float) -> float:
-        """Return the load torque of the next period [Nm].
-
-        Parameters
-        ----------
-        speed_rad_s
-            Of the load at the motor shaft [rad/s].
-        distance_m
-            Driven so far [m].
-        period_s
-            How long it is held [s].
-        """
+        """Return the load torque of the next period [Nm]."""
         v = speed_rad_s * self._bus.metres_per_rad
         given = self._conditions
         self._gust_m_s = self._next(self._gust_m_s, given.gust_m_s, period_s / GUST_S)

@@ -46,13 +46,7 @@ class RoadPlant:
         return float(self._x[0])
 
     def advance(self, torque_nm: tuple[float, float], duration_s: float) -> None:
-        """Let the driveline run with both torques held [Nm] for one period.
-
-        Raises
-        ------
-        ValueError
-            If the duration is not the period this plant was made for.
-        """
+        """Let the driveline run with both torques held [Nm] for one period."""
         if duration_s != self._period_s:
             raise ValueError(
                 f"road: asked for a step of {duration_s:g} s, expected the {self._period_s:g} s it was made for. "
