@@ -13,10 +13,9 @@ import pytest
 from estimator.identification.settings import Settings
 from estimator.signals.record import Record
 from hil.cli.main import run
-from hil.export.filling import Precision, project
 from hil.export.plc_estimator import PlcEstimator
-from hil.export.plcopen import Tc6, plcopen_xml
-from hil.export.structured_text import structured_text
+from hil.export.plcopen import Tc6, plcopen_xml, project
+from hil.export.structured_text import Precision, structured_text
 from hil.report.identification.document import identification_text
 
 BOTH = pytest.mark.parametrize("what", ["st", "plcopen"])

@@ -10,9 +10,8 @@ import numpy as np
 
 from estimator.identification.online.recursive import Trajectory
 from estimator.signals.record import BoolArray, FloatArray
-from hil.export.filling import Precision, project
 from hil.export.plc_estimator import PlcEstimator
-from hil.export.structured_text import structured_text
+from hil.export.structured_text import Precision, structured_text
 from tests.export.iec.machine import Machine
 
 STATUS = {"unestimated": 0, "estimated": 1, "invalid": 2}
@@ -54,7 +53,7 @@ def on_host(estimator: PlcEstimator, cycles: Cycles) -> Trajectory:
 
 def exported(estimator: PlcEstimator, precision: Precision = Precision.DOUBLE) -> str:
     """Return the Structured Text of an estimator."""
-    return structured_text(project(estimator, precision))
+    return structured_text(estimator, precision)
 
 
 def on_plc(

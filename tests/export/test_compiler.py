@@ -14,8 +14,9 @@ import pytest
 
 from estimator.identification.linear_model import Orders
 from estimator.identification.settings import Settings
-from hil.export.filling import Precision, project
 from hil.export.plc_estimator import PlcEstimator
+from hil.export.plcopen import project
+from hil.export.structured_text import Precision
 from tests.export.pyplcopen_dialect import in_dialect
 
 pyplcopen = pytest.importorskip("pyplcopen", reason="pyplcopen, which has a compiler of IEC 61131-3, is not installed")

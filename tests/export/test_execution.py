@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,15 +12,24 @@ import pytest
 from estimator.identification.chain import OnlineChain
 from estimator.identification.linear_model import Orders
 from estimator.identification.online.adaptation import Adaptation
-from estimator.identification.online.recursive import Status
+from estimator.identification.online.recursive import Status, Trajectory
 from estimator.identification.settings import Settings
 from estimator.signals.record import FloatArray
-from hil.export.filling import Precision
-from hil.export.plc_estimator import PlcEstimator
-from hil.export.profiles import PROFILES, profile
+from hil.export.plc_estimator import PROFILES, PlcEstimator, profile
+from hil.export.structured_text import Precision
 from tests.export.drives import bad_drive, clean_drive, still_drive
 from tests.export.iec.machine import Machine
-from tests.export.plc_runs import Cycles, assert_equal_bits, execute_oefo, exported, on_host, on_plc, summed
+from tests.export.plc_runs import (
+    Cycles,
+    Kept,
+    assert_equal_bits,
+    execute,
+    execute_oefo,
+    exported,
+    on_host,
+    on_plc,
+    summed,
+)
 
 RESONANCE = np.poly([0.85 * np.exp(1.0j), 0.85 * np.exp(-1.0j)]).real
 """A filter near the bus's own: 8 Hz at 20 ms is 1.0 rad per sample."""
@@ -140,3 +150,56 @@ def test_in_single_precision_no_number_is_lost_and_the_model_is_the_same(L: Floa
     )
     # A hundredth of the 1 dB the two estimates of one drive may differ by: rounding must not count next to noise.
     assert np.abs(20.0 * np.log10(np.abs(single / double))).max() < 0.01 * 1.0
+
+
+MUTANTS = (
+    ("windowOutput[1] := heldOutput - meanOutput", "windowOutput[1] := heldOutput"),
+    ("(contamination > UNTRUSTED)", "(contamination > 2.0 * UNTRUSTED)"),
+    ("FOR i := NTAPS TO 2 BY -1", "FOR i := NTAPS TO 3 BY -1"),
+    ("IF spoilt > 0 THEN", "IF spoilt > 1 THEN"),
+    ("heldCount := heldCount - 1", "heldCount := 0"),
+    ("IF ABS(speed) > peak THEN", "IF speed > peak THEN"),
+    ("heldCount := NK + NB", "heldCount := NK"),
+    ("phi[NA + j] := pastIn[NK + j]", "phi[NA + j] := pastIn[j]"),
+    ("phi[i] := -pastOut[i]", "phi[i] := pastOut[i]"),
+    ("IF usedCount < START_UP", "IF usedCount <= START_UP"),
+    ("ePost := ePrior / (1.0 + gainF.quad)", "ePost := ePrior / (2.0 + gainF.quad)"),
+    ("facV[i, j] := element - product[i] * share", "facV[i, j] := element - product[j] * share"),
+    ("facE[j] := facE[j] * (before * weight)", "facE[j] := facE[j] * before * weight"),
+    ("before := alpha", "before := lambda1Now"),
+    ("scale := traceHeld / traceF", "scale := 1.0"),
+    ("(mirror > -1.0) AND (mirror < 1.0)", "(mirror > -1.0)"),
+    ("(mirror > -1.0) AND (mirror < 1.0)", "(mirror < 1.0)"),
+    ("IF stable AND ADAPT_FILTER", "IF ADAPT_FILTER"),
+    ("FOR i := 1 TO m / 2 DO", "FOR i := 1 TO (m - 1) / 2 DO"),
+    ("torque := torqueM1 + torqueM2", "torque := torqueM1"),
+)
+"""What stands in the text, and what is put in its place."""
+
+
+SETTINGS = Settings(adaptation=profile("decreasing_then_constant_trace:trace=1.0"))
+
+
+@pytest.mark.parametrize(("before", "after"), MUTANTS)
+def test_a_fault_in_the_text_is_noticed(before: str, after: str, tmp_path: Path) -> None:
+    assert any(not same_bits(plc, host) for plc, host in both_sides(before, after, tmp_path))
+
+
+def both_sides(before: str, after: str, folder: Path) -> Iterator[tuple[Kept, Trajectory]]:
+    """Yield what the text with a fault and the host make of a drive, until the fault has been noticed."""
+    drive = bad_drive()
+    for L in (np.array([1.0, -0.9, 0.72]), None):
+        estimator = PlcEstimator(SETTINGS, L=L)
+        text = exported(estimator)
+        assert before in text
+        wrong = text.replace(before, after)
+        yield execute(wrong, drive, folder), on_host(estimator, drive)
+        yield execute_oefo(wrong, *summed(drive), folder), estimator.oefo().run(*summed(drive))
+
+
+def same_bits(plc: Kept, host: Trajectory) -> bool:
+    try:
+        assert_equal_bits(plc, host)
+    except AssertionError:
+        return False
+    return True

@@ -14,10 +14,9 @@ from estimator.identification.online import regression
 from estimator.identification.settings import Settings
 from estimator.signals import decimate
 from estimator.signals.record import FloatArray
-from hil.export.filling import POUS, Precision, project
 from hil.export.plc_estimator import PlcEstimator
-from hil.export.pou import SectionKind
-from hil.export.pou_reader import read_pou, read_types
+from hil.export.plcopen import SectionKind, project, read_pou, read_types
+from hil.export.structured_text import POUS, Precision
 from tests.export.iec.parser import Parser
 from tests.export.iec.to_c import to_c
 from tests.export.iec.tree import REALS

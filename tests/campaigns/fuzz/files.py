@@ -21,9 +21,9 @@ from estimator.identification.online.adaptation import DecreasingGain
 from hil.cli.main import run
 from hil.config.model_file import read_model_for_recordings
 from hil.config.rig_file import read_rig
-from hil.export.filling import Precision, project
-from hil.export.identification_file import plc_estimator
-from hil.export.structured_text import structured_text
+from hil.export.plc_estimator import plc_estimator
+from hil.export.plcopen import project
+from hil.export.structured_text import Precision, structured_text
 from hil.recording import Table, read_table, write_table
 from hil.recording.formats import read_metadata
 from hil.recording.kinds import as_text

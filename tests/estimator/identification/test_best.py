@@ -10,14 +10,24 @@ import pytest
 from estimator.identification.best import BestEstimate, Verdict, best_estimate
 from estimator.identification.linear_model import LinearModel, Orders
 from estimator.identification.modes.physical import NAMES, two_mass_model
-from estimator.identification.modes.uncertainty import Uncertain, uncertain_resonance
+from estimator.identification.modes.uncertainty import Uncertain
 from estimator.identification.offline.fits import LinearFit, fit_box_jenkins, fit_output_error, problem_of
 from estimator.signals.decimate import high_passed
 from estimator.signals.prbs import prbs_nm
 from estimator.signals.record import BoolArray, Record
 from tests.benchmarks.buses.bus import draw_bus
 from tests.benchmarks.buses.drive import CLEAN, drive
-from tests.estimator.identification.driveline import B_L, B_M, J_L, J_M, C, K, cruise, true_resonance
+from tests.estimator.identification.driveline import (
+    B_L,
+    B_M,
+    J_L,
+    J_M,
+    C,
+    K,
+    cruise,
+    true_resonance,
+    uncertain_resonance,
+)
 
 FREQUENCY_HZ, DAMPING = true_resonance()
 PERIOD_S, SUBSTEPS = 0.01, 50

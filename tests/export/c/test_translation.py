@@ -16,8 +16,7 @@ from hypothesis import strategies as st
 from estimator.lanes import choose, every
 from estimator.physics import laws, low_pass
 from estimator.physics.effects import stribeck_friction, tyre_slip
-from hil.export.c.expressions import NotTranslatable
-from hil.export.c.translation import Translation
+from hil.export.c_laws import NotTranslatable, Translation
 from hil.export.fmu.package import OPTIONS
 
 

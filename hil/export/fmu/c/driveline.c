@@ -201,44 +201,21 @@ int driveline_step(Driveline *d, double length_s) {
     return 1;
 }
 
-/* A low-pass: the rates of its output and of its rise, which is the output's rate times tau. */
-static void pass(double input, double output, double rise, double tau, double shape, double *rates) {
-    rates[0] = shape > 0.0 ? rise / tau : (input - output) / tau;
-    rates[1] = shape > 0.0 ? (input - output - rise) / (shape * tau) : 0.0;
-}
-
-/* Outputs and derivatives of the present state. */
+/* Outputs of the present state. */
 void driveline_update(Driveline *d) {
     Array p = parameters(d);
     Line made = line(d);
     State x = state(d);
-    double *v = d->value, *rest = v + STATE, *rate = v + DERIVATIVE;
-    double time_s = v[TIME], h = v[STEP_S], angle = read_angle(d), torque = on_shaft(d), drive;
+    double *v = d->value, *rest = v + STATE;
+    double time_s = v[TIME], h = v[STEP_S], angle = read_angle(d), torque = on_shaft(d);
     double supplied = p.at[DELAY] == 0.0 ? torque : remembered(&d->history, v[BEFORE_ALL], time_s - p.at[DELAY]);
-    int late = p.at[LAG] >= FASTEST_S;
+    double drive = p.at[LAG] >= FASTEST_S ? rest[LAGGED] : supplied;
     Conditions now =
         conditions_conditions(MASSES, time_s - 0.5 * h, h, angle, v[T_LOAD], v[SIGN_WIDTH], p), felt = now;
     Bristles held = {rest[BRISTLES_MOTOR], rest[BRISTLES_LOAD]};
-    memset(rate, 0, STATES * sizeof(double));
-    if (line_is_bristled(p)) {
-        double little = 1e-4 * h;
-        Bristles after = bristles_bent(made, held, x, now, p, little);
-        felt = bristles_rubbed(now, held, p);
-        rate[BRISTLES_MOTOR] = (after.motor - held.motor) / little;
-        rate[BRISTLES_LOAD] = (after.load - held.load) / little;
-    }
-    if (late) pass(supplied, rest[LAGGED], rest[LAG_RISE], p.at[LAG], p.at[LAG_SHAPE], rate + LAGGED);
-    drive = late ? rest[LAGGED] : supplied;
+    if (line_is_bristled(p)) felt = bristles_rubbed(now, held, p);
     State moving = rates_rates(made, conditions_with_torque(felt, drive), x, p);
-    memcpy(rate, &moving, sizeof moving);
-    double read = sensing_reading(sensing_entry(x, OUTPUT, p), angle, p);
-    if (p.at[FILTER] > 0.0)
-        pass(read, rest[FILTERED], rest[FILTER_RISE], p.at[FILTER], p.at[FILTER_SHAPE], rate + FILTERED);
-    if (p.at[HEATED] > 0.0) {
-        double loss = summed(d) / p.at[HEATED];
-        rate[WARMTH] = (loss * loss - rest[WARMTH]) / p.at[DERATING_TIME];
-    }
-    v[SPEED_MEASURED] = sensing_shown(read, rest[FILTERED], p);
+    v[SPEED_MEASURED] = sensing_shown(sensing_reading(sensing_entry(x, OUTPUT, p), angle, p), rest[FILTERED], p);
     v[SPEED_MOTOR] = x.speed;
     v[ANGLE_MOTOR] = x.angle;
     v[SPEED_LOAD] = MASSES == 1 ? x.speed : x.load_speed;

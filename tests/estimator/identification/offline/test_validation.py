@@ -99,13 +99,11 @@ def test_a_controller_that_answers_the_speed_is_detected_and_its_effects_reporte
         assert found.detected
         assert "The torque follows the speed" in found.statement
         assert "Use the Box-Jenkins model" in found.statement
-        assert set(found.consequences) >= {"output_error", "box_jenkins", "spectral"}
 
 
 def test_in_open_loop_none_is_claimed(records: list[Record], fits: list[LinearFit]) -> None:
     found = judge_feedback(validate(fits[2], records[2]))
     assert not found.detected
-    assert not found.consequences
 
 
 def test_a_recording_at_another_period_is_refused(records: list[Record], fits: list[LinearFit]) -> None:

@@ -3,18 +3,103 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
 import scipy.signal
 
 from estimator.errors import BadSetting, NotExciting
-from estimator.identification.spectral import SpectralEstimate, spectral_estimate
+from estimator.identification.linear_model import LinearModel
+from estimator.identification.spectral import SpectralEstimate, good_segments, spectral_estimate
 from estimator.signals.decimate import decimate
-from estimator.signals.record import Record
+from estimator.signals.record import FloatArray, Record
 from tests.benchmarks.identification.local_polynomial import local_polynomial, longest_stretch
 from tests.estimator.identification.closed_loop import response
 from tests.estimator.identification.driveline import cruise
+
+MODEL = LinearModel(a=(-1.0, 0.6), b=(0.5, 0.2), nk=1, sample_time_s=0.02)
+
+
+def record(n: int, noise: float, seed: int = 0) -> Record:
+    rng = np.random.default_rng(seed)
+    u = rng.normal(size=n)
+    y = MODEL.simulate(u) + noise * rng.normal(size=n)
+    return Record("made", 0.02, 0.02 * np.arange(n), u[:, np.newaxis], y, np.ones(n, dtype=bool))
+
+
+def masked(source: Record, bad: FloatArray) -> Record:
+    okay = np.ones(source.output.shape, dtype=bool)
+    okay[bad.astype(int)] = False
+    output = np.where(okay, source.output, np.nan)
+    return Record(source.name, 0.02, source.time_s, source.torque_nm, output, okay)
+
+
+def test_equals_scipys_welch_estimate() -> None:
+    source = record(4000, noise=0.3)
+    u, y = source.total_torque_nm, source.output
+    ours = spectral_estimate(source, 256)
+    setting = {"fs": 50.0, "window": "hann", "nperseg": 256, "noverlap": 128}
+    frequency_hz, s_uy = scipy.signal.csd(u, y, **setting)
+    s_uu = scipy.signal.welch(u, **setting)[1]
+    np.testing.assert_allclose(ours.frequency_hz, frequency_hz[1:])
+    np.testing.assert_allclose(ours.response, (s_uy / s_uu)[1:], rtol=1e-9)
+    np.testing.assert_allclose(ours.coherence, scipy.signal.coherence(u, y, **setting)[1][1:], rtol=1e-9)
+
+
+def test_the_truth_lies_within_the_stated_error() -> None:
+    deviations = []
+    for seed in range(40):
+        estimate = spectral_estimate(record(4096, noise=0.5, seed=seed), 256)
+        truth = np.abs(MODEL.response(estimate.frequency_hz))
+        deviations.append((np.abs(estimate.response) - truth) / estimate.magnitude_std)
+    inner = np.array(deviations)[:, 4:-4]
+    assert 0.85 < inner.std() < 1.15  # in units of the stated standard deviation
+    assert np.mean(np.abs(inner) > 1.96) == pytest.approx(0.05, abs=0.03)
+
+
+def test_coherence_tells_noise_from_response() -> None:
+    assert spectral_estimate(record(8192, noise=0.0)).coherence[5:-5].min() > 0.99
+    assert spectral_estimate(record(8192, noise=1e3)).coherence.mean() < 0.1
+
+
+def test_segments_with_a_masked_sample_are_left_out() -> None:
+    okay = np.ones(100, dtype=bool)
+    okay[45] = False
+    assert good_segments(okay, 20) == [0, 10, 20, 50, 60, 70, 80]
+    source = record(4000, noise=0.0)
+    estimate = spectral_estimate(masked(source, np.array([1000, 3000])), 256)
+    assert np.isfinite(estimate.response).all()
+    assert estimate.coherence[5:-5].min() > 0.99
+
+
+def test_an_input_without_power_has_no_coherence_and_infinite_error() -> None:
+    n = 2000
+    quiet = Record(
+        "quiet",
+        0.02,
+        0.02 * np.arange(n),
+        np.zeros((n, 1)),
+        np.random.default_rng(0).normal(size=n),
+        np.ones(n, bool),
+    )
+    estimate = spectral_estimate(quiet)
+    assert not estimate.coherence.any()
+    assert np.isinf(estimate.magnitude_std).all()
+
+
+def test_too_few_unbroken_segments_are_refused() -> None:
+    source = record(400, noise=0.1)
+    okay = np.arange(400) % 40 > 10  # gaps of 0.22 s, and 0.58 s between them
+    with pytest.raises(NotExciting, match=r"0 unbroken segments of 1\.28 s, expected 3 or more") as refusal:
+        spectral_estimate(replace(source, okay=okay), 256)
+    assert refusal.value.names == ("frequency response",)
+
+
+def test_a_segment_too_short_is_refused() -> None:
+    with pytest.raises(BadSetting, match="segment_samples is 7"):
+        spectral_estimate(record(400, noise=0.1), 7)
+
 
 PERIOD = 1023
 METHODS: dict[str, Callable[[Record], SpectralEstimate]] = {
@@ -39,9 +124,8 @@ def test_intervals_hold_the_exact_response(method: str, records: list[Record]) -
     for record in records:
         estimate = METHODS[method](record)
         band = around(estimate, 3.0, 20.0)
-        low, high = (end[band] for end in estimate.magnitude_interval())
-        truth = response(estimate.frequency_hz[band])
-        held.append(np.mean((low <= truth) & (truth <= high)))
+        found, reach = np.abs(estimate.response[band]), 1.96 * estimate.magnitude_std[band]
+        held.append(np.mean(np.abs(response(estimate.frequency_hz[band]) - found) <= reach))
         assert ((estimate.coherence >= 0) & (estimate.coherence <= 1)).all()
         assert (estimate.magnitude_std > 0).all()
     assert np.mean(held) == pytest.approx(0.95, abs=0.06)
@@ -69,7 +153,7 @@ def test_noise_alone_has_no_coherence(method: str) -> None:
     assert METHODS[method](response_only).coherence.mean() > 0.97
 
 
-def masked(record: Record, bad: slice) -> Record:
+def with_gaps(record: Record, bad: slice) -> Record:
     okay = record.okay.copy()
     okay[bad] = False
     output = np.where(okay, record.output, np.nan)
@@ -78,7 +162,7 @@ def masked(record: Record, bad: slice) -> Record:
 
 @each
 def test_masked_samples_are_not_looked_at(method: str, records: list[Record]) -> None:
-    estimate = METHODS[method](masked(records[0], slice(1100, 1150)))
+    estimate = METHODS[method](with_gaps(records[0], slice(1100, 1150)))
     assert np.isfinite(estimate.response).all()
     band = around(estimate, 4.0, 7.0)
     np.testing.assert_allclose(np.abs(estimate.response[band]), response(estimate.frequency_hz[band]), rtol=0.4)
@@ -123,7 +207,7 @@ def test_settings_that_make_no_sense_are_refused(
 @pytest.mark.parametrize(
     ("estimate", "why"),
     [
-        (lambda record: local_polynomial(masked(record, slice(None, -20))), "lines, expected 13"),
+        (lambda record: local_polynomial(with_gaps(record, slice(None, -20))), "lines, expected 13"),
     ],
 )
 def test_too_little_data_are_refused(
