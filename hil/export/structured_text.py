@@ -172,7 +172,7 @@ class _Filling:
     def _literals(self, values: Iterable[float]) -> str:
         texts = [self.precision.literal(value) for value in values]
         rows = [", ".join(texts[first : first + NUMBERS_PER_LINE]) for first in range(0, len(texts), NUMBERS_PER_LINE)]
-        return ",\n        ".join(rows)
+        return rows[0] if len(rows) == 1 else "\n        " + ",\n        ".join(rows)
 
 
 def _truth(value: bool) -> str:

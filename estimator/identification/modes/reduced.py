@@ -19,7 +19,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import logm
+from scipy.linalg import logm, schur
 
 from estimator.errors import BadModel, BadShape
 from estimator.identification.linear_model import ComplexArray, LinearModel
@@ -160,12 +160,25 @@ def _as_model(theta: FloatArray, original: LinearModel, order: int) -> LinearMod
     return LinearModel(a, b, min(original.nk, 1), original.sample_time_s)
 
 
+def _triangular_form(
+    A: FloatArray, B: FloatArray, C: FloatArray, D: float
+) -> tuple[FloatArray, FloatArray, FloatArray, float]:
+    """Return the states in their Schur form: powers of A then keep its poles, which rounding else puts outside.
+
+    Where many poles crowd together at 1, as of a recording of one mass, one may lie there all the same; the motion is
+    then slowed by as much.
+    """
+    T, Z = schur(A)
+    radius = float(np.abs(np.linalg.eigvals(T)).max(initial=0.0))
+    return T * min(1.0, (1.0 - 1e-9) / max(radius, 0.5)), Z.T @ B, C @ Z, D
+
+
 def _truncated(model: LinearModel, order: int) -> tuple[FloatArray, FloatArray]:
     """Return theta of the truncated model and the Hankel singular values.
 
     With a delay of 1 or more theta is ``[a_1 .. a_r, b_1 .. b_r]``, without ``[a_1 .. a_r, b_0 .. b_r]``.
     """
-    A, B, C, D = state_space(model)
+    A, B, C, D = _triangular_form(*state_space(model))
     reach = square_root(_gramian(A, B @ B.T))
     see = square_root(_gramian(A.T, C.T @ C))
     left, hankel, right_t = np.linalg.svd(see.T @ reach)

@@ -31,6 +31,9 @@ CONFIDENCE = 0.95
 QUANTILE = float(norm.ppf(0.5 + CONFIDENCE / 2.0))
 """Half width of such an interval in standard deviations: 1.96."""
 
+SHORT = 0.5
+"""Reach of an interval to either side, against the value, up to which a number is known."""
+
 STEP = 0.01
 """Of the difference quotient, in standard deviations."""
 
@@ -42,28 +45,24 @@ class Uncertain:
     Attributes
     ----------
     value, std : float
-    is_reciprocal : bool
-        Whether its reciprocal is what the data determine linearly, as of an inertia: the interval is then one of the
-        reciprocal, and reaches further up than down.
+    interval : tuple of float, optional
+        Interval of 95 %, where it is not that of a normal distribution.
     """
 
     value: float
     std: float
-    is_reciprocal: bool = False
+    interval: tuple[float, float] | None = None
 
     @property
     def ci95(self) -> tuple[float, float]:
         """Interval that holds the truth with 95 % probability."""
-        reach = QUANTILE * self.std
-        if not self.is_reciprocal or self.value <= 0.0 or not math.isfinite(reach):
-            return self.value - reach, self.value + reach
-        share = reach / self.value
-        return self.value / (1.0 + share), self.value / (1.0 - share) if share < 1.0 else math.inf
+        return self.interval or (self.value - QUANTILE * self.std, self.value + QUANTILE * self.std)
 
     @property
     def is_determined(self) -> bool:
-        """Tell whether the interval leaves out 0: size and sign are known."""
-        return math.isfinite(self.std) and abs(self.value) > QUANTILE * self.std
+        """Tell whether the interval is short against the value to either side: then size and sign are known."""
+        low, high = self.ci95
+        return max(high - self.value, self.value - low) <= SHORT * abs(self.value)
 
     def covers(self, truth: float) -> bool:
         """Tell whether the interval holds a value."""
