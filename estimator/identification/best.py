@@ -49,6 +49,10 @@ MOST_UNCERTAIN = 0.5
 """Largest half width of the frequency's 95 % interval, in parts of it."""
 
 
+ONE_MASS_DOES = "one mass explains the recording as well: the data do not need a pole pair"
+"""The reason for no pole pair that is a finding about the drive."""
+
+
 class Verdict(Enum):
     """What a reader may do with the linear model; the value is its name in files."""
 
@@ -57,6 +61,7 @@ class Verdict(Enum):
     CLOSED_LOOP = "closed_loop"
     NOT_EXCITED = "not_excited"
     INCOMPLETE = "incomplete"
+    ONE_MASS = "one_mass"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -141,7 +146,7 @@ def best_estimate(record: Record, high_pass_hz: float = HIGH_PASS_HZ) -> BestEst
         feedback=feedback,
         linearity=linearity,
         regions=regions,
-        verdict=_verdict(mode, chosen.validation, feedback, linearity),
+        verdict=_verdict(mode, reason, chosen.validation, feedback, linearity),
     )
 
 
@@ -165,7 +170,7 @@ def _needed_pair(fit: LinearFit, band_hz: tuple[float, float], rigid: LinearFit)
     if not pairs:
         return None, f"the model has no oscillating pole pair {within}"
     if criterion(rigid) <= criterion(fit):
-        return None, "one mass explains the recording as well: the data do not need a pole pair"
+        return None, ONE_MASS_DOES
     cancelled = [_frequency_hz(one, fit) for one in pole_zero_map(fit.model, fit.covariance).cancellations]
     needed = [each for each in pairs if not np.isclose(each.frequency_hz.value, cancelled, rtol=1e-6).any()]
     if not needed:
@@ -185,10 +190,12 @@ def _half_width(mode: UncertainMode) -> float:
     return (high - low) / 2.0
 
 
-def _verdict(mode: UncertainMode | None, validation: Validation, feedback: Feedback, linearity: Linearity) -> Verdict:
+def _verdict(
+    mode: UncertainMode | None, reason: str, validation: Validation, feedback: Feedback, linearity: Linearity
+) -> Verdict:
     """Name what matters most; a nonlinear drive also looks like feedback, so that it comes first."""
     if mode is None:
-        return Verdict.NOT_EXCITED
+        return Verdict.ONE_MASS if reason == ONE_MASS_DOES else Verdict.NOT_EXCITED
     if not linearity.is_linear:
         return Verdict.NOT_LINEAR
     if not validation.independence.is_independent:

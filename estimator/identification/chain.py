@@ -140,7 +140,7 @@ class OnlineTrajectory:
         return (self[k] for k in range(len(self)))
 
 
-VERSION = 2
+VERSION = 3
 """Of a saved state; goes up when a part changes its meaning."""
 
 EstimatorFactory = Callable[[Settings, FloatArray | None], RecursiveEstimator]

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from estimator.errors import BadModel
-from estimator.identification.best import BestEstimate, best_estimate
+from estimator.identification.best import BestEstimate, Verdict, best_estimate
 from estimator.identification.chain import OnlineChain, OnlineTrajectory
 from estimator.identification.identify import Identification
 from estimator.identification.modes.modes import Mode, resonance
@@ -160,6 +160,8 @@ def study(record: Record, found: Identification, settings: Settings, others: Seq
 
 
 def _physical(best: BestEstimate) -> tuple[PhysicalEstimate | None, str]:
+    if best.verdict is Verdict.ONE_MASS:
+        return None, best.reason
     try:
         return physical_parameters(best.two_mass.model, best.two_mass.covariance), ""
     except BadModel as error:

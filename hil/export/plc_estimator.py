@@ -15,6 +15,7 @@ from estimator.identification.online.adaptation import PROFILES as KINDS
 from estimator.identification.online.adaptation import Adaptation
 from estimator.identification.online.oefo import Oefo
 from estimator.identification.settings import SAMPLES_PER_PARAMETER, Settings
+from estimator.identification.tracking.watch import WatchSettings
 from estimator.signals.decimate import Decimator, low_pass_length
 from estimator.signals.record import FloatArray
 from hil.errors import FileProblem, UsageError
@@ -113,6 +114,11 @@ class PlcEstimator:
     def factor(self) -> int:
         """Cycles per sample of the model."""
         return round(self.settings.sample_time_s / self.cycle_s)
+
+    @property
+    def block_samples(self) -> int:
+        """Samples of a block, at the end of which the excitation is judged."""
+        return WatchSettings().block_samples(self.settings.sample_time_s)
 
     @property
     def start_up_samples(self) -> int:

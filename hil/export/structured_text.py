@@ -7,6 +7,7 @@ compare it with `estimator` to the bit.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
@@ -18,12 +19,16 @@ from typing import Final
 import numpy as np
 
 from estimator.errors import BadModel, BadSetting
+from estimator.identification.modes.modes import LIGHTLY_DAMPED
 from estimator.identification.online import adaptation, regression
+from estimator.identification.tracking import follow, poles
 from estimator.signals.decimate import UNTRUSTED
 from hil import __version__
 from hil.export.plc_estimator import PlcEstimator
 
-POUS: Final = ("FB_HilDecimator", "FB_HilGain", "FB_HilOefo", "FB_HilEstimator", "PRG_HilExample")
+POUS: Final = (
+    "FB_HilDecimator", "FB_HilGain", "FB_HilOefo", "FB_HilExcitation", "FB_HilEstimator", "PRG_HilExample",
+)  # fmt: skip
 """The POUs, each after those it uses."""
 
 _HEAD: Final = Template(
@@ -109,7 +114,7 @@ class _Filling:
     precision: Precision
 
     def names(self) -> dict[str, object]:
-        return self._decimator() | self._structure() | self._gain()
+        return self._decimator() | self._structure() | self._gain() | self._excitation()
 
     def head(self) -> str:
         kind = {Precision.DOUBLE: "64-bit (LREAL)", Precision.SINGLE: "32-bit (REAL)"}[self.precision]
@@ -167,6 +172,36 @@ class _Filling:
             "known_gain": literal(adaptation.INFORMATION_GAIN),
             "learnt": literal(regression.LEARNT),
             "runaway": literal(regression.RUNAWAY),
+        }
+
+    def _excitation(self) -> dict[str, object]:
+        literal, settings = self.precision.literal, self.estimator.settings
+        period_s, (lowest, highest), samples = settings.sample_time_s, settings.band_hz, self.estimator.block_samples
+        coarse = self.precision is Precision.SINGLE  # rounding leaves more of a change
+        return {
+            "na_room": max(1, settings.orders.na),
+            "lowest_hz": f"{lowest:g}",
+            "highest_hz": f"{highest:g}",
+            "block": samples,
+            "half_block": literal(0.5 * samples),
+            "warm_rounds": poles.WARM_ROUNDS,
+            "cold_rounds": poles.ROUNDS,
+            "converged": literal(1e-5 if coarse else poles.CONVERGED),
+            "coinciding": literal(1e-3 if coarse else poles.COINCIDING),
+            "start_re": literal(poles.START.real),
+            "start_im": literal(poles.START.imag),
+            "rate": literal(1.0 / period_s),
+            "turn": literal(2.0 * math.pi * period_s),
+            "pi": literal(math.pi),
+            "lowest": literal(lowest),
+            "highest": literal(highest),
+            "light": literal(LIGHTLY_DAMPED),
+            "fewest": literal(follow.FEWEST),
+            "memory": literal(follow.MEMORY),
+            "share_of_block": literal(samples / follow.MEMORY),
+            "opens": literal(follow.OPENS),
+            "closes": literal(follow.CLOSES),
+            "trusted": follow.TRUSTED,
         }
 
     def _literals(self, values: Iterable[float]) -> str:

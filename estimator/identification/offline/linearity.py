@@ -35,6 +35,10 @@ from estimator.signals.record import BoolArray, FloatArray, Record
 SIGNIFICANCE = 1e-4
 """Of the test: linear drives in closed loop gave p-values somewhat smaller than uniform ones, gaps below 1e-15."""
 
+LEAST_EFFECT = 0.1
+"""Part of the innovations from which on a nonlinearity matters: what 30 s at 10 ms just show. Of a million samples the
+test alone would call every drive nonlinear."""
+
 QUANTILES = (0.1, 0.35, 0.65, 0.9)
 """Knots of the piecewise linear functions, of the signal's own distribution."""
 
@@ -52,16 +56,19 @@ class Linearity:
         Probability of an F at least this large on a linear drive.
     by_torque, by_speed : float
         The same for functions of the shaft's torque alone, and of the speed alone.
+    effect : float
+        What the functions explain of the innovations beyond chance, RMS over RMS.
     """
 
     p_value: float
     by_torque: float
     by_speed: float
+    effect: float = 1.0
 
     @property
     def is_linear(self) -> bool:
-        """Tell whether nothing speaks against a linear model."""
-        return self.p_value > SIGNIFICANCE
+        """Tell whether nothing that matters speaks against a linear model."""
+        return self.p_value > SIGNIFICANCE or self.effect < LEAST_EFFECT
 
     @property
     def depends_on(self) -> str:
@@ -79,8 +86,8 @@ def judge_linearity(problem: Problem, x: FloatArray, record: Record, first: int,
     with threadpool_limits(1):
         J, w = problem.jacobian(x), problem.residual(x)
         columns = [_responses(problem, x, model, group, high_pass_hz) for group in groups]
-        p_values = [_p_value(J, w, c) for c in (np.column_stack(columns), *columns)]
-    return Linearity(*p_values)
+        (p_value, effect), *alone = (_tested(J, w, c) for c in (np.column_stack(columns), *columns))
+    return Linearity(p_value, *(p for p, _ in alone), effect)
 
 
 def shaft_torque(model: LinearModel, u: FloatArray) -> FloatArray:
@@ -114,8 +121,8 @@ def _responses(
     return problem.whitened(x, lagged)
 
 
-def _p_value(J: FloatArray, w: FloatArray, columns: FloatArray) -> float:
-    """Return the probability of so large a fall of the sum of squares by chance."""
+def _tested(J: FloatArray, w: FloatArray, columns: FloatArray) -> tuple[float, float]:
+    """Return the probability of so large a fall of the sum of squares by chance, and the root of its share beyond."""
     basis, _ = np.linalg.qr(J / np.maximum(np.linalg.norm(J, axis=0), np.finfo(np.float64).tiny))
     rest = w - basis @ (basis.T @ w)
     extra = columns - basis @ (basis.T @ columns)
@@ -124,8 +131,9 @@ def _p_value(J: FloatArray, w: FloatArray, columns: FloatArray) -> float:
     q, free = left.shape[1], w.shape[0] - J.shape[1] - left.shape[1]
     gained, total = float(np.sum((left.T @ rest) ** 2)), float(rest @ rest)
     if q == 0 or free <= 0 or total <= gained:
-        return 1.0
-    return float(fisher.sf(gained / q / ((total - gained) / free), q, free))
+        return 1.0, 0.0
+    variance = (total - gained) / free
+    return float(fisher.sf(gained / q / variance, q, free)), float(np.sqrt(max(gained - q * variance, 0.0) / total))
 
 
 REGIONS = 3

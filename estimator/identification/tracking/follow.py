@@ -102,7 +102,8 @@ VERDICT = 0
 WEAK = 1  # 1 if the last block was below what is excitation
 WITHIN = 2  # mean of TORQUE over the memory
 USUAL = 3  # mean of TORQUE while excited; 0 before it ever was
-N_LASTING = 4
+IN_A_ROW = 4  # excited blocks without another in between
+N_LASTING = 5
 
 # Verdicts, as in estimator.identification.tracking.follow.Excitation.
 _, EXCITED, LACKING, DROWNED = 0, 1, 2, 3
@@ -127,7 +128,8 @@ def take_torque(
         psi = sensitivity(weight, through)
         block[GOOD] += 1.0
         block[OUTPUT] += output_density(psi, pole, mode[MODE_HZ] * mode[MODE_DAMPING]) / density
-        block[TORQUE] += (u - through[LAST]) ** 2
+        step = u - through[LAST]
+        block[TORQUE] += step * step
     pass_torque(u, pole, through)
 
 
@@ -160,6 +162,7 @@ def end_block(memory: float, opens: float, closes: float, block: FloatArray, las
     """Judge a whole block and begin the next; with few good samples, or no mode yet, the verdict stays as it is."""
     if 2.0 * block[GOOD] >= block[SAMPLES]:
         lasting[VERDICT] = judge(memory, opens, closes, block, lasting)
+    lasting[IN_A_ROW] = lasting[IN_A_ROW] + 1.0 if lasting[VERDICT] == EXCITED else 0.0
     block[:] = 0.0
 
 
@@ -269,10 +272,13 @@ def hear(e: float, pole: complex, memory: float, heard: FloatArray) -> None:
     once = pole * complex(heard[ONCE_RE], heard[ONCE_IM]) + e
     twice = pole * complex(heard[TWICE_RE], heard[TWICE_IM]) + once
     heard[ONCE_RE], heard[ONCE_IM], heard[TWICE_RE], heard[TWICE_IM] = once.real, once.imag, twice.real, twice.imag
-    r2 = pole.real**2 + pole.imag**2
-    white = (1.0 + r2) / (1.0 - r2) ** 3  # sum over k of (k + 1)^2 r^(2 k): what a white residual of variance 1 gives
+    r2 = squared(pole)
+    rest = 1.0 - r2
+    white = (1.0 + r2) / (
+        rest * rest * rest
+    )  # sum over k of (k + 1)^2 r^(2 k): what a white residual of variance 1 gives
     heard[COUNT] += 1.0
-    heard[DENSITY] += ((twice.real**2 + twice.imag**2) / white - heard[DENSITY]) / min(heard[COUNT], memory)
+    heard[DENSITY] += (squared(twice) / white - heard[DENSITY]) / min(heard[COUNT], memory)
 
 
 @compiled
@@ -387,6 +393,10 @@ MEMORY = 500
 """Kept samples over which the residual's density is averaged: 10 s at 20 ms, some thirty times the memory of a mode at
 8 Hz and a damping of 0.06, so that S is known within a fifth."""
 
+TRUSTED = 26
+"""Excited blocks in a row after which an estimate that had to begin anew counts as settled: as many as the watch takes
+to know what is usual."""
+
 FEWEST = 240
 """Samples of a usable estimate before a standard deviation is given."""
 
@@ -441,6 +451,11 @@ class Follower:
     def excitation(self) -> Excitation:
         """Verdict on the last whole block."""
         return Excitation(int(self._live["lasting"][VERDICT]))
+
+    @property
+    def is_trusted(self) -> bool:
+        """Whether the torque has excited the resonance for long."""
+        return bool(self._live["lasting"][IN_A_ROW] >= TRUSTED)
 
     @property
     def to_block_end(self) -> int:

@@ -101,9 +101,18 @@ def find_poles(a: FloatArray, z: ComplexArray) -> bool:
 
 
 @inlined
+def angle_of(z: complex) -> float:
+    """Return the angle of a pole above the real axis, by the one inverse function that a PLC has too."""
+    if z.real == 0.0:
+        return 0.5 * np.pi
+    angle = np.arctan(z.imag / z.real)
+    return angle + np.pi if z.real < 0.0 else angle
+
+
+@inlined
 def continuous(z: complex, sample_time_s: float) -> complex:
-    """Return the pole ln(z) / T of continuous time [1/s]."""
-    return complex(0.5 * np.log(squared(z)), np.arctan2(z.imag, z.real)) * (1.0 / sample_time_s)
+    """Return the pole ln(z) / T of continuous time [1/s], z above the real axis."""
+    return complex(0.5 * np.log(squared(z)), angle_of(z)) * (1.0 / sample_time_s)
 
 
 @inlined
@@ -208,7 +217,7 @@ def sensitivity(weight: complex, through: FloatArray) -> float:
 @compiled
 def of_steps(pole: complex) -> float:
     """Return |1 - q^-1|^2 at the frequency of a pole: what taking steps makes of a density there."""
-    return float(4.0 * np.sin(0.5 * np.arctan2(pole.imag, pole.real)) ** 2)
+    return float(2.0 * (1.0 - pole.real / np.sqrt(squared(pole))))
 
 
 @compiled
@@ -219,4 +228,5 @@ def output_density(psi: float, pole: complex, half_width_hz: float) -> float:
     variance 1 gives ``|rho|^2 / (1 - r)^2``, the peak, to first order in 1 - r.
     """
     r = np.sqrt(squared(pole))
-    return float((half_width_hz * psi) ** 2 * (1.0 + r) / (1.0 - r) / of_steps(pole))
+    over = half_width_hz * psi
+    return float(over * over * (1.0 + r) / (1.0 - r) / of_steps(pole))

@@ -50,7 +50,7 @@ class Tracker:
     def __init__(self, estimator: RecursiveEstimator, follower: Follower, watch: ChangeWatch) -> None:
         self._estimator, self._follower, self.watch = estimator, follower, watch
         self._fresh = (estimator.state(), follower.state())
-        self._drowned = 0  # how often the estimator has begun anew since the resonance was last watched
+        self._drowned = 0  # how often the estimator has begun anew since the resonance was last excited for long
 
     def run(self, time_s: FloatArray, u: FloatArray, y: FloatArray, okay: BoolArray) -> Tracked:
         """Take samples, each array of shape (n,); n may be 0."""
@@ -88,7 +88,7 @@ class Tracker:
             self._drowned += 1
             self._estimator.restore(self._fresh[0])
             self._follower.restore(self._fresh[1])
-        elif excitation is Excitation.EXCITED and self.watch.doing is TrackingState.WATCHING:
+        elif self._follower.is_trusted:
             self._drowned = 0
         return alarm
 

@@ -103,7 +103,7 @@ def test_one_mass_has_no_pair() -> None:
     record = Record("one", PERIOD_S, PERIOD_S * np.arange(3000), torque[:, np.newaxis], measured, np.ones(3000, bool))
     best = best_estimate(record)
     assert best.mode is None
-    assert best.verdict is Verdict.NOT_EXCITED
+    assert best.verdict is Verdict.ONE_MASS
     assert best.reason
 
 

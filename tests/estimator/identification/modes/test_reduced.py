@@ -128,3 +128,13 @@ def test_an_unstable_model_is_refused() -> None:
 def test_a_covariance_of_another_model_is_refused() -> None:
     with pytest.raises(BadShape, match=r"expected \(8, 8\)"):
         third_order(fourth_order(1e-3), np.eye(3))
+
+
+def test_poles_that_crowd_together_at_one_are_no_exception() -> None:
+    """Four of them within 0.01 of 1, as a fit to a recording of one mass gives: powers of A overflow by rounding."""
+    poles = [0.9968 + 0.002j, 0.9968 - 0.002j, 0.98977, 0.99755]
+    model = LinearModel(tuple(np.real(np.poly(poles))[1:].tolist()), (5e-5, -1.5e-4, 1.49e-4, -4.9e-5), 1, 0.01)
+    found = third_order(model)
+    frequency_hz = np.geomspace(0.5, 40.0, 30)
+    off = np.abs(found.model.response(frequency_hz) - model.response(frequency_hz))
+    assert off.max() <= 1.1 * found.largest_error
