@@ -60,7 +60,7 @@ def test_the_program_compiles(estimator: PlcEstimator, precision: Precision) -> 
         ("IF good THEN", "IF bad THEN"),
         ("END_IF;\nphase", "phase"),
         ("usedCount := usedCount + 1;", "usedCount := usedCount + 1.0;"),
-        ("oefo(reset := reset, torque", "oefo(reset := torqueM1, torque"),
+        ("oefo(reset := reset OR restart, torque", "oefo(reset := torqueM1, torque"),
     ],
 )
 def test_it_would_notice_a_fault(before: str, after: str) -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from estimator.identification.chain import OnlineTrajectory
 from estimator.identification.linear_model import Orders
 from estimator.identification.online.adaptation import Adaptation
 from estimator.identification.online.recursive import Status, Trajectory
@@ -183,6 +184,8 @@ MUTANTS = (
     ("IF stable AND ADAPT_FILTER", "IF ADAPT_FILTER"),
     ("WHILE i <= m / 2 DO", "WHILE i <= (m - 1) / 2 DO"),
     ("torque := torqueM1 + torqueM2", "torque := torqueM1"),
+    ("heardTwRe := part + heardOnRe", "heardTwRe := part"),
+    ("zeta := -aRe / magnitude", "zeta := aRe / magnitude"),
 )
 """What stands in the text, and what is put in its place."""
 
@@ -195,7 +198,7 @@ def test_a_fault_in_the_text_is_noticed(before: str, after: str, tmp_path: Path)
     assert any(not same_bits(plc, host) for plc, host in both_sides(before, after, tmp_path))
 
 
-def both_sides(before: str, after: str, folder: Path) -> Iterator[tuple[Kept, Trajectory]]:
+def both_sides(before: str, after: str, folder: Path) -> Iterator[tuple[Kept, Trajectory | OnlineTrajectory]]:
     """Yield what the text with a fault and the host make of a drive, until the fault has been noticed."""
     drive = bad_drive()
     for L in (np.array([1.0, -0.9, 0.72]), None):
@@ -207,7 +210,7 @@ def both_sides(before: str, after: str, folder: Path) -> Iterator[tuple[Kept, Tr
         yield execute_oefo(wrong, *summed(drive), folder), estimator.oefo().run(*summed(drive))
 
 
-def same_bits(plc: Kept, host: Trajectory) -> bool:
+def same_bits(plc: Kept, host: Trajectory | OnlineTrajectory) -> bool:
     try:
         assert_equal_bits(plc, host)
     except AssertionError:
