@@ -60,7 +60,7 @@ def inlined(function: Function) -> Function:
 
     Of an array that is handed over, references are still counted, two atomic operations per array and call. A loop
     hands over what owns nothing: borrowed arrays (``estimator.lanes.columns``), or parts of a record
-    (``estimator.identification.online.memory``).
+    (``estimator.identification.online.recursive``).
     """
     return cast(Function, numba.njit(cache=True, nogil=True, error_model="numpy", forceinline=True)(function))
 

@@ -29,8 +29,7 @@ from estimator.physics.kernel import state_vector
 from estimator.physics.layout import LOAD, NOMINAL, flat, slot
 from estimator.physics.model import DrivelineModel, Parameter, Structure
 from estimator.physics.simulate import simulate, simulate_each
-from estimator.signals.once import once
-from estimator.signals.record import FloatArray, OutputKind, Record
+from estimator.signals.record import FloatArray, OutputKind, Record, once
 
 Simulated = Callable[[Record, FloatArray, FloatArray, Start], FloatArray]
 """Recording, torque of its inputs (N, M) [Nm], load torque (N,) [Nm], initial state to the true output (N,)."""

@@ -15,8 +15,7 @@ from itertools import pairwise
 import numpy as np
 
 from estimator.diagnosis.stretches import share_of, stretches
-from estimator.signals.part import sliced
-from estimator.signals.record import Record
+from estimator.signals.record import Record, sliced
 
 LONG_S = 1.0
 """A gap that is longer ends a segment."""

@@ -14,19 +14,20 @@ from enum import Enum
 import numpy as np
 
 from estimator.identification.linear_model import Orders
-from estimator.identification.modes.cancellation import Cancellation
 from estimator.identification.modes.physical import RESPONDING
-from estimator.identification.modes.uncertainty import UncertainMode, pole_zero_map, uncertain_modes
-from estimator.identification.offline.blocks import block_of, first_part
-from estimator.identification.offline.box_jenkins import fit_of, solved
-from estimator.identification.offline.feedback import Feedback, judge_feedback
-from estimator.identification.offline.linear_fit import LinearFit
-from estimator.identification.offline.linearity import Linearity, judge_linearity, shaft_torque
+from estimator.identification.modes.uncertainty import Cancellation, UncertainMode, pole_zero_map, uncertain_modes
+from estimator.identification.offline.fits import LinearFit, fit_of, solved
+from estimator.identification.offline.linearity import (
+    Linearity,
+    RegionalMode,
+    judge_linearity,
+    modes_by_region,
+    shaft_torque,
+)
 from estimator.identification.offline.orders import criterion
 from estimator.identification.offline.problem import Problem
-from estimator.identification.offline.regions import RegionalMode, modes_by_region
-from estimator.identification.offline.validation import Validation, validate
-from estimator.signals.decimate import HIGH_PASS_HZ, high_passed
+from estimator.identification.offline.validation import Feedback, Validation, judge_feedback, validate
+from estimator.signals.decimate import HIGH_PASS_HZ, block_of, first_part, high_passed
 from estimator.signals.record import FloatArray, Record
 
 RIGID = Orders(1, 1, 1)
@@ -48,6 +49,10 @@ MOST_UNCERTAIN = 0.5
 """Largest half width of the frequency's 95 % interval, in parts of it."""
 
 
+ONE_MASS_DOES = "one mass explains the recording as well: the data do not need a pole pair"
+"""The reason for no pole pair that is a finding about the drive."""
+
+
 class Verdict(Enum):
     """What a reader may do with the linear model; the value is its name in files."""
 
@@ -56,6 +61,7 @@ class Verdict(Enum):
     CLOSED_LOOP = "closed_loop"
     NOT_EXCITED = "not_excited"
     INCOMPLETE = "incomplete"
+    ONE_MASS = "one_mass"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -115,20 +121,7 @@ class _Rung:
 
 
 def best_estimate(record: Record, high_pass_hz: float = HIGH_PASS_HZ) -> BestEstimate:
-    """Return the best estimate of a recording.
-
-    Parameters
-    ----------
-    record : Record
-        As recorded; not changed. Of a long one the first part is used (:func:`blocks.first_part`).
-    high_pass_hz : float
-        Corner of the high-pass [Hz].
-
-    Raises
-    ------
-    NotExciting
-        If the recording can't determine a third-order model.
-    """
+    """Return the best estimate of a recording."""
     record = first_part(record)
     data = high_passed(record, high_pass_hz)
     rungs = [_rung(data, RESPONDING)]
@@ -153,7 +146,7 @@ def best_estimate(record: Record, high_pass_hz: float = HIGH_PASS_HZ) -> BestEst
         feedback=feedback,
         linearity=linearity,
         regions=regions,
-        verdict=_verdict(mode, chosen.validation, feedback, linearity),
+        verdict=_verdict(mode, reason, chosen.validation, feedback, linearity),
     )
 
 
@@ -177,7 +170,7 @@ def _needed_pair(fit: LinearFit, band_hz: tuple[float, float], rigid: LinearFit)
     if not pairs:
         return None, f"the model has no oscillating pole pair {within}"
     if criterion(rigid) <= criterion(fit):
-        return None, "one mass explains the recording as well: the data do not need a pole pair"
+        return None, ONE_MASS_DOES
     cancelled = [_frequency_hz(one, fit) for one in pole_zero_map(fit.model, fit.covariance).cancellations]
     needed = [each for each in pairs if not np.isclose(each.frequency_hz.value, cancelled, rtol=1e-6).any()]
     if not needed:
@@ -197,10 +190,12 @@ def _half_width(mode: UncertainMode) -> float:
     return (high - low) / 2.0
 
 
-def _verdict(mode: UncertainMode | None, validation: Validation, feedback: Feedback, linearity: Linearity) -> Verdict:
+def _verdict(
+    mode: UncertainMode | None, reason: str, validation: Validation, feedback: Feedback, linearity: Linearity
+) -> Verdict:
     """Name what matters most; a nonlinear drive also looks like feedback, so that it comes first."""
     if mode is None:
-        return Verdict.NOT_EXCITED
+        return Verdict.ONE_MASS if reason == ONE_MASS_DOES else Verdict.NOT_EXCITED
     if not linearity.is_linear:
         return Verdict.NOT_LINEAR
     if not validation.independence.is_independent:

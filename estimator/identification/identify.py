@@ -23,10 +23,10 @@ import numpy as np
 from estimator.errors import NotExciting
 from estimator.identification.linear_model import LinearModel
 from estimator.identification.modes.modes import Mode, continuous, resonance
-from estimator.identification.offline.output_error import OutputErrorFit, fit_output_error
+from estimator.identification.offline.fits import LinearFit, fit_output_error
 from estimator.identification.online.recursive import Estimate, Trajectory
 from estimator.identification.settings import FilterPart, Settings
-from estimator.identification.spectral.welch import SpectralEstimate, spectral_estimate
+from estimator.identification.spectral import SpectralEstimate, spectral_estimate
 from estimator.signals.decimate import decimate
 from estimator.signals.record import FloatArray, Record
 
@@ -45,7 +45,7 @@ class Identification:
         What the off-line models were fitted to: high-passed, at the recording's own period by default.
     L : ndarray
         Observation filter's denominator.
-    batch : OutputErrorFit
+    batch : LinearFit
         Off-line output-error model.
     trajectory : Trajectory
         Every recursive estimate.
@@ -63,7 +63,7 @@ class Identification:
     data: Record
     offline: Record
     L: FloatArray
-    batch: OutputErrorFit
+    batch: LinearFit
     trajectory: Trajectory
     online: LinearModel
     spectral: SpectralEstimate | None

@@ -1,4 +1,4 @@
-"""Everything an expert asks of one identification: how sure, how good, in closed loop or not, and of which drive.
+"""Study of one identification: how sure, how good, in closed loop or not, of which drive; estimators side by side.
 
 What :func:`estimator.identification.identify.identify` found is taken as it is and examined; the best estimate, a
 Box-Jenkins model (:mod:`estimator.identification.best`), stands first, and physical parameters are taken from its
@@ -10,18 +10,75 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from estimator.errors import BadModel
-from estimator.identification.best import BestEstimate, best_estimate
-from estimator.identification.chain import OnlineChain
+from estimator.identification.best import BestEstimate, Verdict, best_estimate
+from estimator.identification.chain import OnlineChain, OnlineTrajectory
 from estimator.identification.identify import Identification
+from estimator.identification.modes.modes import Mode, resonance
 from estimator.identification.modes.physical import PhysicalEstimate, physical_parameters
 from estimator.identification.modes.reduced import Reduced, third_order
 from estimator.identification.modes.uncertainty import PoleZeroMap, UncertainMode, pole_zero_map
-from estimator.identification.offline.feedback import Feedback
-from estimator.identification.offline.validation import Validation, validate
-from estimator.identification.online_estimate import OnlineTrajectory
-from estimator.identification.settings import Settings
+from estimator.identification.offline.fits import free_run
+from estimator.identification.offline.noise_model import white
+from estimator.identification.offline.validation import Feedback, Validation, validate
+from estimator.identification.online.ekf import TwoMass
+from estimator.identification.online.recursive import Status
+from estimator.identification.online.registry import Entry, Feed, Setup
+from estimator.identification.settings import SAMPLES_PER_PARAMETER, Settings
+from estimator.signals.decimate import decimate
 from estimator.signals.record import Record
+
+
+@dataclass(frozen=True, slots=True)
+class Compared:
+    """What one estimator made of one recording.
+
+    Attributes
+    ----------
+    recording, estimator : str
+        Names.
+    resonance : Mode or None
+        Of its last model.
+    fit_percent : float
+        Free-run fit of that model over the whole recording, high-passed, at the model's period; NaN where unstable.
+    status : Status
+        Of its last estimate.
+    reason : str
+        Why it has that status and what to do; empty where nothing is wrong.
+    """
+
+    recording: str
+    estimator: str
+    resonance: Mode | None
+    fit_percent: float
+    status: Status
+    reason: str = ""
+
+
+def compare(
+    record: Record, found: Identification, settings: Settings, name: str, entry: Entry, start: TwoMass | None = None
+) -> Compared:
+    """Run an estimator through the stretch of time the recursive estimate of an identification was made from."""
+    raw = entry.feed is Feed.RAW
+    fed = record if raw else found.data
+    n = len(found.trajectory) * (settings.factor(record) if raw else 1)
+    setup = Setup(
+        orders=settings.orders,
+        sample_time_s=fed.sample_time_s,
+        adaptation=settings.adaptation,
+        L=found.L,
+        start_up_samples=SAMPLES_PER_PARAMETER * settings.orders.n_parameters,
+        two_mass=start,
+    )
+    estimator = entry(setup)
+    trajectory = estimator.run(fed.total_torque_nm[:n], fed.output[:n], fed.okay[:n])
+    model = estimator.model(fed.sample_time_s)
+    judged = decimate(record, 1, settings.high_pass_hz) if raw else found.data
+    fit = free_run(model, judged, white(judged.output, judged.okay)).fit_percent if model.is_stable else float(np.nan)
+    last = trajectory[len(trajectory) - 1]
+    return Compared(found.name, name, resonance(model, settings.band_hz), fit, last.status, last.reason.message)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -103,6 +160,8 @@ def study(record: Record, found: Identification, settings: Settings, others: Seq
 
 
 def _physical(best: BestEstimate) -> tuple[PhysicalEstimate | None, str]:
+    if best.verdict is Verdict.ONE_MASS:
+        return None, best.reason
     try:
         return physical_parameters(best.two_mass.model, best.two_mass.covariance), ""
     except BadModel as error:

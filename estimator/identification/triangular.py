@@ -50,18 +50,6 @@ def triangular(*columns: FloatArray, rows: BoolArray | None = None) -> FloatArra
 
     Rows are taken a part at a time, each below the R of those before (Golub and Van Loan, section 5.2): nothing as long
     as A is copied.
-
-    Parameters
-    ----------
-    *columns : ndarray, shape (N,) or (N, n)
-        Not changed.
-    rows : ndarray, shape (N,), optional
-        Those that count.
-
-    Returns
-    -------
-    ndarray, shape (min(N, n), n)
-        Rows may have either sign.
     """
     R, n_samples = np.zeros((0, sum(np.atleast_2d(column.T).shape[0] for column in columns))), columns[0].shape[0]
     for first in range(0, n_samples, ROWS):

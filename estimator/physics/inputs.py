@@ -17,8 +17,7 @@ from estimator.physics.effects.torque import EDGE
 from estimator.physics.kernel import bristles, sensing, slots, state_vector
 from estimator.physics.kernel.conditions import branch_frequency, branch_inertia, is_bristled, is_within
 from estimator.physics.layout import LOAD, slot
-from estimator.signals.once import MOST_BYTES, once
-from estimator.signals.record import FloatArray, IntArray, Record
+from estimator.signals.record import MOST_BYTES, FloatArray, IntArray, Record, once
 
 _GAIN_M1 = slot("inverter_gain_mismatch", "gain_m1")
 _GAIN_M2 = slot("inverter_gain_mismatch", "gain_m2")

@@ -7,8 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from estimator.physics.driveline import Driveline, Load
-from estimator.signals.once import once
-from estimator.signals.record import FloatArray, OutputKind, Record
+from estimator.signals.record import FloatArray, OutputKind, Record, once
 
 SPEED_WINDOW_S = 0.02
 """Positions are differentiated over this window, so that encoder steps do not pass for speed."""

@@ -17,9 +17,8 @@ from estimator.physics.layout import LOAD, flat, slot
 from estimator.physics.model import DrivelineModel, Load
 from estimator.physics.simulate import simulate_outputs, simulate_records
 from estimator.physics.unknowns import LocalBasis, Shared, local_basis, own_unknowns, shared_load
-from estimator.signals.once import once
 from estimator.signals.outputs import leads
-from estimator.signals.record import BoolArray, FloatArray, IntArray, Record
+from estimator.signals.record import BoolArray, FloatArray, IntArray, Record, once
 
 BAD = 1e3
 """A simulation that runs away counts as this many times the largest output."""

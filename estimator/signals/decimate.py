@@ -25,10 +25,90 @@ from typing import Any
 
 import numpy as np
 
+from estimator.compiled import compiled
 from estimator.errors import BadShape
-from estimator.signals.decimate_kernel import SPOILT, decimate_block
-from estimator.signals.record import BoolArray, FloatArray, IntArray, Record
+from estimator.signals.record import BoolArray, FloatArray, IntArray, Record, sliced
 from estimator.signals.settings import Requirement, is_positive, require
+
+# Rows of the signal arrays.
+U = 0
+Y = 1
+
+# Places in `counters`.
+PHASE = 0  # samples until the next output
+SPOILT = 1  # samples during which the window of the filter still holds a bad one
+STARTED = 2  # 1 once the running means have a first value; then the sample counts towards the mask
+
+# Places in `level`, after the running means of u and y in U and Y.
+HELD_U = 2
+HELD_Y = 3
+CONTAMINATION = 4
+
+LARGEST = 1e30  # beyond it a value is no measurement, as for the estimators; the means can't overflow below
+UNTRUSTED = 0.5  # share of held values in a running mean from which on it is not trusted
+
+
+@compiled
+def _take(u: float, y: float, okay: bool, level: FloatArray) -> bool:
+    """Hold the last good value in place of one that can't be used; tell whether both could be."""
+    u_fits = abs(u) <= LARGEST
+    y_fits = okay and abs(y) <= LARGEST
+    if u_fits:
+        level[HELD_U] = u
+    if y_fits:
+        level[HELD_Y] = y
+    return okay and u_fits and y_fits
+
+
+@compiled
+def _remove_mean(good: bool, share: float, level: FloatArray, window: FloatArray) -> None:
+    """High-pass both signals into the newest place of the window: x minus its exponentially weighted mean."""
+    for row in (U, Y):
+        held = level[HELD_U + row]
+        level[row] += share * (held - level[row])
+        for i in range(window.shape[1] - 1, 0, -1):
+            window[row, i] = window[row, i - 1]
+        window[row, 0] = held - level[row]
+    level[CONTAMINATION] += share * ((0.0 if good else 1.0) - level[CONTAMINATION])
+
+
+@compiled
+def decimate_block(
+    u: FloatArray,
+    y: FloatArray,
+    okay: BoolArray,
+    share: float,
+    factor: int,
+    taps: FloatArray,
+    counters: np.ndarray,
+    level: FloatArray,
+    window: FloatArray,
+    out: FloatArray,
+    out_okay: BoolArray,
+) -> int:
+    """Run the samples of a block through high-pass, low-pass and decimation; return the number of outputs."""
+    produced = 0
+    for t in range(u.shape[0]):
+        good = _take(u[t], y[t], okay[t], level)
+        if counters[STARTED] == 0 and good:
+            level[U], level[Y] = u[t], y[t]
+            counters[STARTED] = 1
+        _remove_mean(good, share, level, window)
+        counters[SPOILT] = max(counters[SPOILT] - 1, 0)
+        if not good or level[CONTAMINATION] > UNTRUSTED:
+            counters[SPOILT] = taps.shape[0]
+        if counters[PHASE] == 0:
+            counters[PHASE] = factor
+            filtered_u, filtered_y = 0.0, 0.0
+            for i in range(taps.shape[0]):
+                filtered_u += taps[i] * window[U, i]
+                filtered_y += taps[i] * window[Y, i]
+            out[U, produced], out[Y, produced] = filtered_u, filtered_y
+            out_okay[produced] = counters[SPOILT] == 0 and counters[STARTED] == 1
+            produced += 1
+        counters[PHASE] -= 1
+    return produced
+
 
 HALF_LENGTH = 8
 """Delay of the low-pass in kept samples; its length is ``2 * 8 * M + 1`` taps.
@@ -136,23 +216,7 @@ class Decimator:
         return HALF_LENGTH if self._factor > 1 else 0
 
     def run(self, u: FloatArray, y: FloatArray, okay: BoolArray) -> Decimated:
-        """Take a block of samples; the block may have any length, also 1.
-
-        Parameters
-        ----------
-        u, y, okay : ndarray, shape (N,)
-            Input, output, mask. They are not changed.
-
-        Returns
-        -------
-        Decimated
-            The samples kept of this block, possibly none.
-
-        Raises
-        ------
-        BadShape
-            If the three do not have one shape (N,).
-        """
+        """Take a block of samples; the block may have any length, also 1."""
         if not (u.ndim == 1 and u.shape == y.shape == okay.shape):
             raise BadShape(
                 f"decimation: u, y and okay have the shapes {u.shape}, {y.shape}, {okay.shape}, expected one "
@@ -185,26 +249,7 @@ class Decimator:
 
 
 def high_passed(record: Record, high_pass_hz: float = HIGH_PASS_HZ) -> Record:
-    """Return a recording's total torque and output through the high-pass alone, at its own period; for use off line.
-
-    Parameters
-    ----------
-    record : Record
-        With any number of torque inputs, which are summed.
-    high_pass_hz : float
-        Corner of the high-pass [Hz].
-
-    Returns
-    -------
-    Record
-        One torque column, the same mask. What was not measured is bridged by a straight line ahead of the filter, which
-        has a memory: a value held would leave a transient behind it.
-
-    Raises
-    ------
-    BadSetting
-        As :class:`Decimator`.
-    """
+    """Return a recording's total torque and output through the high-pass alone, at its own period; for use off line."""
     good = np.flatnonzero(record.okay)
     rows = np.arange(record.okay.shape[0])
     bridged = np.interp(rows, good, record.output[good]) if good.size else np.zeros(rows.shape)
@@ -225,28 +270,7 @@ def high_passed(record: Record, high_pass_hz: float = HIGH_PASS_HZ) -> Record:
 
 
 def decimate(record: Record, factor: int, high_pass_hz: float = HIGH_PASS_HZ) -> Record:
-    """Filter a recording's total torque and output and keep one in ``factor`` samples.
-
-    Parameters
-    ----------
-    record : Record
-        Torque inputs are summed first, as in the paper: ``u = T_M1 + T_M2``.
-    factor : int
-        One in ``factor`` samples is kept.
-    high_pass_hz : float
-        Corner of the high-pass [Hz].
-
-    Returns
-    -------
-    Record
-        One torque column. The filter's delay is compensated in ``time_s``, so its first samples, which are
-        spoilt, lie before the recording's first.
-
-    Raises
-    ------
-    BadSetting
-        As :class:`Decimator`.
-    """
+    """Filter a recording's total torque and output and keep one in ``factor`` samples."""
     chain = Decimator(record.sample_time_s, factor, high_pass_hz)
     kept = chain.run(record.total_torque_nm, record.output, record.okay)
     start_s = float(record.time_s[0]) if record.time_s.size else 0.0
@@ -261,3 +285,50 @@ def decimate(record: Record, factor: int, high_pass_hz: float = HIGH_PASS_HZ) ->
         kind=record.kind,
         location=record.location,
     )
+
+
+RASTER_S = 0.01
+"""Longest block [s]: its means see up to 50 Hz, the upper end of the paper's band for driveline resonances."""
+
+
+MOST = 60_000
+"""Blocks that off-line models are fitted to, ten minutes at 10 ms: they know a resonance to a few parts in 100,000, and
+a longer recording is of a driveline that warms meanwhile. Each costs 6 kilobytes."""
+
+
+def first_part(record: Record) -> Record:
+    """Return the part of a recording that off-line models are fitted to: the first MOST blocks."""
+    most = MOST * block_of(record.sample_time_s)
+    return record if record.time_s.shape[0] <= most else sliced(record, slice(0, most))
+
+
+def block_of(sample_time_s: float) -> int:
+    """Return how many samples of a period [s] make a block."""
+    return max(1, math.floor(RASTER_S / sample_time_s * (1.0 + 1e-6)))
+
+
+class Blocks:
+    """Means over whole blocks, of the measured samples of each; what is left over at the end is not used.
+
+    Parameters
+    ----------
+    okay : ndarray of bool, shape (N,)
+        Which samples were measured.
+    size : int
+        Samples of a block.
+    """
+
+    def __init__(self, okay: BoolArray, size: int) -> None:
+        self._size, self._n = size, okay.shape[0] // size
+        self._good = okay[: self._n * size].reshape(self._n, size)
+        self.okay: BoolArray = 2 * self._good.sum(axis=1) >= size
+        """Blocks of which half or more was measured, shape (n,)."""
+
+    def mean(self, x: FloatArray) -> FloatArray:
+        """Return the means of x, shape (N,) or (N, m): shape (n,) or (n, m), 0 where a block is not okay."""
+        good = self._good.reshape(self._n, self._size, *(1,) * (x.ndim - 1))
+        parts = x[: self._n * self._size].reshape(self._n, self._size, *x.shape[1:])
+        count = np.maximum(good.sum(axis=1), 1)
+        means = np.where(good, parts, 0.0).sum(axis=1) / count
+        means[~self.okay] = 0.0
+        return np.asarray(means, dtype=np.float64)

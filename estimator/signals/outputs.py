@@ -19,13 +19,7 @@ Noise = Callable[[Sequence[Record]], float]
 
 
 def outputs_apart(records: Sequence[Record], noise_of: Noise) -> list[Record]:
-    """Return recordings with one output each.
-
-    Parameters
-    ----------
-    noise_of : callable
-        Returns the noise of the readings of recordings with one output.
-    """
+    """Return recordings with one output each."""
     alone = [replace(record, channels=()) for record in records]
     first = noise_of(alone) if any(record.channels for record in records) else 1.0
     further: list[Record] = []

@@ -100,11 +100,6 @@ class Prbs:
         """State of the register; the most significant of its cells is the present level."""
         return self._state
 
-    @property
-    def period_cycles(self) -> int:
-        """Cycles after which the sequence repeats."""
-        return ((1 << self._cells) - 1) * self._clock_divider
-
     def next(self) -> float:
         """Return the level of this cycle [Nm] and continue to the next cycle."""
         level_nm = self._level_nm if self._state >> (self._cells - 1) else -self._level_nm

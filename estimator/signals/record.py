@@ -2,14 +2,45 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, fields, replace
 from enum import Enum
+from functools import wraps
+from typing import Any, TypeVar
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
 
 from estimator.errors import BadShape
-from estimator.signals.once import once
+
+Object = TypeVar("Object")
+Result = TypeVar("Result")
+
+MOST_BYTES = 2**20
+"""Size of an array that is kept, at most: what is asked for again and again is of stretches, not of whole hours."""
+
+
+def once(function: Callable[[Object], Result]) -> Callable[[Object], Result]:
+    """Remember what a function returns for each object, as long as that lives; arrays of more than ``MOST_BYTES`` not.
+
+    Only for objects that are distinguished by what they are and not by what they hold, and never change. What is
+    returned is shared: nobody may write to it.
+    """
+    known: WeakKeyDictionary[Object, Result] = WeakKeyDictionary()
+
+    @wraps(function)
+    def remembered(of: Object) -> Result:
+        try:
+            return known[of]
+        except KeyError:
+            result = function(of)
+        if isinstance(result, np.ndarray) and result.nbytes > MOST_BYTES:
+            return result
+        return known.setdefault(of, result)
+
+    return remembered
+
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -200,3 +231,41 @@ class Record:
         """Sum of the torque inputs, T_tot = T_M1 + T_M2 in the paper; shape (N,) [Nm]."""
         total: FloatArray = self.torque_nm.sum(axis=1)
         return total
+
+
+def sliced(record: Record, rows: slice, name: str | None = None) -> Record:
+    """Return a part of a recording as a recording of its own; laws over time count from where the whole began."""
+    parts: dict[str, Any] = {
+        field.name: values[rows]
+        for field in fields(record)
+        if isinstance(values := getattr(record, field.name), np.ndarray)  # each has a row per sample
+    }
+    channels = tuple(replace(each, output=each.output[rows], okay=each.okay[rows]) for each in record.channels)
+    began_s = float(record.time_s[0]) if record.began_s is None else record.began_s
+    return replace(record, name=record.name if name is None else name, began_s=began_s, channels=channels, **parts)
+
+
+DIGITS = 9
+"""Digits a period is rounded to at most, so that 0.01 s is 0.01 s in every recording of a rig."""
+
+ALLOWED = 3.0
+"""The roundest period within so many standard errors is taken ..."""
+
+MOST = 0.005
+"""... but not beyond this share of the period: a few wild stamps determine nothing."""
+
+
+def uniform_period_s(time_s: FloatArray) -> float:
+    """Return the sampling period behind a recording's stamps [s]."""
+    rows = np.arange(time_s.size) - 0.5 * (time_s.size - 1)
+    since = time_s - time_s.mean()
+    power = float(rows @ rows)
+    slope = float(rows @ since) / power
+    left = since - slope * rows
+    error = float(np.sqrt(left @ left / max(time_s.size - 2, 1) / power))
+    allowed = min(ALLOWED * error, MOST * slope)
+    for digits in range(1, DIGITS):
+        rounded = float(f"{slope:.{digits}g}")
+        if abs(rounded - slope) <= allowed:
+            return rounded
+    return float(f"{slope:.{DIGITS}g}")

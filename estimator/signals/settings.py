@@ -24,20 +24,7 @@ class Requirement:
 
 
 def require(where: str, rows: Iterable[Requirement]) -> None:
-    """Refuse settings that do not fit.
-
-    Parameters
-    ----------
-    where
-        What is being set up; it opens every line of the message.
-    rows
-        The checks.
-
-    Raises
-    ------
-    BadSetting
-        With one line per fault.
-    """
+    """Refuse settings that do not fit."""
     faults = [f"{where}: {row.name} is {row.value}, expected {row.expected}." for row in rows if not row.fits]
     if faults:
         raise BadSetting("\n".join(faults))

@@ -10,19 +10,7 @@ from estimator.signals.record import FloatArray
 
 @compiled
 def carried(values: FloatArray, width: float) -> FloatArray:
-    """Return the deflection of a slider that is moved by a signal, from rest, and yields at a width.
-
-    Parameters
-    ----------
-    values : ndarray, shape (N,)
-        The signal, in any unit.
-    width : float
-        In the same unit, as is the deflection.
-
-    Returns
-    -------
-    ndarray, shape (N,)
-    """
+    """Return the deflection of a slider that is moved by a signal, from rest, and yields at a width."""
     found = np.zeros(values.size)
     for k in range(1, values.size):
         found[k] = min(max(found[k - 1] + values[k] - values[k - 1], -width), width)

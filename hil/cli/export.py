@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from hil.cli.dbc_option import Dbc
-from hil.export.fmu.versions import FmiVersion
-from hil.export.plcopen import Tc6
+from hil.export import FmiVersion, Tc6
 
 if TYPE_CHECKING:
     from hil.export.plc_estimator import PlcEstimator
-    from hil.export.pou import Project
+    from hil.export.structured_text import Precision
 
 app = typer.Typer(add_completion=False, no_args_is_help=True)
 
@@ -64,11 +63,11 @@ def st(
 
     One text of data types, function blocks and an example; FB_HilEstimator is the block to call.
     """
-    from hil.export.command import written_estimator
+    from hil.export.plc_estimator import written_estimator
     from hil.export.structured_text import structured_text
 
     estimator = written_estimator(identification, run, adaptive, cycle, profile)
-    _write(out, structured_text(_project(estimator, single)), estimator)
+    _write(out, structured_text(estimator, _precision(single)), estimator)
 
 
 @app.command(epilog="Example: hil export plcopen identified/identification.json --run cruise --out estimator.xml")
@@ -97,17 +96,17 @@ def plcopen(
     """
     from datetime import UTC, datetime
 
-    from hil.export.command import written_estimator
-    from hil.export.plcopen import plcopen_xml
+    from hil.export.plc_estimator import written_estimator
+    from hil.export.plcopen import plcopen_xml, project
 
     estimator = written_estimator(identification, run, adaptive, cycle, profile)
-    _write(out, plcopen_xml(_project(estimator, single), datetime.now(UTC), tc6), estimator)
+    _write(out, plcopen_xml(project(estimator, _precision(single)), datetime.now(UTC), tc6), estimator)
 
 
-def _project(estimator: PlcEstimator, single: bool) -> Project:
-    from hil.export.filling import Precision, project
+def _precision(single: bool) -> Precision:
+    from hil.export.structured_text import Precision
 
-    return project(estimator, Precision.SINGLE if single else Precision.DOUBLE)
+    return Precision.SINGLE if single else Precision.DOUBLE
 
 
 def _write(out: Path, text: str, estimator: PlcEstimator) -> None:
@@ -139,12 +138,12 @@ def fmu(
     ] = False,
     dbc: Dbc = None,
 ) -> None:
-    """Write the driveline as an FMU, for co-simulation and model exchange.
+    """Write the driveline as an FMU, for co-simulation.
 
     Inputs T_M1, T_M2, T_load; outputs speeds, motor angle, shaft torque; each parameter with its value. It holds C
     sources and a Linux binary, which is made by the C compiler of this machine.
     """
-    from hil.export.fmu.command import written_fmu
+    from hil.export.fmu.package import written_fmu
 
     for line in written_fmu(model, out, fmi.value, period, recording, sources_only, dbc):
         typer.echo(line)

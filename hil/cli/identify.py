@@ -14,10 +14,9 @@ from hil.cli.dbc_option import Dbc, tell
 from hil.cli.trust_option import TrustLaws
 
 if TYPE_CHECKING:
-    from estimator.identification.compare import Compared
     from estimator.identification.offline.orders import OrderChoice
     from estimator.identification.settings import Settings
-    from estimator.identification.study import Study
+    from estimator.identification.study import Compared, Study
     from estimator.physics.model import DrivelineModel
     from estimator.signals.record import Record
     from hil.provenance import Provenance
@@ -61,8 +60,8 @@ def identify(
     Writes DIR/identification.json with theta, A, B, poles, zeros, intervals, tests and the spectral estimate of each
     recording, and DIR/report.html.
     """
-    from estimator.identification.compare import compare
     from estimator.identification.settings import Settings
+    from estimator.identification.study import compare
     from hil.provenance import provenance
     from hil.recording.recordings import require_even_cycles
     from hil.report.identification.choices import chosen_estimators, chosen_orders, start_values

@@ -14,9 +14,8 @@ from hil.cli.trust_option import TrustLaws
 
 if TYPE_CHECKING:
     from estimator.identification.settings import Settings
-    from hil.figures.local_model import LocalModel
-    from hil.figures.numbers import Row
-    from hil.figures.road.drive import Driven
+    from hil.figures.local_model import LocalModel, Row
+    from hil.figures.road import Driven
     from hil.provenance import Provenance
     from hil.rig.drive import Progress
 
@@ -68,7 +67,7 @@ def paper(
     """
     from estimator.identification.linear_model import Orders
     from estimator.identification.settings import Settings
-    from hil.figures.drawn.style import require_matplotlib
+    from hil.figures.drawn import require_matplotlib
     from hil.provenance import provenance
     from hil.report.outputs import require_folder
 
@@ -85,14 +84,14 @@ def paper(
         raise UsageError("hil paper: expected recordings with --model, got none: the simulated rig has its own model.")
     with tempfile.TemporaryDirectory(prefix="hil-paper-") as workshop:
         driven = _drive(Path(workshop), seed, duration)
-        from hil.figures.experiments import driven_models
+        from hil.figures.road import driven_models
 
         _publish(out, driven_models(driven, settings), settings, driven, seed, as_json=as_json)
 
 
 def _recorded(recordings: list[Path], model: Path | None, trust_laws: bool, settings: Settings) -> list[LocalModel]:
     from hil.config.model_file import read_model_for_recordings
-    from hil.figures.experiments import recorded_models
+    from hil.figures.road import recorded_models
     from hil.recording import read_records
     from hil.recording.recordings import require_even_cycles
 
@@ -104,7 +103,7 @@ def _recorded(recordings: list[Path], model: Path | None, trust_laws: bool, sett
 
 def _drive(workshop: Path, seed: int, duration_s: float) -> list[Driven]:
     from hil.errors import UsageError
-    from hil.figures.experiments import drive_all
+    from hil.figures.road import drive_all
     from hil.rig.stop import StopRequest, stop_on_signals
 
     if not 0.0 < duration_s < float("inf"):
@@ -152,7 +151,7 @@ def _publish(
 ) -> None:
     from rich.console import Console
 
-    from hil.figures.numbers import row_of
+    from hil.figures.local_model import row_of
     from hil.report.identification.paper_json import paper_text
     from hil.report.identification.paper_page import paper_page
     from hil.report.outputs import publish
@@ -178,10 +177,7 @@ def _publish(
 
 
 def _figures(models: list[LocalModel]) -> dict[str, Callable[[Path], object]]:
-    from hil.figures.drawn.poles import poles_figure
-    from hil.figures.drawn.responses import responses_figure
-    from hil.figures.drawn.signals import signals_figure
-    from hil.figures.drawn.style import files_of
+    from hil.figures.drawn import files_of, poles_figure, responses_figure, signals_figure
 
     return {
         **files_of("fig2", lambda: signals_figure([model.record for model in models[:SHOWN_SIGNALS]])),
@@ -195,7 +191,7 @@ def _kept(driven: list[Driven]) -> dict[str, Callable[[Path], object]]:
     import shutil
     from functools import partial
 
-    from hil.figures.road.drive import RIG_FILE
+    from hil.figures.road import RIG_FILE
     from hil.recording.description import sidecar_of
 
     recordings = [path for each in driven for path in (each.path, sidecar_of(each.path))]

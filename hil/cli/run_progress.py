@@ -13,7 +13,7 @@ from hil.rig.live_course import statement
 from hil.rig.plan import Plan
 
 if TYPE_CHECKING:
-    from estimator.identification.online_estimate import OnlineEstimate
+    from estimator.identification.chain import OnlineEstimate
 
 SHOW_EVERY_S = 0.1
 """Time between two changes of the bar [s of the run]; the cycle has better things to do."""

@@ -24,7 +24,7 @@ from estimator.signals.record import Record
 from hil.commission.responses import HIGH_PASS_HZ, TRUSTED, Z95, Measured
 
 if TYPE_CHECKING:
-    from estimator.identification.offline.output_error import OutputErrorFit
+    from estimator.identification.offline.fits import OutputErrorFit
 
 
 WIDEST = 100.0
@@ -143,7 +143,7 @@ class DelaySelection:
 def select_delay(record: Record) -> DelaySelection:
     """Choose the delay from torque to speed."""
     data = decimate(record, 1, HIGH_PASS_HZ)
-    from estimator.identification.offline.output_error import fit_output_error  # a second, and the bus comes first
+    from estimator.identification.offline.fits import fit_output_error  # a second, and the bus comes first
 
     fits = [fit_output_error(data, Orders(nk=nk)) for nk in range(NATURAL_DELAY, LONGEST + 1)]
     best = min(range(len(fits)), key=lambda i: fits[i].rms)

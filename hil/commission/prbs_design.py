@@ -16,7 +16,7 @@ from estimator.signals.record import FloatArray
 from hil.config.rig_file import Rig
 
 if TYPE_CHECKING:
-    from estimator.identification.offline.output_error import OutputErrorFit
+    from estimator.identification.offline.fits import OutputErrorFit
 
 
 STEP = 1e-3

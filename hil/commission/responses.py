@@ -12,7 +12,7 @@ from estimator.signals.decimate import decimate
 from estimator.signals.record import BoolArray, FloatArray, Record
 
 if TYPE_CHECKING:
-    from estimator.identification.spectral.welch import SpectralEstimate
+    from estimator.identification.spectral import SpectralEstimate
 
 
 Z95 = 1.959963984540054
@@ -166,7 +166,7 @@ def response_ratio(first: Record, second: Record) -> ResponseRatio:
 
 
 def _response(record: Record) -> SpectralEstimate:
-    from estimator.identification.spectral.welch import spectral_estimate  # half a second, and the bus comes first
+    from estimator.identification.spectral import spectral_estimate  # half a second, and the bus comes first
 
     samples = 2 * round(SEGMENT_S / record.sample_time_s / 2)
     return spectral_estimate(decimate(record, 1, HIGH_PASS_HZ), samples)

@@ -2,16 +2,51 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, Final
 
-from estimator.errors import BadSetting
+from estimator.errors import BadModel, BadSetting
 from estimator.identification.chain import OnlineChain, oefo
-from estimator.identification.excitation import SAMPLES_PER_PARAMETER
+from estimator.identification.online.adaptation import PROFILES as KINDS
+from estimator.identification.online.adaptation import Adaptation
 from estimator.identification.online.oefo import Oefo
-from estimator.identification.settings import Settings
+from estimator.identification.settings import SAMPLES_PER_PARAMETER, Settings
+from estimator.identification.tracking.watch import WatchSettings
 from estimator.signals.decimate import Decimator, low_pass_length
 from estimator.signals.record import FloatArray
+from hil.errors import FileProblem, UsageError
+from hil.report.identification.read_back import identified
+
+PROFILES: Final[Mapping[str, type[Any]]] = MappingProxyType(
+    {re.sub(r"(?<!^)(?=[A-Z])", "_", kind.__name__).lower(): kind for kind in KINDS}
+)
+"""Every profile by its name."""
+
+
+def profile(text: str) -> Adaptation:
+    """Read a profile."""
+    name, _, rest = text.partition(":")
+    kind = PROFILES.get(name.strip())
+    if kind is None:
+        raise UsageError(f"profile {name!r}: expected one of {', '.join(PROFILES)}")
+    known = [field.name for field in fields(kind)]
+    values: dict[str, float] = {}
+    for part in rest.split(",") if rest else ():
+        key, _, number = (piece.strip() for piece in part.partition("="))
+        if key not in known or key in values:
+            raise UsageError(f"profile {text!r}: expected each of {', '.join(known)} at most once, got {part!r}")
+        try:
+            values[key] = float(number)
+        except ValueError as error:
+            raise UsageError(f"profile {text!r}: expected {key}=number, got {part!r}") from error
+    made: Adaptation = kind(**values)
+    made.law  # noqa: B018 - checks the numbers
+    return made
+
 
 PLC_WORD = 32767
 """Largest INT of IEC 61131-3. Array sizes stay below it: a loop to it would count beyond and never end."""
@@ -81,6 +116,11 @@ class PlcEstimator:
         return round(self.settings.sample_time_s / self.cycle_s)
 
     @property
+    def block_samples(self) -> int:
+        """Samples of a block, at the end of which the excitation is judged."""
+        return WatchSettings().block_samples(self.settings.sample_time_s)
+
+    @property
     def start_up_samples(self) -> int:
         """Good samples at the start that are learnt from without the filter."""
         return SAMPLES_PER_PARAMETER * self.settings.orders.n_parameters
@@ -92,3 +132,34 @@ class PlcEstimator:
     def oefo(self) -> Oefo:
         """Return the host's own estimator of these settings, ready for samples."""
         return oefo(self.settings, self.L)
+
+
+def plc_estimator(
+    path: Path, run: str | None, cycle_s: float, adaptation: Adaptation, adaptive: bool = False
+) -> PlcEstimator:
+    """Return the estimator with the settings and the filter that identified a recording."""
+    found = identified(path, run, adaptation)
+    origin = f"{path.name}, recording {found.name}"
+    try:
+        return PlcEstimator(found.settings, cycle_s, None if adaptive else found.L, origin)
+    except BadModel as cause:
+        raise FileProblem(path, f"recordings.{found.name}.filter_L | {cause}") from cause
+    except BadSetting as cause:
+        raise FileProblem(path, f"settings | {cause}") from cause
+
+
+def written_estimator(
+    identification: Path | None, run: str | None, adaptive: bool, cycle_s: float, profile_text: str
+) -> PlcEstimator:
+    """Return the estimator that the arguments of a command describe."""
+    adaptation = profile(profile_text)
+    if identification is not None:
+        return plc_estimator(identification, run, cycle_s, adaptation, adaptive)
+    if run is not None:
+        raise UsageError(f"--run {run}: expected the identification.json that holds it, got no file")
+    if not adaptive:
+        raise UsageError(
+            "expected identification.json, whose model gives the observation filter, got no file. Make it by: hil "
+            "identify; or let the filter follow the estimate: --adaptive"
+        )
+    return PlcEstimator(Settings(adaptation=adaptation), cycle_s, None, "the defaults, filter adapted on line")

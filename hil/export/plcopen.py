@@ -1,20 +1,182 @@
-"""Prints a project as PLCopen XML (TC6): what CODESYS, TwinCAT and others import in one step.
+"""The estimator as PLCopen XML (TC6): what CODESYS, TwinCAT and others import in one step.
 
-Interfaces are declared element by element, bodies are Structured Text in ``<ST>``. Texts are in ``xhtml:p``, the one
-element that Beremiz reads them from.
+Interfaces are declared element by element, so they are read from the Structured Text as it is laid out in ``st/``: a
+comment before each POU, one declaration at a time, its comment after it, keywords at the start of a line. Bodies are
+Structured Text in ``<ST>``. Texts are in ``xhtml:p``, the one element that Beremiz reads them from.
 
 Source: PLCopen TC6, XML Formats for IEC 61131-3, version 2.01 (2009).
 """
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
 from datetime import datetime
 from enum import Enum
+from inspect import cleandoc
 from typing import Final
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from hil import __version__
-from hil.export.pou import Array, DataType, Pou, PouKind, Project, Section, SectionKind, Variable
+from hil.export import Tc6
+from hil.export.plc_estimator import PlcEstimator
+from hil.export.structured_text import Precision, parts
+
+
+class PouKind(Enum):
+    """The kinds of POU that are exported; the value is the keyword."""
+
+    FUNCTION_BLOCK = "FUNCTION_BLOCK"
+    PROGRAM = "PROGRAM"
+
+
+class SectionKind(Enum):
+    """What a section declares; the value is its keyword."""
+
+    INPUT = "VAR_INPUT"
+    OUTPUT = "VAR_OUTPUT"
+    LOCAL = "VAR"
+
+
+@dataclass(frozen=True, slots=True)
+class Array:
+    """``ARRAY[low..high, ..] OF element``; the element is of an elementary type."""
+
+    bounds: tuple[tuple[int, int], ...]
+    element: str
+
+
+@dataclass(frozen=True, slots=True)
+class DataType:
+    """A named array type. Arrays that are handed over have one: two unnamed array types are never the same type."""
+
+    name: str
+    array: Array
+    comment: str
+
+
+@dataclass(frozen=True, slots=True)
+class Variable:
+    """A declaration; ``initial`` holds no, one, or (of an array) each literal; ``type`` is a name or an array."""
+
+    name: str
+    type: str | Array
+    initial: tuple[str, ...]
+    comment: str
+
+
+@dataclass(frozen=True, slots=True)
+class Section:
+    """``VAR .. END_VAR``; ``comment`` says what its variables have in common, or nothing."""
+
+    kind: SectionKind
+    constant: bool
+    variables: tuple[Variable, ...]
+    comment: str
+
+
+@dataclass(frozen=True, slots=True)
+class Pou:
+    """A program organization unit; ``body`` is Structured Text without the last newline."""
+
+    kind: PouKind
+    name: str
+    sections: tuple[Section, ...]
+    body: str
+    comment: str
+
+
+@dataclass(frozen=True, slots=True)
+class Project:
+    """Data types and POUs, each after those it uses; ``comment`` says where they come from."""
+
+    types: tuple[DataType, ...]
+    pous: tuple[Pou, ...]
+    comment: str
+
+
+_COMMENT: Final = r"\(\*(?P<comment>(?:(?!\(\*|\*\)).)*)\*\)"
+
+_POU: Final = re.compile(
+    rf"{_COMMENT}\n(?P<kind>FUNCTION_BLOCK|PROGRAM)\ (?P<name>\w+)\n(?P<sections>(?:VAR.*?^END_VAR\n)+)\n"
+    r"(?P<body>.*?)\nEND_(?P=kind)\n",
+    re.X | re.S | re.M,
+)
+_SECTION: Final = re.compile(
+    rf"^(?P<kind>VAR\w*)(?P<constant>\ CONSTANT)?(?:\ +{_COMMENT})?\n(?P<variables>.*?)^END_VAR\n", re.X | re.S | re.M
+)
+_TYPE: Final = re.compile(rf"^TYPE\n\ +(?P<name>\w+)\ :\ (?P<type>[^;]+);\ +{_COMMENT}\nEND_TYPE\n", re.X | re.S | re.M)
+_VARIABLE: Final = re.compile(
+    rf"\s+(?P<name>\w+)\s*:\s*(?P<type>[^:;]+?)(?:\s*:=\s*(?P<initial>[^;]+))?;(?:\ +{_COMMENT})?\n", re.X | re.S
+)
+_ARRAY: Final = re.compile(r"ARRAY\[(?P<bounds>[^\]]+)\] OF (?P<element>\w+)")
+
+
+def project(estimator: PlcEstimator, precision: Precision = Precision.DOUBLE) -> Project:
+    """Return the POUs of an estimator, and the data types they share."""
+    head, types, pous = parts(estimator, precision)
+    comment = re.fullmatch(_COMMENT, head.strip(), re.S)
+    assert comment is not None  # noqa: S101 - the head is one comment
+    return Project(read_types(types), tuple(read_pou(text) for text in pous), _plain(comment["comment"]))
+
+
+def read_types(text: str) -> tuple[DataType, ...]:
+    """Return the data types of a text."""
+    return tuple(
+        DataType(found["name"], _array(found["type"]), _plain(found["comment"])) for found in _each(_TYPE, text)
+    )
+
+
+def read_pou(text: str) -> Pou:
+    """Return the one POU of a text."""
+    (found,) = _each(_POU, text)
+    return Pou(
+        PouKind(found["kind"]), found["name"], _sections(found["sections"]), found["body"], _plain(found["comment"])
+    )
+
+
+def _sections(text: str) -> tuple[Section, ...]:
+    return tuple(
+        Section(
+            SectionKind(found["kind"]),
+            found["constant"] is not None,
+            tuple(_read_variable(entry) for entry in _each(_VARIABLE, found["variables"])),
+            _plain(found["comment"]),
+        )
+        for found in _each(_SECTION, text)
+    )
+
+
+def _read_variable(found: re.Match[str]) -> Variable:
+    initial = tuple(re.findall(r"[^\[\],\s]+", found["initial"] or ""))
+    kind = _array(found["type"]) if found["type"].startswith("ARRAY") else found["type"]
+    return Variable(found["name"], kind, initial, _plain(found["comment"]))
+
+
+def _array(text: str) -> Array:
+    found = _ARRAY.fullmatch(text)
+    if found is None:
+        raise ValueError(f"expected ARRAY[low..high] OF name, got {text!r}")
+    bounds = (tuple(map(int, part.split(".."))) for part in found["bounds"].split(","))
+    return Array(tuple((low, high) for low, high in bounds), found["element"])
+
+
+def _each(pattern: re.Pattern[str], text: str) -> Iterator[re.Match[str]]:
+    """Yield one match after the other, with nothing between them."""
+    place = 0
+    while place < len(text):
+        found = pattern.match(text, place)
+        if found is None:
+            raise ValueError(f"not laid out as the files of st/ are: {text[place : place + 60]!r}")
+        yield found
+        place = found.end()
+
+
+def _plain(comment: str | None) -> str:
+    """Return the lines of a comment without the indentation they have in common."""
+    return cleandoc((comment or "").strip())
+
 
 XHTML: Final = "http://www.w3.org/1999/xhtml"
 
@@ -25,30 +187,8 @@ _POU_TYPE: Final = {PouKind.FUNCTION_BLOCK: "functionBlock", PouKind.PROGRAM: "p
 _VARIABLES: Final = {SectionKind.INPUT: "inputVars", SectionKind.OUTPUT: "outputVars", SectionKind.LOCAL: "localVars"}
 
 
-class Tc6(Enum):
-    """Versions of the format. What is written here is the same in both but for the namespace."""
-
-    V2_01 = "2.01"
-    V2_0 = "2.0"
-
-    @property
-    def namespace(self) -> str:
-        """The namespace of its elements."""
-        return {Tc6.V2_01: "http://www.plcopen.org/xml/tc6_0201", Tc6.V2_0: "http://www.plcopen.org/xml/tc6_0200"}[self]
-
-
 def plcopen_xml(project: Project, written: datetime, version: Tc6 = Tc6.V2_01) -> str:
-    """Return the document.
-
-    Parameters
-    ----------
-    project : Project
-        What is printed.
-    written : datetime
-        When, for the file's header.
-    version : Tc6
-        Whose namespace it gets.
-    """
+    """Return the document."""
     root = Element("project", {"xmlns": version.namespace, "xmlns:xhtml": XHTML})
     _headers(root, project.comment, written.isoformat(timespec="seconds"))
     types = SubElement(root, "types")

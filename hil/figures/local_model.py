@@ -2,18 +2,108 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import expm
 
 from estimator.identification.identify import Identification
 from estimator.identification.linear_model import ComplexArray, LinearModel
-from estimator.identification.modes.modes import Mode
+from estimator.identification.modes.modes import Mode, two_mass_resonance
 from estimator.identification.modes.reduced import third_order
 from estimator.physics.model import DrivelineModel, Structure
 from estimator.signals.record import FloatArray, Record
-from hil.figures.line import TwoMassLine
+
+STATES, INPUTS = 3, 2
+
+
+@dataclass(frozen=True, slots=True)
+class TwoMassLine:
+    """A two-mass driveline without anything nonlinear.
+
+    Attributes
+    ----------
+    inertia_motor_kg_m2, inertia_load_kg_m2
+        J_M and J_L [kg m^2].
+    stiffness_nm_per_rad, damping_nm_s_per_rad
+        k and c of the shaft.
+    friction_motor_nm_s_per_rad, friction_load_nm_s_per_rad
+        Viscous friction b_M and b_L.
+    """
+
+    inertia_motor_kg_m2: float
+    inertia_load_kg_m2: float
+    stiffness_nm_per_rad: float
+    damping_nm_s_per_rad: float
+    friction_motor_nm_s_per_rad: float
+    friction_load_nm_s_per_rad: float
+
+    @classmethod
+    def of(cls, values: Mapping[str, float]) -> TwoMassLine:
+        """Take the parameters of a two-mass model by their names in a model file: J_M, J_L, k, c, b_M, b_L."""
+        return cls(*(values[name] for name in ("J_M", "J_L", "k", "c", "b_M", "b_L")))
+
+    @property
+    def matrices(self) -> tuple[FloatArray, FloatArray]:
+        """A, shape (3, 3), and B, shape (3, 2); see the module's text."""
+        j_m, j_l = self.inertia_motor_kg_m2, self.inertia_load_kg_m2
+        k, c = self.stiffness_nm_per_rad, self.damping_nm_s_per_rad
+        a = np.array(
+            [
+                [-(c + self.friction_motor_nm_s_per_rad) / j_m, c / j_m, -k / j_m],
+                [c / j_l, -(c + self.friction_load_nm_s_per_rad) / j_l, k / j_l],
+                [1.0, -1.0, 0.0],
+            ]
+        )
+        return a, np.array([[1.0 / j_m, 0.0], [0.0, -1.0 / j_l], [0.0, 0.0]])
+
+    def discrete(self, period_s: float) -> tuple[FloatArray, FloatArray]:
+        """Return A and B for both torques held over a period [s]: the exponential of [[A, B], [0, 0]] T."""
+        block = np.zeros((STATES + INPUTS, STATES + INPUTS))
+        block[:STATES, :STATES], block[:STATES, STATES:] = self.matrices
+        exponential = expm(block * period_s)
+        return exponential[:STATES, :STATES], exponential[:STATES, STATES:]
+
+    @property
+    def resonance(self) -> Mode | None:
+        """The oscillating pair of poles; None if it does not oscillate."""
+        return two_mass_resonance(
+            self.inertia_motor_kg_m2,
+            self.inertia_load_kg_m2,
+            self.stiffness_nm_per_rad,
+            self.damping_nm_s_per_rad,
+            self.friction_motor_nm_s_per_rad,
+            self.friction_load_nm_s_per_rad,
+        )
+
+    def poles(self, sample_time_s: float) -> ComplexArray:
+        """Return the three poles in z, exp(s T) of those in s."""
+        a, _ = self.matrices
+        return np.exp(np.linalg.eigvals(a).astype(np.complex128) * sample_time_s)
+
+    def zeros(self, sample_time_s: float) -> ComplexArray:
+        """Return exp(s T) of the two zeros from T to w_M: the load on its shaft, ``J_L s^2 + (c + b_L) s + k``.
+
+        A sampled model has its zeros there only roughly, the better the slower they are.
+        """
+        s = np.roots(
+            [
+                self.inertia_load_kg_m2,
+                self.damping_nm_s_per_rad + self.friction_load_nm_s_per_rad,
+                self.stiffness_nm_per_rad,
+            ]
+        )
+        return np.exp(s.astype(np.complex128) * sample_time_s)
+
+    def response(self, frequency_hz: FloatArray, held_s: float) -> ComplexArray:
+        """Return the frequency response from T to w_M [rad/s per Nm] for a torque held over ``held_s``, shape (M,)."""
+        a, b = self.discrete(held_s)
+        z = np.exp(2j * np.pi * np.asarray(frequency_hz) * held_s)
+        states = np.linalg.solve(z[:, np.newaxis, np.newaxis] * np.eye(STATES) - a, b[:, :1])
+        return np.asarray(states[:, 0, 0], dtype=np.complex128)
+
 
 COHERENT = 0.9
 """Coherence from which on a spectral estimate is held against a model."""
@@ -120,3 +210,116 @@ def degrees(response: ComplexArray) -> FloatArray:
     angle = np.rad2deg(np.angle(response))
     jumps = np.abs(np.diff(angle, append=angle[-1:])) > HALF_TURN_DEG
     return np.asarray(np.where(jumps, np.nan, angle), dtype=np.float64)
+
+
+NOT_KNOWN = float("nan")
+
+AGREEMENT_DB = 3.0
+"""On-line model and spectral estimate agree where they differ by no more: a factor of 1.4."""
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One experiment; NaN where there is no such value.
+
+    Attributes
+    ----------
+    name
+        The recording.
+    online_hz, offline_hz, reference_hz
+        Natural frequency of the resonance [Hz].
+    online_damping, offline_damping, reference_damping
+        Its damping ratio.
+    offline_db, spectral_db, reference_db
+        Largest difference of the on-line frequency response from the off-line model's, the spectral estimate and the
+        reference, in the band around the resonance where the coherence is above 0.9 [dB].
+    agrees_hz
+        Unbroken band around the resonance in which on-line model and spectral estimate agree within 3 dB [Hz]; None
+        where one of them is missing.
+    fit_percent
+        Of the off-line model in free run.
+    status
+        Of the on-line estimate.
+    """
+
+    name: str
+    online_hz: float
+    offline_hz: float
+    reference_hz: float
+    online_damping: float
+    offline_damping: float
+    reference_damping: float
+    offline_db: float
+    spectral_db: float
+    agrees_hz: tuple[float, float] | None
+    reference_db: float
+    fit_percent: float
+    status: str
+
+    def error(self, what: str, how: str) -> float:
+        """Return the relative error of ``what`` (hz, damping) as found ``how`` (online, offline) to the reference."""
+        reference: float = getattr(self, f"reference_{what}")
+        return getattr(self, f"{how}_{what}") / reference - 1.0 if reference else NOT_KNOWN
+
+
+def row_of(model: LocalModel) -> Row:
+    """Return the figures of one experiment."""
+    found = model.found
+    online_hz, online_damping = _of(found.online_resonance)
+    offline_hz, offline_damping = _of(found.batch_resonance)
+    reference_hz, reference_damping = _of(model.reference_mode)
+    offline_db, spectral_db, reference_db = _differences_db(model)
+    return Row(
+        name=model.name,
+        online_hz=online_hz,
+        offline_hz=offline_hz,
+        reference_hz=reference_hz,
+        online_damping=online_damping,
+        offline_damping=offline_damping,
+        reference_damping=reference_damping,
+        offline_db=offline_db,
+        spectral_db=spectral_db,
+        agrees_hz=_agreement(model),
+        reference_db=reference_db,
+        fit_percent=found.batch.fit_percent,
+        status=found.estimate.status.value,
+    )
+
+
+def _of(mode: Mode | None) -> tuple[float, float]:
+    return (NOT_KNOWN, NOT_KNOWN) if mode is None else (mode.frequency_hz, mode.damping)
+
+
+def _differences_db(model: LocalModel) -> tuple[float, float, float]:
+    f = model.coherent_hz
+    spectral = model.found.spectral
+    if f.size == 0 or spectral is None:
+        return (NOT_KNOWN,) * 3
+    online = model.online.response(f)
+    seen = spectral.response[np.isin(spectral.frequency_hz, f)]
+    return (
+        _largest_db(online, model.found.batch.model.response(f)),
+        _largest_db(online, seen),
+        _largest_db(online, model.reference_response(f)),
+    )
+
+
+def _agreement(model: LocalModel) -> tuple[float, float] | None:
+    """Return the unbroken band around the resonance in which on-line model and spectral estimate agree [Hz]."""
+    spectral, mode = model.found.spectral, model.found.online_resonance
+    if spectral is None or mode is None:
+        return None
+    f = spectral.frequency_hz[spectral.frequency_hz <= 0.5 / model.online.sample_time_s]
+    apart = np.abs(decibels(model.online.response(f)) - decibels(spectral.response[: f.size]))
+    at = int(np.argmin(np.abs(f - mode.frequency_hz)))
+    inside = f[unbroken(apart <= AGREEMENT_DB, at)]
+    return (float(inside[0]), float(inside[-1])) if inside.size else None
+
+
+def _largest_db(response: ComplexArray, other: ComplexArray | None) -> float:
+    return NOT_KNOWN if other is None else float(np.abs(decibels(response) - decibels(other)).max())
+
+
+def mode_text(mode: Mode | None) -> str:
+    """Return a resonance in words, for a caption."""
+    return "no resonance" if mode is None else f"{mode.frequency_hz:.2f} Hz, ζ {mode.damping:.4f}"

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 
-from estimator.identification.tracking.alarm import Alarm
-from estimator.identification.tracking.state import TrackingState
+from estimator.identification.tracking.alarm import Alarm, TrackingState
 from hil.monitor.snapshot import Estimation, Snapshot
 
 WIDEST_BAND = 0.5

@@ -9,9 +9,9 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from estimator.errors import EstimatorError
+from estimator.identification.chain import OnlineEstimate
 from estimator.identification.modes.modes import Mode
 from estimator.identification.online.recursive import Status
-from estimator.identification.online_estimate import OnlineEstimate
 from estimator.identification.tracking.alarm import Alarm
 from hil.monitor.ring import Ring
 from hil.monitor.snapshot import ComplexArray, Estimation, History, Model

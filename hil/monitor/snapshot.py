@@ -8,8 +8,7 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
-from estimator.identification.tracking.alarm import Alarm
-from estimator.identification.tracking.state import TrackingState
+from estimator.identification.tracking.alarm import Alarm, TrackingState
 from hil.monitor.messages import Health, Notice
 from hil.monitor.quality import Quality
 

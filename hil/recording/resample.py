@@ -16,7 +16,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from estimator.signals.time_stamps import uniform_period_s
+from estimator.signals.record import uniform_period_s
 from hil.errors import RecordingError
 from hil.recording.bounds import require_cells
 from hil.recording.channels import are_row_numbers

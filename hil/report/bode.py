@@ -13,8 +13,8 @@ import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
 from estimator.identification.linear_model import ComplexArray, LinearModel
-from estimator.identification.modes.propagate import QUANTILE, propagate
-from estimator.identification.offline.linear_fit import LinearFit
+from estimator.identification.modes.uncertainty import QUANTILE, propagate
+from estimator.identification.offline.fits import LinearFit
 from estimator.signals.record import FloatArray
 from hil.figures.local_model import decibels, degrees
 from hil.figures.palette import faded

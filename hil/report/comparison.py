@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from estimator.identification.offline.blocks import block_of
 from estimator.identification.offline.validation import CorrelationTest, residual_tests
 from estimator.physics.model import Motion
+from estimator.signals.decimate import block_of
 from estimator.signals.outputs import outputs_apart
 from estimator.signals.record import FloatArray, OutputKind, Record
 from hil.plants.plant import Plant

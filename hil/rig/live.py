@@ -13,9 +13,8 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from estimator.identification.chain import OnlineChain
+from estimator.identification.chain import OnlineChain, OnlineEstimate
 from estimator.identification.online.adaptation import ConstantForgetting
-from estimator.identification.online_estimate import OnlineEstimate
 from estimator.identification.settings import Settings
 from estimator.signals.record import FloatArray
 from hil.rig.experiments.base import Phase

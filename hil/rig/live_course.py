@@ -13,11 +13,10 @@ from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from estimator.identification.tracking.state import TrackingState
+from estimator.identification.tracking.alarm import TrackingState
 
 if TYPE_CHECKING:  # the estimator takes half a second to import, and a run without an estimate has no use for it
-    from estimator.identification.chain import OnlineChain
-    from estimator.identification.online_estimate import OnlineEstimate, OnlineTrajectory
+    from estimator.identification.chain import OnlineChain, OnlineEstimate, OnlineTrajectory
     from estimator.identification.tracking.alarm import Alarm
 
 SCHEMA = "hil.online/1"

@@ -19,10 +19,9 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from estimator.identification.chain import OnlineChain
-from estimator.identification.online_estimate import OnlineTrajectory
-from estimator.identification.tracking.state import TrackingState
-from estimator.identification.tracking.watch_settings import WatchSettings
+from estimator.identification.chain import OnlineChain, OnlineTrajectory
+from estimator.identification.tracking.alarm import TrackingState
+from estimator.identification.tracking.watch import WatchSettings
 from estimator.signals.record import Record
 from hil.rig.live import tracking_settings
 from tests.estimator.identification.tracking import dirty_buses, roads

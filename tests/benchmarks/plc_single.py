@@ -17,8 +17,8 @@ from estimator.identification.identify import identify
 from estimator.identification.linear_model import LinearModel
 from estimator.identification.modes.modes import resonance
 from estimator.signals.record import FloatArray
-from hil.export.filling import Precision
 from hil.export.plc_estimator import PlcEstimator
+from hil.export.structured_text import Precision
 from tests.estimator.identification.driveline import cruise
 from tests.export.drives import clean_drive
 from tests.export.plc_runs import on_host, on_plc

@@ -11,7 +11,7 @@ import pytest
 
 from estimator.identification.online.adaptation import DecreasingGain, DecreasingThenConstantTrace
 from estimator.identification.online.registry import ESTIMATORS
-from estimator.identification.online.rls import Rls
+from estimator.identification.online.rls_riv_oeepm import Rls
 from tests.benchmarks import recursive, recursive_c, recursive_padasip
 from tests.benchmarks.recursive_data import MODEL, data, regressors
 

@@ -21,7 +21,7 @@ from scipy.stats import poisson
 
 from estimator.identification.chain import OnlineChain
 from estimator.identification.settings import Settings
-from estimator.identification.tracking.watch_settings import WatchSettings
+from estimator.identification.tracking.watch import WatchSettings
 from estimator.signals.record import Record
 from hil.rig.live import tracking_settings
 from tests.estimator.identification.tracking.drives import SAMPLE_TIME_S, Line, drives

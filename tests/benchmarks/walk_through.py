@@ -16,7 +16,7 @@ from pathlib import Path
 
 from estimator.identification.best import BestEstimate, best_estimate
 from hil.config.rig_file import read_rig
-from hil.figures.line import TwoMassLine
+from hil.figures.local_model import TwoMassLine
 from hil.recording.signals import read_record
 from hil.recording.writer import RecordingWriter
 from hil.rig.addresses import with_addresses

@@ -9,15 +9,12 @@ from typing import Any
 
 import pytest
 
-from estimator.identification.compare import compare
 from estimator.identification.identify import identify
 from estimator.identification.online.registry import ESTIMATORS
 from estimator.identification.settings import Settings
-from estimator.identification.study import study
-from hil.figures.line import TwoMassLine
-from hil.figures.local_model import LocalModel, Reference
-from hil.figures.numbers import row_of
-from hil.figures.road.conditions import draw_conditions
+from estimator.identification.study import compare, study
+from hil.figures.local_model import LocalModel, Reference, TwoMassLine, row_of
+from hil.figures.road import draw_conditions
 from hil.report.diagnosis_html import diagnosis_page
 from hil.report.identification.page import identification_page
 from hil.report.identification.paper_page import paper_page

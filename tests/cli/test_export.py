@@ -13,10 +13,9 @@ import pytest
 from estimator.identification.settings import Settings
 from estimator.signals.record import Record
 from hil.cli.main import run
-from hil.export.filling import Precision, project
 from hil.export.plc_estimator import PlcEstimator
-from hil.export.plcopen import Tc6, plcopen_xml
-from hil.export.structured_text import structured_text
+from hil.export.plcopen import Tc6, plcopen_xml, project
+from hil.export.structured_text import Precision, structured_text
 from hil.report.identification.document import identification_text
 
 BOTH = pytest.mark.parametrize("what", ["st", "plcopen"])
@@ -45,7 +44,7 @@ def test_the_filter_and_the_settings_are_those_of_the_run(
     assert run(["export", "st", str(identified), "--run", "run_2", "--out", str(out), *option]) == 0
     L = json.loads(identified.read_text())["recordings"][1]["filter_L"]
     expected = PlcEstimator(Settings(), 0.01, np.array(L), "identification.json, recording run_2")
-    assert out.read_text(encoding="ascii") == structured_text(project(expected, precision))
+    assert out.read_text(encoding="ascii") == structured_text(expected, precision)
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from estimator.identification.modes.modes import Mode
-from estimator.identification.offline.output_error import fit_output_error
+from estimator.identification.offline.fits import fit_output_error
 from estimator.physics.stepper import Stepper
 from estimator.signals.decimate import decimate
 from estimator.signals.prbs import prbs_nm

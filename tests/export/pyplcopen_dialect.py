@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from hil.export.pou import Array, Pou, Project, Section, SectionKind, Variable
+from hil.export.plcopen import Array, Pou, Project, Section, SectionKind, Variable
 
 CALL = re.compile(r"\b(?P<instance>\w+)\((?P<inputs>\w+ := [^;]*)\);")
 MEMBER = re.compile(r"\b(?P<instance>[A-Za-z]\w*)\.(?P<member>\w+)")

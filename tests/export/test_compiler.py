@@ -14,8 +14,9 @@ import pytest
 
 from estimator.identification.linear_model import Orders
 from estimator.identification.settings import Settings
-from hil.export.filling import Precision, project
 from hil.export.plc_estimator import PlcEstimator
+from hil.export.plcopen import project
+from hil.export.structured_text import Precision
 from tests.export.pyplcopen_dialect import in_dialect
 
 pyplcopen = pytest.importorskip("pyplcopen", reason="pyplcopen, which has a compiler of IEC 61131-3, is not installed")
@@ -59,7 +60,7 @@ def test_the_program_compiles(estimator: PlcEstimator, precision: Precision) -> 
         ("IF good THEN", "IF bad THEN"),
         ("END_IF;\nphase", "phase"),
         ("usedCount := usedCount + 1;", "usedCount := usedCount + 1.0;"),
-        ("oefo(reset := reset, torque", "oefo(reset := torqueM1, torque"),
+        ("oefo(reset := reset OR restart, torque", "oefo(reset := torqueM1, torque"),
     ],
 )
 def test_it_would_notice_a_fault(before: str, after: str) -> None:

@@ -2,24 +2,35 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from estimator.identification.chain import OnlineChain
+from estimator.identification.chain import OnlineTrajectory
 from estimator.identification.linear_model import Orders
 from estimator.identification.online.adaptation import Adaptation
-from estimator.identification.online.recursive import Status
+from estimator.identification.online.recursive import Status, Trajectory
 from estimator.identification.settings import Settings
 from estimator.signals.record import FloatArray
-from hil.export.filling import Precision
-from hil.export.plc_estimator import PlcEstimator
-from hil.export.profiles import PROFILES, profile
+from hil.export.plc_estimator import PROFILES, PlcEstimator, profile
+from hil.export.structured_text import Precision
+from tests.estimator.identification.tracking import roads
 from tests.export.drives import bad_drive, clean_drive, still_drive
 from tests.export.iec.machine import Machine
-from tests.export.plc_runs import Cycles, assert_equal_bits, execute_oefo, exported, on_host, on_plc, summed
+from tests.export.plc_runs import (
+    Cycles,
+    Kept,
+    assert_equal_bits,
+    execute,
+    execute_oefo,
+    exported,
+    on_host,
+    on_plc,
+    summed,
+)
 
 RESONANCE = np.poly([0.85 * np.exp(1.0j), 0.85 * np.exp(-1.0j)]).real
 """A filter near the bus's own: 8 Hz at 20 ms is 1.0 rad per sample."""
@@ -83,13 +94,22 @@ def test_the_estimator_alone_without_the_decimator_to_hold_bad_values(L: FloatAr
     assert_equal_bits(plc, estimator.oefo().run(u, y, okay))
 
 
-def test_it_does_what_the_chain_of_a_run_does(tmp_path: Path) -> None:
-    drive = bad_drive()
-    estimator = PlcEstimator(L=RESONANCE)
-    chain = OnlineChain(estimator.settings, estimator.cycle_s, estimator.L)
-    times = 0.01 * np.arange(drive.okay.shape[0])
-    estimates = chain.run_block(times, *summed(drive)).estimates
-    assert_equal_bits(on_plc(estimator, drive, tmp_path), estimates)
+def off_at_times(time_s: float) -> float:
+    return 0.0 if 20.0 <= time_s < 35.0 or time_s > 55.0 else 120.0
+
+
+@pytest.mark.parametrize("prbs_nm", [off_at_times, lambda time_s: 0.0], ids=["on and off", "never"])
+@pytest.mark.parametrize("profile_name", ["decreasing_then_constant_trace", "constant_forgetting:lambda1=0.995"])
+def test_excitation_hold_and_restart_are_the_hosts(
+    prbs_nm: Callable[[float], float], profile_name: str, tmp_path: Path
+) -> None:
+    record = roads.drive(5, 65.0, prbs_nm).record
+    drive = Cycles(record.torque_nm[:, 0].copy(), record.torque_nm[:, 1].copy(), record.output.copy(), record.okay)
+    drive.speed_rad_s[4000:4003] = np.nan
+    estimator = PlcEstimator(Settings(adaptation=profile(profile_name)))
+    plc = on_plc(estimator, drive, tmp_path)
+    assert_equal_bits(plc, on_host(estimator, drive))
+    assert np.count_nonzero(plc.status == 3) > 400  # not excited, and it says so
 
 
 def test_the_example_program_keeps_the_last_estimate_that_may_be_used(tmp_path: Path) -> None:
@@ -98,9 +118,10 @@ def test_the_example_program_keeps_the_last_estimate_that_may_be_used(tmp_path: 
     for m1, m2, speed, okay in zip(*vars(drive).values(), strict=True):
         out = machine(torqueM1=m1, torqueM2=m2, speed=speed, fresh=bool(okay), seriesMode=True, clutchOpen=True)
     host = on_host(estimator, drive)
+    theta = host.estimates.theta
     estimated = [k for k in range(len(host)) if host[k].status is Status.ESTIMATED]
     assert out.estimates == len(estimated) > 100
-    assert [*out.theta] == host.theta[estimated[-1]].tolist()
+    assert [*out.theta] == theta[estimated[-1]].tolist()
 
 
 def test_a_reset_forgets_everything(tmp_path: Path) -> None:
@@ -131,12 +152,67 @@ def test_in_single_precision_no_number_is_lost_and_the_model_is_the_same(L: Floa
     plc, host = on_plc(estimator, drive, tmp_path, Precision.SINGLE), on_host(estimator, drive)
     assert np.isfinite(plc.theta).all()
     assert np.isfinite(plc.errors).all()
-    assert np.array_equal(plc.used, host.used)
+    assert np.array_equal(plc.used, host.estimates.used)
     model = estimator.oefo().model(0.02)
     frequency_hz = np.linspace(2.0, 25.0, 50)
     single, double = (
         type(model).from_theta(theta.astype(float), model.orders, 0.02).response(frequency_hz)
-        for theta in (plc.theta[-1], host.theta[-1])
+        for theta in (plc.theta[-1], host.estimates.theta[-1])
     )
     # A hundredth of the 1 dB the two estimates of one drive may differ by: rounding must not count next to noise.
     assert np.abs(20.0 * np.log10(np.abs(single / double))).max() < 0.01 * 1.0
+
+
+MUTANTS = (
+    ("windowOutput[1] := heldOutput - meanOutput", "windowOutput[1] := heldOutput"),
+    ("(contamination > UNTRUSTED)", "(contamination > 2.0 * UNTRUSTED)"),
+    ("WHILE i >= 2 DO\n    windowTorque", "WHILE i >= 3 DO\n    windowTorque"),
+    ("IF spoilt > 0 THEN", "IF spoilt > 1 THEN"),
+    ("heldCount := heldCount - 1", "heldCount := 0"),
+    ("IF ABS(speed) > peak THEN", "IF speed > peak THEN"),
+    ("heldCount := NK + NB", "heldCount := NK"),
+    ("phi[NA + j] := pastIn[NK + j]", "phi[NA + j] := pastIn[j]"),
+    ("phi[i] := -pastOut[i]", "phi[i] := pastOut[i]"),
+    ("IF usedCount < START_UP", "IF usedCount <= START_UP"),
+    ("ePost := ePrior / (1.0 + gainF.quad)", "ePost := ePrior / (2.0 + gainF.quad)"),
+    ("facV[i, j] := element - product[i] * share", "facV[i, j] := element - product[j] * share"),
+    ("facE[j] := facE[j] * (before * weight)", "facE[j] := facE[j] * before * weight"),
+    ("before := alpha", "before := lambda1Now"),
+    ("scale := traceHeld / traceF", "scale := 1.0"),
+    ("(mirror > -1.0) AND (mirror < 1.0)", "(mirror > -1.0)"),
+    ("(mirror > -1.0) AND (mirror < 1.0)", "(mirror < 1.0)"),
+    ("IF stable AND ADAPT_FILTER", "IF ADAPT_FILTER"),
+    ("WHILE i <= m / 2 DO", "WHILE i <= (m - 1) / 2 DO"),
+    ("torque := torqueM1 + torqueM2", "torque := torqueM1"),
+    ("heardTwRe := part + heardOnRe", "heardTwRe := part"),
+    ("zeta := -aRe / magnitude", "zeta := aRe / magnitude"),
+)
+"""What stands in the text, and what is put in its place."""
+
+
+SETTINGS = Settings(adaptation=profile("decreasing_then_constant_trace:trace=1.0"))
+
+
+@pytest.mark.parametrize(("before", "after"), MUTANTS)
+def test_a_fault_in_the_text_is_noticed(before: str, after: str, tmp_path: Path) -> None:
+    assert any(not same_bits(plc, host) for plc, host in both_sides(before, after, tmp_path))
+
+
+def both_sides(before: str, after: str, folder: Path) -> Iterator[tuple[Kept, Trajectory | OnlineTrajectory]]:
+    """Yield what the text with a fault and the host make of a drive, until the fault has been noticed."""
+    drive = bad_drive()
+    for L in (np.array([1.0, -0.9, 0.72]), None):
+        estimator = PlcEstimator(SETTINGS, L=L)
+        text = exported(estimator)
+        assert before in text
+        wrong = text.replace(before, after)
+        yield execute(wrong, drive, folder), on_host(estimator, drive)
+        yield execute_oefo(wrong, *summed(drive), folder), estimator.oefo().run(*summed(drive))
+
+
+def same_bits(plc: Kept, host: Trajectory | OnlineTrajectory) -> bool:
+    try:
+        assert_equal_bits(plc, host)
+    except AssertionError:
+        return False
+    return True

@@ -14,10 +14,10 @@ from lxml import etree
 
 from estimator.identification.linear_model import Orders
 from estimator.identification.settings import Settings
-from hil.export.filling import Precision, project
+from hil.export import Tc6
 from hil.export.plc_estimator import PlcEstimator
-from hil.export.plcopen import Tc6, plcopen_xml
-from hil.export.pou import Project
+from hil.export.plcopen import Project, plcopen_xml, project
+from hil.export.structured_text import Precision
 from tests.export.drives import bad_drive
 from tests.export.iec.parser import Parser
 from tests.export.iec.to_c import to_c

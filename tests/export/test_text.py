@@ -10,14 +10,13 @@ import pytest
 
 from estimator.errors import BadModel, BadSetting
 from estimator.identification.linear_model import Orders
-from estimator.identification.online import regression_kernel
+from estimator.identification.online import regression
 from estimator.identification.settings import Settings
-from estimator.signals import decimate_kernel
+from estimator.signals import decimate
 from estimator.signals.record import FloatArray
-from hil.export.filling import POUS, Precision, project
 from hil.export.plc_estimator import PlcEstimator
-from hil.export.pou import SectionKind
-from hil.export.pou_reader import read_pou, read_types
+from hil.export.plcopen import SectionKind, project, read_pou, read_types
+from hil.export.structured_text import POUS, Precision
 from tests.export.iec.parser import Parser
 from tests.export.iec.to_c import to_c
 from tests.export.iec.tree import REALS
@@ -103,7 +102,7 @@ def test_a_number_reads_back_as_itself(value: float, double: str, single: str) -
 
 
 def test_decimator_and_estimator_agree_on_what_is_no_measurement() -> None:
-    assert regression_kernel.LARGEST == decimate_kernel.LARGEST == Precision.DOUBLE.largest
+    assert regression.LARGEST == decimate.LARGEST == Precision.DOUBLE.largest
 
 
 def test_the_origin_can_not_end_the_comment() -> None:

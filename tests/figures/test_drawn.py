@@ -13,12 +13,16 @@ from matplotlib.figure import Figure
 
 from estimator.identification.identify import identify
 from hil.errors import UsageError
-from hil.figures.drawn.poles import poles_figure
-from hil.figures.drawn.responses import responses_figure
-from hil.figures.drawn.signals import signals_figure
-from hil.figures.drawn.style import WIDTH_IN, drawing, files_of, require_matplotlib
-from hil.figures.line import TwoMassLine
-from hil.figures.local_model import LocalModel, Reference
+from hil.figures.drawn import (
+    WIDTH_IN,
+    drawing,
+    files_of,
+    poles_figure,
+    require_matplotlib,
+    responses_figure,
+    signals_figure,
+)
+from hil.figures.local_model import LocalModel, Reference, TwoMassLine
 from tests.estimator.identification.driveline import B_L, B_M, J_L, J_M, C, K, cruise
 
 LINE = TwoMassLine(J_M, J_L, K, C, B_M, B_L)

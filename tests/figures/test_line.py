@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hil.figures.line import TwoMassLine
+from hil.figures.local_model import TwoMassLine
 from tests.estimator.identification.driveline import B_L, B_M, J_L, J_M, C, K, discrete, true_resonance
 
 LINE = TwoMassLine.of({"J_M": J_M, "J_L": J_L, "k": K, "c": C, "b_M": B_M, "b_L": B_L})

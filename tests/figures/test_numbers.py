@@ -9,9 +9,7 @@ import numpy as np
 import pytest
 
 from estimator.identification.identify import identify
-from hil.figures.line import TwoMassLine
-from hil.figures.local_model import LocalModel, Reference, decibels, degrees
-from hil.figures.numbers import row_of
+from hil.figures.local_model import LocalModel, Reference, TwoMassLine, decibels, degrees, row_of
 from tests.estimator.identification.driveline import B_L, B_M, J_L, J_M, C, K, cruise, true_resonance
 
 LINE = TwoMassLine(J_M, J_L, K, C, B_M, B_L)

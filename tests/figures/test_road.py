@@ -7,12 +7,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hil.figures.line import TwoMassLine
-from hil.figures.road.conditions import Conditions, draw_conditions
-from hil.figures.road.drive import drive
-from hil.figures.road.pedal import LONGEST_S, PedalCruise
-from hil.figures.road.road_load import AIR_KG_M3, DRAG_AREA_M2, GRAVITY_M_S2, ROLLING, Bus, RoadLoad
-from hil.figures.road.road_plant import RoadPlant
+from hil.figures.local_model import TwoMassLine
+from hil.figures.road import (
+    AIR_KG_M3,
+    DRAG_AREA_M2,
+    GRAVITY_M_S2,
+    LONGEST_S,
+    ROLLING,
+    Bus,
+    Conditions,
+    PedalCruise,
+    RoadLoad,
+    RoadPlant,
+    draw_conditions,
+    drive,
+)
 from hil.recording import read_record
 from hil.rig.experiments.cruise import Cruise
 from hil.rig.stop import StopRequest

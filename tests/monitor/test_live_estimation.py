@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from estimator.identification.tracking.state import TrackingState
+from estimator.identification.tracking.alarm import TrackingState
 from estimator.physics.twist import Shaft
 from hil.monitor.live_estimation import LiveEstimation
 from hil.rig.live import LiveEstimate, OnlineSetup, tracking_chain, tracking_settings

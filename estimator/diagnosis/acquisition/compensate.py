@@ -10,8 +10,7 @@ import numpy as np
 from estimator.diagnosis.acquisition.finding import OUTPUT, Finding, no_cells
 from estimator.diagnosis.acquisition.holding import fill
 from estimator.diagnosis.acquisition.stamped_jitter import stamp_offsets_s
-from estimator.signals.record import Record
-from estimator.signals.time_stamps import uniform_period_s
+from estimator.signals.record import Record, uniform_period_s
 
 UNREAD = frozenset({"stale_samples", "lost_samples"})
 """Findings whose readings are not what was measured in that row."""

@@ -15,8 +15,7 @@ from estimator.diagnosis.acquisition.finding import OUTPUT, Finding, Sized, no_c
 from estimator.diagnosis.acquisition.lattice import decimal_place
 from estimator.diagnosis.acquisition.limits import LEVEL, SMALLEST_P
 from estimator.diagnosis.acquisition.predictor import predict, slope_test
-from estimator.signals.record import FloatArray, Record
-from estimator.signals.time_stamps import uniform_period_s
+from estimator.signals.record import FloatArray, Record, uniform_period_s
 
 AGREEMENT = 0.5
 """Share of the stamps' offsets that the output must confirm: half way between none and all."""

@@ -14,9 +14,9 @@ from estimator.diagnosis.line.motion import LASTS, FormPlace, form_changes
 from estimator.diagnosis.line.whitening import Gains, Terms, fill_gains, innovate, terms_of
 from estimator.physics.fit import FitResult
 from estimator.physics.problem import Rows
+from estimator.signals.correlation import stand_in_variance
 from estimator.signals.outputs import by_output
 from estimator.signals.record import BoolArray, FloatArray
-from estimator.signals.stand_in import stand_in_variance
 
 
 class Size(IntEnum):

@@ -10,10 +10,10 @@ from scipy import stats
 from estimator.diagnosis.result import Response
 from estimator.diagnosis.where.spectrum import SEGMENT
 from estimator.errors import NotExciting
-from estimator.identification.offline.blocks import block_of
-from estimator.identification.spectral.welch import SpectralEstimate, spectral_estimate
+from estimator.identification.spectral import SpectralEstimate, spectral_estimate
 from estimator.physics.fit import FitResult
 from estimator.physics.model import Structure
+from estimator.signals.decimate import block_of
 from estimator.signals.record import FloatArray, Record
 
 COHERENT = 0.5

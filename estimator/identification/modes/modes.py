@@ -67,15 +67,6 @@ def modes(model: LinearModel) -> tuple[Mode, ...]:
     return tuple(sorted(found, key=lambda mode: -mode.height))
 
 
-def antiresonances(model: LinearModel) -> tuple[Mode, ...]:
-    """Return the oscillating pairs of zeros, the least damped first.
-
-    Zeros of a sampled system map to those of the continuous one only roughly, the better the slower they are.
-    """
-    found = [_mode(z, model.sample_time_s) for z in _oscillating(model.zeros).tolist()]
-    return tuple(sorted(found, key=lambda mode: abs(mode.damping)))
-
-
 def resonance(model: LinearModel, band_hz: tuple[float, float] = (2.0, 25.0)) -> Mode | None:
     """Return the dominant lightly damped pair of poles in a band.
 

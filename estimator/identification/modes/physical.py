@@ -8,32 +8,37 @@ Torque at the motor in, motor speed out, is of third order with six coefficients
 
 They are estimated from the linear model in place of the data (indirect prediction-error method: T. Soderstrom, P.
 Stoica and B. Friedlander, Automatica 27, 1991): with theta(x) the coefficients of the drive x, sampled with held
-input, and P the covariance of the estimate theta_hat::
+input, and P the covariance of the estimate theta_hat, minimise the deviance::
 
-    minimise  (theta(x) - theta_hat)^T P^-1 (theta(x) - theta_hat)  +  sum of ((x_i - known_i) / std_i)^2
+    D(x) = (theta(x) - theta_hat)^T P^-1 (theta(x) - theta_hat)  +  sum of ((x_i - known_i) / std_i)^2
 
-which for many samples is as good as fitting x to the data themselves. The second sum holds what is known beforehand.
+over what a line can be: inertias and stiffness above 0, damping and frictions 0 or more (it is then passive). The
+second sum holds what is known beforehand. Intervals are profile likelihood (Meeker and Escobar, The American
+Statistician 49, 1995): the values v of a parameter for which the least D with x_i = v is within the chi-square quantile
+of the minimum.
+They end at 0 where the data allow it, and reach as far up as the data do: no normal distribution is supposed.
 
-Near constant speed friction is distinguished from the load torque by the lowest frequencies alone, and a motor friction
-b_M damps the resonance almost as c does. Then b_M, b_L and c come out with intervals that hold 0, and the statement
-says so; the sum c + b_M is sharp all the same.
+A parameter is determined where its interval is short against the value, and not where it leaves out 0 alone. Near
+constant speed friction is distinguished from the load torque by the lowest frequencies alone, and a motor friction b_M
+damps the resonance almost as c does: each is then left open, and the sum c + b_M is sharp all the same.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
-from scipy.linalg import expm
-from scipy.optimize import least_squares
+from scipy.optimize import lsq_linear
+from scipy.stats import chi2
 
 from estimator.errors import BadModel, BadSetting
 from estimator.identification.linear_model import LinearModel, Orders
-from estimator.identification.modes.continuous import numerator_of, to_continuous
-from estimator.identification.modes.propagate import Uncertain
-from estimator.identification.modes.reduced import THIRD
+from estimator.identification.modes.modes import resonance
+from estimator.identification.modes.reduced import THIRD, to_continuous
+from estimator.identification.modes.uncertainty import QUANTILE, Uncertain
 from estimator.signals.record import FloatArray
 
 UNITS = MappingProxyType(
@@ -43,11 +48,23 @@ UNITS = MappingProxyType(
 
 NAMES = tuple(UNITS)
 
+SUMS = MappingProxyType({"J_M + J_L": (0, 1), "c + b_M": (3, 4), "b_M + b_L": (4, 5)})
+"""Often determined where the single ones are not."""
+
+POSITIVE = 3
+"""The first parameters are above 0 and estimated by their logarithms; the others may be 0."""
+
 RESPONDING = Orders(THIRD, THIRD, 1)
 """Structure of a sampled two-mass drive: one sample of delay."""
 
-MOST_EVALUATIONS = 500
-"""Of six parameters by differences; it needs some fifty."""
+IMPLAUSIBLE = float(chi2.isf(1e-3, 2 * THIRD))
+"""Deviance from which on no line that can be responds like this: one in 1000, all six coefficients free."""
+
+MOST_ROUNDS, SETTLED = 60, 1e-7
+"""Gauss-Newton rounds of a minimum, and the relative fall of the deviance that ends them."""
+
+WIDEST = math.log(1e3)
+"""How far from the estimate an end of an interval is looked for; beyond it is 0 or infinity."""
 
 CURES = MappingProxyType(
     {
@@ -81,7 +98,7 @@ class PhysicalParameter:
 
     @property
     def is_determined(self) -> bool:
-        """Tell whether the 95 % interval leaves out 0."""
+        """Tell whether the 95 % interval is short against the value."""
         return self.estimate.is_determined
 
 
@@ -95,15 +112,13 @@ class PhysicalEstimate:
         ``J_M, J_L, k, c, b_M, b_L``.
     sums : Mapping[str, PhysicalParameter]
         ``J_M + J_L``, ``c + b_M``, ``b_M + b_L``: often determined where the single ones are not.
-    covariance : ndarray, shape (6, 6)
-        Of the parameters.
     misfit : float
-        The minimum: chi-square of the coefficients against the drive's and of what was known; 0 without the latter.
+        The least deviance: chi-square of the coefficients against the drive's and of what was known; 0 without the
+        latter where the estimate is a line that can be.
     """
 
     parameters: Mapping[str, PhysicalParameter]
     sums: Mapping[str, PhysicalParameter]
-    covariance: FloatArray
     misfit: float
 
     @property
@@ -112,46 +127,156 @@ class PhysicalEstimate:
         return tuple(name for name, parameter in self.parameters.items() if not parameter.is_determined)
 
 
-SUMS = MappingProxyType({"J_M + J_L": (0, 1), "c + b_M": (3, 4), "b_M + b_L": (4, 5)})
+def coefficients_of(parameters: FloatArray, sample_time_s: float) -> FloatArray:
+    """Return theta of drives ``[J_M, J_L, k, c, b_M, b_L]``, shape (m, 6) both: sampled with held torque.
+
+    The exponential of the motion by its series, scaled and squared; characteristic polynomial and numerator by traces
+    and Markov parameters.
+    """
+    J_M, J_L, k, c, b_M, b_L = parameters.T
+    block = np.zeros((parameters.shape[0], 4, 4))
+    block[:, 0, 0], block[:, 0, 1], block[:, 0, 2], block[:, 0, 3] = -(c + b_M) / J_M, c / J_M, -k / J_M, 1.0 / J_M
+    block[:, 1, 0], block[:, 1, 1], block[:, 1, 2] = c / J_L, -(c + b_L) / J_L, k / J_L
+    block[:, 2, 0], block[:, 2, 1] = 1.0, -1.0
+    motion = block * sample_time_s
+    doublings = max(0, math.ceil(math.log2(max(float(np.abs(motion).sum(axis=2).max()), 1e-300))) + 1)
+    motion = motion / 2.0**doublings
+    term = sampled = np.broadcast_to(np.eye(4), motion.shape)
+    for order in range(1, 15):  # 2^-14 / 14! is below the rounding
+        term = term @ motion / order
+        sampled = sampled + term
+    for _ in range(doublings):
+        sampled = sampled @ sampled
+    A, h = sampled[:, :3, :3], sampled[:, :3, 3:]
+    trace = np.trace(A, axis1=1, axis2=2)
+    square = np.trace(A @ A, axis1=1, axis2=2)
+    a = np.stack([-trace, 0.5 * (trace**2 - square), -np.linalg.det(A)], axis=1)
+    h_1, h_2, h_3 = h[:, 0, 0], (A @ h)[:, 0, 0], (A @ A @ h)[:, 0, 0]
+    b = np.stack([h_1, h_2 + a[:, 0] * h_1, h_3 + a[:, 0] * h_2 + a[:, 1] * h_1], axis=1)
+    return np.concatenate([a, b], axis=1)
 
 
 def two_mass_model(parameters: FloatArray, sample_time_s: float) -> LinearModel:
     """Return the sampled response of motor speed to held motor torque of ``[J_M, J_L, k, c, b_M, b_L]``."""
-    J_M, J_L, k, c, b_M, b_L = parameters
-    block = np.zeros((4, 4))
-    block[:3] = [
-        [-(c + b_M) / J_M, c / J_M, -k / J_M, 1.0 / J_M],
-        [c / J_L, -(c + b_L) / J_L, k / J_L, 0.0],
-        [1.0, -1.0, 0.0, 0.0],
-    ]
-    sampled = expm(block * sample_time_s)
-    A, B = sampled[:3, :3], sampled[:3, 3:]
-    b = numerator_of(A, B, np.array([[1.0, 0.0, 0.0]]), 0.0)[1:]
-    return LinearModel(tuple(np.real(np.poly(A))[1:].tolist()), tuple(b.tolist()), 1, sample_time_s)
+    return LinearModel.from_theta(
+        coefficients_of(np.asarray(parameters)[np.newaxis], sample_time_s)[0], RESPONDING, sample_time_s
+    )
 
 
 def two_mass_start(model: LinearModel) -> FloatArray:
-    """Return the parameters of a third-order model with friction left out, in closed form, shape (6,).
+    """Return the parameters of a third-order model with friction left out, shape (6,): in closed form where it has one.
 
-    Raises
-    ------
-    BadModel
-        If no two-mass drive responds like it.
+    Raises BadModel if the speed answers the torque the wrong way round.
     """
-    response = to_continuous(model)
+    first = model.b[0] / model.sample_time_s  # held torque moves the motor alone at first: 1 / J_M
+    if not first > 0.0:
+        raise BadModel(
+            f"linear model: b_1 is {model.b[0]:.4g}, expected above 0, since a torque speeds its motor up. "
+            "Please check the sign and scale of torque and speed."
+        )
+    try:
+        response = to_continuous(model)
+    except BadModel:  # a pole that no continuous system has: the data do not say how fast it is
+        found = resonance(model, (0.0, math.inf))
+        rate = 2.0 * math.pi * (found.frequency_hz if found else 0.1 / model.sample_time_s)
+        return np.array([1.0 / first, 30.0 / first, rate**2 / first, 0.1 * rate / first, 0.0, 0.0])
     beta_2, beta_1, beta_0 = response.numerator[1:]
     _, alpha_2, alpha_1, _ = response.denominator
-    J_M, load_hz_squared = 1.0 / beta_2, beta_0 / beta_2  # the latter is k / J_L
-    J_L = J_M * (alpha_1 / load_hz_squared - 1.0)
-    c = max(J_M * (alpha_2 - beta_1 / beta_2), 0.0)
-    start = np.array([J_M, J_L, load_hz_squared * J_L, c, 0.0, 0.0])
-    if not (start[:3] > 0.0).all():
-        raise BadModel(
-            f"linear model: J_M, J_L, k would be {start[0]:.4g}, {start[1]:.4g}, {start[2]:.4g}, expected all above 0: "
-            "no two-mass drive responds like this. Fit three coefficients each at the recording's own period, with "
-            "fit_box_jenkins; check the sign and scale of torque and speed."
-        )
-    return start
+    J_M = 1.0 / beta_2 if beta_2 > 0.0 else 1.0 / first
+    of_load = beta_0 * J_M  # k / J_L
+    if not (of_load > 0.0 and alpha_1 > of_load):
+        rate_2 = max(alpha_1, (0.1 / model.sample_time_s) ** 2)
+        return np.array([J_M, 30.0 * J_M, J_M * rate_2, 0.1 * J_M * math.sqrt(rate_2), 0.0, 0.0])
+    J_L = J_M * (alpha_1 / of_load - 1.0)
+    return np.array([J_M, J_L, of_load * J_L, max(J_M * (alpha_2 - beta_1 * J_M), 0.0), 0.0, 0.0])
+
+
+@dataclass(frozen=True, eq=False)
+class _Likelihood:
+    """The deviance over ``z = [ln J_M, ln J_L, ln k, c, b_M, b_L]``, the last three in units of the start's damping."""
+
+    model: LinearModel
+    whitening: FloatArray
+    known: Mapping[int, Uncertain]
+    unit: float
+    least: FloatArray
+    most: FloatArray
+
+    def parameters(self, z: FloatArray) -> FloatArray:
+        """Return the parameters of one z or of several, in its shape."""
+        return np.concatenate([np.exp(z[..., :POSITIVE]), self.unit * z[..., POSITIVE:]], axis=-1)
+
+    def residual(self, z: FloatArray) -> FloatArray:
+        """Return the whitened differences, shape (m, 6 + known), of z of shape (m, 6)."""
+        x = self.parameters(z)
+        off = (coefficients_of(x, self.model.sample_time_s) - self.model.theta) @ self.whitening.T
+        prior = [(x[:, i] - one.value) / one.std for i, one in self.known.items()]
+        return np.column_stack([off, *prior])
+
+    def linearised(self, z: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the differences at z and their derivatives by central differences."""
+        step = 1e-5 * np.diag(np.maximum(np.abs(z), 1.0))
+        both = self.residual(np.vstack([z, z + step, z - step]))
+        return both[0], ((both[1:7] - both[7:]) / (2.0 * np.diag(step)[:, np.newaxis])).T
+
+    def minimum(self, z: FloatArray, held: _Held | None = None) -> tuple[FloatArray, float]:
+        """Return where the deviance is least, from z on, and that deviance; with a quantity held where one is given."""
+        damping, z = 1e-3, np.clip(z, self.least, self.most)
+        best = self._cost(z, held)
+        for _ in range(MOST_ROUNDS):
+            r, J = self.linearised(z)
+            if held is not None:
+                r, J = np.append(r, held.off(self.parameters(z))), np.vstack([J, held.slope(self, z)])
+            while damping < 1e12:
+                after = np.clip(z + self._step(r, J, damping, z), self.least, self.most)
+                cost = self._cost(after, held)
+                if cost <= best:
+                    break
+                damping *= 10.0
+            else:
+                break
+            fallen, z, best, damping = best - cost, after, cost, max(damping / 10.0, 1e-12)
+            if fallen <= SETTLED * (best + 1.0):
+                break
+        return z, float(np.sum(self.residual(z[np.newaxis]) ** 2))
+
+    def _cost(self, z: FloatArray, held: _Held | None) -> float:
+        with np.errstate(over="ignore", invalid="ignore"):
+            cost = float(np.sum(self.residual(z[np.newaxis]) ** 2))
+        cost += 0.0 if held is None else held.off(self.parameters(z)) ** 2
+        return cost if math.isfinite(cost) else math.inf
+
+    def _step(self, r: FloatArray, J: FloatArray, damping: float, z: FloatArray) -> FloatArray:
+        """Return the damped Gauss-Newton step that keeps what may be 0 at 0 or more."""
+        size = np.maximum(np.linalg.norm(J, axis=0), 1e-9 * max(float(np.abs(J).max()), 1e-300))
+        rows = np.vstack([J / size, math.sqrt(damping) * np.eye(6)])
+        wanted = np.concatenate([-r, np.zeros(6)])
+        step = np.linalg.lstsq(rows, wanted, rcond=None)[0]
+        after = z + step / size
+        if (after < self.least).any() or (after > self.most).any():
+            room = (self.least - z) * size - 1e-12, (self.most - z) * size + 1e-12
+            step = lsq_linear(rows, wanted, room, method="bvls").x
+        widest = 2.0 * np.maximum(np.abs(z), 1.0)
+        return np.asarray(np.clip(step / size, -widest, widest), dtype=np.float64)
+
+
+@dataclass(frozen=True)
+class _Held:
+    """A parameter, or the sum of two, kept at a value by a spring far stiffer than the data."""
+
+    places: tuple[int, ...]
+    value: float
+    width: float
+
+    def off(self, x: FloatArray) -> float:
+        return float((x[list(self.places)].sum() - self.value) / self.width)
+
+    def slope(self, of: _Likelihood, z: FloatArray) -> FloatArray:
+        slope = np.zeros(6)
+        x = of.parameters(z)
+        for i in self.places:
+            slope[i] = (x[i] if i < POSITIVE else of.unit) / self.width
+        return slope
 
 
 def physical_parameters(
@@ -171,7 +296,7 @@ def physical_parameters(
     Raises
     ------
     BadModel
-        If the model is of another structure, or no two-mass drive responds like it.
+        If the model is of another structure, or no line that can be responds like it.
     BadSetting
         If ``known`` names no parameter, or gives a standard deviation that is not above 0.
     """
@@ -180,41 +305,23 @@ def physical_parameters(
     variances, axes = np.linalg.eigh(covariance)
     floor = float(variances[-1]) * np.finfo(np.float64).eps
     whitening = (axes / np.sqrt(np.maximum(variances, floor))).T
-    scale = np.maximum(np.abs(start), start[3] if start[3] > 0.0 else 1.0)
-
-    def residual(x: FloatArray) -> FloatArray:
-        apart = two_mass_model(x * scale, model.sample_time_s).theta - model.theta
-        pulled_to_prior = [(x[i] * scale[i] - known_i.value) / known_i.std for i, known_i in prior.items()]
-        return np.concatenate([whitening @ apart, pulled_to_prior])
-
-    solution = least_squares(residual, start / scale, jac="3-point", method="lm", max_nfev=MOST_EVALUATIONS)
-    x, jacobian = solution.x * scale, np.asarray(solution.jac, dtype=np.float64)
-    if not (x[:3] > 0.0).all():
-        raise BadModel(f"linear model: J_M, J_L, k came out as {x[:3].tolist()}, expected all above 0. Record longer.")
-    spread = np.linalg.pinv(jacobian.T @ jacobian, hermitian=True) * np.outer(scale, scale)
-    return _plausible(_estimate(x, spread, 2.0 * float(solution.cost)))
-
-
-def _plausible(estimate: PhysicalEstimate) -> PhysicalEstimate:
-    """Return an estimate no part of which is surely negative.
-
-    Raises
-    ------
-    BadModel
-        If the whole interval of a parameter or sum lies below 0: then the response is not that of two masses.
-    """
-    both = {**estimate.parameters, **estimate.sums}
-    negative = [name for name, one in both.items() if one.estimate.ci95[1] < 0.0]
-    if negative:
-        intervals = "; ".join(
-            f"{name} {both[name].estimate.ci95[0]:.4g} to {both[name].estimate.ci95[1]:.4g}" for name in negative
-        )
+    unit = start[3] if start[3] > 0.0 else 0.1 * math.sqrt(start[0] * start[2])
+    begin = np.concatenate([np.log(start[:POSITIVE]), start[POSITIVE:] / unit])
+    far = 1.5 * WIDEST  # of logarithms: a line that much stiffer or heavier can't be told from a rigid or a free one
+    least, most = (begin[:POSITIVE] + side * far for side in (-1.0, 1.0))
+    likelihood = _Likelihood(
+        model, whitening, prior, float(unit), np.append(least, [0.0] * 3), np.append(most, [math.exp(far)] * 3)
+    )
+    both = begin, begin + np.array([0.0, 0.0, 0.0, 0.5, 0.1, 0.1])  # damping in the shaft alone, or in bearings, too
+    z, misfit = min((likelihood.minimum(each) for each in both), key=lambda one: one[1])
+    if misfit > IMPLAUSIBLE:
         raise BadModel(
-            f"linear model: {intervals} with 95 % confidence, expected values of 0 or more: this is not a two-mass "
-            "line. A delay or lag between torque and speed, a third mass or a gap look like this; see the residual "
-            "tests, or diagnose the recording."
+            f"linear model: chi-square {misfit:.3g} away from the nearest line of two masses that can be, expected at "
+            f"most {IMPLAUSIBLE:.3g}: this is not a two-mass line. A delay or lag between torque and speed, a third "
+            "mass or a gap look like this; see the residual tests, check the sign and scale of torque and speed, or "
+            "diagnose the recording."
         )
-    return estimate
+    return _estimate(likelihood, z, misfit)
 
 
 def _checked(model: LinearModel, covariance: FloatArray, known: Mapping[str, Uncertain]) -> dict[int, Uncertain]:
@@ -232,22 +339,58 @@ def _checked(model: LinearModel, covariance: FloatArray, known: Mapping[str, Unc
     return {NAMES.index(name): value for name, value in known.items()}
 
 
-def _estimate(x: FloatArray, covariance: FloatArray, misfit: float) -> PhysicalEstimate:
-    parameters = {
-        name: _parameter(name, UNITS[name], _uncertain(name, float(x[i]), float(covariance[i, i])), CURES[name])
-        for i, name in enumerate(NAMES)
-    }
-    sums = {}
-    for name, (i, j) in SUMS.items():
-        variance = covariance[i, i] + covariance[j, j] + 2.0 * covariance[i, j]
-        total = _uncertain(name, float(x[i] + x[j]), float(variance))
-        sums[name] = _parameter(name, UNITS[NAMES[i]], total, CURES[NAMES[j]])
-    return PhysicalEstimate(MappingProxyType(parameters), MappingProxyType(sums), covariance, misfit)
+def _estimate(likelihood: _Likelihood, z: FloatArray, misfit: float) -> PhysicalEstimate:
+    x, (_, J) = likelihood.parameters(z), likelihood.linearised(z)
+    spread = np.linalg.pinv(J.T @ J, hermitian=True)
+
+    def quantity(name: str, places: tuple[int, ...]) -> PhysicalParameter:
+        slope = _Held(places, 0.0, 1.0).slope(likelihood, z)
+        guess = math.sqrt(max(float(slope @ spread @ slope), 0.0))
+        value = float(x[list(places)].sum())
+        low, high = (_end(likelihood, z, misfit, places, guess, side) for side in (-1.0, 1.0))
+        std = (high - low) / (2.0 * QUANTILE)
+        return _parameter(name, UNITS[NAMES[places[0]]], Uncertain(value, std, (low, high)), CURES[NAMES[places[-1]]])
+
+    parameters = {name: quantity(name, (i,)) for i, name in enumerate(NAMES)}
+    sums = {name: quantity(name, places) for name, places in SUMS.items()}
+    return PhysicalEstimate(MappingProxyType(parameters), MappingProxyType(sums), misfit)
 
 
-def _uncertain(name: str, value: float, variance: float) -> Uncertain:
-    """Return a parameter with its deviation; the response's coefficients hold inertias by their reciprocals."""
-    return Uncertain(value, float(np.sqrt(max(variance, 0.0))), is_reciprocal=name.startswith("J"))
+def _end(
+    likelihood: _Likelihood, z: FloatArray, misfit: float, places: tuple[int, ...], guess: float, side: float
+) -> float:
+    """Return the end of an interval to one side: where the square root of the deviance's rise is the quantile.
+
+    That root is nearly straight over the quantity, or over its logarithm where it can't be 0.
+    """
+    value = float(likelihood.parameters(z)[list(places)].sum())
+    by_log = places[0] < POSITIVE
+    scale = value if by_log else max(value, 1e-2 * likelihood.unit)
+    most = WIDEST if by_log else math.exp(WIDEST)
+
+    def at(t: float) -> float:
+        return value * math.exp(side * t) if by_log else max(value + side * t * scale, 0.0)
+
+    def width(v: float) -> float:
+        return min(1e-4 * max(v, 1e-2 * scale), 1e-2 * guess) if guess > 0.0 else 1e-4 * max(v, 1e-2 * scale)
+
+    t, inside, outside = min(QUANTILE * guess / scale, 0.5), 0.0, math.inf
+    for _ in range(20):
+        t = min(max(t, 1e-12), most)
+        v = at(t)
+        there, deviance = likelihood.minimum(z, _Held(places, v, width(v)))
+        root = math.sqrt(max(deviance - misfit, 0.0))
+        if abs(root - QUANTILE) < 0.02 or (outside - inside) < 1e-3 * inside:
+            break
+        if root > QUANTILE:
+            outside = t
+        elif v == 0.0 or t == most:
+            return math.inf if side > 0.0 else 0.0
+        else:
+            inside, z = t, there
+        straight = t * QUANTILE / max(root, 0.3)
+        t = straight if inside < straight < outside else 0.5 * (inside + min(outside, 7.0 * t))
+    return at(t)
 
 
 def _parameter(name: str, unit: str, estimate: Uncertain, cure: str) -> PhysicalParameter:
@@ -255,6 +398,8 @@ def _parameter(name: str, unit: str, estimate: Uncertain, cure: str) -> Physical
     interval = f"{low:.4g} to {high:.4g} {unit}"
     if estimate.is_determined:
         statement = f"{name} is {estimate.value:.4g} {unit}, with 95 % confidence {interval}."
-    else:
+    elif low <= 0.0:
         statement = f"The data do not determine {name}: its 95 % interval, {interval}, holds 0. To tell: {cure}."
+    else:
+        statement = f"The data do not determine {name}: its 95 % interval, {interval}, is wide. To tell: {cure}."
     return PhysicalParameter(name, unit, estimate, statement)

@@ -8,6 +8,10 @@ hard to see in the output. Its error is bounded at every frequency (D. F. Enns, 
     |G(f) - G_r(f)|  <=  2 (sigma_(r+1) + ... + sigma_n)
 
 with sigma the Hankel singular values; the bound tells what the left-out order was worth.
+
+With the input held between samples, ``exp([[A_c, B_c], [0, 0]] T) = [[A, B], [0, 1]]`` (Astrom and Wittenmark,
+Computer-Controlled Systems, chapter 2); its matrix logarithm takes a sampled model back to continuous time, zeros and
+all. Signals that were decimated through a low-pass were not held: their zeros, unlike their poles, are off.
 """
 
 from __future__ import annotations
@@ -15,12 +19,70 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import logm, schur
 
 from estimator.errors import BadModel, BadShape
-from estimator.identification.linear_model import LinearModel
-from estimator.identification.modes.continuous import numerator_of, state_space
-from estimator.identification.modes.propagate import propagate, square_root
+from estimator.identification.linear_model import ComplexArray, LinearModel
+from estimator.identification.modes.uncertainty import propagate, square_root
 from estimator.signals.record import FloatArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ContinuousModel:
+    """``numerator(s) / denominator(s)``, highest power first, leading 1 in the denominator."""
+
+    numerator: FloatArray
+    denominator: FloatArray
+
+    @property
+    def poles(self) -> ComplexArray:
+        """Roots of the denominator [1/s]."""
+        return np.asarray(np.roots(self.denominator), dtype=np.complex128)
+
+    @property
+    def zeros(self) -> ComplexArray:
+        """Roots of the numerator [1/s]."""
+        return np.asarray(np.roots(self.numerator), dtype=np.complex128)
+
+
+def state_space(model: LinearModel) -> tuple[FloatArray, FloatArray, FloatArray, float]:
+    """Return (A, B, C, D) of the model in controller form; the delay is part of it.
+
+    Shapes (n, n), (n, 1), (1, n) with n = max(na, nk + nb - 1).
+    """
+    n = model.orders.n_states
+    a, b = np.zeros(n), np.zeros(n + 1)
+    a[: len(model.a)] = model.a
+    b[: model.B.shape[0]] = model.B
+    A = np.eye(n, k=-1)
+    A[:1] = -a
+    C = (b[1:] - b[0] * a)[np.newaxis]
+    return A, np.eye(n, 1), C, float(b[0])
+
+
+def numerator_of(A: FloatArray, B: FloatArray, C: FloatArray, D: float) -> FloatArray:
+    """Return the coefficients of ``C adj(xI - A) B + D det(xI - A)``, highest power first, shape (n+1,)."""
+    denominator = np.real(np.poly(A))
+    return np.asarray(np.real(np.poly(A - B @ C)) + (D - 1.0) * denominator, dtype=np.float64)
+
+
+def to_continuous(model: LinearModel) -> ContinuousModel:
+    """Take a sampled model back to the continuous one with held input."""
+    A, B, C, D = state_space(model)
+    poles = np.linalg.eigvals(A)
+    without = [complex(z) for z in poles if abs(z) < np.finfo(np.float64).eps or (z.imag == 0.0 and z.real < 0.0)]
+    if without or not poles.size:
+        raise BadModel(
+            f"linear model: poles {np.round(poles, 4).tolist()} in z, expected none at 0 or real and negative: no "
+            "continuous system has such samples. Take the third-order equivalent, or fit with fewer coefficients."
+        )
+    n = A.shape[0]
+    block = np.zeros((n + 1, n + 1))
+    block[:n, :n], block[:n, n:], block[n, n] = A, B, 1.0
+    rate = np.real(logm(block)) / model.sample_time_s
+    A_c, B_c = rate[:n, :n], rate[:n, n:]
+    return ContinuousModel(numerator_of(A_c, B_c, C, D), np.real(np.poly(A_c)))
+
 
 THIRD = 3
 
@@ -52,22 +114,7 @@ class Reduced:
 
 
 def third_order(model: LinearModel, covariance: FloatArray | None = None) -> Reduced:
-    """Return the third-order equivalent of a stable model.
-
-    Parameters
-    ----------
-    model : LinearModel
-        Estimate, of any order.
-    covariance : ndarray, shape (na+nb, na+nb), optional
-        Of its theta.
-
-    Raises
-    ------
-    BadModel
-        If the model is not stable: an unstable one has no Hankel singular values.
-    BadShape
-        If the covariance is not that of theta.
-    """
+    """Return the third-order equivalent of a stable model."""
     return reduce_order(model, THIRD, covariance)
 
 
@@ -113,12 +160,25 @@ def _as_model(theta: FloatArray, original: LinearModel, order: int) -> LinearMod
     return LinearModel(a, b, min(original.nk, 1), original.sample_time_s)
 
 
+def _triangular_form(
+    A: FloatArray, B: FloatArray, C: FloatArray, D: float
+) -> tuple[FloatArray, FloatArray, FloatArray, float]:
+    """Return the states in their Schur form: powers of A then keep its poles, which rounding else puts outside.
+
+    Where many poles crowd together at 1, as of a recording of one mass, one may lie there all the same; the motion is
+    then slowed by as much.
+    """
+    T, Z = schur(A)
+    radius = float(np.abs(np.linalg.eigvals(T)).max(initial=0.0))
+    return T * min(1.0, (1.0 - 1e-9) / max(radius, 0.5)), Z.T @ B, C @ Z, D
+
+
 def _truncated(model: LinearModel, order: int) -> tuple[FloatArray, FloatArray]:
     """Return theta of the truncated model and the Hankel singular values.
 
     With a delay of 1 or more theta is ``[a_1 .. a_r, b_1 .. b_r]``, without ``[a_1 .. a_r, b_0 .. b_r]``.
     """
-    A, B, C, D = state_space(model)
+    A, B, C, D = _triangular_form(*state_space(model))
     reach = square_root(_gramian(A, B @ B.T))
     see = square_root(_gramian(A.T, C.T @ C))
     left, hankel, right_t = np.linalg.svd(see.T @ reach)

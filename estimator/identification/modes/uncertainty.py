@@ -1,24 +1,187 @@
-"""Poles and zeros with confidence ellipses, and what cancels; resonance and damping with intervals.
+"""Uncertainty of what is computed from a linear model: roots with ellipses, what cancels, frequency and damping.
 
-The covariance of theta becomes one of (Re z, Im z) through :mod:`estimator.identification.modes.roots`, and a
-chi-square quantile of it the ellipse. Frequency and damping follow through ``s = ln(z) / T``.
+The delta method: for a function g of parameters with covariance P, ``cov g = G P G^T``, G its derivative (L. Ljung,
+System Identification, 2nd ed., section 9.A), taken along the principal axes of P where it is taken by differences:
+where poles and zeros cancel, single coefficients may move far, but only together.
+
+A simple root z of ``c_0 z^n + ... + c_n`` moves with its coefficients by ``dz / dc_i = -z^(n-i) / p'(z)``; at a double
+root p' vanishes, and its standard deviation is infinite, which is what the data say. Frequency and damping follow
+through ``s = ln(z) / T``. A pole and a zero cancel if their difference d is no larger than its own uncertainty,
+``d^T cov(d)^-1 d`` within its chi-square quantile: both are estimated from the same data and move together.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.optimize import linear_sum_assignment
+from scipy.stats import chi2, norm
 
 from estimator.errors import BadShape
 from estimator.identification.linear_model import ComplexArray, LinearModel
-from estimator.identification.modes.cancellation import Cancellation, cancellations
-from estimator.identification.modes.modes import Mode, continuous, modes, resonance
-from estimator.identification.modes.propagate import CONFIDENCE, Uncertain, square_root
-from estimator.identification.modes.roots import Roots, covariance_of, pole_roots, zero_roots
+from estimator.identification.modes.modes import Mode, continuous, modes
 from estimator.signals.record import FloatArray
+
+CONFIDENCE = 0.95
+"""Of every interval and ellipse that does not say otherwise."""
+
+QUANTILE = float(norm.ppf(0.5 + CONFIDENCE / 2.0))
+"""Half width of such an interval in standard deviations: 1.96."""
+
+SHORT = 0.5
+"""Reach of an interval to either side, against the value, up to which a number is known."""
+
+STEP = 0.01
+"""Of the difference quotient, in standard deviations."""
+
+
+@dataclass(frozen=True, slots=True)
+class Uncertain:
+    """A number and its standard deviation; infinite where the data say nothing of it.
+
+    Attributes
+    ----------
+    value, std : float
+    interval : tuple of float, optional
+        Interval of 95 %, where it is not that of a normal distribution.
+    """
+
+    value: float
+    std: float
+    interval: tuple[float, float] | None = None
+
+    @property
+    def ci95(self) -> tuple[float, float]:
+        """Interval that holds the truth with 95 % probability."""
+        return self.interval or (self.value - QUANTILE * self.std, self.value + QUANTILE * self.std)
+
+    @property
+    def is_determined(self) -> bool:
+        """Tell whether the interval is short against the value to either side: then size and sign are known."""
+        low, high = self.ci95
+        return max(high - self.value, self.value - low) <= SHORT * abs(self.value)
+
+    def covers(self, truth: float) -> bool:
+        """Tell whether the interval holds a value."""
+        low, high = self.ci95
+        return low <= truth <= high
+
+
+def square_root(covariance: FloatArray) -> FloatArray:
+    """Return S with ``S S^T = P``, its columns along the principal axes; rounding below zero counts as zero."""
+    variances, axes = np.linalg.eigh(0.5 * (covariance + covariance.T))
+    return np.asarray(axes * np.sqrt(np.maximum(variances, 0.0)), dtype=np.float64)
+
+
+def propagate(
+    function: Callable[[FloatArray], FloatArray], parameters: FloatArray, covariance: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return a function's value, shape (m,), and its covariance, shape (m, m)."""
+    axes = square_root(covariance).T
+    value = function(parameters)
+    slopes = [(function(parameters + STEP * axis) - function(parameters - STEP * axis)) / (2.0 * STEP) for axis in axes]
+    G = np.array(slopes).reshape(axes.shape[0], value.shape[0])
+    return value, G.T @ G
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Roots:
+    """Roots, shape (n,), and their derivatives by theta, shape (n, na + nb), complex."""
+
+    values: ComplexArray
+    slopes: ComplexArray
+
+
+def _roots(coefficients: FloatArray, first: int, place: int, n_parameters: int) -> Roots:
+    """Return the roots of a polynomial whose coefficients from ``first`` on are theta from ``place`` on."""
+    values = np.asarray(np.roots(coefficients), dtype=np.complex128)
+    degree = coefficients.shape[0] - 1
+    slopes = np.zeros((values.shape[0], n_parameters), dtype=np.complex128)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        p_prime = np.polyval(np.polyder(coefficients), values)
+        for i in range(first, degree + 1):
+            slopes[:, place + i - first] = -(values ** (degree - i)) / p_prime
+    return Roots(values, slopes)
+
+
+def pole_roots(model: LinearModel) -> Roots:
+    """Return the poles of a model with their derivatives."""
+    return _roots(model.A, 1, 0, model.orders.n_parameters)
+
+
+def zero_roots(model: LinearModel) -> Roots:
+    """Return the zeros of a model with their derivatives."""
+    return _roots(np.array(model.b), 0, len(model.a), model.orders.n_parameters)
+
+
+def covariance_of(slope: ComplexArray, P: FloatArray) -> FloatArray:
+    """Return the covariance of (Re, Im) of a complex number with this derivative; infinite at a double root."""
+    if not np.isfinite(slope).all():
+        return np.diag([np.inf, np.inf])
+    G = np.array([slope.real, slope.imag])
+    return np.asarray(G @ P @ G.T, dtype=np.float64)
+
+
+FAR = 1e6
+"""Squared distance, in units of its uncertainty, beyond which none is farther: a thousand standard deviations."""
+
+
+@dataclass(frozen=True, slots=True)
+class Cancellation:
+    """A pole and a zero that the data can't tell apart.
+
+    Attributes
+    ----------
+    pole, zero : complex
+        In z; of a conjugate pair the one with positive imaginary part.
+    p_value : float
+        Probability of a distance at least this large if they were one.
+    """
+
+    pole: complex
+    zero: complex
+    p_value: float
+
+    @property
+    def statement(self) -> str:
+        """What it means, in a sentence."""
+        kind = "pair" if self.pole.imag else "pole"
+        return (
+            f"The {kind} at {self.pole:.3f} and the zero at {self.zero:.3f} can't be distinguished "
+            f"(p = {self.p_value:.2g}): the data do not need this {kind}."
+        )
+
+
+def cancellations(poles: Roots, zeros: Roots, P: FloatArray, confidence: float) -> tuple[Cancellation, ...]:
+    """Pair poles and zeros of one kind, closest in units of their uncertainty first, each at most once."""
+    found = []
+    for imaginary, freedom in ((False, 1), (True, 2)):
+        p_at, z_at = (
+            np.flatnonzero(roots.values.imag > 0 if imaginary else roots.values.imag == 0) for roots in (poles, zeros)
+        )
+        distance = np.array([[_distance(poles, int(i), zeros, int(j), P, freedom) for j in z_at] for i in p_at])
+        for row, column in zip(*linear_sum_assignment(distance.reshape(len(p_at), len(z_at))), strict=True):
+            p_value = float(chi2.sf(distance[row, column], freedom))
+            if p_value > 1.0 - confidence:
+                found.append(
+                    Cancellation(complex(poles.values[p_at[row]]), complex(zeros.values[z_at[column]]), p_value)
+                )
+    return tuple(found)
+
+
+def _distance(poles: Roots, i: int, zeros: Roots, j: int, P: FloatArray, freedom: int) -> float:
+    """Return the squared distance of a pole and a zero in units of its own uncertainty."""
+    apart = zeros.values[j] - poles.values[i]
+    spread = covariance_of(zeros.slopes[j] - poles.slopes[i], P)[:freedom, :freedom]
+    d = np.array([apart.real, apart.imag])[:freedom]
+    if not np.isfinite(spread).all():
+        return 0.0
+    variances, axes = np.linalg.eigh(spread)
+    floor = max(float(variances[-1]) * np.finfo(np.float64).eps, np.finfo(np.float64).tiny)
+    return float(min(np.sum((axes.T @ d) ** 2 / np.maximum(variances, floor)), FAR))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -77,22 +240,7 @@ def _checked(model: LinearModel, covariance: FloatArray) -> FloatArray:
 
 
 def pole_zero_map(model: LinearModel, covariance: FloatArray, confidence: float = CONFIDENCE) -> PoleZeroMap:
-    """Return every pole and zero with its uncertainty, and the pairs that cancel.
-
-    Parameters
-    ----------
-    model : LinearModel
-        Estimate.
-    covariance : ndarray, shape (na+nb, na+nb)
-        Of theta.
-    confidence : float
-        At which a pole and a zero count as different.
-
-    Raises
-    ------
-    BadShape
-        If the covariance is not that of theta.
-    """
+    """Return every pole and zero with its uncertainty, and the pairs that cancel."""
     P = _checked(model, covariance)
     poles, zeros = pole_roots(model), zero_roots(model)
     return PoleZeroMap(
@@ -109,30 +257,9 @@ def _uncertain_roots(roots: Roots, P: FloatArray) -> list[UncertainRoot]:
 
 
 def uncertain_modes(model: LinearModel, covariance: FloatArray) -> tuple[UncertainMode, ...]:
-    """Return the oscillating pairs of poles with intervals, the one with the highest peak first.
-
-    Raises
-    ------
-    BadShape
-        If the covariance is not that of theta.
-    """
+    """Return the oscillating pairs of poles with intervals, the one with the highest peak first."""
     P = _checked(model, covariance)
     return tuple(_uncertain_mode(model, P, mode) for mode in modes(model))
-
-
-def uncertain_resonance(
-    model: LinearModel, covariance: FloatArray, band_hz: tuple[float, float] = (2.0, 25.0)
-) -> UncertainMode | None:
-    """Return the dominant lightly damped pair of poles in a band [Hz] with its intervals; None if there is none.
-
-    Raises
-    ------
-    BadShape
-        If the covariance is not that of theta.
-    """
-    P = _checked(model, covariance)
-    mode = resonance(model, band_hz)
-    return None if mode is None else _uncertain_mode(model, P, mode)
 
 
 def _uncertain_mode(model: LinearModel, P: FloatArray, mode: Mode) -> UncertainMode:

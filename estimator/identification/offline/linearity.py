@@ -9,25 +9,35 @@ Studies 47, 1980; an LM test in its F form, which holds in closed loop as well):
     F = ((S_0 - S_1) / q) / (S_1 / (n - p - q))
 
 The step that the linear parameters take when the functions are let in is what the nonlinearity has done to them.
+
+Where the drive is not linear, its resonance is given by operating region: the whitened equations hold row by row, so
+that B / A can be fitted to the rows alone in which a signal lies in a region, D and everything before them as they are.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
+from scipy.optimize import least_squares
 from scipy.signal import lfilter
 from scipy.stats import f as fisher
 from threadpoolctl import threadpool_limits
 
 from estimator.identification.linear_model import LinearModel
+from estimator.identification.modes.modes import Mode, resonance
 from estimator.identification.offline.problem import Problem
 from estimator.identification.offline.starts import delayed
 from estimator.signals.decimate import Decimator
-from estimator.signals.record import FloatArray, Record
+from estimator.signals.record import BoolArray, FloatArray, Record
 
 SIGNIFICANCE = 1e-4
 """Of the test: linear drives in closed loop gave p-values somewhat smaller than uniform ones, gaps below 1e-15."""
+
+LEAST_EFFECT = 0.1
+"""Part of the innovations from which on a nonlinearity matters: what 30 s at 10 ms just show. Of a million samples the
+test alone would call every drive nonlinear."""
 
 QUANTILES = (0.1, 0.35, 0.65, 0.9)
 """Knots of the piecewise linear functions, of the signal's own distribution."""
@@ -46,16 +56,19 @@ class Linearity:
         Probability of an F at least this large on a linear drive.
     by_torque, by_speed : float
         The same for functions of the shaft's torque alone, and of the speed alone.
+    effect : float
+        What the functions explain of the innovations beyond chance, RMS over RMS.
     """
 
     p_value: float
     by_torque: float
     by_speed: float
+    effect: float = 1.0
 
     @property
     def is_linear(self) -> bool:
-        """Tell whether nothing speaks against a linear model."""
-        return self.p_value > SIGNIFICANCE
+        """Tell whether nothing that matters speaks against a linear model."""
+        return self.p_value > SIGNIFICANCE or self.effect < LEAST_EFFECT
 
     @property
     def depends_on(self) -> str:
@@ -64,21 +77,7 @@ class Linearity:
 
 
 def judge_linearity(problem: Problem, x: FloatArray, record: Record, first: int, high_pass_hz: float) -> Linearity:
-    """Test a Box-Jenkins fit.
-
-    Parameters
-    ----------
-    problem : Problem
-        Of the high-passed recording.
-    x : ndarray
-        Its minimum.
-    record : Record
-        As recorded: where zero torque and standstill are is lost in the high-pass.
-    first : int
-        Sample of the recording that the problem begins with.
-    high_pass_hz : float
-        Corner of the high-pass [Hz].
-    """
+    """Test a Box-Jenkins fit."""
     model = problem.model(x)
     u, okay = record.total_torque_nm[first:], record.okay[first:]
     rows = np.arange(okay.shape[0])
@@ -87,8 +86,8 @@ def judge_linearity(problem: Problem, x: FloatArray, record: Record, first: int,
     with threadpool_limits(1):
         J, w = problem.jacobian(x), problem.residual(x)
         columns = [_responses(problem, x, model, group, high_pass_hz) for group in groups]
-        p_values = [_p_value(J, w, c) for c in (np.column_stack(columns), *columns)]
-    return Linearity(*p_values)
+        (p_value, effect), *alone = (_tested(J, w, c) for c in (np.column_stack(columns), *columns))
+    return Linearity(p_value, *(p for p, _ in alone), effect)
 
 
 def shaft_torque(model: LinearModel, u: FloatArray) -> FloatArray:
@@ -122,8 +121,8 @@ def _responses(
     return problem.whitened(x, lagged)
 
 
-def _p_value(J: FloatArray, w: FloatArray, columns: FloatArray) -> float:
-    """Return the probability of so large a fall of the sum of squares by chance."""
+def _tested(J: FloatArray, w: FloatArray, columns: FloatArray) -> tuple[float, float]:
+    """Return the probability of so large a fall of the sum of squares by chance, and the root of its share beyond."""
     basis, _ = np.linalg.qr(J / np.maximum(np.linalg.norm(J, axis=0), np.finfo(np.float64).tiny))
     rest = w - basis @ (basis.T @ w)
     extra = columns - basis @ (basis.T @ columns)
@@ -132,5 +131,52 @@ def _p_value(J: FloatArray, w: FloatArray, columns: FloatArray) -> float:
     q, free = left.shape[1], w.shape[0] - J.shape[1] - left.shape[1]
     gained, total = float(np.sum((left.T @ rest) ** 2)), float(rest @ rest)
     if q == 0 or free <= 0 or total <= gained:
-        return 1.0
-    return float(fisher.sf(gained / q / ((total - gained) / free), q, free))
+        return 1.0, 0.0
+    variance = (total - gained) / free
+    return float(fisher.sf(gained / q / variance, q, free)), float(np.sqrt(max(gained - q * variance, 0.0) / total))
+
+
+REGIONS = 3
+"""Of equal numbers of samples: below, about and above the middle."""
+
+MOST_EVALUATIONS = 30
+
+
+@dataclass(frozen=True, slots=True)
+class RegionalMode:
+    """The resonance where a signal is between two values; None where the drive does not resonate there."""
+
+    low: float
+    high: float
+    mode: Mode | None
+
+
+def modes_by_region(
+    problem: Problem, x: FloatArray, signal: FloatArray, band_hz: tuple[float, float]
+) -> tuple[RegionalMode, ...]:
+    """Fit B / A once for each region of a signal."""
+    value = problem.blocks.mean(signal)[problem.noise_order :]
+    edges = np.quantile(value, np.linspace(0.0, 1.0, REGIONS + 1))
+    found = []
+    for low, high in pairwise(edges.tolist()):
+        model = _model_of(problem, x, (value >= low) & (value <= high))
+        found.append(RegionalMode(low, high, resonance(model, band_hz)))
+    return tuple(found)
+
+
+def _model_of(problem: Problem, x: FloatArray, rows: BoolArray) -> LinearModel:
+    """Return the model that whitened rows alone ask for."""
+    n = problem.n_plant
+
+    def joined(plant: FloatArray) -> FloatArray:
+        return np.concatenate([plant, x[n:]])
+
+    def residual(plant: FloatArray) -> FloatArray:
+        return problem.residual(joined(plant))[rows]
+
+    def jacobian(plant: FloatArray) -> FloatArray:
+        return problem.jacobian(joined(plant))[rows, :n]
+
+    with threadpool_limits(1):
+        solution = least_squares(residual, x[:n], jac=jacobian, x_scale="jac", method="lm", max_nfev=MOST_EVALUATIONS)
+    return problem.model(joined(solution.x))

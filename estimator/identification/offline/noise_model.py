@@ -7,6 +7,11 @@ at a time from the forward error f and the backward error g::
     k_m = - 2 sum f_(m-1)(t) g_(m-1)(t-1) / sum (f_(m-1)(t)^2 + g_(m-1)(t-1)^2)
 
 |k_m| < 1, so that D is always stable. The sums run over unbroken stretches alone, so that masked samples do no harm.
+
+The covariance of a fit whose residual e = w / D is coloured (L. Ljung, System Identification, 2nd ed., section 9.4)::
+
+    cov theta = R^-1 Q R^-1,      R = sum psi psi^T,      Q = sigma_w^2 sum psi_h psi_h^T
+    psi_h(t)  = sum_i h_i psi(t+i),   h the impulse response of 1 / D
 """
 
 from __future__ import annotations
@@ -81,17 +86,7 @@ def reach(sample_time_s: float) -> int:
 
 
 def fit_noise(e: FloatArray, okay: BoolArray, order: int) -> NoiseModel:
-    """Fit the autoregression of a residual by Burg's method.
-
-    Parameters
-    ----------
-    e : ndarray, shape (N,)
-        Residual [output unit].
-    okay : ndarray of bool, shape (N,)
-        False where it is not to be used; may then be any number, also NaN.
-    order : int
-        Coefficients wanted; fewer are fitted where the unbroken stretches are too short for more.
-    """
+    """Fit the autoregression of a residual by Burg's method."""
     forward = np.where(okay, e, 0.0)
     backward, valid = forward.copy(), okay.copy()
     D, power = np.ones(1), float(np.mean(forward[okay] ** 2)) if okay.any() else 0.0
@@ -107,3 +102,14 @@ def fit_noise(e: FloatArray, okay: BoolArray, order: int) -> NoiseModel:
         D = np.concatenate([D, [0.0]]) + k * np.concatenate([[0.0], D[::-1]])
         power *= 1.0 - k * k
     return NoiseModel(D, float(np.sqrt(power)))
+
+
+def sandwich(gradient: FloatArray, okay: BoolArray, noise: NoiseModel) -> FloatArray:
+    """Return the covariance of all parameters of a least-squares fit, shape (n, n)."""
+    psi = np.where(okay[:, np.newaxis], gradient, 0.0)
+    n_samples = int(np.count_nonzero(okay))
+    spent = psi.shape[1] + noise.order
+    bread = np.linalg.pinv(psi.T @ psi, hermitian=True)
+    psi_h = noise.coloured_backwards(psi)
+    scale = noise.std**2 * n_samples / max(n_samples - spent, 1)
+    return np.asarray(scale * bread @ (psi_h.T @ psi_h) @ bread, dtype=np.float64)

@@ -19,9 +19,7 @@ import numpy as np
 
 from estimator.errors import BadSetting
 from estimator.identification.linear_model import LinearModel, Orders
-from estimator.identification.offline.box_jenkins import fit_box_jenkins
-from estimator.identification.offline.free_run import free_run
-from estimator.identification.offline.linear_fit import LinearFit
+from estimator.identification.offline.fits import LinearFit, fit_box_jenkins, free_run
 from estimator.signals.decimate import decimate
 from estimator.signals.record import Record
 
@@ -93,24 +91,7 @@ class OrderChoice:
 
 
 def select_orders(record: Record, among: Sequence[Orders] = DEFAULT, unseen: Sequence[Record] = ()) -> OrderChoice:
-    """Choose order and delay.
-
-    Parameters
-    ----------
-    record : Record
-        Of the period of the models; the slow part need not have been removed.
-    among : sequence of Orders
-        The candidates.
-    unseen : sequence of Record
-        For cross-validation; prepared alike.
-
-    Raises
-    ------
-    BadSetting
-        If there is no candidate.
-    NotExciting
-        If the data do not determine the richest candidate.
-    """
+    """Choose order and delay."""
     if not among:
         raise BadSetting("order selection: 0 candidates, expected one or more. Give the orders to choose from.")
     prepared, *others = (_prepared(one) for one in (record, *unseen))

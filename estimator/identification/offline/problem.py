@@ -15,9 +15,14 @@ Identification, 2nd ed., chapter 10)::
     d yhat / d c_j = q^-(j-1) delta / A
     d w    / d d_i = q^-i e
 
-A is stable by parametrisation (:mod:`estimator.identification.offline.stable`), so Levenberg and Marquardt's steps
-need no bounds. What was not measured or not read is unknown rather than left out
-(:mod:`estimator.identification.offline.missing`).
+A is a product of second-order sections, and one of first order where its order is odd. The stability triangle of
+``1 + a_1 q^-1 + a_2 q^-2`` is ``|a_2| < 1, |a_1| < 1 + a_2`` (E. I. Jury, 1964), so that all of it and nothing else is
+reached by ``a_2 = tanh x_2, a_1 = (1 + a_2) tanh x_1``: Levenberg and Marquardt's steps need no bounds.
+
+What was not measured or not read is unknown rather than left out: an unmeasured output is one unknown that enters the
+next p whitened errors through D; a torque that was not read drives the model as an input of its own. Whitened errors
+and gradients are projected onto what is orthogonal to the responses to all of these (variable projection: G. H. Golub
+and V. Pereyra, SIAM J. Numerical Analysis 10, 1973), which is the same as estimating them along.
 
 Samples that come faster than a driveline answers are simulated as they come, and their error is averaged over blocks
 before D: an average of both sides of an equation holds exactly, and D stays short.
@@ -32,16 +37,196 @@ from functools import cached_property
 import numpy as np
 from scipy.optimize import least_squares
 from scipy.signal import lfilter
+from scipy.sparse import csc_array, diags_array
+from scipy.sparse.linalg import splu
 from threadpoolctl import threadpool_limits
 
 from estimator.identification.linear_model import ComplexArray, LinearModel, Orders, free_response
-from estimator.identification.offline.blocks import Blocks
-from estimator.identification.offline.missing import Elimination, OutputResponses, UnreadTorque
-from estimator.identification.offline.stable import denominator_of, parameters_of
 from estimator.identification.offline.starts import delayed
 from estimator.identification.triangular import solve_least_squares
-from estimator.signals.decimate import HIGH_PASS_HZ
+from estimator.signals.decimate import HIGH_PASS_HZ, Blocks
 from estimator.signals.record import BoolArray, FloatArray
+
+INSIDE = 1.0 - 1e-6
+"""Stands for 1 in both: rounding then leaves every pole inside, the slowest with a time constant of 10^6 samples."""
+
+
+def parameters_of(a: FloatArray) -> FloatArray:
+    """Return x, shape (na,), of coefficients ``a_1 .. a_na``; poles on or outside the circle are moved inside."""
+    poles = np.roots(np.concatenate([[1.0], a]))
+    radius = np.abs(poles)
+    poles = np.where(radius < 1.0, poles, poles / np.maximum(radius, 1.0) ** 2)
+    pairs = poles[poles.imag > 0.0]
+    real = np.sort(poles[poles.imag == 0.0].real)
+    two = [(-2.0 * z.real, abs(z) ** 2) for z in pairs.tolist()]
+    two += [(-(p + q), p * q) for p, q in zip(real[:-1:2].tolist(), real[1::2].tolist(), strict=True)]
+    tangents = [t for a_1, a_2 in two for t in (a_1 / max(1.0 + a_2, 1.0 - INSIDE), a_2)]
+    tangents += [-float(real[-1])] if real.size % 2 else []
+    tangents += [0.0] * (a.shape[0] - len(tangents))  # leading coefficients that vanished have roots at 0
+    return np.arctanh(np.clip(np.array(tangents) / INSIDE, -INSIDE, INSIDE))
+
+
+def denominator_of(x: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return ``a_1 .. a_na`` of x, shape (na,), and their derivatives ``d a_i / d x_j``, shape (na, na)."""
+    tangents = INSIDE * np.tanh(x)
+    steepness = INSIDE - tangents**2 / INSIDE
+    sections, slopes = [], []
+    for i in range(0, x.shape[0] - 1, 2):
+        t_1, t_2 = tangents[i : i + 2]
+        sections.append(np.array([1.0, t_1 * (1.0 + t_2), t_2]))
+        slopes.append(np.array([0.0, steepness[i] * (1.0 + t_2), 0.0]))
+        slopes.append(steepness[i + 1] * np.array([0.0, t_1, 1.0]))
+    if x.shape[0] % 2:
+        sections.append(np.array([1.0, tangents[-1]]))
+        slopes.append(np.array([0.0, steepness[-1]]))
+    columns = [np.convolve(_product(sections, without=j // 2), slope)[1:] for j, slope in enumerate(slopes)]
+    return _product(sections)[1:], np.array(columns).reshape(x.shape[0], x.shape[0]).T
+
+
+def _product(sections: list[FloatArray], without: int = -1) -> FloatArray:
+    product = np.ones(1)
+    for i, section in enumerate(sections):
+        if i != without:
+            product = np.convolve(product, section)
+    return product
+
+
+MOST_UNREAD = 200
+"""Unknowns spent on torque that was not read: their cost grows with the square. Beyond, the torque held stands."""
+
+DEPENDENT = 1e-9
+"""Singular value, against the largest, below which an unknown of the torque changes nothing by itself."""
+
+RIDGE = 1e-12
+"""Keeps an output that no whitened error depends on from making the normal equations singular."""
+
+
+class _Outputs:
+    """Elimination of outputs alone: the normal equations of sparse responses W, shape (n, m)."""
+
+    def __init__(self, W: csc_array) -> None:
+        self.W = W
+        self._normal = splu(csc_array(W.T @ W + RIDGE * diags_array(np.ones(W.shape[1]))))
+
+    def values(self, w: FloatArray) -> FloatArray:
+        """Return what explains w best, shape (m,) or (m, columns)."""
+        return np.asarray(self._normal.solve(np.asarray(self.W.T @ w)), dtype=np.float64)
+
+    def without(self, w: FloatArray) -> FloatArray:
+        """Return w less what the outputs explain."""
+        return np.asarray(w - self.W @ self.values(w), dtype=np.float64)
+
+
+class Elimination:
+    """The projection onto what no missing sample explains, and the values of what is missing.
+
+    Parameters
+    ----------
+    outputs : csc_array, shape (n, m), or None
+        Response of the whitened errors to each output that was not measured.
+    inputs : ndarray, shape (n, k), or None
+        Response to each unknown of torque that was not read.
+    """
+
+    def __init__(self, outputs: csc_array | None, inputs: FloatArray | None) -> None:
+        self._outputs = None if outputs is None else _Outputs(outputs)
+        self._inputs, self._basis, self._inverse = inputs, np.zeros((0, 0)), np.zeros((0, 0))
+        if inputs is not None:
+            left, sizes, right = np.linalg.svd(self._without_outputs(inputs), full_matrices=False)
+            kept = sizes > DEPENDENT * sizes[0]
+            self._basis, self._inverse = left[:, kept], right[kept].T / sizes[kept]
+        self.n_unknowns = (0 if outputs is None else int(outputs.shape[1])) + self._basis.shape[1]
+
+    def without(self, x: FloatArray) -> FloatArray:
+        """Return the projection of whitened samples, shape (n,) or (n, columns)."""
+        rest = self._without_outputs(x)
+        if self._inputs is None:
+            return rest
+        return np.asarray(rest - self._basis @ (self._basis.T @ rest), dtype=np.float64)
+
+    def values(self, w: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return what the unknown outputs, shape (m,), and inputs, shape (k,), must be for the least ``|w|``."""
+        inputs = np.zeros(0)
+        if self._inputs is not None:
+            inputs = -self._inverse @ (self._basis.T @ self._without_outputs(w))
+            w = w + self._inputs @ inputs
+        return np.zeros(0) if self._outputs is None else -self._outputs.values(w), inputs
+
+    def _without_outputs(self, x: FloatArray) -> FloatArray:
+        return x if self._outputs is None else self._outputs.without(x)
+
+
+class OutputResponses:
+    """Where unmeasured outputs enter the whitened errors; only the values change with D.
+
+    Parameters
+    ----------
+    okay : ndarray of bool, shape (n,)
+        Which outputs were measured.
+    order : int
+        Of D; the first whitened error is that of sample ``order``.
+    """
+
+    def __init__(self, okay: BoolArray, order: int) -> None:
+        missing = np.flatnonzero(~okay)
+        lag = np.arange(order + 1)
+        rows = missing[:, np.newaxis] + lag - order
+        inside = (rows >= 0) & (rows < okay.shape[0] - order)
+        self._rows, self._lag = rows[inside], np.broadcast_to(lag, rows.shape)[inside]
+        self._ends = np.concatenate([[0], np.cumsum(inside.sum(axis=1))])
+        self._shape = (okay.shape[0] - order, missing.shape[0])
+
+    def of(self, D: FloatArray) -> csc_array | None:
+        """Return the responses for a noise model; None where every output was measured."""
+        return csc_array((D[self._lag], self._rows, self._ends), shape=self._shape) if self._shape[1] else None
+
+
+class UnreadTorque:
+    """The unknowns of torque that was not read: one a sample; of a gap longer than the state, the state at its end.
+
+    Parameters
+    ----------
+    read : ndarray of bool, shape (N,), or None
+        Where the torque was read; None for everywhere.
+    n_states : int
+        Past values that fix the free response.
+    """
+
+    def __init__(self, read: BoolArray | None, n_states: int) -> None:
+        self.at: list[int] = []
+        self.is_input: list[bool] = []
+        for start, end in [] if read is None else gaps(read):
+            short = end - start <= n_states
+            self.at += range(start if short else end - n_states, end)
+            self.is_input += [short] * min(end - start, n_states)
+        if len(self.at) > MOST_UNREAD:
+            self.at, self.is_input = [], []
+
+    def responses(self, model: LinearModel, n_samples: int) -> FloatArray | None:
+        """Return the model's response to each unknown, shape (N, k); None if there is none."""
+        if not self.at:
+            return None
+        impulse = np.zeros(n_samples)
+        impulse[0] = 1.0
+        at_input, at_state = (lfilter(numerator, model.A, impulse) for numerator in (model.B, np.ones(1)))
+        columns = np.zeros((n_samples, len(self.at)))
+        for j, (t, is_input) in enumerate(zip(self.at, self.is_input, strict=True)):
+            columns[t:, j] = (at_input if is_input else at_state)[: n_samples - t]
+        return columns
+
+    def added_to(self, u: FloatArray, values: FloatArray) -> FloatArray:
+        """Return the input with the unknowns that are inputs at their values, shape (N,)."""
+        filled = u.copy()
+        inputs = np.array(self.is_input, dtype=np.bool_)
+        filled[np.array(self.at, dtype=np.int64)[inputs]] += values[inputs]
+        return filled
+
+
+def gaps(okay: BoolArray) -> list[tuple[int, int]]:
+    """Return start and end (exclusive) of each run of samples that are not okay."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[True], okay, [True]]).astype(np.int8)))
+    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
+
 
 MOST_EVALUATIONS = 60
 """Evaluations per start. Gauss-Newton needs 10 to 30; more are spent in a valley with a flat floor."""

@@ -11,27 +11,37 @@ together::
 
 From one sample of delay on (past input) they tell that B / A is wrong; below (the input answers the residual, at once
 or later) they tell of feedback.
+
+A driver, a cruise controller or an anti-jerk function that answers the speed carries noise from the output back into
+the input (ibid., section 13.4). Judge that at the recording's own period: decimated signals were low-passed, and their
+present output goes with a little of the input to come.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import chi2
 from threadpoolctl import threadpool_limits
 
-from estimator.identification.modes.propagate import CONFIDENCE, QUANTILE
-from estimator.identification.offline.blocks import Blocks
-from estimator.identification.offline.free_run import FreeRun, free_run
-from estimator.identification.offline.linear_fit import LinearFit
+from estimator.identification.modes.uncertainty import CONFIDENCE, QUANTILE
+from estimator.identification.offline.fits import FreeRun, LinearFit, free_run
 from estimator.identification.offline.noise_model import fit_noise, reach
+from estimator.signals.decimate import Blocks
 from estimator.signals.record import BoolArray, FloatArray, IntArray, Record
 
 LAGS = 25
 """Lags looked at to either side: half a second at 20 ms, the decay time of a drive's resonance."""
 
+
+JUMP = 1.2
+"""Gap in the sizes of an input's steps, as a ratio, beyond which the larger ones are jumps of an excitation."""
+
+LEAST_CORRELATED = 0.05
+"""Root of the sum of squared correlations, beyond what chance makes of it, below which a model misses nothing that
+matters: in a recording of a million samples the smallest departure is significant."""
 
 LEAST_DELAY = 1
 """Samples before which held torque can't act on a sampled speed."""
@@ -60,8 +70,10 @@ class CorrelationTest:
 
     @property
     def is_independent(self) -> bool:
-        """Tell whether the correlations are no larger than chance makes them, with 95 % confidence."""
-        return self.p_value > 1.0 - CONFIDENCE
+        """Tell whether the correlations are no larger than chance makes them, with 95 % confidence, or don't matter."""
+        by_chance = self.lag.shape[0] * (self.bound / QUANTILE) ** 2
+        beyond = float(self.correlation @ self.correlation) - by_chance
+        return self.p_value > 1.0 - CONFIDENCE or beyond < LEAST_CORRELATED**2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -102,24 +114,7 @@ class Validation:
 
 
 def validate(fit: LinearFit, record: Record, unseen: Sequence[Record] = (), lags: int = LAGS) -> Validation:
-    """Validate a fit on its own recording and on others.
-
-    Parameters
-    ----------
-    fit : LinearFit
-        Of any off-line estimator.
-    record : Record
-        The recording it was fitted to.
-    unseen : sequence of Record
-        Prepared alike, not used for the fit.
-    lags : int
-        Lags of each test, in samples of the noise model.
-
-    Raises
-    ------
-    BadModel
-        If a recording is sampled at another period than the model, or the model is unstable.
-    """
+    """Validate a fit on its own recording and on others."""
     own = free_run(fit.model, record, fit.noise)
     tests = residual_tests(own.error, record, fit.block, min(fit.model.nk, LEAST_DELAY), lags)
     return Validation(own, tuple(free_run(fit.model, other, fit.noise) for other in unseen), *tests)
@@ -128,28 +123,39 @@ def validate(fit: LinearFit, record: Record, unseen: Sequence[Record] = (), lags
 def residual_tests(
     error: FloatArray, record: Record, block: int, first: int = LEAST_DELAY, lags: int = LAGS
 ) -> tuple[CorrelationTest, CorrelationTest, CorrelationTest]:
-    """Correlate what a simulation leaves with past input, with later input, and with itself.
-
-    Parameters
-    ----------
-    error : ndarray, shape (N,)
-        Of a free run of the recording; NaN where it is not known.
-    block : int
-        Samples of which the mean is looked at (``block_of``).
-    first : int
-        Samples from which on the input can act.
-    """
+    """Correlate what a simulation leaves with past input, with later input, and with itself."""
     blocks = Blocks(record.okay & np.isfinite(error), block)
     residual = blocks.mean(np.nan_to_num(error))
     u = Blocks(np.ones_like(record.okay), block).mean(record.total_torque_nm)
     with threadpool_limits(1):
         white_error, white_input, both = _prewhitened(residual, u, blocks.okay, record.sample_time_s * block)
-    late = first if block == 1 else 0  # within one block both directions are possible
+        answer = between_jumps(u)
+        white_answer = fit_noise(answer, np.ones_like(both), reach(record.sample_time_s * block)).whiten(answer)
+    late = np.arange(-lags, first if block == 1 else 0)  # within one block both directions are possible
+    looks = [correlation_test(white_error, x, both, late) for x in (white_input, white_answer)]
+    feedback = min(looks, key=lambda look: look.p_value)
     return (
         correlation_test(white_error, white_input, both, np.arange(first, first + lags)),
-        correlation_test(white_error, white_input, both, np.arange(-lags, late)),
+        replace(feedback, p_value=min(1.0, len(looks) * feedback.p_value)),
         correlation_test(residual, residual, blocks.okay, np.arange(1, lags + 1)),
     )
+
+
+def between_jumps(u: FloatArray) -> FloatArray:
+    """Return the steps of an input without its jumps, shape (N,).
+
+    Next to a PRBS of 100 Nm a driver's answer of 1 Nm to the noise of the speed is not seen; between its jumps it is.
+    Any function of the input is independent of the residual where the loop is open, so that the test keeps its level.
+    """
+    step = np.diff(u, prepend=u[:1])
+    size = np.abs(step - np.median(step))
+    ordered, first, end = np.sort(size), size.shape[0] // 4, size.shape[0] - size.shape[0] // 50
+    if end - first < 2 or not ordered[-1] > 0.0:
+        return step
+    ratio = ordered[first + 1 : end] / np.maximum(ordered[first : end - 1], 1e-9 * ordered[-1])
+    widest = int(np.argmax(ratio))
+    small = size <= (ordered[first + widest] if ratio[widest] > JUMP else np.inf)
+    return np.where(small, step - step[small].mean(), 0.0)
 
 
 def _prewhitened(
@@ -164,16 +170,7 @@ def _prewhitened(
 
 
 def correlation_test(e: FloatArray, x: FloatArray, okay: BoolArray, lags: IntArray) -> CorrelationTest:
-    """Correlate ``e(t)`` with ``x(t - lag)`` where both samples are good.
-
-    Parameters
-    ----------
-    e, x : ndarray, shape (N,)
-        At least one of them white, for bound and p-value to hold.
-    okay : ndarray of bool, shape (N,)
-    lags : ndarray of int, shape (m,)
-        Negative: x after e.
-    """
+    """Correlate ``e(t)`` with ``x(t - lag)`` where both samples are good."""
     e, x = np.where(okay, e, 0.0), np.where(okay, x, 0.0)
     n = max(int(np.count_nonzero(okay)), 1)
     size = float(np.sqrt((e @ e) * (x @ x)))
@@ -190,3 +187,38 @@ def _product(e: FloatArray, x: FloatArray, lag: int) -> float:
     if lag >= 0:
         return float(e[lag:] @ x[: x.shape[0] - lag])
     return float(e[:lag] @ x[-lag:])
+
+
+SIGNIFICANCE = 0.01
+"""False alarms of the detection, on recordings in open loop."""
+
+
+@dataclass(frozen=True, slots=True)
+class Feedback:
+    """Whether there was feedback and what it means.
+
+    Attributes
+    ----------
+    detected : bool
+    p_value : float
+        Probability of a correlation with later input at least this large without feedback.
+    statement : str
+    """
+
+    detected: bool
+    p_value: float
+    statement: str
+
+
+def judge_feedback(validation: Validation) -> Feedback:
+    """Tell from a validated fit whether its recording was made in closed loop."""
+    p_value = validation.feedback.p_value
+    if p_value > SIGNIFICANCE:
+        statement = f"No sign of the torque following the speed (p = {p_value:.2g})."
+        return Feedback(False, p_value, statement)
+    statement = (
+        f"The torque follows the speed (p = {p_value:.2g}): a driver or controller closes the loop. The output-error, "
+        "recursive and spectral estimates are biased by the noise it feeds back. Use the Box-Jenkins model, or "
+        "hold the torque except for the PRBS."
+    )
+    return Feedback(True, p_value, statement)

@@ -1,23 +1,135 @@
-"""The one interface of every recursive estimator, and what an estimate says about itself.
+"""Recursive estimators: their one interface, and what an estimate says about itself.
 
 An estimator takes samples one by one (:meth:`RecursiveEstimator.update`, on the rig) or as a block
 (:meth:`RecursiveEstimator.run`, from a recording); both give the same bits. In the loop nothing raises: a
 sample that can't be used is masked, and an estimate that can't be trusted says so in its status, with the
 reason.
+
+An estimator is a compiled loop and its memory, a record cut into named parts of fixed shapes: its type *is* its layout,
+so a loop compiled for it knows every shape and place, unrolls what is eight long and looks up no bound. What it
+remembers is saved as plain arrays (``numpy.savez(path, **state)``, or their lists in JSON) and taken up again to the
+bit.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum, IntEnum
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from estimator.errors import BadSetting, BadShape
 from estimator.identification.linear_model import LinearModel, Orders
 from estimator.signals.record import BoolArray, FloatArray
+
+Parts = Any
+"""The record inside a compiled loop: numba's own type, which has no name in Python. Its parts are its attributes."""
+
+Shapes = Mapping[str, tuple[int, ...]]
+
+
+# Places in `live` after those of the gain.
+USED = 2  # samples that corrected theta
+PEAK = 3  # largest output seen
+HELD_SAMPLES = 4  # samples until the regressor is free of torques that were held in place of missing ones
+HELD_OUTPUTS = 5  # the same of outputs
+IS_STABLE = 6  # 1 while A_hat is stable
+BEGUN = 7  # 1 after the first torque
+TORQUE_MOVES = 8  # 1 once the torque has changed
+OUTPUT_MOVES = 9  # 1 once the output has
+LAST_OUTPUT = 10
+N_LIVE = 11
+
+# Reasons, as in estimator.identification.online.recursive.Reason.
+NONE, TOO_FEW_SAMPLES, NOT_EXCITED, UNSTABLE, CONSTANT_OUTPUT = range(5)
+
+
+class Memory:
+    """A record of numbers and its parts.
+
+    Parameters
+    ----------
+    kept : mapping
+        Shape of each part that the next sample needs, by name.
+    settings : mapping
+        Numbers that no sample changes, by name: what is kept is worth nothing without them.
+    room : mapping, optional
+        Shape of each part that no sample leaves anything in for the next.
+    """
+
+    def __init__(self, kept: Shapes, settings: Mapping[str, FloatArray], room: Shapes | None = None) -> None:
+        shapes = {**kept, **{name: numbers.shape for name, numbers in settings.items()}, **(room or {})}
+        self.record = np.zeros(1, dtype=[(name, np.float64, shape) for name, shape in shapes.items()])
+        self._kept, self._settings = tuple(kept), tuple(settings)
+        for name, numbers in settings.items():
+            self[name][...] = numbers
+
+    def __getitem__(self, name: str) -> FloatArray:
+        """Return a part: a view, to be read or written."""
+        part: FloatArray = self.record[name][0]
+        return part
+
+    @property
+    def settings(self) -> dict[str, FloatArray]:
+        """Copies of the settings, by name."""
+        return {name: self[name].copy() for name in self._settings}
+
+    @property
+    def kept(self) -> dict[str, FloatArray]:
+        """Copies of what the next sample needs, by name."""
+        return {name: self[name].copy() for name in self._kept}
+
+
+VERSION = 2
+"""Goes up when a part changes its meaning; states of another version are refused."""
+
+State = dict[str, Any]
+
+
+def saved(estimator: str, memory: Memory) -> State:
+    """Return the state of an estimator: its name, what it was set up with, and what it has learnt."""
+    return {"estimator": estimator, "version": VERSION, **memory.settings, **memory.kept}
+
+
+def restored(state: Mapping[str, Any], estimator: str, memory: Memory) -> None:
+    """Write a state into the memory of an estimator of the same kind and settings."""
+    for name, expected in (("estimator", estimator), ("version", VERSION)):
+        _require(str(np.asarray(_part(state, name))) == str(expected), name, state[name], repr(expected))
+    for name, setting in memory.settings.items():
+        _require(
+            np.array_equal(_numbers(state, name), setting), name, state[name], f"{setting.tolist()}, as set up here"
+        )
+    new = {name: _numbers(state, name) for name in memory.kept}
+    for name, values in new.items():
+        _require(values.shape == memory[name].shape, name, f"of shape {values.shape}", f"shape {memory[name].shape}")
+        _require(bool(np.isfinite(values).all()), name, "not finite", "finite numbers only")
+    for name, values in new.items():
+        memory[name][...] = values
+
+
+def _part(state: Mapping[str, Any], name: str) -> Any:
+    _require(name in state, name, "missing", "a part of every state")
+    return state[name]
+
+
+def _numbers(state: Mapping[str, Any], name: str) -> np.ndarray:
+    part = _part(state, name)
+    try:
+        return np.asarray(part, dtype=np.float64)
+    except (TypeError, ValueError) as fault:
+        raise BadSetting(f"state of an estimator: {name} holds {part!r}, expected numbers only.") from fault
+
+
+def _require(fits: bool, name: str, got: Any, expected: str) -> None:
+    if not fits:
+        raise BadSetting(
+            f"state of an estimator: {name} is {got}, expected {expected}. Restore it into an estimator of the same "
+            "kind and settings as the one that was saved."
+        )
+
 
 ReasonArray = NDArray[np.int8]
 
@@ -146,49 +258,126 @@ class Trajectory:
         )
 
 
-class RecursiveEstimator(Protocol):
-    """What every recursive estimator offers."""
+_REASONS = tuple(Reason)
+
+
+Block = Callable[..., None]
+"""A compiled loop: ``block(u, y, okay, memory, out)``, one row of ``out`` (:func:`row_type`) for each sample."""
+
+
+def row_type(n_parameters: int, n_extra: int) -> np.dtype[np.void]:
+    """Return the type of a row of results: :class:`Estimate` as the compiled loops write it."""
+    numbers = [(name, np.float64) for name in ("y_hat", "e_prior", "e_post")]
+    vectors = [("theta", np.float64, (n_parameters,)), ("extra", np.float64, (n_extra,))]
+    return np.dtype([*vectors, *numbers, ("used", np.bool_), ("reason", np.int8)], align=True)
+
+
+class RecursiveEstimator:
+    """A recursive estimator around compiled loops; memory does not grow.
+
+    Parameters
+    ----------
+    name : str
+        What the registry and saved states call it.
+    block : callable
+        Its compiled loop.
+    orders : Orders
+        Structure of the model it gives.
+    memory : Memory
+        With its start values.
+    extra_names : tuple of str
+        What it holds besides theta, in the columns after it.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        block: Block,
+        orders: Orders,
+        memory: Memory,
+        extra_names: tuple[str, ...] = (),
+    ) -> None:
+        self._name, self._block, self._orders = name, block, orders
+        self._memory, self._extra_names = memory, extra_names
+        self._row = np.zeros(1, row_type(orders.n_parameters, len(extra_names)))
+        self._row_theta = self._row["theta"][0]
+        self._row_rest = self._row[["reason", "used", "y_hat", "e_prior", "e_post"]]
+        self._u, self._y, self._okay = np.zeros(1), np.zeros(1), np.ones(1, dtype=np.bool_)
+        # An empty block compiles the loop now, so that the first cycle on the rig does not wait for it.
+        self.run(np.empty(0), np.empty(0), np.empty(0, dtype=np.bool_))
+
+    @property
+    def name(self) -> str:
+        """What the registry and saved states call it."""
+        return self._name
 
     @property
     def orders(self) -> Orders:
         """Structure of the model."""
-        ...
+        return self._orders
 
     @property
     def theta(self) -> FloatArray:
-        """Present parameters, shape (na+nb,), a copy."""
-        ...
+        """Present parameters ``a_1 .. a_na, b_1 .. b_nb``, a copy."""
+        return self._memory["theta"][: self._orders.n_parameters].copy()
+
+    @property
+    def extra_names(self) -> tuple[str, ...]:
+        """Names of what it estimates besides theta; see :attr:`Trajectory.extra`."""
+        return self._extra_names
 
     @property
     def undetermined(self) -> tuple[str, ...]:
         """Names of the parameters the samples so far do not determine."""
-        ...
-
-    @property
-    def extra_names(self) -> tuple[str, ...]:
-        """Names of what it holds besides theta; see :attr:`Trajectory.extra`."""
-        ...
-
-    def update(self, u: float, y: float, okay: bool = True) -> Estimate:
-        """Take one sample."""
-        ...
-
-    def run(self, u: FloatArray, y: FloatArray, okay: BoolArray) -> Trajectory:
-        """Take a block of samples, each array of shape (N,)."""
-        ...
+        raise NotImplementedError
 
     def model(self, sample_time_s: float) -> LinearModel:
         """Return the present parameters as a model."""
-        ...
+        return LinearModel.from_theta(self.theta, self._orders, sample_time_s)
 
     def statement(self, reason: Reason) -> str:
-        """Return what is wrong with an estimate of that reason, naming the parameters, and what to do."""
-        ...
+        """Return what is wrong with an estimate of that reason, naming the parameters, and what to do; or nothing."""
+        return statement(reason, self.undetermined)
 
-    def state(self) -> dict[str, Any]:
-        """Return everything it remembers, as plain arrays; :mod:`estimator.identification.online.state`."""
-        ...
+    def update(self, u: float, y: float, okay: bool = True) -> Estimate:
+        """Take one sample; correct ``theta`` by the error of the prediction.
+
+        Cost and memory do not depend on the samples before. Never raises on a value.
+        """
+        self._u[0], self._y[0], self._okay[0] = u, y, okay
+        self._advance(self._u, self._y, self._okay, self._row)
+        reason, *rest = self._row_rest.item()
+        return Estimate(self._row_theta.copy(), _REASONS[reason], *rest)
+
+    def run(self, u: FloatArray, y: FloatArray, okay: BoolArray) -> Trajectory:
+        """Take a block of samples, with the same bits as one by one."""
+        if not (u.ndim == 1 and u.shape == y.shape == okay.shape):
+            raise BadShape(
+                f"{self._name}: u, y and okay have the shapes {u.shape}, {y.shape}, {okay.shape}, expected one shape "
+                "(N,). Give every signal one value per sample."
+            )
+        out = np.empty(u.shape[0], self._row.dtype)
+        self._advance(
+            np.ascontiguousarray(u, dtype=np.float64),
+            np.ascontiguousarray(y, dtype=np.float64),
+            np.ascontiguousarray(okay, dtype=np.bool_),
+            out,
+        )
+        return Trajectory(**{name: out[name] for name in self._row.dtype.names or ()}, extra_names=self._extra_names)
+
+    def _advance(self, u: FloatArray, y: FloatArray, okay: BoolArray, out: NDArray[np.void]) -> None:
+        self._block(u, y, okay, self._memory.record, out)
+
+    @property
+    def _stands_still(self) -> bool:
+        """Whether a signal has never changed, so that nothing is determined whatever the gain says."""
+        live = self._memory["live"]
+        return bool(live[TORQUE_MOVES] == 0.0 or live[OUTPUT_MOVES] == 0.0)
+
+    def state(self) -> State:
+        """Return everything it remembers, as plain arrays; see :mod:`estimator.identification.online.recursive`."""
+        return saved(self._name, self._memory)
 
     def restore(self, state: Mapping[str, Any]) -> None:
-        """Take up a saved state; what follows has the bits it would have had without the break."""
-        ...
+        """Take up a saved state: what follows has the bits it would have had without the break."""
+        restored(state, self._name, self._memory)

@@ -16,14 +16,10 @@ import numpy as np
 from estimator.errors import BadModel
 from estimator.identification.linear_model import Orders
 from estimator.identification.online.adaptation import Adaptation, DecreasingThenConstantTrace
-from estimator.identification.online.ekf import Ekf
-from estimator.identification.online.ekf_noise import EkfNoise
-from estimator.identification.online.oeepm import OeEpm
+from estimator.identification.online.ekf import Ekf, EkfNoise, TwoMass
 from estimator.identification.online.oefo import Filtering, Oefo
 from estimator.identification.online.recursive import RecursiveEstimator
-from estimator.identification.online.riv import Riv
-from estimator.identification.online.rls import Rls
-from estimator.identification.online.two_mass import TwoMass
+from estimator.identification.online.rls_riv_oeepm import OeEpm, Riv, Rls
 from estimator.signals.record import FloatArray
 
 

@@ -1,10 +1,31 @@
-"""The record of an alarm: when, what, from where to where, on what evidence."""
+"""Alarms of a change of the resonance: record, state of the tracking, and the threshold for a rate of false ones.
+
+The rule: two statistics in a row beyond a threshold h, on the same side. Each is standardised with the mean m and the
+standard deviation s of statistics before, ``tau = (x - m) / (s sqrt(1 + 1/n))``: m of n of them, s with nu degrees of
+freedom. Where nothing changes, and the statistics are independent and normal, two tau have a bivariate t distribution
+with nu degrees of freedom, correlated by ``rho = 1 / (n + 1)`` through m. By Plackett's identity for its derivative
+with respect to the correlation (Biometrika 41, 1954; A. Genz, Statistics and Computing 14, 2004), from -1, where both
+can't be beyond h, up to rho::
+
+    P(both beyond h) = 2 / (2 pi) integral (1 + 2 h^2 / (nu (1 + sin theta)))^(-nu / 2) dtheta,  -pi/2 to asin(rho)
+
+That times the statistics per hour is the expected number of false alarms in an hour, an upper bound. Two beyond a lower
+threshold instead of one beyond a higher: the rate rests on the bulk of the distribution, and not on tails that nobody
+knows.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from enum import IntEnum
+from functools import cache
 from typing import Any
+
+import numpy as np
+
+from estimator.errors import BadSetting
+from estimator.signals.record import FloatArray
 
 NORMAL_95 = 1.959963984540054
 """Standard deviations that hold 95 % of a normal distribution, either way."""
@@ -104,13 +125,7 @@ class Alarm:
 
     @classmethod
     def from_json(cls, document: Mapping[str, Any]) -> Alarm:
-        """Read what `as_json` gave.
-
-        Raises
-        ------
-        KeyError, TypeError, ValueError
-            If it is something else.
-        """
+        """Read what `as_json` gave."""
         begin_s, end_s = document["changed_between_s"]
         return cls(
             time_s=document["time_s"],
@@ -121,3 +136,70 @@ class Alarm:
             settled=document["settled"],
             **document["evidence"],
         )
+
+
+class TrackingState(IntEnum):
+    """State of the tracking at a sample; in files and on screens it has the name in small letters."""
+
+    STARTING = 0  # there is no resonance to be watched, yet or for a moment
+    LEARNING = 1  # what is usual is being learnt; no alarm can come
+    WATCHING = 2  # a change is alarmed
+    SETTLING = 3  # after an alarm: the estimate is on its way
+    NOT_EXCITED = 4  # the torque says nothing of the resonance: no alarm can come, and the estimate is held or none
+
+    @property
+    def word(self) -> str:
+        """The state as it stands in a file."""
+        return self.name.lower()
+
+    @property
+    def words(self) -> str:
+        """The state as it stands in a text."""
+        return self.word.replace("_", " ")
+
+
+HIGHEST = 40.0
+"""No threshold is sought above."""
+
+NODES = 200
+"""Of the Gauss-Legendre quadrature: twelve digits for thresholds from 0.1 up."""
+
+HALVINGS = 40
+"""Of the interval that holds the threshold: to below 1e-10 of `HIGHEST`."""
+
+
+@cache
+def _quadrature() -> tuple[FloatArray, FloatArray]:
+    """Return nodes and weights on the interval from 0 to 1."""
+    nodes, weights = np.polynomial.legendre.leggauss(NODES)
+    return (nodes + 1.0) / 2, weights / 2
+
+
+def false_pairs(threshold: float, n: int, freedom: int) -> float:
+    """Return the probability that two statistics in a row are beyond a threshold, on the same side."""
+    nodes, weights = _quadrature()
+    length = np.arcsin(1.0 / (n + 1)) + np.pi / 2
+    share = 1.0 + np.sin(nodes * length - np.pi / 2)
+    density = (1.0 + 2.0 * threshold**2 / (freedom * share)) ** (-freedom / 2)
+    return float(length / np.pi * weights @ density)
+
+
+@cache
+def threshold_for(false_alarms_per_hour: float, statistics_per_hour: float, n: int, freedom: int) -> float:
+    """Return the threshold that has at most so many false alarms an hour."""
+    wanted = false_alarms_per_hour / statistics_per_hour
+    if not 0.0 < wanted < false_pairs(0.0, n, freedom):
+        raise BadSetting(
+            f"alarm: false_alarms_per_hour is {false_alarms_per_hour}, expected above 0 and below "
+            f"{statistics_per_hour * false_pairs(0.0, n, freedom):.4g}, what no threshold at all has."
+        )
+    if false_pairs(HIGHEST, n, freedom) > wanted:
+        raise BadSetting(
+            f"alarm: false_alarms_per_hour is {false_alarms_per_hour}, fewer than a level of {n} blocks and a spread "
+            f"with {freedom} degrees of freedom can promise. Take a longer reference."
+        )
+    low, high = 0.0, HIGHEST
+    for _ in range(HALVINGS):  # the probability falls with the threshold
+        middle = (low + high) / 2
+        low, high = (middle, high) if false_pairs(middle, n, freedom) > wanted else (low, middle)
+    return high

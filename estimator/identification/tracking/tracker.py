@@ -1,7 +1,7 @@
 """A recursive estimator, followed and watched, block by block of samples.
 
 What a block says of the excitation decides what becomes of the next: it is learnt from, the estimator is held, or it
-begins anew (:mod:`excitation`). Blocks begin with the first sample that comes, so that samples one by one, or all at
+begins anew (:mod:`follow`). Blocks begin with the first sample that comes, so that samples one by one, or all at
 once, are cut alike.
 """
 
@@ -14,10 +14,8 @@ from typing import Any
 import numpy as np
 
 from estimator.identification.online.recursive import RecursiveEstimator, Trajectory
-from estimator.identification.tracking.alarm import Alarm, Level
-from estimator.identification.tracking.excitation import Excitation
-from estimator.identification.tracking.follow import Followed, Follower
-from estimator.identification.tracking.state import TrackingState
+from estimator.identification.tracking.alarm import Alarm, Level, TrackingState
+from estimator.identification.tracking.follow import Excitation, Followed, Follower
 from estimator.identification.tracking.watch import ChangeWatch
 from estimator.signals.record import BoolArray, FloatArray, IntArray
 
@@ -52,7 +50,7 @@ class Tracker:
     def __init__(self, estimator: RecursiveEstimator, follower: Follower, watch: ChangeWatch) -> None:
         self._estimator, self._follower, self.watch = estimator, follower, watch
         self._fresh = (estimator.state(), follower.state())
-        self._drowned = 0  # how often the estimator has begun anew since the resonance was last watched
+        self._drowned = 0  # how often the estimator has begun anew since the resonance was last excited for long
 
     def run(self, time_s: FloatArray, u: FloatArray, y: FloatArray, okay: BoolArray) -> Tracked:
         """Take samples, each array of shape (n,); n may be 0."""
@@ -90,7 +88,7 @@ class Tracker:
             self._drowned += 1
             self._estimator.restore(self._fresh[0])
             self._follower.restore(self._fresh[1])
-        elif excitation is Excitation.EXCITED and self.watch.doing is TrackingState.WATCHING:
+        elif self._follower.is_trusted:
             self._drowned = 0
         return alarm
 

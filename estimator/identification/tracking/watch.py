@@ -2,7 +2,7 @@
 
 A reference model, the estimate once it has settled, runs free alongside the driveline. If the natural frequency moves
 by delta, its error is to first order ``e = w + psi delta``, with psi the sensitivity of the output to that frequency
-(:mod:`sensitivity_kernel`; e and psi are both taken in steps). Every second the samples come to one deviation::
+(:mod:`poles`; e and psi are both taken in steps). Every second the samples come to one deviation::
 
     d = sum psi e / sum psi^2
 
@@ -13,8 +13,10 @@ move, the score has it in the first block.
 A change smaller than :attr:`WatchSettings.smallest_change` counts as none: so much is taken off d first.
 
 No noise model is believed: level and spread of d are those of :attr:`WatchSettings.reference_blocks` blocks seen
-before, a period of the PRBS and more, so that what the model lacks, which the PRBS repeats, is part of them
-(:mod:`baseline`). The threshold follows from the rate of false alarms (:mod:`threshold`).
+before, a period of the PRBS and more, so that what the model lacks, which the PRBS repeats, is part of them. With the
+information p = sum psi^2 of a block, x = d sqrt(p) has one spread s for every p as long as noise is what spreads it;
+what the model lacks spreads d instead. Which of the two it was is not known: the variance of d is the larger of both,
+``s^2 max(1/p, 1/p_usual)``. The threshold follows from the rate of false alarms (:mod:`alarm`).
 
 A block that is not excited is left out: the reference runs on, and with the excitation the watch is there again.
 
@@ -31,27 +33,237 @@ from typing import Any
 
 import numpy as np
 
-from estimator.identification.linear_model import Orders
+from estimator.compiled import compiled
+from estimator.identification.linear_model import ComplexArray, Orders
 from estimator.identification.modes.modes import LIGHTLY_DAMPED
 from estimator.identification.online.recursive import Trajectory
-from estimator.identification.tracking.alarm import Alarm, Level
-from estimator.identification.tracking.baseline import Baseline, Spread, spread_of
-from estimator.identification.tracking.sensitivity_kernel import N_THROUGH
-from estimator.identification.tracking.state import TrackingState
-from estimator.identification.tracking.watch_kernel import (
-    ERROR_2,
-    GOOD,
-    N_MODE,
-    N_SCORE,
-    OUTPUT_2,
-    PSI_2,
-    PSI_E,
-    REFERENCE_HZ,
-    take_reference,
-    watch_block,
+from estimator.identification.tracking.alarm import Alarm, Level, TrackingState, threshold_for
+from estimator.identification.tracking.follow import NA, NB, NK, shift_in
+from estimator.identification.tracking.poles import (
+    DAMPING,
+    FREQUENCY_HZ,
+    LAST,
+    N_THROUGH,
+    dominant,
+    pass_torque,
+    residue,
+    sensitivity,
+    squared,
+    weight_of,
 )
-from estimator.identification.tracking.watch_settings import WatchSettings
-from estimator.signals.record import BoolArray, FloatArray
+from estimator.signals.record import BoolArray, FloatArray, IntArray
+from estimator.signals.settings import Requirement, is_positive, require
+
+
+@dataclass(frozen=True, slots=True)
+class Spread:
+    """How blocks scatter.
+
+    Attributes
+    ----------
+    of_x : float
+        Standard deviation s of d sqrt(p).
+    usual : float
+        Mean information of the blocks it is known from.
+    """
+
+    of_x: float
+    usual: float
+
+    def variance(self, information: float) -> float:
+        """Return the variance of the deviation that a block of so much information gives [Hz^2]."""
+        return self.of_x**2 * max(1.0 / information, 1.0 / self.usual)
+
+
+@dataclass(frozen=True, slots=True)
+class Baseline:
+    """Mean deviation of some blocks, weighted by their information.
+
+    Attributes
+    ----------
+    level_hz : float
+        Their mean [Hz].
+    information : float
+        Of all of them.
+    """
+
+    level_hz: float
+    information: float
+
+    @classmethod
+    def of(cls, deviation_hz: FloatArray, information: FloatArray) -> Baseline:
+        """Take the mean of blocks, each array of shape (n,)."""
+        total = float(information.sum())
+        return cls(float(information @ deviation_hz) / total, total)
+
+    def statistic(self, deviation_hz: float, information: float, tolerated_hz: float, spread: Spread) -> float:
+        """Return how far a block is from here, beyond what is tolerated, in standard deviations."""
+        away = deviation_hz - self.level_hz
+        beyond = np.sign(away) * max(abs(away) - tolerated_hz, 0.0)
+        return float(beyond / np.sqrt(spread.variance(information) + spread.of_x**2 / self.information))
+
+
+def spread_of(number: FloatArray, deviation_hz: FloatArray, information: FloatArray) -> Spread:
+    """Return how blocks scatter about a straight line over their numbers, each array of shape (n,), n of 3 or more.
+
+    A line, since a resonance that drifts while it is learnt would be taken for one that scatters.
+    """
+    mean = (information @ number) / information.sum()
+    level = (information @ deviation_hz) / information.sum()
+    slope = (information @ ((number - mean) * (deviation_hz - level))) / (information @ (number - mean) ** 2)
+    rest = deviation_hz - level - slope * (number - mean)
+    return Spread(float(np.sqrt(information @ rest**2 / (number.size - 2))), float(information.mean()))
+
+
+HOUR_S = 3600.0
+
+
+@dataclass(frozen=True, slots=True)
+class WatchSettings:
+    """How a change is watched for.
+
+    Attributes
+    ----------
+    false_alarms_per_hour : float
+        So many an hour, at most, where the resonance does not move by more than ``smallest_change``.
+    smallest_change : float
+        A change up to this share of the resonance counts as none: 1 % is 2 % of the stiffness, and more than a
+        heavily laden bus makes of it.
+    block_s : float
+        Length of a block [s]: several times the memory of the mode, so that blocks are nearly independent.
+    reference_blocks : int
+        Blocks that level and spread are learnt from: with one second each, a PRBS period of 1023 levels of 20 ms.
+    baseline_blocks : int
+        Blocks that the level is learnt from after an alarm: as few as make the threshold little higher.
+    settling_s : float
+        How long the estimate is left to itself after an alarm [s]: four memories of a forgetting of 0.995 at 20 ms.
+    fewest_share : float
+        A block with a smaller share of usable samples is left out.
+    """
+
+    false_alarms_per_hour: float = 0.1
+    smallest_change: float = 0.01
+    block_s: float = 1.0
+    reference_blocks: int = 21
+    baseline_blocks: int = 7
+    settling_s: float = 16.0
+    fewest_share: float = 0.8
+
+    def __post_init__(self) -> None:
+        share, blocks, smallest = self.fewest_share, self.reference_blocks, self.smallest_change
+        require(
+            "watch",
+            (
+                Requirement("smallest_change", smallest, 0 <= smallest < 1, "a share from 0 to 1"),
+                Requirement("block_s", self.block_s, is_positive(self.block_s), "a length above 0 s"),
+                Requirement("reference_blocks", blocks, blocks >= 3, "3 or more"),
+                Requirement("baseline_blocks", self.baseline_blocks, self.baseline_blocks >= 1, "1 or more"),
+                Requirement("settling_s", self.settling_s, self.settling_s >= 0, "0 s or more"),
+                Requirement("fewest_share", share, 0 < share <= 1, "a share above 0 and at most 1"),
+            ),
+        )
+
+    def block_samples(self, sample_time_s: float) -> int:
+        """Return the samples of a block at a sampling period [s]."""
+        return max(round(self.block_s / sample_time_s), 1)
+
+    def threshold(self, blocks: int, sample_time_s: float) -> float:
+        """Return the threshold next to a level learnt from so many blocks."""
+        per_hour = HOUR_S / (self.block_samples(sample_time_s) * sample_time_s)
+        return threshold_for(self.false_alarms_per_hour, per_hour, blocks, self.reference_blocks - 2)
+
+
+# Rows of `past`: newest value first.
+OUTPUT, INPUT = 0, 1
+
+# Places in `mode`: the reference's resonance.
+REFERENCE_HZ = 0  # 0 while there is no reference
+POLE_RE, POLE_IM, WEIGHT_RE, WEIGHT_IM = 1, 2, 3, 4
+ERROR, OUTPUT_THEN = 5, 6  # of the last sample; NaN where it was not good
+N_MODE = 7
+
+# Places in `score`: sums over the present block.
+GOOD = 0  # samples that were good, and so was the one before
+PSI_E = 1  # sum of psi and the error's step
+PSI_2 = 2  # sum of psi^2
+ERROR_2, OUTPUT_2 = 3, 4  # sums of the squared steps of error and output
+N_SCORE = 5
+
+
+@compiled
+def take_reference(
+    theta: FloatArray,
+    structure: IntArray,
+    sample_time_s: float,
+    band: FloatArray,
+    work: FloatArray,
+    roots: ComplexArray,
+    mode: FloatArray,
+    through: FloatArray,
+) -> None:
+    """Take the resonance of a model for reference; none where it has no damped one."""
+    na = structure[NA]
+    mode[:] = 0.0
+    mode[ERROR] = np.nan
+    through[:LAST] = 0.0
+    found = dominant(theta, na, structure[NK], sample_time_s, band, roots, work)
+    if found < 0 or not work[DAMPING] > 0.0 or not squared(roots[found]) < 1.0:
+        return
+    weight = weight_of(roots[found], residue(theta[na:], structure[NK], roots, found), work[DAMPING], sample_time_s)
+    mode[REFERENCE_HZ] = work[FREQUENCY_HZ]
+    mode[POLE_RE], mode[POLE_IM] = roots[found].real, roots[found].imag
+    mode[WEIGHT_RE], mode[WEIGHT_IM] = weight.real, weight.imag
+
+
+@compiled
+def reference_output(structure: IntArray, theta: FloatArray, past: FloatArray) -> float:
+    """Return the next output of the reference model, from its own outputs and the inputs."""
+    na = structure[NA]
+    value = 0.0
+    for i in range(na):
+        value -= theta[i] * past[OUTPUT, i]
+    for j in range(structure[NB]):
+        value += theta[na + j] * past[INPUT, structure[NK] + j]
+    return value
+
+
+@compiled
+def take_error(error: float, y: float, mode: FloatArray, through: FloatArray, score: FloatArray) -> None:
+    """Take the error of a sample, NaN where it is not good, into the score of its block."""
+    psi = sensitivity(complex(mode[WEIGHT_RE], mode[WEIGHT_IM]), through)
+    step, y_step = error - mode[ERROR], y - mode[OUTPUT_THEN]
+    mode[ERROR], mode[OUTPUT_THEN] = error, y
+    if step == step:
+        score[GOOD] += 1.0
+        score[PSI_E] += psi * step
+        score[PSI_2] += psi * psi
+        score[ERROR_2] += step * step
+        score[OUTPUT_2] += y_step * y_step
+
+
+@compiled
+def watch_block(
+    u: FloatArray,
+    y: FloatArray,
+    okay: BoolArray,
+    y_hat: FloatArray,
+    structure: IntArray,
+    theta: FloatArray,
+    mode: FloatArray,
+    through: FloatArray,
+    past: FloatArray,
+    score: FloatArray,
+) -> None:
+    """Run the reference through the samples of a block; without one, its outputs are those of the estimate."""
+    for t in range(u.shape[0]):
+        shift_in(past[INPUT], u[t] if np.isfinite(u[t]) else past[INPUT, 0])
+        value = y_hat[t]
+        if mode[REFERENCE_HZ] > 0.0:
+            value = reference_output(structure, theta, past)
+            take_error(y[t] - value if okay[t] else np.nan, y[t], mode, through, score)
+        pass_torque(past[INPUT, 0], complex(mode[POLE_RE], mode[POLE_IM]), through)
+        shift_in(past[OUTPUT], value)
+
 
 CANDIDATES = 5
 """Estimates that the reference is chosen from, one a block: a single one may be of a bad moment, when a spare pair of
@@ -151,26 +363,7 @@ class ChangeWatch:
     def end_block(
         self, time_s: float, theta: FloatArray, frequency: Level | None, damping: float, excited: bool
     ) -> Alarm | None:
-        """End the present block.
-
-        Parameters
-        ----------
-        time_s : float
-            Moment of its last sample [s].
-        theta : ndarray, shape (na+nb,)
-            The estimate now.
-        frequency : Level or None
-            Its resonance [Hz]; None where it has none, or it is not known how sure it is.
-        damping : float
-            Its damping ratio; NaN where it has none.
-        excited : bool
-            Whether the block was excited.
-
-        Returns
-        -------
-        Alarm or None
-            A change that was found, or once more when the estimate has settled.
-        """
+        """End the present block."""
         score = self._live["score"].tolist()
         self._live["score"][:] = 0.0
         self.statistic = np.nan

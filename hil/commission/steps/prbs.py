@@ -157,7 +157,7 @@ def _course(speed_rad_s: FloatArray, period_s: float) -> tuple[float, float]:
 
 
 def _spread(job: Job, record: Record) -> ResonanceSpread | None:
-    from estimator.identification.offline.output_error import fit_output_error  # half a second, and the bus comes first
+    from estimator.identification.offline.fits import fit_output_error  # half a second, and the bus comes first
 
     extra = int(job.evidence("scales").get("extra_samples") or 0)
     try:

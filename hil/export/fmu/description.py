@@ -7,7 +7,7 @@ from datetime import datetime
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from hil import __version__
-from hil.export.fmu.variables import Variable
+from hil.export.fmu.driveline import Variable
 
 IDENTIFIER = "driveline"
 """Name of the binary and prefix of nothing else: the functions are exported by their own names."""
@@ -17,17 +17,7 @@ def description(
     version: str, name: str, token: str, made: datetime, period_s: float, sources: Sequence[str],
     variables: Sequence[Variable],
 ) -> bytes:  # fmt: skip
-    """Return the text of modelDescription.xml.
-
-    Parameters
-    ----------
-    version : str
-        ``2.0`` or ``3.0``.
-    token : str
-        Which build it belongs to (FMI 2.0: guid).
-    sources : sequence of str
-        C files that are compiled.
-    """
+    """Return the text of modelDescription.xml."""
     is_2 = version == "2.0"
     root = Element(
         "fmiModelDescription",
@@ -38,27 +28,21 @@ def description(
             "generationTool": f"hil {__version__}",
             "generationDateAndTime": made.strftime("%Y-%m-%dT%H:%M:%SZ"),
             "variableNamingConvention": "structured",
-            **({"numberOfEventIndicators": "0"} if is_2 else {}),
         },
     )
-    for kind in ("ModelExchange", "CoSimulation"):
-        attributes = {"modelIdentifier": IDENTIFIER}
-        if kind == "CoSimulation":
-            attributes["canHandleVariableCommunicationStepSize"] = "true"
-        elif not is_2:
-            attributes["needsCompletedIntegratorStep"] = "true"  # what a delay remembers; in FMI 2.0 by default
-        of_kind = SubElement(root, kind, attributes)
-        if is_2:
-            files = SubElement(of_kind, "SourceFiles")
-            for source in sources:
-                SubElement(files, "File", {"name": source})
+    attributes = {"modelIdentifier": IDENTIFIER, "canHandleVariableCommunicationStepSize": "true"}
+    of_kind = SubElement(root, "CoSimulation", attributes)
+    if is_2:
+        files = SubElement(of_kind, "SourceFiles")
+        for source in sources:
+            SubElement(files, "File", {"name": source})
     units = SubElement(root, "UnitDefinitions")
     for unit in sorted({each.unit for each in variables if each.unit}):
         SubElement(units, "Unit", {"name": unit})
     SubElement(root, "DefaultExperiment", {"startTime": "0", "stepSize": repr(period_s)})
     listed = SubElement(root, "ModelVariables")
     for each in variables:
-        (_variable_2 if is_2 else _variable_3)(listed, each, variables)
+        (_variable_2 if is_2 else _variable_3)(listed, each)
     (_structure_2 if is_2 else _structure_3)(SubElement(root, "ModelStructure"), variables)
     indent(root)
     return bytes(tostring(root, encoding="utf-8", xml_declaration=True))
@@ -80,8 +64,6 @@ def _common(each: Variable) -> dict[str, str]:
     attributes["variability"] = each.variability
     if each.description:
         attributes["description"] = each.description
-    if each.initial:
-        attributes["initial"] = each.initial
     return attributes
 
 
@@ -97,52 +79,27 @@ def _typed(each: Variable) -> dict[str, str]:
     return attributes
 
 
-def _variable_2(listed: Element, each: Variable, variables: Sequence[Variable]) -> None:
+def _variable_2(listed: Element, each: Variable) -> None:
     variable = SubElement(listed, "ScalarVariable", _common(each))
-    attributes = _typed(each)
-    if each.derivative_of >= 0:
-        attributes["derivative"] = str(_index_of(each.derivative_of, variables))
-    SubElement(variable, "Boolean" if isinstance(each.start, bool) else "Real", attributes)
+    SubElement(variable, "Boolean" if isinstance(each.start, bool) else "Real", _typed(each))
 
 
-def _variable_3(listed: Element, each: Variable, variables: Sequence[Variable]) -> None:
-    attributes = {**_common(each), **_typed(each)}
-    if each.derivative_of >= 0:
-        attributes["derivative"] = str(each.derivative_of)
-    SubElement(listed, "Boolean" if isinstance(each.start, bool) else "Float64", attributes)
-
-
-def _index_of(reference: int, variables: Sequence[Variable]) -> int:
-    """Return the place of a variable in the list, counted from 1: FMI 2.0 refers to that."""
-    return 1 + next(i for i, each in enumerate(variables) if each.reference == reference)
-
-
-def _outputs(variables: Sequence[Variable]) -> list[Variable]:
-    return [each for each in variables if each.causality == "output"]
-
-
-def _calculated(variables: Sequence[Variable]) -> list[Variable]:
-    return [each for each in variables if each.causality == "output" or each.initial == "calculated"]
+def _variable_3(listed: Element, each: Variable) -> None:
+    tag = "Boolean" if isinstance(each.start, bool) else "Float64"
+    SubElement(listed, tag, {**_common(each), **_typed(each)})
 
 
 def _structure_2(structure: Element, variables: Sequence[Variable]) -> None:
-    derivatives = [each for each in variables if each.derivative_of >= 0]
-    for tag, unknown in (
-        ("Outputs", _outputs(variables)),
-        ("Derivatives", derivatives),
-        ("InitialUnknowns", _calculated(variables)),
-    ):
+    """List the outputs by their places in the list, counted from 1: FMI 2.0 refers to that."""
+    places = [place for place, each in enumerate(variables, 1) if each.causality == "output"]
+    for tag in ("Outputs", "InitialUnknowns"):
         group = SubElement(structure, tag)
-        for each in unknown:
-            SubElement(group, "Unknown", {"index": str(_index_of(each.reference, variables))})
+        for place in places:
+            SubElement(group, "Unknown", {"index": str(place)})
 
 
 def _structure_3(structure: Element, variables: Sequence[Variable]) -> None:
-    derivatives = [each for each in variables if each.derivative_of >= 0]
-    for tag, unknown in (
-        ("Output", _outputs(variables)),
-        ("ContinuousStateDerivative", derivatives),
-        ("InitialUnknown", _calculated(variables)),
-    ):
-        for each in unknown:
-            SubElement(structure, tag, {"valueReference": str(each.reference)})
+    for tag in ("Output", "InitialUnknown"):
+        for each in variables:
+            if each.causality == "output":
+                SubElement(structure, tag, {"valueReference": str(each.reference)})

@@ -3,19 +3,153 @@
 from __future__ import annotations
 
 import hashlib
+import math
 import os
+import re
 import shutil
 import subprocess
 import tempfile
 import zipfile
+from collections.abc import Iterator
 from datetime import UTC, datetime
+from importlib import resources
 from pathlib import Path
 
-from hil.errors import UsageError
-from hil.export.fmu import sources
+from estimator.physics import driveline as start
+from estimator.physics import inputs as torque_path
+from estimator.physics import low_pass
+from estimator.physics.effects import actuator_lag
+from estimator.physics.kernel import bristles, conditions, rates, sensing, slots, state_vector
+from estimator.physics.kernel import conditions as line
+from estimator.physics.kernel import rates as contact
+from estimator.physics.layout import SIZE, slot
+from hil.config.model_file import read_model, read_model_for_recordings
+from hil.errors import ModelFileError, UsageError
+from hil.export.c_laws import Translation
 from hil.export.fmu.description import IDENTIFIER, build_description, description
-from hil.export.fmu.driveline import Driveline
-from hil.export.fmu.variables import variables
+from hil.export.fmu.driveline import (
+    NAMED,
+    PARAMETER,
+    STATE,
+    STATES,
+    VALUES,
+    WARMTH,
+    Driveline,
+    begun,
+    driveline,
+    start_values,
+    variables,
+)
+from hil.problems import read_toml
+from hil.recording import read_record
+from hil.recording.signals_config import SignalsConfig
+from hil.report.outputs import publish
+
+USED = (
+    conditions.conditions, conditions.with_torque, line.is_elastic, line.is_extended, line.is_bristled, bristles.bent,
+    bristles.rubbed, contact.stepped, rates.rates, rates.shaft_torques, sensing.entry, sensing.reading,
+    sensing.read_angle, sensing.smoothed, sensing.shown, low_pass.low_pass, actuator_lag.step, start.follow,
+)  # fmt: skip
+"""What driveline.c calls; what these call comes along."""
+
+_FROM_SLOTS = ("DELAY", "DELAYED_BEFORE", "LAG", "LAG_SHAPE", "FILTER", "FILTER_SHAPE")
+_OF_THE_PATH = {
+    "GAIN_M1": ("inverter_gain_mismatch", "gain_m1"),
+    "GAIN_M2": ("inverter_gain_mismatch", "gain_m2"),
+    "LIMIT_M1": ("torque_saturation", "limit_m1_nm"),
+    "LIMIT_M2": ("torque_saturation", "limit_m2_nm"),
+    "LIMIT_SHARPNESS": ("torque_saturation", "sharpness"),
+    "LIMIT_SUM": ("torque_saturation", "limit_sum_nm"),
+    "DEPTH": ("torque_derating", "depth"),
+    "DERATING_TIME": ("torque_derating", "time_constant_s"),
+    "HEATED": ("torque_derating", "heating_nm"),
+}
+_FROM_STATES = (
+    "ANGLE", "SPEED", "TWIST", "LOAD_SPEED", "MIDDLE_TWIST", "MIDDLE_SPEED", "TRACTION", "LAGGED", "LAG_RISE",
+    "FILTERED", "FILTER_RISE", "BRISTLES_MOTOR", "BRISTLES_LOAD",
+)  # fmt: skip
+
+
+def laws() -> str:
+    """Return laws.h."""
+    unit = Translation()
+    for function in USED:
+        unit.function(function)
+    unit.function(torque_path.limited, of_one_number=True)
+    head = "/* The laws of hil, translated from Python. The functions are named after their module. */\n"
+    torque = _torque_laws(unit)  # before the text: it asks for functions
+    return head + unit.text() + torque
+
+
+def _torque_laws(unit: Translation) -> str:
+    """Return the C function of the laws that entries declare for the torque, one behind the other."""
+    lines = ["static double laws_torque(double torque, double time_s, Array p) {"]
+    for law, at, null in torque_path.DECLARED:
+        name, _ = unit.function(law, of_one_number=True)
+        values = ", ".join(["torque", "time_s", *(f"p.at[{place}]" for place in at)])
+        lines.append(f"    if (p.at[{at[0]}] != {_number(null)}) torque = {name}({values});")
+    return "\n".join((*lines, "    return torque;", "}", ""))
+
+
+def model_header(d: Driveline, token: str) -> str:
+    """Return model.h: structure, places and values of one model."""
+    output = state_vector.LOAD_SPEED if d.sensor_at == "load" else state_vector.SPEED
+    defined = {
+        "MASSES": d.masses,
+        "OUTPUT": output,
+        "STATES": STATES,
+        "STATE": STATE,
+        "PARAMETER": PARAMETER,
+        "PARAMETERS": SIZE,
+        "VALUES": VALUES,
+        "WARMTH": WARMTH,
+        "FASTEST_S": actuator_lag.FASTEST_S,
+        **{name: i for i, name in enumerate(NAMED)},
+        **{name: getattr(state_vector, name) for name in _FROM_STATES},
+        **{name: getattr(slots, name) for name in _FROM_SLOTS},
+        **{name: slot(*key) for name, key in _OF_THE_PATH.items()},
+        "GUID": f'"{token}"',
+        "START_VALUES": ", ".join(_number(value) for value in start_values(d)),
+    }
+    lines = [f"#define {name} {value}" for name, value in defined.items()]
+    return "\n".join(("#ifndef MODEL_H", "#define MODEL_H", "#include <math.h>", *lines, "#endif", ""))
+
+
+def _number(value: float) -> str:
+    return repr(value) if math.isfinite(value) else "INFINITY" if value > 0.0 else "-INFINITY"
+
+
+def own(name: str) -> str:
+    """Return one of the C files that are the same for every model."""
+    return (resources.files("hil.export.fmu") / "c" / name).read_text("ascii")
+
+
+_TYPES = {
+    "2": {"INSTANCE": "fmi2Component", "REAL": "fmi2Real"},
+    "3": {"INSTANCE": "fmi3Instance", "REAL": "fmi3Float64"},
+}
+
+
+def interface(number: str) -> str:
+    """Return the C file with the functions of a version of the standard: what both have, and what it has alone."""
+    text = own("fmi.c").replace("fmiX", f"fmi{number}")
+    for name, of in _TYPES[number].items():
+        text = text.replace(f"TYPE_OF_{name}", of)
+    return text + own(f"fmi{number}.c")
+
+
+def stubs(types: str, functions: str, written: str) -> str:
+    """Return a C file with the functions of a standard that a model does not have: they answer with an error."""
+    out = [f'#include "{functions}"', ""]
+    bare = re.sub(r"/\*.*?\*/", "", types, flags=re.DOTALL)
+    for returned, name, given in re.findall(r"typedef\s+([\w\s*]+?)\s*\b(\w+)TYPE\s*\(([^;]*)\);", bare):
+        if re.search(rf"\b{name}\(", written):
+            continue
+        error = "" if returned == "void" else f"return {'NULL' if 'Status' not in returned else name[:4] + 'Error'};"
+        named = re.sub(r"(fmi2Byte)\[\]", r"\1 bytes[]", " ".join(given.split()))
+        out.append(f"{returned} {name}({named}) {{ {error} }}")
+    return "\n".join((*out, ""))
+
 
 PLATFORM = {"2.0": "linux64", "3.0": "x86_64-linux"}
 """Folder of the binary, as each version of the standard calls it."""
@@ -29,24 +163,18 @@ def c_files(d: Driveline, version: str) -> tuple[dict[str, str], list[str], str]
     number = version[0]
     headers = {name: text for name, text in _headers().items() if name.startswith(f"fmi{number}")}
     functions = f"fmi{number}Functions.h"
-    own = {name: sources.own(name) for name in ("driveline.c", "driveline.h")}
-    own[f"fmi{number}.c"] = sources.interface(number)
-    stubs = sources.stubs(headers[f"fmi{number}FunctionTypes.h"], functions, own[f"fmi{number}.c"])
-    files = {**headers, **own, "laws.h": sources.laws(), "stubs.c": stubs}
-    text = "".join((*files.values(), sources.model_header(d, "")))
+    files_of_hil = {name: own(name) for name in ("driveline.c", "driveline.h")}
+    files_of_hil[f"fmi{number}.c"] = interface(number)
+    missing = stubs(headers[f"fmi{number}FunctionTypes.h"], functions, files_of_hil[f"fmi{number}.c"])
+    files = {**headers, **files_of_hil, "laws.h": laws(), "stubs.c": missing}
+    text = "".join((*files.values(), model_header(d, "")))
     token = f"{{{hashlib.sha256(text.encode()).hexdigest()[:32]}}}"
-    files["model.h"] = sources.model_header(d, token)
+    files["model.h"] = model_header(d, token)
     return files, ["driveline.c", f"fmi{number}.c", "stubs.c"], token
 
 
 def write(d: Driveline, version: str, path: Path, sources_only: bool = False) -> None:
-    """Write an FMU.
-
-    Raises
-    ------
-    UsageError
-        Without FMPy, whose copy of the standard's headers it takes, or without a C compiler, where a binary is wanted.
-    """
+    """Write an FMU."""
     files, compiled, token = c_files(d, version)
     described = description(version, d.name, token, datetime.now(UTC), d.period_s, compiled, variables(d))
     content: dict[str, bytes | str] = {
@@ -95,3 +223,26 @@ def _binary(files: dict[str, str], compiled: list[str]) -> bytes:
         if done.returncode:
             raise UsageError(f"{compiler}: expected a compiler that takes C99, got: {done.stderr.strip()[:500]}")
         return (Path(folder) / "out.so").read_bytes()
+
+
+def written_fmu(
+    model: Path, out: Path, version: str, period_s: float, recording: Path | None, sources_only: bool, dbc: Path | None
+) -> Iterator[str]:
+    """Write an FMU and yield the lines that say so."""
+    if out.suffix.lower() != ".fmu":
+        raise UsageError(f"--out {out}: expected a name that ends in .fmu, got {out.suffix!r}")
+    if read_toml(model, ModelFileError).get("laws"):
+        raise UsageError(
+            f"{model}: laws | expected effects of the catalogue, whose laws hil can write as C, got a law of your own "
+            "in Python. Take it out, and write it in your simulation."
+        )
+    file = read_model(model) if recording is None else read_model_for_recordings(model)
+    sensor_at = (file.signals or SignalsConfig()).output()[1].at
+    line = driveline(out.stem, file.model, period_s, sensor_at)
+    if recording is not None:
+        line, _ = begun(line, file.model, read_record(recording, file.signals, file.on_bench, dbc))
+    publish(out.parent, {out.name: lambda path: write(line, version, path, sources_only)})
+    what = "C sources" if sources_only else "C sources and a Linux binary"
+    start = "at rest" if recording is None else f"as in {recording.name}"
+    yield f"{out}: FMI {version}, co-simulation, {what}; starts {start}"
+    yield from (f"note: {text}" for text in line.left_out)

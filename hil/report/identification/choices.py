@@ -8,8 +8,8 @@ from typing import Final
 
 from estimator.identification.linear_model import Orders
 from estimator.identification.offline.orders import OrderChoice, select_orders
+from estimator.identification.online.ekf import TwoMass
 from estimator.identification.online.registry import ESTIMATORS, Entry
-from estimator.identification.online.two_mass import TwoMass
 from estimator.identification.settings import Settings
 from estimator.physics.model import DrivelineModel, Structure
 from estimator.signals.decimate import decimate

@@ -8,8 +8,8 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
-from estimator.identification.modes.propagate import QUANTILE
-from estimator.identification.online_estimate import OnlineTrajectory
+from estimator.identification.chain import OnlineTrajectory
+from estimator.identification.modes.uncertainty import QUANTILE
 from estimator.signals.record import FloatArray, IntArray
 from hil.figures.local_model import LocalModel
 from hil.figures.palette import BLACK, BLUE, VERMILION, faded, series_colour

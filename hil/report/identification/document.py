@@ -11,14 +11,13 @@ from typing import Any, Final
 
 import numpy as np
 
-from estimator.identification.compare import Compared
 from estimator.identification.identify import Identification
 from estimator.identification.linear_model import ComplexArray, LinearModel
 from estimator.identification.modes.modes import Mode
 from estimator.identification.offline.orders import OrderChoice
 from estimator.identification.settings import Settings
-from estimator.identification.spectral.welch import SpectralEstimate
-from estimator.identification.study import Study
+from estimator.identification.spectral import SpectralEstimate
+from estimator.identification.study import Compared, Study
 from hil.provenance import Provenance
 from hil.report.identification.document_study import studied
 from hil.report.numbers import json_number

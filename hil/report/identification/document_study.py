@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from estimator.identification.modes.propagate import Uncertain
-from estimator.identification.offline.free_run import FreeRun
+from estimator.identification.modes.uncertainty import Uncertain
+from estimator.identification.offline.fits import FreeRun
 from estimator.identification.offline.validation import CorrelationTest
 from estimator.identification.study import Study
 from hil.report.identification.wording import best_statement, verdict

@@ -8,9 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from estimator.identification.compare import Compared
 from estimator.identification.offline.orders import OrderChoice
-from estimator.identification.study import Study
+from estimator.identification.study import Compared, Study
 from hil.figures.local_model import LocalModel
 from hil.figures.palette import series_colour
 from hil.provenance import Provenance

@@ -8,8 +8,8 @@ from dataclasses import asdict
 from typing import Any, Final
 
 from estimator.identification.settings import Settings
-from hil.figures.numbers import Row
-from hil.figures.road.conditions import Conditions
+from hil.figures.local_model import Row
+from hil.figures.road import Conditions
 from hil.provenance import Provenance
 from hil.report.numbers import json_number
 

@@ -7,10 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from hil.figures.local_model import LocalModel
-from hil.figures.numbers import Row
+from hil.figures.local_model import LocalModel, Row
 from hil.figures.palette import series_colour
-from hil.figures.road.conditions import Conditions
+from hil.figures.road import Conditions
 from hil.provenance import Provenance
 from hil.report import page as html
 from hil.report.figures import Line, Panel, Style, time_figure

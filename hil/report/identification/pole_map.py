@@ -11,8 +11,7 @@ import plotly.graph_objects as go
 from estimator.identification.linear_model import ComplexArray
 from estimator.signals.record import FloatArray
 from hil.figures.local_model import LocalModel
-from hil.figures.palette import BLACK, faded
-from hil.figures.z_plane import damping_lines, frequency_marks, unit_circle
+from hil.figures.palette import BLACK, damping_lines, faded, frequency_marks, unit_circle
 from hil.report.figures import figure_block
 from hil.report.page import Figure
 

@@ -8,7 +8,7 @@ import numpy as np
 import plotly.graph_objects as go
 
 from estimator.identification.linear_model import ComplexArray
-from estimator.identification.offline.linear_fit import LinearFit
+from estimator.identification.offline.fits import LinearFit
 from estimator.signals.record import FloatArray, IntArray
 from hil.figures.local_model import LocalModel
 from hil.figures.palette import BLACK, BLUE, GREY, VERMILION, series_colour

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from estimator.identification.compare import Compared
 from estimator.identification.offline.orders import OrderChoice
-from estimator.identification.study import Study
+from estimator.identification.study import Compared, Study
 from hil.figures.local_model import LocalModel
 from hil.report import page as html
 from hil.report.identification.wording import plus_minus

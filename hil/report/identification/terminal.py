@@ -8,10 +8,9 @@ from collections.abc import Iterable, Sequence
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
-from estimator.identification.compare import Compared
 from estimator.identification.modes.modes import Mode
 from estimator.identification.online.recursive import Status
-from estimator.identification.study import Study
+from estimator.identification.study import Compared, Study
 from hil.report.identification.wording import plus_minus
 
 NAME_WIDTH = 20

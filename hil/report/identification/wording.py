@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from estimator.identification.best import SEEN, Verdict
-from estimator.identification.modes.propagate import Uncertain
+from estimator.identification.modes.uncertainty import Uncertain
 from estimator.identification.offline.validation import Validation
 from estimator.identification.online.recursive import Status
 from estimator.identification.study import Study
@@ -29,6 +29,7 @@ ADVICE = {
     "output-error, recursive and spectral estimates may be biased",
     Verdict.NOT_EXCITED: "no pole pair: {reason}",
     Verdict.INCOMPLETE: "the model misses a part of the response to past torque",
+    Verdict.ONE_MASS: "one mass: {reason}",
 }
 """What each verdict says of a recording."""
 
@@ -38,6 +39,7 @@ CURES = {
     Verdict.CLOSED_LOOP: "Hold the torque constant except for the PRBS, or use the Box-Jenkins model",
     Verdict.NOT_EXCITED: "Raise the PRBS, record longer or faster; or there is none",
     Verdict.INCOMPLETE: "Look at the residual tests; try --order auto, or diagnose the recording",
+    Verdict.ONE_MASS: "If the shaft is soft, raise the PRBS, record longer or faster",
 }
 
 

@@ -6,9 +6,7 @@ from collections.abc import Callable, Iterator, Mapping
 from types import MappingProxyType
 
 from estimator.identification.linear_model import Orders
-from estimator.identification.offline.box_jenkins import fit_box_jenkins
-from estimator.identification.offline.linear_fit import LinearFit
-from estimator.identification.offline.output_error import fit_output_error
+from estimator.identification.offline.fits import LinearFit, fit_box_jenkins, fit_output_error
 from estimator.identification.offline.validation import validate
 from estimator.identification.settings import Settings
 from estimator.signals.decimate import decimate

@@ -21,7 +21,7 @@ import numpy as np
 
 from estimator.errors import NotExciting
 from estimator.identification.linear_model import ComplexArray
-from estimator.identification.spectral.estimate import SpectralEstimate
+from estimator.identification.spectral import SpectralEstimate
 from estimator.signals.record import BoolArray, FloatArray, Record
 from estimator.signals.settings import Requirement, require
 
@@ -107,4 +107,4 @@ def _estimate(
     coherence = explained / np.maximum(explained + noise, np.finfo(np.float64).tiny)
     std = np.where(coherence > 0.0, np.sqrt(0.5 * noise * spread) / scale[:, 0], np.inf)
     averages = float(np.median(1.0 / np.maximum(spread, np.finfo(np.float64).tiny)))
-    return SpectralEstimate(frequency_hz, G, coherence, std, averages, freedom=2.0 * freedom)
+    return SpectralEstimate(frequency_hz, G, coherence, std, averages)

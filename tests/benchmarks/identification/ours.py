@@ -8,11 +8,11 @@ from estimator.identification.chain import OnlineChain
 from estimator.identification.identify import identify
 from estimator.identification.modes.modes import Mode
 from estimator.identification.modes.physical import physical_parameters
-from estimator.identification.modes.propagate import Uncertain
-from estimator.identification.modes.uncertainty import UncertainMode, uncertain_resonance
-from estimator.identification.offline.linear_fit import LinearFit
+from estimator.identification.modes.uncertainty import Uncertain, UncertainMode
+from estimator.identification.offline.fits import LinearFit
 from estimator.identification.settings import Settings
 from tests.benchmarks.identification.answer import Answer, Case, Interval, Method
+from tests.estimator.identification.driveline import uncertain_resonance
 
 BEST, BATCH, RECURSIVE, TRACKED = "Box-Jenkins, 10 ms", "output error, 10 ms", "OEFO, 20 ms", "OEFO, tracked"
 

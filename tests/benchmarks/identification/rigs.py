@@ -22,14 +22,13 @@ from estimator.identification.identify import identify
 from estimator.identification.linear_model import LinearModel, Orders
 from estimator.identification.modes.modes import Mode, two_mass_resonance
 from estimator.identification.modes.physical import physical_parameters
-from estimator.identification.modes.propagate import Uncertain
-from estimator.identification.modes.uncertainty import uncertain_resonance
-from estimator.identification.offline.box_jenkins import fit_box_jenkins
-from estimator.identification.spectral.estimate import SpectralEstimate
+from estimator.identification.modes.uncertainty import Uncertain
+from estimator.identification.offline.fits import fit_box_jenkins
+from estimator.identification.spectral import SpectralEstimate
 from estimator.signals.decimate import decimate
 from estimator.signals.record import Record
-from hil.figures.road.conditions import draw_conditions
-from hil.figures.road.drive import drive as drive_paper
+from hil.figures.road import draw_conditions
+from hil.figures.road import drive as drive_paper
 from hil.proof.truth.bus import NOMINAL_ERROR
 from hil.proof.truth.case import record as drive
 from hil.proof.truth.specimen import draw_specimen
@@ -39,7 +38,7 @@ from tests.benchmarks.identification.local_polynomial import local_polynomial
 from tests.benchmarks.identification.scores import Rate
 from tests.benchmarks.ratios import table
 from tests.estimator.identification import driveline
-from tests.estimator.identification.driveline import cruise
+from tests.estimator.identification.driveline import cruise, uncertain_resonance
 
 EXPERIMENTS = 8
 

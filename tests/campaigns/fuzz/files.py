@@ -22,9 +22,8 @@ from estimator.identification.online.adaptation import DecreasingGain
 from hil.cli.main import run
 from hil.config.model_file import read_model_for_recordings
 from hil.config.rig_file import read_rig
-from hil.export.filling import Precision, project
-from hil.export.identification_file import plc_estimator
-from hil.export.structured_text import structured_text
+from hil.export.plc_estimator import plc_estimator
+from hil.export.structured_text import Precision, structured_text
 from hil.recording import Table, read_table, write_table
 from hil.recording.formats import read_metadata
 from hil.recording.signals import read_record
@@ -172,7 +171,7 @@ def _identification_seeds(folder: Path) -> list[bytes]:
 
 
 def _export(path: Path) -> None:
-    structured_text(project(plc_estimator(path, None, 0.01, DecreasingGain()), Precision.DOUBLE))
+    structured_text(plc_estimator(path, None, 0.01, DecreasingGain()), Precision.DOUBLE)
 
 
 @contextmanager

@@ -17,8 +17,7 @@ from estimator.diagnosis.result import Course, Discrepancy, Equivalent, Estimate
 from estimator.diagnosis.segments import FEWEST_SAMPLES, LONG_S, LONG_SAMPLES, cut, segments, tiles
 from estimator.errors import NotExciting
 from estimator.physics.driveline import Start
-from estimator.signals.part import sliced
-from estimator.signals.record import Record
+from estimator.signals.record import Record, sliced
 from tests.estimator.physics.bench import ONE_MASS, SAMPLE_TIME_S, linear_record, model, random_steps
 
 Rows = Sequence[tuple[int, int]]

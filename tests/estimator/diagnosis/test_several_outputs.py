@@ -22,8 +22,7 @@ from estimator.physics.problem import make_problem
 from estimator.physics.simulate import simulate
 from estimator.physics.unknowns import nominal_unknowns
 from estimator.signals.outputs import outputs_apart
-from estimator.signals.part import sliced
-from estimator.signals.record import Channel, FloatArray, Location, OutputKind, Record
+from estimator.signals.record import Channel, FloatArray, Location, OutputKind, Record, sliced
 from tests.estimator.diagnosis.one_effect import Bench, bench_with
 from tests.estimator.physics.bench import ONE_MASS, TWO_MASS, model
 

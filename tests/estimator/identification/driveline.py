@@ -8,6 +8,9 @@ import numpy as np
 from scipy.linalg import expm
 from scipy.signal import max_len_seq
 
+from estimator.identification.linear_model import LinearModel
+from estimator.identification.modes.modes import LIGHTLY_DAMPED
+from estimator.identification.modes.uncertainty import UncertainMode, uncertain_modes
 from estimator.signals.record import FloatArray, Record
 
 J_M, J_L, K, C, B_M, B_L = 1.6, 100.0, 4200.0, 9.0, 0.35, 0.9
@@ -79,3 +82,11 @@ def cruise(
         okay=np.ones(n, dtype=bool),
     )
     return Cruise(record, *true_resonance())
+
+
+def uncertain_resonance(model: LinearModel, covariance: FloatArray) -> UncertainMode | None:
+    """Return the lightly damped pair of the highest peak between 2 and 25 Hz, with its intervals."""
+    for found in uncertain_modes(model, covariance):
+        if 2.0 <= found.frequency_hz.value <= 25.0 and abs(found.damping.value) < LIGHTLY_DAMPED:
+            return found
+    return None

@@ -10,17 +10,24 @@ import pytest
 from estimator.identification.best import BestEstimate, Verdict, best_estimate
 from estimator.identification.linear_model import LinearModel, Orders
 from estimator.identification.modes.physical import NAMES, two_mass_model
-from estimator.identification.modes.propagate import Uncertain
-from estimator.identification.modes.uncertainty import uncertain_resonance
-from estimator.identification.offline.box_jenkins import fit_box_jenkins
-from estimator.identification.offline.linear_fit import LinearFit
-from estimator.identification.offline.output_error import fit_output_error, problem_of
+from estimator.identification.modes.uncertainty import Uncertain
+from estimator.identification.offline.fits import LinearFit, fit_box_jenkins, fit_output_error, problem_of
 from estimator.signals.decimate import high_passed
 from estimator.signals.prbs import prbs_nm
 from estimator.signals.record import BoolArray, Record
 from tests.benchmarks.buses.bus import draw_bus
 from tests.benchmarks.buses.drive import CLEAN, drive
-from tests.estimator.identification.driveline import B_L, B_M, J_L, J_M, C, K, cruise, true_resonance
+from tests.estimator.identification.driveline import (
+    B_L,
+    B_M,
+    J_L,
+    J_M,
+    C,
+    K,
+    cruise,
+    true_resonance,
+    uncertain_resonance,
+)
 
 FREQUENCY_HZ, DAMPING = true_resonance()
 PERIOD_S, SUBSTEPS = 0.01, 50
@@ -96,7 +103,7 @@ def test_one_mass_has_no_pair() -> None:
     record = Record("one", PERIOD_S, PERIOD_S * np.arange(3000), torque[:, np.newaxis], measured, np.ones(3000, bool))
     best = best_estimate(record)
     assert best.mode is None
-    assert best.verdict is Verdict.NOT_EXCITED
+    assert best.verdict is Verdict.ONE_MASS
     assert best.reason
 
 

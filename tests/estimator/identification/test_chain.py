@@ -8,13 +8,12 @@ import numpy as np
 import pytest
 
 from estimator.errors import BadSetting, BadShape
-from estimator.identification.chain import OnlineChain
+from estimator.identification.chain import OnlineChain, OnlineTrajectory
 from estimator.identification.identify import identify
 from estimator.identification.online.adaptation import ConstantForgetting
-from estimator.identification.online_estimate import OnlineTrajectory
 from estimator.identification.settings import Settings
-from estimator.identification.tracking.state import TrackingState
-from estimator.identification.tracking.watch_settings import WatchSettings
+from estimator.identification.tracking.alarm import TrackingState
+from estimator.identification.tracking.watch import WatchSettings
 from estimator.signals.record import Record
 from tests.estimator.identification.driveline import Cruise
 from tests.estimator.identification.tracking.drives import Line, drives

@@ -15,8 +15,7 @@ from estimator.physics.free_run import free_run
 from estimator.physics.grid import grid_for
 from estimator.physics.layout import flat_values
 from estimator.physics.simulate import simulate
-from estimator.signals.part import sliced
-from estimator.signals.record import Location, Record
+from estimator.signals.record import Location, Record, sliced
 from tests.estimator.physics.bench import ONE_MASS, TWO_MASS, linear_record, model, random_steps
 
 START = Start(5.0, 0.0, 2.0)

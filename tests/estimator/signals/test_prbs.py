@@ -22,7 +22,6 @@ def test_ten_cells_have_period_1023_and_no_shorter_one() -> None:
     assert np.array_equal(levels[:1023], levels[1023:])
     shorter = (3, 11, 31, 33, 93, 341)  # the divisors of 1023
     assert not any(np.array_equal(levels[:1023], np.roll(levels[:1023], d)) for d in shorter)
-    assert Prbs(1.0).period_cycles == 1023
 
 
 def test_balance_512_to_511() -> None:
@@ -47,7 +46,6 @@ def test_the_divider_holds_each_level() -> None:
     fast = prbs_nm(100, amplitude_nm=5.0, seed=77)
     slow = prbs_nm(300, amplitude_nm=5.0, clock_divider=3, seed=77)
     assert np.array_equal(slow, np.repeat(fast, 3))
-    assert Prbs(5.0, clock_divider=3).period_cycles == 3069
 
 
 def test_the_seed_only_shifts_the_sequence() -> None:

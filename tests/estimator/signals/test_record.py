@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import gc
 from typing import Any
 
 import numpy as np
 import pytest
 
 from estimator.errors import BadShape
-from estimator.signals.record import Record
+from estimator.signals.record import MOST_BYTES, Record, once, uniform_period_s
 
 
 def record(**changed: Any) -> Record:
@@ -49,3 +50,85 @@ def test_every_torque_is_trusted_unless_given_otherwise() -> None:
     assert record(torque_okay=by_row).torque_trusted.tolist() == [[okay, okay] for okay in by_row]
     by_input = np.column_stack([by_row, ~by_row])
     np.testing.assert_array_equal(record(torque_okay=by_input).torque_trusted, by_input)
+
+
+def recording(size: int) -> Record:
+    time_s = 3.0 + 0.01 * np.arange(size)
+    return Record("run", 0.01, time_s, np.ones((size, 2)), np.zeros(size), np.ones(size, dtype=bool))
+
+
+def test_it_is_worked_out_once_for_each() -> None:
+    asked = []
+
+    @once
+    def length(record: Record) -> int:
+        asked.append(record.time_s.size)
+        return record.time_s.size
+
+    one, other = recording(5), recording(7)
+    assert [length(one), length(other), length(one), length(other)] == [5, 7, 5, 7]
+    assert asked == [5, 7]
+
+
+def test_recordings_alike_are_not_taken_for_each_other() -> None:
+    one, other = recording(5), recording(5)
+    assert one.total_torque_nm is one.total_torque_nm
+    assert one.total_torque_nm is not other.total_torque_nm
+    np.testing.assert_allclose(one.since_start_s, 0.01 * np.arange(5), atol=1e-12)
+
+
+def test_an_hour_is_not_kept_a_second_time() -> None:
+    short, long = recording(MOST_BYTES // 8), recording(MOST_BYTES // 8 + 1)
+    assert short.total_torque_nm is short.total_torque_nm
+    assert long.total_torque_nm is not long.total_torque_nm
+    np.testing.assert_array_equal(long.total_torque_nm, 2.0)
+
+
+def test_it_is_forgotten_with_the_recording() -> None:
+    class Weight:
+        alive = 0
+
+        def __init__(self) -> None:
+            Weight.alive += 1
+
+        def __del__(self) -> None:
+            Weight.alive -= 1
+
+    @once
+    def weigh(record: Record) -> Weight:
+        return Weight()
+
+    record = recording(5)
+    weigh(record)
+    assert Weight.alive == 1
+    del record
+    gc.collect()
+    assert Weight.alive == 0
+
+
+@pytest.mark.parametrize("period_s", [0.01, 0.002, 0.0125, 0.1, 1.0 / 1024.0])
+@pytest.mark.parametrize("start_s", [0.0, 1234.56])
+def test_even_stamps_give_their_step(period_s: float, start_s: float) -> None:
+    assert uniform_period_s(start_s + period_s * np.arange(3000)) == pytest.approx(period_s, rel=1e-8)
+
+
+@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("jitter_s", [1e-4, 1e-3, 3e-3])
+def test_jitter_does_not_spoil_it(seed: int, jitter_s: float) -> None:
+    jitter = jitter_s * np.random.default_rng(seed).standard_normal(3000)
+    assert uniform_period_s(0.01 * np.arange(3000) + jitter) == 0.01
+
+
+def test_rounding_does_not_spoil_it() -> None:
+    period_s = 1.0 / 120.0
+    assert uniform_period_s(np.round(period_s * np.arange(3000), 3)) == pytest.approx(period_s, rel=1e-6)
+
+
+def test_a_period_that_is_not_round_is_kept() -> None:
+    """A clock 20 ppm fast, with a jitter that determines the period to 1 ppm."""
+    jitter = 1e-4 * np.random.default_rng(1).standard_normal(30_000)
+    assert uniform_period_s(0.0100002 * np.arange(30_000) + jitter) == pytest.approx(0.0100002, rel=1e-6)
+
+
+def test_two_stamps_give_their_difference() -> None:
+    assert uniform_period_s(np.array([1.0, 1.25])) == 0.25

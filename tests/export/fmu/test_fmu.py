@@ -1,4 +1,4 @@
-"""The exported FMU against the simulation of hil: every law, both standards, both kinds of simulation.
+"""The exported FMU against the simulation of hil: every law, both standards.
 
 FMPy (Dassault Systèmes, BSD) checks the archives and runs them.
 """
@@ -10,7 +10,6 @@ from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from tempfile import mkdtemp
-from typing import Any
 
 import numpy as np
 import pytest
@@ -24,9 +23,8 @@ from estimator.physics.layout import flat_values
 from estimator.physics.model import DrivelineModel, EffectValue, Parameter, Structure
 from estimator.physics.simulate import motor_angle, simulate
 from estimator.signals.record import FloatArray, Record
-from hil.export.fmu.driveline import OF_THE_RECORDER, Driveline, driveline, started
+from hil.export.fmu.driveline import OF_THE_RECORDER, Driveline, driveline, started, variables
 from hil.export.fmu.package import write
-from hil.export.fmu.variables import variables
 from tests.estimator.physics.bench import ONE_MASS, THREE_MASS, TWO_MASS, random_steps, record
 from tests.estimator.physics.test_recovery import PLANTS, effect_of
 from tests.estimator.physics.test_side_by_side import EVERYWHERE, ON_THE_SHAFT
@@ -36,13 +34,8 @@ START = Start(12.0, 0.0, 5.0, 0.01, 4.0, 0.004, 4.5)
 AGREES = 1e-6
 """Of the output's range: the issue's figure. What there is comes to 1e-10 and less."""
 
-EXCHANGE_AGREES = 2e-3
-"""Of the range, against steps eight times as fine: an event is spread over a step, a warming held over a period."""
-
 NEVER_REACHED = 1e30
 """Stands for a limit at infinity, which modelDescription.xml does not hold."""
-
-CO_SIMULATION, EXCHANGE = "CoSimulation", "ModelExchange"
 
 Effects = Mapping[str, Mapping[str, float]]
 LINES = {Structure.ONE_MASS: ONE_MASS, Structure.TWO_MASS: TWO_MASS, Structure.THREE_MASS: THREE_MASS}
@@ -105,45 +98,40 @@ def everything(structure: Structure) -> Path:
     return path
 
 
-def begun(structure: Structure, effects: Effects, substeps: int = 5) -> tuple[Driveline, FloatArray, FloatArray]:
+def begun(structure: Structure, effects: Effects) -> tuple[Driveline, FloatArray, FloatArray]:
     """Return a line with some effects, its load torque, and its output as hil simulates it."""
     rec = recording()
     case = Case(flat_values(LINES[structure], effects), START, random_steps(SAMPLES, seed=8, size_nm=30.0, hold=25))
-    grid = Grid(structure, substeps, SIGN_WIDTH)
+    grid = Grid(structure, 5, SIGN_WIDTH)
     line, load = started(driveline("line", model(structure, effects), PERIOD_S), grid, case, rec)
     expected = simulate(grid, rec, case.p, case.start, case.extra_load_nm)
     return replace(line, angle_is_read=True), load, expected
 
 
-def inputs(names: set[str], load: FloatArray, held: bool) -> np.ndarray:
-    """Return what FMPy takes as input: a row per sample, or, for model exchange, what is held in between."""
+def inputs(names: set[str], load: FloatArray) -> np.ndarray:
+    """Return what FMPy takes as input, a row per sample."""
     rec = recording()
     columns = {"time": rec.time_s, "T_M1": rec.torque_nm[:, 0], "T_M2": rec.torque_nm[:, 1], "T_load": load}
     if "angle_read" in names:
         angle = motor_angle(rec)
         columns["angle_read"] = angle
         columns["turn_rate"] = np.append(np.diff(angle), angle[-1] - angle[-2]) / PERIOD_S
-    rows = np.array(list(zip(*columns.values(), strict=True)), dtype=[(name, float) for name in columns])
-    if not held:
-        return rows
-    steps = np.repeat(rows, 2)[:-1]
-    steps["time"][1::2] = rows["time"][1:]  # each row until the next: two rows of one time are a step
-    return steps
+    return np.array(list(zip(*columns.values(), strict=True)), dtype=[(name, float) for name in columns])
 
 
-def simulated(fmu: Path, kind: str, line: Driveline, load: FloatArray, **more: Any) -> FloatArray:
+def simulated(fmu: Path, line: Driveline, load: FloatArray) -> FloatArray:
     """Return the measured speed that an FMU gives."""
     names = {each.name for each in read_model_description(fmu).modelVariables}
-    given = inputs(names, load, kind == EXCHANGE)
+    given = inputs(names, load)
     start = {each.name: each.start for each in variables(line) if each.causality == "parameter" and each.name in names}
     if "angle_is_read" in names:
         start["angle_is_read"] = True
     end_s = (SAMPLES - 1) * PERIOD_S
     result = simulate_fmu(
-        fmu, fmi_type=kind, start_values=start, input=given, stop_time=end_s, output_interval=PERIOD_S,
-        output=["speed_measured"], **more,
+        fmu, fmi_type="CoSimulation", start_values=start, input=given, stop_time=end_s, output_interval=PERIOD_S,
+        output=["speed_measured"],
     )  # fmt: skip
-    return np.interp(given["time"][:: 2 if kind == EXCHANGE else 1], result["time"], result["speed_measured"])
+    return np.interp(given["time"], result["time"], result["speed_measured"])
 
 
 def off(actual: FloatArray, expected: FloatArray) -> float:
@@ -158,26 +146,11 @@ def off(actual: FloatArray, expected: FloatArray) -> float:
 )  # fmt: skip
 def test_the_steps_are_those_of_hil(structure: Structure, case: str) -> None:
     line, load, expected = begun(structure, CASES[case])
-    assert off(simulated(everything(structure), CO_SIMULATION, line, load), expected) < AGREES
+    assert off(simulated(everything(structure), line, load), expected) < AGREES
 
 
 def test_every_effect_that_acts_in_the_line_is_exported() -> None:
     assert {name for effects in CASES.values() for name in effects} == set(IN_THE_LINE) - {"road_grade"}
-
-
-CONTINUOUS = (
-    "actuator_lag", "transport_delay", "backlash", "shaft_hysteresis", "drag and bristles", "tyre that rolls",
-    "speed_filter", "generator_coupled", "late by parts of a step, heated", "a mode behind the shaft",
-)  # fmt: skip
-
-
-@pytest.mark.parametrize(("case", "version"), [*((case, "2.0") for case in CONTINUOUS), ("transport_delay", "3.0")])
-def test_derivatives_lead_to_where_fine_steps_do(case: str, version: str, tmp_path: Path) -> None:
-    line, load, _ = begun(Structure.TWO_MASS, CASES[case])
-    _, _, fine = begun(Structure.TWO_MASS, CASES[case], substeps=40)
-    write(line, version, tmp_path / "line.fmu")
-    found = simulated(tmp_path / "line.fmu", EXCHANGE, line, load, relative_tolerance=1e-8)
-    assert off(found, fine) < EXCHANGE_AGREES
 
 
 @pytest.mark.parametrize("version", ["2.0", "3.0"])
@@ -186,5 +159,4 @@ def test_the_standards_checker_finds_nothing(version: str, structure: Structure,
     line, load, expected = begun(structure, {"coulomb_friction_motor": {"friction_nm": 5.0}})
     write(line, version, tmp_path / "line.fmu")
     assert validate_fmu(str(tmp_path / "line.fmu")) == []
-    assert off(simulated(tmp_path / "line.fmu", CO_SIMULATION, line, load), expected) < AGREES
-    assert off(simulated(tmp_path / "line.fmu", EXCHANGE, line, load, relative_tolerance=1e-8), expected) < 1e-3
+    assert off(simulated(tmp_path / "line.fmu", line, load), expected) < AGREES

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from tests.export.iec.expressions import Expressions
 from tests.export.iec.tokens import NotStructuredText
-from tests.export.iec.tree import INTEGERS, Assign, Block, Call, Exit, Expression, For, If, Statement, Variable
+from tests.export.iec.tree import INTEGERS, Assign, Block, Call, Exit, Expression, For, If, Statement, Variable, While
 
 
 class Statements(Expressions):
@@ -30,6 +30,8 @@ class Statements(Expressions):
             return self._if()
         if self._took("FOR"):
             return self._for()
+        if self._took("WHILE"):
+            return self._while()
         if self._took("EXIT"):
             self._require(bool(self._counters), "EXIT outside a loop")
             return Exit()
@@ -75,6 +77,15 @@ class Statements(Expressions):
         self._take("END_FOR")
         self._counters.pop()
         return For(name, first, last, step, body)
+
+    def _while(self) -> While:
+        condition = self._typed(self._expression(), "BOOL")
+        self._take("DO")
+        self._counters.append("")
+        body = self._statements("END_WHILE")
+        self._take("END_WHILE")
+        self._counters.pop()
+        return While(condition, body)
 
     def _call(self, instance: Variable) -> Call:
         called = self._called(instance)

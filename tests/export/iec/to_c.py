@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from tests.export.iec.tree import Assign, Block, Call, Exit, For, If, Statement, Variable
+from tests.export.iec.tree import Assign, Block, Call, Exit, For, If, Statement, Variable, While
 
 TYPES = {"BOOL": "int8_t", "INT": "int16_t", "DINT": "int32_t", "LREAL": "double", "REAL": "float"}
 
@@ -17,7 +17,10 @@ HEAD = """#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #define NUMBER(x) ({real})(x)
-#define ABS(x) {abs}(x)
+#define ABS(x) fabs{f}(x)
+#define SQRT(x) sqrt{f}(x)
+#define LN(x) log{f}(x)
+#define ATAN(x) atan{f}(x)
 static int at(int i, int low, int high) {{ if (i < low || i > high) abort(); return i - low; }}
 #define AT(i, low, high) at(i, low, high)
 """
@@ -27,7 +30,7 @@ def to_c(blocks: dict[str, Block]) -> str:
     """Return the program; NAME_start(self) puts a block into its first state, NAME(self) calls it."""
     kinds = {variable.shape.element for block in blocks.values() for variable in block.variables.values()}
     single = "REAL" in kinds
-    lines = [HEAD.format(real="float" if single else "double", abs="fabsf" if single else "fabs")]
+    lines = [HEAD.format(real="float" if single else "double", f="f" if single else "")]
     for block in blocks.values():
         lines += _block(block)
     return "\n".join(lines) + "\n"
@@ -82,6 +85,10 @@ def _statement(statement: Statement) -> Iterator[str]:
             test = "<=" if step > 0 else ">="
             name = f"self->{counter}"
             yield f"for ({name} = {first.c}; {name} {test} {last.c}; {name} += {step}) {{"
+            yield from _statements(inner)
+            yield "}"
+        case While(condition, inner):
+            yield f"while ({condition.c}) {{"
             yield from _statements(inner)
             yield "}"
         case Exit():

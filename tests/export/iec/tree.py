@@ -76,11 +76,17 @@ class For:
 
 
 @dataclass(frozen=True, slots=True)
+class While:
+    condition: Expression
+    body: tuple[Statement, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class Exit:
     pass
 
 
-Statement = Assign | Call | If | For | Exit
+Statement = Assign | Call | If | For | While | Exit
 
 
 @dataclass(slots=True)

@@ -4,7 +4,6 @@
 
 #include <string.h>
 
-static const int CONTINUOUS[] = {CONTINUOUS_STATES};
 #define D ((Driveline *)c)
 
 typedef TYPE_OF_INSTANCE Instance;
@@ -24,34 +23,6 @@ fmiXStatus fmiXExitInitializationMode(Instance c) {
 fmiXStatus fmiXEnterEventMode(Instance c) { (void)c; return fmiXOK; }
 fmiXStatus fmiXTerminate(Instance c) { (void)c; return fmiXOK; }
 fmiXStatus fmiXReset(Instance c) { driveline_reset(D); return fmiXOK; }
-
-/* model exchange */
-
-fmiXStatus fmiXSetTime(Instance c, Real now) { D->value[TIME] = now; return fmiXOK; }
-fmiXStatus fmiXEnterContinuousTimeMode(Instance c) { (void)c; return fmiXOK; }
-fmiXStatus fmiXCompletedIntegratorStep(Instance c, fmiXBoolean no_way_back, fmiXBoolean *event,
-                                       fmiXBoolean *terminate) {
-    (void)no_way_back;
-    *event = *terminate = fmiXFalse;
-    return answer(c, driveline_remember(D));
-}
-fmiXStatus fmiXSetContinuousStates(Instance c, const Real x[], size_t n) {
-    for (size_t i = 0; i < n && i < CONTINUOUS_COUNT; i++) D->value[STATE + CONTINUOUS[i]] = x[i];
-    return n == CONTINUOUS_COUNT ? fmiXOK : fmiXError;
-}
-fmiXStatus fmiXGetContinuousStates(Instance c, Real x[], size_t n) {
-    for (size_t i = 0; i < n && i < CONTINUOUS_COUNT; i++) x[i] = D->value[STATE + CONTINUOUS[i]];
-    return n == CONTINUOUS_COUNT ? fmiXOK : fmiXError;
-}
-fmiXStatus fmiXGetNominalsOfContinuousStates(Instance c, Real nominal[], size_t n) {
-    (void)c;
-    for (size_t i = 0; i < n; i++) nominal[i] = 1.0;
-    return fmiXOK;
-}
-fmiXStatus fmiXGetEventIndicators(Instance c, Real indicator[], size_t n) {
-    (void)c, (void)indicator;
-    return n == 0 ? fmiXOK : fmiXError;
-}
 
 static fmiXStatus get_reals(Driveline *d, const fmiXValueReference r[], size_t n, Real value[]) {
     driveline_update(d);
@@ -82,8 +53,4 @@ static fmiXStatus set_booleans(Driveline *d, const fmiXValueReference r[], size_
     }
     return fmiXOK;
 }
-static fmiXStatus get_derivatives(Driveline *d, Real rate[], size_t n) {
-    driveline_update(d);
-    for (size_t i = 0; i < n && i < CONTINUOUS_COUNT; i++) rate[i] = d->value[DERIVATIVE + CONTINUOUS[i]];
-    return n == CONTINUOUS_COUNT ? fmiXOK : fmiXError;
-}
+

@@ -53,13 +53,3 @@ fmi2Status fmi2DoStep(Instance c, Real now, Real length, fmi2Boolean no_way_back
     D->value[TIME] = now;
     return answer(c, driveline_step(D, length));
 }
-
-/* model exchange */
-
-fmi2Status fmi2NewDiscreteStates(Instance c, fmi2EventInfo *info) {
-    memset(info, 0, sizeof *info);
-    return answer(c, driveline_remember(D));
-}
-fmi2Status fmi2GetDerivatives(Instance c, Real rate[], size_t n) {
-    return get_derivatives(D, rate, n);
-}

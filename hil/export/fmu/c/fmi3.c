@@ -18,12 +18,6 @@ static Instance instance(fmi3String token, fmi3InstanceEnvironment environment, 
     if (d) d->environment = environment, d->logger = (void *)log;
     return d;
 }
-Instance fmi3InstantiateModelExchange(fmi3String name, fmi3String token, fmi3String where, fmi3Boolean visible,
-                                          fmi3Boolean logging, fmi3InstanceEnvironment environment,
-                                          fmi3LogMessageCallback log) {
-    (void)name, (void)where, (void)visible, (void)logging;
-    return instance(token, environment, log);
-}
 Instance fmi3InstantiateCoSimulation(fmi3String name, fmi3String token, fmi3String where, fmi3Boolean visible,
                                          fmi3Boolean logging, fmi3Boolean events, fmi3Boolean early,
                                          const fmi3ValueReference required[], size_t n,
@@ -67,22 +61,4 @@ fmi3Status fmi3DoStep(Instance c, Real now, Real length, fmi3Boolean no_way_back
     if (!(length > 0.0)) return fmi3Error;
     D->value[TIME] = now;
     return answer(c, driveline_step(D, length));
-}
-
-/* model exchange */
-
-fmi3Status fmi3UpdateDiscreteStates(Instance c, fmi3Boolean *again, fmi3Boolean *terminate, fmi3Boolean *nominals,
-                                    fmi3Boolean *values, fmi3Boolean *next_defined, Real *next) {
-    *again = *terminate = *nominals = *values = *next_defined = fmi3False;
-    *next = 0.0;
-    return answer(c, driveline_remember(D));
-}
-fmi3Status fmi3GetContinuousStateDerivatives(Instance c, Real rate[], size_t n) {
-    return get_derivatives(D, rate, n);
-}
-fmi3Status fmi3GetNumberOfEventIndicators(Instance c, size_t *n) { (void)c; *n = 0; return fmi3OK; }
-fmi3Status fmi3GetNumberOfContinuousStates(Instance c, size_t *n) {
-    (void)c;
-    *n = CONTINUOUS_COUNT;
-    return fmi3OK;
 }

@@ -1,15 +1,63 @@
+"""The third-order equivalent of a model."""
+
 from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.signal import cont2discrete
 
 from estimator.errors import BadModel, BadShape
 from estimator.identification.linear_model import LinearModel
 from estimator.identification.modes.modes import resonance
-from estimator.identification.modes.reduced import reduce_order, third_order
-from estimator.identification.offline.output_error import fit_output_error
+from estimator.identification.modes.reduced import reduce_order, state_space, third_order, to_continuous
+from estimator.identification.offline.fits import fit_output_error
 from estimator.signals.decimate import decimate
+from tests.estimator.identification import driveline
 from tests.estimator.identification.driveline import Cruise
+
+PERIOD_S = 0.01
+
+
+def sampled(numerator: list[float], denominator: list[float]) -> LinearModel:
+    b, a, _ = cont2discrete((numerator, denominator), PERIOD_S)
+    return LinearModel(tuple(a[1:].tolist()), tuple(b.ravel()[1:].tolist()), 1, PERIOD_S)
+
+
+def two_mass() -> tuple[list[float], list[float]]:
+    """Numerator and denominator of motor speed over motor torque, by hand."""
+    J_M, J_L, k, c, b_M, b_L = (getattr(driveline, name) for name in ("J_M", "J_L", "K", "C", "B_M", "B_L"))
+    denominator = [
+        J_M * J_L,
+        J_M * (c + b_L) + J_L * (c + b_M),
+        (J_M + J_L) * k + c * (b_M + b_L) + b_M * b_L,
+        k * (b_M + b_L),
+    ]
+    return [J_L, c + b_L, k], denominator
+
+
+def test_sampling_is_undone() -> None:
+    numerator, denominator = two_mass()
+    back = to_continuous(sampled(numerator, denominator))
+    np.testing.assert_allclose(back.numerator[1:], np.array(numerator) / denominator[0], rtol=1e-6)
+    np.testing.assert_allclose(back.denominator[1:], np.array(denominator[1:]) / denominator[0], rtol=1e-6)
+    np.testing.assert_allclose(np.sort_complex(back.poles), np.sort_complex(np.linalg.eigvals(driveline.A)), rtol=1e-5)
+
+
+@pytest.mark.parametrize("nk", [0, 1, 3])
+def test_the_state_space_has_the_models_response(nk: int) -> None:
+    model = LinearModel((-1.2, 0.5), (0.3, 0.1), nk, PERIOD_S)
+    A, B, C, D = state_space(model)
+    frequency_hz = np.array([0.0, 3.0, 20.0, 49.0])
+    z = np.exp(2j * np.pi * frequency_hz * PERIOD_S)
+    response = [(C @ np.linalg.solve(at * np.eye(A.shape[0]) - A, B))[0, 0] + D for at in z]
+    np.testing.assert_allclose(response, model.response(frequency_hz))
+
+
+@pytest.mark.parametrize("a", [(0.5,), (-0.4, -0.1), (0.0,), ()])
+def test_poles_no_continuous_system_has_are_refused(a: tuple[float, ...]) -> None:
+    with pytest.raises(BadModel, match="no continuous system has such samples"):
+        to_continuous(LinearModel(a, (1.0,), 1, PERIOD_S))
+
 
 T_S = 0.02
 FREQUENCY_HZ = np.linspace(0.01, 24.9, 400)
@@ -80,3 +128,13 @@ def test_an_unstable_model_is_refused() -> None:
 def test_a_covariance_of_another_model_is_refused() -> None:
     with pytest.raises(BadShape, match=r"expected \(8, 8\)"):
         third_order(fourth_order(1e-3), np.eye(3))
+
+
+def test_poles_that_crowd_together_at_one_are_no_exception() -> None:
+    """Four of them within 0.01 of 1, as a fit to a recording of one mass gives: powers of A overflow by rounding."""
+    poles = [0.9968 + 0.002j, 0.9968 - 0.002j, 0.98977, 0.99755]
+    model = LinearModel(tuple(np.real(np.poly(poles))[1:].tolist()), (5e-5, -1.5e-4, 1.49e-4, -4.9e-5), 1, 0.01)
+    found = third_order(model)
+    frequency_hz = np.geomspace(0.5, 40.0, 30)
+    off = np.abs(found.model.response(frequency_hz) - model.response(frequency_hz))
+    assert off.max() <= 1.1 * found.largest_error

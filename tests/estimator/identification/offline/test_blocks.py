@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from estimator.identification.offline.blocks import MOST, block_of, first_part
+from estimator.signals.decimate import MOST, block_of, first_part
 from estimator.signals.record import Record
 
 

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter, welch
 
-from estimator.identification.offline.covariance import sandwich
-from estimator.identification.offline.noise_model import fit_noise, reach, white
+from estimator.identification.offline.noise_model import fit_noise, reach, sandwich, white
 
 D = np.array([1.0, -1.5, 0.7])
 N = 20_000

@@ -10,16 +10,14 @@ import pytest
 
 from estimator.errors import BadSetting, NotExciting
 from estimator.identification.linear_model import Orders
-from estimator.identification.modes.uncertainty import UncertainMode, uncertain_resonance
-from estimator.identification.offline.box_jenkins import fit_box_jenkins
-from estimator.identification.offline.linear_fit import LinearFit, Method
-from estimator.identification.offline.output_error import fit_output_error
+from estimator.identification.modes.uncertainty import UncertainMode
+from estimator.identification.offline.fits import LinearFit, Method, fit_box_jenkins, fit_output_error
 from estimator.signals.decimate import decimate, high_passed
 from estimator.signals.record import Record
 from tests.benchmarks.buses.bus import draw_bus
 from tests.benchmarks.buses.drive import drive
 from tests.estimator.identification.closed_loop import controlled
-from tests.estimator.identification.driveline import cruise, true_resonance
+from tests.estimator.identification.driveline import cruise, true_resonance, uncertain_resonance
 
 Fit = Callable[..., LinearFit]
 METHODS: dict[Method, Fit] = {

@@ -5,7 +5,7 @@ import pytest
 
 from estimator.errors import NotExciting
 from estimator.identification.linear_model import LinearModel, Orders
-from estimator.identification.offline.output_error import OutputErrorFit, fit_output_error
+from estimator.identification.offline.fits import LinearFit, fit_output_error
 from estimator.identification.offline.starts import arx, candidates, stabilised, steiglitz_mcbride
 from estimator.signals.prbs import prbs_nm
 from estimator.signals.record import BoolArray, FloatArray, Record
@@ -26,7 +26,7 @@ def noisy(seed: int, noise: float = 0.3, state: FloatArray | None = None) -> Flo
     return clean + noise * np.random.default_rng(seed).normal(size=N)
 
 
-def fitted(y: FloatArray, okay: BoolArray | None = None) -> OutputErrorFit:
+def fitted(y: FloatArray, okay: BoolArray | None = None) -> LinearFit:
     return fit_output_error(record(y, okay), TRUTH.orders)
 
 

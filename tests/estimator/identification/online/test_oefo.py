@@ -17,7 +17,7 @@ from estimator.identification.online.adaptation import (
 )
 from estimator.identification.online.oefo import Filtering, Oefo
 from estimator.identification.online.recursive import Reason, RecursiveEstimator, Status
-from estimator.identification.online.regression_kernel import is_stable
+from estimator.identification.online.regression import is_stable
 from estimator.signals.prbs import prbs_nm
 from estimator.signals.record import BoolArray, FloatArray
 

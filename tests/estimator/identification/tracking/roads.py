@@ -9,10 +9,8 @@ import numpy as np
 
 from estimator.signals.prbs import Prbs
 from estimator.signals.record import FloatArray, Record
-from hil.figures.line import TwoMassLine
-from hil.figures.road.conditions import Conditions, draw_conditions
-from hil.figures.road.pedal import PedalCruise
-from hil.figures.road.road_load import Bus, RoadLoad
+from hil.figures.local_model import TwoMassLine
+from hil.figures.road import Bus, Conditions, PedalCruise, RoadLoad, draw_conditions
 from hil.proof.truth.bus import draw_bus
 from hil.proof.truth.recording import speed_reading, torque_reading
 from hil.rig.experiments.cruise import Cruise

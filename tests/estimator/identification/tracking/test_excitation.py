@@ -8,19 +8,18 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from estimator.identification.chain import OnlineChain
+from estimator.identification.chain import OnlineChain, OnlineTrajectory
 from estimator.identification.online.adaptation import ConstantForgetting
 from estimator.identification.online.recursive import Status
-from estimator.identification.online_estimate import OnlineTrajectory
 from estimator.identification.settings import Settings
-from estimator.identification.tracking.sensitivity_kernel import (
+from estimator.identification.tracking.alarm import TrackingState
+from estimator.identification.tracking.poles import (
     N_THROUGH,
     output_density,
     pass_torque,
     sensitivity,
     weight_of,
 )
-from estimator.identification.tracking.state import TrackingState
 from estimator.signals.record import FloatArray, Record
 from tests.estimator.identification.tracking import dirty_buses, roads
 from tests.estimator.identification.tracking.drives import PRBS_NM, SAMPLE_TIME_S, Line, drives

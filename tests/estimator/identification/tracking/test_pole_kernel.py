@@ -7,7 +7,7 @@ import pytest
 
 from estimator.identification.linear_model import LinearModel, Orders
 from estimator.identification.modes.modes import LIGHTLY_DAMPED, resonance
-from estimator.identification.tracking.pole_kernel import dominant, find_poles, mode_gradient
+from estimator.identification.tracking.poles import dominant, find_poles, mode_gradient
 from estimator.signals.record import FloatArray
 
 SAMPLE_TIME_S = 0.02

@@ -9,16 +9,15 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from scipy.stats import poisson
+from scipy.integrate import quad
+from scipy.stats import chi, norm, poisson
 
 from estimator.errors import BadSetting
-from estimator.identification.chain import OnlineChain
+from estimator.identification.chain import OnlineChain, OnlineTrajectory
 from estimator.identification.online.adaptation import ConstantForgetting
-from estimator.identification.online_estimate import OnlineTrajectory
 from estimator.identification.settings import Settings
-from estimator.identification.tracking.state import TrackingState
-from estimator.identification.tracking.watch import ChangeWatch
-from estimator.identification.tracking.watch_settings import WatchSettings
+from estimator.identification.tracking.alarm import TrackingState, false_pairs, threshold_for
+from estimator.identification.tracking.watch import Baseline, ChangeWatch, Spread, WatchSettings, spread_of
 from estimator.signals.record import Record
 from tests.estimator.identification.tracking.drives import PRBS_NM, SAMPLE_TIME_S, Line, drives
 
@@ -148,3 +147,71 @@ def test_a_reference_that_explains_nothing_is_given_up() -> None:
 def test_settings_that_make_no_sense_are_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(BadSetting, match=next(iter(wrong))):
         WatchSettings(**wrong)  # type: ignore[arg-type]
+
+
+NUMBER = np.arange(2.0, 23.0)
+
+
+@pytest.mark.parametrize("slope", [0.0, 0.3])
+def test_a_drift_is_no_spread(slope: float) -> None:
+    rng = np.random.default_rng(3)
+    spreads = [spread_of(NUMBER, slope * NUMBER + rng.normal(0.0, 0.5, 21), np.full(21, 4.0)) for _ in range(400)]
+    assert np.sqrt(np.mean([spread.of_x**2 for spread in spreads])) == pytest.approx(1.0, rel=0.05)
+    assert spreads[0].usual == 4.0
+
+
+def test_level_weighs_blocks_by_their_information() -> None:
+    level = Baseline.of(np.array([1.0, 4.0]), np.array([2.0, 1.0]))
+    assert level == Baseline(2.0, 3.0)
+
+
+@pytest.mark.parametrize(("information", "std_hz"), [(1.0, 1.0), (0.25, 2.0), (16.0, 1.0)])
+def test_neither_a_weaker_nor_a_stronger_excitation_is_judged_too_sharply(information: float, std_hz: float) -> None:
+    """Noise spreads the weaker one's frequencies more; what the model lacks spreads the stronger one's no less."""
+    statistic = Baseline(0.0, 1e12).statistic(3.0, information, 0.5, Spread(1.0, 1.0))
+    assert statistic == pytest.approx(2.5 / std_hz)
+
+
+def test_what_is_tolerated_counts_as_nothing() -> None:
+    level, spread = Baseline(8.0, 7.0), Spread(0.1, 1.0)
+    assert level.statistic(8.07, 1.0, 0.08, spread) == 0.0
+    assert level.statistic(7.9, 1.0, 0.08, spread) < 0.0 < level.statistic(8.1, 1.0, 0.08, spread)
+
+
+@pytest.mark.parametrize(("threshold", "n"), [(1.5, 21), (2.0, 10)])
+def test_probability_is_that_of_a_trial(threshold: float, n: int) -> None:
+    x = np.random.default_rng(5).normal(3.0, 2.0, (200_000, n + 2))
+    mean, std = x[:, :n].mean(axis=1, keepdims=True), x[:, :n].std(axis=1, ddof=1, keepdims=True)
+    tau = (x[:, n:] - mean) / (std * np.sqrt(1 + 1 / n))
+    pairs = (tau > threshold).all(axis=1) | (tau < -threshold).all(axis=1)
+    scatter = np.sqrt(pairs.mean() / pairs.size)
+    assert false_pairs(threshold, n, n - 1) == pytest.approx(pairs.mean(), abs=4 * scatter)
+
+
+@pytest.mark.parametrize(("threshold", "n", "freedom"), [(0.0, 21, 20), (0.5, 21, 20), (2.5, 7, 19), (5.0, 3, 1)])
+def test_probability_is_that_of_the_normal_tail_over_mean_and_spread(threshold: float, n: int, freedom: int) -> None:
+    """The rule as it is stated: ``2 E[Q(h s sqrt(1 + 1/n) + m)^2]`` with m normal and nu s^2 chi-squared."""
+
+    def given_mean(spread: float) -> float:
+        beyond = threshold * spread * np.sqrt(1 + 1 / n)
+        return float(norm.expect(lambda m: norm.sf(beyond + m) ** 2, scale=n**-0.5))
+
+    expected = quad(lambda s: given_mean(s) * chi.pdf(s, freedom, scale=freedom**-0.5), 0.0, 8.0, epsabs=1e-9)[0]
+    assert false_pairs(threshold, n, freedom) == pytest.approx(2 * expected, rel=1e-4)
+
+
+def test_threshold_gives_the_rate_it_was_asked_for() -> None:
+    threshold = threshold_for(0.1, 3600.0, 21, 20)
+    assert 3600.0 * false_pairs(threshold, 21, 20) == pytest.approx(0.1, rel=1e-3)
+    assert threshold_for(0.01, 3600.0, 21, 20) > threshold > threshold_for(0.1, 3600.0, 100, 99)
+
+
+@pytest.mark.parametrize("rate", [0.0, -1.0, 3600.0, float("nan")])
+def test_a_rate_no_threshold_has_is_refused(rate: float) -> None:
+    with pytest.raises(BadSetting, match="false_alarms_per_hour"):
+        threshold_for(rate, 3600.0, 21, 20)
+
+
+def test_a_reference_too_short_for_the_rate_is_refused() -> None:
+    with pytest.raises(BadSetting, match="longer reference"):
+        threshold_for(1e-6, 3600.0, 3, 2)

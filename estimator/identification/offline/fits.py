@@ -1,0 +1,302 @@
+"""Off-line fits of a whole recording: output error and Box-Jenkins, from record to model, covariance and free run.
+
+Output error: the prediction-error method on the free-run simulation (:mod:`problem` has the equations); consistent
+whatever the colour of the noise on y as long as torque does not follow speed; its covariance takes the colour into
+account. Box-Jenkins: ``y = B / A u + 1 / D w``, w white. The sum of w^2 over A, B and D together is least at the
+maximum-likelihood estimate (Box and Jenkins, Time Series Analysis, chapter 11; Ljung, System Identification, 2nd ed.,
+section 7.4). D is long, a second: road, grade and the driver's slow changes are the noise's, and no pole of the
+driveline has to follow them. The covariance is that of the joint estimate, so that what feedback correlates, plant and
+noise, widens the intervals. On 200 buses on a road, with a driver, the errors of frequency and damping were 0.24 and
+0.38 times those of the output-error fit (``python -m tests.benchmarks.identification``).
+
+Two figures of merit, never one without the other. *Free run*: the output simulated from the input alone, which is what
+a model is for. *One step*: the next output predicted with the last measured ones at hand; on slow signals it is near
+100 % for any model.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from enum import Enum
+
+import numpy as np
+
+from estimator.errors import BadModel, BadSetting
+from estimator.identification.linear_model import ComplexArray, LinearModel, Orders
+from estimator.identification.offline.noise_model import NoiseModel, fit_noise, reach, sandwich
+from estimator.identification.offline.problem import Problem, simulated
+from estimator.identification.offline.starts import candidates, subspace
+from estimator.identification.settings import require_excitation
+from estimator.signals.decimate import Blocks, block_of
+from estimator.signals.record import BoolArray, FloatArray, Record
+
+PERIOD_TOLERANCE = 0.02
+"""Relative. Jitter averages out over a recording; a wrong period is off by far more."""
+
+
+def require_identifiable(record: Record, orders: Orders) -> None:
+    """Refuse a recording that can't determine a model of these orders."""
+    stamped_s = float(np.median(np.diff(record.time_s))) if record.time_s.shape[0] > 1 else record.sample_time_s
+    if abs(stamped_s - record.sample_time_s) > PERIOD_TOLERANCE * record.sample_time_s:
+        raise BadSetting(
+            f"recording {record.name}: sample_time_s is {record.sample_time_s:g}, its time stamps are {stamped_s:g} s "
+            f"apart; expected one period. Frequencies would be wrong by {stamped_s / record.sample_time_s:.3g}; the "
+            "resonance and the stiffness can't be determined. Correct the period or the time column's scale."
+        )
+    require_excitation(record.name, record.total_torque_nm, record.output, record.okay, orders)
+
+
+class Method(Enum):
+    """Off-line estimators; the value is the name in reports."""
+
+    OUTPUT_ERROR = "output_error"
+    BOX_JENKINS = "box_jenkins"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LinearFit:
+    """A fitted model and how well it does.
+
+    Attributes
+    ----------
+    method : Method
+        Which estimator.
+    model : LinearModel
+        Transfer function.
+    covariance : ndarray, shape (na+nb, na+nb)
+        Covariance of theta, the residual's colour taken into account.
+    state : ndarray, shape (n_states + 1,)
+        ``[c, h]``: numerator of the free response from sample ``first`` of the data, and that of the high-pass.
+    first : int
+        First good sample; the simulation starts there.
+    rms : float
+        RMS of the free-run simulation error [output unit].
+    fit_percent : float
+        ``100 (1 - |y - yhat| / |y - mean y|)`` in free run, the normalised RMS fit (not R squared).
+    one_step_fit_percent : float
+        The same for the prediction one step ahead.
+    noise : NoiseModel
+        Of the free-run residual; predicts one step ahead.
+    block : int
+        Samples whose mean residual is one sample to the noise model.
+    n_samples : int
+        Good samples used.
+    """
+
+    method: Method
+    model: LinearModel
+    covariance: FloatArray
+    state: FloatArray
+    first: int
+    rms: float
+    fit_percent: float
+    one_step_fit_percent: float
+    noise: NoiseModel
+    n_samples: int
+    block: int = 1
+
+    def simulate(self, u: FloatArray) -> FloatArray:
+        """Free-run simulation over the data's inputs, shape (N,); the time before ``first`` is 0."""
+        out = np.zeros(u.shape[0])
+        out[self.first :] = simulated(self.model, u[self.first :], self.state)
+        return out
+
+
+def fit_percent(error: FloatArray, measured: FloatArray) -> float:
+    """Return the normalised RMS fit [%] of errors, shape (n,), against the outputs they belong to."""
+    spread = float(np.linalg.norm(measured - measured.mean()))
+    return 100.0 * (1.0 - float(np.linalg.norm(error)) / spread) if spread > 0.0 else float("nan")
+
+
+def one_step_fit(error: FloatArray, y: FloatArray, okay: BoolArray, noise: NoiseModel, block: int) -> float:
+    """Return the fit [%] of the prediction one step of the noise model ahead; NaN where no past is complete."""
+    blocks = Blocks(okay, block)
+    complete = noise.complete(blocks.okay)
+    if not complete.any():
+        return float("nan")
+    return fit_percent(noise.whiten(blocks.mean(error))[complete], blocks.mean(y)[complete])
+
+
+def summary(
+    method: Method,
+    model: LinearModel,
+    covariance: FloatArray,
+    state: FloatArray,
+    first: int,
+    y: FloatArray,
+    okay: BoolArray,
+    error: FloatArray,
+    noise: NoiseModel,
+    block: int,
+) -> LinearFit:
+    """Put a result together; y, okay and the free-run error of shape (N - first,)."""
+    return LinearFit(
+        method=method,
+        model=model,
+        covariance=covariance,
+        state=state,
+        first=first,
+        rms=float(np.sqrt(np.mean(error[okay] ** 2))),
+        fit_percent=fit_percent(error[okay], y[okay]),
+        one_step_fit_percent=one_step_fit(error, y, okay, noise, block),
+        noise=noise,
+        n_samples=int(np.count_nonzero(okay)),
+        block=block,
+    )
+
+
+def problem_of(record: Record, orders: Orders | None) -> tuple[Problem, int]:
+    """Return the output-error problem of a recording from its first good sample on, and the number of that sample."""
+    orders = Orders() if orders is None else orders
+    require_identifiable(record, orders)
+    first = int(record.okay.argmax())
+    problem = Problem(
+        u=record.total_torque_nm[first:],
+        y=record.output[first:],
+        okay=record.okay[first:],
+        orders=orders,
+        sample_time_s=record.sample_time_s,
+        read=None if record.read is None else record.read[first:],
+        block=block_of(record.sample_time_s),
+    )
+    return problem, first
+
+
+def starts(problem: Problem) -> Iterator[FloatArray]:
+    """Yield an x for each start; always at least one.
+
+    They are found from block means, which the driveline fills with its motion whatever the recording's period is, and
+    taken back to it by their poles.
+    """
+    k, orders = problem.block, problem.orders
+    period_s = k * problem.sample_time_s
+    u, y, okay = problem.blocks.mean(problem.u), problem.blocks.mean(problem.y), problem.blocks.okay
+    if k > 1:
+        everywhere = replace(problem, okay=np.ones_like(problem.okay))
+        u = everywhere.blocks.mean(problem.u)
+    first = subspace(u, y, okay, orders, period_s)
+    models = [] if first is None else [first]
+    for model in (*models, *candidates(u, y, okay, orders, period_s)):
+        yield problem.start(model) if k == 1 else problem.start_at(_faster(model.poles, k))
+
+
+def _faster(poles: ComplexArray, k: int) -> ComplexArray:
+    """Return poles at a period k times as short; a negative one, which has no such root, keeps its radius."""
+    real = np.where(poles.imag == 0.0, np.abs(poles.real), poles)
+    return np.asarray(real ** (1.0 / k), dtype=np.complex128)
+
+
+def summarised(
+    method: Method, problem: Problem, x: FloatArray, first: int, covariance: FloatArray, noise: NoiseModel
+) -> LinearFit:
+    """Put together what came out at x; ``covariance`` of theta, shape (na+nb, na+nb)."""
+    return summary(
+        method,
+        problem.model(x),
+        covariance,
+        problem.state(x),
+        first,
+        problem.y,
+        problem.okay,
+        problem.error(x),
+        noise,
+        problem.block,
+    )
+
+
+def fit_output_error(record: Record, orders: Orders | None = None) -> LinearFit:
+    """Fit an output-error model to a recording's total torque and output."""
+    problem, first = problem_of(record, orders)
+    x = problem.solve(starts(problem))
+    noise = fit_noise(problem.blocks.mean(problem.error(x)), problem.blocks.okay, reach(problem.period_s))
+    gradient = problem.blocks.mean(problem.gradient(x))
+    covariance = sandwich(gradient, problem.blocks.okay, noise)
+    n = problem.orders.n_parameters
+    return summarised(Method.OUTPUT_ERROR, problem, x, first, covariance[:n, :n], noise)
+
+
+MOST_STARTS = 2
+"""Starts that are followed, those of the least innovations first: the next best is there for what the best misses."""
+
+
+def fit_box_jenkins(record: Record, orders: Orders | None = None, memory: int | None = None) -> LinearFit:
+    """Fit a Box-Jenkins model to a recording's total torque and output."""
+    return fit_of(*solved(record, orders, memory))
+
+
+def fit_of(problem: Problem, x: FloatArray, first: int) -> LinearFit:
+    """Return the fit at the minimum of :func:`solved`, with the covariance of the joint estimate."""
+    covariance, noise = _spread(problem, x)
+    free = problem.with_free_response(x)  # a free run is judged by itself
+    return summarised(Method.BOX_JENKINS, problem, free, first, covariance, noise)
+
+
+def solved(record: Record, orders: Orders | None, memory: int | None = None) -> tuple[Problem, FloatArray, int]:
+    """Return the joint problem, its minimum, and the first sample it counts from; as :func:`fit_box_jenkins`."""
+    plain, first = problem_of(record, orders)
+    order = reach(plain.period_s) if memory is None else memory
+    begin = sorted(((x, _noise_of(plain, x, order)) for x in starts(plain)), key=lambda each: each[1].std)[:MOST_STARTS]
+    problem = replace(plain, noise_order=min(noise.order for _, noise in begin))
+    x = problem.solve([np.concatenate([x, noise.D[1 : problem.noise_order + 1]]) for x, noise in begin])
+    return problem, x, first
+
+
+def _noise_of(problem: Problem, x: FloatArray, order: int) -> NoiseModel:
+    return fit_noise(problem.blocks.mean(problem.error(x)), problem.blocks.okay, order)
+
+
+def _spread(problem: Problem, x: FloatArray) -> tuple[FloatArray, NoiseModel]:
+    """Return the covariance of theta, ``sigma^2 (J^T J)^-1`` of the joint estimate, and the noise model."""
+    n, w = problem.orders.n_parameters, problem.residual(x)
+    J = problem.jacobian(x, of_theta=True)
+    scale = np.maximum(np.linalg.norm(J, axis=0), np.finfo(np.float64).tiny)
+    inverse = np.linalg.pinv((J / scale).T @ (J / scale), hermitian=True) / np.outer(scale, scale)
+    variance = float(w @ w) / max(w.shape[0] - problem.n_unknowns(x) - J.shape[1], 1)
+    D = np.concatenate([[1.0], x[problem.n_plant :]])
+    return variance * inverse[:n, :n], NoiseModel(D, float(np.sqrt(variance)))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FreeRun:
+    """Free-run simulation next to the measurement.
+
+    Attributes
+    ----------
+    name : str
+        The recording.
+    error : ndarray, shape (N,)
+        Measured less simulated output [output unit]; NaN where there is none.
+    rms : float
+        Of the good samples [output unit].
+    fit_percent, one_step_fit_percent : float
+        In free run, and one step ahead with the noise model given.
+    """
+
+    name: str
+    error: FloatArray
+    rms: float
+    fit_percent: float
+    one_step_fit_percent: float
+
+
+def free_run(model: LinearModel, record: Record, noise: NoiseModel) -> FreeRun:
+    """Simulate a recording with a model."""
+    period_s = record.sample_time_s
+    if not np.isclose(period_s, model.sample_time_s, rtol=1e-3) or not model.is_stable:
+        raise BadModel(
+            f"recording {record.name}: sampled every {period_s:g} s, the model every {model.sample_time_s:g} s with "
+            f"poles of radius up to {np.abs(model.poles).max(initial=0.0):.4g}, expected one period and radii below 1. "
+            "Prepare both recordings alike; take a stable estimate."
+        )
+    first = int(record.okay.argmax())
+    u, y, okay = record.total_torque_nm[first:], record.output[first:], record.okay[first:]
+    problem = Problem(u, y, okay, model.orders, model.sample_time_s)
+    error = np.where(okay, problem.error(problem.start(model)), np.nan)
+    return FreeRun(
+        name=record.name,
+        error=np.concatenate([np.full(first, np.nan), error]),
+        rms=float(np.sqrt(np.mean(error[okay] ** 2))),
+        fit_percent=fit_percent(error[okay], y[okay]),
+        one_step_fit_percent=one_step_fit(error, y, okay, noise, block_of(period_s)),
+    )

@@ -1,1 +1,0 @@
-"""What the data say by frequency, without a model."""
