@@ -24,7 +24,7 @@ from estimator.signals.record import Record
 from hil.commission.responses import HIGH_PASS_HZ, TRUSTED, Z95, Measured
 
 if TYPE_CHECKING:
-    from estimator.identification.offline.fits import OutputErrorFit
+    from estimator.identification.offline.fits import LinearFit
 
 
 WIDEST = 100.0
@@ -136,7 +136,7 @@ class DelaySelection:
     """The delay that suits best, beyond the sample that is natural, and the model with it."""
 
     extra_samples: int
-    fit: OutputErrorFit
+    fit: LinearFit
     rms_by_delay: tuple[float, ...]
 
 

@@ -16,7 +16,7 @@ from estimator.signals.record import FloatArray
 from hil.config.rig_file import Rig
 
 if TYPE_CHECKING:
-    from estimator.identification.offline.fits import OutputErrorFit
+    from estimator.identification.offline.fits import LinearFit
 
 
 STEP = 1e-3
@@ -36,7 +36,7 @@ class ResonanceSpread:
         return ResonanceSpread(self.mode, factor * self.frequency_std, factor * self.damping_std)
 
 
-def resonance_spread(fit: OutputErrorFit, band_hz: tuple[float, float]) -> ResonanceSpread | None:
+def resonance_spread(fit: LinearFit, band_hz: tuple[float, float]) -> ResonanceSpread | None:
     """Return the resonance of a fit and how well it is known; None without one in the band.
 
     First order: differences along the principal directions of the covariance of theta, ``sigma^2 (J'J)^-1``.

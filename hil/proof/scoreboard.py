@@ -6,7 +6,6 @@ import json
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -137,7 +136,7 @@ def scoreboard_page(board: Board) -> str:
     misses = [row for row in rows if not row["success"]]
     title = f"{len(rows) - len(misses)} of {len(rows)} sealed cases answered as they should be"
     sections = [
-        f'<header class="top">\n<h1>{escape(title)}</h1>\n{html.tiles(_tiles(rows))}\n</header>',
+        html.header(title, html.tiles(_tiles(rows))),
         html.section("By what was hidden", _groups(rows)),
         html.section("Misses", _cases(misses) if misses else html.paragraph("None.")),
         *([_wire_section(board.wire)] if board.wire else []),
@@ -146,7 +145,7 @@ def scoreboard_page(board: Board) -> str:
         html.section("Every case", _cases(rows)),
         made_section(board.made),
     ]
-    return html.page("Scoreboard", sections, FOOTER, plots=False)
+    return html.page("Scoreboard", sections, FOOTER)
 
 
 def _tiles(rows: Sequence[Row]) -> list[tuple[str, str, str]]:
@@ -165,7 +164,7 @@ def _tiles(rows: Sequence[Row]) -> list[tuple[str, str, str]]:
     ]
 
 
-def _groups(rows: Sequence[Row]) -> str:
+def _groups(rows: Sequence[Row]) -> html.Table:
     lines = []
     for group, (title, wanted) in GROUPS.items():
         members = [row for row in rows if row["group"] == group.value]
@@ -182,34 +181,31 @@ def _named(rows: Sequence[Row]) -> list[tuple[str, str]]:
     ]
 
 
-def _cases(rows: Sequence[Row]) -> str:
+def _cases(rows: Sequence[Row]) -> html.Table:
     """Return a line for each case, with a link to its report; the page stands next to the folder of verdicts."""
-    return html.html_table(CASE_HEADINGS, [_case(row) for row in rows], numbers=(4, 5, 6, 7))
+    return html.table(CASE_HEADINGS, [_case(row) for row in rows], numbers=(4, 5, 6, 7))
 
 
-def _case(row: Row) -> list[str]:
+def _case(row: Row) -> list[Any]:
     return [
         _unbroken(row["case"]),
-        escape(row["kind"]).replace(PAIR_SIGN, f"{PAIR_SIGN}<wbr>"),
-        escape(_found(row)),
+        str(row["kind"]).replace(PAIR_SIGN, f"{PAIR_SIGN}\u200b"),  # a line may break there
+        _found(row),
         _unbroken(_outcome(row)),
         *_errors(row),
         _number(quantiles(row["fresh_over_floor"], (0.5,))[0]),
-        _report(VERDICTS, row) or escape(row["fault"] or ""),
+        _report(VERDICTS, row) or row["fault"] or "",
     ]
 
 
-def _wire_section(rows: Sequence[Row]) -> str:
+def _wire_section(rows: Sequence[Row]) -> html.Section:
     right = sum(bool(row["success"]) for row in rows)
     sentence = (
         "The effect sits in simulated slaves served by a process of its own; the tool has CANopen and Modbus, runs its "
         "own tests, and the seal is opened once its verdict is written."
     )
-    lines = [
-        [*map(escape, (row["case"], row["where"], _found(row), _outcome(row))), *_errors(row), _report(WIRE, row)]
-        for row in rows
-    ]
-    table = html.html_table(RIG_HEADINGS, lines, numbers=(4, 5, 6))
+    lines = [[row["case"], row["where"], _found(row), _outcome(row), *_errors(row), _report(WIRE, row)] for row in rows]
+    table = html.table(RIG_HEADINGS, lines, numbers=(4, 5, 6))
     return html.section(f"Over the wire: {right} of {len(rows)}", html.paragraph(sentence), table)
 
 
@@ -228,31 +224,31 @@ def _errors(row: Row) -> list[str]:
     return [_number(fit.get(name)) for name in ("retuned", "augmented", "noise_floor")]
 
 
-def _report(folder: str, row: Row) -> str:
-    return f'<a href="{folder}/{escape(row["case"])}/report.html">report</a>' if "verdict" in row else ""
+def _report(folder: str, row: Row) -> html.Link | str:
+    return html.Link("report", f"{folder}/{row['case']}/report.html") if "verdict" in row else ""
 
 
-def _real_section(cases: Sequence[Mapping[str, Any]]) -> str:
-    pieces = [
+def _real_section(cases: Sequence[Mapping[str, Any]]) -> html.Section:
+    pieces: list[Any] = [
         html.paragraph(
             "Recordings of real machines. What is concealed was taken out of the files, or left out of the nominal "
             "model, before the tool read them; the truth withheld was read after its verdict."
         )
     ]
     for case in cases:
-        pieces += [f"<h3>{escape(case['title'])}</h3>", html.paragraph(f"Concealed: {case['conceals']}")]
-        pieces.append(html.html_table(REAL_HEADINGS, [_real_run(run) for run in case["runs"]], numbers=(2, 3)))
+        pieces += [html.Heading(case["title"]), html.paragraph(f"Concealed: {case['conceals']}")]
+        pieces.append(html.table(REAL_HEADINGS, [_real_run(run) for run in case["runs"]], numbers=(2, 3)))
         agreements = [each for run in case["runs"] for each in run["agreements"]]
         if agreements:
             pieces.append(html.table(AGREEMENTS, map(_agreement, agreements), (1, 2)))
     return html.section("Real recordings", *pieces)
 
 
-def _real_run(run: Mapping[str, Any]) -> list[str]:
+def _real_run(run: Mapping[str, Any]) -> list[Any]:
     found = run["fault"] or ", ".join(run["named"]) or str(run["verdict"]).replace("_", " ")
-    report = f'<a href="{REAL}/{escape(run["report"])}">report</a>' if run["report"] else ""
+    report = html.Link("report", f"{REAL}/{run['report']}") if run["report"] else ""
     errors = [_number(run["held_out"][stage]) for stage in ("before", "after")]
-    return [escape(run["name"]), f"{'✓' if run['right'] else '✗'} {escape(found)}", *errors, report]
+    return [run["name"], f"{'✓' if run['right'] else '✗'} {found}", *errors, report]
 
 
 def _agreement(entry: Mapping[str, Any]) -> tuple[str, str, str, str, str]:
@@ -262,7 +258,7 @@ def _agreement(entry: Mapping[str, Any]) -> tuple[str, str, str, str, str]:
 
 
 def _unbroken(text: str) -> str:
-    return f'<span style="white-space: nowrap">{escape(text)}</span>'
+    return text.replace(" ", "\u00a0")
 
 
 def _number(value: float | None) -> str:

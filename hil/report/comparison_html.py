@@ -92,7 +92,7 @@ def _figures(comparisons: Compared) -> html.Table:
         "samples", "p, past torque",
     )  # fmt: skip
     if not several:
-        headings, rows = (headings[0], *headings[2:]), [(name, *rest) for name, _, *rest in rows]
+        headings, rows = (headings[0], *headings[2:]), [(row[0], *row[2:]) for row in rows]
     return html.table(headings, rows, numbers=range(len(headings) - 6, len(headings)))
 
 

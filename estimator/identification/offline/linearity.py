@@ -87,7 +87,8 @@ def judge_linearity(problem: Problem, x: FloatArray, record: Record, first: int,
         J, w = problem.jacobian(x), problem.residual(x)
         columns = [_responses(problem, x, model, group, high_pass_hz) for group in groups]
         (p_value, effect), *alone = (_tested(J, w, c) for c in (np.column_stack(columns), *columns))
-    return Linearity(p_value, *(p for p, _ in alone), effect)
+    (by_torque, _), (by_speed, _) = alone
+    return Linearity(p_value, by_torque, by_speed, effect)
 
 
 def shaft_torque(model: LinearModel, u: FloatArray) -> FloatArray:

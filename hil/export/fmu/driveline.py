@@ -9,10 +9,11 @@ from dataclasses import dataclass, replace
 from estimator.diagnosis.chain import mechanical
 from estimator.diagnosis.segments import tiles
 from estimator.physics.catalogue import EFFECTS
+from estimator.physics.driveline import Case
 from estimator.physics.effect import Element
 from estimator.physics.free_run import settle
 from estimator.physics.grid import Grid, substeps_for
-from estimator.physics.inputs import Case, load_of
+from estimator.physics.inputs import load_of
 from estimator.physics.kernel import state_vector
 from estimator.physics.kernel.integration import with_mode
 from estimator.physics.layout import LOAD, SIZE, flat, slot

@@ -15,13 +15,9 @@ from datetime import UTC, datetime
 from importlib import resources
 from pathlib import Path
 
-from estimator.physics import driveline as start
-from estimator.physics import inputs as torque_path
-from estimator.physics import low_pass
-from estimator.physics.effects import actuator_lag
+from estimator.physics import inputs
+from estimator.physics.effects.timing import FASTEST_S, lag_step, low_pass
 from estimator.physics.kernel import bristles, conditions, rates, sensing, slots, state_vector
-from estimator.physics.kernel import conditions as line
-from estimator.physics.kernel import rates as contact
 from estimator.physics.layout import SIZE, slot
 from hil.config.model_file import read_model, read_model_for_recordings
 from hil.errors import ModelFileError, UsageError
@@ -46,9 +42,10 @@ from hil.recording.signals_config import SignalsConfig
 from hil.report.outputs import publish
 
 USED = (
-    conditions.conditions, conditions.with_torque, line.is_elastic, line.is_extended, line.is_bristled, bristles.bent,
-    bristles.rubbed, contact.stepped, rates.rates, rates.shaft_torques, sensing.entry, sensing.reading,
-    sensing.read_angle, sensing.smoothed, sensing.shown, low_pass.low_pass, actuator_lag.step, start.follow,
+    conditions.conditions, conditions.with_torque, conditions.is_elastic, conditions.is_extended,
+    conditions.is_bristled, bristles.bent, bristles.rubbed, rates.stepped, rates.rates, rates.shaft_torques,
+    sensing.entry, sensing.reading, sensing.read_angle, sensing.smoothed, sensing.shown, low_pass, lag_step,
+    inputs.follow,
 )  # fmt: skip
 """What driveline.c calls; what these call comes along."""
 
@@ -75,7 +72,7 @@ def laws() -> str:
     unit = Translation()
     for function in USED:
         unit.function(function)
-    unit.function(torque_path.limited, of_one_number=True)
+    unit.function(inputs.limited, of_one_number=True)
     head = "/* The laws of hil, translated from Python. The functions are named after their module. */\n"
     torque = _torque_laws(unit)  # before the text: it asks for functions
     return head + unit.text() + torque
@@ -84,7 +81,7 @@ def laws() -> str:
 def _torque_laws(unit: Translation) -> str:
     """Return the C function of the laws that entries declare for the torque, one behind the other."""
     lines = ["static double laws_torque(double torque, double time_s, Array p) {"]
-    for law, at, null in torque_path.DECLARED:
+    for law, at, null in inputs.DECLARED:
         name, _ = unit.function(law, of_one_number=True)
         values = ", ".join(["torque", "time_s", *(f"p.at[{place}]" for place in at)])
         lines.append(f"    if (p.at[{at[0]}] != {_number(null)}) torque = {name}({values});")
@@ -103,7 +100,7 @@ def model_header(d: Driveline, token: str) -> str:
         "PARAMETERS": SIZE,
         "VALUES": VALUES,
         "WARMTH": WARMTH,
-        "FASTEST_S": actuator_lag.FASTEST_S,
+        "FASTEST_S": FASTEST_S,
         **{name: i for i, name in enumerate(NAMED)},
         **{name: getattr(state_vector, name) for name in _FROM_STATES},
         **{name: getattr(slots, name) for name in _FROM_SLOTS},

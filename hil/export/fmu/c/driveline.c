@@ -18,8 +18,8 @@ static State state(const Driveline *d) {
 }
 
 static Line line(Driveline *d) {
-    int elastic = MASSES == 1 || line_is_elastic(parameters(d));
-    return (Line){MASSES, elastic, !elastic, line_is_extended(parameters(d))};
+    int elastic = MASSES == 1 || conditions_is_elastic(parameters(d));
+    return (Line){MASSES, elastic, !elastic, conditions_is_extended(parameters(d))};
 }
 
 /* ---- a torque's past, which a delay reads ---- */
@@ -89,9 +89,9 @@ static void passed(const History *past, double before, double begin, double end,
 
 static double summed(Driveline *d) {
     const double *p = d->value + PARAMETER;
-    double m1 = torque_path_limited(d->value[T_M1] * p[GAIN_M1], p[LIMIT_M1], p[LIMIT_SHARPNESS]);
-    double m2 = torque_path_limited(d->value[T_M2] * p[GAIN_M2], p[LIMIT_M2], p[LIMIT_SHARPNESS]);
-    return laws_torque(torque_path_limited(m1 + m2, p[LIMIT_SUM], p[LIMIT_SHARPNESS]), d->value[TIME], parameters(d));
+    double m1 = inputs_limited(d->value[T_M1] * p[GAIN_M1], p[LIMIT_M1], p[LIMIT_SHARPNESS]);
+    double m2 = inputs_limited(d->value[T_M2] * p[GAIN_M2], p[LIMIT_M2], p[LIMIT_SHARPNESS]);
+    return laws_torque(inputs_limited(m1 + m2, p[LIMIT_SUM], p[LIMIT_SHARPNESS]), d->value[TIME], parameters(d));
 }
 
 static double warmth(const Driveline *d) { /* 1: as warm as they get; heated by the torque's losses it is a state */
@@ -148,7 +148,7 @@ int driveline_begin(Driveline *d) {
     x.at[MIDDLE_SPEED] = d->value[START_MIDDLE_SPEED];
     x.at[TRACTION] = d->value[START_TRACTION];
     double torque = on_shaft(d), angle = d->value[ANGLE_IS_READ] != 0.0 ? d->value[ANGLE_READ] : 0.0;
-    start_follow(x, torque, angle, parameters(d));
+    inputs_follow(x, torque, angle, parameters(d));
     d->value[BEFORE_ALL] = torque + d->value[PARAMETER + DELAYED_BEFORE];
     return driveline_remember(d);
 }
@@ -165,8 +165,8 @@ int driveline_step(Driveline *d, double length_s) {
     double h = length_s / steps, start_s = d->value[TIME], torque = on_shaft(d), angle = read_angle(d);
     double turn = (d->value[ANGLE_IS_READ] != 0.0 ? d->value[TURN_RATE] : d->value[STATE + SPEED]) * length_s;
     double *rest = d->value + STATE;
-    LowPass lag = low_pass_low_pass(p.at[LAG], p.at[LAG_SHAPE], h);
-    LowPass filter = low_pass_low_pass(p.at[FILTER], p.at[FILTER_SHAPE], h);
+    LowPass lag = timing_low_pass(p.at[LAG], p.at[LAG_SHAPE], h);
+    LowPass filter = timing_low_pass(p.at[FILTER], p.at[FILTER_SHAPE], h);
     if (!driveline_remember(d)) return 0;
     State x = state(d);
     Bristles held = {rest[BRISTLES_MOTOR], rest[BRISTLES_LOAD]};
@@ -176,15 +176,15 @@ int driveline_step(Driveline *d, double length_s) {
         Conditions felt = now;
         if (p.at[DELAY] != 0.0)
             passed(&d->history, d->value[BEFORE_ALL], at_s - p.at[DELAY], at_s + h - p.at[DELAY], &mean, &rise);
-        Several_dddd fed = actuator_lag_step(mean, rise, rest[LAGGED], rest[LAG_RISE], lag);
+        Several_dddd fed = timing_lag_step(mean, rise, rest[LAGGED], rest[LAG_RISE], lag);
         rest[LAGGED] = fed.item2, rest[LAG_RISE] = fed.item3;
-        if (line_is_bristled(p)) {
+        if (conditions_is_bristled(p)) {
             held = bristles_bent(made, held, x, now, p, 0.5 * h);
             felt = bristles_rubbed(now, held, p);
         }
         State before = x;
-        x = contact_stepped(made, felt, fed.item0, fed.item1, x, p, h);
-        if (line_is_bristled(p)) held = bristles_bent(made, held, x, now, p, 0.5 * h);
+        x = rates_stepped(made, felt, fed.item0, fed.item1, x, p, h);
+        if (conditions_is_bristled(p)) held = bristles_bent(made, held, x, now, p, 0.5 * h);
         if (p.at[FILTER] > 0.0) {
             double turned = angle + turn * j / steps, turns = angle + turn * (j + 1) / steps;
             Several_dd read = sensing_smoothed(before, x, OUTPUT, turned, turns, rest[FILTERED], rest[FILTER_RISE],
@@ -213,7 +213,7 @@ void driveline_update(Driveline *d) {
     Conditions now =
         conditions_conditions(MASSES, time_s - 0.5 * h, h, angle, v[T_LOAD], v[SIGN_WIDTH], p), felt = now;
     Bristles held = {rest[BRISTLES_MOTOR], rest[BRISTLES_LOAD]};
-    if (line_is_bristled(p)) felt = bristles_rubbed(now, held, p);
+    if (conditions_is_bristled(p)) felt = bristles_rubbed(now, held, p);
     State moving = rates_rates(made, conditions_with_torque(felt, drive), x, p);
     v[SPEED_MEASURED] = sensing_shown(sensing_reading(sensing_entry(x, OUTPUT, p), angle, p), rest[FILTERED], p);
     v[SPEED_MOTOR] = x.speed;
