@@ -98,22 +98,15 @@ class StepRecord:
 
     @classmethod
     def from_json(cls, document: dict[str, Any]) -> StepRecord:
-        """Read it from the state file.
+        """Read it from the state file, which is one (`hil.commission.state_model`); keys of later versions are left."""
+        known = _fields_of(cls, document)
+        findings = [Finding(**_fields_of(Finding, finding)) for finding in known["findings"]]
+        runs = [RunRecord(**_fields_of(RunRecord, run)) for run in known["runs"]]
+        return cls(**known | {"status": Status(known["status"]), "findings": findings, "runs": runs})
 
-        Raises
-        ------
-        KeyError, TypeError, ValueError
-            If it is none.
-        """
-        known = {each.name: document[each.name] for each in fields(cls)}
-        return cls(
-            **known
-            | {
-                "status": Status(known["status"]),
-                "findings": [Finding(**finding) for finding in known["findings"]],
-                "runs": [RunRecord(**run) for run in known["runs"]],
-            }
-        )
+
+def _fields_of(kind: type[StepRecord | RunRecord | Finding], document: dict[str, Any]) -> dict[str, Any]:
+    return {each.name: document[each.name] for each in fields(kind) if each.name in document}
 
 
 def now_utc() -> str:

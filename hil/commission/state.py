@@ -13,14 +13,21 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
+from pydantic import ValidationError
+
 from hil import __version__
 from hil.commission.record import Status, StepRecord, now_utc
+from hil.commission.state_model import StateFile
 from hil.errors import UsageError
 from hil.inside import is_inside
 from hil.parse_json import read_json
+from hil.problems import problem_lines
 
 SCHEMA: Final = "hil.commission/1"
 FILE_NAME: Final = "commission.json"
+
+MOST_NAMED: Final = 3
+"""Keys at fault that a message names."""
 
 
 @dataclass(slots=True)
@@ -118,33 +125,42 @@ def load_state(folder: Path, names: Iterable[str]) -> State | None:
         return None
     try:
         document = read_json(path)
-        if document["schema"] != SCHEMA:
-            raise ValueError(f"schema {document['schema']!r}")
-        steps = {name: _step(folder, document["steps"].get(name)) for name in names}
-        return State(
-            folder=folder,
-            rig_name=document["rig_name"],
-            rig_path=document["rig_path"],
-            rig_text=document["rig_text"],
-            steps=steps,
-            started_utc=document["started_utc"],
-            notes=document["notes"],
-            made=document.get("made"),
-        )
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        _require_state(folder, document)
+    except (ValueError, OSError) as error:
         raise UsageError(
             f"{path}: expected the state of a commissioning ({SCHEMA}), got a file that can't be read as one: "
             f"{error}. Move it away to begin anew in this folder (its recordings stay), or choose another by --out."
         ) from error
+    known = {key: document[key] for key in ("rig_name", "rig_path", "rig_text", "started_utc", "notes")}
+    steps = {name: _step(document["steps"].get(name)) for name in names}
+    return State(folder=folder, steps=steps, made=document.get("made"), **known)
 
 
-def _step(folder: Path, document: Any) -> StepRecord:
+def _require_state(folder: Path, document: Any) -> None:
+    """Refuse what is no state, or names a recording elsewhere.
+
+    Raises
+    ------
+    ValueError
+        With the keys at fault.
+    """
+    if not isinstance(document, dict):
+        raise ValueError(f"expected a table, got {type(document).__name__}")
+    try:
+        file = StateFile.model_validate(document)
+    except ValidationError as cause:
+        lines = problem_lines(StateFile, cause)
+        more = f"; and {len(lines) - MOST_NAMED} more" if len(lines) > MOST_NAMED else ""
+        raise ValueError("; ".join(lines[:MOST_NAMED]) + more) from cause
+    for run in file.steps.runs():
+        if run.recording is not None and not is_inside(folder, folder / run.recording):
+            raise ValueError(f"run {run.name}: a recording outside {folder}: {run.recording}")
+
+
+def _step(document: Any) -> StepRecord:
     if document is None:
         return StepRecord()
     record = StepRecord.from_json(document)
-    for run in record.runs:
-        if run.recording is not None and not is_inside(folder, folder / run.recording):
-            raise ValueError(f"run {run.name}: a recording outside {folder}: {run.recording}")
     if record.status is Status.RUNNING:  # the program was killed, or its machine went down
         record.end(Status.INTERRUPTED, "the program ended without a word: it was killed, or the machine went down")
     return record

@@ -254,7 +254,7 @@ def _signs(evidence: Evidence) -> list[Any]:
     return [
         (html.Heading(f"Pulses of {name}"), _course(f"signs-{name}", evidence[name]["course"], torque, SPEED))
         for name in ("m1", "m2")
-        if name in evidence
+        if evidence.get(name)
     ]
 
 
@@ -265,6 +265,8 @@ def _friction(evidence: Evidence) -> list[Any]:
 
 def _identification(evidence: Evidence) -> list[Any]:
     runs = evidence["runs"]
+    if not runs:
+        return []
     sets = [
         PoleSet(name, _roots(runs, how, "poles"), _roots(runs, how, "zeros"), colour)
         for name, how, colour in (("best off line", "best", BLUE), ("on line, last estimates", "online", VERMILION))

@@ -87,7 +87,7 @@ def _figures(comparisons: Compared) -> html.Table:
             for of_model in zip(*comparisons, strict=True)
             for label, of in by_output(of_model).items()
         ]
-    headings = (
+    headings: tuple[str, ...] = (
         "free run", "model", f"RMS [{first.unit}]", "largest", "fit [%]", f"load [{unit('torque', first.motion)}]",
         "samples", "p, past torque",
     )  # fmt: skip

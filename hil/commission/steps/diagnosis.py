@@ -46,7 +46,7 @@ def _do(job: Job) -> Outcome:
 
     nominal = _nominal(job)
     runs = {run.name: run for run in cruises(job)}
-    slow_to_fast = sorted(runs.values(), key=lambda run: run.measured["speed_measured_rad_s"][0])
+    slow_to_fast = sorted(runs.values(), key=lambda run: run.measured.get("speed_measured_rad_s", [0.0])[0])
     others = [run for run in job.runs_of("experiments") if run.name in OTHERS]
     others += [run for run in job.runs_of("scales") if run.name in ALONE]
     chosen = [slow_to_fast[0], slow_to_fast[-1], *others]

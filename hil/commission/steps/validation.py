@@ -50,7 +50,8 @@ def _do(job: Job) -> Outcome:
     seen, unseen = records[::2], records[1::2]
     mode = _mode(job)
     job.progress("fitting motor, shaft and load", 0.1)
-    inertia = float(job.evidence("friction").get("inertia_kg_m2", [job.rig.vehicle.inertia_kg_m2])[0])
+    measured = job.evidence("friction").get("inertia_kg_m2", [None])[0]
+    inertia = job.rig.vehicle.inertia_kg_m2 if measured is None else float(measured)
     fit = fit_two_mass(seen, inertia, mode)
     job.progress("simulating unseen runs", 0.8)
     compared = [compare_record(ModelPlant("fitted", fit.model), record) for record in unseen]

@@ -1,0 +1,53 @@
+"""One result for each kind of page, made once: pages are judged, not results."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+from estimator.identification.compare import Compared, compare
+from estimator.identification.identify import identify
+from estimator.identification.online.registry import ESTIMATORS
+from estimator.identification.settings import Settings
+from estimator.identification.study import Study, study
+from estimator.physics.model import DrivelineModel, Parameter, Structure
+from hil.figures.line import TwoMassLine
+from hil.figures.local_model import LocalModel, Reference
+from hil.figures.numbers import row_of
+from hil.figures.road.conditions import draw_conditions
+from hil.plants.plant import ModelPlant
+from hil.report.comparison import Comparison, compare_record
+from tests.estimator.identification.driveline import B_L, B_M, J_L, J_M, C, K, cruise
+
+TRUTH = TwoMassLine(J_M, J_L, K, C, B_M, B_L)
+
+
+@cache
+def identified() -> tuple[list[LocalModel], list[Study], None, list[Compared]]:
+    """Arguments of an identification's page."""
+    settings, record = Settings(), cruise(1, name="run_1").record
+    found = identify(record, settings)
+    compared = [compare(record, found, settings, "rls", ESTIMATORS["rls"])]
+    return [LocalModel(record, found, Reference("truth", TRUTH))], [study(record, found, settings)], None, compared
+
+
+@cache
+def paper_results() -> tuple[Any, ...]:
+    """Arguments of the paper's page."""
+    records = [cruise(seed, name=f"run_{seed}").record for seed in (1, 2)]
+    models = [LocalModel(record, identify(record), Reference("truth", TRUTH)) for record in records]
+    return models, [row_of(model) for model in models], draw_conditions(1, len(models))
+
+
+@cache
+def comparisons() -> list[list[Comparison]]:
+    """Arguments of a comparison's page: two models, the second softer, and two recordings."""
+    values = {"J_M": J_M, "J_L": J_L, "k": K, "c": C, "b_M": B_M, "b_L": B_L}
+
+    def plant(name: str, softer: float) -> ModelPlant:
+        parameters = {key: Parameter(softer * value if key == "k" else value, 0.2) for key, value in values.items()}
+        return ModelPlant(name, DrivelineModel(Structure.TWO_MASS, parameters))
+
+    plants = [plant("true.toml", 1.0), plant("soft.toml", 0.7)]
+    records = [cruise(seed, name=f"run_{seed}").record for seed in (1, 2)]
+    return [[compare_record(each, record) for each in plants] for record in records]
