@@ -118,8 +118,9 @@ def _tiles(state: State) -> Iterator[tuple[str, str, str]]:
     known = [resonance for resonance in resonances if resonance is not None]
     if known:
         frequency, damping = (sum(values) / len(known) for values in zip(*known, strict=True))
-        yield "resonance", shown(frequency, "Hz"), f"mean of {len(known)} runs"
-        yield "damping", f"{damping:.3f}", f"mean of {len(known)} runs"
+        of_runs = f"mean of {len(known)} runs" if len(known) > 1 else "of one run"
+        yield "resonance", shown(frequency, "Hz"), of_runs
+        yield "damping", f"{damping:.3f}", of_runs
     if "amplitude_nm" in evidence["prbs"]:
         yield "PRBS", f"±{evidence['prbs']['amplitude_nm']:g} Nm", str(evidence["prbs"]["reason"])
     if evidence["scales"].get("gain") and None not in evidence["scales"]["gain"]:

@@ -54,21 +54,9 @@ def hostile(value: Any, field: str = "") -> Any:
 
 
 def hostile_state(folder: Path) -> str:
-    document = whole_state(folder).document()
-    steps = document.pop("steps")
-    for step in steps.values():
-        for key in ("findings", "because"):
-            step[key] = [hostile(each) for each in map(_plain, step[key])] if key == "findings" else HOSTILE
-        step["evidence"] = _values(step["evidence"])
-        step["runs"] = [{**run, "name": HOSTILE, "recording": HOSTILE} for run in step["runs"]]
-        step["history"] = [_values(each) for each in step["history"]]
-    steps["diagnosis"]["evidence"]["report"] = f"javascript:{RUN}"
-    titles = {step.name: step.title for step in STEPS}
-    return commission_page(_values(document) | {"steps": steps}, titles, MADE)
-
-
-def _plain(finding: Any) -> dict[str, Any]:
-    return finding if isinstance(finding, dict) else finding.as_json()
+    document = _values(whole_state(folder).document())
+    document["steps"]["diagnosis"]["evidence"]["report"] = f"javascript:{RUN}"
+    return commission_page(document, {step.name: step.title for step in STEPS}, MADE)
 
 
 def _values(value: Any, key: str = "") -> Any:
