@@ -13,8 +13,7 @@ from estimator.identification.online_estimate import OnlineTrajectory
 from estimator.signals.record import FloatArray, IntArray
 from hil.figures.local_model import LocalModel
 from hil.figures.palette import BLACK, BLUE, VERMILION, faded, series_colour
-from hil.report.decimate import extremes
-from hil.report.figures import figure_block
+from hil.report.figures import extremes, figure_block
 from hil.report.page import Figure
 
 HEIGHT_PX = 780
