@@ -78,13 +78,7 @@ class State:
         }
 
     def save(self) -> None:
-        """Write the file, whole or not at all.
-
-        Raises
-        ------
-        UsageError
-            If the disk does not take it; the file before it is still there.
-        """
+        """Write the file, whole or not at all."""
         text = json.dumps(self.document(), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
         part = self.path.with_name(f".{FILE_NAME}.{os.getpid()}.part")
         try:
@@ -113,13 +107,7 @@ class State:
 
 
 def load_state(folder: Path, names: Iterable[str]) -> State | None:
-    """Read the state of a folder; None where there is none. A step that is new to it is pending.
-
-    Raises
-    ------
-    UsageError
-        If the file is none of a commissioning, or damaged.
-    """
+    """Read the state of a folder; None where there is none. A step that is new to it is pending."""
     path = folder / FILE_NAME
     if not path.exists():
         return None
@@ -137,13 +125,7 @@ def load_state(folder: Path, names: Iterable[str]) -> State | None:
 
 
 def _require_state(folder: Path, document: Any) -> None:
-    """Refuse what is no state, or names a recording elsewhere.
-
-    Raises
-    ------
-    ValueError
-        With the keys at fault.
-    """
+    """Refuse what is no state, or names a recording elsewhere."""
     if not isinstance(document, dict):
         raise ValueError(f"expected a table, got {type(document).__name__}")
     try:

@@ -301,7 +301,6 @@ class StepsPart(Part):
     diagnosis: StepPart[DiagnosisPart] | None = None
 
     def runs(self) -> Iterator[RunPart]:
-        """Return the runs of all steps."""
         for _, step in self:  # those of other names, too
             yield from () if step is None else step.runs
 

@@ -8,7 +8,7 @@ from estimator.errors import BadModel, BadSetting
 from estimator.identification.online.adaptation import Adaptation
 from hil.errors import FileProblem
 from hil.export.plc_estimator import PlcEstimator
-from hil.report.identification.read_back import identified
+from hil.report.identification_input import identified
 
 
 def plc_estimator(

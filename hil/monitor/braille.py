@@ -54,21 +54,7 @@ class Canvas:
 
 
 def envelope(x: FloatArray, y: FloatArray, width: int) -> list[tuple[int, float, float]]:
-    """Gather a curve of many points into columns: lowest and highest of each, joined to the column before.
-
-    Parameters
-    ----------
-    x, y
-        Shape (N,); ``x`` in columns of dots, rising; NaN in ``y`` leaves a gap.
-    width
-        Columns of dots.
-
-    Returns
-    -------
-    list of (column, low, high)
-        For each column with a value. A column next to one with values begins where that ended, so that the curve
-        has no holes.
-    """
+    """Gather a curve of many points into columns: lowest and highest of each, joined to the column before."""
     known = np.isfinite(y) & np.isfinite(x)
     columns = np.clip(np.floor(np.where(known, x, 0.0)).astype(np.int64), 0, max(width - 1, 0))[known]
     values = y[known]

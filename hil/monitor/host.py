@@ -103,15 +103,7 @@ class SessionStop(StopRequest):
 
 
 def serve(job: Job, connection: Connection) -> None:
-    """Serve one rig to one view, until that ends; the entry point of the rig's process.
-
-    Parameters
-    ----------
-    job
-        What it is for.
-    connection
-        To the view; orders come in, reports go out.
-    """
+    """Serve one rig to one view, until that ends; the entry point of the rig's process."""
     stop = SessionStop()
     with stop_on_signals(stop), Outbox(connection) as outbox:
         try:

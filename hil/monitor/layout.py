@@ -57,7 +57,6 @@ Screen.small .page.shown { display: none; }
 
 
 def page(name: str, *parts: Widget) -> Container:
-    """Give one page."""
     return Container(*parts, id=name, classes="page")
 
 

@@ -48,17 +48,7 @@ def open_rig(
     trust_laws: bool = False,
     setup: OnlineSetup = USUAL,
 ) -> Opening:
-    """Prepare to watch a rig; nothing is connected before the source is entered.
-
-    Raises
-    ------
-    BadSetting, BadModel
-        If there is no on-line estimate with the filter of the setup.
-    UsageError
-        If a rig without ``[simulation]`` is to be simulated, or nothing can be written to the folder.
-    ModelFileError
-        If the model file is wrong, or not of two masses.
-    """
+    """Prepare to watch a rig; nothing is connected before the source is entered."""
     if simulate:
         required_simulation(rig)
     require_folder(out)
@@ -78,19 +68,7 @@ def open_recording(
     channel: str | None = None,
     setup: OnlineSetup = USUAL,
 ) -> Opening:
-    """Prepare to play a recording, or a bus trace with the rig file it is of.
-
-    Raises
-    ------
-    BadSetting, BadModel
-        As `open_rig`.
-    UsageError
-        If a bus trace comes without its rig file.
-    RecordingError
-        If the file can't be read.
-    ModelFileError
-        As `open_rig`.
-    """
+    """Prepare to play a recording, or a bus trace with the rig file it is of."""
     if is_trace(path):
         if rig is None:
             raise UsageError(f"{path}: expected its rig file as well: hil monitor RIG --replay {path.name}; got none")

@@ -35,15 +35,7 @@ def title(text: str, value: str, width: int) -> str:
 
 
 def nice_range(values: FloatArray, least: float) -> Range:
-    """Choose an axis that holds all values and changes seldom: bounds are multiples of 1, 2 or 5 times a power of ten.
-
-    Parameters
-    ----------
-    values
-        What is shown; NaN is left out.
-    least
-        Smallest span, so that noise about a constant does not fill the plot.
-    """
+    """Choose an axis that holds all values and changes seldom: bounds are multiples of 1, 2 or 5 powers of ten."""
     known = values[np.isfinite(values)]
     low, high = (float(known.min()), float(known.max())) if known.size else (0.0, 0.0)
     missing = max(0.0, least - (high - low)) / 2.0

@@ -107,13 +107,7 @@ class ReplaySource:
 
 
 def recorded_samples(path: Path) -> tuple[list[Sample], dict[str, str]]:
-    """Read the samples of a rig's own recording, and column and unit of each of its further channels.
-
-    Raises
-    ------
-    RecordingError
-        If it can't be read, or lacks a column.
-    """
+    """Read the samples of a rig's own recording, and column and unit of each of its further channels."""
     table = read_table(path)
     needed = table.numeric((columns.TIME, columns.TORQUE_M1, columns.TORQUE_M2, columns.SPEED))
     n = table.n_rows

@@ -38,13 +38,7 @@ class WarmUp:
         self._thread.start()
 
     def is_done(self) -> bool:
-        """Tell whether the chain is ready.
-
-        Raises
-        ------
-        Exception
-            What it failed with: a defect.
-        """
+        """Tell whether the chain is ready."""
         if self._failed is not None:
             raise self._failed
         return not self._thread.is_alive()

@@ -18,7 +18,7 @@ from hil.figures.palette import BLUE, GREY, VERMILION, series_colour
 from hil.provenance import Provenance
 from hil.report import page as html
 from hil.report.figures import DECADES, LEGEND_PX, PANEL_PX, Line, Panel, Style, figure_block, time_figure
-from hil.report.identification.pole_map import PoleSet, pole_figure
+from hil.report.identification_figures import PoleSet, pole_figure
 from hil.report.made import made_section
 from hil.report.numbers import moment, shown
 
@@ -47,15 +47,7 @@ COURSES = 4
 
 
 def commission_page(state: State, titles: Mapping[str, str], made: Provenance | None = None) -> str:
-    """Return the text of the page.
-
-    Parameters
-    ----------
-    state
-        Content of the state file (schema ``hil.commission/1``).
-    titles
-        Title of each step, by name, in order.
-    """
+    """Return the text of the page."""
     steps = state["steps"]
     begun, updated = moment(state["started_utc"]), moment(state["updated_utc"])
     return html.page(

@@ -13,7 +13,7 @@ from hil.provenance import Provenance
 from hil.report import page as html
 from hil.report.comparison import Comparison, by_output, shown_error, together
 from hil.report.figures import MODEL_STYLES, Line, Panel, Style, input_lines, spectrum_figure, time_figure
-from hil.report.identification.residuals import correlation_figure
+from hil.report.identification_figures import correlation_figure
 from hil.report.made import facts, made_section
 from hil.report.numbers import listed, shown, shown_p
 from hil.report.terminal import rendered

@@ -23,20 +23,7 @@ from hil.report.page import Figure, Paragraph, note
 
 
 def extremes(y: FloatArray, stretches: int) -> NDArray[np.intp]:
-    """Choose which samples of a trace to draw.
-
-    Parameters
-    ----------
-    y : ndarray, shape (N,)
-        The trace; NaN is a gap.
-    stretches : int
-        Number of stretches; each keeps two samples at most. A trace that is short enough is kept whole.
-
-    Returns
-    -------
-    ndarray of int, shape (K,)
-        Increasing sample numbers. A stretch that is a gap keeps its first sample, so that the gap is drawn.
-    """
+    """Choose which samples of a trace to draw."""
     n = y.shape[0]
     if n <= 2 * stretches:
         return np.arange(n)
@@ -65,16 +52,7 @@ EVEN = 1e-3
 
 
 def packed(time_s: FloatArray, lines: Sequence[FloatArray], recordings: int) -> tuple[dict[str, Any], int]:
-    """Return the samples of some lines for `page.js`, and one in how many is there.
-
-    Parameters
-    ----------
-    time_s : ndarray, shape (N,)
-    lines : sequence of ndarray, shape (N,)
-        NaN is a gap.
-    recordings : int
-        Recordings that share the page.
-    """
+    """Return the samples of some lines for `page.js`, and one in how many is there."""
     most = max(PAGE_SAMPLES // max(1, recordings * len(lines)), 2)
     every = -(-time_s.size // most)
     if every > 1:  # the extremes of each stretch on an even raster of half as many stretches
@@ -205,19 +183,7 @@ def time_figure(
     recordings: int,
     shaded: Sequence[Interval] = (),
 ) -> list[Paragraph | Figure]:
-    """Draw panels over a common time axis; zoomed in, every sample is drawn.
-
-    Parameters
-    ----------
-    name : str
-        Unique in the page.
-    time_s : ndarray, shape (N,)
-        Time [s].
-    recordings : int
-        Recordings that share the page: the more, the coarser each is drawn.
-    shaded : sequence of (float, float)
-        Intervals of time to mark [s].
-    """
+    """Draw panels over a common time axis; zoomed in, every sample is drawn."""
     stretches = stretches_for(recordings)
     figure = time_panels(time_s, panels, stretches, shaded)
     height_px = PANEL_PX * len(panels) + LEGEND_PX

@@ -16,8 +16,8 @@ from hil.report import page as html
 from hil.report.commission_html import commission_page
 from hil.report.comparison_html import comparison_page
 from hil.report.diagnosis_html import diagnosis_page
-from hil.report.identification.page import identification_page
-from hil.report.identification.paper_page import paper_page
+from hil.report.identification_page import identification_page
+from hil.report.paper_page import paper_page
 from tests.browser.conftest import opened
 from tests.browser.results import comparisons, identified, paper_results
 from tests.commission.whole_state import whole_state

@@ -17,7 +17,7 @@ from hil.export.filling import Precision, project
 from hil.export.plc_estimator import PlcEstimator
 from hil.export.plcopen import Tc6, plcopen_xml
 from hil.export.structured_text import structured_text
-from hil.report.identification.document import identification_text
+from hil.report.identification_json import identification_text
 
 BOTH = pytest.mark.parametrize("what", ["st", "plcopen"])
 
