@@ -12,7 +12,7 @@ from textual.screen import ModalScreen
 from textual.widgets import Input, OptionList, Static
 from textual.widgets.option_list import Option
 
-from hil.monitor.choice import Choice
+from hil.monitor.messages import Choice
 from hil.monitor.panel import printable
 
 

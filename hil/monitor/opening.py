@@ -14,8 +14,8 @@ from estimator.physics.twist import Shaft
 from hil.config.model_file import read_model
 from hil.config.rig_file import Rig
 from hil.errors import HilError, RecordingError, UsageError
-from hil.monitor.choice import Choice
 from hil.monitor.host import Job
+from hil.monitor.messages import Choice
 from hil.monitor.replay_source import ReplaySource, recorded_samples
 from hil.monitor.source import RigSource, Source
 from hil.monitor.state import LiveState

@@ -8,11 +8,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from estimator.signals.record import FloatArray
 from hil.monitor.braille import Canvas, envelope
-
-FloatArray = NDArray[np.float64]
 
 AXIS = 8
 """Characters for the numbers on the left and the line next to them."""

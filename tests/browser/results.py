@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 from functools import cache
+from types import SimpleNamespace
 from typing import Any
+
+import numpy as np
 
 from estimator.identification.compare import Compared, compare
 from estimator.identification.identify import identify
 from estimator.identification.online.registry import ESTIMATORS
 from estimator.identification.settings import Settings
 from estimator.identification.study import Study, study
-from estimator.physics.model import DrivelineModel, Parameter, Structure
+from estimator.physics.model import Motion
+from estimator.signals.record import Record
 from hil.figures.line import TwoMassLine
 from hil.figures.local_model import LocalModel, Reference
 from hil.figures.numbers import row_of
 from hil.figures.road.conditions import draw_conditions
-from hil.plants.plant import ModelPlant
 from hil.report.comparison import Comparison, compare_record
 from tests.estimator.identification.driveline import B_L, B_M, J_L, J_M, C, K, cruise
 
@@ -39,15 +42,22 @@ def paper_results() -> tuple[Any, ...]:
     return models, [row_of(model) for model in models], draw_conditions(1, len(models))
 
 
+class Smoothed:
+    """A plant whose simulation is the recording itself, smoothed: nothing has to be compiled for it."""
+
+    motion = Motion.ROTATION
+
+    def __init__(self, name: str, samples: int) -> None:
+        self.name, self._samples = name, samples
+
+    def run(self, record: Record) -> Any:
+        output = np.convolve(record.output, np.full(self._samples, 1.0 / self._samples), mode="same")
+        return SimpleNamespace(output=output, start=SimpleNamespace(load_torque_nm=58.0), further=())
+
+
 @cache
 def comparisons() -> list[list[Comparison]]:
-    """Arguments of a comparison's page: two models, the second softer, and two recordings."""
-    values = {"J_M": J_M, "J_L": J_L, "k": K, "c": C, "b_M": B_M, "b_L": B_L}
-
-    def plant(name: str, softer: float) -> ModelPlant:
-        parameters = {key: Parameter(softer * value if key == "k" else value, 0.2) for key, value in values.items()}
-        return ModelPlant(name, DrivelineModel(Structure.TWO_MASS, parameters))
-
-    plants = [plant("true.toml", 1.0), plant("soft.toml", 0.7)]
+    """Arguments of a comparison's page: two models and two recordings."""
+    plants = [Smoothed("good.toml", 3), Smoothed("poor.toml", 30)]
     records = [cruise(seed, name=f"run_{seed}").record for seed in (1, 2)]
     return [[compare_record(each, record) for each in plants] for record in records]
