@@ -15,11 +15,10 @@ from hil.config.model_file import read_model
 from hil.config.rig_file import Rig
 from hil.errors import HilError, RecordingError, UsageError
 from hil.monitor.host import Job
+from hil.monitor.live_estimation import WarmUp
 from hil.monitor.messages import Choice
-from hil.monitor.replay_source import ReplaySource, recorded_samples
-from hil.monitor.source import RigSource, Source
+from hil.monitor.source import ReplaySource, RigSource, Source, recorded_samples
 from hil.monitor.state import LiveState
-from hil.monitor.warm_up import WarmUp
 from hil.report.outputs import require_folder
 from hil.rig.dry_run import dry_run
 from hil.rig.live import USUAL, OnlineSetup

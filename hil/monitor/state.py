@@ -25,9 +25,8 @@ from hil.monitor.messages import (
     as_known,
     outcome,
 )
-from hil.monitor.quality import QualityWatch
-from hil.monitor.ring import Ring
-from hil.monitor.snapshot import Activity, Channel, Headline, Signals, Snapshot
+from hil.monitor.plot import Ring
+from hil.monitor.snapshot import Activity, Channel, Headline, QualityWatch, Signals, Snapshot
 from hil.rig.experiments.base import Phase
 from hil.rig.live import USUAL, OnlineSetup
 from hil.sample import Sample
