@@ -151,7 +151,7 @@ def _details(finding: Finding) -> Iterator[str]:
     """Say what is no difference: what a run sets, where the DCF is of another mind, what stops a dead host's torque."""
     yield from finding.remarks
     yield from (f"not the same everywhere: {each}" for each in finding.commissioned)
-    yield from (f"without its host: {each}" for each in finding.protections)
+    yield from (f"if its host is lost, {each}" for each in finding.protections)
 
 
 def _register_table(finding: Finding) -> RichTable:

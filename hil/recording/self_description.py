@@ -15,7 +15,7 @@ _SINGLE_LINE = 100
 def self_description(metadata: Mapping[str, str]) -> list[str]:
     """Return a line for each thing that is said; long texts by their length, the rig file by its checksum."""
     if not metadata:
-        return ["says nothing of itself: no units, no rig file, no checksum"]
+        return ["carries no description: no units, no rig file, no checksum"]
     lines = []
     for key, value in metadata.items():
         if key == RIG_TEXT:

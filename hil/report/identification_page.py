@@ -34,6 +34,16 @@ from hil.report.made import facts, made_section
 from hil.report.numbers import shown, shown_interval, shown_p
 from hil.report.terminal import rendered
 
+PHYSICAL = (
+    "The two-mass drive, at the motor shaft, that has the response of the third-order Box-Jenkins model. "
+    "Sums are often known where their parts are not. Grey: these recordings do not determine the value."
+)
+
+FOOTER = (
+    "hil identify. High-passed and decimated; errors and fits are those of free-run simulations: measured torque in, "
+    "nothing fed back. Intervals hold the truth with 95 % probability."
+)
+
 MOST_DRAWN = 12
 """Recordings with a section of their own; the tables hold all."""
 
