@@ -302,7 +302,8 @@ class StepsPart(Part):
 
     def runs(self) -> Iterator[RunPart]:
         for _, step in self:  # those of other names, too
-            yield from () if step is None else step.runs
+            if step is not None:
+                yield from step.runs
 
 
 class NotePart(Part):

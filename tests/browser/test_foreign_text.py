@@ -42,7 +42,7 @@ MADE = Provenance(HOSTILE, "2026-11-27T10:00:00+00:00", HOSTILE, (Source(HOSTILE
 def hostile(value: Any, field: str = "") -> Any:
     """Return a result with markup after every text of it, keys included, so that names still agree."""
     if isinstance(value, str) and not isinstance(value, Enum):
-        return value if field.endswith(KEPT) else value + HOSTILE
+        return value + HOSTILE if value and not field.endswith(KEPT) else value
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         made = object.__new__(type(value))  # past what a constructor refuses
         for each in dataclasses.fields(value):
