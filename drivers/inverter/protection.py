@@ -79,7 +79,7 @@ class Protection:
         return bool(self.by) or self.accepted is not None or self.name not in NEEDED
 
     def __str__(self) -> str:
-        state = self.by or ("not there" if self.accepted is None else f"not there, {self.accepted}")
+        state = self.by or ("none" if self.accepted is None else f"none, {self.accepted}")
         return f"{self.name}: {state}{f'; {self.proof}' if self.proof else ''}"
 
 

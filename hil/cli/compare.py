@@ -38,8 +38,7 @@ def compare(
 
     from hil.plants.trust import Trust
     from hil.provenance import provenance
-    from hil.report.compared import compared
-    from hil.report.comparison import comparison_text
+    from hil.report.comparison import compared, comparison_text
     from hil.report.comparison_html import comparison_page, comparison_summary
     from hil.report.outputs import publish, require_folder
 

@@ -46,7 +46,7 @@ def with_filter(settings: Settings, path: Path | None, run: str | None) -> Onlin
         if run is not None:
             raise UsageError(f"--filter-run {run}: expected --filter FILE with it, got none")
         return OnlineSetup(settings)
-    from hil.report.identification.read_back import identified
+    from hil.report.identification_input import identified
 
     found = identified(path, run, settings.adaptation, "--filter-run")
     return OnlineSetup(replace(found.settings, band_hz=settings.band_hz), found.L)

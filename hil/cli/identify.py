@@ -64,7 +64,7 @@ def identify(
     from estimator.identification.study import compare
     from hil.provenance import provenance
     from hil.recording.recordings import require_even_cycles
-    from hil.report.identification.choices import chosen_estimators, chosen_orders, start_values
+    from hil.report.identification_input import chosen_estimators, chosen_orders, start_values
     from hil.report.outputs import require_folder
     from hil.store import attach_to_runs
     from hil.store.entry import IDENTIFICATION
@@ -154,10 +154,9 @@ def _publish(
     from rich.console import Console
 
     from hil.figures.local_model import LocalModel
-    from hil.report.identification.document import FILE_NAME, identification_text
-    from hil.report.identification.page import identification_page
-    from hil.report.identification.terminal import compared_summary, summary
-    from hil.report.identification.wording import verdict, warnings
+    from hil.report.identification_json import FILE_NAME, identification_text
+    from hil.report.identification_page import compared_summary, identification_page, summary
+    from hil.report.identification_wording import verdict, warnings
     from hil.report.outputs import publish
 
     models = [

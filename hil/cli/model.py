@@ -121,7 +121,7 @@ def _tolerances(texts: list[str] | tuple[str, ...], usual: float) -> tuple[list[
 def _known(path: Path, run: str | None) -> dict[str, Known]:
     """Return what an identification knows of the parameters."""
     from hil.config.new_model.values import LEAST_TOLERANCE, MOST_TOLERANCE, Known
-    from hil.report.identification.read_back import physical_values
+    from hil.report.identification_input import physical_values
 
     return {
         name: Known(

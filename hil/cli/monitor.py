@@ -121,7 +121,7 @@ def _close(opening: Opening, view: MonitorApp) -> None:
 
     Where the terminal has gone, which is reported as an interruption, nobody can be informed.
     """
-    from hil.monitor.outcome import outcome
+    from hil.monitor.messages import outcome
 
     for report in opening.source.poll():  # what the rig said while it was being closed
         opening.state.take(report)

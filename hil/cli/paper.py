@@ -152,9 +152,8 @@ def _publish(
     from rich.console import Console
 
     from hil.figures.local_model import row_of
-    from hil.report.identification.paper_json import paper_text
-    from hil.report.identification.paper_page import paper_page
     from hil.report.outputs import publish
+    from hil.report.paper_page import paper_page, paper_text
 
     rows = [row_of(model) for model in models]
     conditions = [each.conditions for each in driven or ()]

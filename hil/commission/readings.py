@@ -11,7 +11,7 @@ import numpy as np
 from estimator.signals.record import FloatArray, Record
 from hil.recording import read_record, read_table
 from hil.recording.columns import FLAGS, SPEED, TIME, TORQUE_M1, TORQUE_M2
-from hil.report.decimate import extremes
+from hil.report.figures import extremes
 
 REFERENCE = {"m1": "torque_ref_m1_nm", "m2": "torque_ref_m2_nm"}
 READING = {"m1": TORQUE_M1, "m2": TORQUE_M2}

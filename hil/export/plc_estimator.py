@@ -19,7 +19,7 @@ from estimator.identification.tracking.watch import WatchSettings
 from estimator.signals.decimate import Decimator, low_pass_length
 from estimator.signals.record import FloatArray
 from hil.errors import FileProblem, UsageError
-from hil.report.identification.read_back import identified
+from hil.report.identification_input import identified
 
 PROFILES: Final[Mapping[str, type[Any]]] = MappingProxyType(
     {re.sub(r"(?<!^)(?=[A-Z])", "_", kind.__name__).lower(): kind for kind in KINDS}

@@ -19,14 +19,11 @@ from textual.containers import Container
 from textual.events import Resize
 from textual.widgets import Static
 
-from hil.monitor import head_panels
-from hil.monitor.choice import Choice
-from hil.monitor.dialogs import HelpDialog, MarkDialog, StartDialog
-from hil.monitor.keys import HELP, key_line
+from hil.monitor import panel as head_panels
+from hil.monitor.dialogs import HELP, HelpDialog, MarkDialog, StartDialog, key_line
 from hil.monitor.layout import CSS, LEAST_COLUMNS, LEAST_ROWS, PAGES, WIDE_COLUMNS, WIDE_ROWS, pages
-from hil.monitor.log_panel import LogPanel
-from hil.monitor.messages import Kind, Mark, Notice, Quit, Reset, Start, Stop
-from hil.monitor.panel import Panel
+from hil.monitor.messages import Choice, Kind, Mark, Notice, Quit, Reset, Start, Stop
+from hil.monitor.panel import LogPanel, Panel
 from hil.monitor.snapshot import Activity
 from hil.monitor.source import Source
 from hil.monitor.state import LiveState

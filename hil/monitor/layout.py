@@ -7,8 +7,7 @@ from textual.containers import Container, Horizontal, Vertical
 from textual.widget import Widget
 
 from hil.monitor import bus_panels, model_panels, signal_panels
-from hil.monitor.log_panel import LogPanel
-from hil.monitor.panel import Panel
+from hil.monitor.panel import LogPanel, Panel
 
 LEAST_COLUMNS, LEAST_ROWS = 80, 24
 
@@ -57,7 +56,7 @@ Screen.small .page.shown { display: none; }
 
 
 def page(name: str, *parts: Widget) -> Container:
-    """Give one page."""
+    """Put widgets on a page of their own."""
     return Container(*parts, id=name, classes="page")
 
 

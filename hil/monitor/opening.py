@@ -14,12 +14,11 @@ from estimator.physics.twist import Shaft
 from hil.config.model_file import read_model
 from hil.config.rig_file import Rig
 from hil.errors import HilError, RecordingError, UsageError
-from hil.monitor.choice import Choice
 from hil.monitor.host import Job
-from hil.monitor.replay_source import ReplaySource, recorded_samples
-from hil.monitor.source import RigSource, Source
+from hil.monitor.live_estimation import WarmUp
+from hil.monitor.messages import Choice
+from hil.monitor.source import ReplaySource, RigSource, Source, recorded_samples
 from hil.monitor.state import LiveState
-from hil.monitor.warm_up import WarmUp
 from hil.report.outputs import require_folder
 from hil.rig.dry_run import dry_run
 from hil.rig.live import USUAL, OnlineSetup
@@ -48,17 +47,7 @@ def open_rig(
     trust_laws: bool = False,
     setup: OnlineSetup = USUAL,
 ) -> Opening:
-    """Prepare to watch a rig; nothing is connected before the source is entered.
-
-    Raises
-    ------
-    BadSetting, BadModel
-        If there is no on-line estimate with the filter of the setup.
-    UsageError
-        If a rig without ``[simulation]`` is to be simulated, or nothing can be written to the folder.
-    ModelFileError
-        If the model file is wrong, or not of two masses.
-    """
+    """Prepare to watch a rig; nothing is connected before the source is entered."""
     if simulate:
         required_simulation(rig)
     require_folder(out)
@@ -78,19 +67,7 @@ def open_recording(
     channel: str | None = None,
     setup: OnlineSetup = USUAL,
 ) -> Opening:
-    """Prepare to play a recording, or a bus trace with the rig file it is of.
-
-    Raises
-    ------
-    BadSetting, BadModel
-        As `open_rig`.
-    UsageError
-        If a bus trace comes without its rig file.
-    RecordingError
-        If the file can't be read.
-    ModelFileError
-        As `open_rig`.
-    """
+    """Prepare to play a recording, or a bus trace with the rig file it is of."""
     if is_trace(path):
         if rig is None:
             raise UsageError(f"{path}: expected its rig file as well: hil monitor RIG --replay {path.name}; got none")

@@ -85,21 +85,7 @@ class RecordedRun:
         watch: Callable[[int], None],
         metadata: Mapping[str, str],
     ) -> None:
-        """Run it to its end, and tell how it went; what ends it early is reported, not raised.
-
-        Parameters
-        ----------
-        devices
-            The rig, opened.
-        stop
-            Ends it at the next cycle when requested.
-        timing
-            Takes note of its cycles.
-        watch
-            Called after each cycle with its time [ns].
-        metadata
-            What else the recording shall say of itself.
-        """
+        """Run it to its end, and tell how it went; what ends it early is reported, not raised."""
         said = {**run_metadata(self._rig_path, self._name), **metadata}
         recorder = RecordingWriter(self._path, said, 0.0, self._rig.channel_units)
         self._live = self._estimate()

@@ -6,13 +6,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from estimator.signals.record import FloatArray
 from hil.monitor.plot import Range, nice_range, strip, time_axis, title
 from hil.monitor.snapshot import Signals, Snapshot
-
-FloatArray = NDArray[np.float64]
-
 
 ROOM_FOR_PARTS = 60
 """Characters from which on the torque's title has each inverter's."""

@@ -1,17 +1,27 @@
-"""Where the view's reports come from: a rig in a process of its own, or a recording (`replay_source`)."""
+"""Where reports come from: a rig in a process of its own, or a recording that is played; and the way between."""
 
 from __future__ import annotations
 
+import math
 import multiprocessing
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from multiprocessing.connection import wait
+from pathlib import Path
 from types import TracebackType
 from typing import Protocol, Self
 
+import numpy as np
+
 from hil.child import safe_path
+from hil.errors import RecordingError
 from hil.monitor.host import Job, serve
-from hil.monitor.messages import Ended, Order, Quit, Report
+from hil.monitor.messages import Began, Ended, Order, Over, Quit, Report, Samples
+from hil.recording import columns
+from hil.recording.formats import read_table
+from hil.recording.table import Kind, Table
+from hil.rig.experiments.base import Phase
+from hil.sample import Sample, SampleFlag
 
 LONGEST_END_S = 30.0
 """Time for the rig's process to end [s]: every wait in it is bounded, and disarming two dead drives takes seconds."""
@@ -123,3 +133,134 @@ class RigSource:
         if self._process.is_alive():
             self._last_words.append(Ended(f"after {LONGEST_END_S:g} s {HARD_END}"))
         self._connection.close()
+
+
+NS_PER_S = 1_000_000_000
+
+OPTIONAL = (columns.REFERENCE, "prbs_nm", columns.FLAGS)
+"""Columns a recording may lack; zero stands for them."""
+
+
+class ReplaySource:
+    """Plays samples; `poll` gives those that are due.
+
+    Parameters
+    ----------
+    name
+        Of the recording, for the screen.
+    samples
+        In order of time; ``time_s`` says when each is due.
+    speed
+        Multiple of the pace at which they were recorded.
+    measured
+        Whether a sample is of the measured part, and so for the estimate.
+    clock_ns
+        Monotonic clock [ns].
+    """
+
+    can_drive = False
+
+    def __init__(
+        self,
+        name: str,
+        samples: Sequence[Sample],
+        speed: float = 1.0,
+        measured: Callable[[Sample], bool] = lambda sample: True,
+        clock_ns: Callable[[], int] = time.monotonic_ns,
+    ) -> None:
+        self._name = name
+        self._samples = samples
+        self._speed = speed
+        self._measured = measured
+        self._clock_ns = clock_ns
+        self._next = 0
+        self._began_ns = 0
+        self._over = False
+
+    def __enter__(self) -> Self:
+        self._began_ns = self._clock_ns()
+        return self
+
+    def poll(self) -> Sequence[Report]:
+        """Give the samples that are due, framed by beginning and end of the recording."""
+        if self._over:
+            return ()
+        reports: list[Report] = []
+        if self._next == 0:
+            duration_s = self._samples[-1].time_s - self._samples[0].time_s
+            reports.append(Began("", self._name, duration_s))
+        upto = self._due()
+        if upto > self._next:
+            due = self._samples[self._next : upto]
+            reports.append(Samples(tuple((row, Phase.MEASURE if self._measured(row) else None) for row in due)))
+            self._next = upto
+        if upto == len(self._samples):
+            self._over = True
+            flagged = sum(bool(sample.flags) for sample in self._samples)
+            reports.append(Over("", self._name, upto, flagged, stopped=False, reason=None))
+        return reports
+
+    def send(self, order: Order) -> None:
+        """Do nothing: there is no rig."""
+
+    def await_end(self) -> None:
+        """Return at once: nothing drives."""
+
+    def _due(self) -> int:
+        """Count the samples that are due now."""
+        passed_s = (self._clock_ns() - self._began_ns) / NS_PER_S * self._speed
+        until_s = self._samples[0].time_s + passed_s
+        upto = self._next
+        while upto < len(self._samples) and self._samples[upto].time_s <= until_s:
+            upto += 1
+        return upto
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._over = True
+
+
+def recorded_samples(path: Path) -> tuple[list[Sample], dict[str, str]]:
+    """Read the samples of a rig's own recording, and column and unit of each of its further channels."""
+    table = read_table(path)
+    needed = table.numeric((columns.TIME, columns.TORQUE_M1, columns.TORQUE_M2, columns.SPEED))
+    n = table.n_rows
+    given = table.numeric(name for name in OPTIONAL if name in table.columns)
+    if not np.all(np.diff(needed[columns.TIME]) > 0.0):
+        raise RecordingError(path, f"column {columns.TIME}: expected values that rise, got some that do not")
+    channels = {name: table.units[name] for name in table.units if name not in columns.UNITS and _is_read(table, name)}
+    further = table.numeric(channels)
+    zero = np.zeros(n)
+    rows = zip(
+        needed[columns.TIME].tolist(),
+        needed[columns.TORQUE_M1].tolist(),
+        needed[columns.TORQUE_M2].tolist(),
+        needed[columns.SPEED].tolist(),
+        *(given.get(name, zero).tolist() for name in OPTIONAL),
+        *(further[name].tolist() for name in channels),
+        strict=True,
+    )
+    return list(_samples(rows)), channels
+
+
+def _is_read(table: Table, name: str) -> bool:
+    return name in table.columns and Kind.of(table.columns[name]) is not Kind.TEXT
+
+
+def _samples(rows: Iterator[tuple[float, ...]]) -> Iterator[Sample]:
+    for cycle, (time_s, torque_m1, torque_m2, speed, reference, prbs, flags, *channels) in enumerate(rows):
+        yield Sample(
+            cycle=cycle,
+            t_ns=round(time_s * NS_PER_S),
+            time_s=time_s,
+            torque_ref_m1_nm=reference / 2.0,
+            torque_ref_m2_nm=reference / 2.0,
+            prbs_nm=prbs,
+            torque_m1_nm=torque_m1,
+            torque_m2_nm=torque_m2,
+            speed_rad_s=speed,
+            age_ns=0,
+            flags=SampleFlag.GOOD if math.isnan(flags) else SampleFlag(int(flags)),
+            channels=tuple(channels),
+        )

@@ -11,11 +11,22 @@ import numpy as np
 
 from estimator.physics.twist import Shaft, TwistFilter
 from hil.monitor.live_estimation import LiveEstimation
-from hil.monitor.messages import Began, Ended, Health, Kind, Lost, Notice, Over, Ready, Report, Samples
-from hil.monitor.outcome import as_known, outcome
-from hil.monitor.quality import QualityWatch
-from hil.monitor.ring import Ring
-from hil.monitor.snapshot import Activity, Channel, Headline, Signals, Snapshot
+from hil.monitor.messages import (
+    Began,
+    Ended,
+    Health,
+    Kind,
+    Lost,
+    Notice,
+    Over,
+    Ready,
+    Report,
+    Samples,
+    as_known,
+    outcome,
+)
+from hil.monitor.plot import Ring
+from hil.monitor.snapshot import Activity, Channel, Headline, QualityWatch, Signals, Snapshot
 from hil.rig.experiments.base import Phase
 from hil.rig.live import USUAL, OnlineSetup
 from hil.sample import Sample

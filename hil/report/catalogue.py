@@ -23,13 +23,7 @@ SCALES = "Bounds are in multiples of a scale that the recordings give: torque in
 
 
 def select(name: str | None) -> list[Effect]:
-    """Return one entry by name, or all.
-
-    Raises
-    ------
-    UsageError
-        If there is no such entry.
-    """
+    """Return one entry by name, or all."""
     if name is None:
         return list(EFFECTS.values())
     if name not in EFFECTS:

@@ -18,7 +18,7 @@ from hil.figures.palette import BLUE, GREY, VERMILION, series_colour
 from hil.provenance import Provenance
 from hil.report import page as html
 from hil.report.figures import DECADES, LEGEND_PX, PANEL_PX, Line, Panel, Style, figure_block, time_figure
-from hil.report.identification.pole_map import PoleSet, pole_figure
+from hil.report.identification_figures import PoleSet, pole_figure
 from hil.report.made import made_section
 from hil.report.numbers import moment, shown
 
@@ -47,15 +47,7 @@ COURSES = 4
 
 
 def commission_page(state: State, titles: Mapping[str, str], made: Provenance | None = None) -> str:
-    """Return the text of the page.
-
-    Parameters
-    ----------
-    state
-        Content of the state file (schema ``hil.commission/1``).
-    titles
-        Title of each step, by name, in order.
-    """
+    """Return the text of the page."""
     steps = state["steps"]
     begun, updated = moment(state["started_utc"]), moment(state["updated_utc"])
     return html.page(
@@ -118,8 +110,9 @@ def _tiles(state: State) -> Iterator[tuple[str, str, str]]:
     known = [resonance for resonance in resonances if resonance is not None]
     if known:
         frequency, damping = (sum(values) / len(known) for values in zip(*known, strict=True))
-        yield "resonance", shown(frequency, "Hz"), f"mean of {len(known)} runs"
-        yield "damping", f"{damping:.3f}", f"mean of {len(known)} runs"
+        of_runs = f"mean of {len(known)} runs" if len(known) > 1 else "of one run"
+        yield "resonance", shown(frequency, "Hz"), of_runs
+        yield "damping", f"{damping:.3f}", of_runs
     if "amplitude_nm" in evidence["prbs"]:
         yield "PRBS", f"±{evidence['prbs']['amplitude_nm']:g} Nm", str(evidence["prbs"]["reason"])
     if evidence["scales"].get("gain") and None not in evidence["scales"]["gain"]:
@@ -254,7 +247,7 @@ def _signs(evidence: Evidence) -> list[Any]:
     return [
         (html.Heading(f"Pulses of {name}"), _course(f"signs-{name}", evidence[name]["course"], torque, SPEED))
         for name in ("m1", "m2")
-        if name in evidence
+        if evidence.get(name)
     ]
 
 
@@ -265,6 +258,8 @@ def _friction(evidence: Evidence) -> list[Any]:
 
 def _identification(evidence: Evidence) -> list[Any]:
     runs = evidence["runs"]
+    if not runs:
+        return []
     sets = [
         PoleSet(name, _roots(runs, how, "poles"), _roots(runs, how, "zeros"), colour)
         for name, how, colour in (("best off line", "best", BLUE), ("on line, last estimates", "online", VERMILION))

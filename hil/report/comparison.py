@@ -5,17 +5,28 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from estimator.diagnosis.preconditions.channels import with_usable_channels
 from estimator.identification.offline.validation import CorrelationTest, residual_tests
 from estimator.physics.model import Motion
 from estimator.signals.decimate import block_of
 from estimator.signals.outputs import outputs_apart
 from estimator.signals.record import FloatArray, OutputKind, Record
-from hil.plants.plant import Plant
+from hil.config.model_file import ModelFile, read_model_for_recordings
+from hil.config.model_tables import Prepared
+from hil.errors import UsageError
+from hil.plants.fmu_plant import FmuPlant, is_fmu
+from hil.plants.plant import ModelPlant, Plant
+from hil.plants.prepared import known_events, prepare_again
+from hil.plants.scales import tell_scales
+from hil.plants.trust import Trust
 from hil.provenance import Provenance
+from hil.recording import read_records
+from hil.recording.signals import Tell
 from hil.report.numbers import json_number, shown
 from hil.report.wording import output_unit
 
@@ -129,13 +140,7 @@ def shown_error(value: float, each: Comparison, unit_above: str) -> str:
 
 
 def comparison_text(comparisons: Sequence[Sequence[Comparison]], made: Provenance | None = None) -> str:
-    """Return the figures as JSON text: ``recordings`` are those of the first model.
-
-    Parameters
-    ----------
-    comparisons : sequence of sequence of Comparison
-        Of each recording those of all models.
-    """
+    """Return the figures as JSON text: ``recordings`` are those of the first model."""
     by_model = list(zip(*comparisons, strict=True))
     content: dict[str, Any] = {
         "schema": SCHEMA,
@@ -177,3 +182,56 @@ def _output(each: Comparison) -> dict[str, Any]:
             "autocorrelation_p_value": json_number(each.itself.p_value),
         },
     }
+
+
+def compared(
+    models: Sequence[Path],
+    recordings: Sequence[Path],
+    mapped: Sequence[str],
+    trust: Trust,
+    dbc: Path | None,
+    tell: Tell,
+) -> list[list[Comparison]]:
+    """Return the comparisons of each model, a list per recording.
+
+    The recordings are read by the first model file's ``[signals]`` and prepared as the first says that was made by a
+    diagnosis: all models are held against the same samples.
+    """
+    _require_own_names(models)
+    files = {path: read_model_for_recordings(path, trust.laws) for path in models if not is_fmu(path)}
+    reads = next(iter(files.values()), None)
+    signals, on_bench = (None, False) if reads is None else (reads.signals, reads.on_bench)
+    prepared: Prepared | None = next((file.prepared for file in files.values() if file.prepared is not None), None)
+    read = read_records(recordings, signals, on_bench, dbc, tell)
+    if reads is not None:
+        tell_scales(read, recordings, reads.model, signals, dbc, tell)
+    records, unusable = with_usable_channels(prepare_again(read, prepared, tell))
+    for line in unusable:
+        tell(line)
+    by_model = [_of_model(path, files.get(path), records, recordings, mapped, trust) for path in models]
+    return [list(of_recording) for of_recording in zip(*by_model, strict=True)]
+
+
+def _of_model(
+    path: Path,
+    file: ModelFile | None,
+    records: Sequence[Record],
+    recordings: Sequence[Path],
+    mapped: Sequence[str],
+    trust: Trust,
+) -> list[Comparison]:
+    plant: Plant
+    if file is None:
+        plant = FmuPlant(path, mapped, trust.fmu)
+    else:
+        if file.laws:
+            read_model_for_recordings(path, trust.laws)  # its laws in place of those of the model read after it
+        plant = ModelPlant(path.name, file.model, known_events(file.prepared, recordings))
+    return [compare_record(plant, record) for record in records]
+
+
+def _require_own_names(models: Sequence[Path]) -> None:
+    names = [path.name for path in models]
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice is not None:
+        raise UsageError(f"--model {twice}: expected models of different file names, got it twice. Rename one.")

@@ -13,10 +13,9 @@ from hil.provenance import Provenance
 from hil.report import page as html
 from hil.report.comparison import Comparison, by_output, shown_error, together
 from hil.report.figures import MODEL_STYLES, Line, Panel, Style, input_lines, spectrum_figure, time_figure
-from hil.report.identification.residuals import correlation_figure
+from hil.report.identification_figures import correlation_figure
 from hil.report.made import facts, made_section
-from hil.report.numbers import shown, shown_p
-from hil.report.sentence import listed
+from hil.report.numbers import listed, shown, shown_p
 from hil.report.terminal import rendered
 from hil.report.wording import quantity, torque_axis
 
@@ -87,7 +86,7 @@ def _figures(comparisons: Compared) -> html.Table:
             for of_model in zip(*comparisons, strict=True)
             for label, of in by_output(of_model).items()
         ]
-    headings = (
+    headings: tuple[str, ...] = (
         "free run", "model", f"RMS [{first.unit}]", "largest", "fit [%]", f"load [{unit('torque', first.motion)}]",
         "samples", "p, past torque",
     )  # fmt: skip

@@ -23,13 +23,7 @@ def publish_diagnosis(
     paths: Sequence[Path | None],
     made: Provenance,
 ) -> None:
-    """Write the files of a diagnosis, all or none; of a plant that another program simulates no augmented model.
-
-    Parameters
-    ----------
-    records, paths
-        All recordings, and the files they were read from; None for one that was not.
-    """
+    """Write the files of a diagnosis, all or none; of a plant that another program simulates no augmented model."""
     text, prepared = diagnosis_text(diagnosis, made), prepared_by(diagnosis, records, paths)
     augmented, page = diagnosis.augmented, diagnosis_page(diagnosis, made, prepared.one_in)
     files: dict[str, Callable[[Path], object]] = {

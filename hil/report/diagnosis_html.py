@@ -43,8 +43,7 @@ from hil.report.figures import (
     time_figure,
 )
 from hil.report.made import facts, made_section
-from hil.report.numbers import p_statement, shown, shown_interval, shown_p, shown_ratio, shown_times
-from hil.report.sentence import listed
+from hil.report.numbers import listed, p_statement, shown, shown_interval, shown_p, shown_ratio, shown_times
 from hil.report.terminal import rendered
 from hil.report.wording import (
     BADGES,

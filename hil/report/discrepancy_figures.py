@@ -12,8 +12,7 @@ from estimator.diagnosis.result import Course, Equivalent, ErrorSpectrum, Interv
 from estimator.signals.record import FloatArray
 from hil.figures.palette import GREY
 from hil.report import bode
-from hil.report.decimate import extremes
-from hil.report.figures import DECADES, LEGEND_PX, PANEL_PX, SHADE, Style, figure_block
+from hil.report.figures import DECADES, LEGEND_PX, PANEL_PX, SHADE, Style, extremes, figure_block
 from hil.report.page import Figure
 from hil.report.wording import PLACES
 

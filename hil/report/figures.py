@@ -1,11 +1,8 @@
-"""Figures of a page, by plotly: signals over time in panels that zoom together, and spectra.
-
-Colours are those of `hil.figures.palette`, safe for the colour-blind. A model has one colour throughout, in the
-signals, their errors and the spectra.
-"""
+"""Figures of a page, by plotly: signals over time in panels that zoom together, and spectra."""
 
 from __future__ import annotations
 
+import base64
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -16,14 +13,83 @@ import numpy as np
 import plotly.graph_objects as go
 import plotly.io
 import scipy.signal
+from numpy.typing import NDArray
 from plotly.subplots import make_subplots
 from plotly.utils import PlotlyJSONEncoder
 
 from estimator.signals.record import FloatArray
 from hil.figures.palette import BLACK, BLUE, GREEN, GREY, ORANGE, PALE, PURPLE, VERMILION, faded
-from hil.report.decimate import extremes
 from hil.report.page import Figure, Paragraph, note
-from hil.report.samples import packed
+
+
+def extremes(y: FloatArray, stretches: int) -> NDArray[np.intp]:
+    """Choose which samples of a trace to draw."""
+    n = y.shape[0]
+    if n <= 2 * stretches:
+        return np.arange(n)
+    length = -(-n // stretches)
+    padded = np.full(stretches * length, np.nan)
+    padded[:n] = y
+    rows = padded.reshape(stretches, length)
+    first = np.arange(stretches) * length
+    lowest = first + np.argmin(np.where(np.isnan(rows), np.inf, rows), axis=1)
+    highest = first + np.argmax(np.where(np.isnan(rows), -np.inf, rows), axis=1)
+    chosen = np.unique(np.concatenate([[0, n - 1], lowest, highest]))
+    kept: NDArray[np.intp] = chosen[chosen < n]
+    return kept
+
+
+GAP = -32768
+"""Stands for a sample that is not there."""
+
+LARGEST = 32700
+
+PAGE_SAMPLES = 3_000_000
+"""Samples of a page at most, of all its lines: 8 MB as text."""
+
+EVEN = 1e-3
+"""Share of a period that time stamps may be off an even raster."""
+
+
+def packed(time_s: FloatArray, lines: Sequence[FloatArray], recordings: int) -> tuple[dict[str, Any], int]:
+    """Return the samples of some lines for `page.js`, and one in how many is there."""
+    most = max(PAGE_SAMPLES // max(1, recordings * len(lines)), 2)
+    every = -(-time_s.size // most)
+    if every > 1:  # the extremes of each stretch on an even raster of half as many stretches
+        pairs = [_extremes(y, 2 * every) for y in lines]
+        kept = slice(0, pairs[0].size * every, every)
+        return _document(time_s[kept][: pairs[0].size], pairs), every
+    return _document(time_s, lines), every
+
+
+def _extremes(y: FloatArray, length: int) -> FloatArray:
+    """Return the lowest and the highest sample of every stretch of this length, in the order of time."""
+    count = y.size // length
+    cut = y[: count * length].reshape(count, length)
+    low, high = np.nan_to_num(cut, nan=np.inf).argmin(axis=1), np.nan_to_num(cut, nan=-np.inf).argmax(axis=1)
+    order = np.sort(np.column_stack([low, high]), axis=1)
+    return np.asarray(np.take_along_axis(cut, order, axis=1).ravel())
+
+
+def _document(time_s: FloatArray, lines: Sequence[FloatArray]) -> dict[str, Any]:
+    step = float(time_s[-1] - time_s[0]) / max(time_s.size - 1, 1)
+    is_even = np.abs(time_s - time_s[0] - step * np.arange(time_s.size)).max(initial=0.0) <= EVEN * step
+    stamps = {} if is_even else {"stamps": _base64(time_s.astype("<f8"))}
+    return {"start": float(time_s[0]), "step": step, "count": time_s.size, **stamps, "lines": [_line(y) for y in lines]}
+
+
+def _line(y: FloatArray) -> dict[str, Any]:
+    there = np.isfinite(y)
+    low, high = (float(y[there].min()), float(y[there].max())) if there.any() else (0.0, 0.0)
+    middle, scale = 0.5 * (low + high), (0.5 * (high - low) / LARGEST) or 1.0
+    codes = np.full(y.size, GAP, dtype="<i2")
+    codes[there] = np.round((y[there] - middle) / scale)
+    return {"offset": middle, "scale": scale, "codes": _base64(codes)}
+
+
+def _base64(values: np.ndarray[Any, Any]) -> str:
+    return base64.b64encode(values.tobytes()).decode("ascii")
+
 
 Interval = tuple[float, float]
 
@@ -96,7 +162,7 @@ class Panel:
 
 
 def stretches_for(recordings: int) -> int:
-    """Return how finely each of so many recordings is drawn; see :func:`hil.report.decimate.extremes`."""
+    """Return how finely each of so many recordings is drawn; see :func:`hil.report.figures.extremes`."""
     return min(LONGEST_STRETCHES, DRAWN_STRETCHES // max(1, recordings))
 
 
@@ -117,19 +183,7 @@ def time_figure(
     recordings: int,
     shaded: Sequence[Interval] = (),
 ) -> list[Paragraph | Figure]:
-    """Draw panels over a common time axis; zoomed in, every sample is drawn.
-
-    Parameters
-    ----------
-    name : str
-        Unique in the page.
-    time_s : ndarray, shape (N,)
-        Time [s].
-    recordings : int
-        Recordings that share the page: the more, the coarser each is drawn.
-    shaded : sequence of (float, float)
-        Intervals of time to mark [s].
-    """
+    """Draw panels over a common time axis; zoomed in, every sample is drawn."""
     stretches = stretches_for(recordings)
     figure = time_panels(time_s, panels, stretches, shaded)
     height_px = PANEL_PX * len(panels) + LEGEND_PX

@@ -1,9 +1,9 @@
-"""How numbers and moments are shown to people and written for programs."""
+"""Numbers, moments and lists as people read them, and numbers for programs."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from datetime import UTC, datetime
 
 JSON_DIGITS = 10
@@ -71,3 +71,8 @@ def shown_times(intervals: Iterable[tuple[float, float]]) -> str:
 def moment(utc: str) -> str:
     """Write a moment in ISO 8601 as a person reads it: ``2026-11-21 10:03 UTC``."""
     return f"{datetime.fromisoformat(utc).astimezone(UTC):%Y-%m-%d %H:%M} UTC"
+
+
+def listed(words: Sequence[str]) -> str:
+    """Join words as in a sentence."""
+    return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)

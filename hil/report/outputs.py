@@ -10,13 +10,7 @@ from hil.errors import UsageError
 
 
 def require_folder(folder: Path) -> None:
-    """Refuse a folder that can't be written to, before anything is computed.
-
-    Raises
-    ------
-    UsageError
-        If the name, or one above it, is that of a file, or writing is not allowed there.
-    """
+    """Refuse a folder that can't be written to, before anything is computed."""
     existing = next(parent for parent in (folder, *folder.absolute().parents) if parent.exists())
     if not existing.is_dir():
         raise UsageError(f"{folder}: expected a folder to write into, got {existing}, which is a file")
@@ -28,20 +22,7 @@ def require_folder(folder: Path) -> None:
 
 
 def publish(folder: Path, files: Mapping[str, Callable[[Path], object]]) -> None:
-    """Make files and move them into a folder; what was there under the same name is replaced.
-
-    Parameters
-    ----------
-    folder
-        Made where it is not there.
-    files
-        File name to what writes it, given the path to write to.
-
-    Raises
-    ------
-    UsageError
-        If the folder, or the disk it is on, does not take them, or a file has the name of a folder that is there.
-    """
+    """Make files and move them into a folder; what was there under the same name is replaced."""
     for path in (folder / name for name in files):
         if path.is_dir():
             raise UsageError(f"{path}: expected the name of a file to write, got a folder. Name a file in it.")

@@ -10,8 +10,7 @@ from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Element
 from estimator.physics.model import Motion, unit
 from estimator.signals.record import OutputKind
-from hil.report.numbers import shown, shown_p, shown_times
-from hil.report.sentence import listed
+from hil.report.numbers import listed, shown, shown_p, shown_times
 
 BADGES = MappingProxyType(
     {

@@ -16,10 +16,10 @@ from pathlib import Path
 from hil.config.rig_file import Rig, read_rig
 from hil.monitor.app import MonitorApp
 from hil.monitor.host import Job
+from hil.monitor.live_estimation import run_once
 from hil.monitor.messages import Health, Over, Ready, Report, Samples, Start, Stop, TimingHealth
 from hil.monitor.source import RigSource
 from hil.monitor.state import LiveState
-from hil.monitor.warm_up import run_once
 from tests.benchmarks.host import EXAMPLE, served_elsewhere
 
 

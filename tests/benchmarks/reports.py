@@ -21,7 +21,7 @@ from estimator.identification.settings import Settings
 from estimator.identification.study import study
 from hil.figures.local_model import LocalModel
 from hil.report.diagnosis_html import diagnosis_page
-from hil.report.identification.page import identification_page
+from hil.report.identification_page import identification_page
 from tests.browser.conftest import CHROMIUM
 from tests.estimator.identification.driveline import cruise
 from tests.report.conftest import diagnosis as hand_made

@@ -9,42 +9,27 @@ from typing import Any
 
 import pytest
 
-from estimator.identification.identify import identify
-from estimator.identification.online.registry import ESTIMATORS
-from estimator.identification.settings import Settings
-from estimator.identification.study import compare, study
-from hil.figures.local_model import LocalModel, Reference, TwoMassLine, row_of
-from hil.figures.road import draw_conditions
+from hil.commission.engine import STEPS
+from hil.report.commission_html import commission_page
+from hil.report.comparison_html import comparison_page
 from hil.report.diagnosis_html import diagnosis_page
-from hil.report.identification.page import identification_page
-from hil.report.identification.paper_page import paper_page
+from hil.report.identification_page import identification_page
+from hil.report.paper_page import paper_page
 from tests.browser.conftest import Opened, opened
-from tests.estimator.identification.driveline import B_L, B_M, J_L, J_M, C, K, cruise
+from tests.browser.results import comparisons, identified, paper_results
+from tests.commission.whole_state import whole_state
 from tests.report.conftest import diagnosis as hand_made_diagnosis
 
 PHONE, DESK = 360, 1600
 A4_HEIGHT_PX = 96 * 297 / 25.4
 
 
-def identification() -> str:
-    settings, record = Settings(), cruise(1, name="run_1").record
-    found = identify(record, settings)
-    model = LocalModel(record, found, Reference("truth", TwoMassLine(J_M, J_L, K, C, B_M, B_L)))
-    compared = [compare(record, found, settings, "rls", ESTIMATORS["rls"])]
-    return identification_page([model], [study(record, found, settings)], None, compared)
-
-
-def paper() -> str:
-    line = TwoMassLine(J_M, J_L, K, C, B_M, B_L)
-    records = [cruise(seed, name=f"run_{seed}").record for seed in (1, 2)]
-    models = [LocalModel(record, identify(record), Reference("truth", line)) for record in records]
-    return paper_page(models, [row_of(model) for model in models], draw_conditions(1, len(models)))
-
-
 PAGES: dict[str, Callable[[], str]] = {
-    "identification": identification,
-    "paper": paper,
+    "identification": lambda: identification_page(*identified()),
+    "paper": lambda: paper_page(*paper_results()),
     "diagnosis": lambda: diagnosis_page(hand_made_diagnosis.__wrapped__()),
+    "comparison": lambda: comparison_page(comparisons()),
+    "commissioning": lambda: commission_page(whole_state(Path()).document(), {step.name: step.title for step in STEPS}),
 }
 
 

@@ -16,7 +16,7 @@ from hil.cli.main import run
 from hil.export.plc_estimator import PlcEstimator
 from hil.export.plcopen import Tc6, plcopen_xml, project
 from hil.export.structured_text import Precision, structured_text
-from hil.report.identification.document import identification_text
+from hil.report.identification_json import identification_text
 
 BOTH = pytest.mark.parametrize("what", ["st", "plcopen"])
 

@@ -14,7 +14,7 @@ from hil.cli.main import run
 from hil.config.rig_file import read_rig
 from hil.recording import read_record
 from hil.recording.formats import read_table
-from hil.report.identification.read_back import identified
+from hil.report.identification_input import identified
 from hil.rig.live import FORGETTING
 from hil.rig.trace import SUFFIXES
 from tests.drivers.maker_files import MAKERS

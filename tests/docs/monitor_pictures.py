@@ -13,7 +13,7 @@ from pathlib import Path
 from estimator.physics.twist import Shaft
 from hil.config.rig_file import Rig, read_rig
 from hil.monitor.app import MonitorApp
-from hil.monitor.health import HealthWatch, plc_health
+from hil.monitor.host import HealthWatch, plc_health
 from hil.monitor.messages import Began, Ended, Health, Order, Ready, Report, Samples
 from hil.monitor.state import LiveState
 from hil.rig.addresses import with_addresses

@@ -98,7 +98,7 @@ def test_what_the_drive_lacks_is_refused_until_somebody_accepts_it_by_name(
         assert rig.m1.prove_stop(PERIOD_S) == ()
         protections = {each.name: each for each in rig.m1.protections()}
     assert str(protections[name]).startswith(
-        f"{name}: not there, accepted by A. Nyone: a relay of its own takes the power away"
+        f"{name}: none, accepted by A. Nyone: a relay of its own takes the power away"
     )
     assert protections[name].proof == seen
     other = {"rpdo_deadline": "heartbeat_consumer", "heartbeat_consumer": "rpdo_deadline"}[name]

@@ -11,9 +11,8 @@ import pytest
 from textual.pilot import Pilot
 
 from hil.monitor.app import MonitorApp
-from hil.monitor.choice import Choice
 from hil.monitor.layout import PAGES
-from hil.monitor.messages import Began, Ended, Mark, Quit, Ready, Reset, Samples, Start, Stop
+from hil.monitor.messages import Began, Choice, Ended, Mark, Quit, Ready, Reset, Samples, Start, Stop
 from hil.monitor.panel import Panel
 from hil.monitor.snapshot import Activity
 from hil.monitor.state import LiveState

@@ -9,8 +9,7 @@ import re
 import pytest
 
 from hil.monitor.app import MonitorApp
-from hil.monitor.choice import Choice
-from hil.monitor.messages import Began, Kind, Mark, Notice, Ready
+from hil.monitor.messages import Began, Choice, Kind, Mark, Notice, Ready
 from hil.monitor.panel import printable
 from hil.monitor.state import LiveState
 from tests.monitor.fake_source import PERIOD_S, FakeSource, health, node, settled

@@ -7,8 +7,8 @@ import asyncio
 import pytest
 
 from hil.monitor.app import MonitorApp
-from hil.monitor.log_panel import LogPanel, ago, log, log_lines
 from hil.monitor.messages import Kind, Notice, Samples
+from hil.monitor.panel import LogPanel, ago, log, log_lines
 from hil.monitor.state import LiveState
 from tests.monitor.fake_source import PERIOD_S, FakeSource, sample, settled
 

@@ -10,7 +10,9 @@ import pytest
 
 from drivers.plc.types import ClutchState, DriveMode, PlcStatus, PlcWatchdog, PrbsSettings, PrbsSource
 from estimator.identification.tracking.alarm import Alarm, Level, TrackingState
-from hil.monitor import bus_panels, head_panels, log_panel, model_panels, signal_panels
+from hil.monitor import bus_panels, model_panels, signal_panels
+from hil.monitor import panel as head_panels
+from hil.monitor import panel as log_panel
 from hil.monitor.messages import Began, Kind, NodeHealth, Notice, PlcHealth, Ready, Samples
 from hil.monitor.panel import LEAST_WIDTH, Draw, drawn
 from hil.monitor.snapshot import Activity, History, Model, Snapshot

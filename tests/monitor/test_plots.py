@@ -9,9 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hil.monitor.braille import Canvas, envelope
-from hil.monitor.plot import AXIS, Range, nice_range, number, strip, title
-from hil.monitor.ring import Ring
+from hil.monitor.plot import AXIS, Canvas, Range, Ring, envelope, nice_range, number, strip, title
 
 
 @pytest.mark.parametrize(

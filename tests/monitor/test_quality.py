@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from hil.monitor.quality import NO_VALUE, STANDS_STILL_S, WINDOW_S, Quality, QualityWatch, words
+from hil.monitor.snapshot import NO_VALUE, STANDS_STILL_S, WINDOW_S, Quality, QualityWatch, words
 from hil.sample import SampleFlag
 from tests.monitor.fake_source import PERIOD_S, sample
 

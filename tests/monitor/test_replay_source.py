@@ -12,7 +12,7 @@ from hil.config.rig_file import read_rig
 from hil.errors import RecordingError, UsageError
 from hil.monitor.messages import Began, Over, Report, Samples
 from hil.monitor.opening import open_recording
-from hil.monitor.replay_source import ReplaySource, recorded_samples
+from hil.monitor.source import ReplaySource, recorded_samples
 from hil.recording.writer import RecordingWriter
 from hil.rig.build import open_devices
 from hil.rig.experiments.base import Phase

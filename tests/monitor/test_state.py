@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from estimator.physics.twist import Shaft
-from hil.monitor.messages import Began, Ended, Kind, Lost, Notice, Over, Ready, Samples
-from hil.monitor.outcome import outcome
+from hil.monitor.messages import Began, Ended, Kind, Lost, Notice, Over, Ready, Samples, outcome
 from hil.monitor.snapshot import Activity
 from hil.monitor.state import WINDOWS_S, LiveState
 from hil.rig.experiments.base import Phase

@@ -18,13 +18,11 @@ from estimator.physics.model import Motion
 from estimator.signals.record import OutputKind
 from hil.errors import UsageError
 from hil.report.catalogue import catalogue_table, effect_details, entries_text, select
-from hil.report.decimate import extremes
 from hil.report.diagnosis_html import diagnosis_summary
-from hil.report.figures import LONGEST_STRETCHES, input_lines, stretches_for
-from hil.report.numbers import p_statement, shown, shown_interval, shown_p, shown_ratio
+from hil.report.figures import LONGEST_STRETCHES, extremes, input_lines, stretches_for
+from hil.report.numbers import listed, p_statement, shown, shown_interval, shown_p, shown_ratio
 from hil.report.outputs import publish, require_folder
 from hil.report.page import table
-from hil.report.sentence import listed
 from hil.report.wording import simulated_column
 
 NAN = float("nan")

@@ -19,9 +19,13 @@ A_PHRASE, A_FORMULA = ("a function of T", 27.5), ("T^3", -3.22e-7)
         (Element.SPEED_SENSOR, [("w", -0.316)], "looks as if the speed read 31.6 % low"),
         (Element.SPEED_SENSOR, [("dw/dt", -0.012)], "looks as if the speed were read 12 ms late"),
         (Element.TORQUE_PATH, [("T", 0.05)], "looks as if the torque were 5 % above its reading"),
-        (Element.TORQUE_PATH, [("T_2", 0.05)], "goes with the torque of input 2, in the torque path"),
-        (Element.SHAFT, [("d twist/dt |w_M|", 3e-7)], "goes with the twist rate and the motor speed, in the shaft"),
-        (Element.MOTOR, [A_FORMULA, A_PHRASE], "goes with the torque, at the motor"),
+        (Element.TORQUE_PATH, [("T_2", 0.05)], "depends on the torque of input 2, in the torque path"),
+        (
+            Element.SHAFT,
+            [("d twist/dt |w_M|", 3e-7)],
+            "depends on how fast the twist changes and the motor speed, in the shaft",
+        ),
+        (Element.MOTOR, [A_FORMULA, A_PHRASE], "depends on the torque, at the motor"),
         (
             Element.LOAD,
             [("a load step at 3.1 s in run_1", 4.0)],
@@ -30,7 +34,7 @@ A_PHRASE, A_FORMULA = ("a function of T", 27.5), ("T^3", -3.22e-7)
         (
             Element.SPEED_SENSOR,
             [("|w|", 2.0), ("a wave 2 times per motor turn", 1.5), ("dw/dt", 1.0), ("T", 9.0)],  # the first three
-            "goes with the speed and the acceleration and looks like a wave 2 times per motor turn, in the reading",
+            "depends on the speed and the acceleration and looks like a wave 2 times per motor turn, in the reading",
         ),
     ],
 )

@@ -89,7 +89,7 @@ def test_a_law_of_no_entry_is_located_and_described_without_a_name() -> None:
     assert answer.remainder is not None
     assert answer.remainder.element is Element.SHAFT
     said = answer.remainder.law
-    assert said.startswith("goes with the twist")
+    assert said.startswith("depends on the twist")
     assert said.endswith("in the shaft")
     assert f"; it {said}." in answer.statement
 

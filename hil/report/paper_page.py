@@ -1,22 +1,25 @@
-"""``report.html`` of ``hil paper``: the paper's figures, interactive, and the numbers behind them."""
+"""``report.html`` and ``paper.json`` of ``hil paper``: the paper's figures and their numbers."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
-from typing import Any
+from dataclasses import asdict
+from typing import Any, Final
 
 import numpy as np
 
+from estimator.identification.settings import Settings
 from hil.figures.local_model import LocalModel, Row
 from hil.figures.palette import series_colour
 from hil.figures.road import Conditions
 from hil.provenance import Provenance
 from hil.report import page as html
+from hil.report.bode import responses_figure
 from hil.report.figures import Line, Panel, Style, time_figure
-from hil.report.identification.pole_map import PoleSet, known_sets, pole_figure
-from hil.report.identification.responses import responses_figure
+from hil.report.identification_figures import PoleSet, known_sets, pole_figure
 from hil.report.made import facts, made_section
-from hil.report.numbers import shown
+from hil.report.numbers import json_number, shown
 
 SHOWN_SIGNALS = 3
 """Recordings in Fig. 2, as in the paper."""
@@ -33,15 +36,7 @@ def paper_page(
     driven: Sequence[Conditions],
     made: Provenance | None = None,
 ) -> str:
-    """Return the text of the page.
-
-    Parameters
-    ----------
-    models, rows
-        Every experiment and its figures.
-    driven
-        Conditions they were driven under; empty where recordings were given.
-    """
+    """Return the text of the page."""
     sections = [
         _top(models, rows, driven, made),
         html.section("Resonance and damping", _numbers(rows)),
@@ -223,3 +218,39 @@ def _conditions(models: Sequence[LocalModel], driven: Sequence[Conditions]) -> l
         "deviation of the driver's corrections."
     )
     return [html.table(headings, rows, numbers=range(1, 7)), html.note(note)]
+
+
+SCHEMA: Final = "hil.paper/1"
+
+
+def paper_text(
+    rows: Sequence[Row],
+    settings: Settings,
+    driven: Sequence[Conditions],
+    seed: int | None,
+    made: Provenance | None = None,
+) -> str:
+    """Return the text of the file; ``seed`` is None and ``driven`` empty where recordings were given.
+
+    ``made`` is given with recordings alone: from one seed the same file comes at any time.
+    """
+    document = {
+        "schema": SCHEMA,
+        "seed": seed,
+        "settings": {
+            "na": settings.orders.na,
+            "nb": settings.orders.nb,
+            "nk": settings.orders.nk,
+            "sample_time_s": settings.sample_time_s,
+            "samples": settings.samples,
+            "high_pass_hz": settings.high_pass_hz,
+        },
+        "experiments": [_row(row) for row in rows],
+        "conditions": [asdict(each) for each in driven],
+        **({} if made is None else {"made": made.document()}),
+    }
+    return json.dumps(document, indent=1, allow_nan=False) + "\n"
+
+
+def _row(row: Row) -> dict[str, Any]:
+    return {key: json_number(value) if isinstance(value, float) else value for key, value in asdict(row).items()}

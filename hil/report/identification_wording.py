@@ -13,8 +13,7 @@ from estimator.identification.offline.validation import Validation
 from estimator.identification.online.recursive import Status
 from estimator.identification.study import Study
 from hil.figures.local_model import LocalModel
-from hil.report.numbers import shown
-from hil.report.sentence import listed
+from hil.report.numbers import listed, shown
 
 FAR_APART = 0.03
 """On-line and off-line frequency further apart than this share are worth a warning: docs/identification.md."""

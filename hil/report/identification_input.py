@@ -1,24 +1,87 @@
-"""Reads back what runs on line with out of ``identification.json``: settings and observation filter of a recording."""
+"""What an identification is given: order and delay chosen from the data, estimators by name, a file of before."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Final, Literal
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
 from estimator.errors import BadSetting
 from estimator.identification.linear_model import Orders
+from estimator.identification.offline.orders import OrderChoice, select_orders
 from estimator.identification.online.adaptation import Adaptation
+from estimator.identification.online.ekf import TwoMass
+from estimator.identification.online.registry import ESTIMATORS, Entry
 from estimator.identification.settings import Settings
-from estimator.signals.record import FloatArray
+from estimator.physics.model import DrivelineModel, Structure
+from estimator.signals.decimate import decimate
+from estimator.signals.record import FloatArray, Record
 from hil.errors import FileProblem, UsageError
 from hil.files import read_json
 from hil.problems import validate
+
+AUTO: Final = "auto"
+
+PHYSICAL: Final = "ekf"
+"""The estimator whose states are physical parameters, which it can't start from nothing."""
+
+ORDERS: Final = (2, 3, 4, 5, 6)
+"""Tried for ``auto``: a two-mass drive has three."""
+
+DELAYS: Final = (0, 1, 2, 3)
+"""Tried for ``auto``. A low-pass ahead of the decimation spreads the torque over its neighbours to either side, so
+that 0 may fit better than the one sample a held torque has."""
+
+MOST_UNSEEN: Final = 3
+"""Recordings the candidates are tried on besides the first, which they are fitted to."""
+
+
+def chosen_orders(
+    settings: Settings, order: str, delay: str, records: Sequence[Record]
+) -> tuple[Settings, OrderChoice | None]:
+    """Return the settings with order and delay filled in, and how they were chosen; None where both were given."""
+    orders, delays = _numbers("--order", order, 1, ORDERS), _numbers("--delay", delay, 0, DELAYS)
+    among = [Orders(n, n, nk) for nk in delays for n in orders]
+    if len(among) == 1:
+        return replace(settings, orders=among[0]), None
+    first, *rest = (
+        decimate(record, settings.factor(record), settings.high_pass_hz) for record in records[: MOST_UNSEEN + 1]
+    )
+    choice = select_orders(first, among, rest)
+    return replace(settings, orders=choice.chosen), choice
+
+
+def _numbers(option: str, text: str, least: int, all_of_them: Sequence[int]) -> Sequence[int]:
+    if text == AUTO:
+        return all_of_them
+    if not (text.isascii() and text.isdigit()) or int(text) < least:
+        raise UsageError(f"{option}: expected a whole number from {least} on, or {AUTO}, got {text!r}")
+    return (int(text),)
+
+
+def chosen_estimators(names: Sequence[str]) -> Mapping[str, Entry]:
+    """Return what makes the recursive estimators of these names, each once."""
+    for name in names:
+        if name not in ESTIMATORS:
+            raise UsageError(f"--estimator: expected one of {', '.join(ESTIMATORS)}, got {name!r}")
+    return {name: ESTIMATORS[name] for name in names}
+
+
+def start_values(names: Sequence[str], expected: DrivelineModel | None) -> TwoMass | None:
+    """Return the start values for an estimator of physical parameters: those of a two-mass model file."""
+    if expected is not None and expected.structure is Structure.TWO_MASS:
+        return TwoMass(**expected.values())
+    if PHYSICAL in names:
+        raise UsageError(
+            f"--estimator {PHYSICAL}: expected start values for J_M, J_L, k and c, got none. Give a two-mass model "
+            "file by --model; a factor of two off is near enough."
+        )
+    return None
 
 
 class _Part(BaseModel):
@@ -50,13 +113,7 @@ class IdentificationFile(_Part):
 
 
 def read_identification(path: Path) -> IdentificationFile:
-    """Read one file.
-
-    Raises
-    ------
-    FileProblem
-        If it can't be read, is no JSON, or lacks something; with the line or the key.
-    """
+    """Read one file."""
     return validate(IdentificationFile, _json(path), path, FileProblem)
 
 
@@ -80,26 +137,7 @@ class Identified:
 
 
 def identified(path: Path, run: str | None, adaptation: Adaptation, option: str = "--run") -> Identified:
-    """Return the settings that identified a recording, and its observation filter L, as the paper reuses them.
-
-    Parameters
-    ----------
-    path : Path
-        ``identification.json``.
-    run : str or None
-        Name of the recording; None where the file has one alone.
-    adaptation : Adaptation
-        Adaptation-gain profile to run with.
-    option : str
-        The option that names the recording, for messages.
-
-    Raises
-    ------
-    UsageError
-        If the recording is not in the file, or none is named and there are several.
-    FileProblem
-        If the file is wrong, or the recording's output is no speed.
-    """
+    """Return the settings that identified a recording, and its observation filter L, as the paper reuses them."""
     file = read_identification(path)
     entry = _chosen(path, file.recordings, run, option)
     if entry.output != "speed":
@@ -155,15 +193,7 @@ class PhysicalValue:
 
 
 def physical_values(path: Path, run: str | None = None) -> dict[str, PhysicalValue]:
-    """Return the physical parameters of ``identification.json``: of one recording, or the surest of all.
-
-    Raises
-    ------
-    FileProblem
-        If the file is wrong.
-    UsageError
-        If the recording is not in the file.
-    """
+    """Return the physical parameters of ``identification.json``: of one recording, or the surest of all."""
     read_identification(path)  # says what is wrong with it
     entries = [each for each in _json(path)["recordings"] if run in (None, each["name"])]
     if not entries:

@@ -1,1 +1,0 @@
-"""What was identified, as one self-contained page: ``hil identify`` and ``hil paper``."""

@@ -1,0 +1,401 @@
+"""``report.html`` and the terminal's tables of ``hil identify``: what was identified, and how sure it is.
+
+From the top: the result in a paragraph with its warnings, the numbers of every recording, the drive behind them, all
+recordings over one another, and for each its frequency response, poles and zeros, residual tests, free run and course.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from rich.box import SIMPLE_HEAD
+from rich.console import RenderableType
+from rich.table import Table
+
+from estimator.identification.modes.modes import Mode
+from estimator.identification.modes.uncertainty import UncertainRoot
+from estimator.identification.offline.orders import OrderChoice
+from estimator.identification.offline.validation import CorrelationTest
+from estimator.identification.online.recursive import Status
+from estimator.identification.study import Compared, Study
+from estimator.signals.record import FloatArray
+from hil.figures.local_model import LocalModel
+from hil.figures.palette import BLACK, BLUE, GREEN, VERMILION, series_colour
+from hil.provenance import Provenance
+from hil.report import page as html
+from hil.report.bode import response_figure, responses_figure
+from hil.report.figures import Line, Panel, Style, time_figure
+from hil.report.identification_figures import PoleSet, course_figure, known_sets, pole_figure, residual_figure
+from hil.report.identification_wording import best_statement, headline, plus_minus, statement, verdict, warnings
+from hil.report.made import facts, made_section
+from hil.report.numbers import shown, shown_interval, shown_p
+from hil.report.terminal import rendered
+
+PHYSICAL = (
+    "The two-mass drive, at the motor shaft, that has the response of the third-order Box-Jenkins model. "
+    "Sums are often known where their parts are not. Grey: these recordings do not determine the value."
+)
+
+FOOTER = (
+    "hil identify. High-passed and decimated; errors and fits are those of free-run simulations: measured torque in, "
+    "nothing fed back. Intervals hold the truth with 95 % probability."
+)
+
+MOST_DRAWN = 12
+"""Recordings with a section of their own; the tables hold all."""
+
+LARGEST_REGION = 1.0
+"""Regions wider than this in z say only that the data know nothing of the root; they would hide the others."""
+
+
+def recording_section(model: LocalModel, study: Study, number: int) -> html.Section:
+    """Return the section; ``number`` makes its figures' names unique in the page."""
+    return html.section(
+        f"Recording {model.name}",
+        html.paragraph(best_statement(study)),
+        html.paragraph(study.validation.statement),
+        *_regional(study),
+        html.Heading("Frequency response"),
+        html.note(_spectral(study)),
+        response_figure(f"response-{number}", model, study.best.fit),
+        html.Heading("Poles and zeros"),
+        *_roots(model, study, number),
+        html.Heading("Free run of the output-error model"),
+        _free_run(study, number),
+        html.Heading("Residual tests"),
+        _tests(study),
+        residual_figure(f"residuals-{number}", study.validation),
+        html.Heading("Course of the on-line estimate"),
+        course_figure(f"course-{number}", study.course, model),
+    )
+
+
+def _spectral(study: Study) -> str:
+    """Say which samples the spectral estimate is of, or why there is none."""
+    spectral = study.found.spectral
+    if spectral is None:
+        return f"No spectral estimate. {study.found.no_spectral}"
+    bridged = f", {spectral.bridged_samples} missing ones bridged" if spectral.bridged_samples else ""
+    return (
+        f"Spectral estimate of {spectral.used_samples} of {study.found.offline.okay.size} samples{bridged}: "
+        f"{spectral.n_averages:.0f} independent averages, a line every {spectral.frequency_hz[0]:.2g} Hz."
+    )
+
+
+def _regional(study: Study) -> list[Any]:
+    """Return the table of what the resonance depends on; nothing where the drive is linear."""
+    if not study.best.regions:
+        return []
+    rows = [
+        (
+            f"{one.low:.0f} to {one.high:.0f}",
+            "none" if one.mode is None else shown(one.mode.frequency_hz),
+            "" if one.mode is None else shown(one.mode.damping),
+        )
+        for one in study.best.regions
+    ]
+    return [
+        html.Heading("What the resonance depends on"),
+        html.table(("torque in the shaft [Nm]", "[Hz]", "damping"), rows),
+    ]
+
+
+def _roots(model: LocalModel, study: Study, number: int) -> list[Any]:
+    offline, best = study.found.batch.model, study.best.fit.model
+    third = study.third_order.model
+    k = model.online.sample_time_s / offline.sample_time_s  # a pole sampled k times as slowly is its k-th power
+    sets = [
+        PoleSet("best: Box-Jenkins", best.poles**k, best.zeros**k, BLACK),
+        PoleSet("on line", model.online.poles, model.online.zeros, BLUE),
+        PoleSet("output error, 95 %", offline.poles**k, offline.zeros**k, VERMILION, regions=_regions(study, k)),
+        PoleSet("output error, third order", third.poles**k, third.zeros**k, GREEN, hidden=True),
+        *known_sets([model]),
+    ]
+    cancellations = [html.paragraph(each.statement) for each in study.roots.cancellations]
+    bound = shown(study.third_order.largest_error)
+    note = (
+        f"Crosses are poles, circles zeros, drawn at the on-line model's period, {1e3 * model.online.sample_time_s:g} "
+        "ms (exact for poles alone). Outlines: where they are with 95 % confidence, a line for a real one; left "
+        f"out where they would cover the map. The third-order equivalent changes the response by {bound} at most."
+    )
+    return [
+        html.note(note),
+        *cancellations,
+        pole_figure(f"poles-{number}", sets, model.online.sample_time_s),
+    ]
+
+
+def _regions(study: Study, k: float) -> tuple[FloatArray, ...]:
+    outlines = [_outline(root, k) for root in (*study.roots.poles, *study.roots.zeros)]
+    return tuple(each for each in outlines if np.isfinite(each).all() and np.ptp(each, axis=0).max() < LARGEST_REGION)
+
+
+def _outline(root: UncertainRoot, k: float) -> FloatArray:
+    around = root.ellipse() ** k
+    return np.column_stack([around.real, around.imag])
+
+
+def _free_run(study: Study, number: int) -> list[Any]:
+    data, error = study.found.offline, study.validation.own.error
+    measured = np.where(data.okay, data.output, np.nan)
+    panels = (
+        Panel(
+            f"{data.kind.value}, high-passed",
+            (Line("measured", measured, Style.MEASURED), Line("output-error model", measured - error, Style.AFTER)),
+        ),
+        Panel("error", (Line("error", error, Style.BEFORE),)),
+    )
+    return time_figure(f"free-run-{number}", data.time_s, panels, MOST_DRAWN)
+
+
+def _tests(study: Study) -> html.Table:
+    tests = study.validation
+    best, linearity = study.best, study.best.linearity
+    past = best.validation.independence
+    linear = "none seen: linear" if linearity.is_linear else f"not linear: it depends on {linearity.depends_on}"
+    rows = [
+        ("output error, with past input", shown_p(tests.independence.p_value), _verdict(tests.independence)),
+        (
+            "Box-Jenkins, with past input",
+            shown_p(past.p_value),
+            _verdict(past),
+        ),
+        ("Box-Jenkins, with later input", shown_p(best.feedback.p_value), _feedback(study)),
+        ("Box-Jenkins, with functions of torque and speed", shown_p(linearity.p_value), linear),
+        (
+            "output error, with itself",
+            shown_p(tests.autocorrelation.p_value),
+            "shown only: road and load correlate it, which is no fault of the model",
+        ),
+    ]
+    return html.table(("residual of", "p", "result"), rows, numbers=(1,))
+
+
+def _feedback(study: Study) -> str:
+    if not study.feedback.detected:
+        return "none seen: the torque does not follow the speed"
+    if not study.best.linearity.is_linear:
+        return "seen, but a nonlinear drive can cause it, too"
+    return "the torque follows the speed"
+
+
+def _verdict(test: CorrelationTest) -> str:
+    good = "independent: the model holds"
+    return good if test.is_independent else "dependent: the model misses a part of the response"
+
+
+MOST_CANDIDATES = 8
+"""Structures shown of an order selection."""
+
+
+def numbers_table(models: Sequence[LocalModel], studies: Sequence[Study]) -> list[Any]:
+    """Return resonance and damping on line and off line, and how well the models do, of every recording."""
+    headings = (
+        "recording",
+        "best [Hz]",
+        "damping",
+        "on line [Hz]",
+        "damping",
+        "free-run fit",
+        "one step",
+        "unseen",
+        "status",
+    )
+    rows = [_numbers(each) for each in studies]
+    known = [model for model in models if model.reference_mode is not None]
+    if known and (mode := known[0].reference_mode) is not None and known[0].reference is not None:
+        rows.append((known[0].reference.name, shown(mode.frequency_hz), shown(mode.damping), "", "", "", "", "", ""))
+    note = (
+        "Best: the Box-Jenkins model. ± is half the 95 % interval. Free-run fit, of the output-error model: 100 % less "
+        "the simulation error over the output's own variation; one step ahead uses the measured output and does not "
+        "measure a model. Unseen: free run on the others."
+    )
+    return [html.table(headings, rows, numbers=range(1, 8)), html.note(note)]
+
+
+def _numbers(each: Study) -> tuple[str, ...]:
+    online, best, own = each.found.online_resonance, each.resonance, each.validation.own
+    unseen = [run.fit_percent for run in each.validation.unseen]
+    return (
+        each.name,
+        "–" if best is None else plus_minus(best.frequency_hz),
+        "–" if best is None else plus_minus(best.damping),
+        "–" if online is None else shown(online.frequency_hz),
+        "–" if online is None else shown(online.damping),
+        shown(own.fit_percent, "%"),
+        shown(own.one_step_fit_percent, "%"),
+        shown(sum(unseen) / len(unseen), "%") if unseen else "–",
+        each.found.estimate.status.value,
+    )
+
+
+def physical_tables(studies: Sequence[Study]) -> list[Any]:
+    """Return the drive's parameters of every recording: one row each, then what is open and why."""
+    rows, warnings, is_open = [], [], []
+    for each in studies:
+        if each.physical is None:
+            warnings.append(html.warning(f"{each.name}: no two-mass drive. {each.not_physical}"))
+            continue
+        both = {**each.physical.parameters, **each.physical.sums}
+        rows += [
+            html.Row(
+                (
+                    each.name,
+                    name,
+                    shown(one.estimate.value),
+                    shown_interval(one.estimate.ci95),
+                    one.unit,
+                    "determined" if one.is_determined else "open",
+                ),
+                "" if one.is_determined else "undetermined",
+            )
+            for name, one in both.items()
+        ]
+        is_open += [html.note(f"{each.name}: {one.statement}") for one in both.values() if not one.is_determined]
+    headings = ("recording", "parameter", "value", "95 % interval", "unit", "")
+    table = html.table(headings, rows, numbers=(2, 3)) if rows else None
+    return [table, *warnings, html.details("What is open, and what would determine it", *is_open) if is_open else None]
+
+
+def orders_table(choice: OrderChoice) -> list[Any]:
+    """Return the best structures of an order selection, the chosen one first."""
+    rows = [
+        (
+            str(each.orders.na),
+            str(each.orders.nb),
+            str(each.orders.nk),
+            shown(each.criterion),
+            shown(each.rms),
+            shown(each.unseen_fit_percent, "%"),
+        )
+        for each in choice.candidates[:MOST_CANDIDATES]
+    ]
+    headings = ("nA", "nB", "delay", "BIC above the best", "RMS of the whitened error", "fit on unseen")
+    return [html.paragraph(choice.statement), html.table(headings, rows, numbers=range(6))]
+
+
+def compared_table(compared: Sequence[Compared]) -> list[Any]:
+    """Return what several recursive estimators made of the same data, and why one has no estimate."""
+    rows = [
+        (
+            each.recording,
+            each.estimator,
+            "–" if each.resonance is None else shown(each.resonance.frequency_hz),
+            "–" if each.resonance is None else shown(each.resonance.damping),
+            shown(each.fit_percent, "%"),
+            each.status.value,
+        )
+        for each in compared
+    ]
+    headings = ("recording", "estimator", "frequency [Hz]", "damping", "free-run fit", "status")
+    reasons = [html.paragraph(f"{each.recording}, {each.estimator}: {each.reason}") for each in compared if each.reason]
+    return [html.table(headings, rows, numbers=(2, 3, 4)), *reasons]
+
+
+def identification_page(
+    models: Sequence[LocalModel],
+    studies: Sequence[Study],
+    choice: OrderChoice | None = None,
+    compared: Sequence[Compared] = (),
+    made: Provenance | None = None,
+) -> str:
+    """Return the text of the page."""
+    drawn = list(zip(models, studies, strict=True))[:MOST_DRAWN]
+    left = len(models) - len(drawn)
+    return html.page(
+        f"Identification: {headline(studies)}",
+        [
+            html.header(
+                headline(studies),
+                [html.paragraph(verdict(each), kind="statement") for each in studies],
+                html.paragraph(statement(models, studies)),
+                [html.warning(f"Note: {text}") for text in warnings(studies)],
+                html.tiles(_tiles(studies)),
+                facts=facts(made),
+            ),
+            html.section("Resonance and damping", numbers_table(models, studies)),
+            html.section("Physical parameters", html.note(PHYSICAL), physical_tables(studies)),
+            html.section("Order and delay", orders_table(choice)) if choice is not None else None,
+            html.section("Recursive estimators compared", compared_table(compared)) if compared else None,
+            _together(models) if len(models) > 1 else None,
+            *(recording_section(model, each, number) for number, (model, each) in enumerate(drawn)),
+            html.section("More recordings", html.note(f"{left} more are only in the tables.")) if left else None,
+            made_section(made),
+        ],
+        FOOTER,
+    )
+
+
+def _tiles(studies: Sequence[Study]) -> list[tuple[str, str, str]]:
+    first = studies[0]
+    tiles = []
+    if first.resonance is not None:
+        mode, online = first.resonance, first.found.online_resonance
+        on_line = ("none on line", "none on line")
+        if online is not None:
+            on_line = (f"on line {shown(online.frequency_hz, 'Hz')}", f"on line {shown(online.damping)}")
+        tiles += [
+            (f"frequency, {first.name}", plus_minus(mode.frequency_hz, "Hz"), on_line[0]),
+            (f"damping, {first.name}", plus_minus(mode.damping), on_line[1]),
+        ]
+    own = first.validation.own
+    tiles.append(("free-run fit", f"{own.fit_percent:.1f} %", f"one step ahead {own.one_step_fit_percent:.1f} %"))
+    tiles.append(("recordings", str(len(studies)), "each with models of its own"))
+    return tiles
+
+
+def _together(models: Sequence[LocalModel]) -> html.Section:
+    sets = [
+        PoleSet(model.name, model.online.poles, model.online.zeros, series_colour(number))
+        for number, model in enumerate(models)
+    ]
+    return html.section(
+        "All recordings",
+        html.note("Lines: on-line models. Dots: spectral estimates. Click a name to hide it, double click to see it "
+                  "alone."),
+        html.Heading("Frequency responses"),
+        responses_figure("all-responses", models),
+        html.Heading("Poles and zeros of the on-line models"),
+        pole_figure("all-poles", [*sets, *known_sets(models)], models[0].online.sample_time_s),
+    )  # fmt: skip
+
+
+NAME_WIDTH = 20
+"""Longest name of a recording in the table; a longer one wraps."""
+
+
+def summary(studies: Sequence[Study], nominal: Mode | None) -> Table:
+    """Return each recording's best estimate and on-line estimate; it fits into 80 columns, numbers are never cut.
+
+    The status of the on-line estimates has a column where one of them is not as it should be.
+    """
+    wrong = any(each.found.estimate.status is not Status.ESTIMATED for each in studies)
+    table = Table(title="Resonance and damping", title_justify="left", box=SIMPLE_HEAD, pad_edge=False)
+    table.add_column("recording", overflow="fold", max_width=NAME_WIDTH)
+    for heading in ("best [Hz]", "damping", "on line", "damping"):
+        table.add_column(heading, no_wrap=True, justify="right")
+    if wrong:
+        table.add_column("on line is", no_wrap=True)
+    for each in studies:
+        status = [each.found.estimate.status.value] if wrong else []
+        table.add_row(each.name, *_known(each), *_shown(each.found.online_resonance), *status)
+    if nominal is not None:
+        table.add_section()
+        table.add_row("model file", *_shown(nominal), "", "")
+    return table
+
+
+def compared_summary(compared: Sequence[Compared]) -> RenderableType:
+    """Return what several recursive estimators made of the same data, for a terminal."""
+    return rendered([html.section("Recursive estimators", compared_table(compared))])
+
+
+def _shown(mode: Mode | None) -> tuple[str, str]:
+    return ("none", "") if mode is None else (f"{mode.frequency_hz:.2f}", f"{mode.damping:.3f}")
+
+
+def _known(each: Study) -> tuple[str, str]:
+    mode = each.resonance
+    return ("none", "") if mode is None else (plus_minus(mode.frequency_hz), plus_minus(mode.damping))
