@@ -22,7 +22,7 @@ import json
 import sys
 import tempfile
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise, product
 from pathlib import Path
@@ -248,9 +248,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run or continue; return the exit status."""
     options = _parser().parse_args(arguments)
     options.out.mkdir(parents=True, exist_ok=True)
-    path = options.out / "worlds.jsonl"
-    rows = [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()] if path.exists() else []
-    known = {_key(row["form"], row["seed"], row["outputs"]): row for row in rows}
     if ENGINE in options.forms and importlib.util.find_spec("mujoco") is None:
         sys.stdout.write("engine: left out, MuJoCo is not installed: pip install mujoco\n")
         options.forms.remove(ENGINE)
@@ -262,20 +259,32 @@ def main(arguments: Sequence[str] | None = None) -> int:
     def work(name: str) -> Row:
         form, seed, count = wanted[name]
         row = answered(form, seed, count == 2, **given)
-        with path.open("a", encoding="utf-8") as file:
-            file.write(json.dumps(row, allow_nan=False) + "\n")
         found = [each["name"] + ("" if each["is_there"] else " (false)") for each in row["names"]]
         sys.stdout.write(f"{name} {row['strong']}: {row['verdict']} {', '.join(found)}\n")
         sys.stdout.flush()
         return row
 
-    done = work_on(list(wanted), work, known=known)
-    sys.stdout.write(f"{table(list(done.values()))}\n{reliability(list(done.values()))}")
+    rows = continued(options.out / "worlds.jsonl", list(wanted), work)
+    sys.stdout.write(f"{table(rows)}\n{reliability(rows)}")
     return 0
 
 
 def _key(form: str, seed: int, outputs: int) -> str:
     return f"{form} {seed} {outputs}"
+
+
+def continued(path: Path, names: Sequence[str], work: Callable[[str], Row]) -> list[Row]:
+    """Return the row of each name: from a file of JSON lines, to which those are added that are not there yet."""
+    lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
+    known = {entry["name"]: entry["row"] for entry in map(json.loads, lines)}
+
+    def kept(name: str) -> Row:
+        row = work(name)
+        with path.open("a", encoding="utf-8") as file:
+            file.write(json.dumps({"name": name, "row": row}, allow_nan=False) + "\n")
+        return row
+
+    return list(work_on(names, kept, known=known).values())
 
 
 if __name__ == "__main__":
