@@ -20,7 +20,7 @@ from hil.monitor.messages import Health, Over, Ready, Report, Samples, Start, St
 from hil.monitor.source import RigSource
 from hil.monitor.state import LiveState
 from hil.monitor.warm_up import run_once
-from tests.benchmarks.host import EXAMPLE, served_elsewhere
+from tests.benchmarks.fieldbus import EXAMPLE, served_elsewhere
 
 
 class Noted:

@@ -16,8 +16,7 @@ from estimator.identification.offline.linear_fit import LinearFit, Method
 from estimator.identification.offline.output_error import fit_output_error
 from estimator.signals.decimate import decimate, high_passed
 from estimator.signals.record import Record
-from tests.benchmarks.buses.bus import draw_bus
-from tests.benchmarks.buses.drive import drive
+from tests.benchmarks.buses import draw_bus, drive
 from tests.estimator.identification.closed_loop import controlled
 from tests.estimator.identification.driveline import cruise, true_resonance
 
