@@ -22,10 +22,9 @@ import numpy as np
 from estimator.diagnosis.diagnose import diagnose
 from estimator.diagnosis.result import Diagnosis
 from tests.benchmarks.cases import NOTHING, Case, make
-from tests.benchmarks.fit import SEED, problem_of
+from tests.benchmarks.fit import SEED, fit_by_scipy, problem_of
 from tests.benchmarks.memory import write_case
 from tests.benchmarks.ratios import COLUMNS, compare, machine, table, timed
-from tests.benchmarks.scipy_fit import fit_by_scipy
 
 PAIRS = 3
 EFFECTS = (NOTHING, "backlash", "road_grade")

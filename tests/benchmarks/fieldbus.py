@@ -13,18 +13,178 @@ from __future__ import annotations
 
 import argparse
 import math
+import shutil
+import subprocess
 import sys
 import time
-from collections.abc import Callable, Sequence
-from contextlib import ExitStack
+import uuid
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
 from statistics import median
+from tempfile import TemporaryDirectory
 
-from hil.rig.pacing import FreePacer, RealTimePacer, period_ns
+import can
+
+from drivers.torque_guard import TorqueRequest
+from hil.config.rig_file import Rig, read_rig
+from hil.rig.addresses import with_addresses
+from hil.rig.arming import ArmedDrives
+from hil.rig.build import open_devices
+from hil.rig.cycle import Cycle
+from hil.rig.excitation import NO_TORQUE
+from hil.rig.fitness import Needs
+from hil.rig.pacing import FreePacer, Pacer, RealTimePacer, period_ns
+from hil.rig.plc_watch import PlcWatch
 from hil.rig.realtime import PRIORITY, real_time
-from tests.benchmarks.bare_loop import compiled, lateness_ns
-from tests.benchmarks.host import armed, example_rig, served_elsewhere, served_here
+from hil.rig.stop import StopRequest
+from hil.sample import SampleFlag
+from hil.simulator.loopback import Address
+from hil.simulator.plant import RigidPlant
+from hil.simulator.rig_server import RigServer
 from tests.benchmarks.ratios import machine, table, timed
-from tests.benchmarks.raw_can import raw_exchange
+
+SOURCE = Path(__file__).with_suffix(".c")
+
+
+@contextmanager
+def compiled() -> Iterator[Path]:
+    """Compile the loop, for the time of the block; needs a C compiler."""
+    compiler = shutil.which("gcc") or shutil.which("cc")
+    if compiler is None:
+        raise FileNotFoundError("expected gcc or cc for the loop to compare with, got neither: install a C compiler")
+    with TemporaryDirectory(prefix="hil-bare-loop-") as folder:
+        program = Path(folder) / "bare_loop"
+        subprocess.run([compiler, "-O2", "-Wall", "-Werror", "-o", str(program), str(SOURCE)], check=True)
+        yield program
+
+
+def lateness_ns(program: Path, period_ns: int, count: int, priority: int) -> list[int]:
+    """Run the loop: how late each cycle began [ns]; ``priority`` of SCHED_FIFO, 0 for ordinary scheduling."""
+    command = [str(program), str(period_ns), str(count), str(priority)]
+    done = subprocess.run(command, check=True, capture_output=True, text=True)
+    return [int(line) for line in done.stdout.split()]
+
+
+RPDOS, SYNC, TPDOS = (0x201, 0x202), 0x080, (0x181, 0x182)
+RPDO_BYTES, TPDO_BYTES = 6, 8
+
+Exchange = Callable[[int], None]
+"""``exchange(count)``: so many cycles, one after the other."""
+
+
+@contextmanager
+def raw_exchange() -> Iterator[Exchange]:
+    """Open the bus, and yield what sends and receives two RPDOs, SYNC and two TPDOs, all in one thread."""
+    channel = str(uuid.uuid4())
+    with _participant(channel) as host, _participant(channel) as drives:
+
+        def exchange(count: int) -> None:
+            for _ in range(count):
+                for cob_id in RPDOS:
+                    host.send(_frame(cob_id, RPDO_BYTES))
+                host.send(_frame(SYNC, 0))
+                _receive(drives, len(RPDOS) + 1)
+                for cob_id in TPDOS:
+                    drives.send(_frame(cob_id, TPDO_BYTES))
+                _receive(host, len(TPDOS))
+
+        yield exchange
+
+
+def _participant(channel: str) -> can.BusABC:
+    return can.Bus(interface="virtual", channel=channel, ignore_config=True)
+
+
+def _frame(cob_id: int, size_bytes: int) -> can.Message:
+    return can.Message(arbitration_id=cob_id, data=bytes(size_bytes), is_extended_id=False)
+
+
+def _receive(bus: can.BusABC, count: int) -> None:
+    for _ in range(count):
+        if bus.recv(1.0) is None:
+            raise TimeoutError("a frame of the raw exchange did not arrive within 1 s")
+
+
+EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "rig.toml"
+PRBS_NM = 20.0
+"""Of each inverter, up and down in turn: the drives carry torque, the vehicle stays where it is."""
+
+
+def example_rig(period_s: float) -> Rig:
+    """The example's rig, at another period; a busy machine ends no comparison."""
+    rig = read_rig(EXAMPLE)
+    guard = rig.guard.model_copy(update={"feedback_timeout_s": PATIENCE_S})
+    return rig.model_copy(update={"period_s": period_s, "guard": guard})
+
+
+PATIENCE_S = 5.0
+"""With an inverter that does not answer: the simulated ones run at ordinary priority."""
+
+
+@dataclass(frozen=True, slots=True)
+class Host:
+    """An armed host."""
+
+    cycle: Cycle
+    watch: PlcWatch
+    pacer: Pacer
+
+    def run(self, count: int, with_plc: bool) -> None:
+        """Run so many cycles: guard, both commands, SYNC, both answers; the PLC's watch before each, if asked for."""
+        for number in range(count):
+            tick = self.pacer.next()
+            flags = self.watch.look(tick, self.cycle.speed_rad_s) if with_plc else SampleFlag.GOOD
+            prbs_nm = PRBS_NM if number % 2 else -PRBS_NM
+            self.cycle.step(tick, TorqueRequest(0.0, prbs_nm, 0.0, prbs_nm), 0.0, flags)
+
+
+@contextmanager
+def armed(rig: Rig, pacer: Pacer) -> Iterator[Host]:
+    """Open a rig's devices, arm its drives and wake them up, for the time of the block."""
+    with open_devices(rig) as devices:
+        for inverter in (devices.m1, devices.m2):
+            inverter.configure()
+        status = devices.plc_loop.call(devices.plc.read_status())
+        with ArmedDrives(devices, StopRequest()):
+            cycle = Cycle(devices.link, devices.m1, devices.m2, devices.guard, pacer.period_ns, pacer.answer_timeout_s)
+            while not cycle.answered:
+                cycle.step(pacer.next(), NO_TORQUE, 0.0, SampleFlag.GOOD)
+            devices.guard.enable()
+            cycle.step(pacer.next(), NO_TORQUE, 0.0, SampleFlag.GOOD)
+            watch = PlcWatch(devices.plc_loop, devices.plc, status, Needs(0.0), pacer.poll_patience_s)
+            yield Host(cycle, watch, pacer)
+
+
+@contextmanager
+def served_here(rig: Rig) -> Iterator[Rig]:
+    """Serve a rig from this process, on the virtual bus; yields it at its addresses."""
+    server = RigServer(RigidPlant(100.0, 0.5), rig, f"virtual:{uuid.uuid4()}", Address("127.0.0.1", 0))
+    with server:
+        yield with_addresses(rig, server.bus_url, str(server.modbus))
+
+
+@contextmanager
+def served_elsewhere(rig: Rig, *options: str) -> Iterator[Rig]:
+    """Serve a rig from a process of its own (``hil sim``), over loopback; yields it at its addresses."""
+    if rig.period_s != read_rig(EXAMPLE).period_s:
+        raise ValueError(f"expected the example's period, got {rig.period_s:g} s: hil sim reads the example's file")
+    served = ("--bus", "ws://127.0.0.1:0/", "--modbus", "127.0.0.1:0")
+    command = [sys.executable, "-m", "hil", "sim", str(EXAMPLE), *served, *options]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        try:
+            yield with_addresses(rig, *_addresses(process.stdout.readline if process.stdout else str))
+        finally:
+            process.terminate()
+
+
+def _addresses(line: Callable[[], str]) -> tuple[str, str]:
+    word, bus, modbus = line().split()
+    if word != "ready":
+        raise RuntimeError(f"hil sim: expected its line 'ready', got {word!r}")
+    return bus.removeprefix("bus="), modbus.removeprefix("modbus=")
+
 
 PAIRS = 3
 DEFAULT_PERIOD_S, SHORTEST_PERIOD_S = 0.01, 0.001

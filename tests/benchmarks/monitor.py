@@ -20,7 +20,7 @@ from hil.monitor.live_estimation import run_once
 from hil.monitor.messages import Health, Over, Ready, Report, Samples, Start, Stop, TimingHealth
 from hil.monitor.source import RigSource
 from hil.monitor.state import LiveState
-from tests.benchmarks.host import EXAMPLE, served_elsewhere
+from tests.benchmarks.fieldbus import EXAMPLE, served_elsewhere
 
 
 class Noted:

@@ -10,10 +10,9 @@ import pytest
 from estimator.physics.fit import fit
 from estimator.physics.problem import Problem
 from tests.benchmarks.cases import NOTHING, make
-from tests.benchmarks.fit import agreement, compare_simulations, problem_of
+from tests.benchmarks.fit import ScipyFit, agreement, compare_simulations, fit_by_scipy, problem_of
 from tests.benchmarks.memory import read_case, write_case
 from tests.benchmarks.ratios import Comparison, Taken
-from tests.benchmarks.scipy_fit import ScipyFit, fit_by_scipy
 
 SHORT_S = 2.0
 

@@ -11,10 +11,24 @@ from scipy.integrate import solve_ivp
 from scipy.signal import welch
 
 from tests.benchmarks import buses
-from tests.benchmarks.buses.bus import METRES_PER_RAD, Bus, draw_bus
-from tests.benchmarks.buses.drive import CLEAN, COUNT_NM, PERIOD_S, World, drive, prbs
-from tests.benchmarks.buses.line import Line
-from tests.benchmarks.buses.road import FRONT_SHARE, GRAVITY_M_S2, PATCH_M, gusts, hills, surface
+from tests.benchmarks.buses import (
+    CLEAN,
+    COUNT_NM,
+    FRONT_SHARE,
+    GRAVITY_M_S2,
+    METRES_PER_RAD,
+    PATCH_M,
+    PERIOD_S,
+    Bus,
+    Line,
+    World,
+    draw_bus,
+    drive,
+    gusts,
+    hills,
+    prbs,
+    surface,
+)
 
 LINE = Line(1.6, 100.0, 4200.0, 9.0, 0.35, 0.9)
 STEP_S = 0.001

@@ -9,10 +9,17 @@ import can
 import pytest
 
 from hil.rig.pacing import FreePacer, period_ns
-from tests.benchmarks import raw_can
-from tests.benchmarks.bare_loop import compiled, lateness_ns
-from tests.benchmarks.fieldbus import DEFAULT_PERIOD_S, main, quantile
-from tests.benchmarks.host import armed, example_rig, served_here
+from tests.benchmarks import fieldbus as raw_can
+from tests.benchmarks.fieldbus import (
+    DEFAULT_PERIOD_S,
+    armed,
+    compiled,
+    example_rig,
+    lateness_ns,
+    main,
+    quantile,
+    served_here,
+)
 
 CYCLES = 20
 CYCLIC = {raw_can.SYNC, *raw_can.RPDOS, *raw_can.TPDOS}

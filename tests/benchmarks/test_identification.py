@@ -8,15 +8,23 @@ import math
 import numpy as np
 import pytest
 
-from tests.benchmarks.buses.drive import CLEAN, ON_THE_ROAD
+from tests.benchmarks.buses import CLEAN, ON_THE_ROAD
 from tests.benchmarks.identification.__main__ import main
-from tests.benchmarks.identification.answer import BAND_HZ, Answer, Case, Interval, high_passed, make_case, of_poles
-from tests.benchmarks.identification.healthy import COUNT, at_10_ms, passed, recordings
-from tests.benchmarks.identification.peers import PEERS, REFERENCE, Peer
-from tests.benchmarks.identification.report import document, tables
+from tests.benchmarks.identification.methods import (
+    BAND_HZ,
+    PEERS,
+    REFERENCE,
+    Answer,
+    Case,
+    Interval,
+    Peer,
+    high_passed,
+    make_case,
+    of_poles,
+)
 from tests.benchmarks.identification.rigs import Experiment, buses, coverage, cruises, experiment
-from tests.benchmarks.identification.run import Judged, judge
-from tests.benchmarks.identification.scores import Rate, coverages, errors
+from tests.benchmarks.identification.run import COUNT, Judged, at_10_ms, judge, passed, recordings
+from tests.benchmarks.identification.scores import Rate, coverages, document, errors, tables
 
 TRUTH = {"frequency": 8.0, "damping": 0.05}
 

@@ -21,7 +21,7 @@ from estimator.signals.prbs import prbs_nm
 from hil.cli.main import run
 from hil.recording import read_record
 from hil.report.identification_page import compared_summary
-from tests.benchmarks.buses.line import Line
+from tests.benchmarks.buses import Line
 from tests.cli.bus_model import MODEL
 from tests.estimator.identification.driveline import cruise, true_resonance
 

@@ -18,8 +18,8 @@ from hil.config.rig_file import read_rig
 from hil.monitor.host import Job, SessionStop
 from hil.monitor.messages import Ended, Health, Kind, Lost, Notice, Over, Ready, Report, Reset, Samples, Start
 from hil.monitor.opening import open_rig
-from hil.monitor.recorded_run import recording_path
 from hil.monitor.outbox import Outbox
+from hil.monitor.recorded_run import recording_path
 from hil.monitor.source import RigSource
 from hil.rig.addresses import with_addresses
 from hil.rig.experiments.base import Phase

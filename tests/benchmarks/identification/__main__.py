@@ -19,11 +19,10 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 
-from tests.benchmarks.buses.drive import CLEAN, ON_THE_ROAD, World
+from tests.benchmarks.buses import CLEAN, ON_THE_ROAD, World
 from tests.benchmarks.identification import rigs
-from tests.benchmarks.identification.healthy import healthy_table
-from tests.benchmarks.identification.report import document, tables
-from tests.benchmarks.identification.run import judge_all, missing
+from tests.benchmarks.identification.run import healthy_table, judge_all, missing
+from tests.benchmarks.identification.scores import document, tables
 from tests.benchmarks.ratios import machine
 
 BUSES, FIRST_SEED = 200, 0

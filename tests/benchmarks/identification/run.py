@@ -1,20 +1,26 @@
-"""Every method on every bus, in so many processes; each bus is driven once for all methods."""
+"""Every method on every bus, in so many processes; ten healthy recordings, whose models must pass their own test."""
 
 from __future__ import annotations
 
 import math
 import os
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
 from multiprocessing import get_context
+from types import MappingProxyType
 
-from tests.benchmarks.buses.drive import World
-from tests.benchmarks.identification.answer import Answer, Method, make_case
-from tests.benchmarks.identification.ours import OURS
-from tests.benchmarks.identification.peers import PEERS
+from estimator.identification.linear_model import Orders
+from estimator.identification.offline.fits import LinearFit, fit_box_jenkins, fit_output_error
+from estimator.identification.offline.validation import validate
+from estimator.identification.settings import Settings
+from estimator.signals.decimate import decimate
+from estimator.signals.record import Record
+from tests.benchmarks.buses import CLEAN, ON_THE_ROAD, World, draw_bus, drive
+from tests.benchmarks.identification.methods import OURS, PEERS, Answer, Method, make_case
+from tests.benchmarks.ratios import table
 
 THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 """Of linear algebra: one each, so that processor times compare."""
@@ -60,3 +66,42 @@ def judge_all(seeds: Sequence[int], world: World, jobs: int) -> list[Judged]:
     warm_up = partial(judge, WARM_UP_SEED, world)
     with ProcessPoolExecutor(jobs, get_context("spawn"), initializer=warm_up) as pool:
         return list(pool.map(partial(judge, world=world), seeds, chunksize=math.ceil(len(seeds) / (8 * jobs))))
+
+
+FIRST_SEED, COUNT = 5000, 10
+
+Fit = Callable[[Record], tuple[LinearFit, Record]]
+
+
+def recordings(world: World = CLEAN) -> Iterator[Record]:
+    """Yield ten recordings of 30 s in which nothing is wrong, each of another bus."""
+    for seed in range(FIRST_SEED, FIRST_SEED + COUNT):
+        yield drive(draw_bus(seed), world=world)
+
+
+def at_10_ms(record: Record) -> tuple[LinearFit, Record]:
+    """Return the model at the recording's own period and the data it is of."""
+    data = decimate(record, 1)
+    return fit_box_jenkins(data, Orders(3, 3, 1)), data
+
+
+def at_20_ms(record: Record) -> tuple[LinearFit, Record]:
+    """Return the model at the paper's period and the data it is of."""
+    data = decimate(record, Settings().factor(record))
+    return fit_output_error(data), data
+
+
+FITS: Mapping[str, Fit] = MappingProxyType({"Box-Jenkins, 10 ms": at_10_ms, "output error, 20 ms": at_20_ms})
+
+
+def passed(world: World, fit: Fit) -> int:
+    """Return how many of the ten models leave a residual that is independent of the past input."""
+    fitted = (fit(record) for record in recordings(world))
+    return sum(validate(model, data).independence.is_independent for model, data in fitted)
+
+
+def healthy_table() -> str:
+    """Tell how many pass."""
+    worlds = {"clean": CLEAN, "on the road": ON_THE_ROAD}
+    rows = [(name, *(f"{passed(world, fit)} of {COUNT}" for world in worlds.values())) for name, fit in FITS.items()]
+    return table(("residual independent of the past torque", *worlds), rows)

@@ -15,8 +15,7 @@ from estimator.identification.offline.fits import LinearFit, fit_box_jenkins, fi
 from estimator.signals.decimate import high_passed
 from estimator.signals.prbs import prbs_nm
 from estimator.signals.record import BoolArray, Record
-from tests.benchmarks.buses.bus import draw_bus
-from tests.benchmarks.buses.drive import CLEAN, drive
+from tests.benchmarks.buses import CLEAN, draw_bus, drive
 from tests.estimator.identification.driveline import (
     B_L,
     B_M,

@@ -14,8 +14,7 @@ from estimator.identification.modes.uncertainty import UncertainMode
 from estimator.identification.offline.fits import LinearFit, Method, fit_box_jenkins, fit_output_error
 from estimator.signals.decimate import decimate, high_passed
 from estimator.signals.record import Record
-from tests.benchmarks.buses.bus import draw_bus
-from tests.benchmarks.buses.drive import drive
+from tests.benchmarks.buses import draw_bus, drive
 from tests.estimator.identification.closed_loop import controlled
 from tests.estimator.identification.driveline import cruise, true_resonance, uncertain_resonance
 

@@ -9,6 +9,7 @@ from hil.proof.truth.dirty import FEWEST, IMPERFECTIONS, LEAST_PART, MOST, MOST_
 from hil.errors import UsageError
 from hil.proof.truth.recording import USUAL, coloured, speed_reading
 from hil.proof.truth.specimen import EFFECTS, draw_specimen
+from tests.campaigns.dirty import FEWEST, IMPERFECTIONS, LEAST_PART, MOST, MOST_PART, Known, in_a_model_file, make_dirty
 
 
 @pytest.mark.parametrize(("strong", "seed"), [("brake_drag", 1), ("actuator_lag", 2), ("none", 3)])
