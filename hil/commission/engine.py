@@ -60,7 +60,6 @@ class PlannedRun:
 
     @classmethod
     def of(cls, name: str, prediction: Prediction) -> PlannedRun:
-        """Make it from a prediction."""
         m1, m2, speed = prediction.torque_m1_nm, prediction.torque_m2_nm, prediction.speed_rad_s
         return cls(name, prediction.seconds, (m1.low, m1.high), (m2.low, m2.high), (speed.low, speed.high))
 
@@ -81,7 +80,6 @@ def vehicle_seconds(runs: Sequence[PlannedRun]) -> float:
 
 
 def announcement(job: Job, step: Step, runs: Sequence[PlannedRun]) -> list[str]:
-    """Return the lines that announce a step."""
     number = [each.name for each in STEPS].index(step.name) + 1
     lines = ["", f"{number}/{len(STEPS)} {step.title} ({step.name})", f"  It {step.about(job)}"]
     if not runs:
@@ -138,24 +136,12 @@ class Asked:
 
 @dataclass(slots=True)
 class Commissioning:
-    """One call: from where the last one ended to the end, or to what keeps it from there.
+    """One call: from where the last one ended to the end, or to what keeps it from there."""
 
-    Attributes
-    ----------
-    job
-        What the steps work with.
-    talk
-        Who is asked.
-    asked
-        What the command line asks of single steps.
-    show
-        Called with the findings of each step.
-    """
-
-    job: Job
-    talk: Talk
-    asked: Asked
-    show: Callable[[Step, list[Finding]], None]
+    job: Job  # What the steps work with
+    talk: Talk  # Who is asked
+    asked: Asked  # What the command line asks of single steps
+    show: Callable[[Step, list[Finding]], None]  # Called with the findings of each step
     _first_torque: bool = True
     _redone: set[str] = field(default_factory=set)
 

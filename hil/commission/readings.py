@@ -30,7 +30,6 @@ def columns_of(path: Path) -> Mapping[str, FloatArray]:
 
 
 def record_of(path: Path) -> Record:
-    """Return a recording as the estimator takes it."""
     return read_record(path)
 
 

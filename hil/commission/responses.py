@@ -89,7 +89,6 @@ def pulse_response(
     wave_samples: int,
     lead_samples: int,
 ) -> PulseResponse:
-    """Measure the response to waves of pulses."""
     rigid = averaged(
         np.concatenate([[0.0], np.cumsum(reference_nm)[:-1]]) * period_s / inertia_kg_m2, RINGING_S, period_s
     )

@@ -20,30 +20,14 @@ from hil.parse_json import read_json
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One line of a step's verdict.
+    """One line of a step's verdict."""
 
-    Attributes
-    ----------
-    what
-        The quantity, in a few words.
-    expected
-        The limit, with its unit.
-    measured
-        The value, with its unit and interval.
-    within
-        Whether it is; None where the data don't tell, or there is no limit to keep.
-    advice
-        What to do where it is not within; empty where nothing need be done.
-    blocking
-        Whether continuing would be unsafe, or without meaning.
-    """
-
-    what: str
-    expected: str
-    measured: str
-    within: bool | None
-    advice: str = ""
-    blocking: bool = False
+    what: str  # The quantity, in a few words
+    expected: str  # The limit, with its unit
+    measured: str  # The value, with its unit and interval
+    within: bool | None  # Whether it is; None where the data don't tell, or there is no limit to keep
+    advice: str = ""  # What to do where it is not within; empty where nothing need be done
+    blocking: bool = False  # Whether continuing would be unsafe, or without meaning
 
     @property
     def stops(self) -> bool:
@@ -51,7 +35,6 @@ class Finding:
         return self.blocking and self.within is not True
 
     def as_json(self) -> dict[str, Any]:
-        """Return it for the state file."""
         return asdict(self)
 
 
@@ -130,7 +113,6 @@ class StepRecord:
         self.started_utc, self.ended_utc = now_utc(), ""
 
     def end(self, status: Status, because: str = "") -> None:
-        """End the attempt."""
         self.status, self.because, self.ended_utc = status, because, now_utc()
 
     def run(self, name: str) -> RunRecord | None:
@@ -138,7 +120,6 @@ class StepRecord:
         return next((run for run in self.runs if run.name == name and run.whole), None)
 
     def as_json(self) -> dict[str, Any]:
-        """Return it for the state file."""
         document = {each.name: getattr(self, each.name) for each in fields(self)}
         return document | {
             "status": self.status.value,
@@ -171,38 +152,22 @@ FILE_NAME: Final = "commission.json"
 
 @dataclass(slots=True)
 class State:
-    """A commissioning as far as it is.
+    """A commissioning as far as it is."""
 
-    Attributes
-    ----------
-    folder
-        Where the file and everything next to it is.
-    rig_name, rig_path, rig_text
-        The rig file as of the last call.
-    steps
-        Record of every step, by name, in order.
-    notes
-        What was decided about the whole, such as keeping results after the rig file was changed.
-    made
-        What the report was made from (``hil.provenance``); None before there is one.
-    """
-
-    folder: Path
-    rig_name: str
-    rig_path: str
-    rig_text: str
-    steps: dict[str, StepRecord]
+    folder: Path  # Where the file and everything next to it is
+    rig_name: str  # The rig file as of the last call
+    rig_path: str  # The rig file as of the last call
+    rig_text: str  # The rig file as of the last call
+    steps: dict[str, StepRecord]  # Record of every step, by name, in order
     started_utc: str = field(default_factory=now_utc)
     notes: list[dict[str, str]] = field(default_factory=list)
-    made: dict[str, Any] | None = None
+    made: dict[str, Any] | None = None  # What the report was made from (``hil.provenance``); None before there is one
 
     @property
     def path(self) -> Path:
-        """The state file."""
         return self.folder / FILE_NAME
 
     def document(self) -> dict[str, Any]:
-        """Return the content of the file."""
         return {
             "schema": SCHEMA,
             "hil_version": __version__,
@@ -293,6 +258,5 @@ def model_json(model: DrivelineModel) -> dict[str, Any]:
 
 
 def model_from_json(document: Mapping[str, Any]) -> DrivelineModel:
-    """Return the model again."""
     parameters = {name: Parameter(value, tolerance) for name, (value, tolerance) in document["parameters"].items()}
     return DrivelineModel(Structure(document["structure"]), parameters)

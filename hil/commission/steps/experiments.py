@@ -40,7 +40,6 @@ def _speed_parts() -> list[float]:
 
 
 def orders(job: Job) -> list[Order]:
-    """Order all of them."""
     cruise = cruise_of(job.rig)
     amplitude_nm = job.evidence("prbs").get("amplitude_nm", job.rig.prbs.amplitude_nm)
     seeds = 2**job.rig.prbs.cells - 1
