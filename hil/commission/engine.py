@@ -9,7 +9,7 @@ from typing import Any
 from hil.commission.order import changed_keys, rig_digest
 from hil.commission.readings import json_safe
 from hil.commission.runner import Prediction
-from hil.commission.state import Finding, Status, now_utc
+from hil.commission.state import Finding, Note, Status, now_utc
 from hil.commission.step import Job, Outcome, Step
 from hil.commission.steps.checks import DEVICES, LIMITS
 from hil.commission.steps.experiments import EXPERIMENTS, IDENTIFICATION
@@ -173,9 +173,7 @@ class Commissioning:
             elif record.status is not Status.SKIPPED:
                 record.end(Status.PENDING, "the rig file was changed")
         decided = f"kept: {answer.because}" if answer.what is What.GO else "repeated"
-        self.job.state.notes.append(
-            {"at_utc": now_utc(), "what": "the rig file was changed", "changes": "; ".join(changes), "steps": decided}
-        )
+        self.job.state.notes.append(Note(now_utc(), "the rig file was changed", "; ".join(changes), decided))
 
     def _through(self, step: Step) -> None:
         record = step.record(self.job)
