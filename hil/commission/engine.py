@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from hil.commission.order import changed_keys, rig_digest
-from hil.commission.readings import json_safe
+from hil.commission.responses import json_safe
 from hil.commission.runner import Prediction
 from hil.commission.state import Finding, Note, Status, now_utc
 from hil.commission.step import Job, Outcome, Step
