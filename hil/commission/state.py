@@ -1,4 +1,4 @@
-"""What a commissioning keeps in its folder: steps, findings, evidence and runs, in commission.json; one call at a time."""
+"""What a commissioning keeps in its folder, in commission.json: steps, findings, evidence, runs; one call at a time."""
 
 from __future__ import annotations
 
