@@ -1,7 +1,7 @@
 """Evidence of the steps of a commissioning, as its state file has it: one table per step, by pydantic.
 
 A state file may be a stranger's. What it has is compared with these before a step or a page reads it; a quantity that
-could not be told is null there.
+could not be determined is null there.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from estimator.physics.model import DrivelineModel, Parameter, Structure
 Number = Annotated[FiniteFloat, Field(ge=-1e30, le=1e30)]
 """Far beyond any quantity here, and what pages draw and multiply."""
 
-Told = Number | None
-Interval = Annotated[list[Told], Field(min_length=2, max_length=2)]
+Known = Number | None
+Interval = Annotated[list[Known], Field(min_length=2, max_length=2)]
 """A value and half of its 95 % interval."""
 
 Both = Annotated[list[Number], Field(min_length=2, max_length=2)]
-Whole = tuple[Number, Told]
+Whole = tuple[Number, Known]
 """A value that is there, and half of its interval."""
 
 Positive = Annotated[FiniteFloat, Field(gt=0, le=1e30)]
@@ -58,7 +58,7 @@ class _Table(BaseModel):
 class _Course(_Table):
     """Columns of one length, time first."""
 
-    time_s: list[Told]
+    time_s: list[Known]
 
     @model_validator(mode="after")
     def _of_one_length(self) -> _Course:
@@ -68,22 +68,22 @@ class _Course(_Table):
 
 
 class _SpeedCourse(_Course):
-    speed_rad_s: list[Told]
+    speed_rad_s: list[Known]
 
 
 class _PulseCourse(_SpeedCourse):
-    reference_nm: list[Told]
-    reading_nm: list[Told]
+    reference_nm: list[Known]
+    reading_nm: list[Known]
 
 
 class _DrivenCourse(_SpeedCourse):
-    torque_nm: list[Told]
+    torque_nm: list[Known]
 
 
 class _Worst(_Course):
     name: Name
-    simulated_rad_s: list[Told]
-    measured_rad_s: list[Told]
+    simulated_rad_s: list[Known]
+    measured_rad_s: list[Known]
 
     @model_validator(mode="after")
     def _of_one_length(self) -> _Worst:
@@ -112,8 +112,8 @@ class ModelEvidence(_Table):
 
 
 class _Noise(_Table):
-    speed_std_rad_s: Told
-    speed_mean_rad_s: Told
+    speed_std_rad_s: Known
+    speed_mean_rad_s: Known
     course: _SpeedCourse
 
 
@@ -145,7 +145,7 @@ class _Friction(_Table):
     dry_nm: Interval
     viscous_nm_s: Interval
     load_nm: Interval
-    rms_rad_s: Told
+    rms_rad_s: Known
     course: _DrivenCourse
 
 
@@ -156,7 +156,7 @@ class _Prbs(_Table):
 
 
 class _Linear(_Table):
-    theta: list[Told]
+    theta: list[Known]
     nk: int
     sample_time_s: Positive
     poles: Roots
@@ -165,9 +165,9 @@ class _Linear(_Table):
 
 
 class _Spectral(_Table):
-    frequency_hz: list[Told]
-    magnitude: list[Told]
-    coherence: list[Told]
+    frequency_hz: list[Known]
+    magnitude: list[Known]
+    coherence: list[Known]
 
 
 class _Identified(_Table):
@@ -175,8 +175,8 @@ class _Identified(_Table):
     best: _Linear
     batch: _Linear
     online: _Linear
-    frequency_hz: list[Told]
-    magnitude: list[Told]
+    frequency_hz: list[Known]
+    magnitude: list[Known]
     spectral: _Spectral | None
 
     @model_validator(mode="after")
@@ -194,14 +194,14 @@ class _Identification(_Table):
 class _Validation(_Table):
     model: ModelEvidence
     parameters: dict[str, Interval]
-    rms_rad_s: Told
-    unseen: dict[str, dict[str, Told]]
+    rms_rad_s: Known
+    unseen: dict[str, dict[str, Known]]
     worst: _Worst
 
 
 class _Value(_Table):
-    nominal: Told
-    value: Told
+    nominal: Known
+    value: Known
     ci95: Interval
     unit: Name
 
@@ -213,7 +213,7 @@ class _Diagnosis(_Table):
     effects: list[Name]
     report: PathBelow
     model_file: PathBelow
-    seconds: Told
+    seconds: Known
     parameters: dict[str, _Value]
 
 

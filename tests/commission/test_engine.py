@@ -102,7 +102,7 @@ def test_skipped_with_its_reason(world: World) -> None:
 def test_repeated_and_what_is_computed_from_it(world: World) -> None:
     world.call()
     assert world.call(repeat=frozenset({"second"})) == ["second", "third"]
-    assert world.state().steps["second"].history[0]["status"] == "done"
+    assert world.state().steps["second"].history[0].status is Status.DONE
 
 
 def test_repeating_what_another_with_torque_builds_on_says_so(world: World, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -110,7 +110,7 @@ def test_after_an_interruption_whole_runs_are_kept_and_the_rest_is_driven(
     assert driven == ["m1", "m2", "m2"]
     record = state.steps["signs"]
     assert (record.status, record.attempt) == (Status.DONE, 2)
-    assert record.history[0]["because"] == "RunAborted: PLC: permissive is withdrawn"
+    assert record.history[0].because == "RunAborted: PLC: permissive is withdrawn"
 
 
 @pytest.mark.parametrize(
