@@ -7,9 +7,9 @@ from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from hil.commission.order import changed_keys, rig_digest
-from hil.commission.readings import json_safe
+from hil.commission.responses import json_safe
 from hil.commission.runner import Prediction
-from hil.commission.state import Finding, Status, now_utc
+from hil.commission.state import Finding, Note, Status, now_utc
 from hil.commission.step import Job, Outcome, Step
 from hil.commission.steps.checks import DEVICES, LIMITS
 from hil.commission.steps.experiments import EXPERIMENTS, IDENTIFICATION
@@ -60,7 +60,6 @@ class PlannedRun:
 
     @classmethod
     def of(cls, name: str, prediction: Prediction) -> PlannedRun:
-        """Make it from a prediction."""
         m1, m2, speed = prediction.torque_m1_nm, prediction.torque_m2_nm, prediction.speed_rad_s
         return cls(name, prediction.seconds, (m1.low, m1.high), (m2.low, m2.high), (speed.low, speed.high))
 
@@ -81,7 +80,6 @@ def vehicle_seconds(runs: Sequence[PlannedRun]) -> float:
 
 
 def announcement(job: Job, step: Step, runs: Sequence[PlannedRun]) -> list[str]:
-    """Return the lines that announce a step."""
     number = [each.name for each in STEPS].index(step.name) + 1
     lines = ["", f"{number}/{len(STEPS)} {step.title} ({step.name})", f"  It {step.about(job)}"]
     if not runs:
@@ -138,24 +136,12 @@ class Asked:
 
 @dataclass(slots=True)
 class Commissioning:
-    """One call: from where the last one ended to the end, or to what keeps it from there.
+    """One call: from where the last one ended to the end, or to what keeps it from there."""
 
-    Attributes
-    ----------
-    job
-        What the steps work with.
-    talk
-        Who is asked.
-    asked
-        What the command line asks of single steps.
-    show
-        Called with the findings of each step.
-    """
-
-    job: Job
-    talk: Talk
-    asked: Asked
-    show: Callable[[Step, list[Finding]], None]
+    job: Job  # What the steps work with
+    talk: Talk  # Who is asked
+    asked: Asked  # What the command line asks of single steps
+    show: Callable[[Step, list[Finding]], None]  # Called with the findings of each step
     _first_torque: bool = True
     _redone: set[str] = field(default_factory=set)
 
@@ -187,9 +173,7 @@ class Commissioning:
             elif record.status is not Status.SKIPPED:
                 record.end(Status.PENDING, "the rig file was changed")
         decided = f"kept: {answer.because}" if answer.what is What.GO else "repeated"
-        self.job.state.notes.append(
-            {"at_utc": now_utc(), "what": "the rig file was changed", "changes": "; ".join(changes), "steps": decided}
-        )
+        self.job.state.notes.append(Note(now_utc(), "the rig file was changed", "; ".join(changes), decided))
 
     def _through(self, step: Step) -> None:
         record = step.record(self.job)

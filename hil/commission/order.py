@@ -21,24 +21,12 @@ from hil.rig.addresses import with_addresses
 
 @dataclass(frozen=True, slots=True)
 class Order:
-    """A run.
+    """A run."""
 
-    Attributes
-    ----------
-    name
-        Of the experiment in the changed rig file, and part of the recording's.
-    table
-        Its table in that file.
-    prbs
-        Keys of ``[prbs]`` that are other than the user's; None takes a key out.
-    least_margin_rad_s
-        How far the speed may leave its predicted range, at least.
-    """
-
-    name: str
-    table: Mapping[str, Any]
+    name: str  # Of the experiment in the changed rig file, and part of the recording's
+    table: Mapping[str, Any]  # Its table in that file
     prbs: Mapping[str, Any] = field(default_factory=dict)
-    least_margin_rad_s: float = 1.0
+    least_margin_rad_s: float = 1.0  # How far the speed may leave its predicted range, at least
 
     @property
     def from_standstill(self) -> bool:
@@ -57,7 +45,6 @@ class RigSource:
     take_over: bool = False
 
     def rig(self) -> Rig:
-        """Return the rig as the user wrote it."""
         return self._checked(self.text)
 
     def ordered(self, order: Order) -> tuple[Rig, str]:
@@ -84,7 +71,6 @@ def as_table(experiment: AnyExperiment, **changes: object) -> dict[str, Any]:
 
 
 def rig_digest(text: str) -> str:
-    """Return a digest of what a rig file says."""
     return hashlib.sha256(json.dumps(tomllib.loads(text), sort_keys=True, default=str).encode()).hexdigest()
 
 

@@ -39,24 +39,12 @@ FRICTION_RATE = 0.01
 
 @dataclass(frozen=True, slots=True)
 class PhysicalFit:
-    """A fitted model, its parameters with intervals, and what is left.
+    """A fitted model, its parameters with intervals, and what is left."""
 
-    Attributes
-    ----------
-    model
-        Its tolerances are `TRUSTED`.
-    parameters
-        Every parameter by name.
-    load_nm
-        Constant load torque of each recording.
-    rms
-        RMS of the free-run error [rad/s].
-    """
-
-    model: DrivelineModel
-    parameters: Mapping[str, Measured]
-    load_nm: Mapping[str, Measured]
-    rms: float
+    model: DrivelineModel  # Its tolerances are `TRUSTED`
+    parameters: Mapping[str, Measured]  # Every parameter by name
+    load_nm: Mapping[str, Measured]  # Constant load torque of each recording
+    rms: float  # RMS of the free-run error [rad/s]
 
 
 def fit_rigid(records: Sequence[Record], inertia_kg_m2: float) -> PhysicalFit:

@@ -1,18 +1,65 @@
-"""What pulses and PRBS say of a driveline: signs, gains, delays, and the ratio of two inverters."""
+"""What recordings of pulses and PRBS say of a driveline: signs, gains, delays, and the ratio of two inverters."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from estimator.signals.decimate import decimate
 from estimator.signals.record import BoolArray, FloatArray, Record
+from hil.recording import read_record, read_table
+from hil.recording.columns import FLAGS, SPEED, TIME, TORQUE_M1, TORQUE_M2
+from hil.report.figures import extremes
 
 if TYPE_CHECKING:
     from estimator.identification.spectral import SpectralEstimate
+
+
+REFERENCE = {"m1": "torque_ref_m1_nm", "m2": "torque_ref_m2_nm"}
+READING = {"m1": TORQUE_M1, "m2": TORQUE_M2}
+
+DRAWN = 400
+"""Stretches of a course that is kept for the report: two samples each."""
+
+DIGITS = 6
+"""Significant digits of what is kept to be drawn."""
+
+
+def columns_of(path: Path) -> Mapping[str, FloatArray]:
+    """Return the numeric columns of a recording, each of shape (N,)."""
+    names = [TIME, SPEED, FLAGS, *READING.values(), *REFERENCE.values()]
+    return read_table(path).numeric(names)
+
+
+def record_of(path: Path) -> Record:
+    return read_record(path)
+
+
+def thinned(x: FloatArray, *ys: FloatArray) -> list[list[float]]:
+    """Return courses thinned for drawing, x first; the peaks of the last one are kept."""
+    kept = extremes(ys[-1], DRAWN)
+    return [rounded(values[kept]) for values in (x, *ys)]
+
+
+def rounded(values: FloatArray) -> list[float]:
+    """Return numbers with the digits a picture needs."""
+    return [float(f"{value:.{DIGITS}g}") for value in np.asarray(values, dtype=np.float64).tolist()]
+
+
+def json_safe(evidence: Any) -> Any:
+    """Return evidence with what JSON has not, NaN and infinity, as None."""
+    if isinstance(evidence, Mapping):
+        return {str(key): json_safe(value) for key, value in evidence.items()}
+    if isinstance(evidence, list | tuple):
+        return [json_safe(value) for value in evidence]
+    if isinstance(evidence, np.floating | float):
+        return float(evidence) if np.isfinite(evidence) else None
+    return int(evidence) if isinstance(evidence, np.integer) else evidence
 
 
 Z95 = 1.959963984540054
@@ -89,7 +136,6 @@ def pulse_response(
     wave_samples: int,
     lead_samples: int,
 ) -> PulseResponse:
-    """Measure the response to waves of pulses."""
     rigid = averaged(
         np.concatenate([[0.0], np.cumsum(reference_nm)[:-1]]) * period_s / inertia_kg_m2, RINGING_S, period_s
     )

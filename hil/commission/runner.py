@@ -41,30 +41,16 @@ NO_DRAG = 1e-3
 
 @dataclass(frozen=True, slots=True)
 class Prediction:
-    """What to expect of a run.
+    """What to expect of a run."""
 
-    Attributes
-    ----------
-    seconds
-        Length of the whole run.
-    torque_m1_nm, torque_m2_nm
-        Range of each inverter's torque, PRBS included.
-    speed_rad_s, speed_measured_rad_s
-        Range of the speed over the whole run and over its recorded part.
-    last_rad_s
-        Speed at the end.
-    torque_nm, course_rad_s
-        Total torque and speed of the recorded part, shape (N,).
-    """
-
-    seconds: float
-    torque_m1_nm: Range
-    torque_m2_nm: Range
-    speed_rad_s: Range
-    speed_measured_rad_s: Range
-    last_rad_s: float
-    torque_nm: FloatArray
-    course_rad_s: FloatArray
+    seconds: float  # Length of the whole run
+    torque_m1_nm: Range  # Range of each inverter's torque, PRBS included
+    torque_m2_nm: Range  # Range of each inverter's torque, PRBS included
+    speed_rad_s: Range  # Range of the speed over the whole run and over its recorded part
+    speed_measured_rad_s: Range  # Range of the speed over the whole run and over its recorded part
+    last_rad_s: float  # Speed at the end
+    torque_nm: FloatArray  # Total torque and speed of the recorded part, shape (N,)
+    course_rad_s: FloatArray  # Total torque and speed of the recorded part, shape (N,)
 
     def as_json(self) -> dict[str, list[float]]:
         """Return the ranges for the state file."""
@@ -129,24 +115,13 @@ class WithinBand:
     """An experiment inside a speed band.
 
     Where the vehicle rolls at the beginning, the band reaches from there.
-
-    Attributes
-    ----------
-    experiment
-        What is driven.
-    low_rad_s, high_rad_s
-        Ends of the band [rad/s].
-    margin_rad_s
-        What the speed at the beginning is given next to it.
-    period_s
-        Time between two cycles [s].
     """
 
-    experiment: Experiment
-    low_rad_s: float
-    high_rad_s: float
-    margin_rad_s: float
-    period_s: float
+    experiment: Experiment  # What is driven
+    low_rad_s: float  # Ends of the band [rad/s]
+    high_rad_s: float  # Ends of the band [rad/s]
+    margin_rad_s: float  # What the speed at the beginning is given next to it
+    period_s: float  # Time between two cycles [s]
     _speed: LowPass | None = None
 
     @property
@@ -189,24 +164,12 @@ class Shows(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Conditions:
-    """What a run is driven under: pacing, real-time scheduling, progress.
+    """What a run is driven under: pacing, real-time scheduling, progress."""
 
-    Attributes
-    ----------
-    pace
-        Its name, for the recording.
-    pacer
-        Makes a fresh pacer.
-    scheduling
-        Asks for real-time scheduling for the time of a block.
-    progress
-        Shows a run for the time of a block.
-    """
-
-    pace: str
-    pacer: Callable[[Rig], Pacer]
+    pace: str  # Its name, for the recording
+    pacer: Callable[[Rig], Pacer]  # Makes a fresh pacer
     scheduling: Callable[[], AbstractContextManager[RealTimeGrants]]
-    progress: Callable[[Plan], AbstractContextManager[Shows]]
+    progress: Callable[[Plan], AbstractContextManager[Shows]]  # Shows a run for the time of a block
 
 
 @dataclass(slots=True)
@@ -245,21 +208,11 @@ class _Seen:
 
 @dataclass(frozen=True, slots=True)
 class Runner:
-    """Runs orders of one commissioning.
+    """Runs orders of one commissioning."""
 
-    Attributes
-    ----------
-    source
-        The user's rig file.
-    folder
-        Of the commissioning.
-    conditions
-        How runs are driven.
-    """
-
-    source: RigSource
-    folder: Path
-    conditions: Conditions
+    source: RigSource  # The user's rig file
+    folder: Path  # Of the commissioning
+    conditions: Conditions  # How runs are driven
     _predicted: dict[tuple[Hashable, ...], Prediction] = field(default_factory=dict)
 
     def predict(self, order: Order, model: DrivelineModel, speed_rad_s: float) -> Prediction:
@@ -279,7 +232,6 @@ class Runner:
         speed_rad_s: float,
         note: Callable[[RunRecord], None],
     ) -> RunRecord:
-        """Drive an order."""
         rig, text = self.source.ordered(order)
         prediction = self.predict(order, model, speed_rad_s)
         path, seen = self._free_path(step, order), _Seen()

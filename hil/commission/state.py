@@ -1,57 +1,43 @@
-"""What is kept of a commissioning: its steps, their findings, evidence and runs, in commission.json."""
+"""What a commissioning keeps in its folder, in commission.json: steps, findings, evidence, runs; one call at a time."""
 
 from __future__ import annotations
 
+import errno
 import json
 import os
-from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass, field, fields
+import sys
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, field
 from datetime import UTC, datetime
 from enum import Enum
 from pathlib import Path
-from typing import Any, Final
+from typing import IO, Annotated, Any, Final, Literal
 
-from estimator.physics.model import DrivelineModel, Parameter, Structure
+from pydantic import Field, TypeAdapter, ValidationError
+
+from estimator.physics.model import DrivelineModel
 from hil import __version__
+from hil.commission.evidence import EVIDENCE, Both, ModelEvidence, Utc
 from hil.errors import UsageError
 from hil.files import is_inside, read_json
 
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One line of a step's verdict.
+    """One line of a step's verdict."""
 
-    Attributes
-    ----------
-    what
-        The quantity, in a few words.
-    expected
-        The limit, with its unit.
-    measured
-        The value, with its unit and interval.
-    within
-        Whether it is; None where the data don't tell, or there is no limit to keep.
-    advice
-        What to do where it is not within; empty where nothing need be done.
-    blocking
-        Whether continuing would be unsafe, or without meaning.
-    """
-
-    what: str
-    expected: str
-    measured: str
-    within: bool | None
-    advice: str = ""
-    blocking: bool = False
+    what: str  # The quantity, in a few words
+    expected: str  # The limit, with its unit
+    measured: str  # The value, with its unit and interval
+    within: bool | None  # Whether it is; None where the data don't tell, or there is no limit to keep
+    advice: str = ""  # What to do where it is not within; empty where nothing need be done
+    blocking: bool = False  # Whether continuing would be unsafe, or without meaning
 
     @property
     def stops(self) -> bool:
         """Whether the commissioning ends here."""
         return self.blocking and self.within is not True
-
-    def as_json(self) -> dict[str, Any]:
-        """Return it for the state file."""
-        return asdict(self)
 
 
 def stated(what: str, measured: str) -> Finding:
@@ -86,41 +72,47 @@ class RunRecord:
     recording: str | None
     whole: bool
     seconds: float
-    predicted: dict[str, list[float]]
-    measured: dict[str, list[float]]
+    predicted: dict[str, Both]
+    measured: dict[str, Both]
     flagged: int = 0
     recorded: int = 0
     prbs_nm: float = 0.0
     last_rad_s: float = 0.0
 
 
+@dataclass(frozen=True, slots=True)
+class Attempt:
+    """An attempt before the last one."""
+
+    attempt: int
+    status: Status
+    because: str
+    ended_utc: Utc
+    recordings: list[str]
+    findings: list[Finding]
+
+
 @dataclass(slots=True)
 class StepRecord:
-    """One step; see the module's text."""
+    """One step: the last attempt, and those before it."""
 
     status: Status = Status.PENDING
     because: str = ""
     attempt: int = 0
     rig_digest: str = ""
-    started_utc: str = ""
-    ended_utc: str = ""
+    started_utc: Utc = ""
+    ended_utc: Utc = ""
     findings: list[Finding] = field(default_factory=list)
     evidence: dict[str, Any] = field(default_factory=dict)
     runs: list[RunRecord] = field(default_factory=list)
-    history: list[dict[str, Any]] = field(default_factory=list)
+    history: list[Attempt] = field(default_factory=list)
 
     def begin(self, rig_digest: str, keep_runs: bool) -> None:
         """Begin an attempt; the one before it goes to the history, its whole runs stay where ``keep_runs``."""
         if self.attempt:
+            recordings = [run.recording for run in self.runs if run.recording]
             self.history.append(
-                {
-                    "attempt": self.attempt,
-                    "status": self.status.value,
-                    "because": self.because,
-                    "ended_utc": self.ended_utc,
-                    "recordings": [run.recording for run in self.runs if run.recording],
-                    "findings": [finding.as_json() for finding in self.findings],
-                }
+                Attempt(self.attempt, self.status, self.because, self.ended_utc, recordings, self.findings)
             )
         self.attempt += 1
         self.runs = [run for run in self.runs if run.whole] if keep_runs else []
@@ -129,34 +121,11 @@ class StepRecord:
         self.started_utc, self.ended_utc = now_utc(), ""
 
     def end(self, status: Status, because: str = "") -> None:
-        """End the attempt."""
         self.status, self.because, self.ended_utc = status, because, now_utc()
 
     def run(self, name: str) -> RunRecord | None:
         """Return the whole run of a name, if there is one."""
         return next((run for run in self.runs if run.name == name and run.whole), None)
-
-    def as_json(self) -> dict[str, Any]:
-        """Return it for the state file."""
-        document = {each.name: getattr(self, each.name) for each in fields(self)}
-        return document | {
-            "status": self.status.value,
-            "findings": [finding.as_json() for finding in self.findings],
-            "runs": [asdict(run) for run in self.runs],
-        }
-
-    @classmethod
-    def from_json(cls, document: dict[str, Any]) -> StepRecord:
-        """Read it from the state file."""
-        known = {each.name: document[each.name] for each in fields(cls)}
-        return cls(
-            **known
-            | {
-                "status": Status(known["status"]),
-                "findings": [Finding(**finding) for finding in known["findings"]],
-                "runs": [RunRecord(**run) for run in known["runs"]],
-            }
-        )
 
 
 def now_utc() -> str:
@@ -168,40 +137,52 @@ SCHEMA: Final = "hil.commission/1"
 FILE_NAME: Final = "commission.json"
 
 
-@dataclass(slots=True)
-class State:
-    """A commissioning as far as it is.
+@dataclass(frozen=True, slots=True)
+class Note:
+    """What was decided about the whole, such as keeping results after the rig file was changed."""
 
-    Attributes
-    ----------
-    folder
-        Where the file and everything next to it is.
-    rig_name, rig_path, rig_text
-        The rig file as of the last call.
-    steps
-        Record of every step, by name, in order.
-    notes
-        What was decided about the whole, such as keeping results after the rig file was changed.
-    made
-        What the report was made from (``hil.provenance``); None before there is one.
-    """
+    at_utc: Annotated[Utc, Field(min_length=1)]
+    what: str
+    changes: str
+    steps: str
 
-    folder: Path
+
+@dataclass(frozen=True, slots=True)
+class _Document:
+    """The state file."""
+
+    schema: Literal["hil.commission/1"]
     rig_name: str
     rig_path: str
     rig_text: str
+    started_utc: Annotated[Utc, Field(min_length=1)]
+    notes: list[Note]
     steps: dict[str, StepRecord]
-    started_utc: str = field(default_factory=now_utc)
-    notes: list[dict[str, str]] = field(default_factory=list)
     made: dict[str, Any] | None = None
+
+
+_DOCUMENT: Final = TypeAdapter(_Document)
+_STEP: Final = TypeAdapter(StepRecord)
+
+
+@dataclass(slots=True)
+class State:
+    """A commissioning as far as it is."""
+
+    folder: Path  # Where the file and everything next to it is
+    rig_name: str  # The rig file as of the last call
+    rig_path: str  # The rig file as of the last call
+    rig_text: str  # The rig file as of the last call
+    steps: dict[str, StepRecord]  # Record of every step, by name, in order
+    started_utc: str = field(default_factory=now_utc)
+    notes: list[Note] = field(default_factory=list)
+    made: dict[str, Any] | None = None  # What the report was made from (``hil.provenance``); None before there is one
 
     @property
     def path(self) -> Path:
-        """The state file."""
         return self.folder / FILE_NAME
 
     def document(self) -> dict[str, Any]:
-        """Return the content of the file."""
         return {
             "schema": SCHEMA,
             "hil_version": __version__,
@@ -210,9 +191,9 @@ class State:
             "rig_text": self.rig_text,
             "started_utc": self.started_utc,
             "updated_utc": now_utc(),
-            "notes": self.notes,
+            "notes": [asdict(note) for note in self.notes],
             "made": self.made,
-            "steps": {name: record.as_json() for name, record in self.steps.items()},
+            "steps": {name: _STEP.dump_python(record, mode="json") for name, record in self.steps.items()},
         }
 
     def save(self) -> None:
@@ -250,37 +231,44 @@ def load_state(folder: Path, names: Iterable[str]) -> State | None:
     if not path.exists():
         return None
     try:
-        document = read_json(path)
-        if document["schema"] != SCHEMA:
-            raise ValueError(f"schema {document['schema']!r}")
-        steps = {name: _step(folder, document["steps"].get(name)) for name in names}
-        return State(
-            folder=folder,
-            rig_name=document["rig_name"],
-            rig_path=document["rig_path"],
-            rig_text=document["rig_text"],
-            steps=steps,
-            started_utc=document["started_utc"],
-            notes=document["notes"],
-            made=document.get("made"),
-        )
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        document = _DOCUMENT.validate_python(read_json(path))
+        steps = {name: _checked(folder, name, document.steps.get(name, StepRecord())) for name in names}
+    except ValueError as error:
         raise UsageError(
             f"{path}: expected the state of a commissioning ({SCHEMA}), got a file that can't be read as one: "
-            f"{error}. Move it away to begin anew in this folder (its recordings stay), or choose another by --out."
+            f"{_first(error)}. Move it away to begin anew in this folder (its recordings stay), or choose another by "
+            "--out."
         ) from error
+    return State(
+        folder,
+        document.rig_name,
+        document.rig_path,
+        document.rig_text,
+        steps,
+        document.started_utc,
+        document.notes,
+        document.made,
+    )
 
 
-def _step(folder: Path, document: Any) -> StepRecord:
-    if document is None:
-        return StepRecord()
-    record = StepRecord.from_json(document)
+def _checked(folder: Path, name: str, record: StepRecord) -> StepRecord:
     for run in record.runs:
         if run.recording is not None and not is_inside(folder, folder / run.recording):
             raise ValueError(f"run {run.name}: a recording outside {folder}: {run.recording}")
+    if record.evidence and name in EVIDENCE:
+        EVIDENCE[name].validate_python(record.evidence)
     if record.status is Status.RUNNING:  # the program was killed, or its machine went down
         record.end(Status.INTERRUPTED, "the program ended without a word: it was killed, or the machine went down")
     return record
+
+
+def _first(error: ValueError) -> str:
+    """Say the first thing that is wrong, and where."""
+    if not isinstance(error, ValidationError):
+        return str(error)
+    first = error.errors()[0]
+    place = ".".join(str(part) for part in first["loc"])
+    return f"{place}: {first['msg']}" if place else first["msg"]
 
 
 def model_json(model: DrivelineModel) -> dict[str, Any]:
@@ -293,5 +281,69 @@ def model_json(model: DrivelineModel) -> dict[str, Any]:
 
 def model_from_json(document: Mapping[str, Any]) -> DrivelineModel:
     """Return the model again."""
-    parameters = {name: Parameter(value, tolerance) for name, (value, tolerance) in document["parameters"].items()}
-    return DrivelineModel(Structure(document["structure"]), parameters)
+    return ModelEvidence.model_validate(document).model()
+
+
+LOCK: Final = ".commission.lock"
+_BEHIND_THE_TEXT: Final = 1 << 20
+
+
+@contextmanager
+def sole_use(folder: Path) -> Iterator[None]:
+    """Hold a folder for the time of a block.
+
+    The operating system lets go of it when the process ends, however it ends: a lock is never left behind. The file
+    stays, for a lock on a file that is removed and made anew holds nobody off.
+    """
+    with _opened(folder / LOCK) as file:
+        if not _taken(file):
+            file.seek(0)
+            holder = file.read().strip() or "?"
+            raise UsageError(
+                f"{folder}: expected no other call at work on this commissioning, got process {holder}. "
+                "Wait for its end or end it by Ctrl-C, or choose another folder by --out."
+            )
+        _sign(file)
+        yield
+
+
+def _opened(path: Path) -> IO[str]:
+    try:
+        return path.open("a+", encoding="utf-8", buffering=1)
+    except OSError as error:
+        raise _unwritable(path, error) from error
+
+
+def _sign(file: IO[str]) -> None:
+    """Write who holds it."""
+    try:
+        file.truncate(0)
+        print(os.getpid(), file=file, flush=True)
+    except OSError as error:
+        raise _unwritable(Path(file.name), error) from error
+
+
+def _unwritable(path: Path, error: OSError) -> UsageError:
+    return UsageError(
+        f"{path}: expected a place to write to, got: {error.strerror or error}. Make room there, or choose another "
+        "folder by --out."
+    )
+
+
+def _taken(file: IO[str]) -> bool:
+    """Take the lock where nobody has it; never waits."""
+    try:
+        if sys.platform == "win32":
+            import msvcrt
+
+            file.seek(_BEHIND_THE_TEXT)  # what is locked there can't be read by others
+            msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
+        else:
+            import fcntl
+
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as error:
+        if error.errno in (errno.EACCES, errno.EAGAIN, errno.EDEADLK):
+            return False
+        raise
+    return True

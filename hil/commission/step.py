@@ -28,37 +28,17 @@ class Outcome:
 
 @dataclass(slots=True)
 class Job:
-    """What the steps work with.
+    """What the steps work with."""
 
-    Attributes
-    ----------
-    source, rig
-        The user's rig file, and what it says.
-    state
-        Everything known so far.
-    runner
-        Drives runs.
-    nominal
-        The user's own model of the driveline, where there is one.
-    travel_m_per_rad
-        Way the vehicle makes per radian of the motor shaft [m].
-    travel_is_given
-        Whether the user said so; else it is assumed.
-    say
-        Called with what happens.
-    progress
-        Called during long computations: what, and the share done.
-    """
-
-    source: RigSource
-    rig: Rig
-    state: State
-    runner: Runner
-    nominal: DrivelineModel | None
-    travel_m_per_rad: float
-    travel_is_given: bool
-    say: Callable[[str], None]
-    progress: Callable[[str, float], None]
+    source: RigSource  # The user's rig file, and what it says
+    rig: Rig  # The user's rig file, and what it says
+    state: State  # Everything known so far
+    runner: Runner  # Drives runs
+    nominal: DrivelineModel | None  # The user's own model of the driveline, where there is one
+    travel_m_per_rad: float  # Way the vehicle makes per radian of the motor shaft [m]
+    travel_is_given: bool  # Whether the user said so; else it is assumed
+    say: Callable[[str], None]  # Called with what happens
+    progress: Callable[[str, float], None]  # Called during long computations: what, and the share done
 
     @property
     def folder(self) -> Path:
@@ -103,11 +83,9 @@ class Job:
         return self.runner.run(step, order, self.model(), self.rolling_rad_s(), note)
 
     def recording(self, run: RunRecord) -> Path:
-        """Return the path of a run's recording."""
         return self.folder / (run.recording or "")
 
     def runs_of(self, step: str) -> list[RunRecord]:
-        """Return the whole runs of a step."""
         return [run for run in self.state.steps[step].runs if run.whole]
 
 
@@ -117,30 +95,14 @@ def _no_orders(job: Job) -> Sequence[Order]:
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """One step.
+    """One step."""
 
-    Attributes
-    ----------
-    name
-        As on the command line.
-    title
-        As in headings.
-    about
-        Says what it is about to do.
-    do
-        Does it.
-    orders
-        The runs it will drive; none where it commands no torque.
-    needs
-        Steps it builds on.
-    """
-
-    name: str
-    title: str
-    about: Callable[[Job], str]
-    do: Callable[[Job], Outcome]
-    orders: Callable[[Job], Sequence[Order]] = _no_orders
-    needs: tuple[str, ...] = ()
+    name: str  # As on the command line
+    title: str  # As in headings
+    about: Callable[[Job], str]  # Says what it is about to do
+    do: Callable[[Job], Outcome]  # Does it
+    orders: Callable[[Job], Sequence[Order]] = _no_orders  # The runs it will drive; none where it commands no torque
+    needs: tuple[str, ...] = ()  # Steps it builds on
 
     def record(self, job: Job) -> StepRecord:
         return job.state.steps[self.name]

@@ -58,21 +58,12 @@ class Talk(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Script:
-    """Nobody to ask.
+    """Nobody to ask."""
 
-    Attributes
-    ----------
-    yes
-        Whether torque may be commanded.
-    keep
-        Why results from before a change of the rig file are kept; empty to repeat those steps.
-    """
-
-    yes: bool
-    keep: str = ""
+    yes: bool  # Whether torque may be commanded
+    keep: str = ""  # Why results from before a change of the rig file are kept; empty to repeat those steps
 
     def may_command(self, step: str, first: bool) -> Answer:
-        """Answer by ``--yes``."""
         if not self.yes:
             raise UsageError(
                 f"step {step} commands torque: expected someone at a terminal to ask, or --yes, got neither. What was "
@@ -99,21 +90,11 @@ Ask = Callable[[str], str]
 
 @dataclass(slots=True)
 class Person:
-    """Someone at a terminal.
+    """Someone at a terminal."""
 
-    Attributes
-    ----------
-    ask
-        Shows a question and returns the answer.
-    yes
-        Whether torque was agreed to on the command line.
-    keep
-        As in `Script`.
-    """
-
-    ask: Ask
-    yes: bool = False
-    keep: str = ""
+    ask: Ask  # Shows a question and returns the answer
+    yes: bool = False  # Whether torque was agreed to on the command line
+    keep: str = ""  # As in `Script`
 
     def may_command(self, step: str, first: bool) -> Answer:
         """Ask before every step with torque, with more words before the first."""
@@ -230,7 +211,6 @@ def result_document(state: Mapping[str, Any], folder: str, report: str | None) -
 
 
 def result_lines(document: Mapping[str, Any]) -> Iterator[str]:
-    """Return the last lines of a call."""
     open_steps = [name for name, step in document["steps"].items() if step["status"] not in ("done", "skipped")]
     skipped = [name for name, step in document["steps"].items() if step["status"] == "skipped"]
     yield ""

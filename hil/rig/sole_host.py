@@ -2,15 +2,15 @@
 
 CAN hands no node its own frames, so what arrives of a host's frames is another host's::
 
-    listen   at least `LISTEN_S`, ten SYNC periods, and the longest heartbeat of the rig file. SYNC, an NMT
-             command, a host's heartbeat, an RPDO or an SDO request to a drive: somebody else is at work; refused
+    listen   at least `LISTEN_S`, ten SYNC periods, and the longest heartbeat of the rig file, and up to `APART_S` more,
+             drawn at random. SYNC, an NMT command, a host's heartbeat, an RPDO or an SDO request to a drive: somebody
+             else is at work; refused
     ask      each drive for its statusword, by SDO: a drive that may carry torque is driven, whoever does it
-    claim    a host that is going to command sends its heartbeat, from a time drawn at random on, and listens on for
-             `SETTLE_S`
+    claim    a host that is going to command sends its heartbeat from now on, and listens on for `SETTLE_S`
 
-Of two hosts that begin at once at most one drives. Let A's heartbeat be the earlier. B listens for longer than A's
-heartbeats are apart, from before B's own first heartbeat until `SETTLE_S` after it; so it hears A, unless A began only
-after B had finished. Then A has heard B. Two that begin within a frame's time hear each other, and both give up.
+Of two hosts that begin at once at most one drives. Let A's first heartbeat be the earlier. B listens for longer than
+A's heartbeats are apart, until `SETTLE_S` after its own first one: it hears A. Two whose first frames go out within a
+frame's time hear each other, and both give up.
 """
 
 from __future__ import annotations
@@ -30,8 +30,11 @@ from hil.simulator.loopback import IN_PROCESS
 LISTEN_S: Final = 1.0
 """Listened at least, for hosts with another rig file [s]."""
 
+APART_S: Final = 0.15
+"""Two that begin at once listen for times that differ by up to so much, drawn at random [s]."""
+
 SETTLE_S: Final = 0.3
-"""Listened on after the own heartbeat began; it begins within half of that, drawn at random [s]."""
+"""Listened on after the own heartbeat began [s]."""
 
 _SDO_REQUEST, _SDO_ANSWER = 0x600, 0x580
 _RPDOS: Final = {0x200: "RPDO 1", 0x300: "RPDO 2", 0x400: "RPDO 3", 0x500: "RPDO 4"}
@@ -96,26 +99,30 @@ def require_sole_host(link: CanLink, rig: Rig, heartbeat_s: float | None) -> Non
     alone = rig.can.url.startswith(IN_PROCESS)
     ear = _Ear(link, rig)
     if not alone:
-        ear.wait(0.0 if rig.takes_over else listening_s(rig))
+        ear.wait(0.0 if rig.takes_over else listening_s(rig) + random.uniform(0.0, APART_S))
         link.raise_if_failed()
         _require_silence(ear, rig)
-    for name, node_id in _nodes(rig).items():
-        state = _state_of(link, node_id, min(table.sdo_timeout_s for table in (rig.inverters.m1, rig.inverters.m2)))
-        if state in TORQUE_STATES:
-            raise ForeignController(
-                f"inverter {name} (node {node_id}): power state is {state.value} before this program's first command, "
-                "expected a drive that is disabled. Another host drives it, or one that died has left it so. Nothing "
-                "was sent: end that host, or disable the drive at its own control or by its mains."
-            )
+    _require_disabled(link, rig)
     if heartbeat_s is None or alone:
         return
-    ear.wait(random.uniform(0.0, SETTLE_S / 2.0))
     _require_silence(ear, rig)
     link.produce_heartbeat(heartbeat_s, rig.host_node_id)
     ear.wait(SETTLE_S)
     if ear.heard is not None and not rig.takes_over:
         link.stop_heartbeat()
     _require_silence(ear, rig)
+
+
+def _require_disabled(link: CanLink, rig: Rig) -> None:
+    timeout_s = max(rig.inverters.m1.sdo_timeout_s, rig.inverters.m2.sdo_timeout_s)
+    for name, node_id in _nodes(rig).items():
+        state = _state_of(link, node_id, timeout_s)
+        if state in TORQUE_STATES:
+            raise ForeignController(
+                f"inverter {name} (node {node_id}): power state is {state.value} before this program's first command, "
+                "expected a drive that is disabled. Another host drives it, or one that died has left it so. No "
+                "command was sent: end that host, or disable the drive at its own control or by its mains."
+            )
 
 
 def _nodes(rig: Rig) -> dict[str, int]:

@@ -241,25 +241,7 @@ def _cut(connection: socket.socket) -> None:
 
 
 class CanBridge:
-    """A virtual channel at a TCP address, from `__enter__` to `__exit__`.
-
-    Parameters
-    ----------
-    address
-        Where to serve; port 0 takes a free one.
-    channel
-        Name of python-can's virtual channel in this process.
-
-    Attributes
-    ----------
-    url : str
-        With the token: who has it has the bus.
-
-    Raises
-    ------
-    BusDown
-        If the address can't be served at, for example because the port is taken.
-    """
+    """A virtual channel at a TCP address, from `__enter__` to `__exit__`."""
 
     def __init__(self, address: Address, channel: str) -> None:
         try:

@@ -24,58 +24,24 @@ _WARM = 0.9
 
 @dataclass(frozen=True, slots=True)
 class SimulatedInverter:
-    """One simulated inverter.
+    """One simulated inverter."""
 
-    Attributes
-    ----------
-    node_id
-        CANopen node id.
-    rated_torque_nm
-        Motor rated torque; a torque count is 0.1 % of it [Nm].
-    supported_modes
-        Modes of operation it knows; it refuses others.
-    torque_noise_counts
-        Standard deviation of the torque reading, in counts.
-    speed_noise_rad_s
-        Standard deviation of the speed reading [rad/s].
-    eds_path
-        Its EDS; None for the one that is shipped.
-    identity
-        Vendor-ID and product code where its EDS has none.
-    speed_unit
-        Unit of its velocity actual value where its EDS has none.
-    rated_torque_unit_nm
-        What one count of its object 0x6076 is [Nm].
-    sensors
-        What reads the objects of further sensors at it, in counts.
-    faults
-        What is wrong with it.
-    serial_number
-        Entry 4 of its identity, 0x1018; None for the EDS's.
-    """
-
-    node_id: int
-    rated_torque_nm: float = 600.0
-    supported_modes: frozenset[TorqueMode] = frozenset(TorqueMode)
-    torque_noise_counts: float = 1.0
-    speed_noise_rad_s: float = 0.05
-    eds_path: Path | None = None
-    identity: tuple[int, int] = (0, 0)
-    speed_unit: SpeedUnit | None = None
-    rated_torque_unit_nm: float = 1e-3
+    node_id: int  # CANopen node id
+    rated_torque_nm: float = 600.0  # Motor rated torque; a torque count is 0.1 % of it [Nm]
+    supported_modes: frozenset[TorqueMode] = frozenset(TorqueMode)  # Modes of operation it knows; it refuses others
+    torque_noise_counts: float = 1.0  # Standard deviation of the torque reading, in counts
+    speed_noise_rad_s: float = 0.05  # Standard deviation of the speed reading [rad/s]
+    eds_path: Path | None = None  # Its EDS; None for the one that is shipped
+    identity: tuple[int, int] = (0, 0)  # Vendor-ID and product code where its EDS has none
+    speed_unit: SpeedUnit | None = None  # Unit of its velocity actual value where its EDS has none
+    rated_torque_unit_nm: float = 1e-3  # What one count of its object 0x6076 is [Nm]
     sensors: Mapping[ObjectId, Callable[[], int]] = field(default_factory=dict)
-    faults: InverterFaults = field(default_factory=InverterFaults)
-    serial_number: int | None = None
+    faults: InverterFaults = field(default_factory=InverterFaults)  # What is wrong with it
+    serial_number: int | None = None  # Entry 4 of its identity, 0x1018; None for the EDS's
 
 
 class Heat:
-    """The temperature of one drive, from cold.
-
-    Parameters
-    ----------
-    limits
-        Continuous torque and time constant.
-    """
+    """The temperature of one drive, from cold."""
 
     __slots__ = ("_limits", "_x")
 
@@ -135,13 +101,7 @@ class DcLink:
 
 
 class SampleClock:
-    """Age of what each SYNC fetches, and the values of that age.
-
-    Parameters
-    ----------
-    drift_ppm
-        How much slower than the SYNC's it runs [parts per million]; 0 for a drive that samples at SYNC.
-    """
+    """Age of what each SYNC fetches, and the values of that age."""
 
     __slots__ = ("_drift", "_speed_rad_s", "_steps", "_torque")
 
@@ -181,24 +141,7 @@ def _normal(random: np.random.Generator) -> Iterator[float]:
 
 
 class DriveSensors:
-    """The latest readings of one drive.
-
-    Parameters
-    ----------
-    settings
-        Noise, coarseness, and whether it samples at SYNC.
-    velocity
-        Scale of the velocity actual value.
-    seed
-        Of the noise.
-
-    Attributes
-    ----------
-    torque, current
-        Torque and current actual value, 0x6077 and 0x6078 [per mille of rated].
-    speed
-        Velocity actual value, 0x606C [counts].
-    """
+    """The latest readings of one drive."""
 
     __slots__ = ("_clock", "_noise", "_settings", "_velocity_scale", "current", "speed", "torque")
 
@@ -256,7 +199,6 @@ class ErrorList:
 
     @property
     def register(self) -> int:
-        """Error register, 0x1001."""
         bits = 0
         for code in self._active:
             bits |= GENERIC | _CLASSES.get(code & 0xFF00, _CLASSES.get(code & 0xF000, 0))

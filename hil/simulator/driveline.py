@@ -25,15 +25,7 @@ FINER = 16
 
 
 class SensedDriveline(Stepper):
-    """A stepped driveline with more to measure than the motor's speed.
-
-    Parameters
-    ----------
-    model
-        With its effects.
-    period_s
-        Length of a step [s].
-    """
+    """A stepped driveline with more to measure than the motor's speed."""
 
     def __init__(self, model: DrivelineModel, period_s: float) -> None:
         super().__init__(model, period_s)
@@ -80,13 +72,6 @@ class DrivelinePlant:
 
     Both inverters turn one shaft. This plant shares its physics with what is fitted: it is for trying things out, the
     proof has a plant of its own.
-
-    Parameters
-    ----------
-    model
-        The driveline, effects included.
-    period_s
-        Time of one step [s].
     """
 
     __slots__ = ("_period_s", "_stepper")

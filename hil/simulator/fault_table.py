@@ -57,20 +57,7 @@ class Size:
 
 
 class Kind:
-    """One kind of fault: a row of the table.
-
-    Parameters
-    ----------
-    fields
-        What it sets in the device's faults, by (dotted) name: a constant, or what makes it from the moment. To a set of
-        objects the value is added.
-    size
-        What it is asked for with; None for nothing.
-    timed
-        Whether it comes at a moment; else it is there from the start.
-    since_start
-        Whether the moment may be left out: then it is the start.
-    """
+    """One kind of fault: a row of the table."""
 
     def __init__(
         self, fields: Mapping[str, Any], size: Size | None = None, timed: bool = False, since_start: bool = False

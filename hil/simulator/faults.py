@@ -55,24 +55,12 @@ class WrongSpeed:
 
 @dataclass(frozen=True, slots=True)
 class DriveLimits:
-    """Limits a drive sets itself, besides max torque 0x6072; by default none that acts.
+    """Limits a drive sets itself, besides max torque 0x6072; by default none that acts."""
 
-    Attributes
-    ----------
-    base_speed_rad_s
-        Field weakening begins here [rad/s].
-    continuous_permille
-        Torque it can give for ever [per mille of rated].
-    thermal_time_constant_s
-        Of winding and heat sink together [s].
-    torque_step_permille
-        Coarseness of torque and current actual value [per mille].
-    """
-
-    base_speed_rad_s: float = math.inf
-    continuous_permille: float = math.inf
-    thermal_time_constant_s: float = 30.0
-    torque_step_permille: int = 1
+    base_speed_rad_s: float = math.inf  # Field weakening begins here [rad/s]
+    continuous_permille: float = math.inf  # Torque it can give for ever [per mille of rated]
+    thermal_time_constant_s: float = 30.0  # Of winding and heat sink together [s]
+    torque_step_permille: int = 1  # Coarseness of torque and current actual value [per mille]
 
     def weakening(self, speed_rad_s: float) -> float:
         """Field left at a speed, 0 to 1: torque per current, and largest torque, relative to standstill."""

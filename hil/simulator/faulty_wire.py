@@ -70,21 +70,7 @@ class Postman:
 
 
 class Lane:
-    """One direction of the cable.
-
-    Parameters
-    ----------
-    faults
-        What happens to frames.
-    seed
-        Of chance.
-    step
-        Tells the number of the last SYNC.
-    deliver
-        Puts a frame onto the other channel.
-    postman
-        Delivers those that are delayed; None where none is.
-    """
+    """One direction of the cable."""
 
     def __init__(
         self, faults: BusFaults, seed: int, step: Callable[[], int], deliver: Deliver, postman: Postman | None
@@ -151,17 +137,7 @@ class Lane:
 
 
 class FaultyWire:
-    """The cable, from `__enter__` to `__exit__`.
-
-    Parameters
-    ----------
-    host_channel, device_channel
-        Names of python-can's virtual channels in this process.
-    faults
-        What it does to frames.
-    seed
-        Of chance.
-    """
+    """The cable, from `__enter__` to `__exit__`."""
 
     def __init__(self, host_channel: str, device_channel: str, faults: BusFaults, seed: int) -> None:
         self._faults = faults

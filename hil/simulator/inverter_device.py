@@ -60,13 +60,7 @@ _FOLLOWS_TARGET = StatusBit.FOLLOWS_TARGET.value
 
 
 class ObjectRefused(Exception):
-    """The device does not accept a value; the node answers with an SDO abort.
-
-    Parameters
-    ----------
-    abort_code
-        As in CiA 301, table "SDO abort codes".
-    """
+    """The device does not accept a value; the node answers with an SDO abort."""
 
     def __init__(self, abort_code: int) -> None:
         self.abort_code = abort_code
@@ -74,19 +68,7 @@ class ObjectRefused(Exception):
 
 
 class InverterDevice:
-    """One inverter.
-
-    Parameters
-    ----------
-    settings
-        What it is.
-    defaults
-        Power-on values of the objects in `PARAMETERS`, from its EDS, and of supported drive modes 0x6502 if it has any.
-    velocity
-        Scale of its velocity actual value.
-    seed
-        Of its reading noise.
-    """
+    """One inverter."""
 
     def __init__(
         self, settings: SimulatedInverter, defaults: Mapping[int, int], velocity: VelocityScale, seed: int

@@ -66,19 +66,7 @@ _LOST_HOST_STATES = {0: NmtState.PRE_OPERATIONAL, 2: NmtState.STOPPED}
 
 
 class InverterNode:
-    """One simulated inverter on a link.
-
-    Parameters
-    ----------
-    link
-        The simulated rig's end of the bus.
-    settings
-        What the inverter is.
-    seed
-        Of its reading noise.
-    real_time
-        Whether the deadline of its RPDO is of the wall clock.
-    """
+    """One simulated inverter on a link."""
 
     def __init__(self, link: CanLink, settings: SimulatedInverter, seed: int, real_time: bool = False) -> None:
         self._link = link

@@ -44,27 +44,15 @@ _REQUEST_BYTES = 8
 
 
 class ObjectServer(canopen.LocalNode):
-    """The library's node, with the hooks it offers, but without its NMT slave.
-
-    Parameters
-    ----------
-    node_id
-        Node id.
-    eds
-        Its objects.
-    faults
-        Objects it forgets, lacks or locks.
-    on_read, on_write
-        Called with ``index``, ``subindex``, ``od`` and, for a write, ``data``.
-    """
+    """The library's node, with the hooks it offers, but without its NMT slave."""
 
     def __init__(
         self,
-        node_id: int,
-        eds: EdsFile,
-        faults: InverterFaults,
-        on_read: Callable[..., int | None],
-        on_write: Callable[..., None],
+        node_id: int,  # Node id
+        eds: EdsFile,  # Its objects
+        faults: InverterFaults,  # Objects it forgets, lacks or locks
+        on_read: Callable[..., int | None],  # Called with ``index``, ``subindex``, ``od`` and, for a write, ``data``
+        on_write: Callable[..., None],  # Called with ``index``, ``subindex``, ``od`` and, for a write, ``data``
     ) -> None:
         super().__init__(node_id, eds.dictionary)
         self._eds = eds
@@ -120,27 +108,17 @@ Read = Callable[[], int]
 
 @dataclass(frozen=True, slots=True)
 class PdoFrame:
-    """One PDO's frames.
+    """One PDO's frames."""
 
-    Attributes
-    ----------
-    layout
-        The PDO.
-    signed
-        Whether each mapped object may be negative.
-    """
-
-    layout: PdoLayout
-    signed: tuple[bool, ...]
+    layout: PdoLayout  # The PDO
+    signed: tuple[bool, ...]  # Whether each mapped object may be negative
 
     @property
     def bits(self) -> int:
-        """Bits mapped."""
         return sum(mapped.length_bits for mapped in self.layout.objects)
 
     @property
     def size_bytes(self) -> int:
-        """Length of a frame."""
         return (self.bits + 7) // 8
 
     @property
@@ -181,15 +159,7 @@ _COB_ID_BITS = (1 << 30) - 1
 
 
 class PdoObjects:
-    """Objects 0x1400 to 0x1BFF of one node.
-
-    Parameters
-    ----------
-    eds
-        The node's EDS, for data types and what may be mapped.
-    read
-        Reads the node's own objects.
-    """
+    """Objects 0x1400 to 0x1BFF of one node."""
 
     def __init__(self, eds: EdsFile, read: ReadObject) -> None:
         self._eds = eds

@@ -37,15 +37,6 @@ class RigidPlant:
     """One inertia with viscous drag: ``J dw/dt = T1 + T2 - b w``; the shaft is rigid.
 
     Stepped by the exact solution for held torque, so the result does not depend on the period.
-
-    Parameters
-    ----------
-    inertia_kg_m2
-        J, total inertia [kg m^2].
-    drag_nm_s
-        b, viscous drag [Nm s/rad]; greater than 0.
-    speed_rad_s
-        Speed at the start [rad/s].
     """
 
     def __init__(self, inertia_kg_m2: float, drag_nm_s: float, speed_rad_s: float = 0.0) -> None:

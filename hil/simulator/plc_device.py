@@ -18,17 +18,7 @@ TAPS: Final = (10, 7)
 
 
 class PlcPrbs:
-    """The generator, clocked by the PLC's cycle.
-
-    Parameters
-    ----------
-    amplitude_nm : float
-        The level is plus or minus this torque [Nm].
-    divider : int
-        PLC cycles each level is held.
-    seed : int
-        First state, 1 to 1023.
-    """
+    """The generator, clocked by the PLC's cycle."""
 
     __slots__ = ("_amplitude_nm", "_divider", "_held", "_state")
 
@@ -68,26 +58,12 @@ class ValueRefusedError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class PlcSetup:
-    """How the PLC is built, and what it starts with.
+    """How the PLC is built, and what it starts with."""
 
-    Attributes
-    ----------
-    drive_mode : DriveMode
-        Mode at the start.
-    speed_limit_rad_s, torque_limit_nm : float
-        Limits it reports [rad/s, Nm].
-    period_s : float
-        PLC cycle [s].
-    host_timeout_s : float
-        Simulated time without a beat, from a host that has begun to beat, after which the permissive is
-        withdrawn [s]. Infinite by default: a simulation may run far ahead of a host that beats by the wall
-        clock. A served rig sets it, since its host beats by the cycles it makes the simulation run.
-    """
-
-    drive_mode: DriveMode = DriveMode.SERIES
-    speed_limit_rad_s: float = 320.0
-    torque_limit_nm: float = 450.0
-    period_s: float = 0.01
+    drive_mode: DriveMode = DriveMode.SERIES  # Mode at the start
+    speed_limit_rad_s: float = 320.0  # Limits it reports [rad/s, Nm]
+    torque_limit_nm: float = 450.0  # Limits it reports [rad/s, Nm]
+    period_s: float = 0.01  # PLC cycle [s]
     host_timeout_s: float = math.inf
 
 
@@ -106,15 +82,7 @@ _ACCEPTED: Final[Mapping[str, tuple[str, Callable[[Value], bool]]]] = MappingPro
 
 
 class PlcDevice:
-    """The PLC's program.
-
-    Parameters
-    ----------
-    setup : PlcSetup
-        How it is built.
-    faults : PlcFaults
-        What goes wrong.
-    """
+    """The PLC's program."""
 
     __slots__ = (
         "_clutch",
@@ -183,7 +151,6 @@ class PlcDevice:
             self._clutch = ClutchState.CLOSED
 
     def withdraw_permissive(self) -> None:
-        """Withdraw the permissive now."""
         with self._lock:
             self._permissive = False
 

@@ -46,20 +46,7 @@ KIND: Final = {
 
 
 class PlcRegisters(SimCore):
-    """pymodbus's view of the device: the two methods its server calls, for exactly the addresses of the map.
-
-    Parameters
-    ----------
-    device : PlcDevice
-        Holds all values.
-    register_map : RegisterMap
-        Where they are.
-
-    Raises
-    ------
-    ConfigMismatch
-        If the map has a register that the device knows nothing of.
-    """
+    """pymodbus's view of the device: the two methods its server calls, for exactly the addresses of the map."""
 
     def __init__(self, device: PlcDevice, register_map: RegisterMap) -> None:
         super().__init__(SimDevice(0, SimData(0, values=0, datatype=DataType.REGISTERS)))
@@ -148,18 +135,10 @@ READ_CODES: Final = frozenset({1, 2, 3, 4})
 
 @dataclass(frozen=True, slots=True)
 class PlcSecurity:
-    """The PLC's own certificate, and what each role may do.
+    """The PLC's own certificate, and what each role may do."""
 
-    Attributes
-    ----------
-    credentials : Credentials
-        What the PLC shows, and the authority that must have signed a client's certificate.
-    roles : mapping of str to Access
-        What each role may do.
-    """
-
-    credentials: Credentials
-    roles: Mapping[str, Access] = field(default_factory=dict)
+    credentials: Credentials  # What the PLC shows, and the authority that must have signed a client's certificate
+    roles: Mapping[str, Access] = field(default_factory=dict)  # What each role may do
 
     def allows(self, role: str | None, function_code: int) -> bool:
         """Whether a client of this role, None for no role, may send a request of this function code."""
@@ -177,31 +156,14 @@ NO_LINGER: Final = struct.pack("ii", 1, 0)
 
 
 class PlcTcpServer(ModbusTcpServer):
-    """pymodbus's server for one PLC, with TLS where its security is given.
-
-    Parameters
-    ----------
-    registers : PlcRegisters
-        What it answers from.
-    host, port
-        Address to listen on.
-    answers : callable
-        How the PLC answers at the moment of asking.
-    security : PlcSecurity or None
-        Its certificate and what roles may do; None for plain Modbus TCP, where everybody may do everything.
-
-    Raises
-    ------
-    ConfigMismatch
-        If the files of its security can't be used.
-    """
+    """pymodbus's server for one PLC, with TLS where its security is given."""
 
     def __init__(
         self,
-        registers: PlcRegisters,
-        host: str,
-        port: int,
-        answers: Callable[[], Answers],
+        registers: PlcRegisters,  # What it answers from
+        host: str,  # Address to listen on
+        port: int,  # Address to listen on
+        answers: Callable[[], Answers],  # How the PLC answers at the moment of asking
         security: PlcSecurity | None,
     ) -> None:
         if security is not None:
@@ -223,13 +185,7 @@ class PlcTcpServer(ModbusTcpServer):
 
 
 class PlcSession(ServerRequestHandler):
-    """One connection.
-
-    Parameters
-    ----------
-    plc : PlcTcpServer
-        Whose it is.
-    """
+    """One connection."""
 
     def __init__(self, plc: PlcTcpServer) -> None:
         super().__init__(plc, self._pass_packet, None, None)  # type: ignore[no-untyped-call]
@@ -323,7 +279,6 @@ class ServedPlc:
         self._paused = True
 
     def resume(self) -> None:
-        """Answer again."""
         self._paused = False
 
     def answers(self) -> Answers:
@@ -375,23 +330,17 @@ async def _settle() -> None:
 
 
 class PlcServer:
-    """A simulated PLC served by a thread of its own; a context manager that starts and closes.
-
-    Parameters
-    ----------
-    device, register_map, host, port, security
-        As for `serve_plc`.
-    """
+    """A simulated PLC served by a thread of its own; a context manager that starts and closes."""
 
     __slots__ = ("_device", "_host", "_loop", "_map", "_port", "_ready", "_security", "_stop", "_thread")
 
     def __init__(
         self,
-        device: PlcDevice,
-        register_map: RegisterMap,
-        host: str = "127.0.0.1",
-        port: int = 0,
-        security: PlcSecurity | None = None,
+        device: PlcDevice,  # As for `serve_plc`
+        register_map: RegisterMap,  # As for `serve_plc`
+        host: str = "127.0.0.1",  # As for `serve_plc`
+        port: int = 0,  # As for `serve_plc`
+        security: PlcSecurity | None = None,  # As for `serve_plc`
     ) -> None:
         self._device = device
         self._map = register_map
@@ -410,12 +359,10 @@ class PlcServer:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Close."""
         self.close()
 
     @property
     def host(self) -> str:
-        """Host it listens on."""
         return self._host
 
     @property
@@ -444,7 +391,6 @@ class PlcServer:
         self._ready.result().pause()
 
     def resume(self) -> None:
-        """Answer again."""
         self._ready.result().resume()
 
     def _run(self) -> None:

@@ -42,24 +42,7 @@ _RANGES = {
 
 
 class ChannelSensors:
-    """The channels of one rig file on one plant.
-
-    Parameters
-    ----------
-    rig
-        With a table ``[simulation]``.
-    plant
-        The driveline.
-    seed
-        Of the noise.
-
-    Raises
-    ------
-    UsageError
-        If there are channels, and the driveline has nothing to measure but its motor's speed.
-    BadModel
-        If its structure has no such output.
-    """
+    """The channels of one rig file on one plant."""
 
     def __init__(self, rig: Rig, plant: Plant, seed: int) -> None:
         self._tables = tuple(rig.channels)
@@ -78,7 +61,6 @@ class ChannelSensors:
                 self._read[table.column] = self._plant.measured(table.kind, table.at) + noise
 
     def objects(self, inverter: str) -> Mapping[ObjectId, Callable[[], int]]:
-        """Give what reads the objects of an inverter, in counts."""
         return {
             table.object_id: partial(self._count, table)
             for table in self._tables
@@ -124,43 +106,16 @@ HOST_TIMEOUT_S = 1.0
 
 
 class RigServer:
-    """Both inverters, the PLC and the driveline, served from `__enter__` to `__exit__`.
-
-    Parameters
-    ----------
-    plant
-        The driveline.
-    rig
-        The rig file the simulated rig agrees with; it must have a table ``[simulation]``.
-    bus_url
-        Where the CAN bus is served: ``ws://127.0.0.1:PORT/`` for other processes, ``virtual:NAME`` for this
-        one, ``socketcan:vcan0`` on a bus of the kernel.
-    modbus
-        Where the PLC is served. Port 0 takes a free one, here as in ``bus_url``.
-    faults
-        What is wrong with the devices.
-    seed
-        Of all that is random; None for the one of the rig file.
-    real_time
-        Whether the drives watch for RPDOs by the wall clock, as real ones do, and not by simulated time.
-
-    Raises
-    ------
-    UsageError
-        If the rig file has no ``[simulation]``, or channels that the driveline does not have, or an address is not on
-        this machine.
-    BusDown
-        On entry, if an address can't be served at.
-    """
+    """Both inverters, the PLC and the driveline, served from `__enter__` to `__exit__`."""
 
     def __init__(
         self,
-        plant: Plant,
-        rig: Rig,
+        plant: Plant,  # The driveline
+        rig: Rig,  # The rig file the simulated rig agrees with; it must have a table ``[simulation]``
         bus_url: str,
-        modbus: Address,
-        faults: RigFaults | None = None,
-        seed: int | None = None,
+        modbus: Address,  # Where the PLC is served. Port 0 takes a free one, here as in ``bus_url``
+        faults: RigFaults | None = None,  # What is wrong with the devices
+        seed: int | None = None,  # Of all that is random; None for the one of the rig file
         real_time: bool = False,
     ) -> None:
         self._plant = plant
@@ -226,7 +181,6 @@ class RigServer:
             self._bus_url = stack.enter_context(CanBridge(self._bridged, channel)).url
 
     def _devices_bus(self, channel: str, stack: ExitStack) -> can.BusABC:
-        """Open the devices' end of the bus."""
         if self._bus_url.startswith(SOCKETCAN):
             return open_bus(self._bus_url)
         if not self._faults.bus.touch_frames:

@@ -25,30 +25,15 @@ class SimulatedRig:
     At each SYNC both inverters put the torque of their last RPDO into effect, both send their TPDO with the
     speed and torque of this moment, then the plant runs for one period. The same seed and commands give the
     same TPDOs, byte for byte.
-
-    Parameters
-    ----------
-    bus
-        An open ``python-can`` bus; it belongs to the rig from now on.
-    plant
-        What the inverters drive.
-    inverters
-        Inverters m1 and m2.
-    period_s
-        Simulated time of one SYNC [s].
-    seed
-        Of all reading noise.
-    real_time
-        Whether the drives watch for RPDOs by the wall clock, as real ones do, and not by simulated time.
     """
 
     def __init__(
         self,
-        bus: can.BusABC,
-        plant: Plant,
-        inverters: tuple[SimulatedInverter, SimulatedInverter],
-        period_s: float = 0.01,
-        seed: int = 0,
+        bus: can.BusABC,  # An open ``python-can`` bus; it belongs to the rig from now on
+        plant: Plant,  # What the inverters drive
+        inverters: tuple[SimulatedInverter, SimulatedInverter],  # Inverters m1 and m2
+        period_s: float = 0.01,  # Simulated time of one SYNC [s]
+        seed: int = 0,  # Of all reading noise
         real_time: bool = False,
     ) -> None:
         self._plant = plant

@@ -106,15 +106,7 @@ LONGEST_LOOK_NS = 15 * NS_PER_MS
 
 
 class HeartbeatConsumer:
-    """Watches one heartbeat, from the first that comes; off by default.
-
-    Parameters
-    ----------
-    node_id
-        Whose heartbeat it is.
-    timeout_ms
-        Longest time between two [ms]; 0 for no watching.
-    """
+    """Watches one heartbeat, from the first that comes; off by default."""
 
     __slots__ = ("_silence", "_watches", "cob_id")
 
@@ -129,7 +121,6 @@ class HeartbeatConsumer:
         return cls(value >> 16 & 0x7F, value & 0xFFFF)
 
     def beat(self, t_ns: int) -> None:
-        """Take one heartbeat."""
         self._silence.beat(t_ns)
 
     def lost(self, now_ns: int) -> bool:
@@ -141,13 +132,7 @@ class HeartbeatConsumer:
 
 
 class RpdoDeadline:
-    """Watches one RPDO, from the first that comes.
-
-    Parameters
-    ----------
-    deadline_ms
-        Longest time between two [ms]; 0 for no watching.
-    """
+    """Watches one RPDO, from the first that comes."""
 
     __slots__ = ("_deadline_ns", "_last_ns")
 
@@ -156,7 +141,6 @@ class RpdoDeadline:
         self._last_ns: int | None = None
 
     def received(self, now_ns: int) -> None:
-        """Take the RPDO."""
         self._last_ns = now_ns
 
     def missed(self, now_ns: int) -> bool:
@@ -173,13 +157,7 @@ RPDO_TIMEOUT: Final = 0x8250
 
 
 class HostWatch:
-    """The watch of one node.
-
-    Parameters
-    ----------
-    real_time
-        Whether the deadline of the RPDOs is of the wall clock.
-    """
+    """The watch of one node."""
 
     __slots__ = ("_deadlines", "_next_sync_ns", "_real_time", "_sync_ns", "heartbeat")
 
@@ -219,17 +197,7 @@ class HostWatch:
 
 
 class Ticker:
-    """Calls until stopped.
-
-    Parameters
-    ----------
-    period_s
-        Time between two calls [s].
-    call
-        What is called; it raises nothing.
-    name
-        Of the thread.
-    """
+    """Calls until stopped."""
 
     def __init__(self, period_s: float, call: Callable[[], None], name: str) -> None:
         self._period_s = period_s

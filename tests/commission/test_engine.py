@@ -102,7 +102,7 @@ def test_skipped_with_its_reason(world: World) -> None:
 def test_repeated_and_what_is_computed_from_it(world: World) -> None:
     world.call()
     assert world.call(repeat=frozenset({"second"})) == ["second", "third"]
-    assert world.state().steps["second"].history[0]["status"] == "done"
+    assert world.state().steps["second"].history[0].status is Status.DONE
 
 
 def test_repeating_what_another_with_torque_builds_on_says_so(world: World, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -143,7 +143,7 @@ def test_changed_rig_file_is_noticed_and_its_steps_are_done_again(world: World) 
     world.call()
     world.text = world.text.replace("amplitude_nm = 120.0", "amplitude_nm = 60.0")
     assert world.call() == list(NAMES)
-    assert "prbs.amplitude_nm: 120.0 → 60.0" in world.state().notes[0]["changes"]
+    assert "prbs.amplitude_nm: 120.0 → 60.0" in world.state().notes[0].changes
 
 
 def test_comment_in_the_rig_file_is_no_change(world: World) -> None:
@@ -156,7 +156,7 @@ def test_results_are_kept_for_a_reason(world: World) -> None:
     world.call()
     world.text = world.text.replace("amplitude_nm = 120.0", "amplitude_nm = 60.0")
     assert world.call(Script(True, keep="only the amplitude")) == []
-    assert world.state().notes[0]["steps"] == "kept: only the amplitude"
+    assert world.state().notes[0].steps == "kept: only the amplitude"
     assert world.call() == []
 
 

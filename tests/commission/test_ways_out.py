@@ -1,8 +1,9 @@
-"""Whatever ends a step: drives disarmed, the record says why, the next call continues there."""
+"""Every way out of a commissioning: interrupted, unplugged, refused, and continued."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import product
 from pathlib import Path
 
 import pytest
@@ -109,7 +110,7 @@ def test_after_an_interruption_whole_runs_are_kept_and_the_rest_is_driven(
     assert driven == ["m1", "m2", "m2"]
     record = state.steps["signs"]
     assert (record.status, record.attempt) == (Status.DONE, 2)
-    assert record.history[0]["because"] == "RunAborted: PLC: permissive is withdrawn"
+    assert record.history[0].because == "RunAborted: PLC: permissive is withdrawn"
 
 
 @pytest.mark.parametrize(
@@ -150,3 +151,52 @@ def test_rolling_vehicle_is_no_standstill(tmp_path: Path) -> None:
         with pytest.raises(RunAborted, match="expected standstill"):
             rig.call("signs")
         assert_disarmed(rig.server.bus_url, 1, 2)
+
+
+LOST = {"m1.hang@2.0": "m1", "m2.hang@2.0": "m2", "plc.hang@2.0": "PLC", "bus.off@2.0": "bus"}
+"""What is lost after two seconds of simulated time, and what has to be named."""
+
+OTHERS = {"m1": 2, "m2": 1}
+"""CANopen node that is still there when an inverter is lost."""
+
+SHORT_FORM = {("friction", "bus.off@2.0")}
+"""Every device in every step is a campaign; this one leaves both drives to themselves."""
+
+
+@pytest.mark.parametrize(
+    ("step", "fault"),
+    [
+        pytest.param(step, fault, marks=() if (step, fault) in SHORT_FORM else pytest.mark.campaign)
+        for step, fault in product(DRIVEN, LOST)
+    ],
+)
+def test_a_lost_device_is_named_and_the_step_is_done_once_it_is_back(step: str, fault: str, tmp_path: Path) -> None:
+    with bench(tmp_path, changes=SHORT, faults=[fault]) as rig:
+        with pytest.raises((RunAborted, DriverError)) as ended:
+            rig.call(step)
+        record = rig.job().state.steps[step]
+        if fault.startswith("plc"):
+            assert_disarmed(rig.server.bus_url, 1, 2)
+        elif LOST[fault] in OTHERS:
+            assert_disarmed(rig.server.bus_url, OTHERS[LOST[fault]])
+    assert LOST[fault] in str(ended.value)
+    assert record.status is Status.INTERRUPTED
+    assert LOST[fault] in record.because
+    with bench(tmp_path, changes=SHORT) as mended:
+        assert mended.call(step).steps[step].status is Status.DONE
+
+
+@pytest.mark.parametrize(
+    ("fault", "device"),
+    [("m1.absent", "m1"), pytest.param("m2.absent", "m2", marks=pytest.mark.campaign), ("plc.hang@0.0", "plc")],
+)
+def test_a_device_that_is_not_there_blocks_and_is_found_once_it_is_back(
+    fault: str, device: str, tmp_path: Path
+) -> None:
+    with bench(tmp_path, faults=[fault]) as rig:
+        with pytest.raises(RunAborted):
+            rig.call("devices")
+        outside = [finding for finding in rig.shown if finding.within is False]
+        assert [finding.what.split()[0] for finding in outside] == [device]
+    with bench(tmp_path) as mended:
+        assert mended.call("devices").steps["devices"].status is Status.DONE

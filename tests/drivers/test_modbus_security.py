@@ -12,7 +12,7 @@ from cryptography.hazmat.primitives.serialization import Encoding
 
 from drivers.errors import ConfigMismatch
 from drivers.plc.modbus_security import Credentials, client_context, own_role, role_of, server_context, tls_failure
-from tests.wire.certificates import Authority, der_text
+from tests.wire.tls_peers import Authority, der_text
 
 
 def der_of(credentials: Credentials) -> bytes:

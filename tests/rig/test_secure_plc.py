@@ -14,7 +14,7 @@ from hil.rig.check import Verdict, check_rig
 from hil.simulator.rig_server import RigServer
 from tests.rig.observer import assert_disarmed
 from tests.rig.serving import CHANGES, EXAMPLE, Samples, changed, run_once, served
-from tests.wire.certificates import SERVER_NAME, Authority, der_text
+from tests.wire.tls_peers import SERVER_NAME, Authority, der_text
 
 TABLES = """
 [plc.security]

@@ -156,7 +156,7 @@ def test_two_hosts_started_at_once_do_not_both_drive(
 
 def test_the_two_that_claim_within_a_frames_time_both_give_up(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sole_host, "LISTEN_S", 0.4)
-    monkeypatch.setattr(sole_host.random, "uniform", lambda low, high: 0.1)
+    monkeypatch.setattr(sole_host, "APART_S", 0.0)
     quick = changed(small_rig(), {"inverters.m1": {"host_timeout_ms": 150}, "inverters.m2": {"host_timeout_ms": 150}})
     with served(quick, bus_url=WS) as (server, rig):
         ends = _hosts_at_once(server.bus_url, [rig, rig], [0.0, 0.0])

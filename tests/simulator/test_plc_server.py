@@ -1,4 +1,4 @@
-"""The simulated PLC on a real Modbus TCP connection, asked by pymodbus's own client."""
+"""The simulated PLC on Modbus TCP: requests, roles, and answers that go wrong, to bare sockets and clients."""
 
 from __future__ import annotations
 
@@ -14,10 +14,14 @@ from pymodbus.client import AsyncModbusTcpClient
 from pymodbus.constants import ExcCodes
 
 from drivers.errors import BusDown, ConfigMismatch
+from drivers.plc.modbus_security import Credentials
+from drivers.plc.register import Access
 from drivers.plc.register_map import load_register_map
 from drivers.resources import data_file
+from hil.simulator.fault_table import known_faults, rig_faults
+from hil.simulator.faults import LATE_BY_S, PlcFaults
 from hil.simulator.plc_device import PlcDevice
-from hil.simulator.plc_server import PlcServer, serve_plc
+from hil.simulator.plc_server import PlcSecurity, PlcServer, serve_plc
 
 MAP = load_register_map(data_file("plc.toml"))
 
@@ -211,3 +215,84 @@ def test_nothing_leaks_to_the_terminal(capfd: pytest.CaptureFixture[str]) -> Non
         with pytest.raises(BusDown):
             PlcServer(PlcDevice(), MAP, port=server.port).start()
     assert capfd.readouterr() == ("", "")
+
+
+NO_FILES = Credentials(Path("ca"), Path("certificate"), Path("key"))
+SECURITY = PlcSecurity(NO_FILES, {"viewer": Access.READ, "operator": Access.READ_WRITE})
+READING, WRITING = (1, 2, 3, 4), (5, 6, 15, 16)
+UNKNOWN = (0, 7, 22, 23, 43, 100, 255)
+
+
+@pytest.mark.parametrize("function_code", READING)
+def test_reading(function_code: int) -> None:
+    assert SECURITY.allows("viewer", function_code)
+    assert SECURITY.allows("operator", function_code)
+
+
+@pytest.mark.parametrize("function_code", WRITING + UNKNOWN)
+def test_everything_else_counts_as_writing(function_code: int) -> None:
+    assert not SECURITY.allows("viewer", function_code)
+    assert SECURITY.allows("operator", function_code)
+
+
+@pytest.mark.parametrize("role", [None, "", "nobody", "Operator", "operator "])
+@pytest.mark.parametrize("function_code", READING + WRITING)
+def test_no_role_and_an_unknown_one_may_do_nothing(role: str | None, function_code: int) -> None:
+    assert not SECURITY.allows(role, function_code)
+
+
+READ_TWO = bytes.fromhex("0001 0000 0006 01 04 0002 0002")
+TWO = bytes.fromhex("0001 0000 0007 01 04 04 2024 0001")
+ONE = bytes.fromhex("0001 0000 0005 01 04 02 2024")
+DEVICE_FAILURE = bytes.fromhex("0001 0000 0003 01 84 04")
+
+
+@pytest.mark.parametrize(
+    ("name", "field"),
+    [
+        ("exception", "exceptions_at_s"),
+        ("slow", "late_at_s"),
+        ("half_answer", "half_at_s"),
+        ("reset", "resets_at_s"),
+        ("wrong_width", "too_few_at_s"),
+        ("wrong_unit", "wrong_unit_at_s"),
+        ("wrong_transaction", "wrong_transaction_at_s"),
+    ],
+)
+def test_each_is_put_into_the_device_by_name(name: str, field: str) -> None:
+    assert f"{name}@S" in known_faults()
+    assert rig_faults([f"plc.{name}@2.5"], 0.01).plc == PlcFaults(**{field: 2.5})
+
+
+def answer_of(faults: PlcFaults, timeout_s: float) -> bytes:
+    with PlcServer(PlcDevice(faults=faults), MAP) as server:
+        with socket.create_connection((server.host, server.port), timeout=timeout_s) as client:
+            client.sendall(READ_TWO)
+            return client.recv(64)
+
+
+@pytest.mark.parametrize(
+    ("faults", "answer"),
+    [
+        (PlcFaults(), TWO),
+        (PlcFaults(exceptions_at_s=0.0), DEVICE_FAILURE),
+        (PlcFaults(half_at_s=0.0), TWO[: len(TWO) // 2]),
+        (PlcFaults(too_few_at_s=0.0), ONE),
+        (PlcFaults(late_at_s=0.0), TWO),
+        (PlcFaults(wrong_unit_at_s=0.0), TWO[:6] + b"\x81" + TWO[7:]),
+        (PlcFaults(wrong_transaction_at_s=0.0), b"\x80" + TWO[1:]),
+    ],
+)
+def test_what_comes_back(faults: PlcFaults, answer: bytes) -> None:
+    assert answer_of(faults, timeout_s=10.0) == answer
+
+
+def test_a_slow_one_is_later_than_a_client_waits() -> None:
+    assert LATE_BY_S > 1.0
+    with pytest.raises(TimeoutError):
+        answer_of(PlcFaults(late_at_s=0.0), timeout_s=1.0)
+
+
+def test_a_reset_is_a_reset_and_no_end() -> None:
+    with pytest.raises(ConnectionResetError):
+        answer_of(PlcFaults(resets_at_s=0.0), timeout_s=10.0)

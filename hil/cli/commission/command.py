@@ -60,8 +60,8 @@ def commission(
     from hil.cli.commission.asked import asked_of_steps, who_answers
     from hil.cli.commission.job import job_in
     from hil.cli.commission.result import print_plan
-    from hil.commission.lock import sole_use
     from hil.commission.order import RigSource
+    from hil.commission.state import sole_use
     from hil.config.rig_file import read_rig
     from hil.report.outputs import require_folder
 

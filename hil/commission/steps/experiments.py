@@ -10,8 +10,7 @@ from estimator.identification.modes.modes import Mode
 from estimator.identification.online.recursive import Status as OnlineStatus
 from estimator.identification.settings import Settings
 from hil.commission.order import Order, as_table, cruise_of, first_of, halt
-from hil.commission.readings import record_of, rounded
-from hil.commission.responses import of_repeats
+from hil.commission.responses import of_repeats, record_of, rounded
 from hil.commission.state import Finding
 from hil.commission.step import Job, Outcome, Step
 from hil.commission.steps.noise_friction import LOST_SHARE
@@ -40,7 +39,6 @@ def _speed_parts() -> list[float]:
 
 
 def orders(job: Job) -> list[Order]:
-    """Order all of them."""
     cruise = cruise_of(job.rig)
     amplitude_nm = job.evidence("prbs").get("amplitude_nm", job.rig.prbs.amplitude_nm)
     seeds = 2**job.rig.prbs.cells - 1

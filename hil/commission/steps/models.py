@@ -8,8 +8,7 @@ import numpy as np
 
 from estimator.identification.modes.modes import Mode, two_mass_resonance
 from estimator.physics.model import DrivelineModel, parameter_unit
-from hil.commission.readings import record_of, thinned
-from hil.commission.responses import TRUSTED
+from hil.commission.responses import TRUSTED, record_of, thinned
 from hil.commission.state import Finding, model_from_json, model_json, stated
 from hil.commission.step import Job, Outcome, Step
 from hil.commission.steps.experiments import cruises

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hil.commission.order import Order, as_table, first_of
-from hil.commission.readings import READING, columns_of, record_of, thinned
-from hil.commission.responses import Measured
+from hil.commission.responses import READING, Measured, columns_of, record_of, thinned
 from hil.commission.state import Finding, stated
 from hil.commission.step import Job, Outcome, Step
 from hil.config.experiment_tables import ReversalTable

@@ -31,8 +31,7 @@ from hil.commission.prbs_design import (
     resonance_spread,
     vibration_m_s2,
 )
-from hil.commission.readings import record_of
-from hil.commission.responses import HIGH_PASS_HZ, RINGING_S, averaged
+from hil.commission.responses import HIGH_PASS_HZ, RINGING_S, averaged, record_of
 from hil.commission.state import Finding, RunRecord
 from hil.commission.step import Job, Outcome, Step
 from hil.report.numbers import shown

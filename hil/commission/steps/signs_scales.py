@@ -13,8 +13,18 @@ from estimator.signals.record import Record
 from hil.commission.order import Order, as_table, cruise_of, halt
 from hil.commission.physical_fit import NATURAL_DELAY, DelaySelection, select_delay
 from hil.commission.prbs_design import ResonanceSpread, resonance_spread
-from hil.commission.readings import READING, REFERENCE, columns_of, record_of, thinned
-from hil.commission.responses import PulseResponse, ResponseRatio, pulse_response, reading_lag, response_ratio
+from hil.commission.responses import (
+    READING,
+    REFERENCE,
+    PulseResponse,
+    ResponseRatio,
+    columns_of,
+    pulse_response,
+    reading_lag,
+    record_of,
+    response_ratio,
+    thinned,
+)
 from hil.commission.state import Finding, model_json, stated
 from hil.commission.step import Job, Outcome, Step
 from hil.recording.columns import SPEED, TIME

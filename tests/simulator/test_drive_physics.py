@@ -1,4 +1,4 @@
-"""What keeps a simulated drive from its torque: closed forms, and what its objects tell of it."""
+"""Inside a simulated drive: limits and heat, its own clock, its list of errors."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from dataclasses import replace
 import pytest
 
 from drivers.inverter.cia402 import Command, StatusBit
-from hil.simulator.drive_physics import Heat
+from hil.simulator.drive_physics import ErrorList, Heat, SampleClock
 from hil.simulator.faults import DriveLimits, InverterFaults
 from hil.simulator.inverter_device import InverterDevice
 from tests.simulator.test_inverter_device import PERIOD_S, QUIET, enabled
@@ -97,3 +97,55 @@ def test_a_brown_out_is_a_fault_that_stays_until_the_supply_is_back() -> None:
     made.write(0x6040, 0)
     made.write(0x6040, Command.FAULT_RESET.value)
     assert made.read(0x603F) == 0
+
+
+def test_without_drift_every_sample_is_that_of_its_sync() -> None:
+    clock = SampleClock(0.0)
+    assert [clock.sample(float(k), 10.0 * k) for k in range(5)] == [(float(k), 10.0 * k) for k in range(5)]
+
+
+@pytest.mark.parametrize("drift", [0.125, -0.125])
+def test_the_age_grows_by_the_drift_and_wraps_after_a_period(drift: float) -> None:
+    """Of a speed that grows by 1 per SYNC, what is read is behind by its age."""
+    clock = SampleClock(drift * 1e6)
+    ages = [k - clock.sample(float(k), 0.0)[0] for k in range(17)]
+    assert ages == pytest.approx([0.0] + [(k * drift) % 1.0 for k in range(1, 17)])
+
+
+def test_a_torque_that_is_not_fresh_is_that_of_the_sync_before() -> None:
+    clock = SampleClock(1e5)
+    assert [clock.sample(0.0, torque)[1] for torque in (1.0, 2.0, 3.0)] == [1.0, 1.0, 2.0]
+
+
+@pytest.mark.parametrize(
+    ("code", "register"),
+    [(0x2310, 0x03), (0x3220, 0x05), (0x4310, 0x09), (0x8130, 0x11), (0x8250, 0x11), (0x7303, 0x01), (0x5441, 0x21)],
+)
+def test_the_register_tells_the_class(code: int, register: int) -> None:
+    errors = ErrorList()
+    errors.set(code)
+    assert errors.register == register
+    [emergency] = errors.take_due()
+    assert (emergency.code, emergency.register) == (code, register)
+
+
+def test_an_error_is_reported_once_and_its_end_when_all_are_gone() -> None:
+    errors = ErrorList()
+    for code in (0x8130, 0x8130, 0x4310):
+        errors.set(code)
+    errors.clear(0x8130)
+    assert [each.code for each in errors.take_due()] == [0x8130, 0x4310]
+    errors.clear()
+    errors.clear()
+    assert [(each.code, each.register) for each in errors.take_due()] == [(0, 0)]
+    assert errors.take_due() == []
+
+
+def test_the_history_has_the_newest_first_and_outlives_the_errors() -> None:
+    errors = ErrorList()
+    for code in (0x1000, 0x2310, 0x3220, 0x4310, 0x8130):
+        errors.set(code)
+    errors.clear()
+    assert [errors.history(n) for n in range(6)] == [4, 0x8130, 0x4310, 0x3220, 0x2310, 0]
+    errors.forget_history()
+    assert [errors.history(n) for n in range(2)] == [0, 0]
