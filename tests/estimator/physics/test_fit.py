@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from estimator.physics.driveline import Start
-from estimator.physics.fit import fit
+from estimator.physics.fit import FitResult, best_fit, fit, rates, warm_start
 from estimator.physics.jacobian import jacobian_at
-from estimator.physics.layout import flat
+from estimator.physics.layout import flat, slot
+from estimator.physics.model import DrivelineModel, Parameter, Structure
 from estimator.physics.problem import (
     BAD,
     Problem,
@@ -24,10 +25,11 @@ from estimator.physics.problem import (
     start_of,
     start_vector,
 )
-from estimator.physics.unknowns import Shared, nominal_unknowns
-from estimator.signals.record import Location, OutputKind, Record
+from estimator.physics.unknowns import Shared, effect_unknowns, nominal_unknowns
+from estimator.signals.record import FloatArray, Location, OutputKind, Record
 from tests.estimator.physics.bench import (
     ONE_MASS,
+    SAMPLE_TIME_S,
     TWO_MASS,
     linear_record,
     model,
@@ -223,3 +225,98 @@ class TestRunaway:
         result = fit(make_problem(model(TRUE), records, self.explosive(1.0)))
         assert np.isfinite(result.x).all()
         assert np.isfinite(result.residual).all()
+
+
+def test_of_several_starts_the_best_counts() -> None:
+    """Under a square wave of ten samples a delay of eight looks like two too early: small starts end at zero."""
+    torque = 100.0 * np.tile(np.repeat([1.0, -1.0], 5), 60)
+    late = np.concatenate([np.full(8, torque[0]), torque[:-8]])
+    rec = replace(linear_record(ONE_MASS, late, Start(0.0, 0.0, 0.0), sigma=0.01), torque_nm=torque[:, None])
+    line = model(ONE_MASS)
+    problems = [
+        make_problem(line, [rec], (*nominal_unknowns(line), *release.shared))
+        for release in effect_unknowns("transport_delay", line, [rec])
+    ]
+    alone = [fit(problem).value("transport_delay", "delay_s") for problem in problems]
+    assert alone[0] == pytest.approx(0.0, abs=1e-9)
+    assert best_fit(problems).value("transport_delay", "delay_s") == pytest.approx(0.08, abs=1e-3)
+
+
+def test_a_warm_start_begins_where_the_last_fit_ended() -> None:
+    records = recordings()
+    line = model(TWO_MASS)
+    warm = fit(nominal_problem(records))
+    delay = effect_unknowns("transport_delay", line, records)[0].shared
+    problem = make_problem(line, records, (*nominal_unknowns(line), *delay), profile=True)
+    x = warm_start(problem, warm)
+    p = parameters(problem, x)
+    for shared in warm.problem.shared:
+        assert p[shared.slot] == pytest.approx(warm.value("", shared.name))
+    assert p[slot("transport_delay", "delay_s")] == delay[0].start * delay[0].scale
+    for i in range(2):
+        assert start_of(problem, x, i) == start_of(warm.problem, warm.x, i)
+        assert not problem.local[i].extra_load(local_part(problem, x, i)).any()
+
+
+def test_a_warm_start_from_other_recordings_keeps_values_not_scaled_unknowns() -> None:
+    """The scale of an effect's parameter is read off the recordings."""
+    line = model(TWO_MASS)
+    large = recordings()
+    small = [linear_record(TRUE, random_steps(400, 5, size_nm=10.0), STARTS["first"], sigma=SIGMA, name="small")]
+    gaps = [effect_unknowns("backlash", line, recs)[1].shared for recs in (large, small)]
+    shared = [(*nominal_unknowns(line), *gap) for gap in gaps]
+    assert gaps[0][0].scale == pytest.approx(10.0 * gaps[1][0].scale)
+    warm = fit(make_problem(line, large, shared[0]))
+    problem = make_problem(line, small, shared[1])
+    carried = parameters(problem, warm_start(problem, warm))
+    np.testing.assert_allclose(carried, warm.p)
+
+
+TORQUE_NM = random_steps(400, 1)
+START = Start(5.0, 0.0, 20.0)
+
+
+def fitted(record: Record, line: DrivelineModel) -> FitResult:
+    return fit(make_problem(line, [record], nominal_unknowns(line)))
+
+
+def test_of_one_mass_the_acceleration_before_and_after_a_torque_steps() -> None:
+    """Newton's law with the torque that was, and with the one that comes; within a sub-step's share of J / b = 5 s."""
+    line = model(ONE_MASS, tolerance=0.0)
+    found = fitted(linear_record(ONE_MASS, TORQUE_NM, START), line)
+    ((before, after),) = rates(found)
+    drag = ONE_MASS["b_M"] * found.outputs[0] + START.load_torque_nm
+    assert after == pytest.approx((TORQUE_NM - drag) / ONE_MASS["J_M"], rel=2e-3)
+    was = np.append(TORQUE_NM[0], TORQUE_NM[:-1])
+    assert before == pytest.approx((was - drag) / ONE_MASS["J_M"], rel=2e-3)
+
+
+def test_of_a_position_the_speed_on_both_sides() -> None:
+    """Within what the speed, 10 rad/s^2 at most, changes by in a sub-step."""
+    line = model(ONE_MASS, tolerance=0.0)
+    found = fitted(linear_record(ONE_MASS, TORQUE_NM, START, kind=OutputKind.POSITION), line)
+    ((before, after),) = rates(found)
+    assert before == pytest.approx(after, abs=0.1)
+    assert after[:-1] == pytest.approx(np.diff(found.outputs[0]) / SAMPLE_TIME_S, abs=0.1)
+
+
+def test_of_a_joint_straight_lines_to_the_neighbours() -> None:
+    stiffness, time_s = 100.0, SAMPLE_TIME_S * np.arange(300)
+    twist: FloatArray = 0.1 * np.sin(3.0 * time_s)
+    line = DrivelineModel(Structure.JOINT, {"k": Parameter(stiffness, 0.0), "c": Parameter(0.0, 0.0)})
+    record = Record(
+        "bench",
+        SAMPLE_TIME_S,
+        time_s,
+        (stiffness * twist)[:, None],
+        stiffness * twist,
+        np.ones(300, dtype=bool),
+        OutputKind.FORCE,
+        imposed=twist,
+    )
+    ((before, after),) = rates(fitted(record, line))
+    secants = stiffness * np.diff(twist) / SAMPLE_TIME_S
+    assert after[:-1] == pytest.approx(secants, abs=1e-6)
+    assert before[1:] == pytest.approx(secants, abs=1e-6)
+    assert before[0] == after[0]
+    assert after[-1] == before[-1]

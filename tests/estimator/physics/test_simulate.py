@@ -8,24 +8,150 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.errors import BadModel
+from estimator.diagnosis.assemble import load_torques
+from estimator.diagnosis.hypotheses import open_hypotheses
+from estimator.diagnosis.preconditions.thinned import thin
+from estimator.diagnosis.preconditions.units import require_plausible_units
+from estimator.errors import BadModel, BadShape, Implausible
 from estimator.physics.driveline import Case, Start
+from estimator.physics.fit import FitResult, fit, make_problem
+from estimator.physics.free_run import free_run
 from estimator.physics.grid import FASTEST_IN_NYQUIST, RADIANS_PER_STEP, SIGN_WIDTH, grid_for, substeps_for
 from estimator.physics.kernel import state_vector
 from estimator.physics.layout import flat, flat_values, slot
-from estimator.physics.model import Structure, natural_frequencies_rad_s
+from estimator.physics.model import DrivelineModel, Load, Structure, natural_frequencies_rad_s
 from estimator.physics.simulate import output_state, simulate, simulate_each
-from estimator.signals.record import Location, OutputKind
+from estimator.physics.unknowns import nominal_unknowns
+from estimator.signals.record import Location, OutputKind, Record, sliced
 from tests.estimator.physics.bench import (
     ONE_MASS,
     SAMPLE_TIME_S,
     TWO_MASS,
     assert_same_to_rounding,
     exact_states,
+    linear_record,
     model,
     random_steps,
     record,
 )
+
+LOADS_NM = (20.0, 20.0)
+SIGMA = 0.02
+
+
+def one_way(direction: float, seed: int, load_nm: float) -> Record:
+    """A cruise in one direction; dry friction of 6 Nm at the motor is a constant torque there."""
+    friction = 6.0 * direction
+    torque = random_steps(1500, seed, size_nm=40.0, mean_nm=direction * 60.0 + load_nm + friction)
+    start = Start(load_nm, 0.0, direction * 60.0, 0.0, direction * 60.0)
+    plain = linear_record(TWO_MASS, torque - friction, start, sigma=SIGMA, seed=seed, name=f"run_{seed}")
+    return replace(plain, torque_nm=torque[:, np.newaxis])
+
+
+FORWARD, BACK = one_way(1.0, 1, 20.0), one_way(-1.0, 2, 20.0)
+
+
+def with_load(load: Load | float) -> DrivelineModel:
+    return replace(model(TWO_MASS, 0.02), load=load)
+
+
+def fitted(load: Load | float) -> FitResult:
+    line = with_load(load)
+    return fit(make_problem(line, [FORWARD, BACK], nominal_unknowns(line)))
+
+
+def test_its_own_takes_up_dry_friction_in_each_direction() -> None:
+    result = fitted(Load.OWN)
+    loads = [each.value for each in load_torques(result, with_load(Load.OWN)).values()]
+    assert loads == pytest.approx([26.0, 14.0], abs=1.0)
+    assert result.rms == pytest.approx(SIGMA, rel=0.1)
+
+
+@pytest.mark.parametrize("load", [Load.SHARED, 20.0])
+def test_shared_or_known_it_leaves_dry_friction_to_be_seen(load: Load | float) -> None:
+    result = fitted(load)
+    loads = load_torques(result, with_load(load))
+    assert len({each.value for each in loads.values()}) == 1
+    assert result.rms > 5.0 * SIGMA
+    low, high = loads["run_1"].ci95
+    assert (low == high) == (load == 20.0)
+    free = fitted(Load.OWN)
+    assert free.free_count - result.free_count == (1 if load is Load.SHARED else 2)
+
+
+def test_dry_friction_is_reported_in_one_direction_where_the_load_is_known_or_shared_by_both() -> None:
+    def tells(load: Load | float, *records: Record) -> bool:
+        return "coulomb_friction_motor" in open_hypotheses(with_load(load), records)[0]
+
+    assert not tells(Load.OWN, FORWARD, BACK)
+    assert tells(Load.SHARED, FORWARD, BACK)
+    assert not tells(Load.SHARED, FORWARD)
+    assert tells(20.0, FORWARD)
+
+
+def test_of_one_recording_alone_a_shared_load_is_its_own_and_a_known_one_is_kept() -> None:
+    assert free_run(with_load(Load.SHARED), FORWARD).start.load_torque_nm == pytest.approx(26.0, abs=1.0)
+    assert free_run(with_load(26.0), FORWARD).start.load_torque_nm == 26.0
+    assert free_run(with_load(20.0), FORWARD).rms > 2.0 * free_run(with_load(26.0), FORWARD).rms
+
+
+def test_a_load_that_is_no_number_is_refused() -> None:
+    with pytest.raises(BadModel, match=r"load\.constant: expected 'own', 'shared' or a finite number, got nan"):
+        with_load(float("nan"))
+
+
+START = Start(5.0, 0.0, 2.0)
+TORQUE, LOAD = random_steps(400, 1), random_steps(400, 2, size_nm=60.0, hold=25)
+
+
+def braked(values: dict[str, float], location: Location = Location.MOTOR) -> Record:
+    """Return a recording in which the load machine's torque acts and is measured."""
+    record = linear_record(values, TORQUE, START, extra_load_nm=LOAD, location=location)
+    return replace(record, load_nm=LOAD)
+
+
+@pytest.mark.parametrize("location", [Location.MOTOR, Location.LOAD])
+def test_it_acts_at_the_load(location: Location) -> None:
+    record, start = braked(TWO_MASS, location), START
+    simulated = simulate(grid_for(model(TWO_MASS), [record]), record, flat_values(TWO_MASS, {}), start)
+    np.testing.assert_allclose(simulated, record.output, atol=1e-3 * np.ptp(record.output))
+
+
+def test_a_free_run_finds_the_constant_load_besides_it() -> None:
+    record = braked(ONE_MASS)
+    run = free_run(model(ONE_MASS), record)
+    assert run.start.load_torque_nm == pytest.approx(START.load_torque_nm, abs=1e-3)
+    assert run.rms < 1e-4 * np.ptp(record.output)
+    without = free_run(model(ONE_MASS), replace(record, load_nm=None))
+    assert without.rms > 0.1 * np.std(record.output)
+
+
+def test_a_part_and_a_thinned_recording_keep_it() -> None:
+    record = braked(ONE_MASS)
+    np.testing.assert_array_equal(sliced(record, slice(100, 300)).known_load_nm, LOAD[100:300])
+    np.testing.assert_allclose(thin(record, 5).known_load_nm, LOAD.reshape(-1, 5).mean(axis=1))
+
+
+def test_a_load_that_takes_most_of_the_torque_is_no_wrong_unit() -> None:
+    torque = random_steps(3000, 1)
+    load = 0.8 * torque
+    record = replace(linear_record(ONE_MASS, torque, START, extra_load_nm=load), load_nm=load)
+    require_plausible_units([record], model(ONE_MASS))
+    with pytest.raises(Implausible):
+        require_plausible_units([replace(record, load_nm=None)], model(ONE_MASS))
+
+
+def test_a_load_beyond_all_torque_is_another_unit() -> None:
+    record = braked(ONE_MASS)
+    with pytest.raises(Implausible, match="its measured load torque reaches"):
+        require_plausible_units([replace(record, load_nm=1000.0 * record.total_torque_nm)], model(ONE_MASS))
+
+
+def test_it_has_a_number_in_every_row() -> None:
+    with pytest.raises(BadShape, match="load_nm holds NaN"):
+        replace(braked(ONE_MASS), load_nm=np.where(np.arange(400) == 7, np.nan, LOAD))
+    with pytest.raises(BadShape, match="load_nm has shape"):
+        replace(braked(ONE_MASS), load_nm=LOAD[:10])
 
 
 def test_the_natural_frequency_is_that_of_two_free_masses() -> None:

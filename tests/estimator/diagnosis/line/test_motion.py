@@ -4,12 +4,23 @@ from __future__ import annotations
 
 import numpy as np
 
-from estimator.diagnosis.line.motion import motion_of
+from estimator.diagnosis.line.motion import AROUND, FormPlace, change_around, form_changes, motion_of
 from estimator.physics.driveline import Start
-from estimator.physics.fit import fit
-from estimator.physics.problem import make_problem
+from estimator.physics.fit import fit, not_fitted
+from estimator.physics.problem import make_problem, start_vector
+from estimator.signals.record import FloatArray
 from tests.estimator.diagnosis.planted import drive_torque
-from tests.estimator.physics.bench import ANGLE, LOAD_SPEED, SPEED, TWIST, TWO_MASS, exact_states, linear_record, model
+from tests.estimator.physics.bench import (
+    ANGLE,
+    LOAD_SPEED,
+    SAMPLE_TIME_S,
+    SPEED,
+    TWIST,
+    TWO_MASS,
+    exact_states,
+    linear_record,
+    model,
+)
 
 START = Start(5.0, 0.0, 2.0, 0.0, 2.0)
 
@@ -23,3 +34,43 @@ def test_the_motion_of_a_fit_is_the_motion_of_the_line() -> None:
         assert np.max(np.abs(found - states[:, state])) < 1e-3 * np.ptp(states[:, state])
     assert np.max(np.abs(moved.angle - states[:, ANGLE])) < 1e-3 * np.ptp(states[:, ANGLE])
     np.testing.assert_array_equal(moved.torque, drive_torque(2))
+
+
+SIZE_NM, GAP_RAD = 15.0, 0.02
+TIME_S = np.arange(600) * SAMPLE_TIME_S
+TORQUE_NM = 200.0 * np.sin(2.0 * np.pi * TIME_S / 3.0)
+
+
+def changes(**effects: dict[str, float]) -> FloatArray:
+    """Return the changes of the laws of a line that swings there and back twice."""
+    record = linear_record(TWO_MASS, TORQUE_NM, Start(0.0, 0.0, -3.0, 0.0, -3.0))
+    problem = make_problem(model(TWO_MASS, effects=effects), [record], ())
+    return form_changes(not_fitted(problem, start_vector(problem)), 0)
+
+
+def test_a_jump_counts_for_the_samples_around_it() -> None:
+    step = np.where(np.arange(30) < 12, -3.0, 4.0)
+    change = change_around(step)
+    assert set(np.flatnonzero(change)) == set(range(12 - AROUND, 12 + AROUND))
+    assert np.all(change[change > 0.0] == 7.0)
+
+
+def test_a_line_without_such_a_law_has_no_error_of_form() -> None:
+    assert not changes().any()
+    assert not changes(generator_coupled={"inertia_kg_m2": 1.0, "from_s": 0.0, "to_s": 2.0}).any()
+
+
+def test_dry_friction_changes_by_twice_its_size_at_a_reversal_and_at_its_place() -> None:
+    at_motor = changes(coulomb_friction_motor={"friction_nm": SIZE_NM})
+    assert at_motor[FormPlace.MOTOR].max() == 2.0 * SIZE_NM
+    assert 0 < np.count_nonzero(at_motor) < 0.2 * TIME_S.size
+    assert not at_motor[[FormPlace.LOAD, FormPlace.SHAFT]].any()
+    at_load = changes(coulomb_friction_load={"friction_nm": SIZE_NM})
+    assert at_load[FormPlace.LOAD].max() == 2.0 * SIZE_NM
+    assert not at_load[[FormPlace.MOTOR, FormPlace.SHAFT]].any()
+
+
+def test_a_gap_changes_what_the_shaft_carries_while_it_is_crossed() -> None:
+    in_shaft = changes(backlash={"gap_rad": GAP_RAD, "contact_rad": 1e-3})
+    assert 0.0 < in_shaft[FormPlace.SHAFT].max() <= TWO_MASS["k"] * GAP_RAD
+    assert not in_shaft[[FormPlace.MOTOR, FormPlace.LOAD]].any()
