@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hil.proof.truth.dirty import FEWEST, IMPERFECTIONS, LEAST_PART, MOST, MOST_PART, Known, in_a_model_file, make_dirty
 
 from hil.errors import UsageError
 from hil.proof.truth.recording import USUAL, coloured, speed_reading
