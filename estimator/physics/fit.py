@@ -109,12 +109,6 @@ class FitResult:
         ended: BoolArray = fixed | (down < 1e-6) | (-up < 1e-6)
         return ended
 
-    @property
-    def free_count(self) -> int:
-        """How many unknowns the fit could change."""
-        low, high = bounds(self.problem)
-        return int(np.sum(low < high))
-
     def value(self, effect: str, name: str) -> float:
         """Fitted value of a parameter (``effect`` empty for a nominal one)."""
         return float(self.p[next(s.slot for s in self.problem.shared if (s.effect, s.name) == (effect, name))])
