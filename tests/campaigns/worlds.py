@@ -10,7 +10,7 @@ Each world is answered by the public ``diagnose``, and what it names is compared
 - ``engine`` is a rigid-body engine (`tests.campaigns.engine`), left out where MuJoCo is not installed.
 
 ``DIR/worlds.jsonl`` has a line for each world; called again, it continues where it was interrupted. The tables count
-the worlds in which what is strong was named, the names that are not there, and, in bins of the probability told, how
+the worlds in which what is strong was named, the names that are not there, and, in bins of the stated probability, how
 many of the names are there.
 """
 
@@ -63,7 +63,7 @@ ALL: Mapping[str, Role] = {
 """Every form of world, and what it is for. What thresholds are fitted on does not judge them."""
 
 BINS = (0.0, 0.5, 0.8, 0.9, 0.99, 0.999, 1.0)
-"""Bins of the probability told; the last one holds 1."""
+"""Bins of the stated probability; the last one holds 1."""
 
 Row = dict[str, Any]
 
@@ -170,7 +170,7 @@ def main_named(row: Row) -> bool:
 def table(rows: Sequence[Row]) -> str:
     """Return the results as a table in Markdown: a line for each form, one for each role, one for all."""
     head = ["form, outputs", "worlds", "main named", "names", "false names", "no false name", "no verdict"]
-    head += ["of told 0.9, there", "CPU median, most [s]"]
+    head += ["of stated 0.9, there", "CPU median, most [s]"]
     groups = []
     for form, outputs in product(ALL, (1, 2)):
         groups.append((f"{form}, {outputs}", [row for row in rows if (row["form"], row["outputs"]) == (form, outputs)]))
@@ -193,17 +193,17 @@ def _cells(title: str, rows: Sequence[Row]) -> str:
 
 
 def reliability(rows: Sequence[Row]) -> str:
-    """Return the reliability curve as a table in Markdown: how many names are there, by probability told and role."""
+    """Return the reliability curve as a table in Markdown: how many names are there, by stated probability and role."""
     groups = {role.value: [row for row in rows if ALL[row["form"]] is role] for role in Role}
-    lines = [f"| probability told | {' | '.join(groups)} |", f"|{' --- |' * (1 + len(groups))}"]
+    lines = [f"| stated probability | {' | '.join(groups)} |", f"|{' --- |' * (1 + len(groups))}"]
     for low, high in pairwise(BINS):
         cells = []
         for group in groups.values():
             names = [name for row in group for name in row["names"] if name["probability"] is not None]
             inside = [n for n in names if low <= n["probability"] < high or n["probability"] == high == BINS[-1]]
-            told = sum(n["probability"] for n in inside) / len(inside) if inside else 0.0
+            stated = sum(n["probability"] for n in inside) / len(inside) if inside else 0.0
             there = f"{sum(n['is_there'] for n in inside)} of {len(inside)} there"
-            cells.append(f"{there}, told {told:.3g}" if inside else "")
+            cells.append(f"{there}, stated {stated:.3g}" if inside else "")
         lines.append(f"| {low:g} to {high:g} | {' | '.join(cells)} |")
     return "\n".join(lines) + "\n"
 

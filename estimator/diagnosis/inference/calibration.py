@@ -1,6 +1,6 @@
 """The thresholds of a verdict by likelihood, in one place; no other number decides.
 
-Those that depend on what worlds are like are data (``thresholds.toml``), written by ``python -m hil.proof.calibrate``,
+Those that depend on what worlds are like are data (``thresholds.toml``), written by ``python -m tests.campaigns.calibrate``,
 whose command the file holds.
 """
 
