@@ -86,8 +86,9 @@ def judge_linearity(problem: Problem, x: FloatArray, record: Record, first: int,
     with threadpool_limits(1):
         J, w = problem.jacobian(x), problem.residual(x)
         columns = [_responses(problem, x, model, group, high_pass_hz) for group in groups]
-        (p_value, effect), *alone = (_tested(J, w, c) for c in (np.column_stack(columns), *columns))
-    return Linearity(p_value, *(p for p, _ in alone), effect)
+        tested = [_tested(J, w, c) for c in (np.column_stack(columns), *columns)]
+    (p_value, effect), (by_torque, _), (by_speed, _) = tested
+    return Linearity(p_value, by_torque, by_speed, effect)
 
 
 def shaft_torque(model: LinearModel, u: FloatArray) -> FloatArray:

@@ -105,7 +105,7 @@ def angle_of(z: complex) -> float:
     """Return the angle of a pole above the real axis, by the one inverse function that a PLC has too."""
     if z.real == 0.0:
         return 0.5 * np.pi
-    angle = np.arctan(z.imag / z.real)
+    angle = float(np.arctan(z.imag / z.real))
     return angle + np.pi if z.real < 0.0 else angle
 
 
