@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from estimator.diagnosis.holdout import BLOCK_S, EVERY_S
+from estimator.diagnosis.inference.figures import BLOCK_S, EVERY_S
 from estimator.diagnosis.segments import FEWEST_SAMPLES, SHORTEST_S, segments
 from estimator.signals.record import BoolArray, Record
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from estimator.diagnosis.holdout import blocks
+from estimator.diagnosis.inference.figures import blocks
 from estimator.signals.record import BoolArray
 from hil.parse_json import read_json
 from hil.proof.command import CommandFailed
