@@ -10,8 +10,7 @@ from functools import partial
 import numpy as np
 
 from estimator.diagnosis.chain import Chain
-from estimator.diagnosis.evidence import gain_from_squares
-from estimator.diagnosis.inherit import line_values
+from estimator.diagnosis.hypotheses import line_values
 from estimator.diagnosis.intervals import (
     Z95,
     interval_both_ways,
@@ -19,6 +18,7 @@ from estimator.diagnosis.intervals import (
     reported_covariance,
     trusted,
 )
+from estimator.diagnosis.noise import gain_from_squares
 from estimator.diagnosis.result import Estimated, Evidence, FoundEffect, Interval, Profile, Retuned
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effects.load import ROAD_GRADE, grade_basis

@@ -7,8 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from estimator.diagnosis.evidence import residuals_by_record
-from estimator.diagnosis.noise import unpredictable
+from estimator.diagnosis.noise import residuals_by_record, unpredictable
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult

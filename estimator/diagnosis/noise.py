@@ -1,12 +1,17 @@
-"""How much of an error is noise: the floor no model gets below."""
+"""Noise of a reading, and what errors say against it."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
+from scipy import stats
 
 from estimator.errors import NotExciting
+from estimator.physics.fit import FitResult
+from estimator.signals.correlation import effective_samples
 from estimator.signals.record import BoolArray, FloatArray, Record
 
 PREDICTOR_ORDER = 20
@@ -80,3 +85,86 @@ def unpredictable(errors: Sequence[FloatArray]) -> float:
     now = np.concatenate([error[n:] for error in errors])
     left = now - past @ np.linalg.lstsq(past, now, rcond=None)[0]
     return float(np.sqrt(left @ left / max(left.size - n, 1)))
+
+
+VERY_STRONG = 10.0
+"""A difference in BIC above this is very strong evidence (Kass and Raftery, JASA 90, 1995)."""
+
+SMALLEST_P = 1e-300
+
+
+@dataclass(frozen=True, slots=True)
+class Gain:
+    """What a larger model gains over a smaller one.
+
+    Attributes
+    ----------
+    delta_bic : float
+        Information gained, residual correlation taken into account; positive speaks for the larger model.
+    p_value : float
+        Probability of so large a gain if the smaller model were true, for one hypothesis.
+    n_effective : float
+        Independent samples the larger model's residual is worth.
+    """
+
+    delta_bic: float
+    p_value: float
+    n_effective: float
+
+
+def residuals_by_record(result: FitResult) -> list[FloatArray]:
+    """Split a fit's stacked residual into one array per recording."""
+    sizes = np.cumsum([int(use.sum()) for use in result.problem.use])[:-1]
+    return list(np.split(result.residual, sizes))
+
+
+def gain_from_squares(before: float, after: float, added: int, unknowns: int, errors: Sequence[FloatArray]) -> Gain:
+    """Compare two nested least-squares fits by their sums of squares.
+
+    ``delta_bic = n_e ln(S_0/S_1) - q ln n_e`` with the effective number of samples n_e of the larger model's
+    ``errors`` (Schwarz, Ann. Stat. 6, 1978), and the F test with the same n_e.
+    """
+    n = max(effective_samples(errors), unknowns + 2.0)
+    ratio = before / max(after, np.finfo(float).tiny)
+    if ratio <= 1.0:
+        return Gain(-added * math.log(n), 1.0, n)
+    f_value = (ratio - 1.0) * (n - unknowns) / added
+    p_value = max(float(stats.f.sf(f_value, added, n - unknowns)), SMALLEST_P)
+    return Gain(n * math.log(ratio) - added * math.log(n), p_value, n)
+
+
+LONGEST_S = 60.0
+"""Length of a stretch at most: hundreds of periods of a driveline's first mode, and a dozen speed changes."""
+
+MOST_SAMPLES = 30_000
+"""Samples that are fitted, of all recordings together: five minutes at 10 ms. Every array of a fit is in proportion."""
+
+
+def stretches(record: Record, parts: Sequence[slice], share: float) -> list[slice]:
+    """Return the rows of a recording that are used, in order.
+
+    Parameters
+    ----------
+    parts : sequence of slice
+        Its segments.
+    share : float
+        Part of the samples that may be used, 1 or more for all.
+    """
+    if share >= 1.0:
+        return list(parts)
+    longest = max(round(LONGEST_S / record.sample_time_s), 1)
+    return [piece for part in parts for piece in _pieces(part, longest, share)]
+
+
+def share_of(records: Sequence[Record]) -> float:
+    """Return which part of the samples of all recordings may be used."""
+    return MOST_SAMPLES / sum(record.okay.size for record in records)
+
+
+def _pieces(part: slice, longest: int, share: float) -> list[slice]:
+    size = part.stop - part.start
+    allowed = min(size, max(math.ceil(share * size), longest))
+    count = math.ceil(allowed / longest)
+    length = allowed // count
+    starts = part.start + np.linspace(0, size - length, count).astype(int)
+    return [slice(int(start), int(start) + length) for start in starts]

@@ -14,7 +14,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from estimator.diagnosis.stretches import share_of, stretches
+from estimator.diagnosis.noise import share_of, stretches
 from estimator.signals.record import Record, sliced
 
 LONG_S = 1.0

@@ -76,7 +76,7 @@ def effect_unknowns(name: str, model: DrivelineModel, records: Sequence[Record])
     """Return an effect's parameters as unknowns, once per start point; a profile has no shared ones.
 
     What recordings have of their own starts at its null: phases and moments are found by a scan
-    (``estimator.diagnosis.screening``).
+    (``estimator.diagnosis.inference.looks``).
     """
     name = model.own(name)
     entry = EFFECTS[name]

@@ -25,8 +25,8 @@ from scipy.optimize import minimize_scalar
 from threadpoolctl import threadpool_limits
 
 from estimator.diagnosis.chain import mechanical, read_through
+from estimator.diagnosis.inference.answer import searched as searched_for
 from estimator.diagnosis.inference.calibration import LEAST_SHARE, TEST_LIMITS, THRESHOLDS_FILE
-from estimator.diagnosis.inference.read_again import searched as searched_for
 from estimator.diagnosis.inference.remainder import chance
 from estimator.diagnosis.preconditions import prepare
 from estimator.errors import EstimatorError

@@ -11,9 +11,9 @@ from pydantic import BaseModel
 
 from drivers.inverter.drive_settings import OPTION_CODES
 from drivers.plc.map_needs import USED
-from estimator.diagnosis import holdout
-from estimator.diagnosis.diagnose import BUDGET_S
 from estimator.diagnosis.inference import calibration, plausible
+from estimator.diagnosis.inference import figures as holdout
+from estimator.diagnosis.inference.search import STARTS
 from estimator.diagnosis.where import locate
 from hil.cli.main import ExitStatus
 from hil.config.experiment_tables import AnyExperiment
@@ -93,15 +93,13 @@ def test_the_thresholds_of_a_verdict_are_those_of_the_code() -> None:
         f"blocks of {holdout.BLOCK_S:g} s every {holdout.EVERY_S:g} s",
         f"over {locate.WINDOW_S:g} s",
         f"central {locate.CENTRAL:.0%}".replace("%", " %"),
-        f"({BUDGET_S:g} s)",
         f"whose share is below {calibration.LEAST_SHARE:g}",
     ):
         assert said in page
     assert plausible.LEAST_THROUGH == 0.2
     assert "lets through less than a fifth" in page
-    assert (calibration.MOST_AT_PLACE, calibration.MOST_ELSEWHERE) == (0.75, 0.9)
-    assert "gain nine tenths of what it gains" in page
-    assert "gain three quarters of it by themselves" in page
+    assert "the five most promising effects" in page
+    assert STARTS == 5
 
 
 def test_every_concealed_effect_is_listed() -> None:

@@ -1,10 +1,8 @@
 """Faults of the acquisition, recognised in the raw recordings and compensated, so that mechanics can be judged."""
 
-from estimator.diagnosis.acquisition.as_read import as_read
-from estimator.diagnosis.acquisition.compensate import compensate
+from estimator.diagnosis.acquisition.compensate import as_if_not_lost, as_read, compensate, recognise
 from estimator.diagnosis.acquisition.finding import OUTPUT, Finding, Sized
-from estimator.diagnosis.acquisition.hidden_jitter import hidden_jitter, mean_shift
-from estimator.diagnosis.acquisition.recognise import as_if_not_lost, recognise
+from estimator.diagnosis.acquisition.jitter import hidden_jitter, mean_shift
 
 __all__ = [
     "OUTPUT",

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from estimator.diagnosis.acquisition.finding import OUTPUT, Finding, no_cells
-from estimator.diagnosis.acquisition.holding import fill
+from estimator.diagnosis.acquisition.stale import fill
 from estimator.diagnosis.acquisition.stamped_jitter import stamp_offsets_s
 from estimator.signals.record import Record, uniform_period_s
 

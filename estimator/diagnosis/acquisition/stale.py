@@ -1,19 +1,416 @@
-"""Stale samples: a reading that was not renewed in time and repeats the one before, without a flag."""
+"""Stale samples: readings that repeat the one before, seen by themselves or by what the line answers."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from scipy import stats
 
-from estimator.diagnosis.acquisition.finding import OUTPUT, Finding, Sized, no_cells
-from estimator.diagnosis.acquisition.late_torque import LateTorque, late_torque, pooled_p_value
-from estimator.diagnosis.acquisition.lattice import lattice_step, repeats
-from estimator.diagnosis.acquisition.limits import LEVEL, SMALLEST_P, SMALLEST_SHARE
-from estimator.diagnosis.acquisition.readings import channels, flagged, mean_run, share_interval
-from estimator.diagnosis.acquisition.repeated import Repeated, repeated
-from estimator.signals.record import BoolArray, Record
+from estimator.diagnosis.acquisition.finding import (
+    LEVEL,
+    OUTPUT,
+    SMALLEST_P,
+    SMALLEST_SHARE,
+    Finding,
+    Sized,
+    all_of,
+    channels,
+    flagged,
+    mean_run,
+    no_cells,
+    runs,
+    share_interval,
+)
+from estimator.diagnosis.acquisition.predictor import predict
+from estimator.diagnosis.acquisition.quantised import chance_repeats, lattice_step, repeats
+from estimator.signals.record import BoolArray, FloatArray, Record
+
+HALF_WINDOW = 25
+"""Rows before and after that tell whether the signal moves: long against a stale burst, short against a standstill."""
+
+STEPS_PER_ROW = 1.5
+"""The signal moves if all but a quarter of its changes, repeats left out, are larger than so many lattice steps, two
+steps that is: where one step is common, a repeat is the likeliest outcome and can't be predicted from its neighbours.
+The quarter is taken, not the half, because a torque that jumps every few samples is at rest in between."""
+
+REST_ROWS = 8
+"""A run of repeats this long, at zero or at the end of the channel's range, is standstill or saturation."""
+
+NEAR_ZERO = 0.02
+"""Zero is within this share of the channel's size."""
+
+
+def telling_rows(values: FloatArray, step: float) -> BoolArray:
+    """Return the rows of a channel in which a repeat would tell, shape (N,).
+
+    Parameters
+    ----------
+    values : ndarray, shape (N,)
+        Readings, NaN where there is none.
+    step : float
+        Of their lattice.
+    """
+    change = np.abs(np.diff(values, prepend=np.nan))
+    read, again = np.isfinite(change), repeats(values, step)
+    tells: BoolArray = read & (_moving_share(read & ~again, read) > 0.5)
+    moving = change[tells & ~again]
+    if moving.size == 0 or float(np.quantile(moving, 0.25)) <= STEPS_PER_ROW * step:
+        return np.zeros_like(tells)
+    low, high = float(np.nanmin(values)), float(np.nanmax(values))
+    for begin, end in runs(again):
+        value = values[begin]
+        at_rest = abs(value) <= NEAR_ZERO * max(abs(low), abs(high)) or value in (low, high)
+        if end - begin >= REST_ROWS and at_rest:
+            tells[begin:end] = False
+    return tells
+
+
+def _moving_share(moving: BoolArray, read: BoolArray) -> FloatArray:
+    """Return the share of the readings around each row that differ from the one before, shape (N,)."""
+    counts = [
+        sliding_window_view(np.pad(rows, HALF_WINDOW), 2 * HALF_WINDOW + 1).sum(axis=1) for rows in (moving, read)
+    ]
+    share: FloatArray = counts[0] / np.maximum(counts[1], 1)
+    return share
+
+
+CATCH_UP = 0.8
+"""Smallest ratio of the median change after a repeat to the usual one, for the repeats to be stale. Two periods of
+motion give up to 2, of white noise 1; an innocent repeat in white noise gives sqrt(3)/2 = 0.87, one in a slow signal
+on a lattice a small fraction."""
+
+
+@dataclass(frozen=True, slots=True)
+class Repeated:
+    """What one channel's repeats say.
+
+    Attributes
+    ----------
+    rows : tuple of ndarray of bool, shape (N,)
+        Per recording, rows that repeat where a repeat tells.
+    total : int
+        Rows in which a repeat would tell.
+    expected, upper : float
+        Repeats by chance among these: best estimate, and the most it may be.
+    catch_up : float
+        Median change after a repeat, over the usual one; 0 without repeats.
+    """
+
+    rows: tuple[BoolArray, ...]
+    total: int
+    expected: float
+    upper: float
+    catch_up: float
+
+    @property
+    def count(self) -> int:
+        """Repeats in telling rows."""
+        return sum(int(rows.sum()) for rows in self.rows)
+
+    @property
+    def p_value(self) -> float:
+        """Probability of as many repeats by chance: binomial, at the most that chance may do."""
+        return float(stats.binom.sf(self.count - 1, self.total, self.upper / self.total)) if self.total else 1.0
+
+    @property
+    def is_stale(self) -> bool:
+        """Whether they are beyond chance, enough to matter, and caught up with."""
+        return self.share(self.count) >= SMALLEST_SHARE and self.p_value <= LEVEL and self.catch_up >= CATCH_UP
+
+    def share(self, count: float) -> float:
+        """Return the share of stale rows behind a count of repeats: those by chance taken off."""
+        fresh = self.total - self.expected
+        return max(count - self.expected, 0.0) / fresh if fresh > 0.0 else 0.0
+
+
+def repeated(series: Sequence[FloatArray]) -> Repeated:
+    """Look for repeats in one channel of a set of recordings; each array has shape (N,), NaN where nothing was read."""
+    rows, after, usual = [], [], []
+    total, expected, upper = 0, 0.0, 0.0
+    for values in series:
+        step = lattice_step(values)
+        tells = telling_rows(values, step)
+        again = repeats(values, step) & tells
+        change = np.diff(values, prepend=np.nan)
+        chance = chance_repeats(change[tells], step)
+        rows.append(again)
+        total, expected, upper = total + int(tells.sum()), expected + chance.expected, upper + chance.upper
+        follows = _follows(again)
+        after.append(np.abs(change[follows & np.isfinite(change)]))
+        usual.append(np.abs(change[tells & ~again & ~follows]))
+    return Repeated(tuple(rows), total, expected, upper, _ratio(np.concatenate(after), np.concatenate(usual)))
+
+
+def _follows(again: BoolArray) -> BoolArray:
+    """Return the rows right after runs of repeats, shape (N,)."""
+    follows = np.zeros_like(again)
+    for _, end in runs(again):
+        if end < again.size:
+            follows[end] = True
+    return follows
+
+
+def _ratio(after: FloatArray, usual: FloatArray) -> float:
+    return float(np.median(after) / np.median(usual)) if after.size and usual.size else 0.0
+
+
+PERIODS = 3
+"""The torque of a row is predicted from its own reference and from those before it, so many in all."""
+
+FEWEST_ROWS = 100
+"""Fewer rows that were read do not show how a drive follows."""
+
+MOST_LEFT = 0.25
+"""Share of the torque's changes, as a power, that a reference may leave; one that leaves more does not tell."""
+
+AS_GOOD = 0.003
+"""One that leaves no more than this share tells the torque as well as a reading does: of a step a twentieth is left."""
+
+
+def followed(torque: FloatArray, trusted: BoolArray, reference: FloatArray) -> tuple[FloatArray, BoolArray, bool]:
+    """Return a torque as its reference tells it.
+
+    Parameters
+    ----------
+    torque, trusted : ndarray, shape (N,)
+        Readings [Nm], and where they are to be trusted.
+    reference : ndarray, shape (N,)
+        What was asked of all drives together, or of this one [Nm]; NaN where it is not known.
+
+    Returns
+    -------
+    ndarray, shape (N,)
+        Torque by the reference [Nm].
+    ndarray of bool, shape (N,)
+        Where the reference tells it; nowhere if the torque does not follow.
+    bool
+        Whether that is as good as a reading.
+    """
+    regressors = _regressors(np.where(~trusted & (reference == 0.0), np.nan, reference))  # lost with the torque
+    predicted = all_of(np.isfinite(regressors))
+    read = predicted & trusted
+    both = read[1:] & read[:-1]
+    if read.sum() < FEWEST_ROWS or not both.any():
+        return torque, np.zeros_like(trusted), False
+    gain = np.linalg.lstsq(regressors[read], torque[read])[0]
+    by_reference = regressors @ gain
+    rows = np.flatnonzero(read)
+    by_reference += np.interp(np.arange(torque.size), rows, (torque - by_reference)[rows])
+    left, change = np.diff(torque - regressors @ gain)[both], np.diff(torque)[both]
+    power_left, power = float(left @ left), float(change @ change)
+    if power_left > MOST_LEFT * power:
+        return torque, np.zeros_like(trusted), False
+    return by_reference, predicted, power_left <= AS_GOOD * power
+
+
+def _regressors(reference: FloatArray) -> FloatArray:
+    """Return the references of each row and of those before it, and one for an offset; shape (N, PERIODS + 1)."""
+    before = [np.concatenate([np.full(lag, reference[0]), reference[: reference.size - lag]]) for lag in range(PERIODS)]
+    return np.column_stack([*before, np.ones(reference.size)])
+
+
+LONGEST_HOLD = 20
+"""Longest clock looked for, in samples."""
+
+ON_TICK = 0.95
+"""Share of the steps that must fall on the ticks; the rest may be steps of the base torque."""
+
+FEWEST_STEPS = 20
+"""Fewer steps do not show a clock."""
+
+CLEAR_STEP = 8.0
+"""A step is a change this many times the usual one within a hold."""
+
+SAME_STEP = 0.2
+"""A change is the clock's step if it differs from it by at most this share: the base torque may drift meanwhile."""
+
+
+@dataclass(frozen=True, slots=True)
+class Clock:
+    """When and by how much a torque steps: in rows ``k % period == phase`` [samples], by ``+-step_nm``."""
+
+    period: int
+    phase: int
+    step_nm: float
+    usual_nm: float
+
+    def ticks(self, first: int, last: int) -> list[int]:
+        """Return the ticks from one row to another, both included."""
+        return [row for row in range(first, last + 1) if row % self.period == self.phase]
+
+    def explains(self, change_nm: float) -> bool:
+        """Tell whether a change is one step of the clock, or none."""
+        size = abs(change_nm)
+        return size <= CLEAR_STEP * self.usual_nm or abs(size - self.step_nm) <= SAME_STEP * self.step_nm
+
+
+def clock_of(torque: FloatArray, trusted: BoolArray) -> Clock | None:
+    """Return the clock at whose ticks a torque steps; None where there is none of two samples or more.
+
+    Parameters
+    ----------
+    torque, trusted : ndarray, shape (N,)
+        Readings [Nm], and where they are to be trusted.
+    """
+    change = np.abs(np.diff(torque))
+    known = trusted[1:] & trusted[:-1]
+    if known.sum() < FEWEST_STEPS:
+        return None
+    usual = 1.4826 * float(np.median(change[known]))
+    steps = 1 + np.flatnonzero(known & (change > CLEAR_STEP * usual))
+    if steps.size < FEWEST_STEPS:
+        return None
+    for period in range(LONGEST_HOLD, 1, -1):
+        on_tick = np.bincount(steps % period, minlength=period)
+        if on_tick.max() >= ON_TICK * steps.size:
+            return Clock(period, int(on_tick.argmax()), float(np.median(change[steps - 1])), usual)
+    return None
+
+
+def fill(torque: FloatArray, trusted: BoolArray, reference: FloatArray | None = None) -> tuple[FloatArray, BoolArray]:
+    """Return a torque with what is not trusted replaced, and where the replacement is as good as a reading.
+
+    Parameters
+    ----------
+    torque, trusted : ndarray, shape (N,)
+        Readings [Nm], and where they are to be trusted.
+    reference : ndarray, shape (N,), optional
+        What the torque follows [Nm], NaN where not known.
+
+    Returns
+    -------
+    ndarray, shape (N,)
+        Filled torque [Nm].
+    ndarray of bool, shape (N,)
+        True where read, or known by reference or clock.
+    """
+    filled, known = _by_clock(torque, trusted)
+    if reference is None or trusted.all():
+        return filled, known
+    by_reference, predicted, as_good = followed(torque, trusted, reference)
+    unread = predicted & ~trusted & (as_good | ~known)
+    filled[unread] = by_reference[unread]
+    return filled, known | (unread & as_good)
+
+
+def _by_clock(torque: FloatArray, trusted: BoolArray) -> tuple[FloatArray, BoolArray]:
+    clock = clock_of(torque, trusted)
+    filled, known = torque.copy(), trusted.copy()
+    for begin, end in runs(~trusted):
+        before, after = torque[max(begin - 1, 0)], torque[min(end, torque.size - 1)]
+        if begin == 0 or end == torque.size:
+            filled[begin:end] = after if end < torque.size else before
+            continue
+        filled[begin:end] = np.linspace(before, after, end - begin + 2)[1:-1]
+        if clock is not None and clock.explains(after - before) and len(ticks := clock.ticks(begin, end)) < 2:
+            change = ticks[0] if ticks else end
+            filled[begin:change], filled[change:end] = before, after
+            known[begin:end] = True
+    return filled, known
+
+
+CLEAR = (2.0, 3.0, 4.0)
+"""A step tells whether it was answered where the answer is this many times the predictor's error. Torques found stale
+are mended and the predictor fitted again, for wrong torques blur it; each pass asks for more, the last one counts."""
+
+ANSWERED = 0.5
+"""Share of the answer that must have come early: half way between none and all of it."""
+
+
+@dataclass(frozen=True, slots=True)
+class LateTorque:
+    """What one recording says of some torque inputs together.
+
+    Attributes
+    ----------
+    rows : ndarray of bool, shape (N,)
+        Rows whose torques repeat while the output answers the next one.
+    early, repeats : int
+        Clear steps that were answered early, of those before which the torque repeats.
+    early_others, others : int
+        The same of those before which it does not.
+    """
+
+    rows: BoolArray
+    early: int
+    repeats: int
+    early_others: int
+    others: int
+
+
+def late_torque(record: Record, inputs: Sequence[int], trusted: BoolArray) -> LateTorque | None:
+    """Examine torque inputs that may be stale in the same rows; None where no predictor can be fitted.
+
+    Parameters
+    ----------
+    inputs : sequence of int
+        Which; a row repeats where all of them do.
+    trusted : ndarray of bool, shape (N,)
+        Rows whose output may be used.
+    """
+    torque = record.torque_nm[:, inputs].sum(axis=1)
+    read = all_of(record.torque_trusted[:, inputs])
+    again = read & all_of(np.column_stack([_repeats(record.torque_nm[:, i]) for i in inputs]))
+    step = np.append(np.where(read[1:], np.diff(torque), 0.0), 0.0)  # from this row to the next
+    found, stale = None, np.zeros_like(read)
+    for clear in CLEAR:
+        prediction = predict(_mended(record, inputs, stale), trusted)
+        if prediction is None or prediction.gain == 0.0:
+            return None
+        early = np.full(torque.size, np.nan)  # torque beyond the recorded that the next output speaks of
+        early[prediction.rows - 1] = prediction.error / prediction.gain
+        early += _next_fresh(torque, stale) - torque  # which the predictor was given already
+        found = _late(again, step, early, np.abs(step * prediction.gain) > clear * prediction.typical)
+        stale = found.rows
+    return found
+
+
+def _repeats(torque: FloatArray) -> BoolArray:
+    return repeats(torque, lattice_step(torque))
+
+
+def _late(again: BoolArray, step: FloatArray, early: FloatArray, clear: BoolArray) -> LateTorque:
+    """Compare the clear steps after repeats with the others, and follow a burst of repeats back to its beginning."""
+    clear = clear & np.isfinite(early)
+    answered = np.zeros_like(clear)
+    answered[clear] = early[clear] / step[clear] > ANSWERED
+    rows = np.zeros_like(clear)
+    for last in np.flatnonzero(answered & again):
+        row = int(last)
+        while row > 0 and again[row] and early[row] / step[last] > ANSWERED:
+            rows[row] = True
+            row -= 1
+    counts = (answered & again, clear & again, answered & ~again, clear & ~again)
+    return LateTorque(rows, *(int(count.sum()) for count in counts))
+
+
+def _next_fresh(torque: FloatArray, stale: BoolArray) -> FloatArray:
+    """Return in each row the torque of the next row that is not stale, shape (N,)."""
+    rows = np.where(stale, torque.size - 1, np.arange(torque.size))
+    following: FloatArray = torque[np.minimum.accumulate(rows[::-1])[::-1]]
+    return following
+
+
+def _mended(record: Record, inputs: Sequence[int], stale: BoolArray) -> Record:
+    torque = record.torque_nm.copy()
+    for i in inputs:
+        torque[:, i] = _next_fresh(torque[:, i], stale)
+    return replace(record, torque_nm=torque)
+
+
+def pooled_p_value(found: Sequence[LateTorque]) -> float:
+    """Return the probability of so many early answers after repeats, if they were as common as elsewhere.
+
+    Elsewhere in the same recording: where the predictor follows one worse than the others, that one has more of both.
+    Above its mean a sum of binomials is at most as far out as Poisson's law of that mean (Hoeffding, Ann. Math. Stat.
+    27, 1956); that probability is returned.
+    """
+    usual = sum(late.repeats * (late.early_others + 1.0) / (late.others + 2.0) for late in found)
+    return float(stats.poisson.sf(sum(late.early for late in found) - 1, usual))
+
 
 Cells = dict[str, BoolArray]
 Size = tuple[float, tuple[float, float], float]

@@ -11,10 +11,9 @@ from collections.abc import Sequence
 import numpy as np
 from scipy import stats
 
-from estimator.diagnosis.acquisition.finding import OUTPUT, Finding, Sized, no_cells
-from estimator.diagnosis.acquisition.lattice import decimal_place
-from estimator.diagnosis.acquisition.limits import LEVEL, SMALLEST_P
+from estimator.diagnosis.acquisition.finding import LEVEL, OUTPUT, SMALLEST_P, Finding, Sized, no_cells
 from estimator.diagnosis.acquisition.predictor import predict, slope_test
+from estimator.diagnosis.acquisition.quantised import decimal_place
 from estimator.signals.record import FloatArray, Record, uniform_period_s
 
 AGREEMENT = 0.5

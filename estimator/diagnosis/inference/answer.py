@@ -4,27 +4,27 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from estimator.diagnosis.assemble import augmented_model, load_torques, retuned_parameters
 from estimator.diagnosis.chain import Chain, mechanical, read_through
-from estimator.diagnosis.hypotheses import Progress, open_hypotheses
-from estimator.diagnosis.inference.data_sheet import FreeLine, free_line
+from estimator.diagnosis.hypotheses import Progress, everything, open_hypotheses, silent
 from estimator.diagnosis.inference.disturbances import reading_noise
 from estimator.diagnosis.inference.figures import (
     FreeRuns,
+    Unseen,
     acquired,
     courses_of,
     effects_of,
     figures_of,
     first_figures,
     free_runs,
+    on_recordings,
     traces_of,
 )
-from estimator.diagnosis.inference.free_run import Unseen
 from estimator.diagnosis.inference.judge import (
     Decision,
     Grounds,
@@ -32,17 +32,18 @@ from estimator.diagnosis.inference.judge import (
     decide,
     error_falls,
     free_rms,
+    grounds,
     spread,
     verdict_of,
 )
 from estimator.diagnosis.inference.likelihood import SAME, Hypothesis, fitted, of_first_outputs
-from estimator.diagnosis.inference.read_again import Found, searched
 from estimator.diagnosis.inference.remainder import Test, tests, tests_in_words
+from estimator.diagnosis.inference.rivals import FreeLine, Law, best_law, free_line, hunts_around, rival_laws
 from estimator.diagnosis.inference.search import Search
-from estimator.diagnosis.inference.unnamed import Law, best_law, hunts_around, rival_laws
-from estimator.diagnosis.inference.wording import Beside, statement
-from estimator.diagnosis.phrases import law_in_words
+from estimator.diagnosis.inference.wording import Beside, law_in_words, statement
+from estimator.diagnosis.noise import noise_floor
 from estimator.diagnosis.preconditions import Prepared
+from estimator.diagnosis.preconditions.thinned import as_slow_as_needed
 from estimator.diagnosis.result import (
     Diagnosis,
     Discrepancy,
@@ -66,7 +67,56 @@ from estimator.physics.fit import not_fitted
 from estimator.physics.model import DrivelineModel
 from estimator.physics.steps import from_their_moment
 from estimator.physics.work import TimeIsUp, Work, counted
+from estimator.signals.outputs import outputs_apart
 from estimator.signals.record import FloatArray
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """What a search found, and the recordings as they were read for it."""
+
+    chain: Chain
+    search: Search
+    grounds: Grounds
+
+
+def ignore(_search: Search) -> None:
+    """Do nothing with a search that begins."""
+
+
+def searched(
+    chain: Chain,
+    line: DrivelineModel,
+    work: Work | None = None,
+    most: float = math.inf,
+    watch: Callable[[Search], None] = ignore,
+    progress: Progress = silent,
+) -> Found:
+    """Search for what is missing; once more where the errors of what is found show jitter."""
+
+    def begun(of: Chain) -> Search:
+        search = _search(of, line, work or Work(), most)
+        search.progress = progress
+        watch(search)
+        return search
+
+    found = _found(chain, begun(chain))
+    if found.search.stopped:
+        return found
+    free = on_recordings(found.grounds.best, line, chain.apart, is_whole=True)
+    steady = chain.with_jitter_in(free.first_outputs())
+    return found if steady is chain else _found(steady, begun(steady))
+
+
+def _search(chain: Chain, line: DrivelineModel, work: Work, most: float) -> Search:
+    fitted_to = outputs_apart(as_slow_as_needed(chain.records, line), noise_floor)
+    names = open_hypotheses(line, chain.records)[0]
+    return Search(line, fitted_to, everything(fitted_to), names, work=work, most=most)
+
+
+def _found(chain: Chain, search: Search) -> Found:
+    return Found(chain, search, grounds(search))
+
 
 SMALLEST_P = 1e-300
 
@@ -285,7 +335,7 @@ def _untestable(blind: Mapping[str, Untestable]) -> tuple[UntestableEffect, ...]
 
 def _effort(search: Search, level: str, decision: Decision) -> Effort:
     """Return what the search cost; ``untried`` is what looked worth a fit and had none."""
-    settled = {*search.rivals, *search.implausible, *decision.best.effects}
+    settled = {*search.rivals, *search.implausible, *(name for effects in search.visited for name in effects)}
     best = decision.best.score
     untried = tuple(
         name for name in search.names if name not in settled and search.foreseen.get(name, -math.inf) < best
@@ -357,7 +407,7 @@ def _rejected(search: Search, decision: Decision, named: set[str], untried: set[
     best = decision.best.score
     doubted = {each.name: RejectedEffect(each.name, each.reason, 0.0) for each in decision.doubted}
     scores = (
-        (search.rivals, "fitted: the best set with it is {} in minus twice the log-probability"),
+        (_fitted(search), "fitted: the best set with it is {} in minus twice the log-probability"),
         (
             search.implausible,
             "fitted, and ended at values that are no case of it: {} in minus twice the log-probability",
@@ -371,6 +421,15 @@ def _rejected(search: Search, decision: Decision, named: set[str], untried: set[
                 found[name] = RejectedEffect(name, reason.format(_compared(score - best)), min(best - score, 0.0))
     found = {name: each for name, each in found.items() if name not in named and name not in untried}
     return tuple(sorted(found.values(), key=lambda each: -each.delta_bic))
+
+
+def _fitted(search: Search) -> dict[str, float]:
+    """Return the best score of a set with each effect that was fitted, to its end or a few steps."""
+    scores = dict(search.rivals)
+    for effects, each in search.visited.items():
+        for name in effects if search.is_plausible(each) else ():
+            scores[name] = min(each.score, scores.get(name, math.inf))
+    return scores
 
 
 def _compared(worse: float) -> str:

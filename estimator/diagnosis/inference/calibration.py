@@ -51,12 +51,5 @@ ALIKE_SHARE = 0.03
 """The same over what the effect itself explains: nature's laws are written in other forms, and none is known to better
 than some per cent of what it does."""
 
-MOST_AT_PLACE, MOST_ELSEWHERE = 0.75, 0.9
-"""Shares of what a law without a name gains that names must gain to stand against it: those at its own place by
-themselves, of which it is another form, and all together. A law of many terms follows the form of a real machine more
-closely than any name does. Set by hand: dry friction gains 0.80 of such a law in the EMPS drive, and 0.93 to 0.97 in a
-small motor; sets that imitate a dead band, an inertia by speed or a curved sensor gain 0.4 to 0.88 (worlds outside the
-catalogue, seeds 34000 to 34026)."""
-
 CLEARLY_BELOW = 0.5
 """RMS of the augmented model's error, over the spread of the signal, up to which anything is explained."""

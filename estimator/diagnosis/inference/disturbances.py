@@ -1,30 +1,275 @@
-"""What moves the output beyond every law: the noise of the readings, a torque reading that drifts, a load that walks.
-
-The free-run error of a hypothesis is the output of the line under these disturbances::
-
-    error = line(torque reading's noise + its drift, load's walk) + coloured + white reading noise
-
-Torque noise is white, and as large as a gap makes it where a torque was not read; its drift and the coloured reading
-noise are of first order, the load's walk is a random one. A Kalman filter of this model whitens the error; the model's
-sizes and times are estimated with each hypothesis.
-
-Torque and load are the same for every measured output of a recording; each has a reading's noise of its own.
-"""
+"""Disturbances of torque, load and reading, and the Kalman filter that whitens their error."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from enum import IntEnum
+from functools import partial
 
 import numpy as np
+from scipy.linalg import expm
 
-from estimator.diagnosis.inference.whitener import READING, Size, Whitener, changes_of, of_first, readings, whitening_of
+from estimator.diagnosis.line.motion import LASTS, FormPlace, form_changes
+from estimator.diagnosis.line.whitening import Gains, Terms, fill_gains, innovate, terms_of
 from estimator.diagnosis.noise import noise_floor
 from estimator.physics.fit import FitResult
+from estimator.physics.layout import slot
+from estimator.physics.model import Structure
 from estimator.physics.motion import torque_scale
+from estimator.physics.problem import Rows
 from estimator.physics.work import check_time
+from estimator.signals.correlation import stand_in_variance
 from estimator.signals.outputs import by_output
-from estimator.signals.record import FloatArray, OutputKind, Record
+from estimator.signals.record import BoolArray, FloatArray, Location, OutputKind, Record
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """The linear line as disturbances see it, sampled.
+
+    Attributes
+    ----------
+    f : ndarray, shape (n, n)
+    torque, load, shaft : ndarray, shape (n,)
+        How a torque held for a sample, at the motor, against the load and more in the first shaft, moves the state.
+    h : ndarray, shape (C, n)
+        How each output shows the state.
+    direct : float
+        How the load shows in the output at once: 1 for a joint, whose torque is read.
+    """
+
+    f: FloatArray
+    torque: FloatArray
+    load: FloatArray
+    h: FloatArray
+    direct: float = 0.0
+    shaft: FloatArray = field(default_factory=lambda: np.zeros(0))
+
+
+def line_of(result: FitResult) -> Line:
+    """Return the linear line with a fit's values, as the recordings' outputs show it.
+
+    Effects beyond it do not change how disturbances spread.
+    """
+    records, structure = result.problem.records, result.problem.grid.structure
+    outputs = [records[part.start] for part in by_output(records)]
+    if structure is Structure.JOINT:
+        nothing = np.zeros(0)
+        return Line(np.zeros((0, 0)), nothing, nothing, np.zeros((len(outputs), 0)), 1.0)
+    values = {name: float(result.p[slot("", name)]) for name in structure.parameter_names}
+    a, at_motor, at_load = _continuous(values)
+    n = a.shape[0]
+    h = np.array([_seen(record, a, values) / record.unit for record in outputs])
+    joined = np.zeros((n + 3, n + 3))
+    joined[:n, :n], joined[:n, n], joined[:n, n + 1], joined[:n, n + 2] = a, at_motor, at_load, _in_shaft(values)
+    moved = expm(joined * outputs[0].sample_time_s)
+    keep = list(range(n if h[:, -1].any() else n - 1))  # the angle stands last
+    return Line(moved[np.ix_(keep, keep)], moved[keep, n], moved[keep, n + 1], h[:, keep], 0.0, moved[keep, n + 2])
+
+
+def _seen(record: Record, a: FloatArray, values: Mapping[str, float]) -> FloatArray:
+    """Return how the state of a chain shows in an output; what a torque adds to an acceleration at once is left out."""
+    h, is_load = np.zeros(a.shape[0]), record.location is Location.LOAD
+    speed = h.size - 2 if is_load else 0
+    if record.kind is OutputKind.TORQUE:
+        h[:3] = values["c"], values["k"], -values["c"]
+    elif record.kind is OutputKind.ACCELERATION:
+        h[:] = a[speed]
+    elif record.kind is OutputKind.POSITION:
+        h[-1], h[1:-1:2] = 1.0, -float(is_load)  # behind the shafts less their twists
+    else:
+        h[speed] = 1.0
+    return h
+
+
+def _in_shaft(values: Mapping[str, float]) -> FloatArray:
+    """Return how a torque more in the first shaft drives a chain: back on the motor, and on what is behind it."""
+    inertias = [values[name] for name in ("J_M", "J_2", "J_L") if name in values]
+    at_shaft = np.zeros(2 * len(inertias))
+    if len(inertias) > 1:
+        at_shaft[[0, 2]] = -1.0 / inertias[0], 1.0 / inertias[1]
+    return at_shaft
+
+
+def _continuous(values: dict[str, float]) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return state matrix and inputs of a chain: speeds and twists in turn, last the motor's angle."""
+    inertias = [values[name] for name in ("J_M", "J_2", "J_L") if name in values]
+    springs = [(values[k], values[c]) for k, c in (("k", "c"), ("k_2", "c_2")) if k in values]
+    viscous = [values["b_M"], *[0.0] * (len(inertias) - 2), *([values["b_L"]] if "b_L" in values else [])]
+    n = 2 * len(inertias)
+    a, at_motor, at_load = np.zeros((n, n)), np.zeros(n), np.zeros(n)
+    a[n - 1, 0] = 1.0
+    for i, (inertia, b) in enumerate(zip(inertias, viscous, strict=True)):
+        a[2 * i, 2 * i] -= b / inertia
+    for i, (k, c) in enumerate(springs):
+        left, twist, right = 2 * i, 2 * i + 1, 2 * i + 2
+        a[twist, left], a[twist, right] = 1.0, -1.0
+        for speed, sign, inertia in ((left, -1.0, inertias[i]), (right, 1.0, inertias[i + 1])):
+            a[speed, [twist, left, right]] += sign / inertia * np.array([k, c, -c])
+    at_motor[0] = 1.0 / inertias[0]
+    at_load[n - 2] = -1.0 / inertias[-1]
+    return a, at_motor, at_load
+
+
+class Size(IntEnum):
+    """Places in the vector of a noise model: natural logarithms of sizes and times.
+
+    The noise of each further output's reading follows: its ``WHITE``, ``COLOURED`` and ``COLOUR_S``.
+    """
+
+    WHITE = 0
+    COLOURED = 1
+    COLOUR_S = 2
+    TORQUE = 3
+    DRIFT = 4
+    DRIFT_S = 5
+    WALK = 6
+    FORM = 7
+
+
+READING = 3
+"""How many sizes are of an output's reading."""
+
+
+def of_first(sizes: FloatArray) -> FloatArray:
+    """Return the noise model of the first output alone, shape (8,)."""
+    return sizes[: len(Size)]
+
+
+def readings(sizes: FloatArray) -> FloatArray:
+    """Return the sizes of each output's reading, shape (C, 3), of a noise model of C outputs."""
+    return np.concatenate([sizes[:READING], sizes[len(Size) :]]).reshape(-1, READING)
+
+
+@dataclass(frozen=True, slots=True)
+class Whitener:
+    """Kalman filters for recordings: a linear map of their errors to innovations of variance 1.
+
+    Attributes
+    ----------
+    f, h : Terms
+        Of the transition, shape (m, m), and of how the outputs show the state, shape (C, m).
+    gains : tuple of Gains
+        Of each recording.
+    use : tuple of ndarray of bool, shape (N_i, C)
+    rows : tuple of Rows
+        Where the samples of each recording that count stand among all, its outputs in turn.
+    """
+
+    f: Terms
+    h: Terms
+    gains: tuple[Gains, ...]
+    use: tuple[BoolArray, ...]
+    rows: tuple[Rows, ...]
+
+    def __call__(self, stacked: FloatArray) -> FloatArray:
+        """Return the innovations of stacked errors of the samples that count, shape (R,) or (R, K)."""
+        columns = np.atleast_2d(stacked.T).T
+        found = np.empty(columns.shape)
+        for i, rows in enumerate(self.rows):
+            found[rows] = self.part(i, columns[rows])
+        return found.reshape(stacked.shape)
+
+    def part(self, index: int, columns: FloatArray) -> FloatArray:
+        """Return the same of one recording alone, shape (R_i, K)."""
+        found = np.array(columns, order="C")
+        innovate(self.f, self.h, self.gains[index], self.use[index], found)
+        return found
+
+    @property
+    def logs(self) -> FloatArray:
+        """Logarithms of the innovations' standard deviations, stacked, shape (R,)."""
+        found = np.empty(sum(int(use.sum()) for use in self.use))
+        for rows, gains, use in zip(self.rows, self.gains, self.use, strict=True):
+            found[rows] = np.log(gains.spread.T[use.T])
+        return found
+
+    def minus_twice_log(self, innovations: FloatArray) -> float:
+        """Return minus twice the log-likelihood of stacked innovations, but for a constant."""
+        return 2.0 * float(self.logs.sum()) + float(innovations @ innovations)
+
+
+def whitener_of(result: FitResult, sizes: FloatArray) -> Whitener:
+    """Return the filters of a fit's errors under a noise model, ``sizes`` as `Size` says."""
+    return whitening_of(result)(sizes)
+
+
+def whitening_of(result: FitResult) -> Callable[[FloatArray], Whitener]:
+    """Return a function from a noise model to the filters of a fit's errors."""
+    problem = result.problem
+    parts, firsts = by_output(problem.records), problem.records[: len(problem.bases)]
+    use = [np.zeros((record.time_s.size, len(parts)), dtype=np.bool_) for record in firsts]
+    for output, part in enumerate(parts):
+        for i in range(part.start, part.stop):
+            use[problem.leads[i]][:, output] = problem.use[i]
+    unread = [stand_in_variance(record) for record in firsts]
+    changes = changes_of(result)
+    return partial(whitener, line_of(result), firsts[0].sample_time_s, use, unread, problem.rows, changes=changes)
+
+
+def changes_of(result: FitResult) -> tuple[FloatArray, ...]:
+    """Return how much laws change in each recording at each place, shape (3, N_i); nothing where none does."""
+    each = tuple(form_changes(result, i) for i in range(len(result.problem.bases)))
+    return each if any(change.any() for change in each) else ()
+
+
+def whitener(
+    line: Line,
+    period_s: float,
+    use: Sequence[BoolArray],
+    unread: Sequence[FloatArray],
+    rows: Sequence[Rows],
+    sizes: FloatArray,
+    changes: Sequence[FloatArray] = (),
+) -> Whitener:
+    """Return the filters of recordings under a noise model, ``sizes`` as `Size` says.
+
+    Parameters
+    ----------
+    use : sequence of ndarray of bool, shapes (N_i, C)
+    unread : sequence of ndarray, shapes (N_i,)
+        Variance of each recording's torque where it was not read.
+    rows : sequence of Rows
+        See `Whitener`.
+    changes : sequence of ndarray, shapes (3, N_i)
+        By how much laws change at each place [Nm]; empty where none does (``form_error``).
+    """
+    torque, drift, drift_s, walk, share = np.exp(sizes[READING : len(Size)])
+    white, coloured, colour_s = np.exp(readings(sizes)).T
+    count, n = line.h.shape
+    off = [place for place in FormPlace if any(change[place].any() for change in changes)]
+    m = n + 2 + count + len(off)  # drift, walk, coloured of each output, laws off by their forms
+    forms = n + 2 + count + np.arange(len(off))
+    colours = n + 2 + np.arange(count)
+    f, q, prior, h = np.zeros((m, m)), np.zeros((m, m)), np.zeros((m, m)), np.zeros((count, m))
+    kept_drift, kept_colour = np.exp(-period_s / drift_s), np.exp(-period_s / colour_s)
+    f[:n, :n], f[:n, n], f[:n, n + 1] = line.f, line.torque, line.load
+    f[n, n], f[n + 1, n + 1], f[colours, colours] = kept_drift, 1.0, kept_colour
+    q[:n, :n] = torque**2 * np.outer(line.torque, line.torque)
+    q[n, n], q[n + 1, n + 1] = drift**2 * (1.0 - kept_drift**2), walk**2 * period_s
+    q[colours, colours] = coloured**2 * (1.0 - kept_colour**2)
+    prior[n, n], prior[colours, colours] = drift**2, coloured**2
+    h[:, :n], h[:, n + 1], h[np.arange(count), colours] = line.h, line.direct, 1.0
+    at_input = np.zeros((1 + len(off), m))
+    at_input[0, :n], at_input[1:, forms] = line.torque, np.eye(len(off))
+    kept_form = np.exp(-1.0 / LASTS)
+    f[forms, forms] = kept_form
+    for place, state in zip(off, forms, strict=True):
+        f[:n, state] = (line.torque, line.load, line.shaft)[place]
+    terms = terms_of(f)
+    seen: dict[tuple[bytes, bytes], Gains] = {}
+    each = []
+    for i, (mask, own) in enumerate(zip(use, unread, strict=True)):
+        of_forms = [(1.0 - kept_form**2) * (share * changes[i][place]) ** 2 for place in off]
+        variance = np.column_stack([own, *of_forms])
+        key = mask.tobytes(), variance.tobytes()
+        if key not in seen:
+            seen[key] = Gains(np.empty((*mask.shape, m)), np.empty((*mask.shape, count)), np.empty(mask.shape))
+            fill_gains(terms, h, q, white**2, prior, mask, at_input, variance, seen[key])
+        each.append(seen[key])
+    return Whitener(terms, terms_of(h), tuple(each), tuple(use), tuple(rows))
+
 
 TORQUE_SHARE, DRIFT_SHARE, WALK_SHARE = 2e-3, 2e-3, 5e-4
 """Usual sizes as shares of the torque in use: a reading of a per mille of the rated torque, its drift, and the change

@@ -1,4 +1,4 @@
-"""What a diagnosis says in figures: free runs of what is believed, at the recordings' own rate, and their errors."""
+"""Figures of a diagnosis: free runs of what is believed, their errors, and effects with values and intervals."""
 
 from __future__ import annotations
 
@@ -9,25 +9,202 @@ from functools import cached_property
 
 import numpy as np
 
-from estimator.diagnosis.assemble import acquired_effects, rms_of
+from estimator.diagnosis.assemble import acquired_effects, moments_in, parameters_of, profile_size, profiles_of, rms_of
 from estimator.diagnosis.chain import Chain
-from estimator.diagnosis.holdout import foreign_outputs
-from estimator.diagnosis.hypotheses import NOTHING, everything
+from estimator.diagnosis.hypotheses import NOTHING, Effects, everything
 from estimator.diagnosis.inference.calibration import LEAST_SHARE
 from estimator.diagnosis.inference.descent import descended
 from estimator.diagnosis.inference.disturbances import reading_noise
-from estimator.diagnosis.inference.effects import found_effects
-from estimator.diagnosis.inference.free_run import Unseen, on_recordings
-from estimator.diagnosis.inference.judge import Decision
-from estimator.diagnosis.inference.likelihood import THOROUGH, Hypothesis, covariance
+from estimator.diagnosis.inference.judge import Belief, Decision, free_rms
+from estimator.diagnosis.inference.likelihood import THOROUGH, Hypothesis, covariance, refitted
+from estimator.diagnosis.inference.plausible import GRADE
 from estimator.diagnosis.intervals import reported_covariance
-from estimator.diagnosis.result import Fit, FoundEffect, OutputFit, Trace
-from estimator.physics.fit import FitResult, fit, not_fitted
+from estimator.diagnosis.result import Evidence, Fit, FoundEffect, OutputFit, Trace
+from estimator.physics.catalogue import EFFECTS
+from estimator.physics.fit import FitResult, fit, not_fitted, warm_start
+from estimator.physics.free_run import simulate_foreign
 from estimator.physics.model import DrivelineModel, unit
-from estimator.physics.problem import make_problem, start_vector
-from estimator.physics.unknowns import Shared
+from estimator.physics.problem import Problem, make_problem, parameters, start_vector
+from estimator.physics.unknowns import LocalBasis, Shared
 from estimator.signals.outputs import by_output
-from estimator.signals.record import FloatArray, OutputKind, Record
+from estimator.signals.record import BoolArray, FloatArray, OutputKind, Record
+
+BLOCK_S, EVERY_S = 0.6, 2.0
+"""Blocks kept out for a profile: shorter than its knot spacing, so that its neighbours predict it."""
+
+FEWEST_BLOCKS = 3
+"""Blocks of a recording at least: it may be shorter than one of these."""
+
+
+def blocks(record: Record) -> BoolArray:
+    """Return which samples are kept out: blocks all along, none at the very ends; shape (N,).
+
+    A recording too short for as many has shorter ones, closer together.
+    """
+    since_s = record.time_s - record.time_s[0]
+    scale = min(1.0, float(since_s[-1]) / (FEWEST_BLOCKS * EVERY_S))
+    every_s, block_s = scale * EVERY_S, scale * BLOCK_S
+    phase = np.mod(since_s, every_s)
+    middle = 0.5 * (every_s - block_s)
+    inside: BoolArray = (phase >= middle) & (phase < middle + block_s)
+    return inside
+
+
+def foreign_outputs(
+    result: FitResult,
+    model: DrivelineModel,
+    records: Sequence[Record],
+    use: Sequence[BoolArray],
+    effects: Effects,
+) -> tuple[FloatArray, ...]:
+    """Simulate other recordings with a fit's parameters; only what is each recording's own is estimated."""
+    return tuple(
+        simulate_foreign(model, result.p, result.problem.grid, record, samples, effects)
+        for record, samples in zip(records, use, strict=True)
+    )
+
+
+ITERATIONS = 8
+"""Steps of a least-squares fit of what is a recording's own, which is nearly linear."""
+
+
+def on_recordings(
+    hypothesis: Hypothesis,
+    line: DrivelineModel,
+    records: Sequence[Record],
+    is_whole: bool,
+    use: Sequence[BoolArray] | None = None,
+) -> FitResult:
+    """Return the free run of a hypothesis on recordings it was fitted to, at their own rate.
+
+    Parameters
+    ----------
+    is_whole : bool
+        Whether the hypothesis leaves nothing but its disturbances: else its parameters are estimated anew, too.
+    use : sequence of ndarray of bool, optional
+        The samples to estimate from; by default all good ones.
+    """
+    of = hypothesis.plain.problem
+    own = [basis.own for basis in of.local]
+    problem = make_problem(line, records, of.shared, own=own, profile=GRADE in hypothesis.effects, use=use)
+    own_alone = _with_own(problem, warm_start(problem, hypothesis.plain))
+    if is_whole:
+        return own_alone
+    rms = own_alone.rms
+    return descended(own_alone, lambda errors: errors / rms, THOROUGH).light()
+
+
+def _with_own(problem: Problem, x: FloatArray) -> FitResult:
+    """Estimate initial states, load torques and courses; phases and moments stay where they are."""
+    count = len(problem.shared)
+    held = tuple(_held(basis, x_i) for basis, x_i in zip(problem.bases, _parts(problem, x), strict=True))
+    alone = replace(problem, p=parameters(problem, x), shared=(), local=tuple(held[lead] for lead in problem.leads))
+    own = fit(alone, x[count:], ITERATIONS)
+    return FitResult(problem, np.concatenate([x[:count], own.x]), own.outputs, own.residual, None, own.converged)
+
+
+def _parts(problem: Problem, x: FloatArray) -> list[FloatArray]:
+    ends = np.cumsum([basis.guess.size for basis in problem.bases])[:-1]
+    return list(np.split(x[len(problem.shared) :], ends))
+
+
+def _held(basis: LocalBasis, x: FloatArray) -> LocalBasis:
+    values = (float(value) for value in x[basis.own_rows])
+    own = tuple(replace(u, low=v, high=v, start=v) for u, v in zip(basis.own, values, strict=True))
+    return replace(basis, own=own)
+
+
+@dataclass(frozen=True, slots=True)
+class Unseen:
+    """The samples that judge: those of recordings kept out of the fit, else blocks of the recordings themselves.
+
+    Attributes
+    ----------
+    line : DrivelineModel
+    chain : Chain
+        Of recordings kept out of every fit; empty where there are none.
+    """
+
+    line: DrivelineModel
+    chain: Chain
+
+    def rms(self, hypothesis: Hypothesis, whole: FitResult, is_whole: bool, seen: Chain, is_as_read: bool) -> float:
+        """Return the RMS of a hypothesis' free-run error in blocks of 0.6 s every 2 s [unit of the output].
+
+        What is between the blocks tells what is a recording's own. Without recordings kept out the hypothesis is
+        fitted once more to what is between them; ``whole`` is its free run with the values of the whole fit.
+        Where faults of the acquisition were recognised the readings judge: simulated ``as_read``, or as it is.
+        """
+        judging = self.chain if self.chain.records else seen
+        records: Sequence[Record] = judging.records if self.chain.records else hypothesis.plain.problem.records
+        if judging.findings and not self.chain.records:
+            records = seen.apart
+        between = [record.okay & ~blocks(record) for record in records]
+        if self.chain.records:
+            outputs = foreign_outputs(whole, self.line, records, between, hypothesis.effects)
+        else:
+            plain = hypothesis.plain
+            if is_whole:
+                of = plain.problem
+                use = tuple(record.okay & ~blocks(record) for record in of.records)
+                plain = refitted(hypothesis, replace(of, use=use))
+            outputs = on_recordings(replace(hypothesis, plain=plain), self.line, records, is_whole, between).outputs
+        firsts = [(out, record) for out, record in zip(outputs, records, strict=True) if record.lead is None]
+        inside = [blocks(record) for _, record in firsts]
+        if not judging.findings:
+            errors = [(out - r.output)[r.okay & held] for (out, r), held in zip(firsts, inside, strict=True)]
+        elif is_as_read:
+            errors = judging.errors([out for out, _ in firsts], inside)
+        else:
+            pairs = zip(firsts, judging.raw, inside, strict=True)
+            errors = [(out - raw.output)[raw.okay & held] for (out, _), raw, held in pairs]
+        return float(np.sqrt(np.mean(np.concatenate(errors) ** 2)))
+
+
+SMALLEST_P = 1e-300
+
+
+def found_effects(
+    decision: Decision, estimate: FitResult, cov: FloatArray, model: DrivelineModel
+) -> tuple[FoundEffect, ...]:
+    """Return the named effects, the weightiest first, with the values and covariance of a fit."""
+    return tuple(_found(belief, decision, estimate, cov, model) for belief in decision.named)
+
+
+def _found(
+    belief: Belief, decision: Decision, estimate: FitResult, cov: FloatArray, model: DrivelineModel
+) -> FoundEffect:
+    entry, best = EFFECTS[belief.name], decision.best
+    nulls = {parameter.name: parameter.null for parameter in entry.parameters}
+    profiles = {}
+    if belief.name == GRADE:
+        of = best.plain.problem
+        problem = make_problem(model, of.records, of.shared, own=[b.own for b in of.local], profile=True, use=of.use)
+        course = fit(problem, warm_start(problem, best.plain))
+        of_course = reported_covariance(course)
+        profiles, parameters = profiles_of(course, of_course, model), profile_size(course, of_course, model)
+    else:
+        parameters = parameters_of(belief.name, estimate, cov, model)
+    return FoundEffect(
+        name=entry.name,
+        element=entry.element,
+        statement=entry.sentence(nulls | {name: p.value for name, p in parameters.items()}, model.motion),
+        parameters=parameters,
+        time_s=moments_in(belief.name, estimate) if entry.event else {},
+        indistinguishable_from=tuple(belief.alike),
+        alternatives=belief.alike,
+        evidence=Evidence(
+            belief.score,
+            free_rms(decision.nothing),
+            free_rms(best),
+            max(math.exp(-0.5 * max(belief.score, 0.0)), SMALLEST_P),
+        ),
+        profiles=profiles,
+        share=belief.share,
+        probability=belief.probability,
+        form=entry.form({name: p.value for name, p in parameters.items()}),
+    )
+
 
 DIMENSIONS = {
     OutputKind.SPEED: "speed",

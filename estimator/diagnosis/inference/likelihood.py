@@ -1,10 +1,4 @@
-"""The fit of one hypothesis under the weighting of its own disturbances, and its score.
-
-A hypothesis is a set of effects. Its unknowns ``x`` and the sizes of its disturbances are estimated in turn, each where
-the other ended, until the likelihood of the recordings stays: ``x`` by Gauss-Newton steps on the innovations, the sizes
-by Fisher scoring. Source: Ljung, System Identification (2nd ed., 1999), chapters 4 and 7: prediction errors of a model
-of Box and Jenkins, here with a noise model of physical sizes in place of free polynomials.
-"""
+"""The fit of one hypothesis under the weighting of its own disturbances, and its score."""
 
 from __future__ import annotations
 
@@ -19,18 +13,115 @@ from estimator.diagnosis.hypotheses import Effects
 from estimator.diagnosis.inference.descent import Effort, descended, extended, light
 from estimator.diagnosis.inference.disturbances import (
     Limits,
+    Whitener,
     estimated,
     minus_twice_log_prior,
+    of_first,
     reading_noise,
+    readings,
+    whitener_of,
 )
-from estimator.diagnosis.inference.moments import moved
-from estimator.diagnosis.inference.whitener import Whitener, of_first, readings, whitener_of
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import MOMENT_NAMES, FitResult, not_fitted
-from estimator.physics.jacobian import jacobian_at
-from estimator.physics.problem import Problem, bounds
+from estimator.physics.jacobian import changes, jacobian_at
+from estimator.physics.problem import Problem, bounds, own_part, simulated_each
+from estimator.physics.unknowns import LocalBasis
 from estimator.signals.outputs import by_output
-from estimator.signals.record import FloatArray
+from estimator.signals.record import FloatArray, Record
+
+OFFSETS_S = np.array([0.01, 0.02, 0.04, 0.08, 0.15, 0.3, 0.6, 1.2, 2.4])
+OFFSETS_S = np.concatenate([-OFFSETS_S[::-1], OFFSETS_S])
+"""Where else the likelihood is looked at, around the moment a fit ended at; and at the recording's own ends."""
+
+WORTH_MOVING = 2.0
+"""Fall of the squared innovations that moments elsewhere must bring."""
+
+MOVES = 4
+
+
+def moved(result: FitResult, filtered: Whitener) -> tuple[Problem, FloatArray] | None:
+    """Return a problem and its unknowns with moments where the innovations are less; None where they are nowhere.
+
+    A fit may move them from there as far as it could before.
+    """
+    problem, x, better = result.problem, result.x.copy(), False
+    bases = list(problem.local)
+    for i, basis in enumerate(problem.bases):
+        local = _moved_in(result, filtered, i)
+        if local is not None:
+            x[own_part(problem, i)], better = local, True
+            bases[i] = _around(basis, local, problem.records[i])
+    return (replace(problem, local=tuple(bases[lead] for lead in problem.leads)), x) if better else None
+
+
+def _around(basis: LocalBasis, local: FloatArray, record: Record) -> LocalBasis:
+    """Return a basis with the bounds of movable moments as wide as before, around where they are."""
+    first, last = (float(each) for each in record.since_start_s[[0, -1]])
+    last += record.sample_time_s
+    own = []
+    for row, unknown in enumerate(basis.own, start=basis.own_rows.start):
+        if EFFECTS[unknown.effect].event and unknown.low < unknown.high:
+            at, reach = float(local[row]), 0.5 * (unknown.high - unknown.low)
+            unknown = replace(unknown, start=at, low=max(first, at - reach), high=min(last, at + reach))
+        own.append(unknown)
+    return replace(basis, own=tuple(own))
+
+
+def _moved_in(result: FitResult, filtered: Whitener, index: int) -> FloatArray | None:
+    basis, local = result.problem.local[index], result.local_of(index).copy()
+    ends = _ends(basis)
+    if not ends:
+        return None
+    taken_up = _initial_state(result, filtered, index)
+    began = best = float(_squares(result, filtered, index, taken_up, [local])[0])
+    first, last = (float(each) for each in result.problem.records[index].since_start_s[[0, -1]])
+    for begin, end in ends:
+        may_move = [row for row in (begin, end) if basis.low[row] < basis.high[row]]
+        sets = [[row] for row in may_move] + ([may_move] if len(may_move) > 1 else [])
+        for _ in range(MOVES):
+            tried = [_shifted(local, rows, offset) for rows in sets for offset in OFFSETS_S]
+            tried += [_shifted(local, [row], {begin: first, end: last}[row] - local[row]) for row in may_move]
+            tried = [each for each in tried if first <= each[begin] <= each[end] <= max(last, local[end])]
+            if not tried:
+                break
+            squares = _squares(result, filtered, index, taken_up, tried)
+            if squares.min() >= best:
+                break
+            best, local = float(squares.min()), tried[int(squares.argmin())]
+    return local if best < began - WORTH_MOVING else None
+
+
+def _shifted(local: FloatArray, rows: list[int], offset_s: float) -> FloatArray:
+    x = local.copy()
+    x[rows] += offset_s
+    return x
+
+
+def _ends(basis: LocalBasis) -> list[tuple[int, int]]:
+    """Return where beginning and end of each event stand among a recording's unknowns."""
+    place = {(u.effect, u.name): row for row, u in enumerate(basis.own, start=basis.own_rows.start)}
+    movable = {u.effect for u in basis.own if EFFECTS[u.effect].event and u.low < u.high}
+    return [(place[effect, "from_s"], place[effect, "to_s"]) for effect in sorted(movable)]
+
+
+def _initial_state(result: FitResult, filtered: Whitener, index: int) -> FloatArray:
+    """Return an orthonormal basis of what load torque and initial state do to the innovations."""
+    first = own_part(result.problem, index).start
+    columns = np.arange(first, first + result.problem.local[index].own_rows.start)
+    return np.linalg.qr(filtered.part(index, changes(result.problem, result.x, index, columns, result.outputs)))[0]
+
+
+def _squares(
+    result: FitResult, filtered: Whitener, index: int, taken_up: FloatArray, tried: list[FloatArray]
+) -> FloatArray:
+    """Return the squared innovations for each of several vectors that differ in moments, shape (K,)."""
+    problem = result.problem
+    measured = np.concatenate([problem.records[i].output[problem.use[i]] for i in problem.drives[index]])
+    outputs = simulated_each(problem, [(result.p, x) for x in tried], index)
+    errors = filtered.part(index, (outputs - measured).T).T
+    left: FloatArray = (errors**2).sum(axis=1) - ((errors @ taken_up) ** 2).sum(axis=1)
+    return left
+
 
 SAME = 1.0
 """Fall of minus twice the log-likelihood below which another pass over unknowns and disturbances is not made."""

@@ -8,10 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from estimator.diagnosis.hypotheses import Effects
+from estimator.diagnosis.hypotheses import Effects, line_values
+from estimator.diagnosis.inference.disturbances import Size
 from estimator.diagnosis.inference.likelihood import Hypothesis
-from estimator.diagnosis.inference.whitener import Size
-from estimator.diagnosis.inherit import line_values
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Element, Span
 from estimator.physics.fit import FitResult

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from estimator.diagnosis.inference.calibration import TEST_LIMITS
+from estimator.diagnosis.inference.disturbances import Size
 from estimator.diagnosis.inference.likelihood import Hypothesis, residuals
-from estimator.diagnosis.inference.whitener import Size
 from estimator.diagnosis.noise import PREDICTOR_ORDER, unpredictable
 from estimator.physics.motion import measured_speed, motor_angle
 from estimator.signals.record import FloatArray, Record

@@ -10,14 +10,24 @@ from threading import Lock
 
 import numpy as np
 
-from estimator.diagnosis.hypotheses import NOTHING, Effects, Progress, open_hypotheses, silent, with_effect
+from estimator.diagnosis.hypotheses import (
+    NOTHING,
+    Effects,
+    Progress,
+    forgetting,
+    inheriting,
+    kept,
+    line_values,
+    open_hypotheses,
+    placed,
+    silent,
+    with_effect,
+)
 from estimator.diagnosis.inference.descent import extended
 from estimator.diagnosis.inference.disturbances import Limits, limits_of
 from estimator.diagnosis.inference.likelihood import Hypothesis, compared, fitted
-from estimator.diagnosis.inference.looks import Answers, Look, Remembering, screen
+from estimator.diagnosis.inference.looks import Answers, Look, Remembering, promising, screen
 from estimator.diagnosis.inference.plausible import GRADE, is_plausible, loosened, may_be_loose
-from estimator.diagnosis.inherit import forgetting, inheriting, kept, line_values, placed
-from estimator.diagnosis.screening import promising
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import FitResult, not_fitted, warm_start
 from estimator.physics.grid import Grid, grid_for

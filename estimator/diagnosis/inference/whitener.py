@@ -9,7 +9,7 @@ from functools import partial
 
 import numpy as np
 
-from estimator.diagnosis.inference.sampled_line import Line, line_of
+from estimator.diagnosis.inference.disturbances import Line, line_of
 from estimator.diagnosis.line.motion import LASTS, FormPlace, form_changes
 from estimator.diagnosis.line.whitening import Gains, Terms, fill_gains, innovate, terms_of
 from estimator.physics.fit import FitResult

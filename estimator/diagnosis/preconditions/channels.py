@@ -1,20 +1,171 @@
-"""Further measured outputs that can take part in a fit; what is wrong with the others is said, and the rest is used.
-
-A speed at the load goes as the motor's does, but for the shaft's twist; an angle as its integral, an acceleration as
-its slope, a shaft's torque as the torque that drives it. A channel that goes the other way, or much more or less than
-that, is turned round, or not reflected to the motor shaft, or it is another signal.
-"""
+"""Channels that no sensor made: clipped, wrapped, dead, repeated, or of another clock."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 
 from estimator.physics.motion import measured_speed
 from estimator.signals.record import BoolArray, Channel, FloatArray, IntArray, Location, OutputKind, Record
+
+HALF = 0.5
+"""Share of the range of a reading that a jump must exceed."""
+
+FAR = 4.0
+"""How far a jump must be, in the largest other steps."""
+
+TURN = 2.0 * math.pi
+NEAR_A_TURN = 0.01
+"""Share within which a jump is one of a whole turn."""
+
+
+def period_of(values: FloatArray, seen: BoolArray) -> float | None:
+    """Return after how much a reading begins anew; None where it does not.
+
+    Parameters
+    ----------
+    values : ndarray, shape (N,)
+    seen : ndarray of bool, shape (N,)
+        Which rows were read.
+
+    Returns
+    -------
+    float or None
+        In the unit of the reading; a single jump counts only if it is of a whole turn [rad].
+    """
+    both = seen[1:] & seen[:-1] & (values[1:] != 0.0) & (values[:-1] != 0.0)  # a lost reading is zero
+    steps = np.where(both, np.diff(values), 0.0)
+    jumps = np.abs(steps) > HALF * float(np.ptp(values[seen]))
+    if not jumps.any() or jumps.all():
+        return None
+    largest = float(np.abs(steps[~jumps]).max())
+    sizes = np.abs(steps[jumps])
+    if sizes.min() <= FAR * largest or float(np.ptp(sizes)) > 2.0 * largest:
+        return None
+    onward = np.array([_motion(steps, jumps, i) for i in np.flatnonzero(jumps).tolist()])
+    period = float(np.mean(np.sign(steps[jumps]) * (steps[jumps] - onward)))
+    if abs(period / TURN - 1.0) <= NEAR_A_TURN:
+        return TURN
+    return period if sizes.size > 1 else None
+
+
+def _motion(steps: FloatArray, jumps: BoolArray, at: int) -> float:
+    """Return the step that the motion itself makes at a jump: the mean of those around it."""
+    around = [i for i in (at - 1, at + 1) if 0 <= i < steps.size and not jumps[i]]
+    return float(np.mean(steps[around])) if around else 0.0
+
+
+def unwrapped(records: Sequence[Record]) -> tuple[list[Record], list[str]]:
+    """Put wrapped positions together again; say so."""
+    mended, warnings = [], []
+    for record in records:
+        seen = record.okay & np.isfinite(record.output)
+        period = period_of(record.output, seen) if record.kind is OutputKind.POSITION and seen.any() else None
+        if period is None:
+            mended.append(record)
+            continue
+        output = record.output.copy()
+        output[seen] = np.unwrap(output[seen], period=period)
+        mended.append(replace(record, output=output))
+        warnings.append(
+            f"recording {record.name}: the position wraps after {period:.6g} and was unwrapped. If it is no wrapped "
+            "angle, give it as it was read, without jumps."
+        )
+    return mended, warnings
+
+
+FEWEST_SAMPLES = 10
+"""Rows at the limit that count."""
+
+FEWEST_LEVELS = 10
+"""A channel of fewer values is switched."""
+
+SMALLEST_SHARE = 0.005
+"""Share of the rows that must stand at the limit: fewer change no fit."""
+
+OFTEN = 10.0
+"""How often the limit must come over any other value: four times what a smooth peak read in steps can have."""
+
+AT_PACE = 0.1
+"""Step before the signal comes to the limit, in its usual steps (medians): below, it settles there."""
+
+
+@dataclass(frozen=True, slots=True)
+class Clipped:
+    """One channel at one limit: the value, and in which rows it stands there, shape (N,)."""
+
+    channel: str
+    value: float
+    rows: BoolArray
+
+
+def clipped(channel: str, values: FloatArray, seen: BoolArray) -> list[Clipped]:
+    """Return the limits at which a channel is cut off, of its largest and its smallest value.
+
+    Parameters
+    ----------
+    values : ndarray, shape (N,)
+    seen : ndarray of bool, shape (N,)
+        Which rows were read.
+    """
+    levels, counts = np.unique(values[seen], return_counts=True)
+    if levels.size < FEWEST_LEVELS:
+        return []
+    others = counts[1:-1][levels[1:-1] != 0.0]
+    found = []
+    for end in (0, -1):
+        limit = float(levels[end])
+        often = counts[end] >= max(FEWEST_SAMPLES, SMALLEST_SHARE * values.size, OFTEN * others.max(initial=1))
+        rows: BoolArray = seen & (values == limit)
+        if limit != 0.0 and often and _at_pace(values, seen, rows):
+            found.append(Clipped(channel, limit, rows))
+    return found
+
+
+def _at_pace(values: FloatArray, seen: BoolArray, rows: BoolArray) -> bool:
+    """Tell whether a signal is still moving as it usually does when it comes to where it stands."""
+    before = np.abs(values[1:-1] - values[:-2])
+    read = seen[2:] & seen[1:-1] & seen[:-2]
+    comes = before[read & rows[2:] & ~rows[1:-1]]
+    usual = before[read & ~rows[1:-1] & ~rows[:-2] & (before > 0.0)]
+    return bool(comes.size and usual.size and np.median(comes) >= AT_PACE * np.median(usual))
+
+
+def without_clipped(records: Sequence[Record]) -> tuple[list[Record], list[str]]:
+    """Mask the rows in which the output is cut off; say so, and say where a torque seems to be.
+
+    A torque that stands at its limit may be cut off in the reading or held there by the drive; the reading
+    alone doesn't show which, so its rows stay.
+    """
+    mended, warnings = [], []
+    for record in records:
+        okay = record.okay.copy()
+        for found in clipped(record.kind.value, record.output, record.okay & np.isfinite(record.output)):
+            okay &= ~found.rows
+            warnings.append(
+                f"recording {record.name}: the {found.channel} stands at its limit {found.value:g} in "
+                f"{found.rows.mean():.1%} of the rows: its reading is cut off there; these rows are not used. "
+                "Widen the range of the sensor or of its scale."
+            )
+        mended.append(record if np.array_equal(okay, record.okay) else replace(record, okay=okay))
+        warnings += _torques(record)
+    return mended, warnings
+
+
+def _torques(record: Record) -> list[str]:
+    trusted = record.torque_trusted
+    return [
+        f"recording {record.name}: {found.channel} stands at its limit {found.value:g} in {found.rows.mean():.1%} of "
+        "the rows. If the drive limited it, the reading is right; if the reading is cut off, the verdict can't be "
+        "trusted: mask these rows ([signals] mask) or widen the range."
+        for i in range(record.torque_nm.shape[1])
+        for found in clipped(f"torque input {i + 1}", record.torque_nm[:, i], trusted[:, i])
+    ]
+
 
 FEWEST_GOOD = 0.5
 """Share of the recording's good rows that a channel must have read."""

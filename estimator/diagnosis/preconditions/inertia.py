@@ -1,33 +1,71 @@
-"""The inertia a recording fits, over the nominal one, found in two ways that missing physics hardly touches.
-
-**By bands.** Well below its first mode a line moves as one body, well above it only the motor does: there torque and
-speed follow the inertias, whatever the shaft does. A lag distorts the upper band, backlash or a soft shaft the lower;
-a factor between units moves both alike, so only where both agree is there a factor. Near the mode itself nothing is
-compared. A road, a brake or a speed control is slower than either band.
-
-**As one body.** Over a second the line moves as one body::
-
-    J (w(t + s) - w(t)) = int T dt - b int w dt - T_0 s,      J the sum of the inertias
-
-which is linear in 1/J, b/J and T_0/J. Means over a period of the first mode leave its swing out. This needs no mode and
-no torque near one, but motion that the torque makes: where a road makes it and a control sets the torque, the share
-of the speed's changes that the torque accounts for tells so.
-"""
+"""Inertia seen by torque and motion, against the model's."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 from scipy.signal import detrend
 
-from estimator.diagnosis.preconditions.driven import driven
+from estimator.physics.driveline import Start
 from estimator.physics.grid import Grid
-from estimator.physics.model import DrivelineModel, natural_frequencies_rad_s
+from estimator.physics.layout import flat
+from estimator.physics.model import DrivelineModel, Structure, natural_frequencies_rad_s
 from estimator.physics.motion import measured_speed
+from estimator.physics.simulate import simulate
 from estimator.signals.record import FloatArray, Record
+
+
+def driven(record: Record, line: DrivelineModel, grid: Grid, from_hz: float = 0.0, to_hz: float = np.inf) -> FloatArray:
+    """Simulate the output that the torque of a band of frequencies makes from rest; shape (N,) [unit of the output].
+
+    The torque is taken without its mean; above 0 Hz without its trend, too.
+    """
+    torque = record.total_torque_nm - record.total_torque_nm.mean()
+    if from_hz > 0.0 or to_hz < np.inf:
+        frequency = np.fft.rfftfreq(torque.size, record.sample_time_s)
+        spectrum = np.fft.rfft(detrend(torque))
+        spectrum[(frequency < from_hz) | (frequency > to_hz)] = 0.0
+        torque = np.fft.irfft(spectrum, torque.size)
+    alone = replace(record, torque_nm=torque[:, np.newaxis], load_nm=None, torque_okay=None, offset_s=None)
+    return simulate(grid, alone, flat(line), Start(0.0, 0.0, 0.0))
+
+
+UNEQUAL = 1000.0
+"""Ratio of two inertias from which on one of them is invisible from the other: 1 / 1000 of the motion."""
+
+
+def model_warnings(model: DrivelineModel) -> list[str]:
+    """Return what is odd about a model's values, one sentence each; values that can't be are refused by the model."""
+    values = model.values()
+    damping = _damping(values) if model.structure is Structure.TWO_MASS else []
+    return [*_inertias({name: value for name, value in values.items() if name.startswith("J")}), *damping]
+
+
+def _inertias(values: Mapping[str, float]) -> list[str]:
+    small, large = min(values, key=values.__getitem__, default=""), max(values, key=values.__getitem__, default="")
+    if small == large or values[large] < UNEQUAL * values[small]:
+        return []
+    return [
+        f"model: {small} = {values[small]:g} and {large} = {values[large]:g} differ by a factor of "
+        f"{values[large] / values[small]:.3g}; the smaller one can hardly be seen. Are both reflected to the motor "
+        "shaft and in the same unit?"
+    ]
+
+
+def _damping(values: Mapping[str, float]) -> list[str]:
+    first = float(natural_frequencies_rad_s(values)[0])
+    ratio = 0.5 * values["c"] * first / values["k"]  # of the relative motion of two masses: 2 zeta w_0 = c w_0^2 / k
+    if ratio < 1.0:
+        return []
+    return [
+        f"model: with c = {values['c']:g} and k = {values['k']:g} the first mode ({first / (2.0 * math.pi):.3g} Hz) is "
+        f"damped {ratio:.3g} times critically: the line does not oscillate. Are k and c in the right unit and order?"
+    ]
+
 
 BELOW, ABOVE = (0.1, 0.6), (1.6, math.inf)
 """The two bands, in first modes of the nominal model: a mode off by a quarter lies in neither."""

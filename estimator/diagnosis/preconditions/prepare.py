@@ -1,29 +1,236 @@
-"""From recordings as they were read to such as a diagnosis can be built on, and back again."""
+"""Preparation of recordings for a diagnosis: whether they belong together, excite anything, and what is left out."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+from scipy.signal import detrend
+
 from estimator.diagnosis.acquisition import as_if_not_lost
 from estimator.diagnosis.joined import joined
-from estimator.diagnosis.preconditions.channels import with_usable_channels
-from estimator.diagnosis.preconditions.clipped import without_clipped
-from estimator.diagnosis.preconditions.exciting import require_excitation, require_signals
-from estimator.diagnosis.preconditions.model_values import model_warnings
-from estimator.diagnosis.preconditions.not_read import without_not_read
-from estimator.diagnosis.preconditions.room import with_room
-from estimator.diagnosis.preconditions.thinned import thinned
-from estimator.diagnosis.preconditions.together import require_together
+from estimator.diagnosis.noise import noise_floor
+from estimator.diagnosis.preconditions.channels import unwrapped, with_usable_channels, without_clipped
+from estimator.diagnosis.preconditions.inertia import BODY_TELLS, Inertia, as_one_body, driven, model_warnings
+from estimator.diagnosis.preconditions.thinned import thinned, with_room, without_not_read
 from estimator.diagnosis.preconditions.units import require_plausible_units
-from estimator.diagnosis.preconditions.wrapped import unwrapped
 from estimator.diagnosis.result import Diagnosis
 from estimator.diagnosis.segments import Cut, cut
-from estimator.errors import NotExciting
-from estimator.physics.model import DrivelineModel
+from estimator.errors import BadShape, Cure, Implausible, NotExciting
+from estimator.physics.grid import Grid, grid_for
+from estimator.physics.model import DrivelineModel, Parameter, Structure, natural_frequencies_rad_s
 from estimator.physics.simulate import output_state
 from estimator.signals.outputs import outputs_apart
-from estimator.signals.record import Record
+from estimator.signals.record import FloatArray, OutputKind, Record
+
+FEWEST_SAMPLES = 200
+"""Fewer good samples than this do not carry a model with a dozen unknowns and its hold-out."""
+
+NEAR_MODE = 0.7
+"""From this share of the first natural frequency on a line answers otherwise than one body: by ``1 / (1 - 0.7^2)``,
+twice as much."""
+
+
+def require_signals(record: Record) -> None:
+    """Refuse a recording with too few good samples, or of which torque or output does not change.
+
+    Raises
+    ------
+    NotExciting
+        Naming the recording.
+    """
+    good = int(record.okay.sum())
+    if good < FEWEST_SAMPLES:
+        raise NotExciting(
+            f"recording {record.name}: {good} good samples, expected at least {FEWEST_SAMPLES}. Record longer.",
+            (record.name,),
+        )
+    driven_by = ("torque", record.total_torque_nm) if record.imposed is None else ("imposed motion", record.imposed)
+    for what, values in (driven_by, ("output", record.output)):
+        seen = values[record.okay]
+        if float(np.ptp(seen)) == 0.0:
+            raise NotExciting(
+                f"recording {record.name}: the {what} is constant at {seen[0]:g}, expected it to vary. "
+                "Excite the driveline (PRBS, reversal, tip-in) and check the channel.",
+                (record.name,),
+            )
+
+
+def require_excitation(records: Sequence[Record], model: DrivelineModel) -> list[str]:
+    """Refuse recordings in which nothing moves beyond the noise; warn where only a part of the model is excited.
+
+    What the torque does to the output is asked of the nominal model. A part of it that stays below the noise of the
+    reading is not excited: whatever is fitted there is fitted to noise.
+
+    Raises
+    ------
+    NotExciting
+        Where output or torque excites nothing in any recording.
+    """
+    floor = noise_floor(records)
+    moved = _rms([_good(record, record.output) for record in records])
+    excited = math.sqrt(max(moved**2 - floor**2, 0.0))
+    unit = records[0].kind.value
+    if excited < floor:
+        raise NotExciting(
+            f"the {unit} moves by {excited:.3g} (rms) beyond a noise of {floor:.3g}, expected more than the noise. "
+            "Excite the driveline (PRBS, reversal, tip-in).",
+            tuple(record.name for record in records),
+        )
+    if records[0].imposed is not None:  # no torque that could be too small
+        return []
+    line = replace(model, effects={})
+    grid = grid_for(line, records)
+    answer = _rms([_good(record, driven(record, line, grid)) for record in records])
+    if answer < floor:
+        raise NotExciting(
+            f"by the nominal model the torque moves the {unit} by {answer:.3g} (rms), less than its noise of "
+            f"{floor:.3g}: the torque excites nothing. Excite the driveline (PRBS, reversal, tip-in), and check that "
+            "the torque is in Nm (force: N).",
+            tuple(record.name for record in records),
+        )
+    return _unexcited_mode(records, line, grid, floor)
+
+
+def _unexcited_mode(records: Sequence[Record], line: DrivelineModel, grid: Grid, floor: float) -> list[str]:
+    first_hz = float(natural_frequencies_rad_s(line.values())[0]) / (2.0 * math.pi)
+    if first_hz == 0.0:
+        return []
+    lacking = "stiffness, damping and effects of the shaft can't be determined from these recordings"
+    nyquist_hz = 0.5 / records[0].sample_time_s
+    if nyquist_hz < first_hz:
+        return [
+            f"the model's first mode is at {first_hz:.3g} Hz, beyond the {nyquist_hz:.3g} Hz that a sampling period of "
+            f"{records[0].sample_time_s:g} s can show: {lacking}. Sample faster, or use structure = 'one_mass'."
+        ]
+    answer = _rms([_good(record, driven(record, line, grid, NEAR_MODE * first_hz)) for record in records])
+    if answer >= floor:
+        return []
+    return [
+        f"at and above the model's first mode ({first_hz:.3g} Hz) the torque moves the {records[0].kind.value} by "
+        f"{answer:.3g} (rms), less than its noise of {floor:.3g}: {lacking}. Superpose a PRBS, or a tip-in."
+    ]
+
+
+def _good(record: Record, signal: FloatArray) -> FloatArray:
+    """Return a signal's good samples without mean and trend."""
+    good: FloatArray = detrend(signal[record.okay])
+    return good
+
+
+def _rms(signals: Sequence[FloatArray]) -> float:
+    return math.sqrt(sum(float(signal @ signal) for signal in signals) / sum(signal.size for signal in signals))
+
+
+SAME_PERIOD = 1e-3
+"""Relative difference of sampling periods that rounding of time stamps makes."""
+
+
+def require_together(records: Sequence[Record]) -> None:
+    """Refuse recordings that do not belong together.
+
+    Raises
+    ------
+    BadShape
+        No recording, or different sampling periods, outputs or numbers of torques, or a name used twice.
+    """
+    if not records:
+        raise BadShape("no recording was given, expected at least one")
+    first = records[0]
+    names = [record.name for record in records]
+    if len(set(names)) < len(names):
+        raise BadShape(f"recordings must have different names, got {', '.join(names)}. Rename the files.")
+    for record in records[1:]:
+        if not np.isclose(record.sample_time_s, first.sample_time_s, rtol=SAME_PERIOD):
+            raise BadShape(
+                f"recording {record.name}: sampling period {record.sample_time_s:g} s, expected "
+                f"{first.sample_time_s:g} s as in {first.name}. Diagnose recordings of one period together."
+            )
+        if (record.kind, record.location) != (first.kind, first.location):
+            raise BadShape(
+                f"recording {record.name}: output is {record.kind.value} at the {record.location.value}, expected "
+                f"{first.kind.value} at the {first.location.value} as in {first.name}."
+            )
+        if record.torque_nm.shape[1] != first.torque_nm.shape[1]:
+            raise BadShape(
+                f"recording {record.name}: {record.torque_nm.shape[1]} torque inputs, expected "
+                f"{first.torque_nm.shape[1]} as in {first.name}. Give every recording the same inputs."
+            )
+
+
+FASTEST_RAD_S = 2500.0
+"""Speed of a traction motor that is not reached: 24,000 rpm. A speed in rpm is."""
+
+RPM = math.pi / 30.0
+
+CLEARLY = 0.5
+"""Share of the unexplained motion that may be left with columns changed or a torque turned round."""
+
+_BODY = DrivelineModel(Structure.ONE_MASS, {"J_M": Parameter(1.0, 0.0), "b_M": Parameter(0.0, 0.0)})
+
+
+def require_plausible_alone(record: Record) -> None:
+    """Refuse a recording whose columns are swapped, or off in sign or by a unit, whatever the model is.
+
+    Raises
+    ------
+    Implausible
+        With what cures it.
+    """
+    if record.kind is OutputKind.FORCE:
+        return
+    fastest = float(np.abs(record.output[record.okay]).max())
+    if record.kind is OutputKind.SPEED and fastest > FASTEST_RAD_S:
+        raise Implausible(
+            f"recording {record.name}: a speed of {fastest:.0f} rad/s is more than a drive reaches. Is it in rpm?",
+            Cure(record.name, output=RPM),
+        )
+    found = _moved(record)
+    _refuse_swapped(record, found)
+    _refuse_turned(record, found)
+    if found.share >= BODY_TELLS and found.ratio < 0.0:
+        raise Implausible(
+            f"recording {record.name}: the {record.kind.value} falls where the torque rises. Is the sign of one of "
+            "them turned round?",
+            Cure(record.name, output=-1.0),
+        )
+
+
+def _moved(record: Record) -> Inertia:
+    """Return the inertia that moves as one body [kg m^2], and how much of the motion the torque accounts for."""
+    return as_one_body(record, _BODY, 0.0)
+
+
+def _is_clearer(other: Inertia, found: Inertia) -> bool:
+    return other.share >= BODY_TELLS and 1.0 - other.share < CLEARLY * (1.0 - found.share)
+
+
+def _refuse_swapped(record: Record, found: Inertia) -> None:
+    for i in range(record.torque_nm.shape[1]):
+        torque, good = record.torque_nm.copy(), np.flatnonzero(record.okay)
+        torque[:, i] = np.interp(np.arange(record.okay.size), good, record.output[good])
+        other = _moved(replace(record, torque_nm=torque, output=record.torque_nm[:, i], torque_okay=None))
+        if other.ratio > 0.0 and _is_clearer(other, found):
+            raise Implausible(
+                f"recording {record.name}: torque input {i + 1} moves as the {record.kind.value} should, and vice "
+                "versa. Are their columns swapped?",
+                Cure(record.name, swapped=i),
+            )
+
+
+def _refuse_turned(record: Record, found: Inertia) -> None:
+    for i in range(record.torque_nm.shape[1] if record.torque_nm.shape[1] > 1 else 0):
+        turned = record.torque_nm.copy()
+        turned[:, i] *= -1.0
+        other = _moved(replace(record, torque_nm=turned))
+        if other.ratio > 0.0 and _is_clearer(other, found):
+            raise Implausible(
+                f"recording {record.name}: the {record.kind.value} follows the torques with the sign of input {i + 1} "
+                "turned round. All torques count positive in the direction of the speed.",
+                Cure(record.name, torque=-1.0, inputs=(i,)),
+            )
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,24 +1,152 @@
-"""Recordings faster than the line needs, thinned to what it needs: a diagnosis takes time and memory by the sample.
-
-Only where all of them together hold more than are used: fast samples tell a little more of the noise.
-
-The torque is averaged over the samples between two that are kept, as it acts on an inertia; the output is taken as it
-was read at the kept moments. Averaging that, too, would lower its noise, but also damp what the line does: at 12 blocks
-a period by 1 %, which a fit would take for a parameter.
-"""
+"""Samples for fits: those that were read, as slow as the line answers, as many as there is room for."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from math import sqrt
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from estimator.diagnosis.stretches import share_of
+from estimator.diagnosis.noise import share_of
+from estimator.diagnosis.segments import Cut
 from estimator.physics.model import DrivelineModel, Structure, natural_frequencies_rad_s
-from estimator.signals.record import Record
+from estimator.signals.record import BoolArray, FloatArray, OutputKind, Record
+
+FEWEST_SAMPLES = 20
+"""Samples in a row that count: by chance two in three of the steps between them would have to be alike."""
+
+ROUNDING = 2.0
+"""How far three samples of a straight line may be off one, in the file's least steps: each is rounded by half of one,
+and the middle one counts twice."""
+
+SMOOTH = 1e-9
+"""The same as a share of the signal's range, where a file has all digits."""
+
+BENT = 50.0
+"""How far three samples usually are off a straight line, in what rounding makes of one: below, it can't be decided. The
+line itself must go further than that: a motion that settles without noise is straight in the end."""
+
+SELDOM = 0.05
+"""Share of equal neighbours elsewhere up to which twenty in a row are no chance: 1e-26."""
+
+
+@dataclass(frozen=True, slots=True)
+class NotRead:
+    """Rows of a channel that no sensor has read, shape (N,), and what is there instead."""
+
+    channel: str
+    rows: BoolArray
+    held: bool
+
+
+def not_read(channel: str, values: FloatArray, seen: BoolArray, may_rest: bool) -> list[NotRead]:
+    """Return the rows in which a channel is interpolated, and those in which it is held at one value.
+
+    Parameters
+    ----------
+    values : ndarray, shape (N,)
+    seen : ndarray of bool, shape (N,)
+        Which rows were read.
+    may_rest : bool
+        Whether the channel may stay where it is, whatever that is: a position, the torque of a joint.
+    """
+    whole = seen[:-2] & seen[1:-1] & seen[2:]
+    steps = np.abs(np.diff(values))
+    if not whole.any() or not (steps > 0.0).any():
+        return []
+    rounding = max(ROUNDING * float(steps[steps > 0.0].min()), SMOOTH * float(np.ptp(values[seen])))
+    bend = np.abs(np.diff(values, 2))
+    bent = bend[whole & (bend > rounding)]
+    usual = float(np.median(bent)) if bent.size else 0.0
+    if usual < BENT * rounding:
+        return []
+    drawn, held = np.zeros_like(seen), np.zeros_like(seen)
+    for first, behind in _runs(whole & (bend <= rounding)):
+        rows = slice(first, behind + 2)  # a triple has two rows more
+        if behind + 2 - first < FEWEST_SAMPLES:
+            continue
+        moved = float(np.ptp(values[rows]))
+        drawn[rows] |= moved >= usual
+        held[rows] |= moved == 0.0 and values[first] != 0.0
+    if may_rest or float(np.mean(steps[~(held[1:] & held[:-1])] == 0.0)) > SELDOM:
+        held[:] = False
+    return [NotRead(channel, rows, rows is held) for rows in (drawn, held) if rows.any()]
+
+
+def _runs(rows: BoolArray) -> list[tuple[int, int]]:
+    """Return first and behind the last of each run of true values."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], rows.astype(np.int8), [0]])))
+    return [(int(first), int(last)) for first, last in edges.reshape(-1, 2)]
+
+
+def without_not_read(records: Sequence[Record]) -> tuple[list[Record], list[str]]:
+    """Mask the rows in which the output was not read; say so.
+
+    A torque that lies on straight lines may be one that was commanded: ramps, and levels.
+    """
+    mended, warnings = [], []
+    for record in records:
+        okay = record.okay.copy()
+        seen = record.okay & np.isfinite(record.output)
+        for found in not_read(record.kind.value, record.output, seen, record.kind is not OutputKind.SPEED):
+            okay &= ~found.rows
+            what = "stands still to the last digit" if found.held else "lies on straight lines to the last digit"
+            why = "its reading had stopped" if found.held else "it was interpolated, not read"
+            warnings.append(
+                f"recording {record.name}: the {found.channel} {what} in {found.rows.mean():.1%} of the rows: {why} "
+                "there; these rows are not used. Give the raw recording, with its gaps."
+            )
+        mended.append(record if np.array_equal(okay, record.okay) else replace(record, okay=okay))
+    return mended, warnings
+
+
+MOST = 500_000
+"""Samples of all recordings, counted once for each recording: 12 of 3000 samples. A fit takes some 1.4 kB for each."""
+
+SEED = 1
+
+
+def with_room(segments: Cut, training: Iterable[str]) -> tuple[Cut, list[str]]:
+    """Leave out pieces of the recordings that are fitted, as many as a fit can't hold; say which are used.
+
+    Parameters
+    ----------
+    segments
+        All recordings, cut.
+    training
+        Names of those that are fitted; others are only simulated, one by one.
+    """
+    pieces = segments.of(training)
+    used = list(pieces)
+    while (size := _size(used)) > MOST and len(used) > 1:
+        used = _some(pieces, min(int(len(used) * sqrt(MOST / size)), len(used) - 1))
+    if len(used) == len(pieces):
+        return segments, []
+    left_out = {piece.name for piece in pieces} - {piece.name for piece in used}
+    kept = tuple(record for record in segments.records if record.name not in left_out)
+    return replace(segments, records=kept), [_warning(used, pieces)]
+
+
+def _size(pieces: Sequence[Record]) -> int:
+    return len(pieces) * sum(int(piece.output.shape[0]) for piece in pieces)
+
+
+def _some(pieces: Sequence[Record], count: int) -> list[Record]:
+    """Return one of each of so many equal parts of the list, at least one in all."""
+    edges = np.linspace(0, len(pieces), max(count, 1) + 1).astype(int)
+    return [pieces[i] for i in np.random.default_rng(SEED).integers(edges[:-1], edges[1:])]
+
+
+def _warning(used: Sequence[Record], pieces: Sequence[Record]) -> str:
+    return (
+        f"{len(used)} of {len(pieces)} recordings are used (each piece between long gaps, or stretch of a long one, "
+        f"counts as one), drawn from the whole list: {', '.join(piece.name for piece in used)}. Each has unknowns of "
+        "its own, so more would take gigabytes. Give those that matter, and the others by --holdout."
+    )
+
 
 LONGEST_S = 0.01
 LONGEST_OF_RIGID_S = 0.02

@@ -15,9 +15,8 @@ from typing import TypeVar
 
 from scipy import stats
 
-from estimator.diagnosis.evidence import SMALLEST_P, Gain
 from estimator.diagnosis.line import PLACES, Place
-from estimator.diagnosis.noise import noise_floor
+from estimator.diagnosis.noise import SMALLEST_P, Gain, noise_floor
 from estimator.diagnosis.unnamed.first_look import first, first_along_motion
 from estimator.diagnosis.unnamed.ground import ground_of
 from estimator.diagnosis.unnamed.hunt import Hunt

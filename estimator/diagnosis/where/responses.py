@@ -8,7 +8,7 @@ import numpy as np
 from scipy import stats
 
 from estimator.diagnosis.result import Response
-from estimator.diagnosis.where.spectrum import SEGMENT
+from estimator.diagnosis.where.locate import SEGMENT
 from estimator.errors import NotExciting
 from estimator.identification.spectral import SpectralEstimate, spectral_estimate
 from estimator.physics.fit import FitResult

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from estimator.diagnosis.hypotheses import NOTHING, Effects
-from estimator.diagnosis.inherit import kept
-from estimator.diagnosis.screening import Screen, promising
+from estimator.diagnosis.hypotheses import NOTHING, Effects, kept
+from estimator.diagnosis.inference.looks import Screen, promising
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import FitResult, best_fit, fit, make_problem
 from estimator.physics.grid import Grid

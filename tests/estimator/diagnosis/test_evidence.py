@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from estimator.diagnosis.evidence import (
+from estimator.diagnosis.noise import (
     SMALLEST_P,
     VERY_STRONG,
     Gain,

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from estimator.diagnosis.hypotheses import NOTHING, everything
-from estimator.diagnosis.screening import Screen, promising
+from estimator.diagnosis.inference.looks import Screen, promising
 from estimator.physics.driveline import Start
 from estimator.physics.grid import grid_for
 from estimator.physics.layout import flat_values

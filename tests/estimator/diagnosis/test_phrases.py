@@ -6,7 +6,7 @@ import re
 
 import pytest
 
-from estimator.diagnosis.phrases import PLACE_NAMES, is_phrase, law_in_words
+from estimator.diagnosis.inference.wording import PLACE_NAMES, is_phrase, law_in_words
 from estimator.diagnosis.unnamed.laws import LAWS
 from estimator.physics.effect import Element
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.diagnosis.preconditions.clipped import clipped, without_clipped
+from estimator.diagnosis.preconditions.channels import clipped, without_clipped
 from estimator.physics.driveline import Start
 from estimator.signals.record import FloatArray, Record
 from tests.estimator.physics.bench import ONE_MASS, linear_record, random_steps

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from estimator.diagnosis.preconditions import prepare
-from estimator.diagnosis.preconditions.not_read import not_read, without_not_read
-from estimator.diagnosis.preconditions.wrapped import period_of, unwrapped
+from estimator.diagnosis.preconditions.channels import period_of, unwrapped
+from estimator.diagnosis.preconditions.thinned import not_read, without_not_read
 from estimator.physics.driveline import Start
 from estimator.signals.record import FloatArray, OutputKind, Record
 from tests.estimator.physics.bench import ONE_MASS, linear_record, model, random_steps

@@ -9,9 +9,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.diagnosis.preconditions.factors import close_factors
 from estimator.diagnosis.preconditions.inertia import as_one_body, fitted_inertia
-from estimator.diagnosis.preconditions.units import BEYOND, require_plausible_units
+from estimator.diagnosis.preconditions.units import BEYOND, close_factors, require_plausible_units
 from estimator.errors import Implausible
 from estimator.physics.driveline import Start
 from estimator.physics.effect import Element

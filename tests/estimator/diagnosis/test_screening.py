@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from estimator.diagnosis.hypotheses import NOTHING, everything
-from estimator.diagnosis.screening import Look, Screen, promising
+from estimator.diagnosis.inference.looks import Look, Screen, promising
 from estimator.physics.driveline import Start
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult

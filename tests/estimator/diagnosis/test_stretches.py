@@ -7,8 +7,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from estimator.diagnosis.noise import LONGEST_S, MOST_SAMPLES, share_of, stretches
 from estimator.diagnosis.segments import cut
-from estimator.diagnosis.stretches import LONGEST_S, MOST_SAMPLES, share_of, stretches
 from estimator.signals.record import Record
 from tests.estimator.physics.bench import record
 

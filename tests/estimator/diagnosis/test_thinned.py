@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from estimator.diagnosis.hypotheses import NOTHING, everything
+from estimator.diagnosis.noise import MOST_SAMPLES
 from estimator.diagnosis.preconditions.thinned import (
     LONGEST_OF_RIGID_S,
     LONGEST_S,
@@ -15,7 +16,6 @@ from estimator.diagnosis.preconditions.thinned import (
     factor_for,
     thinned,
 )
-from estimator.diagnosis.stretches import MOST_SAMPLES
 from estimator.physics.driveline import Start
 from estimator.physics.grid import grid_for
 from estimator.physics.layout import flat

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.diagnosis.preconditions.room import MOST, with_room
+from estimator.diagnosis.preconditions.thinned import MOST, with_room
 from estimator.diagnosis.segments import cut
 from estimator.diagnosis.unnamed.orders import LONGEST_TRAVEL, peaks
 from estimator.errors import BadSetting, BadShape

@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import lfilter
 
 from estimator.diagnosis.acquisition import OUTPUT, as_read, compensate, recognise
-from estimator.diagnosis.acquisition.holding import clock_of, fill
+from estimator.diagnosis.acquisition.stale import clock_of, fill
 from estimator.signals.record import BoolArray, FloatArray, Record
 from tests.estimator.diagnosis.acquisition.bench import (
     KINDS,

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from estimator.diagnosis.acquisition import compensate, hidden_jitter, recognise
+from estimator.diagnosis.acquisition.jitter import stamped_jitter
 from estimator.diagnosis.acquisition.lost import lost_samples
 from estimator.diagnosis.acquisition.quantised import speed_quantisation
 from estimator.diagnosis.acquisition.stale import stale_samples
-from estimator.diagnosis.acquisition.stamped_jitter import stamped_jitter
 from estimator.signals.record import FloatArray, Record
 
 Make = Callable[[int], FloatArray]

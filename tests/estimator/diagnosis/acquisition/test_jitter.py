@@ -9,7 +9,7 @@ import pytest
 
 from estimator.diagnosis.acquisition import OUTPUT, compensate, hidden_jitter, recognise
 from estimator.diagnosis.acquisition.finding import Finding
-from estimator.diagnosis.acquisition.hidden_jitter import _likeliest
+from estimator.diagnosis.acquisition.jitter import _likeliest
 from estimator.signals.record import FloatArray, Record
 from tests.estimator.diagnosis.acquisition.bench import (
     KINDS,

@@ -9,9 +9,9 @@ import pytest
 from scipy import stats
 
 from estimator.diagnosis.acquisition import OUTPUT, Finding, recognise
-from estimator.diagnosis.acquisition.late_torque import LateTorque, pooled_p_value
-from estimator.diagnosis.acquisition.lattice import chance_repeats, lattice_step
-from estimator.diagnosis.acquisition.limits import LEVEL
+from estimator.diagnosis.acquisition.finding import LEVEL
+from estimator.diagnosis.acquisition.quantised import chance_repeats, lattice_step
+from estimator.diagnosis.acquisition.stale import LateTorque, pooled_p_value
 from estimator.signals.record import BoolArray, Record
 from tests.estimator.diagnosis.acquisition.bench import healthy, periodic_rows, random_rows, stale
 

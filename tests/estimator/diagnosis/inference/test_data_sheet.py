@@ -9,7 +9,7 @@ import pytest
 
 from estimator.diagnosis.diagnose import diagnose
 from estimator.diagnosis.hypotheses import everything, open_hypotheses
-from estimator.diagnosis.inference.data_sheet import FREELY, free_line
+from estimator.diagnosis.inference.rivals import FREELY, free_line
 from estimator.diagnosis.inference.search import Search
 from estimator.diagnosis.inference.wording import off_the_sheet
 from estimator.diagnosis.result import Stray, Verdict

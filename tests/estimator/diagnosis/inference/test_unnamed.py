@@ -10,8 +10,8 @@ import pytest
 
 from estimator.diagnosis.hypotheses import everything, open_hypotheses
 from estimator.diagnosis.inference.judge import Grounds, decide, free_rms, grounds
+from estimator.diagnosis.inference.rivals import Law, best_law, hunts_around, rival_laws
 from estimator.diagnosis.inference.search import Search
-from estimator.diagnosis.inference.unnamed import Law, best_law, hunts_around, rival_laws
 from estimator.diagnosis.unnamed import scene
 from estimator.physics.effect import Element
 from estimator.signals.record import Record

@@ -12,9 +12,19 @@ import numpy as np
 import pytest
 from scipy.linalg import block_diag, cholesky, solve_triangular
 
-from estimator.diagnosis.inference.disturbances import Limits, estimate, limits_for, starts
-from estimator.diagnosis.inference.sampled_line import Line, line_of
-from estimator.diagnosis.inference.whitener import Size, Whitener, readings, whitener, whitener_of
+from estimator.diagnosis.inference.disturbances import (
+    Limits,
+    Line,
+    Size,
+    Whitener,
+    estimate,
+    limits_for,
+    line_of,
+    readings,
+    starts,
+    whitener,
+    whitener_of,
+)
 from estimator.diagnosis.line.motion import LASTS
 from estimator.physics.driveline import Start
 from estimator.physics.fit import FitResult, fit, not_fitted

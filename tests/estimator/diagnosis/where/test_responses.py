@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from estimator.diagnosis.where.responses import responses
+from estimator.diagnosis.where.locate import responses
 from estimator.physics.driveline import Start
 from estimator.physics.fit import fit
 from estimator.physics.problem import make_problem

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.diagnosis.where.spectrum import error_spectrum
+from estimator.diagnosis.where.locate import error_spectrum
 from estimator.physics.fit import fit
 from estimator.physics.problem import make_problem
 from tests.estimator.diagnosis.planted import SIGMA, nominal_fit, quiet
