@@ -1,7 +1,7 @@
 """The thresholds of a verdict by likelihood, in one place; no other number decides.
 
-Those that depend on what worlds are like are data (``thresholds.toml``), written by ``python -m tests.campaigns.calibrate``,
-whose command the file holds.
+Those that depend on what worlds are like are data (``thresholds.toml``), written by
+``python -m tests.campaigns.calibrate``, whose command the file holds.
 """
 
 from __future__ import annotations
