@@ -1,16 +1,18 @@
-"""Records without the acquisition's faults: what is stale or lost is masked, what is known of it is filled in."""
+"""Recognition of faults of the acquisition, their compensation, and readings as a faulty chain gives them."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from estimator.diagnosis.acquisition.finding import OUTPUT, Finding, no_cells
-from estimator.diagnosis.acquisition.stale import fill
-from estimator.diagnosis.acquisition.stamped_jitter import stamp_offsets_s
-from estimator.signals.record import Record, uniform_period_s
+from estimator.diagnosis.acquisition.finding import OUTPUT, Finding, flagged, no_cells
+from estimator.diagnosis.acquisition.jitter import stamp_offsets_s, stamped_jitter
+from estimator.diagnosis.acquisition.lost import lost_samples
+from estimator.diagnosis.acquisition.quantised import speed_quantisation
+from estimator.diagnosis.acquisition.stale import fill, repeated, stale_samples
+from estimator.signals.record import FloatArray, Record, uniform_period_s
 
 UNREAD = frozenset({"stale_samples", "lost_samples"})
 """Findings whose readings are not what was measured in that row."""
@@ -65,3 +67,53 @@ def _on_time(record: Record) -> Record:
     offset_s = stamp_offsets_s(record)
     period_s = uniform_period_s(record.time_s)
     return replace(record, sample_time_s=period_s, time_s=record.time_s - offset_s, offset_s=offset_s)
+
+
+def as_read(output: FloatArray, record: Record, effects: Mapping[str, Mapping[str, float]]) -> FloatArray:
+    """Return a simulated output as this recording would show it.
+
+    Lost samples and jitter leave it as it is: what was lost is not shown, and an instant that nothing tells can't be
+    reproduced (one that stamps tell is in ``record.offset_s``).
+
+    Parameters
+    ----------
+    output : ndarray, shape (N,)
+        Simulated output at each row.
+    record : Record
+        The recording that it is simulated for: tells which rows are stale.
+    effects : mapping
+        Effects of the model: name to parameters.
+    """
+    read = output
+    if "speed_quantisation" in effects:
+        step = effects["speed_quantisation"]["step_rad_s"]
+        read = np.round(read / step) * step
+    if "stale_samples" in effects:
+        read = _repeating(read, record)
+    return read
+
+
+def _repeating(output: FloatArray, record: Record) -> FloatArray:
+    """Repeat the simulated value where the recording repeats its own: the row last renewed is shown."""
+    (stale,) = repeated([np.where(flagged(record), np.nan, record.output)]).rows
+    renewed = np.maximum.accumulate(np.where(stale, 0, np.arange(output.size)))
+    shown: FloatArray = output[renewed]
+    return shown
+
+
+AMONG_READ = (stale_samples, speed_quantisation, stamped_jitter)
+"""What is looked for among the readings that were not lost."""
+
+
+def recognise(records: Sequence[Record]) -> tuple[Finding, ...]:
+    """Return what is recognised in a set of recordings of one acquisition chain; none in healthy ones."""
+    lost = lost_samples(records)
+    read = [blanked(record, lost) for record in records]
+    found = (lost, *(look(read) for look in AMONG_READ))
+    return tuple(finding for finding in found if finding is not None)
+
+
+def as_if_not_lost(records: Sequence[Record]) -> tuple[Record, ...]:
+    """Return records without the readings that were lost: zeros without a flag are neither noise nor motion."""
+    lost = lost_samples(records)
+    return tuple(records) if lost is None else compensate(records, [lost])

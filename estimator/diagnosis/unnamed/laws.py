@@ -1,7 +1,7 @@
 """The laws that are tried, element by element, as functions of the motion at their place.
 
 A name is a formula, which takes a coefficient, or a phrase, which begins with an article
-(`estimator.diagnosis.phrases`).
+(`estimator.diagnosis.inference.wording`).
 """
 
 from __future__ import annotations
