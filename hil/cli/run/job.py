@@ -101,7 +101,7 @@ def _register(job: Job, recorder: RecordingWriter, ended_by: str) -> None:
     try:
         register_run(job.out, ended_by, results=results)
     except HilError as error:
-        typer.echo(f"{error}\n{job.out} is whole; 'hil runs rebuild --store {job.out.parent}' enters it.", err=True)
+        typer.echo(f"{error}\n{job.out} holds the run; 'hil runs rebuild --store {job.out.parent}' enters it.", err=True)
 
 
 @contextmanager
