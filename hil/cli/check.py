@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from hil.cli.printing import say
 from hil.errors import InputError, UsageError
 
 if TYPE_CHECKING:
@@ -70,7 +71,7 @@ def check(
     if proof is not None and rig is not None:
         _keep(proof, _document(rig_file, findings, reports), rig)
     if as_json:
-        typer.echo(json.dumps(_document(rig_file, findings, reports), indent=2))
+        say(json.dumps(_document(rig_file, findings, reports), indent=2))
     else:
         _print_eds(reports)
         if rig_file is not None and findings:
@@ -94,7 +95,7 @@ def _keep(proof: Path, document: dict[str, Any], rig: Path) -> None:
 
     text = json.dumps({**document, "made": provenance([rig]).document()}, indent=2) + "\n"
     publish(proof.parent, {proof.name: lambda path: path.write_text(text, encoding="utf-8")})
-    typer.echo(f"proof: {proof}", err=True)
+    say(f"proof: {proof}", err=True)
 
 
 def _refuse(reports: tuple[EdsReport, ...], rig: Rig | None, findings: tuple[Finding, ...]) -> None:
@@ -120,13 +121,14 @@ def _print_eds(reports: tuple[EdsReport, ...]) -> None:
 
     for report in reports:
         for line in eds_lines(report):
-            typer.echo(line)
+            say(line)
 
 
 def _print(name: str, findings: tuple[Finding, ...]) -> None:
-    from rich.console import Console
     from rich.markup import escape
     from rich.table import Table
+
+    from hil.cli.printing import new_console
 
     table = Table(title=name, title_justify="left")
     for column in ("device", "address", "result", "what", "expected", "found"):
@@ -135,7 +137,7 @@ def _print(name: str, findings: tuple[Finding, ...]) -> None:
         rows = [(each.what, f"{each.expected} ({each.source})", each.found) for each in finding.differences]
         for row in rows or [("", "", "")]:
             table.add_row(*map(escape, (finding.device, finding.address, finding.verdict.value, *row)))
-    console = Console()
+    console = new_console()
     console.print(table)
     for finding in findings:
         if finding.registers:

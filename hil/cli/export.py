@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from hil.cli.dbc_option import Dbc
+from hil.cli.printing import say
 from hil.export.fmu.versions import FmiVersion
 from hil.export.plcopen import Tc6
 
@@ -115,7 +116,7 @@ def _write(out: Path, text: str, estimator: PlcEstimator) -> None:
 
     publish(out.parent, {out.name: lambda path: path.write_text(text, encoding="ascii")})
     orders = estimator.settings.orders
-    typer.echo(f"{out}: {estimator.origin}; na {orders.na}, nb {orders.nb}, nk {orders.nk}; call FB_HilEstimator")
+    say(f"{out}: {estimator.origin}; na {orders.na}, nb {orders.nb}, nk {orders.nk}; call FB_HilEstimator")
 
 
 @app.command(epilog="Example: hil export fmu out/augmented.toml --recording run_1.csv --out bus.fmu")
@@ -147,4 +148,4 @@ def fmu(
     from hil.export.fmu.command import written_fmu
 
     for line in written_fmu(model, out, fmi.value, period, recording, sources_only, dbc):
-        typer.echo(line)
+        say(line)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from hil.cli.filter_option import FilterOf, FilterRun, with_filter
+from hil.cli.printing import say
 from hil.cli.trust_option import TrustLaws
 from hil.errors import RunAborted, UsageError
 
@@ -64,7 +65,7 @@ def monitor(
     elif not snapshot.absolute().parent.is_dir():
         raise UsageError(f"--snapshot {snapshot}: expected an existing folder, there is no {snapshot.parent}")
     _require_page(page)
-    typer.echo("hil monitor: starting", err=True)
+    say("hil monitor: starting", err=True)
     opening = _open(rig, replay, out, model, bus, modbus, simulate, speed, channel, trust_laws, filter_of, filter_run)
     with opening.source:  # its process starts up while this one does
         view = _view(opening, out, page, None if snapshot is None else (snapshot, after))
@@ -122,7 +123,7 @@ def _close(opening: Opening, view: MonitorApp) -> None:
     if opening.source.can_drive:
         with suppress(OSError) if view.interrupted else nullcontext():
             for run in opening.state.runs:
-                typer.echo(outcome(run))
+                say(outcome(run))
     if opening.state.ended is not None and opening.state.ended.error is not None:
         raise RunAborted(opening.state.ended.error)
     if view.return_code:

@@ -28,8 +28,7 @@ from hil.rig.stop import StopRequest
 from hil.rig.timing import RunTiming
 from hil.sample import Sample
 from hil.store import register_run
-from hil.store.entry import found_changes
-from hil.store.entry import COMPLETE, ONLINE
+from hil.store.entry import COMPLETE, ONLINE, found_changes
 
 SUFFIX = ".parquet"
 """A format that carries units and metadata in the file itself."""

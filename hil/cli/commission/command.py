@@ -53,11 +53,10 @@ def commission(
     a speed outside its band or a dead device end it at zero torque with the drives disarmed; the next call resumes at
     the step that was interrupted. Writes DIR/commissioning.html, DIR/model.toml, DIR/commission.json and DIR/runs/.
     """
-    from rich.console import Console
-
     from hil.cli.commission.asked import asked_of_steps, who_answers
     from hil.cli.commission.job import job_in
     from hil.cli.commission.result import print_plan
+    from hil.cli.printing import new_console
     from hil.commission.lock import sole_use
     from hil.commission.order import RigSource
     from hil.config.rig_file import read_rig
@@ -66,7 +65,7 @@ def commission(
     asked = asked_of_steps(skip or (), because or (), repeat or ())
     read_rig(rig)  # names every fault of the file, and of what it names, by the line
     source = RigSource(rig, rig.read_text(encoding="utf-8"), bus, modbus)
-    console = Console(stderr=as_json, highlight=False)
+    console = new_console(stderr=as_json, highlight=False)
     if dry_run:
         print_plan(job_in(out, source, model, trust_laws, travel, pace, console), console, as_json)
         return
