@@ -20,7 +20,7 @@ def printable(text: str) -> str:
 
 
 def _is_plain(letter: str) -> bool:
-    return letter in _KEPT or letter.isprintable() or (letter == NO_BREAK)
+    return letter in _KEPT or letter.isprintable()
 
 
 def _as_code(letter: str) -> str:
