@@ -65,12 +65,14 @@ def read_json(path: Path) -> Any:
     OSError
         If it can't be read.
     """
-    if not stat.S_ISREG(path.stat().st_mode):  # a pipe that nobody writes to would be waited for
-        raise OSError(errno.EINVAL, "expected a file, got a folder, a pipe or a device")
-    with path.open("rb") as file:
-        content = file.read(LARGEST_BYTES + 1)
-    if len(content) > LARGEST_BYTES:
-        raise ValueError(f"more than {LARGEST_BYTES >> 20} MB")
+    handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))  # a pipe that nobody writes to is not waited for
+    with os.fdopen(handle, "rb", buffering=0) as file:
+        about = os.fstat(handle)
+        if not stat.S_ISREG(about.st_mode):
+            raise OSError(errno.EINVAL, "expected a file, got a folder, a pipe or a device")
+        if about.st_size > LARGEST_BYTES:
+            raise ValueError(f"more than {LARGEST_BYTES >> 20} MB")
+        content = file.read(about.st_size)
     return parse_json(content.decode("utf-8"))
 
 
@@ -100,6 +102,11 @@ _HOST: Final = f"{zlib.crc32(platform.node().encode()):08x}"
 _PART: Final = re.compile(r"\..+\.(?P<host>[0-9a-f]{8})-(?P<process>[0-9]+)\.part(\.json)?")
 
 
+def part_of(path: Path) -> Path:
+    """Name what this process has not finished yet of a file."""
+    return path.with_name(f".{path.name}.{_HOST}-{os.getpid()}.part")
+
+
 @contextmanager
 def whole(path: Path, *, new: bool = False) -> Iterator[Path]:
     """Give the hidden name to write to; the file gets its own when the block ends, and nothing stays if it fails.
@@ -116,7 +123,7 @@ def whole(path: Path, *, new: bool = False) -> Iterator[Path]:
     OSError
         If the disk does not take it.
     """
-    part = path.with_name(f".{path.name}.{_HOST}-{os.getpid()}.part")
+    part = part_of(path)
     try:
         yield part
         _sync(part)

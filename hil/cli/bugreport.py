@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from hil.cli.printing import say
+
 app = typer.Typer(add_completion=False)
 
 
@@ -26,11 +28,11 @@ def bugreport(
     refuse_existing(out)
     report = bug_report(tuple(rig or ()), runs)
     write_new(out, report.zipped())
-    typer.echo(f"{out}: {len(report.parts)} files")
+    say(f"{out}: {len(report.parts)} files")
     for part in report.parts:
-        typer.echo(f"  {part.name:<20} {len(part.content):>8} bytes")
+        say(f"  {part.name:<20} {len(part.content):>8} bytes")
     taken = ", ".join(f"{count} {kind}" for kind, count in sorted(report.taken_out.items()) if count)
-    typer.echo(f"taken out: {taken or 'nothing private was found'}")
+    say(f"taken out: {taken or 'nothing private was found'}")
     for line in report.missing:
-        typer.echo(f"not in it: {line}")
-    typer.echo("Read it before you send it.")
+        say(f"not in it: {line}")
+    say("Read it before you send it.")

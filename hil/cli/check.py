@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from hil.cli.take_over_option import TakeOver
+from hil.cli.printing import say
 from hil.errors import InputError, UsageError
 
 if TYPE_CHECKING:
@@ -45,7 +45,6 @@ def check(
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")] = False,
     bus: Annotated[str | None, typer.Option(metavar="URL", help="CAN bus in place of the rig file's.")] = None,
     modbus: Annotated[str | None, typer.Option(metavar="HOST:PORT", help="PLC in place of the rig file's.")] = None,
-    take_over: TakeOver = False,
 ) -> None:
     """Find both inverters and the PLC and compare them with rig file, EDS and register map.
 
@@ -66,13 +65,13 @@ def check(
         raise UsageError("--bus, --modbus and --prove-stop concern the rig's devices: expected a rig file next to them")
     if proof is not None:
         _require_proof(proof, prove_stop)
-    rig_file = None if rig is None else with_addresses(read_rig(rig), bus, modbus, take_over)
+    rig_file = None if rig is None else with_addresses(read_rig(rig), bus, modbus)
     reports = tuple(check_eds(path) for path in eds or ())
     findings = () if rig_file is None or not all(each.usable for each in reports) else check_rig(rig_file, prove_stop)
     if proof is not None and rig is not None:
         _keep(proof, _document(rig_file, findings, reports), rig)
     if as_json:
-        typer.echo(json.dumps(_document(rig_file, findings, reports), indent=2))
+        say(json.dumps(_document(rig_file, findings, reports), indent=2))
     else:
         _print_eds(reports)
         if rig_file is not None and findings:
@@ -96,7 +95,7 @@ def _keep(proof: Path, document: dict[str, Any], rig: Path) -> None:
 
     text = json.dumps({**document, "made": provenance([rig]).document()}, indent=2) + "\n"
     publish(proof.parent, {proof.name: lambda path: path.write_text(text, encoding="utf-8")})
-    typer.echo(f"proof: {proof}", err=True)
+    say(f"proof: {proof}", err=True)
 
 
 def _refuse(reports: tuple[EdsReport, ...], rig: Rig | None, findings: tuple[Finding, ...]) -> None:
@@ -122,13 +121,14 @@ def _print_eds(reports: tuple[EdsReport, ...]) -> None:
 
     for report in reports:
         for line in eds_lines(report):
-            typer.echo(line)
+            say(line)
 
 
 def _print(name: str, findings: tuple[Finding, ...]) -> None:
-    from rich.console import Console
     from rich.markup import escape
     from rich.table import Table
+
+    from hil.cli.printing import new_console
 
     table = Table(title=name, title_justify="left")
     for column in ("device", "address", "result", "what", "expected", "found"):
@@ -137,7 +137,7 @@ def _print(name: str, findings: tuple[Finding, ...]) -> None:
         rows = [(each.what, f"{each.expected} ({each.source})", each.found) for each in finding.differences]
         for row in rows or [("", "", "")]:
             table.add_row(*map(escape, (finding.device, finding.address, finding.verdict.value, *row)))
-    console = Console()
+    console = new_console()
     console.print(table)
     for finding in findings:
         if finding.registers:
@@ -151,10 +151,9 @@ def _print(name: str, findings: tuple[Finding, ...]) -> None:
 
 def _details(finding: Finding) -> Iterator[str]:
     """Say what is no difference: what a run sets, where the DCF is of another mind, what stops a dead host's torque."""
-    yield from finding.questions
     yield from finding.remarks
     yield from (f"not the same everywhere: {each}" for each in finding.commissioned)
-    yield from (f"if its host is lost, {each}" for each in finding.protections)
+    yield from (f"without its host: {each}" for each in finding.protections)
 
 
 def _register_table(finding: Finding) -> RichTable:
@@ -209,7 +208,6 @@ def _device(finding: Finding) -> dict[str, Any]:
         ],
         "notes": list(finding.notes),
         "remarks": list(finding.remarks),
-        **({"questions": list(finding.questions)} if finding.questions else {}),
         "commissioned": [asdict(each) for each in finding.commissioned],
         "protections": [asdict(each) for each in finding.protections],
         **({"registers": [_register(each) for each in finding.registers]} if finding.registers else {}),

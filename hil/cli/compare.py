@@ -9,6 +9,7 @@ import typer
 
 from hil.cli.dbc_option import Dbc, tell
 from hil.cli.fmu_options import Mapped, TrustFmu
+from hil.cli.printing import say
 from hil.cli.trust_option import TrustLaws
 
 app = typer.Typer(add_completion=False)
@@ -34,8 +35,7 @@ def compare(
     Only initial state and constant load torque are estimated; the model's parameters stay as they are. Recordings are
     prepared as the diagnosis did that wrote the model.
     """
-    from rich.console import Console
-
+    from hil.cli.printing import new_console
     from hil.plants.trust import Trust
     from hil.provenance import provenance
     from hil.report.comparison import compared, comparison_text
@@ -58,8 +58,8 @@ def compare(
             },
         )
     if as_json:
-        typer.echo(text, nl=False)
+        say(text, nl=False)
     else:
-        Console().print(comparison_summary(comparisons))
+        new_console().print(comparison_summary(comparisons))
         if out is not None:
-            typer.echo(f"plots: {out / 'compare.html'}")
+            say(f"plots: {out / 'compare.html'}")

@@ -10,6 +10,7 @@ import typer
 from typer.completion import get_completion_script  # type: ignore[attr-defined]
 from typer.core import TyperCommand, TyperGroup
 
+from hil.cli.printing import say
 from hil.support.command_log import Level
 
 app = typer.Typer(add_completion=False)
@@ -29,7 +30,7 @@ class Shell(Enum):
 @app.command(epilog="Example: hil completion bash > ~/.local/share/bash-completion/completions/hil")
 def completion(shell: Annotated[Shell, typer.Argument(metavar="SHELL", help="bash, zsh or fish.")]) -> None:
     """Print the completion script of a shell: commands, options, experiments of a rig file, effects, files."""
-    typer.echo(get_completion_script(prog_name="hil", complete_var=VARIABLE, shell=shell.value))
+    say(get_completion_script(prog_name="hil", complete_var=VARIABLE, shell=shell.value))
 
 
 class Commands(TyperGroup):

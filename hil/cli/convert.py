@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from hil.cli.dbc_option import Dbc
+from hil.cli.printing import say
 
 if TYPE_CHECKING:
     from hil.recording.table import Table
@@ -55,13 +56,13 @@ def convert(
     lost: list[str] = []
     write_table(table, target, replace=force, on_loss=lost.extend)
     for line in (*(f"{source}: {remark}" for remark in table.remarks), *(f"{target}: lost: {what}" for what in lost)):
-        typer.echo(line, err=True)
+        say(line, err=True)
     if as_json:
-        typer.echo(json.dumps(_document(source, target, table, lost)))
+        say(json.dumps(_document(source, target, table, lost)))
         return
-    typer.echo(f"{target}: {table.n_rows} rows, {len(table.columns)} columns{', not all of it' if lost else ''}")
+    say(f"{target}: {table.n_rows} rows, {len(table.columns)} columns{', not all of it' if lost else ''}")
     for line in _said(target):
-        typer.echo(f"  {line}")
+        say(f"  {line}")
 
 
 def _require_room(target: Path, force: bool) -> None:

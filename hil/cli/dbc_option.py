@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from hil.cli.printing import say
 from hil.cli.silence import is_silent
 from hil.printable import printable
 
@@ -19,4 +20,4 @@ Dbc = Annotated[
 def tell(line: str) -> None:
     """Tell what was recognised in a file or done to it, on standard error."""
     if not is_silent():
-        typer.echo(f"note: {printable(line)}", err=True)
+        say(f"note: {printable(line)}", err=True)

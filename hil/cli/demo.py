@@ -46,14 +46,13 @@ def demo(
 
     Takes about a minute. The verdict is written before the seal is opened, and is judged unchanged.
     """
-    from rich.console import Console
-
+    from hil.cli.printing import new_console
     from hil.report.outputs import require_folder
 
     require_folder(out)
     chosen = secrets.randbelow(SEEDS) if seed is None else seed
     with tempfile.TemporaryDirectory(prefix="hil-demo-") as workshop:
-        _Demo(Console(), chosen, Path(workshop), out).run()
+        _Demo(new_console(), chosen, Path(workshop), out).run()
 
 
 class _Demo:

@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from hil.cli.completers import effect_names
+from hil.cli.printing import say
 
 app = typer.Typer(add_completion=False)
 
@@ -20,14 +21,13 @@ def effects(
     as_json: Annotated[bool, typer.Option("--json", help="Print as JSON.")] = False,
 ) -> None:
     """List the catalogue, or one entry: law, parameters, what excites it, what it is confused with."""
-    from rich.console import Console
-
+    from hil.cli.printing import new_console
     from hil.report.catalogue import catalogue_table, effect_details, entries_text, select
 
     entries = select(name)
     if as_json:
-        typer.echo(entries_text(entries), nl=False)
+        say(entries_text(entries), nl=False)
     elif name is None:
-        Console().print(catalogue_table(entries))
+        new_console().print(catalogue_table(entries))
     else:
-        Console().print(effect_details(entries[0]))
+        new_console().print(effect_details(entries[0]))

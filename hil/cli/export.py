@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from hil.cli.dbc_option import Dbc
-from hil.export import FmiVersion, Tc6
+from hil.cli.printing import say
+from hil.export.fmu.package import FmiVersion
+from hil.export.plcopen import Tc6
 
 if TYPE_CHECKING:
     from hil.export.plc_estimator import PlcEstimator
-    from hil.export.structured_text import Precision
+    from hil.export.pou import Project
 
 app = typer.Typer(add_completion=False, no_args_is_help=True)
 
@@ -67,7 +69,7 @@ def st(
     from hil.export.structured_text import structured_text
 
     estimator = written_estimator(identification, run, adaptive, cycle, profile)
-    _write(out, structured_text(estimator, _precision(single)), estimator)
+    _write(out, structured_text(_project(estimator, single)), estimator)
 
 
 @app.command(epilog="Example: hil export plcopen identified/identification.json --run cruise --out estimator.xml")
@@ -97,16 +99,16 @@ def plcopen(
     from datetime import UTC, datetime
 
     from hil.export.plc_estimator import written_estimator
-    from hil.export.plcopen import plcopen_xml, project
+    from hil.export.plcopen import plcopen_xml
 
     estimator = written_estimator(identification, run, adaptive, cycle, profile)
-    _write(out, plcopen_xml(project(estimator, _precision(single)), datetime.now(UTC), tc6), estimator)
+    _write(out, plcopen_xml(_project(estimator, single), datetime.now(UTC), tc6), estimator)
 
 
-def _precision(single: bool) -> Precision:
-    from hil.export.structured_text import Precision
+def _project(estimator: PlcEstimator, single: bool) -> Project:
+    from hil.export.filling import Precision, project
 
-    return Precision.SINGLE if single else Precision.DOUBLE
+    return project(estimator, Precision.SINGLE if single else Precision.DOUBLE)
 
 
 def _write(out: Path, text: str, estimator: PlcEstimator) -> None:
@@ -114,7 +116,7 @@ def _write(out: Path, text: str, estimator: PlcEstimator) -> None:
 
     publish(out.parent, {out.name: lambda path: path.write_text(text, encoding="ascii")})
     orders = estimator.settings.orders
-    typer.echo(f"{out}: {estimator.origin}; na {orders.na}, nb {orders.nb}, nk {orders.nk}; call FB_HilEstimator")
+    say(f"{out}: {estimator.origin}; na {orders.na}, nb {orders.nb}, nk {orders.nk}; call FB_HilEstimator")
 
 
 @app.command(epilog="Example: hil export fmu out/augmented.toml --recording run_1.csv --out bus.fmu")
@@ -138,7 +140,7 @@ def fmu(
     ] = False,
     dbc: Dbc = None,
 ) -> None:
-    """Write the driveline as an FMU, for co-simulation.
+    """Write the driveline as an FMU, for co-simulation and model exchange.
 
     Inputs T_M1, T_M2, T_load; outputs speeds, motor angle, shaft torque; each parameter with its value. It holds C
     sources and a Linux binary, which is made by the C compiler of this machine.
@@ -146,4 +148,4 @@ def fmu(
     from hil.export.fmu.package import written_fmu
 
     for line in written_fmu(model, out, fmi.value, period, recording, sources_only, dbc):
-        typer.echo(line)
+        say(line)

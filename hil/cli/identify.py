@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from hil.cli.dbc_option import Dbc, tell
+from hil.cli.printing import say
 from hil.cli.trust_option import TrustLaws
 
 if TYPE_CHECKING:
@@ -87,7 +88,7 @@ def identify(
     made = provenance([] if model is None else [model], recordings)
     _publish(out, records, settings, studies, expected, choice, compared, made, as_json=as_json)
     for complaint in attach_to_runs(recordings, {IDENTIFICATION: out / "identification.json"}):
-        typer.echo(complaint, err=True)
+        say(complaint, err=True)
 
 
 def _read(
@@ -123,13 +124,13 @@ def _tell_unused(record: Record) -> None:
 
 def _identified(records: Sequence[Record], settings: Settings) -> list[Study]:
     """Identify from each and examine it, with a bar on standard error where that is a terminal."""
-    from rich.console import Console
     from rich.progress import track
 
     from estimator.identification.identify import identify as identify_record
     from estimator.identification.study import study
+    from hil.cli.printing import new_console
 
-    console = Console(stderr=True)
+    console = new_console(stderr=True)
     bar = partial(track, console=console, transient=True, disable=not console.is_terminal)
     results = [identify_record(record, settings) for record in bar(records, "identifying")]
     pairs = list(zip(records, results, strict=True))
@@ -151,8 +152,7 @@ def _publish(
     *,
     as_json: bool,
 ) -> None:
-    from rich.console import Console
-
+    from hil.cli.printing import new_console
     from hil.figures.local_model import LocalModel
     from hil.report.identification_json import FILE_NAME, identification_text
     from hil.report.identification_page import compared_summary, identification_page, summary
@@ -173,9 +173,9 @@ def _publish(
         },
     )
     if as_json:
-        typer.echo(text, nl=False)
+        say(text, nl=False)
         return
-    console = Console()
+    console = new_console()
     for each in studies:
         console.print(verdict(each), highlight=False, markup=False)
     console.print(summary(studies, nominal))
@@ -183,4 +183,4 @@ def _publish(
         console.print(compared_summary(compared))
     for text in warnings(studies):
         console.print(f"note: {text}", highlight=False, markup=False)
-    typer.echo(f"all of it: {out / FILE_NAME}    report: {out / PAGE}")
+    say(f"all of it: {out / FILE_NAME}    report: {out / PAGE}")

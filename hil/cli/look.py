@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from hil.cli.dbc_option import Dbc
+from hil.cli.printing import say
 
 if TYPE_CHECKING:
     from hil.recording.look import Look
@@ -34,17 +35,17 @@ def look(
 
     found = look_into(file, dbc)
     if as_json:
-        typer.echo(json.dumps(_document(found)))
+        say(json.dumps(_document(found)))
         return
-    typer.echo(f"{file}: {_size(found)}")
+    say(f"{file}: {_size(found)}")
     for line in found.survey.said:
-        typer.echo(f"  {printable(line)}")
+        say(f"  {printable(line)}")
     _show(found)
-    typer.echo("")
+    say("")
     if not found.signals:
-        typer.echo("It has the columns that every command reads: no [signals] table is needed.")
+        say("It has the columns that every command reads: no [signals] table is needed.")
     for line in found.signals:
-        typer.echo(line)
+        say(line)
     if model is not None:
         _tell_scales(file, model, dbc)
     elif found.roles.torques and found.roles.output is not None:
@@ -89,12 +90,12 @@ def _size(found: Look) -> str:
 
 def _show(found: Look) -> None:
     """Print a table of the channels for each time."""
-    from rich.console import Console
     from rich.table import Table
 
+    from hil.cli.printing import new_console
     from hil.recording.survey import guesses
 
-    console = Console()
+    console = new_console()
     for group in found.survey.groups:
         table = Table(title=_rate(group), title_justify="left", box=None, pad_edge=False)
         for heading in ("channel", "unit", "samples", "missing", "low", "high", "could be"):

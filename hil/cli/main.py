@@ -18,6 +18,7 @@ from hil.cli.call import Call
 from hil.cli.overview import overview
 from hil.cli.silence import silence
 from hil.errors import HilError, InputError
+from hil.printable import shown
 from hil.rig.stop import interrupt_on_signals
 
 
@@ -153,7 +154,7 @@ def _see_help(error: BaseException) -> str:
 def _complain(text: str) -> None:
     """Say what went wrong; where the terminal is gone nobody can be informed, and the exit status says it alone."""
     with contextlib.suppress(OSError):
-        print(text, file=sys.stderr, flush=True)  # noqa: T201 - the one place that speaks of errors
+        print(shown(text), file=sys.stderr, flush=True)  # noqa: T201 - the one place that speaks of errors
 
 
 def main() -> None:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, TypeVar
 import typer
 
 from hil.cli.dbc_option import Dbc
+from hil.cli.printing import say
 
 if TYPE_CHECKING:
     from hil.config.new_model.values import Ask, Known
@@ -90,7 +91,7 @@ def new(
     found = parameters(shape, kind, values, assignments("--tolerance", own, shape), usual, known, ask)
     built = DrivelineModel(structure=shape, motion=kind, parameters=found)
     write_new(file, model_text(file, built, known, signals, recording))
-    typer.echo(f"{file}: written. Go through it, then: hil diagnose REC --model {file} --out report")
+    say(f"{file}: written. Go through it, then: hil diagnose REC --model {file} --out report")
 
 
 def _member(kind: type[Kind], option: str, text: str) -> Kind:
@@ -138,11 +139,11 @@ def _asker() -> Ask:
     """Ask at the terminal; the first words say how."""
     from hil.errors import UsageError
 
-    typer.echo("A model file. Enter takes what stands in [brackets]; Ctrl-C writes nothing.")
+    say("A model file. Enter takes what stands in [brackets]; Ctrl-C writes nothing.")
 
     def ask(what: str, default: str, wrong: str) -> str:
         if wrong:
-            typer.echo(f"  {wrong}")
+            say(f"  {wrong}")
         try:
             return input(f"{what}{f' [{default}]' if default else ''}: ")
         except EOFError as end:
@@ -164,6 +165,6 @@ def schema(
 
     text = schema_text(FileKind.MODEL)
     if out is None:
-        typer.echo(text, nl=False)
+        say(text, nl=False)
     else:
         publish(out.parent, {out.name: lambda path: path.write_text(text, encoding="utf-8")})

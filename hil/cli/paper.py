@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from hil.cli.printing import say
 from hil.cli.trust_option import TrustLaws
 
 if TYPE_CHECKING:
@@ -116,13 +117,13 @@ def _drive(workshop: Path, seed: int, duration_s: float) -> list[Driven]:
 @contextmanager
 def _bar(count: int, duration_s: float) -> Iterator[Callable[[int], Progress]]:
     """Show seconds driven on standard error, where that is a terminal."""
-    from rich.console import Console
     from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
     from rich.progress import Progress as Bar
 
+    from hil.cli.printing import new_console
     from hil.rig.experiments.base import Phase
 
-    console = Console(stderr=True)
+    console = new_console(stderr=True)
     columns = (TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn())
     with Bar(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task("driving", total=count * duration_s)
@@ -149,8 +150,7 @@ def _publish(
     made: Provenance | None = None,
     as_json: bool,
 ) -> None:
-    from rich.console import Console
-
+    from hil.cli.printing import new_console
     from hil.figures.local_model import row_of
     from hil.report.outputs import publish
     from hil.report.paper_page import paper_page, paper_text
@@ -169,10 +169,10 @@ def _publish(
         },
     )
     if as_json:
-        typer.echo(text, nl=False)
+        say(text, nl=False)
         return
-    Console().print(_summary(rows))
-    typer.echo(f"report: {out / PAGE}    figures: {out}/fig2, fig4, fig5 (.svg, .pdf)")
+    new_console().print(_summary(rows))
+    say(f"report: {out / PAGE}    figures: {out}/fig2, fig4, fig5 (.svg, .pdf)")
 
 
 def _figures(models: list[LocalModel]) -> dict[str, Callable[[Path], object]]:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from hil.cli.filter_option import FilterOf, FilterRun, with_filter
+from hil.cli.printing import say
 from hil.cli.trust_option import TrustLaws
 from hil.errors import UsageError
 
@@ -89,15 +90,15 @@ def replay(
         publish(estimate.absolute().parent, {estimate.name: course.write})
     if as_json:
         rate = course.samples / took_s
-        typer.echo(json.dumps({"schema": SCHEMA, **result, "samples_per_s": rate, "online": course.summary()}))
+        say(json.dumps({"schema": SCHEMA, **result, "samples_per_s": rate, "online": course.summary()}))
         return
     if out is not None:
-        typer.echo(f"{out}: {result['recorded']} samples, {result['flagged']} flagged")
-    typer.echo(f"{recording}: {course.samples} samples in {took_s:.2f} s; {course.statement}")
+        say(f"{out}: {result['recorded']} samples, {result['flagged']} flagged")
+    say(f"{recording}: {course.samples} samples in {took_s:.2f} s; {course.statement}")
     if course.excitation:
-        typer.echo(f"  {course.excitation}")
+        say(f"  {course.excitation}")
     for statement in statements(course.summary()):
-        typer.echo(f"  alarm: {statement}")
+        say(f"  alarm: {statement}")
 
 
 def _require(path: Path, what: str, needed: dict[str, object], senseless: dict[str, object]) -> None:
@@ -154,9 +155,9 @@ def _play_trace(
 
 def _show(pace: Pace) -> OnCourse:
     """Return what shows the estimate as it goes: on a terminal, where the eye can follow."""
-    from rich.console import Console
+    from hil.cli.printing import new_console
 
-    console = Console(stderr=True)
+    console = new_console(stderr=True)
     if pace.speed is None or not console.is_terminal:
         return lambda course, time_s: None
     return lambda course, time_s: console.print(f"{time_s:8.1f} s  {course.statement}", end="\r", highlight=False)

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from hil.cli.printing import say
+
 if TYPE_CHECKING:
     from hil.config.new_rig.answers import Ask
     from hil.config.new_rig.questions import Question
@@ -94,11 +96,11 @@ def new(
     given_texts = {key: text for key, text in given.items() if text is not None}
     found = answers(given_texts, simulated, ask, None if drive is None else drive.defaults)
     write_new(file, rig_text(found, file, simulated, () if drive is None else drive.lines))
-    typer.echo(f"{file}: written. Go through it, then: hil check {file}")
+    say(f"{file}: written. Go through it, then: hil check {file}")
     schema = file.with_name(FileKind.RIG.value)
     if not schema.exists():
         write_new(schema, schema_text(FileKind.RIG))
-        typer.echo(f"{schema}: written, for editors")
+        say(f"{schema}: written, for editors")
 
 
 @app.command(epilog="Example: hil rig schema --out rig.schema.json")
@@ -114,7 +116,7 @@ def schema(
 
     text = schema_text(FileKind.RIG)
     if out is None:
-        typer.echo(text, nl=False)
+        say(text, nl=False)
     else:
         publish(out.parent, {out.name: lambda path: path.write_text(text, encoding="utf-8")})
 
@@ -122,13 +124,13 @@ def schema(
 def _asker(simulated: bool) -> Ask:
     """Ask at the terminal; the first words say how."""
     kind = "the simulated rig of hil sim" if simulated else "a vehicle; for the simulated rig: --simulated"
-    typer.echo(f"A rig file for {kind}. Enter takes what stands in [brackets]; Ctrl-C writes nothing.")
+    say(f"A rig file for {kind}. Enter takes what stands in [brackets]; Ctrl-C writes nothing.")
 
     def ask(question: Question, default: str, wrong: str) -> str:
         from hil.errors import UsageError
 
         if wrong:
-            typer.echo(f"  {wrong}")
+            say(f"  {wrong}")
         try:
             return input(f"{question.asks}{f' [{default}]' if default else ''}: ")
         except EOFError as end:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
-from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
+from hil.cli.printing import new_console
 from hil.rig.experiments.base import Phase
 from hil.rig.live_course import statement
 from hil.rig.plan import Plan
@@ -29,7 +29,7 @@ class RunProgress:
     """
 
     def __init__(self, plan: Plan) -> None:
-        console = Console(stderr=True)
+        console = new_console(stderr=True)
         self._bar = Progress(
             TextColumn("{task.description}", markup=False),
             BarColumn(),

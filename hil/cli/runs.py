@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from hil.cli.printing import new_console, say
 from hil.errors import UsageError
+from hil.printable import shown
 
 if TYPE_CHECKING:
     from hil.store import Run, RunStore
@@ -53,15 +55,14 @@ def cell(value: Any) -> str:
 
 def print_columns(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
     """Print a table."""
-    from rich.console import Console
     from rich.table import Table
     from rich.text import Text
 
     table = Table(*heads, box=None, pad_edge=False)
     for row in rows:
-        table.add_row(*(Text(text) for text in row))  # as it is: "[Hz]" is no markup
-    console = Console()
-    console.print(table, soft_wrap=not console.is_terminal)
+        table.add_row(*(Text(shown(text)) for text in row))  # as it is: "[Hz]" is no markup
+    terminal = new_console()
+    terminal.print(table, soft_wrap=not terminal.is_terminal)
 
 
 def listed(
@@ -88,11 +89,11 @@ def listed(
             RunFilter(experiment=experiment, since=since, until=until, rig=rig, verdict=verdict, text=text)
         )
     if as_json:
-        typer.echo(json.dumps({"schema": SCHEMA, "runs": [run_facts(run) for run in found]}))
+        say(json.dumps({"schema": SCHEMA, "runs": [run_facts(run) for run in found]}))
     elif found:
         _print_table(found)
     else:
-        typer.echo("no such run" if any((experiment, since, until, rig, verdict, text)) else "no runs yet")
+        say("no such run" if any((experiment, since, until, rig, verdict, text)) else "no runs yet")
 
 
 def _require_date(option: str, date: str) -> None:
@@ -167,7 +168,7 @@ def show(run: RunId, store: Folder = HERE, as_json: AsJson = False) -> None:
     if as_json:
         shown = {"recording_state": state, "results": results, "alarm_statements": alarms_of(found)}
         more = {**shown, "rig_file": found.entry.rig_text}
-        typer.echo(json.dumps({"schema": "hil.run_facts/1", **facts, **more}))
+        say(json.dumps({"schema": "hil.run_facts/1", **facts, **more}))
         return
     for what in HEAD:
         _line(what, facts[what])
@@ -190,7 +191,7 @@ def show(run: RunId, store: Folder = HERE, as_json: AsJson = False) -> None:
 
 
 def _line(what: str, value: Any) -> None:
-    typer.echo(f"{what:<31} {cell(value)}")
+    say(f"{what:<31} {cell(value)}")
 
 
 def compare(
@@ -208,13 +209,13 @@ def compare(
     if as_json:
         rows = [{"what": row.what, "a": row.a, "b": row.b, "differs": row.differs} for row in both.rows]
         document = {"schema": "hil.runs_compare/1", "a": a, "b": b, "rows": rows, "rig_changes": both.rig_changes}
-        typer.echo(json.dumps(document))
+        say(json.dumps(document))
         return
     shown = [row for row in both.rows if every or row.differs]
     cells = [(row.what, *(_short(row.what, value) for value in (row.a, row.b))) for row in shown]
     print_columns(("", f"run {a}", f"run {b}"), cells)
     for line in both.rig_changes:
-        typer.echo(line)
+        say(line)
 
 
 def _short(what: str, value: Any) -> str:
@@ -230,7 +231,7 @@ def note(
     """Write a note to a run."""
     with opened(store) as runs:
         runs.note(run, text)
-    typer.echo(f"note written to run {run}")
+    say(f"note written to run {run}")
 
 
 def attach(
@@ -242,7 +243,7 @@ def attach(
     """Attach a result to a run; its text is kept as it is now."""
     with opened(store) as runs:
         runs.attach(run, kind, file)
-    typer.echo(f"{file} attached to run {run} as {kind}")
+    say(f"{file} attached to run {run} as {kind}")
 
 
 def delete(
@@ -265,9 +266,9 @@ def delete(
         _confirm(f"delete {what}{f', and {found.entry.recording}' if with_recording else ''}?", yes)
         runs.delete(run)
     removed = remove_files(found.entry) if with_recording else []
-    typer.echo(f"deleted {what}")
+    say(f"deleted {what}")
     for path in removed:
-        typer.echo(f"deleted {path}")
+        say(f"deleted {path}")
 
 
 def _confirm(question: str, yes: bool) -> None:
@@ -292,7 +293,7 @@ def export(
     with opened(store) as at_hand:
         chosen = [at_hand.get(run) for run in runs or [run.run_id for run in at_hand.find()]]
     export_runs(chosen, out)
-    typer.echo(f"{out}: {len(chosen)} run{'' if len(chosen) == 1 else 's'}")
+    say(f"{out}: {len(chosen)} run{'' if len(chosen) == 1 else 's'}")
 
 
 def rebuild(store: Folder = HERE, as_json: AsJson = False) -> None:
@@ -305,15 +306,15 @@ def rebuild(store: Folder = HERE, as_json: AsJson = False) -> None:
         raise StoreError(store_of(store), f"expected an existing folder, got {store}")
     result = rebuilt(store)
     for problem in result.unreadable:
-        typer.echo(f"not entered: {problem}", err=True)
+        say(f"not entered: {problem}", err=True)
     for text in result.lost_notes:
-        typer.echo(f"note to a run that is lost: {text}", err=True)
+        say(f"note to a run that is lost: {text}", err=True)
     if as_json:
-        typer.echo(json.dumps(_document(result)))
+        say(json.dumps(_document(result)))
         return
     for path in result.removed:
-        typer.echo(f"removed {path}, unfinished by a process that was killed")
-    typer.echo(f"{store_of(store)}: {_said(result)}")
+        say(f"removed {path}, unfinished by a process that was killed")
+    say(f"{store_of(store)}: {_said(result)}")
 
 
 def _document(result: Rebuilt) -> dict[str, Any]:

@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from hil.cli.dbc_option import Dbc, tell
+from hil.cli.printing import say
 from hil.cli.trust_option import TrustLaws
 
 app = typer.Typer(add_completion=False)
@@ -63,7 +64,7 @@ def simulate(
             "constant_load": {"value": json_number(run.start.load_torque_nm), "unit": load_unit},
             "made": provenance([model], [recording]).document(),
         }
-        typer.echo(json.dumps(document))
+        say(json.dumps(document))
         return
     error, load = shown(run.rms, error_unit), shown(run.start.load_torque_nm, load_unit)
-    typer.echo(f"{record.name}: {record.time_s.size} samples, RMS error {error}, constant load {load}; in {out}")
+    say(f"{record.name}: {record.time_s.size} samples, RMS error {error}, constant load {load}; in {out}")

@@ -1,19 +1,17 @@
 """Another program's model as an FMU, simulated by FMPy.
 
-An FMU is a program from whoever made it: it runs only where it is trusted.
+An FMU is a program from whoever made it: it runs only where it is trusted, in a process of its own
+(`hil.plants.fmu_process`).
 """
 
 from __future__ import annotations
 
-import shutil
-import sys
-import tempfile
+import importlib.util
+import signal
 import weakref
 from collections.abc import Mapping, Sequence
-from contextlib import redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -22,9 +20,12 @@ from estimator.physics.driveline import Start
 from estimator.physics.free_run import FreeRun
 from estimator.physics.model import Motion
 from estimator.signals.record import FloatArray, OutputKind, Record
-from estimator.undisturbed import Deferred
 from hil.errors import UsageError
+from hil.plants.fmu_process import HUNG, MEMORY_BYTES, STEP_S
 from hil.plants.names import Names, names
+from hil.printable import printable
+from hil.recording.sandbox import Document, Gone, Sandbox
+from hil.recording.table import Column
 
 ROUNDS = 4
 """Steps of Gauss and Newton: the output is nearly linear in a load and an initial state."""
@@ -34,6 +35,11 @@ SMALL = 1e-3
 
 NUMBERS = ("Real", "Float64", "Float32")
 """Types of inputs that are given."""
+
+LONGEST_S = 86400.0
+"""Time for a simulation of any length [s]; one that hangs is ended long before (`hil.plants.fmu_process`)."""
+
+CURE = "Simulate it in the program that made it, and export it for Linux, 64 bit."
 
 SHARE_OF_RANGE = 0.1
 """Scale of a load or an initial state, over the range of the torque or the output."""
@@ -70,21 +76,36 @@ class FmuPlant:
                 f"{path}: an FMU is a program of whoever made it, and runs only where you trust it: --trust-fmu"
             )
         self.name = path.name
-        self._fmpy = _fmpy()
-        self._folder = tempfile.mkdtemp(prefix="hil-fmu-")
-        weakref.finalize(self, shutil.rmtree, self._folder, ignore_errors=True)
-        try:
-            self._described = self._fmpy.read_model_description(str(path))
-            self._fmpy.extract(str(path), unzipdir=self._folder)
-        except Exception as error:
+        if importlib.util.find_spec("fmpy") is None:
             raise UsageError(
-                f"{path}: expected an FMU of FMI 1.0, 2.0 or 3.0, got: {error}. Check the path, or export it again."
-            ) from error
-        variables = {each.name: each for each in self._described.modelVariables}
+                "expected FMPy, which simulates FMUs, got none. Install it: pip install 'hil-driveline[fmu]'"
+            )
+        self._sandbox = Sandbox("hil.plants.fmu_process")
+        weakref.finalize(self, self._sandbox.end)
+        described, _ = self._asked(
+            {"what": "open", "path": str(path.absolute())}, f"{path}: expected an FMU of FMI 1.0, 2.0 or 3.0"
+        )
+        variables = {str(each["name"]): each for each in described["variables"]}
+        self._kind: str = described["kind"]
         self._mapped, self._known = tuple(mapped), tuple(variables)
         names(mapped, variables)
-        given = {name: each for name, each in variables.items() if each.causality == "input"}
-        self._inputs = {name: float(each.start or 0.0) for name, each in given.items() if each.type in NUMBERS}
+        given = {name: each for name, each in variables.items() if each["causality"] == "input"}
+        self._inputs = {name: _number(each["start"]) for name, each in given.items() if each["type"] in NUMBERS}
+
+    def _asked(
+        self, request: Document, expected: str, columns: Mapping[str, Column] | None = None
+    ) -> tuple[Document, dict[str, Column]]:
+        """Have the FMU's process do something; a `UsageError` says what it did instead."""
+        try:
+            document, answered = self._sandbox.ask(request, LONGEST_S, columns)
+        except Gone:
+            raise UsageError(f"{expected}, got {_ended(self._sandbox.end(at_once=False))}. {CURE}") from None
+        except BaseException:  # Ctrl-C, for one: it may not return by itself
+            self._sandbox.end()
+            raise
+        if "problem" in document:
+            raise UsageError(f"{expected}, got: {printable(str(document['problem']))}. {CURE}")
+        return document, answered
 
     def run(self, record: Record) -> FreeRun:
         """Simulate a recording; load torque and initial state are estimated where the FMU has them.
@@ -167,29 +188,18 @@ class FmuPlant:
         held = {name: value for name, value in values.items() if name in self._inputs}
         start = {name: value for name, value in values.items() if name not in self._inputs}
         since_s = record.time_s - record.time_s[0]
-        kind = "CoSimulation" if self._described.coSimulation is not None else "ModelExchange"
-        try:
-            # An FMU may say what it likes, but not in the midst of JSON. Its solver calls back into Python, where
-            # ctypes loses an exception, and with it a Ctrl-C: it waits for the end of a step.
-            with Deferred() as signals, redirect_stdout(sys.stderr):
-                result = self._fmpy.simulate_fmu(
-                    self._folder,
-                    model_description=self._described,
-                    fmi_type=kind,
-                    stop_time=float(since_s[-1]),
-                    step_size=record.sample_time_s if kind == "CoSimulation" else None,
-                    output_interval=record.sample_time_s,
-                    start_values=start,
-                    input=self._given(torque_nm, named, since_s, held, kind),
-                    output=[named.output],
-                    step_finished=lambda time_s, recorder: not signals.is_interrupted,
-                )
-        except Exception as error:
-            raise UsageError(
-                f"{self.name}: expected an FMU that simulates {record.name}, got: {error}. Simulate it in the program "
-                "that made it, and export it for Linux, 64 bit."
-            ) from error
-        output = np.interp(since_s, result["time"], result[named.output])
+        request = {
+            "what": "run",
+            "kind": self._kind,
+            "stop_s": float(since_s[-1]),
+            "step_s": record.sample_time_s,
+            "start": {name: float(np.asarray(value)) for name, value in start.items()},
+            "output": named.output,
+        }
+        given = self._given(torque_nm, named, since_s, held)
+        expected = f"{self.name}: expected an FMU that simulates {record.name}"
+        result = self._asked(request, expected, given)[1]
+        output = np.interp(since_s, result["time"], result["output"])
         if not np.isfinite(output).all():
             given = ", ".join(f"{name} = {float(np.mean(value)):.4g}" for name, value in values.items())
             raise UsageError(
@@ -199,24 +209,16 @@ class FmuPlant:
         return np.asarray(output, dtype=np.float64)
 
     def _given(
-        self,
-        torque_nm: FloatArray,
-        named: Names,
-        since_s: FloatArray,
-        held: Mapping[str, FloatArray | float],
-        kind: str,
-    ) -> Any:
-        """Return FMPy's table of inputs; each torque is held until the next, in model exchange by a step."""
+        self, torque_nm: FloatArray, named: Names, since_s: FloatArray, held: Mapping[str, FloatArray | float]
+    ) -> dict[str, Column]:
+        """Return the inputs over time; each torque is held until the next, in model exchange by a step."""
         torques = torque_nm if len(named.torque) > 1 else torque_nm.sum(axis=1, keepdims=True)
-        still = {name: np.full(since_s.size, value) for name, value in self._inputs.items()}
-        columns = {"time": since_s, **still, **dict(zip(named.torque, torques.T, strict=False))}
-        columns |= {name: np.broadcast_to(value, since_s.size) for name, value in held.items()}
-        rows = np.zeros(since_s.size, dtype=[(name, float) for name in columns])
-        for name, values in columns.items():
-            rows[name] = values
-        if kind == "CoSimulation":
-            return rows
-        steps = np.repeat(rows, 2)[:-1]
+        values = {**self._inputs, **dict(zip(named.torque, torques.T, strict=False)), **held}
+        columns: dict[str, Column] = {"time": since_s}
+        columns |= {name: np.array(np.broadcast_to(value, since_s.size), dtype=float) for name, value in values.items()}
+        if self._kind == "CoSimulation":
+            return columns
+        steps = {name: np.repeat(column, 2)[:-1] for name, column in columns.items()}
         steps["time"][1::2] = since_s[1:]
         return steps
 
@@ -244,11 +246,17 @@ class _Unknown:
         )
 
 
-def _fmpy() -> Any:
+def _number(start: object) -> float:
     try:
-        import fmpy
-    except ModuleNotFoundError as error:
-        raise UsageError(
-            "expected FMPy, which simulates FMUs, got none. Install it: pip install 'hil-driveline[fmu]'"
-        ) from error
-    return fmpy
+        return float(start or 0.0)  # type: ignore[arg-type]  # whatever a file says
+    except (TypeError, ValueError):
+        return 0.0
+
+
+def _ended(status: int) -> str:
+    """Say how the process of an FMU ended."""
+    if status == HUNG:
+        return f"one of which a step, or the loading, lasts longer than {STEP_S:g} s"
+    if status < 0:
+        return f"one that crashes ({signal.Signals(-status).name}) or needs more than {MEMORY_BYTES >> 30} GiB"
+    return f"one that ends its process (exit status {status})"

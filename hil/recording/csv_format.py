@@ -228,7 +228,7 @@ def _parse(path: Path, rows: bytes, form: TextForm, skipped: tuple[int, ...]) ->
     names = [*form.names, *([TRAILING] if form.trailing else [])]
     try:
         cells = pa.csv.read_csv(
-            pa.BufferReader(rows),
+            pa.BufferReader(_outside_python(rows)),
             pa.csv.ReadOptions(column_names=names, block_size=BLOCK_BYTES),
             pa.csv.ParseOptions(delimiter=form.delimiter, newlines_in_values=False, ignore_empty_lines=False),
             pa.csv.ConvertOptions(
@@ -240,6 +240,13 @@ def _parse(path: Path, rows: bytes, form: TextForm, skipped: tuple[int, ...]) ->
     if cells.num_rows != rows.count(b"\n") + 1:
         raise RecordingError(path, _broken_line(rows, form, skipped))
     return cells
+
+
+def _outside_python(rows: bytes) -> pa.Buffer:
+    """Copy rows to memory of pyarrow's: its threads may free them last, at exit, when Python is no longer there."""
+    buffer = pa.allocate_buffer(len(rows))
+    np.frombuffer(buffer, dtype=np.uint8)[:] = np.frombuffer(rows, dtype=np.uint8)
+    return buffer
 
 
 def _broken_line(rows: bytes, form: TextForm, skipped: tuple[int, ...]) -> str:

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from hil.errors import RecordingError
-from hil.files import parse_json, read_json
+from hil.files import parse_json, read_json, write_whole
 from hil.recording.bounds import no_room
 from hil.recording.table import Column, Kind, Table
 
@@ -113,12 +113,9 @@ def write_sidecar(recording: Path, said: Sidecar, needed: bool = False) -> None:
     tables = {UNITS_KEY: dict(said.units), TYPES_KEY: {name: kind.value for name, kind in said.types.items()}}
     document = {**said.metadata, SCHEMA_KEY: SIDECAR_SCHEMA, **{key: table for key, table in tables.items() if table}}
     text = json.dumps(document, indent=1, ensure_ascii=False) + "\n"
-    unfinished = path.with_name(f".{path.name}.part")
     try:
-        unfinished.write_text(text, encoding="utf-8")
-        unfinished.replace(path)
+        write_whole(path, text)
     except OSError as error:
-        unfinished.unlink(missing_ok=True)
         raise no_room(path, "the description", error) from error
 
 

@@ -7,7 +7,6 @@ same, and is informed of each loss; what is kept then carries the checksum of wh
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Sequence
 from dataclasses import replace as changed
 from pathlib import Path
@@ -15,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from hil.errors import RecordingError
+from hil.files import part_of
 from hil.recording.bounds import no_room
 from hil.recording.checksum import CHECKSUMS, sealed
 from hil.recording.formats import FORMATS, Format, writer_for
@@ -114,7 +114,7 @@ def write_table(
     path = Path(path)
     write = writer_for(path, replace)
     form = FORMATS[path.suffix.lower()]
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
+    part = part_of(path)
 
     def written(content: Table) -> Table:
         """Write, and read what was written."""

@@ -1,14 +1,23 @@
-"""A table through a pipe: a header in JSON, then the cells. Whoever reads it runs nothing, whatever comes."""
+"""Processes that work on what others made, recordings and FMUs: what that does to them ends there.
+
+Requests and answers go through pipes, a header in JSON, then columns of cells: whoever reads them runs nothing.
+"""
 
 from __future__ import annotations
 
 import atexit
 import json
+import math
+import os
+import queue
+import shutil
 import signal
 import subprocess
+import sys
 import tempfile
 import threading
-from collections.abc import Mapping
+import time
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import IO, Any, Final, Literal
 
@@ -106,6 +115,65 @@ def _fill(stream: IO[bytes], place: memoryview) -> None:
         done += count
 
 
+Answer = Callable[[Document, dict[str, Column]], tuple[Document, Mapping[str, Column] | None]]
+
+
+def serve(answer: Answer) -> None:
+    """Answer requests on standard input in this process, until that ends: then it ends at once, whatever it is doing.
+
+    Whoever asks may be killed at any time, and what is worked on may never return: a thread of its own sees it, and
+    removes the folder of this process, which nobody else would.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for whoever asks, and ends this process by its input
+    answers = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
+    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # libraries print
+    requests: queue.SimpleQueue[tuple[Document, dict[str, Column]]] = queue.SimpleQueue()
+    stream, folder = os.fdopen(os.dup(sys.stdin.fileno()), "rb"), os.getcwd()
+
+    def read() -> None:
+        try:
+            while True:
+                requests.put(receive(stream))
+        except (EOFError, OSError):
+            shutil.rmtree(folder, ignore_errors=True)
+            os._exit(0)
+
+    threading.Thread(target=read, name="requests", daemon=True).start()
+    while True:
+        send(answers, *answer(*requests.get()))
+
+
+def limit(memory: int, processor: float | None = None, file_bytes: int | None = None) -> None:
+    """Bound what this process takes from now on, where the system can; whoever asks does not wait longer anyway."""
+    try:
+        import resource
+    except ImportError:
+        return
+    _lower(resource.RLIMIT_CORE, 0)
+    _lower(resource.RLIMIT_AS, _address_space() + memory)
+    if processor is not None:
+        _lower(resource.RLIMIT_CPU, math.ceil(time.process_time() + processor))
+    if file_bytes is not None:
+        _lower(resource.RLIMIT_FSIZE, file_bytes)
+
+
+def _lower(which: int, most_now: int) -> None:
+    """Set what is allowed from now on, inside what the system allows at all."""
+    import resource
+
+    _, most = resource.getrlimit(which)
+    resource.setrlimit(which, (most_now if most == resource.RLIM_INFINITY else min(most_now, most), most))
+
+
+def _address_space() -> int:
+    """Return what this process has of it, its libraries included [byte]; 1 GiB where the system does not say."""
+    try:
+        pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0])
+    except (OSError, ValueError, IndexError):
+        return 1 << 30
+    return pages * os.sysconf("SC_PAGE_SIZE")
+
+
 PROCESS: Final = "hil.recording.reader_process"
 
 WAITING: Final = 6.0
@@ -127,17 +195,17 @@ EVERYTHING: Final = Request()
 What = Literal["table", "metadata", "survey"]
 
 
-class _Gone(Exception):
+class Gone(Exception):
     """The process has ended before it answered."""
 
 
-class _Process:
-    """One process that reads, with its pipes and its empty folder."""
+class Sandbox:
+    """One process that works on what others made, with its pipes and its empty folder."""
 
-    def __init__(self) -> None:
-        self._folder = tempfile.TemporaryDirectory(prefix="hil-reading-", ignore_cleanup_errors=True)
+    def __init__(self, module: str) -> None:
+        self._folder = tempfile.TemporaryDirectory(prefix="hil-sandbox-", ignore_cleanup_errors=True)
         self._process: Any = subprocess.Popen(
-            python("-m", PROCESS),
+            python("-m", module),
             cwd=self._folder.name,
             env=environment(**ENVIRONMENT),
             stdin=subprocess.PIPE,
@@ -145,17 +213,17 @@ class _Process:
             stderr=subprocess.DEVNULL,
         )
 
-    def ask(self, path: Path, what: What, limit_s: float, asked: Request) -> tuple[Document, dict[str, Column]]:
-        """Have a file read."""
+    def ask(
+        self, request: Document, limit_s: float, columns: Mapping[str, Column] | None = None
+    ) -> tuple[Document, dict[str, Column]]:
+        """Have a request answered; raises `Gone` where the process ends, or does not answer in time."""
         watchdog = threading.Timer(limit_s, self._process.kill)
         watchdog.start()
         try:
-            request = json.dumps({"path": str(path.absolute()), "what": what, "request": asked.as_document()})
-            self._process.stdin.write(f"{request}\n".encode())
-            self._process.stdin.flush()
+            send(self._process.stdin, request, columns)
             return receive(self._process.stdout)
-        except (OSError, EOFError, ValueError, MemoryError) as error:  # also what is no answer at all
-            raise _Gone from error
+        except (OSError, EOFError, ValueError, MemoryError, KeyError, TypeError) as error:  # also what is no answer
+            raise Gone from error
         finally:
             watchdog.cancel()
             watchdog.join()
@@ -183,7 +251,7 @@ class Reader:
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._process: _Process | None = None
+        self._process: Sandbox | None = None
 
     def table(self, path: Path, request: Request = EVERYTHING) -> Table:
         """Read a recording."""
@@ -207,10 +275,11 @@ class Reader:
     def _read(self, path: Path, what: What, request: Request) -> tuple[Document, dict[str, Column]]:
         size = path.stat().st_size
         with self._lock:
-            self._process = process = self._process or _Process()
+            self._process = process = self._process or Sandbox(PROCESS)
+            asked = {"path": str(path.absolute()), "what": what, "request": request.as_document()}
             try:
-                document, columns = process.ask(path, what, WAITING * processor_s(size), request)
-            except _Gone:
+                document, columns = process.ask(asked, WAITING * processor_s(size))
+            except Gone:
                 raise RecordingError(path, _why(self._end(at_once=False), size)) from None
             except BaseException:  # Ctrl-C, for one: half an answer is no beginning for the next
                 self._end()

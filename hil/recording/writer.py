@@ -1,7 +1,8 @@
 """A recording as it is made: every sample leaves the program at once, the file gets its name when whole.
 
-While the run continues, rows stand in ``<stem>.part.csv`` next to the target, one line each, handed to the
-operating system as they come by a thread of its own: whoever appends waits for no disk. What the disk has not taken
+While the run continues, rows stand in ``<stem>.part.csv`` next to the target, described by ``<stem>.part.csv.json``
+before the first of them comes; one line each, handed to the operating system by a thread of its own: whoever appends
+waits for no disk. What the disk has not taken
 yet waits in memory, `CAPACITY` samples at most. When the run ends, in any way Python can still act on (end, error,
 Ctrl-C), the rows become the recording, in its own format. What a harder end leaves:
 
@@ -27,9 +28,10 @@ from typing import Protocol, Self
 import numpy as np
 
 from hil.errors import RecordingError
+from hil.files import remove_abandoned
 from hil.recording import columns
 from hil.recording.bounds import no_room
-from hil.recording.description import OUTCOME, write_sidecar
+from hil.recording.description import OUTCOME, Sidecar, as_metadata, sidecar_of, write_sidecar
 from hil.recording.formats import read_table, writer_for
 from hil.recording.own_csv import own_sidecar
 from hil.recording.publish import write_table
@@ -103,9 +105,15 @@ class WritingThread:
         self._changed = threading.Condition()
         self._ending = self._given_up = False
         self.n_written = 0
+        self._first_s: float | None = None
         self.failed: OSError | None = None
         self._thread = threading.Thread(target=self._run, name="recording", daemon=True)
         self._thread.start()
+
+    @property
+    def first_waits_s(self) -> float:
+        """How long the first line has waited for the disk [s]; 0 once that has taken it."""
+        return 0.0 if self.n_written or self._first_s is None else time.monotonic() - self._first_s
 
     @property
     def n_waiting(self) -> int:
@@ -118,6 +126,7 @@ class WritingThread:
             if not self._changed.wait_for(lambda: self.n_waiting < self._capacity, patience_s):
                 return False
             self._lines.append(line)
+            self._first_s = self._first_s or time.monotonic()
             if len(self._lines) == 1:
                 self._changed.notify_all()
         return True
@@ -169,6 +178,12 @@ CAPACITY = 20_000
 
 DRAIN_S = 60.0
 """Time the disk has for them when the run is over [s]."""
+
+FIRST_WRITE_S = 10.0
+"""Time it has for the first bytes [s]."""
+
+NOT_ENDED = "did not reach its end: the program was killed, or the disk was full"
+"""What a recording says of its outcome until it has one."""
 
 LONGEST_ROW = 1 << 16
 """Bytes; the disk tore at most one row."""
@@ -224,16 +239,49 @@ class RecordingWriter:
         self._file: FileIO | None = None
         self._patience_s = patience_s
         self._writing: WritingThread | None = None
+        self._refused: BaseException | None = None
+        self._given_up = False
 
     def __enter__(self) -> Self:
+        opening = threading.Thread(target=self._open, name="opening", daemon=True)
+        opening.start()
+        opening.join(FIRST_WRITE_S)
+        self._given_up = opening.is_alive()
+        if self._given_up:
+            raise self._too_slow()
+        if self._refused is not None:
+            raise self._refused
+        if self._file is not None:
+            self._writing = WritingThread(self._file, CAPACITY)
+        return self
+
+    def _too_slow(self) -> RecordingError:
+        return RecordingError(
+            self.path,
+            f"expected a disk that takes the first bytes within {FIRST_WRITE_S:g} s, got one that does not. "
+            "Choose another disk.",
+        )
+
+    def _open(self) -> None:
+        """Make the part file, its description and its header, in a thread that may wait for the disk for ever."""
+        try:
+            self._make()
+        except BaseException as error:  # noqa: BLE001 - it is raised where it is waited for
+            self._refused = error
+        if self._given_up and self._file is not None:
+            self._file.close()
+            self._remove_part()
+
+    def _make(self) -> None:
         writer_for(self.path)
         try:
+            remove_abandoned(self.path.parent)
             self._file = self._opened()
         except FileExistsError as error:
             raise RecordingError(
                 self.part_path,
                 "expected no such file, got one left by a run that was killed, or that continues. "
-                "It is a recording up to that moment: rename it to keep it, or remove it.",
+                "It is a recording up to that moment: rename it and its .json to keep it, or remove it.",
             ) from error
         except OSError as error:
             raise RecordingError(
@@ -241,14 +289,19 @@ class RecordingWriter:
                 f"expected a place to write, got: {error.strerror}. Choose another folder, or fix this one.",
             ) from error
         try:
+            said = as_metadata({**self._metadata, OUTCOME: NOT_ENDED})
+            write_sidecar(self.part_path, Sidecar(said, self._units))
             self._begin(self._file)
-        except OSError as error:
+        except (OSError, RecordingError) as error:
             self._file.close()
             self._file = None
-            self.part_path.unlink(missing_ok=True)
-            raise no_room(self.path, "the recording", error) from error
-        self._writing = WritingThread(self._file, CAPACITY)
-        return self
+            self._remove_part()
+            cause = error.__cause__ if isinstance(error, RecordingError) else error
+            raise no_room(self.path, "the recording", cause if isinstance(cause, OSError) else OSError()) from error
+
+    def _remove_part(self) -> None:
+        self.part_path.unlink(missing_ok=True)
+        sidecar_of(self.part_path).unlink(missing_ok=True)
 
     def _opened(self) -> FileIO:
         """Open the part file, a new one or one that a run has left which was killed before its first sample.
@@ -302,6 +355,8 @@ class RecordingWriter:
         if self._file is None or self._writing is None:
             raise RecordingError(self.path, "expected an open writer, got one that is closed. Use it by 'with'.")
         self._raise_if_failed(self._writing)
+        if self._writing.first_waits_s > FIRST_WRITE_S:
+            raise self._too_slow()
         if not self._writing.put(self._row(sample), self._patience_s):
             raise RecordingError(
                 self.path,
@@ -328,7 +383,7 @@ class RecordingWriter:
         try:
             lost = self._closed(file)
             if self.n_samples == 0:
-                self.part_path.unlink()
+                self._remove_part()
             else:
                 self._publish()
             if lost is not None:
@@ -343,7 +398,7 @@ class RecordingWriter:
         writing = self._writing
         if writing is None:
             return None
-        drained = writing.finish(DRAIN_S)
+        drained = writing.finish(DRAIN_S if writing.first_waits_s <= FIRST_WRITE_S else 0.0)
         if not drained:
             raise RecordingError(
                 self.path,
@@ -370,17 +425,23 @@ class RecordingWriter:
         if self.path.suffix.lower() == CSV:  # the part file is the recording: it only gets its name
             writer_for(self.path)
             said = own_sidecar(self.part_path, self._metadata, self._units)
-            self.part_path.rename(self.path)
-            write_sidecar(self.path, said)
+            try:
+                write_sidecar(self.path, said)
+            except RecordingError:  # the description from before the first row needs no room
+                sidecar_of(self.part_path).replace(sidecar_of(self.path))
+                raise
+            finally:
+                self.part_path.rename(self.path)
+            self._remove_part()
             return
         table = Table(self.path, read_table(self.part_path).columns, self._units, self._metadata)
         try:
             write_table(table, self.path)
         except RecordingError as error:
-            kept = f"Its samples are in {self.part_path}, a recording itself: rename it to keep it, or remove it."
+            kept = f"Its samples are in {self.part_path}, a recording itself: rename it and its .json to keep it."
             *others, last = error.problems
             raise RecordingError(self.path, *others, f"{last} {kept}") from error
-        self.part_path.unlink()
+        self._remove_part()
 
     def _row(self, sample: Sample) -> str:
         """Format one row in the order of the header; a float as the shortest decimal that reads back to it."""

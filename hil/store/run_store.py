@@ -233,10 +233,8 @@ class RunStore:
         listed = self._listed().items()
         runs = [run for number, files in listed if (run := self._read(number, files, bool(asked.text))) is not None]
         taken = [run for run in runs if asked.takes(run)]
-        return [
-            replace(run, attachments=tuple(replace(each, document="") for each in run.attachments))
-            for run in sorted(taken, key=lambda run: (run.entry.started_utc, run.run_id))
-        ]
+        taken.sort(key=lambda run: (run.entry.started_utc, run.run_id))
+        return [_without_documents(run) for run in taken] if asked.text else taken
 
     def get(self, run_id: int) -> Run:
         """Return one run.
@@ -284,6 +282,16 @@ class RunStore:
                 found[number] = self._recording_of(self._run_path(number))
         return found
 
+    def _is_here(self, name: Path) -> bool:
+        """Whether a name is that of a file in the folder; a plain one that is no link needs no further look."""
+        path = self.folder / name
+        if len(name.parts) == 1 and name.name not in ("", "..") and "\0" not in name.name:
+            try:
+                return not path.is_symlink() or is_inside(self.folder, path)
+            except OSError:
+                return False
+        return is_inside(self.folder, path)
+
     def _recording_of(self, path: Path) -> str:
         try:
             name = read_json(path)["run"]["recording"]
@@ -313,7 +321,7 @@ class RunStore:
             entry = self._content(self._run_path(number), _RUN)
             if entry is None:
                 return None
-            if not is_inside(self.folder, self.folder / entry.recording):
+            if not self._is_here(entry.recording):
                 raise ValueError("recording: expected the name of a file in the folder, got one that leads out of it")
             entry = replace(entry, recording=self.folder / entry.recording)
         except ValueError as error:
@@ -337,8 +345,8 @@ class RunStore:
         if found is None:
             return Attachment(f"{DAMAGED}: {path.name}", "")
         where = None if found.path is None else self.folder / found.path
-        document = self._document_path(run_id, number)
-        return replace(found, path=where, document=_read_text(document) if with_document else "")
+        document = _read_text(self._document_path(run_id, number)) if with_document else ""
+        return replace(found, path=where, document=document) if where or document else found
 
     def _content(self, path: Path, kind: TypeAdapter[T]) -> T | None:
         """Read a file; None for a run that was deleted.
@@ -416,6 +424,10 @@ class RunStore:
                 f"expected a folder that can be read and has room, got: {error.strerror or error}. Nothing of it was "
                 "entered; make room, or fix the permissions, and try again.",
             ) from error
+
+
+def _without_documents(run: Run) -> Run:
+    return replace(run, attachments=tuple(replace(each, document="") for each in run.attachments))
 
 
 def _what(path: Path) -> str:

@@ -92,7 +92,7 @@ def test_it_listens_tells_its_health_and_resets(rig_path: Path, tmp_path: Path) 
 def test_a_store_that_can_not_be_used_costs_no_recording(rig_path: Path, tmp_path: Path) -> None:
     out = tmp_path / "runs"
     out.mkdir()
-    (out / "runs.sqlite").write_bytes(b"no database" * 1000)
+    (out / "hil_runs").write_bytes(b"no database" * 1000)
     with hosted(rig_path, out) as (source, seen):
         await_report(source, seen, Ready)
         source.send(Start("cruise"))

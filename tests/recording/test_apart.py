@@ -266,7 +266,8 @@ def test_every_kind_of_column_comes_through(tmp_path: Path, suffix: str) -> None
 
 
 def test_the_limits_are_set_where_it_reads() -> None:
-    program = "from hil.recording.reader_process import _limit; import resource; _limit(0)\n" + "".join(
+    program = "from hil.recording.bounds import memory_bytes, processor_s; import resource\n"
+        "from hil.recording.sandbox import limit; limit(memory_bytes(0), processor_s(0))\n" + "".join(
         f"print(resource.getrlimit(resource.{name})[0])\n" for name in ("RLIMIT_CORE", "RLIMIT_CPU", "RLIMIT_AS")
     )
     done = subprocess.run(

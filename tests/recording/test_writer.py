@@ -3,18 +3,26 @@
 from __future__ import annotations
 
 import math
-import os
+import subprocess
+import sys
+import threading
 import time
 from pathlib import Path
 
 import pytest
 
 from hil.errors import RecordingError
+from hil.files import part_of
 from hil.recording import RecordingWriter, columns, read_record, read_table
+from hil.recording import writer as writer_module
 from hil.recording.checksum import CHECKSUM, SAID, data_sha256, said_sha256
 from hil.recording.formats import FORMATS
 from hil.recording.own_csv import HEADER
+from hil.recording.writer import NOT_ENDED, WritingThread
 from hil.sample import Sample, SampleFlag
+from hil.store import RunStore
+from hil.store.rebuild import rebuild
+from tests.full_disk import largest_file
 
 WRITABLE = [suffix for suffix, form in FORMATS.items() if form.write]
 
@@ -167,7 +175,7 @@ def test_a_closed_writer_takes_no_sample(tmp_path: Path) -> None:
 def test_a_recording_there_is_no_room_for_stays_in_the_part_file(tmp_path: Path) -> None:
     """A folder stands where Parquet is written to before it gets its name: the write fails, as on a full disk."""
     path = tmp_path / "run.parquet"
-    (tmp_path / f".run.parquet.{os.getpid()}.part").mkdir()
+    part_of(path).mkdir()
     writer = RecordingWriter(path)
     with pytest.raises(RecordingError, match=r"run\.parquet: expected room for the recording, got: .*run\.part\.csv"):
         with writer:
@@ -218,3 +226,81 @@ def test_a_disk_that_is_full_from_the_start_is_reported_with_the_name_and_leaves
     with refusal, largest_file(10), RecordingWriter(tmp_path / "run.csv"):
         pass
     assert list(tmp_path.iterdir()) == []
+
+
+SAYS = {"schema": "hil.recording/1", "experiment": "cruise", "rig_file": 'name = "bench"\n'}
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".parquet"])
+def test_a_killed_run_describes_itself_and_is_listed_as_what_it_is(tmp_path: Path, suffix: str) -> None:
+    program = (
+        "import os, sys, time; from hil.recording import RecordingWriter; from tests.recording.test_writer import *\n"
+        "with RecordingWriter(sys.argv[1], SAYS) as writer:\n"
+        "    for k in range(12): writer.append(sample(k))\n"
+        "    while writer.n_samples < 12: time.sleep(0.001)\n"
+        "    os.kill(os.getpid(), 9)\n"
+    )
+    subprocess.run([sys.executable, "-c", program, str(tmp_path / f"run{suffix}")], check=False, timeout=120)
+    table = read_table(tmp_path / "run.part.csv")
+    assert dict(table.metadata) == {**SAYS, "outcome": NOT_ENDED}
+    assert dict(table.units) == dict(columns.UNITS)
+    assert rebuild(tmp_path).found == 1
+    with RunStore(tmp_path) as store:
+        (run,) = store.find()
+    assert (run.entry.rig_name, run.entry.samples, run.entry.outcome) == ("bench", 12, NOT_ENDED)
+
+
+def test_a_run_that_continues_is_not_listed_yet(tmp_path: Path) -> None:
+    with RecordingWriter(tmp_path / "run.csv", SAYS) as writer:
+        writer.append(sample(1))
+        assert rebuild(tmp_path).found == 0
+    assert rebuild(tmp_path).found == 1
+
+
+def test_a_disk_without_room_for_the_last_words_leaves_a_recording_that_describes_itself(tmp_path: Path) -> None:
+    def run() -> None:
+        with RecordingWriter(tmp_path / "run.csv", SAYS) as writer:
+            writer.append(sample(1))
+            writer.describe("timing", "x" * 100_000)
+            with largest_file(4096):
+                writer.__exit__(None, None, None)
+
+    with pytest.raises(RecordingError, match="room for the description"):
+        run()
+    assert read_table(tmp_path / "run.csv").metadata["outcome"] == NOT_ENDED
+    assert {path.name for path in tmp_path.iterdir()} == {"run.csv", "run.csv.json"}
+
+
+@pytest.mark.parametrize("hangs", ["write_sidecar", "_begin"])
+def test_a_disk_that_never_takes_the_first_bytes_is_reported(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, hangs: str
+) -> None:
+    free = threading.Event()
+    monkeypatch.setattr(writer_module, "FIRST_WRITE_S", 0.2)
+    owner = writer_module if hangs == "write_sidecar" else RecordingWriter
+    monkeypatch.setattr(owner, hangs, lambda *_: free.wait(60))
+    with pytest.raises(RecordingError, match=r"first bytes within 0\.2 s"), RecordingWriter(tmp_path / "run.csv"):
+        pass
+    free.set()
+    until = time.monotonic() + 10
+    while list(tmp_path.iterdir()) and time.monotonic() < until:
+        time.sleep(0.01)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_disk_that_never_takes_the_first_row_is_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    free = threading.Event()
+    monkeypatch.setattr(writer_module, "FIRST_WRITE_S", 0.2)
+    monkeypatch.setattr(WritingThread, "_write", lambda *_: free.wait(60))
+
+    def run() -> None:
+        with RecordingWriter(tmp_path / "run.csv") as writer:
+            try:
+                for k in range(100):
+                    writer.append(sample(k))
+                    time.sleep(0.01)
+            finally:
+                free.set()
+
+    with pytest.raises(RecordingError, match="takes the first bytes"):
+        run()

@@ -20,7 +20,6 @@ from hil.cli.commission.options import (
     Yes,
 )
 from hil.cli.pace import Pace, PaceOption
-from hil.cli.take_over_option import TakeOver
 from hil.cli.trust_option import TrustLaws
 
 if TYPE_CHECKING:
@@ -46,7 +45,6 @@ def commission(
     pace: PaceOption = Pace.REAL,
     bus: Bus = None,
     modbus: Modbus = None,
-    take_over: TakeOver = False,
     as_json: AsJson = False,
 ) -> None:
     """Lead through commissioning: devices, limits, signs, scales, friction, PRBS, experiments, models, diagnosis.
@@ -55,11 +53,10 @@ def commission(
     a speed outside its band or a dead device end it at zero torque with the drives disarmed; the next call resumes at
     the step that was interrupted. Writes DIR/commissioning.html, DIR/model.toml, DIR/commission.json and DIR/runs/.
     """
-    from rich.console import Console
-
     from hil.cli.commission.asked import asked_of_steps, who_answers
     from hil.cli.commission.job import job_in
     from hil.cli.commission.result import print_plan
+    from hil.cli.printing import new_console
     from hil.commission.order import RigSource
     from hil.commission.state import sole_use
     from hil.config.rig_file import read_rig
@@ -67,8 +64,8 @@ def commission(
 
     asked = asked_of_steps(skip or (), because or (), repeat or ())
     read_rig(rig)  # names every fault of the file, and of what it names, by the line
-    source = RigSource(rig, rig.read_text(encoding="utf-8"), bus, modbus, take_over)
-    console = Console(stderr=as_json, highlight=False)
+    source = RigSource(rig, rig.read_text(encoding="utf-8"), bus, modbus)
+    console = new_console(stderr=as_json, highlight=False)
     if dry_run:
         print_plan(job_in(out, source, model, trust_laws, travel, pace, console), console, as_json)
         return

@@ -6,8 +6,7 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import typer
-
+from hil.cli.printing import say
 from hil.commission.engine import STEPS, plan_document
 from hil.commission.state import State
 from hil.commission.step import Job
@@ -45,7 +44,7 @@ def print_plan(job: Job, console: Console, as_json: bool) -> None:
     """Print what the job would do."""
     document = plan_document(job)
     if as_json:
-        typer.echo(json.dumps(document))
+        say(json.dumps(document))
         return
     for line in plan_lines(document):
         console.print(line, markup=False, soft_wrap=not console.is_terminal)
@@ -55,7 +54,7 @@ def print_result(state: State, console: Console, as_json: bool, reported: bool) 
     """Print what has come of the job so far; ``reported`` tells whether its report could be written."""
     document = result_document(state.document(), str(state.folder), REPORT if reported else None)
     if as_json:
-        typer.echo(json.dumps(document))
+        say(json.dumps(document))
         return
     for line in result_lines(document):
         console.print(line, markup=False, soft_wrap=True)

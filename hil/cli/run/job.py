@@ -9,9 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import typer
-
 from drivers.canopen.can_link import CanLink
+from hil.cli.printing import say
 from hil.cli.run.live import keep_course
 from hil.cli.run_progress import RunProgress
 from hil.config.rig_file import Rig
@@ -85,7 +84,7 @@ def record(job: Job, grants: RealTimeGrants) -> RunSummary:
     except BaseException as error:
         ended_by = "interrupted" if isinstance(error, KeyboardInterrupt) else str(error) or type(error).__name__
         if recorder.kept is not None:
-            typer.echo(f"{recorder.kept} holds the {recorder.n_samples} samples up to there", err=True)
+            say(f"{recorder.kept} holds the {recorder.n_samples} samples up to there", err=True)
         raise
     finally:
         if job.live is not None and recorder.kept is not None:
@@ -101,7 +100,7 @@ def _register(job: Job, recorder: RecordingWriter, ended_by: str) -> None:
     try:
         register_run(job.out, ended_by, results=results)
     except HilError as error:
-        typer.echo(f"{error}\n{job.out} is whole; 'hil runs rebuild --store {job.out.parent}' enters it.", err=True)
+        say(f"{error}\n{job.out} holds the run; 'hil runs rebuild --store {job.out.parent}' enters it.", err=True)
 
 
 @contextmanager

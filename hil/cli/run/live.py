@@ -5,9 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import typer
-
 from hil.cli.filter_option import with_filter
+from hil.cli.printing import say
 from hil.config.rig_file import Rig
 from hil.errors import UsageError
 from hil.report.outputs import publish
@@ -46,4 +45,4 @@ def keep_course(live: LiveEstimate, path: Path) -> None:
     try:
         publish(path.parent, {path.name: live.course.write})
     except UsageError as error:
-        typer.echo(f"{path} is missing: {error}", err=True)
+        say(f"{path} is missing: {error}", err=True)

@@ -5,8 +5,7 @@ from __future__ import annotations
 import json
 from typing import Any
 
-import typer
-
+from hil.cli.printing import say
 from hil.cli.run.job import Job
 from hil.rig.drive import RunSummary
 from hil.rig.live_course import course_path
@@ -18,24 +17,24 @@ from hil.store.entry import statements
 def print_result(job: Job, summary: RunSummary, grants: RealTimeGrants, as_json: bool) -> None:
     """Print how a run went: samples, how evenly it ran, what the on-line estimate made of it."""
     if as_json:
-        typer.echo(json.dumps(_document(job, summary, grants)))
+        say(json.dumps(_document(job, summary, grants)))
         return
-    typer.echo(
+    say(
         f"{job.out}: {summary.recorded} samples, {summary.flagged} flagged; "
         f"latest cycle {summary.most_late_ns / 1e6:.1f} ms late"
     )
     for line in timing_lines(summary.timing):
-        typer.echo(f"  {line}")
+        say(f"  {line}")
     if grants is not NOT_ASKED:
-        typer.echo(f"  {grants.statement}")
+        say(f"  {grants.statement}")
     if job.trace is not None:
-        typer.echo(f"{job.trace}: every frame of the bus")
+        say(f"{job.trace}: every frame of the bus")
     if job.live is not None and summary.recorded:
-        typer.echo(f"{course_path(job.out)}: {job.live.course.statement}")
+        say(f"{course_path(job.out)}: {job.live.course.statement}")
         if job.live.course.excitation:
-            typer.echo(f"  {job.live.course.excitation}")
+            say(f"  {job.live.course.excitation}")
         for statement in statements(job.live.course.summary()):
-            typer.echo(f"  alarm: {statement}")
+            say(f"  alarm: {statement}")
 
 
 def _document(job: Job, summary: RunSummary, grants: RealTimeGrants) -> dict[str, Any]:
