@@ -5,6 +5,7 @@ A simulated rig is reached by the same drivers over the same protocols; only the
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -141,6 +142,7 @@ def inverter_settings(name: str, rig: Rig) -> InverterSettings:
         sdo_timeout_s=table.sdo_timeout_s,
         mode_timeout_s=table.mode_timeout_s,
         state_timeout_s=table.state_timeout_s,
+        speed_limit_rad_s=math.inf if rig.guard.speed_limit_rad_s is None else rig.guard.speed_limit_rad_s,
         channels=tuple(each.object_id for each in rig.channels if each.inverter == name and each.object_id is not None),
     )
 

@@ -211,6 +211,15 @@ def driven(inverter: Inverter, link: CanLink, cycles: int, torque_nm: float = 60
         inverter.raise_if_faulted()
 
 
+def test_arming_takes_away_the_targets_that_another_program_has_left() -> None:
+    with on_bus() as (drive, inverter, _):
+        drive.objects |= {(0x6071, 0): 300, (0x60B2, 0): -50}
+        inverter.configure()
+        inverter.arm()
+        assert (drive.objects[0x6071, 0], drive.objects[0x60B2, 0]) == (0, 0)
+        inverter.disarm()
+
+
 def test_internal_limit_is_part_of_the_feedback() -> None:
     with on_bus() as (drive, inverter, link):
         inverter.configure()

@@ -140,3 +140,9 @@ def test_drive_that_can_not_be_made_to_watch_is_refused(locked: int) -> None:
     with bench(InverterFaults(locked_objects=frozenset({locked})), settings=QUICK) as rig:
         with pytest.raises(ConfigMismatch, match=f"object 0x{locked:04X}.*0x06010002.*read only"):
             rig.m1.prove_stop(PERIOD_S)
+
+
+def test_the_reaction_is_that_of_the_rig_file_where_it_has_one() -> None:
+    with bench(settings=replace(QUICK, option_codes={0x6007: 3})) as rig:
+        [reaction] = [each for each in rig.m1.protections() if each.name == "abort_connection"]
+        assert "3 (quick stop)" in reaction.by

@@ -190,7 +190,9 @@ def test_a_limit_that_takes_all_of_the_torque_ends_the_run() -> None:
     assert m1_alone(torques(*[0.0] * 500, limited=True), command_nm=30.0) is None
 
 
-@pytest.mark.parametrize("state", set(PowerState) - {PowerState.OPERATION_ENABLED} - FAULT_STATES)
+@pytest.mark.parametrize(
+    "state", [each for each in PowerState if each not in {PowerState.OPERATION_ENABLED, *FAULT_STATES}]
+)
 @pytest.mark.parametrize("mode", TorqueMode)
 @pytest.mark.parametrize("follows", [True, False])
 def test_another_state_ends_the_run_in_that_cycle(state: PowerState, mode: TorqueMode, follows: bool) -> None:
