@@ -98,7 +98,7 @@ def remarks(
         if found != carrier.layout and (_is_given(carrier) or found == carrier.described):
             yield f"{_pdo_name(carrier)} has [{found}], a run gives it [{carrier.layout}]"
     for setting, value in _kept(sdo, given):
-        if not setting.is_met_by(value) and (setting.at_most or _as_ordered(plan, setting, value)):
+        if not (setting.is_met_by(value) or setting.at_most) and _as_ordered(plan, setting, value):
             yield f"{setting} is {value}, a run gives it {setting.value} ({setting.source})"
     yield from _not_limited(sdo, plan, settings)
     wanted, emcy = EMCY_COB_ID + settings.node_id, emcy_cob_id(plan)

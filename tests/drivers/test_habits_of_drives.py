@@ -92,8 +92,9 @@ def test_cob_id_that_the_drive_had_before_is_switched_off_as_it_is() -> None:
     """Bits 0 to 29 do not change while the PDO is on, an identifier of 29 bits included."""
     with on_bus(Strict) as (drive, inverter, _):
         drive.objects[0x1800, 1] = 1 << 29 | 0x12345
-        [difference] = inverter.check()
-        assert "of 29 bits" in difference.found
+        assert inverter.check() == ()
+        [remark] = inverter.remarks()
+        assert "(of 29 bits)" in remark
         inverter.configure()
         assert drive.objects[0x1800, 1] == 0x180 + M1.node_id
 

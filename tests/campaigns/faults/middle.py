@@ -26,6 +26,7 @@ import can
 import numpy as np
 
 from drivers.canopen.can_link import SYNC_COB_ID, CanLink
+from drivers.inverter.supervision import NO_TORQUE_S
 from drivers.plc.plc import Plc
 from hil.config.rig_file import Rig
 from hil.recording import RecordingWriter, read_table
@@ -144,6 +145,7 @@ class Man:
 
     def __init__(self, fault: Fault, rated_nm: float) -> None:
         self._fault = fault
+        self.kind = fault.kind
         self._scale_nm = rated_nm / 1000.0
         self._sent = [0.0, 0.0]
         self.cycle = 0
@@ -276,6 +278,7 @@ def _also(fault: Fault, server: RigServer, stack: ExitStack) -> Callable[[], Non
 def _judge_shaft(rig: Rig, man: Man, shaft: Shaft, fastest_rad_s: float, outcome: Outcome) -> None:
     """Sum up how far each torque was outside what the host asked for: beyond the stated impulse nothing may follow."""
     error = rig.guard_limits.error
+    time_s = NO_TORQUE_S if man.kind == "limit bit, no torque" else error.time_s
     for drive, limit_nm in ((0, error.m1_nm), (1, error.m2_nm)):
         impulse = length = 0.0
         for k, (given, _) in enumerate(zip(shaft.torques_nm, man.asked_nm, strict=False)):
@@ -283,7 +286,7 @@ def _judge_shaft(rig: Rig, man: Man, shaft: Shaft, fastest_rad_s: float, outcome
             off_nm = max(min(asked) - given[drive], given[drive] - max(asked), 0.0)
             if off_nm <= limit_nm + COUNT_NM:
                 continue
-            if impulse >= 2.0 * limit_nm * error.time_s:
+            if impulse >= 2.0 * limit_nm * time_s:
                 length += 1
             impulse += off_nm * rig.period_s
         outcome.zero_s = max(outcome.zero_s, impulse)
