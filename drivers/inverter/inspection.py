@@ -104,6 +104,21 @@ class InspectedInverter:
         """
         return self._sdo.upload_text(0x1008)
 
+    @property
+    def count_rad_s(self) -> float:
+        """One count of its speed [rad/s]."""
+        return self._pdos.velocity.rad_s_per_count
+
+    def read_speed_rad_s(self) -> float:
+        """Read the velocity actual value 0x606C over SDO [rad/s].
+
+        Raises
+        ------
+        DeviceTimeout, ConfigMismatch
+            If the node does not answer, or lacks the object.
+        """
+        return self._pdos.velocity.to_rad_s(self._sdo.upload(0x606C))
+
     def read_channel(self, channel: ObjectId) -> int:
         """Read the count of a further object over SDO.
 

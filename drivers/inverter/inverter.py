@@ -74,11 +74,6 @@ class Inverter(InspectedInverter):
         """The last feedback received; None before the first after `configure`."""
         return self._feedback.latest
 
-    @property
-    def count_rad_s(self) -> float:
-        """One count of its speed [rad/s]."""
-        return self._pdos.velocity.rad_s_per_count
-
     def messages(self) -> tuple[int, int]:
         """How often the seldomest and the commonest kind of its TPDOs has come since this was last asked."""
         return self._feedback.messages()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from pathlib import Path
 from urllib.parse import parse_qsl, urlsplit
@@ -18,6 +18,7 @@ from drivers.inverter.check import Difference
 from drivers.inverter.commissioned import CommissionedValue
 from drivers.inverter.inverter import Inverter
 from drivers.inverter.protection import Protection
+from drivers.inverter.supervision import speed_tolerance_rad_s
 from drivers.plc.reader import Backoff, PlcReader
 from drivers.plc.reading import Reading
 from drivers.plc.types import PlcStatus
@@ -128,13 +129,29 @@ def _can(rig: Rig, prove_stop: bool) -> tuple[Finding, ...]:
         )
     with link:
         bus = Finding("can", rig.can.url, Verdict.AGREES)
-        return (
-            bus,
-            *(_inverter(link, name, rig, prove_stop) for name in tables),
-        )
+        made: dict[str, Inverter] = {}
+        m1, m2 = (_inverter(link, name, rig, prove_stop, made) for name in tables)
+        if len(made) == len(tables):
+            m2 = _or_failed("m2", m2.address, lambda: _one_shaft(m2, made["m1"], made["m2"]))
+        return bus, m1, m2
 
 
-def _inverter(link: CanLink, name: str, rig: Rig, prove_stop: bool) -> Finding:
+def _one_shaft(finding: Finding, m1: Inverter, m2: Inverter) -> Finding:
+    """Compare the speeds that both read of their one shaft, at rest or coasting."""
+    one, other = m1.read_speed_rad_s(), m2.read_speed_rad_s()
+    if abs(one - other) <= speed_tolerance_rad_s(one, other, m1.count_rad_s + m2.count_rad_s):
+        return finding
+    difference = Difference(
+        m2.settings.where,
+        "velocity actual value 0x606C",
+        f"the {one:.3g} rad/s that m1 reads, for both turn with one shaft",
+        f"{other:.3g} rad/s",
+        "m1",
+    )
+    return replace(finding, verdict=Verdict.DIFFERS, differences=(*finding.differences, difference))
+
+
+def _inverter(link: CanLink, name: str, rig: Rig, prove_stop: bool, made: dict[str, Inverter]) -> Finding:
     table: InverterTable = getattr(rig.inverters, name)
 
     def compare() -> Finding:
@@ -142,6 +159,7 @@ def _inverter(link: CanLink, name: str, rig: Rig, prove_stop: bool) -> Finding:
         differences, fault = inverter.check(), inverter.fault()
         if prove_stop and not differences and fault is None:
             differences = inverter.prove_stop(rig.period_s)
+        made[name] = inverter
         verdict = Verdict.DIFFERS if differences else Verdict.AGREES
         notes = (*_eds_note(table.eds), *(() if fault is None else (fault,)))
         return Finding(

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from drivers.errors import DriverError
 from drivers.plc.types import PlcStatus
 from hil.errors import RunAborted
 from hil.rig.arming import ArmedDrives
@@ -91,9 +92,22 @@ def run_plan(
             watch = PlcWatch(devices.plc_loop, devices.plc, before, plan.needs, pacer.poll_patience_s)
             drive = Drive(plan, cycle, watch, prbs, pacer, recorder, stop, progress, observers)
             beat.hand_over()
-            drive.wake_up()
-            devices.guard.enable()
-            return drive.run()
+            try:
+                drive.wake_up()
+                devices.guard.enable()
+                return drive.run()
+            except (DriverError, RunAborted) as error:
+                _blame_the_host_first(error, drive.lateness)
+                raise
+
+
+def _blame_the_host_first(error: Exception, lateness: str) -> None:
+    """Where this machine was late, whatever looks wrong with a device may be its own doing."""
+    if lateness and "too busy" not in str(error):
+        error.args = (
+            f"This machine was too busy within the last second: {lateness}; close other programs before you look "
+            f"at anything else. What ended the run then: {error}",
+        )
 
 
 def _fit(devices: Devices, plan: Plan) -> PlcStatus:
