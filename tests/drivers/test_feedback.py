@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-import time
 
 from drivers.canopen.pdo_map import MappedObject, PdoCodec, PdoLayout
 from drivers.inverter.cia402 import STATUSWORD_STATE_BITS, PowerState
@@ -27,7 +26,7 @@ def test_further_objects_are_waited_for_until_all_have_come() -> None:
     receiver.start_anew()
     receiver.on_frame(0, b"\x05\x00", 10)
     assert receiver.await_after(0, 0.01) == (5, None)
-    late = threading.Thread(target=lambda: (time.sleep(0.05), receiver.on_frame(1, b"\x07\x00\x00\x00", 11)))
+    late = threading.Timer(0.05, receiver.on_frame, (1, b"\x07\x00\x00\x00", 11))
     late.start()
     assert receiver.await_after(0, 30.0) == (5, 7)
     late.join()
@@ -39,11 +38,12 @@ def test_each_kind_of_tpdo_is_counted() -> None:
     receiver = FeedbackReceiver([codec(0, 0x6041, 0x6077), codec(1, 0x606C)], TorqueScale(600.0), VelocityScale(0.1))
     receiver.start_anew()
     receiver.on_frame(0, status + b"\x05\x00", 1)
-    assert receiver.latest is None
+    assert receiver.await_after(0, 0.01) is None
     assert receiver.messages() == (0, 1)
     receiver.on_frame(1, b"\x07\x00\x00\x00", 2)
-    assert receiver.latest is not None
-    assert (receiver.latest.torque_nm, receiver.latest.t_ns) == (3.0, 1)
+    seen = receiver.await_after(0, 0.01)
+    assert seen is not None
+    assert (seen.torque_nm, seen.t_ns) == (3.0, 1)
     receiver.on_frame(1, b"\x07\x00\x00\x00", 3)
     assert receiver.messages() == (0, 2)
     receiver.start_anew()
