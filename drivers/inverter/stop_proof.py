@@ -113,7 +113,7 @@ class StopProof:
                 self._without_anything()
             self._revive()
             if consumers:
-                yield from self._without_heartbeat()
+                yield from self._without_heartbeat(consumers[0])
                 self._revive()
         finally:
             self._link.stop_heartbeat()
@@ -132,7 +132,7 @@ class StopProof:
         self._send_ready()
         self._link.sync()
         yield from self._noticed(
-            "stop without commands", "rpdo_deadline", timer.value, lambda: self._sync_and_wait(period_s)
+            "stop without commands", "rpdo_deadline", timer, timer.value, lambda: self._sync_and_wait(period_s)
         )
 
     def _without_anything(self) -> None:
@@ -148,11 +148,13 @@ class StopProof:
             within_ms = self._settings.rpdo_deadline_ms
             self.seen["rpdo_deadline"] = f"without commands and SYNC nothing happened within {within_ms} ms"
 
-    def _without_heartbeat(self) -> Iterator[Difference]:
+    def _without_heartbeat(self, consumer: DriveSetting) -> Iterator[Difference]:
         self._make_ready()
         time.sleep(HEARD_PERIODS * self._settings.host_heartbeat_s)
         self._link.stop_heartbeat()
-        yield from self._noticed("stop without heartbeat", "heartbeat_consumer", self._settings.host_timeout_ms, _wait)
+        yield from self._noticed(
+            "stop without heartbeat", "heartbeat_consumer", consumer, self._settings.host_timeout_ms, _wait
+        )
 
     def _revive(self) -> None:
         """Come back to life; a fault that playing dead has made, 0x6007 being 1, is reset."""
@@ -167,7 +169,9 @@ class StopProof:
         self._power.make_ready()
         self._monitor.forget_emergency()
 
-    def _noticed(self, what: str, name: str, within_ms: int, pause: Callable[[], None]) -> Iterator[Difference]:
+    def _noticed(
+        self, what: str, name: str, entry: DriveSetting, within_ms: int, pause: Callable[[], None]
+    ) -> Iterator[Difference]:
         after_s = self._watch(within_ms, pause)
         state = self._power.state()
         left = state is not PowerState.READY_TO_SWITCH_ON
@@ -180,7 +184,7 @@ class StopProof:
             self._settings.where,
             what,
             f"{expected}, and READY TO SWITCH ON left" if self._reacts else expected,
-            self._answer(state),
+            f"{self._answer(state)}; the entry that failed is {entry}",
             SOURCE,
         )
 

@@ -72,7 +72,11 @@ def test_drive_that_does_not_notice_is_found(monkeypatch: pytest.MonkeyPatch) ->
         assert node is not None
         node.look_for_host = lambda now_ns: None  # type: ignore[method-assign]
         differences = rig.m1.prove_stop(PERIOD_S)
-    assert [each.found for each in differences] == ["no EMCY, power state ready to switch on"] * 2
+    said = "no EMCY, power state ready to switch on; the entry that failed is "
+    assert [each.found for each in differences] == [
+        f"{said}RPDO event timer 0x1400:05",
+        f"{said}consumer heartbeat time 0x1016:01",
+    ]
     assert differences[0].expected == "an EMCY 0x81xx or 0x82xx within 50 ms, and READY TO SWITCH ON left"
 
 

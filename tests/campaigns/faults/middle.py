@@ -332,7 +332,7 @@ def main(arguments: list[str] | None = None) -> int:
             outcome, _ = run_with(rig, experiment, fault, folder, fastest_rad_s)
             return fault.kind, f"in {experiment}, {fault}: {outcome.said[:120] or 'went to its end'}", outcome
 
-        return tried(asked, one)
+        return tried(asked, one, "worst torque error [Nm s]")
 
 
 if __name__ == "__main__":
