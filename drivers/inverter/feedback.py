@@ -153,8 +153,8 @@ class FeedbackReceiver(_TpdoReceiver):
         counts, before = self._counts[:], self._taken
         self._taken = counts
         if len(counts) == 1:
-            came = counts[0] - before[0]
-            return came, came
+            got = counts[0] - before[0]
+            return got, got
         came_each = [now - then for now, then in zip(counts, before, strict=True)]
         return min(came_each), max(came_each)
 

@@ -61,7 +61,7 @@ def test_drive_that_does_nothing_without_its_host_is_found() -> None:
     assert [each.what for each in differences] == ["stop without commands", "stop without heartbeat"]
     assert differences[0].found == (
         "EMCY 0x8250 RPDO timeout: the host's command did not come in time (error register 0x11), "
-        "power state ready to switch on"
+        "power state ready to switch on; the entry that failed is RPDO event timer 0x1400:05"
     )
 
 

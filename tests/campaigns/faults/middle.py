@@ -3,7 +3,7 @@
 Between the host and the simulated rig frames are changed, lost, repeated and invented: kind, drive, moment, pattern
 (once, burst, periodic, for ever) and size are drawn. How a run ended is judged by what turned the shaft, which no code
 of the product has a part in: the torques the plant was driven with against those the host sent before they were
-changed, and the plant's own speed. A failure is a run that goes on after the torque was wrong by more than stated, or
+changed, and the plant's own speed. A failure is a run that continues after the torque was wrong by more than stated, or
 a shaft that got faster than the experiment has it, or a drive that is not disarmed at the end.
 """
 
