@@ -80,21 +80,7 @@ class DriveSetting:
 
 
 def drive_settings(plan: DrivePlan, settings: InverterSettings) -> tuple[DriveSetting, ...]:
-    """List what a drive is given, in the order of writing.
-
-    Parameters
-    ----------
-    plan
-        Which of the objects the drive has.
-    settings
-        What the rig file says.
-
-    Raises
-    ------
-    ConfigMismatch
-        If the drive would keep its torque without the host, lacks an object the rig file has a value for, or has one
-        for good that this program can't work with.
-    """
+    """List what a drive is given, in the order of writing."""
     _require_action(plan, settings)
     return (
         *_sync(plan),

@@ -86,21 +86,7 @@ class StopProof:
         self.seen: dict[str, str] = {}
 
     def run(self, given: tuple[DriveSetting, ...], period_s: float) -> Iterator[Difference]:
-        """Play dead in both ways; the drive is disabled at the end.
-
-        Parameters
-        ----------
-        given
-            What the drive was configured with.
-        period_s
-            Time between two SYNCs [s].
-
-        Raises
-        ------
-        DriverError
-            If the drive can't be configured or made ready, answers no more, or is in operation: then another
-            program drives it.
-        """
+        """Play dead in both ways; the drive is disabled at the end."""
         self._refuse_if_driven()
         self._longest_look_s = max(LONGEST_LOOK_S, 2.0 * period_s)
         self._reacts = self._power.reacts_to_a_lost_host()

@@ -497,24 +497,12 @@ class Supervision:
         )
 
     def raise_if_ended(self) -> None:
-        """End the run where a cycle has.
-
-        Raises
-        ------
-        DeviceFault
-            What was found; `WrongTorque` if it is a torque alone.
-        """
+        """End the run where a cycle has."""
         if self.ended is not None:
             raise self.ended
 
     def raise_if_old(self, ages_ns: Sequence[int]) -> None:
-        """Refuse feedback that is too old.
-
-        Raises
-        ------
-        DeviceTimeout
-            Naming the inverter.
-        """
+        """Refuse feedback that is too old."""
         for drive, age_ns in zip((self._m1, self._m2), ages_ns, strict=True):
             if age_ns > self._stale_ns:
                 raise DeviceTimeout(

@@ -7,22 +7,7 @@ from hil.simulator.loopback import host_port
 
 
 def with_addresses(rig: Rig, bus: str | None, modbus: str | None) -> Rig:
-    """Replace the addresses that are given.
-
-    Parameters
-    ----------
-    rig
-        As read from its file.
-    bus
-        CAN bus URL in place of ``[can] url``.
-    modbus
-        ``HOST:PORT`` in place of ``[plc]`` host and port.
-
-    Raises
-    ------
-    UsageError
-        If ``modbus`` is no such pair.
-    """
+    """Replace the addresses that are given."""
     can, plc = rig.can, rig.plc
     if bus is not None:
         can = can.model_copy(update={"url": bus})

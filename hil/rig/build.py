@@ -89,13 +89,7 @@ def _require_acceptances(rig: Rig) -> None:
 
 @contextmanager
 def connected_plc(table: PlcTable, loop: PlcLoop) -> Iterator[Plc]:
-    """Connect to the PLC on its loop; disconnected at the end of the block.
-
-    Raises
-    ------
-    BusDown, DeviceTimeout, ConfigMismatch
-        See `open_devices`.
-    """
+    """Connect to the PLC on its loop; disconnected at the end of the block."""
     plc = plc_client(table)
     loop.call(plc.connect())
     try:
@@ -105,13 +99,7 @@ def connected_plc(table: PlcTable, loop: PlcLoop) -> Iterator[Plc]:
 
 
 def plc_client(table: PlcTable) -> Plc:
-    """Make the PLC's client, not connected yet.
-
-    Raises
-    ------
-    ConfigMismatch
-        If the register map can't be used.
-    """
+    """Make the PLC's client, not connected yet."""
     register_map = load_register_map(table.map or data_file("plc.toml"))
     security = None if table.security is None else table.security.client
     return Plc(table.host, table.port, register_map, security=security)

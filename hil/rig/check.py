@@ -103,16 +103,7 @@ class Finding:
 
 
 def check_rig(rig: Rig, prove_stop: bool = False) -> tuple[Finding, ...]:
-    """Look for the CAN bus, both inverters and the PLC; each, whatever is wrong with the others.
-
-    Parameters
-    ----------
-    rig
-        What to look for.
-    prove_stop
-        Whether an inverter that agrees is to show that it stops without its host (`Inverter.prove_stop`): it is
-        configured for that and left disabled, and no torque is commanded.
-    """
+    """Look for the CAN bus, both inverters and the PLC; each, whatever is wrong with the others."""
     return (*_can(rig, prove_stop), _plc(rig))
 
 

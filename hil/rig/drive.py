@@ -135,13 +135,7 @@ class Drive:
             self._stand_still()
 
     def run(self) -> RunSummary:
-        """Drive the experiment to its end; the torque guard is enabled.
-
-        Raises
-        ------
-        RunAborted, DriverError, KeyboardInterrupt
-            As `hil.rig.session.run_plan`.
-        """
+        """Drive the experiment to its end; the torque guard is enabled."""
         first = self._stand_still().cycle + 1  # the guard counts its rate limit from a cycle at zero torque
         self._phase_from = first
         while self._phase is not Phase.DONE:

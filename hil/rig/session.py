@@ -41,37 +41,7 @@ def run_plan(
     timing: RunTiming | None = None,
     observers: Sequence[Observer] = (),
 ) -> RunSummary:
-    """Run a plan on an opened rig.
-
-    Parameters
-    ----------
-    devices
-        The rig, opened.
-    plan
-        What to do; used up by the run.
-    pacer
-        When each cycle begins.
-    recorder
-        Where samples go.
-    stop
-        Ends the run at the next cycle when requested.
-    progress
-        Called with every cycle.
-    timing
-        Where the run's timing is kept, for a caller who wants it however the run ends.
-    observers
-        Given every sample after its cycle's work; see `hil.rig.drive.Observer`.
-
-    Raises
-    ------
-    RunAborted
-        If the vehicle is not fit or no longer, or a drive can't be confirmed disarmed, or the PLC's PRBS
-        generator off.
-    DriverError
-        What the devices raise; `CommandRefused` if the guard refused a torque.
-    KeyboardInterrupt
-        If `stop` was requested.
-    """
+    """Run a plan on an opened rig."""
     before = _fit(devices, plan)
     with HostBeat(devices.plc_loop, devices.plc) as beat:
         _configure(devices, stop)
