@@ -34,6 +34,7 @@ kernels: $(READY)
 campaign: $(READY)
 	$(BIN)/python -m pytest -n 2 -m campaign
 	$(BIN)/python -m tests.campaigns.faults
+	$(BIN)/python -m tests.campaigns.faults.middle
 	$(BIN)/python -m tests.campaigns.faults.processes
 	$(BIN)/python -m tests.campaigns.mutants
 	$(BIN)/python -m tests.campaigns.fuzz

@@ -15,13 +15,7 @@ _FOLDERS = (_PACKAGE / "eds", _PACKAGE.parent / "eds")
 
 
 def data_file(name: str) -> Path:
-    """Locate a shipped data file by name, for example ``inverter.eds``.
-
-    Raises
-    ------
-    ConfigMismatch
-        If no folder holds it: the installation is damaged.
-    """
+    """Locate a shipped data file by name, for example ``inverter.eds``."""
     for folder in _FOLDERS:
         if (folder / name).is_file():
             return folder / name

@@ -49,13 +49,7 @@ class IntegerType(IntEnum):
         return _RANGE[self][1]
 
     def encode(self, value: int, where: str) -> bytes:
-        """Pack little-endian.
-
-        Raises
-        ------
-        CommandRefused
-            If the value is outside the type's range.
-        """
+        """Pack little-endian."""
         if not self.low <= value <= self.high:
             raise CommandRefused(
                 f"{where}: {value} does not fit {self.name}, expected {self.low} to {self.high}. "
@@ -115,13 +109,7 @@ class TorqueScale:
         return raw * self.rated_torque_nm / 1000.0
 
     def to_raw(self, torque_nm: float, where: str) -> int:
-        """Nearest count of a torque [Nm]; the object's INTEGER16 range applies.
-
-        Raises
-        ------
-        CommandRefused
-            If the torque is not finite or does not fit.
-        """
+        """Nearest count of a torque [Nm]; the object's INTEGER16 range applies."""
         exact = torque_nm * 1000.0 / self.rated_torque_nm
         count = _nearest_count(exact, *_INT16_RANGE)
         if count is None:
@@ -152,21 +140,7 @@ class VelocityScale:
 
     @classmethod
     def from_object(cls, si_unit_velocity: int, where: str) -> VelocityScale:
-        """Scale from object 0x60A9, SI unit velocity.
-
-        Parameters
-        ----------
-        si_unit_velocity
-            Bits 31-24 power of ten (signed), 23-16 unit of angle, 15-8 unit of time, 7-0 reserved; codes of
-            CiA 303-2. 0xFDB44700 is 10^-3 revolutions per minute.
-        where
-            Device, for the message.
-
-        Raises
-        ------
-        ConfigMismatch
-            If the unit is not an angle per time, or is not known here.
-        """
+        """Scale from object 0x60A9, SI unit velocity."""
         prefix = IntegerType.INTEGER8.decode(bytes([si_unit_velocity >> 24 & 0xFF]))
         angle = _RADIANS_OF_UNIT.get(si_unit_velocity >> 16 & 0xFF)
         time = _SECONDS_OF_UNIT.get(si_unit_velocity >> 8 & 0xFF)
@@ -183,13 +157,7 @@ class VelocityScale:
         return raw * self.rad_s_per_count
 
     def to_raw(self, speed_rad_s: float, where: str) -> int:
-        """Nearest count of a speed [rad/s]; the object's INTEGER32 range applies.
-
-        Raises
-        ------
-        CommandRefused
-            If the speed is not finite or does not fit.
-        """
+        """Nearest count of a speed [rad/s]; the object's INTEGER32 range applies."""
         exact = speed_rad_s / self.rad_s_per_count
         count = _nearest_count(exact, *_INT32_RANGE)
         if count is None:

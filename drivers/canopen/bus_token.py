@@ -32,13 +32,7 @@ def token_file(port: int) -> Path:
 
 
 def keep_token(port: int, token: str) -> None:
-    """Keep the token of a server that is up; nobody else can read it.
-
-    Raises
-    ------
-    OSError
-        If the folder does not take it.
-    """
+    """Keep the token of a server that is up; nobody else can read it."""
     path = token_file(port)
     path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
     path.unlink(missing_ok=True)

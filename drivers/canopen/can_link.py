@@ -125,20 +125,7 @@ class CanLink:
 
     @classmethod
     def open(cls, url: str) -> CanLink:
-        """Open the bus a URL names.
-
-        Parameters
-        ----------
-        url
-            ``virtual:rig`` (inside this process), ``ws://127.0.0.1:54701/`` (a ``python-can-remote``
-            server), or ``interface:channel?key=value`` for any ``python-can`` interface, such as
-            ``socketcan:can0?bitrate=500000``.
-
-        Raises
-        ------
-        BusDown
-            If it can't be opened.
-        """
+        """Open the bus a URL names."""
         return cls(open_bus(url))
 
     def subscribe(self, cob_id: int, callback: FrameCallback) -> None:
@@ -150,28 +137,11 @@ class CanLink:
         self.network.tap = tap
 
     def send(self, cob_id: int, data: bytes) -> None:
-        """Send one frame.
-
-        Raises
-        ------
-        BusDown
-            If the bus is gone.
-        """
+        """Send one frame."""
         self.network.send_message(cob_id, data)
 
     def sync(self) -> int:
-        """Send SYNC.
-
-        Returns
-        -------
-        int
-            The host's monotonic time just before it went out [ns]: every answer to it arrives later.
-
-        Raises
-        ------
-        BusDown, ProtocolViolation
-            What the receive thread met since the last call.
-        """
+        """Send SYNC."""
         self.raise_if_failed()
         t_ns = time.monotonic_ns()
         self.network.send_message(SYNC_COB_ID, b"")
@@ -206,15 +176,7 @@ class CanLink:
             self._producer = None
 
     def raise_if_failed(self) -> None:
-        """Raise what the receive thread met.
-
-        Raises
-        ------
-        BusDown
-            If the bus is gone; from then on at every call.
-        ProtocolViolation
-            If a frame could not be read; once, receiving continues.
-        """
+        """Raise what the receive thread met."""
         self._raise_if_down()
         violation, self._violation = self._violation, None
         if violation is not None:
@@ -279,13 +241,7 @@ class CanLink:
             )
 
     def close(self) -> None:
-        """End the threads and shut the bus down; calling it again does nothing.
-
-        Raises
-        ------
-        Exception
-            What a subscriber raised in the receive thread, if it was no error of the bus: a defect.
-        """
+        """End the threads and shut the bus down; calling it again does nothing."""
         self.stop_heartbeat()
         self._closing.set()
         if self._thread is not None:
@@ -308,13 +264,7 @@ class CanLink:
 
 
 def open_bus(url: str) -> can.BusABC:
-    """Open the bus a URL names, as `CanLink.open` takes it.
-
-    Raises
-    ------
-    BusDown
-        If it can't be opened.
-    """
+    """Open the bus a URL names, as `CanLink.open` takes it."""
     try:
         return BoundedRemoteBus(url) if url.startswith(("ws:", "wss:")) else _python_can_bus(url)
     except _OPENING_ERRORS as error:

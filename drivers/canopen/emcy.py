@@ -47,13 +47,7 @@ class Emergency:
 
 
 def decode(data: bytes) -> Emergency:
-    """Unpack an EMCY frame.
-
-    Raises
-    ------
-    ProtocolViolation
-        If it has not the 8 bytes CiA 301 gives it.
-    """
+    """Unpack an EMCY frame."""
     if len(data) != _FRAME.size:
         raise ProtocolViolation(
             f"EMCY frame of {len(data)} bytes ({data.hex(' ')}), expected {_FRAME.size}. "

@@ -102,23 +102,11 @@ class InlineBus(VirtualBus):
         self._inbox.open(receiver)
 
     def send(self, msg: can.Message, timeout: float | None = None) -> None:
-        """Put a copy of a frame into the queue of every other participant.
-
-        Raises
-        ------
-        can.CanOperationError
-            If the bus is closed, or a participant's queue stays full for ``timeout`` [s].
-        """
+        """Put a copy of a frame into the queue of every other participant."""
         self.hand_out(_copied(msg), timeout)
 
     def hand_out(self, message: can.Message, timeout: float | None = None) -> None:
-        """Give a frame away: another participant gets it as it is, any further one a copy.
-
-        Raises
-        ------
-        can.CanOperationError
-            As `send`.
-        """
+        """Give a frame away: another participant gets it as it is, any further one a copy."""
         self._check_if_open()
         message.timestamp = time.time()
         message.channel = self.channel_id

@@ -46,13 +46,7 @@ class NodeMonitor:
         return self._emergency
 
     def on_heartbeat(self, data: bytes, t_ns: int) -> None:
-        """Take a heartbeat or boot-up frame.
-
-        Raises
-        ------
-        ProtocolViolation
-            If it is not one byte with an NMT state.
-        """
+        """Take a heartbeat or boot-up frame."""
         state = _NMT_STATES.get(data[0] & 0x7F) if len(data) == 1 else None
         if state is None:
             raise ProtocolViolation(
@@ -67,13 +61,7 @@ class NodeMonitor:
             self._changed.notify_all()
 
     def on_emergency(self, data: bytes, t_ns: int) -> None:
-        """Take an EMCY frame; the first that is not yet reset is kept, for it names the cause.
-
-        Raises
-        ------
-        ProtocolViolation
-            If it has not 8 bytes.
-        """
+        """Take an EMCY frame; the first that is not yet reset is kept, for it names the cause."""
         emergency = emcy.decode(data)
         if emergency.is_reset:
             self._past_emergency, self._emergency = self._emergency or self._past_emergency, None
@@ -100,20 +88,6 @@ class NodeMonitor:
 
         No NMT command is acknowledged: it may be lost, and a node that still writes what it was given does not
         take it.
-
-        Parameters
-        ----------
-        state
-            What to wait for.
-        timeout_s
-            How long to wait [s].
-        ask
-            Sends the NMT command.
-
-        Raises
-        ------
-        DeviceTimeout
-            If none reports it in ``timeout_s``.
         """
         deadline = time.monotonic() + timeout_s
         ask()
@@ -135,15 +109,7 @@ class NodeMonitor:
             )
 
     def raise_if_unwell(self, now_ns: int) -> None:
-        """Check emergencies, heartbeat and NMT state at ``now_ns``.
-
-        Raises
-        ------
-        DeviceFault
-            If an emergency is active, or the node has left the NMT state it should be in.
-        DeviceTimeout
-            If the heartbeat is lost.
-        """
+        """Check emergencies, heartbeat and NMT state at ``now_ns``."""
         if self._emergency is not None:
             raise DeviceFault(
                 f"{self._where}: {self._emergency}, expected none. Fix the cause at the drive, reset the fault."

@@ -105,13 +105,7 @@ class PdoLayout:
 
 
 def read_layout(read: ReadObject, communication_index: int, mapping_index: int) -> PdoLayout:
-    """Read one PDO's layout through ``read``.
-
-    Raises
-    ------
-    ConfigMismatch
-        If it says that it maps more objects than a PDO can.
-    """
+    """Read one PDO's layout through ``read``."""
     cob_id = read(communication_index, 1)
     count = read(mapping_index, 0)
     if not 0 <= count <= MAX_MAPPED:
@@ -137,13 +131,6 @@ def configuration_writes(layout: PdoLayout, present: int) -> tuple[tuple[int, in
     The order is that of CiA 301, 7.5.2.35 and 7.5.2.36: switch the PDO off and change no other bit of its COB-ID,
     set the number of mapped objects to 0, map, set the number, give it its identifier and switch it on. Bit 30 is
     the device's: many know no remote frames, and refuse an entry that allows them.
-
-    Parameters
-    ----------
-    layout
-        What it shall have.
-    present
-        COB-ID entry it has now.
     """
     communication, mapping = layout.communication_index, layout.mapping_index
     no_rtr = present & COB_ID_NO_RTR | (COB_ID_NO_RTR if layout.no_rtr else 0)
@@ -210,13 +197,7 @@ class PdoCodec:
         return kind
 
     def position(self, index: int, subindex: int = 0) -> int:
-        """Place of an object among the unpacked values.
-
-        Raises
-        ------
-        ConfigMismatch
-            If this PDO does not carry the object.
-        """
+        """Place of an object among the unpacked values."""
         if (index, subindex) not in self._positions:
             at = f":{subindex:02X}" if subindex else ""
             raise ConfigMismatch(
@@ -226,13 +207,7 @@ class PdoCodec:
         return self._positions[index, subindex]
 
     def pack(self, values: tuple[int, ...]) -> bytes:
-        """Build the frame's data from the objects' values, in mapping order.
-
-        Raises
-        ------
-        CommandRefused
-            If a value does not fit its object, or the number of values is not the number of objects.
-        """
+        """Build the frame's data from the objects' values, in mapping order."""
         try:
             return self._struct.pack(*values)
         except struct.error as error:
@@ -242,13 +217,7 @@ class PdoCodec:
             ) from error
 
     def unpack(self, data: bytes) -> tuple[int, ...]:
-        """Read the objects' values, in mapping order, from a frame's data.
-
-        Raises
-        ------
-        ProtocolViolation
-            If the frame has another length than the mapping gives it.
-        """
+        """Read the objects' values, in mapping order, from a frame's data."""
         if len(data) != self._struct.size:
             raise ProtocolViolation(
                 f"{self._where}: frame of {len(data)} bytes, expected {self._struct.size} from the mapping "

@@ -59,17 +59,7 @@ class SdoChannel:
         return self._eds.dictionary.get_variable(index, subindex) is not None
 
     def upload(self, index: int, subindex: int = 0) -> int:
-        """Read an object.
-
-        Raises
-        ------
-        DeviceTimeout
-            If the node does not answer.
-        ConfigMismatch
-            If it answers with an abort.
-        ProtocolViolation
-            If the answer is none to this request, or has another length than the object.
-        """
+        """Read an object."""
         kind = self._eds.integer_type(index, subindex)
         data = self._transfer(index, subindex, lambda: self._client.upload(index, subindex))
         if len(data) != kind.size_bytes:
@@ -80,13 +70,7 @@ class SdoChannel:
         return kind.decode(data)
 
     def upload_text(self, index: int, subindex: int = 0) -> str:
-        """Read a VISIBLE_STRING, such as the device name 0x1008; one longer than 4 bytes comes in segments.
-
-        Raises
-        ------
-        DeviceTimeout, ConfigMismatch, ProtocolViolation
-            As `upload`; also if the text is no ASCII.
-        """
+        """Read a VISIBLE_STRING, such as the device name 0x1008; one longer than 4 bytes comes in segments."""
         data: bytes = self._transfer(index, subindex, lambda: self._client.upload(index, subindex))
         try:
             return data.rstrip(b"\0").decode("ascii")
@@ -97,34 +81,13 @@ class SdoChannel:
             ) from error
 
     def download(self, index: int, subindex: int, value: int) -> None:
-        """Write an object; returns when the node has acknowledged it.
-
-        Raises
-        ------
-        CommandRefused
-            If the value does not fit the object's type.
-        DeviceTimeout, ConfigMismatch, ProtocolViolation
-            As `upload`.
-        """
+        """Write an object; returns when the node has acknowledged it."""
         where = f"{self._where}: object {object_name(index, subindex)}"
         data = self._eds.integer_type(index, subindex).encode(value, where)
         self._transfer(index, subindex, lambda: self._client.download(index, subindex, data))
 
     def download_confirmed(self, index: int, subindex: int, value: int, ignored: int = 0) -> None:
-        """Write an object and read it back.
-
-        Parameters
-        ----------
-        index, subindex, value
-            What to write where.
-        ignored
-            Bits that are the device's own affair.
-
-        Raises
-        ------
-        ConfigMismatch
-            If the node acknowledged the value and has another.
-        """
+        """Write an object and read it back."""
         self.download(index, subindex, value)
         found = self.upload(index, subindex)
         if (found ^ value) & ~ignored:

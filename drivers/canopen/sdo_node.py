@@ -66,18 +66,7 @@ class MatchingSdoClient(SdoClient):
         self._probes = list(PROBES)
 
     def request_response(self, sdo_request: bytes) -> bytes:
-        """Send a request and wait for its answer.
-
-        Raises
-        ------
-        SdoSilence
-            If none comes in time, neither for this request nor for the probe before it; the request has gone out all
-            the same, for it may be the one that takes the torque away.
-        SdoAbortedError
-            If the node refuses.
-        SdoCommunicationError
-            If an object has no end.
-        """
+        """Send a request and wait for its answer."""
         self._in_segments = sdo_request[0] >> 5 not in _INITIATE_REQUESTS
         self._segments = self._segments + 1 if self._in_segments else 0
         if self._segments > MOST_SEGMENTS:
@@ -140,13 +129,7 @@ class MatchingSdoClient(SdoClient):
             self._unanswered[multiplexer] -= 1
 
     def on_response(self, can_id: int, data: bytes, timestamp: float) -> None:
-        """Take an answer, in the receive thread.
-
-        Raises
-        ------
-        ProtocolViolation
-            If it has not 8 bytes.
-        """
+        """Take an answer, in the receive thread."""
         if len(data) != _FRAME_BYTES:
             raise ProtocolViolation(
                 f"SDO answer 0x{can_id:03X} of {len(data)} bytes, expected {_FRAME_BYTES}. "

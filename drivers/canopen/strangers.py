@@ -46,13 +46,7 @@ class Strangers:
         self._seen = None
 
     def raise_if_seen(self) -> None:
-        """Judge.
-
-        Raises
-        ------
-        ForeignController
-            If a frame came; the first is named.
-        """
+        """Judge."""
         if self._seen is not None:
             raise ForeignController(
                 f"{self._seen} came from somebody else on the bus, expected it from this program alone. Another "

@@ -160,13 +160,7 @@ def cob_id_of(sheet: DataSheet, direction: Direction, number: int, taken: Collec
 
 
 def _described(sheet: DataSheet, direction: Direction, number: int) -> PdoLayout:
-    """Read what the data sheet has.
-
-    Raises
-    ------
-    Unusable
-        If it does not say it all, or counts more objects than a PDO can map.
-    """
+    """Read what the data sheet has."""
 
     def read(index: int, subindex: int) -> int:
         value = sheet.value(index, subindex)
@@ -189,24 +183,7 @@ def as_described(
     taken: Collection[int] = (),
     also: Collection[int] = (),
 ) -> Carrier:
-    """Take a PDO as the data sheet maps it: with one or more of the objects wanted.
-
-    Parameters
-    ----------
-    sheet, direction, number
-        The PDO.
-    wanted
-        What is wanted; a TPDO may carry more.
-    taken
-        Identifiers that it can't have.
-    also
-        What an RPDO may carry more, by index.
-
-    Raises
-    ------
-    Unusable
-        If it does not, or can't be used.
-    """
+    """Take a PDO as the data sheet maps it: with one or more of the objects wanted."""
     described = _described(sheet, direction, number)
     carried = {(mapped.index, mapped.subindex) for mapped in described.objects}
     more = {mapped.index for mapped in described.objects} - {*(index for index, _ in wanted), *also, *FILLERS}

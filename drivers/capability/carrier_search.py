@@ -48,17 +48,7 @@ class CarrierSearch:
 
 
 def find_carriers(sheet: DataSheet, direction: Direction, *choices: Sequence[ObjectId]) -> CarrierSearch:
-    """Find the PDOs that carry certain objects; one is better than several.
-
-    Parameters
-    ----------
-    sheet
-        The drive.
-    direction
-        Which way the objects go.
-    *choices
-        What is to be carried, in the order in which this program would map it; the best choice first.
-    """
+    """Find the PDOs that carry certain objects; one is better than several."""
     best, *_ = found = [_one(sheet, direction, wanted) for wanted in choices]
     one = next((search for search in found if search.carriers), None)
     if one is not None:

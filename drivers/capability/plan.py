@@ -76,13 +76,7 @@ class DrivePlan:
         )
 
     def pdos(self, direction: Direction) -> tuple[Carrier, ...]:
-        """Give the PDOs of a direction, one or more.
-
-        Raises
-        ------
-        ConfigMismatch
-            If the drive has none, or lacks a function without which it can't be used.
-        """
+        """Give the PDOs of a direction, one or more."""
         if self.missing:
             lacking = "; ".join(_lacking(each) for each in self.missing)
             raise ConfigMismatch(
@@ -101,13 +95,7 @@ class DrivePlan:
         return search.carriers
 
     def channel_carriers(self) -> tuple[Carrier, ...]:
-        """Give the TPDOs that carry the further objects to be recorded; those of the feedback may be among them.
-
-        Raises
-        ------
-        ConfigMismatch
-            If there is none for one of them.
-        """
+        """Give the TPDOs that carry the further objects to be recorded; those of the feedback may be among them."""
         carriers = (*self.feedback.carriers, *self.further.carriers)
         lacking = [each for each in self.channels if not any(carrier.carries(*each) for carrier in carriers)]
         if lacking:

@@ -90,15 +90,7 @@ class SpeedUnit:
 
 
 def described_scale(plan: DrivePlan, where: str) -> VelocityScale | None:
-    """Give the scale that the data sheet's own values make; None if they make none.
-
-    Parameters
-    ----------
-    plan
-        The drive.
-    where
-        Device or file, for messages.
-    """
+    """Give the scale that the data sheet's own values make; None if they make none."""
     values = {part.index: plan.sheet.value(part.index) for part in plan.abilities[Function.SPEED_UNIT].parts}
     return scale_of(values, where)
 
@@ -118,13 +110,7 @@ def scale_of(values: dict[int, int | None], where: str) -> VelocityScale | None:
 
 
 def speed_scale(plan: DrivePlan, stated: SpeedUnit | None, where: str) -> VelocityScale:
-    """Give the scale of 0x606C: what the rig file states, else what the data sheet says.
-
-    Raises
-    ------
-    ConfigMismatch
-        If neither says it.
-    """
+    """Give the scale of 0x606C: what the rig file states, else what the data sheet says."""
     if stated is not None:
         return stated.scale
     described = described_scale(plan, where)

@@ -63,13 +63,7 @@ class EdsFile:
             raise ConfigMismatch(f"EDS {text.path} lists no object. {NO_EDS}")
 
     def integer_type(self, index: int, subindex: int = 0) -> IntegerType:
-        """Look up the data type of an integer object.
-
-        Raises
-        ------
-        ConfigMismatch
-            If the EDS has no such object, or it is no integer of 8, 16 or 32 bit.
-        """
+        """Look up the data type of an integer object."""
         code = getattr(self.dictionary.get_variable(index, subindex), "data_type", None)
         if code not in _INTEGER_CODES:
             got = "no such object" if code is None else f"data type 0x{code:04X}"

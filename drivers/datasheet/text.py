@@ -107,13 +107,7 @@ class EdsText:
 
 
 def read_eds_text(path: Path) -> EdsText:
-    """Read a file's text.
-
-    Raises
-    ------
-    EdsUnreadable
-        If it can't be opened, is no text of one byte per character, or is too large.
-    """
+    """Read a file's text."""
     text, findings = _decode(path)
     reader = _Reader()
     reader.findings.extend((*findings, *_ends_of_lines(text)))

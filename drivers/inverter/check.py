@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from drivers.canopen.emcy import EMCY_COB_ID
 from drivers.canopen.pdo_map import PdoLayout, read_layout
 from drivers.canopen.sdo import SdoChannel, object_name
 from drivers.capability.carrier import Carrier
@@ -18,7 +19,15 @@ from drivers.capability.speed_unit import SI_UNIT_VELOCITY, described_scale, sca
 from drivers.capability.table import OPTION_CODES
 from drivers.errors import ConfigMismatch
 from drivers.inverter.cia402 import TorqueMode
-from drivers.inverter.drive_settings import ABORT_CONNECTION, NO_ACTION, DriveSetting, chosen_code
+from drivers.inverter.drive_settings import (
+    ABORT_CONNECTION,
+    EMCY_COB_ID_OBJECT,
+    NO_ACTION,
+    DriveSetting,
+    chosen_code,
+    emcy_cob_id,
+    limits_torque,
+)
 from drivers.inverter.settings import InverterSettings
 
 
@@ -72,11 +81,11 @@ def configurable_differences(
     """
     for carrier in plan.carriers:
         found = _layout(sdo, carrier)
-        if not carrier.mapped_here and found not in (carrier.layout, carrier.described):
+        if not _is_given(carrier) and found not in (carrier.layout, carrier.described):
             name = _pdo_name(carrier)
             yield Difference(settings.where, name, f"[{carrier.layout}]", f"[{found}]", plan.sheet.kind)
     for setting, value in _kept(sdo, given):
-        if value != setting.value and not _as_ordered(plan, setting, value):
+        if not (setting.is_met_by(value) or setting.at_most or _as_ordered(plan, setting, value)):
             yield Difference(settings.where, str(setting), str(setting.value), str(value), setting.source)
 
 
@@ -86,11 +95,18 @@ def remarks(
     """Say what a run will set, and which option codes of the drive's own are not the data sheet's."""
     for carrier in plan.carriers:
         found = _layout(sdo, carrier)
-        if found != carrier.layout and (carrier.mapped_here or found == carrier.described):
+        if found != carrier.layout and (_is_given(carrier) or found == carrier.described):
             yield f"{_pdo_name(carrier)} has [{found}], a run gives it [{carrier.layout}]"
     for setting, value in _kept(sdo, given):
-        if value != setting.value and _as_ordered(plan, setting, value):
+        if not (setting.is_met_by(value) or setting.at_most) and _as_ordered(plan, setting, value):
             yield f"{setting} is {value}, a run gives it {setting.value} ({setting.source})"
+    yield from _not_limited(sdo, plan, settings)
+    wanted, emcy = EMCY_COB_ID + settings.node_id, emcy_cob_id(plan)
+    if emcy != wanted:
+        yield (
+            f"COB-ID EMCY {object_name(EMCY_COB_ID_OBJECT)} is 0x{emcy:03X} for good, expected 0x{wanted:03X}: its "
+            f"emergencies are heard there, and look like those of node {emcy - EMCY_COB_ID}"
+        )
     for index, function in OPTION_CODES.items():
         described = plan.sheet.value(index)
         if plan.has(function) and described is not None and chosen_code(plan, settings, index) is None:
@@ -100,6 +116,22 @@ def remarks(
                     f"{function.value} {object_name(index)} is {value}, the {plan.sheet.kind} has {described}: the "
                     "drive keeps its own. To set it: option_codes in the rig file"
                 )
+
+
+def _is_given(carrier: Carrier) -> bool:
+    """Whether a run gives the drive this layout whatever it has: nothing of it is fixed."""
+    return carrier.mapped_here or not (carrier.mapping_is_fixed or carrier.fixed)
+
+
+def _not_limited(sdo: SdoChannel, plan: DrivePlan, settings: InverterSettings) -> Iterator[str]:
+    parts = plan.abilities[Function.MAXIMUM_TORQUE].parts
+    if limits_torque(plan):
+        return
+    known = [f"0x{part.index:04X} is {sdo.upload(part.index, part.subindex)} per mille of rated" for part in parts]
+    yield (
+        f"the drive can't be given the torque limit of {settings.torque_limit_nm:g} Nm as its own "
+        f"({' and '.join(known) or 'it has no max torque 0x6072'}): what else is on its bus may command more"
+    )
 
 
 def _as_ordered(plan: DrivePlan, setting: DriveSetting, value: int) -> bool:

@@ -150,13 +150,7 @@ _STATE_OF_BITS = _state_of_bits()
 
 
 def state_of(statusword: int) -> PowerState:
-    """Decode the state from a statusword, 0x6041.
-
-    Raises
-    ------
-    ProtocolViolation
-        If the bits are the code of no state.
-    """
+    """Decode the state from a statusword, 0x6041."""
     state = _STATE_OF_BITS.get(statusword & _STATE_MASK)
     if state is None:
         raise ProtocolViolation(

@@ -8,6 +8,7 @@ choice, and a drive that was commissioned otherwise keeps its own.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
@@ -26,6 +27,8 @@ SYNC_COB_ID_OBJECT: Final = 0x1005
 SYNC_COUNTER_OVERFLOW: Final = 0x1019
 EMCY_COB_ID_OBJECT: Final = 0x1014
 ABORT_CONNECTION: Final = 0x6007
+MAX_TORQUE: Final = 0x6072
+MAX_MOTOR_SPEED: Final = 0x6080
 TORQUE_SLOPE: Final = 0x6087
 PRODUCER_HEARTBEAT: Final = 0x1017
 
@@ -56,6 +59,8 @@ class DriveSetting:
         Who asks for it: rig file, DCF, or this program.
     watches_host
         Whether the drive watches the host by it; such a setting is made anew at every run.
+    at_most
+        Whether a drive that has less keeps that: a limit is taken down, never up.
     """
 
     index: int
@@ -64,27 +69,18 @@ class DriveSetting:
     value: int
     source: str
     watches_host: bool = False
+    at_most: bool = False
+
+    def is_met_by(self, value: int) -> bool:
+        """Whether a drive that has this value needs no other."""
+        return value <= self.value if self.at_most else value == self.value
 
     def __str__(self) -> str:
         return f"{self.name} {object_name(self.index, self.subindex)}"
 
 
 def drive_settings(plan: DrivePlan, settings: InverterSettings) -> tuple[DriveSetting, ...]:
-    """List what a drive is given, in the order of writing.
-
-    Parameters
-    ----------
-    plan
-        Which of the objects the drive has.
-    settings
-        What the rig file says.
-
-    Raises
-    ------
-    ConfigMismatch
-        If the drive would keep its torque without the host, lacks an object the rig file has a value for, or has one
-        for good that this program can't work with.
-    """
+    """List what a drive is given, in the order of writing."""
     _require_action(plan, settings)
     return (
         *_sync(plan),
@@ -93,6 +89,7 @@ def drive_settings(plan: DrivePlan, settings: InverterSettings) -> tuple[DriveSe
         *_no_node_guarding(plan),
         *_option_codes(plan, settings),
         *_torque_slope(plan, settings),
+        *_limits(plan, settings),
         *_deadline(plan, settings),
         *_heartbeats(plan, settings),
     )
@@ -153,6 +150,14 @@ def _emcy(plan: DrivePlan) -> Iterator[DriveSetting]:
         yield DriveSetting(EMCY_COB_ID_OBJECT, 0, "COB-ID EMCY", wanted, THIS_PROGRAM)
 
 
+def emcy_cob_id(plan: DrivePlan) -> int:
+    """Give the identifier that the drive's EMCY have in a run: what its sheet holds for good, or what it is given."""
+    wanted, described = EMCY_COB_ID + plan.sheet.node_id, plan.sheet.value(EMCY_COB_ID_OBJECT)
+    if described is None or plan.abilities[Function.EMCY_ID].writable(plan.sheet):
+        return wanted if described is None or list(_emcy(plan)) else described & 0x7FF
+    return described & 0x7FF
+
+
 def _no_node_guarding(plan: DrivePlan) -> Iterator[DriveSetting]:
     entries = [(plan.sheet.entry(index), name) for index, name in GUARDING]
     if all(entry is not None for entry, _ in entries):
@@ -178,6 +183,23 @@ def _torque_slope(plan: DrivePlan, settings: InverterSettings) -> Iterator[Drive
         _require(plan, settings, Function.TORQUE_SLOPE, TORQUE_SLOPE)
         permille_per_s = round(1000.0 * settings.torque_slope_nm_per_s / settings.rated_torque_nm)
         yield DriveSetting(TORQUE_SLOPE, 0, "torque slope", permille_per_s, RIG_FILE)
+
+
+def _limits(plan: DrivePlan, settings: InverterSettings) -> Iterator[DriveSetting]:
+    """Have the drive itself keep the rig file's limits, whoever commands it."""
+    if limits_torque(plan):
+        permille = math.ceil(1000.0 * settings.torque_limit_nm / settings.rated_torque_nm - 1e-9)
+        yield DriveSetting(MAX_TORQUE, 0, "max torque", permille, RIG_FILE, at_most=True)
+    entry = plan.sheet.entry(MAX_MOTOR_SPEED)
+    if entry is not None and entry.settable and math.isfinite(settings.speed_limit_rad_s):
+        per_minute = math.ceil(settings.speed_limit_rad_s * 30.0 / math.pi)
+        yield DriveSetting(MAX_MOTOR_SPEED, 0, "max motor speed", per_minute, RIG_FILE, at_most=True)
+
+
+def limits_torque(plan: DrivePlan) -> bool:
+    """Whether max torque can be written."""
+    ability = plan.abilities[Function.MAXIMUM_TORQUE]
+    return [part.index for part in ability.parts] == [MAX_TORQUE] and ability.writable(plan.sheet)
 
 
 def _deadline(plan: DrivePlan, settings: InverterSettings) -> Iterator[DriveSetting]:

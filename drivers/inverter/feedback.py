@@ -80,13 +80,7 @@ class _TpdoReceiver:
         return [(codec.layout.cob_id, partial(self.on_frame, n)) for n, codec in enumerate(self._codecs)]
 
     def on_frame(self, part: int, data: bytes, t_ns: int) -> None:
-        """Take the TPDO of that number; before `start_anew` its mapping is unknown, and it is left alone.
-
-        Raises
-        ------
-        ProtocolViolation
-            If it has not the length of its mapping, or holds what no drive may send.
-        """
+        """Take the TPDO of that number; before `start_anew` its mapping is unknown, and it is left alone."""
         if self._started:
             received = Received(self._codecs[part].unpack(data), t_ns)
             with self._arrived:
@@ -108,13 +102,7 @@ class _TpdoReceiver:
         """Forget what followed from those before."""
 
     def _place(self, index: int, subindex: int = 0) -> tuple[int, int]:
-        """Find an object: number of the TPDO, and place among its values.
-
-        Raises
-        ------
-        ConfigMismatch
-            If it is in none of them.
-        """
+        """Find an object: number of the TPDO, and place among its values."""
         wanted = (index, subindex)
         carries = [any((o.index, o.subindex) == wanted for o in codec.layout.objects) for codec in self._codecs]
         of = carries.index(True) if any(carries) else 0
@@ -153,19 +141,13 @@ class FeedbackReceiver(_TpdoReceiver):
         counts, before = self._counts[:], self._taken
         self._taken = counts
         if len(counts) == 1:
-            came = counts[0] - before[0]
-            return came, came
+            got = counts[0] - before[0]
+            return got, got
         came_each = [now - then for now, then in zip(counts, before, strict=True)]
         return min(came_each), max(came_each)
 
     def _take(self, part: int) -> None:
-        """Make feedback of the TPDOs, once each has come.
-
-        Raises
-        ------
-        ProtocolViolation
-            If the statusword is no state.
-        """
+        """Make feedback of the TPDOs, once each has come."""
         self._counts[part] += 1
         received = self._received
         if self._alone is not None and received[0] is not None:
@@ -228,13 +210,7 @@ class ChannelReceiver(_TpdoReceiver):
         self._places = tuple(self._place(*each) for each in objects)
 
     def await_after(self, after_ns: int, timeout_s: float) -> tuple[int | None, ...]:
-        """Wait for all TPDOs that arrive after ``after_ns`` [ns], ``timeout_s`` at most [s].
-
-        Returns
-        -------
-        tuple of int or None
-            The count of each object; None for one whose TPDO did not arrive in time.
-        """
+        """Wait for all TPDOs that arrive after ``after_ns`` [ns], ``timeout_s`` at most [s]."""
         deadline = time.monotonic() + timeout_s
         with self._arrived:
             while any(received is None or received.t_ns <= after_ns for received in self._received):

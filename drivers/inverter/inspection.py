@@ -47,43 +47,18 @@ class InspectedInverter:
         self._sdo = SdoChannel(node, self._pdos.eds, self._where, settings.sdo_timeout_s)
 
     def check(self) -> tuple[Difference, ...]:
-        """Compare the device with rig file and EDS; reads objects, writes none.
-
-        Returns
-        -------
-        tuple of Difference
-            Empty if everything agrees.
-
-        Raises
-        ------
-        DeviceTimeout
-            If the node does not answer.
-        ConfigMismatch
-            If it lacks an object of the EDS.
-        """
+        """Compare the device with rig file and EDS; reads objects, writes none."""
         return (
             *fixed_differences(self._sdo, self._plan, self.settings),
             *configurable_differences(self._sdo, self._plan, self.settings, self._given),
         )
 
     def remarks(self) -> tuple[str, ...]:
-        """Say what a run will set that the drive does not have yet; reads objects, writes none.
-
-        Raises
-        ------
-        DeviceTimeout, ConfigMismatch
-            As `check`.
-        """
+        """Say what a run will set that the drive does not have yet; reads objects, writes none."""
         return tuple(remarks(self._sdo, self._plan, self.settings, self._given))
 
     def commissioned(self) -> tuple[CommissionedValue, ...]:
-        """List where DCF, device and rig file are not of one mind; empty without a DCF. Reads objects, writes none.
-
-        Raises
-        ------
-        DeviceTimeout
-            If the node does not answer.
-        """
+        """List where DCF, device and rig file are not of one mind; empty without a DCF. Reads objects, writes none."""
         return tuple(commissioned_values(self._sdo, self._plan, self.settings))
 
     def protections(self) -> tuple[Protection, ...]:
@@ -93,23 +68,18 @@ class InspectedInverter:
         )
 
     def device_name(self) -> str:
-        """Read the name the maker gave the drive, object 0x1008; in segments, for it is a text.
-
-        Raises
-        ------
-        ConfigMismatch
-            If the drive has no such object: it is optional.
-        DeviceTimeout, ProtocolViolation
-            If the drive does not answer, or not with a text.
-        """
+        """Read the name the maker gave the drive, object 0x1008; in segments, for it is a text."""
         return self._sdo.upload_text(0x1008)
 
-    def read_channel(self, channel: ObjectId) -> int:
-        """Read the count of a further object over SDO.
+    @property
+    def count_rad_s(self) -> float:
+        """One count of its speed [rad/s]."""
+        return self._pdos.velocity.rad_s_per_count
 
-        Raises
-        ------
-        DeviceTimeout, ConfigMismatch
-            If the node does not answer, or lacks the object.
-        """
+    def read_speed_rad_s(self) -> float:
+        """Read the velocity actual value 0x606C over SDO [rad/s]."""
+        return self._pdos.velocity.to_rad_s(self._sdo.upload(0x606C))
+
+    def read_channel(self, channel: ObjectId) -> int:
+        """Read the count of a further object over SDO."""
         return self._sdo.upload(*channel)

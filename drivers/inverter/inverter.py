@@ -13,12 +13,12 @@ from collections.abc import Callable
 from typing import Final
 
 from drivers.canopen.can_link import CanLink
-from drivers.canopen.emcy import EMCY_COB_ID
 from drivers.canopen.heartbeat import HEARTBEAT_COB_ID, NMT_COB_ID, NmtCommand, NmtState, nmt_frame
 from drivers.canopen.node_monitor import NodeMonitor
 from drivers.errors import CommandRefused, ConfigMismatch, DeviceFault, DriverError
 from drivers.inverter.check import Difference, fixed_differences
 from drivers.inverter.cia402 import Command, PowerState
+from drivers.inverter.drive_settings import emcy_cob_id
 from drivers.inverter.feedback import InverterFeedback
 from drivers.inverter.inspection import InspectedInverter
 from drivers.inverter.pdo_setup import set_up_pdos
@@ -61,7 +61,7 @@ class Inverter(InspectedInverter):
             link.subscribe(cob_id, take)
         self._monitor = NodeMonitor(settings.where, settings.heartbeat_timeout_ms * 1_000_000)
         link.subscribe(HEARTBEAT_COB_ID + settings.node_id, self._monitor.on_heartbeat)
-        link.subscribe(EMCY_COB_ID + settings.node_id, self._monitor.on_emergency)
+        link.subscribe(emcy_cob_id(self._plan), self._monitor.on_emergency)
         for cob_id in self._pdos.rpdos:
             link.strangers.claim(cob_id, f"{settings.where}: an RPDO")
         link.strangers.claim(SDO_REQUEST_COB_ID + settings.node_id, f"{settings.where}: an SDO request")
@@ -73,11 +73,6 @@ class Inverter(InspectedInverter):
     def latest(self) -> InverterFeedback | None:
         """The last feedback received; None before the first after `configure`."""
         return self._feedback.latest
-
-    @property
-    def count_rad_s(self) -> float:
-        """One count of its speed [rad/s]."""
-        return self._pdos.velocity.rad_s_per_count
 
     def messages(self) -> tuple[int, int]:
         """How often the seldomest and the commonest kind of its TPDOs has come since this was last asked."""
@@ -123,7 +118,8 @@ class Inverter(InspectedInverter):
         # before the drive listens for it:
         self._link.produce_heartbeat(self.settings.host_heartbeat_s, self.settings.host_node_id)
         for setting in self._given:
-            self._sdo.download_confirmed(setting.index, setting.subindex, setting.value)
+            if not (setting.at_most and setting.is_met_by(self._sdo.upload(setting.index, setting.subindex))):
+                self._sdo.download_confirmed(setting.index, setting.subindex, setting.value)
         self._link.beat()  # the drive watches its host from now on, and not from some later heartbeat
         self._feedback.start_anew()
         self._channels.start_anew()

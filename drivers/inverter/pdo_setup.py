@@ -13,15 +13,7 @@ from drivers.errors import ConfigMismatch
 
 
 def set_up_pdos(sdo: SdoChannel, plan: DrivePlan, where: str) -> None:
-    """Switch off the PDOs that would disturb, and give those of the plan their layouts.
-
-    Raises
-    ------
-    ConfigMismatch
-        If a write does not hold, or a PDO has something else for good.
-    DeviceTimeout
-        If the node does not answer.
-    """
+    """Switch off the PDOs that would disturb, and give those of the plan their layouts."""
     for index in plan.strangers:
         _switch_off(sdo, index)
     for carrier in plan.carriers:

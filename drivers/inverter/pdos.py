@@ -24,13 +24,7 @@ CONTROLWORD, TARGET_TORQUE, TORQUE_OFFSET = 0x6040, 0x6071, 0x60B2
 
 
 def codecs(eds: EdsFile, carriers: Iterable[Carrier], where: str) -> tuple[PdoCodec, ...]:
-    """Build packers and unpackers of PDOs.
-
-    Raises
-    ------
-    ConfigMismatch
-        If a mapped object is none that this program reads.
-    """
+    """Build packers and unpackers of PDOs."""
     return tuple(eds.codec(carrier.layout, where) for carrier in carriers)
 
 
@@ -87,13 +81,7 @@ class InverterPdos:
         return ChannelReceiver(self._channel_tpdos, self.plan.channels)
 
     def counts(self, torque: GuardedTorque) -> TorqueCounts:
-        """Turn a command into counts; base and PRBS are summed where the drive has one object for both.
-
-        Raises
-        ------
-        CommandRefused
-            If a torque does not fit its object.
-        """
+        """Turn a command into counts; base and PRBS are summed where the drive has one object for both."""
         if self.has_offset:
             return TorqueCounts(
                 self._torque.to_raw(torque.base_nm, self._where), self._torque.to_raw(torque.prbs_nm, self._where)
@@ -114,13 +102,7 @@ class InverterPdos:
         ]
 
     def unpack(self, cob_id: int, data: bytes) -> TorqueOnBus:
-        """Read the torque of an RPDO's frame.
-
-        Raises
-        ------
-        ProtocolViolation
-            If it has not the length of its mapping.
-        """
+        """Read the torque of an RPDO's frame."""
         codec = self._rpdos[self.rpdos.index(cob_id)]
         values = dict(zip(codec.indices, codec.unpack(data), strict=True))
         return TorqueOnBus(*(self._nm(values.get(index)) for index in (TARGET_TORQUE, TORQUE_OFFSET)))

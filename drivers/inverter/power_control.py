@@ -60,15 +60,7 @@ class PowerControl:
         self._where = settings.where
 
     def select_mode(self) -> None:
-        """Write 0x6060 and wait for 0x6061 to agree.
-
-        Raises
-        ------
-        ConfigMismatch
-            If the drive refuses the mode at once.
-        DeviceTimeout
-            If 0x6061 does not follow.
-        """
+        """Write 0x6060 and wait for 0x6061 to agree."""
         mode, timeout_s = self._settings.mode, self._settings.mode_timeout_s
         try:
             self._sdo.download(0x6060, 0, mode)
@@ -91,30 +83,14 @@ class PowerControl:
             self._sdo.download(index, 0, 0)
 
     def enable_operation(self) -> None:
-        """Step to OPERATION_ENABLED; the torque is what the targets say.
-
-        Raises
-        ------
-        DeviceFault
-            If the drive is in FAULT or goes there.
-        DeviceTimeout
-            If a step does not happen.
-        """
+        """Step to OPERATION_ENABLED; the torque is what the targets say."""
         state = self._await(lambda state: state is not PowerState.NOT_READY_TO_SWITCH_ON, "to initialise")
         while state is not PowerState.OPERATION_ENABLED:
             self.raise_if_fault(state)
             state = self._step(state, TOWARDS_OPERATION[state])
 
     def make_ready(self) -> None:
-        """Step to READY_TO_SWITCH_ON, where the power stage is off, from whatever state.
-
-        Raises
-        ------
-        DeviceFault
-            If the drive is in FAULT.
-        DeviceTimeout
-            If a step does not happen.
-        """
+        """Step to READY_TO_SWITCH_ON, where the power stage is off, from whatever state."""
         self.disable_voltage()
         state = self._await(lambda state: state not in TORQUE_STATES, "without torque")
         self.raise_if_fault(state)
@@ -124,16 +100,6 @@ class PowerControl:
         """Take the torque away as the quick stop option code 0x605A has it, and wait for the end of it.
 
         Which state that is the code says: SWITCH_ON_DISABLED, or QUICK_STOP_ACTIVE at no torque (5 to 8).
-
-        Parameters
-        ----------
-        sync
-            Sends the command again, and SYNC: a simulated drive's ramp takes simulated time.
-
-        Raises
-        ------
-        DeviceTimeout
-            If the drive has not left OPERATION_ENABLED, or still reports a torque.
         """
         self._command(Command.QUICK_STOP)
         self._await(lambda state: state is not PowerState.OPERATION_ENABLED, "out of operation")
@@ -153,24 +119,12 @@ class PowerControl:
             )
 
     def disable_voltage(self) -> None:
-        """Take the voltage off, from whatever state.
-
-        Raises
-        ------
-        DeviceTimeout
-            If the drive still reports a state that may carry torque.
-        """
+        """Take the voltage off, from whatever state."""
         self._command(Command.DISABLE_VOLTAGE)
         self._await(lambda state: state not in TORQUE_STATES, "without torque")
 
     def reset_fault(self) -> None:
-        """Give the rising edge of fault reset and wait for FAULT to end.
-
-        Raises
-        ------
-        DeviceTimeout
-            If it does not end.
-        """
+        """Give the rising edge of fault reset and wait for FAULT to end."""
         self._command(Command.DISABLE_VOLTAGE)  # the edge needs a zero before it
         self._command(Command.FAULT_RESET)
         self._await(lambda state: state not in FAULT_STATES, "without fault")
@@ -215,13 +169,7 @@ class PowerControl:
                 )
 
     def raise_if_fault(self, state: PowerState) -> None:
-        """Refuse a fault state, with the cause the drive gives in its error code 0x603F, or in its EMCY without one.
-
-        Raises
-        ------
-        DeviceFault
-            If ``state`` is FAULT or FAULT_REACTION_ACTIVE.
-        """
+        """Refuse a fault state, with the cause the drive gives in its error code 0x603F, or in its EMCY without one."""
         if state in FAULT_STATES:
             raise DeviceFault(f"{self._where}: {self._fault_of(state)}")
 

@@ -89,13 +89,7 @@ def protections(plan: DrivePlan, settings: InverterSettings) -> tuple[Protection
 
 
 def require_protections(plan: DrivePlan, settings: InverterSettings) -> None:
-    """See that nothing is missing that nobody has accepted.
-
-    Raises
-    ------
-    ConfigMismatch
-        Naming all of it, with the lines of the rig file that accept it.
-    """
+    """See that nothing is missing that nobody has accepted."""
     missing = [each for each in protections(plan, settings) if not each.in_order]
     if missing:
         reasons = "; ".join(f"{each.name} ({each.against})" for each in missing)

@@ -21,29 +21,7 @@ RETRY_S = 0.2
 def reconnect(
     url: str, settings: Sequence[InverterSettings], patience_s: float
 ) -> tuple[CanLink, tuple[Inverter, ...]]:
-    """Open the bus anew and see every drive disarmed.
-
-    Parameters
-    ----------
-    url
-        The bus, as `CanLink.open` takes it.
-    settings
-        The drives that have to be there.
-    patience_s
-        How long to try to open the bus [s].
-
-    Returns
-    -------
-    CanLink, tuple of Inverter
-        The new link, the caller's to close, and the drives on it, to be configured before use.
-
-    Raises
-    ------
-    BusDown
-        If the bus can't be opened in that time, or is off again.
-    DeviceTimeout, DriverError
-        If a drive does not answer, or can't be confirmed disarmed: cut its power.
-    """
+    """Open the bus anew and see every drive disarmed."""
     link = _opened(url, patience_s)
     try:
         inverters = tuple(Inverter(link, each) for each in settings)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -61,6 +62,8 @@ class InverterSettings:
         Longest wait for the mode of operation to be shown in 0x6061 [s].
     state_timeout_s
         Longest wait for a change of power state or NMT state [s].
+    speed_limit_rad_s
+        Fastest speed at which there may be a torque; infinite where nothing limits it [rad/s].
     """
 
     name: str
@@ -85,6 +88,7 @@ class InverterSettings:
     sdo_timeout_s: float = 0.5
     mode_timeout_s: float = 2.0
     state_timeout_s: float = 2.0
+    speed_limit_rad_s: float = math.inf
 
     @property
     def heartbeat_timeout_ms(self) -> int:

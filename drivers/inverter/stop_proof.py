@@ -86,21 +86,7 @@ class StopProof:
         self.seen: dict[str, str] = {}
 
     def run(self, given: tuple[DriveSetting, ...], period_s: float) -> Iterator[Difference]:
-        """Play dead in both ways; the drive is disabled at the end.
-
-        Parameters
-        ----------
-        given
-            What the drive was configured with.
-        period_s
-            Time between two SYNCs [s].
-
-        Raises
-        ------
-        DriverError
-            If the drive can't be configured or made ready, answers no more, or is in operation: then another
-            program drives it.
-        """
+        """Play dead in both ways; the drive is disabled at the end."""
         self._refuse_if_driven()
         self._longest_look_s = max(LONGEST_LOOK_S, 2.0 * period_s)
         self._reacts = self._power.reacts_to_a_lost_host()
@@ -113,7 +99,7 @@ class StopProof:
                 self._without_anything()
             self._revive()
             if consumers:
-                yield from self._without_heartbeat()
+                yield from self._without_heartbeat(consumers[0])
                 self._revive()
         finally:
             self._link.stop_heartbeat()
@@ -132,7 +118,7 @@ class StopProof:
         self._send_ready()
         self._link.sync()
         yield from self._noticed(
-            "stop without commands", "rpdo_deadline", timer.value, lambda: self._sync_and_wait(period_s)
+            "stop without commands", "rpdo_deadline", timer, timer.value, lambda: self._sync_and_wait(period_s)
         )
 
     def _without_anything(self) -> None:
@@ -148,11 +134,13 @@ class StopProof:
             within_ms = self._settings.rpdo_deadline_ms
             self.seen["rpdo_deadline"] = f"without commands and SYNC nothing happened within {within_ms} ms"
 
-    def _without_heartbeat(self) -> Iterator[Difference]:
+    def _without_heartbeat(self, consumer: DriveSetting) -> Iterator[Difference]:
         self._make_ready()
         time.sleep(HEARD_PERIODS * self._settings.host_heartbeat_s)
         self._link.stop_heartbeat()
-        yield from self._noticed("stop without heartbeat", "heartbeat_consumer", self._settings.host_timeout_ms, _wait)
+        yield from self._noticed(
+            "stop without heartbeat", "heartbeat_consumer", consumer, self._settings.host_timeout_ms, _wait
+        )
 
     def _revive(self) -> None:
         """Come back to life; a fault that playing dead has made, 0x6007 being 1, is reset."""
@@ -167,7 +155,9 @@ class StopProof:
         self._power.make_ready()
         self._monitor.forget_emergency()
 
-    def _noticed(self, what: str, name: str, within_ms: int, pause: Callable[[], None]) -> Iterator[Difference]:
+    def _noticed(
+        self, what: str, name: str, entry: DriveSetting, within_ms: int, pause: Callable[[], None]
+    ) -> Iterator[Difference]:
         after_s = self._watch(within_ms, pause)
         state = self._power.state()
         left = state is not PowerState.READY_TO_SWITCH_ON
@@ -180,7 +170,7 @@ class StopProof:
             self._settings.where,
             what,
             f"{expected}, and READY TO SWITCH ON left" if self._reacts else expected,
-            self._answer(state),
+            f"{self._answer(state)}; the entry that failed is {entry}",
             SOURCE,
         )
 

@@ -69,6 +69,11 @@ def left_operation(where: str, state: PowerState) -> str:
     )
 
 
+def speed_tolerance_rad_s(one_rad_s: float, other_rad_s: float, counts_rad_s: float) -> float:
+    """Give how far two readings of one shaft at one time may be from each other [rad/s]."""
+    return SPEED_NOISE_RAD_S + counts_rad_s + SPEED_SHARE * max(abs(one_rad_s), abs(other_rad_s))
+
+
 class Rule(NamedTuple):
     """One row of the table: what is looked at, what is expected, within what, for how long, and what happens."""
 
@@ -376,7 +381,7 @@ class Supervision:
         self._m1 = _Drive(m1, guard, guard.error.m1_nm)
         self._m2 = _Drive(m2, guard, guard.error.m2_nm)
         self._both = _Torque(guard.error.sum_nm, guard)
-        self._counts_rad_s = SPEED_NOISE_RAD_S + limits.count_m1_rad_s + limits.count_m2_rad_s
+        self._counts_rad_s = limits.count_m1_rad_s + limits.count_m2_rad_s
         self._stale_ns = guard.feedback_timeout_s * NS_PER_S
         self._apart: Excess | None = None
         self._impulse_nm_s = 0.0
@@ -434,19 +439,19 @@ class Supervision:
 
     def _compare_speeds(self, t_ns: int, one: InverterFeedback, other: InverterFeedback) -> None:
         difference = abs(one.speed_rad_s - other.speed_rad_s)
-        if difference <= self._counts_rad_s:
+        if difference <= SPEED_NOISE_RAD_S:
             return
         m1, m2 = self._m1, self._m2
-        greater = max(abs(one.speed_rad_s), abs(other.speed_rad_s))
-        tolerance = self._counts_rad_s + SPEED_SHARE * greater + 2.0 * min(m1.change_rad_s, m2.change_rad_s)
+        tolerance = speed_tolerance_rad_s(one.speed_rad_s, other.speed_rad_s, self._counts_rad_s)
+        tolerance += 2.0 * min(m1.change_rad_s, m2.change_rad_s)
         if difference <= tolerance or any(t_ns - each.fresh_ns in range(1, round(self._stale_ns)) for each in (m1, m2)):
             return
         m1.doubtful = m2.doubtful = True
         guard = self._limits.guard
         if self._apart is None:
-            self._apart = Excess(self._counts_rad_s, guard.error.time_s, guard.period_s)
+            self._apart = Excess(SPEED_NOISE_RAD_S, guard.error.time_s, guard.period_s)
         # in units of its tolerance, which grows with the speed
-        if self._apart.take(t_ns, difference * self._counts_rad_s / tolerance):
+        if self._apart.take(t_ns, difference * SPEED_NOISE_RAD_S / tolerance):
             stopped = [each for each in (m1, m2) if each.repeats and each.feedback is not None]
             m1.faults += [
                 each.stands_still(each.feedback, "the other drive reads a speed that changes")
@@ -492,24 +497,12 @@ class Supervision:
         )
 
     def raise_if_ended(self) -> None:
-        """End the run where a cycle has.
-
-        Raises
-        ------
-        DeviceFault
-            What was found; `WrongTorque` if it is a torque alone.
-        """
+        """End the run where a cycle has."""
         if self.ended is not None:
             raise self.ended
 
     def raise_if_old(self, ages_ns: Sequence[int]) -> None:
-        """Refuse feedback that is too old.
-
-        Raises
-        ------
-        DeviceTimeout
-            Naming the inverter.
-        """
+        """Refuse feedback that is too old."""
         for drive, age_ns in zip((self._m1, self._m2), ages_ns, strict=True):
             if age_ns > self._stale_ns:
                 raise DeviceTimeout(

@@ -46,13 +46,7 @@ ENUMS: Final[Mapping[str, type[Enum]]] = {
 
 
 def require_usable(register_map: RegisterMap) -> None:
-    """See that a map holds every register of `USED` in a way that makes sense.
-
-    Raises
-    ------
-    ConfigMismatch
-        Naming every register that is missing or makes no sense.
-    """
+    """See that a map holds every register of `USED` in a way that makes sense."""
     faults = [fault for name in USED for fault in _faults(register_map, name)]
     if faults:
         raise ConfigMismatch(

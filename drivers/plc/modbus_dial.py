@@ -67,15 +67,7 @@ class Dial:
         self.client.ctx.callback_disconnected = self._lost  # type: ignore[method-assign]
 
     async def open(self) -> None:
-        """Connect.
-
-        Raises
-        ------
-        BusDown
-            If there is no server at the address.
-        ConfigMismatch
-            If TLS is asked for and fails: certificates, name or version, or a server without TLS.
-        """
+        """Connect."""
         params = self.client.ctx.comm_params  # one time-out for both is all that pymodbus has
         params.timeout_connect = self._connecting_s
         if not await self.client.connect():

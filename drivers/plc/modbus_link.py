@@ -117,15 +117,7 @@ class ModbusLink:
         return self._dial is not None and self._dial.client.connected
 
     async def open(self) -> None:
-        """Connect.
-
-        Raises
-        ------
-        BusDown
-            If there is no server at the address.
-        ConfigMismatch
-            If TLS is asked for and fails: certificates, name or version, or a server without TLS.
-        """
+        """Connect."""
         self.close()
         dial = Dial(self._host, self._port, self._timeout_s, self._security, self.place)
         dial.client.ctx.framer = MbapFramer(_Decoder(False))
@@ -139,13 +131,7 @@ class ModbusLink:
         self._dial = None
 
     async def read(self, kind: RegisterKind, address: int, count: int) -> tuple[int, ...]:
-        """Read ``count`` words, or bits as 0 and 1, from ``address`` on.
-
-        Raises
-        ------
-        BusDown, DeviceTimeout, ProtocolViolation, DeviceFault
-            If there is no connection, no answer, a wrong answer or an exception answer.
-        """
+        """Read ``count`` words, or bits as 0 and 1, from ``address`` on."""
         dial = self._connected()
         requests = {
             RegisterKind.COIL: dial.client.read_coils,
@@ -163,13 +149,7 @@ class ModbusLink:
         return tuple(int(value) for value in got[:count])
 
     async def write(self, kind: RegisterKind, address: int, words: Sequence[int]) -> None:
-        """Write words, or bits as 0 and 1, from ``address`` on.
-
-        Raises
-        ------
-        BusDown, DeviceTimeout, ProtocolViolation, DeviceFault
-            As for `read`; a `ProtocolViolation` too where Modbus can't write the kind.
-        """
+        """Write words, or bits as 0 and 1, from ``address`` on."""
         dial = self._connected()
         what = f"writing {list(words)} to {kind.value} {address}"
         if kind is RegisterKind.COIL:

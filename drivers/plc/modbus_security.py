@@ -84,42 +84,19 @@ class ClientSecurity:
 
 
 def client_context(credentials: Credentials) -> ssl.SSLContext:
-    """Build what a client connects with: it verifies the server's certificate and name, and shows its own.
-
-    Raises
-    ------
-    ConfigMismatch
-        If a file can't be read or key and certificate do not belong together.
-    """
+    """Build what a client connects with: it verifies the server's certificate and name, and shows its own."""
     return _context(ssl.PROTOCOL_TLS_CLIENT, credentials)
 
 
 def server_context(credentials: Credentials) -> ssl.SSLContext:
-    """Build what a server listens with: a client without a certificate of the authority gets no connection.
-
-    Raises
-    ------
-    ConfigMismatch
-        As `client_context`.
-    """
+    """Build what a server listens with: a client without a certificate of the authority gets no connection."""
     context = _context(ssl.PROTOCOL_TLS_SERVER, credentials)
     context.verify_mode = ssl.CERT_REQUIRED
     return context
 
 
 def role_of(certificate_der: bytes) -> str | None:
-    """Read the role out of a certificate.
-
-    Parameters
-    ----------
-    certificate_der : bytes
-        The certificate, DER encoded, already verified by TLS.
-
-    Returns
-    -------
-    str or None
-        None without the extension, or with one that is not one UTF8String: no role, and no rights.
-    """
+    """Read the role out of a certificate."""
     return _role(x509.load_der_x509_certificate(certificate_der))
 
 
@@ -137,15 +114,7 @@ def _role(certificate: x509.Certificate) -> str | None:
 
 
 def tls_failure(place: str, cause: Exception | None) -> ConfigMismatch:
-    """Put into words for a person at the rig why a TLS connection did not come about, or not for long.
-
-    Parameters
-    ----------
-    place : str
-        What it led to.
-    cause : Exception or None
-        What OpenSSL said, a lost connection, or None where nothing came at all.
-    """
+    """Put into words for a person at the rig why a TLS connection did not come about, or not for long."""
     return ConfigMismatch(
         f"{place}: expected a TLS connection with certificates that both sides accept, got: {_said(cause)}. "
         "Look at [plc.security] of the rig file and at the PLC's own settings."

@@ -30,13 +30,7 @@ class NamedRegisters:
         self._map = register_map
 
     async def all(self) -> tuple[Reading, ...]:
-        """Read every register of the map, in the order of the map; what can't be believed says so and is kept.
-
-        Raises
-        ------
-        BusDown, DeviceTimeout
-            If the PLC can't be asked, or does not answer.
-        """
+        """Read every register of the map, in the order of the map; what can't be believed says so and is kept."""
         readings: dict[str, Reading] = {}
         for block in blocks_of(self._map, self._map.registers):
             try:
@@ -49,13 +43,7 @@ class NamedRegisters:
         return tuple(readings[name] for name in self._map.registers)
 
     async def read(self, names: Iterable[str]) -> dict[str, Value]:
-        """Read registers, in the units the driver works in.
-
-        Raises
-        ------
-        BusDown, DeviceTimeout, ProtocolViolation, DeviceFault
-            If one can't be read, or means nothing.
-        """
+        """Read registers, in the units the driver works in."""
         values: dict[str, Value] = {}
         for block in blocks_of(self._map, names):
             for name, each in (await self._read_block(block)).items():
@@ -66,24 +54,12 @@ class NamedRegisters:
         return values
 
     def encoded(self, values: Mapping[str, Value]) -> dict[str, tuple[int, ...]]:
-        """Turn values in the units the driver works in into words.
-
-        Raises
-        ------
-        ConfigMismatch
-            If a value does not fit its register.
-        """
+        """Turn values in the units the driver works in into words."""
         registers = {name: self._map[name] for name in values}
         return {name: registers[name].encode(from_si(name, registers[name], value)) for name, value in values.items()}
 
     async def write(self, words: Mapping[str, tuple[int, ...]]) -> None:
-        """Write registers block by block and see that they then hold what was written.
-
-        Raises
-        ------
-        BusDown, DeviceTimeout, ProtocolViolation, DeviceFault
-            If they can't be written, or hold something else.
-        """
+        """Write registers block by block and see that they then hold what was written."""
         for block in blocks_of(self._map, words):
             sent = tuple(word for name in block.names for word in words[name])
             await self._link.write(block.kind, block.address, sent)

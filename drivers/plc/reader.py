@@ -92,40 +92,15 @@ class PlcReader:
         self._plc.close()
 
     async def read_status(self) -> PlcStatus:
-        """Read the status; connect first where there is no connection, or no longer one.
-
-        Returns
-        -------
-        PlcStatus
-            Its ``t_ns`` is that of the attempt that succeeded.
-
-        Raises
-        ------
-        BusDown, DeviceTimeout
-            If the last attempt fails as well; what it failed with.
-        ConfigMismatch, ProtocolViolation, DeviceFault
-            At once: another attempt would find the same.
-        """
+        """Read the status; connect first where there is no connection, or no longer one."""
         return await self._read(self._plc.read_status)
 
     async def greet(self) -> PlcStatus:
-        """Beat and read the status, as `Plc.greet`; connect first as `read_status` does.
-
-        Raises
-        ------
-        BusDown, DeviceTimeout, ConfigMismatch, ProtocolViolation, DeviceFault
-            As `read_status`.
-        """
+        """Beat and read the status, as `Plc.greet`; connect first as `read_status` does."""
         return await self._read(self._plc.greet)
 
     async def read_registers(self) -> tuple[Reading, ...]:
-        """Read every register of the map, as `Plc.read_registers` gives them; connect first as `read_status` does.
-
-        Raises
-        ------
-        BusDown, DeviceTimeout, ConfigMismatch, ProtocolViolation, DeviceFault
-            As `read_status`.
-        """
+        """Read every register of the map, as `Plc.read_registers` gives them; connect first as `read_status` does."""
         return await self._read(self._plc.read_registers)
 
     async def _read(self, read: Callable[[], Awaitable[T]]) -> T:

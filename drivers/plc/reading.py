@@ -67,13 +67,7 @@ class Reading:
         return "" if self.register.unit == "1" else self.register.unit
 
     def required(self) -> Value:
-        """Give the value in the unit the driver works in.
-
-        Raises
-        ------
-        ProtocolViolation
-            If it can't be believed.
-        """
+        """Give the value in the unit the driver works in."""
         if self.problem is not None or self.value is None:
             raise ProtocolViolation(
                 f"register {self.name} ({self.register.kind.value} {self.register.address}): expected {self.expected}, "

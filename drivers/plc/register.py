@@ -117,24 +117,7 @@ class Register(MapTable):
         return self.address + self.size
 
     def encode(self, value: Value) -> tuple[int, ...]:
-        """Put a value into words.
-
-        Parameters
-        ----------
-        value : bool, int, float or str
-            Bool for type bool, a member's name for an enum, else a number in ``unit``; with a scale it is
-            rounded to the nearest step of the register.
-
-        Returns
-        -------
-        tuple of int
-            One word per address in the order of addresses; 0 or 1 for a bit.
-
-        Raises
-        ------
-        ConfigMismatch
-            If the value is of another type or does not fit.
-        """
+        """Put a value into words."""
         if self.type is ValueType.BOOL:
             if not isinstance(value, bool):
                 raise self._unfit(value, "True or False")
@@ -142,23 +125,7 @@ class Register(MapTable):
         return self._ordered(self._words(value))
 
     def decode(self, words: Sequence[int]) -> Value:
-        """Read words as a value.
-
-        Parameters
-        ----------
-        words : sequence of int, length ``size``
-            One word per address, 0 to 65535; 0 or 1 for a bit.
-
-        Returns
-        -------
-        bool, int, float or str
-            As `encode` takes it; an int where the register has an integer type and no scale.
-
-        Raises
-        ------
-        ProtocolViolation
-            If the number of words is another, or they mean nothing.
-        """
+        """Read words as a value."""
         if len(words) != self.size:
             raise ProtocolViolation(
                 f"{self._place}: expected {self.size} word(s), got {len(words)}. Compare the register map "

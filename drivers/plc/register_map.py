@@ -64,13 +64,7 @@ class RegisterMap(MapTable):
     registers: dict[str, Register]
 
     def __getitem__(self, name: str) -> Register:
-        """Return an entry by name.
-
-        Raises
-        ------
-        ConfigMismatch
-            If the map has none of that name.
-        """
+        """Return an entry by name."""
         if name not in self.registers:
             raise ConfigMismatch(
                 f"register map {self.name!r}: expected a register {name}, it has {', '.join(sorted(self.registers))}. "
@@ -90,20 +84,7 @@ class Block:
 
 
 def blocks_of(map_: RegisterMap, names: Iterable[str]) -> tuple[Block, ...]:
-    """Group registers into the fewest requests that touch no address outside them.
-
-    Parameters
-    ----------
-    map_ : RegisterMap
-        The map.
-    names : iterable of str
-        Registers wanted.
-
-    Returns
-    -------
-    tuple of Block
-        In the order of kind and address; no block is longer than one request may be.
-    """
+    """Group registers into the fewest requests that touch no address outside them."""
     ordered = sorted(names, key=lambda name: (map_[name].kind.value, map_[name].address))
     blocks: list[Block] = []
     for name in ordered:
@@ -123,14 +104,7 @@ def _continues(block: Block, register: Register) -> bool:
 
 
 def load_register_map(path: Path) -> RegisterMap:
-    """Read and check a map file.
-
-    Raises
-    ------
-    RegisterMapError
-        If it can't be read, is not TOML, or has any key wrong, missing or unknown, overlapping addresses, or
-        an identity that names no register; all faults at once.
-    """
+    """Read and check a map file."""
     try:
         data = tomllib.loads(path.read_text("utf-8"))
     except OSError as cause:

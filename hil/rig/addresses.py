@@ -6,26 +6,8 @@ from hil.config.rig_file import Rig
 from hil.simulator.loopback import host_port
 
 
-def with_addresses(rig: Rig, bus: str | None, modbus: str | None, take_over: bool = False) -> Rig:
-    """Replace the addresses that are given.
-
-    Parameters
-    ----------
-    rig
-        As read from its file.
-    bus
-        CAN bus URL in place of ``[can] url``.
-    modbus
-        ``HOST:PORT`` in place of ``[plc]`` host and port.
-    take_over
-        Whether another host on the bus is put up with (`hil.rig.sole_host`).
-
-    Raises
-    ------
-    UsageError
-        If ``modbus`` is no such pair.
-    """
-    rig = rig.taking_over() if take_over else rig
+def with_addresses(rig: Rig, bus: str | None, modbus: str | None) -> Rig:
+    """Replace the addresses that are given."""
     can, plc = rig.can, rig.plc
     if bus is not None:
         can = can.model_copy(update={"url": bus})

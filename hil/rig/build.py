@@ -5,6 +5,7 @@ A simulated rig is reached by the same drivers over the same protocols; only the
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -92,13 +93,7 @@ def _require_acceptances(rig: Rig) -> None:
 
 @contextmanager
 def connected_plc(table: PlcTable, loop: PlcLoop) -> Iterator[Plc]:
-    """Connect to the PLC on its loop; disconnected at the end of the block.
-
-    Raises
-    ------
-    BusDown, DeviceTimeout, ConfigMismatch
-        See `open_devices`.
-    """
+    """Connect to the PLC on its loop; disconnected at the end of the block."""
     plc = plc_client(table)
     loop.call(plc.connect())
     try:
@@ -108,13 +103,7 @@ def connected_plc(table: PlcTable, loop: PlcLoop) -> Iterator[Plc]:
 
 
 def plc_client(table: PlcTable) -> Plc:
-    """Make the PLC's client, not connected yet.
-
-    Raises
-    ------
-    ConfigMismatch
-        If the register map can't be used.
-    """
+    """Make the PLC's client, not connected yet."""
     register_map = load_register_map(table.map or data_file("plc.toml"))
     security = None if table.security is None else table.security.client
     return Plc(table.host, table.port, register_map, security=security)
@@ -145,6 +134,7 @@ def inverter_settings(name: str, rig: Rig) -> InverterSettings:
         sdo_timeout_s=table.sdo_timeout_s,
         mode_timeout_s=table.mode_timeout_s,
         state_timeout_s=table.state_timeout_s,
+        speed_limit_rad_s=math.inf if rig.guard.speed_limit_rad_s is None else rig.guard.speed_limit_rad_s,
         channels=tuple(each.object_id for each in rig.channels if each.inverter == name and each.object_id is not None),
     )
 

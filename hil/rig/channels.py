@@ -52,20 +52,7 @@ class Channels:
         self._poll: Future[tuple[float, ...]] | None = None
 
     def read(self, sync_ns: int, patience_s: float) -> tuple[float, ...]:
-        """Read all channels of the present cycle.
-
-        Parameters
-        ----------
-        sync_ns
-            When its SYNC went out [ns].
-        patience_s
-            How long to wait, in all [s].
-
-        Returns
-        -------
-        tuple of float
-            In SI units; NaN for a channel that was not read in this cycle.
-        """
+        """Read all channels of the present cycle."""
         if not self._sources:
             return ()
         until = time.monotonic() + patience_s

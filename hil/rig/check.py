@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from pathlib import Path
 from urllib.parse import parse_qsl, urlsplit
@@ -18,6 +18,7 @@ from drivers.inverter.check import Difference
 from drivers.inverter.commissioned import CommissionedValue
 from drivers.inverter.inverter import Inverter
 from drivers.inverter.protection import Protection
+from drivers.inverter.supervision import speed_tolerance_rad_s
 from drivers.plc.reader import Backoff, PlcReader
 from drivers.plc.reading import Reading
 from drivers.plc.types import PlcStatus
@@ -25,8 +26,6 @@ from hil.config.channel_table import ChannelTable
 from hil.config.rig_file import InverterTable, PlcTable, Rig
 from hil.rig.build import inverter_settings, plc_client
 from hil.rig.fitness import Needs, reasons_against
-from hil.rig.plc_limits import max_speed_rad_s, plc_limits
-from hil.rig.sole_host import require_sole_host
 
 NO_NEEDS = Needs(torque_of_one_nm=0.0)
 """A check asks for no torque."""
@@ -89,10 +88,6 @@ class Finding:
         What the registers of a PLC hold.
     channels
         What the further channels of the rig file read at this device.
-    max_speed_rad_s
-        The largest speed that a drive gives for itself [rad/s], where it does.
-    questions
-        What only someone who knows the vehicle can confirm.
     """
 
     device: str
@@ -105,24 +100,11 @@ class Finding:
     protections: tuple[Protection, ...] = ()
     registers: tuple[Reading, ...] = ()
     channels: tuple[ChannelReading, ...] = ()
-    max_speed_rad_s: float | None = None
-    questions: tuple[str, ...] = ()
 
 
 def check_rig(rig: Rig, prove_stop: bool = False) -> tuple[Finding, ...]:
-    """Look for the CAN bus, both inverters and the PLC; each, whatever is wrong with the others.
-
-    Parameters
-    ----------
-    rig
-        What to look for.
-    prove_stop
-        Whether an inverter that agrees is to show that it stops without its host (`Inverter.prove_stop`): it is
-        configured for that and left disabled, and no torque is commanded.
-    """
-    drives = _can(rig, prove_stop)
-    speeds = [each.max_speed_rad_s for each in drives if each.max_speed_rad_s is not None]
-    return (*drives, _plc(rig, min(speeds, default=None)))
+    """Look for the CAN bus, both inverters and the PLC; each, whatever is wrong with the others."""
+    return (*_can(rig, prove_stop), _plc(rig))
 
 
 def _can(rig: Rig, prove_stop: bool) -> tuple[Finding, ...]:
@@ -137,15 +119,30 @@ def _can(rig: Rig, prove_stop: bool) -> tuple[Finding, ...]:
             *(Finding(name, _node(table), Verdict.FAILED, notes=lost) for name, table in tables.items()),
         )
     with link:
-        require_sole_host(link, rig, inverter_settings("m1", rig).host_heartbeat_s if prove_stop else None)
         bus = Finding("can", rig.can.url, Verdict.AGREES)
-        return (
-            bus,
-            *(_inverter(link, name, rig, prove_stop) for name in tables),
-        )
+        made: dict[str, Inverter] = {}
+        m1, m2 = (_inverter(link, name, rig, prove_stop, made) for name in tables)
+        if len(made) == len(tables):
+            m2 = _or_failed("m2", m2.address, lambda: _one_shaft(m2, made["m1"], made["m2"]))
+        return bus, m1, m2
 
 
-def _inverter(link: CanLink, name: str, rig: Rig, prove_stop: bool) -> Finding:
+def _one_shaft(finding: Finding, m1: Inverter, m2: Inverter) -> Finding:
+    """Compare the speeds that both read of their one shaft, at rest or coasting."""
+    one, other = m1.read_speed_rad_s(), m2.read_speed_rad_s()
+    if abs(one - other) <= speed_tolerance_rad_s(one, other, m1.count_rad_s + m2.count_rad_s):
+        return finding
+    difference = Difference(
+        m2.settings.where,
+        "velocity actual value 0x606C",
+        f"the {one:.3g} rad/s that m1 reads, for both turn with one shaft",
+        f"{other:.3g} rad/s",
+        "m1",
+    )
+    return replace(finding, verdict=Verdict.DIFFERS, differences=(*finding.differences, difference))
+
+
+def _inverter(link: CanLink, name: str, rig: Rig, prove_stop: bool, made: dict[str, Inverter]) -> Finding:
     table: InverterTable = getattr(rig.inverters, name)
 
     def compare() -> Finding:
@@ -153,6 +150,7 @@ def _inverter(link: CanLink, name: str, rig: Rig, prove_stop: bool) -> Finding:
         differences, fault = inverter.check(), inverter.fault()
         if prove_stop and not differences and fault is None:
             differences = inverter.prove_stop(rig.period_s)
+        made[name] = inverter
         verdict = Verdict.DIFFERS if differences else Verdict.AGREES
         notes = (*_eds_note(table.eds), *(() if fault is None else (fault,)))
         return Finding(
@@ -165,7 +163,6 @@ def _inverter(link: CanLink, name: str, rig: Rig, prove_stop: bool) -> Finding:
             (*_rate(table, rig.can.url), *inverter.commissioned()),
             inverter.protections(),
             channels=tuple(_objects_read(inverter, name, rig)),
-            max_speed_rad_s=max_speed_rad_s(inverter),
         )
 
     address = _node(table)
@@ -209,7 +206,7 @@ def _node(table: InverterTable) -> str:
     return f"node {table.node_id}"
 
 
-def _plc(rig: Rig, drives_rad_s: float | None) -> Finding:
+def _plc(rig: Rig) -> Finding:
     def compare() -> Finding:
         registers, status, refusals = asyncio.run(_asked(rig.plc))
         differences = tuple(
@@ -223,12 +220,6 @@ def _plc(rig: Rig, drives_rad_s: float | None) -> Finding:
             for each in registers
             if each.problem is not None
         )
-        limits = () if status is None else tuple(plc_limits(status, rig, drives_rad_s))
-        differences += tuple(
-            Difference("plc", each.what, f"at most {each.most}", each.found, MAP)
-            for each in limits
-            if not each.believed
-        )
         notes = (*refusals, *(() if status is None else reasons_against(status, NO_NEEDS)))
         return Finding(
             "plc",
@@ -237,7 +228,6 @@ def _plc(rig: Rig, drives_rad_s: float | None) -> Finding:
             differences,
             notes,
             registers=registers,
-            questions=tuple(each.question for each in limits),
             channels=tuple(_registers_read(registers, rig)),
         )
 

@@ -114,32 +114,7 @@ class Cycle:
     def step(
         self, tick: Tick, request: TorqueRequest, time_s: float, flags: SampleFlag, permissive_age_ns: int = 0
     ) -> Sample:
-        """Run one cycle.
-
-        Parameters
-        ----------
-        tick
-            The cycle's number and time.
-        request
-            What the experiment asks for.
-        time_s
-            Time of the sample in the recording [s].
-        flags
-            What is already known against the sample.
-        permissive_age_ns
-            Age of the PLC's permission; 0 where no PLC is asked [ns].
-
-        Raises
-        ------
-        CommandRefused
-            If the guard refuses the request.
-        DeviceFault
-            If an inverter reports a fault, or the cycle before has ended the run (`raise_if_ended`).
-        DeviceTimeout
-            If an inverter has not answered for as long as the guard's feedback time-out.
-        RunAborted
-            If this machine itself was late by as much.
-        """
+        """Run one cycle."""
         self.raise_if_ended()
         age_ns = self._age_if_fit(tick)
         evidence = Evidence(age_ns, permissive_age_ns, self.fastest_rad_s)
@@ -163,13 +138,7 @@ class Cycle:
         return self._sample(tick, request, time_s, sync_ns, flags, channels)
 
     def raise_if_ended(self) -> None:
-        """End the run where its last cycle has, once the sample is kept; the guard is then disabled.
-
-        Raises
-        ------
-        DriverError
-            The drive's own word on what is wrong first, then what supervision found.
-        """
+        """End the run where its last cycle has, once the sample is kept; the guard is then disabled."""
         if self._supervision.ended is None:
             return
         self._guard.disable()
@@ -228,13 +197,7 @@ class Cycle:
         return math.nan if any(map(math.isnan, speeds)) else max(speeds, key=abs)
 
     def refuse_if_overslept(self, tick: Tick) -> None:
-        """See that this machine was not late by as much as feedback may be old: then nothing else is to blame.
-
-        Raises
-        ------
-        RunAborted
-            If it was.
-        """
+        """See that this machine was not late by as much as feedback may be old: then nothing else is to blame."""
         timeout_s = self._guard.limits.feedback_timeout_s
         if tick.late_ns > max(self.timing.period_ns, timeout_s * NS_PER_S):
             raise RunAborted(

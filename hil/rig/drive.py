@@ -114,10 +114,20 @@ class Drive:
     _phase: Phase = Phase.APPROACH
     _phase_from: int = 0
     _last: Sample | None = None
+    _late: Tick | None = None
+    _cycle: int = 0
 
     def __post_init__(self) -> None:
         self._summary = RunSummary(self.cycle.timing)
         self._catch_up = CatchUp(self.cycle.largest_step_nm / self.plan.split.largest_base_share)
+
+    @property
+    def lateness(self) -> str:
+        """How late this machine was within the last second, in words; empty where it was not."""
+        late = self._late
+        if late is None or (self._cycle - late.cycle) * self.pacer.period_ns > NS_PER_S:
+            return ""
+        return f"cycle {late.cycle} began {late.late_ns / NS_PER_S:.3f} s late"
 
     def wake_up(self) -> None:
         """Cycle at zero torque until both inverters have answered; the cycle itself ends a wait in vain."""
@@ -125,13 +135,7 @@ class Drive:
             self._stand_still()
 
     def run(self) -> RunSummary:
-        """Drive the experiment to its end; the torque guard is enabled.
-
-        Raises
-        ------
-        RunAborted, DriverError, KeyboardInterrupt
-            As `hil.rig.session.run_plan`.
-        """
+        """Drive the experiment to its end; the torque guard is enabled."""
         first = self._stand_still().cycle + 1  # the guard counts its rate limit from a cycle at zero torque
         self._phase_from = first
         while self._phase is not Phase.DONE:
@@ -166,6 +170,9 @@ class Drive:
     def _begin(self) -> tuple[Tick, SampleFlag]:
         self.stop.raise_if_requested()
         tick = self.pacer.next()
+        self._cycle = tick.cycle
+        if tick.late_ns > self.pacer.period_ns:
+            self._late = tick
         self._summary.cycles += 1
         self._summary.most_late_ns = max(self._summary.most_late_ns, tick.late_ns)
         self.cycle.refuse_if_overslept(tick)  # first: whatever looks wrong after a stall is its consequence

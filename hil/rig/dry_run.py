@@ -72,17 +72,7 @@ class Prediction:
 
 
 def dry_run(rig: Rig, name: str, trust_laws: bool = False) -> Prediction:
-    """Predict a run of one experiment of the rig file; laws of its model's own run only where they are trusted.
-
-    Raises
-    ------
-    UsageError
-        If the rig file has no experiment of that name.
-    CommandRefused
-        If the torque guard would refuse one of its torques.
-    RunAborted
-        If the vehicle of the prediction does not come to the start speed.
-    """
+    """Predict a run of one experiment of the rig file; laws of its model's own run only where they are trusted."""
     plan = plan_run(rig, name)
     prediction = Prediction(_rigid_vehicle(rig, trust_laws), rig.period_s)
     guard = TorqueGuard(rig.guard_limits)

@@ -35,13 +35,7 @@ class Histogram:
         return self._counts.total()
 
     def quantile_ns(self, share: float) -> int | None:
-        """Give the time that this share of all does not exceed [ns]; None where nothing was counted.
-
-        Parameters
-        ----------
-        share
-            Above 0, to 1: 0.99 for the 99th percentile (the nearest rank, no interpolation).
-        """
+        """Give the time that this share of all does not exceed [ns]; None where nothing was counted."""
         rank, below = share * self.total, 0
         for number in sorted(self._counts):
             below += self._counts[number]

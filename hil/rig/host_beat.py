@@ -39,13 +39,7 @@ class HostBeat:
         return self
 
     def hand_over(self) -> None:
-        """End beating, with the beat under way: from now on somebody else does.
-
-        Raises
-        ------
-        RunAborted
-            If a beat has failed.
-        """
+        """End beating, with the beat under way: from now on somebody else does."""
         if error := self._end():
             raise RunAborted(f"PLC: expected it to see the host's beats, got: {error}") from error
 

@@ -141,24 +141,12 @@ class Listening:
         return self._m1.trouble, self._m2.trouble
 
     def begin(self) -> None:
-        """Configure both inverters; one that is not there is listened for all the same.
-
-        Raises
-        ------
-        BusDown
-            If the bus is gone.
-        """
+        """Configure both inverters; one that is not there is listened for all the same."""
         for ear in (self._m1, self._m2):
             ear.configure()
 
     def reset_faults(self) -> tuple[str, ...]:
-        """Reset the fault of each drive that is in one; what could not be reset, in words.
-
-        Raises
-        ------
-        BusDown
-            If the bus is gone.
-        """
+        """Reset the fault of each drive that is in one; what could not be reset, in words."""
         failures = []
         for ear in (self._m1, self._m2):
             try:
@@ -171,19 +159,7 @@ class Listening:
         return tuple(failures)
 
     def step(self) -> Sample:
-        """Run one cycle: SYNC, and what answers it.
-
-        Returns
-        -------
-        Sample
-            Nothing is commanded, so its references are zero. An inverter that does not answer has its last
-            values, flagged.
-
-        Raises
-        ------
-        BusDown
-            If the bus is gone.
-        """
+        """Run one cycle: SYNC, and what answers it."""
         tick = self._pacer.next()
         self.plc.look(tick.now_ns)
         sync_ns = self._link.sync()

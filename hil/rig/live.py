@@ -48,11 +48,6 @@ def tracking_chain(period_s: float, settings: Settings | None = None, L: FloatAr
     """Make the chain for samples of a period [s]; counted in whole nanoseconds, as the pacers do.
 
     With an observation filter L of an earlier run it is the paper's; without, the filter follows the estimate.
-
-    Raises
-    ------
-    BadSetting
-        If the models' period is no whole multiple of it.
     """
     return OnlineChain(settings or tracking_settings(), period_ns(period_s) / NS_PER_S, L)
 

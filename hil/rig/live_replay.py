@@ -63,13 +63,7 @@ class Pace:
 def play_record(
     record: Record, settings: Settings, pace: Pace, on_course: OnCourse, L: FloatArray | None = None
 ) -> Course:
-    """Play a recording in blocks; return what the chain said.
-
-    Raises
-    ------
-    BadSetting
-        If the recording's period does not divide that of the models.
-    """
+    """Play a recording in blocks; return what the chain said."""
     chain = tracking_chain(record.sample_time_s, settings, L)
     course, size, wait = Course(chain), pace.block_samples(record.sample_time_s), pace.waits()
     torque_nm = chain.torque_of(record)
@@ -91,13 +85,7 @@ def play_samples(
     on_course: OnCourse,
     L: FloatArray | None = None,
 ) -> Course:
-    """Play samples as they come, such as those of a bus trace; return what the chain said.
-
-    Raises
-    ------
-    BadSetting
-        If the samples' period does not divide that of the models.
-    """
+    """Play samples as they come, such as those of a bus trace; return what the chain said."""
     live, every, wait = LiveEstimate(tracking_chain(period_s, settings, L)), pace.block_samples(period_s), pace.waits()
     for sample in samples:
         live(sample)

@@ -13,20 +13,7 @@ from hil.recording.checksum import RIG_CHECKSUM, RIG_TEXT, text_sha256
 
 
 def run_metadata(rig_path: Path, experiment: str) -> dict[str, str]:
-    """Describe a run that begins now.
-
-    Parameters
-    ----------
-    rig_path
-        The rig file.
-    experiment
-        Name of the experiment.
-
-    Raises
-    ------
-    RigFileError
-        If the rig file can't be read.
-    """
+    """Describe a run that begins now."""
     inverters = read_rig(rig_path).inverters
     text = rig_path.read_text(encoding="utf-8")
     shipped = data_file("inverter.eds")
@@ -47,17 +34,7 @@ EARLIEST_NS = 946_684_800 * 1_000_000_000
 
 
 def replay_metadata(rig_path: Path, trace: Path, first_ns: int) -> dict[str, str]:
-    """Describe a recording that is rebuilt from a bus trace.
-
-    Parameters
-    ----------
-    rig_path
-        The rig file of the run.
-    trace
-        The trace.
-    first_ns
-        Time of its first sample [ns]; since 1970 where the trace says so, and then it is the start of the run.
-    """
+    """Describe a recording that is rebuilt from a bus trace."""
     metadata = {**run_metadata(rig_path, f"replay of {trace.name}"), "replayed_from": trace.name}
     del metadata["started_utc"]  # it began long before now
     if first_ns >= EARLIEST_NS:

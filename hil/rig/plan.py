@@ -68,15 +68,7 @@ class Plan:
 
 
 def plan_run(rig: Rig, name: str) -> Plan:
-    """Plan a run of one experiment of the rig file.
-
-    Raises
-    ------
-    UsageError
-        If the rig file has no experiment of that name.
-    CommandRefused
-        If the torque guard's limits don't allow the PRBS that the PLC is to make.
-    """
+    """Plan a run of one experiment of the rig file."""
     table = experiment_table(rig, name)
     split = Split(table.share_m1, rig.prbs.part_m1)
     largest = split.request(table.torque_nm, rig.prbs.amplitude_nm if table.prbs else 0.0)

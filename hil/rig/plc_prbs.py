@@ -42,22 +42,7 @@ class PlcPrbsOrder:
 
 
 def guarded_prbs(limits: GuardLimits, split: Split, amplitude_nm: float) -> tuple[GuardedTorque, GuardedTorque]:
-    """Have the torque guard's rules judge a PRBS; they hold either way, so that one of its two levels will do.
-
-    Parameters
-    ----------
-    limits
-        All of the rig's limits, nothing kept free.
-    split
-        Which inverter carries how much of it.
-    amplitude_nm
-        Level, plus or minus, of both inverters together [Nm].
-
-    Raises
-    ------
-    CommandRefused
-        If a limit of an inverter, of the PRBS, or of the sum is broken.
-    """
+    """Have the torque guard's rules judge a PRBS; they hold either way, so that one of its two levels will do."""
     guard = TorqueGuard(limits)
     guard.enable()
     return guard.check(split.request(0.0, amplitude_nm), now_ns=0, evidence=Evidence(0, 0, 0.0))
@@ -125,22 +110,7 @@ class PlcPrbs:
             ) from error
 
     def follow(self, tick: Tick, phase: Phase, status: PlcStatus) -> None:
-        """Switch it with the phase of the experiment, and see that it is as it should be.
-
-        Parameters
-        ----------
-        tick
-            The present cycle.
-        phase
-            What the experiment is in.
-        status
-            Latest report of the PLC, its ``t_ns`` in the time of the cycle.
-
-        Raises
-        ------
-        RunAborted
-            If the PLC does not do as ordered, or its generator is set to something else.
-        """
+        """Switch it with the phase of the experiment, and see that it is as it should be."""
         order = self._order if phase is Phase.MEASURE else None
         if self._change is None and (order is not None) is not self._wanted:
             self._wanted = order is not None

@@ -66,20 +66,7 @@ class PlcWatch:
         return self._news
 
     def look(self, tick: Tick, *speeds_rad_s: float) -> SampleFlag:
-        """Poll if it is due, and judge what is known.
-
-        Parameters
-        ----------
-        tick
-            The present cycle.
-        speeds_rad_s
-            Latest motor speed, as each inverter reads it: they turn one shaft [rad/s].
-
-        Raises
-        ------
-        RunAborted
-            If the vehicle is no longer fit, is faster than the PLC permits, or the PLC is silent.
-        """
+        """Poll if it is due, and judge what is known."""
         if self._asked_ns is None:  # what was reported before the run counts from here
             self._latest = replace(self._latest, t_ns=tick.now_ns)
         self._start_if_due(tick.now_ns)

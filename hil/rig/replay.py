@@ -186,30 +186,7 @@ class _Reader:
 
 
 def replay(path: Path, rig: Rig, whole: bool = False, channel: str | None = None) -> Iterator[Sample]:
-    """Read the samples of a bus trace.
-
-    Parameters
-    ----------
-    path
-        The trace.
-    rig
-        The rig it was recorded on: nodes, EDS, rated torques and period.
-    whole
-        Every cycle from the first SYNC, not only the measured part, where the PRBS runs.
-    channel
-        Which channel of the trace; None where it has one.
-
-    Yields
-    ------
-    Sample
-        One per period, flagged where a cycle did not take place.
-
-    Raises
-    ------
-    RecordingError
-        If the file can't be read, has several channels and none is chosen, a frame is not what the EDS says, or there
-        is no measured part, or a second.
-    """
+    """Read the samples of a bus trace."""
     period = period_ns(rig.period_s)
     clock = _Clock(period, paced=_is_paced(path, period, channel))
     m1 = _Station(inverter_settings("m1", rig), SampleFlag.M1_STALE, SampleFlag.M1_LIMITED)

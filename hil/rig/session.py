@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from drivers.errors import DriverError
 from drivers.plc.types import PlcStatus
 from hil.errors import RunAborted
 from hil.rig.arming import ArmedDrives
@@ -40,37 +41,7 @@ def run_plan(
     timing: RunTiming | None = None,
     observers: Sequence[Observer] = (),
 ) -> RunSummary:
-    """Run a plan on an opened rig.
-
-    Parameters
-    ----------
-    devices
-        The rig, opened.
-    plan
-        What to do; used up by the run.
-    pacer
-        When each cycle begins.
-    recorder
-        Where samples go.
-    stop
-        Ends the run at the next cycle when requested.
-    progress
-        Called with every cycle.
-    timing
-        Where the run's timing is kept, for a caller who wants it however the run ends.
-    observers
-        Given every sample after its cycle's work; see `hil.rig.drive.Observer`.
-
-    Raises
-    ------
-    RunAborted
-        If the vehicle is not fit or no longer, or a drive can't be confirmed disarmed, or the PLC's PRBS
-        generator off.
-    DriverError
-        What the devices raise; `CommandRefused` if the guard refused a torque.
-    KeyboardInterrupt
-        If `stop` was requested.
-    """
+    """Run a plan on an opened rig."""
     before = _fit(devices, plan)
     with HostBeat(devices.plc_loop, devices.plc) as beat:
         _configure(devices, stop)
@@ -91,9 +62,22 @@ def run_plan(
             watch = PlcWatch(devices.plc_loop, devices.plc, before, plan.needs, pacer.poll_patience_s)
             drive = Drive(plan, cycle, watch, prbs, pacer, recorder, stop, progress, observers)
             beat.hand_over()
-            drive.wake_up()
-            devices.guard.enable()
-            return drive.run()
+            try:
+                drive.wake_up()
+                devices.guard.enable()
+                return drive.run()
+            except (DriverError, RunAborted) as error:
+                _blame_the_host_first(error, drive.lateness)
+                raise
+
+
+def _blame_the_host_first(error: Exception, lateness: str) -> None:
+    """Where this machine was late, whatever looks wrong with a device may be its own doing."""
+    if lateness and "too busy" not in str(error):
+        error.args = (
+            f"This machine was too busy within the last second: {lateness}; close other programs before you look "
+            f"at anything else. What ended the run then: {error}",
+        )
 
 
 def _fit(devices: Devices, plan: Plan) -> PlcStatus:

@@ -34,13 +34,7 @@ class StopRequest:
         self._requested = True
 
     def raise_if_requested(self) -> None:
-        """End the run here if that was asked for.
-
-        Raises
-        ------
-        KeyboardInterrupt
-            As if Ctrl-C had been pressed at this line.
-        """
+        """End the run here if that was asked for."""
         if self._requested:
             raise KeyboardInterrupt
 

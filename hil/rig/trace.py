@@ -73,13 +73,7 @@ class BusTrace:
             self._failed = OSError(f"{MOST_WAITING} frames wait for the disk")
 
     def raise_if_failed(self) -> None:
-        """Tell that the disk does not take the frames.
-
-        Raises
-        ------
-        RecordingError
-            From the first that could not be written.
-        """
+        """Tell that the disk does not take the frames."""
         if self._failed is not None:
             raise no_room(self.path, "the bus trace", self._failed, "Make room and run again.") from self._failed
 
@@ -119,12 +113,6 @@ def is_trace(path: Path) -> bool:
 
 
 def require_trace_name(path: Path) -> None:
-    """Refuse a name no trace that is written can have.
-
-    Raises
-    ------
-    RecordingError
-        Unless it ends in one of `SUFFIXES`.
-    """
+    """Refuse a name no trace that is written can have."""
     if path.suffix.lower() not in SUFFIXES:
         raise RecordingError(path, f"expected a name that ends in one of {', '.join(SUFFIXES)}, got {path.suffix!r}")

@@ -42,20 +42,7 @@ _READERS: dict[str, Callable[..., Any]] = {
 
 
 def read_frames(path: Path, channel: str | None = None) -> Iterator[tuple[int, bytes, int]]:
-    """Give identifier, data and time [ns] of every frame of CANopen's kind, in the file's order.
-
-    Parameters
-    ----------
-    path
-        The trace.
-    channel
-        Name of the channel to read, as the file has it; None for the only one.
-
-    Raises
-    ------
-    RecordingError
-        If the file can't be read to its end, is no trace, has no such channel, or has several and none is chosen.
-    """
+    """Give identifier, data and time [ns] of every frame of CANopen's kind, in the file's order."""
     first, found = channel, channel is None
     for name, message in _frames(path):
         first = name if first is None else first

@@ -92,8 +92,9 @@ def test_cob_id_that_the_drive_had_before_is_switched_off_as_it_is() -> None:
     """Bits 0 to 29 do not change while the PDO is on, an identifier of 29 bits included."""
     with on_bus(Strict) as (drive, inverter, _):
         drive.objects[0x1800, 1] = 1 << 29 | 0x12345
-        [difference] = inverter.check()
-        assert "of 29 bits" in difference.found
+        assert inverter.check() == ()
+        [remark] = inverter.remarks()
+        assert "(of 29 bits)" in remark
         inverter.configure()
         assert drive.objects[0x1800, 1] == 0x180 + M1.node_id
 
@@ -209,6 +210,15 @@ def driven(inverter: Inverter, link: CanLink, cycles: int, torque_nm: float = 60
         inverter.command(guarded(torque_nm if n % 4 < 2 else -torque_nm))
         assert inverter.await_feedback(link.sync(), 5.0) is not None
         inverter.raise_if_faulted()
+
+
+def test_arming_takes_away_the_targets_that_another_program_has_left() -> None:
+    with on_bus() as (drive, inverter, _):
+        drive.objects |= {(0x6071, 0): 300, (0x60B2, 0): -50}
+        inverter.configure()
+        inverter.arm()
+        assert (drive.objects[0x6071, 0], drive.objects[0x60B2, 0]) == (0, 0)
+        inverter.disarm()
 
 
 def test_internal_limit_is_part_of_the_feedback() -> None:

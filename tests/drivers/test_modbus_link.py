@@ -8,6 +8,7 @@ import re
 import pytest
 
 from drivers.errors import BusDown, DeviceFault, DeviceTimeout, DriverError, ProtocolViolation
+from drivers.plc.modbus_dial import Dial
 from drivers.plc.modbus_link import EXCEPTION_TEXT, ModbusLink
 from drivers.plc.register import RegisterKind
 from tests.drivers.modbus_peers import Answer, frame, free_port, peer
@@ -183,6 +184,26 @@ def test_no_server_is_a_bus_that_is_down() -> None:
     port = free_port()
     with pytest.raises(BusDown, match=f"PLC at 127.0.0.1:{port}.*expected a Modbus TCP server"):
         asyncio.run(ModbusLink("127.0.0.1", port, 1, TIMEOUT_S).open())
+
+
+def test_connecting_has_a_time_of_its_own_and_answers_have_theirs_after_it() -> None:
+    async def run() -> tuple[float | None, float | None]:
+        async with peer(lambda request: frame(request, b"\x03\x02\x00\x01")) as port:
+            dial = Dial("127.0.0.1", port, TIMEOUT_S, None, "PLC")
+            dial._connecting_s = 7.0
+            params, connect = dial.client.ctx.comm_params, dial.client.connect
+            during = []
+
+            async def watched() -> bool:
+                during.append(params.timeout_connect)
+                return await connect()
+
+            dial.client.connect = watched  # type: ignore[method-assign]
+            await dial.open()
+            dial.close()
+            return during[0], params.timeout_connect
+
+    assert asyncio.run(run()) == (7.0, TIMEOUT_S)
 
 
 def test_nothing_is_sent_before_it_is_open_or_after_it_is_closed() -> None:

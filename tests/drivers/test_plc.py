@@ -281,6 +281,46 @@ def test_a_plc_that_does_not_see_the_beats_is_raised_when_the_time_is_up() -> No
     talk(StoppedPlc(), conversation, clock=clock)
 
 
+def test_the_time_of_a_beat_counts_from_the_last_that_was_seen() -> None:
+    """On a clock that has run for long: a sum of two times in place of their difference would be over at once."""
+    clock = Clock()
+    clock.now_ns = 1000 * 1000 * MS
+
+    async def conversation(plc: Plc, _: ServedPlc) -> None:
+        await plc.beat()
+        clock.now_ns += 500 * MS
+        await plc.beat()
+
+    talk(StoppedPlc(), conversation, clock=clock)
+
+
+class PermitsLater(PlcDevice):
+    """A PLC that gives its permissive back some beats after its host's first."""
+
+    __slots__ = ("looks",)
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.looks = 0
+
+    def values(self) -> dict[str, bool | int | float | str]:
+        self.looks += 1
+        return {**super().values(), "permissive": self.looks > 6}
+
+
+def test_a_greeting_waits_for_the_permissive_and_no_longer_than_its_time() -> None:
+    async def waits(plc: Plc, _: ServedPlc) -> None:
+        assert (await plc.greet()).permissive
+
+    async def gives_up(plc: Plc, _: ServedPlc) -> None:
+        assert not (await plc.greet()).permissive
+
+    device = PermitsLater()
+    talk(device, waits)
+    device.looks = -1_000_000
+    talk(device, gives_up, clock=ImpatientClock())
+
+
 def test_a_plc_that_hangs_is_a_timeout_and_can_come_back() -> None:
     async def conversation(plc: Plc, served: ServedPlc) -> None:
         served.pause()

@@ -61,7 +61,7 @@ def test_drive_that_does_nothing_without_its_host_is_found() -> None:
     assert [each.what for each in differences] == ["stop without commands", "stop without heartbeat"]
     assert differences[0].found == (
         "EMCY 0x8250 RPDO timeout: the host's command did not come in time (error register 0x11), "
-        "power state ready to switch on"
+        "power state ready to switch on; the entry that failed is RPDO event timer 0x1400:05"
     )
 
 
@@ -72,7 +72,11 @@ def test_drive_that_does_not_notice_is_found(monkeypatch: pytest.MonkeyPatch) ->
         assert node is not None
         node.look_for_host = lambda now_ns: None  # type: ignore[method-assign]
         differences = rig.m1.prove_stop(PERIOD_S)
-    assert [each.found for each in differences] == ["no EMCY, power state ready to switch on"] * 2
+    said = "no EMCY, power state ready to switch on; the entry that failed is "
+    assert [each.found for each in differences] == [
+        f"{said}RPDO event timer 0x1400:05",
+        f"{said}consumer heartbeat time 0x1016:01",
+    ]
     assert differences[0].expected == "an EMCY 0x81xx or 0x82xx within 50 ms, and READY TO SWITCH ON left"
 
 
@@ -140,3 +144,9 @@ def test_drive_that_can_not_be_made_to_watch_is_refused(locked: int) -> None:
     with bench(InverterFaults(locked_objects=frozenset({locked})), settings=QUICK) as rig:
         with pytest.raises(ConfigMismatch, match=f"object 0x{locked:04X}.*0x06010002.*read only"):
             rig.m1.prove_stop(PERIOD_S)
+
+
+def test_the_reaction_is_that_of_the_rig_file_where_it_has_one() -> None:
+    with bench(settings=replace(QUICK, option_codes={0x6007: 3})) as rig:
+        [reaction] = [each for each in rig.m1.protections() if each.name == "abort_connection"]
+        assert "3 (quick stop)" in reaction.by

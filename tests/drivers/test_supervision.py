@@ -71,7 +71,7 @@ def m1_alone(
 
 
 def torques(*torques_nm: float, **more: object) -> list[InverterFeedback]:
-    return [answer(each, **more) for each in torques_nm]
+    return [answer(each, 0.0, **more) for each in torques_nm]
 
 
 def steady(cycle: int) -> float:
@@ -190,7 +190,9 @@ def test_a_limit_that_takes_all_of_the_torque_ends_the_run() -> None:
     assert m1_alone(torques(*[0.0] * 500, limited=True), command_nm=30.0) is None
 
 
-@pytest.mark.parametrize("state", set(PowerState) - {PowerState.OPERATION_ENABLED} - FAULT_STATES)
+@pytest.mark.parametrize(
+    "state", [each for each in PowerState if each not in {PowerState.OPERATION_ENABLED, *FAULT_STATES}]
+)
 @pytest.mark.parametrize("mode", TorqueMode)
 @pytest.mark.parametrize("follows", [True, False])
 def test_another_state_ends_the_run_in_that_cycle(state: PowerState, mode: TorqueMode, follows: bool) -> None:
@@ -313,11 +315,12 @@ def messages(*counts: int | tuple[int, int]) -> int | None:
 
 
 def test_one_tpdo_per_sync() -> None:
+    pair: list[int | tuple[int, int]] = [1, (1, 2)]
     assert messages(*[1] * 1000) is None
     assert messages(*[1, 0] * 500) is None, "each second is lost: its row is flagged"
     assert messages(*[0, 2] * 500) is None, "each second is late"
     assert messages(*[1, 1, 2] * 500) == 3 * MOST_SURPLUS
-    assert messages(*[1, (1, 2)] * 500) == 2 * MOST_SURPLUS, "one kind of two"
+    assert messages(*pair * 500) == 2 * MOST_SURPLUS, "one kind of two"
     assert messages(*([2] + [1] * 200) * 20) is None, "a controller that hears a frame twice"
     assert messages(*[1, 0, 0] * 500) == 3 * (MOST_MISSING - 1)
 

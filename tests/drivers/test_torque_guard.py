@@ -19,7 +19,6 @@ from drivers.torque_guard import (
     Evidence,
     GuardedTorque,
     GuardLimits,
-    Measured,
     TorqueGuard,
     TorqueRequest,
 )
@@ -322,9 +321,7 @@ def test_limits_and_requests_can_t_be_changed_afterwards() -> None:
         HOLD.base_m1_nm = 9999.0  # type: ignore[misc]
 
 
-@pytest.mark.parametrize(
-    "kind", [GuardLimits, ErrorLimits, Evidence, TorqueRequest, GuardedTorque, Measured, torque_guard._Past]
-)
+@pytest.mark.parametrize("kind", [GuardLimits, ErrorLimits, Evidence, TorqueRequest, GuardedTorque, torque_guard._Past])
 def test_what_the_guard_judges_by_can_t_be_changed(kind: type) -> None:
     assert kind.__dataclass_params__.frozen
 

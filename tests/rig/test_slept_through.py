@@ -6,12 +6,14 @@ from itertools import pairwise
 
 import pytest
 
+from drivers.errors import DeviceFault
 from hil.errors import RunAborted
 from hil.rig.drive import SLEPT_THROUGH
 from hil.rig.pacing import FreePacer, Tick
 from hil.sample import SampleFlag
+from hil.simulator.fault_table import rig_faults
 from tests.rig.observer import assert_disarmed
-from tests.rig.serving import Samples, fast, run_once, served
+from tests.rig.serving import Samples, fast, run_once, served, small_rig
 
 GAP_AFTER = 250
 """A cycle inside the measured part of the small rig's reversal."""
@@ -55,6 +57,17 @@ def test_a_stall_of_this_machine_is_this_machines_fault() -> None:
         with pytest.raises(RunAborted, match=r"cycle 250 began 2\.000 s late, .* This machine was too busy"):
             run_once(rig, Samples(), experiment="reversal", pacer=SleepyPacer(fast(rig), gap=200))
         assert_disarmed(server.bus_url, 1, 2)
+
+
+def test_what_ends_a_run_soon_after_this_machine_was_late_is_told_behind_that() -> None:
+    rig = small_rig()
+    for at_s, first in (
+        (2.6, "This machine was too busy within the last second: cycle 250 began 0.030 s late"),
+        (2.4, "inverter m2"),
+    ):
+        with served(rig, rig_faults([f"m2.emcy@{at_s}=0x4210"], rig.period_s)) as (_, at):
+            with pytest.raises(DeviceFault, match=f"^{first}.*EMCY 0x4210"):
+                run_once(at, Samples(), experiment="reversal", pacer=SleepyPacer(fast(at)))
 
 
 @pytest.mark.parametrize("gap_after", range(210, 290, 10))

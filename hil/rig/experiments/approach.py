@@ -75,13 +75,7 @@ class Approach:
         self.settled = False
 
     def torque_nm(self, time_s: float, speed_rad_s: float) -> float:
-        """Torque of this cycle [Nm]; sets ``settled`` once the vehicle is there.
-
-        Raises
-        ------
-        RunAborted
-            If it is not there in time.
-        """
+        """Torque of this cycle [Nm]; sets ``settled`` once the vehicle is there."""
         torque_nm = self._hold.torque_nm(speed_rad_s)
         self.settled = self._is_steady(time_s)
         if not self.settled and time_s >= self._timeout_s:

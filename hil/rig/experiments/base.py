@@ -44,20 +44,7 @@ class Experiment(Protocol):
         ...
 
     def torque(self, time_s: float, speed_rad_s: float) -> BaseTorque:
-        """Ask for the torque of one cycle.
-
-        Parameters
-        ----------
-        time_s
-            Time since the first cycle of the experiment [s]; never runs backwards.
-        speed_rad_s
-            Latest motor speed [rad/s].
-
-        Raises
-        ------
-        RunAborted
-            If the vehicle does not come to the start speed.
-        """
+        """Ask for the torque of one cycle."""
         ...
 
 

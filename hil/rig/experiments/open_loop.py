@@ -64,13 +64,7 @@ class OpenLoop:
         return self._course.duration_s
 
     def torque(self, time_s: float, speed_rad_s: float) -> BaseTorque:
-        """Torque and phase of one cycle; see `hil.rig.experiments.base.Experiment`.
-
-        Raises
-        ------
-        RunAborted
-            If the vehicle moves at the beginning, or faster than it may later.
-        """
+        """Torque and phase of one cycle; see `hil.rig.experiments.base.Experiment`."""
         self._watch(time_s, speed_rad_s)
         over = time_s > self._course.duration_s - 1e-9
         self._phase = Phase.MEASURE if not over else Phase.RELEASE

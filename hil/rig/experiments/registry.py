@@ -24,13 +24,7 @@ from hil.rig.experiments.tip import Tip
 
 
 def experiment_table(rig: Rig, name: str) -> AnyExperiment:
-    """Look an experiment of the rig file up by name.
-
-    Raises
-    ------
-    UsageError
-        If the rig file has none of that name.
-    """
+    """Look an experiment of the rig file up by name."""
     table = rig.experiments.get(name)
     if table is None:
         known = ", ".join(sorted(rig.experiments)) or "none"
@@ -42,13 +36,7 @@ def experiment_table(rig: Rig, name: str) -> AnyExperiment:
 
 
 def build_experiment(rig: Rig, name: str) -> Experiment:
-    """Build a fresh experiment; each run needs its own.
-
-    Raises
-    ------
-    UsageError
-        If the rig file has none of that name.
-    """
+    """Build a fresh experiment; each run needs its own."""
     table = experiment_table(rig, name)
     match table:
         case PulsesTable():

@@ -20,7 +20,10 @@ def asked_for(program: str, runs: int, arguments: list[str] | None) -> argparse.
     return parser.parse_args(arguments)
 
 
-def tried(asked: argparse.Namespace, one: Callable[[int], tuple[str, str, Outcome]]) -> int:
+WORST = "worst time to zero [s]"
+
+
+def tried(asked: argparse.Namespace, one: Callable[[int], tuple[str, str, Outcome]], worst: str = WORST) -> int:
     """Carry the runs out, each of which gives its fault, where it was met, and how it ended; 1 if one is wrong.
 
     Whoever interrupts it gets the table of those until then.
@@ -32,12 +35,12 @@ def tried(asked: argparse.Namespace, one: Callable[[int], tuple[str, str, Outcom
             outcomes[kind].append(outcome)
             for problem in outcome.problems:
                 print(f"run {number}: {kind} {where}: {problem}", file=sys.stderr, flush=True)
-    return report(outcomes)
+    return report(outcomes, worst)
 
 
-def report(outcomes: dict[str, list[Outcome]]) -> int:
+def report(outcomes: dict[str, list[Outcome]], worst: str = WORST) -> int:
     """Print the table; 1 if there is a problem."""
-    print("| fault | runs | ended by it | worst time to zero [s] | wrong |")
+    print(f"| fault | runs | ended by it | {worst} | wrong |")
     print("| --- | --- | --- | --- | --- |")
     for kind, each in outcomes.items():
         ended = [outcome for outcome in each if outcome.said]

@@ -20,18 +20,15 @@ _SLACK = "differs where a torque is beyond its limit by the slack for rounding t
 
 TARGETS: dict[str, Target] = {
     "drivers.torque_guard": Target(
-        ("tests/drivers/test_torque_guard.py", "tests/drivers/test_torque_error.py"),
+        ("tests/drivers/test_torque_guard.py", "tests/drivers/test_supervision.py"),
         {
             "abs(value_nm) <= limit_nm + ROUNDING_NM -> abs(value_nm) < limit_nm + ROUNDING_NM": _SLACK,
             "abs(base_nm - before_nm) <= allowed_nm + ROUNDING_NM -> abs(base_nm - before_nm) < allowed_nm + "
             "ROUNDING_NM": _SLACK,
         },
     ),
-    "drivers.guard_limits": Target(("tests/drivers/test_torque_guard.py", "tests/drivers/test_torque_error.py")),
-    "drivers.torque_error": Target(
-        ("tests/drivers/test_torque_error.py",), {"3 -> 4": "a fourth pair of counters, which nobody asks"}
-    ),
-    "drivers.message_rate": Target(("tests/drivers/test_message_rate.py",)),
+    "drivers.guard_limits": Target(("tests/drivers/test_torque_guard.py", "tests/drivers/test_supervision.py")),
+    "drivers.inverter.supervision": Target(("tests/drivers/test_supervision.py",)),
     "drivers.scaling": Target(("tests/drivers/test_scaling.py",)),
     "drivers.inverter.cia402": Target(
         ("tests/drivers/test_cia402.py",), {"0 -> 1 #3": "a previous controlword of which bit 7 alone counts"}

@@ -1,0 +1,339 @@
+"""``python -m tests.campaigns.faults.middle``: a man in the middle of the bus, judged by the simulated shaft.
+
+Between the host and the simulated rig frames are changed, lost, repeated and invented: kind, drive, moment, pattern
+(once, burst, periodic, for ever) and size are drawn. How a run ended is judged by what turned the shaft, which no code
+of the product has a part in: the torques the plant was driven with against those the host sent before they were
+changed, and the plant's own speed. A failure is a run that continues after the torque was wrong by more than stated, or
+a shaft that got faster than the experiment has it, or a drive that is not disarmed at the end.
+"""
+
+from __future__ import annotations
+
+import re
+import struct
+import sys
+import tempfile
+import time
+import uuid
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from functools import cache, partial
+from pathlib import Path
+from unittest import mock
+
+import can
+import numpy as np
+
+from drivers.canopen.can_link import SYNC_COB_ID, CanLink
+from drivers.inverter.supervision import NO_TORQUE_S
+from drivers.plc.plc import Plc
+from hil.config.rig_file import Rig
+from hil.recording import RecordingWriter, read_table
+from hil.rig import build
+from hil.rig.addresses import with_addresses
+from hil.rig.build import Devices, open_devices
+from hil.rig.experiments.base import Phase
+from hil.rig.pacing import FreePacer, period_ns
+from hil.rig.plan import plan_run
+from hil.rig.session import run_plan
+from hil.rig.stop import StopRequest
+from hil.simulator.loopback import Address
+from hil.simulator.rig_server import RigServer
+from tests.campaigns.faults.one_run import COUNT_NM, PATIENCE_S, Outcome
+from tests.campaigns.faults.rig import WatchedPlant, campaign_rig
+from tests.campaigns.faults.runs import asked_for, tried
+from tests.rig.observer import DISARMED, power_state
+
+RPDO, TPDO, HEARTBEAT = 0x200, 0x180, 0x700
+EXPERIMENTS = ("cruise", "reversal", "tip", "pulses")
+PATTERNS = ("once", "burst", "periodic", "for ever")
+COMMAND = struct.Struct("<Hhh")
+"""Controlword, target torque, torque offset."""
+
+ANSWER = struct.Struct("<Hhi")
+"""Statusword, torque and velocity actual value."""
+
+LATE_CYCLES = 2
+"""From the cycle that is too much to zero: the answer to the next SYNC shows it, and disarming takes one."""
+
+SPEED_SLACK_RAD_S = 3.0
+
+
+@dataclass
+class Fault:
+    """What happens, from a moment on, in the cycles of its pattern."""
+
+    kind: str
+    drive: int
+    at: int
+    pattern: str
+    on: int
+    period: int
+    size: float
+    frozen: dict[int, bytes] = field(default_factory=dict)
+
+    def acts(self, cycle: int) -> bool:
+        since = cycle - self.at
+        if since < 0 or self.pattern == "for ever":
+            return since >= 0
+        length = {"once": 1, "burst": self.on}.get(self.pattern)
+        return since < length if length is not None else since % self.period < self.on
+
+    def __str__(self) -> str:
+        pattern = {"periodic": f"{self.on} of {self.period}", "burst": f"burst of {self.on}"}
+        return f"m{self.drive} from cycle {self.at}, {pattern.get(self.pattern, self.pattern)}, size {self.size:.2f}"
+
+
+Change = Callable[[Fault, bytes], list[bytes]]
+
+
+def command(fault: Fault, data: bytes, word: int | None = None, factor: float = 1.0, offset: int = 0) -> list[bytes]:
+    controlword, target, prbs = COMMAND.unpack(data[:6])
+    changed = (round(factor * target) + offset, round(factor * prbs))
+    clipped = [max(-1000, min(1000, each)) for each in changed]
+    return [COMMAND.pack(controlword if word is None else word, *clipped) + data[6:]]
+
+
+def answer(data: bytes, set_bits: int = 0, clear_bits: int = 0, speed: Callable[[int], float] | None = None) -> bytes:
+    status, torque, velocity = ANSWER.unpack(data[:8])
+    status = (status | set_bits) & ~clear_bits
+    return ANSWER.pack(status, torque, velocity if speed is None else round(speed(velocity)))
+
+
+def kept(fault: Fault, cob_id: int, data: bytes) -> list[bytes]:
+    return [fault.frozen.setdefault(cob_id, data)]
+
+
+LEAVES = (0x0006, 0x0007, 0x0002)
+"""Shutdown, disable operation, quick stop."""
+
+TO_DRIVE: dict[str, Change] = {
+    "leaves operation": lambda f, d: command(f, d, word=LEAVES[int(f.size * 100) % 3]),
+    "torque times": lambda f, d: command(f, d, factor=4.0 * f.size - 2.0),
+    "torque plus": lambda f, d: command(f, d, offset=round(800 * f.size - 400)),
+    "torque nothing": lambda f, d: command(f, d, factor=0.0),
+    "limit bit, no torque": lambda f, d: command(f, d, factor=0.0),
+    "ignores its target": lambda f, d: command(f, d, factor=0.0),
+    "RPDO lost": lambda f, d: [],
+    "stuck and frozen": lambda f, d: kept(f, RPDO, d),
+}
+TO_HOST: dict[str, Change] = {
+    "speed reversed": lambda f, d: [answer(d, speed=lambda v: -v)],
+    "speed stuck": lambda f, d: [answer(d, speed=lambda v: ANSWER.unpack(kept(f, TPDO, d)[0][:8])[2])],
+    "speed zero": lambda f, d: [answer(d, speed=lambda v: 0)],
+    "speed times": lambda f, d: [answer(d, speed=lambda v: 2.0 * f.size * v)],
+    "foreign TPDO": lambda f, d: [d, answer(d, speed=lambda v: 0)],
+    "TPDO doubled": lambda f, d: [d, d],
+    "TPDO lost": lambda f, d: [],
+    "limit bit, no torque": lambda f, d: [answer(d, set_bits=1 << 11)],
+    "ignores its target": lambda f, d: [answer(d, clear_bits=1 << 12)],
+    "stuck and frozen": lambda f, d: kept(f, TPDO, d),
+}
+WITH_SYNC: dict[str, tuple[int, bytes]] = {
+    "PRE-OPERATIONAL heartbeat": (HEARTBEAT, b"\x7f"),
+    "boot-up": (HEARTBEAT, b"\x00"),
+}
+"""Frames that come to the host next to those of the drive."""
+
+OTHERS = ("node ids exchanged", "second host", "clock stepped")
+KINDS = (*dict.fromkeys((*TO_DRIVE, *TO_HOST, *WITH_SYNC, *OTHERS)),)
+
+
+class Man:
+    """Stands between the host's link and its bus."""
+
+    def __init__(self, fault: Fault, rated_nm: float) -> None:
+        self._fault = fault
+        self.kind = fault.kind
+        self._scale_nm = rated_nm / 1000.0
+        self._sent = [0.0, 0.0]
+        self.cycle = 0
+        self.asked_nm: list[tuple[float, float]] = []
+        self.on_fault: Callable[[], None] = lambda: None
+
+    def stand_between(self, devices: Devices) -> None:
+        link = devices.link
+        send, take = link.network._send, link._take
+        self._take = take
+
+        def out(message: can.Message) -> None:
+            for each in self._out(message):
+                send(each)
+
+        def into(message: can.Message) -> None:
+            for each in self._into(message):
+                take(each)
+
+        link.network._send = out
+        link._bus.receive_by(into)  # type: ignore[attr-defined]
+
+    def _out(self, message: can.Message) -> Iterator[can.Message]:
+        fault, cob_id, data = self._fault, message.arbitration_id, bytes(message.data)
+        if cob_id in (RPDO + 1, RPDO + 2):
+            self._sent[cob_id - RPDO - 1] = sum(COMMAND.unpack(data[:6])[1:]) * self._scale_nm
+        if cob_id == SYNC_COB_ID:
+            self.cycle += 1
+            self.asked_nm.append((self._sent[0], self._sent[1]))
+            if fault.acts(self.cycle):
+                self.on_fault()
+                if fault.kind in WITH_SYNC:
+                    base, extra = WITH_SYNC[fault.kind]
+                    self._take(_frame(base + fault.drive, extra))
+        if not fault.acts(self.cycle):
+            yield message
+        elif fault.kind == "node ids exchanged" and cob_id in (RPDO + 1, RPDO + 2):
+            yield _frame(2 * RPDO + 3 - cob_id, data)
+        elif cob_id == RPDO + fault.drive and fault.kind in TO_DRIVE:
+            yield from (_frame(cob_id, each) for each in TO_DRIVE[fault.kind](fault, data))
+        else:
+            yield message
+
+    def _into(self, message: can.Message) -> Iterator[can.Message]:
+        fault, cob_id, data = self._fault, message.arbitration_id, bytes(message.data)
+        if not fault.acts(self.cycle):
+            yield message
+        elif fault.kind == "node ids exchanged" and cob_id in (TPDO + 1, TPDO + 2):
+            yield _frame(2 * TPDO + 3 - cob_id, data)
+        elif cob_id == TPDO + fault.drive and fault.kind in TO_HOST:
+            yield from (_frame(cob_id, each) for each in TO_HOST[fault.kind](fault, data))
+        else:
+            yield message
+
+
+def _frame(cob_id: int, data: bytes) -> can.Message:
+    return can.Message(arbitration_id=cob_id, data=data, is_extended_id=False)
+
+
+class Shaft(WatchedPlant):
+    """The plant, with its own speed kept [rad/s]."""
+
+    def __init__(self, rated_nm: float) -> None:
+        super().__init__(rated_nm)
+        self.speeds_rad_s: list[float] = []
+
+    def advance(self, torque_nm: tuple[float, float], duration_s: float) -> None:
+        super().advance(torque_nm, duration_s)
+        self.speeds_rad_s.append(self.speed_rad_s)
+
+
+def drawn(rng: np.random.Generator, kind: str, steps: int) -> Fault:
+    period = int(rng.integers(2, 60))
+    return Fault(
+        kind,
+        drive=int(rng.integers(1, 3)),
+        at=int(rng.integers(5, max(6, steps - 5))),
+        pattern=str(rng.choice(PATTERNS)),
+        on=int(rng.integers(1, period + 1)),
+        period=period,
+        size=float(rng.random()),
+    )
+
+
+def run_with(rig: Rig, experiment: str, fault: Fault, folder: Path, fastest_rad_s: float) -> tuple[Outcome, Shaft]:
+    """Carry out one run and judge it."""
+    outcome, shaft = Outcome(), Shaft(rig.inverters.m1.rated_torque_nm)
+    man = Man(fault, rig.inverters.m1.rated_torque_nm)
+    path = folder / f"{uuid.uuid4()}.csv"
+    server = RigServer(shaft, rig, f"virtual:{uuid.uuid4()}", Address("127.0.0.1", 0))
+    patient = mock.patch.object(build, "Plc", partial(Plc, timeout_s=20.0, beat_timeout_s=20.0))
+    with ExitStack() as stack:
+        stack.enter_context(server)
+        at = with_addresses(rig, server.bus_url, str(server.modbus))
+        recorder = RecordingWriter(path)
+        man.on_fault = _also(fault, server, stack)
+        try:
+            with patient, recorder, open_devices(at) as devices:
+                man.stand_between(devices)
+                pacer = FreePacer(period_ns(rig.period_s), PATIENCE_S)
+                run_plan(devices, plan_run(at, experiment), pacer, recorder, StopRequest(), _progress)
+        except Exception as error:  # noqa: BLE001 - whatever it is, it is looked at
+            outcome.said = f"{error} | {error.__cause__}" if error.__cause__ else str(error) or type(error).__name__
+        outcome.steps = len(shaft.torques_nm)
+        _judge_shaft(rig, man, shaft, fastest_rad_s, outcome)
+        _judge_end(rig, server, fault, outcome)
+    if recorder.kept is not None and read_table(recorder.kept).n_rows != recorder.n_samples:
+        outcome.problems.append("the recording lacks rows")
+    for left in folder.glob(f"{path.stem}*"):
+        left.unlink()
+    return outcome, shaft
+
+
+def _progress(phase: Phase, time_s: float) -> None:
+    """Show nothing."""
+
+
+def _also(fault: Fault, server: RigServer, stack: ExitStack) -> Callable[[], None]:
+    """What somebody else does in a cycle of the fault."""
+    if fault.kind == "second host":
+        other = stack.enter_context(CanLink.open(server.bus_url))
+        data = COMMAND.pack(0x000F, round(800 * fault.size - 400), 0)
+        return lambda: other.send(RPDO + fault.drive, data)
+    if fault.kind == "clock stepped":
+        real, step_s = time.time, 7200.0 * fault.size - 3600.0
+        stack.enter_context(mock.patch.object(time, "time", side_effect=lambda: real() + step_s))
+    return lambda: None
+
+
+def _judge_shaft(rig: Rig, man: Man, shaft: Shaft, fastest_rad_s: float, outcome: Outcome) -> None:
+    """Sum up how far each torque was outside what the host asked for: beyond the stated impulse nothing may follow."""
+    error = rig.guard_limits.error
+    time_s = NO_TORQUE_S if man.kind == "limit bit, no torque" else error.time_s
+    for drive, limit_nm in ((0, error.m1_nm), (1, error.m2_nm)):
+        impulse = length = 0.0
+        for k, (given, _) in enumerate(zip(shaft.torques_nm, man.asked_nm, strict=False)):
+            asked = [each[drive] for each in man.asked_nm[max(0, k - 3) : k + 1]]
+            off_nm = max(min(asked) - given[drive], given[drive] - max(asked), 0.0)
+            if off_nm <= limit_nm + COUNT_NM:
+                continue
+            if impulse >= 2.0 * limit_nm * time_s:
+                length += 1
+            impulse += off_nm * rig.period_s
+        outcome.zero_s = max(outcome.zero_s, impulse)
+        if length > LATE_CYCLES:
+            outcome.problems.append(f"m{drive + 1} was wrong by {impulse:.1f} Nm s, {length:.0f} cycles too many")
+    fastest = max(map(abs, shaft.speeds_rad_s), default=0.0)
+    if fastest_rad_s and fastest > 1.3 * fastest_rad_s + SPEED_SLACK_RAD_S:
+        outcome.problems.append(f"the shaft turned at {fastest:.1f} rad/s, {fastest_rad_s:.1f} without a fault")
+
+
+def _judge_end(rig: Rig, server: RigServer, fault: Fault, outcome: Outcome) -> None:
+    if server.torque_nm != (0.0, 0.0):
+        outcome.problems.append(f"torque is left at {server.torque_nm}")
+    for number, table in ((1, rig.inverters.m1), (2, rig.inverters.m2)):
+        state = power_state(server.bus_url, table.node_id)
+        if state not in DISARMED and "fault" not in state.value:
+            outcome.problems.append(f"drive m{number} is in {state.value}")
+    if fault.kind == "clock stepped" and outcome.said:
+        outcome.problems.append(f"a step of the clock ended it: {outcome.said[:200]}")
+    if outcome.said and not re.search(r"inverters? m[12]|both inverters|drives|somebody else", outcome.said):
+        outcome.problems.append(f"names no drive: {outcome.said[:200]}")
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Draw and judge runs; 1 if one is wrong."""
+    asked = asked_for("tests.campaigns.faults.middle", 2000, arguments)
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        rig = campaign_rig(folder)
+
+        @cache
+        def untouched(experiment: str) -> tuple[int, float]:
+            outcome, shaft = run_with(rig, experiment, Fault("none", 1, 1 << 30, "once", 1, 1, 0.0), folder, 0.0)
+            if outcome.problems or outcome.said:
+                raise AssertionError((experiment, outcome))
+            return outcome.steps, max(map(abs, shaft.speeds_rad_s))
+
+        def one(number: int) -> tuple[str, str, Outcome]:
+            rng = np.random.default_rng((asked.seed, number))
+            experiment = str(rng.choice(EXPERIMENTS))
+            steps, fastest_rad_s = untouched(experiment)
+            fault = drawn(rng, KINDS[number % len(KINDS)], steps)
+            outcome, _ = run_with(rig, experiment, fault, folder, fastest_rad_s)
+            return fault.kind, f"in {experiment}, {fault}: {outcome.said[:120] or 'went to its end'}", outcome
+
+        return tried(asked, one, "worst torque error [Nm s]")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,29 @@
+"""The man in the middle: the judge finds what is wrong, and leaves alone what is not."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.campaigns.faults.middle import Fault, run_with
+from tests.campaigns.faults.rig import campaign_rig
+
+
+@pytest.mark.parametrize(
+    ("kind", "ends"),
+    [("none", ""), ("leaves operation", "power state is"), ("speed zero", "expected one speed"), ("boot-up", "NMT")],
+)
+def test_a_fault_ends_the_run_and_none_does_not(kind: str, ends: str, tmp_path: Path) -> None:
+    fault = Fault(kind, 1, 100, "for ever", 1, 1, 0.0)
+    outcome, _ = run_with(campaign_rig(tmp_path), "tip", fault, tmp_path, 5.0)
+    assert outcome.problems == []
+    assert ends in outcome.said
+    assert bool(outcome.said) is bool(ends)
+
+
+def test_a_torque_that_nobody_can_see_is_a_failure(tmp_path: Path) -> None:
+    """Exchanged in both directions each drive answers for the other: for commissioning to find."""
+    fault = Fault("node ids exchanged", 1, 100, "for ever", 1, 1, 0.0)
+    outcome, _ = run_with(campaign_rig(tmp_path), "tip", fault, tmp_path, 5.0)
+    assert any("was wrong by" in problem for problem in outcome.problems)
