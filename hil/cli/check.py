@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from hil.cli.printing import say
+from hil.cli.take_over_option import TakeOver
 from hil.errors import InputError, UsageError
 
 if TYPE_CHECKING:
@@ -45,6 +46,7 @@ def check(
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")] = False,
     bus: Annotated[str | None, typer.Option(metavar="URL", help="CAN bus in place of the rig file's.")] = None,
     modbus: Annotated[str | None, typer.Option(metavar="HOST:PORT", help="PLC in place of the rig file's.")] = None,
+    take_over: TakeOver = False,
 ) -> None:
     """Find both inverters and the PLC and compare them with rig file, EDS and register map.
 
@@ -65,7 +67,7 @@ def check(
         raise UsageError("--bus, --modbus and --prove-stop concern the rig's devices: expected a rig file next to them")
     if proof is not None:
         _require_proof(proof, prove_stop)
-    rig_file = None if rig is None else with_addresses(read_rig(rig), bus, modbus)
+    rig_file = None if rig is None else with_addresses(read_rig(rig), bus, modbus, take_over)
     reports = tuple(check_eds(path) for path in eds or ())
     findings = () if rig_file is None or not all(each.usable for each in reports) else check_rig(rig_file, prove_stop)
     if proof is not None and rig is not None:
@@ -151,6 +153,7 @@ def _print(name: str, findings: tuple[Finding, ...]) -> None:
 
 def _details(finding: Finding) -> Iterator[str]:
     """Say what is no difference: what a run sets, where the DCF is of another mind, what stops a dead host's torque."""
+    yield from finding.questions
     yield from finding.remarks
     yield from (f"not the same everywhere: {each}" for each in finding.commissioned)
     yield from (f"without its host: {each}" for each in finding.protections)
@@ -208,6 +211,7 @@ def _device(finding: Finding) -> dict[str, Any]:
         ],
         "notes": list(finding.notes),
         "remarks": list(finding.remarks),
+        **({"questions": list(finding.questions)} if finding.questions else {}),
         "commissioned": [asdict(each) for each in finding.commissioned],
         "protections": [asdict(each) for each in finding.protections],
         **({"registers": [_register(each) for each in finding.registers]} if finding.registers else {}),

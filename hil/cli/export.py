@@ -9,12 +9,11 @@ import typer
 
 from hil.cli.dbc_option import Dbc
 from hil.cli.printing import say
-from hil.export.fmu.package import FmiVersion
-from hil.export.plcopen import Tc6
+from hil.export import FmiVersion, Tc6
 
 if TYPE_CHECKING:
     from hil.export.plc_estimator import PlcEstimator
-    from hil.export.pou import Project
+    from hil.export.structured_text import Precision
 
 app = typer.Typer(add_completion=False, no_args_is_help=True)
 
@@ -69,7 +68,7 @@ def st(
     from hil.export.structured_text import structured_text
 
     estimator = written_estimator(identification, run, adaptive, cycle, profile)
-    _write(out, structured_text(_project(estimator, single)), estimator)
+    _write(out, structured_text(estimator, _precision(single)), estimator)
 
 
 @app.command(epilog="Example: hil export plcopen identified/identification.json --run cruise --out estimator.xml")
@@ -99,16 +98,16 @@ def plcopen(
     from datetime import UTC, datetime
 
     from hil.export.plc_estimator import written_estimator
-    from hil.export.plcopen import plcopen_xml
+    from hil.export.plcopen import plcopen_xml, project
 
     estimator = written_estimator(identification, run, adaptive, cycle, profile)
-    _write(out, plcopen_xml(_project(estimator, single), datetime.now(UTC), tc6), estimator)
+    _write(out, plcopen_xml(project(estimator, _precision(single)), datetime.now(UTC), tc6), estimator)
 
 
-def _project(estimator: PlcEstimator, single: bool) -> Project:
-    from hil.export.filling import Precision, project
+def _precision(single: bool) -> Precision:
+    from hil.export.structured_text import Precision
 
-    return project(estimator, Precision.SINGLE if single else Precision.DOUBLE)
+    return Precision.SINGLE if single else Precision.DOUBLE
 
 
 def _write(out: Path, text: str, estimator: PlcEstimator) -> None:
@@ -140,7 +139,7 @@ def fmu(
     ] = False,
     dbc: Dbc = None,
 ) -> None:
-    """Write the driveline as an FMU, for co-simulation and model exchange.
+    """Write the driveline as an FMU, for co-simulation.
 
     Inputs T_M1, T_M2, T_load; outputs speeds, motor angle, shaft torque; each parameter with its value. It holds C
     sources and a Linux binary, which is made by the C compiler of this machine.

@@ -10,6 +10,7 @@ import typer
 
 from hil.cli.filter_option import FilterOf, FilterRun, with_filter
 from hil.cli.printing import say
+from hil.cli.take_over_option import TakeOver
 from hil.cli.trust_option import TrustLaws
 from hil.errors import RunAborted, UsageError
 
@@ -34,6 +35,7 @@ def monitor(
     ] = None,
     bus: Annotated[str | None, typer.Option(metavar="URL", help="CAN bus in place of the rig file's.")] = None,
     modbus: Annotated[str | None, typer.Option(metavar="HOST:PORT", help="PLC in place of the rig file's.")] = None,
+    take_over: TakeOver = False,
     simulate: Annotated[
         bool, typer.Option("--simulate", help=r"Simulate the rig, with nothing connected; needs \[simulation].")
     ] = False,
@@ -66,20 +68,27 @@ def monitor(
         raise UsageError(f"--snapshot {snapshot}: expected an existing folder, there is no {snapshot.parent}")
     _require_page(page)
     say("hil monitor: starting", err=True)
-    opening = _open(rig, replay, out, model, bus, modbus, simulate, speed, channel, trust_laws, filter_of, filter_run)
+    rig_file = _rig_file(rig, bus, modbus, take_over)
+    opening = _open(rig, rig_file, replay, out, model, simulate, speed, channel, trust_laws, filter_of, filter_run)
     with opening.source:  # its process starts up while this one does
         view = _view(opening, out, page, None if snapshot is None else (snapshot, after))
         view.run(headless=snapshot is not None, size=None if snapshot is None else screen)
     _close(opening, view)
 
 
+def _rig_file(rig: Path | None, bus: str | None, modbus: str | None, take_over: bool) -> Rig | None:
+    from hil.config.rig_file import read_rig
+    from hil.rig.addresses import with_addresses
+
+    return None if rig is None else with_addresses(read_rig(rig), bus, modbus, take_over)
+
+
 def _open(
     rig: Path | None,
+    rig_file: Rig | None,
     replay: Path | None,
     out: Path,
     model: Path | None,
-    bus: str | None,
-    modbus: str | None,
     simulate: bool,
     speed: float,
     channel: str | None,
@@ -87,12 +96,9 @@ def _open(
     filter_of: Path | None,
     filter_run: str | None,
 ) -> Opening:
-    from hil.config.rig_file import read_rig
     from hil.monitor.opening import open_recording, open_rig
-    from hil.rig.addresses import with_addresses
     from hil.rig.live import tracking_settings
 
-    rig_file: Rig | None = None if rig is None else with_addresses(read_rig(rig), bus, modbus)
     setup = with_filter(tracking_settings(), filter_of, filter_run)
     if replay is not None:
         if simulate:

@@ -23,7 +23,7 @@ def new_console(**options: Any) -> Console:
     from rich.console import Console
 
     made = Console(**options)
-    made.push_render_hook(_Shown())
+    made.push_render_hook(_Shown())  # type: ignore[arg-type]  # its class is imported with rich, which takes time
     return made
 
 

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import secrets
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from hil.cli.printing import say
-
 if TYPE_CHECKING:
-    from hil.proof.prove.make import Progress
+    from hil.proof.work import Progress
 
 SEEDS = 2**31
 RIG_SEED = 11
@@ -74,8 +72,8 @@ def make(
     key_file: KeyFile = None,
 ) -> None:
     """Draw, record and seal a set of cases. Prints the key, or writes it to FILE."""
-    from hil.proof.prove.make import make as make_set
-    from hil.proof.prove.vault import new_key, parse_key
+    from hil.proof.seal import new_key, parse_key
+    from hil.proof.sealed_set import make as make_set
     from hil.report.outputs import require_folder
 
     require_folder(folder)
@@ -87,22 +85,22 @@ def make(
     with _progress() as progress:
         make_set(folder, cases, chosen, parse_key(key), jobs, progress)
     if key_file is None:
-        say(f"key: {key}")
+        typer.echo(f"key: {key}")
     else:
         key_file.touch(mode=0o600)
         key_file.write_text(f"{key}\n", encoding="utf-8")
-        say(f"key: in {key_file}")
-    say(f"made: {folder}/cases   next: hil prove run {folder}")
+        typer.echo(f"key: in {key_file}")
+    typer.echo(f"made: {folder}/cases   next: hil prove run {folder}")
 
 
 @app.command(epilog="Example: hil prove run proof")
 def run(folder: Folder, jobs: Jobs = 2) -> None:
     """Let the public command answer every case; it sees only DIR/cases, one case at a time."""
-    from hil.proof.prove.answer import answer
+    from hil.proof.answers import answer
 
     with _progress() as progress:
         digest = answer(folder, jobs, progress)
-    say(f"verdicts: {folder}/verdicts   digest: {digest}")
+    typer.echo(f"verdicts: {folder}/verdicts   digest: {digest}")
 
 
 @app.command("open", epilog="Example: hil prove open proof --key-file proof.key")
@@ -116,11 +114,12 @@ def open_(
     jobs: Jobs = 2,
 ) -> None:
     """Open the seals, check that nothing was changed, score the verdicts; writes DIR/scoreboard.html and .json."""
-    from hil.proof.prove.judge_set import judge_set
-    from hil.proof.prove.manifest import CASES
-    from hil.proof.prove.scoreboard import PAGE, REAL, WIRE, Board, scoreboard_files
-    from hil.proof.prove.vault import parse_key
-    from hil.proof.wire.run import read_rows
+    from hil.proof.answers import judge_set
+    from hil.proof.real import read_real
+    from hil.proof.rigs import read_rows
+    from hil.proof.scoreboard import PAGE, REAL, WIRE, Board, scoreboard_files
+    from hil.proof.seal import parse_key
+    from hil.proof.sealed_set import CASES
     from hil.provenance import provenance
     from hil.report.outputs import publish
 
@@ -129,13 +128,13 @@ def open_(
         rows = judge_set(folder, secret, jobs, progress, verdicts)
     shown = folder / CASES
     made = provenance(sorted(shown.rglob("*.toml")), sorted(shown.rglob("*.csv")))
-    publish(folder, scoreboard_files(Board(rows, read_rows(folder / WIRE), _real_cases(folder / REAL), made)))
+    publish(folder, scoreboard_files(Board(rows, read_rows(folder / WIRE), read_real(folder / REAL), made)))
     for row in rows:
         if not row["success"]:
             found = row["fault"] or ", ".join(row.get("named", ())) or row.get("verdict")
-            say(f"{row['case']}: {row['outcome']}: hidden {row['kind']}, found {found}")
+            typer.echo(f"{row['case']}: {row['outcome']}: hidden {row['kind']}, found {found}")
     right = sum(row["success"] for row in rows)
-    say(f"{right} of {len(rows)} as they should be   scoreboard: {folder / PAGE}")
+    typer.echo(f"{right} of {len(rows)} as they should be   scoreboard: {folder / PAGE}")
 
 
 @app.command(epilog="Example: hil prove wire proof")
@@ -145,16 +144,15 @@ def wire(
     seed: Annotated[int, typer.Option(min=0, help="Seed of buses and sizes.")] = RIG_SEED,
 ) -> None:
     """Drive rigs with something concealed in their slaves, over CANopen and Modbus; writes DIR/wire/wire.json."""
-    from hil.proof.prove.scoreboard import WIRE
-    from hil.proof.wire.concealed import WIRED
-    from hil.proof.wire.run import run_wire
+    from hil.proof.rigs import WIRED, run_wire
+    from hil.proof.scoreboard import WIRE
 
     with _progress() as progress:
         rows = run_wire(folder / WIRE, seed, only or list(WIRED), progress)
     for row in rows:
         found = ", ".join(row.get("named", ())) or row.get("verdict", row["said"])
-        say(f"{row['case']}: {row['outcome']}: {found}")
-    say(f"{sum(row['success'] for row in rows)} of {len(rows)} rigs as they should be")
+        typer.echo(f"{row['case']}: {row['outcome']}: {found}")
+    typer.echo(f"{sum(row['success'] for row in rows)} of {len(rows)} rigs as they should be")
 
 
 @app.command(epilog="Example: hil prove real data proof")
@@ -165,33 +163,13 @@ def real(
     jobs: Jobs = 1,
 ) -> None:
     """Conceal what is known of real recordings, diagnose, compare; writes DIR/real/real.json."""
-    from hil.proof.prove.scoreboard import REAL
-    from hil.proof.real.run import run_real
+    from hil.proof.real import run_real
+    from hil.proof.scoreboard import REAL
 
     with _progress() as progress:
-        results = run_real(data, folder / REAL, only or (), jobs, _in_per_cent(progress))
+        results = run_real(data, folder / REAL, only or (), jobs, progress)
     for result in results:
-        say(f"{result.name}: {'as it should be' if result.named_right else 'not as it should be'}")
-
-
-def _real_cases(folder: Path) -> list[dict[str, Any]]:
-    """Return what was made of real recordings; nothing where none were asked for."""
-    from hil.errors import UsageError
-    from hil.files import read_json
-
-    path = folder / "real.json"
-    if not path.exists():
-        return []
-    try:
-        cases: list[dict[str, Any]] = read_json(path)["cases"]
-    except (ValueError, KeyError, TypeError) as error:
-        raise UsageError(f"{path}: expected what hil prove real has written, got: {error}. Remove it.") from error
-    return cases
-
-
-def _in_per_cent(progress: Progress) -> Callable[[str, float], None]:
-    """Take the share of the work done, 0 to 1."""
-    return lambda what, share: progress(what, round(100 * share), 100)
+        typer.echo(f"{result['name']}: {'as it should be' if result['named_right'] else 'not as it should be'}")
 
 
 def _key_text(key: str | None, key_file: Path | None) -> str:
@@ -226,10 +204,9 @@ def _require_outside(key_file: Path, folder: Path) -> None:
 @contextmanager
 def _progress() -> Iterator[Progress]:
     """Show what is done on standard error, with the time taken and left."""
+    from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
     from rich.progress import Progress as Bar
-
-    from hil.cli.printing import new_console
 
     columns = (
         TextColumn("{task.description}"),
@@ -238,6 +215,6 @@ def _progress() -> Iterator[Progress]:
         TimeElapsedColumn(),
         TimeRemainingColumn(),
     )
-    with Bar(*columns, console=new_console(stderr=True), transient=True) as bar:
+    with Bar(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("", total=None)
         yield lambda what, done, total: bar.update(task, description=what, completed=done, total=total)

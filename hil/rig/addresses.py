@@ -6,8 +6,9 @@ from hil.config.rig_file import Rig
 from hil.simulator.loopback import host_port
 
 
-def with_addresses(rig: Rig, bus: str | None, modbus: str | None) -> Rig:
-    """Replace the addresses that are given."""
+def with_addresses(rig: Rig, bus: str | None, modbus: str | None, take_over: bool = False) -> Rig:
+    """Replace the addresses that are given; ``take_over`` lets another host be on the bus (`hil.rig.sole_host`)."""
+    rig = rig.taking_over() if take_over else rig
     can, plc = rig.can, rig.plc
     if bus is not None:
         can = can.model_copy(update={"url": bus})

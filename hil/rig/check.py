@@ -26,6 +26,8 @@ from hil.config.channel_table import ChannelTable
 from hil.config.rig_file import InverterTable, PlcTable, Rig
 from hil.rig.build import inverter_settings, plc_client
 from hil.rig.fitness import Needs, reasons_against
+from hil.rig.plc_limits import max_speed_rad_s, plc_limits
+from hil.rig.sole_host import require_sole_host
 
 NO_NEEDS = Needs(torque_of_one_nm=0.0)
 """A check asks for no torque."""
@@ -88,6 +90,10 @@ class Finding:
         What the registers of a PLC hold.
     channels
         What the further channels of the rig file read at this device.
+    max_speed_rad_s
+        The largest speed that a drive gives for itself [rad/s], where it does.
+    questions
+        What only someone who knows the vehicle can confirm.
     """
 
     device: str
@@ -100,11 +106,15 @@ class Finding:
     protections: tuple[Protection, ...] = ()
     registers: tuple[Reading, ...] = ()
     channels: tuple[ChannelReading, ...] = ()
+    max_speed_rad_s: float | None = None
+    questions: tuple[str, ...] = ()
 
 
 def check_rig(rig: Rig, prove_stop: bool = False) -> tuple[Finding, ...]:
     """Look for the CAN bus, both inverters and the PLC; each, whatever is wrong with the others."""
-    return (*_can(rig, prove_stop), _plc(rig))
+    drives = _can(rig, prove_stop)
+    speeds = [each.max_speed_rad_s for each in drives if each.max_speed_rad_s is not None]
+    return (*drives, _plc(rig, min(speeds, default=None)))
 
 
 def _can(rig: Rig, prove_stop: bool) -> tuple[Finding, ...]:
@@ -119,6 +129,7 @@ def _can(rig: Rig, prove_stop: bool) -> tuple[Finding, ...]:
             *(Finding(name, _node(table), Verdict.FAILED, notes=lost) for name, table in tables.items()),
         )
     with link:
+        require_sole_host(link, rig, inverter_settings("m1", rig).host_heartbeat_s if prove_stop else None)
         bus = Finding("can", rig.can.url, Verdict.AGREES)
         made: dict[str, Inverter] = {}
         m1, m2 = (_inverter(link, name, rig, prove_stop, made) for name in tables)
@@ -163,6 +174,7 @@ def _inverter(link: CanLink, name: str, rig: Rig, prove_stop: bool, made: dict[s
             (*_rate(table, rig.can.url), *inverter.commissioned()),
             inverter.protections(),
             channels=tuple(_objects_read(inverter, name, rig)),
+            max_speed_rad_s=max_speed_rad_s(inverter),
         )
 
     address = _node(table)
@@ -206,7 +218,7 @@ def _node(table: InverterTable) -> str:
     return f"node {table.node_id}"
 
 
-def _plc(rig: Rig) -> Finding:
+def _plc(rig: Rig, drives_rad_s: float | None) -> Finding:
     def compare() -> Finding:
         registers, status, refusals = asyncio.run(_asked(rig.plc))
         differences = tuple(
@@ -220,6 +232,12 @@ def _plc(rig: Rig) -> Finding:
             for each in registers
             if each.problem is not None
         )
+        limits = () if status is None else tuple(plc_limits(status, rig, drives_rad_s))
+        differences += tuple(
+            Difference("plc", each.what, f"at most {each.most}", each.found, MAP)
+            for each in limits
+            if not each.believed
+        )
         notes = (*refusals, *(() if status is None else reasons_against(status, NO_NEEDS)))
         return Finding(
             "plc",
@@ -228,6 +246,7 @@ def _plc(rig: Rig) -> Finding:
             differences,
             notes,
             registers=registers,
+            questions=tuple(each.question for each in limits),
             channels=tuple(_registers_read(registers, rig)),
         )
 

@@ -266,9 +266,15 @@ def test_every_kind_of_column_comes_through(tmp_path: Path, suffix: str) -> None
 
 
 def test_the_limits_are_set_where_it_reads() -> None:
-    program = "from hil.recording.bounds import memory_bytes, processor_s; import resource\n"
-        "from hil.recording.sandbox import limit; limit(memory_bytes(0), processor_s(0))\n" + "".join(
-        f"print(resource.getrlimit(resource.{name})[0])\n" for name in ("RLIMIT_CORE", "RLIMIT_CPU", "RLIMIT_AS")
+    shown = (f"print(resource.getrlimit(resource.{name})[0])" for name in ("RLIMIT_CORE", "RLIMIT_CPU", "RLIMIT_AS"))
+    program = "\n".join(
+        [
+            "import resource",
+            "from hil.recording.bounds import memory_bytes, processor_s",
+            "from hil.recording.sandbox import limit",
+            "limit(memory_bytes(0), processor_s(0))",
+            *shown,
+        ]
     )
     done = subprocess.run(
         [sys.executable, "-P", "-c", program],

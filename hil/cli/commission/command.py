@@ -20,6 +20,7 @@ from hil.cli.commission.options import (
     Yes,
 )
 from hil.cli.pace import Pace, PaceOption
+from hil.cli.take_over_option import TakeOver
 from hil.cli.trust_option import TrustLaws
 
 if TYPE_CHECKING:
@@ -45,6 +46,7 @@ def commission(
     pace: PaceOption = Pace.REAL,
     bus: Bus = None,
     modbus: Modbus = None,
+    take_over: TakeOver = False,
     as_json: AsJson = False,
 ) -> None:
     """Lead through commissioning: devices, limits, signs, scales, friction, PRBS, experiments, models, diagnosis.
@@ -64,7 +66,7 @@ def commission(
 
     asked = asked_of_steps(skip or (), because or (), repeat or ())
     read_rig(rig)  # names every fault of the file, and of what it names, by the line
-    source = RigSource(rig, rig.read_text(encoding="utf-8"), bus, modbus)
+    source = RigSource(rig, rig.read_text(encoding="utf-8"), bus, modbus, take_over)
     console = new_console(stderr=as_json, highlight=False)
     if dry_run:
         print_plan(job_in(out, source, model, trust_laws, travel, pace, console), console, as_json)
