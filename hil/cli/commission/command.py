@@ -19,8 +19,7 @@ from hil.cli.commission.options import (
     Travel,
     Yes,
 )
-from hil.cli.pace import Pace, PaceOption
-from hil.cli.trust_option import TrustLaws
+from hil.cli.options import Pace, PaceOption, TrustLaws
 
 if TYPE_CHECKING:
     from rich.console import Console
