@@ -11,12 +11,9 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperCommand
 
-from hil.cli.dbc_option import Dbc, tell
-from hil.cli.fmu_options import Mapped, TrustFmu
 from hil.cli.importing import without_collecting
-from hil.cli.jobs_option import Jobs
+from hil.cli.options import Dbc, Jobs, Mapped, TrustFmu, TrustLaws, tell
 from hil.cli.silence import is_silent
-from hil.cli.trust_option import TrustLaws
 
 HOLDOUT = "--holdout"
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from hil.cli.dbc_option import Dbc
+from hil.cli.options import Dbc
 from hil.cli.printing import say
 from hil.export import FmiVersion, Tc6
 

@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from hil.cli.dbc_option import Dbc, tell
+from hil.cli.options import Dbc, TrustLaws, tell
 from hil.cli.printing import say
-from hil.cli.trust_option import TrustLaws
 
 if TYPE_CHECKING:
     from estimator.identification.offline.orders import OrderChoice

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from hil.cli.dbc_option import Dbc
+from hil.cli.options import Dbc
 from hil.cli.printing import say
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ def look(
 
 def _tell_scales(file: Path, model: Path, dbc: Path | None) -> None:
     """Read a recording by a model file and tell which scale does not fit the model, with the line that cures it."""
-    from hil.cli.dbc_option import tell
+    from hil.cli.options import tell
     from hil.config.model_file import read_model_for_recordings
     from hil.plants.scales import tell_scales
     from hil.recording import read_record
@@ -66,7 +66,7 @@ def _tell_scales(file: Path, model: Path, dbc: Path | None) -> None:
 
 def _tell_scales_alone(found: Look, dbc: Path | None) -> None:
     """Read a recording by the lines that were found and tell which scale can't be, with the line that cures it."""
-    from hil.cli.dbc_option import tell
+    from hil.cli.options import tell
     from hil.config.model_file import signals_of
     from hil.errors import RecordingError
     from hil.plants.scales import tell_scales_alone

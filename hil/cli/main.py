@@ -121,7 +121,7 @@ def _run(call: Call, keep_log: bool) -> int:
 def _called(call: Call) -> int:
     """Import the command that is called, it alone, and carry it out."""
     from hil.cli.flowing import flow
-    from hil.cli.jobs_option import use_cores_of_environment
+    from hil.cli.options import use_cores_of_environment
 
     use_cores_of_environment()
     app = importlib.import_module(f"hil.cli.{call.command}").app

@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from hil.cli.filter_option import FilterOf, FilterRun, with_filter
+from hil.cli.options import FilterOf, FilterRun, TrustLaws, with_filter
 from hil.cli.printing import say
 from hil.cli.take_over_option import TakeOver
-from hil.cli.trust_option import TrustLaws
 from hil.errors import RunAborted, UsageError
 
 if TYPE_CHECKING:

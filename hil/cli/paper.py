@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from hil.cli.options import TrustLaws
 from hil.cli.printing import say
-from hil.cli.trust_option import TrustLaws
 
 if TYPE_CHECKING:
     from estimator.identification.settings import Settings

@@ -20,18 +20,15 @@ def say(text: object = "", err: bool = False, nl: bool = True) -> None:
 
 def new_console(**options: Any) -> Console:
     """Return a console for tables and progress that shows control characters likewise."""
-    from rich.console import Console
+    from rich.console import Console, RenderHook
+
+    class Shown(RenderHook):
+        def process_renderables(self, renderables: list[Any]) -> list[Any]:
+            return [_Filtered(each) for each in renderables]
 
     made = Console(**options)
-    made.push_render_hook(_Shown())  # type: ignore[arg-type]  # its class is imported with rich, which takes time
+    made.push_render_hook(Shown())
     return made
-
-
-class _Shown:
-    """Lets a console print what it is given with its control characters shown."""
-
-    def process_renderables(self, renderables: list[Any]) -> list[Any]:
-        return [_Filtered(each) for each in renderables]
 
 
 class _Filtered:

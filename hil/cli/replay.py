@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from hil.cli.filter_option import FilterOf, FilterRun, with_filter
+from hil.cli.options import FilterOf, FilterRun, TrustLaws, with_filter
 from hil.cli.printing import say
-from hil.cli.trust_option import TrustLaws
 from hil.errors import UsageError
 
 if TYPE_CHECKING:

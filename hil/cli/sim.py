@@ -10,7 +10,7 @@ import typer
 from rich.markup import escape
 
 from hil.cli.completers import effect_names
-from hil.cli.trust_option import TrustLaws
+from hil.cli.options import TrustLaws
 from hil.rig.stop import StopRequest, stop_on_signals
 from hil.simulator.fault_table import known_faults
 

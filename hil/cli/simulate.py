@@ -8,9 +8,8 @@ from typing import Annotated
 
 import typer
 
-from hil.cli.dbc_option import Dbc, tell
+from hil.cli.options import Dbc, TrustLaws, tell
 from hil.cli.printing import say
-from hil.cli.trust_option import TrustLaws
 
 app = typer.Typer(add_completion=False)
 

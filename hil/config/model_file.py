@@ -8,7 +8,6 @@ neutral one while the rest of the model is checked.
 from __future__ import annotations
 
 import math
-import os
 import tomllib
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
@@ -25,6 +24,7 @@ from hil.config.laws import LawTable, laws_of, moved
 from hil.config.model_tables import ModelDocument, Prepared
 from hil.config.model_text import as_toml
 from hil.errors import ModelFileError
+from hil.files import write_whole
 from hil.problems import problem_lines, read_toml
 from hil.recording import columns
 from hil.recording.signals_config import SignalsConfig
@@ -169,13 +169,7 @@ def write_model(
 
     An interval that is not finite is left out: a model file holds finite numbers only.
     """
-    path = Path(path)
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        part.write_text(as_toml(model, signals, laws or {}, prepared), encoding="utf-8")
-        part.replace(path)
-    finally:
-        part.unlink(missing_ok=True)
+    write_whole(Path(path), as_toml(model, signals, laws or {}, prepared))
 
 
 def _model(

@@ -196,9 +196,9 @@ class FmuPlant:
             "start": {name: float(np.asarray(value)) for name, value in start.items()},
             "output": named.output,
         }
-        given = self._given(torque_nm, named, since_s, held)
+        columns = self._given(torque_nm, named, since_s, held)
         expected = f"{self.name}: expected an FMU that simulates {record.name}"
-        result = self._asked(request, expected, given)[1]
+        result = self._asked(request, expected, columns)[1]
         output = np.interp(since_s, result["time"], result["output"])
         if not np.isfinite(output).all():
             with_values = ", ".join(f"{name} = {float(np.mean(value)):.4g}" for name, value in values.items())

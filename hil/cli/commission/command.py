@@ -19,9 +19,8 @@ from hil.cli.commission.options import (
     Travel,
     Yes,
 )
-from hil.cli.pace import Pace, PaceOption
+from hil.cli.options import Pace, PaceOption, TrustLaws
 from hil.cli.take_over_option import TakeOver
-from hil.cli.trust_option import TrustLaws
 
 if TYPE_CHECKING:
     from rich.console import Console

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from hil.cli.pace import Pace, pacer_for, scheduling
+from hil.cli.options import Pace, pacer_for, scheduling
 from hil.cli.run_progress import RunProgress
 from hil.commission.engine import NAMES
 from hil.commission.order import RigSource

@@ -8,10 +8,8 @@ from typing import Annotated
 import typer
 
 from hil.cli.completers import experiment_names
-from hil.cli.filter_option import FilterOf, FilterRun
-from hil.cli.pace import Pace, PaceOption
+from hil.cli.options import FilterOf, FilterRun, Pace, PaceOption, TrustLaws
 from hil.cli.take_over_option import TakeOver
-from hil.cli.trust_option import TrustLaws
 from hil.errors import UsageError
 
 
@@ -63,7 +61,7 @@ def run(
         return
     if out is None:
         raise UsageError("hil run: expected --out REC, a recording to write, or --dry-run; got neither.")
-    from hil.cli.pace import pacer_for, scheduling
+    from hil.cli.options import pacer_for, scheduling
     from hil.cli.run.job import Job, record
     from hil.cli.run.live import live_estimate
     from hil.cli.run.result import print_result

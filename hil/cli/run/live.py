@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from hil.cli.filter_option import with_filter
+from hil.cli.options import with_filter
 from hil.cli.printing import say
 from hil.config.rig_file import Rig
 from hil.errors import UsageError

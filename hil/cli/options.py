@@ -1,0 +1,167 @@
+"""Options that several commands share."""
+
+from __future__ import annotations
+
+import os
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import replace
+from enum import Enum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from hil.cli.printing import say
+from hil.cli.silence import is_silent
+from hil.errors import UsageError
+from hil.printable import printable
+
+if TYPE_CHECKING:
+    from estimator.identification.settings import Settings
+    from hil.config.rig_file import Rig
+    from hil.rig.live import OnlineSetup
+    from hil.rig.pacing import Pacer
+    from hil.rig.realtime import RealTimeGrants
+
+
+Dbc = Annotated[
+    Path | None,
+    typer.Option("--dbc", metavar="FILE", help="DBC file: what the frames of a logged CAN bus (MDF) mean."),
+]
+
+
+def tell(line: str) -> None:
+    """Tell what was recognised in a file or done to it, on standard error."""
+    if not is_silent():
+        say(f"note: {printable(line)}", err=True)
+
+
+Mapped = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--map",
+        metavar="KEY=NAME,...",
+        help="Variables of an FMU: torque=T1,T2 (one: their sum), output=w, load=T_L and start=w0,... (estimated).",
+    ),
+]
+
+TrustFmu = Annotated[bool, typer.Option("--trust-fmu", help="Run the program in an FMU; without it FMUs are refused.")]
+
+
+TrustLaws = Annotated[
+    bool,
+    typer.Option(
+        "--trust-laws", help=r"Run the Python code that \[laws] of the model file name; without it they are refused."
+    ),
+]
+
+
+VARIABLE = "HIL_JOBS"
+
+
+def use_cores(count: int | None) -> None:
+    """Compute on so many cores; None leaves it as it is."""
+    from estimator.physics.parallel import work_on
+
+    if count is not None:
+        work_on(count)
+
+
+def use_cores_of_environment() -> None:
+    """Compute on as many cores as ``HIL_JOBS`` says, where it is set.
+
+    Raises
+    ------
+    UsageError
+        If it is no whole number from 1 on.
+    """
+    text = os.environ.get(VARIABLE, "").strip()
+    if not text:
+        return
+    if not text.isdecimal() or int(text) < 1:
+        raise UsageError(f"{VARIABLE}: expected a whole number from 1 on, got {text!r}. Correct or unset it.")
+    use_cores(int(text))
+
+
+Jobs = Annotated[
+    int | None,
+    typer.Option(
+        "--jobs",
+        min=1,
+        metavar="N",
+        help="Cores to compute on; all by default, or as many as HIL_JOBS says.",
+        callback=use_cores,
+    ),
+]
+
+
+FilterOf = Annotated[
+    Path | None,
+    typer.Option(
+        "--filter",
+        metavar="FILE",
+        help="identification.json of an earlier run: its orders, and its off-line model as the fixed filter.",
+    ),
+]
+FilterRun = Annotated[
+    str | None, typer.Option("--filter-run", metavar="NAME", help="Which recording of that file, if it has several.")
+]
+
+
+def with_filter(settings: Settings, path: Path | None, run: str | None) -> OnlineSetup:
+    """Return settings with what identified an earlier run, and its filter L; as they are without a file.
+
+    Raises
+    ------
+    UsageError
+        If a recording is named without a file, is not in it, or has to be named.
+    FileProblem
+        If the file is wrong.
+    """
+    from hil.rig.live import OnlineSetup
+
+    if path is None:
+        if run is not None:
+            raise UsageError(f"--filter-run {run}: expected --filter FILE with it, got none")
+        return OnlineSetup(settings)
+    from hil.report.identification_input import identified
+
+    found = identified(path, run, settings.adaptation, "--filter-run")
+    return OnlineSetup(replace(found.settings, band_hz=settings.band_hz), found.L)
+
+
+class Pace(Enum):
+    """What the cycles are paced by."""
+
+    REAL = "real"
+    FAST = "fast"
+
+
+PaceOption = Annotated[Pace, typer.Option(help="By the wall clock, or as fast as a simulated rig answers.")]
+
+
+def pacer_for(rig: Rig, pace: Pace) -> Pacer:
+    """Make the pacer of one run.
+
+    Raises
+    ------
+    UsageError
+        If it is to be fast and the rig is none that is simulated on this machine.
+    """
+    from hil.rig.pacing import FreePacer, RealTimePacer, period_ns
+    from hil.simulator.loopback import IN_PROCESS, bus_address
+    from hil.simulator.rig_server import required_simulation
+
+    if pace is Pace.REAL:
+        return RealTimePacer(period_ns(rig.period_s))
+    required_simulation(rig)
+    if not rig.can.url.startswith(IN_PROCESS):
+        bus_address(rig.can.url)  # a bus elsewhere may be a real one: SYNC would come at whatever rate it answers
+    return FreePacer(period_ns(rig.period_s))
+
+
+def scheduling(pace: Pace) -> AbstractContextManager[RealTimeGrants]:
+    """Ask the operating system for real time as long as a run lasts, where it keeps to the wall clock."""
+    from hil.rig.realtime import NOT_ASKED, real_time
+
+    return real_time() if pace is Pace.REAL else nullcontext(NOT_ASKED)
