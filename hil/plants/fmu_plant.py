@@ -201,10 +201,10 @@ class FmuPlant:
         result = self._asked(request, expected, columns)[1]
         output = np.interp(since_s, result["time"], result["output"])
         if not np.isfinite(output).all():
-            with_values = ", ".join(f"{name} = {float(np.mean(value)):.4g}" for name, value in values.items())
+            used = ", ".join(f"{name} = {float(np.mean(value)):.4g}" for name, value in values.items())
             raise UsageError(
                 f"{self.name}: expected a finite {named.output} over {record.name}, got NaN or infinity"
-                f"{f' with {with_values}' if with_values else ''}. See that what --map names as load and start is what it is."
+                f"{f' with {used}' if used else ''}. See that what --map names as load and start is what it is."
             )
         return np.asarray(output, dtype=np.float64)
 
