@@ -154,11 +154,11 @@ class FeedbackReceiver(_TpdoReceiver):
             values, t_ns = received[0]
             statusword, torque_raw, speed_raw = [values[at] for at in self._alone]
         else:
-            all_of_it = [each for each in received if each is not None]
-            if len(all_of_it) < len(self._codecs):
+            all_received = [each for each in received if each is not None]
+            if len(all_received) < len(self._codecs):
                 return
-            statusword, torque_raw, speed_raw = (all_of_it[n].values[at] for n, at in self._places)
-            t_ns = min(each.t_ns for each in all_of_it)
+            statusword, torque_raw, speed_raw = (all_received[n].values[at] for n, at in self._places)
+            t_ns = min(each.t_ns for each in all_received)
         self._sequence += 1
         self.latest = InverterFeedback(
             self._torque.to_nm(torque_raw),

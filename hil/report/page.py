@@ -26,8 +26,8 @@ FEWEST_LISTED = 3
 LONGEST_WORDS = 30
 """Characters of a cell that fit a line of a narrow screen; longer ones are sentences and get room for some words."""
 
-MOST_BESIDE = 2
-"""Columns of a table that fit beside one another on a narrow screen; with more each row becomes a card."""
+MOST_COLUMNS = 2
+"""Columns of a table that fit next to one another on a narrow screen; with more each row becomes a card."""
 
 SCHEMES = ("https", "http")
 """What a link may begin with, besides a path of a file next to the page."""
@@ -147,7 +147,7 @@ class Table:
     @property
     def is_wide(self) -> bool:
         """Whether a row becomes a card on a narrow screen."""
-        return any(self.headings) and len(self.headings) > MOST_BESIDE
+        return any(self.headings) and len(self.headings) > MOST_COLUMNS
 
     def kind(self, column: int) -> str:
         """Return the class of a column."""

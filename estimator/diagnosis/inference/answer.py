@@ -40,7 +40,7 @@ from estimator.diagnosis.inference.likelihood import SAME, Hypothesis, fitted, o
 from estimator.diagnosis.inference.remainder import Test, tests, tests_in_words
 from estimator.diagnosis.inference.rivals import FreeLine, Law, best_law, free_line, hunts_around, rival_laws
 from estimator.diagnosis.inference.search import Search
-from estimator.diagnosis.inference.wording import Beside, law_in_words, statement
+from estimator.diagnosis.inference.wording import Context, law_in_words, statement
 from estimator.diagnosis.noise import noise_floor
 from estimator.diagnosis.preconditions import Prepared
 from estimator.diagnosis.preconditions.thinned import as_slow_as_needed
@@ -195,15 +195,15 @@ def _seen(search: Search, ground: Grounds) -> _Seen:
     nothing, best = of_first_outputs(ground.nothing), of_first_outputs(ground.best)
     hunts = hunts_around(nothing)
     alone = best_law(nothing, hunts)
-    beside = alone if ground.best is ground.nothing else best_law(best, hunts_around(best))
+    added = alone if ground.best is ground.nothing else best_law(best, hunts_around(best))
     sheet = free_line(search)
-    decision = decide(search, ground, (*rival_laws(ground, alone, beside), *_off_the_sheet(sheet)))
+    decision = decide(search, ground, (*rival_laws(ground, alone, added), *_off_the_sheet(sheet)))
     believed = _without_doubted(search, decision)
     if not decision.named:
         strays = sheet.strays if sheet is not None and sheet.leaves_noise else ()
         return _Seen(decision, ground.nothing, failed or (), hunts, alone, alone, strays)
     if believed is ground.best:
-        return _Seen(decision, believed, failed, hunts, alone, beside if failed else None)
+        return _Seen(decision, believed, failed, hunts, alone, added if failed else None)
     failed, first = tuple(test for test in tests(believed) if test.failed), of_first_outputs(believed)
     left = best_law(first, hunts_around(first)) if failed else None
     return _Seen(decision, believed, failed, hunts, alone, left)
@@ -250,7 +250,7 @@ def _said(seen: _Seen, runs: FreeRuns, search: Search, model: DrivelineModel, le
     named = {each.name for each in effects} | {each.name for each in traces}
     named |= {name for each in effects for name in each.indistinguishable_from}
     slight = tuple(Slight(each.name, each.share, decision.best.plain.values_of(each.name)) for each in traces)
-    beside = Beside(
+    context = Context(
         remainder,
         [each.name for each in traces],
         seen.strays,
@@ -259,7 +259,7 @@ def _said(seen: _Seen, runs: FreeRuns, search: Search, model: DrivelineModel, le
     )
     return Diagnosis(
         verdict=verdict,
-        statement=statement(verdict, figures, effects, effort, beside),
+        statement=statement(verdict, figures, effects, effort, context),
         mismatch=mismatch,
         effects=effects,
         rejected=_rejected(search, decision, named, {*effort.untried}),
@@ -310,10 +310,10 @@ def _undecided(
     effort = Effort(level, simulations, False, untried, len(names), work.limit_s)
     untestable = _untestable(blind)
     can_be_retuned = line.plant is None
-    beside = Beside(untestable=untestable, can_be_retuned=can_be_retuned)
+    context = Context(untestable=untestable, can_be_retuned=can_be_retuned)
     return Diagnosis(
         verdict=Verdict.UNEXPLAINED,
-        statement=statement(Verdict.UNEXPLAINED, fit, (), effort, beside),
+        statement=statement(Verdict.UNEXPLAINED, fit, (), effort, context),
         mismatch=Mismatch(True, None, {}, None, None, math.nan),
         effects=(),
         rejected=(),

@@ -1,6 +1,6 @@
 """The judge: from the sets of effects that were fitted to what is believed, and nothing after that.
 
-Every explanation is a hypothesis with a score: sets of names, a law without a name, such a law beside the names, and
+Every explanation is a hypothesis with a score: sets of names, a law without a name, such a law added to the names, and
 nominal values off their data sheet. A score is minus twice a log-probability, prior included, if the model were the
 world. Worlds are written in other forms than the model, and what they leave takes part in every difference of scores:
 these are divided by what is calibrated (``calibration``) and by what the best set leaves that is no noise

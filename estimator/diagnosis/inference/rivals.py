@@ -175,8 +175,8 @@ def _rms(hunt: Hunt) -> float:
     return math.sqrt(max(left, 0.0) / count)
 
 
-def rival_laws(ground: Grounds, alone: Law | None, beside: Law | None) -> tuple[Score, ...]:
-    """Return laws without a name as hypotheses: one instead of all effects, and one beside the best set of these.
+def rival_laws(ground: Grounds, alone: Law | None, added: Law | None) -> tuple[Score, ...]:
+    """Return laws without a name as hypotheses: one instead of all effects, and one added to the best set of these.
 
     Where the law alone is more probable than names and a law for what they leave, the names imitate it. Laws are sought
     in the first output alone: what they gain over the same set without them counts there. One that leaves the free-run
@@ -187,6 +187,6 @@ def rival_laws(ground: Grounds, alone: Law | None, beside: Law | None) -> tuple[
     found = []
     if alone is not None and 1.0 - (alone.rms / free_rms(first)) ** 2 >= LEAST_SHARE:
         found.append(Score(NOTHING, offset + alone.score))
-    if beside is not None and best.effects:
-        found.append(Score(best.effects, offset + beside.score))
+    if added is not None and best.effects:
+        found.append(Score(best.effects, offset + added.score))
     return tuple(found)

@@ -101,7 +101,7 @@ MOST_NAMES = 4
 
 
 @dataclass(frozen=True, slots=True)
-class Beside:
+class Context:
     """What a statement adds to the verdict.
 
     Attributes
@@ -118,23 +118,23 @@ class Beside:
 
 
 def statement(
-    verdict: Verdict, fit: Fit, effects: Sequence[FoundEffect], effort: Effort, beside: Beside = Beside()
+    verdict: Verdict, fit: Fit, effects: Sequence[FoundEffect], effort: Effort, context: Context = Context()
 ) -> str:
     """Return one paragraph: verdict, figures, and what to do next."""
     parts = [] if effort.finished else [_not_decided(effort)]
-    parts.append(_headline(verdict, fit, effects, effort, beside))
-    if beside.remainder is not None and not beside.strays:
-        parts.append(_left(verdict, beside.remainder))
-    if beside.traces:
-        parts.append(f"Seen, but too small to matter: {', '.join(beside.traces)}.")
+    parts.append(_headline(verdict, fit, effects, effort, context))
+    if context.remainder is not None and not context.strays:
+        parts.append(_left(verdict, context.remainder))
+    if context.traces:
+        parts.append(f"Seen, but too small to matter: {', '.join(context.traces)}.")
     twins = sorted({twin for effect in effects for twin in effect.indistinguishable_from})
     if twins:
         parts.append(f"These recordings could as well be explained by {' or '.join(twins)}.")
-    tests = sorted({entry.suggested_test for entry in beside.untestable if not entry.needs})
+    tests = sorted({entry.suggested_test for entry in context.untestable if not entry.needs})
     if tests:
-        names = ", ".join(entry.name for entry in beside.untestable if not entry.needs)
+        names = ", ".join(entry.name for entry in context.untestable if not entry.needs)
         parts.append(f"Neither found nor excluded by these recordings: {names}. Record a {' or a '.join(tests)}.")
-    parts += [f"Neither found nor excluded without {e.needs}: {e.name}." for e in beside.untestable if e.needs]
+    parts += [f"Neither found nor excluded without {e.needs}: {e.name}." for e in context.untestable if e.needs]
     return " ".join(parts)
 
 
@@ -145,8 +145,8 @@ def _not_decided(effort: Effort) -> str:
     return f"Not decided: the search was ended after {effort.limit_s:.3g} s{left}."
 
 
-def _headline(verdict: Verdict, fit: Fit, effects: Sequence[FoundEffect], effort: Effort, beside: Beside) -> str:
-    model = "re-tuned inside its tolerances, the nominal model" if beside.can_be_retuned else "the model"
+def _headline(verdict: Verdict, fit: Fit, effects: Sequence[FoundEffect], effort: Effort, context: Context) -> str:
+    model = "re-tuned inside its tolerances, the nominal model" if context.can_be_retuned else "the model"
     noise = f" at a noise of {fit.noise_floor:.3g} {fit.unit}" if math.isfinite(fit.noise_floor) else ""
     left = f"{model} leaves a free-run error of {fit.retuned:.3g} {fit.unit}{noise}"
     if not effort.finished:
@@ -156,8 +156,8 @@ def _headline(verdict: Verdict, fit: Fit, effects: Sequence[FoundEffect], effort
             f"Nothing is missing: {model} leaves nothing but the noise and slow drift of the readings ({_noise(fit)})."
         )
     found = "; ".join(effect.statement for effect in effects)
-    if beside.strays and verdict is Verdict.UNEXPLAINED:
-        return _wrong_values(left, beside.strays)
+    if context.strays and verdict is Verdict.UNEXPLAINED:
+        return _wrong_values(left, context.strays)
     if verdict is Verdict.UNEXPLAINED:
         also = f" Found in the acquisition, and not the cause: {found}." if effects else ""
         return f"Something is missing in the model, and no effect of the catalogue explains it: {left}.{also}"

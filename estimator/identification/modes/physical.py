@@ -307,7 +307,7 @@ def physical_parameters(
     whitening = (axes / np.sqrt(np.maximum(variances, floor))).T
     unit = start[3] if start[3] > 0.0 else 0.1 * math.sqrt(start[0] * start[2])
     begin = np.concatenate([np.log(start[:POSITIVE]), start[POSITIVE:] / unit])
-    far = 1.5 * WIDEST  # of logarithms: a line that much stiffer or heavier can't be told from a rigid or a free one
+    far = 1.5 * WIDEST  # of logarithms: such a line is as good as rigid or free
     least, most = (begin[:POSITIVE] + side * far for side in (-1.0, 1.0))
     likelihood = _Likelihood(
         model, whitening, prior, float(unit), np.append(least, [0.0] * 3), np.append(most, [math.exp(far)] * 3)

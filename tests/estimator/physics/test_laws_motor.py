@@ -82,7 +82,7 @@ def test_quadratic_friction_grows_with_the_square_of_the_speed() -> None:
 
 @pytest.mark.parametrize("exponent", [1.7, 2.1])
 def test_drag_may_grow_with_another_power_of_the_speed(exponent: float) -> None:
-    """At the speed it is told for, it is what the square would be."""
+    """At the speed it is given for, it is what the square would be."""
     line = two_mass(friction=lambda t, w: 4.0 * 3.0**2 * abs(w / 3.0) ** exponent * np.sign(w))
     effects = {"quadratic_friction": {"quadratic_nm_s2": 4.0, "exponent": exponent, "at_rad_s": 3.0}}
     assert_law(effects, solved(line))

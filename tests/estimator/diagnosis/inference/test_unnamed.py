@@ -65,9 +65,9 @@ def law(ground: Grounds, better: float) -> Law:
     return Law(Element.SHAFT, (("T", 1.0),), ground.best.score - better, 0.1)
 
 
-def named(friction: tuple[Search, Grounds], alone: Law | None, beside: Law | None) -> list[str]:
+def named(friction: tuple[Search, Grounds], alone: Law | None, added: Law | None) -> list[str]:
     search, ground = friction
-    decision = decide(search, ground, rival_laws(ground, alone, beside))
+    decision = decide(search, ground, rival_laws(ground, alone, added))
     assert {each.name for each in (*decision.named, *decision.doubted)} == {"coulomb_friction_motor"}
     return [each.name for each in decision.named]
 
@@ -76,7 +76,7 @@ def test_a_name_falls_to_a_law_without_one_that_is_more_probable(friction: tuple
     assert named(friction, law(friction[1], 100.0), None) == []
 
 
-def test_a_name_stands_where_a_law_beside_it_is_more_probable_still(friction: tuple[Search, Grounds]) -> None:
+def test_a_name_stands_where_a_law_next to_it_is_more_probable_still(friction: tuple[Search, Grounds]) -> None:
     """A law of many terms follows the form of what is there; with the name it needs fewer of them."""
     ground = friction[1]
     assert named(friction, None, None) == ["coulomb_friction_motor"]

@@ -1,4 +1,4 @@
-"""No statement contradicts the numbers beside it, whatever they are."""
+"""No statement contradicts the numbers next to it, whatever they are."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import re
 import pytest
 
 from estimator.diagnosis.inference.judge import error_falls, verdict_of
-from estimator.diagnosis.inference.wording import Beside, statement
+from estimator.diagnosis.inference.wording import Context, statement
 from estimator.diagnosis.result import Effort, Evidence, Fit, FoundEffect, Remainder, Stray, Verdict
 from estimator.physics.effect import Element
 
@@ -42,7 +42,7 @@ def says_what_its_numbers_say(
     fit = Fit("rad/s", retuned, retuned, augmented, held_before, held_after, 0.05)
     verdict = verdict_of(0.1, bool(effects), left is not None, error_falls(fit))
     remainder = None if left is None else Remainder(left, 3.0, None, None, "has a line in its spectrum")
-    said = statement(verdict, fit, effects, effort, Beside(remainder))
+    said = statement(verdict, fit, effects, effort, Context(remainder))
     assert said.startswith("Not decided") is not effort.finished
     is_explained = verdict in (Verdict.EXPLAINED, Verdict.PARTLY_EXPLAINED)
     assert ("This explains" in said) is (is_explained and effort.finished)
@@ -58,5 +58,7 @@ def says_what_its_numbers_say(
 
 def test_a_constant_off_its_sheet_is_said_as_such() -> None:
     fit = Fit("rad/s", 2.0, 1.0, 1.0, 1.0, 1.0, 0.05)
-    said = statement(Verdict.UNEXPLAINED, fit, (), Effort(), Beside(strays=(Stray("J_L", 1.34, 0.2, 105.0, "kg m^2"),)))
+    said = statement(
+        Verdict.UNEXPLAINED, fit, (), Effort(), Context(strays=(Stray("J_L", 1.34, 0.2, 105.0, "kg m^2"),))
+    )
     assert "J_L is 141 kg m^2, the data sheet says 105 ± 20 %" in said
