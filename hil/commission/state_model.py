@@ -301,6 +301,7 @@ class StepsPart(Part):
     diagnosis: StepPart[DiagnosisPart] | None = None
 
     def runs(self) -> Iterator[RunPart]:
+        """Return the runs of all steps."""
         for _, step in self:  # those of other names, too
             if step is not None:
                 yield from step.runs
