@@ -460,8 +460,9 @@ def course_panels(diagnosis: Diagnosis, trace: Trace) -> tuple[Panel, ...]:
 
 def _rejected_section(diagnosis: Diagnosis) -> html.Section:
     rows = [(title_of(each.name), each.reason, shown(each.delta_bic)) for each in diagnosis.rejected]
+    short = _rejected(diagnosis)
     everyone = html.details("Each of them", html.table(REJECTED, rows, numbers=(2,)))
-    return html.section("Rejected effects", _rejected(diagnosis), everyone)
+    return html.section("Rejected effects", short, everyone if len(short.rows) < len(rows) else None)
 
 
 def _rejected(diagnosis: Diagnosis) -> html.Table:

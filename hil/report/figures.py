@@ -187,9 +187,11 @@ def time_figure(
     stretches = stretches_for(recordings)
     figure = time_panels(time_s, panels, stretches, shaded)
     height_px = PANEL_PX * len(panels) + LEGEND_PX
-    if time_s.size <= 2 * stretches:
-        return [figure_block(figure, name, height_px)]
+    for trace in figure.data:
+        trace.x = trace.y = None  # `page.js` draws them from the samples, which take a quarter of the room
     samples, every = packed(time_s, [line.y for panel in panels for line in panel.lines], recordings)
+    if time_s.size <= 2 * stretches:
+        return [figure_block(figure, name, height_px, samples=samples)]
     finest = "every sample" if every == 1 else f"the lowest and the highest of {2 * every} samples"
     drawn = (
         f"Drawn: the lowest and the highest of each {-(-time_s.size // stretches)} samples; zoomed in, {finest}. "

@@ -12,6 +12,7 @@ from estimator.diagnosis.result import Diagnosis, Mismatch, Stray, Trace, Unname
 from estimator.physics.effect import Element
 from hil.report.diagnosis_html import MOST_DRAWN, diagnosis_page, interval_bar
 from hil.report.page import IntervalBar
+from tests.report.conftest import trace
 
 VOID = {"meta", "br", "hr", "img", "input", "link"}
 
@@ -209,6 +210,11 @@ def test_many_long_recordings_stay_under_fifteen_megabytes(diagnosis: Diagnosis)
     sections = read(page).sections
     assert [f"Recording run_{number}" in sections for number in range(MOST_DRAWN + 1)] == [False] + [True] * MOST_DRAWN
     assert "1 more recordings, with smaller errors" in page
+
+
+def test_three_recordings_of_a_minute_are_a_page_of_a_megabyte_and_a_half(diagnosis: Diagnosis) -> None:
+    traces = tuple(trace(f"run_{seed}", False, seed, 6000) for seed in (1, 2, 3))
+    assert len(diagnosis_page(replace(diagnosis, traces=traces)).encode()) < 1.5e6
 
 
 def test_a_law_without_a_name_is_shown(diagnosis):

@@ -59,7 +59,7 @@ def test_a_stall_of_this_machine_is_this_machines_fault() -> None:
         assert_disarmed(server.bus_url, 1, 2)
 
 
-def test_what_ends_a_run_soon_after_this_machine_was_late_is_told_behind_that() -> None:
+def test_what_ends_a_run_soon_after_this_machine_was_late_is_reported_after_it() -> None:
     rig = small_rig()
     for at_s, first in (
         (2.6, "This machine was too busy within the last second: cycle 250 began 0.030 s late"),

@@ -24,7 +24,14 @@
   }
 
   async function load() {
-    for (const div of figures) contents.set(div, JSON.parse(await unpackedText(div.dataset.figure)));
+    for (const div of figures) {
+      const figure = JSON.parse(await unpackedText(div.dataset.figure));
+      if (figure.samples) {
+        figure.zoom = reader(figure.samples);
+        figure.zoom.drawn(0, figure.zoom.last).forEach((line, i) => Object.assign(figure.data[i], line));
+      }
+      contents.set(div, figure);
+    }
     const script = document.createElement("script");
     script.textContent = await unpackedText("plotly");
     document.head.append(script); // runs at once
@@ -69,7 +76,7 @@
     if (div.dataset.drawn || !window.Plotly) return;
     div.dataset.drawn = "yes";
     Plotly.newPlot(div, ...specification(div));
-    if (contents.get(div).samples) zoomable(div, contents.get(div));
+    if (contents.get(div).zoom) zoomable(div, contents.get(div).zoom);
     div.addEventListener("keydown", (event) => onKey(div, event));
     reachable(div);
   }
@@ -91,12 +98,10 @@
     return new Kind(bytes.buffer);
   }
 
-  /* A figure over time that stands on more samples than are drawn: what comes into view is drawn from them. */
-  function zoomable(div, figure) {
-    const samples = figure.samples;
+  /* The samples of a figure over time: where a moment is among them, and its lines between two of them. */
+  function reader(samples) {
     const stamps = samples.stamps ? numbers(samples.stamps, Float64Array) : null;
     const lines = samples.lines.map((line) => ({ ...line, codes: numbers(line.codes, Int16Array) }));
-    const whole = figure.data.map((trace) => ({ x: trace.x, y: trace.y }));
     const time = (i) => (stamps ? stamps[i] : samples.start + i * samples.step);
     const value = (line, i) => (line.codes[i] === GAP ? null : line.offset + line.scale * line.codes[i]);
     const row = (t) => {
@@ -109,19 +114,8 @@
       }
       return low;
     };
-    let shown = "";
-    function redraw() {
-      const range = div._fullLayout.xaxis.range;
-      const first = Math.max(0, Math.floor(row(range[0])) - 1);
-      const last = Math.min(samples.count - 1, Math.ceil(row(range[1])) + 1);
-      const key = first === 0 && last === samples.count - 1 ? "" : `${first} ${last}`;
-      if (key === shown || last <= first) return;
-      shown = key;
-      const drawn = key ? lines.map((line) => inView(line, first, last)) : whole;
-      Plotly.restyle(div, { x: drawn.map((each) => each.x), y: drawn.map((each) => each.y) });
-    }
     function inView(line, first, last) {
-      const length = Math.max(1, Math.floor((2 * (last - first + 1)) / DRAWN));
+      const length = Math.max(1, Math.ceil((2 * (last - first + 1)) / DRAWN));
       const x = [];
       const y = [];
       for (let begin = first; begin <= last; begin += length) {
@@ -138,6 +132,23 @@
         }
       }
       return { x, y };
+    }
+    const drawn = (first, last) => lines.map((line) => inView(line, first, last));
+    return { row, drawn, last: samples.count - 1 };
+  }
+
+  /* What comes into view of a figure is drawn from its samples. */
+  function zoomable(div, { row, drawn, last }) {
+    let shown = "";
+    function redraw() {
+      const range = div._fullLayout.xaxis.range;
+      const from = Math.max(0, Math.floor(row(range[0])) - 1);
+      const to = Math.min(last, Math.ceil(row(range[1])) + 1);
+      const key = from === 0 && to === last ? "" : `${from} ${to}`;
+      if (key === shown || to <= from) return;
+      shown = key;
+      const lines = key ? drawn(from, to) : drawn(0, last);
+      Plotly.restyle(div, { x: lines.map((each) => each.x), y: lines.map((each) => each.y) });
     }
     div.on("plotly_relayout", redraw);
     zooms.set(div, () => {

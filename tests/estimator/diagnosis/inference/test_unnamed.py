@@ -76,7 +76,7 @@ def test_a_name_falls_to_a_law_without_one_that_is_more_probable(friction: tuple
     assert named(friction, law(friction[1], 100.0), None) == []
 
 
-def test_a_name_stands_where_a_law_next to_it_is_more_probable_still(friction: tuple[Search, Grounds]) -> None:
+def test_a_name_stands_where_a_law_added_to_it_is_more_probable_still(friction: tuple[Search, Grounds]) -> None:
     """A law of many terms follows the form of what is there; with the name it needs fewer of them."""
     ground = friction[1]
     assert named(friction, None, None) == ["coulomb_friction_motor"]
