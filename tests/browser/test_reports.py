@@ -9,7 +9,8 @@ from typing import Any
 
 import pytest
 
-from hil.commission.engine import STEPS
+from hil.commission.registry import STEPS
+from hil.provenance import Provenance, Source
 from hil.report.commission_html import commission_page
 from hil.report.comparison_html import comparison_page
 from hil.report.diagnosis_html import diagnosis_page
@@ -24,11 +25,13 @@ PHONE, DESK = 360, 1600
 A4_HEIGHT_PX = 96 * 297 / 25.4
 
 
+MADE = Provenance("0.2.0", "2026-11-27T10:00:00+00:00", "", (Source("model.toml", "0"),), (Source("run_1.csv", "1"),))
+
 PAGES: dict[str, Callable[[], str]] = {
     "identification": lambda: identification_page(*identified()),
     "paper": lambda: paper_page(*paper_results()),
     "diagnosis": lambda: diagnosis_page(hand_made_diagnosis.__wrapped__()),
-    "comparison": lambda: comparison_page(comparisons()),
+    "comparison": lambda: comparison_page(comparisons(), MADE),
     "commissioning": lambda: commission_page(whole_state(Path()).document(), {step.name: step.title for step in STEPS}),
 }
 

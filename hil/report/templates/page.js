@@ -134,11 +134,12 @@
       return { x, y };
     }
     const drawn = (first, last) => lines.map((line) => inView(line, first, last));
-    return { row, drawn, last: samples.count - 1 };
+    const last = samples.count - 1;
+    return { row, drawn, last, whole: [time(0), time(last)] };
   }
 
   /* What comes into view of a figure is drawn from its samples. */
-  function zoomable(div, { row, drawn, last }) {
+  function zoomable(div, { row, drawn, last, whole }) {
     let shown = "";
     function redraw() {
       const range = div._fullLayout.xaxis.range;
@@ -150,7 +151,12 @@
       const lines = key ? drawn(from, to) : drawn(0, last);
       Plotly.restyle(div, { x: lines.map((each) => each.x), y: lines.map((each) => each.y) });
     }
-    div.on("plotly_relayout", redraw);
+    div.on("plotly_relayout", (change) => {
+      const all = Object.keys(change).some((key) => /^xaxis\d*\.autorange$/.test(key) && change[key]);
+      if (!all) return redraw();
+      const names = axes(div).filter((name) => name.startsWith("x")); // what is drawn is a part: it has not the whole range
+      Plotly.relayout(div, Object.fromEntries(names.map((name) => [`${name}.range`, whole])));
+    });
     zooms.set(div, () => {
       shown = "";
       redraw();
