@@ -120,7 +120,7 @@ def _found(chain: Chain, search: Search) -> Found:
 
 SMALLEST_P = 1e-300
 
-LEVELS: Mapping[str, int] = {"quick": 3_000, "normal": 20_000, "thorough": 200_000}
+LEVELS: Mapping[str, int] = {"quick": 4_000, "normal": 40_000, "thorough": 400_000}
 """Free runs of all recordings after which a search makes no further step: a choice of how long people wait."""
 
 
