@@ -5,23 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-import typer
-
 from drivers.capability.ability import Ability
 from drivers.capability.carrier import RPDO, TPDO
 from drivers.datasheet.finding import EdsFinding, Severity
 from drivers.eds_check import EdsReport
 
-_COLOURS = {Severity.ERROR: "red", Severity.WARNING: "yellow", Severity.NOTE: "cyan"}
-
 
 def eds_lines(report: EdsReport) -> Iterator[str]:
-    """Write one line per finding, ``FILE:LINE: error: ...``, and one for the verdict.
-
-    Colours are in the text; `typer.echo` takes them out where no terminal reads it.
-    """
+    """Write one line per finding, ``FILE:LINE: error: ...``, and one for the verdict."""
     for finding in report.findings:
-        severity = typer.style(finding.severity.value, fg=_COLOURS[finding.severity], bold=True)
+        severity = finding.severity.value
         line = "" if finding.line is None else f"{finding.line}:"
         yield f"{report.path}:{line} {severity}: {finding}"
     yield from _table(report)

@@ -84,7 +84,7 @@ def test_what_is_no_file_of_a_person_is_refused_and_not_read_to_its_end(tmp_path
 def test_json_is_not_read_to_the_end_of_a_file_that_has_none(tmp_path: Path) -> None:
     endless = tmp_path / "run.csv.json"
     endless.symlink_to("/dev/zero")
-    with pytest.raises(ValueError, match=f"more than {LARGEST_BYTES >> 20} MB"):
+    with pytest.raises(OSError, match="expected a file, got a folder, a pipe or a device"):
         read_json(endless)
     large = tmp_path / "large.json"
     large.write_bytes(b"[" + b" " * LARGEST_BYTES + b"]")
