@@ -73,12 +73,9 @@ def test_refused_by_line_and_nothing_is_written(refused: Refused, drive: Path, f
         ("run.parquet", b"time_s,speed_rad_s\n", "a damaged or truncated one"),
         ("run.parquet", b"", "a damaged or truncated one"),
         ("run.mat", b"time_s,speed_rad_s\n", "a damaged or truncated one"),
-        (
-            "run.xlsx",
-            b"PK",
-            "expected a recording (.csv, .txt, .tsv, .parquet, .mf4, .mdf, .dat, .h5, .hdf5, .mat), got '.xlsx'",
-        ),
-        ("run", b"", "expected a recording (.csv, .txt, .tsv, .parquet, .mf4, .mdf, .dat, .h5, .hdf5, .mat), got ''"),
+        ("run.xlsx", b"PK", "a damaged or truncated one"),
+        ("run.wav", b"RIFF", f"expected a recording ({', '.join(FORMATS)}), got '.wav'"),
+        ("run", b"", f"expected a recording ({', '.join(FORMATS)}), got ''"),
     ],
 )
 def test_what_is_no_recording_is_refused(
