@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from hil.recording.formats import FORMATS
 from tests.bad_input.conftest import Refused
 
 Lines = list[str]
