@@ -45,7 +45,7 @@ from hil.simulator.plant import RigidPlant
 from hil.simulator.rig_server import RigServer
 from tests.benchmarks.ratios import machine, table, timed
 
-SOURCE = Path(__file__).with_suffix(".c")
+SOURCE = Path(__file__).with_name("bare_loop.c")
 
 
 @contextmanager
