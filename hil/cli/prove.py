@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from hil.cli.printing import new_console, say
+
 if TYPE_CHECKING:
     from hil.proof.work import Progress
 
@@ -85,12 +87,12 @@ def make(
     with _progress() as progress:
         make_set(folder, cases, chosen, parse_key(key), jobs, progress)
     if key_file is None:
-        typer.echo(f"key: {key}")
+        say(f"key: {key}")
     else:
         key_file.touch(mode=0o600)
         key_file.write_text(f"{key}\n", encoding="utf-8")
-        typer.echo(f"key: in {key_file}")
-    typer.echo(f"made: {folder}/cases   next: hil prove run {folder}")
+        say(f"key: in {key_file}")
+    say(f"made: {folder}/cases   next: hil prove run {folder}")
 
 
 @app.command(epilog="Example: hil prove run proof")
@@ -100,7 +102,7 @@ def run(folder: Folder, jobs: Jobs = 2) -> None:
 
     with _progress() as progress:
         digest = answer(folder, jobs, progress)
-    typer.echo(f"verdicts: {folder}/verdicts   digest: {digest}")
+    say(f"verdicts: {folder}/verdicts   digest: {digest}")
 
 
 @app.command("open", epilog="Example: hil prove open proof --key-file proof.key")
@@ -132,9 +134,9 @@ def open_(
     for row in rows:
         if not row["success"]:
             found = row["fault"] or ", ".join(row.get("named", ())) or row.get("verdict")
-            typer.echo(f"{row['case']}: {row['outcome']}: hidden {row['kind']}, found {found}")
+            say(f"{row['case']}: {row['outcome']}: hidden {row['kind']}, found {found}")
     right = sum(row["success"] for row in rows)
-    typer.echo(f"{right} of {len(rows)} as they should be   scoreboard: {folder / PAGE}")
+    say(f"{right} of {len(rows)} as they should be   scoreboard: {folder / PAGE}")
 
 
 @app.command(epilog="Example: hil prove wire proof")
@@ -151,8 +153,8 @@ def wire(
         rows = run_wire(folder / WIRE, seed, only or list(WIRED), progress)
     for row in rows:
         found = ", ".join(row.get("named", ())) or row.get("verdict", row["said"])
-        typer.echo(f"{row['case']}: {row['outcome']}: {found}")
-    typer.echo(f"{sum(row['success'] for row in rows)} of {len(rows)} rigs as they should be")
+        say(f"{row['case']}: {row['outcome']}: {found}")
+    say(f"{sum(row['success'] for row in rows)} of {len(rows)} rigs as they should be")
 
 
 @app.command(epilog="Example: hil prove real data proof")
@@ -169,7 +171,7 @@ def real(
     with _progress() as progress:
         results = run_real(data, folder / REAL, only or (), jobs, progress)
     for result in results:
-        typer.echo(f"{result['name']}: {'as it should be' if result['named_right'] else 'not as it should be'}")
+        say(f"{result['name']}: {'as it should be' if result['named_right'] else 'not as it should be'}")
 
 
 def _key_text(key: str | None, key_file: Path | None) -> str:
@@ -204,7 +206,6 @@ def _require_outside(key_file: Path, folder: Path) -> None:
 @contextmanager
 def _progress() -> Iterator[Progress]:
     """Show what is done on standard error, with the time taken and left."""
-    from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
     from rich.progress import Progress as Bar
 
@@ -215,6 +216,6 @@ def _progress() -> Iterator[Progress]:
         TimeElapsedColumn(),
         TimeRemainingColumn(),
     )
-    with Bar(*columns, console=Console(stderr=True), transient=True) as bar:
+    with Bar(*columns, console=new_console(stderr=True), transient=True) as bar:
         task = bar.add_task("", total=None)
         yield lambda what, done, total: bar.update(task, description=what, completed=done, total=total)

@@ -98,7 +98,7 @@ def test_one_row_shows_no_period(tmp_path: Path, capsys: pytest.CaptureFixture[s
         (contract, "no [signals] table is needed"),
         (unnamed, "# torque = [ { column = ... } ]"),
         (epoch_ms, 'time = { column = "timestamp", scale = 1e-3 }'),
-        (no_time, "time = { sample_time_s = 0.01 }   # no channel is a time: write the true period"),
+        (no_time, "# time = { sample_time_s = ... }   # no channel is a time: write the true period"),
         (per_cent, "in %: give scale = rated value * 0.01"),
         (uneven, "resample_s = 0.01   # rows are uneven"),
     ],

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from hil.commission.engine import STEPS
-from hil.commission.state import Finding, RunRecord, State, Status, StepRecord, stated
+from hil.commission.state import Finding, Note, RunRecord, State, Status, StepRecord, stated
 
 TIME_S = [0.0, 0.5, 1.0]
 SERIES = [0.1, None, -0.2]
@@ -54,7 +54,7 @@ EVIDENCE: dict[str, dict[str, Any]] = {
 
 def whole_state(folder: Path) -> State:
     state = State(folder, "bus", "rig.toml", 'name = "bus"', {step.name: StepRecord() for step in STEPS})
-    state.notes = [{"at_utc": state.started_utc, "what": "kept", "changes": "period_s", "steps": "noise"}]
+    state.notes = [Note(state.started_utc, "kept", "period_s", "noise")]
     ranges = {name: [-1.0, 1.0] for name in ("torque_m1_nm", "torque_m2_nm", "speed_rad_s", "speed_measured_rad_s")}
     for name, step in state.steps.items():
         for attempt in (Status.INTERRUPTED, Status.DONE):
