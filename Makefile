@@ -56,6 +56,7 @@ lint: $(READY)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/python tools/words.py
+	$(BIN)/python tools/budget.py
 	$(BIN)/lint-imports
 	$(BIN)/mypy
 
