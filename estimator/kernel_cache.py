@@ -27,11 +27,6 @@ def take(folder: Path) -> None:
     """Take a cache for this process, and make it if it is new; then remove what no version has used for long.
 
     Where nothing can be written, nothing is done here: numba says what it can't do.
-
-    Parameters
-    ----------
-    folder
-        Its name is that of its kind, a hyphen and the digest of the sources.
     """
     is_new = not folder.exists()
     with suppress(OSError):

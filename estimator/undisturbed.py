@@ -74,7 +74,6 @@ class _Compilation(event.Listener):
         self._signals.__enter__()
 
     def on_end(self, event: Any) -> None:
-        """End."""
         self._signals.__exit__()
 
 

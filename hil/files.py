@@ -38,13 +38,7 @@ def is_inside(folder: Path, path: Path) -> bool:
 
 
 def inside(folder: Path, name: str) -> Path:
-    """Return the path of a name that is relative to a folder.
-
-    Raises
-    ------
-    ValueError
-        If it leads out of the folder: what was expected, without what came.
-    """
+    """Return the path of a name that is relative to a folder."""
     path = folder / name
     if not is_inside(folder, path):
         raise ValueError(f"the name of a file inside {folder}, none that leads out of it")
@@ -56,15 +50,7 @@ LARGEST_BYTES: Final = 32 << 20
 
 
 def read_json(path: Path) -> Any:
-    """Return what a JSON file says.
-
-    Raises
-    ------
-    ValueError
-        As `parse_json`; if the file is no UTF-8, or longer than a program writes such files.
-    OSError
-        If it can't be read.
-    """
+    """Return what a JSON file says."""
     handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))  # a pipe that nobody writes to is not waited for
     with os.fdopen(handle, "rb", buffering=0) as file:
         about = os.fstat(handle)
@@ -77,13 +63,7 @@ def read_json(path: Path) -> Any:
 
 
 def parse_json(text: str) -> Any:
-    """Return what a JSON text says.
-
-    Raises
-    ------
-    ValueError
-        If it is no JSON, is nested deeper than Python can follow, or has a whole number beyond 64 bit.
-    """
+    """Return what a JSON text says."""
     try:
         return json.loads(text, parse_int=_of_64_bit)
     except RecursionError:
@@ -109,20 +89,7 @@ def part_of(path: Path) -> Path:
 
 @contextmanager
 def whole(path: Path, *, new: bool = False) -> Iterator[Path]:
-    """Give the hidden name to write to; the file gets its own when the block ends, and nothing stays if it fails.
-
-    Parameters
-    ----------
-    new : bool
-        Whether a file that is there must stay: two programs may choose the same name at once.
-
-    Raises
-    ------
-    FileExistsError
-        If there is one that must stay.
-    OSError
-        If the disk does not take it.
-    """
+    """Give the hidden name to write to; the file gets its own when the block ends, and nothing stays if it fails."""
     part = part_of(path)
     try:
         yield part

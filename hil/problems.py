@@ -61,38 +61,14 @@ class Fault:
 
 
 def refuse(faults: Iterable[Fault]) -> None:
-    """Refuse a table with all its faults; for the model validators that check rules across keys.
-
-    Raises
-    ------
-    PydanticCustomError
-        If there is any fault; `validate` turns it into one line per fault.
-    """
+    """Refuse a table with all its faults; for the model validators that check rules across keys."""
     found = tuple(faults)
     if found:
         raise PydanticCustomError(ACROSS_KEYS, "rules across keys are broken", {"faults": found})
 
 
 def read_toml(path: Path, error: type[FileProblem]) -> dict[str, Any]:
-    """Read one TOML file.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    error : type of FileProblem
-        What to raise: `hil.errors.RigFileError`, `hil.errors.ModelFileError`, ...
-
-    Returns
-    -------
-    dict
-        The file's tables.
-
-    Raises
-    ------
-    FileProblem
-        Of the class given, if the file can't be read, is not UTF-8, or is not TOML; with the line.
-    """
+    """Read one TOML file."""
     try:
         content = _content(path)
     except OSError as cause:
@@ -116,13 +92,7 @@ def read_toml(path: Path, error: type[FileProblem]) -> dict[str, Any]:
 
 
 def _content(path: Path) -> bytes:
-    """Read a file, no more of it than a person writes.
-
-    Raises
-    ------
-    OSError
-        If it can't be read.
-    """
+    """Read a file, no more of it than a person writes."""
     with path.open("rb") as file:
         content = file.read(LARGEST_BYTES + 1)
     if len(content) > LARGEST_BYTES:
@@ -143,29 +113,7 @@ def _beyond_64_bit(value: object, *keys: int | str) -> Iterator[str]:
 
 
 def validate(model: type[Model], data: Mapping[str, Any], path: Path, error: type[FileProblem]) -> Model:
-    """Check a file's tables against a model.
-
-    Parameters
-    ----------
-    model : type of BaseModel
-        The model of the whole file.
-    data : mapping
-        What `read_toml` returned.
-    path : Path
-        The file, for the message; validators find it as ``info.context["path"]``, for paths relative to it.
-    error : type of FileProblem
-        What to raise.
-
-    Returns
-    -------
-    BaseModel
-        An instance of ``model``.
-
-    Raises
-    ------
-    FileProblem
-        Of the class given, with one line for every key that is missing, unknown or wrong.
-    """
+    """Check a file's tables against a model."""
     try:
         return model.model_validate(data, context={"path": path})
     except ValidationError as cause:

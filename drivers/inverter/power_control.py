@@ -155,11 +155,6 @@ class PowerControl:
         """Refuse a drive that is enabled before it is configured: an NMT command would take its torque from it.
 
         One that does not say, as in NMT STOPPED, has no torque to lose.
-
-        Raises
-        ------
-        ForeignController
-            If it is in OPERATION_ENABLED.
         """
         with suppress(DeviceTimeout, ProtocolViolation):
             if self.state() is PowerState.OPERATION_ENABLED:

@@ -51,13 +51,7 @@ def moments_in(name: str, result: FitResult) -> dict[str, tuple[Interval, ...]]:
 def acquired_effects(
     chain: Chain, before: Sequence[FloatArray], after: Sequence[FloatArray]
 ) -> tuple[FoundEffect, ...]:
-    """Return what was recognised of the acquisition as effects.
-
-    Parameters
-    ----------
-    before, after : sequence of ndarray
-        Errors of the samples that were read, without and with the faults compensated, per recording.
-    """
+    """Return what was recognised of the acquisition as effects."""
     gained = gain_from_squares(_squares(before), _squares(after), 1, 1, after)
     seen = [slice(int(0.7 * error.size), None) for error in after]
     held = [rms_of([e[rows] for e, rows in zip(errors, seen, strict=True)]) for errors in (before, after)]

@@ -111,11 +111,6 @@ def replay(model: DrivelineModel, record: Record, known: Own = NOTHING_KNOWN) ->
 
     After a long gap the simulation begins anew, with an initial state and a load of its own; ``start`` is that of the
     segment with the most good samples. ``known`` is as in ``free_run``.
-
-    Raises
-    ------
-    BadModel
-        Where the model's structure does not have the recorded output.
     """
     parts = tiles(record)
     runs = [_replay(model, part, known) for part in parts]

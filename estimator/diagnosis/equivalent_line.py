@@ -37,13 +37,7 @@ ITERATIONS = 12
 
 
 def equivalent_line(records: Sequence[Record]) -> DrivelineModel:
-    """Return a line with one inertia or two, trusted exactly, that answers as the outputs of some recordings.
-
-    Parameters
-    ----------
-    records : sequence of Record
-        With the plant's own simulated output.
-    """
+    """Return a line with one inertia or two, trusted exactly, that answers as the outputs of some recordings."""
     inertia, viscous = _rigid(records)
     one = _fitted(Structure.ONE_MASS, {"J_M": inertia, "b_M": viscous}, records)
     highest = min(HIGHEST_HZ, 0.25 / records[0].sample_time_s)

@@ -114,15 +114,7 @@ def interval(result: FitResult, cov: FloatArray, index: int) -> tuple[float, flo
 def interval_that_follows(
     result: FitResult, cov: FloatArray, value_of: Callable[[FitResult], float]
 ) -> tuple[float, float]:
-    """Return the 95 % interval of what follows from the unknowns, to first order; never of the other sign.
-
-    Parameters
-    ----------
-    cov : ndarray, shape (n, n)
-        Covariance of all unknowns, in their scales.
-    value_of : callable
-        A fit to the value, in the value's own unit, which is the interval's.
-    """
+    """Return the 95 % interval of what follows from the unknowns, to first order; never of the other sign."""
     value, slope = value_of(result), np.zeros(result.x.size)
     for i in np.flatnonzero(np.diag(cov) > 0.0):
         moved = result.x.copy()

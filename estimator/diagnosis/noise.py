@@ -30,11 +30,6 @@ def noise_floor(records: Sequence[Record]) -> float:
     The floor is the RMS error of a linear one-step predictor that sees the last outputs and torques. A predictor
     follows whatever moves slowly, missing physics included, so what it leaves is the noise of the sensor [unit of
     the output]. Recordings, or segments, too short for a predictor of their own are left to the others.
-
-    Raises
-    ------
-    NotExciting
-        If so many samples are masked that no predictor can be fitted to any recording.
     """
     squares, count = 0.0, 0
     pairs = [(record, _usable(record)) for record in records]
@@ -141,15 +136,7 @@ MOST_SAMPLES = 30_000
 
 
 def stretches(record: Record, parts: Sequence[slice], share: float) -> list[slice]:
-    """Return the rows of a recording that are used, in order.
-
-    Parameters
-    ----------
-    parts : sequence of slice
-        Its segments.
-    share : float
-        Part of the samples that may be used, 1 or more for all.
-    """
+    """Return the rows of a recording that are used, in order."""
     if share >= 1.0:
         return list(parts)
     longest = max(round(LONGEST_S / record.sample_time_s), 1)

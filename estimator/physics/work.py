@@ -27,13 +27,7 @@ class Work:
         self._lock = threading.Lock()
 
     def add(self, samples: int) -> None:
-        """Count samples that are to be simulated.
-
-        Raises
-        ------
-        TimeIsUp
-            Where the limit has passed.
-        """
+        """Count samples that are to be simulated."""
         self.check()
         with self._lock:
             self.samples += samples

@@ -82,14 +82,7 @@ class ComparisonResult:
 
 
 def compare(models: Model | Sequence[Model], recordings: Recordings) -> ComparisonResult:
-    """Simulate recordings with models, nothing fed back, and measure the errors.
-
-    Parameters
-    ----------
-    models : path or model file, or several
-        Recordings are read by the first, and prepared as it says where a diagnosis wrote it.
-    recordings : Record, path, or several
-    """
+    """Simulate recordings with models, nothing fed back, and measure the errors."""
     given = list(models) if isinstance(models, Sequence) and not isinstance(models, str) else [models]
     files = [as_file(each) for each in given]
     records = records_of(recordings, files[0])

@@ -34,13 +34,7 @@ def as_file(model: Model) -> ModelFile:
 
 
 def signals_of(signals: Mapping[str, Any] | None, model: Model | None) -> tuple[SignalsConfig, bool]:
-    """Return how a recording is read, and whether it is of a joint on a bench.
-
-    Raises
-    ------
-    UsageError
-        If ``signals`` is no ``[signals]`` table.
-    """
+    """Return how a recording is read, and whether it is of a joint on a bench."""
     file = None if model is None else as_file(model)
     on_bench = file is not None and file.on_bench
     if signals is None:

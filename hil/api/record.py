@@ -105,20 +105,6 @@ class Record(base.Record):
 
 
 def read(path: Path | str, signals: Mapping[str, Any] | None = None, model: Model | None = None) -> Record:
-    """Read a recording from a file of any format that ``hil`` reads.
-
-    Parameters
-    ----------
-    path : path
-    signals : mapping, optional
-        As ``[signals]`` of a model file; the contract's columns without it.
-    model : path or model file, optional
-        Whose ``[signals]`` count, where ``signals`` is not given.
-
-    Raises
-    ------
-    RecordingError
-        If the file is at fault, with every fault of a kind, by name and line.
-    """
+    """Read a recording from a file of any format that ``hil`` reads."""
     known, on_bench = signals_of(signals, model)
     return Record.of(read_record(path, known, on_bench), Path(path))

@@ -44,13 +44,7 @@ class Call:
 
     @classmethod
     def parse(cls, line: Sequence[str], commands: Collection[str]) -> Call:
-        """Take a command line apart.
-
-        Raises
-        ------
-        UsageError
-            If what should be a command is none, or the log level is missing.
-        """
+        """Take a command line apart."""
         own, quiet, level = _common(line)
         if not own:
             return cls("", (), quiet, level)

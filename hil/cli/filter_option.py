@@ -31,15 +31,7 @@ FilterRun = Annotated[
 
 
 def with_filter(settings: Settings, path: Path | None, run: str | None) -> OnlineSetup:
-    """Return settings with what identified an earlier run, and its filter L; as they are without a file.
-
-    Raises
-    ------
-    UsageError
-        If a recording is named without a file, is not in it, or has to be named.
-    FileProblem
-        If the file is wrong.
-    """
+    """Return settings with what identified an earlier run, and its filter L; as they are without a file."""
     from hil.rig.live import OnlineSetup
 
     if path is None:

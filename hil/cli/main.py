@@ -81,21 +81,7 @@ def exit_status(error: BaseException) -> ExitStatus | None:
 
 
 def run(line: Sequence[str], keep_log: bool = False) -> int:
-    """Run one command line.
-
-    Parameters
-    ----------
-    line
-        Its words, without the program's name.
-    keep_log
-        Whether the user's log tells of it (`hil.support.command_log`).
-
-    Returns
-    -------
-    int
-        The exit status; one line of cause and cure is on standard error where it is not 0. An error that is
-        none of ours is a defect and is raised with its traceback.
-    """
+    """Run one command line."""
     try:
         return _run(Call.parse(line, COMMANDS), keep_log)
     except (Exception, KeyboardInterrupt) as error:  # noqa: BLE001 - the one place that maps errors to statuses

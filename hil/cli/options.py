@@ -68,13 +68,7 @@ def use_cores(count: int | None) -> None:
 
 
 def use_cores_of_environment() -> None:
-    """Compute on as many cores as ``HIL_JOBS`` says, where it is set.
-
-    Raises
-    ------
-    UsageError
-        If it is no whole number from 1 on.
-    """
+    """Compute on as many cores as ``HIL_JOBS`` says, where it is set."""
     text = os.environ.get(VARIABLE, "").strip()
     if not text:
         return
@@ -109,15 +103,7 @@ FilterRun = Annotated[
 
 
 def with_filter(settings: Settings, path: Path | None, run: str | None) -> OnlineSetup:
-    """Return settings with what identified an earlier run, and its filter L; as they are without a file.
-
-    Raises
-    ------
-    UsageError
-        If a recording is named without a file, is not in it, or has to be named.
-    FileProblem
-        If the file is wrong.
-    """
+    """Return settings with what identified an earlier run, and its filter L; as they are without a file."""
     from hil.rig.live import OnlineSetup
 
     if path is None:
@@ -141,13 +127,7 @@ PaceOption = Annotated[Pace, typer.Option(help="By the wall clock, or as fast as
 
 
 def pacer_for(rig: Rig, pace: Pace) -> Pacer:
-    """Make the pacer of one run.
-
-    Raises
-    ------
-    UsageError
-        If it is to be fast and the rig is none that is simulated on this machine.
-    """
+    """Make the pacer of one run."""
     from hil.rig.pacing import FreePacer, RealTimePacer, period_ns
     from hil.simulator.loopback import IN_PROCESS, bus_address
     from hil.simulator.rig_server import required_simulation

@@ -27,15 +27,7 @@ HERE = Path()
 
 
 def opened(folder: Path) -> RunStore:
-    """Open the store of a folder; a look must not make one.
-
-    Raises
-    ------
-    UsageError
-        If there is none.
-    StoreError
-        If it can't be read.
-    """
+    """Open the store of a folder; a look must not make one."""
     from hil.store import RunStore, store_of
 
     if not store_of(folder).exists():

@@ -107,7 +107,6 @@ class ModelEvidence(_Table):
         return self
 
     def model(self) -> DrivelineModel:
-        """Make it."""
         return DrivelineModel(self.structure, {name: Parameter(*each) for name, each in self.parameters.items()})
 
 

@@ -52,14 +52,7 @@ class LawTable(Table):
 
 
 def laws_of(path: Path, tables: Mapping[str, LawTable], trust_laws: bool) -> tuple[LawName, ...]:
-    """Return the laws of a model file and those of installed packages, for the model of that file alone.
-
-    Raises
-    ------
-    ModelFileError
-        If the file's own are not trusted: then nothing of it was run, and the message says what would be. For every
-        law whose function can't be found or used.
-    """
+    """Return the laws of a model file and those of installed packages, for the model of that file alone."""
     laws, problems = [], []
     if tables and not trust_laws:
         problems += [_would_run(path, name, table) for name, table in tables.items()]

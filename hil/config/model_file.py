@@ -101,13 +101,7 @@ class _SignalsDocument(BaseModel):
 
 
 def read_signals(path: Path) -> SignalsConfig:
-    """Read the ``[signals]`` of a file that may hold more, such as a model.
-
-    Raises
-    ------
-    ModelFileError
-        With one line for every fault.
-    """
+    """Read the ``[signals]`` of a file that may hold more, such as a model."""
     try:
         return _SignalsDocument.model_validate(read_toml(path, ModelFileError)).signals
     except ValidationError as error:
@@ -120,14 +114,7 @@ def signals_of(text: str) -> SignalsConfig:
 
 
 def read_model_for_recordings(path: Path | str, trust_laws: bool = False) -> ModelFile:
-    """Read a model file that recordings are to be held against.
-
-    Raises
-    ------
-    ModelFileError
-        As `read_model`; also if the model is of a translation and would be held against the motor speed of a
-        rig's own recording, or of a joint whose imposed motion is not named, or that has further outputs.
-    """
+    """Read a model file that recordings are to be held against."""
     file = read_model(path, trust_laws)
     if file.on_bench:
         _require_bench(path, file.signals)

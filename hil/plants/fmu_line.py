@@ -24,13 +24,7 @@ FAST_ENOUGH_S = 1.0 / 240.0
 
 
 def fmu_line(fmu: FmuPlant, records: Sequence[Record]) -> DrivelineModel:
-    """Return the model that is questioned, of recordings of one kind of output.
-
-    Raises
-    ------
-    UsageError
-        Where the FMU does not have the variables, or fails.
-    """
+    """Return the model that is questioned, of recordings of one kind of output."""
     kind = records[0].kind
     named = fmu.named(kind)
     states = ("angle_rad", *STARTS) if kind is OutputKind.POSITION else STARTS

@@ -136,13 +136,7 @@ class FmuPlant:
         return FreeRun(output, float(np.sqrt(np.mean(error**2))), Start(load, 0.0, float("nan")))
 
     def named(self, kind: OutputKind) -> Names:
-        """Return which of its variables are what, for a kind of output.
-
-        Raises
-        ------
-        UsageError
-            Where a torque is none of its inputs, or its output is one.
-        """
+        """Return which of its variables are what, for a kind of output."""
         found = names(self._mapped, self._known, kind)
         for name in found.torque:
             if name not in self._inputs:
@@ -171,20 +165,7 @@ class FmuPlant:
     def simulated(
         self, record: Record, named: Names, torque_nm: FloatArray, values: Mapping[str, FloatArray | float]
     ) -> FloatArray:
-        """Simulate the output of a recording, shape (N,).
-
-        Parameters
-        ----------
-        torque_nm : ndarray, shape (N, M)
-            Torque of each of the recording's inputs [Nm].
-        values : mapping
-            Of inputs over time, shape (N,), or constant; of parameters.
-
-        Raises
-        ------
-        UsageError
-            Where the FMU fails.
-        """
+        """Simulate the output of a recording, shape (N,)."""
         held = {name: value for name, value in values.items() if name in self._inputs}
         start = {name: value for name, value in values.items() if name not in self._inputs}
         since_s = record.time_s - record.time_s[0]

@@ -116,13 +116,7 @@ class Runner:
 
 
 def unpack(path: Path, home: Path) -> None:
-    """Unpack an FMU into a folder, none of it elsewhere, no more of it than one may take.
-
-    Raises
-    ------
-    ValueError, OSError, zipfile.BadZipFile
-        If it can't be.
-    """
+    """Unpack an FMU into a folder, none of it elsewhere, no more of it than one may take."""
     room = UNPACKED_BYTES
     with zipfile.ZipFile(path) as archive:
         for entry in archive.infolist():

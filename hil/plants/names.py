@@ -38,22 +38,7 @@ OF_A_POSITION = Names(output="angle_motor", start=("start.angle", *Names().start
 
 
 def names(given: Sequence[str], known: Collection[str], kind: OutputKind = OutputKind.SPEED) -> Names:
-    """Return the names that ``--map`` gives, the others as ``hil export fmu`` writes them.
-
-    Parameters
-    ----------
-    given : sequence of str
-        ``KEY=NAME,...`` each.
-    known : collection of str
-        The variables that the FMU has.
-    kind : OutputKind
-        What is measured.
-
-    Raises
-    ------
-    UsageError
-        For a key that there is not or that is given twice, or a name that the FMU does not have or that is too much.
-    """
+    """Return the names that ``--map`` gives, the others as ``hil export fmu`` writes them."""
     entries = [text.partition("=") for text in given]
     for text, (key, sign, _) in zip(given, entries, strict=True):
         if key not in KEYS or not sign:

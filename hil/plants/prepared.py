@@ -66,13 +66,7 @@ def _one_in(diagnosis: Diagnosis, records: Sequence[Record]) -> int:
 def prepare_again(
     records: Sequence[Record], prepared: Prepared | None, tell: Tell, keep_rows: bool = False
 ) -> tuple[Record, ...]:
-    """Return recordings as a diagnosis took them; as they are where the model is of none.
-
-    Parameters
-    ----------
-    keep_rows : bool
-        Whether every row stays, so that only what does not count is marked.
-    """
+    """Return recordings as a diagnosis took them; as they are where the model is of none."""
     if prepared is None:
         return tuple(records)
     if prepared.mended:

@@ -37,13 +37,7 @@ class Asked:
 def questioned(
     asked: Asked, recordings: Sequence[Path], dbc: Path | None, tell: Tell
 ) -> tuple[ModelFile, tuple[Record, ...]]:
-    """Read a model and recordings.
-
-    Raises
-    ------
-    UsageError, ModelFileError, RecordingError
-        For what can't be read, is not trusted, or does not fit together.
-    """
+    """Read a model and recordings."""
     if is_fmu(asked.model):
         fmu = FmuPlant(asked.model, asked.mapped, asked.trust.fmu)
         signals = None if asked.signals is None else read_signals(asked.signals)

@@ -58,17 +58,7 @@ def max_speed_rad_s(inverter: Inverter) -> float | None:
 
 
 def plc_limits(status: PlcStatus, rig: Rig, drives_rad_s: float | None) -> Iterator[PlcLimit]:
-    """Put each limit into words.
-
-    Parameters
-    ----------
-    status
-        As read.
-    rig
-        What is known of the drives.
-    drives_rad_s
-        The largest speed that a drive gives for itself [rad/s]; None where none does.
-    """
+    """Put each limit into words."""
     tables = (rig.inverters.m1, rig.inverters.m2)
     rated_nm = max(table.rated_torque_nm for table in tables)
     asked_nm = max(table.torque_limit_nm for table in tables)

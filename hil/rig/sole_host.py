@@ -80,22 +80,7 @@ def listening_s(rig: Rig) -> float:
 
 
 def require_sole_host(link: CanLink, rig: Rig, heartbeat_s: float | None) -> None:
-    """See that nobody else drives, before the first command; on a bus inside this process there is nobody else.
-
-    Parameters
-    ----------
-    link
-        The bus, opened; nothing has been sent on it.
-    rig
-        Whose drives are on it. With `Rig.takes_over` another host is put up with, unless a drive may carry torque.
-    heartbeat_s
-        Period of the heartbeat that this host sends from now on [s]; None for one that only reads.
-
-    Raises
-    ------
-    ForeignController
-        If somebody else is heard, or a drive may carry torque.
-    """
+    """See that nobody else drives, before the first command; on a bus inside this process there is nobody else."""
     alone = rig.can.url.startswith(IN_PROCESS)
     ear = _Ear(link, rig)
     if not alone:

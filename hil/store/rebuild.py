@@ -26,31 +26,7 @@ def register_run(
     folder: Path | str | None = None,
     results: Mapping[str, Path] | None = None,
 ) -> int:
-    """Enter a recording that was just made.
-
-    Parameters
-    ----------
-    recording : Path or str
-        The recording; what is entered is what it says of itself.
-    outcome : str
-        `COMPLETE`, or what ended the run.
-    folder : Path or str, optional
-        Of the store; by default the recording's own.
-    results : mapping of kind to Path, optional
-        What came of it so far, to be attached.
-
-    Returns
-    -------
-    int
-        The run's number in the store.
-
-    Raises
-    ------
-    RecordingError
-        If the recording can't be read.
-    StoreError
-        If the store can't be written. The recording is whole: ``hil runs rebuild`` enters it later.
-    """
+    """Enter a recording that was just made."""
     recording = Path(recording)
     entry = entry_at(recording, outcome)
     with RunStore(recording.parent if folder is None else folder) as store:
@@ -61,20 +37,7 @@ def register_run(
 
 
 def attach_to_runs(recordings: Iterable[Path], results: Mapping[str, Path]) -> list[str]:
-    """Attach what was computed from recordings to their runs, where the recordings' folders have a store.
-
-    Parameters
-    ----------
-    recordings : iterable of Path
-        What the results are of; those that are no runs of a store are passed over.
-    results : mapping of kind to Path
-        The files.
-
-    Returns
-    -------
-    list of str
-        What could not be attached, and why, for people: the results themselves are whole.
-    """
+    """Attach what was computed from recordings to their runs, where the recordings' folders have a store."""
     folders: dict[Path, set[Path]] = {}
     for recording in recordings:
         if store_of(recording.parent).exists():
@@ -127,13 +90,7 @@ class Rebuilt:
 
 
 def rebuild(folder: Path) -> Rebuilt:
-    """Bring the list of a folder up to what is in the folder and in those in it.
-
-    Raises
-    ------
-    StoreError
-        If the list can't be written.
-    """
+    """Bring the list of a folder up to what is in the folder and in those in it."""
     with RunStore(folder) as store:
         done = Rebuilt(removed=[path for each in _folders(folder) for path in remove_abandoned(each)])
         _read_again(store, done)

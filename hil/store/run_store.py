@@ -146,13 +146,7 @@ class RunStore:
         self._is_open = False
 
     def add_run(self, entry: RunEntry) -> int:
-        """Enter a run; one that is there already, the same file with the same data, keeps its number.
-
-        Returns
-        -------
-        int
-            Its number.
-        """
+        """Enter a run; one that is there already, the same file with the same data, keeps its number."""
         card, listed = self._card(entry), self._listed()
         for number in listed:
             try:
@@ -167,22 +161,7 @@ class RunStore:
         return self._first_free(lambda number: self._run_path(number), max(listed, default=0) + 1, "run", card)
 
     def attach(self, run_id: int, kind: str, content: Path | str | Mapping[str, Any]) -> None:
-        """Add something that came of a run.
-
-        Parameters
-        ----------
-        run_id : int
-            The run.
-        kind : str
-            ``model``, ``diagnosis``, ``identification``, ``alarm``, or a word of your own.
-        content : Path, str, or mapping
-            A file, whose text is kept as it is now; a text; or a document to be kept as JSON.
-
-        Raises
-        ------
-        UsageError
-            If there is no such run, or the file can't be read.
-        """
+        """Add something that came of a run."""
         path = Path(self._relative(content)) if isinstance(content, Path) else None
         found = attachment_of(kind, _now_utc(), path, _document(content))
         files = self._require(run_id)
@@ -200,13 +179,7 @@ class RunStore:
         self._first_free(lambda _: self._path(run_id, "result", number), number, "result", head)
 
     def note(self, run_id: int, text: str) -> None:
-        """Add an operator's note to a run.
-
-        Raises
-        ------
-        UsageError
-            If there is no such run, or the note is empty.
-        """
+        """Add an operator's note to a run."""
         if not text.strip():
             raise UsageError("expected a note, got an empty one")
         text = text.encode("utf-8", "replace").decode()
@@ -216,13 +189,7 @@ class RunStore:
         )
 
     def move(self, run_id: int, entry: RunEntry) -> None:
-        """Tell where the recording of a run is now, and what it says of itself.
-
-        Raises
-        ------
-        UsageError
-            If there is no such run.
-        """
+        """Tell where the recording of a run is now, and what it says of itself."""
         self._require(run_id)
         with self._in_words():
             write_whole(self._run_path(run_id), _text("run", self._card(entry)))
@@ -237,13 +204,6 @@ class RunStore:
         return [_without_documents(run) for run in taken] if asked.text else taken
 
     def get(self, run_id: int) -> Run:
-        """Return one run.
-
-        Raises
-        ------
-        UsageError
-            If there is no such run.
-        """
         files = self._listed().get(run_id)
         run = None if files is None else self._read(run_id, files, True)
         if run is None:
@@ -251,18 +211,7 @@ class RunStore:
         return run
 
     def delete(self, run_id: int) -> Run:
-        """Take a run out, with its notes and attachments; no recording is touched.
-
-        Returns
-        -------
-        Run
-            What was taken out.
-
-        Raises
-        ------
-        UsageError
-            If there is no such run.
-        """
+        """Take a run out, with its notes and attachments; no recording is touched."""
         run, files = self.get(run_id), self._listed()[run_id]
         with self._in_words():
             write_whole(self._run_path(run_id), _text("run", None))
@@ -349,13 +298,7 @@ class RunStore:
         return replace(found, path=where, document=document) if where or document else found
 
     def _content(self, path: Path, kind: TypeAdapter[T]) -> T | None:
-        """Read a file; None for a run that was deleted.
-
-        Raises
-        ------
-        ValueError
-            With what was expected and what came, if it is not as it is written here.
-        """
+        """Read a file; None for a run that was deleted."""
         try:
             document = read_json(path)
         except OSError as error:

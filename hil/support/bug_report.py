@@ -64,20 +64,7 @@ class BugReport:
 
 
 def bug_report(rigs: tuple[Path, ...], runs: Path) -> BugReport:
-    """Gather a report.
-
-    Parameters
-    ----------
-    rigs
-        Rig files; a faulty one is taken as it is.
-    runs
-        Folder of recordings, with its run store.
-
-    Raises
-    ------
-    UsageError
-        If a rig file can't be read.
-    """
+    """Gather a report."""
     redaction, missing = Redaction(), []
     parts = [Part("about.txt", ABOUT.encode()), _json("versions.json", redaction.document(versions()))]
     parts += [_rig(path, redaction) for path in rigs]

@@ -54,13 +54,7 @@ OTHERS: Final = ("", "numba")
 
 
 def level_of(given: str | None) -> str:
-    """Return the level: what was given, else what the environment says, else the default.
-
-    Raises
-    ------
-    UsageError
-        If it is none of the levels.
-    """
+    """Return the level: what was given, else what the environment says, else the default."""
     source, level = ("--log-level", given) if given is not None else (VARIABLE, os.environ.get(VARIABLE) or DEFAULT)
     if level.lower() not in tuple(Level):
         raise UsageError(f"{source}: expected one of {', '.join(Level)}, got {level!r}")

@@ -75,17 +75,7 @@ AIR_KG_M3, DRAG_AREA_M2 = 1.2, 5.0
 
 @dataclass(frozen=True, slots=True)
 class Road:
-    """What the load torque varies with.
-
-    Attributes
-    ----------
-    roughness_m3
-        Displacement spectrum at 0.1 cycles per metre, G_d(n_0) of ISO 8608 [m^3]: 16e-6 is class A, 256e-6 class C.
-    grade_nm
-        RMS of the torque that hills take, at the motor [Nm].
-    gust_nm
-        RMS of the torque that gusts take, at the motor [Nm].
-    """
+    """What the load torque varies with."""
 
     roughness_m3: float
     grade_nm: float
@@ -94,19 +84,7 @@ class Road:
 
 @dataclass(frozen=True, slots=True)
 class Driver:
-    """Who holds the speed.
-
-    Attributes
-    ----------
-    reading_s
-        Time constant of the speedometer [s].
-    reaction_s
-        From what it shows to the foot [s].
-    pedal_s
-        Time constant of foot, pedal and torque ramp together [s].
-    bandwidth_rad_s
-        Crossover of the loop that the driver closes [rad/s].
-    """
+    """Who holds the speed."""
 
     reading_s: float
     reaction_s: float
@@ -116,27 +94,7 @@ class Driver:
 
 @dataclass(frozen=True, slots=True)
 class Bus:
-    """A bus on its way.
-
-    Attributes
-    ----------
-    seed
-        It was drawn from.
-    line
-        The driveline, the truth of what is identified.
-    speed_rad_s
-        Motor speed that is held [rad/s].
-    share
-        Of the driver's torque that inverter 1 gives.
-    prbs_nm
-        Amplitude of the PRBS, both inverters together [Nm].
-    ripple_nm
-        RMS of what an inverter's torque departs from its command [Nm].
-    noise_rad_s
-        RMS of the speed's noise, white [rad/s].
-    road, driver
-        Around the line.
-    """
+    """A bus on its way."""
 
     seed: int
     line: Line
@@ -205,15 +163,6 @@ class Foot:
     The load alone, ``1 / J s`` with all inertia, is what the driver feels: the gain is crossover times inertia, and
     the integral has a tenth of the crossover's speed. Two lags, of the reading and of the pedal, keep the foot off the
     resonance, where the speed of the motor answers a torque much more than ``1 / J s`` says.
-
-    Parameters
-    ----------
-    bus
-        Whose speed is held.
-    torque_nm
-        That holds it without road [Nm].
-    period_s
-        Between two calls [s].
     """
 
     def __init__(self, bus: Bus, torque_nm: float, period_s: float) -> None:
@@ -312,19 +261,7 @@ ON_THE_ROAD, CLEAN = World(), World(road=False, driver=False)
 
 
 def drive(bus: Bus, seconds: float = 30.0, seed: int = 0, world: World = ON_THE_ROAD) -> Record:
-    """Drive a bus and return the recording at 10 ms.
-
-    Parameters
-    ----------
-    bus
-        Drawn by :func:`tests.benchmarks.buses.draw_bus`.
-    seconds
-        Length of the recording [s].
-    seed
-        Of this drive: another road, other noise, another state of the shift register.
-    world
-        With road and driver; ``CLEAN`` has neither.
-    """
+    """Drive a bus and return the recording at 10 ms."""
     rng = np.random.default_rng([bus.seed, seed])
     kept, settling = round(seconds / PERIOD_S), round(SETTLING_S / PERIOD_S)
     n = kept + settling

@@ -32,21 +32,7 @@ class Case:
 
 
 def make(effect: str, seed: int, duration_s: float = DURATION_S, reads_per_period: int = 1, tests: int = 3) -> Case:
-    """Draw a bus, hide an effect in it and record each test once.
-
-    Parameters
-    ----------
-    effect : str
-        Name of the effect, or ``NOTHING``.
-    seed : int
-        What everything is drawn from.
-    duration_s : float
-        Length of each recording [s].
-    reads_per_period : int
-        Readings in each of the 10 ms for which a torque is held: 10 for a recording at 1 kHz.
-    tests : int
-        How many recordings.
-    """
+    """Draw a bus, hide an effect in it and record each test once."""
     specimen = draw_specimen(effect, seed)
     records = tuple(_record(specimen, number, duration_s, reads_per_period) for number in range(tests))
     return Case(nominal_model(specimen), records)

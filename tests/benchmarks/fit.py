@@ -153,17 +153,7 @@ SIMULATIONS = 20
 
 @dataclass(frozen=True, slots=True)
 class Agreement:
-    """How far two fits of one problem ended apart.
-
-    Attributes
-    ----------
-    squares, parameters : float
-        Difference of the sums of squared errors, and the largest one of a parameter of the line; as shares.
-    likelihood : float
-        The same difference of the sums as a log-likelihood ratio, ``n dS / S``.
-    sigmas : float
-        Largest difference of a parameter of the line in standard errors of the fit.
-    """
+    """How far two fits of one problem ended apart."""
 
     squares: float
     parameters: float

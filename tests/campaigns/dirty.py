@@ -47,19 +47,7 @@ class Known(Enum):
 
 
 def make_dirty(strong: str, seed: int, known: Known = Known.NONE) -> tuple[Case, dict[str, dict[str, float]]]:
-    """Draw a dirty bus with one strong effect, record it, and say what its model file knows beyond the line.
-
-    Parameters
-    ----------
-    strong : str
-        Name of an effect at its usual size; ``none`` for nothing strong.
-
-    Returns
-    -------
-    Case
-    dict of effect to sizes
-        As a model file states them; off by up to `NOMINAL_ERROR` where ``known`` says so.
-    """
+    """Draw a dirty bus with one strong effect, record it, and say what its model file knows beyond the line."""
     rng = stream(seed, Stream.WORLD)
     names, sizes = _small(strong, seed, rng)
     drawn = draw_specimen(strong, seed)

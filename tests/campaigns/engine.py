@@ -88,13 +88,7 @@ EFFECTS: Mapping[str, Draw] = {
 
 
 def make_engine(seed: int) -> Case:
-    """Draw a bus, build it in the engine, record its three tests.
-
-    Raises
-    ------
-    ImportError
-        Without MuJoCo.
-    """
+    """Draw a bus, build it in the engine, record its three tests."""
     bus, effect = draw_bus(stream(seed, Stream.BUS)), list(EFFECTS)[seed % len(EFFECTS)]
     sizes = EFFECTS[effect](np.random.default_rng([seed, len("engine")]), bus)
     line = Line(bus.J_M, bus.J_L, bus.k, bus.c, bus.b_M, bus.b_L, bus.load_torque_nm)

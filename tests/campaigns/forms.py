@@ -39,29 +39,7 @@ class Role(Enum):
 
 
 class Line(NamedTuple):
-    """A line with its laws in a form; each law is absent at its default.
-
-    Attributes
-    ----------
-    dry_nm, dry_at_load, dry_width, dry_excess, dry_speed_rad_s
-        Dry friction: size, where it is; speed [rad/s] or deflection [rad] over which it builds up; share by which it is
-        greater near standstill, and the speed over which that is lost.
-    memory
-        0 friction follows the speed, 1 bristles of LuGre's, 2 of Dahl's with exponent 2.
-    gap_rad, gap_damper
-        Dead band of the shaft; its damper 0 acts across the gap, 1 in contact, 2 grows with the depth of contact.
-    drag, exponent, drag_at_load
-        Torque at 1 rad/s, and the power of the speed.
-    limit_nm, knee
-        Limit of the torque of both inverters; knee 0 is a tanh.
-    lag_s, second
-        Time constant; ratio of a second one to it, or minus the damping ratio of an oscillating lag.
-    stop_rad, stop_stiffness
-        Twist beyond which a stop adds to the stiffness, and by how much over k.
-    slider_share, slider_rad, slider_sharpness
-        Share of the stiffness that slides, the twist at which it does; sharpness 0 is one Jenkins element, else
-        Bouc and Wen's exponent.
-    """
+    """A line with its laws in a form; each law is absent at its default."""
 
     J_M: float
     J_L: float

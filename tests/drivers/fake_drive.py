@@ -31,17 +31,7 @@ VALUE_RANGE, NO_SUCH_OBJECT, DEVICE_STATE = 0x06090030, 0x06020000, 0x08000022
 
 
 class FakeDrive:
-    """One drive on a bus of its own.
-
-    Attributes
-    ----------
-    objects
-        The object dictionary by index and sub-index.
-    state, nmt
-        What it is in.
-    status_bits
-        Bits of the statusword next to the state.
-    """
+    """One drive on a bus of its own."""
 
     def __init__(self, link: CanLink, eds_path: Path | None = None, node_id: int = M1.node_id) -> None:
         self.link = link

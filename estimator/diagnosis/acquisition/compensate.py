@@ -74,15 +74,6 @@ def as_read(output: FloatArray, record: Record, effects: Mapping[str, Mapping[st
 
     Lost samples and jitter leave it as it is: what was lost is not shown, and an instant that nothing tells can't be
     reproduced (one that stamps tell is in ``record.offset_s``).
-
-    Parameters
-    ----------
-    output : ndarray, shape (N,)
-        Simulated output at each row.
-    record : Record
-        The recording that it is simulated for: tells which rows are stale.
-    effects : mapping
-        Effects of the model: name to parameters.
     """
     read = output
     if "speed_quantisation" in effects:

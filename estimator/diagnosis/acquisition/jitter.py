@@ -131,24 +131,7 @@ class _Rest:
 def hidden_jitter(
     records: Sequence[Record], errors: Sequence[FloatArray], slopes: Sequence[FloatArray], okay: Sequence[BoolArray]
 ) -> Finding | None:
-    """Recognise jitter in the errors of a simulation that explains everything else.
-
-    Parameters
-    ----------
-    records : sequence of Record
-        Name the recordings.
-    errors : sequence of ndarray, shape (N,)
-        Recorded less simulated output, per recording.
-    slopes : sequence of ndarray, shape (2, N)
-        Rates of the simulated output just before each row and just after it [its unit per second].
-    okay : sequence of ndarray of bool, shape (N,)
-        Rows that count.
-
-    Returns
-    -------
-    Finding or None
-        ``sample_jitter`` with its standard deviation; None where the errors don't show any.
-    """
+    """Recognise jitter in the errors of a simulation that explains everything else."""
     rest = _rests(errors, slopes, okay)
     within = _rests(errors, slopes, okay, BLOCK)
     if rest is None or within is None or _likeliest(within.error, within.steepness) is None:
@@ -173,13 +156,7 @@ def hidden_jitter(
 
 
 def mean_shift(slopes: FloatArray, jitter_s: float) -> FloatArray:
-    """Return what readings off their time by ``jitter_s`` (rms) are off in the mean, shape (N,): a kink is cut short.
-
-    Parameters
-    ----------
-    slopes : ndarray, shape (2, N)
-        As in ``hidden_jitter``.
-    """
+    """Return what readings off their time by ``jitter_s`` (rms) are off in the mean: a kink is cut short."""
     shift: FloatArray = np.sqrt(OF_A_KINK) * jitter_s * (slopes[1] - slopes[0])
     return shift
 

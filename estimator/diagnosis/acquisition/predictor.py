@@ -57,16 +57,6 @@ def predict(record: Record, trusted: BoolArray) -> Prediction | None:
 
     The torque of the row itself is among the regressors. By the convention of every recording it acts later, so its
     coefficient is zero; where the torque is recorded a row late it takes up what would pass for staleness.
-
-    Parameters
-    ----------
-    trusted : ndarray of bool, shape (N,)
-        Rows whose output may be used; others are interpolated where they are needed as past.
-
-    Returns
-    -------
-    Prediction or None
-        None where too few rows are usable.
     """
     good = np.flatnonzero(trusted)
     n = trusted.size

@@ -74,13 +74,6 @@ def chance_repeats(differences: FloatArray, step: float) -> ChanceRepeats:
 
     A Gaussian is drawn through the counts of two bands next to zero, ``0 < |d| <= w`` and ``w < |d| <= 2w``: it has
     ``ln p(d)`` linear in d^2, and locally so has every smooth density that is symmetric about zero.
-
-    Parameters
-    ----------
-    differences : ndarray, shape (n,)
-        Of readings in a row, zeros included.
-    step : float
-        Of the lattice.
     """
     size = np.abs(differences)
     moving = size[size > 0.5 * step] if step > 0.0 else size[size > 0.0]

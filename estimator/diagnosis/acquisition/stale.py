@@ -44,15 +44,7 @@ NEAR_ZERO = 0.02
 
 
 def telling_rows(values: FloatArray, step: float) -> BoolArray:
-    """Return the rows of a channel in which a repeat would tell, shape (N,).
-
-    Parameters
-    ----------
-    values : ndarray, shape (N,)
-        Readings, NaN where there is none.
-    step : float
-        Of their lattice.
-    """
+    """Return the rows of a channel in which a repeat would tell, shape (N,)."""
     change = np.abs(np.diff(values, prepend=np.nan))
     read, again = np.isfinite(change), repeats(values, step)
     tells: BoolArray = read & (_moving_share(read & ~again, read) > 0.5)
@@ -171,24 +163,7 @@ AS_GOOD = 0.003
 
 
 def followed(torque: FloatArray, trusted: BoolArray, reference: FloatArray) -> tuple[FloatArray, BoolArray, bool]:
-    """Return a torque as its reference tells it.
-
-    Parameters
-    ----------
-    torque, trusted : ndarray, shape (N,)
-        Readings [Nm], and where they are to be trusted.
-    reference : ndarray, shape (N,)
-        What was asked of all drives together, or of this one [Nm]; NaN where it is not known.
-
-    Returns
-    -------
-    ndarray, shape (N,)
-        Torque by the reference [Nm].
-    ndarray of bool, shape (N,)
-        Where the reference tells it; nowhere if the torque does not follow.
-    bool
-        Whether that is as good as a reading.
-    """
+    """Return a torque as its reference tells it."""
     regressors = _regressors(np.where(~trusted & (reference == 0.0), np.nan, reference))  # lost with the torque
     predicted = all_of(np.isfinite(regressors))
     read = predicted & trusted
@@ -248,13 +223,7 @@ class Clock:
 
 
 def clock_of(torque: FloatArray, trusted: BoolArray) -> Clock | None:
-    """Return the clock at whose ticks a torque steps; None where there is none of two samples or more.
-
-    Parameters
-    ----------
-    torque, trusted : ndarray, shape (N,)
-        Readings [Nm], and where they are to be trusted.
-    """
+    """Return the clock at whose ticks a torque steps; None where there is none of two samples or more."""
     change = np.abs(np.diff(torque))
     known = trusted[1:] & trusted[:-1]
     if known.sum() < FEWEST_STEPS:
@@ -271,22 +240,7 @@ def clock_of(torque: FloatArray, trusted: BoolArray) -> Clock | None:
 
 
 def fill(torque: FloatArray, trusted: BoolArray, reference: FloatArray | None = None) -> tuple[FloatArray, BoolArray]:
-    """Return a torque with what is not trusted replaced, and where the replacement is as good as a reading.
-
-    Parameters
-    ----------
-    torque, trusted : ndarray, shape (N,)
-        Readings [Nm], and where they are to be trusted.
-    reference : ndarray, shape (N,), optional
-        What the torque follows [Nm], NaN where not known.
-
-    Returns
-    -------
-    ndarray, shape (N,)
-        Filled torque [Nm].
-    ndarray of bool, shape (N,)
-        True where read, or known by reference or clock.
-    """
+    """Return a torque with what is not trusted replaced, and where the replacement is as good as a reading."""
     filled, known = _by_clock(torque, trusted)
     if reference is None or trusted.all():
         return filled, known
@@ -342,15 +296,7 @@ class LateTorque:
 
 
 def late_torque(record: Record, inputs: Sequence[int], trusted: BoolArray) -> LateTorque | None:
-    """Examine torque inputs that may be stale in the same rows; None where no predictor can be fitted.
-
-    Parameters
-    ----------
-    inputs : sequence of int
-        Which; a row repeats where all of them do.
-    trusted : ndarray of bool, shape (N,)
-        Rows whose output may be used.
-    """
+    """Examine torque inputs that may be stale in the same rows; None where no predictor can be fitted."""
     torque = record.torque_nm[:, inputs].sum(axis=1)
     read = all_of(record.torque_trusted[:, inputs])
     again = read & all_of(np.column_stack([_repeats(record.torque_nm[:, i]) for i in inputs]))

@@ -159,21 +159,7 @@ def _decided(
 
 @dataclass(frozen=True, slots=True)
 class _Seen:
-    """A decision, and the laws without a name around it.
-
-    Attributes
-    ----------
-    believed : Hypothesis
-        What the answer is of, and the augmented model holds: the effects that are named, and traces.
-    failed : tuple of Test
-        What it leaves that noise has not.
-    hunts : list of Hunt
-        The search for a law without any effect; empty where it was not made.
-    alone, left : Law or None
-        The law without any effect, and that of what is left.
-    strays : tuple of Stray
-        Nominal values that alone, beyond what they are trusted to, would leave nothing but noise.
-    """
+    """A decision, and the laws without a name around it."""
 
     decision: Decision
     believed: Hypothesis

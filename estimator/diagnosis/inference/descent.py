@@ -75,13 +75,7 @@ def light(fit: FitResult) -> FitResult:
 
 
 def descended(begun: FitResult, weigh: Weigh, effort: Effort) -> FitResult:
-    """Return the unknowns at which the squared innovations under fixed disturbances are least.
-
-    Parameters
-    ----------
-    begun : FitResult
-        Where it begins; its derivative, if it has one, need not be exact.
-    """
+    """Return the unknowns at which the squared innovations under fixed disturbances are least."""
     descent = _Descent(begun, weigh, effort.derivatives)
     for _ in range(effort.steps):
         if not descent.step():

@@ -223,18 +223,7 @@ def whitener(
     sizes: FloatArray,
     changes: Sequence[FloatArray] = (),
 ) -> Whitener:
-    """Return the filters of recordings under a noise model, ``sizes`` as `Size` says.
-
-    Parameters
-    ----------
-    use : sequence of ndarray of bool, shapes (N_i, C)
-    unread : sequence of ndarray, shapes (N_i,)
-        Variance of each recording's torque where it was not read.
-    rows : sequence of Rows
-        See `Whitener`.
-    changes : sequence of ndarray, shapes (3, N_i)
-        By how much laws change at each place [Nm]; empty where none does (``form_error``).
-    """
+    """Return the filters of recordings under a noise model, ``sizes`` as `Size` says."""
     torque, drift, drift_s, walk, share = np.exp(sizes[READING : len(Size)])
     white, coloured, colour_s = np.exp(readings(sizes)).T
     count, n = line.h.shape
@@ -398,17 +387,7 @@ def estimated(
 def estimate(
     whitened: Callable[[FloatArray], Whitener], error: FloatArray, begun: FloatArray, limits: Limits, rounds: int
 ) -> tuple[FloatArray, float]:
-    """Return the most probable noise model of an error and its minus twice log-posterior, by Fisher scoring.
-
-    Parameters
-    ----------
-    whitened : callable
-        Returns the filter of a noise model.
-    error : ndarray, shape (R,)
-        Stacked errors of the samples that count.
-    begun : ndarray, shape (S,)
-        Where the iteration begins.
-    """
+    """Return the most probable noise model of an error and its minus twice log-posterior, by Fisher scoring."""
 
     def at(sizes: FloatArray) -> tuple[float, FloatArray, FloatArray]:
         filtered = whitened(sizes)

@@ -75,15 +75,7 @@ def on_recordings(
     is_whole: bool,
     use: Sequence[BoolArray] | None = None,
 ) -> FitResult:
-    """Return the free run of a hypothesis on recordings it was fitted to, at their own rate.
-
-    Parameters
-    ----------
-    is_whole : bool
-        Whether the hypothesis leaves nothing but its disturbances: else its parameters are estimated anew, too.
-    use : sequence of ndarray of bool, optional
-        The samples to estimate from; by default all good ones.
-    """
+    """Return the free run of a hypothesis on recordings it was fitted to, at their own rate."""
     of = hypothesis.plain.problem
     own = [basis.own for basis in of.local]
     problem = make_problem(line, records, of.shared, own=own, profile=GRADE in hypothesis.effects, use=use)

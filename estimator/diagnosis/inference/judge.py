@@ -85,23 +85,7 @@ def beliefs(
     alike_within: float,
     alike_share: float,
 ) -> tuple[Belief, ...]:
-    """Return what is believed of each effect of the best set, the weightiest first.
-
-    Parameters
-    ----------
-    visited : mapping of set to Hypothesis
-        All that were fitted to their end, the sets without each effect of the best among them.
-    scores : sequence of Score
-        Of those of the same sets that a machine can be.
-    share : mapping of str to float
-        Of each effect of the best set (``shares``).
-    tempered : float
-        By which differences of scores are divided.
-    alike_within : float
-        Difference in score within which another effect in an effect's place is as good.
-    alike_share : float
-        The same over what the effect itself explains.
-    """
+    """Return what is believed of each effect of the best set, the weightiest first."""
     found = []
     plausible = {each.effects: visited[each.effects] for each in scores if each.is_plausible}
     for name in sorted(best.effects):
@@ -198,11 +182,6 @@ def probability_of(names: Collection[str], scores: Sequence[Score], tempered: fl
 
     A set with values that are no case of its effects is evidence of something else: against the effects it does
     without, and for none that it holds.
-
-    Parameters
-    ----------
-    tempered : float
-        By which differences of scores are divided.
     """
     holds = [any(name in names for name in each.effects) for each in scores]
     counted = [(each.score, has) for each, has in zip(scores, holds, strict=True) if each.is_plausible or not has]

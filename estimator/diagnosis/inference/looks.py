@@ -158,13 +158,7 @@ class Screen:
         return (releases[first : first + count] for first in range(0, len(releases), count))
 
     def _each(self, tried: Sequence[Callable[[FloatArray], list[FloatArray]]]) -> list[list[FloatArray]]:
-        """Simulate every recording with the parameters that several functions make of its own, in one call for all.
-
-        Returns
-        -------
-        list of list of ndarray, shape (K, R_i)
-            For each function and each recording.
-        """
+        """Simulate every recording with the parameters that several functions make of its own, in one call for all."""
         found = []
         for i in range(len(self._rows)):
             lists = [make(self._result.p_of(i)) for make in tried]

@@ -130,24 +130,7 @@ def fill_gains(
     unread: FloatArray,
     gains: Gains,
 ) -> None:
-    """Fill the gains of a recording.
-
-    Parameters
-    ----------
-    f : Terms
-        Of the transition, shape (m, m).
-    h : ndarray, shape (C, m)
-        How each of C outputs shows the state.
-    q, prior : ndarray, shape (m, m)
-        Covariance of what drives the state, and of the first state.
-    r : ndarray, shape (C,)
-        Variance of each reading.
-    observed : ndarray of bool, shape (N, C)
-    at_input : ndarray, shape (E, m)
-        How each of E inputs held for a sample moves the state.
-    unread : ndarray, shape (N, E)
-        Variance of each of them where it is known no better: of a torque that was not read, of a law's form; else 0.
-    """
+    """Fill the gains of a recording."""
     count, m = h.shape
     room = (np.empty((m, m)), np.empty((count, m)), np.empty((count, m)), np.zeros(m), np.empty(count))
     fill_gains_in(f, h, q, r, prior.copy(), observed, at_input, unread, gains, room)
@@ -223,14 +206,7 @@ def fill_gained(gains: FloatArray, t: int, e: FloatArray, total: FloatArray) -> 
 
 @compiled
 def innovate(f: Terms, h: Terms, gains: Gains, observed: BoolArray, signals: FloatArray) -> None:
-    """Replace signals of the samples that were observed by their innovations over the standard deviations.
-
-    Parameters
-    ----------
-    observed : ndarray of bool, shape (N, C)
-    signals : ndarray, shape (R, K)
-        The outputs in turn.
-    """
+    """Replace signals of the samples that were observed by their innovations over the standard deviations."""
     outputs, m, count = observed.shape[1], gains.predictor.shape[2], signals.shape[1]
     places = np.zeros(outputs, dtype=np.int64)
     for i in range(1, outputs):

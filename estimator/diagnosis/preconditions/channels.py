@@ -24,19 +24,7 @@ NEAR_A_TURN = 0.01
 
 
 def period_of(values: FloatArray, seen: BoolArray) -> float | None:
-    """Return after how much a reading begins anew; None where it does not.
-
-    Parameters
-    ----------
-    values : ndarray, shape (N,)
-    seen : ndarray of bool, shape (N,)
-        Which rows were read.
-
-    Returns
-    -------
-    float or None
-        In the unit of the reading; a single jump counts only if it is of a whole turn [rad].
-    """
+    """Return after how much a reading begins anew; None where it does not."""
     both = seen[1:] & seen[:-1] & (values[1:] != 0.0) & (values[:-1] != 0.0)  # a lost reading is zero
     steps = np.where(both, np.diff(values), 0.0)
     jumps = np.abs(steps) > HALF * float(np.ptp(values[seen]))
@@ -104,14 +92,7 @@ class Clipped:
 
 
 def clipped(channel: str, values: FloatArray, seen: BoolArray) -> list[Clipped]:
-    """Return the limits at which a channel is cut off, of its largest and its smallest value.
-
-    Parameters
-    ----------
-    values : ndarray, shape (N,)
-    seen : ndarray of bool, shape (N,)
-        Which rows were read.
-    """
+    """Return the limits at which a channel is cut off, of its largest and its smallest value."""
     levels, counts = np.unique(values[seen], return_counts=True)
     if levels.size < FEWEST_LEVELS:
         return []

@@ -108,15 +108,7 @@ NOTHING = Inertia(math.nan, 0.0)
 
 
 def fitted_inertia(record: Record, line: DrivelineModel, grid: Grid | None) -> Inertia | None:
-    """Return the inertia that a recording fits; None where it does not tell.
-
-    Parameters
-    ----------
-    line : DrivelineModel
-        Nominal model without effects.
-    grid : Grid, optional
-        How it is simulated; without one only the motion as one body is looked at.
-    """
+    """Return the inertia that a recording fits; None where it does not tell."""
     first_hz = float(natural_frequencies_rad_s(line.values())[0]) / (2.0 * math.pi)
     if grid is not None and 0.0 < ABOVE[0] * first_hz < 0.5 / record.sample_time_s:
         below, above = (by_band(record, line, grid, low * first_hz, high * first_hz) for low, high in (BELOW, ABOVE))

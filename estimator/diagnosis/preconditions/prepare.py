@@ -34,13 +34,7 @@ twice as much."""
 
 
 def require_signals(record: Record) -> None:
-    """Refuse a recording with too few good samples, or of which torque or output does not change.
-
-    Raises
-    ------
-    NotExciting
-        Naming the recording.
-    """
+    """Refuse a recording with too few good samples, or of which torque or output does not change."""
     good = int(record.okay.sum())
     if good < FEWEST_SAMPLES:
         raise NotExciting(
@@ -63,11 +57,6 @@ def require_excitation(records: Sequence[Record], model: DrivelineModel) -> list
 
     What the torque does to the output is asked of the nominal model. A part of it that stays below the noise of the
     reading is not excited: whatever is fitted there is fitted to noise.
-
-    Raises
-    ------
-    NotExciting
-        Where output or torque excites nothing in any recording.
     """
     floor = noise_floor(records)
     moved = _rms([_good(record, record.output) for record in records])
@@ -129,13 +118,7 @@ SAME_PERIOD = 1e-3
 
 
 def require_together(records: Sequence[Record]) -> None:
-    """Refuse recordings that do not belong together.
-
-    Raises
-    ------
-    BadShape
-        No recording, or different sampling periods, outputs or numbers of torques, or a name used twice.
-    """
+    """Refuse recordings that do not belong together."""
     if not records:
         raise BadShape("no recording was given, expected at least one")
     first = records[0]
@@ -172,13 +155,7 @@ _BODY = DrivelineModel(Structure.ONE_MASS, {"J_M": Parameter(1.0, 0.0), "b_M": P
 
 
 def require_plausible_alone(record: Record) -> None:
-    """Refuse a recording whose columns are swapped, or off in sign or by a unit, whatever the model is.
-
-    Raises
-    ------
-    Implausible
-        With what cures it.
-    """
+    """Refuse a recording whose columns are swapped, or off in sign or by a unit, whatever the model is."""
     if record.kind is OutputKind.FORCE:
         return
     fastest = float(np.abs(record.output[record.okay]).max())
@@ -259,19 +236,7 @@ def as_moved(records: Sequence[Record]) -> tuple[list[Record], list[str]]:
 
 
 def prepare(records: Sequence[Record], model: DrivelineModel, holdout: Sequence[Record] = ()) -> Prepared:
-    """Check and mend recordings before anything is fitted.
-
-    Raises
-    ------
-    BadShape
-        No recording, or recordings that do not belong together.
-    BadModel
-        A recorded output that the structure does not have.
-    NotExciting
-        Too few good samples, too many gaps, or torque or output that does not change or excites nothing.
-    Implausible
-        Torque, output or time that is off by a factor or in sign.
-    """
+    """Check and mend recordings before anything is fitted."""
     require_together([*records, *holdout] if records else records)
     mended, warnings = as_moved([*records, *holdout])
     for record in mended:

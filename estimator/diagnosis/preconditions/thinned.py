@@ -43,16 +43,7 @@ class NotRead:
 
 
 def not_read(channel: str, values: FloatArray, seen: BoolArray, may_rest: bool) -> list[NotRead]:
-    """Return the rows in which a channel is interpolated, and those in which it is held at one value.
-
-    Parameters
-    ----------
-    values : ndarray, shape (N,)
-    seen : ndarray of bool, shape (N,)
-        Which rows were read.
-    may_rest : bool
-        Whether the channel may stay where it is, whatever that is: a position, the torque of a joint.
-    """
+    """Return the rows in which a channel is interpolated, and those in which it is held at one value."""
     whole = seen[:-2] & seen[1:-1] & seen[2:]
     steps = np.abs(np.diff(values))
     if not whole.any() or not (steps > 0.0).any():
@@ -110,15 +101,7 @@ SEED = 1
 
 
 def with_room(segments: Cut, training: Iterable[str]) -> tuple[Cut, list[str]]:
-    """Leave out pieces of the recordings that are fitted, as many as a fit can't hold; say which are used.
-
-    Parameters
-    ----------
-    segments
-        All recordings, cut.
-    training
-        Names of those that are fitted; others are only simulated, one by one.
-    """
+    """Leave out pieces of the recordings that are fitted, as many as a fit can't hold; say which are used."""
     pieces = segments.of(training)
     used = list(pieces)
     while (size := _size(used)) > MOST and len(used) > 1:

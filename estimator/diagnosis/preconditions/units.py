@@ -82,15 +82,7 @@ AT_THE_WHEEL = "is the speed, the torque or the inertia at the wheel, expected a
 
 
 def close_factors(ratio: float, gear_ratio: float | None = None) -> list[Factor]:
-    """Return the factors that a ratio of inertias is close to, nearest first.
-
-    Parameters
-    ----------
-    ratio : float
-        Inertia that fits over the nominal one, greater than 0.
-    gear_ratio : float, optional
-        Motor turns per wheel turn.
-    """
+    """Return the factors that a ratio of inertias is close to, nearest first."""
     table = list(KNOWN)
     if gear_ratio is not None:
         for power, name in ((1, "the gear ratio"), (2, "the gear ratio squared")):
@@ -149,13 +141,7 @@ UNKNOWN = "No common unit is off by this; is one of several torques counted with
 
 
 def require_plausible_units(records: Sequence[Record], model: DrivelineModel) -> None:
-    """Refuse recordings whose torque, output or time is off by a factor or in sign.
-
-    Raises
-    ------
-    Implausible
-        With the factor, and the units that it is close to.
-    """
+    """Refuse recordings whose torque, output or time is off by a factor or in sign."""
     line = replace(model, effects={})
     for record in records:
         _require_plausible_load(record)

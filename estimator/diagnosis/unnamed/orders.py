@@ -31,18 +31,7 @@ FEWEST_SAMPLES = 1024
 
 
 def peaks(signals: Sequence[FloatArray], angles: Sequence[FloatArray]) -> FloatArray:
-    """Return the orders at which signals of recordings have most power over the angle, strongest first.
-
-    Parameters
-    ----------
-    signals, angles : sequence of ndarray, shape (B_i,)
-        Signal and motor angle [rad] of each recording; phases are each recording's own.
-
-    Returns
-    -------
-    ndarray, shape (K,)
-        Periods per motor turn; K may be 0.
-    """
+    """Return the orders at which signals of recordings have most power over the angle, strongest first."""
     width = 2.0 * np.pi / (BINS_PER_WAVE * HIGHEST_ORDER)
     signals, angles = _pieces(signals, angles)
     if not angles:

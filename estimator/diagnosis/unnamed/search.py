@@ -72,13 +72,7 @@ def best_of(laws: Sequence[UnnamedLaw]) -> UnnamedLaw | None:
 
 
 def unnamed_laws(result: FitResult, rounds: int = 1) -> list[UnnamedLaw]:
-    """Return the best law of each element that has candidates.
-
-    Parameters
-    ----------
-    rounds : int
-        1 looks from the fit alone: enough to tell whether anything is left. ``ROUNDS``, as many as help, tells where.
-    """
+    """Return the best law of each element that has candidates."""
     view = scene(result, noise_floor(result.problem.records))
     return judged(view, hunts_of(view, rounds))
 

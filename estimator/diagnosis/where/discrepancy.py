@@ -169,19 +169,7 @@ def picture(
     kind: Kind,
     length: int,
 ) -> LawPicture | None:
-    """Return a law over the signal that it is most nearly a function of; None where it is a function of none.
-
-    Parameters
-    ----------
-    without : FitResult
-        The model without the law, its outputs simulated.
-    outputs : sequence of ndarray, shape (N_i,)
-        Simulations with the law.
-    motions : sequence of Motion
-        What then happens, per block.
-    length : int
-        Samples of such a block.
-    """
+    """Return a law over the signal that it is most nearly a function of; None where it is a function of none."""
     cut = lines(without, length=length)
     place = PLACES[element]
     found = explain(without, cut, place, floor)
@@ -216,29 +204,7 @@ def discrepancy(
     begun: Sequence[Hunt] = (),
     whitening: Filter | None = None,
 ) -> Discrepancy:
-    """Look at what a re-tuned model lacks, with the effects found or, where there are none, with laws without a name.
-
-    Parameters
-    ----------
-    retuned : FitResult
-        Fit of the nominal parameters within their tolerances.
-    final : FitResult
-        Fit with the effects found to the same recordings; ``retuned`` itself where none is believed.
-    floor : float
-        Noise floor [unit of the output].
-    motion : Motion
-        Rotation or translation, for the units.
-    rounds : int, optional
-        Rounds of the search for laws without a name; by default all (``ROUNDS``) where nothing is named, else one.
-    begun : sequence of Hunt, optional
-        What the first of them have found in ``retuned``, where there were any.
-    whitening : Filter, optional
-        By which laws are weighed; by default errors count as they are.
-
-    Returns
-    -------
-    Discrepancy
-    """
+    """Look at what a re-tuned model lacks, with the effects found or, without any, with laws without a name."""
     view = scene(retuned, floor, whitening)
     named = effects_added(retuned, final)
     hunts = hunts_of(view, rounds or (1 if named else ROUNDS), begun)

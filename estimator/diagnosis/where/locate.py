@@ -220,17 +220,7 @@ def _merged(spans: Sequence[Interval]) -> list[Interval]:
 
 
 def band_hz(mismatch: Sequence[FloatArray], sample_times_s: Sequence[float], noise: float) -> Interval | None:
-    """Return the band that holds the central part of a mismatch's power [Hz]; None where noise could be all.
-
-    Parameters
-    ----------
-    mismatch : sequence of ndarray, shape (N_i,)
-        Per recording, 0 where a sample is missing.
-    sample_times_s : sequence of float
-        Their sampling periods.
-    noise : float
-        RMS of the white noise in them; only frequencies that stand above it count. 0 where simulations are compared.
-    """
+    """Return the band that holds the central part of a mismatch's power [Hz]; None where noise could be all."""
     frequency: FloatArray = np.fft.rfftfreq(min(LONGEST_SEGMENT, mismatch[0].size), sample_times_s[0]).astype(float)
     density: FloatArray = np.zeros(frequency.size)
     white, averages = 0.0, 0.0

@@ -282,24 +282,7 @@ class _Held:
 def physical_parameters(
     model: LinearModel, covariance: FloatArray, known: Mapping[str, Uncertain] | None = None
 ) -> PhysicalEstimate:
-    """Estimate the two-mass drive behind a linear model from motor torque to motor speed.
-
-    Parameters
-    ----------
-    model : LinearModel
-        na = nb = 3, nk = 1, at the period at which the torque was held.
-    covariance : ndarray, shape (6, 6)
-        Of its theta.
-    known : Mapping[str, Uncertain], optional
-        What is known beforehand of single parameters, e.g. a friction measured by coasting down.
-
-    Raises
-    ------
-    BadModel
-        If the model is of another structure, or no line that can be responds like it.
-    BadSetting
-        If ``known`` names no parameter, or gives a standard deviation that is not above 0.
-    """
+    """Estimate the two-mass drive behind a linear model from motor torque to motor speed."""
     prior = _checked(model, covariance, known or {})
     start = two_mass_start(model)
     variances, axes = np.linalg.eigh(covariance)

@@ -298,40 +298,6 @@ def integrate(
     """Simulate samples ``first`` to ``last``, without this one.
 
     Column k of ``out`` is the states' entries before torque k acts.
-
-    Parameters
-    ----------
-    masses : tuple of int
-        An entry for each of them, 1 to 3.
-    own : tuple
-        Empty, or what ``Line.own`` says.
-    sample_time_s : float
-        Sampling period [s].
-    substeps : int
-        Integration steps per period.
-    sign_width : float
-        Speed within which dry friction changes sign [rad/s].
-    first, last : int
-        Sample to start at, and the one behind the last; other torques are only seen through a delay or a clock.
-    start_s : float
-        Time of sample 0, for laws over time [s].
-    torque, load : ndarray, shape (N,)
-        Torque on the motor shaft before delay and lag, held over each period, and load torque [Nm].
-    angle : ndarray, shape (N,)
-        Motor angle at each sample, which periodic laws take their phase from [rad].
-    p : ndarray, shape (layout.SIZE,)
-        Parameters of the superset model.
-    state : ndarray, shape (STATES,)
-        Start state; the end state afterwards.
-    outputs : ndarray of int, shape (C,)
-        Which states are the outputs.
-    sensor : bool
-        Whether the first output is seen through the speed sensor.
-    out : ndarray, shape (C, N)
-        Filled from ``first`` on.
-    slopes : ndarray, shape (2, N) or (2, 0)
-        Where it has room: slope of the first output just before and just after each sample [its unit / s]. That before
-        ``first`` is taken from it, and where it is longer that before the next sample is left in it.
     """
     given = (
         sample_time_s,

@@ -15,13 +15,7 @@ if TYPE_CHECKING:
 
 
 def asked_of_steps(skip: Sequence[str], because: Sequence[str], repeat: Sequence[str]) -> Asked:
-    """Put together what is asked of single steps.
-
-    Raises
-    ------
-    UsageError
-        If a step is unknown, is to be both skipped and repeated, or is to be skipped without a reason.
-    """
+    """Put together what is asked of single steps."""
     for name in (*skip, *repeat):
         if name not in NAMES:
             raise UsageError(f"step {name!r}: expected one of {', '.join(NAMES)}. Name one of these.")

@@ -21,13 +21,7 @@ REPORT, MODEL = "commissioning.html", "model.toml"
 
 
 def write_report(state: State) -> None:
-    """Write the commissioning report into the folder of the job, and into the state what it was made from.
-
-    Raises
-    ------
-    UsageError
-        If it can't be written.
-    """
+    """Write the commissioning report into the folder of the job, and into the state what it was made from."""
     from hil.report.commission_html import commission_page  # brings the plotting library along
 
     runs = [run for record in state.steps.values() for run in record.runs if run.recording]

@@ -48,13 +48,7 @@ class Job:
 
 
 def record(job: Job, grants: RealTimeGrants) -> RunSummary:
-    """Drive the experiment and record it; what was measured is kept and entered on every way out.
-
-    Raises
-    ------
-    DriverError, HilError
-        What ended the run early; the drives are disarmed by then.
-    """
+    """Drive the experiment and record it; what was measured is kept and entered on every way out."""
     plan = plan_run(job.rig, job.experiment)
     stop, timing = StopRequest(), RunTiming(job.pacer.period_ns)
     recorder = RecordingWriter(

@@ -19,13 +19,7 @@ if TYPE_CHECKING:
 def live_estimate(
     rig: Rig, recording: Path, filter_of: Path | None = None, filter_run: str | None = None
 ) -> LiveEstimate:
-    """Make what estimates a run while it lasts.
-
-    Raises
-    ------
-    UsageError
-        If its file is there already, or the rig's period does not divide that of the models; see `with_filter` too.
-    """
+    """Make what estimates a run while it lasts."""
     from estimator.errors import BadSetting
     from hil.rig.live import LiveEstimate, tracking_chain, tracking_settings
 

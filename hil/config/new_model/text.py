@@ -21,13 +21,7 @@ COMMENTS_AT = 48
 def model_text(
     file: Path, model: DrivelineModel, known: Mapping[str, Known], signals: Sequence[str], recording: Path | None
 ) -> str:
-    """Return the file, checked as any model file is.
-
-    Raises
-    ------
-    ModelFileError
-        If it does not make one.
-    """
+    """Return the file, checked as any model file is."""
     where = "at the motor shaft" if model.motion is Motion.ROTATION else "in the line of travel"
     source = "REC" if recording is None else printable(recording.name)
     lines = [

@@ -42,13 +42,7 @@ class Known:
 
 
 def assignments(option: str, texts: Sequence[str], structure: Structure) -> dict[str, float]:
-    """Read NAME=NUMBER as often as it was given.
-
-    Raises
-    ------
-    UsageError
-        With every one that is none, or of a parameter that the structure does not have.
-    """
+    """Read NAME=NUMBER as often as it was given."""
     found: dict[str, float] = {}
     faults = []
     for text in texts:
@@ -75,24 +69,7 @@ def parameters(
     known: Mapping[str, Known],
     ask: Ask | None,
 ) -> dict[str, Parameter]:
-    """Return every parameter of a structure.
-
-    Parameters
-    ----------
-    values, tolerances
-        As they were given by name.
-    usual_tolerance
-        Of what has none of its own.
-    known
-        What an identification says; what was given counts over it.
-    ask
-        Asks for what is not given; None: nobody is there, and what is missing is refused.
-
-    Raises
-    ------
-    UsageError
-        With every value that is missing.
-    """
+    """Return every parameter of a structure."""
     found: dict[str, Parameter] = {}
     missing = []
     for name in structure.parameter_names:

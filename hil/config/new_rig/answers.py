@@ -14,24 +14,7 @@ Ask = Callable[[Question, str, str], str]
 def answers(
     given: Mapping[str, str], simulated: bool, ask: Ask | None = None, known: Mapping[str, str] | None = None
 ) -> Answers:
-    """Return an answer to every question.
-
-    Parameters
-    ----------
-    given
-        Text by name of the question, from the command line.
-    simulated
-        Whether the defaults are those of the simulated rig; on a vehicle some questions have none.
-    ask
-        Asks for what was not given, as often as it takes; None: nobody is there, and defaults stand.
-    known
-        Defaults by name of the question that a drive's data sheet has, over the usual ones.
-
-    Raises
-    ------
-    UsageError
-        Naming every option that is wrong, and every one that is missing where nobody can be asked.
-    """
+    """Return an answer to every question."""
     found: dict[str, Value] = {}
     faults: list[str] = []
     for question in QUESTIONS:

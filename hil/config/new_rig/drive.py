@@ -40,22 +40,7 @@ class NewDrive:
 
 
 def new_drive(eds: Path, rig_file: Path, simulated: bool) -> NewDrive:
-    """Read a drive's data sheet for a new rig file.
-
-    Parameters
-    ----------
-    eds
-        The data sheet.
-    rig_file
-        The rig file to be, for the path between the two.
-    simulated
-        Whether it is for ``hil sim``: there what is not known may be guessed, on a vehicle guesses are comments.
-
-    Raises
-    ------
-    InputError
-        If a drive with this file can't be used.
-    """
+    """Read a drive's data sheet for a new rig file."""
     report = check_eds(eds)
     if report.plan is None or not report.usable:
         first = next(each for each in report.findings if each.severity is Severity.ERROR)

@@ -51,24 +51,7 @@ HEARTBEAT: Final = "heartbeat_ms ="
 
 
 def rig_text(answers: Answers, file: Path, simulated: bool, drive_lines: Sequence[str] = ()) -> str:
-    """Return the file, checked as any rig file is.
-
-    Parameters
-    ----------
-    answers
-        To every question.
-    file
-        Where the file will be, for the commands its comments show and the paths in it.
-    simulated
-        Whether the table for ``hil sim`` is kept.
-    drive_lines
-        Lines that the drives' data sheet makes necessary, for each inverter.
-
-    Raises
-    ------
-    RigFileError
-        If the answers do not make a rig; every fault is named.
-    """
+    """Return the file, checked as any rig file is."""
     template = (files("hil.config.new_rig") / "rig.toml").read_text(encoding="utf-8")
     if not simulated:
         template = template.partition("\n[simulation]")[0]

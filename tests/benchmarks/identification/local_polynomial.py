@@ -30,24 +30,7 @@ DEGREE = 2
 
 
 def local_polynomial(record: Record, half_width: int = 6, degree: int = DEGREE) -> SpectralEstimate:
-    """Estimate the transfer function from total torque to output with the transient taken out.
-
-    Parameters
-    ----------
-    record : Record
-        With the slow part removed. The longest stretch without masked samples is used.
-    half_width : int
-        n: neighbours to either side that each value is fitted to; more average more, and follow a sharp resonance less.
-    degree : int
-        R of both polynomials.
-
-    Raises
-    ------
-    BadSetting
-        If the neighbours are too few for the polynomials.
-    NotExciting
-        If the longest unbroken stretch has fewer lines than neighbours.
-    """
+    """Estimate the transfer function from total torque to output with the transient taken out."""
     columns, width = 2 * (degree + 1), 2 * half_width + 1
     require(
         "local polynomial estimate",

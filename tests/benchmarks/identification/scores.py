@@ -62,25 +62,7 @@ class Errors:
 
 @dataclass(frozen=True, slots=True)
 class Coverage:
-    """How often the printed intervals of one quantity held the truth.
-
-    Attributes
-    ----------
-    method, quantity
-        Whose, and of what.
-    held : Rate
-        Of all intervals printed.
-    held_determined : Rate
-        Of those called determined.
-    impossible : int
-        Called determined although all of the interval is at or below 0.
-    refused : int
-        Buses without such an interval.
-    error_rms, half_width : float
-        Relative to the truth: RMS of the error, and the median half width of the intervals.
-    scatter : float
-        Error over stated standard deviation, its median size over that of a normal variable: 1 is right.
-    """
+    """How often the printed intervals of one quantity held the truth."""
 
     method: str
     quantity: str
@@ -211,7 +193,6 @@ def coverage_row(one: Coverage) -> tuple[str, ...]:
 
 
 def tables(judged: Sequence[Judged]) -> str:
-    """Return all tables."""
     methods = list(judged[0].answers)
     scored = {name: errors(judged, name) for name in methods}
     reference = scored.get(REFERENCE)

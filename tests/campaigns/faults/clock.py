@@ -19,13 +19,7 @@ def compiler() -> str | None:
 
 
 class Clock:
-    """The time of day of the processes that are started with its environment.
-
-    Parameters
-    ----------
-    folder
-        Where its library and the file are that says how far it is off.
-    """
+    """The time of day of the processes that are started with its environment."""
 
     def __init__(self, folder: Path) -> None:
         self._library, self._path = folder / "stepped_clock.so", folder / "clock_offset"

@@ -17,13 +17,7 @@ CHUNK_BYTES = 1 << 16
 
 
 class Disk:
-    """A mounted file system.
-
-    Attributes
-    ----------
-    root
-        Where it is mounted.
-    """
+    """A mounted file system."""
 
     def __init__(self, root: Path) -> None:
         self.root = root
@@ -52,13 +46,7 @@ class Disk:
 
 @contextmanager
 def disk(folder: Path) -> Iterator[Disk]:
-    """Make a disk in a folder, and mount it.
-
-    Raises
-    ------
-    subprocess.CalledProcessError, FileNotFoundError
-        If the machine does not let this user mount.
-    """
+    """Make a disk in a folder, and mount it."""
     image, root = folder / "disk.img", folder / "disk"
     with image.open("wb") as file:
         file.truncate(SIZE_BYTES)

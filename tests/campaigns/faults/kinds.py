@@ -11,25 +11,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """One fault.
-
-    Attributes
-    ----------
-    spec
-        Fault of a device, with ``S`` for the moment; empty where the host meets it.
-    cause
-        Pattern of what the run has to say when it ends.
-    host
-        What the host meets: ``stop``, ``stall``, ``disk``, or a frame of a stranger ``ID:DATA`` in hex.
-    needs_torque
-        Whether it shows only while a torque is asked for that is large enough.
-    may_pass
-        Whether a run may also continue with it.
-    exceeds
-        Whether the drive itself gives more than it is asked for.
-    silent
-        The drive that can't say that it is disarmed; 0 for none.
-    """
+    """One fault."""
 
     spec: str
     cause: str

@@ -49,19 +49,7 @@ NOTICED_S = 0.3
 
 @dataclass
 class Outcome:
-    """How a run ended.
-
-    Attributes
-    ----------
-    said
-        What ended it; empty where it went to its end.
-    zero_s
-        From the fault until both torques were zero for good [s].
-    steps
-        SYNCs in all.
-    problems
-        What must not be, in words.
-    """
+    """How a run ended."""
 
     said: str = ""
     zero_s: float = 0.0
@@ -121,13 +109,7 @@ class _StallingPacer(FreePacer):
 
 
 def run_with(rig: Rig, experiment: str, kind: Kind, at_s: float, folder: Path, steps: int = 0) -> Outcome:
-    """Run an experiment with a fault.
-
-    Parameters
-    ----------
-    steps
-        SYNCs of the same run without a fault.
-    """
+    """Run an experiment with a fault."""
     outcome = Outcome()
     plant, path = WatchedPlant(rig.inverters.m1.rated_torque_nm), folder / f"{uuid.uuid4()}.csv"
     faults = rig_faults([kind.spec.replace("@S", f"@{at_s}")] if kind.spec else [], rig.period_s)

@@ -112,13 +112,6 @@ class Kind:
     """What is met, what the host has to say, and whether the drives have to stop by themselves.
 
     A host that continues must not be disturbed: who asks its drives for anything is a foreign controller.
-
-    Attributes
-    ----------
-    ends_it
-        Whether the run has to end; else it has to continue undisturbed, and is stopped later.
-    needs
-        A ``disk`` or a ``clock`` of its own.
     """
 
     meet: Meet

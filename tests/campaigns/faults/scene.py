@@ -75,11 +75,6 @@ class States:
         """Wait until neither drive is in a state that may carry torque; give how long that took [s].
 
         Ask for the states, or, where that would disturb a host, listen to the answers that it gets when it disarms.
-
-        Raises
-        ------
-        TimeoutError
-            If they are not within `PATIENCE_S`.
         """
         began_s = time.monotonic()
         while len(self.answers) < 2 or any(state in TORQUE_STATES for state in self.answers.values()):

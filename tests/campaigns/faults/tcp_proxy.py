@@ -10,13 +10,7 @@ from typing import Self
 
 
 class TcpProxy:
-    """Forwards connections to a port of 127.0.0.1, from a free port of its own.
-
-    Parameters
-    ----------
-    target
-        The port.
-    """
+    """Forwards connections to a port of 127.0.0.1, from a free port of its own."""
 
     def __init__(self, target: int) -> None:
         self._target = target

@@ -13,19 +13,7 @@ Read = Callable[[bytes], object]
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """One reader.
-
-    Attributes
-    ----------
-    seeds
-        Makes whole inputs, in a folder of its own.
-    opened
-        Gives what reads, in the same folder, for as long as it is open.
-    text
-        Whether its inputs are texts.
-    names_file
-        Whether a refusal has to name the file.
-    """
+    """One reader."""
 
     seeds: Callable[[Path], list[bytes]]
     opened: Callable[[Path], AbstractContextManager[Read]]

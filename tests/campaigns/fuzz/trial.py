@@ -25,21 +25,7 @@ MOST_SEEDS = 400
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """What became of one input.
-
-    Attributes
-    ----------
-    number
-        Of the mutant; below 0 for a seed as it is.
-    data
-        The input.
-    said
-        Why it was refused; empty where it was read.
-    wrong
-        What must not be; empty where nothing was.
-    seconds
-        How long it took.
-    """
+    """What became of one input."""
 
     number: int
     data: bytes

@@ -39,19 +39,7 @@ class Progress(Structure):
 
 @dataclass
 class Left:
-    """What a killed process left.
-
-    Attributes
-    ----------
-    moment
-        What it was doing: ``writing``, ``publishing`` or ``after``.
-    rows
-        Readable rows.
-    lost
-        Rows that were handed over and are not readable.
-    problems
-        What must not be, in words.
-    """
+    """What a killed process left."""
 
     moment: str
     rows: int = 0

@@ -39,17 +39,7 @@ _FUNCTIONS = {"min": "max", "max": "min", "any": "all", "all": "any"}
 
 @dataclass(frozen=True)
 class Mutant:
-    """A changed module.
-
-    Attributes
-    ----------
-    line
-        Where, for people.
-    change
-        What was there, and what is now; with the number of its like, a name that outlives other lines.
-    source
-        The whole module.
-    """
+    """A changed module."""
 
     line: int
     change: str

@@ -58,19 +58,7 @@ def tell(failure: Failure) -> Outcome:
 
 
 def said(command: str, *also: str, only: tuple[str, ...] = (), without: str = "") -> tuple[str, int]:
-    """Carry out a command line as a user types it; return what it printed and its exit status.
-
-    Parameters
-    ----------
-    command
-        ``hil ...``.
-    also
-        Further words that are not shown.
-    only
-        How the paragraphs begin that are shown, such as ``note:``; without it all are. What is left out is marked.
-    without
-        Pattern of what is taken out wherever it stands, unmarked: a name drawn at random.
-    """
+    """Carry out a command line as a user types it; return what it printed and its exit status."""
     printed = io.StringIO()
     with _wide(), contextlib.redirect_stdout(printed), contextlib.redirect_stderr(printed):
         status = run([*shlex.split(command)[1:], *also])

@@ -19,19 +19,7 @@ TORQUE_STEP_NM = 0.6
 
 
 def cruise(path: Path, prbs_nm: float, gain_nm_s: float = 0.0, duration_s: float = 30.0) -> Path:
-    """Write a cruise of the bus at 10 ms.
-
-    Parameters
-    ----------
-    path
-        CSV file to write.
-    prbs_nm
-        Amplitude of the PRBS, both inverters together [Nm].
-    gain_nm_s
-        Of a controller from the measured speed to the torque [Nm s/rad]; 0 for none.
-    duration_s
-        Length [s].
-    """
+    """Write a cruise of the bus at 10 ms."""
     rng = np.random.default_rng(3)
     samples = round(duration_s / PERIOD_S)
     transition, drive = _sampled()

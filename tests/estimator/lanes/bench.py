@@ -13,13 +13,7 @@ from estimator.signals.record import FloatArray
 
 
 def in_both_ways(function: Callable[..., Any], arguments: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray]:
-    """Return a compiled function's results, shape (N,), in lanes and one by one, for arguments of shape (N,) each.
-
-    Raises
-    ------
-    ValueError
-        Where N is no multiple of the lanes.
-    """
+    """Return a compiled function's results, shape (N,), in lanes and one by one, for arguments of shape (N,) each."""
     rows = [np.ascontiguousarray(argument).reshape(-1, LANES) for argument in arguments]
     together, alone = np.empty_like(rows[0]), np.empty(rows[0].size)
     WAYS[len(arguments) - 1](function, tuple(rows), together)

@@ -70,23 +70,7 @@ def solve(rhs: Rhs, start: FloatArray, held: Held, times_s: FloatArray, events_s
 
 @dataclass(frozen=True, slots=True)
 class TwoMass:
-    """Newton's law for two masses and a shaft; each torque is a function that a test replaces by an effect's law.
-
-    Attributes
-    ----------
-    values : mapping
-        J_M, J_L, k, c, b_M, b_L.
-    load_nm : float
-        Constant load torque T_0.
-    ripple : callable
-        Time to a torque next to the one applied [Nm].
-    friction, drag : callable
-        Time and speed to the torque against the motor's and the load's motion, next to the viscous one [Nm].
-    shaft : callable or None
-        Time, twist and its rate to the torque of the shaft [Nm]; None: linear.
-    more_motor, more_load : callable
-        Time to what the inertias gain [kg m^2].
-    """
+    """Newton's law for two masses and a shaft; each torque is a function that a test replaces by an effect's law."""
 
     values: Mapping[str, float]
     load_nm: float = 0.0
