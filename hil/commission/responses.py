@@ -14,7 +14,6 @@ from estimator.signals.decimate import decimate
 from estimator.signals.record import BoolArray, FloatArray, Record
 from hil.recording import read_record, read_table
 from hil.recording.columns import FLAGS, SPEED, TIME, TORQUE_M1, TORQUE_M2
-from hil.report.figures import extremes
 
 if TYPE_CHECKING:
     from estimator.identification.spectral import SpectralEstimate
@@ -42,6 +41,8 @@ def record_of(path: Path) -> Record:
 
 def thinned(x: FloatArray, *ys: FloatArray) -> list[list[float]]:
     """Return courses thinned for drawing, x first; the peaks of the last one are kept."""
+    from hil.report.figures import extremes  # brings the plot library
+
     kept = extremes(ys[-1], DRAWN)
     return [rounded(values[kept]) for values in (x, *ys)]
 
