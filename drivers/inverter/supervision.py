@@ -8,7 +8,7 @@ What has been summed is forgotten evenly over `FORGOTTEN_S` of readings within t
 A torque is expected within the range of the commands of the last response time and of the two cycles in which it may
 be sampled (opendbc's ``dist_to_meas_check``): a drive is between where it was and where it is sent. Two readings of
 the one shaft may differ by `SPEED_NOISE_RAD_S`, one count of each, `SPEED_SHARE` of the greater, and what the speed
-changes within two periods: by so much one may have been sampled earlier than the other.
+changes within two periods, now or usually: by so much one may have been sampled earlier than the other.
 
 No clock, bus or thread here: time comes in as nanoseconds.
 """
@@ -52,6 +52,9 @@ SURPLUS_CYCLES: Final = 100
 
 MOST_MISSING: Final = 25
 """Cycles without a TPDO more than with one: a drive that answers less than every second SYNC, within 1 s at 10 ms."""
+
+CHANGE_CYCLES: Final = 8.0
+"""Over which the usual change of a speed from one cycle to the next is taken: noise changes it at every cycle."""
 
 RUNAWAY_RAD_S: Final = 2.0
 """Change of speed that a torque must have been able to give before it is compared [rad/s]; four times the noise."""
@@ -244,7 +247,7 @@ class _Drive:
         self.doubtful = False
         self.faults: list[str] = []
         self.wrong_torque = ""
-        self.change_rad_s = 0.0
+        self.change_rad_s = self._usual_rad_s = 0.0
         self.followed = not self._watches_follow
         self._ignored_ns: int | None = None
         self._asked = False
@@ -268,7 +271,9 @@ class _Drive:
         self.repeats = (
             before is not None and feedback.torque_raw == before.torque_raw and feedback.speed_raw == before.speed_raw
         )
-        self.change_rad_s = 0.0 if before is None else abs(feedback.speed_rad_s - before.speed_rad_s)
+        change_rad_s = 0.0 if before is None else abs(feedback.speed_rad_s - before.speed_rad_s)
+        self._usual_rad_s += (change_rad_s - self._usual_rad_s) / CHANGE_CYCLES
+        self.change_rad_s = max(change_rad_s, self._usual_rad_s)
         if self.repeats:
             self._repeated(t_ns, feedback, seen.commanded_nm)
         else:
@@ -385,7 +390,7 @@ class Supervision:
         self._stale_ns = guard.feedback_timeout_s * NS_PER_S
         self._apart: Excess | None = None
         self._impulse_nm_s = 0.0
-        self._from_rad_s = 0.0
+        self._from_rad_s: float | None = None
         self._first_ns: int | None = None
         self.ended: DriverError | None = None
 
@@ -470,7 +475,7 @@ class Supervision:
         if inertia is None:
             return
         torque_nm = one.torque_nm + other.torque_nm
-        if torque_nm * one.speed_rad_s >= 0.0 or torque_nm * self._impulse_nm_s < 0.0:
+        if self._from_rad_s is None or torque_nm * one.speed_rad_s >= 0.0 or torque_nm * self._impulse_nm_s < 0.0:
             self._impulse_nm_s, self._from_rad_s = 0.0, one.speed_rad_s
             return
         self._impulse_nm_s += torque_nm * self._limits.guard.period_s

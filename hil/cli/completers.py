@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import pkgutil
 import re
 from collections.abc import Iterator
 from importlib.resources import files
@@ -12,9 +11,11 @@ import typer
 
 
 def effect_names(incomplete: str) -> Iterator[str]:
-    """Yield the effects that begin so; by their files, for importing them takes a second."""
-    folder = files("estimator") / "physics" / "effects"
-    return (module.name for module in pkgutil.iter_modules([str(folder)]) if module.name.startswith(incomplete))
+    """Yield the effects that begin so; from the text of their files, for importing them takes a second."""
+    for file in (files("estimator") / "physics" / "effects").iterdir():
+        if file.name.endswith(".py"):
+            names = re.findall(r'^    name="(\w+)",$', file.read_text("utf-8"), re.MULTILINE)
+            yield from (name for name in names if name.startswith(incomplete))
 
 
 def experiment_names(ctx: typer.Context, incomplete: str) -> Iterator[str]:

@@ -73,9 +73,8 @@ def sim(
     Prints one line, `ready bus=... modbus=...`, and runs until SIGINT or SIGTERM. Port 0 takes a free one.
     """
     from hil.config.rig_file import read_rig
-    from hil.simulator.driveline import plant_for
+    from hil.simulator.driveline import EffectSpec, plant_for
     from hil.simulator.fault_table import rig_faults
-    from hil.simulator.plant import EffectSpec
     from hil.simulator.rig_server import RigServer
 
     rig_file = read_rig(rig)

@@ -35,8 +35,8 @@ from hil.rig.pacing import FreePacer, heartbeat_patience_ms, period_ns
 from hil.rig.plan import Plan, plan_run
 from hil.rig.session import run_plan
 from hil.rig.stop import StopRequest
+from hil.simulator.driveline import simulation_model
 from hil.simulator.loopback import IN_PROCESS, Address
-from hil.simulator.plant import simulation_model
 from hil.simulator.rig_server import RigServer, required_simulation
 
 PRBS_STATES = 1023

@@ -25,7 +25,7 @@ from hil.rig.live import USUAL, OnlineSetup
 from hil.rig.replay import replay
 from hil.rig.trace import is_trace
 from hil.sample import Sample
-from hil.simulator.plant import simulation_model
+from hil.simulator.driveline import simulation_model
 from hil.simulator.rig_server import required_simulation
 
 

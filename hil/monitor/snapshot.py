@@ -20,7 +20,7 @@ WINDOW_S = 10.0
 STANDS_STILL_S = 0.3
 """Without a good sample for so long [s] the estimate is said to stand still; a lost frame or two are no news."""
 
-NO_VALUE = 1 << 8
+NO_VALUE = 2 * max(SampleFlag)
 """Besides the bits of `SampleFlag`: no flag, and yet no number, as a recording of another program may have it."""
 
 _WORDS = {
@@ -29,6 +29,8 @@ _WORDS = {
     SampleFlag.M1_LIMITED: "m1 in its internal limit",
     SampleFlag.M2_LIMITED: "m2 in its internal limit",
     SampleFlag.CHANNEL_LOST: "a channel not read",
+    SampleFlag.M1_DOUBTFUL: "m1 doubtful",
+    SampleFlag.M2_DOUBTFUL: "m2 doubtful",
     NO_VALUE: "no value",
 }
 

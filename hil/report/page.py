@@ -325,7 +325,7 @@ def is_allowed(href: str) -> bool:
 def _environment() -> Environment:
     environment = Environment(
         loader=PackageLoader("hil.report"), autoescape=True, undefined=StrictUndefined, trim_blocks=True,
-        lstrip_blocks=True,
+        lstrip_blocks=True, keep_trailing_newline=True,
     )  # fmt: skip
     environment.filters["kind"] = lambda block: type(block).__name__
     environment.tests["allowed"] = is_allowed

@@ -15,7 +15,7 @@ from hil.config.rig_file import Rig
 from hil.rig.experiments.base import Phase
 from hil.rig.pacing import FreePacer, period_ns
 from hil.rig.plan import plan_run
-from hil.simulator.plant import simulation_model
+from hil.simulator.driveline import simulation_model
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,25 +3,76 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Effect, EffectParameter, Element
 from estimator.physics.kernel import integration
-from estimator.physics.model import DrivelineModel, EffectValue, Motion
+from estimator.physics.model import DrivelineModel, EffectValue, Motion, Parameter, Structure
 from estimator.physics.simulate import MASSES, output_state
 from estimator.physics.stepper import SIGN_WIDTH_RAD_S, Stepper
 from estimator.signals.record import FloatArray, Location, OutputKind, Record
-from hil.config.rig_file import Rig
-from hil.errors import UsageError
-from hil.simulator.plant import EffectSpec, Plant, simulation_model
+from hil.config.model_file import read_model
+from hil.config.rig_file import Rig, SimulationTable
+from hil.errors import ModelFileError, UsageError
+from hil.simulator.plant import Plant
 from hil.simulator.plc_device import PlcSetup
 from hil.simulator.rig_server import required_simulation
 
 FINER = 16
 """An acceleration is the slope over an integration step: this many times shorter than those of the simulation."""
+
+
+DEFAULT_BUS = DrivelineModel(
+    structure=Structure.TWO_MASS,
+    parameters={
+        "J_M": Parameter(1.6, 0.2),
+        "J_L": Parameter(100.0, 0.2),
+        "k": Parameter(4200.0, 0.2),
+        "c": Parameter(9.0, 0.2),
+        "b_M": Parameter(0.35, 0.2),
+        "b_L": Parameter(0.9, 0.2),
+    },
+    gear_ratio=5.6,
+)
+"""A hybrid bus of 14 t, gear ratio 5.6, wheel radius 0.48 m, reflected to the motor shaft.
+
+Assumed, for the paper gives no parameter values: first resonance 8.2 Hz, inside the 5 to 50 Hz band it names.
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class EffectSpec:
+    """An effect put into the simulated rig: its name in the catalogue and the parameters given for it."""
+
+    name: str
+    parameters: Mapping[str, float]
+
+    @classmethod
+    def parse(cls, text: str) -> EffectSpec:
+        """Read ``NAME[:k=v,...]``."""
+        name, _, rest = text.partition(":")
+        if not name.strip():
+            raise UsageError(f"effect {text!r}: expected NAME:key=number, got no name. List them by: hil effects")
+        parameters: dict[str, float] = {}
+        for part in rest.split(",") if rest else ():
+            key, value = _parameter(text, part)
+            if key in parameters:
+                raise UsageError(f"effect {text!r}: expected {key!r} once, got twice. Leave one out.")
+            parameters[key] = value
+        return cls(name.strip(), parameters)
+
+
+def simulation_model(table: SimulationTable, trust_laws: bool = False) -> DrivelineModel:
+    """Model of the simulated driveline: the rig file's, or the default bus; its own laws run only where trusted."""
+    if table.model is None:
+        return DEFAULT_BUS
+    file = read_model(table.model, trust_laws)
+    if file.on_bench:
+        raise ModelFileError(table.model, "structure | expected a driveline for a rig to drive | got 'joint'")
+    return file.model
 
 
 class SensedDriveline(Stepper):
@@ -203,3 +254,13 @@ def _reason_absent(entry: Effect, values: Mapping[str, EffectValue]) -> str:
     if entry.event and not {"from_s", "to_s"} <= set(values):
         return "expected from_s and to_s too, the moments between which it acts, got none"
     return ""
+
+
+def _parameter(text: str, part: str) -> tuple[str, float]:
+    key, _, value = part.partition("=")
+    try:
+        return key.strip(), float(value)
+    except ValueError as error:
+        raise UsageError(
+            f"effect {text!r}: expected key=number, got {part!r}. Write NAME:key=number,key=number."
+        ) from error

@@ -25,9 +25,8 @@ from hil.rig.pacing import FreePacer, heartbeat_patience_ms, period_ns
 from hil.rig.plan import plan_run
 from hil.rig.session import run_plan
 from hil.rig.stop import StopRequest
-from hil.simulator.driveline import plant_for
+from hil.simulator.driveline import EffectSpec, plant_for, simulation_model
 from hil.simulator.loopback import IN_PROCESS, Address
-from hil.simulator.plant import EffectSpec, simulation_model
 from hil.simulator.rig_server import RigServer, required_simulation
 
 RIG_FILE = Path(__file__).resolve().parents[2] / "examples" / "rig.toml"

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hil.commission.registry import STEPS
 
+from hil.commission.engine import STEPS
 from hil.provenance import Provenance, Source
 from hil.report.commission_html import commission_page
 from hil.report.comparison_html import comparison_page

@@ -23,7 +23,7 @@ from tests.campaigns.fuzz.target import Read, Target
 from tests.campaigns.fuzz.targets import TARGETS
 from tests.campaigns.fuzz.trial import KEPT, trials
 
-MUTANTS = {"modbus": 15, "rows": 40, "mdf": 40}
+MUTANTS = {"modbus": 15, "store": 40, "mdf": 40}
 """Some wait for a time-out, start a process anew, or check more than others."""
 
 SEED = 3

@@ -12,7 +12,7 @@ import pytest
 from hil.cli.main import run
 from hil.config.rig_file import SimulationTable
 from hil.errors import ModelFileError
-from hil.simulator.plant import simulation_model
+from hil.simulator.driveline import simulation_model
 
 STIFFNESS, GAP, OFFSET, NOISE = 2000.0, 0.02, 4.0, 0.5
 

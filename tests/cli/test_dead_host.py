@@ -104,4 +104,6 @@ def test_hil_check_names_what_it_can_not_prove(quick_rig: Path, capsys: pytest.C
         "stop without commands",
         "stop without heartbeat",
     ]
-    assert devices["m2"]["differences"][0]["found"] == "no EMCY, power state switch on disabled"
+    assert devices["m2"]["differences"][0]["found"] == (
+        "no EMCY, power state switch on disabled; the entry that failed is RPDO event timer 0x1400:05"
+    )

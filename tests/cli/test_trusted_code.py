@@ -17,7 +17,7 @@ from hil.cli.main import run
 from hil.proof.command import run_hil
 from hil.proof.rigs import sealed_process
 from hil.recording import read_table
-from hil.simulator.plant import simulation_model
+from hil.simulator.driveline import simulation_model
 from tests.cli import bench
 
 ROOT = Path(__file__).resolve().parents[2]

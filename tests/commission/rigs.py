@@ -18,10 +18,10 @@ from hil.config.rig_file import read_rig
 from hil.rig.experiments.base import Phase
 from hil.rig.pacing import FreePacer, period_ns
 from hil.rig.realtime import NOT_ASKED
-from hil.simulator.driveline import plant_for
+from hil.simulator.driveline import EffectSpec, plant_for
 from hil.simulator.fault_table import rig_faults
 from hil.simulator.loopback import Address
-from hil.simulator.plant import EffectSpec, Plant
+from hil.simulator.plant import Plant
 from hil.simulator.rig_server import RigServer
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "rig.toml"

@@ -20,7 +20,7 @@ from hil.commission.responses import Measured, of_repeats, pulse_response, readi
 from hil.commission.runner import rigid_model
 from hil.config.rig_file import read_rig
 from hil.rig.experiments.pulses import LEAD_S, Pulses
-from hil.simulator.plant import DEFAULT_BUS
+from hil.simulator.driveline import DEFAULT_BUS
 from tests.commission.rigs import EXAMPLE
 
 PERIOD_S = 0.01

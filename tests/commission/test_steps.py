@@ -9,7 +9,7 @@ import pytest
 from hil.commission.state import Status, model_json
 from hil.commission.steps import prbs
 from hil.errors import RunAborted
-from hil.simulator.plant import DEFAULT_BUS
+from hil.simulator.driveline import DEFAULT_BUS
 from tests.commission.rigs import bench
 from tests.rig.observer import assert_disarmed
 
@@ -118,8 +118,8 @@ def test_prbs_is_held_down_for_those_on_board(tmp_path: Path) -> None:
     with bench(tmp_path, changes=SHORT) as rig:
         job = rig.job()
         job.state.steps["scales"].evidence = SCALES
-        assert "(as in the rig file)" in prbs.STEP.about(job)
+        assert "(as in the rig file)" in prbs.PRBS.about(job)
         job.travel_m_per_rad = 0.5  # a vehicle that goes six times as far per turn: six times the vibration
-        assert "(held down by the comfort of those on board)" in prbs.STEP.about(job)
-        (order, _) = prbs.STEP.orders(job)
+        assert "(held down by the comfort of those on board)" in prbs.PRBS.about(job)
+        (order, _) = prbs.PRBS.orders(job)
     assert 0.0 < order.prbs["amplitude_nm"] < 120.0

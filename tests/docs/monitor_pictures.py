@@ -26,9 +26,8 @@ from hil.rig.session import run_plan
 from hil.rig.stop import StopRequest
 from hil.rig.timing import RunTiming
 from hil.sample import Sample
-from hil.simulator.driveline import plant_for
+from hil.simulator.driveline import DEFAULT_BUS, plant_for
 from hil.simulator.loopback import Address
-from hil.simulator.plant import DEFAULT_BUS
 from hil.simulator.rig_server import RigServer
 from tests.monitor.fake_source import FakeSource
 from tests.rig.serving import Samples as Recorded

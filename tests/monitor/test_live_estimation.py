@@ -10,7 +10,7 @@ from estimator.physics.twist import Shaft
 from hil.monitor.live_estimation import LiveEstimation
 from hil.rig.live import LiveEstimate, OnlineSetup, tracking_chain, tracking_settings
 from hil.sample import Sample, SampleFlag
-from hil.simulator.plant import DEFAULT_BUS
+from hil.simulator.driveline import DEFAULT_BUS
 from tests.estimator.identification.tracking import roads
 from tests.estimator.identification.tracking.drives import drives
 from tests.monitor.fake_source import sample

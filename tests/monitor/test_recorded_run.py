@@ -28,7 +28,7 @@ from hil.rig.live_replay import Pace, play_record
 from hil.rig.stop import StopRequest
 from hil.rig.timing import RunTiming
 from hil.sample import Sample
-from hil.simulator.plant import DEFAULT_BUS
+from hil.simulator.driveline import DEFAULT_BUS
 from hil.store import RunStore
 from hil.store.entry import ONLINE
 from tests.monitor.fake_source import sample

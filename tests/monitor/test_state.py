@@ -14,7 +14,7 @@ from hil.monitor.snapshot import Activity
 from hil.monitor.state import WINDOWS_S, LiveState
 from hil.rig.experiments.base import Phase
 from hil.sample import SampleFlag
-from hil.simulator.plant import DEFAULT_BUS
+from hil.simulator.driveline import DEFAULT_BUS
 from tests.monitor.fake_source import PERIOD_S, sample
 
 DONE = Over("cruise", "runs/cruise.parquet", 3000, 2, stopped=False, reason=None, run_id=7)

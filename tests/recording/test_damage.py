@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import random
 import shutil
+from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 
@@ -145,14 +146,22 @@ def test_a_full_disk_at_the_end_of_a_run_costs_the_description_and_no_sample(tmp
     from tests.recording.test_writer import sample
 
     def run() -> None:
-        with largest_file(50_000), RecordingWriter(tmp_path / "run.csv", {"note": "x" * 100_000}) as writer:
+        with ExitStack() as full, RecordingWriter(tmp_path / "run.csv", {"note": "x" * 100_000}) as writer:
             for k in range(20):
                 writer.append(sample(k))
+            full.enter_context(largest_file(50_000))
 
     with pytest.raises(RecordingError, match=r"run\.csv\.json: expected room for the description"):
         run()
-    assert [path.name for path in tmp_path.iterdir()] == ["run.csv"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["run.csv", "run.csv.json"]
     assert read_table(tmp_path / "run.csv").n_rows == 20
+
+
+def test_a_disk_without_room_for_the_description_is_reported_before_the_first_row(tmp_path: Path) -> None:
+    writer = RecordingWriter(tmp_path / "run.csv", {"note": "x" * 100_000})
+    with pytest.raises(RecordingError, match="expected room for the recording"), largest_file(50_000), writer:
+        raise AssertionError("the run began")
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize("suffix", WRITABLE)

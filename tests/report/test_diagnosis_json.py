@@ -42,6 +42,7 @@ def test_the_text_is_strict_json_of_the_contract(diagnosis: Diagnosis) -> None:
         "strays",
         "remainder",
         "traces",
+        "effort",
     ]
     assert content["schema"] == "hil.diagnosis/1"
     assert content["verdict"] == "explained"
@@ -68,6 +69,7 @@ def test_where_the_mismatch_is_and_what_it_was_found_to_be_is_written(diagnosis:
         },
         "time_s": {"run_1": [[1.5, 6.2]]},
         "indistinguishable_from": ["shaft_hysteresis"],
+        "alternatives": {},
         "share": 0.94,
         "probability": 0.999,
         "evidence": {

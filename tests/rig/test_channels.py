@@ -19,8 +19,9 @@ from hil.rig.plan import plan_run
 from hil.rig.session import run_plan
 from hil.rig.stop import StopRequest
 from hil.sample import SampleFlag
+from hil.simulator.driveline import simulation_model
 from hil.simulator.fault_table import rig_faults
-from hil.simulator.plant import RigidPlant, simulation_model
+from hil.simulator.plant import RigidPlant
 from hil.simulator.rig_server import RigServer, required_simulation
 from tests.rig.sensed import CHANNELS, sensed_rig, served_with_sensors, write_rig
 from tests.rig.serving import ANY_PORT, Samples, fast, run_once

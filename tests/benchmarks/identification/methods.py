@@ -21,11 +21,12 @@ from estimator.identification.chain import OnlineChain
 from estimator.identification.identify import identify
 from estimator.identification.modes.modes import Mode
 from estimator.identification.modes.physical import physical_parameters
-from estimator.identification.modes.uncertainty import Uncertain, UncertainMode, uncertain_resonance
+from estimator.identification.modes.uncertainty import Uncertain, UncertainMode
 from estimator.identification.offline.fits import LinearFit
 from estimator.identification.settings import Settings
 from estimator.signals.record import Record
 from tests.benchmarks.buses import PERIOD_S, Array, Bus, World, draw_bus, drive
+from tests.estimator.identification.driveline import uncertain_resonance
 
 HIGH_PASS_HZ = 0.3
 BAND_HZ = (2.0, 25.0)

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import io
 import json
-import sqlite3
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, redirect_stderr, redirect_stdout, suppress
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import Any
 
 import can
 import numpy as np
-from hil.store.row_faults import NEUTRAL
 
 from drivers.eds_check.check import check_eds
 from drivers.inverter.pdos import InverterPdos
@@ -191,19 +189,19 @@ def _sidecar_seeds(folder: Path) -> list[bytes]:
     return [(folder / "seed.csv.json").read_bytes()]
 
 
-def _stored(folder: Path) -> Path:
-    """Make a store of two runs in a folder; return its file."""
+def _stored(folder: Path) -> list[Path]:
+    """Make a list of two runs in a folder; return the files of one run, its note and its result."""
     for name in ("a.csv", "b.csv"):
         write_table(_table(folder / name), folder / name, replace=True)
         register_run(folder / name)
     with RunStore(folder) as store:
         store.note(1, "windy")
         store.attach(1, "alarm", json.dumps({"time_s": 1.0}))
-    return folder / "runs.sqlite"
+        return sorted(store.path.glob("1.*json"))
 
 
 def _read_store(folder: Path) -> None:
-    """Read all of it; raises what keeps the store from being read, and what a command would not tell in words."""
+    """Read all of it; raises what keeps the list from being read, and what a command would not tell in words."""
     with RunStore(folder) as store:
         for found in store.find():
             store.get(found.run_id)
@@ -213,76 +211,24 @@ def _read_store(folder: Path) -> None:
         run(["runs", "show", "1", "--store", str(folder)])
 
 
+def _store_seeds(folder: Path) -> list[bytes]:
+    return [path.read_bytes() for path in _stored(folder)]
+
+
 @contextmanager
 def _stores(folder: Path) -> Iterator[Read]:
+    """Put the changed text in the place of each file of a run in turn."""
     at = folder / "input"
     at.mkdir()
+    whole = {path: path.read_bytes() for path in _stored(at)}
 
     def read(data: bytes) -> None:
-        (at / "runs.sqlite").write_bytes(data)
-        _read_store(at)
+        for path, content in whole.items():
+            path.write_bytes(data)
+            _read_store(at)
+            path.write_bytes(content)
 
     yield read
-
-
-def _store_seeds(folder: Path) -> list[bytes]:
-    """Return a store, and one whose version is none."""
-    whole = _stored(folder)
-    seeds = [whole.read_bytes()]
-    database = sqlite3.connect(whole)
-    database.execute("PRAGMA user_version = -7")
-    database.close()
-    return [*seeds, whole.read_bytes()]
-
-
-_COLUMNS = {
-    "runs": tuple(NEUTRAL),
-    "notes": ("written_utc", "text"),
-    "attachments": ("kind", "added_utc", "path", "document"),
-}
-_SEPARATOR = b"\n;"
-
-
-def _row_seeds(folder: Path) -> list[bytes]:
-    """Return the cells of one run, its note and its attachment, as text."""
-    database = sqlite3.connect(_stored(folder))
-    cells = []
-    for table, names in _COLUMNS.items():
-        cells += database.execute(f"SELECT {', '.join(names)} FROM {table} ORDER BY id LIMIT 1").fetchone()
-    database.close()
-    return [_SEPARATOR.join(str("" if cell is None else cell).encode() for cell in cells)]
-
-
-@contextmanager
-def _rows(folder: Path) -> Iterator[Read]:
-    """Put changed cells into the rows of a store: the file is whole, what it says is not."""
-    at = folder / "input"
-    at.mkdir()
-    whole = _stored(at).read_bytes()
-
-    def read(data: bytes) -> None:
-        (at / "runs.sqlite").write_bytes(whole)
-        cells = iter(data.split(_SEPARATOR))
-        database = sqlite3.connect(at / "runs.sqlite", isolation_level=None)
-        for table, names in _COLUMNS.items():
-            for name, cell in zip(names, cells, strict=False):
-                with suppress(sqlite3.IntegrityError):  # SQLite itself takes no NaN there
-                    database.execute(f"UPDATE {table} SET {name} = ? WHERE id = 1", (_cell(cell),))
-        database.close()
-        _read_store(at)
-
-    yield read
-
-
-def _cell(data: bytes) -> Any:
-    """Return a number where it is one, a text where it is UTF-8, else bytes."""
-    for kind in (lambda: int(data) if len(data) < 18 else None, lambda: float(data), data.decode):
-        try:
-            if (value := kind()) is not None:
-                return value
-        except ValueError:
-            continue
-    return data
 
 
 FILES: dict[str, Target] = {
@@ -306,6 +252,5 @@ FILES: dict[str, Target] = {
     "registers": file_target("input.toml", load_register_map, _texts("eds/plc.toml"), text=True),
     "eds": file_target("input.eds", _read_eds, _eds_seeds, text=True),
     "identification": file_target("input.json", _export, _identification_seeds, text=True),
-    "store": Target(_store_seeds, _stores),
-    "rows": Target(_row_seeds, _rows, text=True),
+    "store": Target(_store_seeds, _stores, text=True),
 }

@@ -127,7 +127,8 @@ def _judge(path: Path, appended: int, written: int, left: Left) -> None:
             left.problems.append(f"{each.name} has {table.n_rows} rows of {needed}")
         left.problems += [f"{each.name}: {problem}" for problem in _other_cells(table.columns, table.n_rows)]
     left.lost = appended - left.rows
-    foreign = {each.name for each in path.parent.iterdir()} - {path.name, part.name, f"{path.name}.json"}
+    own = {path.name, part.name, f"{path.name}.json", f"{part.name}.json"}
+    foreign = {each.name for each in path.parent.iterdir()} - own
     left.problems += [f"{name} is left" for name in foreign if not name.startswith(f".{path.name}.")]
 
 

@@ -14,8 +14,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from estimator.lanes import choose, every
-from estimator.physics import laws, low_pass
-from estimator.physics.effects import stribeck_friction, tyre_slip
+from estimator.physics import laws
+from estimator.physics.effects.dry_friction import stribeck_law
+from estimator.physics.effects.load import coupling
+from estimator.physics.effects.timing import low_pass
 from hil.export.c_laws import NotTranslatable, Translation
 from hil.export.fmu.package import OPTIONS
 
@@ -48,9 +50,9 @@ combined.__module__ = "estimator.for_a_test"  # where laws are
 
 
 def of_laws(speed: float, size: float) -> float:
-    friction = stribeck_friction.law(speed, 3.0, size, 0.7, 0.01)
-    slope, share = tyre_slip.coupling(speed, 1e-3, 0.5, 0.1, 40.0)
-    low = low_pass.low_pass(abs(size) + 1e-3, 0.3, 0.01)
+    friction = stribeck_law(speed, 3.0, size, 0.7, 0.01)
+    slope, share = coupling(speed, 1e-3, 0.5, 0.1, 40.0)
+    low = low_pass(abs(size) + 1e-3, 0.3, 0.01)
     gap = laws.beyond_gap(speed, size)
     return friction + slope * share + low.rise_of_rise + gap + laws.fading(abs(speed)) + speed**2
 
