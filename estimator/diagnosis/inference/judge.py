@@ -315,10 +315,11 @@ def _as_simple_as_will_do(search: Search, best: Hypothesis) -> Hypothesis:
 
 
 def _with_sizes(search: Search, best: Hypothesis) -> Hypothesis:
-    """Return the best set without effects whose interval holds their null: they may do nothing at all."""
+    """Return the best set without effects that it is as probable without, or whose interval holds their null."""
     for name in sorted(best.effects):
-        if holds_null(best, name):
-            best = search.without(best, name)
+        without = search.without(best, name)
+        if without.score <= best.score or holds_null(best, name):
+            best = without
             search.path.append(best)
     return best
 

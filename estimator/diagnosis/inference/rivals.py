@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from estimator.diagnosis.hypotheses import NOTHING
+from estimator.diagnosis.hypotheses import NOTHING, Effects
 from estimator.diagnosis.inference.calibration import LEAST_SHARE
-from estimator.diagnosis.inference.disturbances import estimated, reading_noise
+from estimator.diagnosis.inference.disturbances import MOST_FORM, estimated, reading_noise
 from estimator.diagnosis.inference.judge import Grounds, Score, free_rms
 from estimator.diagnosis.inference.likelihood import (
     ROUNDS,
@@ -24,6 +24,7 @@ from estimator.diagnosis.inference.remainder import tests
 from estimator.diagnosis.inference.search import Search
 from estimator.diagnosis.result import Stray
 from estimator.diagnosis.unnamed import Hunt, hunts_of, scene
+from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Element
 from estimator.physics.fit import not_fitted
 from estimator.physics.jacobian import changes
@@ -178,15 +179,27 @@ def _rms(hunt: Hunt) -> float:
 def rival_laws(ground: Grounds, alone: Law | None, added: Law | None) -> tuple[Score, ...]:
     """Return laws without a name as hypotheses: one instead of all effects, and one added to the best set of these.
 
-    Where the law alone is more probable than names and a law for what they leave, the names imitate it. Laws are sought
-    in the first output alone: what they gain over the same set without them counts there. One that leaves the free-run
-    error as it was is a trace, and no other explanation of what the names explain.
+    Where the law alone is more probable than names and a law for what they leave, the names imitate it, unless it is
+    another form of theirs (`_at_its_place`). Laws are sought in the first output alone: what they gain over the same
+    set without them counts there. One that leaves the free-run error as it was is a trace, and no other explanation of
+    what the names explain.
     """
     best, first = of_first_outputs(ground.best), of_first_outputs(ground.nothing)
     offset = ground.best.score - best.score
     found = []
     if alone is not None and 1.0 - (alone.rms / free_rms(first)) ** 2 >= LEAST_SHARE:
-        found.append(Score(NOTHING, offset + alone.score))
+        found.append(Score(_at_its_place(ground, alone, first.score - alone.score), offset + alone.score))
     if added is not None and best.effects:
         found.append(Score(best.effects, offset + added.score))
     return tuple(found)
+
+
+def _at_its_place(ground: Grounds, law: Law, gained: float) -> Effects:
+    """Return the names of which a law is another form: those at its place, where they gain nearly all that it gains.
+
+    What a form leaves is at most `MOST_FORM` of the law in torque, and so the square of that in squared error.
+    """
+    names = frozenset(name for name in ground.best.effects if EFFECTS[name].element is law.element)
+    score = {each.effects: each.score for each in ground.scores}.get(names, math.inf)
+    is_form = ground.nothing.score - score >= (1.0 - MOST_FORM**2) * gained
+    return names if is_form else NOTHING
