@@ -28,7 +28,7 @@ ARTICLES = ("a ", "the ")
 FUNCTION = "a function of "
 
 _SIGNALS: Mapping[str, str] = {
-    "d twist/dt": "the twist rate",
+    "d twist/dt": "how fast the twist changes",
     "dw_M/dt": "the motor's acceleration",
     "dw_L/dt": "the load's acceleration",
     "dw/dt": "the acceleration",
@@ -49,16 +49,16 @@ def is_phrase(name: str) -> bool:
 
 
 def law_in_words(element: Element, terms: Sequence[tuple[str, float]]) -> str:
-    """Say a law by what it goes with, as the end of a sentence that begins with "it".
+    """Say a law by what it depends on, as the end of a sentence that begins with "it".
 
     One that is a wrong scale, or a reading that is late, is said as such.
     """
     alike = _as_if(element, *terms[0]) if len(terms) == 1 else ""
     if alike:
         return alike
-    signals = list(dict.fromkeys(word for name, _ in terms[:MOST_TERMS] for word in _goes_with(name)))
-    others = [name for name, _ in terms[:MOST_TERMS] if not _goes_with(name)]
-    said = [f"goes with {_listed(signals)}"] if signals else []
+    signals = list(dict.fromkeys(word for name, _ in terms[:MOST_TERMS] for word in _signals_of(name)))
+    others = [name for name, _ in terms[:MOST_TERMS] if not _signals_of(name)]
+    said = [f"depends on {_listed(signals)}"] if signals else []
     said += [f"looks like {_listed(others)}"] if others else []
     return f"{' and '.join(said)}, {PLACE_NAMES[element]}"
 
@@ -76,7 +76,7 @@ def _as_if(element: Element, name: str, coefficient: float) -> str:
     return ""
 
 
-def _goes_with(name: str) -> list[str]:
+def _signals_of(name: str) -> list[str]:
     """Return the signals that a formula, or a function of one, depends on; none of a phrase."""
     if is_phrase(name) and not name.startswith(FUNCTION):
         return []
