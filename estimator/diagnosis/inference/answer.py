@@ -402,7 +402,7 @@ def _rejected(search: Search, decision: Decision, named: set[str], untried: set[
     )
     found = dict(doubted)
     for known, reason in scores:
-        for name, score in known.items():
+        for name, score in sorted(known.items(), key=lambda item: item[::-1]):  # not as cores came to their end
             if name not in found:
                 found[name] = RejectedEffect(name, reason.format(_compared(score - best)), min(best - score, 0.0))
     found = {name: each for name, each in found.items() if name not in named and name not in untried}
