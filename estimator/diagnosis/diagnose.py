@@ -68,6 +68,7 @@ def diagnose(
     Implausible
         Where torque, output or time is off by a factor or in sign.
     """
+    progress = _rising(progress)
     masses = len(MASSES.get(model.structure, ()))  # of a joint on a bench there is nothing to compile
     if masses and is_first_use(masses):
         progress = _telling(progress)
@@ -81,6 +82,18 @@ def diagnose(
         work = Work(BUDGET_S if budget_s is None else budget_s, TO_SEARCH)
         ready = prepare(records, model, holdout)
         return ready.finished(answer(ready, model, progress, effort, work))
+
+
+def _rising(progress: Progress) -> Progress:
+    """Report no share below an earlier one: a search begins again from another effect, or on other readings."""
+    most = 0.0
+
+    def report(message: str, share: float) -> None:
+        nonlocal most
+        most = max(most, share)
+        progress(message, most)
+
+    return report
 
 
 def _telling(progress: Progress) -> Progress:

@@ -69,7 +69,7 @@ def test_a_diagnosis_says_at_every_stage_that_it_compiles(first: bool, monkeypat
     assert list(dict.fromkeys(stage.split(" (")[0] for stage in stages))[:3] == (
         ["preparing", "compiling itself", "checking the recordings"]
         if first
-        else ["checking the recordings", "comparing hypotheses", "simulating what was found"]
+        else ["checking the recordings", "comparing hypotheses", "weighing what was found"]
     )
     assert {COMPILING in stage for stage in stages} == {first}
 
