@@ -340,4 +340,4 @@ def test_a_held_value_is_reported_at_its_null_where_a_model_file_needs_it() -> N
     assert set(found) == {"amplitude_nm", "order"}
     assert found["order"].ci95 == (6.0, 6.0)
     values = {name: EffectValue(each.value, each.ci95) for name, each in found.items()}
-    assert effect_problems("torque_ripple", values, LINE) == []
+    assert effect_problems("torque_ripple", values, LINE.structure, LINE.laws) == []

@@ -147,7 +147,7 @@ def has_a_verdict(case: Case, folder: Path) -> None:
     path, recordings = files(case, folder)
     file = read_model_for_recordings(path)
     records = read_records(recordings, file.signals, file.on_bench)
-    content = diagnosis_json(diagnose(records, file.model, budget_s=1.0))
+    content = diagnosis_json(diagnose(records, file.model, effort="quick"))
     assert content["verdict"] in {"no_mismatch", "explained", "partly_explained", "unexplained"}
     assert all(math.isfinite(each) for each in numbers(content))
     fit = content["fit"]
