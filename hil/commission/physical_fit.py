@@ -9,15 +9,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from estimator.diagnosis.assemble import load_torques
-from estimator.diagnosis.intervals import reported_covariance
 from estimator.identification.linear_model import Orders
 from estimator.identification.modes.modes import Mode
 from estimator.physics.effects.dry_friction import COULOMB_FRICTION_MOTOR
-from estimator.physics.fit import FitResult, best_fit
 from estimator.physics.model import DrivelineModel, Parameter, Structure
 from estimator.physics.motion import torque_scale
-from estimator.physics.problem import make_problem
 from estimator.physics.unknowns import Shared
 from estimator.signals.decimate import decimate
 from estimator.signals.record import Record
@@ -25,6 +21,7 @@ from hil.commission.responses import HIGH_PASS_HZ, TRUSTED, Z95, Measured
 
 if TYPE_CHECKING:
     from estimator.identification.offline.fits import LinearFit
+    from estimator.physics.fit import FitResult
 
 
 WIDEST = 100.0
@@ -83,6 +80,9 @@ def _two_mass(inertia_kg_m2: float, mode: Mode, motor_share: float) -> Driveline
 
 
 def _fitted(starts: Sequence[DrivelineModel], records: Sequence[Record], more: tuple[Shared, ...]) -> PhysicalFit:
+    from estimator.physics.fit import best_fit
+    from estimator.physics.problem import make_problem
+
     problems = [make_problem(model, records, (*_unknowns(model), *more)) for model in starts]
     results = [best_fit([problem]) for problem in problems]
     best = min(range(len(results)), key=lambda i: results[i].squares)
@@ -97,6 +97,9 @@ def _unknowns(model: DrivelineModel) -> tuple[Shared, ...]:
 
 
 def _summary(model: DrivelineModel, result: FitResult) -> PhysicalFit:
+    from estimator.diagnosis.assemble import load_torques  # a second, and the bus comes first
+    from estimator.diagnosis.intervals import reported_covariance
+
     covariance = reported_covariance(result)
     values = {
         shared.name: Measured(
