@@ -132,7 +132,7 @@ def shares(path: Sequence[Hypothesis]) -> dict[str, float]:
     for (one, before), (other, after) in pairwise(zip(path, left, strict=True)):
         gone = sum(found.pop(name) for name in one.effects - other.effects)
         change, new = (before - after) / left[0] + gone, other.effects - one.effects
-        among = new or other.effects
+        among = sorted(new or other.effects)
         whole = sum(found.values())
         for name in among:
             part = 1.0 / len(among) if new or whole <= 0.0 else found[name] / whole
@@ -145,7 +145,7 @@ def shares_with_grade(best: Hypothesis, visited: Mapping[Effects, Hypothesis], n
 
     What another effect has is by how much more is left without it; the rest goes with the grade.
     """
-    without = {name: visited[best.effects - {name}] for name in best.effects if name != GRADE}
+    without = {name: visited[best.effects - {name}] for name in sorted(best.effects) if name != GRADE}
     found = {name: max(fall(each, best, nothing), 0.0) for name, each in without.items()}
     return found | {GRADE: max(1.0 - best.free_squares / nothing.free_squares - sum(found.values()), 0.0)}
 
@@ -261,9 +261,10 @@ def grounds(search: Search) -> Grounds:
 
 
 def scores_of(search: Search) -> tuple[Score, ...]:
-    """Return the scores of all sets that were fitted to their end and that a machine can be."""
-    possible = {effects: each for effects, each in search.visited.items() if is_possible(each, search.records)}
-    return tuple(Score(effects, each.score, search.is_plausible(each)) for effects, each in possible.items())
+    """Return the scores of all sets that were fitted to their end and that a machine can be, in a fixed order."""
+    possible = [each for each in search.visited.values() if is_possible(each, search.records)]
+    ordered = sorted(possible, key=lambda each: sorted(each.effects))
+    return tuple(Score(each.effects, each.score, search.is_plausible(each)) for each in ordered)
 
 
 def believed(search: Search, ground: Grounds, rivals: Sequence[Score] = ()) -> tuple[Belief, ...]:
