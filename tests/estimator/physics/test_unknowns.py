@@ -44,19 +44,20 @@ def test_an_effect_has_unknowns_once_per_start() -> None:
         shared = release.shared
         assert release.own == ((),)
         assert [(s.effect, s.name) for s in shared] == [
-            ("backlash", name) for name in ("gap_rad", "contact_rad", "pull")
+            ("backlash", name) for name in ("gap_rad", "contact_rad", "pull", "across")
         ]
         assert shared[0].scale == pytest.approx(0.2 * 100.0 / TWO_MASS["k"])
 
 
 def test_a_start_may_hold_a_value_or_have_bounds_of_its_own() -> None:
     rec = linear_record(TWO_MASS, random_steps(500, seed=1), CRUISE)
-    (release,) = released("backlash", model(TWO_MASS), [rec], [(Within(1.0, 0.5, 2.0), Held(0.3), 0.4)])
+    (release,) = released("backlash", model(TWO_MASS), [rec], [(Within(1.0, 0.5, 2.0), Held(0.3), 0.4, Held(1.0))])
     usual = effect_unknowns("backlash", model(TWO_MASS), [rec])[0].shared
-    gap, contact, pull = release.shared
+    gap, contact, pull, across = release.shared
     assert (gap.low, gap.start, gap.high, gap.scale) == (0.5, 1.0, 2.0, usual[0].scale)
     assert contact.low == contact.start == contact.high == 0.3
     assert pull == replace(usual[2], start=0.4)
+    assert across.low == across.start == across.high == 1.0
 
 
 def test_a_profile_has_no_shared_unknowns() -> None:
@@ -69,7 +70,7 @@ def test_moments_and_phases_are_every_recordings_own() -> None:
     first = linear_record(TWO_MASS, random_steps(500, seed=1), CRUISE)
     second = replace(linear_record(TWO_MASS, random_steps(300, seed=2), CRUISE), began_s=-7.0)
     (brake,) = effect_unknowns("brake_drag", line, [first, second])
-    assert [s.name for s in brake.shared] == ["brake_nm", "presliding_rad"]
+    assert [s.name for s in brake.shared] == ["brake_nm", "presliding_rad", "creep_rad_s"]
     spans = [[(s.name, s.low, s.high) for s in own] for own in brake.own]
     assert spans[0] == [("from_s", 0.0, pytest.approx(5.0)), ("to_s", 0.0, pytest.approx(5.0))]
     assert spans[1] == [("from_s", 7.0, pytest.approx(10.0)), ("to_s", 7.0, pytest.approx(10.0))]
