@@ -44,9 +44,6 @@ NO_TORQUE_COUNTS: Final = 2
 MOST_SURPLUS: Final = 3
 """So many TPDOs more than SYNCs end a run: a controller may hear one frame twice (ISO 11898, last bit of EOF)."""
 
-MOST_LATE: Final = 2
-"""So many missing TPDOs may still come, with those of the next cycles."""
-
 SURPLUS_CYCLES: Final = 100
 """After so many cycles one that was too many is forgotten."""
 
@@ -75,6 +72,11 @@ def left_operation(where: str, state: PowerState) -> str:
 def speed_tolerance_rad_s(one_rad_s: float, other_rad_s: float, counts_rad_s: float) -> float:
     """Give how far two readings of one shaft at one time may be from each other [rad/s]."""
     return SPEED_NOISE_RAD_S + counts_rad_s + SPEED_SHARE * max(abs(one_rad_s), abs(other_rad_s))
+
+
+def most_late(guard: GuardLimits) -> int:
+    """Give how many answers may still come: an older one is too old for another rule."""
+    return round(guard.feedback_timeout_s / guard.period_s)
 
 
 class Rule(NamedTuple):
@@ -201,16 +203,26 @@ class Excess:
 class _Torque:
     """One torque, or the sum of both, against the range of its commands."""
 
-    __slots__ = ("commands", "excess")
+    __slots__ = ("_commands", "_width", "excess", "late")
 
     def __init__(self, tolerance_nm: float, guard: GuardLimits) -> None:
-        width = max(1, round(guard.error.response_s / guard.period_s)) + 2
-        self.commands: deque[float] = deque(maxlen=width)
+        self._width = max(1, round(guard.error.response_s / guard.period_s)) + 2
+        self._commands: deque[float] = deque(maxlen=self._width + most_late(guard))
+        self.late = 0
         self.excess = Excess(tolerance_nm, guard.error.time_s, guard.period_s)
+
+    def command(self, commanded_nm: float, late: int) -> None:
+        """Take the command of a cycle; answers to so many cycles are still to come."""
+        self._commands.append(commanded_nm)
+        self.late = late
+
+    def commands(self) -> tuple[float, ...]:
+        """Give the commands that the next answer may be to."""
+        return tuple(self._commands)[-self._width - self.late :]
 
     def distance(self, torque_nm: float, limited: bool) -> float:
         """Give how far a torque is outside the range; 0 within the tolerance."""
-        commands = self.commands
+        commands = self.commands()
         tolerance = self.excess.tolerance
         if abs(torque_nm - commands[-1]) <= tolerance:
             return 0.0
@@ -222,7 +234,7 @@ class _Torque:
 
     def range(self) -> str:
         """Give the range in words."""
-        low, high = min(self.commands), max(self.commands)
+        low, high = min(self.commands()), max(self.commands())
         return f"{low:g} Nm" if low == high else f"{low:g} to {high:g} Nm"
 
 
@@ -253,13 +265,14 @@ class _Drive:
         self._asked = False
         self._fresh_nm = 0.0
         self._surplus = self._missing = self._cycles = 0
+        self._most_late = most_late(guard)
 
     def take(self, t_ns: int, seen: DriveRecord) -> None:
         """Judge one cycle of this drive alone."""
         self.doubtful = False
-        self.torque.commands.append(seen.commanded_nm)
         if seen.fewest != 1 or seen.most != 1 or self._surplus or self._missing:
             self._count(seen)
+        self.torque.command(seen.commanded_nm, max(0, -self._surplus))
         feedback = seen.feedback
         if feedback is None:
             return
@@ -290,14 +303,14 @@ class _Drive:
     @property
     def moves(self) -> bool:
         """Whether the command has changed of late: a reading that repeats is then an old one, and says nothing."""
-        commands = self.torque.commands
+        commands = self.torque.commands()
         return min(commands) != max(commands)
 
     def _count(self, seen: DriveRecord) -> None:
         self._cycles += 1
         if seen.most > 1 and self._surplus >= 0:
             self.doubtful = True
-        self._surplus = max(self._surplus + seen.most - 1, -MOST_LATE)
+        self._surplus = max(self._surplus + seen.most - 1, -self._most_late)
         self._missing = max(self._missing + (-1 if seen.fewest else 1), 0)
         if self._surplus >= MOST_SURPLUS or self._missing >= MOST_MISSING:
             got = f"{self._surplus} TPDOs more than SYNCs" if self._surplus > 0 else "TPDOs missing at most SYNCs"
@@ -307,7 +320,8 @@ class _Drive:
                 "answers late on a busy machine."
             )
         if self._cycles >= SURPLUS_CYCLES:
-            self._cycles, self._surplus = 0, max(0, self._surplus - 1)
+            self._cycles = 0
+            self._surplus = self._surplus - 1 if self._surplus > 0 else int(self._surplus / 2)
 
     def _left(self, state: PowerState) -> None:
         self.doubtful = True
@@ -404,7 +418,8 @@ class Supervision:
         m1, m2 = self._m1, self._m2
         m1.take(record.t_ns, record.m1)
         m2.take(record.t_ns, record.m2)
-        self._both.commands.append(record.m1.commanded_nm + record.m2.commanded_nm)
+        late = max(m1.torque.late, m2.torque.late)
+        self._both.command(record.m1.commanded_nm + record.m2.commanded_nm, late)
         one, other = record.m1.feedback, record.m2.feedback
         sum_fault = ""
         if one is not None and other is not None:

@@ -80,7 +80,7 @@ def test_a_day_at_the_rig(rig_path: Path, tmp_path: Path) -> None:
         assert terminal.await_end() == 0
         assert_restored(terminal)
         assert_disarmed(server.bus_url, 1, 2)
-        assert "cruise stopped by the operator:" in terminal.text
+        assert "cruise stopped by the operator:" in terminal.text, terminal.text[-900:]
     (recording,) = out.glob("cruise-*.parquet")
     metadata = read_table(recording).metadata
     (event,) = json.loads(metadata["events"])
