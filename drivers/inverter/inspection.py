@@ -67,10 +67,6 @@ class InspectedInverter:
             replace(each, proof=self._proof.get(each.name, "")) for each in protections(self._plan, self.settings)
         )
 
-    def device_name(self) -> str:
-        """Read the name the maker gave the drive, object 0x1008; in segments, for it is a text."""
-        return self._sdo.upload_text(0x1008)
-
     @property
     def count_rad_s(self) -> float:
         """One count of its speed [rad/s]."""

@@ -100,7 +100,7 @@ class Runner:
             rows[name] = values
         is_stepped = request["kind"] == "CoSimulation"
         result = fmpy.simulate_fmu(
-            HOME,
+            str(Path(HOME).absolute()),  # FMPy makes an address of it
             model_description=self._described,
             fmi_type=request["kind"],
             stop_time=request["stop_s"],

@@ -57,7 +57,9 @@ def known_events(prepared: Prepared | None, paths: Sequence[Path | None]) -> Eve
 
 
 def _one_in(diagnosis: Diagnosis, records: Sequence[Record]) -> int:
-    """Return to one in how many samples the first recording was thinned."""
+    """Return to one in how many samples the first recording was thinned; 1 where nothing was decided."""
+    if not diagnosis.traces:
+        return 1
     record = next(r for r in records if any(trace.name == r.name for trace in diagnosis.traces))
     trace = next(trace for trace in diagnosis.traces if trace.name == record.name)
     return max(1, round(float(trace.time_s[1] - trace.time_s[0]) / record.sample_time_s))

@@ -10,6 +10,7 @@ import pytest
 
 from hil.cli.main import run
 from tests.cli import bench
+from tests.report.conftest import figures
 
 NOISE = 0.05
 
@@ -99,7 +100,7 @@ def test_each_output_is_drawn(
     assert "run_1:angle_rad" in capsys.readouterr().out
     page = (tmp_path / "result" / "compare.html").read_text()
     assert page.count('class="plotly-graph-div"') == 2 * (1 + 2 + 1)  # over time, a spectrum each, residuals
-    assert "angle_rad: error" in page
+    assert "angle_rad: error [rad]" in figures(page)
 
 
 @pytest.mark.parametrize(

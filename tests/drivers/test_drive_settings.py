@@ -169,9 +169,9 @@ PDOMapping=0
 """
     eds = changed_eds(tmp_path, more=named)
     with bench(simulated=replace(SIMULATED_M1, eds_path=eds)) as rig:
-        assert rig.m1.device_name() == "Traction inverter"
+        assert rig.m1._sdo.upload_text(0x1008) == "Traction inverter"
         with pytest.raises(ConfigMismatch, match=r"object 0x1008:00 refused .*Object does not exist"):
-            rig.m2.device_name()
+            rig.m2._sdo.upload_text(0x1008)
 
 
 def test_a_drive_that_is_guarded_is_found_and_set_right(tmp_path: Path) -> None:

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import base64
+import gzip
+import re
+
 import numpy as np
 import pytest
 
@@ -166,3 +170,9 @@ def diagnosis() -> Diagnosis:
         warnings=("run_2 has 60 samples missing",),
         discrepancy=discrepancy(),
     )
+
+
+def figures(page: str) -> str:
+    """Return what the figures of a page hold, as JSON; in the page it is packed."""
+    packed = re.findall(r'<script type="text/plain" id="[^"]*-data">([^<]*)</script>', page)
+    return "\n".join(gzip.decompress(base64.b64decode(each)).decode() for each in packed)
