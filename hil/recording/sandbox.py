@@ -115,6 +115,9 @@ def _fill(stream: IO[bytes], place: memoryview) -> None:
         done += count
 
 
+TRIES: Final = 20
+"""Attempts to remove the folder of a process whose command has ended."""
+
 Answer = Callable[[Document, dict[str, Column]], tuple[Document, Mapping[str, Column] | None]]
 
 
@@ -135,7 +138,10 @@ def serve(answer: Answer) -> None:
             while True:
                 requests.put(receive(stream))
         except (EOFError, OSError):
-            shutil.rmtree(folder, ignore_errors=True)
+            for _ in range(TRIES):  # what is being unpacked meanwhile comes in its way
+                shutil.rmtree(folder, ignore_errors=True)
+                if not os.path.exists(folder):
+                    break
             os._exit(0)
 
     threading.Thread(target=read, name="requests", daemon=True).start()

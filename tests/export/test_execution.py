@@ -98,13 +98,17 @@ def off_at_times(time_s: float) -> float:
     return 0.0 if 20.0 <= time_s < 35.0 or time_s > 55.0 else 120.0
 
 
+def on_the_road(prbs_nm: Callable[[float], float]) -> Cycles:
+    record = roads.drive(5, 65.0, prbs_nm).record
+    return Cycles(record.torque_nm[:, 0].copy(), record.torque_nm[:, 1].copy(), record.output.copy(), record.okay)
+
+
 @pytest.mark.parametrize("prbs_nm", [off_at_times, lambda time_s: 0.0], ids=["on and off", "never"])
 @pytest.mark.parametrize("profile_name", ["decreasing_then_constant_trace", "constant_forgetting:lambda1=0.995"])
 def test_excitation_hold_and_restart_are_the_hosts(
     prbs_nm: Callable[[float], float], profile_name: str, tmp_path: Path
 ) -> None:
-    record = roads.drive(5, 65.0, prbs_nm).record
-    drive = Cycles(record.torque_nm[:, 0].copy(), record.torque_nm[:, 1].copy(), record.output.copy(), record.okay)
+    drive = on_the_road(prbs_nm)
     drive.speed_rad_s[4000:4003] = np.nan
     estimator = PlcEstimator(Settings(adaptation=profile(profile_name)))
     plc = on_plc(estimator, drive, tmp_path)
@@ -208,6 +212,8 @@ def both_sides(before: str, after: str, folder: Path) -> Iterator[tuple[Kept, Tr
         wrong = text.replace(before, after)
         yield execute(wrong, drive, folder), on_host(estimator, drive)
         yield execute_oefo(wrong, *summed(drive), folder), estimator.oefo().run(*summed(drive))
+    at_times, estimator = on_the_road(off_at_times), PlcEstimator(SETTINGS)  # for what decides on the excitation
+    yield execute(exported(estimator).replace(before, after), at_times, folder), on_host(estimator, at_times)
 
 
 def same_bits(plc: Kept, host: Trajectory | OnlineTrajectory) -> bool:
