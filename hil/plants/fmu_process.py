@@ -6,6 +6,7 @@ the end of the command it works for (`hil.recording.sandbox.serve`).
 
 from __future__ import annotations
 
+import ctypes
 import os
 import threading
 import time
@@ -99,6 +100,7 @@ class Runner:
         for name, values in columns.items():
             rows[name] = values
         is_stepped = request["kind"] == "CoSimulation"
+        _load((self._described.coSimulation if is_stepped else self._described.modelExchange).modelIdentifier)
         result = fmpy.simulate_fmu(
             str(Path(HOME).absolute()),  # FMPy makes an address of it
             model_description=self._described,
@@ -113,6 +115,16 @@ class Runner:
         )
         found = {"time": result["time"], "output": result[request["output"]]}
         return {}, {name: np.asarray(column, dtype=np.float64) for name, column in found.items()}
+
+
+def _load(identifier: str) -> None:
+    """Load an FMU's binary before FMPy does, whose way stops all threads until it is loaded: no watch would see it."""
+    import fmpy
+
+    for folder in (fmpy.platform, fmpy.platform_tuple):  # FMI 2 and 3
+        path = Path(HOME, "binaries", folder, identifier + fmpy.sharedLibraryExtension).absolute()
+        if os.name == "posix" and path.is_file():
+            ctypes.CDLL(None).dlopen(os.fsencode(path), os.RTLD_NOW)
 
 
 def unpack(path: Path, home: Path) -> None:

@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 from hil.commission.engine import STEPS
+from hil.proof.scoreboard import Board, scoreboard_page
 from hil.provenance import Provenance, Source
 from hil.report import page as html
 from hil.report.commission_html import commission_page
@@ -68,12 +69,30 @@ def _values(value: Any, key: str = "") -> Any:
     return [_values(each, key) for each in value] if isinstance(value, list) else value
 
 
+def hostile_scoreboard(_: Path) -> str:
+    rig = {"case": "clutch", "where": "the PLC", "said": "open", "outcome": "right", "success": True}
+    size = {"what": "gap", "unit": "mm", "truth": 4.0, "found": 4.1, "ci95": [4.0, 4.2], "inside": True, "within": True}
+    run = {
+        "name": "sines",
+        "verdict": "explained",
+        "named": ["backlash"],
+        "fault": None,
+        "held_out": {"before": 1.11, "after": 0.2},
+        "right": True,
+        "agreements": [{**size, "asked": "within 10 %"}],
+        "report": f"javascript:{RUN}",
+    }
+    case = {"title": "A joint", "concealed": ["backlash"], "conceals": "its gap", "runs": [run]}
+    return scoreboard_page(Board([], [_values(rig)], [_values(case)], MADE))
+
+
 PAGES: dict[str, Callable[[Path], str]] = {
     "diagnosis": lambda _: diagnosis_page(hostile(hand_made_diagnosis.__wrapped__()), MADE),
     "comparison": lambda _: comparison_page(hostile(comparisons()), MADE),
     "identification": lambda _: identification_page(*hostile(identified()), MADE),
     "paper": lambda _: paper_page(*hostile(paper_results()), MADE),
     "commissioning": hostile_state,
+    "scoreboard": hostile_scoreboard,
 }
 
 PLANTED = 'document.querySelectorAll(\'img[src="x"], [onload], [onerror], a[href^="javascript" i]\').length'

@@ -33,9 +33,7 @@ DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
 </ScalarVariable>
 </ModelVariables><ModelStructure><Outputs><Unknown index="2"/></Outputs></ModelStructure></fmiModelDescription>"""
 
-LOADED = (
-    "#include <stdlib.h>\n#include <signal.h>\n#include <unistd.h>\n__attribute__((constructor)) static void f(void) "
-)
+LOADED = "#include <fcntl.h>\n#include <stdlib.h>\n#include <signal.h>\n#include <unistd.h>\n__attribute__((constructor)) static void f(void) "
 
 
 def fmu(folder: Path, does: str = "{}", name: str = "x") -> Path:
@@ -115,7 +113,8 @@ simulate(Path(sys.argv[1]))
 @pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
 def test_an_fmu_that_hangs_ends_with_its_command(tmp_path: Path, home: Path, number: signal.Signals) -> None:
-    path = fmu(tmp_path, "{ for (;;) pause(); }")
+    loads = tmp_path / "loads"
+    path = fmu(tmp_path, f'{{ creat("{loads}", 0600); for (;;) pause(); }}')
     command = subprocess.Popen(
         [sys.executable, "-c", HANGING, str(path)],
         stdout=subprocess.PIPE,
@@ -125,8 +124,9 @@ def test_an_fmu_that_hangs_ends_with_its_command(tmp_path: Path, home: Path, num
     assert command.stdout is not None
     command.stdout.readline()
     until = time.monotonic() + 60
-    while not list(home.glob("*/fmu/binaries")) and time.monotonic() < until:
+    while not loads.exists() and time.monotonic() < until:
         time.sleep(0.05)
+    assert loads.exists()
     command.send_signal(number)
     assert command.wait(30) != 0
     while list(home.iterdir()) and time.monotonic() < until:
