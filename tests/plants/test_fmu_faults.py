@@ -33,7 +33,8 @@ DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
 </ScalarVariable>
 </ModelVariables><ModelStructure><Outputs><Unknown index="2"/></Outputs></ModelStructure></fmiModelDescription>"""
 
-LOADED = "#include <fcntl.h>\n#include <stdlib.h>\n#include <signal.h>\n#include <unistd.h>\n__attribute__((constructor)) static void f(void) "
+HEADERS = ("fcntl", "signal", "stdlib", "unistd")
+LOADED = "".join(f"#include <{each}.h>\n" for each in HEADERS) + "__attribute__((constructor)) static void f(void) "
 
 
 def fmu(folder: Path, does: str = "{}", name: str = "x") -> Path:
