@@ -264,15 +264,15 @@ class _Drive:
         self._ignored_ns: int | None = None
         self._asked = False
         self._fresh_nm = 0.0
-        self._surplus = self._missing = self._cycles = 0
+        self._surplus = self._missing = self._late = self._cycles = 0
         self._most_late = most_late(guard)
 
     def take(self, t_ns: int, seen: DriveRecord) -> None:
         """Judge one cycle of this drive alone."""
         self.doubtful = False
-        if seen.fewest != 1 or seen.most != 1 or self._surplus or self._missing:
+        if seen.fewest != 1 or seen.most != 1 or self._surplus or self._missing or self._late:
             self._count(seen)
-        self.torque.command(seen.commanded_nm, max(0, -self._surplus))
+        self.torque.command(seen.commanded_nm, self._late)
         feedback = seen.feedback
         if feedback is None:
             return
@@ -308,9 +308,12 @@ class _Drive:
 
     def _count(self, seen: DriveRecord) -> None:
         self._cycles += 1
-        if seen.most > 1 and self._surplus >= 0:
+        if seen.most - 1 > self._late:
             self.doubtful = True
-        self._surplus = max(self._surplus + seen.most - 1, -self._most_late)
+        extra = max(seen.most - 1, 0)
+        came = min(extra, self._late)  # of any kind: two of one SYNC may come in two cycles
+        self._late = min(self._late - came + (0 if seen.fewest else 1), self._most_late)
+        self._surplus += extra - came
         self._missing = max(self._missing + (-1 if seen.fewest else 1), 0)
         if self._surplus >= MOST_SURPLUS or self._missing >= MOST_MISSING:
             got = f"{self._surplus} TPDOs more than SYNCs" if self._surplus > 0 else "TPDOs missing at most SYNCs"
@@ -320,8 +323,7 @@ class _Drive:
                 "answers late on a busy machine."
             )
         if self._cycles >= SURPLUS_CYCLES:
-            self._cycles = 0
-            self._surplus = self._surplus - 1 if self._surplus > 0 else int(self._surplus / 2)
+            self._cycles, self._surplus, self._late = 0, max(0, self._surplus - 1), self._late // 2
 
     def _left(self, state: PowerState) -> None:
         self.doubtful = True
