@@ -11,7 +11,8 @@ import os
 import threading
 import time
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final
 
@@ -100,31 +101,46 @@ class Runner:
         for name, values in columns.items():
             rows[name] = values
         is_stepped = request["kind"] == "CoSimulation"
-        _load((self._described.coSimulation if is_stepped else self._described.modelExchange).modelIdentifier)
-        result = fmpy.simulate_fmu(
-            str(Path(HOME).absolute()),  # FMPy makes an address of it
-            model_description=self._described,
-            fmi_type=request["kind"],
-            stop_time=request["stop_s"],
-            step_size=request["step_s"] if is_stepped else None,
-            output_interval=request["step_s"],
-            start_values=request["start"],
-            input=rows,
-            output=[request["output"]],
-            step_finished=lambda *_: self._watch.happened(),
-        )
+        with _loaded((self._described.coSimulation if is_stepped else self._described.modelExchange).modelIdentifier):
+            result = fmpy.simulate_fmu(
+                str(Path(HOME).absolute()),  # FMPy makes an address of it
+                model_description=self._described,
+                fmi_type=request["kind"],
+                stop_time=request["stop_s"],
+                step_size=request["step_s"] if is_stepped else None,
+                output_interval=request["step_s"],
+                start_values=request["start"],
+                input=rows,
+                output=[request["output"]],
+                step_finished=lambda *_: self._watch.happened(),
+            )
         found = {"time": result["time"], "output": result[request["output"]]}
         return {}, {name: np.asarray(column, dtype=np.float64) for name, column in found.items()}
 
 
-def _load(identifier: str) -> None:
-    """Load an FMU's binary before FMPy does, whose way stops all threads until it is loaded: no watch would see it."""
+@contextmanager
+def _loaded(identifier: str) -> Iterator[None]:
+    """Load an FMU's binary before FMPy does, and unload it last: that may hang, and FMPy stops the watch meanwhile.
+
+    It does not stay loaded: each simulation finds the binary's own variables as they are at first.
+    """
     import fmpy
 
-    for folder in (fmpy.platform, fmpy.platform_tuple):  # FMI 2 and 3
-        path = Path(HOME, "binaries", folder, identifier + fmpy.sharedLibraryExtension).absolute()
-        if os.name == "posix" and path.is_file():
-            ctypes.CDLL(None).dlopen(os.fsencode(path), os.RTLD_NOW)
+    folders = (fmpy.platform, fmpy.platform_tuple) if os.name == "posix" else ()  # FMI 2 and 3
+    paths = [Path(HOME, "binaries", folder, identifier + fmpy.sharedLibraryExtension).absolute() for folder in folders]
+    handles = [_system("dlopen", os.fsencode(path), os.RTLD_NOW) for path in paths if path.is_file()]
+    try:
+        yield
+    finally:
+        for handle in filter(None, handles):
+            _system("dlclose", ctypes.c_void_p(handle))
+
+
+def _system(name: str, *arguments: Any) -> Any:
+    """Call a function of the system, without the interpreter's lock."""
+    function = ctypes.CDLL(None)[name]
+    function.restype = ctypes.c_void_p
+    return function(*arguments)
 
 
 def unpack(path: Path, home: Path) -> None:

@@ -17,10 +17,14 @@ from typing import Any
 import numpy as np
 import pytest
 
+from estimator.physics.model import DrivelineModel, Parameter, Structure
 from hil.errors import UsageError
+from hil.export.fmu import package
+from hil.export.fmu.driveline import driveline
 from hil.plants.fmu_plant import FmuPlant
 from hil.plants.fmu_process import UNPACKED_BYTES, unpack
 from hil.plants.names import Names
+from tests.estimator.physics.bench import TWO_MASS
 
 pytest.importorskip("fmpy")
 
@@ -50,10 +54,31 @@ def fmu(folder: Path, does: str = "{}", name: str = "x") -> Path:
 
 
 def simulate(path: Path) -> Any:
-    plant = FmuPlant(path, [], trusted=True)
+    return simulated(FmuPlant(path, [], trusted=True))
+
+
+def simulated(plant: FmuPlant) -> Any:
     record: Any = SimpleNamespace(time_s=np.arange(5) * 0.1, sample_time_s=0.1, name="run")
     names = Names(torque=("T_M1",), load="", start=())
     return plant.simulated(record, names, np.zeros((5, 1)), {})
+
+
+COUNTED = """static int begun;
+fmi2Status fmi2EnterInitializationMode(Instance c) { if (begun++) return fmi2Error; """
+"""A binary that is good for one simulation, as some are: what it counts is the binary's own, not the instance's."""
+
+
+@pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
+def test_each_simulation_begins_with_the_binary_as_it_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    before, own = "fmi2Status fmi2EnterInitializationMode(Instance c) { ", package.own
+    assert before in own("fmi2.c")
+    monkeypatch.setattr(package, "own", lambda name: own(name).replace(before, COUNTED))
+    model = DrivelineModel(Structure.TWO_MASS, {name: Parameter(value, 0.2) for name, value in TWO_MASS.items()})
+    package.write(driveline("drive", model, 0.1), "2.0", tmp_path / "drive.fmu")
+    plant = FmuPlant(tmp_path / "drive.fmu", [], trusted=True)
+    first, second = simulated(plant), simulated(plant)
+    assert np.isfinite(first).all()
+    np.testing.assert_array_equal(first, second)
 
 
 @pytest.fixture
