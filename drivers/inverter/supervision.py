@@ -264,15 +264,15 @@ class _Drive:
         self._ignored_ns: int | None = None
         self._asked = False
         self._fresh_nm = 0.0
-        self._surplus = self._missing = self._late = self._cycles = 0
-        self._most_late = most_late(guard)
+        self._surplus = self._missing = self._cycles = 0
+        self._late_ns: deque[int] = deque(maxlen=most_late(guard))
 
     def take(self, t_ns: int, seen: DriveRecord) -> None:
         """Judge one cycle of this drive alone."""
         self.doubtful = False
-        if seen.fewest != 1 or seen.most != 1 or self._surplus or self._missing or self._late:
-            self._count(seen)
-        self.torque.command(seen.commanded_nm, self._late)
+        if seen.fewest != 1 or seen.most != 1 or self._surplus or self._missing or self._late_ns:
+            self._count(t_ns, seen)
+        self.torque.command(seen.commanded_nm, len(self._late_ns))
         feedback = seen.feedback
         if feedback is None:
             return
@@ -306,13 +306,18 @@ class _Drive:
         commands = self.torque.commands()
         return min(commands) != max(commands)
 
-    def _count(self, seen: DriveRecord) -> None:
+    def _count(self, t_ns: int, seen: DriveRecord) -> None:
         self._cycles += 1
-        if seen.most - 1 > self._late:
-            self.doubtful = True
+        late_ns = self._late_ns
+        while late_ns and t_ns - late_ns[0] > self._guard.feedback_timeout_s * NS_PER_S:
+            late_ns.popleft()  # it is lost
         extra = max(seen.most - 1, 0)
-        came = min(extra, self._late)  # of any kind: two of one SYNC may come in two cycles
-        self._late = min(self._late - came + (0 if seen.fewest else 1), self._most_late)
+        came = min(extra, len(late_ns))  # of any kind: two of one SYNC may come in two cycles
+        self.doubtful |= extra > came
+        for _ in range(came):
+            late_ns.popleft()
+        if not seen.fewest:
+            late_ns.append(t_ns)
         self._surplus += extra - came
         self._missing = max(self._missing + (-1 if seen.fewest else 1), 0)
         if self._surplus >= MOST_SURPLUS or self._missing >= MOST_MISSING:
@@ -323,7 +328,7 @@ class _Drive:
                 "answers late on a busy machine."
             )
         if self._cycles >= SURPLUS_CYCLES:
-            self._cycles, self._surplus, self._late = 0, max(0, self._surplus - 1), self._late // 2
+            self._cycles, self._surplus = 0, max(0, self._surplus - 1)
 
     def _left(self, state: PowerState) -> None:
         self.doubtful = True

@@ -325,6 +325,13 @@ def test_one_tpdo_per_sync() -> None:
     assert messages(*[1, 0, 0] * 500) == 3 * (MOST_MISSING - 1)
 
 
+def test_late_ones_are_awaited_for_as_long_as_feedback_may_be_old() -> None:
+    for begins in range(80, 120):
+        assert messages(0, *[1] * begins, *[0] * 12, 13, *[1] * 50) is None, "a drive that stops for 12 cycles"
+    assert messages(*[0] * 5, *[1] * 14, *[2] * 5, *[1] * 50) is None
+    assert messages(*[0] * 5, *[1] * 30, *[2] * 5) == 35 + MOST_SURPLUS, "these were lost"
+
+
 def test_doubtful_rows_are_those_of_the_drive_that_is() -> None:
     made = supervised()
 
