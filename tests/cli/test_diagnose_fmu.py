@@ -90,7 +90,7 @@ def test_a_recorded_angle_is_held_against_the_fmus(fmu: str, tmp_path: Path) -> 
     columns = np.column_stack([time, first + second, bench.DT * np.cumsum(speed)])
     np.savetxt(tmp_path / "turned.csv", columns, delimiter=",", header="t,T,x", comments="")
     (tmp_path / "signals.toml").write_text(SIGNALS.replace("speed", "position").replace('"w"', '"x"'))
-    given = ["--signals", str(tmp_path / "signals.toml"), "--trust-fmu", "--map", "torque=T_M1", "--budget-s", "6"]
+    given = ["--signals", str(tmp_path / "signals.toml"), "--trust-fmu", "--map", "torque=T_M1", "--budget-s", "20"]
     assert run(["diagnose", str(tmp_path / "turned.csv"), "--model", fmu, "--out", str(tmp_path / "out"), *given]) == 0
 
 
