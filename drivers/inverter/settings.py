@@ -34,6 +34,8 @@ class InverterSettings:
         The drive's EDS; None for the one that is shipped.
     vendor_id, product_code
         Identity expected in object 0x1018; None for the EDS's.
+    serial_number
+        Of the drive behind this node id, 0x1018:04; None where it is not compared.
     heartbeat_ms
         Heartbeat period of the drive [ms].
     host_node_id
@@ -74,6 +76,7 @@ class InverterSettings:
     eds_path: Path | None = None
     vendor_id: int | None = None
     product_code: int | None = None
+    serial_number: int | None = None
     heartbeat_ms: int = 100
     host_node_id: int = HOST_NODE_ID
     host_timeout_ms: int = 150

@@ -77,6 +77,7 @@ class InverterTable(Table):
     node_id: NodeId
     vendor_id: Unsigned32
     product_code: Unsigned32
+    serial_number: Unsigned32 | None = None
     rated_torque_nm: Positive
     torque_limit_nm: Positive
     mode: Annotated[

@@ -121,6 +121,7 @@ def inverter_settings(name: str, rig: Rig) -> InverterSettings:
         eds_path=table.eds,
         vendor_id=table.vendor_id,
         product_code=table.product_code,
+        serial_number=table.serial_number,
         heartbeat_ms=table.heartbeat_ms,
         host_node_id=rig.host_node_id,
         host_timeout_ms=table.host_timeout_ms,

@@ -12,9 +12,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 
-from drivers.errors import DriverError
+from drivers.canopen.strangers import Strangers, foreign
+from drivers.errors import DriverError, ForeignController
 from drivers.plc.types import PlcStatus
 from hil.errors import RunAborted
 from hil.rig.arming import ArmedDrives
@@ -43,7 +45,7 @@ def run_plan(
 ) -> RunSummary:
     """Run a plan on an opened rig."""
     before = _fit(devices, plan)
-    with HostBeat(devices.plc_loop, devices.plc) as beat:
+    with HostBeat(devices.plc_loop, devices.plc) as beat, _blaming_strangers(devices.link.strangers):
         _configure(devices, stop)
         prbs = PlcPrbs(devices.plc_loop, devices.plc, plan.plc_prbs, pacer.poll_patience_s)
         with prbs, ArmedDrives(devices, stop):
@@ -69,6 +71,21 @@ def run_plan(
             except (DriverError, RunAborted) as error:
                 _blame_the_host_first(error, drive.lateness)
                 raise
+
+
+@contextmanager
+def _blaming_strangers(strangers: Strangers) -> Iterator[None]:
+    """Where another controller was heard, what looks wrong with a device may be its doing."""
+    try:
+        yield
+    except ForeignController:
+        raise
+    except (DriverError, RunAborted) as error:
+        if strangers.heard is None:
+            raise
+        cause = foreign(strangers.heard)
+        cause.args = (f"{cause} What this program met: {error}",)
+        raise cause from error
 
 
 def _blame_the_host_first(error: Exception, lateness: str) -> None:
