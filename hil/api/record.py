@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
@@ -14,6 +14,7 @@ from hil.api.models import Model, signals_of
 from hil.recording import columns
 from hil.recording.channels import column_of, understood
 from hil.recording.signals import read_record, to_record, under_imposed_motion
+from hil.recording.survey import survey_of
 from hil.recording.table import Table
 from hil.report.figures import Line, Panel, Style, input_lines, time_panels
 from hil.report.wording import quantity
@@ -48,31 +49,47 @@ class Record(base.Record):
         name: str = "frame",
         signals: Mapping[str, Any] | None = None,
         model: Model | None = None,
+        *,
+        torque: str | Sequence[str] | None = None,
+        speed: str | None = None,
+        position: str | None = None,
+        time: str | None = None,
     ) -> Self:
         """Take the columns of a table.
 
         Parameters
         ----------
         frame : pandas.DataFrame
-            Columns as in a file; without a column for the time its index is the time, in seconds or as moments.
+            Columns as in a file; without a column for the time its index is the time, in seconds or as moments, or a
+            column that rises evenly.
         name : str
             What the recording is called in results.
         signals : mapping, optional
             As ``[signals]`` of a model file; the contract's columns without it.
         model : path or model file, optional
             Whose ``[signals]`` count, where ``signals`` is not given.
+        torque, speed, position, time : str, or several for ``torque``, optional
+            Columns by name, in place of those of ``signals``.
 
         Raises
         ------
         RecordingError
             If the columns are not those of a recording, by name.
         """
-        known, on_bench = signals_of(signals, model)
+        named = {"speed": speed, "position": position, "time": time}
+        given: dict[str, Any] = {role: {"column": column} for role, column in named.items() if column is not None}
+        if torque is not None:
+            given["torque"] = [{"column": each} for each in ([torque] if isinstance(torque, str) else torque)]
+        known, on_bench = signals_of({**(signals or {}), **given} if given else signals, model)
         cells = {str(key): column_of(frame[key].to_numpy()) for key in frame.columns}
-        time = known.time.column or columns.TIME
-        if known.time.column is not None and time not in cells:
-            cells[time] = column_of(frame.index.to_numpy())
-        record = to_record(understood(Table(Path(name), cells)), known)
+        counted = known.time.column or columns.TIME
+        is_counted = type(frame.index).__name__ == "RangeIndex"  # of rows, which are no time
+        if known.time.column is not None and counted not in cells and not is_counted:
+            cells[counted] = column_of(frame.index.to_numpy())
+        table = understood(Table(Path(name), cells, is_frame=True))
+        if time is None and counted not in cells:
+            table = replace(table, master=survey_of([table]).groups[0].time)
+        record = to_record(table, known)
         return cls.of(under_imposed_motion(record) if on_bench else record)
 
     def to_dataframe(self) -> pandas.DataFrame:

@@ -93,19 +93,17 @@ def _show(found: Look) -> None:
     from rich.table import Table
 
     from hil.cli.printing import new_console
-    from hil.recording.survey import guesses
+    from hil.recording.look import CHANNEL_HEADINGS, channel_rows
 
     console = new_console()
     for group in found.survey.groups:
         table = Table(title=_rate(group), title_justify="left", box=None, pad_edge=False)
-        for heading in ("channel", "unit", "samples", "missing", "low", "high", "could be"):
+        for heading in CHANNEL_HEADINGS:
             is_number = heading in ("samples", "missing", "low", "high")
             table.add_column(heading, justify="right" if is_number else "left", overflow="fold")
-        for channel in group.channels:
-            could = "time" if channel.name == group.time else ", ".join(g.role.value for g in guesses(channel))
-            low, high = ("" if value is None else f"{value:.6g}" for value in (channel.low, channel.high))
-            cells = (channel.name, channel.unit, str(channel.rows), str(channel.missing or ""), low, high, could)
-            table.add_row(*(_plain(cell) for cell in cells))
+        for name, unit, rows, missing, *ends, could in channel_rows(group):
+            low, high = ("" if value is None else f"{value:.6g}" for value in ends)
+            table.add_row(*map(_plain, (name, unit, str(rows), str(missing or ""), low, high, could)))
         console.print(table)
 
 
