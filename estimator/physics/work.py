@@ -34,8 +34,13 @@ class Work:
 
     def check(self) -> None:
         """Raise ``TimeIsUp`` where the limit has passed."""
-        if time.perf_counter() > self._end:
+        if self.left_s < 0.0:
             raise TimeIsUp
+
+    @property
+    def left_s(self) -> float:
+        """Time until the limit [s]; negative where it has passed."""
+        return self._end - time.perf_counter()
 
 
 _work: ContextVar[Work | None] = ContextVar("work", default=None)
@@ -56,6 +61,12 @@ def count_samples(samples: int) -> None:
     work = _work.get()
     if work is not None:
         work.add(samples)
+
+
+def time_left_s() -> float:
+    """Return the time until the limit [s], for what is done outside this process; infinity without one."""
+    work = _work.get()
+    return math.inf if work is None else work.left_s
 
 
 def check_time() -> None:

@@ -112,7 +112,7 @@ def diagnose(
 
     require_folder(out)
     every = [*recordings, *(holdout or ())]
-    asked = Asked(model, signals, mapped or (), Trust(trust_laws, trust_fmu))
+    asked = Asked(model, signals, mapped or (), Trust(trust_laws, trust_fmu), budget_s)
     file, records = questioned(asked, every, dbc, tell)
     training, kept_back = records[: len(recordings)], records[len(recordings) :]
     with with_the_line_to_write(every, file.signals, dbc), progress_bar() as progress:

@@ -19,6 +19,7 @@ from estimator.diagnosis.segments import tiles
 from estimator.physics.driveline import Start
 from estimator.physics.free_run import FreeRun
 from estimator.physics.model import Motion
+from estimator.physics.work import check_time, time_left_s
 from estimator.signals.record import FloatArray, OutputKind, Record
 from hil.errors import UsageError
 from hil.plants.fmu_process import HUNG, MEMORY_BYTES, STEP_S
@@ -97,9 +98,12 @@ class FmuPlant:
     ) -> tuple[Document, dict[str, Column]]:
         """Have the FMU's process do something; a `UsageError` says what it did instead."""
         try:
-            document, answered = self._sandbox.ask(request, LONGEST_S, columns)
+            check_time()
+            document, answered = self._sandbox.ask(request, min(LONGEST_S, time_left_s()), columns)
         except Gone:
-            raise UsageError(f"{expected}, got {_ended(self._sandbox.end(at_once=False))}. {CURE}") from None
+            status = self._sandbox.end(at_once=False)
+            check_time()  # it was ended, and did not end
+            raise UsageError(f"{expected}, got {_ended(status)}. {CURE}") from None
         except BaseException:  # Ctrl-C, for one: it may not return by itself
             self._sandbox.end()
             raise

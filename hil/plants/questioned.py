@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from estimator.physics.work import TimeIsUp, Work, counted
 from estimator.signals.record import Record
 from hil.config.model_file import ModelFile, read_model_for_recordings, read_signals
 from hil.errors import UsageError
@@ -26,12 +28,15 @@ class Asked:
         File with the ``[signals]`` that recordings are read by; a model file has its own.
     mapped : sequence of str
         Variables of an FMU (``names``).
+    budget_s : float or None
+        Time that an FMU's first simulations may take, too [s].
     """
 
     model: Path
     signals: Path | None
     mapped: Sequence[str]
     trust: Trust
+    budget_s: float | None = None
 
 
 def questioned(
@@ -44,7 +49,15 @@ def questioned(
         records = read_records(recordings, signals, False, dbc, tell)
         if any(record.channels for record in records):
             raise UsageError(f"{asked.signals}: expected one output with an FMU. Take outputs out of [signals]")
-        return ModelFile(fmu_line(fmu, records), signals), records
+        try:
+            with counted(Work(math.inf if asked.budget_s is None else asked.budget_s)):
+                return ModelFile(fmu_line(fmu, records), signals), records
+        except TimeIsUp:
+            raise UsageError(
+                f"{asked.model}: expected an FMU that simulates the recordings once in {asked.budget_s:g} s "
+                "(--budget-s), got one that does not. Give it more time, fewer or shorter recordings; one that hangs "
+                "is to be repaired in the program that made it."
+            ) from None
     if asked.signals is not None:
         raise UsageError(f"--signals {asked.signals}: expected with an FMU; a model file has its own [signals]")
     if asked.mapped:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import signal
 from pathlib import Path
 
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 
 from hil.cli.main import run
+from hil.export.fmu import package
 from hil.plants.fmu_plant import FmuPlant
 from hil.recording import read_record, sandbox
 from tests.cli import bench
@@ -88,7 +90,7 @@ def test_a_recorded_angle_is_held_against_the_fmus(fmu: str, tmp_path: Path) -> 
     columns = np.column_stack([time, first + second, bench.DT * np.cumsum(speed)])
     np.savetxt(tmp_path / "turned.csv", columns, delimiter=",", header="t,T,x", comments="")
     (tmp_path / "signals.toml").write_text(SIGNALS.replace("speed", "position").replace('"w"', '"x"'))
-    given = ["--signals", str(tmp_path / "signals.toml"), "--trust-fmu", "--map", "torque=T_M1", "--budget-s", "2"]
+    given = ["--signals", str(tmp_path / "signals.toml"), "--trust-fmu", "--map", "torque=T_M1", "--budget-s", "6"]
     assert run(["diagnose", str(tmp_path / "turned.csv"), "--model", fmu, "--out", str(tmp_path / "out"), *given]) == 0
 
 
@@ -105,6 +107,38 @@ def test_an_interruption_ends_the_process_of_the_fmu(fmu: str, tmp_path: Path, m
     with pytest.raises(KeyboardInterrupt):
         plant.run(read_record(tmp_path / "run_1.csv"))
     assert process.returncode == -signal.SIGKILL
+
+
+HANGS = """#include <fcntl.h>
+#include <unistd.h>
+fmi2Status fmi2EnterInitializationMode(Instance c) {{
+    int begun = open("{counter}", O_WRONLY | O_CREAT | O_APPEND, 0600);
+    if (write(begun, "x", 1) != 1 || lseek(begun, 0, SEEK_END) > {good}) for (;;) pause();
+    close(begun);
+    """
+
+
+@pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
+@pytest.mark.parametrize(("good", "status"), [(0, 2), (60, 0)])
+def test_one_that_hangs_ends_with_the_budget(
+    good: int, status: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """At its first simulation there is no diagnosis; at a later one nothing is decided."""
+    before, own = "fmi2Status fmi2EnterInitializationMode(Instance c) { ", package.own
+    assert before in own("fmi2.c")
+    hangs = HANGS.format(counter=tmp_path / "begun", good=good)
+    monkeypatch.setattr(package, "own", lambda name: own(name).replace(before, hangs))
+    (tmp_path / "drive.toml").write_text(bench.MODEL)
+    export = ["export", "fmu", str(tmp_path / "drive.toml"), "--fmi", "2.0", "--out", str(tmp_path / "drive.fmu")]
+    assert run(export) == 0
+    bench.record(tmp_path / "run_1.csv", 1, n=300)
+    given = ["--model", str(tmp_path / "drive.fmu"), "--trust-fmu", "--budget-s", "8", "--out", str(tmp_path / "out")]
+    capsys.readouterr()
+    assert run(["diagnose", str(tmp_path / "run_1.csv"), *given]) == status
+    printed = capsys.readouterr()
+    expected = "Not decided: the search was ended after 8 s" if good else "in 8 s (--budget-s)"
+    assert expected in printed.out + printed.err
+    assert len((tmp_path / "begun").read_bytes()) > good
 
 
 def test_a_model_file_takes_no_map(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
