@@ -25,6 +25,10 @@ def look(
         Path | None,
         typer.Option("--model", metavar="MODEL", help="Model file to read FILE by: shows which scale is wrong."),
     ] = None,
+    plot: Annotated[
+        bool,
+        typer.Option("--plot", help="Write FILE's name with .look.html: its channels over time, to see and to cut."),
+    ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
     """Show what is in a recording: channels, units, rates, gaps, what each could be, and the table that reads it."""
@@ -34,6 +38,8 @@ def look(
     from hil.recording.look import look as look_into
 
     found = look_into(file, dbc)
+    if plot:
+        _plot(found, model, dbc)
     if as_json:
         say(json.dumps(_document(found)))
         return
@@ -50,6 +56,28 @@ def look(
         _tell_scales(file, model, dbc)
     elif found.roles.torques and found.roles.output is not None:
         _tell_scales_alone(found, dbc)
+
+
+def _plot(found: Look, model: Path | None, dbc: Path | None) -> None:
+    """Write the page with the channels into this folder, and open it where a person sits at a terminal."""
+    import sys
+    import webbrowser
+
+    from hil.config.model_file import read_model_for_recordings, signals_of
+    from hil.recording.signals_config import SignalsConfig
+    from hil.report.look_page import look_page
+    from hil.report.outputs import publish
+
+    known = None if model is None else read_model_for_recordings(model).signals
+    if known is None and found.signals:
+        known = signals_of("\n".join(found.signals))
+    signals = known or SignalsConfig()
+    text = look_page(found, signals, signals.request(dbc))
+    page = Path(f"{found.path.stem}.look.html")
+    publish(Path(), {page.name: lambda path: path.write_text(text, encoding="utf-8")})
+    say(f"page: {page}", err=True)
+    if sys.stdout.isatty():
+        webbrowser.open(page.absolute().as_uri())
 
 
 def _tell_scales(file: Path, model: Path, dbc: Path | None) -> None:

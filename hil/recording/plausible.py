@@ -9,6 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hil.errors import RecordingError
 from hil.recording.table import FloatArray, Table
@@ -58,13 +59,22 @@ def doubts(torques: Sequence[str], output: str, values: Mapping[str, FloatArray]
 def clipped_at(values: FloatArray) -> tuple[float, float] | None:
     """Return which share of the rows stands at the greatest or least value, and that; else None."""
     seen = values[np.isfinite(values)]
+    rows = clipped_rows(seen)
+    return (float(rows.mean()), float(seen[rows][0])) if rows.any() else None
+
+
+def clipped_rows(values: FloatArray) -> NDArray[np.bool_]:
+    """Tell which rows stand at the greatest value, or else the least, as a reading that is clipped does; shape (N,)."""
+    clipped = np.zeros(values.size, dtype=np.bool_)
+    seen = values[np.isfinite(values)]
     if np.unique(seen).size < DISTINCT:
-        return None
+        return clipped
     for bound in (float(seen.max()), float(seen.min())):
-        at = np.concatenate([[0], (seen == bound).astype(np.int8), [0]])
-        edges = np.diff(at)
-        runs = np.flatnonzero(edges == -1) - np.flatnonzero(edges == 1)
-        share = float(runs[runs >= CLIPPED_RUN].sum()) / seen.size
-        if share > CLIPPED_SHARE:
-            return share, bound
-    return None
+        edges = np.diff(np.concatenate([[0], (values == bound).astype(np.int8), [0]]))
+        runs = zip(np.flatnonzero(edges == 1).tolist(), np.flatnonzero(edges == -1).tolist(), strict=True)
+        for first, end in runs:
+            clipped[first:end] = end - first >= CLIPPED_RUN
+        if clipped.sum() > CLIPPED_SHARE * seen.size:
+            return clipped
+        clipped[:] = False
+    return clipped

@@ -110,7 +110,7 @@ def to_record(table: Table, signals: SignalsConfig, tell: Tell | None = None) ->
         doubtful = doubts(names, output.column, numbers)
         for line in (*table.recognised, *remark, *_units_used(table, signals), *doubtful):
             tell(f"{table.path}: {line}")
-    masks = {mask: _inside(numbers[mask.column], mask) for mask in signals.mask}
+    masks = {mask: in_mask(numbers[mask.column], mask) for mask in signals.mask}
     flagged = _flagged(table, signals)
     read = np.column_stack([np.isfinite(numbers[torque.column]) & ~flagged for torque in torques])
     trusted = read & np.column_stack([_inside_own(numbers[torque.column], torque.column, masks) for torque in torques])
@@ -254,11 +254,12 @@ def under_imposed_motion(record: Record) -> Record:
     )
 
 
-def _inside(values: FloatArray, mask: MaskRange) -> NDArray[np.bool_]:
+def in_mask(values: FloatArray, mask: MaskRange) -> NDArray[np.bool_]:
+    """Tell of each row whether a mask lets it count; both shapes (N,)."""
     low = -np.inf if mask.min is None else mask.min
     high = np.inf if mask.max is None else mask.max
-    inside: NDArray[np.bool_] = (values >= low) & (values <= high)  # NaN is outside
-    return inside
+    counts: NDArray[np.bool_] = (values >= low) & (values <= high)  # NaN is outside
+    return counts
 
 
 def _flagged(table: Table, signals: SignalsConfig) -> NDArray[np.bool_]:
