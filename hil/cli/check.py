@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from rich.table import Table as RichTable
 
     from drivers.eds_check import EdsReport
-    from drivers.plc.reading import Reading
+    from drivers.plc.named_registers import Reading
     from hil.config.rig_file import Rig
     from hil.rig.check import ChannelReading, Finding
 

@@ -8,7 +8,7 @@ from typing import Annotated, Self
 from pydantic import Field, model_validator
 
 from drivers.capability.speed_unit import SpeedUnit, SpeedUnitName
-from drivers.inverter.acceptance import Acceptance
+from drivers.inverter.settings import Acceptance
 from hil.config.table import Positive, Table, Text
 from hil.problems import Fault, refuse
 
@@ -62,7 +62,7 @@ class AcceptanceTable(Table):
 
 
 class AcceptedTable(Table):
-    """What a drive lacks, by name; see `drivers.inverter.protection`."""
+    """What a drive lacks, by name; see `drivers.inverter.stop_proof`."""
 
     heartbeat_consumer: AcceptanceTable | None = None
     rpdo_deadline: AcceptanceTable | None = None

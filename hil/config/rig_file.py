@@ -21,8 +21,7 @@ from pydantic import Field, PrivateAttr, model_validator
 from drivers.capability.plan import plan_drive
 from drivers.datasheet.file import EdsFile
 from drivers.errors import ConfigMismatch
-from drivers.plc.map_needs import require_usable
-from drivers.plc.register_map import RegisterMap, RegisterMapError, load_register_map
+from drivers.plc.register_map import RegisterMap, RegisterMapError, load_register_map, require_usable
 from drivers.plc.types import PrbsSource
 from drivers.resources import data_file
 from drivers.torque_guard import ErrorLimits, GuardLimits

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from drivers.canopen.pdo_map import MAX_MAPPED, read_layout
-from drivers.datasheet.number import octal_matters, read_formula, read_number
+from drivers.datasheet.types import octal_matters, read_formula, read_number
 from drivers.eds_check.check import check_eds
 from drivers.errors import ConfigMismatch
 from drivers.plc.register_map import RegisterMapError, load_register_map

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from drivers.inverter.acceptance import Acceptance
+from drivers.inverter.settings import Acceptance
 from hil.config.drive_tables import AcceptanceTable, AcceptedTable
 from hil.config.rig_file import Rig
 from hil.errors import UsageError

@@ -7,13 +7,12 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from drivers.capability.function import Function
 from drivers.capability.plan import DrivePlan
-from drivers.datasheet.finding import Severity
-from drivers.datasheet.number import read_number
-from drivers.datasheet.text import EdsSection, read_eds_text
+from drivers.capability.table import Function
+from drivers.datasheet.text import EdsSection, Severity, read_eds_text
+from drivers.datasheet.types import read_number
 from drivers.eds_check import EdsReport, check_eds
-from drivers.eds_check.rig_lines import RigLine, usual_mode
+from drivers.eds_check.needs import RigLine, usual_mode
 from hil.config.new_rig.questions import BY_NAME
 from hil.errors import InputError
 
