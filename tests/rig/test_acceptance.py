@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from drivers.inverter.settings import Acceptance
-from hil.config.drive_tables import AcceptanceTable, AcceptedTable
+from hil.config.device_tables import AcceptanceTable, AcceptedTable
 from hil.config.rig_file import Rig
 from hil.errors import UsageError
 from hil.rig.build import open_devices
