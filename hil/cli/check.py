@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from hil.cli.options import TakeOver
 from hil.cli.printing import say
-from hil.cli.take_over_option import TakeOver
 from hil.errors import InputError, UsageError
 
 if TYPE_CHECKING:

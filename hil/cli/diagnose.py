@@ -11,9 +11,9 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperCommand
 
+from hil.cli.command_line import is_silent
 from hil.cli.importing import without_collecting
 from hil.cli.options import Dbc, Jobs, Mapped, TrustFmu, TrustLaws, tell
-from hil.cli.silence import is_silent
 
 HOLDOUT = "--holdout"
 

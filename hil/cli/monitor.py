@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from hil.cli.options import FilterOf, FilterRun, TrustLaws, with_filter
+from hil.cli.options import FilterOf, FilterRun, TakeOver, TrustLaws, with_filter
 from hil.cli.printing import say
-from hil.cli.take_over_option import TakeOver
 from hil.errors import RunAborted, UsageError
 
 if TYPE_CHECKING:

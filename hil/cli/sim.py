@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.markup import escape
 
-from hil.cli.completers import effect_names
+from hil.cli.completion import effect_names
 from hil.cli.options import TrustLaws
 from hil.rig.stop import StopRequest, stop_on_signals
 from hil.simulator.fault_table import known_faults
