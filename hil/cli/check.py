@@ -58,8 +58,8 @@ def check(
     """
     from drivers.eds_check import check_eds
     from hil.config.rig_file import read_rig
-    from hil.rig.addresses import with_addresses
     from hil.rig.check import check_rig
+    from hil.simulator.addresses import with_addresses
 
     if rig is None and not eds:
         raise UsageError("expected a rig file, an EDS with --eds, or both, got neither. See: hil check --help")

@@ -76,7 +76,7 @@ def monitor(
 
 def _rig_file(rig: Path | None, bus: str | None, modbus: str | None, take_over: bool) -> Rig | None:
     from hil.config.rig_file import read_rig
-    from hil.rig.addresses import with_addresses
+    from hil.simulator.addresses import with_addresses
 
     return None if rig is None else with_addresses(read_rig(rig), bus, modbus, take_over)
 

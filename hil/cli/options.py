@@ -129,7 +129,7 @@ PaceOption = Annotated[Pace, typer.Option(help="By the wall clock, or as fast as
 def pacer_for(rig: Rig, pace: Pace) -> Pacer:
     """Make the pacer of one run."""
     from hil.rig.pacing import FreePacer, RealTimePacer, period_ns
-    from hil.simulator.loopback import IN_PROCESS, bus_address
+    from hil.simulator.addresses import IN_PROCESS, bus_address
     from hil.simulator.rig_server import required_simulation
 
     if pace is Pace.REAL:

@@ -56,7 +56,7 @@ def run(
     everything up to there.
     """
     from hil.config.rig_file import read_rig
-    from hil.rig.addresses import with_addresses
+    from hil.simulator.addresses import with_addresses
 
     rig_file = with_addresses(read_rig(rig), bus, modbus, take_over)
     if dry_run:

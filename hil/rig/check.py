@@ -25,8 +25,7 @@ from drivers.plc.types import PlcStatus
 from hil.config.channel_table import ChannelTable
 from hil.config.rig_file import InverterTable, PlcTable, Rig
 from hil.rig.build import inverter_settings, plc_client
-from hil.rig.fitness import Needs, reasons_against
-from hil.rig.plc_limits import max_speed_rad_s, plc_limits
+from hil.rig.plc_watch import Needs, max_speed_rad_s, plc_limits, reasons_against
 from hil.rig.sole_host import require_sole_host
 
 NO_NEEDS = Needs(torque_of_one_nm=0.0)

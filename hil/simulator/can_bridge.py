@@ -28,7 +28,7 @@ from can_remote.websocket import WebSocket, WebsocketClosed, get_accept_key
 
 from drivers.canopen.remote_bus import forget_token, keep_token, new_token
 from drivers.errors import BusDown
-from hil.simulator.loopback import Address
+from hil.simulator.addresses import Address
 
 LOGGER = logging.getLogger(__name__)
 
