@@ -74,7 +74,7 @@ Abilities = Mapping[Function, Ability]
 
 
 def abilities(sheet: DataSheet) -> dict[Function, Ability]:
-    """Find what a drive has of each function, but for what its PDOs decide (`drivers.capability.plan`)."""
+    """Find what a drive has of each function, but for what its PDOs decide (`DrivePlan`)."""
     return {function: _ability(sheet, row) for function, row in TABLE.items()}
 
 

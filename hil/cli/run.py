@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from hil.cli.completion import experiment_names
-from hil.cli.options import FilterOf, FilterRun, Pace, PaceOption, TakeOver, TrustLaws
+from hil.cli.options import FilterOf, FilterRun, Pace, PaceOption, TakeOver, TrustLaws, pacer_for, scheduling
 from hil.errors import UsageError
 
 app = typer.Typer(add_completion=False)
@@ -66,7 +66,6 @@ def run(
         return
     if out is None:
         raise UsageError("hil run: expected --out REC, a recording to write, or --dry-run; got neither.")
-    from hil.cli.options import pacer_for, scheduling
     from hil.cli.run_job import Job, live_estimate, print_result, record
     from hil.rig.metadata import run_metadata
 

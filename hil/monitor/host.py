@@ -58,7 +58,7 @@ from hil.rig.pacing import RealTimePacer, period_ns
 from hil.rig.realtime import real_time
 from hil.rig.stop import StopRequest, stop_on_signals
 from hil.rig.timing import Histogram, RunTiming
-from hil.simulator.addresses import with_addresses
+from hil.simulator.addresses import IN_PROCESS, Address, with_addresses
 
 NS_PER_S = 1_000_000_000
 
@@ -351,7 +351,6 @@ def _rig(job: Job) -> Iterator[Rig]:
     if not job.simulate:
         yield job.rig
         return
-    from hil.simulator.addresses import IN_PROCESS, Address
     from hil.simulator.driveline import plant_for
     from hil.simulator.rig_server import RigServer
 
