@@ -19,7 +19,7 @@ PLACEHOLDERS: Final = ("NAME", "REASON")
 
 @dataclass(frozen=True, slots=True)
 class Acceptance:
-    """Who accepted it, and why.
+    """Who accepted what a drive lacks, and why.
 
     Attributes
     ----------
