@@ -22,20 +22,13 @@ from pathlib import Path
 from types import TracebackType
 from typing import IO, Any, BinaryIO, Final, Self
 
-from can.io.blf import (
-    LOG_CONTAINER,
-    LOG_CONTAINER_STRUCT,
-    NO_COMPRESSION,
-    OBJ_HEADER_BASE_STRUCT,
-    ZLIB_DEFLATE,
-    BLFParseError,
-    BLFReader,
-)
-
 from drivers.canopen import can
 from drivers.canopen.can_link import is_canopen
 from hil.errors import RecordingError
 from hil.recording.bounds import no_room
+
+blf = can.io.blf
+"""Not imported before `drivers.canopen`, see there."""
 
 SUFFIXES = (".blf", ".log", ".asc")
 """Vector's binary and text logs, and the text of Linux's candump: what ``can.Logger`` writes by these names."""
@@ -145,10 +138,10 @@ FLOOR_BYTES: Final = 32 << 20
 UNPACKED_PER_BYTE: Final = 64
 """What a whole file may unpack to: a floor, and for large files a multiple of their size; frames pack tenfold."""
 
-HEADER_BYTES: Final = OBJ_HEADER_BASE_STRUCT.size
+HEADER_BYTES: Final = blf.OBJ_HEADER_BASE_STRUCT.size
 
 
-class BoundedBlfReader(BLFReader):
+class BoundedBlfReader(can.BLFReader):
     """Gives the frames of a BLF.
 
     Raises
@@ -165,35 +158,35 @@ class BoundedBlfReader(BLFReader):
 
     def __iter__(self) -> Iterator[can.Message]:  # type: ignore[override]  # nothing is sent into it
         while header := self.file.read(HEADER_BYTES):
-            signature, _, _, size, kind = OBJ_HEADER_BASE_STRUCT.unpack(header)
+            signature, _, _, size, kind = blf.OBJ_HEADER_BASE_STRUCT.unpack(header)
             if signature != b"LOBJ" or size < HEADER_BYTES:
-                raise BLFParseError(f"expected an object, got {signature!r} of {size} bytes")
+                raise blf.BLFParseError(f"expected an object, got {signature!r} of {size} bytes")
             content = self.file.read(size - HEADER_BYTES)
             self.file.read(size % 4)
-            if kind == LOG_CONTAINER:
+            if kind == blf.LOG_CONTAINER:
                 yield from self._parse_container(self._unpacked(content))
         self.stop()
 
     def _unpacked(self, content: bytes) -> bytes:
-        method, _ = LOG_CONTAINER_STRUCT.unpack_from(content)
-        packed = content[LOG_CONTAINER_STRUCT.size :]
-        if method == NO_COMPRESSION:
+        method, _ = blf.LOG_CONTAINER_STRUCT.unpack_from(content)
+        packed = content[blf.LOG_CONTAINER_STRUCT.size :]
+        if method == blf.NO_COMPRESSION:
             data = packed
-        elif method == ZLIB_DEFLATE:
+        elif method == blf.ZLIB_DEFLATE:
             unpacking = zlib.decompressobj()
             data = unpacking.decompress(packed, CONTAINER_BYTES)
             if unpacking.unconsumed_tail:
-                raise BLFParseError(f"expected containers of at most {CONTAINER_BYTES} bytes, got a larger one")
+                raise blf.BLFParseError(f"expected containers of at most {CONTAINER_BYTES} bytes, got a larger one")
         else:
-            raise BLFParseError(f"expected a container packed by zlib or not at all, got method {method}")
+            raise blf.BLFParseError(f"expected a container packed by zlib or not at all, got method {method}")
         self._left -= len(data)
         if self._left < 0:
-            raise BLFParseError("expected a log, got a file that unpacks to far more than one of its size")
+            raise blf.BLFParseError("expected a log, got a file that unpacks to far more than one of its size")
         return data
 
     def _parse_container(self, data: bytes) -> Iterator[can.Message]:
         if len(self._tail) > CONTAINER_BYTES:
-            raise BLFParseError("expected objects that end, got one that is longer than any")
+            raise blf.BLFParseError("expected objects that end, got one that is longer than any")
         _require_lengths(self._tail + data)
         yield from super()._parse_container(data)
 
@@ -202,9 +195,9 @@ def _require_lengths(data: bytes) -> None:
     """See that every object whose header is there leads on to the next."""
     at = data.find(b"LOBJ", 0, 8)
     while 0 <= at <= len(data) - HEADER_BYTES:
-        size = OBJ_HEADER_BASE_STRUCT.unpack_from(data, at)[3]
+        size = blf.OBJ_HEADER_BASE_STRUCT.unpack_from(data, at)[3]
         if size < HEADER_BYTES:
-            raise BLFParseError(f"expected an object of {HEADER_BYTES} bytes or more, got one of {size}")
+            raise blf.BLFParseError(f"expected an object of {HEADER_BYTES} bytes or more, got one of {size}")
         at = data.find(b"LOBJ", at + size, at + size + 8)
 
 
