@@ -24,7 +24,7 @@ class Strangers:
     Attributes
     ----------
     heard
-        The first such frame at all, before the watch, too: where a device is not as it was told, why.
+        The first such frame at all, before the watch, too: the reason where a device is not as it was set.
     """
 
     def __init__(self, subscribe: Subscribe) -> None:

@@ -14,10 +14,9 @@ from drivers.canopen.emcy import EMCY_COB_ID
 from drivers.canopen.pdo_map import PdoLayout, read_layout
 from drivers.canopen.sdo import SdoChannel, object_name
 from drivers.capability.carrier import Carrier
-from drivers.capability.function import Function
 from drivers.capability.plan import DrivePlan
 from drivers.capability.speed_unit import SI_UNIT_VELOCITY, described_scale, scale_of
-from drivers.capability.table import OPTION_CODES
+from drivers.capability.table import OPTION_CODES, Function
 from drivers.errors import ConfigMismatch
 from drivers.inverter.cia402 import TorqueMode
 from drivers.inverter.drive_settings import (

@@ -6,9 +6,8 @@ What may come in: everything but the command line.
 from hil.api.comparison import ComparisonResult, compare
 from hil.api.diagnosis import DiagnosisResult, diagnose
 from hil.api.identification import IdentificationResult, identify
-from hil.api.look import LookResult, look
 from hil.api.models import read_model
-from hil.api.record import Record, read
+from hil.api.record import LookResult, Record, look, read
 
 __all__ = [
     "ComparisonResult",

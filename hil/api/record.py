@@ -1,4 +1,4 @@
-"""A recording in Python: read from a file or taken from a table of pandas."""
+"""A recording in Python: looked into, read from a file, or taken from a table of pandas."""
 
 from __future__ import annotations
 
@@ -13,9 +13,12 @@ from estimator.signals import record as base
 from hil.api.models import Model, signals_of
 from hil.recording import columns
 from hil.recording.channels import column_of, understood
+from hil.recording.look import CHANNEL_HEADINGS, Look, channel_rows
+from hil.recording.look import look as look_into
 from hil.recording.signals import read_record, to_record, under_imposed_motion
 from hil.recording.survey import survey_of
 from hil.recording.table import Table
+from hil.report import page as html
 from hil.report.figures import Line, Panel, Style, input_lines, time_panels
 from hil.report.wording import quantity
 
@@ -125,3 +128,39 @@ def read(path: Path | str, signals: Mapping[str, Any] | None = None, model: Mode
     """Read a recording from a file of any format that ``hil`` reads."""
     known, on_bench = signals_of(signals, model)
     return Record.of(read_record(path, known, on_bench), Path(path))
+
+
+@dataclass(frozen=True, slots=True)
+class LookResult:
+    """Channels of a recording, and the table that reads it; ``found`` holds all of it."""
+
+    found: Look
+
+    @property
+    def signals(self) -> str:
+        """The lines of ``[signals]`` that read it; empty where none are needed."""
+        return "\n".join(self.found.signals)
+
+    def to_dataframe(self) -> pandas.DataFrame:
+        """Return a row per channel."""
+        import pandas
+
+        rows = [row for group in self.found.survey.groups for row in channel_rows(group)]
+        return pandas.DataFrame(rows, columns=list(CHANNEL_HEADINGS)).set_index("channel")
+
+    def __repr__(self) -> str:
+        roles = self.found.roles
+        torques = ", ".join(guess.channel.name for guess in roles.torques) or "none found"
+        output = "none found" if roles.output is None else roles.output.channel.name
+        count = sum(len(group.channels) for group in self.found.survey.groups)
+        return f"<{self.found.path.name}: {count} channels; torque {torques}; output {output}>"
+
+    def _repr_html_(self) -> str:
+        rows = [tuple(map(str, row)) for group in self.found.survey.groups for row in channel_rows(group)]
+        lines = [html.paragraph(line) for line in self.found.signals]
+        return html.fragment(html.Heading(repr(self)[1:-1]), html.table(CHANNEL_HEADINGS, rows, range(2, 6)), *lines)
+
+
+def look(path: Path | str, dbc: Path | str | None = None) -> LookResult:
+    """Say what is in a recording, and which ``[signals]`` read it."""
+    return LookResult(look_into(Path(path), None if dbc is None else Path(dbc)))

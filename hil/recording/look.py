@@ -11,7 +11,7 @@ import tomlkit
 
 from hil.printable import printable
 from hil.recording import columns
-from hil.recording.encoding import FALLBACK, likely_encoding
+from hil.recording.csv_format import FALLBACK, likely_encoding
 from hil.recording.formats import format_of, tables_of
 from hil.recording.request import FormatHints, Request
 from hil.recording.sandbox import READER

@@ -14,10 +14,9 @@ from hil.figures.palette import GREY, ORANGE, PURPLE
 from hil.printable import printable
 from hil.recording.formats import read_table
 from hil.recording.look import Look
-from hil.recording.plausible import clipped_rows
 from hil.recording.request import Request
 from hil.recording.scales import Role, scale_of
-from hil.recording.signals import in_mask
+from hil.recording.signals import clipped_rows, in_mask
 from hil.recording.signals_config import MaskRange, SignalsConfig
 from hil.recording.survey import Group
 from hil.recording.table import Table
@@ -103,10 +102,11 @@ def _marks(time_s: FloatArray, values: dict[str, FloatArray], masks: list[MaskRa
 
 
 MOST_MARKS: Final = 200
-"""Of one kind in one channel: more can't be told from one another."""
+"""Of one kind in one channel: more can't be distinguished."""
 
 
 def _spans(time_s: FloatArray, rows: NDArray[np.bool_], colour: str) -> Iterator[Mark]:
     edges = np.diff(np.concatenate([[0], rows.astype(np.int8), [0]]))
-    for first, end in list(zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1), strict=True))[:MOST_MARKS]:
+    spans = np.column_stack([np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)])[:MOST_MARKS]
+    for first, end in spans.tolist():
         yield Mark(float(time_s[first]), float(time_s[min(end, time_s.size - 1)]), colour)

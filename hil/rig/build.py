@@ -22,7 +22,7 @@ from hil.errors import UsageError
 from hil.rig.channels import Channels
 from hil.rig.plc_loop import PlcLoop
 from hil.rig.sole_host import require_sole_host
-from hil.simulator.loopback import is_simulated_bus
+from hil.simulator.addresses import is_simulated_bus
 
 NAMES = ("m1", "m2")
 

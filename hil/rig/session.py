@@ -23,12 +23,11 @@ from hil.rig.arming import ArmedDrives
 from hil.rig.build import Devices
 from hil.rig.cycle import Cycle
 from hil.rig.drive import Drive, Observer, Progress, Recorder, RunSummary
-from hil.rig.fitness import reasons_against
-from hil.rig.host_beat import HostBeat
+from hil.rig.excitation import PlcPrbs
 from hil.rig.pacing import Pacer
 from hil.rig.plan import Plan
-from hil.rig.plc_prbs import PlcPrbs
-from hil.rig.plc_watch import PlcWatch
+from hil.rig.plc_loop import HostBeat
+from hil.rig.plc_watch import PlcWatch, reasons_against
 from hil.rig.stop import StopRequest
 from hil.rig.timing import RunTiming
 

@@ -20,11 +20,11 @@ from drivers.plc.register import Register, ValueType
 from hil.config.channel_table import ChannelTable
 from hil.config.rig_file import InverterTable, Rig, SimulationTable
 from hil.errors import UsageError
+from hil.simulator.addresses import IN_PROCESS, SOCKETCAN, Address, bus_address
 from hil.simulator.can_bridge import CanBridge
 from hil.simulator.drive_physics import SimulatedInverter
 from hil.simulator.faults import InverterFaults, RigFaults
 from hil.simulator.faulty_wire import FaultyWire
-from hil.simulator.loopback import IN_PROCESS, SOCKETCAN, Address, bus_address
 from hil.simulator.plant import Plant, SensedPlant
 from hil.simulator.plc_device import PlcDevice, PlcSetup
 from hil.simulator.plc_server import PlcSecurity, PlcServer

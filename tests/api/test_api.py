@@ -52,7 +52,7 @@ def test_columns_by_plain_strings(recording: Path) -> None:
         np.testing.assert_array_equal(found.output, of_file.output)
         assert found.sample_time_s == pytest.approx(of_file.sample_time_s)
     assert hil.Record.from_pandas(frame, torque="T1", speed="n").torque_nm.shape[1] == 1
-    with pytest.raises(RecordingError, match=r"column w: missing, the frame has s, T1, T2, n\. Name its columns: from_p"):
+    with pytest.raises(RecordingError, match=r"column w: missing, the frame has s, T1, T2, n\. Name its"):
         hil.Record.from_pandas(frame, torque="T1", speed="w")
     with pytest.raises(RecordingError, match="column time_s: missing"):  # counted rows are no time
         hil.Record.from_pandas(frame.drop(columns="s"), torque="T1", speed="n")

@@ -109,5 +109,6 @@ def test_the_stretch_in_view_is_what_signals_cut(browser: Any, tmp_path: Path, m
         shown.page.locator(".cut button").last.click()
         expect(lines).to_have_text("from_s = 0.00\nto_s = 19.99")
         assert "<b>n</b>" in shown.page.locator(".plotly-graph-div").text_content()
-        marks = shown.page.evaluate("document.querySelector('.plotly-graph-div').layout.shapes.map((s) => [s.x0, s.x1])")
+        shapes = shown.page.evaluate("document.querySelector('.plotly-graph-div').layout.shapes")
+        marks = [[each["x0"], each["x1"]] for each in shapes]
         assert [7.98, 8.99] in marks  # the gap

@@ -11,9 +11,9 @@ from drivers.inverter.cia402 import PowerState, state_of
 from drivers.inverter.cia402 import PowerState as S
 from drivers.plc.types import ClutchState, DriveMode
 from hil.errors import UsageError
-from hil.rig.addresses import with_addresses
 from hil.rig.build import open_devices
 from hil.rig.check import check_rig
+from hil.simulator.addresses import with_addresses
 from hil.simulator.fault_table import DEVICES, NOBODY, OVERCURRENT, known_faults, rig_faults
 from hil.simulator.faults import (
     BusFaults,

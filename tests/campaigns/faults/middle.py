@@ -36,14 +36,13 @@ from drivers.plc.register_map import RegisterMap
 from hil.config.rig_file import Rig
 from hil.recording import RecordingWriter, read_table
 from hil.rig import build
-from hil.rig.addresses import with_addresses
 from hil.rig.build import Devices, open_devices
 from hil.rig.experiments.base import Phase
 from hil.rig.pacing import FreePacer, period_ns
 from hil.rig.plan import plan_run
 from hil.rig.session import run_plan
 from hil.rig.stop import StopRequest
-from hil.simulator.loopback import Address
+from hil.simulator.addresses import Address, with_addresses
 from hil.simulator.rig_server import RigServer
 from tests.campaigns.faults.one_run import COUNT_NM, PATIENCE_S, Outcome
 from tests.campaigns.faults.rig import WatchedPlant, campaign_rig

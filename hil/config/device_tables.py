@@ -1,18 +1,92 @@
-"""The tables ``[inverters.NAME]`` of a rig file: where a drive is, what it may give, how it stops by itself."""
+"""The tables of a rig file about devices: each inverter, and the PLC.
+
+Of a drive: where it is, what it may give, how it stops by itself, what its data sheet does not say, and what somebody
+has accepted that it lacks. Of the PLC: where it is, and how the connection to it is secured.
+
+Modbus/TCP Security: both sides show a certificate signed by the authority in ``ca``. All paths are relative to the
+rig file, all files PEM.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from enum import Enum
 from types import MappingProxyType
 from typing import Annotated, Any, Final, Self
 
 from pydantic import BeforeValidator, Field, WithJsonSchema, model_validator
 
+from drivers.capability.speed_unit import SpeedUnit, SpeedUnitName
 from drivers.inverter.cia402 import TorqueMode
 from drivers.inverter.drive_settings import ABORT_CONNECTION
-from hil.config.drive_tables import AcceptedTable, RatedTorqueUnit, SpeedUnitTable
-from hil.config.table import ExistingFile, Positive, Table, Unsigned32
+from drivers.inverter.settings import Acceptance
+from drivers.plc.modbus_security import ClientSecurity, Credentials
+from drivers.plc.register import Access
+from hil.config.table import ExistingFile, Positive, Table, TcpPort, Text, Unsigned32
 from hil.problems import Fault, refuse
+
+
+class SpeedUnitTable(Table):
+    """Unit of the velocity actual value 0x606C, from the drive's manual; over what its data sheet says."""
+
+    unit: Annotated[SpeedUnitName, Field(strict=False)]
+    counts_per_unit: Positive = 1.0
+    increments_per_turn: Positive | None = None
+
+    @property
+    def speed_unit(self) -> SpeedUnit:
+        """The unit as the drivers take it."""
+        return SpeedUnit(self.unit, self.counts_per_unit, self.increments_per_turn)
+
+    @model_validator(mode="after")
+    def _resolution_where_it_counts(self) -> Self:
+        per_turn = self.increments_per_turn
+        if self.speed_unit.needs_increments and per_turn is None:
+            refuse(
+                [Fault("increments_per_turn", f"the increments of one turn, since unit is {self.unit.value!r}", None)]
+            )
+        if not self.speed_unit.needs_increments and per_turn is not None:
+            refuse([Fault("increments_per_turn", f"no such key while unit is {self.unit.value!r}", per_turn)])
+        return self
+
+
+class RatedTorqueUnit(Enum):
+    """Unit of the motor rated torque 0x6076; CiA 402 has the thousandth."""
+
+    MILLI = "mNm"
+    MICRO = "uNm"
+
+    @property
+    def nm(self) -> float:
+        """One count [Nm]."""
+        return {RatedTorqueUnit.MILLI: 1e-3, RatedTorqueUnit.MICRO: 1e-6}[self]
+
+
+class AcceptanceTable(Table):
+    """Who accepted that it is missing, and why."""
+
+    by: Text
+    why: Text
+
+    @property
+    def acceptance(self) -> Acceptance:
+        """The acceptance as the drivers take it."""
+        return Acceptance(self.by, self.why)
+
+
+class AcceptedTable(Table):
+    """What a drive lacks, by name; see `drivers.inverter.stop_proof`."""
+
+    heartbeat_consumer: AcceptanceTable | None = None
+    rpdo_deadline: AcceptanceTable | None = None
+    abort_connection: AcceptanceTable | None = None
+    supported_modes: AcceptanceTable | None = None
+
+    @property
+    def by_name(self) -> dict[str, Acceptance]:
+        """What is accepted."""
+        given = {name: getattr(self, name) for name in type(self).model_fields}
+        return {name: table.acceptance for name, table in given.items() if table is not None}
 
 
 def _mode_by_name(value: object) -> TorqueMode:
@@ -133,3 +207,42 @@ class InvertersTable(Table):
         if self.m1.node_id == self.m2.node_id:
             refuse([Fault("m2.node_id", "another node id than m1", self.m2.node_id)])
         return self
+
+
+class CredentialsTable(Table):
+    """What one side trusts and shows; ``key`` without a password."""
+
+    ca: ExistingFile
+    certificate: ExistingFile
+    key: ExistingFile
+
+    @property
+    def credentials(self) -> Credentials:
+        """The same as the drivers take it."""
+        return Credentials(self.ca, self.certificate, self.key)
+
+
+class PlcSecurityTable(CredentialsTable):
+    """The host's side. ``server_name`` is the name in the PLC's certificate; without it that is ``[plc] host``."""
+
+    server_name: Text | None = None
+
+    @property
+    def client(self) -> ClientSecurity:
+        """The same as the drivers take it."""
+        return ClientSecurity(self.credentials, self.server_name)
+
+
+class PlcTable(Table):
+    """The PLC. ``map`` is relative to the rig file; without it the shipped ``plc.toml`` counts."""
+
+    host: Text
+    port: TcpPort
+    map: ExistingFile | None = None
+    security: PlcSecurityTable | None = None
+
+
+class SimulatedPlcSecurityTable(CredentialsTable):
+    """The simulated PLC's side: its own certificate, and what each role in a client's certificate may do."""
+
+    roles: Annotated[dict[Text, Annotated[Access, Field(strict=False)]], Field(min_length=1)]

@@ -1,26 +1,13 @@
-"""The command ``hil commission``: what is asked for, one call on its folder at a time, a report at every end."""
+"""``hil commission``: the job step by step, from the first look for devices to model file and report."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
-from hil.cli.commission.options import (
-    AsJson,
-    Because,
-    Bus,
-    DryRun,
-    Folder,
-    KeepResults,
-    Modbus,
-    Model,
-    Repeat,
-    RigFile,
-    Skip,
-    Travel,
-    Yes,
-)
-from hil.cli.options import Pace, PaceOption, TrustLaws
-from hil.cli.take_over_option import TakeOver
+import typer
+
+from hil.cli.options import Pace, PaceOption, TakeOver, TrustLaws
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -29,7 +16,44 @@ if TYPE_CHECKING:
     from hil.commission.step import Job
     from hil.commission.talk import Talk
 
+app = typer.Typer(add_completion=False)
 
+RigFile = Annotated[Path, typer.Argument(metavar="RIG", help="Rig file.")]
+Folder = Annotated[
+    Path, typer.Option("--out", metavar="DIR", help="Folder of this commissioning; it is resumed there.")
+]
+DryRun = Annotated[
+    bool, typer.Option("--dry-run", help="Print the plan: steps, torques, time; opens no bus, writes nothing.")
+]
+Yes = Annotated[bool, typer.Option("--yes", help="Command torque without asking; for scripts.")]
+Skip = Annotated[list[str] | None, typer.Option(metavar="STEP", help="Skip a step; may be repeated. Needs --because.")]
+Because = Annotated[
+    list[str] | None,
+    typer.Option(metavar="TEXT", help="Why it is skipped, one for each --skip or one for all; it is recorded."),
+]
+Repeat = Annotated[
+    list[str] | None, typer.Option(metavar="STEP", help="Do a step again that is done; may be repeated.")
+]
+KeepResults = Annotated[
+    str, typer.Option(metavar="TEXT", help="After a change of the rig file: why results from before it are kept.")
+]
+Model = Annotated[
+    Path | None,
+    typer.Option(metavar="MODEL", help="Model file for predictions and the diagnosis; else one is made."),
+]
+Travel = Annotated[
+    float | None,
+    typer.Option(metavar="M_PER_RAD", min=1e-6, help="Distance of the vehicle in metres per radian of the shaft."),
+]
+Bus = Annotated[str | None, typer.Option(metavar="URL", help="CAN bus in place of the rig file's.")]
+Modbus = Annotated[str | None, typer.Option(metavar="HOST:PORT", help="PLC in place of the rig file's.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON, progress on standard error.")]
+
+
+@app.command(
+    epilog="Example: hil commission examples/rig.toml --out commissioning. "
+    "First look at it: hil commission examples/rig.toml --out commissioning --dry-run"
+)
 def commission(
     rig: RigFile,
     out: Folder,
@@ -54,9 +78,7 @@ def commission(
     a speed outside its band or a dead device end it at zero torque with the drives disarmed; the next call resumes at
     the step that was interrupted. Writes DIR/commissioning.html, DIR/model.toml, DIR/commission.json and DIR/runs/.
     """
-    from hil.cli.commission.asked import asked_of_steps, who_answers
-    from hil.cli.commission.job import job_in
-    from hil.cli.commission.result import print_plan
+    from hil.cli.commission_job import asked_of_steps, job_in, print_plan, who_answers
     from hil.cli.printing import new_console
     from hil.commission.order import RigSource
     from hil.commission.state import sole_use
@@ -79,7 +101,7 @@ def commission(
 
 def _to_its_report(job: Job, talk: Talk, asked: Asked, console: Console, as_json: bool) -> None:
     """Go through the steps, and report however they end."""
-    from hil.cli.commission.result import print_result, write_report
+    from hil.cli.commission_job import print_result, write_report
     from hil.errors import UsageError
 
     try:
@@ -98,7 +120,7 @@ def _to_its_report(job: Job, talk: Talk, asked: Asked, console: Console, as_json
 
 
 def _commission(job: Job, talk: Talk, asked: Asked, console: Console) -> None:
-    from hil.cli.commission.bar import Bar
+    from hil.cli.commission_job import Bar
     from hil.commission.engine import Commissioning
     from hil.commission.talk import findings_table
 

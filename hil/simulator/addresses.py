@@ -1,4 +1,4 @@
-"""Addresses a simulated rig may be served at: this machine's own, and no other.
+"""Addresses of a simulated rig: this machine's own and no other, and a rig at others than its file's.
 
 The CAN server knows a token but no encryption, and a simulated PLC certificates only where the rig file says so:
 neither may be reached from outside.
@@ -10,6 +10,7 @@ import ipaddress
 from dataclasses import dataclass
 from urllib.parse import urlsplit
 
+from hil.config.rig_file import Rig
 from hil.errors import UsageError
 
 IN_PROCESS = "virtual:"
@@ -86,3 +87,15 @@ def _is_loopback(host: str) -> bool:
         return ipaddress.ip_address(host).is_loopback
     except ValueError:
         return False
+
+
+def with_addresses(rig: Rig, bus: str | None, modbus: str | None, take_over: bool = False) -> Rig:
+    """Replace the addresses that are given; ``take_over`` lets another host be on the bus (`hil.rig.sole_host`)."""
+    rig = rig.taking_over() if take_over else rig
+    can, plc = rig.can, rig.plc
+    if bus is not None:
+        can = can.model_copy(update={"url": bus})
+    if modbus is not None:
+        address = host_port(modbus)
+        plc = plc.model_copy(update={"host": address.host, "port": address.port})
+    return rig.model_copy(update={"can": can, "plc": plc})

@@ -1,4 +1,4 @@
-"""The command ``hil run``: what is asked for, and who does it."""
+"""``hil run``: one experiment, recorded; or, as a dry run, what it would do."""
 
 from __future__ import annotations
 
@@ -7,12 +7,17 @@ from typing import Annotated
 
 import typer
 
-from hil.cli.completers import experiment_names
-from hil.cli.options import FilterOf, FilterRun, Pace, PaceOption, TrustLaws
-from hil.cli.take_over_option import TakeOver
+from hil.cli.completion import experiment_names
+from hil.cli.options import FilterOf, FilterRun, Pace, PaceOption, TakeOver, TrustLaws, pacer_for, scheduling
 from hil.errors import UsageError
 
+app = typer.Typer(add_completion=False)
 
+
+@app.command(
+    epilog="Example: hil run examples/rig.toml cruise --out cruise.csv. "
+    "First look at it: hil run examples/rig.toml cruise --dry-run"
+)
 def run(
     rig: Annotated[Path, typer.Argument(metavar="RIG", help="Rig file.")],
     experiment: Annotated[
@@ -51,20 +56,17 @@ def run(
     everything up to there.
     """
     from hil.config.rig_file import read_rig
-    from hil.rig.addresses import with_addresses
+    from hil.simulator.addresses import with_addresses
 
     rig_file = with_addresses(read_rig(rig), bus, modbus, take_over)
     if dry_run:
-        from hil.cli.run.prediction import predict
+        from hil.cli.run_job import predict
 
         predict(rig_file, experiment, as_json, trust_laws)
         return
     if out is None:
         raise UsageError("hil run: expected --out REC, a recording to write, or --dry-run; got neither.")
-    from hil.cli.options import pacer_for, scheduling
-    from hil.cli.run.job import Job, record
-    from hil.cli.run.live import live_estimate
-    from hil.cli.run.result import print_result
+    from hil.cli.run_job import Job, live_estimate, print_result, record
     from hil.rig.metadata import run_metadata
 
     metadata = {**run_metadata(rig, experiment), "pace": pace.value}
