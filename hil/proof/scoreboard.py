@@ -15,7 +15,7 @@ from hil.proof.sealed_set import VERDICTS
 from hil.proof.truth.specimen import PAIR_SIGN
 from hil.provenance import Provenance
 from hil.report import page as html
-from hil.report.page import made_section
+from hil.report.made import made_section
 
 SCHEMA = "hil.scoreboard/1"
 PAGE, DATA = "scoreboard.html", "scoreboard.json"

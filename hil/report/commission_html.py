@@ -19,8 +19,8 @@ from hil.provenance import Provenance
 from hil.report import page as html
 from hil.report.figures import DECADES, LEGEND_PX, PANEL_PX, Line, Panel, Style, figure_block, time_figure
 from hil.report.identification_figures import PoleSet, pole_figure
+from hil.report.made import made_section
 from hil.report.numbers import moment, shown
-from hil.report.page import made_section
 
 State = Mapping[str, Any]
 Evidence = Mapping[str, Any]

@@ -14,8 +14,8 @@ from hil.report import page as html
 from hil.report.comparison import Comparison, by_output, shown_error, together
 from hil.report.figures import MODEL_STYLES, Line, Panel, Style, input_lines, spectrum_figure, time_figure
 from hil.report.identification_figures import correlation_figure
+from hil.report.made import facts, made_section
 from hil.report.numbers import listed, shown, shown_p
-from hil.report.page import facts, made_section
 from hil.report.terminal import rendered
 from hil.report.wording import quantity, torque_axis
 

@@ -43,8 +43,8 @@ from hil.report.figures import (
     stretches_for,
     time_figure,
 )
+from hil.report.made import facts, made_section
 from hil.report.numbers import listed, p_statement, shown, shown_interval, shown_p, shown_ratio, shown_times
-from hil.report.page import facts, made_section
 from hil.report.terminal import rendered
 from hil.report.wording import (
     BADGES,

@@ -29,8 +29,8 @@ from hil.report.bode import response_figure, responses_figure
 from hil.report.figures import Line, Panel, Style, time_figure
 from hil.report.identification_figures import PoleSet, course_figure, known_sets, pole_figure, residual_figure
 from hil.report.identification_wording import best_statement, headline, plus_minus, statement, verdict, warnings
+from hil.report.made import facts, made_section
 from hil.report.numbers import shown, shown_interval, shown_p
-from hil.report.page import facts, made_section
 from hil.report.terminal import rendered
 
 PHYSICAL = (

@@ -2,8 +2,7 @@
 
 Pages are lists of blocks (headings, paragraphs, tables, figures); nobody but the templates writes markup. Jinja2
 escapes every text in them, links keep to `is_allowed`, and the page's policy lets no script run but its own two, by
-their hashes. The same blocks are shown on a terminal by `hil.report.terminal`. How a result was made stands in the
-first line of its page and in its last section.
+their hashes. The same blocks are shown on a terminal by `hil.report.terminal`.
 """
 
 from __future__ import annotations
@@ -16,14 +15,10 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
-from pathlib import Path
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
-
-from hil.provenance import Provenance
-from hil.report.numbers import moment
 
 FEWEST_LISTED = 3
 """Sections from which on a page begins with a list of them."""
@@ -363,29 +358,3 @@ def _packed(content: bytes) -> str:
 
 def _hash(script: str) -> str:
     return base64.b64encode(hashlib.sha256(script.encode()).digest()).decode("ascii")
-
-
-MOST_NAMED = 4
-"""Recordings that the first line names."""
-
-
-def facts(made: Provenance | None) -> Iterator[tuple[str, str]]:
-    """Return what a page is of, for its head: model, recordings, date."""
-    if made is None:
-        return
-    names = [Path(each.file).name for each in made.recordings]
-    more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
-    yield "model", ", ".join(Path(each.file).name for each in made.models)
-    yield "recordings", ", ".join(names[:MOST_NAMED]) + more
-    yield "date", moment(made.date)
-    yield "program", f"hil {made.version}"
-
-
-def made_section(made: Provenance | None) -> Section | None:
-    """Return program, date, command and the files with their checksums; None where nothing is known."""
-    if made is None:
-        return None
-    rows = [("program", f"hil {made.version}"), ("date", made.date), ("command", made.command or "from Python")]
-    for kind, sources in (("model", made.models), ("recording", made.recordings)):
-        rows += [(kind, f"{each.file}, SHA-256 {each.sha256}") for each in sources]
-    return section("How this was made", table(("", ""), rows))

@@ -18,8 +18,8 @@ from hil.report import page as html
 from hil.report.bode import responses_figure
 from hil.report.figures import Line, Panel, Style, time_figure
 from hil.report.identification_figures import PoleSet, known_sets, pole_figure
+from hil.report.made import facts, made_section
 from hil.report.numbers import json_number, shown
-from hil.report.page import facts, made_section
 
 SHOWN_SIGNALS = 3
 """Recordings in Fig. 2, as in the paper."""
