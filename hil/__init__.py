@@ -1,7 +1,7 @@
 """The rig: configuration, cycle, experiments, simulated slaves, recordings, reports, command line.
 
-From Python: ``hil.read``, ``hil.read_model``, ``hil.Record.from_pandas``, ``hil.diagnose`` and ``hil.compare``
-(``hil.api``), imported when they are asked for.
+From Python: ``hil.look``, ``hil.read``, ``hil.read_model``, ``hil.Record.from_pandas``, ``hil.identify``,
+``hil.diagnose`` and ``hil.compare`` (``hil.api``), imported when they are asked for.
 """
 
 from __future__ import annotations
@@ -9,11 +9,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from hil.api import Record, compare, diagnose, read, read_model
+    from hil.api import Record, compare, diagnose, identify, look, read, read_model
 
 __version__ = "0.2.0"
 
-__all__ = ["Record", "compare", "diagnose", "read", "read_model"]
+__all__ = ["Record", "compare", "diagnose", "identify", "look", "read", "read_model"]
 
 
 def __getattr__(name: str) -> Any:
@@ -22,3 +22,7 @@ def __getattr__(name: str) -> Any:
 
         return getattr(api, name)
     raise AttributeError(f"module 'hil' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return [*__all__, "__version__"]

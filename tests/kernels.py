@@ -11,8 +11,7 @@ from estimator.diagnosis.diagnose import diagnose
 from estimator.diagnosis.first_use import compile_kernels
 from estimator.errors import EstimatorError
 from estimator.identification.settings import Settings
-from hil.rig.live import tracking_settings
-from hil.rig.live_replay import Pace, play_record
+from hil.rig.live import Pace, play_record, tracking_settings
 from tests.benchmarks.cases import make
 from tests.estimator.physics import test_own_law as own_law
 from tests.estimator.physics.bench import TWO_MASS

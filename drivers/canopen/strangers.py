@@ -20,6 +20,11 @@ class Strangers:
     ----------
     subscribe
         ``subscribe(cob_id, callback)`` of the bus.
+
+    Attributes
+    ----------
+    heard
+        The first such frame at all, before the watch, too: the reason where a device is not as it was set.
     """
 
     def __init__(self, subscribe: Subscribe) -> None:
@@ -27,6 +32,7 @@ class Strangers:
         self._names: dict[int, str] = {}
         self._watching = False
         self._seen: str | None = None
+        self.heard: str | None = None
 
     def claim(self, cob_id: int, what: str) -> None:
         """Take an identifier for this program's own; ``what`` names it in messages."""
@@ -48,11 +54,20 @@ class Strangers:
     def raise_if_seen(self) -> None:
         """Judge."""
         if self._seen is not None:
-            raise ForeignController(
-                f"{self._seen} came from somebody else on the bus, expected it from this program alone. Another "
-                "controller commands the devices: end it, or unplug it, before you run again."
-            )
+            raise foreign(self._seen)
 
     def _on_frame(self, cob_id: int, data: bytes) -> None:
-        if self._watching and self._seen is None:
-            self._seen = f"{self._names[cob_id]} (frame 0x{cob_id:03X} [{data.hex(' ')}])"
+        if self.heard is not None and (self._seen is not None or not self._watching):
+            return
+        frame = f"{self._names[cob_id]} (frame 0x{cob_id:03X} [{data.hex(' ')}])"
+        self.heard = self.heard or frame
+        if self._watching:
+            self._seen = frame
+
+
+def foreign(frame: str) -> ForeignController:
+    """Say that there is another controller, by a frame of its."""
+    return ForeignController(
+        f"{frame} came from somebody else on the bus, expected it from this program alone. Another controller commands "
+        "the devices: end it, or unplug it, before you run again."
+    )

@@ -24,8 +24,8 @@ from drivers.canopen.pdo_map import (
     PdoLayout,
     read_layout,
 )
+from drivers.datasheet.file import DataSheet
 from drivers.datasheet.objects import EdsEntry
-from drivers.datasheet.sheet import DataSheet
 from drivers.datasheet.types import DATA_TYPES
 from drivers.scaling import IntegerType
 

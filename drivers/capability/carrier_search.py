@@ -28,7 +28,7 @@ from drivers.capability.carrier import (
     cob_id_of,
     map_here,
 )
-from drivers.datasheet.sheet import DataSheet
+from drivers.datasheet.file import DataSheet
 from drivers.errors import ConfigMismatch
 
 MODES_OF_OPERATION: Final = 0x6060

@@ -17,8 +17,8 @@ from enum import Enum
 from types import MappingProxyType
 from typing import Final
 
-from drivers.capability.function import Function
 from drivers.capability.plan import DrivePlan
+from drivers.capability.table import Function
 from drivers.errors import ConfigMismatch
 from drivers.scaling import IntegerType, VelocityScale
 

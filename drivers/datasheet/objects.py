@@ -15,9 +15,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from enum import IntEnum
 
-from drivers.datasheet.number import read_formula, read_number
 from drivers.datasheet.text import EdsSection, EdsText
-from drivers.datasheet.types import DATA_TYPES, DOMAIN, UNSIGNED8, DataType
+from drivers.datasheet.types import DATA_TYPES, DOMAIN, UNSIGNED8, DataType, read_formula, read_number
 
 _PDO_PARAMETERS = range(0x1400, 0x1C00)
 _OTHER_PARAMETER = 0x200

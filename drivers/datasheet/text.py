@@ -1,4 +1,4 @@
-"""The text of an EDS: sections and keys with their line numbers, as they stand in the file.
+"""The text of an EDS: sections and keys with their line numbers, as they stand in the file, and remarks on them.
 
 What can't be an EDS at all is refused. Everything else is read as well as can be, and what was odd about it
 is kept as findings: vendors' files have duplicate keys, stray lines, other encodings. Of two keys or sections
@@ -10,10 +10,53 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from enum import Enum
 from pathlib import Path
 
-from drivers.datasheet.finding import EdsFinding, Severity
 from drivers.errors import ConfigMismatch
+
+
+class Severity(Enum):
+    """How bad a remark is."""
+
+    ERROR = "error"
+    """This program needs it, or CiA 306 forbids it and it changes what the file says."""
+
+    WARNING = "warning"
+    """Not as CiA 306 has it, but vendors do it and this program copes, or does not use the object."""
+
+    NOTE = "note"
+    """Nothing is wrong for this program; another tool may think otherwise."""
+
+
+@dataclass(frozen=True, slots=True)
+class EdsFinding:
+    """One remark.
+
+    Attributes
+    ----------
+    severity
+        How bad it is.
+    line
+        Line of the file, from 1; None if it concerns the file as a whole.
+    place
+        Section, and key if it concerns one: ``[60A9] DefaultValue``.
+    expected, found
+        Both in words.
+    advice
+        What to do, as a sentence.
+    """
+
+    severity: Severity
+    line: int | None
+    place: str
+    expected: str
+    found: str
+    advice: str
+
+    def __str__(self) -> str:
+        return f"{self.place}: expected {self.expected}, found {self.found}. {self.advice}"
+
 
 ADVICE = "Take the file from the drive's maker."
 NO_EDS = f"Expected an EDS as CiA 306 has it. {ADVICE}"

@@ -7,20 +7,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from drivers.capability.plan import DrivePlan, plan_drive
-from drivers.datasheet.finding import EdsFinding, Severity
+from drivers.datasheet.file import DataSheet, read_commissioning
 from drivers.datasheet.objects import EdsObject, objects_of_use, read_objects
-from drivers.datasheet.sheet import DataSheet, read_commissioning
-from drivers.datasheet.text import ADVICE, EdsText, EdsUnreadable, read_eds_text
-from drivers.eds_check.carriers import check_carriers
+from drivers.datasheet.text import ADVICE, EdsFinding, EdsText, EdsUnreadable, Severity, read_eds_text
 from drivers.eds_check.context import SAMPLE_NODE_ID, EdsContext, at_file
-from drivers.eds_check.entries import check_entries
-from drivers.eds_check.lists import check_lists
-from drivers.eds_check.modes import check_modes
-from drivers.eds_check.needs import ALWAYS_USED, check_needs
-from drivers.eds_check.pdos import check_pdos
-from drivers.eds_check.rig_lines import RigLine, rig_lines
-from drivers.eds_check.sections import check_sections
-from drivers.eds_check.values import check_values
+from drivers.eds_check.entries import check_entries, check_values
+from drivers.eds_check.needs import ALWAYS_USED, RigLine, check_modes, check_needs, rig_lines
+from drivers.eds_check.pdos import check_carriers, check_pdos
+from drivers.eds_check.sections import check_lists, check_sections
 
 RULES = (check_sections, check_lists, check_entries, check_values, check_pdos, check_needs, check_modes, check_carriers)
 

@@ -6,9 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from drivers.capability.plan import DrivePlan
-from drivers.datasheet.finding import EdsFinding, Severity
 from drivers.datasheet.objects import EdsEntry, EdsObject
-from drivers.datasheet.text import EdsSection, EdsText
+from drivers.datasheet.text import EdsFinding, EdsSection, EdsText, Severity
 
 SAMPLE_NODE_ID = 127
 """Node id put in for ``$NODEID`` where the file is for none: the greatest, for it needs the most room."""

@@ -8,15 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Final
 
 from drivers.canopen.emcy import EMCY_COB_ID
 from drivers.canopen.pdo_map import PdoLayout, read_layout
 from drivers.canopen.sdo import SdoChannel, object_name
 from drivers.capability.carrier import Carrier
-from drivers.capability.function import Function
 from drivers.capability.plan import DrivePlan
 from drivers.capability.speed_unit import SI_UNIT_VELOCITY, described_scale, scale_of
-from drivers.capability.table import OPTION_CODES
+from drivers.capability.table import OPTION_CODES, Function
 from drivers.errors import ConfigMismatch
 from drivers.inverter.cia402 import TorqueMode
 from drivers.inverter.drive_settings import (
@@ -29,6 +29,9 @@ from drivers.inverter.drive_settings import (
     limits_torque,
 )
 from drivers.inverter.settings import InverterSettings
+
+SERIAL_NUMBER: Final = (0x1018, 4)
+"""Object and entry: the one thing that tells two drives of one kind apart."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,6 +104,11 @@ def remarks(
         if not (setting.is_met_by(value) or setting.at_most) and _as_ordered(plan, setting, value):
             yield f"{setting} is {value}, a run gives it {setting.value} ({setting.source})"
     yield from _not_limited(sdo, plan, settings)
+    if settings.serial_number is None and plan.sheet.entry(*SERIAL_NUMBER) is not None:
+        yield (
+            f"serial number {object_name(*SERIAL_NUMBER)} is {sdo.upload(*SERIAL_NUMBER)}: write it into the rig file "
+            "(serial_number), and exchanged node ids are found"
+        )
     wanted, emcy = EMCY_COB_ID + settings.node_id, emcy_cob_id(plan)
     if emcy != wanted:
         yield (
@@ -178,6 +186,15 @@ def _identity(sdo: SdoChannel, plan: DrivePlan, settings: InverterSettings) -> I
                 f"0x{found:08X}",
                 plan.sheet.kind if from_rig_file is None else "rig file",
             )
+    serial_number = None if settings.serial_number is None else sdo.upload(*SERIAL_NUMBER)
+    if serial_number != settings.serial_number:
+        yield Difference(
+            settings.where,
+            f"serial number {object_name(*SERIAL_NUMBER)}",
+            f"{settings.serial_number}",
+            f"{serial_number}: another drive has this node id",
+            "rig file",
+        )
 
 
 def _rated_torque(sdo: SdoChannel, settings: InverterSettings) -> Iterator[Difference]:

@@ -1,6 +1,6 @@
 """What configuring gives a drive next to its PDO layouts: which object, which value, and who asks for it.
 
-A dead host must mean zero torque; `drivers.inverter.protection` lists what of this sees to that.
+A dead host must mean zero torque; `drivers.inverter.stop_proof` lists what of this sees to that.
 
 An option code is written where the rig file or a DCF has one: somebody has chosen it. The default of an EDS is nobody's
 choice, and a drive that was commissioned otherwise keeps its own.
@@ -15,9 +15,8 @@ from typing import Final
 
 from drivers.canopen.emcy import EMCY_COB_ID
 from drivers.canopen.sdo import object_name
-from drivers.capability.function import Function
 from drivers.capability.plan import DrivePlan
-from drivers.capability.table import EVENT_TIMER, OPTION_CODES, SYNC_COB_ID
+from drivers.capability.table import EVENT_TIMER, OPTION_CODES, SYNC_COB_ID, Function
 from drivers.errors import ConfigMismatch
 from drivers.inverter.settings import InverterSettings
 

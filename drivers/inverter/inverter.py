@@ -21,8 +21,7 @@ from drivers.inverter.cia402 import Command, PowerState
 from drivers.inverter.drive_settings import emcy_cob_id
 from drivers.inverter.feedback import InverterFeedback
 from drivers.inverter.inspection import InspectedInverter
-from drivers.inverter.pdo_setup import set_up_pdos
-from drivers.inverter.pdos import TARGET_TORQUE, TORQUE_OFFSET, TorqueCounts
+from drivers.inverter.pdos import TARGET_TORQUE, TORQUE_OFFSET, TorqueCounts, set_up_pdos
 from drivers.inverter.power_control import PowerControl
 from drivers.inverter.settings import InverterSettings
 from drivers.inverter.stop_proof import StopProof

@@ -1,6 +1,7 @@
-"""The PDOs of an inverter, found by the objects they carry. No bus, no clock.
+"""The PDOs of an inverter, found by the objects they carry, and set up as a run wants them.
 
-A run on the bus and the replay of a bus trace read the same frames by these.
+A run on the bus and the replay of a bus trace read the same frames by these. Set-up is over SDO and read back; only
+what differs is written: a drive that has the mapping already, for good or from the run before, keeps it.
 """
 
 from __future__ import annotations
@@ -8,12 +9,21 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from drivers.canopen.pdo_map import PdoCodec
+from drivers.canopen.pdo_map import (
+    COB_ID_INVALID,
+    COB_ID_NO_RTR,
+    PdoCodec,
+    PdoLayout,
+    configuration_writes,
+    read_layout,
+)
+from drivers.canopen.sdo import SdoChannel
 from drivers.capability.carrier import RPDO, TPDO, Carrier
 from drivers.capability.carrier_search import MODES_OF_OPERATION
 from drivers.capability.plan import DrivePlan, plan_drive
 from drivers.capability.speed_unit import speed_scale
 from drivers.datasheet.file import EdsFile
+from drivers.errors import ConfigMismatch
 from drivers.inverter.cia402 import Command
 from drivers.inverter.feedback import ChannelReceiver, FeedbackReceiver
 from drivers.inverter.settings import InverterSettings
@@ -130,3 +140,45 @@ class TorqueOnBus:
 
     target_nm: float | None
     offset_nm: float | None
+
+
+def set_up_pdos(sdo: SdoChannel, plan: DrivePlan, where: str) -> None:
+    """Switch off the PDOs that would disturb, and give those of the plan their layouts."""
+    for index in plan.strangers:
+        _switch_off(sdo, index)
+    for carrier in plan.carriers:
+        _write(sdo, carrier)
+        _require_layout(sdo, carrier.layout, where)
+
+
+def _switch_off(sdo: SdoChannel, communication_index: int) -> None:
+    present = sdo.upload(communication_index, 1)
+    if not present & COB_ID_INVALID:
+        sdo.download_confirmed(communication_index, 1, present | COB_ID_INVALID, ignored=COB_ID_NO_RTR)
+
+
+def _write(sdo: SdoChannel, carrier: Carrier) -> None:
+    """Write all but what the drive holds for good, and a mapping that is right."""
+    layout = carrier.layout
+    maps_it = _maps(sdo, layout)
+    for index, subindex, value in configuration_writes(layout, sdo.upload(layout.communication_index, 1)):
+        if carrier.written(index, subindex) and not (maps_it and index == layout.mapping_index):
+            is_cob_id = (index, subindex) == (layout.communication_index, 1)
+            sdo.download_confirmed(index, subindex, value, ignored=COB_ID_NO_RTR if is_cob_id else 0)
+
+
+def _maps(sdo: SdoChannel, layout: PdoLayout) -> bool:
+    try:
+        found = read_layout(sdo.upload, layout.communication_index, layout.mapping_index)
+    except ConfigMismatch:  # what was never set may be of any kind
+        return False
+    return found.objects == layout.objects
+
+
+def _require_layout(sdo: SdoChannel, layout: PdoLayout, where: str) -> None:
+    found = read_layout(sdo.upload, layout.communication_index, layout.mapping_index)
+    if found != layout:  # what is not written has to be there
+        raise ConfigMismatch(
+            f"{where}: PDO 0x{layout.communication_index:04X}/0x{layout.mapping_index:04X} has [{found}], "
+            f"expected [{layout}], and can't be given it. Use the EDS of the drive's firmware version."
+        )

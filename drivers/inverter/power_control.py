@@ -7,7 +7,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import TypeVar
 
-from drivers.canopen.emcy_codes import cause_of
+from drivers.canopen.emcy import cause_of
 from drivers.canopen.sdo import SdoChannel
 from drivers.errors import ConfigMismatch, DeviceFault, DeviceTimeout, ForeignController, ProtocolViolation
 from drivers.inverter.cia402 import (

@@ -1,4 +1,4 @@
-"""What the host knows of an inverter before it talks to it."""
+"""What the host knows of an inverter before it talks to it, and what of its lacks somebody has accepted by name."""
 
 from __future__ import annotations
 
@@ -6,12 +6,51 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Final
 
 from drivers.canopen.heartbeat import HOST_NODE_ID
 from drivers.capability.carrier import ObjectId
 from drivers.capability.speed_unit import SpeedUnit
-from drivers.inverter.acceptance import Acceptance
 from drivers.inverter.cia402 import TorqueMode
+
+PLACEHOLDERS: Final = ("NAME", "REASON")
+"""Of name and reason, in a line to be filled in."""
+
+
+@dataclass(frozen=True, slots=True)
+class Acceptance:
+    """Who accepted what a drive lacks, and why.
+
+    Attributes
+    ----------
+    by
+        A person's name.
+    why
+        What stops the torque instead, or why it does not have to.
+    """
+
+    by: str
+    why: str
+
+    @property
+    def is_by_a_person(self) -> bool:
+        """Whether somebody filled in name and reason: a line that was only pasted is nobody's acceptance."""
+        return _is_filled_in(self.by) and _is_filled_in(self.why)
+
+    def __str__(self) -> str:
+        return f"accepted by {self.by}: {self.why}"
+
+
+def acceptance_line(name: str) -> str:
+    """Write the line of the rig file that accepts what is missing, to be filled in."""
+    by, why = PLACEHOLDERS
+    return f'accepted.{name} = {{ by = "{by}", why = "{why}" }}'
+
+
+def _is_filled_in(text: str) -> bool:
+    """Whether a person has written something: not blank or dots, and not what stands in the line to be filled in."""
+    words = text.strip(" .<>\"'").upper()
+    return any(map(str.isalnum, words)) and words not in PLACEHOLDERS
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,6 +73,8 @@ class InverterSettings:
         The drive's EDS; None for the one that is shipped.
     vendor_id, product_code
         Identity expected in object 0x1018; None for the EDS's.
+    serial_number
+        Of the drive behind this node id, 0x1018:04; None where it is not compared.
     heartbeat_ms
         Heartbeat period of the drive [ms].
     host_node_id
@@ -74,6 +115,7 @@ class InverterSettings:
     eds_path: Path | None = None
     vendor_id: int | None = None
     product_code: int | None = None
+    serial_number: int | None = None
     heartbeat_ms: int = 100
     host_node_id: int = HOST_NODE_ID
     host_timeout_ms: int = 150

@@ -3,6 +3,9 @@
 pymodbus 3.16.1 turns every failure to connect into one False, has no name of the server to check, and lets a
 request wait for its whole time-out when the connection is lost meanwhile. All three are fixed here, through the
 two hooks of its transport: what makes the connection, and what is reported of its end.
+
+An answer whose transaction or unit identifier is not the request's is skipped by pymodbus with a line in its log, and
+its user learns that none came. `MbapFramer` keeps which ones came, so that the wait can end with the right cause.
 """
 
 from __future__ import annotations
@@ -11,13 +14,53 @@ import asyncio
 import ssl
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import Final
 
 from pymodbus.client import AsyncModbusTcpClient
 from pymodbus.exceptions import ConnectionException
+from pymodbus.framer import FramerSocket
+from pymodbus.pdu import DecodePDU
 
 from drivers.errors import BusDown, DriverError
 from drivers.plc.modbus_security import ClientSecurity, client_context, tls_failure
+
+
+@dataclass(frozen=True, slots=True)
+class AnswerIds:
+    """Identifiers in the MBAP header of an answer (Modbus Messaging on TCP/IP V1.0b, 3.1.3)."""
+
+    transaction: int
+    unit: int
+
+    def __str__(self) -> str:
+        return f"transaction id {self.transaction}, unit id {self.unit}"
+
+
+class MbapFramer(FramerSocket):
+    """A framer that keeps the identifiers of the answers that came.
+
+    Parameters
+    ----------
+    decoder
+        Makes PDUs of bytes.
+    """
+
+    def __init__(self, decoder: DecodePDU) -> None:
+        super().__init__(decoder)
+        self.got: list[AnswerIds] = []
+
+    def begin(self) -> None:
+        """Forget what came: another request is sent."""
+        self.got.clear()
+
+    def decode(self, data: bytes) -> tuple[int, int, int, bytes]:
+        """Take a frame apart: length, unit, transaction, PDU; length 0 where it is none, or not all of one."""
+        length, unit, transaction, pdu = super().decode(data)
+        if length:
+            self.got.append(AnswerIds(transaction, unit))
+        return length, unit, transaction, pdu
+
 
 NO_RECONNECT: Final = 0
 """pymodbus would reconnect behind the caller's back: a lost PLC must be seen."""

@@ -10,7 +10,7 @@ What is done about pymodbus 3.16.1 here:
 - it retries and reconnects behind the caller's back: both are switched off, a lost PLC must be seen;
 - it does not say why there is no connection, and has no name of the server to check: `drivers.plc.modbus_dial`
   connects for it;
-- it passes over an answer of another transaction or unit: `drivers.plc.mbap_framer` keeps which ones came;
+- it passes over an answer of another transaction or unit: `drivers.plc.modbus_dial` keeps which ones came;
 - it logs to standard error where logging is not configured: a `NullHandler` ends that.
 """
 
@@ -27,8 +27,7 @@ from pymodbus.exceptions import ModbusException
 from pymodbus.pdu import DecodePDU, ExceptionResponse, ModbusPDU
 
 from drivers.errors import BusDown, DeviceFault, DeviceTimeout, DriverError, ProtocolViolation
-from drivers.plc.mbap_framer import AnswerIds, MbapFramer
-from drivers.plc.modbus_dial import Dial
+from drivers.plc.modbus_dial import AnswerIds, Dial, MbapFramer
 from drivers.plc.modbus_security import ClientSecurity, own_role
 from drivers.plc.register import RegisterKind
 

@@ -1,15 +1,123 @@
-"""The registers of a map by their names: read as values, written and read back."""
+"""The registers of a map by their names: read as values that can be, written and read back; and the host's watchdog.
+
+A value that no vehicle has is one that was misread. The usual cause is the order of the two words of a 32-bit value,
+which Modbus leaves to the maker: 350 Nm read in the other order is 2.4e-41 Nm, or a billion. Neither would hold a
+torque back.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Final
 
-from drivers.errors import DeviceFault, ProtocolViolation
-from drivers.plc.map_needs import from_si
+from drivers.errors import DeviceFault, DeviceTimeout, ProtocolViolation
 from drivers.plc.modbus_link import ModbusLink
-from drivers.plc.reading import Reading, reading
-from drivers.plc.register import Value
-from drivers.plc.register_map import Block, RegisterMap, blocks_of
+from drivers.plc.register import Register, Value, WordOrder
+from drivers.plc.register_map import USED, Block, RegisterMap, blocks_of, from_si, to_si
+
+PLAUSIBLE: Final[Mapping[str, tuple[float, float]]] = MappingProxyType(
+    {
+        "speed_limit": (0.1, 1e4),
+        "torque_limit": (0.1, 1e5),
+        "prbs_torque": (-1e5, 1e5),
+        "prbs_amplitude": (0.01, 1e5),
+        "prbs_divider": (1, 1e6),
+        "prbs_seed": (1, 1023),
+        "host_count_seen": (0, 65535),
+    }
+)
+"""Least and greatest value a vehicle may have, in the unit the driver works in; 0 may be everywhere: nothing is set."""
+
+LEAST_TORQUE_NM: Final = 1e-6
+"""A torque below this and not zero is no torque but a misread number [Nm]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """One register as it was read.
+
+    Attributes
+    ----------
+    name, register
+        Which it is.
+    value
+        What it holds, in the register's own unit; None where it could not be read, or means nothing.
+    problem
+        Why the value can't be believed; None where it can.
+    expected
+        What it should be, where there is a problem.
+    """
+
+    name: str
+    register: Register
+    value: Value | None
+    problem: str | None = None
+    expected: str = ""
+
+    @property
+    def shown(self) -> str:
+        """The value in words, without its unit."""
+        if self.value is None:
+            return "–"
+        return f"{self.value:.7g}" if isinstance(self.value, float) else str(self.value).lower()
+
+    @property
+    def unit(self) -> str:
+        """The register's unit; empty for counts, states and bits."""
+        return "" if self.register.unit == "1" else self.register.unit
+
+    def required(self) -> Value:
+        """Give the value in the unit the driver works in."""
+        if self.problem is not None or self.value is None:
+            raise ProtocolViolation(
+                f"register {self.name} ({self.register.kind.value} {self.register.address}): expected {self.expected}, "
+                f"got {self.problem}"
+            )
+        return to_si(self.name, self.register, self.value)
+
+
+def reading(name: str, register: Register, words: Sequence[int]) -> Reading:
+    """Make a value of words, and judge it."""
+    try:
+        value = register.decode(words)
+    except ProtocolViolation as error:
+        return Reading(name, register, None, str(error), "a value of its type")
+    if is_plausible(name, register, value):
+        return Reading(name, register, value)
+    unit = f" {register.unit}" if register.unit != "1" else ""
+    problem = f"{value:.7g}{unit}. {_advice(name, register, words)}"
+    return Reading(name, register, value, problem, _range(name))
+
+
+def is_plausible(name: str, register: Register, value: Value) -> bool:
+    """Whether a vehicle may have such a value; what nothing is known of may be anything."""
+    if name not in PLAUSIBLE or isinstance(value, str):
+        return True
+    low, high = PLAUSIBLE[name]
+    number = float(to_si(name, register, value))
+    return number == 0.0 or (low <= number <= high and abs(number) > LEAST_TORQUE_NM)
+
+
+def _range(name: str) -> str:
+    low, high = PLAUSIBLE[name]
+    unit = USED[name][1]
+    return f"0, or {low:g} to {high:g}{'' if unit == '1' else f' {unit}'}"
+
+
+def _advice(name: str, register: Register, words: Sequence[int]) -> str:
+    """Say what the value would be with the words in the other order, where that makes one."""
+    if register.word_order is not None:
+        order = next(each for each in WordOrder if each is not register.word_order)
+        other = register.model_copy(update={"word_order": order})
+        try:
+            value = other.decode(words)
+        except ProtocolViolation:
+            value = None
+        if value is not None and not isinstance(value, str) and is_plausible(name, other, value):
+            return f"With word_order = {order.value!r} in the register map it would be {value:.7g} {register.unit}."
+    return "Compare address, type, scale and word order in the register map with the PLC's program."
 
 
 class NamedRegisters:
@@ -79,3 +187,60 @@ class NamedRegisters:
             offset = register.address - block.address
             readings[name] = reading(name, register, words[offset : offset + register.size])
         return readings
+
+
+COUNTS: Final = 65536
+"""The count starts over here, so that it fits 16 bits."""
+
+NS_PER_S: Final = 1_000_000_000
+
+
+class HostWatchdog:
+    """Counts beats.
+
+    Parameters
+    ----------
+    registers : NamedRegisters
+        With ``host_count`` and ``host_count_seen``.
+    place : str
+        Of the PLC, for messages.
+    timeout_s : float
+        Time the PLC may leave a beat unseen [s].
+    clock_ns : callable
+        Monotonic clock [ns].
+    """
+
+    __slots__ = ("_clock_ns", "_count", "_place", "_registers", "_seen_ns", "_timeout_s")
+
+    def __init__(self, registers: NamedRegisters, place: str, timeout_s: float, clock_ns: Callable[[], int]) -> None:
+        self._registers = registers
+        self._place = place
+        self._timeout_s = timeout_s
+        self._clock_ns = clock_ns
+        self._count: int | None = None
+        self._seen_ns = 0
+
+    def start_anew(self) -> None:
+        """Begin at 0 with the next beat: the connection is another."""
+        self._count = None
+
+    async def beat(self) -> None:
+        """Move the count on by one, and see that the PLC has seen the beats before."""
+        now_ns = self._clock_ns()
+        if self._count is None:
+            self._seen_ns = now_ns
+        else:
+            await self._require_seen(self._count, now_ns)
+        count = 0 if self._count is None else (self._count + 1) % COUNTS
+        await self._registers.write(self._registers.encoded({"host_count": count}))
+        self._count = count
+
+    async def _require_seen(self, count: int, now_ns: int) -> None:
+        seen = (await self._registers.read(("host_count_seen",)))["host_count_seen"]
+        if seen == count:
+            self._seen_ns = now_ns
+        elif now_ns - self._seen_ns > self._timeout_s * NS_PER_S:
+            raise DeviceTimeout(
+                f"{self._place}: watchdog: expected beat {count} seen by the PLC within "
+                f"{self._timeout_s:g} s, it has seen {seen}. Check that the PLC's program runs."
+            )

@@ -22,14 +22,11 @@ from types import TracebackType
 from typing import Final, Self, TypeVar
 
 from drivers.errors import ConfigMismatch, DeviceFault
-from drivers.plc.host_watchdog import HostWatchdog
-from drivers.plc.map_needs import require_usable
 from drivers.plc.modbus_link import ModbusLink
 from drivers.plc.modbus_security import ClientSecurity
-from drivers.plc.named_registers import NamedRegisters
-from drivers.plc.reading import Reading
+from drivers.plc.named_registers import HostWatchdog, NamedRegisters, Reading
 from drivers.plc.register import Value
-from drivers.plc.register_map import RegisterMap
+from drivers.plc.register_map import RegisterMap, require_usable
 from drivers.plc.types import ClutchState, DriveMode, PlcStatus, PlcWatchdog, PrbsSettings, PrbsSource
 from drivers.torque_guard import GuardedTorque
 
@@ -88,7 +85,7 @@ class Plc:
     Raises
     ------
     ConfigMismatch
-        If the map can't be used; see `drivers.plc.map_needs`.
+        If the map can't be used; see `drivers.plc.register_map`.
     """
 
     __slots__ = (

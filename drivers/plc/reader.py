@@ -15,8 +15,8 @@ from types import TracebackType
 from typing import Final, Self, TypeVar
 
 from drivers.errors import BusDown, ConfigMismatch, DeviceTimeout
+from drivers.plc.named_registers import Reading
 from drivers.plc.plc import Plc
-from drivers.plc.reading import Reading
 from drivers.plc.types import PlcStatus
 
 T = TypeVar("T")

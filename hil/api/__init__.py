@@ -5,7 +5,20 @@ What may come in: everything but the command line.
 
 from hil.api.comparison import ComparisonResult, compare
 from hil.api.diagnosis import DiagnosisResult, diagnose
+from hil.api.identification import IdentificationResult, identify
 from hil.api.models import read_model
-from hil.api.record import Record, read
+from hil.api.record import LookResult, Record, look, read
 
-__all__ = ["ComparisonResult", "DiagnosisResult", "Record", "compare", "diagnose", "read", "read_model"]
+__all__ = [
+    "ComparisonResult",
+    "DiagnosisResult",
+    "IdentificationResult",
+    "LookResult",
+    "Record",
+    "compare",
+    "diagnose",
+    "identify",
+    "look",
+    "read",
+    "read_model",
+]

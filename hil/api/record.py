@@ -1,9 +1,9 @@
-"""A recording in Python: read from a file or taken from a table of pandas."""
+"""A recording in Python: looked into, read from a file, or taken from a table of pandas."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
@@ -13,8 +13,12 @@ from estimator.signals import record as base
 from hil.api.models import Model, signals_of
 from hil.recording import columns
 from hil.recording.channels import column_of, understood
+from hil.recording.look import CHANNEL_HEADINGS, Look, channel_rows
+from hil.recording.look import look as look_into
 from hil.recording.signals import read_record, to_record, under_imposed_motion
+from hil.recording.survey import survey_of
 from hil.recording.table import Table
+from hil.report import page as html
 from hil.report.figures import Line, Panel, Style, input_lines, time_panels
 from hil.report.wording import quantity
 
@@ -48,31 +52,47 @@ class Record(base.Record):
         name: str = "frame",
         signals: Mapping[str, Any] | None = None,
         model: Model | None = None,
+        *,
+        torque: str | Sequence[str] | None = None,
+        speed: str | None = None,
+        position: str | None = None,
+        time: str | None = None,
     ) -> Self:
         """Take the columns of a table.
 
         Parameters
         ----------
         frame : pandas.DataFrame
-            Columns as in a file; without a column for the time its index is the time, in seconds or as moments.
+            Columns as in a file; without a column for the time its index is the time, in seconds or as moments, or a
+            column that rises evenly.
         name : str
             What the recording is called in results.
         signals : mapping, optional
             As ``[signals]`` of a model file; the contract's columns without it.
         model : path or model file, optional
             Whose ``[signals]`` count, where ``signals`` is not given.
+        torque, speed, position, time : str, or several for ``torque``, optional
+            Columns by name, in place of those of ``signals``.
 
         Raises
         ------
         RecordingError
             If the columns are not those of a recording, by name.
         """
-        known, on_bench = signals_of(signals, model)
+        named = {"speed": speed, "position": position, "time": time}
+        given: dict[str, Any] = {role: {"column": column} for role, column in named.items() if column is not None}
+        if torque is not None:
+            given["torque"] = [{"column": each} for each in ([torque] if isinstance(torque, str) else torque)]
+        known, on_bench = signals_of({**(signals or {}), **given} if given else signals, model)
         cells = {str(key): column_of(frame[key].to_numpy()) for key in frame.columns}
-        time = known.time.column or columns.TIME
-        if known.time.column is not None and time not in cells:
-            cells[time] = column_of(frame.index.to_numpy())
-        record = to_record(understood(Table(Path(name), cells)), known)
+        counted = known.time.column or columns.TIME
+        is_counted = type(frame.index).__name__ == "RangeIndex"  # of rows, which are no time
+        if known.time.column is not None and counted not in cells and not is_counted:
+            cells[counted] = column_of(frame.index.to_numpy())
+        table = understood(Table(Path(name), cells, is_frame=True))
+        if time is None and counted not in cells:
+            table = replace(table, master=survey_of([table]).groups[0].time)
+        record = to_record(table, known)
         return cls.of(under_imposed_motion(record) if on_bench else record)
 
     def to_dataframe(self) -> pandas.DataFrame:
@@ -108,3 +128,39 @@ def read(path: Path | str, signals: Mapping[str, Any] | None = None, model: Mode
     """Read a recording from a file of any format that ``hil`` reads."""
     known, on_bench = signals_of(signals, model)
     return Record.of(read_record(path, known, on_bench), Path(path))
+
+
+@dataclass(frozen=True, slots=True)
+class LookResult:
+    """Channels of a recording, and the table that reads it; ``found`` holds all of it."""
+
+    found: Look
+
+    @property
+    def signals(self) -> str:
+        """The lines of ``[signals]`` that read it; empty where none are needed."""
+        return "\n".join(self.found.signals)
+
+    def to_dataframe(self) -> pandas.DataFrame:
+        """Return a row per channel."""
+        import pandas
+
+        rows = [row for group in self.found.survey.groups for row in channel_rows(group)]
+        return pandas.DataFrame(rows, columns=list(CHANNEL_HEADINGS)).set_index("channel")
+
+    def __repr__(self) -> str:
+        roles = self.found.roles
+        torques = ", ".join(guess.channel.name for guess in roles.torques) or "none found"
+        output = "none found" if roles.output is None else roles.output.channel.name
+        count = sum(len(group.channels) for group in self.found.survey.groups)
+        return f"<{self.found.path.name}: {count} channels; torque {torques}; output {output}>"
+
+    def _repr_html_(self) -> str:
+        rows = [tuple(map(str, row)) for group in self.found.survey.groups for row in channel_rows(group)]
+        lines = [html.paragraph(line) for line in self.found.signals]
+        return html.fragment(html.Heading(repr(self)[1:-1]), html.table(CHANNEL_HEADINGS, rows, range(2, 6)), *lines)
+
+
+def look(path: Path | str, dbc: Path | str | None = None) -> LookResult:
+    """Say what is in a recording, and which ``[signals]`` read it."""
+    return LookResult(look_into(Path(path), None if dbc is None else Path(dbc)))

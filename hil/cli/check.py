@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from hil.cli.options import TakeOver
 from hil.cli.printing import say
-from hil.cli.take_over_option import TakeOver
 from hil.errors import InputError, UsageError
 
 if TYPE_CHECKING:
     from rich.table import Table as RichTable
 
     from drivers.eds_check import EdsReport
-    from drivers.plc.reading import Reading
+    from drivers.plc.named_registers import Reading
     from hil.config.rig_file import Rig
     from hil.rig.check import ChannelReading, Finding
 
@@ -58,8 +58,8 @@ def check(
     """
     from drivers.eds_check import check_eds
     from hil.config.rig_file import read_rig
-    from hil.rig.addresses import with_addresses
     from hil.rig.check import check_rig
+    from hil.simulator.addresses import with_addresses
 
     if rig is None and not eds:
         raise UsageError("expected a rig file, an EDS with --eds, or both, got neither. See: hil check --help")

@@ -34,7 +34,7 @@ def compare(
     prepared as the diagnosis did that wrote the model.
     """
     from hil.cli.printing import new_console
-    from hil.plants.trust import Trust
+    from hil.plants.plant import Trust
     from hil.provenance import provenance
     from hil.report.comparison import compared, comparison_text
     from hil.report.comparison_html import comparison_page, comparison_summary

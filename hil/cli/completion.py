@@ -1,9 +1,16 @@
-"""``hil completion``: what a shell needs to complete the commands, by typer: each TAB asks hil itself."""
+"""``hil completion``: what a shell needs to complete the commands, by typer: each TAB asks hil itself.
+
+The commands name here what is offered for their arguments: effects, and the experiments of a rig file.
+"""
 
 from __future__ import annotations
 
 import importlib
+import re
+from collections.abc import Iterator
 from enum import Enum
+from importlib.resources import files
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -73,3 +80,22 @@ def everywhere(
 def complete() -> None:
     """Answer the shell that asks by `VARIABLE`, and end."""
     root(prog_name="hil")
+
+
+def effect_names(incomplete: str) -> Iterator[str]:
+    """Yield the effects that begin so; from the text of their files, for importing them takes a second."""
+    for file in (files("estimator") / "physics" / "effects").iterdir():
+        if file.name.endswith(".py"):
+            names = re.findall(r'^    name="(\w+)",$', file.read_text("utf-8"), re.MULTILINE)
+            yield from (name for name in names if name.startswith(incomplete))
+
+
+def experiment_names(ctx: typer.Context, incomplete: str) -> Iterator[str]:
+    """Yield the experiments of the rig file on the line that begin so; none of a file that can't be read."""
+    try:
+        text = Path(ctx.params.get("rig") or "").read_text("utf-8")
+    except (OSError, UnicodeDecodeError):
+        return
+    for name in re.findall(r"^\s*\[experiments\.([^].]*)\]", text, re.MULTILINE):
+        if name.startswith(incomplete):
+            yield name

@@ -108,7 +108,7 @@ class _Demo:
                 raise ConfigMismatch(f"{finding.device}: {_faults(finding)}. The rig file is {self._rig_path}.")
 
     def _record(self, rig: Rig, name: str) -> Path:
-        from hil.cli.run_progress import RunProgress
+        from hil.cli.run_job import RunProgress
         from hil.recording import RecordingWriter
         from hil.rig.build import open_devices
         from hil.rig.metadata import run_metadata

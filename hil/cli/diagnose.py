@@ -11,9 +11,9 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperCommand
 
+from hil.cli.command_line import is_silent
 from hil.cli.importing import without_collecting
 from hil.cli.options import Dbc, Jobs, Mapped, TrustFmu, TrustLaws, tell
-from hil.cli.silence import is_silent
 
 HOLDOUT = "--holdout"
 
@@ -99,10 +99,10 @@ def diagnose(
         from rich.console import Console
 
         from estimator.diagnosis.diagnose import diagnose as diagnose_records
+        from hil.plants.plant import Trust
         from hil.plants.questioned import Asked, questioned
-        from hil.plants.trust import Trust
+        from hil.plants.scales import with_the_line_to_write
         from hil.provenance import provenance
-        from hil.recording.cure import with_the_line_to_write
         from hil.report.diagnosis_files import publish_diagnosis
         from hil.report.diagnosis_html import diagnosis_summary
         from hil.report.diagnosis_json import diagnosis_text

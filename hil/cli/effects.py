@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from hil.cli.completers import effect_names
+from hil.cli.completion import effect_names
 from hil.cli.printing import say
 
 app = typer.Typer(add_completion=False)

@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from estimator.signals.record import Record
     from hil.provenance import Provenance
 
-PAGE = "report.html"
-
 app = typer.Typer(add_completion=False)
 
 
@@ -125,18 +123,12 @@ def _identified(records: Sequence[Record], settings: Settings) -> list[Study]:
     """Identify from each and examine it, with a bar on standard error where that is a terminal."""
     from rich.progress import track
 
-    from estimator.identification.identify import identify as identify_record
-    from estimator.identification.study import study
     from hil.cli.printing import new_console
+    from hil.report.identification_files import identify_all
 
     console = new_console(stderr=True)
     bar = partial(track, console=console, transient=True, disable=not console.is_terminal)
-    results = [identify_record(record, settings) for record in bar(records, "identifying")]
-    pairs = list(zip(records, results, strict=True))
-    return [
-        study(record, found, settings, [other for other in results if other is not found])
-        for record, found in bar(pairs, "examining")
-    ]
+    return identify_all(records, settings, bar)
 
 
 def _publish(
@@ -152,25 +144,12 @@ def _publish(
     as_json: bool,
 ) -> None:
     from hil.cli.printing import new_console
-    from hil.figures.local_model import LocalModel
-    from hil.report.identification_json import FILE_NAME, identification_text
-    from hil.report.identification_page import compared_summary, identification_page, summary
+    from hil.report.identification_files import PAGE, publish_identification
+    from hil.report.identification_json import FILE_NAME
+    from hil.report.identification_page import compared_summary, summary
     from hil.report.identification_wording import verdict, warnings
-    from hil.report.outputs import publish
 
-    models = [
-        LocalModel.with_expected(record, each.found, model) for record, each in zip(records, studies, strict=True)
-    ]
-    nominal = models[0].reference_mode
-    text = identification_text([each.found for each in studies], settings, nominal, studies, choice, compared, made)
-    page = identification_page(models, studies, choice, compared, made)
-    publish(
-        out,
-        {
-            FILE_NAME: lambda path: path.write_text(text, encoding="utf-8"),
-            PAGE: lambda path: path.write_text(page, encoding="utf-8"),
-        },
-    )
+    text, nominal = publish_identification(out, records, settings, studies, model, made, choice, compared)
     if as_json:
         say(text, nl=False)
         return

@@ -25,6 +25,10 @@ def look(
         Path | None,
         typer.Option("--model", metavar="MODEL", help="Model file to read FILE by: shows which scale is wrong."),
     ] = None,
+    plot: Annotated[
+        bool,
+        typer.Option("--plot", help="Write FILE's name with .look.html: its channels over time, to see and to cut."),
+    ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
     """Show what is in a recording: channels, units, rates, gaps, what each could be, and the table that reads it."""
@@ -34,6 +38,8 @@ def look(
     from hil.recording.look import look as look_into
 
     found = look_into(file, dbc)
+    if plot:
+        _plot(found, model, dbc)
     if as_json:
         say(json.dumps(_document(found)))
         return
@@ -50,6 +56,28 @@ def look(
         _tell_scales(file, model, dbc)
     elif found.roles.torques and found.roles.output is not None:
         _tell_scales_alone(found, dbc)
+
+
+def _plot(found: Look, model: Path | None, dbc: Path | None) -> None:
+    """Write the page with the channels into this folder, and open it where a person sits at a terminal."""
+    import sys
+    import webbrowser
+
+    from hil.config.model_file import read_model_for_recordings, signals_of
+    from hil.recording.signals_config import SignalsConfig
+    from hil.report.look_page import look_page
+    from hil.report.outputs import publish
+
+    known = None if model is None else read_model_for_recordings(model).signals
+    if known is None and found.signals:
+        known = signals_of("\n".join(found.signals))
+    signals = known or SignalsConfig()
+    text = look_page(found, signals, signals.request(dbc))
+    page = Path(f"{found.path.stem}.look.html")
+    publish(Path(), {page.name: lambda path: path.write_text(text, encoding="utf-8")})
+    say(f"page: {page}", err=True)
+    if sys.stdout.isatty():
+        webbrowser.open(page.absolute().as_uri())
 
 
 def _tell_scales(file: Path, model: Path, dbc: Path | None) -> None:
@@ -93,19 +121,17 @@ def _show(found: Look) -> None:
     from rich.table import Table
 
     from hil.cli.printing import new_console
-    from hil.recording.survey import guesses
+    from hil.recording.look import CHANNEL_HEADINGS, channel_rows
 
     console = new_console()
     for group in found.survey.groups:
         table = Table(title=_rate(group), title_justify="left", box=None, pad_edge=False)
-        for heading in ("channel", "unit", "samples", "missing", "low", "high", "could be"):
+        for heading in CHANNEL_HEADINGS:
             is_number = heading in ("samples", "missing", "low", "high")
             table.add_column(heading, justify="right" if is_number else "left", overflow="fold")
-        for channel in group.channels:
-            could = "time" if channel.name == group.time else ", ".join(g.role.value for g in guesses(channel))
-            low, high = ("" if value is None else f"{value:.6g}" for value in (channel.low, channel.high))
-            cells = (channel.name, channel.unit, str(channel.rows), str(channel.missing or ""), low, high, could)
-            table.add_row(*(_plain(cell) for cell in cells))
+        for name, unit, rows, missing, *ends, could in channel_rows(group):
+            low, high = ("" if value is None else f"{value:.6g}" for value in ends)
+            table.add_row(*map(_plain, (name, unit, str(rows), str(missing or ""), low, high, could)))
         console.print(table)
 
 

@@ -14,9 +14,7 @@ from collections.abc import Sequence
 from enum import IntEnum
 
 from hil import __version__
-from hil.cli.call import Call
-from hil.cli.overview import overview
-from hil.cli.silence import silence
+from hil.cli.command_line import Call, overview, silence
 from hil.errors import HilError, InputError
 from hil.printable import shown
 from hil.rig.stop import interrupt_on_signals
@@ -106,8 +104,8 @@ def _run(call: Call, keep_log: bool) -> int:
 
 def _called(call: Call) -> int:
     """Import the command that is called, it alone, and carry it out."""
-    from hil.cli.flowing import flow
     from hil.cli.options import use_cores_of_environment
+    from hil.cli.printing import flow
 
     use_cores_of_environment()
     app = importlib.import_module(f"hil.cli.{call.command}").app

@@ -13,7 +13,7 @@ from hil.cli.options import Dbc
 from hil.cli.printing import say
 
 if TYPE_CHECKING:
-    from hil.config.new_model.values import Ask, Known
+    from hil.config.new_model import Ask, Known
 
 USUAL = "two_mass"
 
@@ -66,8 +66,7 @@ def new(
     Asks for what is not given as an option or by an identification; never writes over a file that is there.
     """
     from estimator.physics.model import DrivelineModel, Motion, Structure
-    from hil.config.new_model.text import model_text
-    from hil.config.new_model.values import TOLERANCE, assignments, parameters
+    from hil.config.new_model import TOLERANCE, assignments, model_text, parameters
     from hil.errors import UsageError
     from hil.files import refuse_existing, write_new
     from hil.recording.look import look
@@ -121,7 +120,7 @@ def _tolerances(texts: list[str] | tuple[str, ...], usual: float) -> tuple[list[
 
 def _known(path: Path, run: str | None) -> dict[str, Known]:
     """Return what an identification knows of the parameters."""
-    from hil.config.new_model.values import LEAST_TOLERANCE, MOST_TOLERANCE, Known
+    from hil.config.new_model import LEAST_TOLERANCE, MOST_TOLERANCE, Known
     from hil.report.identification_input import physical_values
 
     return {
@@ -159,8 +158,8 @@ def schema(
     ] = None,
 ) -> None:
     """Print the JSON schema of model files, for editors that read `#:schema ./model.schema.json`."""
-    from hil.config.file_schema import FileKind
     from hil.config.schema import schema_text
+    from hil.config.table import FileKind
     from hil.report.outputs import publish
 
     text = schema_text(FileKind.MODEL)

@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from hil.cli.options import FilterOf, FilterRun, TrustLaws, with_filter
+from hil.cli.options import FilterOf, FilterRun, TakeOver, TrustLaws, with_filter
 from hil.cli.printing import say
-from hil.cli.take_over_option import TakeOver
 from hil.errors import RunAborted, UsageError
 
 if TYPE_CHECKING:
@@ -77,7 +76,7 @@ def monitor(
 
 def _rig_file(rig: Path | None, bus: str | None, modbus: str | None, take_over: bool) -> Rig | None:
     from hil.config.rig_file import read_rig
-    from hil.rig.addresses import with_addresses
+    from hil.simulator.addresses import with_addresses
 
     return None if rig is None else with_addresses(read_rig(rig), bus, modbus, take_over)
 

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from hil.cli.command_line import is_silent
 from hil.cli.printing import say
-from hil.cli.silence import is_silent
 from hil.errors import UsageError
 from hil.printable import printable
 
@@ -129,7 +129,7 @@ PaceOption = Annotated[Pace, typer.Option(help="By the wall clock, or as fast as
 def pacer_for(rig: Rig, pace: Pace) -> Pacer:
     """Make the pacer of one run."""
     from hil.rig.pacing import FreePacer, RealTimePacer, period_ns
-    from hil.simulator.loopback import IN_PROCESS, bus_address
+    from hil.simulator.addresses import IN_PROCESS, bus_address
     from hil.simulator.rig_server import required_simulation
 
     if pace is Pace.REAL:
@@ -145,3 +145,11 @@ def scheduling(pace: Pace) -> AbstractContextManager[RealTimeGrants]:
     from hil.rig.realtime import NOT_ASKED, real_time
 
     return real_time() if pace is Pace.REAL else nullcontext(NOT_ASKED)
+
+
+TakeOver = Annotated[
+    bool,
+    typer.Option(
+        "--take-over", help="Continue though another host is heard on the bus; refused where a drive may carry torque."
+    ),
+]

@@ -16,8 +16,8 @@ from hil.errors import UsageError
 if TYPE_CHECKING:
     from estimator.identification.settings import Settings
     from estimator.signals.record import FloatArray
+    from hil.rig.live import OnCourse, Pace
     from hil.rig.live_course import Course
-    from hil.rig.live_replay import OnCourse, Pace
 
 SCHEMA = "hil.replay/1"
 
@@ -66,8 +66,7 @@ def replay(
     whole per mille of the rated torque. The PLC is not on this bus, so no sample is flagged for it.
     """
     from hil.report.outputs import publish
-    from hil.rig.live import tracking_settings
-    from hil.rig.live_replay import Pace
+    from hil.rig.live import Pace, tracking_settings
     from hil.rig.trace import is_trace
     from hil.store.entry import statements
 
@@ -115,7 +114,7 @@ def _play_recording(
 ) -> tuple[Course, dict[str, Any]]:
     from hil.config.model_file import read_model_for_recordings
     from hil.recording import read_record
-    from hil.rig.live_replay import play_record
+    from hil.rig.live import play_record
 
     signals = None if model is None else read_model_for_recordings(model, trust_laws).signals
     record = read_record(path, signals)
@@ -136,7 +135,7 @@ def _play_trace(
 ) -> tuple[Course, dict[str, Any]]:
     from hil.config.rig_file import read_rig
     from hil.recording import RecordingWriter
-    from hil.rig.live_replay import play_samples
+    from hil.rig.live import play_samples
     from hil.rig.metadata import replay_metadata
     from hil.rig.replay import replay as replayed
 

@@ -11,8 +11,7 @@ import typer
 from hil.cli.printing import say
 
 if TYPE_CHECKING:
-    from hil.config.new_rig.answers import Ask
-    from hil.config.new_rig.questions import Question
+    from hil.config.new_rig import Ask, Question
 
 app = typer.Typer(add_completion=False, no_args_is_help=True)
 
@@ -65,11 +64,9 @@ def new(
     With --eds identity, mode, and from a DCF node id and bit rate, are the data sheet's; what it does not say and the
     drive needs is written with its reason. On a vehicle such a line is a comment until somebody fills it in.
     """
-    from hil.config.file_schema import FileKind
-    from hil.config.new_rig.answers import answers
-    from hil.config.new_rig.drive import new_drive
-    from hil.config.new_rig.text import rig_text
+    from hil.config.new_rig import answers, new_drive, rig_text
     from hil.config.schema import schema_text
+    from hil.config.table import FileKind
     from hil.errors import UsageError
     from hil.files import refuse_existing, write_new
 
@@ -110,8 +107,8 @@ def schema(
     ] = None,
 ) -> None:
     """Print the JSON schema of rig files, for editors that read `#:schema ./rig.schema.json`."""
-    from hil.config.file_schema import FileKind
     from hil.config.schema import schema_text
+    from hil.config.table import FileKind
     from hil.report.outputs import publish
 
     text = schema_text(FileKind.RIG)

@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.markup import escape
 
-from hil.cli.completers import effect_names
+from hil.cli.completion import effect_names
 from hil.cli.options import TrustLaws
 from hil.rig.stop import StopRequest, stop_on_signals
 from hil.simulator.fault_table import known_faults
 
 if TYPE_CHECKING:
     from hil.config.rig_file import Rig
-    from hil.simulator.loopback import Address
+    from hil.simulator.addresses import Address
     from hil.simulator.rig_server import RigServer
 
 LOOK_EVERY_S = 0.1
@@ -92,7 +92,7 @@ def sim(
 
 
 def _modbus(rig: Rig, given: str | None) -> Address:
-    from hil.simulator.loopback import Address, modbus_address
+    from hil.simulator.addresses import Address, modbus_address
 
     return modbus_address(str(Address(rig.plc.host, rig.plc.port)) if given is None else given)
 

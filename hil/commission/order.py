@@ -16,7 +16,7 @@ from hil.config.experiment_tables import AnyExperiment, CruiseTable
 from hil.config.rig_file import Rig
 from hil.errors import RigFileError, UsageError
 from hil.problems import validate
-from hil.rig.addresses import with_addresses
+from hil.simulator.addresses import with_addresses
 
 
 @dataclass(frozen=True, slots=True)

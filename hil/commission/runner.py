@@ -24,7 +24,7 @@ from hil.recording.writer import RecordingWriter
 from hil.rig.build import open_devices
 from hil.rig.dry_run import Range
 from hil.rig.experiments.base import BaseTorque, Experiment, Phase
-from hil.rig.experiments.low_pass import LowPass
+from hil.rig.experiments.staged import LowPass
 from hil.rig.metadata import run_metadata
 from hil.rig.pacing import FreePacer, Pacer, disk_patience_s, heartbeat_patience_ms, period_ns
 from hil.rig.plan import Plan, plan_run

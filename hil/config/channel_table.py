@@ -13,9 +13,7 @@ from typing import Annotated, Final, Literal, Self
 from pydantic import Field, model_validator
 
 from drivers.capability.carrier import ObjectId, object_name
-from drivers.plc.map_needs import NUMBER
-from drivers.plc.register_map import RegisterMap
-from drivers.plc.units import IN_SI
+from drivers.plc.register_map import IN_SI, NUMBER, RegisterMap
 from estimator.signals.record import Location, OutputKind
 from hil.config.table import Table, Text
 from hil.problems import Fault, refuse

@@ -9,7 +9,7 @@ from pydantic import Field
 
 from drivers.inverter.cia402 import TorqueMode
 from drivers.torque_guard import ErrorLimits
-from hil.config.inverter_table import InvertersTable, InverterTable
+from hil.config.device_tables import InvertersTable, InverterTable
 from hil.config.table import Positive, Table
 
 ERROR_SHARE: Final = 0.05

@@ -21,8 +21,7 @@ from estimator.errors import BadModel
 from estimator.physics.model import DrivelineModel, EffectValue, Load, Motion, Parameter, Structure
 from estimator.physics.own_law import LawName
 from hil.config.laws import LawTable, laws_of, moved
-from hil.config.model_tables import ModelDocument, Prepared
-from hil.config.model_text import as_toml
+from hil.config.model_tables import ModelDocument, Prepared, as_toml
 from hil.errors import ModelFileError
 from hil.files import write_whole
 from hil.problems import problem_lines, read_toml

@@ -14,9 +14,9 @@ from pydantic import BaseModel
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import core_schema
 
-from hil.config.file_schema import FileKind
 from hil.config.model_tables import ModelDocument
 from hil.config.rig_file import Rig
+from hil.config.table import FileKind
 
 DIALECT: Final = GenerateJsonSchema.schema_dialect
 

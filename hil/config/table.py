@@ -1,8 +1,9 @@
-"""What every table of a configuration file is: frozen, strict, complete; and the field types they share."""
+"""What configuration files share: tables that are frozen, strict and complete; field types; the line of the schema."""
 
 from __future__ import annotations
 
 import os
+from enum import Enum
 from pathlib import Path
 from typing import Annotated
 
@@ -36,3 +37,15 @@ TcpPort = Annotated[int, Field(ge=1, le=65535)]
 Unsigned32 = Annotated[int, Field(ge=0, le=0xFFFF_FFFF)]
 ExistingFile = Annotated[Path, BeforeValidator(_next_to_the_file)]
 """A file, relative to the folder of the file that names it; read as an absolute path."""
+
+
+class FileKind(Enum):
+    """A kind of file; the value is its schema's file name."""
+
+    RIG = "rig.schema.json"
+    MODEL = "model.schema.json"
+
+
+def schema_line(kind: FileKind) -> str:
+    """Return the first line of such a file: the TOML language servers look for the schema there."""
+    return f"#:schema ./{kind.value}"

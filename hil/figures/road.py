@@ -23,20 +23,17 @@ from hil.errors import UsageError
 from hil.figures.local_model import TRUTH, LocalModel, Reference, TwoMassLine
 from hil.recording import read_record
 from hil.recording.writer import RecordingWriter
-from hil.rig.addresses import with_addresses
 from hil.rig.build import open_devices
 from hil.rig.drive import Progress
-from hil.rig.experiments.approach import Approach
 from hil.rig.experiments.cruise import Cruise
-from hil.rig.experiments.low_pass import LowPass
 from hil.rig.experiments.registry import experiment_table
-from hil.rig.experiments.staged import StagedExperiment, TorqueBounds
+from hil.rig.experiments.staged import Approach, LowPass, StagedExperiment, TorqueBounds
 from hil.rig.pacing import FreePacer, heartbeat_patience_ms, period_ns
 from hil.rig.plan import Plan, plan_run
 from hil.rig.session import run_plan
 from hil.rig.stop import StopRequest
+from hil.simulator.addresses import IN_PROCESS, Address, with_addresses
 from hil.simulator.driveline import simulation_model
-from hil.simulator.loopback import IN_PROCESS, Address
 from hil.simulator.rig_server import RigServer, required_simulation
 
 PRBS_STATES = 1023

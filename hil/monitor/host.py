@@ -51,15 +51,14 @@ from hil.monitor.messages import (
 )
 from hil.monitor.outbox import Outbox
 from hil.monitor.recorded_run import RecordedRun
-from hil.rig.addresses import with_addresses
 from hil.rig.build import Devices, open_devices
-from hil.rig.histogram import Histogram
 from hil.rig.idle import Listening
 from hil.rig.live import USUAL, OnlineSetup
 from hil.rig.pacing import RealTimePacer, period_ns
 from hil.rig.realtime import real_time
 from hil.rig.stop import StopRequest, stop_on_signals
-from hil.rig.timing import RunTiming
+from hil.rig.timing import Histogram, RunTiming
+from hil.simulator.addresses import IN_PROCESS, Address, with_addresses
 
 NS_PER_S = 1_000_000_000
 
@@ -353,7 +352,6 @@ def _rig(job: Job) -> Iterator[Rig]:
         yield job.rig
         return
     from hil.simulator.driveline import plant_for
-    from hil.simulator.loopback import IN_PROCESS, Address
     from hil.simulator.rig_server import RigServer
 
     plant = plant_for(job.rig, [], job.trust_laws)

@@ -7,8 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from estimator.diagnosis.black_box import BlackBox
-from estimator.diagnosis.equivalent_line import equivalent_line
+from estimator.diagnosis.black_box import BlackBox, equivalent_line
 from estimator.diagnosis.preconditions import thin
 from estimator.physics.driveline import Start
 from estimator.physics.model import DrivelineModel, Load

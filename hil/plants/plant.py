@@ -51,3 +51,11 @@ class ModelPlant:
     def run(self, record: Record) -> FreeRun:
         """Simulate a recording; constant load torque and initial state are estimated."""
         return replay(self.model, record, self.events.get(record.name, NOTHING_KNOWN))
+
+
+@dataclass(frozen=True, slots=True)
+class Trust:
+    """What code may run: that of a model file's own laws, and that in an FMU."""
+
+    laws: bool = False
+    fmu: bool = False

@@ -13,7 +13,7 @@ from hil.config.model_file import ModelFile, read_model_for_recordings, read_sig
 from hil.errors import UsageError
 from hil.plants.fmu_line import fmu_line
 from hil.plants.fmu_plant import FmuPlant, is_fmu
-from hil.plants.trust import Trust
+from hil.plants.plant import Trust
 from hil.recording import read_records
 from hil.recording.signals import Tell
 

@@ -28,8 +28,8 @@ from hil.proof.make_case import model_toml
 from hil.proof.seal import Seal, seal
 from hil.proof.truth.driveline import TruthDriveline
 from hil.proof.truth.specimen import Specimen, Stream, choose_effect, draw_specimen, stream
+from hil.simulator.addresses import modbus_address
 from hil.simulator.fault_table import rig_faults
-from hil.simulator.loopback import modbus_address
 from hil.simulator.rig_server import RigServer
 
 RIG_FILE = Path(__file__).with_name("demo_rig.toml")

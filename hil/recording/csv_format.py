@@ -9,10 +9,12 @@
 - A last line without line end is taken (RFC 4180 allows it): a file cut inside its very last number can't be
   distinguished from a whole one. A cut anywhere else leaves a row with cells missing, and is refused.
 - A quoted cell must end on its line, so that a row is a line and every fault has its number.
+- A byte order mark says how bytes are text, else what was set by hand does, else it is UTF-8.
 """
 
 from __future__ import annotations
 
+import codecs
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
@@ -28,7 +30,6 @@ from hil.errors import RecordingError
 from hil.recording.bounds import require_columns
 from hil.recording.channels import numbers_of_texts
 from hil.recording.description import NO_SIDECAR, Sidecar, as_metadata, read_sidecar, write_sidecar
-from hil.recording.encoding import decoded
 from hil.recording.request import FormatHints, Request
 from hil.recording.table import Column, Kind, Table, as_text, line_of
 from hil.recording.text_form import BLANKS, MISSING, SAMPLE_LINES, TextForm, recognise, split
@@ -296,3 +297,62 @@ def _quoted(text: str) -> str:
     """Quote a text with anything in it that a reader could take for a delimiter, or that would leave a line empty."""
     unclear = not text or any(c in text for c in f'{SPECIAL}"')
     return '"' + text.replace('"', '""') + '"' if unclear else text
+
+
+MARKS: Final = (
+    (codecs.BOM_UTF8, "utf-8-sig"),
+    (codecs.BOM_UTF32_LE, "utf-32"),  # begins like that of UTF-16
+    (codecs.BOM_UTF16_LE, "utf-16"),
+    (codecs.BOM_UTF16_BE, "utf-16"),
+)
+"""Byte order marks (Unicode 15, 23.8) and the encoding that reads them."""
+
+WITHOUT_MARK: Final = ((1, "utf-16-le"), (0, "utf-16-be"))
+"""UTF-16 without a mark: of ASCII every second byte is NUL, from this one on."""
+
+LOOKED_AT_BYTES: Final = 64
+"""Enough for the names of a column or two."""
+
+FALLBACK: Final = "latin-1"
+"""What a file that is no UTF-8 most likely is: of a Windows program, whose other characters are in no unit."""
+
+
+def encoding_of(content: bytes, given: str) -> str:
+    """Return how a file is encoded, as far as it tells, else ``given``."""
+    for mark, name in MARKS:
+        if content.startswith(mark):
+            return name
+    start = content[:LOOKED_AT_BYTES]
+    start = start[: len(start) // 2 * 2]
+    for first, name in WITHOUT_MARK:
+        if len(start) >= 4 and not any(start[first::2]) and all(start[1 - first :: 2]):
+            return name
+    return given
+
+
+def decoded(path: Path, content: bytes, given: str) -> tuple[str, str]:
+    """Return a file's text with line feeds only and no empty lines at the end, and its encoding."""
+    encoding = encoding_of(content, given)
+    try:
+        text = content.decode(encoding)
+    except UnicodeError as error:
+        start = error.start if isinstance(error, UnicodeDecodeError) else 0
+        line = content.count(b"\n", 0, start) + 1
+        byte = content[start : start + 1].hex()
+        raise RecordingError(
+            path,
+            f"line {line}: expected {encoding} text, got byte 0x{byte}. Give its encoding in the model file: "
+            f'[signals] format = {{ encoding = "{FALLBACK}" }}.',
+        ) from error
+    lines = text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
+    return lines.rstrip("\n"), encoding
+
+
+def likely_encoding(content: bytes) -> str:
+    """Return the encoding to try: what the file tells, else UTF-8 where it is some, else `FALLBACK`."""
+    encoding = encoding_of(content, "utf-8")
+    try:
+        content.decode(encoding)
+    except UnicodeError:
+        return FALLBACK
+    return encoding

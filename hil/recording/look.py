@@ -11,12 +11,12 @@ import tomlkit
 
 from hil.printable import printable
 from hil.recording import columns
-from hil.recording.encoding import FALLBACK, likely_encoding
+from hil.recording.csv_format import FALLBACK, likely_encoding
 from hil.recording.formats import format_of, tables_of
 from hil.recording.request import FormatHints, Request
 from hil.recording.sandbox import READER
 from hil.recording.scales import Quantity, Role, unit_of
-from hil.recording.survey import Group, Guess, Roles, Survey, roles_of, rounded, survey_of
+from hil.recording.survey import Group, Guess, Roles, Survey, guesses, roles_of, rounded, survey_of
 
 LONG_PERIOD_S = 1.0
 """A period that no recording of a drive has: a time without a unit whose rows are as far is one in ms, perhaps."""
@@ -123,6 +123,16 @@ class Look:
     survey: Survey
     roles: Roles
     signals: tuple[str, ...]
+
+
+CHANNEL_HEADINGS = ("channel", "unit", "samples", "missing", "low", "high", "could be")
+
+
+def channel_rows(group: Group) -> Iterator[tuple[str, str, int, int, float | None, float | None, str]]:
+    """Give what is known of each channel of a time, in the order of ``CHANNEL_HEADINGS``."""
+    for channel in group.channels:
+        could = "time" if channel.name == group.time else ", ".join(g.role.value for g in guesses(channel))
+        yield channel.name, channel.unit, channel.rows, channel.missing, channel.low, channel.high, could
 
 
 def look(path: Path, dbc: Path | None = None) -> Look:

@@ -1,4 +1,9 @@
-"""MDF files, opened with every fault put into words."""
+"""MDF files, opened with every fault put into words; those of other programs: which of many groups is the recording.
+
+A file of a measurement tool has a group for each rate. The groups that share their time to the bit belong together. The
+recording is made of those that have the channels asked for, or the most channels; what the others have is named.
+Channels of different times are brought to one only by ``resample_s``: a sample that was made up is none.
+"""
 
 from __future__ import annotations
 
@@ -6,16 +11,23 @@ import io
 import logging
 import struct
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, redirect_stdout
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
 
 from hil.errors import RecordingError
-from hil.recording.bounds import damaged
+from hil.recording.bounds import damaged, require_columns
+from hil.recording.request import Request
+from hil.recording.resample import Series, resampled
+from hil.recording.table import Column, Kind, Table, as_column, is_column
 
 if TYPE_CHECKING:
     from asammdf import MDF
+
 
 DAMAGED = (
     OSError,
@@ -90,3 +102,227 @@ def _quiet() -> Iterator[None]:
             yield
     finally:
         logger.disabled = before
+
+
+BUS_EVENT: Final = 2
+"""Flag of a group of bus events, ``cg_flags`` (ASAM MDF 4.1, table 51)."""
+
+LARGEST_DBC_BYTES: Final = 32 << 20
+"""One of a whole vehicle has some megabytes."""
+
+ANY_BUS: Final = 0
+"""Channel of the bus, as asammdf counts: every one."""
+
+
+def is_bus_log(mdf: MDF) -> bool:
+    """Whether all a file holds are frames of a bus."""
+    groups = [group.channel_group for group in mdf.groups if group.channel_group.cycles_nr]
+    return bool(groups) and all(int(getattr(group, "flags", 0)) & BUS_EVENT for group in groups)
+
+
+def decoded(path: Path, mdf: MDF, dbc: Path) -> MDF:
+    """Return the signals of a logged bus, a J1939 one among them, as a file of their own in memory."""
+    if not any(int(getattr(group.channel_group, "flags", 0)) & BUS_EVENT for group in mdf.groups):
+        raise RecordingError(path, "expected the frames of a bus for --dbc, got signals. Leave --dbc out.")
+    database_of(path, dbc)
+    signals = mdf.extract_bus_logging({"CAN": [(dbc, ANY_BUS)]})
+    if not any(group.channel_group.cycles_nr for group in signals.groups):
+        raise RecordingError(
+            path,
+            f"--dbc {dbc}: expected a description of the frames in this file, got none of them. Is it of another bus?",
+        )
+    return signals
+
+
+def database_of(path: Path, dbc: Path) -> Any:
+    """Read a DBC file that says what the frames of a log mean."""
+    import cantools
+
+    if dbc.suffix.lower() != ".dbc":
+        raise RecordingError(path, f"--dbc {dbc}: expected a DBC file, named .dbc, got {dbc.suffix!r}")
+    try:
+        size = dbc.stat().st_size
+        database: Any = cantools.database.load_file(dbc, "dbc") if size <= LARGEST_DBC_BYTES else None
+    except Exception as error:
+        raise RecordingError(path, f"--dbc {dbc}: expected a DBC file, got: {type(error).__name__}: {error}") from error
+    if database is None or not database.messages:
+        raise RecordingError(path, f"--dbc {dbc}: expected a DBC file that describes messages, got one without any")
+    return database
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where a channel is in a file."""
+
+    group: int
+    index: int
+
+
+@dataclass(slots=True)
+class Raster:
+    """The groups that share one time, and their channels by name."""
+
+    times: Column
+    master: str
+    unit: str
+    places: dict[str, Place] = field(default_factory=dict)
+
+    @property
+    def said(self) -> str:
+        """How often it has a sample, for people."""
+        if self.times.size < 2:
+            return f"with {self.times.size} samples"
+        return f"every {float(np.median(np.diff(self.times))):.4g} s"
+
+
+def foreign_table(path: Path, mdf: MDF, request: Request) -> Table:
+    """Read the channels asked for, or those that share the time of most; physical values, invalid ones as NaN."""
+    mdf = readable(path, mdf, request)
+    rasters, remarks = rasters_of(path, mdf)
+    if request.resample_s is not None and (found := _found(rasters, request)):
+        return _brought_together(path, mdf, found, request, request.resample_s)
+    if not rasters:
+        return Table(path, {}, {}, foreign_metadata(mdf))
+    chosen = max(rasters, key=lambda raster: _fits(raster, request))
+    table = raster_table(path, mdf, chosen)
+    elsewhere = {
+        name: f"column {name}: it is in this file, but {raster.said}, and what was read is {chosen.said}. "
+        "Bring all to one period: [signals] resample_s = 0.01"
+        for raster in rasters
+        for name in raster.places
+        if raster is not chosen
+    }
+    left = [f"{name}: left out, it has a time of its own" for name in elsewhere]
+    return Table(
+        path,
+        table.columns,
+        table.units,
+        foreign_metadata(mdf),
+        remarks=(*remarks, *table.remarks, *left),
+        master=table.master,
+        elsewhere=elsewhere,
+    )
+
+
+def foreign_tables(path: Path, mdf: MDF, request: Request) -> list[Table]:
+    """Read all channels, a table for each time."""
+    mdf = readable(path, mdf, request)
+    rasters, _ = rasters_of(path, mdf)
+    return [raster_table(path, mdf, raster) for raster in rasters]
+
+
+def readable(path: Path, mdf: MDF, request: Request) -> MDF:
+    """Return a file whose channels are signals: a logged bus decoded."""
+    if request.dbc is not None:
+        return decoded(path, mdf, request.dbc)
+    if is_bus_log(mdf):
+        raise RecordingError(
+            path,
+            "expected signals, got the frames of a bus as they were logged. Say what they mean: --dbc FILE",
+        )
+    return mdf
+
+
+def rasters_of(path: Path, mdf: MDF) -> tuple[list[Raster], list[str]]:
+    """Return the times of a file with their channels; a name that comes again is numbered, and that is said."""
+    rasters: list[Raster] = []
+    count: dict[str, int] = {}
+    remarks: list[str] = []
+    for group in range(len(mdf.groups)):
+        times = np.asarray(mdf.get_master(group))
+        if not times.size:
+            continue
+        raster = next((known for known in rasters if np.array_equal(known.times, times)), None)
+        if raster is None:
+            rasters.append(raster := Raster(times, *_master(mdf, group)))
+        for index, channel in _channels(mdf, group):
+            name = str(channel.name)
+            count[name] = count.get(name, 0) + 1
+            called = name if count[name] == 1 else f"{name} ({count[name]})"
+            if called != name:
+                remarks.append(f"{name}: another channel has that name, that of group {group + 1} is {called!r} here")
+            raster.places[called] = Place(group, index)
+    require_columns(path, sum(len(raster.places) for raster in rasters))
+    return rasters, remarks
+
+
+def raster_table(path: Path, mdf: MDF, raster: Raster) -> Table:
+    """Read all channels of one time, and that."""
+    columns: dict[str, Column] = {raster.master: as_column(raster.times)}
+    units = {raster.master: raster.unit} if raster.unit else {}
+    remarks: list[str] = []
+    for name, place in raster.places.items():
+        signal = _signal(mdf, place)
+        if signal.samples.ndim != 1 or not is_column(signal.samples):
+            remarks.append(f"{name}: left out, it is no channel of single numbers or texts")
+            continue
+        columns[name] = _valid(as_column(signal.samples), signal.invalidation_bits)
+        if signal.unit:
+            units[name] = str(signal.unit)
+    return Table(path, columns, units, remarks=tuple(remarks), master=raster.master)
+
+
+def foreign_metadata(mdf: MDF) -> dict[str, str]:
+    """Read comment, start and common properties of a file."""
+    header = mdf.header
+    own = {"comment": getattr(header, "description", ""), "start_time": header.start_time.isoformat()}
+    properties = getattr(header, "_common_properties", {})
+    said = {**own, **{key: value for key, value in properties.items() if isinstance(value, str)}}
+    return {key: value for key, value in said.items() if value}
+
+
+def _channels(mdf: MDF, group: int) -> Iterator[tuple[int, Any]]:
+    """Yield the channels of a group with their number, but for its time."""
+    master = mdf.masters_db.get(group)
+    return ((index, channel) for index, channel in enumerate(channels_of(mdf, group)) if index != master)
+
+
+def _master(mdf: MDF, group: int) -> tuple[str, str]:
+    """Return name and unit of the time of a group."""
+    index = mdf.masters_db.get(group)
+    if index is None:
+        return "time", "s"
+    channel = channels_of(mdf, group)[index]
+    return str(channel.name), str(getattr(channel, "unit", "") or "s")
+
+
+def _fits(raster: Raster, request: Request) -> tuple[int, int, int]:
+    asked = sum(name in raster.places for name in request.columns)
+    return asked, len(raster.places), raster.times.size
+
+
+def _found(rasters: Sequence[Raster], request: Request) -> dict[str, tuple[Raster, Place]]:
+    """Return where the channels that are asked for are."""
+    places = {name: (raster, place) for raster in rasters for name, place in raster.places.items()}
+    return {name: places[name] for name in request.columns if name in places}
+
+
+def _brought_together(
+    path: Path, mdf: MDF, found: dict[str, tuple[Raster, Place]], request: Request, period_s: float
+) -> Table:
+    """Read the channels that are asked for, at one period."""
+    series: dict[str, Series] = {}
+    units: dict[str, str] = {}
+    for name, (raster, place) in found.items():
+        signal = _signal(mdf, place)
+        column = _valid(as_column(signal.samples), signal.invalidation_bits) if signal.samples.ndim == 1 else None
+        if column is None or Kind.of(column) is Kind.TEXT:
+            raise RecordingError(path, f"column {name}: expected a channel of numbers for resample_s, got another")
+        series[name] = Series(raster.times.astype(np.float64), column.astype(np.float64), name in request.held)
+        units[name] = str(signal.unit or "")
+    time, columns, remarks = resampled(path, series, period_s)
+    master = next(iter(found.values()))[0].master
+    units[master] = "s"
+    said = {name: unit for name, unit in units.items() if unit}
+    return Table(path, {master: time, **columns}, said, foreign_metadata(mdf), remarks=tuple(remarks), master=master)
+
+
+def _signal(mdf: MDF, place: Place) -> Any:
+    return mdf.get(group=place.group, index=place.index, ignore_invalidation_bits=True)  # else it drops rows
+
+
+def _valid(column: Column, invalid: Column | None) -> Column:
+    """Mark the samples that the file itself calls invalid as missing."""
+    if invalid is None or not np.any(invalid) or Kind.of(column) is Kind.TEXT:
+        return column
+    return np.where(np.asarray(invalid, dtype=np.bool_), np.nan, column.astype(np.float64))

@@ -5,7 +5,7 @@ The group is timed by ``time_s``, the master channel, where that can be one (fin
 people; its rig file is attached as ``rig.toml``; ``recording.json``, attached too, is what is read back
 (`hil.recording.description`), for MDF's texts are cut free of blanks and its names take no backslash.
 
-Versions 3 and 4 of other programs are read too, by `hil.recording.mdf_foreign`.
+Versions 3 and 4 of other programs are read too, by `hil.recording.mdf_file`.
 """
 
 from __future__ import annotations
@@ -23,8 +23,16 @@ from hil import __version__
 from hil.recording import columns
 from hil.recording.checksum import RIG_TEXT
 from hil.recording.description import described_table, description_of, metadata_of
-from hil.recording.mdf_file import IDENTIFICATION_BYTES, channels_of, is_unfinished, opened, require_mdf
-from hil.recording.mdf_foreign import foreign_metadata, foreign_table, foreign_tables
+from hil.recording.mdf_file import (
+    IDENTIFICATION_BYTES,
+    channels_of,
+    foreign_metadata,
+    foreign_table,
+    foreign_tables,
+    is_unfinished,
+    opened,
+    require_mdf,
+)
 from hil.recording.request import Request
 from hil.recording.table import Column, Kind, Table, as_column
 

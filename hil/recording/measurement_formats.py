@@ -1,7 +1,7 @@
 """Files of measurement programs whose channels have times of their own: TDMS (NI), MCAP (robotics), logs of a CAN bus.
 
 What a file holds becomes groups of channels that share a time; from there on they are read as the groups of an MDF file
-are (`hil.recording.mdf_foreign`): the recording is made of those asked for, others are named, `resample_s` brings all
+are (`hil.recording.mdf_file`): the recording is made of those asked for, others are named, `resample_s` brings all
 to one period. The libraries of TDMS and MCAP are extras: ``pip install hil-driveline[formats]``.
 """
 
@@ -21,7 +21,7 @@ import numpy as np
 
 from hil.errors import RecordingError
 from hil.recording.bounds import damaged, require_cells
-from hil.recording.mdf_foreign import database_of, foreign_table, foreign_tables
+from hil.recording.mdf_file import database_of, foreign_table, foreign_tables
 from hil.recording.request import Request
 from hil.recording.table import Column, Table, as_column, is_column
 

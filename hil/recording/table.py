@@ -107,6 +107,9 @@ LARGEST = 1e30
 LEFT_OUT = ": left out, "
 """What every remark on a column that was not read has behind the column's name."""
 
+NAME_IN_MODEL = "For a foreign recording, name its columns in [signals] of the model file."
+NAME_IN_PYTHON = "Name its columns: from_pandas(frame, torque=[...], speed=..., time=...)."
+
 LONGEST_CELL = 40
 """Characters of a wrong cell that a message shows."""
 
@@ -135,6 +138,8 @@ class Table:
         The column that the file itself calls its time.
     elsewhere : mapping of name to str
         Channels of the file that are no columns here by that name, and what to say where one is asked for.
+    is_frame : bool
+        Whether it is of pandas, and of no file.
 
     Raises
     ------
@@ -151,6 +156,7 @@ class Table:
     skipped: tuple[int, ...] = ()
     master: str | None = None
     elsewhere: Mapping[str, str] = field(default_factory=dict)
+    is_frame: bool = False
 
     def __post_init__(self) -> None:
         lengths = {name: column.shape[0] for name, column in self.columns.items()}
@@ -203,9 +209,8 @@ class Table:
             if name in self.elsewhere:
                 return self.elsewhere[name]
             listed = ", ".join([*self.columns, *self.elsewhere])
-            return (
-                f"column {name}: missing, the file has {listed}. "
-                "For a foreign recording, name its columns in [signals] of the model file."
+            return f"column {name}: missing, the {'frame' if self.is_frame else 'file'} has {listed}. " + (
+                NAME_IN_PYTHON if self.is_frame else NAME_IN_MODEL
             )
         row = _first_bad(column)
         if row is None:

@@ -158,6 +158,11 @@ POINTS = 300
 
 
 def response_figure(name: str, model: LocalModel, best: LinearFit | None = None) -> Figure:
+    """Draw one experiment on a page."""
+    return figure_block(response(model, best), name, HEIGHT_PX)
+
+
+def response(model: LocalModel, best: LinearFit | None = None) -> go.Figure:
     """Draw one experiment: spectral estimate and models with their 95 % intervals, and the reference."""
     figure = panels()
     f = frequencies_hz(model)
@@ -171,7 +176,7 @@ def response_figure(name: str, model: LocalModel, best: LinearFit | None = None)
     curve(figure, below, model.online.response(below), "on line", {"color": BLUE, "width": 2.2})
     _reference(figure, model, f)
     fix_scale(figure, _levels([model]))
-    return figure_block(figure, name, HEIGHT_PX)
+    return figure
 
 
 def responses_figure(name: str, models: Sequence[LocalModel]) -> Figure:

@@ -20,10 +20,9 @@ from hil.config.model_file import ModelFile, read_model_for_recordings
 from hil.config.model_tables import Prepared
 from hil.errors import UsageError
 from hil.plants.fmu_plant import FmuPlant, is_fmu
-from hil.plants.plant import ModelPlant, Plant
+from hil.plants.plant import ModelPlant, Plant, Trust
 from hil.plants.prepared import known_events, prepare_again
 from hil.plants.scales import tell_scales
-from hil.plants.trust import Trust
 from hil.provenance import Provenance
 from hil.recording import read_records
 from hil.recording.signals import Tell

@@ -34,6 +34,7 @@ from hil.report import page as html
 from hil.report.discrepancy_figures import course_figure, error_spectrum_figure, law_figure, response_figure
 from hil.report.figures import (
     Line,
+    Mark,
     Panel,
     Style,
     band_figure,
@@ -434,7 +435,7 @@ def _recording(diagnosis: Diagnosis, trace: Trace, number: int, recordings: int)
             f"RMS error {shown(_rms(before))} → {shown(_rms(after))} {fit.unit}; {kind}. Drag to zoom, double click "
             f"to go back; the dotted pair of lines is the noise floor.{marked}"
         ),
-        time_figure(f"time-{number}", trace.time_s, panels, recordings, shaded),
+        time_figure(f"time-{number}", trace.time_s, panels, recordings, [Mark(*each) for each in shaded]),
         html.Heading("Spectrum of the error"),
         spectrum_figure(f"spectrum-{number}", sample_time_s, panels[-1].lines, fit.unit, fit.noise_floor),
     )

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from drivers.capability.ability import Ability
 from drivers.capability.carrier import RPDO, TPDO
-from drivers.datasheet.finding import EdsFinding, Severity
+from drivers.capability.plan import Ability
+from drivers.datasheet.text import EdsFinding, Severity
 from drivers.eds_check import EdsReport
 
 

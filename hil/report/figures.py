@@ -7,7 +7,7 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import plotly.graph_objects as go
@@ -91,7 +91,12 @@ def _base64(values: np.ndarray[Any, Any]) -> str:
     return base64.b64encode(values.tobytes()).decode("ascii")
 
 
-Interval = tuple[float, float]
+class Mark(NamedTuple):
+    """A span of time [s] to shade."""
+
+    from_s: float
+    to_s: float
+    colour: str = ORANGE
 
 
 class Style(Enum):
@@ -181,7 +186,7 @@ def time_figure(
     time_s: FloatArray,
     panels: Sequence[Panel],
     recordings: int,
-    shaded: Sequence[Interval] = (),
+    shaded: Sequence[Mark] = (),
 ) -> list[Paragraph | Figure]:
     """Draw panels over a common time axis; zoomed in, every sample is drawn."""
     stretches = stretches_for(recordings)
@@ -200,9 +205,7 @@ def time_figure(
     return [note(drawn), figure_block(figure, name, height_px, samples=samples)]
 
 
-def time_panels(
-    time_s: FloatArray, panels: Sequence[Panel], stretches: int, shaded: Sequence[Interval] = ()
-) -> go.Figure:
+def time_panels(time_s: FloatArray, panels: Sequence[Panel], stretches: int, shaded: Sequence[Mark] = ()) -> go.Figure:
     """Return panels over a common time axis; of each line the extremes of so many stretches (``decimate``)."""
     figure = make_subplots(rows=len(panels), cols=1, shared_xaxes=True, vertical_spacing=0.04)
     seen: set[str] = set()
@@ -215,8 +218,9 @@ def time_panels(
         figure.update_yaxes(title_text=panel.axis, row=row, col=1)
         for limit in () if panel.band is None else (-panel.band, panel.band):
             figure.add_hline(y=limit, line={"color": "#777777", "width": 1, "dash": "dot"}, row=row, col=1)
-    for low, high in shaded:
-        figure.add_vrect(x0=low, x1=high, fillcolor=SHADE, opacity=0.25, line_width=0, layer="below")
+    whole = {"type": "rect", "yref": "paper", "y0": 0.0, "y1": 1.0, "opacity": 0.25, "layer": "below"}
+    spans = [{"x0": from_s, "x1": to_s, "fillcolor": colour} for from_s, to_s, colour in shaded]
+    figure.update_layout(shapes=[*figure.layout.shapes, *({**whole, **each, "line": {"width": 0}} for each in spans)])
     figure.update_xaxes(title_text="time [s]", row=len(panels), col=1)
     return figure
 

@@ -187,6 +187,13 @@ class Figure:
 
 
 @dataclass(frozen=True, slots=True)
+class Cut:
+    """The stretch in view of a figure, as the lines of ``[signals]`` that cut it; `page.js` writes them."""
+
+    figure: str
+
+
+@dataclass(frozen=True, slots=True)
 class Picture:
     """An SVG drawing, shown as an image: nothing in it can run."""
 

@@ -22,7 +22,7 @@ from hil.errors import UsageError
 from hil.rig.channels import Channels
 from hil.rig.plc_loop import PlcLoop
 from hil.rig.sole_host import require_sole_host
-from hil.simulator.loopback import is_simulated_bus
+from hil.simulator.addresses import is_simulated_bus
 
 NAMES = ("m1", "m2")
 
@@ -121,6 +121,7 @@ def inverter_settings(name: str, rig: Rig) -> InverterSettings:
         eds_path=table.eds,
         vendor_id=table.vendor_id,
         product_code=table.product_code,
+        serial_number=table.serial_number,
         heartbeat_ms=table.heartbeat_ms,
         host_node_id=rig.host_node_id,
         host_timeout_ms=table.host_timeout_ms,

@@ -11,22 +11,21 @@ from urllib.parse import parse_qsl, urlsplit
 
 from drivers.canopen.can_link import CanLink
 from drivers.datasheet.file import EdsFile
-from drivers.datasheet.finding import Severity
+from drivers.datasheet.text import Severity
 from drivers.eds_check import check_eds
 from drivers.errors import DeviceFault, DriverError, ProtocolViolation
 from drivers.inverter.check import Difference
-from drivers.inverter.commissioned import CommissionedValue
+from drivers.inverter.inspection import CommissionedValue
 from drivers.inverter.inverter import Inverter
-from drivers.inverter.protection import Protection
+from drivers.inverter.stop_proof import Protection
 from drivers.inverter.supervision import speed_tolerance_rad_s
+from drivers.plc.named_registers import Reading
 from drivers.plc.reader import Backoff, PlcReader
-from drivers.plc.reading import Reading
 from drivers.plc.types import PlcStatus
 from hil.config.channel_table import ChannelTable
 from hil.config.rig_file import InverterTable, PlcTable, Rig
 from hil.rig.build import inverter_settings, plc_client
-from hil.rig.fitness import Needs, reasons_against
-from hil.rig.plc_limits import max_speed_rad_s, plc_limits
+from hil.rig.plc_watch import Needs, max_speed_rad_s, plc_limits, reasons_against
 from hil.rig.sole_host import require_sole_host
 
 NO_NEEDS = Needs(torque_of_one_nm=0.0)

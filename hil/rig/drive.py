@@ -9,11 +9,10 @@ from typing import Protocol
 
 from hil.rig.catch_up import CatchUp
 from hil.rig.cycle import Cycle
-from hil.rig.excitation import NO_TORQUE
+from hil.rig.excitation import NO_TORQUE, PlcPrbs
 from hil.rig.experiments.base import Phase
 from hil.rig.pacing import NS_PER_S, Pacer, Tick
 from hil.rig.plan import Plan
-from hil.rig.plc_prbs import PlcPrbs
 from hil.rig.plc_watch import PlcWatch
 from hil.rig.stop import StopRequest
 from hil.rig.timing import RunTiming

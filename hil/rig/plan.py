@@ -8,11 +8,10 @@ from typing import Protocol
 from drivers.plc.types import PrbsSource
 from estimator.signals.prbs import Prbs
 from hil.config.rig_file import Rig
-from hil.rig.excitation import Split
+from hil.rig.excitation import PlcPrbsOrder, Split, guarded_prbs
 from hil.rig.experiments.base import Experiment, Phase
 from hil.rig.experiments.registry import build_experiment, experiment_table
-from hil.rig.fitness import Needs
-from hil.rig.plc_prbs import PlcPrbsOrder, guarded_prbs
+from hil.rig.plc_watch import Needs
 
 
 class Levels(Protocol):

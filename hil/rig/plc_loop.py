@@ -1,4 +1,8 @@
-"""The PLC's asyncio client on an event loop of its own thread: the torque cycle never waits for Modbus."""
+"""The PLC's asyncio client on an event loop of its own thread: the torque cycle never waits for Modbus.
+
+There too the host's beat while drives are configured and armed, before the cycle polls the PLC: that takes longer than
+a PLC may wait for its host.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +12,9 @@ from collections.abc import Coroutine
 from concurrent.futures import Future
 from types import TracebackType
 from typing import Any, Self, TypeVar
+
+from drivers.plc.plc import Plc
+from hil.errors import RunAborted
 
 T = TypeVar("T")
 
@@ -48,3 +55,43 @@ async def _cancel_rest() -> None:
     for task in rest:
         task.cancel()
     await asyncio.gather(*rest, return_exceptions=True)
+
+
+class HostBeat:
+    """Beats from `__enter__` until `hand_over`, or the end of the block.
+
+    Parameters
+    ----------
+    loop
+        Where the PLC's client runs.
+    plc
+        The client, connected.
+    """
+
+    __slots__ = ("_beating", "_loop", "_on", "_plc")
+
+    def __init__(self, loop: PlcLoop, plc: Plc) -> None:
+        self._loop = loop
+        self._plc = plc
+        self._on = False
+        self._beating: Future[None] | None = None
+
+    def __enter__(self) -> Self:
+        self._on = True
+        self._beating = self._loop.start(self._plc.keep_beating(lambda: self._on))
+        return self
+
+    def hand_over(self) -> None:
+        """End beating, with the beat under way: from now on somebody else does."""
+        if error := self._end():
+            raise RunAborted(f"PLC: expected it to see the host's beats, got: {error}") from error
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._end()  # what ended the block comes first
+
+    def _end(self) -> BaseException | None:
+        self._on = False
+        beating, self._beating = self._beating, None
+        return None if beating is None else beating.exception()

@@ -1,24 +1,69 @@
-"""Watch the PLC during a run without delaying the torque cycle.
+"""Watch the PLC during a run without delaying the torque cycle: whether what it reports may be driven, and its limits.
 
 A poll is started when it is due and its result is taken at a later cycle; only a run without a wall clock
 waits for it, since simulated time would run away from the PLC otherwise. Ages count in the cycle's time,
 from the start of the poll.
+
+Identification needs the series or electric mode with the clutch open: with it closed the combustion engine
+turns with the motor shaft, and the driveline is another one.
+
+A register map with a torque limit ten times too high, or a speed limit in another unit, can't be seen from one reading:
+the limits are put into words, for someone who knows the vehicle to confirm. Beyond `MOST_OF_RATED` times a drive's own
+rated value a limit limits nothing, and is refused: a traction drive gives two to three times its rated torque for a
+short time, and its field weakening ends at about three times its base speed.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Iterator, Sequence
 from concurrent.futures import Future
-from dataclasses import replace
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from typing import Final
 
-from drivers.errors import DriverError
+from drivers.errors import ConfigMismatch, DriverError
+from drivers.inverter.inverter import Inverter
 from drivers.plc.plc import Plc
-from drivers.plc.types import PlcStatus
+from drivers.plc.types import ClutchState, DriveMode, PlcStatus
+from hil.config.rig_file import Rig
 from hil.errors import RunAborted
-from hil.rig.fitness import Needs, changes
 from hil.rig.pacing import NS_PER_S, Tick
 from hil.rig.plc_loop import PlcLoop
 from hil.sample import SampleFlag
+
+FIT_MODES = (DriveMode.SERIES, DriveMode.ELECTRIC)
+
+
+@dataclass(frozen=True, slots=True)
+class Needs:
+    """What a run needs of the vehicle: the largest torque it asks of one inverter, PRBS included [Nm]."""
+
+    torque_of_one_nm: float
+
+
+def reasons_against(status: PlcStatus, needs: Needs) -> Iterator[str]:
+    """Name everything that speaks against driving; nothing if the vehicle is fit."""
+    if status.drive_mode not in FIT_MODES:
+        wanted = " or ".join(mode.value for mode in FIT_MODES)
+        yield f"drive mode is {status.drive_mode.value}, expected {wanted}"
+    if status.clutch is not ClutchState.OPEN:
+        yield f"clutch is {status.clutch.value}, expected open"
+    if not status.permissive:
+        yield "permissive is withdrawn, expected present"
+    if status.torque_limit_nm < needs.torque_of_one_nm:
+        yield (
+            f"torque limit of one inverter is {status.torque_limit_nm:g} Nm, expected at least the "
+            f"{needs.torque_of_one_nm:g} Nm this experiment may ask for"
+        )
+
+
+def changes(before: PlcStatus, status: PlcStatus, needs: Needs) -> Iterator[str]:
+    """Name everything that speaks against driving on, given what was reported when the run began."""
+    yield from reasons_against(status, needs)
+    if status.drive_mode in FIT_MODES and status.drive_mode is not before.drive_mode:
+        yield f"drive mode is {status.drive_mode.value}, expected {before.drive_mode.value} as at the start"
+
 
 POLL_EVERY_NS = NS_PER_S // 10
 """Time between two polls [ns]: a clutch takes longer than this to close."""
@@ -111,3 +156,72 @@ class PlcWatch:
             reasons.append(f"speed is {read} rad/s, expected at most {self._latest.speed_limit_rad_s:g} rad/s")
         if reasons:
             raise RunAborted(f"PLC: {'; '.join(reasons)}. The run was ended at zero torque; fix the cause, run again.")
+
+
+MOST_OF_RATED: Final = 3.0
+"""A limit of the PLC beyond so many times the drives' rated value is refused."""
+
+MAX_MOTOR_SPEED: Final = (0x6080, 0)
+"""Of CiA 402 [rpm]; few drives have it."""
+
+RPM: Final = 2.0 * math.pi / 60.0
+
+
+@dataclass(frozen=True, slots=True)
+class PlcLimit:
+    """One limit that the PLC reports.
+
+    Attributes
+    ----------
+    what
+        Its name.
+    question
+        It and what it is to be compared with, in words.
+    found, most
+        It, and the largest that is believed, with their unit; ``most`` is None where the drives say nothing of it.
+    believed
+        Whether it is within that.
+    """
+
+    what: str
+    question: str
+    found: str
+    most: str | None
+    believed: bool
+
+
+def max_speed_rad_s(inverter: Inverter) -> float | None:
+    """Read a drive's own largest speed [rad/s]; None where it has none."""
+    with suppress(ConfigMismatch):
+        return inverter.read_channel(MAX_MOTOR_SPEED) * RPM or None
+    return None
+
+
+def plc_limits(status: PlcStatus, rig: Rig, drives_rad_s: float | None) -> Iterator[PlcLimit]:
+    """Put each limit into words."""
+    tables = (rig.inverters.m1, rig.inverters.m2)
+    rated_nm = max(table.rated_torque_nm for table in tables)
+    asked_nm = max(table.torque_limit_nm for table in tables)
+    yield PlcLimit(
+        "torque limit",
+        f"the PLC allows {status.torque_limit_nm:,g} Nm of one inverter; the drives are rated {rated_nm:,g} Nm, the "
+        f"rig file asks for {asked_nm:,g} Nm at most: right?",
+        f"{status.torque_limit_nm:,g} Nm",
+        f"{MOST_OF_RATED * rated_nm:,g} Nm, {MOST_OF_RATED:g} times rated torque",
+        status.torque_limit_nm <= MOST_OF_RATED * rated_nm,
+    )
+    own = {"the drives": drives_rad_s, "the rig file": rig.guard.speed_limit_rad_s}
+    known = {who: limit for who, limit in own.items() if limit is not None}
+    others = "".join(f"; {who} {_speed(limit)}" for who, limit in known.items())
+    most = MOST_OF_RATED * min(known.values()) if known else None
+    yield PlcLimit(
+        "speed limit",
+        f"the PLC allows {_speed(status.speed_limit_rad_s)} of the motor shaft{others}: right?",
+        _speed(status.speed_limit_rad_s),
+        None if most is None else f"{_speed(most)}, {MOST_OF_RATED:g} times the drives' or the rig file's own",
+        most is None or status.speed_limit_rad_s <= most,
+    )
+
+
+def _speed(rad_s: float) -> str:
+    return f"{rad_s:,.4g} rad/s ({rad_s / RPM:,.0f} rpm)"

@@ -28,7 +28,7 @@ from hil.errors import RecordingError
 from hil.rig.build import inverter_settings
 from hil.rig.drive import SLEPT_THROUGH, unread
 from hil.rig.pacing import NS_PER_S, answer_timeout_ns, period_ns, periods_used_up
-from hil.rig.trace_file import read_frames
+from hil.rig.trace import read_frames
 from hil.sample import Sample, SampleFlag
 
 Frame = tuple[int, bytes, int]

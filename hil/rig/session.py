@@ -12,21 +12,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 
-from drivers.errors import DriverError
+from drivers.canopen.strangers import Strangers, foreign
+from drivers.errors import DriverError, ForeignController
 from drivers.plc.types import PlcStatus
 from hil.errors import RunAborted
 from hil.rig.arming import ArmedDrives
 from hil.rig.build import Devices
 from hil.rig.cycle import Cycle
 from hil.rig.drive import Drive, Observer, Progress, Recorder, RunSummary
-from hil.rig.fitness import reasons_against
-from hil.rig.host_beat import HostBeat
+from hil.rig.excitation import PlcPrbs
 from hil.rig.pacing import Pacer
 from hil.rig.plan import Plan
-from hil.rig.plc_prbs import PlcPrbs
-from hil.rig.plc_watch import PlcWatch
+from hil.rig.plc_loop import HostBeat
+from hil.rig.plc_watch import PlcWatch, reasons_against
 from hil.rig.stop import StopRequest
 from hil.rig.timing import RunTiming
 
@@ -43,7 +44,7 @@ def run_plan(
 ) -> RunSummary:
     """Run a plan on an opened rig."""
     before = _fit(devices, plan)
-    with HostBeat(devices.plc_loop, devices.plc) as beat:
+    with HostBeat(devices.plc_loop, devices.plc) as beat, _blaming_strangers(devices.link.strangers):
         _configure(devices, stop)
         prbs = PlcPrbs(devices.plc_loop, devices.plc, plan.plc_prbs, pacer.poll_patience_s)
         with prbs, ArmedDrives(devices, stop):
@@ -69,6 +70,21 @@ def run_plan(
             except (DriverError, RunAborted) as error:
                 _blame_the_host_first(error, drive.lateness)
                 raise
+
+
+@contextmanager
+def _blaming_strangers(strangers: Strangers) -> Iterator[None]:
+    """Where another controller was heard, what looks wrong with a device may be its doing."""
+    try:
+        yield
+    except ForeignController:
+        raise
+    except (DriverError, RunAborted) as error:
+        if strangers.heard is None:
+            raise
+        cause = foreign(strangers.heard)
+        cause.args = (f"{cause} What this program met: {error}",)
+        raise cause from error
 
 
 def _blame_the_host_first(error: Exception, lateness: str) -> None:

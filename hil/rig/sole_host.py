@@ -25,7 +25,7 @@ from drivers.canopen.heartbeat import HEARTBEAT_COB_ID, NMT_COB_ID
 from drivers.errors import ForeignController, ProtocolViolation
 from drivers.inverter.cia402 import TORQUE_STATES, PowerState, state_of
 from hil.config.rig_file import Rig
-from hil.simulator.loopback import IN_PROCESS
+from hil.simulator.addresses import IN_PROCESS
 
 LISTEN_S: Final = 1.0
 """Listened at least, for hosts with another rig file [s]."""

@@ -1,21 +1,34 @@
-"""Every frame of a run's bus, recorded next to its samples by python-can's own writers.
+"""A bus trace: every frame of a run's bus, recorded next to its samples by python-can's own writers, and read back.
 
 The cycle only puts a frame into a queue; a thread of its own writes, twenty times a second. The times are those of
 the samples: the host's monotonic clock, stamped once, shifted to the time of day at which the trace began.
+
+What is read are data frames with their time; every fault by the file's name. A trace is that of one bus. Where a log
+has several channels one has to be chosen: merged, the frames of two buses would be taken for those of one.
+
+python-can's reader of Vector's BLF trusts every length in the file: here each is checked before it is used. A BLF is a
+row of containers, each a part of the log packed by zlib; an object may continue in the next container. One megabyte of
+them can unpack to gigabytes, and an object of length 0 is one that a reader never leaves.
 """
 
 from __future__ import annotations
 
 import threading
 import time
-from collections import deque
+import zlib
+from collections import Counter, deque
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import IO, Any, BinaryIO, Final, Self
 
 from drivers.canopen import can
+from drivers.canopen.can_link import is_canopen
 from hil.errors import RecordingError
 from hil.recording.bounds import no_room
+
+blf = can.io.blf
+"""Not imported before `drivers.canopen`, see there."""
 
 SUFFIXES = (".blf", ".log", ".asc")
 """Vector's binary and text logs, and the text of Linux's candump: what ``can.Logger`` writes by these names."""
@@ -116,3 +129,162 @@ def require_trace_name(path: Path) -> None:
     """Refuse a name no trace that is written can have."""
     if path.suffix.lower() not in SUFFIXES:
         raise RecordingError(path, f"expected a name that ends in one of {', '.join(SUFFIXES)}, got {path.suffix!r}")
+
+
+CONTAINER_BYTES: Final = 16 << 20
+"""A container holds 128 KiB in files of Vector and of python-can."""
+
+FLOOR_BYTES: Final = 32 << 20
+UNPACKED_PER_BYTE: Final = 64
+"""What a whole file may unpack to: a floor, and for large files a multiple of their size; frames pack tenfold."""
+
+HEADER_BYTES: Final = blf.OBJ_HEADER_BASE_STRUCT.size
+
+
+class BoundedBlfReader(can.BLFReader):
+    """Gives the frames of a BLF.
+
+    Raises
+    ------
+    BLFParseError
+        While reading, where a length in the file can't be one, or it unpacks to more than a log of its size does.
+    """
+
+    def __init__(self, file: BinaryIO, **kwargs: Any) -> None:
+        file.seek(0, 2)
+        self._left = max(FLOOR_BYTES, UNPACKED_PER_BYTE * file.tell())
+        file.seek(0)
+        super().__init__(file, **kwargs)
+
+    def __iter__(self) -> Iterator[can.Message]:  # type: ignore[override]  # nothing is sent into it
+        while header := self.file.read(HEADER_BYTES):
+            signature, _, _, size, kind = blf.OBJ_HEADER_BASE_STRUCT.unpack(header)
+            if signature != b"LOBJ" or size < HEADER_BYTES:
+                raise blf.BLFParseError(f"expected an object, got {signature!r} of {size} bytes")
+            content = self.file.read(size - HEADER_BYTES)
+            self.file.read(size % 4)
+            if kind == blf.LOG_CONTAINER:
+                yield from self._parse_container(self._unpacked(content))
+        self.stop()
+
+    def _unpacked(self, content: bytes) -> bytes:
+        method, _ = blf.LOG_CONTAINER_STRUCT.unpack_from(content)
+        packed = content[blf.LOG_CONTAINER_STRUCT.size :]
+        if method == blf.NO_COMPRESSION:
+            data = packed
+        elif method == blf.ZLIB_DEFLATE:
+            unpacking = zlib.decompressobj()
+            data = unpacking.decompress(packed, CONTAINER_BYTES)
+            if unpacking.unconsumed_tail:
+                raise blf.BLFParseError(f"expected containers of at most {CONTAINER_BYTES} bytes, got a larger one")
+        else:
+            raise blf.BLFParseError(f"expected a container packed by zlib or not at all, got method {method}")
+        self._left -= len(data)
+        if self._left < 0:
+            raise blf.BLFParseError("expected a log, got a file that unpacks to far more than one of its size")
+        return data
+
+    def _parse_container(self, data: bytes) -> Iterator[can.Message]:
+        if len(self._tail) > CONTAINER_BYTES:
+            raise blf.BLFParseError("expected objects that end, got one that is longer than any")
+        _require_lengths(self._tail + data)
+        yield from super()._parse_container(data)
+
+
+def _require_lengths(data: bytes) -> None:
+    """See that every object whose header is there leads on to the next."""
+    at = data.find(b"LOBJ", 0, 8)
+    while 0 <= at <= len(data) - HEADER_BYTES:
+        size = blf.OBJ_HEADER_BASE_STRUCT.unpack_from(data, at)[3]
+        if size < HEADER_BYTES:
+            raise blf.BLFParseError(f"expected an object of {HEADER_BYTES} bytes or more, got one of {size}")
+        at = data.find(b"LOBJ", at + size, at + size + 8)
+
+
+LATEST_S = float(1 << 33)
+"""Times beyond are none of a clock [s]; in nanoseconds they would not fit into 64 bit."""
+
+COUNTED_FROM_1 = (".blf", ".asc")
+"""Formats whose channels python-can counts from 0, and their files and every other program from 1."""
+
+
+class _TrcReader(can.TRCReader):
+    """python-can's reader of PEAK's text log (1.0, 1.1, 1.3, 2.0, 2.1), which passes over a line that is cut short."""
+
+    def _parse_line(self, line: str) -> can.Message | None:
+        return self._parse_cols(tuple(line.split(maxsplit=self._num_columns)))
+
+
+_READERS: dict[str, Callable[..., Any]] = {
+    ".blf": BoundedBlfReader,
+    ".log": can.CanutilsLogReader,
+    ".asc": can.ASCReader,
+    ".trc": _TrcReader,
+}
+
+
+def read_frames(path: Path, channel: str | None = None) -> Iterator[tuple[int, bytes, int]]:
+    """Give identifier, data and time [ns] of every frame of CANopen's kind, in the file's order."""
+    first, found = channel, channel is None
+    for name, message in _frames(path):
+        first = name if first is None else first
+        if name == first:
+            found = True
+            yield message.arbitration_id, bytes(message.data), _time_ns(path, message.timestamp)
+        elif channel is None:
+            raise _which(path, "expected the traffic of one bus")
+    if not found:
+        raise _which(path, f"expected channel {channel!r}")
+
+
+def _which(path: Path, expected: str) -> RecordingError:
+    counts = Counter(name for name, _ in _frames(path))
+    got = ", ".join(f"{name} ({count} frames)" for name, count in sorted(counts.items()))
+    return RecordingError(
+        path,
+        f"{expected}, got channels {got or 'without a frame'}. Say which: --channel {next(iter(counts), 'NAME')}",
+    )
+
+
+def _frames(path: Path) -> Iterator[tuple[str, can.Message]]:
+    """Give channel and frame; those of other protocols on the same wire are left out."""
+    if not is_trace(path):
+        raise RecordingError(path, f"expected a name that ends in one of {', '.join(READABLE)}, got {path.suffix!r}")
+    if not path.is_file():
+        raise RecordingError(path, "expected a bus trace to read, there is no such file")
+    suffix = path.suffix.lower()
+    try:
+        with _opened(path) as file, _READERS[suffix](file) as reader:
+            for message in reader:
+                if is_canopen(message):
+                    if len(message.data) != message.dlc:
+                        raise ValueError(f"a frame of {message.dlc} bytes that has {len(message.data)}")
+                    yield _channel(message, suffix), message
+    except NotImplementedError as error:
+        raise RecordingError(path, f"expected a version of {suffix} that python-can reads, got: {error}") from error
+    except RecordingError:
+        raise
+    except Exception as error:  # python-can's readers raise anything on a file that is damaged
+        raise RecordingError(
+            path,
+            f"expected a bus trace in the format of its suffix, got: {error or type(error).__name__}. It is damaged, "
+            "cut off, or of another format.",
+        ) from error
+
+
+def _channel(message: can.Message, suffix: str) -> str:
+    channel = message.channel
+    return str(channel + 1) if suffix in COUNTED_FROM_1 and isinstance(channel, int) else str(channel)
+
+
+def _time_ns(path: Path, timestamp_s: float) -> int:
+    if not abs(timestamp_s) < LATEST_S:
+        raise RecordingError(path, f"expected frames with the time of a clock, got {timestamp_s:g} s. It is damaged.")
+    return round(timestamp_s * NS_PER_S)
+
+
+def _opened(path: Path) -> IO[Any]:
+    """Open a trace; a reader that opens it itself leaves it open where the file is at fault."""
+    if path.suffix.lower() == ".blf":
+        return path.open("rb")
+    return path.open(encoding="utf-8", errors="replace")  # comments and names may be of another code page

@@ -1,7 +1,7 @@
 """Serve a virtual CAN channel to other processes: python-can-remote's WebSocket server, closed to strangers.
 
 The library serves whoever comes: a page in a browser, any path of the file system by HTTP, a frame of any length. Here
-a host must name the token of the URL (`drivers.canopen.bus_token`), a browser's request is refused whatever it names,
+a host must name the token of the URL (`drivers.canopen.remote_bus`), a browser's request is refused whatever it names,
 nothing but the WebSocket is served, and every length is bounded. The library's own server never ends the connections
 it holds either: here each is remembered, cut when the bridge closes, and its thread waited for. A host that dies in
 the middle of a frame is no defect: the library's thread would print a traceback and leave its end of the bus open.
@@ -26,9 +26,9 @@ from can_remote import RemoteServer
 from can_remote.server import ClientRequestHandler, RemoteServerProtocol
 from can_remote.websocket import WebSocket, WebsocketClosed, get_accept_key
 
-from drivers.canopen.bus_token import forget_token, keep_token, new_token
+from drivers.canopen.remote_bus import forget_token, keep_token, new_token
 from drivers.errors import BusDown
-from hil.simulator.loopback import Address
+from hil.simulator.addresses import Address
 
 LOGGER = logging.getLogger(__name__)
 

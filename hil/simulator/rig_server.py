@@ -20,11 +20,11 @@ from drivers.plc.register import Register, ValueType
 from hil.config.channel_table import ChannelTable
 from hil.config.rig_file import InverterTable, Rig, SimulationTable
 from hil.errors import UsageError
+from hil.simulator.addresses import IN_PROCESS, SOCKETCAN, Address, bus_address
 from hil.simulator.can_bridge import CanBridge
 from hil.simulator.drive_physics import SimulatedInverter
 from hil.simulator.faults import InverterFaults, RigFaults
 from hil.simulator.faulty_wire import FaultyWire
-from hil.simulator.loopback import IN_PROCESS, SOCKETCAN, Address, bus_address
 from hil.simulator.plant import Plant, SensedPlant
 from hil.simulator.plc_device import PlcDevice, PlcSetup
 from hil.simulator.plc_server import PlcSecurity, PlcServer
@@ -99,7 +99,7 @@ def _converted(register: Register, value: float) -> float:
 
 
 SERIAL_NUMBERS = (1, 2)
-"""Of the drives behind m1 and m2; they stay with them where the node ids are swapped."""
+"""Of the drives behind m1 and m2, unless the rig file says; they stay with them where the node ids are swapped."""
 
 HOST_TIMEOUT_S = 1.0
 """Simulated time without a beat of the host after which the PLC permits no torque [s]: ten of the host's polls."""
@@ -252,7 +252,7 @@ def _inverter(
         rated_torque_unit_nm=table.rated_torque_unit.nm,
         sensors=sensors,
         faults=faults,
-        serial_number=serial_number,
+        serial_number=serial_number if table.serial_number is None else table.serial_number,
     )
 
 

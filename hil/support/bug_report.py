@@ -4,16 +4,21 @@ from __future__ import annotations
 
 import io
 import json
+import os
+import platform
+import re
+import sys
 import zipfile
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
+from importlib import metadata
 from pathlib import Path
 from typing import Any
 
+from hil import __version__
 from hil.errors import InputError, UsageError
-from hil.support.folders import log_file
+from hil.support.command_log import VARIABLE, log_file
 from hil.support.redact import Redaction
-from hil.support.versions import versions
 
 ABOUT = """What is in this report, for whoever is asked to send it: read it before you do.
 
@@ -117,3 +122,36 @@ def _last_run(folder: Path) -> dict[str, Any]:
 
 def _json(name: str, document: Any) -> Part:
     return Part(name, (json.dumps(document, indent=1, ensure_ascii=False) + "\n").encode())
+
+
+DISTRIBUTION = "hil-driveline"
+
+
+def versions() -> dict[str, Any]:
+    """Return versions and the kind of machine; nothing of the user."""
+    return {
+        "hil": __version__,
+        "python": sys.version,
+        "platform": platform.platform(),
+        "machine": platform.machine(),
+        "processors": os.cpu_count(),
+        "packages": _packages(),
+        "environment": {name: os.environ[name] for name in (VARIABLE, "LANG", "TERM") if name in os.environ},
+    }
+
+
+def _packages() -> dict[str, str]:
+    """Return the version of each library this program asks for, as it is installed."""
+    try:
+        required = metadata.requires(DISTRIBUTION) or []
+    except metadata.PackageNotFoundError:
+        return {DISTRIBUTION: "not installed as a package"}
+    names = sorted({re.split(r"[^\w.-]", line, maxsplit=1)[0] for line in required})
+    return {name: _version(name) for name in names}
+
+
+def _version(name: str) -> str:
+    try:
+        return metadata.version(name)
+    except metadata.PackageNotFoundError:
+        return "missing"

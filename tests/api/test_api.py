@@ -43,6 +43,51 @@ def test_moments_as_the_index_are_a_time(recording: Path) -> None:
     assert hil.Record.from_pandas(frame).sample_time_s == pytest.approx(0.01)
 
 
+def test_columns_by_plain_strings(recording: Path) -> None:
+    frame = pd.read_csv(recording)
+    frame.columns = ["s", "T1", "T2", "n"]
+    of_file = hil.read(recording)
+    for given in ({}, {"time": "s"}):
+        found = hil.Record.from_pandas(frame, "run_1", torque=["T1", "T2"], speed="n", **given)
+        np.testing.assert_array_equal(found.output, of_file.output)
+        assert found.sample_time_s == pytest.approx(of_file.sample_time_s)
+    assert hil.Record.from_pandas(frame, torque="T1", speed="n").torque_nm.shape[1] == 1
+    with pytest.raises(RecordingError, match=r"column w: missing, the frame has s, T1, T2, n\. Name its"):
+        hil.Record.from_pandas(frame, torque="T1", speed="w")
+    with pytest.raises(RecordingError, match="column time_s: missing"):  # counted rows are no time
+        hil.Record.from_pandas(frame.drop(columns="s"), torque="T1", speed="n")
+
+
+def test_the_public_names_are_shown() -> None:
+    assert set(hil.__all__) == {"Record", "compare", "diagnose", "identify", "look", "read", "read_model"}
+    assert set(hil.__all__) < set(dir(hil))
+    assert all(callable(getattr(hil, name)) for name in hil.__all__)
+
+
+def test_a_look_shows_channels_and_the_table_that_reads_them(recording: Path) -> None:
+    found = hil.look(recording)
+    assert found.signals == ""
+    assert repr(found) == "<run_1.csv: 4 channels; torque torque_m1_nm, torque_m2_nm; output speed_rad_s>"
+    assert found.to_dataframe().loc["time_s", "could be"] == "time"
+    frame = pd.read_csv(recording).rename(columns={"speed_rad_s": "n [1/min]"})
+    frame.to_csv(recording, index=False)
+    assert '"n [1/min]"' in hil.look(recording).signals
+    assert "read times 0.10472" in hil.look(recording)._repr_html_()
+
+
+def test_an_identification_shows_and_saves_itself(model: Path, recording: Path, tmp_path: Path) -> None:
+    result = hil.identify(recording, model)
+    mode = result.to_dataframe().loc["run_1"]
+    assert mode["frequency_hz_low"] < mode["frequency_hz"] < mode["frequency_hz_high"]
+    assert mode["frequency_hz"] == pytest.approx(bench.RESONANCE_HZ, rel=0.05)
+    assert "best: Box-Jenkins, 95 %" in {trace.name for trace in result.plot().data}
+    assert repr(result).startswith("<Identification: ")
+    assert "run_1" in result._repr_html_()
+    with pytest.raises(UsageError, match="expected one of run_1"):
+        result.plot("run_7")
+    assert {path.name for path in result.save(tmp_path / "found").iterdir()} == {"identification.json", "report.html"}
+
+
 def test_foreign_columns_by_signals(recording: Path) -> None:
     frame = pd.read_csv(recording).rename(columns={"speed_rad_s": "n"})
     frame["n"] *= 60.0 / (2.0 * np.pi)

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from drivers.canopen.pdo_map import MAX_MAPPED, read_layout
-from drivers.datasheet.number import octal_matters, read_formula, read_number
+from drivers.datasheet.types import octal_matters, read_formula, read_number
 from drivers.eds_check.check import check_eds
 from drivers.errors import ConfigMismatch
 from drivers.plc.register_map import RegisterMapError, load_register_map
@@ -26,9 +26,8 @@ from hil.problems import read_toml
 from hil.recording import Table, read_table, write_table
 from hil.recording.description import sidecar_of
 from hil.rig import replay as replaying
-from hil.rig.blf_file import CONTAINER_BYTES
 from hil.rig.replay import replay
-from hil.rig.trace_file import read_frames
+from hil.rig.trace import CONTAINER_BYTES, read_frames
 from hil.store.rebuild import recordings_named
 from tests.rig.serving import small_rig
 

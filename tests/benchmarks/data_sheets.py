@@ -15,7 +15,7 @@ from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
-from drivers.datasheet.finding import Severity
+from drivers.datasheet.text import Severity
 from drivers.eds_check import check_eds
 from tests.drivers.maker_rig import SAMPLES, drive
 from tests.drivers.mutants import mutants

@@ -29,18 +29,16 @@ import can
 
 from drivers.torque_guard import TorqueRequest
 from hil.config.rig_file import Rig, read_rig
-from hil.rig.addresses import with_addresses
 from hil.rig.arming import ArmedDrives
 from hil.rig.build import open_devices
 from hil.rig.cycle import Cycle
 from hil.rig.excitation import NO_TORQUE
-from hil.rig.fitness import Needs
 from hil.rig.pacing import FreePacer, Pacer, RealTimePacer, period_ns
-from hil.rig.plc_watch import PlcWatch
+from hil.rig.plc_watch import Needs, PlcWatch
 from hil.rig.realtime import PRIORITY, real_time
 from hil.rig.stop import StopRequest
 from hil.sample import SampleFlag
-from hil.simulator.loopback import Address
+from hil.simulator.addresses import Address, with_addresses
 from hil.simulator.plant import RigidPlant
 from hil.simulator.rig_server import RigServer
 from tests.benchmarks.ratios import machine, table, timed

@@ -34,8 +34,7 @@ from estimator.identification.online.registry import ESTIMATORS, Setup
 from estimator.identification.online.rls_riv_oeepm import Rls
 from estimator.identification.settings import Settings
 from estimator.signals.record import FloatArray, Record
-from hil.rig.live import tracking_settings
-from hil.rig.live_replay import Pace, play_record
+from hil.rig.live import Pace, play_record, tracking_settings
 from tests.benchmarks import recursive_c, recursive_padasip
 from tests.benchmarks.ratios import Comparison, Taken, compare, machine, table, timed
 from tests.benchmarks.recursive_data import MODEL, Data, data, regressors

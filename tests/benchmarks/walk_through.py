@@ -19,14 +19,13 @@ from hil.config.rig_file import read_rig
 from hil.figures.local_model import TwoMassLine
 from hil.recording.signals import read_record
 from hil.recording.writer import RecordingWriter
-from hil.rig.addresses import with_addresses
 from hil.rig.build import open_devices
 from hil.rig.pacing import FreePacer, heartbeat_patience_ms, period_ns
 from hil.rig.plan import plan_run
 from hil.rig.session import run_plan
 from hil.rig.stop import StopRequest
+from hil.simulator.addresses import IN_PROCESS, Address, with_addresses
 from hil.simulator.driveline import EffectSpec, plant_for, simulation_model
-from hil.simulator.loopback import IN_PROCESS, Address
 from hil.simulator.rig_server import RigServer, required_simulation
 
 RIG_FILE = Path(__file__).resolve().parents[2] / "examples" / "rig.toml"

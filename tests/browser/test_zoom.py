@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from hil.cli.main import run
 from hil.report import page as html
 from hil.report.figures import Line, Panel, Style, input_lines, time_figure
 from hil.report.page import Figure
@@ -84,3 +85,30 @@ def test_five_minutes_at_a_kilohertz_are_a_page_of_fifteen_megabytes() -> None:
     text = html.page("long", [html.section("Run", time_figure("run", time_s, panels, 1))], "")
     assert "zoomed in, every sample" in text
     assert len(text.encode()) < 15e6
+
+
+ROWS = ["t [s],T [Nm],<b>n</b> [1/min]", *(f"{0.01 * k:.2f},{50 * (-1) ** (k // 40)},{k % 300}" for k in range(2000))]
+"""A recording whose channels have names that would be markup."""
+
+
+def test_the_stretch_in_view_is_what_signals_cut(browser: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from playwright.sync_api import expect
+
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "run.csv").write_text("\n".join(ROWS[:800] + ROWS[900:]))
+    assert run(["look", "run.csv", "--plot"]) == 0
+    with opened(browser, tmp_path / "run.look.html", 1200) as shown:
+        shown.wait_until_drawn()
+        lines = shown.page.locator(".cut pre")
+        assert lines.text_content() == "from_s = 0.00\nto_s = 19.99"
+        shown.page.locator(".plotly-graph-div").focus()
+        shown.page.keyboard.press("+")
+        expect(lines).to_have_text("from_s = 4.997\nto_s = 14.992")
+        shown.page.locator(".cut button").first.click()
+        expect(lines).to_have_text("stretches = [[4.997, 14.992]]")
+        shown.page.locator(".cut button").last.click()
+        expect(lines).to_have_text("from_s = 0.00\nto_s = 19.99")
+        assert "<b>n</b>" in shown.page.locator(".plotly-graph-div").text_content()
+        shapes = shown.page.evaluate("document.querySelector('.plotly-graph-div').layout.shapes")
+        marks = [[each["x0"], each["x1"]] for each in shapes]
+        assert [7.98, 8.99] in marks  # the gap

@@ -16,7 +16,7 @@ from pathlib import Path
 from unittest import mock
 
 from drivers.plc.plc import Plc
-from hil.cli.run.job import Job, record
+from hil.cli.run_job import Job, record
 from hil.recording.recordings import read_facts
 from hil.rig.experiments.base import Phase
 from hil.rig.live import LiveEstimate, tracking_chain

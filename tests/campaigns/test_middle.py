@@ -12,7 +12,14 @@ from tests.campaigns.faults.rig import campaign_rig
 
 @pytest.mark.parametrize(
     ("kind", "ends"),
-    [("none", ""), ("leaves operation", "power state is"), ("speed zero", "expected one speed"), ("boot-up", "NMT")],
+    [
+        ("none", ""),
+        ("leaves operation", "power state is"),
+        ("speed zero", "expected one speed"),
+        ("boot-up", "NMT"),
+        ("two hosts at once", "somebody else"),
+        ("PLC registers exchanged", "PLC"),
+    ],
 )
 def test_a_fault_ends_the_run_and_none_does_not(kind: str, ends: str, tmp_path: Path) -> None:
     fault = Fault(kind, 1, 100, "for ever", 1, 1, 0.0)

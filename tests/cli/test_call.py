@@ -7,9 +7,8 @@ import sys
 
 import pytest
 
-from hil.cli.call import SPEAKERS, Call
+from hil.cli.command_line import SPEAKERS, Call, overview
 from hil.cli.main import COMMANDS, run
-from hil.cli.overview import overview
 from hil.errors import UsageError
 
 

@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 from estimator.diagnosis.first_use import COMPILING
+from hil.cli.command_line import silence
 from hil.cli.diagnose import app, progress_bar
 from hil.cli.main import run
-from hil.cli.silence import silence
 from hil.config.model_file import read_model
 from tests.cli import bench
 

@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from hil.cli.flowing import flowing
 from hil.cli.main import run
+from hil.cli.printing import flowing
 from tests.cli.command_lines import every_command, examples, parse
 
 EVERY = list(every_command())

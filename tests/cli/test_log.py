@@ -12,7 +12,7 @@ import pytest
 
 from hil.cli.main import run
 from hil.support import command_log
-from hil.support.folders import log_file
+from hil.support.command_log import log_file
 
 
 @pytest.fixture(autouse=True)

@@ -220,3 +220,17 @@ def test_names_and_units_of_a_file_do_nothing_on_a_terminal_or_in_a_model_file(
     assert file.signals is not None
     assert file.signals.output()[1].column == HOSTILE
     assert file.model.parameters["k"].value == 4500.0
+
+
+def test_a_plot_is_a_page_in_this_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "sub").mkdir()
+    rows = [f"{0.01 * k:.2f},{k % 7},{k % 11},{'' if k == 50 else k % 13}" for k in range(100)]
+    (tmp_path / "sub" / "run.csv").write_text("\n".join(["time_s,torque_m1_nm,torque_m2_nm,speed_rad_s", *rows]))
+    assert run(["look", "sub/run.csv", "--plot"]) == 0
+    assert "page: run.look.html" in capsys.readouterr().err
+    assert [path.name for path in tmp_path.iterdir() if path.is_file()] == ["run.look.html"]
+    page = (tmp_path / "run.look.html").read_text()
+    assert 'data-cut="channels-0"' in page

@@ -19,12 +19,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hil.cli.main import run
-from hil.config.file_schema import FileKind
-from hil.config.new_rig.answers import answers
-from hil.config.new_rig.questions import QUESTIONS, Question
-from hil.config.new_rig.text import COMMENTS_AT, rig_text
+from hil.config.new_rig import COMMENTS_AT, QUESTIONS, Question, answers, rig_text
 from hil.config.rig_file import read_rig
 from hil.config.schema import json_schema
+from hil.config.table import FileKind
 from hil.errors import UsageError
 from tests.cli.json_schema import Validator
 

@@ -178,7 +178,7 @@ def test_course_that_can_not_be_kept_is_said_and_the_run_is_entered_all_the_same
     def full(folder: Path, files: object) -> None:
         raise UsageError(f"{folder}: no room")
 
-    monkeypatch.setattr("hil.cli.run.live.publish", full)
+    monkeypatch.setattr("hil.cli.run_job.publish", full)
     out = tmp_path / "run.csv"
     with served(read_rig(short_rig)) as (server, _):
         addresses = ("--bus", server.bus_url, "--modbus", str(server.modbus))

@@ -11,9 +11,9 @@ import pytest
 
 from estimator.physics.model import DrivelineModel, Parameter, Structure
 from hil.cli.main import run
-from hil.config.file_schema import FileKind, schema_line
 from hil.config.model_file import read_model, write_model
 from hil.config.schema import json_schema
+from hil.config.table import FileKind, schema_line
 from tests.cli.json_schema import Validator
 from tests.docs.pages import blocks, pages
 

@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 
 from hil.cli.main import run
+from hil.simulator.addresses import Address
 from hil.simulator.can_bridge import CanBridge
-from hil.simulator.loopback import Address
 
 
 @pytest.mark.parametrize(

@@ -46,7 +46,7 @@ sys.exit(f"no bus was opened: status {run(sys.argv[1:])}")
 @pytest.mark.parametrize(
     ("modules", "absent"),
     [
-        ("hil.cli.main, hil.cli.overview", (*SLOW, "can", "numba", "numpy", "pydantic", "rich", "scipy", "typer")),
+        ("hil.cli.main, hil.cli.command_line", (*SLOW, "can", "numba", "numpy", "pydantic", "rich", "scipy", "typer")),
         ("hil.monitor.host", SLOW),
         ("hil.monitor.opening", (*OF_FILES, "scipy.signal", "scipy.stats", "textual")),
         ("hil.monitor.opening, hil.monitor.app", (*OF_FILES, "scipy.signal", "scipy.stats")),

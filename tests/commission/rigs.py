@@ -18,9 +18,9 @@ from hil.config.rig_file import read_rig
 from hil.rig.experiments.base import Phase
 from hil.rig.pacing import FreePacer, period_ns
 from hil.rig.realtime import NOT_ASKED
+from hil.simulator.addresses import Address
 from hil.simulator.driveline import EffectSpec, plant_for
 from hil.simulator.fault_table import rig_faults
-from hil.simulator.loopback import Address
 from hil.simulator.plant import Plant
 from hil.simulator.rig_server import RigServer
 

@@ -16,7 +16,6 @@ from hil.monitor.app import MonitorApp
 from hil.monitor.host import HealthWatch, plc_health
 from hil.monitor.messages import Began, Ended, Health, Order, Ready, Report, Samples
 from hil.monitor.state import LiveState
-from hil.rig.addresses import with_addresses
 from hil.rig.build import open_devices
 from hil.rig.experiments.base import Phase
 from hil.rig.pacing import FreePacer, period_ns
@@ -26,8 +25,8 @@ from hil.rig.session import run_plan
 from hil.rig.stop import StopRequest
 from hil.rig.timing import RunTiming
 from hil.sample import Sample
+from hil.simulator.addresses import Address, with_addresses
 from hil.simulator.driveline import DEFAULT_BUS, plant_for
-from hil.simulator.loopback import Address
 from hil.simulator.rig_server import RigServer
 from tests.monitor.fake_source import FakeSource
 from tests.rig.serving import Samples as Recorded

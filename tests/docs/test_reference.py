@@ -10,7 +10,7 @@ import pytest
 from pydantic import BaseModel
 
 from drivers.inverter.drive_settings import OPTION_CODES
-from drivers.plc.map_needs import USED
+from drivers.plc.register_map import USED
 from estimator.diagnosis.inference import calibration, plausible
 from estimator.diagnosis.inference import figures as holdout
 from estimator.diagnosis.inference.search import STARTS

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from drivers.datasheet.finding import Severity
+from drivers.datasheet.text import Severity
 from drivers.eds_check import EdsReport, check_eds
 from drivers.resources import data_file
 

@@ -6,9 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from drivers.inverter.check import Difference
-from hil.config.new_rig.answers import answers
-from hil.config.new_rig.drive import new_drive
-from hil.config.new_rig.text import rig_text
+from hil.config.new_rig import answers, new_drive, rig_text
 from hil.config.rig_file import Rig, read_rig
 from hil.rig.build import open_devices
 from hil.rig.pacing import FREE_HEARTBEAT_MS

@@ -16,8 +16,8 @@ from drivers.canopen.can_link import CanLink
 from drivers.canopen.heartbeat import HOST_NODE_ID
 from drivers.canopen.remote_bus import BoundedRemoteBus
 from drivers.errors import BusDown, ProtocolViolation
+from hil.simulator.addresses import Address
 from hil.simulator.can_bridge import CanBridge
-from hil.simulator.loopback import Address
 from tests.drivers.can_bench import frame, new_channel, virtual_bus
 
 

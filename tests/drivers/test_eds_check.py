@@ -7,9 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from drivers.capability.function import Function, Without
-from drivers.capability.table import TABLE
-from drivers.datasheet.finding import EdsFinding, Severity
+from drivers.capability.table import TABLE, Function, Without
+from drivers.datasheet.text import EdsFinding, Severity
 from drivers.eds_check import EdsReport
 from tests.docs.pages import DOCS
 from tests.drivers.eds_bench import SHIPPED, E, N, W, checked, edited, line_of, without

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from drivers.datasheet.finding import Severity
+from drivers.datasheet.text import Severity
 from tests.drivers.eds_bench import E, N, W, checked, edited, line_of
 
 MORE = 20

@@ -6,8 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.datasheet.number import Formula, octal_matters, read_formula, read_number
-from drivers.datasheet.types import DATA_TYPES, DataType
+from drivers.datasheet.types import DATA_TYPES, DataType, Formula, octal_matters, read_formula, read_number
 
 INTEGERS = [kind for kind in DATA_TYPES.values() if kind.is_integer]
 

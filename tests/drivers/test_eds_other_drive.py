@@ -14,17 +14,16 @@ import pytest
 from canopen import import_od
 
 from drivers.capability.carrier import RPDO, TPDO
-from drivers.capability.function import Function, Without
 from drivers.capability.plan import plan_drive
 from drivers.capability.speed_unit import SpeedUnit, SpeedUnitName
-from drivers.capability.table import TABLE
+from drivers.capability.table import TABLE, Function, Without
 from drivers.datasheet.file import EdsFile
-from drivers.datasheet.finding import Severity
+from drivers.datasheet.text import Severity
 from drivers.eds_check import check_eds
 from drivers.errors import ConfigMismatch
-from drivers.inverter.acceptance import Acceptance
 from drivers.inverter.cia402 import PowerState
 from drivers.inverter.inverter import Inverter
+from drivers.inverter.settings import Acceptance
 from drivers.resources import data_file
 from hil.config.rig_file import read_rig
 from hil.rig.build import inverter_settings

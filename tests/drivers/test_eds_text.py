@@ -11,8 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.datasheet.file import EdsFile
-from drivers.datasheet.finding import Severity
-from drivers.datasheet.text import MAX_BYTES, EdsText, EdsUnreadable, read_eds_text
+from drivers.datasheet.text import MAX_BYTES, EdsText, EdsUnreadable, Severity, read_eds_text
 from drivers.eds_check import check_eds
 from drivers.errors import ConfigMismatch
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from drivers.capability.carrier import RPDO
-from drivers.datasheet.finding import Severity
+from drivers.datasheet.text import Severity
 from drivers.errors import ConfigMismatch
 from drivers.resources import data_file
 from drivers.scaling import IntegerType, TorqueScale

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from drivers.canopen.emcy import Emergency, decode
-from drivers.canopen.emcy_codes import CAUSES, cause_of
+from drivers.canopen.emcy import CAUSES, Emergency, cause_of, decode
 from drivers.errors import ProtocolViolation
 
 

@@ -7,9 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from drivers.datasheet.finding import Severity
-from drivers.datasheet.sheet import Commissioning, read_commissioning
-from drivers.datasheet.text import read_eds_text
+from drivers.datasheet.file import Commissioning, read_commissioning
+from drivers.datasheet.text import Severity, read_eds_text
 from drivers.eds_check import check_eds
 from tests.drivers.maker_files import COMPLETE, EPOS_DCF, FIXED, I8, I16, U8, U16, U32, Entry, Maker, fixed, pdo, pdos
 from tests.drivers.maker_rig import drive

@@ -7,11 +7,10 @@ import asyncio
 import pytest
 
 from drivers.errors import ProtocolViolation
-from drivers.plc.map_needs import USED
+from drivers.plc.named_registers import PLAUSIBLE, reading
 from drivers.plc.plc import Plc
-from drivers.plc.reading import PLAUSIBLE, reading
 from drivers.plc.register import Register, WordOrder
-from drivers.plc.register_map import load_register_map
+from drivers.plc.register_map import USED, load_register_map
 from drivers.resources import data_file
 from hil.simulator.faults import PlcFaults
 from hil.simulator.plc_device import PlcDevice

@@ -8,15 +8,17 @@ from pathlib import Path
 import pytest
 
 from drivers.errors import ConfigMismatch
-from drivers.plc.map_needs import ENUMS, USED, require_usable
 from drivers.plc.register import RegisterKind
 from drivers.plc.register_map import (
+    ENUMS,
     MOST_REGISTERS,
+    USED,
     Block,
     RegisterMap,
     RegisterMapError,
     blocks_of,
     load_register_map,
+    require_usable,
 )
 from drivers.plc.types import DriveMode
 from drivers.resources import data_file

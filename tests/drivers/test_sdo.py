@@ -10,8 +10,7 @@ from threading import Timer
 import pytest
 
 from drivers.canopen.can_link import CanLink
-from drivers.canopen.sdo import SdoChannel
-from drivers.canopen.sdo_node import SdoNode
+from drivers.canopen.sdo import SdoChannel, SdoNode
 from drivers.datasheet.file import EdsFile
 from drivers.errors import BusDown, CommandRefused, ConfigMismatch, DeviceTimeout, ProtocolViolation
 from tests.drivers.can_bench import new_channel

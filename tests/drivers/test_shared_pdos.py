@@ -11,8 +11,8 @@ import pytest
 
 from drivers.canopen.can_link import CanLink
 from drivers.canopen.pdo_map import PdoCodec
-from drivers.inverter.acceptance import Acceptance
 from drivers.inverter.inverter import Inverter
+from drivers.inverter.settings import Acceptance
 from hil.rig.replay import replay
 from tests.drivers.can_bench import M1, guarded
 from tests.drivers.fake_drive import FakeDrive, on_bus

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from drivers.errors import ConfigMismatch, DeviceFault
-from drivers.inverter.acceptance import Acceptance
 from drivers.inverter.cia402 import PowerState
+from drivers.inverter.settings import Acceptance
 from hil.simulator.faults import FaultAtStep, InverterFaults
 from tests.drivers.can_bench import M1, SIMULATED_M1, Bench, bench
 from tests.drivers.eds_bench import without

@@ -80,3 +80,11 @@ def test_an_identifier_claimed_twice_has_one_callback_and_the_last_name(bus: Bus
     bus.arrive(0x080)
     with pytest.raises(ForeignController, match="another SYNC"):
         strangers.raise_if_seen()
+
+
+def test_what_came_before_the_watch_explains_but_does_not_end(bus: Bus, strangers: Strangers) -> None:
+    bus.arrive(0x201, b"\x0f")
+    bus.arrive(0x080)
+    strangers.watch()
+    strangers.raise_if_seen()
+    assert strangers.heard == "an RPDO (frame 0x201 [0f])"

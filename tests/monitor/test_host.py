@@ -21,8 +21,8 @@ from hil.monitor.opening import open_rig
 from hil.monitor.outbox import Outbox
 from hil.monitor.recorded_run import recording_path
 from hil.monitor.source import RigSource
-from hil.rig.addresses import with_addresses
 from hil.rig.experiments.base import Phase
+from hil.simulator.addresses import with_addresses
 from tests.monitor.fake_source import sample
 from tests.rig.serving import served
 

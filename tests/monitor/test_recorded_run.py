@@ -23,8 +23,7 @@ from hil.recording import read_record
 from hil.rig.build import Devices
 from hil.rig.drive import Observer, Recorder
 from hil.rig.experiments.base import Phase
-from hil.rig.live import USUAL, OnlineSetup, tracking_settings
-from hil.rig.live_replay import Pace, play_record
+from hil.rig.live import USUAL, OnlineSetup, Pace, play_record, tracking_settings
 from hil.rig.stop import StopRequest
 from hil.rig.timing import RunTiming
 from hil.sample import Sample

@@ -15,12 +15,12 @@ from hil.errors import RunAborted
 from hil.proof.rigs import sealed_process
 from hil.proof.seal import verify
 from hil.proof.sealed_rig import RIG_FILE
-from hil.rig.addresses import with_addresses
 from hil.rig.build import open_devices
 from hil.rig.pacing import FreePacer, heartbeat_patience_ms, period_ns
 from hil.rig.plan import plan_run
 from hil.rig.session import run_plan
 from hil.rig.stop import StopRequest
+from hil.simulator.addresses import with_addresses
 
 
 @dataclass

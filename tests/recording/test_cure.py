@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from estimator.errors import Cure, Implausible
+from hil.plants.scales import cure_lines, with_the_line_to_write
 from hil.recording import SignalsConfig, Table, write_table
-from hil.recording.cure import cure_lines, with_the_line_to_write
 
 TABLE = Table(
     Path("run.csv"),

@@ -13,7 +13,7 @@ import pytest
 from hil.errors import RecordingError
 from hil.recording import SignalsConfig, Table, read_record, read_table, write_table
 from hil.recording.formats import read_metadata
-from hil.recording.mat73_format import variable_names
+from hil.recording.mat_format import variable_names
 from hil.recording.table import as_text
 
 

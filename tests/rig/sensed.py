@@ -10,7 +10,7 @@ from pathlib import Path
 
 from drivers.resources import data_file
 from hil.config.rig_file import Rig, read_rig
-from hil.rig.addresses import with_addresses
+from hil.simulator.addresses import with_addresses
 from hil.simulator.driveline import plant_for
 from hil.simulator.faults import RigFaults
 from hil.simulator.rig_server import RigServer

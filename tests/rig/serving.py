@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 from hil.config.rig_file import Rig, read_rig
-from hil.rig.addresses import with_addresses
 from hil.rig.build import Devices, open_devices
 from hil.rig.drive import Progress, RunSummary
 from hil.rig.pacing import FreePacer, Pacer, period_ns
@@ -18,8 +17,8 @@ from hil.rig.plan import plan_run
 from hil.rig.session import run_plan
 from hil.rig.stop import StopRequest
 from hil.sample import Sample
+from hil.simulator.addresses import Address, with_addresses
 from hil.simulator.faults import RigFaults
-from hil.simulator.loopback import Address
 from hil.simulator.plant import RigidPlant
 from hil.simulator.plc_device import PlcDevice
 from hil.simulator.rig_server import RigServer

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import pytest
 
-from drivers.inverter.acceptance import Acceptance
-from hil.config.drive_tables import AcceptanceTable, AcceptedTable
+from drivers.inverter.settings import Acceptance
+from hil.config.device_tables import AcceptanceTable, AcceptedTable
 from hil.config.rig_file import Rig
 from hil.errors import UsageError
 from hil.rig.build import open_devices
-from hil.simulator.loopback import is_simulated_bus
+from hil.simulator.addresses import is_simulated_bus
 from tests.rig.serving import changed, served, small_rig
 
 FILLED_IN = ("A. Nyone", "a relay of its own")

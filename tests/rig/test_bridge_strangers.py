@@ -19,12 +19,12 @@ from urllib.parse import urlsplit
 import can
 import pytest
 
-from drivers.canopen.bus_token import forget_token, keep_token, kept_token, token_file
 from drivers.canopen.can_link import open_bus
+from drivers.canopen.remote_bus import forget_token, keep_token, kept_token, token_file
 from drivers.errors import BusDown
 from hil.simulator import can_bridge
+from hil.simulator.addresses import Address
 from hil.simulator.can_bridge import LONGEST_FRAME_BYTES, MOST_HOSTS, MOST_WAITING, CanBridge
-from hil.simulator.loopback import Address
 
 
 @pytest.fixture(autouse=True)

@@ -11,8 +11,8 @@ import can
 import pytest
 
 from drivers.errors import BusDown
+from hil.simulator.addresses import Address
 from hil.simulator.can_bridge import CanBridge
-from hil.simulator.loopback import Address
 
 ANY_PORT = Address("127.0.0.1", 0)
 

@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 
 from hil.errors import RunAborted
-from hil.rig.experiments.approach import Approach
 from hil.rig.experiments.base import MeasureLaw, Phase
 from hil.rig.experiments.cruise import Cruise
 from hil.rig.experiments.reversal import Reversal
-from hil.rig.experiments.staged import StagedExperiment, TorqueBounds
+from hil.rig.experiments.staged import Approach, StagedExperiment, TorqueBounds
 from hil.rig.experiments.tip import Tip
 from tests.rig.vehicle import INERTIA_KG_M2, PERIOD_S, RigidVehicle, drive
 

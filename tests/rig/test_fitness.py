@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from drivers.plc.types import ClutchState, DriveMode, PlcStatus, PlcWatchdog, PrbsSettings, PrbsSource
-from hil.rig.fitness import Needs, changes, reasons_against
+from hil.rig.plc_watch import Needs, changes, reasons_against
 
 FIT = PlcStatus(
     drive_mode=DriveMode.SERIES,

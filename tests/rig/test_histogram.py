@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hil.rig.histogram import Histogram
+from hil.rig.timing import Histogram
 
 WIDEST = 1.0 / 128.0
 

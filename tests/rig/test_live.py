@@ -16,8 +16,7 @@ from hil.recording import RecordingWriter, read_record
 from hil.rig import live_course
 from hil.rig.build import open_devices
 from hil.rig.experiments.base import Phase
-from hil.rig.live import LiveEstimate, tracking_chain, tracking_settings
-from hil.rig.live_replay import Pace, play_record, play_samples
+from hil.rig.live import LiveEstimate, Pace, play_record, play_samples, tracking_chain, tracking_settings
 from hil.rig.plan import plan_run
 from hil.rig.session import run_plan
 from hil.rig.stop import StopRequest

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from hil.errors import UsageError
-from hil.simulator.loopback import Address, bus_address, host_port, modbus_address
+from hil.simulator.addresses import Address, bus_address, host_port, modbus_address
 
 
 @pytest.mark.parametrize(

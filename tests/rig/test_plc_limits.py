@@ -11,7 +11,7 @@ import pytest
 from hil.commission.talk import Script
 from hil.errors import RunAborted
 from hil.rig.check import Verdict, check_rig
-from hil.rig.plc_limits import MOST_OF_RATED, plc_limits
+from hil.rig.plc_watch import MOST_OF_RATED, plc_limits
 from hil.simulator.plc_device import PlcDevice, PlcSetup
 from tests.commission.rigs import bench
 from tests.commission.test_engine import person

@@ -9,9 +9,8 @@ import pytest
 
 from hil.errors import RunAborted
 from hil.rig.build import open_devices
-from hil.rig.fitness import Needs
 from hil.rig.pacing import Tick
-from hil.rig.plc_watch import PlcWatch
+from hil.rig.plc_watch import Needs, PlcWatch
 from hil.sample import SampleFlag
 from hil.simulator.rig_server import RigServer
 from tests.rig.serving import served

@@ -13,8 +13,8 @@ from drivers.resources import data_file
 from hil.errors import RunAborted
 from hil.rig.build import open_devices
 from hil.rig.check import check_rig
-from hil.rig.host_beat import HostBeat
-from hil.simulator.loopback import Address
+from hil.rig.plc_loop import HostBeat
+from hil.simulator.addresses import Address
 from hil.simulator.rig_server import HOST_TIMEOUT_S, RigServer
 from tests.rig.serving import Samples, run_once, served
 

@@ -15,9 +15,8 @@ from estimator.errors import BadModel
 from estimator.physics.model import EffectValue, Parameter
 from hil.config.model_file import write_model
 from hil.errors import UsageError
-from hil.rig.addresses import with_addresses
+from hil.simulator.addresses import Address, with_addresses
 from hil.simulator.driveline import DEFAULT_BUS, EffectSpec, plant_for, simulation_model
-from hil.simulator.loopback import Address
 from hil.simulator.plant import RigidPlant
 from hil.simulator.rig_server import RigServer
 from tests.rig.serving import ANY_PORT, Samples, changed, run_once, small_rig

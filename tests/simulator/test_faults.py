@@ -6,10 +6,14 @@ from pathlib import Path
 
 import pytest
 
+from drivers.errors import ConfigMismatch
 from drivers.inverter.cia402 import PowerState, state_of
 from drivers.inverter.cia402 import PowerState as S
 from drivers.plc.types import ClutchState, DriveMode
 from hil.errors import UsageError
+from hil.rig.build import open_devices
+from hil.rig.check import check_rig
+from hil.simulator.addresses import with_addresses
 from hil.simulator.fault_table import DEVICES, NOBODY, OVERCURRENT, known_faults, rig_faults
 from hil.simulator.faults import (
     BusFaults,
@@ -259,3 +263,17 @@ def test_swapped_node_ids_go_with_the_drive_and_not_with_its_number() -> None:
         ) as server:
             nodes = (rig.inverters.m1.node_id, rig.inverters.m2.node_id)
             assert [read_object(server.bus_url, node_id, 0x1018, 4) for node_id in nodes] == serials
+
+
+def test_swapped_node_ids_are_found_by_the_serial_numbers() -> None:
+    rig = small_rig()
+    swapped = rig_faults(("bus.swapped_nodes",), rig.period_s)
+    with RigServer(RigidPlant(1.0, 0.01), rig, "virtual:swapped", ANY_PORT, swapped) as server:
+        at = with_addresses(rig, server.bus_url, str(server.modbus))
+        with open_devices(at) as devices, pytest.raises(ConfigMismatch, match="0x1018:04 is 2: another drive"):
+            devices.m1.configure()
+        found = [str(each) for finding in check_rig(at) for each in finding.differences]
+    assert [text for text in found if "serial" in text] == [
+        "inverter m1 (node 1): serial number 0x1018:04 is 2: another drive has this node id, expected 1 (rig file)",
+        "inverter m2 (node 2): serial number 0x1018:04 is 1: another drive has this node id, expected 2 (rig file)",
+    ]

@@ -29,14 +29,13 @@ from drivers.canopen.can_link import CanLink
 from drivers.errors import BusDown
 from hil.config.rig_file import read_rig
 from hil.errors import UsageError
-from hil.rig.addresses import with_addresses
 from hil.rig.build import open_devices
 from hil.rig.check import Verdict, check_rig
 from hil.rig.trace import BusTrace
+from hil.simulator.addresses import Address, with_addresses
 from hil.simulator.can_bridge import CanBridge
 from hil.simulator.driveline import plant_for
 from hil.simulator.faults import BusFaults, RigFaults
-from hil.simulator.loopback import Address
 from hil.simulator.rig_server import RigServer
 from tests.drivers.can_bench import virtual_bus
 from tests.rig.serving import EXAMPLE, Samples, run, served

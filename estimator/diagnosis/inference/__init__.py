@@ -2,5 +2,5 @@
 
 ``disturbances``: the noise of a free-run error and the Kalman filter that whitens it. ``likelihood``: the fit of a
 hypothesis under that weighting, and its score. ``looks``: which effects are worth a fit. ``search``: add, drop,
-exchange. ``posterior``: probability and weight of an effect. ``verdict``: the decision.
+exchange. ``judge``: probability and weight of an effect, and the decision.
 """

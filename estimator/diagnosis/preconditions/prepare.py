@@ -10,14 +10,13 @@ import numpy as np
 from scipy.signal import detrend
 
 from estimator.diagnosis.acquisition import as_if_not_lost
-from estimator.diagnosis.joined import joined
 from estimator.diagnosis.noise import noise_floor
 from estimator.diagnosis.preconditions.channels import unwrapped, with_usable_channels, without_clipped
 from estimator.diagnosis.preconditions.inertia import BODY_TELLS, Inertia, as_one_body, driven, model_warnings
 from estimator.diagnosis.preconditions.thinned import thinned, with_room, without_not_read
 from estimator.diagnosis.preconditions.units import require_plausible_units
 from estimator.diagnosis.result import Diagnosis
-from estimator.diagnosis.segments import Cut, cut
+from estimator.diagnosis.segments import Cut, cut, joined
 from estimator.errors import BadShape, Cure, Implausible, NotExciting
 from estimator.physics.grid import Grid, grid_for
 from estimator.physics.model import DrivelineModel, Parameter, Structure, natural_frequencies_rad_s

@@ -1,8 +1,7 @@
 """Laws without a name: at each element the best sparse sum of functions, the rival that every name must beat."""
 
-from estimator.diagnosis.unnamed.hunt import Hunt
+from estimator.diagnosis.unnamed.hunt import Hunt, without_law
 from estimator.diagnosis.unnamed.laws import LAGS
-from estimator.diagnosis.unnamed.look_again import without_law
 from estimator.diagnosis.unnamed.scene import Filter, Scene, scene
 from estimator.diagnosis.unnamed.search import (
     ROUNDS,

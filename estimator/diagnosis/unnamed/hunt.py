@@ -1,21 +1,35 @@
-"""The state of the search for a law at one element, and how many terms of it are worth having."""
+"""The search for a law at one element: its state, the first look, and further looks from where the law has led.
+
+The first look goes by what the error of the re-tuned model promises; single readings that are off by far, which no
+motion of the line explains, are set aside. A large mismatch is more than a small disturbance of the re-tuned model. A
+further round simulates with the law found and with what it changes of the parameters, looks at the error from there,
+and chooses anew; a step that does not make the simulation better is shortened (Gauss-Newton over the model's unknowns
+and the law's coefficients).
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy import stats
+from scipy.ndimage import maximum_filter1d, median_filter
 
-from estimator.diagnosis.line import PLACES, Place
-from estimator.diagnosis.unnamed.forms import Form
-from estimator.diagnosis.unnamed.ground import Ground
-from estimator.diagnosis.unnamed.pursuit import Path
-from estimator.diagnosis.unnamed.scene import Scene
+from estimator.diagnosis.line import PLACES, Place, block_mean_of, lines, simulated
+from estimator.diagnosis.unnamed.forms import Form, forms
+from estimator.diagnosis.unnamed.laws import Law
+from estimator.diagnosis.unnamed.pursuit import Path, answers, candidates, factored, pursue
+from estimator.diagnosis.unnamed.scene import Extra, Ground, Scene, extra_of
 from estimator.physics.effect import Element
+from estimator.physics.fit import FitResult
+from estimator.physics.jacobian import STEP
+from estimator.physics.least_squares import least_inside, unbounded_first
+from estimator.physics.parallel import concurrently
+from estimator.physics.problem import bounds, own_part, residual_at
 from estimator.signals.correlation import effective_samples
-from estimator.signals.record import FloatArray
+from estimator.signals.record import BoolArray, FloatArray
 
 RIDGE = 1e-5
 """Keeps columns that are combinations of others small; a share of a column's norm."""
@@ -139,3 +153,228 @@ def _in_use(hunt: Hunt) -> float:
 def rms(parts: Sequence[FloatArray]) -> float:
     """Return the RMS over all recordings."""
     return float(np.sqrt(np.mean(np.concatenate(list(parts)) ** 2)))
+
+
+NEIGHBOURS = 7
+"""A reading is held against the median of so many around it: a swing of the line lasts longer."""
+
+FALSE_ALARM = 0.01
+"""Probability that normal noise makes one stray in all recordings."""
+
+WITHIN = 0.9
+"""Share of the values from which their spread is estimated: few of those are their neighbours' median, none a stray."""
+
+
+def strays(errors: Sequence[FloatArray]) -> list[BoolArray]:
+    """Tell which values of an error stand out of their neighbours, per recording; shapes (B_i,)."""
+    apart = [apart_from_neighbours(error) for error in errors]
+    every = np.concatenate(apart)
+    sigma = float(np.quantile(np.abs(every), WITHIN)) / float(stats.norm.isf(0.5 * (1.0 - WITHIN)))
+    limit = float(stats.norm.isf(0.5 * FALSE_ALARM / every.size)) * sigma
+    return [np.abs(each) > limit for each in apart]
+
+
+def apart_from_neighbours(error: FloatArray) -> FloatArray:
+    """Return how far each value is from its neighbours' median; 0 at the ends, with neighbours on one side only."""
+    apart: FloatArray = error - median_filter(error, NEIGHBOURS, mode="nearest")
+    ends = NEIGHBOURS // 2
+    apart[:ends] = apart[-ends:] = 0.0
+    return apart
+
+
+def near(off: BoolArray) -> BoolArray:
+    """Tell which values stand next to one that is off, shape (B,): a filter answers to it for some samples."""
+    found: BoolArray = maximum_filter1d(off.astype(np.int8), NEIGHBOURS, mode="constant").astype(np.bool_)
+    return found
+
+
+KEPT = 40
+"""Forms that by themselves explain most, which further rounds choose from."""
+
+PARAMETER_LAWS: Mapping[str, tuple[Element, Law]] = {
+    "J_M": (Element.MOTOR, lambda m: np.gradient(m.speed, m.time_s)),
+    "b_M": (Element.MOTOR, lambda m: m.speed),
+    "k": (Element.SHAFT, lambda m: m.twist),
+    "c": (Element.SHAFT, lambda m: m.speed - m.load_speed),
+    "J_L": (Element.LOAD, lambda m: np.gradient(m.load_speed, m.time_s)),
+    "b_L": (Element.LOAD, lambda m: m.load_speed),
+}
+"""What one unit more of a nominal parameter does, as a law at its place."""
+
+
+def first(view: Scene, ground: Ground, element: Element) -> Hunt:
+    """Look for a law at an element from a fit alone; ``ground`` is that of the view."""
+    return _from(view, element, ground)
+
+
+def first_along_motion(view: Scene, plain: Ground, element: Element) -> Hunt:
+    """Look for a law as a function of the motion that goes with an unknown input at the element's place.
+
+    Along the true motion the line with other parameters and a law is the line as it is under further torques, exactly,
+    however large they are: a better start for a large mismatch. The motion holds some of the error, and a law may copy
+    it from there; whether it is one shows when it is simulated.
+    """
+    inputs = view.explanations[PLACES[element]].inputs
+    cut = tuple(replace(line, motion=each.motion) for line, each in zip(view.cut, inputs, strict=True))
+    along = replace(view, cut=cut)
+    jacobian = plain.jacobian.copy()
+    for j, unknown in enumerate(view.result.problem.shared):
+        place = PARAMETER_LAWS.get(unknown.name) if not unknown.effect else None
+        if place is not None:
+            columns = [place[1](m)[:, np.newaxis] for m in along.motions(element)]
+            jacobian[:, j] = unknown.scale * answers(along, place[0], [columns])[0]
+    ground = Ground(cut, jacobian, plain.raw, view.result.pinned)
+    return _from(along, element, ground)
+
+
+def _from(view: Scene, element: Element, ground: Ground) -> Hunt:
+    tried = forms(view, element)
+    path = pursue(candidates(view, element, tried), ground)
+    strongest = np.argsort(-path.alone)[:KEPT].tolist()
+    kept = list(dict.fromkeys([*path.chosen, *strongest]))
+    path = replace(path, chosen=list(range(len(path.chosen))))
+    chosen = [tried[i] for i in kept]
+    weights = [np.zeros(line.size) for line in view.cut]
+    start = Hunt(element, view, ground, len(tried), chosen, path, weights, NO_LAW, 0.0, [], False)
+    terms = worthwhile(start)
+    coefficients, left = path.solved(terms, RIDGE)
+    law = cost(start, terms, terms_of(start, terms, coefficients))
+    hunt = replace(start, law=law, mean_square=float(left @ left) / left.size, errors=ground.split(left))
+    return _without_strays(hunt) if element is Element.ACQUISITION else hunt
+
+
+def _without_strays(hunt: Hunt) -> Hunt:
+    """Take single readings that are off for the law, where that is worth a coefficient each.
+
+    They have pulled the fit away from the others: a slow error that is no reason to doubt them. What of the rest stands
+    apart from its neighbours tells how many samples are independent. A torque that is missing for a moment stands out
+    in the innovations, too, and not in what is read.
+    """
+    errors = hunt.ground.split(hunt.ground.error)
+    off = [seen & near(read) for seen, read in zip(strays(errors), strays(hunt.view.as_read), strict=True)]
+    count = sum(int(each.sum()) for each in off)
+    rest = [np.where(each, 0.0, error) for each, error in zip(off, errors, strict=True)]
+    rows = hunt.ground.error.size
+    before, after = hunt.path.squares[0], sum(float(each @ each) for each in rest)
+    aside = [apart_from_neighbours(each) for each in rest]
+    n = effective_samples(aside)
+    law = Found((), count, count * math.log(rows))
+    known = hunt.law.information(before, hunt.mean_square * rows, n)
+    if count == 0 or law.information(before, after, n) <= max(0.0, known):
+        return hunt
+    size = rms([error[each] for each, error in zip(off, errors, strict=True)])
+    law = replace(law, terms=(("the single readings that are off", size),))
+    return replace(hunt, law=law, mean_square=after / rows, errors=aside, stuck=True)
+
+
+STEPS = (1.0, 0.5, 0.2, 0.05)
+"""Shares of a step that are tried until the error falls."""
+
+
+def again(hunt: Hunt) -> Hunt:
+    """Simulate with the law found, look at the error from there, and choose again."""
+    if hunt.stuck:
+        return hunt
+    terms = worthwhile(hunt)
+    if terms == 0:
+        return _given_up(hunt)
+    step, coefficients = _solution(hunt, terms)
+    wanted = weights_of(hunt, terms, coefficients)
+    before = hunt.view.result
+    for share in STEPS:
+        weights = [old + share * (new - old) for old, new in zip(hunt.weights, wanted, strict=True)]
+        x = np.clip(before.x + share * step, *bounds(before.problem))
+        extra = extra_of(hunt.view, hunt.element, weights)
+        moved = replace(before, x=x, outputs=tuple(extra.outputs(before, [x], i)[0] for i in range(len(weights))))
+        if _squares(hunt.view, moved) < _squares(hunt.view, before):
+            return _looked(hunt, moved, extra, weights, cost(hunt, terms, terms_of(hunt, terms, coefficients)))
+    return _given_up(hunt)
+
+
+def _given_up(hunt: Hunt) -> Hunt:
+    """Return a hunt that goes no further; a law that was only promised, and not simulated, is none."""
+    if any(w.any() for w in hunt.weights):
+        return replace(hunt, stuck=True)
+    errors = hunt.view.errors
+    return replace(hunt, stuck=True, law=NO_LAW, mean_square=_mean_square(errors), errors=errors)
+
+
+def without_law(hunt: Hunt) -> FitResult:
+    """Return the model that a hunt has come to, simulated without its law."""
+    result = hunt.view.result
+    outputs = tuple(simulated(result, i) for i in range(len(hunt.view.cut)))
+    return replace(result, outputs=outputs)
+
+
+def _looked(hunt: Hunt, moved: FitResult, extra: Extra, weights: list[FloatArray], law: Found) -> Hunt:
+    """Look at the error of a simulation with a law, and choose among the forms again."""
+    cut = lines(moved, extra.forces, hunt.view.cut[0].length)  # in which the law found is written
+    view = replace(hunt.view, result=moved, cut=cut)
+    known = answers(view, hunt.element, [[w[:, np.newaxis] for w in weights]])[0]
+    errors = view.errors
+    ground = Ground(view.cut, _jacobian(view, extra), np.concatenate(errors) + known, moved.pinned)
+    path = pursue(candidates(view, hunt.element, hunt.forms), ground)
+    return replace(
+        hunt,
+        view=view,
+        ground=ground,
+        path=path,
+        weights=weights,
+        law=law,
+        mean_square=_mean_square(errors),
+        errors=errors,
+    )
+
+
+def _mean_square(errors: Sequence[FloatArray]) -> float:
+    return sum(float(error @ error) for error in errors) / sum(error.size for error in errors)
+
+
+def _squares(view: Scene, result: FitResult) -> float:
+    """Return the sum of squares of the error of simulated outputs, whitened where the view is."""
+    if view.filter is None:
+        left = residual_at(result.problem, result.outputs)
+        return float(left @ left)
+    problem = result.problem
+    pairs = zip(problem.records, problem.use, result.outputs, strict=True)
+    errors = [(record.output - output)[use, np.newaxis] for record, use, output in pairs]
+    return sum(float(np.sum(view.filter.part(i, error) ** 2)) for i, error in enumerate(errors))
+
+
+def _jacobian(view: Scene, extra: Extra) -> FloatArray:
+    """Return the derivative of the output by every unknown with a law in place, shape (rows, U)."""
+    problem, x = view.result.problem, view.result.x
+    _, high = bounds(problem)
+    steps = np.where(x + STEP <= high, STEP, -STEP)
+    shared = np.arange(len(problem.shared))
+
+    def part(i: int) -> FloatArray:
+        mine = np.concatenate([shared, np.arange(x.size)[own_part(problem, i)]])
+        points = x + steps[mine, None] * np.eye(x.size)[mine]
+        changes = (extra.outputs(view.result, points, i) - view.result.outputs[i]) / steps[mine, None]
+        found = np.zeros((view.cut[i].size, x.size))
+        for j, change in zip(mine, changes, strict=True):
+            found[:, j] = block_mean_of(change, problem.use[i], view.cut[i].length)[0]
+        return view.rows(i, found)
+
+    return np.vstack(concurrently(part, range(len(view.cut))))
+
+
+def _solution(hunt: Hunt, terms: int) -> tuple[FloatArray, FloatArray]:
+    """Return the step of the unknowns, inside their bounds, and the coefficients of the first terms."""
+    result, ground, path = hunt.view.result, hunt.ground, hunt.path
+    columns = path.columns[:, path.term < terms]
+    design = np.hstack([ground.jacobian, columns])
+    scale = np.maximum(np.linalg.norm(design, axis=0), np.finfo(float).tiny)
+    x, (low, high) = result.x, bounds(result.problem)
+    below, above = (np.subtract(end, x, out=np.zeros(x.size), where=x != end) for end in (low, high))  # a limit of inf
+    free, open_edge = np.full(columns.shape[1], np.inf), 1e-12  # an unknown at its bound has no room but must have some
+    lower = np.concatenate([np.minimum(below, -open_edge), -free]) * scale
+    upper = np.concatenate([np.maximum(above, open_edge), free]) * scale
+    order = unbounded_first(lower, upper, np.ones(scale.size, dtype=bool))
+    target = np.concatenate([ground.raw, np.zeros(scale.size)])
+    r, along = factored(np.vstack([(design / scale)[:, order], RIDGE * np.eye(scale.size)]), target)
+    solved = np.empty(scale.size)
+    solved[order] = least_inside(r, along, lower[order], upper[order])
+    solved /= scale
+    return solved[: result.x.size], solved[result.x.size :]

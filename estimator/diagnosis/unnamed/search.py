@@ -17,12 +17,9 @@ from scipy import stats
 
 from estimator.diagnosis.line import PLACES, Place
 from estimator.diagnosis.noise import SMALLEST_P, Gain, noise_floor
-from estimator.diagnosis.unnamed.first_look import first, first_along_motion
-from estimator.diagnosis.unnamed.ground import ground_of
-from estimator.diagnosis.unnamed.hunt import Hunt
-from estimator.diagnosis.unnamed.look_again import again
+from estimator.diagnosis.unnamed.hunt import Hunt, again, first, first_along_motion
 from estimator.diagnosis.unnamed.pursuit import MOST_COEFFICIENTS
-from estimator.diagnosis.unnamed.scene import Scene, elements, scene
+from estimator.diagnosis.unnamed.scene import Scene, elements, ground_of, scene
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult
 from estimator.physics.parallel import concurrently, in_turn

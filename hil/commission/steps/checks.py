@@ -22,7 +22,7 @@ from hil.rig.check import Finding as Found
 from hil.rig.check import Verdict, check_rig
 from hil.rig.excitation import NO_TORQUE
 from hil.rig.plan import plan_run
-from hil.rig.plc_limits import max_speed_rad_s, plc_limits
+from hil.rig.plc_watch import max_speed_rad_s, plc_limits
 
 MENDING = "Correct the rig file, or fix or connect the device it describes; see: hil check RIG"
 

@@ -77,6 +77,7 @@
     div.dataset.drawn = "yes";
     Plotly.newPlot(div, ...specification(div));
     if (contents.get(div).zoom) zoomable(div, contents.get(div).zoom);
+    document.querySelectorAll(`[data-cut="${div.id}"]`).forEach((box) => cutting(div, box));
     div.addEventListener("keydown", (event) => onKey(div, event));
     reachable(div);
   }
@@ -161,6 +162,35 @@
       shown = "";
       redraw();
     });
+  }
+
+  /* The stretch in view, with those that were kept before it, as lines of [signals]. */
+  function cutting(div, box) {
+    const [keep, again] = box.querySelectorAll("button");
+    const kept = [];
+    const inView = () => {
+      const range = div._fullLayout.xaxis.range;
+      const digits = Math.max(0, 3 - Math.floor(Math.log10(range[1] - range[0])));
+      return range.map((each) => each.toFixed(digits));
+    };
+    const whole = inView().join();
+    function show() {
+      const [from, to] = inView();
+      const chosen = `${[from, to]}` === whole ? kept : [...kept, [from, to]];
+      const all = chosen.map((each) => `[${each.join(", ")}]`);
+      const lines = kept.length ? `stretches = [${all.join(", ")}]` : `from_s = ${from}\nto_s = ${to}`;
+      box.querySelector("pre").textContent = lines;
+    }
+    keep.addEventListener("click", () => {
+      kept.push(inView());
+      Plotly.relayout(div, Object.fromEntries(axes(div).map((name) => [`${name}.autorange`, true])));
+    });
+    again.addEventListener("click", () => {
+      kept.length = 0;
+      show();
+    });
+    div.on("plotly_relayout", show);
+    show();
   }
 
   /* Buttons of a figure's own bar, for those without a pointer. */

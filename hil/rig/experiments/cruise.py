@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from hil.rig.experiments.speed_hold import HoldTuning, SpeedHold
+from hil.rig.experiments.staged import HoldTuning, SpeedHold
 
 BANDWIDTH_HZ = 0.01
 """Crossover of the speed loop while measuring [Hz].

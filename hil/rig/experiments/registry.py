@@ -13,13 +13,12 @@ from hil.config.experiment_tables import (
 )
 from hil.config.rig_file import Rig
 from hil.errors import UsageError
-from hil.rig.experiments.approach import Approach
 from hil.rig.experiments.base import Experiment, MeasureLaw
 from hil.rig.experiments.cruise import Cruise
 from hil.rig.experiments.open_loop import MOVING_RAD_S, OpenLoop
 from hil.rig.experiments.pulses import Pulses, Rest
 from hil.rig.experiments.reversal import Reversal
-from hil.rig.experiments.staged import StagedExperiment, TorqueBounds
+from hil.rig.experiments.staged import Approach, StagedExperiment, TorqueBounds
 from hil.rig.experiments.tip import Tip
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from hil.rig.experiments.low_pass import LowPass
+from hil.rig.experiments.staged import LowPass
 
 FILTER_S = 0.1
 """Low-pass of the speed that decides on turning [s]: a resonance at 8 Hz is a fifth of itself behind it."""

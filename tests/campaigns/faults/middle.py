@@ -16,10 +16,13 @@ import tempfile
 import time
 import uuid
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack, nullcontext
 from dataclasses import dataclass, field
 from functools import cache, partial
+from itertools import combinations
 from pathlib import Path
+from typing import Any
 from unittest import mock
 
 import can
@@ -28,17 +31,18 @@ import numpy as np
 from drivers.canopen.can_link import SYNC_COB_ID, CanLink
 from drivers.inverter.supervision import NO_TORQUE_S
 from drivers.plc.plc import Plc
+from drivers.plc.register import Register, RegisterKind
+from drivers.plc.register_map import RegisterMap
 from hil.config.rig_file import Rig
 from hil.recording import RecordingWriter, read_table
 from hil.rig import build
-from hil.rig.addresses import with_addresses
 from hil.rig.build import Devices, open_devices
 from hil.rig.experiments.base import Phase
 from hil.rig.pacing import FreePacer, period_ns
 from hil.rig.plan import plan_run
 from hil.rig.session import run_plan
 from hil.rig.stop import StopRequest
-from hil.simulator.loopback import Address
+from hil.simulator.addresses import Address, with_addresses
 from hil.simulator.rig_server import RigServer
 from tests.campaigns.faults.one_run import COUNT_NM, PATIENCE_S, Outcome
 from tests.campaigns.faults.rig import WatchedPlant, campaign_rig
@@ -136,8 +140,15 @@ WITH_SYNC: dict[str, tuple[int, bytes]] = {
 }
 """Frames that come to the host next to those of the drive."""
 
-OTHERS = ("node ids exchanged", "second host", "clock stepped")
+OTHERS = ("node ids exchanged", "second host", "two hosts at once", "clock stepped", "PLC registers exchanged")
 KINDS = (*dict.fromkeys((*TO_DRIVE, *TO_HOST, *WITH_SYNC, *OTHERS)),)
+
+
+NAMED = {
+    "PLC registers exchanged": "PLC",
+    "two hosts at once": "somebody else|[Aa]nother host",
+}
+"""What a message has to name, where that is no drive."""
 
 
 class Man:
@@ -236,19 +247,17 @@ def run_with(rig: Rig, experiment: str, fault: Fault, folder: Path, fastest_rad_
     man = Man(fault, rig.inverters.m1.rated_torque_nm)
     path = folder / f"{uuid.uuid4()}.csv"
     server = RigServer(shaft, rig, f"virtual:{uuid.uuid4()}", Address("127.0.0.1", 0))
-    patient = mock.patch.object(build, "Plc", partial(Plc, timeout_s=20.0, beat_timeout_s=20.0))
+    patient = mock.patch.object(build, "Plc", partial(_plc, fault))
     with ExitStack() as stack:
         stack.enter_context(server)
         at = with_addresses(rig, server.bus_url, str(server.modbus))
         recorder = RecordingWriter(path)
         man.on_fault = _also(fault, server, stack)
-        try:
-            with patient, recorder, open_devices(at) as devices:
-                man.stand_between(devices)
-                pacer = FreePacer(period_ns(rig.period_s), PATIENCE_S)
-                run_plan(devices, plan_run(at, experiment), pacer, recorder, StopRequest(), _progress)
-        except Exception as error:  # noqa: BLE001 - whatever it is, it is looked at
-            outcome.said = f"{error} | {error.__cause__}" if error.__cause__ else str(error) or type(error).__name__
+        stack.enter_context(patient)
+        if fault.kind == "two hosts at once":
+            _start_together(outcome, partial(_driven, at, experiment, recorder), partial(_driven, at, experiment, None))
+        else:
+            outcome.said = _driven(at, experiment, recorder, man)
         outcome.steps = len(shaft.torques_nm)
         _judge_shaft(rig, man, shaft, fastest_rad_s, outcome)
         _judge_end(rig, server, fault, outcome)
@@ -257,6 +266,44 @@ def run_with(rig: Rig, experiment: str, fault: Fault, folder: Path, fastest_rad_
     for left in folder.glob(f"{path.stem}*"):
         left.unlink()
     return outcome, shaft
+
+
+def _driven(at: Rig, experiment: str, recorder: RecordingWriter | None, man: Man | None = None) -> str:
+    """Drive as ``hil run`` does; give what it says where the run ends early."""
+    try:
+        with recorder or nullcontext(), open_devices(at) as devices:
+            if man is not None:
+                man.stand_between(devices)
+            pacer = FreePacer(period_ns(at.period_s), PATIENCE_S)
+            run_plan(devices, plan_run(at, experiment), pacer, recorder or mock.Mock(), StopRequest(), _progress)
+    except Exception as error:  # noqa: BLE001 - whatever it is, it is looked at
+        return f"{error} | {error.__cause__}" if error.__cause__ else str(error) or type(error).__name__
+    return ""
+
+
+def _start_together(outcome: Outcome, one: Callable[[], str], other: Callable[[], str]) -> None:
+    """Two hosts begin in the same moment: at most one of them may get to its end."""
+    with ThreadPoolExecutor(2) as threads:
+        said = [run.result() for run in [threads.submit(each) for each in (one, other)]]
+    outcome.said = next(filter(None, said), "")
+    if not any(said):
+        outcome.problems.append("both went to their end")
+
+
+def _plc(fault: Fault, host: str, port: int, map_: RegisterMap, **more: Any) -> Plc:
+    """Make the PLC's client, with two registers of one kind and type in each other's place where they are exchanged."""
+    if fault.kind == "PLC registers exchanged":
+        registers = map_.registers
+        pairs = [(a, b) for a, b in combinations(registers, 2) if _alike(registers[a]) == _alike(registers[b])]
+        a, b = pairs[int(fault.size * len(pairs))]
+        moved = {a: registers[a].model_copy(update={"address": registers[b].address})}
+        moved[b] = registers[b].model_copy(update={"address": registers[a].address})
+        map_ = map_.model_copy(update={"registers": {**registers, **moved}})
+    return Plc(host, port, map_, timeout_s=20.0, beat_timeout_s=20.0, **more)
+
+
+def _alike(register: Register) -> tuple[RegisterKind, str]:
+    return register.kind, register.type
 
 
 def _progress(phase: Phase, time_s: float) -> None:
@@ -306,8 +353,9 @@ def _judge_end(rig: Rig, server: RigServer, fault: Fault, outcome: Outcome) -> N
             outcome.problems.append(f"drive m{number} is in {state.value}")
     if fault.kind == "clock stepped" and outcome.said:
         outcome.problems.append(f"a step of the clock ended it: {outcome.said[:200]}")
-    if outcome.said and not re.search(r"inverters? m[12]|both inverters|drives|somebody else", outcome.said):
-        outcome.problems.append(f"names no drive: {outcome.said[:200]}")
+    named = NAMED.get(fault.kind, r"inverters? m[12]|both inverters|drives|somebody else")
+    if outcome.said and not re.search(named, outcome.said):
+        outcome.problems.append(f"does not name what is wrong: {outcome.said[:200]}")
 
 
 def main(arguments: list[str] | None = None) -> int:

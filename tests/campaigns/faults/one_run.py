@@ -21,15 +21,14 @@ from hil.errors import RecordingError
 from hil.recording import RecordingWriter, read_table, writer
 from hil.recording.writer import Unbuffered, WritingThread
 from hil.rig import build
-from hil.rig.addresses import with_addresses
 from hil.rig.build import open_devices
 from hil.rig.experiments.base import Phase
 from hil.rig.pacing import FreePacer, Tick, period_ns
 from hil.rig.plan import plan_run
 from hil.rig.session import run_plan
 from hil.rig.stop import StopRequest
+from hil.simulator.addresses import Address, with_addresses
 from hil.simulator.fault_table import rig_faults
-from hil.simulator.loopback import Address
 from hil.simulator.rig_server import RigServer
 from tests.campaigns.faults.kinds import UNTOUCHED, Kind
 from tests.campaigns.faults.rig import WatchedPlant

@@ -16,13 +16,12 @@ from pathlib import Path
 from drivers.canopen.can_link import CanLink
 from drivers.canopen.heartbeat import NmtState
 from drivers.canopen.node_monitor import NodeMonitor
-from drivers.canopen.sdo import SdoChannel
-from drivers.canopen.sdo_node import SdoNode
+from drivers.canopen.sdo import SdoChannel, SdoNode
 from drivers.errors import BusDown, DriverError
 from drivers.inverter.inverter import Inverter
 from drivers.inverter.pdos import InverterPdos
 from drivers.plc.modbus_link import ModbusLink
-from drivers.plc.reading import reading
+from drivers.plc.named_registers import reading
 from drivers.plc.register import RegisterKind
 from drivers.plc.register_map import load_register_map
 from tests.campaigns.fuzz.target import Read, Target

@@ -6,9 +6,9 @@ from functools import partial
 from pathlib import Path
 
 from hil.config.rig_file import read_rig
+from hil.simulator.addresses import Address
 from hil.simulator.driveline import plant_for
 from hil.simulator.fault_table import rig_faults
-from hil.simulator.loopback import Address
 from hil.simulator.rig_server import RigServer
 from tests.docs.gallery.case import Failure, Outcome, said
 from tests.docs.gallery.draw import signals_of

@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.diagnosis.black_box import BlackBox
-from estimator.diagnosis.equivalent_line import equivalent_line
+from estimator.diagnosis.black_box import BlackBox, equivalent_line
 from estimator.diagnosis.hypotheses import open_hypotheses
 from estimator.physics.driveline import Case, Start
 from estimator.physics.free_run import free_run

@@ -10,11 +10,10 @@ import pytest
 
 from estimator.diagnosis import diagnose
 from estimator.diagnosis.chain import replay
-from estimator.diagnosis.joined import joined
 from estimator.diagnosis.noise import noise_floor
 from estimator.diagnosis.preconditions import prepare
 from estimator.diagnosis.result import Course, Discrepancy, Equivalent, Estimated, Profile, Response, Verdict
-from estimator.diagnosis.segments import FEWEST_SAMPLES, LONG_S, LONG_SAMPLES, cut, segments, tiles
+from estimator.diagnosis.segments import FEWEST_SAMPLES, LONG_S, LONG_SAMPLES, cut, joined, segments, tiles
 from estimator.errors import NotExciting
 from estimator.physics.driveline import Start
 from estimator.signals.record import Record, sliced

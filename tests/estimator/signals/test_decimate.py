@@ -11,7 +11,7 @@ import pytest
 
 from estimator.diagnosis.preconditions.thinned import MOST, with_room
 from estimator.diagnosis.segments import cut
-from estimator.diagnosis.unnamed.orders import LONGEST_TRAVEL, peaks
+from estimator.diagnosis.unnamed.forms import LONGEST_TRAVEL, peaks
 from estimator.errors import BadSetting, BadShape
 from estimator.identification.identify import identify
 from estimator.signals.decimate import HALF_LENGTH, MOST_FACTOR, Decimated, Decimator, decimate, low_pass_taps

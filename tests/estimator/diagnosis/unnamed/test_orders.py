@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from estimator.diagnosis.unnamed.orders import peaks
+from estimator.diagnosis.unnamed.forms import peaks
 
 
 def test_orders_of_waves_are_found_strongest_first() -> None:

@@ -8,10 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.diagnosis.unnamed.candidates import Pool, candidates
-from estimator.diagnosis.unnamed.ground import Ground, ground_of
-from estimator.diagnosis.unnamed.pursuit import pursue
-from estimator.diagnosis.unnamed.scene import scene
+from estimator.diagnosis.unnamed.pursuit import Pool, candidates, pursue
+from estimator.diagnosis.unnamed.scene import Ground, ground_of, scene
 from estimator.physics.effect import Element
 from estimator.signals.record import FloatArray
 from tests.estimator.diagnosis.planted import SIGMA, nominal_fit, quiet

@@ -1,0 +1,66 @@
+"""Identification of several recordings, and its files: identification.json and report.html."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+from estimator.identification.identify import identify
+from estimator.identification.modes.modes import Mode
+from estimator.identification.offline.orders import OrderChoice
+from estimator.identification.settings import Settings
+from estimator.identification.study import Compared, Study, study
+from estimator.physics.model import DrivelineModel
+from estimator.signals.record import Record
+from hil.figures.local_model import LocalModel
+from hil.provenance import Provenance
+from hil.report.identification_json import FILE_NAME, identification_text
+from hil.report.identification_page import identification_page
+from hil.report.outputs import publish
+
+PAGE = "report.html"
+
+Bar = Callable[[Sequence[Any], str], Iterable[Any]]
+"""Hands the items on, and shows how far it is."""
+
+
+def _no_bar(items: Sequence[Any], what: str) -> Iterable[Any]:
+    return items
+
+
+def identify_all(records: Sequence[Record], settings: Settings, bar: Bar = _no_bar) -> list[Study]:
+    """Identify from each recording, and examine it, also on the others."""
+    found = [identify(record, settings) for record in bar(records, "identifying")]
+    pairs = list(zip(records, found, strict=True))
+    return [
+        study(record, one, settings, [other for other in found if other is not one])
+        for record, one in bar(pairs, "examining")
+    ]
+
+
+def publish_identification(
+    folder: Path,
+    records: Sequence[Record],
+    settings: Settings,
+    studies: Sequence[Study],
+    model: DrivelineModel | None,
+    made: Provenance,
+    choice: OrderChoice | None = None,
+    compared: Sequence[Compared] = (),
+) -> tuple[str, Mode | None]:
+    """Write both files or none; return the text of the first, and the mode of the model file."""
+    models = [
+        LocalModel.with_expected(record, each.found, model) for record, each in zip(records, studies, strict=True)
+    ]
+    nominal = models[0].reference_mode
+    text = identification_text([each.found for each in studies], settings, nominal, studies, choice, compared, made)
+    page = identification_page(models, studies, choice, compared, made)
+    publish(
+        folder,
+        {
+            FILE_NAME: lambda path: path.write_text(text, encoding="utf-8"),
+            PAGE: lambda path: path.write_text(page, encoding="utf-8"),
+        },
+    )
+    return text, nominal
