@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import importlib.util
 import signal
+import time
 import weakref
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -19,7 +20,7 @@ from estimator.diagnosis.segments import tiles
 from estimator.physics.driveline import Start
 from estimator.physics.free_run import FreeRun
 from estimator.physics.model import Motion
-from estimator.physics.work import check_time, time_left_s
+from estimator.physics.work import TimeIsUp, check_time, time_left_s
 from estimator.signals.record import FloatArray, OutputKind, Record
 from hil.errors import UsageError
 from hil.plants.fmu_process import HUNG, MEMORY_BYTES, STEP_S
@@ -39,6 +40,9 @@ NUMBERS = ("Real", "Float64", "Float32")
 
 LONGEST_S = 86400.0
 """Time for a simulation of any length [s]; one that hangs is ended long before (`hil.plants.fmu_process`)."""
+
+AFTERWARDS_S = 10.0
+"""Time for a simulation once that of the whole command has been used up: what was found so far is still said [s]."""
 
 CURE = "Simulate it in the program that made it, and export it for Linux, 64 bit."
 
@@ -81,11 +85,8 @@ class FmuPlant:
             raise UsageError(
                 "expected FMPy, which simulates FMUs, got none. Install it: pip install 'hil-driveline[fmu]'"
             )
-        self._sandbox = Sandbox("hil.plants.fmu_process")
-        weakref.finalize(self, self._sandbox.end)
-        described, _ = self._asked(
-            {"what": "open", "path": str(path.absolute())}, f"{path}: expected an FMU of FMI 1.0, 2.0 or 3.0"
-        )
+        self._path, self._longest_s, self._is_ended = path.absolute(), LONGEST_S, False
+        described = self._open()
         variables = {str(each["name"]): each for each in described["variables"]}
         self._kind: str = described["kind"]
         self._mapped, self._known = tuple(mapped), tuple(variables)
@@ -93,17 +94,33 @@ class FmuPlant:
         given = {name: each for name, each in variables.items() if each["causality"] == "input"}
         self._inputs = {name: _number(each["start"]) for name, each in given.items() if each["type"] in NUMBERS}
 
+    def _open(self) -> Document:
+        """Start the FMU's process, and return what it says of itself."""
+        self._sandbox = Sandbox("hil.plants.fmu_process")
+        weakref.finalize(self, self._sandbox.end)
+        return self._asked(
+            {"what": "open", "path": str(self._path)}, f"{self._path}: expected an FMU of FMI 1.0, 2.0 or 3.0"
+        )[0]
+
     def _asked(
         self, request: Document, expected: str, columns: Mapping[str, Column] | None = None
     ) -> tuple[Document, dict[str, Column]]:
         """Have the FMU's process do something; a `UsageError` says what it did instead."""
+        check_time()
+        if self._is_ended:
+            self._is_ended = False
+            self._open()
+        limit_s, began_s = min(self._longest_s, time_left_s()), time.monotonic()
         try:
-            check_time()
-            document, answered = self._sandbox.ask(request, min(LONGEST_S, time_left_s()), columns)
+            document, answered = self._sandbox.ask(request, limit_s, columns)
         except Gone:
             status = self._sandbox.end(at_once=False)
-            check_time()  # it was ended, and did not end
-            raise UsageError(f"{expected}, got {_ended(status)}. {CURE}") from None
+            took_s = time.monotonic() - began_s
+            if time_left_s() < 0.0:  # it was ended, and did not end; one that hangs is not waited for again
+                self._longest_s, self._is_ended = AFTERWARDS_S, True
+                raise TimeIsUp from None
+            ended = f"one that does not return in {limit_s:g} s" if took_s >= limit_s else _ended(status)
+            raise UsageError(f"{expected}, got {ended}. {CURE}") from None
         except BaseException:  # Ctrl-C, for one: it may not return by itself
             self._sandbox.end()
             raise
