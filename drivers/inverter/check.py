@@ -104,11 +104,6 @@ def remarks(
         if not (setting.is_met_by(value) or setting.at_most) and _as_ordered(plan, setting, value):
             yield f"{setting} is {value}, a run gives it {setting.value} ({setting.source})"
     yield from _not_limited(sdo, plan, settings)
-    if settings.serial_number is None and plan.sheet.entry(*SERIAL_NUMBER) is not None:
-        yield (
-            f"serial number {object_name(*SERIAL_NUMBER)} is {sdo.upload(*SERIAL_NUMBER)}: write it into the rig file "
-            "(serial_number), and exchanged node ids are found"
-        )
     wanted, emcy = EMCY_COB_ID + settings.node_id, emcy_cob_id(plan)
     if emcy != wanted:
         yield (

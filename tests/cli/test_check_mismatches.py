@@ -57,7 +57,12 @@ DIFFERENCES = [
     Mismatch("vendor-ID 0x1018:01", "0x000003E7", "0x0000FFFE", faults=InverterFaults(identity=(0xFFFE, 0x402))),
     Mismatch("product code 0x1018:02", "0x00000402", "0x00000403", faults=InverterFaults(identity=(0x3E7, 0x403))),
     Mismatch("product code 0x1018:02", "0x00000501", "0x00000402", host=(rig_key("product_code", "0x501"),)),
-    Mismatch("serial number 0x1018:04", "7", "1: another drive has this", host=(rig_key("serial_number", "7"),)),
+    Mismatch(
+        "serial number 0x1018:04",
+        "7",
+        "1: another drive has this",
+        host=((r"rig: # serial_number = .*", "serial_number = 7"),),
+    ),
     Mismatch("motor rated torque 0x6076", "600 Nm", "450 Nm", device=(rig_key("rated_torque_nm", "450.0"),)),
     Mismatch(
         "max torque 0x6072", "at least the torque limit of 400 Nm", "300 Nm", device=(eds_default("6072", "500"),)

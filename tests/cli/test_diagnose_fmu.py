@@ -135,7 +135,15 @@ def test_one_that_hangs_ends_with_the_budget(
     export = ["export", "fmu", str(tmp_path / "drive.toml"), "--fmi", "2.0", "--out", str(tmp_path / "drive.fmu")]
     assert run(export) == 0
     bench.record(tmp_path / "run_1.csv", 1, n=300)
-    given = ["--model", str(tmp_path / "drive.fmu"), "--trust-fmu", "--budget-s", "20" if good else "3", "--out", str(tmp_path / "out")]
+    given = [
+        "--model",
+        str(tmp_path / "drive.fmu"),
+        "--trust-fmu",
+        "--budget-s",
+        "20" if good else "3",
+        "--out",
+        str(tmp_path / "out"),
+    ]
     capsys.readouterr()
     assert run(["diagnose", str(tmp_path / "run_1.csv"), *given]) == status
     printed = capsys.readouterr()

@@ -34,7 +34,7 @@ from hil.simulator.plc_device import PlcDevice
 from hil.simulator.rig_server import RigServer
 from tests.drivers.can_bench import M1, Bench, bench, guarded
 from tests.rig.observer import read_object
-from tests.rig.serving import ANY_PORT, small_rig
+from tests.rig.serving import ANY_PORT, changed, small_rig
 
 PERIOD_S = 0.01
 
@@ -266,7 +266,7 @@ def test_swapped_node_ids_go_with_the_drive_and_not_with_its_number() -> None:
 
 
 def test_swapped_node_ids_are_found_by_the_serial_numbers() -> None:
-    rig = small_rig()
+    rig = changed(small_rig(), {f"inverters.m{number}": {"serial_number": number} for number in (1, 2)})
     swapped = rig_faults(("bus.swapped_nodes",), rig.period_s)
     with RigServer(RigidPlant(1.0, 0.01), rig, "virtual:swapped", ANY_PORT, swapped) as server:
         at = with_addresses(rig, server.bus_url, str(server.modbus))
