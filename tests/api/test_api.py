@@ -77,9 +77,7 @@ def test_a_look_shows_channels_and_the_table_that_reads_them(recording: Path) ->
 
 def test_an_identification_shows_and_saves_itself(model: Path, recording: Path, tmp_path: Path) -> None:
     result = hil.identify(recording, model)
-    mode = result.to_dataframe().loc["run_1"]
-    assert mode["frequency_hz_low"] < mode["frequency_hz"] < mode["frequency_hz_high"]
-    assert mode["frequency_hz"] == pytest.approx(bench.RESONANCE_HZ, rel=0.05)
+    assert result.to_dataframe().loc["run_1"].isna().all()  # one mass has no resonance
     assert "best: Box-Jenkins, 95 %" in {trace.name for trace in result.plot().data}
     assert repr(result).startswith("<Identification: ")
     assert "run_1" in result._repr_html_()

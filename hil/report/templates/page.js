@@ -77,7 +77,7 @@
     div.dataset.drawn = "yes";
     Plotly.newPlot(div, ...specification(div));
     if (contents.get(div).zoom) zoomable(div, contents.get(div).zoom);
-    document.querySelectorAll(`[data-cut="${div.id}"]`).forEach((box) => cutting(div, box));
+    document.querySelectorAll("[data-cut]").forEach((box) => box.dataset.cut === div.id && cutting(div, box));
     div.addEventListener("keydown", (event) => onKey(div, event));
     reachable(div);
   }
