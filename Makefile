@@ -30,14 +30,17 @@ test: $(READY)
 kernels: $(READY)
 	$(BIN)/python -m tests.kernels
 
-# What takes too long for every change.
+# What takes too long for every change: all figures of docs/reliability.md.
 campaign: $(READY)
 	$(BIN)/python -m pytest -n 2 -m campaign
 	$(BIN)/python -m tests.campaigns.faults
 	$(BIN)/python -m tests.campaigns.faults.middle
 	$(BIN)/python -m tests.campaigns.faults.processes
+	$(BIN)/python -m tests.campaigns.kills
 	$(BIN)/python -m tests.campaigns.mutants
 	$(BIN)/python -m tests.campaigns.fuzz
+	$(BIN)/python -m tests.campaigns.day
+	$(BIN)/python -m pytest tests/browser/test_foreign_text.py tests/plants tests/rig/test_foreign_controller.py
 
 # Speed as ratios to scipy, a bare C loop, raw python-can; growth with the length, memory: docs/benchmarks.md.
 bench: $(READY)
