@@ -71,7 +71,7 @@ def test_a_run_is_not_started_where_nothing_can_be_made(refused: Refused, short_
     assert "expected a place to write" in refused("run", short_rig, "cruise", "--out", "/proc/run.csv", *NOWHERE)
 
 
-@pytest.mark.parametrize("name", ["run.csv", "run.parquet"])
+@pytest.mark.parametrize("name", ["run.csv", pytest.param("run.parquet", marks=pytest.mark.campaign)])
 def test_a_full_disk_ends_the_run_disarmed_and_keeps_what_fitted(short_rig: Path, name: str) -> None:
     folder = short_rig.parent
     with served(read_rig(short_rig), bus_url="ws://127.0.0.1:0/") as (server, _):

@@ -155,6 +155,7 @@ def test_an_experiment_off_its_limit_is_not_good() -> None:
         assert not Experiment("run", online, (0.0, 0.0), response_db).is_good
 
 
+@pytest.mark.campaign
 def test_coverage_of_the_tests_driveline() -> None:
     rates = coverage(cruises(4))
     assert set(rates) == {"resonance", "damping", "J_M", "J_L", "k", "c + b_M"}

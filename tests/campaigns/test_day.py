@@ -7,6 +7,7 @@ import pytest
 from tests.campaigns import day
 
 
+@pytest.mark.campaign
 def test_half_a_minute_of_a_day(capsys: pytest.CaptureFixture[str]) -> None:
     assert day.main(["--hours", "0.01"]) == 0
     assert "| published, 3600 rows: at most |" in capsys.readouterr().out

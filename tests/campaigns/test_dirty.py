@@ -25,6 +25,7 @@ def test_small_effects_are_some_and_small_and_not_the_strong_one_again(strong: s
             assert LEAST_PART * abs(whole[key]) <= abs(sizes[key]) <= MOST_PART * abs(whole[key])
 
 
+@pytest.mark.campaign
 def test_the_same_seed_makes_the_same_world_and_another_another() -> None:
     one, again, other = (make_dirty("brake_drag", seed)[0] for seed in (4, 4, 5))
     np.testing.assert_array_equal(one.recordings[0].speed_rad_s, again.recordings[0].speed_rad_s)

@@ -45,6 +45,7 @@ def test_a_mutant_is_the_module_with_one_change() -> None:
     assert first.line == 2
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("module", TARGETS)
 def test_what_is_listed_is_a_change_there_is(module: str) -> None:
     assert set(TARGETS[module].equivalent) <= set(changes(source_of(module).read_text("utf-8")))

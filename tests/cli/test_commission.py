@@ -106,7 +106,9 @@ def test_finding_that_blocks_is_a_device_problem(tmp_path: Path, capsys: pytest.
 
 
 @pytest.mark.timeout(300)  # a process of its own, at its own pace; a busy machine starts it late
-@pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), (signal.SIGKILL, -9)])
+@pytest.mark.parametrize(
+    ("number", "status"), [(signal.SIGINT, 130), pytest.param(signal.SIGKILL, -9, marks=pytest.mark.campaign)]
+)
 def test_signal_in_the_middle_and_the_way_on(
     number: signal.Signals, status: int, spawn: Callable[..., subprocess.Popen[str]], short_rig: Path, tmp_path: Path
 ) -> None:

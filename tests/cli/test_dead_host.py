@@ -40,7 +40,7 @@ def await_end_of_operation(bus: str, node_id: int) -> None:
         time.sleep(0.02)
 
 
-@pytest.mark.parametrize("death", [signal.SIGKILL, signal.SIGSTOP])
+@pytest.mark.parametrize("death", [signal.SIGKILL, pytest.param(signal.SIGSTOP, marks=pytest.mark.campaign)])
 def test_drives_of_a_host_that_dies_leave_operation(
     simulate: Callable[..., Any],
     spawn: Callable[..., subprocess.Popen[str]],

@@ -43,8 +43,8 @@ def test_nothing_is_named_where_nothing_is_missing() -> None:
     ("name", "values"),
     [
         ("coulomb_friction_motor", {"friction_nm": 8.0}),
-        ("actuator_lag", {"time_constant_s": 0.008}),
-        ("backlash", {"gap_rad": 0.01}),
+        pytest.param("actuator_lag", {"time_constant_s": 0.008}, marks=pytest.mark.campaign),
+        pytest.param("backlash", {"gap_rad": 0.01}, marks=pytest.mark.campaign),
     ],
 )
 def test_a_planted_effect_is_named_and_explains_all(name: str, values: Mapping[str, float]) -> None:
