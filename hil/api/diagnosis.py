@@ -109,7 +109,7 @@ def diagnose(
     holdout : the same
         Kept back to judge the explanation on.
     budget_s : float, optional
-        Time after which the best answer so far is given [s]; 30 by default.
+        Time after which it is ended, undecided [s]; without it there is no limit.
 
     Raises
     ------
@@ -126,7 +126,7 @@ def diagnose(
     return DiagnosisResult(found, file, records, made)
 
 
-def records_of(given: Recordings, file: ModelFile) -> tuple[Record, ...]:
+def records_of(given: Recordings, file: ModelFile | None) -> tuple[Record, ...]:
     """Return recordings, read where paths are given."""
     several = [given] if isinstance(given, Record | Path | str) else given
     return tuple(each if isinstance(each, Record) else read(each, model=file) for each in several)

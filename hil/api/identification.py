@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 from estimator.identification.modes.uncertainty import Uncertain
 from estimator.identification.settings import Settings
 from estimator.identification.study import Study
-from hil.api.diagnosis import Recordings, sources_of
+from hil.api.diagnosis import Recordings, records_of, sources_of
 from hil.api.models import Model, as_file
-from hil.api.record import Record, read
+from hil.api.record import Record
 from hil.config.model_file import ModelFile
 from hil.errors import UsageError
 from hil.figures.local_model import LocalModel
@@ -103,8 +103,7 @@ def identify(
         For recordings that excite nothing.
     """
     file = None if model is None else as_file(model)
-    several = [recordings] if isinstance(recordings, Record | Path | str) else recordings
-    records = tuple(each if isinstance(each, Record) else read(each, model=file) for each in several)
+    records = records_of(recordings, file)
     chosen = settings or Settings(samples=1024)
     made = provenance([Path(model)] if isinstance(model, Path | str) else [], sources_of(records))
     return IdentificationResult(identify_all(records, chosen), records, chosen, file, made)
