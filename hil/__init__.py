@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from hil.version import __version__
+
 if TYPE_CHECKING:
     from hil.api import Record, compare, diagnose, identify, look, read, read_model
 
-__version__ = "0.2.0"
-
-__all__ = ["Record", "compare", "diagnose", "identify", "look", "read", "read_model"]
+__all__ = ["Record", "__version__", "compare", "diagnose", "identify", "look", "read", "read_model"]
 
 
 def __getattr__(name: str) -> Any:
@@ -25,4 +25,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return [*__all__, "__version__"]
+    return __all__

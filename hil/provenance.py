@@ -15,7 +15,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from hil import __version__
+from hil.version import __version__
 
 _LINE: ContextVar[tuple[str, ...]] = ContextVar("_LINE", default=())
 

@@ -17,6 +17,7 @@ import typer
 from typer.completion import get_completion_script  # type: ignore[attr-defined]
 from typer.core import TyperCommand, TyperGroup
 
+from hil.cli.command_line import COMMANDS
 from hil.cli.printing import say
 from hil.support.command_log import Level
 
@@ -45,14 +46,10 @@ class Commands(TyperGroup):
 
     def list_commands(self, ctx: Any) -> list[str]:
         """Return their names."""
-        from hil.cli.main import COMMANDS
-
         return list(COMMANDS)
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         """Return what is shown of a command in a list."""
-        from hil.cli.main import COMMANDS
-
         return TyperCommand(cmd_name, help=COMMANDS[cmd_name])
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:

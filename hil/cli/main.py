@@ -13,11 +13,11 @@ import sys
 from collections.abc import Sequence
 from enum import IntEnum
 
-from hil import __version__
-from hil.cli.command_line import Call, overview, silence
+from hil.cli.command_line import COMMANDS, Call, overview, silence
 from hil.errors import HilError, InputError
 from hil.printable import shown
 from hil.rig.stop import interrupt_on_signals
+from hil.version import __version__
 
 
 class ExitStatus(IntEnum):
@@ -30,30 +30,6 @@ class ExitStatus(IntEnum):
     INTERRUPTED = 130
 
 
-COMMANDS: dict[str, str] = {
-    "demo": "The whole job with nothing connected: sealed effect, verdict, seal opened.",
-    "prove": "The proof: sealed cases, answered and opened, with a scoreboard.",
-    "sim": "Serve the simulated slaves: two inverters, PLC, driveline.",
-    "check": "Find every device, compare it with rig file and EDS; commands no torque.",
-    "commission": "Lead through commissioning: checks, experiments, models, report.",
-    "run": "Run one experiment and record it.",
-    "monitor": "Watch a rig live; start, mark and stop experiments.",
-    "replay": "Play a recording or a bus trace through the on-line estimate.",
-    "look": "What is in a recording, and the table that reads it.",
-    "convert": "Between the recording formats, and from bus traces.",
-    "runs": "The runs of a folder: list, show, compare, note, delete, export.",
-    "identify": "Identify the driveline from recordings.",
-    "paper": "The paper's figures from eight experiments on the simulated rig, or from recordings.",
-    "diagnose": "Locate the mismatch and name the missing physics.",
-    "simulate": "Free-run simulation from the measured torques.",
-    "compare": "Simulation against recording, in figures and plots.",
-    "effects": "The catalogue of effects.",
-    "rig": "Write a new rig file from a few answers; its schema for editors.",
-    "model": "Write a new model file; the schema of model files for editors.",
-    "completion": "Print the completion script of a shell.",
-    "bugreport": "Pack what a supporter needs, without secrets.",
-    "export": "Write the on-line estimator for a PLC, or the driveline as an FMU.",
-}
 """Each command's line in ``hil --help``; the command itself is ``app`` in ``hil.cli.<name>``."""
 
 

@@ -17,10 +17,10 @@ from typing import IO, Annotated, Any, Final, Literal
 from pydantic import Field, TypeAdapter, ValidationError
 
 from estimator.physics.model import DrivelineModel
-from hil import __version__
 from hil.commission.evidence import EVIDENCE, Both, ModelEvidence, Utc
 from hil.errors import UsageError
 from hil.files import is_inside, read_json
+from hil.version import __version__
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,10 +18,10 @@ from inspect import cleandoc
 from typing import Final
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
-from hil import __version__
 from hil.export import Tc6
 from hil.export.plc_estimator import PlcEstimator
 from hil.export.structured_text import Precision, parts
+from hil.version import __version__
 
 
 class PouKind(Enum):

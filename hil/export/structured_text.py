@@ -23,8 +23,8 @@ from estimator.identification.modes.modes import LIGHTLY_DAMPED
 from estimator.identification.online import adaptation, regression
 from estimator.identification.tracking import follow, poles
 from estimator.signals.decimate import UNTRUSTED
-from hil import __version__
 from hil.export.plc_estimator import PlcEstimator
+from hil.version import __version__
 
 POUS: Final = (
     "FB_HilDecimator", "FB_HilGain", "FB_HilOefo", "FB_HilExcitation", "FB_HilEstimator", "PRG_HilExample",

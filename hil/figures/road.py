@@ -16,7 +16,6 @@ from estimator.identification.identify import identify
 from estimator.identification.settings import Settings
 from estimator.physics.model import DrivelineModel
 from estimator.signals.record import Record
-from hil import __version__
 from hil.config.experiment_tables import CruiseTable
 from hil.config.rig_file import Rig, read_rig
 from hil.errors import UsageError
@@ -35,6 +34,7 @@ from hil.rig.stop import StopRequest
 from hil.simulator.addresses import IN_PROCESS, Address, with_addresses
 from hil.simulator.driveline import simulation_model
 from hil.simulator.rig_server import RigServer, required_simulation
+from hil.version import __version__
 
 PRBS_STATES = 1023
 """States of a ten-cell shift register."""

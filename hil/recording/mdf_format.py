@@ -19,7 +19,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hil import __version__
 from hil.recording import columns
 from hil.recording.checksum import RIG_TEXT
 from hil.recording.description import described_table, description_of, metadata_of
@@ -35,6 +34,7 @@ from hil.recording.mdf_file import (
 )
 from hil.recording.request import Request
 from hil.recording.table import Column, Kind, Table, as_column
+from hil.version import __version__
 
 if TYPE_CHECKING:
     from asammdf import MDF, Signal

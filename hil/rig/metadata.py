@@ -7,9 +7,9 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from drivers.resources import data_file
-from hil import __version__
 from hil.config.rig_file import read_rig
 from hil.recording.checksum import RIG_CHECKSUM, RIG_TEXT, text_sha256
+from hil.version import __version__
 
 
 def run_metadata(rig_path: Path, experiment: str) -> dict[str, str]:

@@ -15,10 +15,10 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from hil import __version__
 from hil.errors import InputError, UsageError
 from hil.support.command_log import VARIABLE, log_file
 from hil.support.redact import Redaction
+from hil.version import __version__
 
 ABOUT = """What is in this report, for whoever is asked to send it: read it before you do.
 

@@ -20,9 +20,9 @@ from logging.handlers import RotatingFileHandler
 from pathlib import Path
 from typing import Final
 
-from hil import __version__
 from hil.errors import UsageError
 from hil.support.redact import Redaction
+from hil.version import __version__
 
 
 def state_folder() -> Path:

@@ -9,7 +9,8 @@ import pytest
 
 from drivers.errors import BusDown, CommandRefused, ConfigMismatch, DeviceFault, DeviceTimeout, ProtocolViolation
 from estimator.errors import BadModel, EstimatorError
-from hil.cli.main import COMMANDS, ExitStatus, exit_status, run
+from hil.cli.command_line import COMMANDS
+from hil.cli.main import ExitStatus, exit_status, run
 from hil.errors import RecordingError, RigFileError, RunAborted, UsageError
 from tests.bad_input.conftest import Refused
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import typer
 
-from hil.cli.main import COMMANDS
+from hil.cli.command_line import COMMANDS
 
 
 def command(name: str) -> Any:

@@ -7,8 +7,8 @@ import sys
 
 import pytest
 
-from hil.cli.command_line import SPEAKERS, Call, overview
-from hil.cli.main import COMMANDS, run
+from hil.cli.command_line import COMMANDS, SPEAKERS, Call, overview
+from hil.cli.main import run
 from hil.errors import UsageError
 
 

@@ -12,7 +12,8 @@ from pathlib import Path
 import pytest
 
 from estimator.physics.catalogue import EFFECTS
-from hil.cli.main import COMMANDS, run
+from hil.cli.command_line import COMMANDS
+from hil.cli.main import run
 
 RIG = Path(__file__).resolve().parents[2] / "examples" / "rig.toml"
 HIL = Path(sys.executable).with_name("hil")

@@ -11,8 +11,8 @@ from enum import Enum
 from pathlib import Path
 from typing import Any, Final, get_args
 
-from hil.cli.command_line import OPTIONS
-from hil.cli.main import COMMANDS, ExitStatus
+from hil.cli.command_line import COMMANDS, OPTIONS
+from hil.cli.main import ExitStatus
 from tests.cli.command_lines import command, examples
 
 PAGE = Path(__file__).parents[2] / "docs" / "reference-commands.md"

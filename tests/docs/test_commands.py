@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from hil.cli.main import COMMANDS, ExitStatus
+from hil.cli.command_line import COMMANDS
+from hil.cli.main import ExitStatus
 from tests.cli.command_lines import command, parse
 from tests.docs import commands_page
 from tests.docs.pages import ROOT, command_lines, mentioned_commands, pages

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from datetime import datetime
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
-from hil import __version__
 from hil.export.fmu.driveline import Variable
+from hil.version import __version__
 
 IDENTIFIER = "driveline"
 """Name of the binary and prefix of nothing else: the functions are exported by their own names."""
