@@ -325,7 +325,8 @@ def _also(fault: Fault, server: RigServer, stack: ExitStack) -> Callable[[], Non
 def _judge_shaft(rig: Rig, man: Man, shaft: Shaft, fastest_rad_s: float, outcome: Outcome) -> None:
     """Sum up how far each torque was outside what the host asked for: beyond the stated impulse nothing may follow."""
     error = rig.guard_limits.error
-    time_s = NO_TORQUE_S if man.kind == "limit bit, no torque" else error.time_s
+    own = {"limit bit, no torque": NO_TORQUE_S, "stuck and frozen": rig.guard_limits.feedback_timeout_s}
+    time_s = own.get(man.kind, error.time_s)  # a drive that shows nothing of it is judged by another row of the table
     for drive, limit_nm in ((0, error.m1_nm), (1, error.m2_nm)):
         impulse = length = 0.0
         for k, (given, _) in enumerate(zip(shaft.torques_nm, man.asked_nm, strict=False)):
