@@ -294,8 +294,8 @@ def _cells(table: Table, path: Path, name: str) -> Iterable[str]:
 
 
 def _quoted(text: str) -> str:
-    """Quote a text with anything in it that a reader could take for a delimiter, or that would leave a line empty."""
-    unclear = not text or any(c in text for c in f'{SPECIAL}"')
+    """Quote a text with anything in it that a reader could take for a delimiter, or that would leave a line blank."""
+    unclear = not text.strip() or any(c in text for c in f'{SPECIAL}"')
     return '"' + text.replace('"', '""') + '"' if unclear else text
 
 

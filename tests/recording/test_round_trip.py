@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from hil.errors import RecordingError
@@ -46,6 +46,7 @@ def tables(draw: st.DrawFn) -> Table:
 
 
 @given(tables(), st.permutations(WRITABLE))
+@example(Table(Path("a.csv"), {"0": as_text([" ", ""])}), list(WRITABLE))
 @settings(max_examples=60, deadline=None)
 def test_through_every_format_in_any_order_nothing_is_lost(table: Table, order: list[str]) -> None:
     with tempfile.TemporaryDirectory() as folder:
