@@ -31,7 +31,7 @@ from drivers.inverter.drive_settings import (
 from drivers.inverter.settings import InverterSettings
 
 SERIAL_NUMBER: Final = (0x1018, 4)
-"""Object and entry: the one thing that tells two drives of one kind apart."""
+"""Object and entry: the one thing in which two drives of one kind differ."""
 
 
 @dataclass(frozen=True, slots=True)

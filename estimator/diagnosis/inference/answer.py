@@ -38,7 +38,7 @@ from estimator.diagnosis.inference.judge import (
 )
 from estimator.diagnosis.inference.likelihood import SAME, Hypothesis, fitted, of_first_outputs
 from estimator.diagnosis.inference.remainder import Test, tests, tests_in_words
-from estimator.diagnosis.inference.rivals import FreeLine, Law, best_law, free_line, hunts_around, rival_laws
+from estimator.diagnosis.inference.rivals import FreeLine, Law, best_law, free_line, rival_laws, searches_around
 from estimator.diagnosis.inference.search import Search
 from estimator.diagnosis.inference.wording import Context, law_in_words, statement
 from estimator.diagnosis.noise import noise_floor
@@ -60,7 +60,7 @@ from estimator.diagnosis.result import (
     UntestableEffect,
     Verdict,
 )
-from estimator.diagnosis.unnamed import Hunt
+from estimator.diagnosis.unnamed import ElementSearch
 from estimator.diagnosis.where import discrepancy, locate
 from estimator.physics.effect import Element, Untestable
 from estimator.physics.fit import not_fitted
@@ -164,7 +164,7 @@ class _Seen:
     decision: Decision
     believed: Hypothesis
     failed: tuple[Test, ...]
-    hunts: list[Hunt]
+    searches: list[ElementSearch]
     alone: Law | None
     left: Law | None
     strays: tuple[Stray, ...] = ()
@@ -179,20 +179,20 @@ def _seen(search: Search, ground: Grounds) -> _Seen:
     if not failed and not ground.best.effects:
         return _Seen(decide(search, ground), ground.nothing, (), [], None, None)
     nothing, best = of_first_outputs(ground.nothing), of_first_outputs(ground.best)
-    hunts = hunts_around(nothing)
-    alone = best_law(nothing, hunts)
-    added = alone if ground.best is ground.nothing else best_law(best, hunts_around(best))
+    searches = searches_around(nothing)
+    alone = best_law(nothing, searches)
+    added = alone if ground.best is ground.nothing else best_law(best, searches_around(best))
     sheet = free_line(search)
     decision = decide(search, ground, (*rival_laws(ground, alone, added), *_off_the_sheet(sheet)))
     believed = _without_doubted(search, decision)
     if not decision.named:
         strays = sheet.strays if sheet is not None and sheet.leaves_noise else ()
-        return _Seen(decision, ground.nothing, failed or (), hunts, alone, alone, strays)
+        return _Seen(decision, ground.nothing, failed or (), searches, alone, alone, strays)
     if believed is ground.best:
-        return _Seen(decision, believed, failed, hunts, alone, added if failed else None)
+        return _Seen(decision, believed, failed, searches, alone, added if failed else None)
     failed, first = tuple(test for test in tests(believed) if test.failed), of_first_outputs(believed)
-    left = best_law(first, hunts_around(first)) if failed else None
-    return _Seen(decision, believed, failed, hunts, alone, left)
+    left = best_law(first, searches_around(first)) if failed else None
+    return _Seen(decision, believed, failed, searches, alone, left)
 
 
 def _off_the_sheet(sheet: FreeLine | None) -> tuple[Score, ...]:
@@ -281,7 +281,7 @@ def _abstained(seen: _Seen, runs: FreeRuns, reason: str) -> tuple[_Seen, FreeRun
     nothing = decision.nothing
     failed = tuple(test for test in tests(nothing) if test.failed)
     runs = replace(runs, believed=nothing, is_whole=False, after=runs.before, held_after=runs.held_before)
-    return _Seen(decision, nothing, failed or seen.failed, seen.hunts, seen.alone, seen.alone, seen.strays), runs
+    return _Seen(decision, nothing, failed or seen.failed, seen.searches, seen.alone, seen.alone, seen.strays), runs
 
 
 def _undecided(
@@ -380,7 +380,7 @@ def _discrepancy(seen: _Seen, line: DrivelineModel) -> Discrepancy:
     noise = noise_of(seen.decision.best)
     nothing, believed = of_first_outputs(seen.decision.nothing), seen.believed.plain.first_outputs()
     return discrepancy(
-        nothing.plain, believed, noise, line.motion, rounds=1, begun=seen.hunts, whitening=nothing.filter
+        nothing.plain, believed, noise, line.motion, rounds=1, begun=seen.searches, whitening=nothing.filter
     )
 
 

@@ -23,7 +23,7 @@ from estimator.diagnosis.inference.likelihood import (
 from estimator.diagnosis.inference.remainder import tests
 from estimator.diagnosis.inference.search import Search
 from estimator.diagnosis.result import Stray
-from estimator.diagnosis.unnamed import Hunt, hunts_of, scene
+from estimator.diagnosis.unnamed import ElementSearch, scene, searches_at
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Element
 from estimator.physics.fit import not_fitted
@@ -117,41 +117,41 @@ class Law:
     rms: float
 
 
-def hunts_around(hypothesis: Hypothesis) -> list[Hunt]:
+def searches_around(hypothesis: Hypothesis) -> list[ElementSearch]:
     """Look for the best law to add to a hypothesis at every element; none inside a plant simulated elsewhere."""
     if hypothesis.plain.problem.grid.plant is not None:
         return []
     noise = float(reading_noise(hypothesis.sizes)[0])
-    return hunts_of(scene(hypothesis.plain, noise, hypothesis.filter), LOOKING_ROUNDS)
+    return searches_at(scene(hypothesis.plain, noise, hypothesis.filter), LOOKING_ROUNDS)
 
 
-def best_law(hypothesis: Hypothesis, hunts: Sequence[Hunt]) -> Law | None:
+def best_law(hypothesis: Hypothesis, searches: Sequence[ElementSearch]) -> Law | None:
     """Return the law with which the recordings are most probable; None where they are more probable without one."""
     white = hypothesis.filter(hypothesis.plain.residual)
     before = float(white @ white) / white.size
-    laws = [_scored(hypothesis, hunt, before, math.log(len(hunts))) for hunt in hunts if hunt.law.terms]
+    laws = [_scored(hypothesis, search, before, math.log(len(searches))) for search in searches if search.law.terms]
     best = min(laws, key=lambda law: law.score, default=None)
     return best if best is not None and best.score < hypothesis.score else None
 
 
-def _scored(hypothesis: Hypothesis, hunt: Hunt, before: float, places: float) -> Law:
+def _scored(hypothesis: Hypothesis, search: ElementSearch, before: float, places: float) -> Law:
     """Return a law with its score: that of its innovations, or with disturbances estimated anew where it is simulated.
 
     With all disturbances in one proportion minus twice the log-likelihood falls by ``n log(Q / Q')``, Q the squared
     innovations; estimated anew it falls further.
     """
     n = hypothesis.plain.residual.size
-    score = hypothesis.score - hunt.law.information(before, hunt.mean_square, n) + 2.0 * places
-    is_simulated = any(weights.any() for weights in hunt.weights)
+    score = hypothesis.score - search.law.information(before, search.mean_square, n) + 2.0 * places
+    is_simulated = any(weights.any() for weights in search.weights)
     if is_simulated:
-        paid = hunt.law.coefficients * math.log(n) + 2.0 * (hunt.law.choices + places)
+        paid = search.law.coefficients * math.log(n) + 2.0 * (search.law.choices + places)
         own = hypothesis.score - hypothesis.minus_twice_log
-        score = min(score, _minus_twice_log(hypothesis, hunt) + own + paid)
-    return Law(hunt.element, hunt.law.terms, score, _rms(hunt))
+        score = min(score, _minus_twice_log(hypothesis, search) + own + paid)
+    return Law(search.element, search.law.terms, score, _rms(search))
 
 
-def _minus_twice_log(hypothesis: Hypothesis, hunt: Hunt) -> float:
-    result = hunt.view.result
+def _minus_twice_log(hypothesis: Hypothesis, search: ElementSearch) -> float:
+    result = search.view.result
     error = np.concatenate(
         [
             (out - record.output)[use]
@@ -161,9 +161,9 @@ def _minus_twice_log(hypothesis: Hypothesis, hunt: Hunt) -> float:
     return estimated(result, error, hypothesis.sizes, hypothesis.limits, ROUNDS)[1]
 
 
-def _rms(hunt: Hunt) -> float:
+def _rms(search: ElementSearch) -> float:
     """Return the RMS of the error with a law, each recording's load torque and initial state as they leave least."""
-    result = hunt.view.result
+    result = search.view.result
     problem, without = result.problem, outputs_at(result.problem, result.x)
     left = count = 0.0
     for i, (record, use, out) in enumerate(zip(problem.records, problem.use, result.outputs, strict=True)):

@@ -1,6 +1,6 @@
 """Laws without a name: at each element the best sparse sum of functions, the rival that every name must beat."""
 
-from estimator.diagnosis.unnamed.hunt import Hunt, without_law
+from estimator.diagnosis.unnamed.element_search import ElementSearch, without_law
 from estimator.diagnosis.unnamed.laws import LAGS
 from estimator.diagnosis.unnamed.scene import Filter, Scene, scene
 from estimator.diagnosis.unnamed.search import (
@@ -9,24 +9,24 @@ from estimator.diagnosis.unnamed.search import (
     best_of,
     best_unnamed,
     each_of,
-    hunts_of,
     judged,
+    searches_at,
     unnamed_laws,
 )
 
 __all__ = [
     "LAGS",
     "ROUNDS",
+    "ElementSearch",
     "Filter",
-    "Hunt",
     "Scene",
     "UnnamedLaw",
     "best_of",
     "best_unnamed",
     "each_of",
-    "hunts_of",
     "judged",
     "scene",
+    "searches_at",
     "unnamed_laws",
     "without_law",
 ]

@@ -17,7 +17,7 @@ from scipy import stats
 
 from estimator.diagnosis.line import PLACES, Place
 from estimator.diagnosis.noise import SMALLEST_P, Gain, noise_floor
-from estimator.diagnosis.unnamed.hunt import Hunt, again, first, first_along_motion
+from estimator.diagnosis.unnamed.element_search import ElementSearch, again, first, first_along_motion
 from estimator.diagnosis.unnamed.pursuit import MOST_COEFFICIENTS
 from estimator.diagnosis.unnamed.scene import Scene, elements, ground_of, scene
 from estimator.physics.effect import Element
@@ -71,7 +71,7 @@ def best_of(laws: Sequence[UnnamedLaw]) -> UnnamedLaw | None:
 def unnamed_laws(result: FitResult, rounds: int = 1) -> list[UnnamedLaw]:
     """Return the best law of each element that has candidates."""
     view = scene(result, noise_floor(result.problem.records))
-    return judged(view, hunts_of(view, rounds))
+    return judged(view, searches_at(view, rounds))
 
 
 def each_of(result: FitResult, search: Callable[[Item], Found], items: Sequence[Item]) -> list[Found]:
@@ -79,50 +79,50 @@ def each_of(result: FitResult, search: Callable[[Item], Found], items: Sequence[
     return (concurrently if result.residual.size <= MOST_AT_ONCE else in_turn)(search, items)
 
 
-def judged(view: Scene, hunts: Sequence[Hunt]) -> list[UnnamedLaw]:
-    """Return what each hunt has found, weighed with one number of independent samples."""
-    best = min(hunts, key=lambda hunt: hunt.mean_square)
+def judged(view: Scene, searches: Sequence[ElementSearch]) -> list[UnnamedLaw]:
+    """Return what each state has found, weighed with one number of independent samples."""
+    best = min(searches, key=lambda state: state.mean_square)
     n = max(effective_samples(best.errors), best.ground.unknowns + MOST_COEFFICIENTS + 2.0)
     before = sum(float(error @ error) for error in view.errors)
-    return [_law(hunt, n, before / best.ground.error.size) for hunt in hunts]
+    return [_law(state, n, before / best.ground.error.size) for state in searches]
 
 
-def hunts_of(view: Scene, rounds: int = 1, begun: Sequence[Hunt] = ()) -> list[Hunt]:
+def searches_at(view: Scene, rounds: int = 1, begun: Sequence[ElementSearch] = ()) -> list[ElementSearch]:
     """Look for a law at every element, and again where it is among the best.
 
     ``begun`` is what earlier rounds have found in the same fit, where there were any.
     """
-    hunts = list(begun) or each_of(view.result, partial(first, view, ground_of(view)), elements(view.result))
-    behind = max(hunt.rounds for hunt in hunts)
+    searches = list(begun) or each_of(view.result, partial(first, view, ground_of(view)), elements(view.result))
+    behind = max(state.rounds for state in searches)
     if behind < 2 <= rounds:
-        hunts = each_of(view.result, partial(_tried, view), hunts)
+        searches = each_of(view.result, partial(_tried, view), searches)
     at_rest = set[int]()
     for done in range(max(behind, 2), rounds):
-        least = min(hunt.mean_square for hunt in hunts)
-        near = [i for i, h in enumerate(hunts) if not h.stuck and h.mean_square <= IN_REACH**2 * least]
+        least = min(state.mean_square for state in searches)
+        near = [i for i, h in enumerate(searches) if not h.stuck and h.mean_square <= IN_REACH**2 * least]
         further = [i for i in near if i not in at_rest]
-        for i, moved in zip(further, each_of(view.result, again, [hunts[i] for i in further]), strict=True):
-            had, hunts[i] = hunts[i].mean_square, moved
+        for i, moved in zip(further, each_of(view.result, again, [searches[i] for i in further]), strict=True):
+            had, searches[i] = searches[i].mean_square, moved
             if done + 1 >= LEAST_ROUNDS and moved.mean_square > (1.0 - WORTH_A_ROUND) * had:
                 at_rest.add(i)
-    return [replace(hunt, rounds=max(rounds, behind)) for hunt in hunts]
+    return [replace(state, rounds=max(rounds, behind)) for state in searches]
 
 
-def _tried(view: Scene, begun: Hunt) -> Hunt:
+def _tried(view: Scene, begun: ElementSearch) -> ElementSearch:
     """Look again from the fit alone, and along the motion of an unknown input; return what simulates better."""
     starts = [begun]
     if PLACES[begun.element] is not Place.SENSOR:
         starts.append(first_along_motion(view, begun.ground, begun.element))
-    return min((again(start) for start in starts), key=lambda hunt: (hunt.stuck, hunt.mean_square))
+    return min((again(start) for start in starts), key=lambda state: (state.stuck, state.mean_square))
 
 
-def _law(hunt: Hunt, n: float, before: float) -> UnnamedLaw:
-    q = hunt.law.coefficients
+def _law(state: ElementSearch, n: float, before: float) -> UnnamedLaw:
+    q = state.law.coefficients
     if q == 0:
-        return UnnamedLaw(hunt.element, (), Gain(0.0, 1.0, n), math.sqrt(before))
-    gained = hunt.law.information(before, hunt.mean_square, n)
-    rest = max(n - hunt.ground.unknowns - q, 1.0)
-    f_value = max(before / hunt.mean_square - 1.0, 0.0) * rest / q
-    log_p = float(stats.f.logsf(f_value, q, rest)) + hunt.law.choices
+        return UnnamedLaw(state.element, (), Gain(0.0, 1.0, n), math.sqrt(before))
+    gained = state.law.information(before, state.mean_square, n)
+    rest = max(n - state.ground.unknowns - q, 1.0)
+    f_value = max(before / state.mean_square - 1.0, 0.0) * rest / q
+    log_p = float(stats.f.logsf(f_value, q, rest)) + state.law.choices
     p_value = max(math.exp(min(log_p, 0.0)), SMALLEST_P)
-    return UnnamedLaw(hunt.element, hunt.law.terms, Gain(gained, p_value, n), math.sqrt(hunt.mean_square))
+    return UnnamedLaw(state.element, state.law.terms, Gain(gained, p_value, n), math.sqrt(state.mean_square))

@@ -25,7 +25,17 @@ from estimator.diagnosis.line import (
 )
 from estimator.diagnosis.noise import VERY_STRONG
 from estimator.diagnosis.result import Course, Discrepancy, Equivalent, LawPicture, RankedLaw
-from estimator.diagnosis.unnamed import ROUNDS, Filter, Hunt, Scene, UnnamedLaw, hunts_of, judged, scene, without_law
+from estimator.diagnosis.unnamed import (
+    ROUNDS,
+    ElementSearch,
+    Filter,
+    Scene,
+    UnnamedLaw,
+    judged,
+    scene,
+    searches_at,
+    without_law,
+)
 from estimator.diagnosis.where.locate import error_spectrum, responses
 from estimator.physics import model
 from estimator.physics.catalogue import EFFECTS
@@ -201,19 +211,19 @@ def discrepancy(
     floor: float,
     motion: model.Motion = model.Motion.ROTATION,
     rounds: int | None = None,
-    begun: Sequence[Hunt] = (),
+    begun: Sequence[ElementSearch] = (),
     whitening: Filter | None = None,
 ) -> Discrepancy:
     """Look at what a re-tuned model lacks, with the effects found or, without any, with laws without a name."""
     view = scene(retuned, floor, whitening)
     named = effects_added(retuned, final)
-    hunts = hunts_of(view, rounds or (1 if named else ROUNDS), begun)
-    laws = sorted(judged(view, hunts), key=lambda law: -law.gain.delta_bic)
+    searches = searches_at(view, rounds or (1 if named else ROUNDS), begun)
+    laws = sorted(judged(view, searches), key=lambda law: -law.gain.delta_bic)
     best = laws[0] if laws and laws[0].gain.delta_bic > 0.0 else None
     if named:
         pictures = _pictures_of_effects(named, final, floor, motion)
     else:
-        pictures = _picture_of_law(best, hunts, floor, motion)
+        pictures = _picture_of_law(best, searches, floor, motion)
     return Discrepancy(
         element=None if best is None else best.element,
         laws=tuple(
@@ -289,23 +299,23 @@ def without_effect(result: FitResult, name: str) -> FitResult:
 
 
 def _picture_of_law(
-    best: UnnamedLaw | None, hunts: Sequence[Hunt], floor: float, motion: model.Motion
+    best: UnnamedLaw | None, searches: Sequence[ElementSearch], floor: float, motion: model.Motion
 ) -> tuple[LawPicture, ...]:
     if best is None:
         return ()
-    hunt = next(each for each in hunts if each.element is best.element)
-    if not any(weights.any() for weights in hunt.weights):
+    state = next(each for each in searches if each.element is best.element)
+    if not any(weights.any() for weights in state.weights):
         return ()
-    motions = hunt.view.motions(hunt.element)
-    outputs = hunt.view.result.outputs
+    motions = state.view.motions(state.element)
+    outputs = state.view.result.outputs
     drawn = picture(
         " + ".join(name for name, _ in best.terms[:3]),
         best.element,
-        without_law(hunt),
+        without_law(state),
         outputs,
         motions,
         floor,
         motion,
-        hunt.view.cut[0].length,
+        state.view.cut[0].length,
     )
     return () if drawn is None else (drawn,)

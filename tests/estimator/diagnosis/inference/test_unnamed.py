@@ -10,7 +10,7 @@ import pytest
 
 from estimator.diagnosis.hypotheses import everything, open_hypotheses
 from estimator.diagnosis.inference.judge import Grounds, decide, free_rms, grounds
-from estimator.diagnosis.inference.rivals import Law, best_law, hunts_around, rival_laws
+from estimator.diagnosis.inference.rivals import Law, best_law, rival_laws, searches_around
 from estimator.diagnosis.inference.search import Search
 from estimator.diagnosis.unnamed import scene
 from estimator.physics.effect import Element
@@ -27,13 +27,13 @@ def searched(records: list[Record]) -> Search:
 
 def test_in_noise_no_law_pays_for_itself() -> None:
     nothing = searched(quiet()).nothing()
-    assert best_law(nothing, hunts_around(nothing)) is None
+    assert best_law(nothing, searches_around(nothing)) is None
 
 
 def test_a_planted_law_is_scored_by_the_likelihood_it_gains() -> None:
     """Simulated with the law the recordings are as probable as noise alone, at the price of its unknowns and choice."""
     planted = searched(recordings(Element.MOTOR, lambda m: m.speed * np.abs(m.speed), 0.1)).nothing()
-    found = best_law(planted, hunts_around(planted))
+    found = best_law(planted, searches_around(planted))
     assert found is not None
     assert found.element is Element.MOTOR
     assert found.terms[0] == ("w_M |w_M|", pytest.approx(0.1, rel=0.1))

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.diagnosis.unnamed.hunt import Hunt
+from estimator.diagnosis.unnamed.element_search import ElementSearch
 from estimator.diagnosis.unnamed.scene import scene
-from estimator.diagnosis.unnamed.search import LEAST_ROUNDS, ROUNDS, best_unnamed, hunts_of, unnamed_laws
+from estimator.diagnosis.unnamed.search import LEAST_ROUNDS, ROUNDS, best_unnamed, searches_at, unnamed_laws
 from estimator.physics.driveline import Start
 from estimator.physics.effect import Element
 from tests.estimator.diagnosis.planted import SIGMA, Law, nominal_fit, quiet, recordings
@@ -137,21 +137,22 @@ def test_a_law_is_looked_for_again_for_as_long_as_that_helps(
     """At any element in reach, be it the best or not, and at that alone; the first two looks are from the fit alone."""
     view = scene(nominal_fit(quiet((1,))), SIGMA)
     first = [
-        replace(hunt, rounds=2, mean_square=SIGMA**2 * (1 + i), stuck=i > 1) for i, hunt in enumerate(hunts_of(view))
+        replace(state, rounds=2, mean_square=SIGMA**2 * (1 + i), stuck=i > 1)
+        for i, state in enumerate(searches_at(view))
     ]
     looks: list[Element] = []
 
-    def again(hunt: Hunt) -> Hunt:
-        looks.append(hunt.element)
-        fall = falls[looks.count(hunt.element) - 1] if hunt.element is first[1].element else 0.0
-        return replace(hunt, mean_square=(1.0 - fall) * hunt.mean_square)
+    def again(state: ElementSearch) -> ElementSearch:
+        looks.append(state.element)
+        fall = falls[looks.count(state.element) - 1] if state.element is first[1].element else 0.0
+        return replace(state, mean_square=(1.0 - fall) * state.mean_square)
 
     monkeypatch.setattr("estimator.diagnosis.unnamed.search.again", again)
-    found = hunts_of(view, ROUNDS, first)
+    found = searches_at(view, ROUNDS, first)
     assert looks.count(first[1].element) == rounds - 2
     assert looks.count(first[0].element) == LEAST_ROUNDS - 2
-    assert set(looks) == {hunt.element for hunt in first[:2]}
-    assert {hunt.rounds for hunt in found} == {ROUNDS}
+    assert set(looks) == {state.element for state in first[:2]}
+    assert {state.rounds for state in found} == {ROUNDS}
 
 
 def test_single_readings_that_are_off_are_the_acquisitions() -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from estimator.diagnosis.hypotheses import NOTHING, everything
-from estimator.diagnosis.unnamed import ROUNDS, hunts_of, scene
+from estimator.diagnosis.unnamed import ROUNDS, scene, searches_at
 from estimator.diagnosis.where.discrepancy import discrepancy, effects_added, without_effect
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult
@@ -99,6 +99,6 @@ class TestPlaces:
 @pytest.mark.parametrize("rounds", [1, ROUNDS])
 def test_what_a_first_look_has_found_is_not_looked_for_again(rounds: int, monkeypatch: pytest.MonkeyPatch) -> None:
     result = nominal_fit(recordings(Element.SHAFT, lambda m: np.tanh(m.twist / 1e-3), 5.0))
-    plain, begun = discrepancy(result, result, SIGMA, rounds=rounds), hunts_of(scene(result, SIGMA))
+    plain, begun = discrepancy(result, result, SIGMA, rounds=rounds), searches_at(scene(result, SIGMA))
     monkeypatch.setattr("estimator.diagnosis.unnamed.search.first", None)
     assert discrepancy(result, result, SIGMA, rounds=rounds, begun=begun).laws == plain.laws

@@ -65,7 +65,7 @@ NO_LAW = Found((), 0, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
-class Hunt:
+class ElementSearch:
     """The state of the search at one element.
 
     Attributes
@@ -104,50 +104,50 @@ class Hunt:
     rounds: int = 1
 
 
-def worthwhile(hunt: Hunt) -> int:
+def worthwhile(state: ElementSearch) -> int:
     """Return how many terms of a path are worth their coefficients and take no more force than the line has."""
-    path, ground = hunt.path, hunt.ground
+    path, ground = state.path, state.ground
     _, left = path.solved(len(path.chosen), RIDGE)
     n = effective_samples(ground.split(left))
     best, terms = 0.0, 0
     for count in range(1, len(path.chosen) + 1):
-        gained = cost(hunt, count).information(path.squares[0], path.squares[count], n)
+        gained = cost(state, count).information(path.squares[0], path.squares[count], n)
         if gained <= best:
             continue
         coefficients = path.weighed(count, RIDGE)
-        if rms(weights_of(hunt, count, coefficients)) <= MOST_FORCE * _in_use(hunt):
+        if rms(weights_of(state, count, coefficients)) <= MOST_FORCE * _in_use(state):
             best, terms = gained, count
     return terms
 
 
-def cost(hunt: Hunt, terms: int, named: tuple[tuple[str, float], ...] = ()) -> Found:
+def cost(state: ElementSearch, terms: int, named: tuple[tuple[str, float], ...] = ()) -> Found:
     """Return the law of the first terms of a path, with what it costs."""
-    return Found(named, hunt.path.coefficients[terms], terms * math.log(hunt.pool))
+    return Found(named, state.path.coefficients[terms], terms * math.log(state.pool))
 
 
-def weights_of(hunt: Hunt, terms: int, coefficients: FloatArray) -> list[FloatArray]:
+def weights_of(state: ElementSearch, terms: int, coefficients: FloatArray) -> list[FloatArray]:
     """Return the first terms of a path as one function of time per recording, shape (B,)."""
-    motions = hunt.view.motions(hunt.element)
-    built = [hunt.forms[i].build(motions) for i in hunt.path.chosen[:terms]]
+    motions = state.view.motions(state.element)
+    built = [state.forms[i].build(motions) for i in state.path.chosen[:terms]]
     return [np.hstack([form[i] for form in built]) @ coefficients for i in range(len(motions))]
 
 
-def terms_of(hunt: Hunt, terms: int, coefficients: FloatArray) -> tuple[tuple[str, float], ...]:
+def terms_of(state: ElementSearch, terms: int, coefficients: FloatArray) -> tuple[tuple[str, float], ...]:
     """Return the first terms of a path by name, with their coefficients; see ``Found``."""
-    motions = hunt.view.motions(hunt.element)
-    term = hunt.path.term[hunt.path.term < terms]
+    motions = state.view.motions(state.element)
+    term = state.path.term[state.path.term < terms]
     found = []
-    for i, each in enumerate(hunt.path.chosen[:terms]):
+    for i, each in enumerate(state.path.chosen[:terms]):
         mine = coefficients[term == i]
-        form = hunt.forms[each]
+        form = state.forms[each]
         value = float(mine[0]) if mine.size == 1 else float(np.std(np.vstack(form.build(motions)) @ mine))
         found.append((form.law, value))
     return tuple(found)
 
 
-def _in_use(hunt: Hunt) -> float:
-    at_sensor = PLACES[hunt.element] is Place.SENSOR
-    return rms([line.reading.speed if at_sensor else line.motion.torque for line in hunt.view.cut])
+def _in_use(state: ElementSearch) -> float:
+    at_sensor = PLACES[state.element] is Place.SENSOR
+    return rms([line.reading.speed if at_sensor else line.motion.torque for line in state.view.cut])
 
 
 def rms(parts: Sequence[FloatArray]) -> float:
@@ -159,27 +159,27 @@ NEIGHBOURS = 7
 """A reading is held against the median of so many around it: a swing of the line lasts longer."""
 
 FALSE_ALARM = 0.01
-"""Probability that normal noise makes one stray in all recordings."""
+"""Probability that normal noise makes one outlier in all recordings."""
 
 WITHIN = 0.9
-"""Share of the values from which their spread is estimated: few of those are their neighbours' median, none a stray."""
+"""Share of the values from which their spread is estimated: few are their neighbours' median, none an outlier."""
 
 
-def strays(errors: Sequence[FloatArray]) -> list[BoolArray]:
+def outliers(errors: Sequence[FloatArray]) -> list[BoolArray]:
     """Tell which values of an error stand out of their neighbours, per recording; shapes (B_i,)."""
-    apart = [apart_from_neighbours(error) for error in errors]
-    every = np.concatenate(apart)
+    distance = [distance_from_neighbours(error) for error in errors]
+    every = np.concatenate(distance)
     sigma = float(np.quantile(np.abs(every), WITHIN)) / float(stats.norm.isf(0.5 * (1.0 - WITHIN)))
     limit = float(stats.norm.isf(0.5 * FALSE_ALARM / every.size)) * sigma
-    return [np.abs(each) > limit for each in apart]
+    return [np.abs(each) > limit for each in distance]
 
 
-def apart_from_neighbours(error: FloatArray) -> FloatArray:
+def distance_from_neighbours(error: FloatArray) -> FloatArray:
     """Return how far each value is from its neighbours' median; 0 at the ends, with neighbours on one side only."""
-    apart: FloatArray = error - median_filter(error, NEIGHBOURS, mode="nearest")
+    distance: FloatArray = error - median_filter(error, NEIGHBOURS, mode="nearest")
     ends = NEIGHBOURS // 2
-    apart[:ends] = apart[-ends:] = 0.0
-    return apart
+    distance[:ends] = distance[-ends:] = 0.0
+    return distance
 
 
 def near(off: BoolArray) -> BoolArray:
@@ -202,12 +202,12 @@ PARAMETER_LAWS: Mapping[str, tuple[Element, Law]] = {
 """What one unit more of a nominal parameter does, as a law at its place."""
 
 
-def first(view: Scene, ground: Ground, element: Element) -> Hunt:
+def first(view: Scene, ground: Ground, element: Element) -> ElementSearch:
     """Look for a law at an element from a fit alone; ``ground`` is that of the view."""
     return _from(view, element, ground)
 
 
-def first_along_motion(view: Scene, plain: Ground, element: Element) -> Hunt:
+def first_along_motion(view: Scene, plain: Ground, element: Element) -> ElementSearch:
     """Look for a law as a function of the motion that goes with an unknown input at the element's place.
 
     Along the true motion the line with other parameters and a law is the line as it is under further torques, exactly,
@@ -227,7 +227,7 @@ def first_along_motion(view: Scene, plain: Ground, element: Element) -> Hunt:
     return _from(along, element, ground)
 
 
-def _from(view: Scene, element: Element, ground: Ground) -> Hunt:
+def _from(view: Scene, element: Element, ground: Ground) -> ElementSearch:
     tried = forms(view, element)
     path = pursue(candidates(view, element, tried), ground)
     strongest = np.argsort(-path.alone)[:KEPT].tolist()
@@ -235,87 +235,89 @@ def _from(view: Scene, element: Element, ground: Ground) -> Hunt:
     path = replace(path, chosen=list(range(len(path.chosen))))
     chosen = [tried[i] for i in kept]
     weights = [np.zeros(line.size) for line in view.cut]
-    start = Hunt(element, view, ground, len(tried), chosen, path, weights, NO_LAW, 0.0, [], False)
+    start = ElementSearch(element, view, ground, len(tried), chosen, path, weights, NO_LAW, 0.0, [], False)
     terms = worthwhile(start)
     coefficients, left = path.solved(terms, RIDGE)
     law = cost(start, terms, terms_of(start, terms, coefficients))
-    hunt = replace(start, law=law, mean_square=float(left @ left) / left.size, errors=ground.split(left))
-    return _without_strays(hunt) if element is Element.ACQUISITION else hunt
+    state = replace(start, law=law, mean_square=float(left @ left) / left.size, errors=ground.split(left))
+    return _without_outliers(state) if element is Element.ACQUISITION else state
 
 
-def _without_strays(hunt: Hunt) -> Hunt:
+def _without_outliers(state: ElementSearch) -> ElementSearch:
     """Take single readings that are off for the law, where that is worth a coefficient each.
 
-    They have pulled the fit away from the others: a slow error that is no reason to doubt them. What of the rest stands
-    apart from its neighbours tells how many samples are independent. A torque that is missing for a moment stands out
+    They have pulled the fit away from the others: a slow error that is no reason to doubt them. How far the rest is
+    from its neighbours shows how many samples are independent. A torque that is missing for a moment stands out
     in the innovations, too, and not in what is read.
     """
-    errors = hunt.ground.split(hunt.ground.error)
-    off = [seen & near(read) for seen, read in zip(strays(errors), strays(hunt.view.as_read), strict=True)]
+    errors = state.ground.split(state.ground.error)
+    off = [seen & near(read) for seen, read in zip(outliers(errors), outliers(state.view.as_read), strict=True)]
     count = sum(int(each.sum()) for each in off)
     rest = [np.where(each, 0.0, error) for each, error in zip(off, errors, strict=True)]
-    rows = hunt.ground.error.size
-    before, after = hunt.path.squares[0], sum(float(each @ each) for each in rest)
-    aside = [apart_from_neighbours(each) for each in rest]
+    rows = state.ground.error.size
+    before, after = state.path.squares[0], sum(float(each @ each) for each in rest)
+    aside = [distance_from_neighbours(each) for each in rest]
     n = effective_samples(aside)
     law = Found((), count, count * math.log(rows))
-    known = hunt.law.information(before, hunt.mean_square * rows, n)
+    known = state.law.information(before, state.mean_square * rows, n)
     if count == 0 or law.information(before, after, n) <= max(0.0, known):
-        return hunt
+        return state
     size = rms([error[each] for each, error in zip(off, errors, strict=True)])
     law = replace(law, terms=(("the single readings that are off", size),))
-    return replace(hunt, law=law, mean_square=after / rows, errors=aside, stuck=True)
+    return replace(state, law=law, mean_square=after / rows, errors=aside, stuck=True)
 
 
 STEPS = (1.0, 0.5, 0.2, 0.05)
 """Shares of a step that are tried until the error falls."""
 
 
-def again(hunt: Hunt) -> Hunt:
+def again(state: ElementSearch) -> ElementSearch:
     """Simulate with the law found, look at the error from there, and choose again."""
-    if hunt.stuck:
-        return hunt
-    terms = worthwhile(hunt)
+    if state.stuck:
+        return state
+    terms = worthwhile(state)
     if terms == 0:
-        return _given_up(hunt)
-    step, coefficients = _solution(hunt, terms)
-    wanted = weights_of(hunt, terms, coefficients)
-    before = hunt.view.result
+        return _given_up(state)
+    step, coefficients = _solution(state, terms)
+    wanted = weights_of(state, terms, coefficients)
+    before = state.view.result
     for share in STEPS:
-        weights = [old + share * (new - old) for old, new in zip(hunt.weights, wanted, strict=True)]
+        weights = [old + share * (new - old) for old, new in zip(state.weights, wanted, strict=True)]
         x = np.clip(before.x + share * step, *bounds(before.problem))
-        extra = extra_of(hunt.view, hunt.element, weights)
+        extra = extra_of(state.view, state.element, weights)
         moved = replace(before, x=x, outputs=tuple(extra.outputs(before, [x], i)[0] for i in range(len(weights))))
-        if _squares(hunt.view, moved) < _squares(hunt.view, before):
-            return _looked(hunt, moved, extra, weights, cost(hunt, terms, terms_of(hunt, terms, coefficients)))
-    return _given_up(hunt)
+        if _squares(state.view, moved) < _squares(state.view, before):
+            return _looked(state, moved, extra, weights, cost(state, terms, terms_of(state, terms, coefficients)))
+    return _given_up(state)
 
 
-def _given_up(hunt: Hunt) -> Hunt:
-    """Return a hunt that goes no further; a law that was only promised, and not simulated, is none."""
-    if any(w.any() for w in hunt.weights):
-        return replace(hunt, stuck=True)
-    errors = hunt.view.errors
-    return replace(hunt, stuck=True, law=NO_LAW, mean_square=_mean_square(errors), errors=errors)
+def _given_up(state: ElementSearch) -> ElementSearch:
+    """Return a state that goes no further; a law that was only promised, and not simulated, is none."""
+    if any(w.any() for w in state.weights):
+        return replace(state, stuck=True)
+    errors = state.view.errors
+    return replace(state, stuck=True, law=NO_LAW, mean_square=_mean_square(errors), errors=errors)
 
 
-def without_law(hunt: Hunt) -> FitResult:
-    """Return the model that a hunt has come to, simulated without its law."""
-    result = hunt.view.result
-    outputs = tuple(simulated(result, i) for i in range(len(hunt.view.cut)))
+def without_law(state: ElementSearch) -> FitResult:
+    """Return the model that a state has come to, simulated without its law."""
+    result = state.view.result
+    outputs = tuple(simulated(result, i) for i in range(len(state.view.cut)))
     return replace(result, outputs=outputs)
 
 
-def _looked(hunt: Hunt, moved: FitResult, extra: Extra, weights: list[FloatArray], law: Found) -> Hunt:
+def _looked(
+    state: ElementSearch, moved: FitResult, extra: Extra, weights: list[FloatArray], law: Found
+) -> ElementSearch:
     """Look at the error of a simulation with a law, and choose among the forms again."""
-    cut = lines(moved, extra.forces, hunt.view.cut[0].length)  # in which the law found is written
-    view = replace(hunt.view, result=moved, cut=cut)
-    known = answers(view, hunt.element, [[w[:, np.newaxis] for w in weights]])[0]
+    cut = lines(moved, extra.forces, state.view.cut[0].length)  # in which the law found is written
+    view = replace(state.view, result=moved, cut=cut)
+    known = answers(view, state.element, [[w[:, np.newaxis] for w in weights]])[0]
     errors = view.errors
     ground = Ground(view.cut, _jacobian(view, extra), np.concatenate(errors) + known, moved.pinned)
-    path = pursue(candidates(view, hunt.element, hunt.forms), ground)
+    path = pursue(candidates(view, state.element, state.forms), ground)
     return replace(
-        hunt,
+        state,
         view=view,
         ground=ground,
         path=path,
@@ -360,9 +362,9 @@ def _jacobian(view: Scene, extra: Extra) -> FloatArray:
     return np.vstack(concurrently(part, range(len(view.cut))))
 
 
-def _solution(hunt: Hunt, terms: int) -> tuple[FloatArray, FloatArray]:
+def _solution(state: ElementSearch, terms: int) -> tuple[FloatArray, FloatArray]:
     """Return the step of the unknowns, inside their bounds, and the coefficients of the first terms."""
-    result, ground, path = hunt.view.result, hunt.ground, hunt.path
+    result, ground, path = state.view.result, state.ground, state.path
     columns = path.columns[:, path.term < terms]
     design = np.hstack([ground.jacobian, columns])
     scale = np.maximum(np.linalg.norm(design, axis=0), np.finfo(float).tiny)
