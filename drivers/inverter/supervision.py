@@ -15,6 +15,7 @@ No clock, bus or thread here: time comes in as nanoseconds.
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -58,6 +59,9 @@ RUNAWAY_RAD_S: Final = 2.0
 
 RUNAWAY_SHARE: Final = 0.5
 """Of that change, the other way and away from standstill: the torque drives the vehicle against its sign."""
+
+SWING_S: Final = 0.2
+"""Low-pass of the speed that is compared [s]: after a step of torque the motor swings on its shaft, faster than it."""
 
 
 def left_operation(where: str, state: PowerState) -> str:
@@ -410,8 +414,9 @@ class Supervision:
         self._counts_rad_s = limits.count_m1_rad_s + limits.count_m2_rad_s
         self._stale_ns = guard.feedback_timeout_s * NS_PER_S
         self._apart: Excess | None = None
-        self._impulse_nm_s = 0.0
-        self._from_rad_s: float | None = None
+        self._opposing_nm = self._could_rad_s = 0.0
+        self._smooth: tuple[float, float] | None = None
+        self._from: tuple[float, float, float] | None = None
         self._first_ns: int | None = None
         self.ended: DriverError | None = None
 
@@ -496,22 +501,29 @@ class Supervision:
         inertia = self._limits.inertia_kg_m2
         if inertia is None:
             return
-        torque_nm = one.torque_nm + other.torque_nm
-        if self._from_rad_s is None or torque_nm * one.speed_rad_s >= 0.0 or torque_nm * self._impulse_nm_s < 0.0:
-            self._impulse_nm_s, self._from_rad_s = 0.0, one.speed_rad_s
+        torque_nm, period_s = one.torque_nm + other.torque_nm, self._limits.guard.period_s
+        turns = torque_nm * self._opposing_nm < 0.0
+        self._opposing_nm = torque_nm
+        self._could_rad_s += abs(torque_nm) * period_s / inertia
+        speed, could = self._smooth or (one.speed_rad_s, self._could_rad_s)
+        taken = 1.0 - math.exp(-period_s / SWING_S)
+        speed += taken * (one.speed_rad_s - speed)
+        could += taken * (self._could_rad_s - could)  # as late as the speed that it is compared with
+        self._smooth = speed, could
+        if self._from is None or turns or torque_nm * speed >= 0.0:
+            self._from = speed, could, self._could_rad_s
             return
-        self._impulse_nm_s += torque_nm * self._limits.guard.period_s
-        could_rad_s = abs(self._impulse_nm_s) / inertia
-        if could_rad_s < RUNAWAY_RAD_S:
+        from_rad_s, could_from, whole_from = self._from
+        since_rad_s = self._could_rad_s - whole_from
+        if since_rad_s < RUNAWAY_RAD_S:
             return
-        grown_rad_s = abs(one.speed_rad_s) - abs(self._from_rad_s)
-        if grown_rad_s > RUNAWAY_SHARE * could_rad_s:
+        if abs(speed) - abs(from_rad_s) > RUNAWAY_SHARE * (could - could_from):
             self._m1.faults.append(
-                f"inverters m1 and m2: the speed went from {self._from_rad_s:.3g} to {one.speed_rad_s:.3g} rad/s "
-                f"against a torque of {torque_nm:g} Nm, expected it slower by up to {could_rad_s:.2g} rad/s. Compare "
+                f"inverters m1 and m2: the speed went from {from_rad_s:.3g} to {speed:.3g} rad/s "
+                f"against a torque of {torque_nm:g} Nm, expected it slower by up to {since_rad_s:.2g} rad/s. Compare "
                 "the signs of torque and speed of both drives with the rig file; on a grade the vehicle rolls away."
             )
-        self._impulse_nm_s, self._from_rad_s = 0.0, one.speed_rad_s
+        self._from = speed, could, self._could_rad_s
 
     def ages_ns(self, now_ns: int) -> tuple[int, int]:
         """Ages of the last answers of m1 and m2, from the first look on while there is none [ns]."""

@@ -308,6 +308,26 @@ def test_a_speed_that_runs_away_against_the_torque_ends_it() -> None:
     assert run(-0.45) is None, "a grade that is steeper than the torque"
 
 
+SWINGING = """
+-532 -5.42  -532 -6.19  -291 -6.00  -261 -3.80  -472 -1.27  -442 -0.52  -411 -0.41  -382 -0.65  -112 -1.52  -82 -1.09
+-292 -1.07  -262 -2.77  8 -4.40  38 -4.05  68 -3.30  98 -2.45  128 -1.62  158 -1.12  -52 -0.99  -22 -2.58  8 -4.12
+38 -5.18  68 -5.51  98 -4.91  128 -3.86  158 -2.48  429 -1.20  458 1.03  248 2.24  269 0.77  509 -1.31  509 -2.33
+509 -3.27  509 -4.19  509 -4.60  509 -4.55  509 -4.02  509 -3.29  269 -2.30  269 -2.83  509 -3.25  509 -2.18  269 -1.16
+268 -1.90  509 -2.69  509 -2.03  268 -1.39  269 -2.48  509 -3.44  510 -2.51  269 -1.59  269 -2.36  509 -2.91  509 -1.82
+269 -0.82  269 -1.53  509 -2.37  509 -1.63  509 -0.91  509 -0.50  509 -0.51  509 -0.64  509 -1.09  508 -1.61  509 -1.99
+509 -2.37  509 -2.38  509 -2.25  509 -1.74  509 -1.08  509 -0.70  508 -0.20  269 -0.23  269 -1.66  509 -2.99
+"""
+"""Torque [Nm] and motor speed [rad/s] of a simulated bus of 100 kg m², cycle by cycle: a reversal of 400 Nm with a PRBS
+of 120 Nm. The motor swings on its shaft at 8 Hz and beyond zero while the vehicle slows down."""
+
+
+def test_a_motor_that_swings_on_its_shaft_does_not_run_away() -> None:
+    torque_nm, speed = ([float(word) for word in SWINGING.split()[first::2]] for first in (0, 1))
+    halves = zip((0.5 * torque for torque in torque_nm), speed, strict=True)
+    seen = ((DriveRecord(half, answer(half, w)), DriveRecord(half, answer(half, w))) for half, w in halves)
+    assert cycles_to_end(supervised(inertia_kg_m2=100.0), seen) is None
+
+
 def messages(*counts: int | tuple[int, int]) -> int | None:
     each = (count if isinstance(count, tuple) else (count, count) for count in counts)
     pair = ((DriveRecord(0.0, answer(), *count), DriveRecord(0.0, answer())) for count in each)
