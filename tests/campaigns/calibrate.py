@@ -20,14 +20,16 @@ from itertools import product
 from pathlib import Path
 
 import numpy as np
-from estimator.diagnosis.inference.posterior import Score, probability_of
 from scipy.optimize import minimize_scalar
 from threadpoolctl import threadpool_limits
 
 from estimator.diagnosis.chain import mechanical, read_through
+from estimator.diagnosis.inference.answer import LEVELS
 from estimator.diagnosis.inference.answer import searched as searched_for
 from estimator.diagnosis.inference.calibration import LEAST_SHARE, TEST_LIMITS, THRESHOLDS_FILE
+from estimator.diagnosis.inference.judge import Score, probability_of
 from estimator.diagnosis.inference.remainder import chance
+from estimator.diagnosis.inference.rivals import rivals_of
 from estimator.diagnosis.preconditions import prepare
 from estimator.errors import EstimatorError
 from hil.proof.truth.specimen import NOTHING
@@ -126,7 +128,8 @@ def searched(form: str, seed: int) -> Row | None:
         return None
     line, chain = mechanical(world.model), read_through(ready.records)
     with threadpool_limits(1, user_api="blas"):  # as a diagnosis does
-        whole = searched_for(chain, line)
+        whole = searched_for(chain, line, most=LEVELS["normal"])
+        rivals = rivals_of(whole.search, whole.grounds).scores
     found, recognised = whole.grounds, {finding.name for finding in whole.chain.findings}
     there = {name for name in world.case.specimen.sizes if name != NOTHING} - recognised
     return asdict(
@@ -136,7 +139,7 @@ def searched(form: str, seed: int) -> Row | None:
             NOTHING if world.strong in recognised else world.strong,
             sorted(there | {*world.known}),
             [Claim(each.name, sorted(each.names), each.share) for each in found.beliefs],
-            [(sorted(each.effects), each.score, each.is_plausible) for each in found.scores],
+            [(sorted(each.effects), each.score, each.is_plausible) for each in (*found.scores, *rivals)],
             {test.key: test.value for test in found.tests if test.key},
             found.best.plain.residual.size,
             round(time.process_time() - began, 2),

@@ -28,7 +28,6 @@ from estimator.diagnosis.inference.figures import (
 from estimator.diagnosis.inference.judge import (
     Decision,
     Grounds,
-    Score,
     decide,
     error_falls,
     free_rms,
@@ -38,7 +37,7 @@ from estimator.diagnosis.inference.judge import (
 )
 from estimator.diagnosis.inference.likelihood import SAME, Hypothesis, fitted, of_first_outputs
 from estimator.diagnosis.inference.remainder import Test, tests, tests_in_words
-from estimator.diagnosis.inference.rivals import FreeLine, Law, best_law, free_line, rival_laws, searches_around
+from estimator.diagnosis.inference.rivals import Law, best_law, rivals_of, searches_around
 from estimator.diagnosis.inference.search import Search
 from estimator.diagnosis.inference.wording import Context, law_in_words, statement
 from estimator.diagnosis.noise import noise_floor
@@ -124,8 +123,22 @@ LEVELS: Mapping[str, int] = {"quick": 4_000, "normal": 40_000, "thorough": 400_0
 """Free runs of all recordings after which a search makes no further step: a choice of how long people wait."""
 
 
-def answer(ready: Prepared, model: DrivelineModel, progress: Progress, level: str, work: Work) -> Diagnosis:
-    """Return the diagnosis of recordings that are fit for one; undecided where the limit of time ends it."""
+def keep_nothing(_found: Found) -> None:
+    """Take no note of what a search found."""
+
+
+def answer(
+    ready: Prepared,
+    model: DrivelineModel,
+    progress: Progress,
+    level: str,
+    work: Work,
+    keep: Callable[[Found], None] = keep_nothing,
+) -> Diagnosis:
+    """Return the diagnosis of recordings that are fit for one; undecided where the limit of time ends it.
+
+    ``keep`` is given what the search found, for those who go on with it.
+    """
     began = time.perf_counter()
     line, chain = mechanical(model), read_through(ready.records)
     search: Search | None = None
@@ -137,6 +150,7 @@ def answer(ready: Prepared, model: DrivelineModel, progress: Progress, level: st
     with counted(work):
         try:
             found = searched(chain, line, work, LEVELS[level], watched, progress)
+            keep(found)
             said = _decided(found, line, ready, model, progress, level)
         except TimeIsUp:
             said = None
@@ -178,25 +192,18 @@ def _seen(search: Search, ground: Grounds) -> _Seen:
     failed = tuple(test for test in ground.tests if test.failed)
     if not failed and not ground.best.effects:
         return _Seen(decide(search, ground), ground.nothing, (), [], None, None)
-    nothing, best = of_first_outputs(ground.nothing), of_first_outputs(ground.best)
-    searches = searches_around(nothing)
-    alone = best_law(nothing, searches)
-    added = alone if ground.best is ground.nothing else best_law(best, searches_around(best))
-    sheet = free_line(search)
-    decision = decide(search, ground, (*rival_laws(ground, alone, added), *_off_the_sheet(sheet)))
+    rivals = rivals_of(search, ground)
+    decision = decide(search, ground, rivals.scores)
     believed = _without_doubted(search, decision)
+    alone, sheet, searches = rivals.alone, rivals.sheet, rivals.searches
     if not decision.named:
         strays = sheet.strays if sheet is not None and sheet.leaves_noise else ()
         return _Seen(decision, ground.nothing, failed or (), searches, alone, alone, strays)
     if believed is ground.best:
-        return _Seen(decision, believed, failed, searches, alone, added if failed else None)
+        return _Seen(decision, believed, failed, searches, alone, rivals.added if failed else None)
     failed, first = tuple(test for test in tests(believed) if test.failed), of_first_outputs(believed)
     left = best_law(first, searches_around(first)) if failed else None
     return _Seen(decision, believed, failed, searches, alone, left)
-
-
-def _off_the_sheet(sheet: FreeLine | None) -> tuple[Score, ...]:
-    return () if sheet is None else (Score(frozenset(), sheet.score),)
 
 
 def _without_doubted(search: Search, decision: Decision) -> Hypothesis:

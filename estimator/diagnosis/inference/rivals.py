@@ -176,6 +176,39 @@ def _rms(search: ElementSearch) -> float:
     return math.sqrt(max(left, 0.0) / count)
 
 
+@dataclass(frozen=True, slots=True)
+class Rivals:
+    """What the names of the best set are weighed against.
+
+    Attributes
+    ----------
+    alone, added : Law or None
+        The best law without a name: instead of all effects, and on top of the best set of these.
+    sheet : FreeLine or None
+    searches : list of ElementSearch
+        For the law alone, element by element.
+    scores : tuple of Score
+        Those of all these.
+    """
+
+    alone: Law | None
+    added: Law | None
+    sheet: FreeLine | None
+    searches: list[ElementSearch]
+    scores: tuple[Score, ...]
+
+
+def rivals_of(search: Search, ground: Grounds) -> Rivals:
+    """Fit laws without a name, and the nominal line with its values free."""
+    nothing, best = of_first_outputs(ground.nothing), of_first_outputs(ground.best)
+    searches = searches_around(nothing)
+    alone = best_law(nothing, searches)
+    added = alone if ground.best is ground.nothing else best_law(best, searches_around(best))
+    sheet = free_line(search)
+    off = () if sheet is None else (Score(NOTHING, sheet.score),)
+    return Rivals(alone, added, sheet, searches, (*rival_laws(ground, alone, added), *off))
+
+
 def rival_laws(ground: Grounds, alone: Law | None, added: Law | None) -> tuple[Score, ...]:
     """Return laws without a name as hypotheses: one instead of all effects, and one added to the best set of these.
 

@@ -29,6 +29,7 @@ from estimator.diagnosis.inference.likelihood import Hypothesis, compared, fitte
 from estimator.diagnosis.inference.looks import Answers, Look, Remembering, promising, screen
 from estimator.diagnosis.inference.plausible import GRADE, is_plausible, loosened, may_be_loose
 from estimator.physics.catalogue import EFFECTS
+from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult, not_fitted, warm_start
 from estimator.physics.grid import Grid, grid_for
 from estimator.physics.layout import slot
@@ -176,6 +177,8 @@ class Search:
         near = [each for each in found[:most] if self._may_be_best(each, found[0], current)]
         near = list({each.effects: each for each in reversed(near)}.values())  # of one set the best
         finished = concurrently(lambda each: self.finish(each, current), near)
+        if any(_is_event_of_load(name) for each in near for name in each.effects - current.effects):
+            finished += [self._with_grade(current)] if GRADE in self.names and GRADE not in current.effects else []
         return self._better(finished, current)
 
     def _may_be_best(self, each: Hypothesis, best: Hypothesis, current: Hypothesis) -> bool:
@@ -432,6 +435,11 @@ class Search:
 
     def _keep(self, hypothesis: Hypothesis) -> None:
         self.visited[hypothesis.effects] = hypothesis
+
+
+def _is_event_of_load(name: str) -> bool:
+    """Tell whether an effect is one that a road's grade may be taken for: a load that comes and goes."""
+    return EFFECTS[name].event and EFFECTS[name].element is Element.LOAD
 
 
 def _gain(better: Hypothesis, than: Hypothesis) -> float:
