@@ -32,6 +32,8 @@ COMMANDS: dict[str, str] = {
     "identify": "Identify the driveline from recordings.",
     "paper": "The paper's figures from eight experiments on the simulated rig, or from recordings.",
     "diagnose": "Locate the mismatch and name the missing physics.",
+    "design": "The next experiment that would decide what is left open.",
+    "solve": "Diagnose, design, drive, diagnose again, until it is decided.",
     "simulate": "Free-run simulation from the measured torques.",
     "compare": "Simulation against recording, in figures and plots.",
     "effects": "The catalogue of effects.",
@@ -47,7 +49,7 @@ LOG_LEVEL = "--log-level"
 HELP, SHORT_HELP = "--help", "-h"
 
 SPEAKERS = frozenset(
-    {"bugreport", "commission", "completion", "effects", "look", "model", "monitor", "rig", "runs", "sim"}
+    {"bugreport", "commission", "completion", "effects", "look", "model", "monitor", "rig", "runs", "sim", "solve"}
 )
 """Commands that ask, or whose output is what they are called for: ``--quiet`` does not silence them."""
 

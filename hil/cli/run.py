@@ -23,7 +23,9 @@ def run(
     experiment: Annotated[
         str,
         typer.Argument(
-            metavar="EXPERIMENT", help="Name of an experiment of the rig file.", autocompletion=experiment_names
+            metavar="EXPERIMENT",
+            help="Name of an experiment of the rig file, or a TOML file with one, as hil design writes it.",
+            autocompletion=experiment_names,
         ),
     ],
     out: Annotated[
@@ -55,10 +57,11 @@ def run(
     The drives are at zero torque and disarmed on every way out, Ctrl-C included; the recording then holds
     everything up to there.
     """
-    from hil.config.rig_file import read_rig
+    from hil.config.rig_file import with_experiment_of
     from hil.simulator.addresses import with_addresses
 
-    rig_file = with_addresses(read_rig(rig), bus, modbus, take_over)
+    named, rig_text, experiment = with_experiment_of(rig, experiment)
+    rig_file = with_addresses(named, bus, modbus, take_over)
     if dry_run:
         from hil.cli.run_job import predict
 
@@ -69,7 +72,7 @@ def run(
     from hil.cli.run_job import Job, live_estimate, print_result, record
     from hil.rig.metadata import run_metadata
 
-    metadata = {**run_metadata(rig, experiment), "pace": pace.value}
+    metadata = {**run_metadata(rig, experiment, rig_text), "pace": pace.value}
     live = live_estimate(rig_file, out, filter_of, filter_run) if estimate else None
     job = Job(rig_file, experiment, out, trace, pacer_for(rig_file, pace), metadata, live)
     with scheduling(pace) as grants:

@@ -67,7 +67,7 @@ class RigSource:
 
 def as_table(experiment: AnyExperiment, **changes: object) -> dict[str, Any]:
     """Return an experiment of a rig file as a table to order, with changes."""
-    return {**experiment.model_dump(), **changes}
+    return {**experiment.model_dump(mode="json", exclude_none=True), **changes}
 
 
 def rig_digest(text: str) -> str:

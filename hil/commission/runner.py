@@ -49,8 +49,14 @@ class Prediction:
     speed_rad_s: Range  # Range of the speed over the whole run and over its recorded part
     speed_measured_rad_s: Range  # Range of the speed over the whole run and over its recorded part
     last_rad_s: float  # Speed at the end
-    torque_nm: FloatArray  # Total torque and speed of the recorded part, shape (N,)
-    course_rad_s: FloatArray  # Total torque and speed of the recorded part, shape (N,)
+    each_nm: FloatArray  # Torque of each inverter in the recorded part, shape (N, 2)
+    course_rad_s: FloatArray  # Speed in the recorded part, shape (N,)
+
+    @property
+    def torque_nm(self) -> FloatArray:
+        """Total torque of the recorded part, shape (N,)."""
+        total: FloatArray = self.each_nm.sum(axis=1)
+        return total
 
     def as_json(self) -> dict[str, list[float]]:
         """Return the ranges for the state file."""
@@ -79,7 +85,7 @@ def predict(rig: Rig, name: str, model: DrivelineModel, speed_rad_s: float = 0.0
     pacer = FreePacer(period_ns(rig.period_s))
     guard.check(plan.split.request(0.0, 0.0), pacer.next().due_ns, Evidence(0, 0, vehicle.speed_rad_s))
     m1, m2, speed, measured = Range(), Range(), Range(), Range()
-    torque: list[float] = []
+    torque: list[tuple[float, float]] = []
     course: list[float] = []
     cycles, phase = 0, Phase.APPROACH
     while phase is not Phase.DONE:
@@ -95,12 +101,12 @@ def predict(rig: Rig, name: str, model: DrivelineModel, speed_rad_s: float = 0.0
         speed.see(vehicle.speed_rad_s)
         if phase is Phase.MEASURE:
             measured.see(vehicle.speed_rad_s)
-            torque.append(request.total_m1_nm + request.total_m2_nm)
+            torque.append((request.total_m1_nm, request.total_m2_nm))
             course.append(vehicle.speed_rad_s)
         vehicle.step(request.total_m1_nm, request.total_m2_nm)
     seconds = cycles * rig.period_s
     last_rad_s = vehicle.speed_rad_s
-    return Prediction(seconds, m1, m2, speed, measured, last_rad_s, np.array(torque), np.array(course))
+    return Prediction(seconds, m1, m2, speed, measured, last_rad_s, np.array(torque).reshape(-1, 2), np.array(course))
 
 
 FILTER_S = 0.2
@@ -246,7 +252,7 @@ class Runner:
                 measured=seen.as_json(),
                 flagged=seen.flagged,
                 recorded=seen.recorded,
-                prbs_nm=rig.prbs.amplitude_nm if rig.experiments[order.name].prbs else 0.0,
+                prbs_nm=rig.excitation_nm(rig.experiments[order.name]),
                 last_rad_s=seen.last_rad_s,
             )
 

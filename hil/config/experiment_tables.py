@@ -9,7 +9,9 @@ Torques are of both inverters together. What every kind has:
 - ``approach_timeout_s``: time in which the start speed must be reached;
 - ``share_m1``: the part of the base torque that inverter m1 gives. A gain that is not what an inverter reports shows
   where the two share differently from test to test;
-- ``prbs``: whether the PRBS is superposed on the recorded part.
+- ``prbs``: whether the PRBS is superposed on the recorded part;
+- ``prbs_amplitude_nm``, ``prbs_clock_divider``: those of this experiment in place of ``[prbs]``'s;
+- ``multisine``: a multi-sine in place of the PRBS.
 """
 
 from __future__ import annotations
@@ -21,6 +23,8 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, model_validator
 
 from drivers.plc.types import PrbsSource
+from estimator.signals.multisine import Lines, excited_lines, multisine_nm
+from estimator.signals.record import FloatArray, IntArray
 from hil.config.table import NotNegative, Positive, Table
 from hil.problems import Fault, refuse
 
@@ -29,6 +33,30 @@ APPROACH_TIMEOUT_S = 60.0
 
 EVEN_SHARE = 0.5
 """Both inverters give half: they drive one shaft, and equal currents heat them equally."""
+
+
+class MultisineTable(Table):
+    """A multi-sine of ``period_s``, with power from ``lowest_hz`` to ``highest_hz``, never above ``amplitude_nm``.
+
+    ``lines`` are ``"full"``, ``"odd"``, or ``"odd_random"`` with one odd line in four left out, by which distortion is
+    distinguished from noise. ``amplitude_nm`` is that of both inverters together; they share it as the PRBS.
+    """
+
+    amplitude_nm: Positive
+    period_s: Positive
+    lowest_hz: Positive
+    highest_hz: Positive
+    lines: Annotated[Lines, Field(strict=False)] = Lines.ODD_RANDOM
+    seed: Annotated[int, Field(ge=0)] = 1
+
+    def excited(self, sample_time_s: float) -> IntArray:
+        """Return the lines with power, as multiples of the fundamental, at a sampling time [s]."""
+        samples = round(self.period_s / sample_time_s)
+        return excited_lines(samples, sample_time_s, self.lowest_hz, self.highest_hz, self.lines, self.seed)
+
+    def levels_nm(self, sample_time_s: float) -> FloatArray:
+        """Return one period [Nm] at a sampling time [s]."""
+        return multisine_nm(round(self.period_s / sample_time_s), self.excited(sample_time_s), self.amplitude_nm)
 
 
 class ExperimentTable(Table):
@@ -40,6 +68,21 @@ class ExperimentTable(Table):
     approach_timeout_s: Positive = APPROACH_TIMEOUT_S
     share_m1: Annotated[float, Field(ge=0, le=1)] = EVEN_SHARE
     prbs: bool = True
+    prbs_amplitude_nm: Positive | None = None
+    prbs_clock_divider: Annotated[int, Field(ge=1, le=65535)] | None = None
+    multisine: MultisineTable | None = None
+
+    @model_validator(mode="after")
+    def _one_excitation(self) -> Self:
+        refuse(self._excitation_faults())
+        return self
+
+    def _excitation_faults(self) -> Iterator[Fault]:
+        if self.multisine is not None and not self.prbs:
+            yield Fault("multisine", "no such table while prbs is false", {})
+        for key in ("prbs_amplitude_nm", "prbs_clock_divider"):
+            if getattr(self, key) is not None and (self.multisine is not None or not self.prbs):
+                yield Fault(key, "no such key without a PRBS", getattr(self, key))
 
 
 class CruiseTable(ExperimentTable):
@@ -100,6 +143,27 @@ class PulsesTable(ExperimentTable):
         return self
 
 
+class CoastTable(ExperimentTable):
+    """Let go of the torque at ``speed_rad_s``: what slows the vehicle is its own. No PRBS."""
+
+    kind: Literal["coast"]
+    speed_rad_s: float
+    prbs: Literal[False] = False
+
+
+class RampTable(ExperimentTable):
+    """Raise and lower the torque evenly through zero, from standstill: ``ramp_s`` from zero to ``swing_nm``."""
+
+    kind: Literal["ramp"]
+    swing_nm: Positive
+    ramp_s: Positive
+
+    @model_validator(mode="after")
+    def _swing_within_torque(self) -> Self:
+        refuse(_part_above_torque("swing_nm", self.swing_nm, self.torque_nm))
+        return self
+
+
 class RestTable(ExperimentTable):
     """Zero torque at standstill, armed: what the readings show of themselves. No torque, no slew, no PRBS."""
 
@@ -109,7 +173,7 @@ class RestTable(ExperimentTable):
     prbs: Literal[False] = False
 
 
-DrivenTable = CruiseTable | ReversalTable | TipTable
+DrivenTable = CruiseTable | ReversalTable | TipTable | CoastTable | RampTable
 """Kinds that a speed control leads up to."""
 
 AnyExperiment = Annotated[DrivenTable | PulsesTable | RestTable, Field(discriminator="kind")]

@@ -15,8 +15,9 @@ import math
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
+import tomlkit
 from pydantic import Field, PrivateAttr, model_validator
 
 from drivers.capability.plan import plan_drive
@@ -26,6 +27,7 @@ from drivers.plc.register_map import RegisterMap, RegisterMapError, load_registe
 from drivers.plc.types import PrbsSource
 from drivers.resources import data_file
 from drivers.torque_guard import ErrorLimits, GuardLimits
+from estimator.signals.multisine import FEWEST_LINES
 from hil.config.channel_table import ChannelTable
 from hil.config.device_tables import InvertersTable, NodeId, SimulatedPlcSecurityTable
 from hil.config.device_tables import InverterTable as InverterTable
@@ -71,6 +73,19 @@ class SimulationTable(Table):
     plc_security: SimulatedPlcSecurityTable | None = None
 
 
+class DesignTable(Table):
+    """What an experiment that the program designs may ask of the vehicle, at the motor shaft.
+
+    Torque is the base torque of both inverters together. What is left out is as the file's own experiments go; the
+    angle from where a recorded part begins is then free.
+    """
+
+    most_torque_nm: Positive | None = None
+    most_speed_rad_s: Positive | None = None
+    most_duration_s: Positive | None = None
+    most_angle_rad: Positive | None = None
+
+
 class Rig(Table):
     """One rig file. The key ``schema`` is `schema_id` here: pydantic has a use of its own for that name."""
 
@@ -85,6 +100,7 @@ class Rig(Table):
     vehicle: VehicleTable
     channels: list[ChannelTable] = Field(default_factory=list)
     experiments: dict[str, AnyExperiment] = Field(default_factory=dict)
+    design: DesignTable = DesignTable()
     simulation: SimulationTable | None = None
     _takes_over: bool = PrivateAttr(default=False)
 
@@ -139,6 +155,14 @@ class Rig(Table):
     def _free_node_ids(self, taken: int | None) -> list[int]:
         used = {self.inverters.m1.node_id, self.inverters.m2.node_id, taken}
         return [node_id for node_id in range(127, 0, -1) if node_id not in used]
+
+    def excitation_nm(self, table: AnyExperiment) -> float:
+        """Give the amplitude of what is superposed in an experiment, of both inverters together [Nm]; 0 for nothing."""
+        if not table.prbs:
+            return 0.0
+        if table.multisine is not None:
+            return table.multisine.amplitude_nm
+        return self.prbs.amplitude_nm if table.prbs_amplitude_nm is None else table.prbs_amplitude_nm
 
     @property
     def torque_limits(self) -> GuardLimits:
@@ -214,6 +238,43 @@ def read_rig(path: Path | str) -> Rig:
     if faults := list(_channels_nothing_gives(rig)):
         raise RigFileError(file, *faults)
     return rig
+
+
+def with_experiment_of(path: Path, experiment: str) -> tuple[Rig, str | None, str]:
+    """Read a rig file for one of its experiments, or with the one that a file of its own has.
+
+    Returns
+    -------
+    rig : Rig
+    text : str or None
+        Of the rig file with the experiment of the other file in it; None where there is no other file.
+    name : str
+        Of the experiment.
+
+    Raises
+    ------
+    RigFileError
+        As `read_rig`, and where the other file has not one experiment, or one of a name that the rig has otherwise.
+    """
+    file = Path(experiment)
+    rig = read_rig(path)
+    if experiment in rig.experiments or file.suffix.lower() != ".toml":
+        return rig, None, experiment
+    tables = read_toml(file, RigFileError).get("experiments")
+    if not isinstance(tables, dict) or len(tables) != 1:
+        raise RigFileError(file, "experiments | expected one table [experiments.NAME] | got none, or several")
+    (name,) = tables
+    if name in rig.experiments:
+        raise RigFileError(
+            file, f"experiments.{name} | expected a name that {path} does not have | got one that it has"
+        )
+    document = tomlkit.parse(path.read_text(encoding="utf-8"))
+    if "experiments" not in document:
+        document.add("experiments", tomlkit.table(is_super_table=True))
+    added: Any = document["experiments"]
+    added.add(name, tables[name])
+    text = tomlkit.dumps(document)
+    return validate(Rig, tomlkit.parse(text).unwrap(), path, RigFileError), text, name
 
 
 def _channels_nothing_gives(rig: Rig) -> Iterator[str]:
@@ -334,7 +395,9 @@ def _room_faults(rig: Rig) -> Iterator[Fault]:
 def _experiment_faults(rig: Rig) -> Iterator[Fault]:
     for name, experiment in rig.experiments.items():
         key = f"experiments.{name}"
-        for rest_nm, of in _torque_rests(rig, experiment.share_m1):
+        yield from _excitation_faults(rig, key, experiment)
+        amplitude_nm = max(rig.prbs.amplitude_nm, rig.excitation_nm(experiment))
+        for rest_nm, of in _torque_rests(rig, experiment.share_m1, amplitude_nm):
             if experiment.torque_nm > rest_nm:
                 expected = f"at most {rest_nm:g}, what {of} leaves besides the PRBS"
                 yield Fault(f"{key}.torque_nm", expected, experiment.torque_nm)
@@ -344,13 +407,39 @@ def _experiment_faults(rig: Rig) -> Iterator[Fault]:
             yield Fault(f"{key}.slew_nm_per_s", expected, experiment.slew_nm_per_s)
 
 
-def _torque_rests(rig: Rig, share_m1: float) -> Iterator[tuple[float, str]]:
+def _excitation_faults(rig: Rig, key: str, experiment: AnyExperiment) -> Iterator[Fault]:
+    """See that what an experiment superposes by itself is there, is the host's to send, and passes the guard."""
+    if (table := experiment.multisine) is not None:
+        where, nyquist_hz = f"{key}.multisine", 0.5 / rig.period_s
+        if table.highest_hz >= nyquist_hz:
+            yield Fault(f"{where}.highest_hz", f"below half the sampling rate ({nyquist_hz:g})", table.highest_hz)
+        elif table.excited(rig.period_s).size < FEWEST_LINES:
+            expected = f"a band with at least {FEWEST_LINES} of its lines, which are {1.0 / table.period_s:g} Hz apart"
+            yield Fault(f"{where}.highest_hz", expected, table.highest_hz)
+        if experiment.duration_s < table.period_s:
+            yield Fault(f"{where}.period_s", f"at most duration_s ({experiment.duration_s:g})", table.period_s)
+        where = f"{where}.amplitude_nm"
+    elif experiment.prbs_amplitude_nm is not None or experiment.prbs_clock_divider is not None:
+        where = f"{key}.prbs_amplitude_nm"
+    else:
+        return
+    if rig.prbs.source is PrbsSource.PLC:
+        yield Fault(where, "no such key while prbs.source is 'plc', whose generator has one setting", None)
+    part = max(rig.prbs.part_m1, 1.0 - rig.prbs.part_m1)
+    if part * rig.excitation_nm(experiment) > rig.guard.prbs_limit_nm:
+        expected = f"at most {rig.guard.prbs_limit_nm / part:g}, of which one inverter gets guard.prbs_limit_nm"
+        yield Fault(where, expected, rig.excitation_nm(experiment))
+
+
+def _torque_rests(rig: Rig, share_m1: float, amplitude_nm: float | None = None) -> Iterator[tuple[float, str]]:
     """Largest base torque of both inverters that each limit leaves besides the PRBS [Nm], and its key.
 
-    ``share_m1`` is the part of the base torque that inverter m1 gives, 0 to 1.
+    ``share_m1`` is the part of the base torque that inverter m1 gives, 0 to 1; ``amplitude_nm`` that of the PRBS, or of
+    what an experiment has in its place.
     """
-    parts_nm = rig.prbs.parts_nm
-    yield rig.guard.sum_limit_nm - rig.prbs.amplitude_nm, "guard.sum_limit_nm"
+    amplitude_nm = rig.prbs.amplitude_nm if amplitude_nm is None else amplitude_nm
+    parts_nm = {"m1": rig.prbs.part_m1 * amplitude_nm, "m2": (1.0 - rig.prbs.part_m1) * amplitude_nm}
+    yield rig.guard.sum_limit_nm - amplitude_nm, "guard.sum_limit_nm"
     for name, table, share in (("m1", rig.inverters.m1, share_m1), ("m2", rig.inverters.m2, 1.0 - share_m1)):
         if share > 0.0:
             yield (table.torque_limit_nm - parts_nm[name]) / share, f"inverters.{name}.torque_limit_nm"

@@ -117,9 +117,11 @@ def _shaft(model: Path | None, rig: Rig | None, trust_laws: bool) -> Shaft | Non
 def _summary(rig: Rig, name: str, trust_laws: bool) -> str:
     """Tell what an experiment would command, and what to expect."""
     table = rig.experiments[name]
+    superposed = "PRBS" if table.multisine is None else "multi-sine"
     lines = [
         f"{table.kind}: {table.duration_s:g} s are recorded, after the approach.",
-        f"Base torque at most ±{table.torque_nm:g} Nm, PRBS ±{rig.prbs.amplitude_nm:g} Nm, both inverters together.",
+        f"Base torque at most ±{table.torque_nm:g} Nm, {superposed} ±{rig.excitation_nm(table):g} Nm, both inverters "
+        "together.",
     ]
     try:
         prediction = dry_run(rig, name, trust_laws)

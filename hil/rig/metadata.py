@@ -12,10 +12,10 @@ from hil.recording.checksum import RIG_CHECKSUM, RIG_TEXT, text_sha256
 from hil.version import __version__
 
 
-def run_metadata(rig_path: Path, experiment: str) -> dict[str, str]:
-    """Describe a run that begins now."""
+def run_metadata(rig_path: Path, experiment: str, text: str | None = None) -> dict[str, str]:
+    """Describe a run that begins now; ``text`` is that of the rig file with what was changed for this run."""
     inverters = read_rig(rig_path).inverters
-    text = rig_path.read_text(encoding="utf-8")
+    text = rig_path.read_text(encoding="utf-8") if text is None else text
     shipped = data_file("inverter.eds")
     return {
         "schema": "hil.recording/1",

@@ -6,7 +6,9 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from drivers.plc.types import PrbsSource
+from estimator.signals.multisine import Multisine
 from estimator.signals.prbs import Prbs
+from hil.config.experiment_tables import AnyExperiment
 from hil.config.rig_file import Rig
 from hil.rig.excitation import PlcPrbsOrder, Split, guarded_prbs
 from hil.rig.experiments.base import Experiment, Phase
@@ -15,7 +17,7 @@ from hil.rig.plc_watch import Needs
 
 
 class Levels(Protocol):
-    """Where the levels of a PRBS come from, one per cycle."""
+    """Where the levels of a PRBS or multi-sine come from, one per cycle."""
 
     def next(self) -> float:
         """Level of this cycle [Nm]."""
@@ -70,20 +72,25 @@ def plan_run(rig: Rig, name: str) -> Plan:
     """Plan a run of one experiment of the rig file."""
     table = experiment_table(rig, name)
     split = Split(table.share_m1, rig.prbs.part_m1)
-    largest = split.request(table.torque_nm, rig.prbs.amplitude_nm if table.prbs else 0.0)
+    largest = split.request(table.torque_nm, rig.excitation_nm(table))
     return Plan(
         name=name,
         period_s=rig.period_s,
         experiment=build_experiment(rig, name),
-        prbs=_levels(rig) if table.prbs else NoPrbs(),
+        prbs=_levels(rig, table),
         plc_prbs=_plc_prbs(rig, split) if table.prbs and rig.prbs.source is PrbsSource.PLC else None,
         split=split,
         needs=Needs(max(largest.total_m1_nm, largest.total_m2_nm)),
     )
 
 
-def _levels(rig: Rig) -> Prbs:
-    return Prbs(rig.prbs.amplitude_nm, rig.prbs.cells, rig.prbs.clock_divider, rig.prbs.seed)
+def _levels(rig: Rig, table: AnyExperiment) -> Levels:
+    if not table.prbs:
+        return NoPrbs()
+    if table.multisine is not None:
+        return Multisine(table.multisine.levels_nm(rig.period_s))
+    divider = table.prbs_clock_divider or rig.prbs.clock_divider
+    return Prbs(rig.excitation_nm(table), rig.prbs.cells, divider, rig.prbs.seed)
 
 
 def _plc_prbs(rig: Rig, split: Split) -> PlcPrbsOrder:

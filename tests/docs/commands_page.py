@@ -32,6 +32,8 @@ READ_MORE = {
     "identify": "identification",
     "paper": "paper",
     "diagnose": "diagnosis",
+    "design": "design",
+    "solve": "design",
     "effects": "catalogue",
     "rig": "support",
     "model": "from-your-logger",

@@ -137,7 +137,7 @@ def answer(
 ) -> Diagnosis:
     """Return the diagnosis of recordings that are fit for one; undecided where the limit of time ends it.
 
-    ``keep`` is given what the search found, for those who go on with it.
+    ``keep`` is given what the search found, for those who continue with it.
     """
     began = time.perf_counter()
     line, chain = mechanical(model), read_through(ready.records)

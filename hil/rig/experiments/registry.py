@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from hil.config.experiment_tables import (
     AnyExperiment,
+    CoastTable,
     CruiseTable,
     DrivenTable,
     PulsesTable,
+    RampTable,
     RestTable,
     ReversalTable,
     TipTable,
@@ -18,6 +20,7 @@ from hil.rig.experiments.cruise import Cruise
 from hil.rig.experiments.open_loop import MOVING_RAD_S, OpenLoop
 from hil.rig.experiments.pulses import Pulses, Rest
 from hil.rig.experiments.reversal import Reversal
+from hil.rig.experiments.slow import Coast, Ramp
 from hil.rig.experiments.staged import Approach, StagedExperiment, TorqueBounds
 from hil.rig.experiments.tip import Tip
 
@@ -67,3 +70,7 @@ def _law(table: DrivenTable, inertia_kg_m2: float, period_s: float) -> MeasureLa
             return Reversal(table.turning_speed_rad_s, table.swing_nm, table.duration_s, period_s)
         case TipTable():
             return Tip(table.speed_rad_s, table.step_nm, table.step_s, table.duration_s)
+        case CoastTable():
+            return Coast(table.speed_rad_s, table.duration_s)
+        case RampTable():
+            return Ramp(table.swing_nm, table.ramp_s, table.duration_s)

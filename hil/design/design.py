@@ -1,0 +1,204 @@
+"""The design: every experiment that a rig may drive is driven on paper, and the one that tells most is chosen."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from drivers.errors import CommandRefused
+from estimator.design import Expected, Open, Width, as_model, expected, shown, widths
+from estimator.physics.model import DrivelineModel
+from estimator.signals.record import Record
+from hil.commission.order import Order, RigSource
+from hil.commission.runner import Prediction, predict
+from hil.design.candidates import Limits, Table, candidates
+from hil.errors import InputError, RunAborted, UsageError
+
+Progress = Callable[[str, float], None]
+
+WORTH = 3.0
+"""Factor by which an experiment has to change the odds to be worth driving (CONTRACT: design)."""
+
+NEARLY = 0.02
+"""Probability by which an experiment may tell less than another and be preferred for its shorter drive."""
+
+WIDE = 0.1
+"""Half of a 95 % interval over its value from which a parameter is not well known."""
+
+
+class Aim(Enum):
+    """What the next experiment is for."""
+
+    DECIDE = "decide"
+    PARAMETERS = "parameters"
+
+
+@dataclass(frozen=True, slots=True)
+class Planned:
+    """An experiment as the most probable hypothesis drives it on paper."""
+
+    name: str
+    table: Table
+    record: Record
+    prediction: Prediction
+
+    @property
+    def seconds(self) -> float:
+        """Length of the whole run [s]."""
+        return self.prediction.seconds
+
+    @property
+    def largest_nm(self) -> float:
+        """Largest torque of both inverters together in the recorded part [Nm]."""
+        return float(np.abs(self.prediction.torque_nm).max())
+
+    @property
+    def speed_rad_s(self) -> tuple[float, float]:
+        """Slowest and fastest speed over the whole run [rad/s]."""
+        return self.prediction.speed_rad_s.low, self.prediction.speed_rad_s.high
+
+    @property
+    def angle_rad(self) -> float:
+        """How far the shaft turns from where the recorded part begins, at most [rad]."""
+        return float(np.abs(np.cumsum(self.prediction.course_rad_s)).max()) * self.record.sample_time_s
+
+
+@dataclass(frozen=True, slots=True)
+class Design:
+    """The experiment that was chosen, and what it is expected to bring.
+
+    Attributes
+    ----------
+    aim : Aim
+    key : str
+        Name of its table in a rig file.
+    decides : Expected or None
+        Where it is to decide between hypotheses.
+    widths : tuple of Width
+        Of the most probable hypothesis' values, now and after it.
+    shows : tuple of str
+        Effects that no recording so far could show, and this experiment does.
+    others : tuple of (str, float)
+        What else was driven on paper, and what it was judged by: the probability of the true hypothesis afterwards;
+        where one is left, how many effects it shows; for parameters, by what factor intervals that are wide become
+        shorter, in the mean.
+    refused : mapping of str to str
+        What may not be driven, and why.
+    """
+
+    aim: Aim
+    key: str
+    planned: Planned
+    decides: Expected | None
+    widths: tuple[Width, ...]
+    shows: tuple[str, ...]
+    others: tuple[tuple[str, float], ...]
+    refused: dict[str, str]
+
+    @property
+    def factor(self) -> float:
+        """By what factor it changes the odds, or shortens the intervals that are wide."""
+        return _shortened(self.widths) if self.decides is None else self.decides.factor
+
+    @property
+    def is_worth_driving(self) -> bool:
+        """Whether it tells enough to take the vehicle out."""
+        if self.aim is Aim.DECIDE and self.decides is None:
+            return bool(self.shows)
+        return self.factor >= (WORTH if self.decides is not None else 1.0 + WIDE)
+
+
+def designed(source: RigSource, known: Open, aim: Aim, progress: Progress) -> Design:
+    """Choose the next experiment for a rig.
+
+    Raises
+    ------
+    UsageError
+        Where the rig may drive nothing.
+    """
+    rig = source.rig()
+    limits = Limits.of(rig)
+    model = as_model(known.candidates[0], known.line)
+    found: list[tuple[float, Planned, Expected | None]] = []
+    refused: dict[str, str] = {}
+    wanted, is_single = list(candidates(rig, limits)), aim is Aim.DECIDE and len(known.candidates) == 1
+    with threadpool_limits(1, user_api="blas"):
+        for i, (name, table) in enumerate(wanted):
+            progress(f"on paper: {name}", i / len(wanted))
+            try:
+                planned = on_paper(source, name, table, model, limits)
+            except (InputError, CommandRefused, RunAborted) as error:
+                refused[name] = str(error)
+                continue
+            decides = expected(known, planned.record) if aim is Aim.DECIDE and not is_single else None
+            if decides is not None:
+                found.append((decides.right, planned, decides))
+            elif is_single:
+                found.append((float(len(shown(known, planned.record))), planned, None))
+            else:
+                found.append((_shortened(_widths(known, planned)), planned, None))
+    progress("designed", 1.0)
+    if not found:
+        why = next(iter(refused.values()))
+        raise UsageError(
+            f"rig {rig.name!r}: expected an experiment that it may drive, got none: of {len(wanted)} none passes its "
+            f"limits, the first because: {why}"
+        )
+    found.sort(key=lambda each: -each[0])
+    enough = found[0][0] - NEARLY if found[0][2] is not None else found[0][0] * (1.0 - NEARLY)
+    near = [each for each in found if each[0] >= enough]
+    _, planned, decides = min(near, key=lambda each: each[1].seconds)
+    others = tuple((each.name, value) for value, each, _ in found if each is not planned)
+    key, shows = free_key(list(rig.experiments)), shown(known, planned.record) if is_single else ()
+    return Design(aim, key, planned, decides, _widths(known, planned), shows, others, refused)
+
+
+def is_needed(known: Open, aim: Aim) -> bool:
+    """Tell whether there is anything that an experiment could tell."""
+    return aim is Aim.PARAMETERS or len(known.candidates) > 1 or bool(known.untested)
+
+
+def _widths(known: Open, planned: Planned) -> tuple[Width, ...]:
+    return tuple(widths(known.candidates[0], known.line, planned.record))
+
+
+def on_paper(source: RigSource, name: str, table: Table, model: DrivelineModel, limits: Limits) -> Planned:
+    """Drive an experiment on paper, through the torque guard and within the limits."""
+    rig, _ = source.ordered(Order("next", table))
+    prediction = predict(rig, "next", model)
+    planned = Planned(name, table, _record(name, rig.period_s, prediction), prediction)
+    fastest = max(map(abs, planned.speed_rad_s))
+    if fastest > SPEED_ROOM * limits.speed_rad_s:
+        raise UsageError(f"it reaches {fastest:.3g} rad/s, allowed are {limits.speed_rad_s:.3g}")
+    if planned.angle_rad > limits.angle_rad:
+        raise UsageError(f"it turns the shaft by {planned.angle_rad:.3g} rad, allowed are {limits.angle_rad:.3g}")
+    return planned
+
+
+SPEED_ROOM = 1.2
+"""Part of the fastest speed that may be reached: a hold of it swings by some per cent."""
+
+
+def _record(name: str, period_s: float, prediction: Prediction) -> Record:
+    speed = prediction.course_rad_s
+    okay = np.ones(speed.size, dtype=np.bool_)
+    return Record(name, period_s, period_s * np.arange(speed.size, dtype=np.float64), prediction.each_nm, speed, okay)
+
+
+def _shortened(values: Sequence[Width]) -> float:
+    """Return the mean factor by which the intervals that are wide become shorter; all, where none is."""
+    wide = [each for each in values if each.now > WIDE * abs(each.value)] or list(values)
+    return math.exp(float(np.mean([math.log(max(each.now, 1e-300) / max(each.after, 1e-300)) for each in wide])))
+
+
+def free_key(taken: Sequence[str]) -> str:
+    """Return the first of ``next_1``, ``next_2``, … that a rig file does not have."""
+    number = 1
+    while f"next_{number}" in taken:
+        number += 1
+    return f"next_{number}"

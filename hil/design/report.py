@@ -1,0 +1,188 @@
+"""What a design says: to a person, to a script, to ``hil run``, and as a picture."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tomlkit
+
+from estimator.design import Open, Width
+from hil.design.design import WORTH, Aim, Design, Planned
+from hil.figures.drawn import drawing, require_matplotlib
+
+SCHEMA = "hil.design/1"
+
+MOST_SHOWN = 1e6
+"""Factor of odds from which no more digits are said."""
+
+LISTED = 3
+"""Other experiments that are named."""
+
+
+def question_lines(known: Open) -> Iterator[str]:
+    """Say what recordings leave open."""
+    first, *rivals = known.candidates
+    if not rivals:
+        yield f"One explanation is left: {first.name}."
+    else:
+        yield "The recordings leave open, with the odds of each among these:"
+        yield from (f"  {each.name:40} {each.probability:.3f}" for each in known.candidates)
+    if known.untested:
+        yield f"  Neither found nor excluded so far: {', '.join(known.untested)}."
+    for name, twins in known.twins.items():
+        yield (
+            f"  {name} and {' and '.join(twins)} are the same linear system by this output: no experiment tells them "
+            "apart. Measure another output, such as the load's speed."
+        )
+
+
+def design_lines(known: Open, design: Design) -> Iterator[str]:
+    """Say what is to be driven and what it is expected to bring."""
+    planned = design.planned
+    low, high = planned.speed_rad_s
+    yield f"Next experiment: {planned.name} ({design.key})"
+    yield (
+        f"  the vehicle is needed for {planned.seconds:.0f} s; speed {low:.1f} to {high:.1f} rad/s, torque up to "
+        f"{planned.largest_nm:.0f} Nm, the shaft turns by up to {planned.angle_rad / (2.0 * math.pi):.0f} turns"
+    )
+    if design.decides is not None:
+        now = sum(each.probability**2 for each in known.candidates)
+        yield (
+            f"  expected: the odds change by a factor of {_factor(design.factor)}; the true one then has a probability "
+            f"of {design.decides.right:.3f} in the mean, now {now:.3f}"
+        )
+    elif design.shows:
+        yield f"  shows what no recording so far could: {', '.join(design.shows)}"
+    else:
+        yield f"  expected: intervals that are wide become shorter by a factor of {_factor(design.factor)}"
+        yield from (f"    {line}" for line in width_lines(design.widths))
+    if not design.is_worth_driving:
+        yield f"  {obstacle(design)}"
+    others = ", ".join(f"{name} ({_value(value, design)})" for name, value in design.others[:LISTED])
+    if others:
+        yield f"  next best: {others}"
+    if design.refused:
+        name, why = next(iter(design.refused.items()))
+        yield f"  {len(design.refused)} others may not be driven here, such as {name}: {why.splitlines()[0]}"
+
+
+def _value(value: float, design: Design) -> str:
+    if design.decides is not None:
+        return f"probability {value:.3f}"
+    return f"shows {value:.0f}" if design.aim is Aim.DECIDE else f"factor {value:.3g}"
+
+
+def _factor(factor: float) -> str:
+    return f"{factor:.3g}" if factor < MOST_SHOWN else f"more than {MOST_SHOWN:.0e}"
+
+
+def width_lines(widths: Sequence[Width]) -> Iterator[str]:
+    """Say how well each value is known now, and then."""
+    for each in widths:
+        yield f"{each.name:32} {each.value:.4g} ± {each.now:.2g} {each.unit}, then ± {each.after:.2g}"
+
+
+def obstacle(design: Design) -> str:
+    """Say why no experiment tells enough, and by how much a limit would have to be raised.
+
+    Information grows with the time, and with the square of the torque.
+    """
+    if design.decides is None and design.aim is Aim.DECIDE:
+        return "no experiment that this rig may drive shows one of these"
+    if design.aim is Aim.PARAMETERS:
+        return "no experiment that this rig may drive makes intervals clearly shorter"
+    gained = math.log(max(design.factor, 1.0))
+    if gained < 1e-3:
+        return "no experiment that this rig may drive tells them apart: they move the speed alike in all of them"
+    longer = math.log(WORTH) / gained
+    return (
+        f"not worth driving: no experiment within the rig's limits changes the odds by a factor of {WORTH:g}. It would "
+        f"take {longer:.2g} times the duration ([design] most_duration_s), or {math.sqrt(longer):.2g} times the torque "
+        "([design] most_torque_nm, within the guard's)"
+    )
+
+
+def design_document(known: Open, design: Design | None, aim: Aim) -> dict[str, Any]:
+    """Return the design as JSON (schema ``hil.design/1``)."""
+    document: dict[str, Any] = {
+        "schema": SCHEMA,
+        "for": aim.value,
+        "hypotheses": [{"effects": sorted(each.effects), "probability": each.probability} for each in known.candidates],
+        "same_by_this_output": {name: list(twins) for name, twins in known.twins.items()},
+        "untested": list(known.untested),
+        "decided": known.is_decided,
+        "experiment": None,
+    }
+    if design is None:
+        return document
+    planned, low_high = design.planned, design.planned.speed_rad_s
+    return document | {
+        "worth_driving": design.is_worth_driving,
+        "obstacle": None if design.is_worth_driving else obstacle(design),
+        "experiment": {"key": design.key, "name": planned.name, "table": dict(planned.table)},
+        "expected": {
+            "factor": min(design.factor, MOST_SHOWN),
+            "probability": None if design.decides is None else design.decides.right,
+            "intervals": [
+                {"name": w.name, "value": w.value, "now": w.now, "after": w.after, "unit": w.unit}
+                for w in design.widths
+            ],
+        },
+        "drive": {
+            "seconds": planned.seconds,
+            "torque_nm": planned.largest_nm,
+            "speed_rad_s": list(low_high),
+            "angle_rad": planned.angle_rad,
+        },
+        "others": [{"name": name, "value": value} for name, value in design.others],
+        "refused": design.refused,
+    }
+
+
+def design_toml(design: Design, rig: Path) -> str:
+    """Return the experiment as a table of a rig file."""
+    document = tomlkit.document()
+    document.add(tomlkit.comment(f"Designed: {design.planned.name}. Drive it by"))
+    document.add(tomlkit.comment(f"  hil run {rig} THIS_FILE --out {design.key}.csv"))
+    document.add(tomlkit.comment(f"or copy the table into the rig file and name it: hil run {rig} {design.key} …"))
+    experiments = tomlkit.table(is_super_table=True)
+    table = tomlkit.table()
+    for key, value in design.planned.table.items():
+        if isinstance(value, dict):
+            inline = tomlkit.inline_table()
+            inline.update({k: _rounded(v) for k, v in value.items()})
+            table.add(key, inline)
+        else:
+            table.add(key, _rounded(value))
+    experiments.add(design.key, table)
+    document.add("experiments", experiments)
+    return tomlkit.dumps(document)
+
+
+def _rounded(value: Any) -> Any:
+    return float(f"{value:.6g}") if isinstance(value, float) else value
+
+
+def draw(planned: Planned, path: Path) -> None:
+    """Draw torque and speed of an experiment as they are expected."""
+    require_matplotlib()
+    with drawing():
+        from matplotlib.figure import Figure
+
+        figure = Figure(figsize=(7.16, 3.4))
+        top, bottom = figure.subplots(2, 1, sharex=True)
+        record = planned.record
+        top.step(record.time_s, record.total_torque_nm, where="post", linewidth=0.6)
+        bottom.plot(record.time_s, record.output, linewidth=0.8)
+        top.set_ylabel("torque, both inverters [Nm]")
+        bottom.set_ylabel("motor speed [rad/s]")
+        bottom.set_xlabel("time in the recorded part [s]")
+        top.set_title(f"{planned.name}, as predicted")
+        bottom.set_xlim(float(record.time_s[0]), float(record.time_s[-1]))
+        if float(np.ptp(record.total_torque_nm)) == 0.0:
+            top.set_ylim(-1.0, 1.0)
+        figure.savefig(path, dpi=150)

@@ -1,0 +1,95 @@
+"""An experiment on paper tells hypotheses apart by as much as a fit of what it then gives does."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from estimator.design import Candidate, Open, as_model, distance, expected, name_of, shown, widths
+from estimator.design import _on_paper as on_paper
+from estimator.design import _precision as precision
+from estimator.diagnosis.inference.descent import descended
+from estimator.diagnosis.inference.disturbances import whitener_of
+from estimator.diagnosis.inference.judge import grounds
+from estimator.diagnosis.inference.likelihood import THOROUGH
+from estimator.diagnosis.inference.search import Search
+from estimator.physics.driveline import Start
+from estimator.physics.fit import not_fitted
+from estimator.physics.grid import grid_for
+from estimator.physics.layout import flat
+from estimator.physics.problem import make_problem
+from estimator.physics.simulate import simulate
+from estimator.physics.unknowns import own_unknowns
+from estimator.signals.record import Record
+from tests.estimator.diagnosis.one_effect import bench_with
+from tests.estimator.physics.bench import record
+
+NAMES = ["coulomb_friction_motor", "coulomb_friction_load"]
+
+
+@pytest.fixture(scope="module")
+def known() -> Open:
+    """Dry friction at the motor or at the load, as if either were as probable; and what none of them showed."""
+    bench = bench_with(NAMES[0], {"friction_nm": 8.0})
+    search = Search(bench.model, bench.records, bench.use, NAMES)
+    best = grounds(search).best
+    other = search.exchanged(best, *NAMES)
+    assert other is not None
+    candidates = tuple(Candidate(name_of(fit.effects), 0.5, fit, precision(fit)) for fit in (best, other))
+    return Open(search.model, candidates, {}, 1.0, ("speed_sign_blind", "coulomb_friction_motor"))
+
+
+def driven(known: Open, torque_nm: float, cycles: int = 400) -> Record:
+    """Back and forth through standstill, as the first hypothesis lets the motor turn."""
+    model = as_model(known.candidates[0], known.line)
+    turns = np.where(np.arange(cycles) // 100 % 2 == 0, torque_nm, -torque_nm)
+    silent = record(turns, np.zeros(cycles), name="paper")
+    output = simulate(grid_for(model, [silent]), silent, flat(model), Start(0.0, 0.0, 0.0))
+    return record(turns, output, name="paper")
+
+
+def test_both_hypotheses_are_there(known: Open) -> None:
+    assert [each.name for each in known.candidates] == NAMES
+
+
+def test_nothing_is_told_from_itself(known: Open) -> None:
+    one = known.candidates[0]
+    assert distance(one, one, known.line, driven(known, 60.0)) == pytest.approx(0.0, abs=1e-6)
+
+
+def test_more_time_tells_more_and_the_right_one_becomes_surer(known: Open) -> None:
+    short, long = (expected(known, driven(known, 60.0, cycles)) for cycles in (200, 800))
+    assert 0.5 < short.right < long.right <= 1.0
+    assert 1.0 < short.factor < long.factor
+
+
+def test_what_an_experiment_promises_is_what_a_fit_to_it_finds(known: Open) -> None:
+    """The rival, fitted to noise-free samples of the truth with what it knew before, is behind by the distance."""
+    truth, rival = known.candidates
+    paper = driven(known, 60.0)
+    said = replace(paper, output=on_paper(truth, known.line, paper).outputs[0])
+    before = rival.fit.plain.problem
+    records = [*before.records, said]
+    own = [own_unknowns(rival.effects, each) for each in records]
+    joint = make_problem(known.line, records, before.shared, own=own)
+    begun = not_fitted(joint, np.concatenate([rival.fit.plain.x, joint.local[-1].guess]))
+    fitted = descended(begun, whitener_of(begun, rival.fit.sizes), THOROUGH)
+    squares = [
+        float(np.sum(whitener_of(each, rival.fit.sizes)(each.residual) ** 2)) for each in (fitted, rival.fit.plain)
+    ]
+    promised = distance(truth, rival, known.line, paper)
+    assert promised > 10.0
+    assert promised == pytest.approx(squares[0] - squares[1], rel=0.25)
+
+
+def test_values_become_better_known(known: Open) -> None:
+    found = list(widths(known.candidates[0], known.line, driven(known, 60.0)))
+    assert {"J_M", "J_L", "k", "coulomb_friction_motor.friction_nm"} <= {each.name for each in found}
+    assert all(each.after <= each.now * (1.0 + 1e-9) for each in found)
+    assert min(each.after / each.now for each in found) < 0.9
+
+
+def test_what_a_reversal_shows_is_asked_of_the_catalogue(known: Open) -> None:
+    assert "coulomb_friction_motor" in shown(known, driven(known, 60.0))
