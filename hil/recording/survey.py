@@ -25,23 +25,7 @@ EVEN: Final = 0.5
 
 @dataclass(frozen=True, slots=True)
 class Channel:
-    """One channel in figures.
-
-    Attributes
-    ----------
-    name, unit : str
-        As the file has them; the unit is empty where it has none.
-    kind : str
-        ``number`` or ``text``.
-    rows, missing : int
-        Samples, and how many of them hold no number.
-    low, high : float or None
-        Range, in the file's own unit; None where there is no number.
-    increases : bool
-        Whether every value is above the one before.
-    wraps_at : float or None
-        Where it begins anew, if it was stored with a sign and is read without.
-    """
+    """One channel in figures; ranges are in the file's own unit."""
 
     name: str
     unit: str
@@ -51,7 +35,7 @@ class Channel:
     low: float | None
     high: float | None
     increases: bool
-    wraps_at: float | None
+    wraps_at: float | None  # where it begins anew, if it was stored with a sign and is read without
 
     @property
     def moves(self) -> bool:
@@ -61,20 +45,7 @@ class Channel:
 
 @dataclass(frozen=True, slots=True)
 class Group:
-    """Channels that share their time.
-
-    Attributes
-    ----------
-    time : str or None
-        The channel that is their time.
-    period_s : float or None
-        Usual distance of two rows; None without a time.
-    even : bool
-        Whether rows can be read as they are, every one a period after the one before.
-    gaps : int
-        Places where rows are missing.
-    channels : tuple of Channel
-    """
+    """Channels that share their time; ``even`` where every row is a period after the one before."""
 
     time: str | None
     period_s: float | None
@@ -217,17 +188,7 @@ class Guess:
 
 @dataclass(frozen=True, slots=True)
 class Roles:
-    """What was chosen of a file, and what else it could be.
-
-    Attributes
-    ----------
-    torques : tuple of Guess
-        Inputs, to be summed; empty where none is likely.
-    output : Guess or None
-        Speed or position.
-    others : tuple of Guess
-        What else could be one of them.
-    """
+    """What was chosen of a file, inputs to be summed and speed or position, and what else could be one of them."""
 
     torques: tuple[Guess, ...]
     output: Guess | None
