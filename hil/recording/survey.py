@@ -9,6 +9,7 @@ from dataclasses import asdict, dataclass, field
 from typing import Any, Final
 
 import numpy as np
+from pydantic import TypeAdapter
 
 from hil.recording.channels import are_row_numbers, is_even_time, time_quantity
 from hil.recording.resample import GAP, straightened
@@ -79,11 +80,7 @@ class Survey:
     @classmethod
     def of_document(cls, document: Mapping[str, Any]) -> Survey:
         """Return what `as_document` was made of."""
-        groups = [
-            Group(**{**group, "channels": tuple(Channel(**channel) for channel in group["channels"])})
-            for group in document["groups"]
-        ]
-        return cls(tuple(groups), tuple(document["said"]), document["metadata"])
+        return TypeAdapter(Survey).validate_python(document)
 
 
 def survey_of(tables: Sequence[Table]) -> Survey:

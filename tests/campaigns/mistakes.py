@@ -1,8 +1,8 @@
 """Seventy mistakes of people who bring a recording, each in a file of its own: ``python -m tests.campaigns.mistakes``.
 
 A bus with two motors is simulated; its model is off by as much as models are. Then one thing is written wrongly. What a
-person is told is judged by what comes of it: the lines that they are told to paste are pasted and the recording is read
-again. ``right`` is a mistake that is undone then, or needs nothing, or that only a person can undo and is named;
+person reads then is judged by what comes of it: the lines that they are asked to paste are pasted and the recording is
+read again. ``right`` is a mistake that is undone then, or needs nothing, or that only a person can undo and is named;
 ``named`` is one that is among those listed; ``wrong`` has lines that read something else; ``silent`` has no word.
 """
 
@@ -224,11 +224,11 @@ class Outcome:
     """What came of a mistake, and what was said."""
 
     kind: str
-    told: str
+    said: str
 
 
 def judge(mistake: Mistake, folder: Path) -> Outcome:
-    """Write the file, read it as a person would, paste what they are told, and say what came of it."""
+    """Write the file, read it as a person would, paste the lines, and say what came of it."""
     true = driven(mistake.of)
     path = folder / "run.csv"
     columns = mistake.columns(dict(true))
@@ -237,28 +237,28 @@ def judge(mistake: Mistake, folder: Path) -> Outcome:
     line = model(nominal, 0.2, motion=mistake.motion)
     line = DrivelineModel(line.structure, line.parameters, line.motion, gear_ratio=mistake.gear_ratio)
     signals = {**SIGNALS, **mistake.signals}
-    told, record = told_of(path, signals, line)
-    lines = pasted(told)
+    said, record = said_of(path, signals, line)
+    lines = pasted(said)
     if lines:
         for key, value in lines.items():
             signals = {name: each for name, each in signals.items() if not (key in OUTPUTS and name in OUTPUTS)}
             signals[key] = value
-        _, record = told_of(path, signals, line)
-        return Outcome("right" if record is not None and is_true(record, true, mistake.within) else "wrong", told)
-    if not told and mistake.words:
-        return Outcome("silent", told)
+        _, record = said_of(path, signals, line)
+        return Outcome("right" if record is not None and is_true(record, true, mistake.within) else "wrong", said)
+    if not said and mistake.words:
+        return Outcome("silent", said)
     if not mistake.words:
         is_read = record is not None and is_true(record, true, mistake.within)
-        return Outcome("right" if is_read else "silent", told)
-    if re.search(mistake.words, told) is None:
-        return Outcome("another named", told)
-    return Outcome("right" if mistake.by_hand else "named", told)
+        return Outcome("right" if is_read else "silent", said)
+    if re.search(mistake.words, said) is None:
+        return Outcome("another named", said)
+    return Outcome("right" if mistake.by_hand else "named", said)
 
 
 OUTPUTS = ("speed", "position")
 
 
-def told_of(path: Path, signals: Mapping[str, Any], line: DrivelineModel) -> tuple[str, Record | None]:
+def said_of(path: Path, signals: Mapping[str, Any], line: DrivelineModel) -> tuple[str, Record | None]:
     """Return all that ``hil look FILE --model MODEL`` tells of a file, and the recording where it could be read."""
     said: list[str] = []
     config = SignalsConfig.model_validate(dict(signals))
@@ -273,12 +273,12 @@ def told_of(path: Path, signals: Mapping[str, Any], line: DrivelineModel) -> tup
 ENTRY = re.compile(r"[Ww]rite (\{ column = '(\w+)'.*?\})")
 
 
-def pasted(told: str) -> dict[str, Any]:
-    """Return the lines of [signals] that a person is told to write."""
+def pasted(said: str) -> dict[str, Any]:
+    """Return the lines of [signals] that a person is asked to write."""
     found: dict[str, Any] = {}
-    for text in re.findall(r"In \[signals\] write: (.*)", told):
+    for text in re.findall(r"In \[signals\] write: (.*)", said):
         found |= tomllib.loads(re.sub(r"  (?=\w+ = )", "\n", text))
-    for entry, column in ENTRY.findall(told):
+    for entry, column in ENTRY.findall(said):
         value = tomllib.loads(f"x = {entry}".replace("'", '"'))["x"]
         if column == "n":
             found["speed"] = {**value, "at": "motor"}
@@ -304,15 +304,15 @@ def is_true(record: Record, true: Mapping[str, FloatArray], within: float) -> bo
 
 
 def main() -> int:
-    """Print what comes of every mistake, and how often; all that was told with ``--told``."""
+    """Print what comes of every mistake, and how often; all that was said with ``--said``."""
     counts: Counter[str] = Counter()
     with tempfile.TemporaryDirectory() as folder:
         for name, mistake in MISTAKES.items():
             outcome = judge(mistake, Path(folder))
             counts[outcome.kind] += 1
             print(f"{name:45} {outcome.kind}")
-            if "--told" in sys.argv[1:]:
-                print("    " + outcome.told.replace("\n", "\n    "))
+            if "--said" in sys.argv[1:]:
+                print("    " + outcome.said.replace("\n", "\n    "))
     print(f"\n{len(MISTAKES)} mistakes: " + ", ".join(f"{count} {kind}" for kind, count in counts.most_common()))
     return 0
 
