@@ -24,7 +24,7 @@ def test_no_mistake_has_a_wrong_cure_or_goes_without_a_word(tmp_path: Path) -> N
 
 
 @pytest.mark.parametrize("of", ["tip", "cruise", "back", "rig"])
-def test_of_a_recording_that_is_right_nothing_is_told(of: str, tmp_path: Path) -> None:
+def test_of_a_recording_that_is_right_nothing_is_said(of: str, tmp_path: Path) -> None:
     path = tmp_path / "run.csv"
     path.write_text(csv({name: driven(of)[name] for name in ("t", "T1", "T2", "n")}), "utf-8")
     said: list[str] = []
