@@ -25,11 +25,9 @@ from estimator.signals.record import OutputKind, Record
 
 
 class Part(Enum):
-    """What a factor belongs to; the value is the word for people."""
+    """What a factor belongs to."""
 
-    TORQUE = "torque"
-    OUTPUT = "output"
-    MODEL = "inertia in the model file"
+    TORQUE, OUTPUT, MODEL = range(3)
 
 
 RPM, DEGREE, TURN = math.pi / 30.0, math.pi / 180.0, 2.0 * math.pi
@@ -198,6 +196,7 @@ def column_changes(record: Record) -> Iterator[Change]:
             0.2,
             f"is the sign of torque input {i + 1} turned round (all count positive in the direction of the speed)",
             Cure(record.name, torque=-1.0, inputs=(i,)),
+            factors=0,
         )
     for i in range(count):
         torque, good = record.torque_nm.copy(), np.flatnonzero(record.okay)
@@ -207,6 +206,7 @@ def column_changes(record: Record) -> Iterator[Change]:
             0.05,
             f"are the columns of torque input {i + 1} and of the output swapped",
             Cure(record.name, swapped=i),
+            factors=0,
         )
     good = np.flatnonzero(record.okay)
     output = np.interp(np.arange(record.okay.size), good, record.output[good])
@@ -247,7 +247,7 @@ USUAL_TORQUE_NM, USUAL_SPEED_RAD_S = (200.0, math.log(8.0)), (80.0, math.log(5.0
 """Median, and spread of the logarithm, of the largest torque and speed in a recording of a drive."""
 
 WHOLE, FEWEST_VALUES = 1e-6, 5
-"""How far whole numbers may be off, and how many different there must be: fewer are levels that were asked for."""
+"""How far whole numbers may be off, and how many there must be: fewer are levels that were asked for."""
 
 
 def _normal(x: float, spread: float) -> float:

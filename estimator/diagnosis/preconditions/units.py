@@ -73,7 +73,8 @@ def _judged(
     records: Sequence[Record], line: DrivelineModel, is_cured: bool = False
 ) -> tuple[Implausible | None, list[Implausible]]:
     """Return the refusal of the recording that tells most clearly, or what is doubtful; neither where all fit."""
-    judged = [_less_its_load(record) for record in records if record.kind is not OutputKind.FORCE]
+    moving = [each for each in records if each.kind is not OutputKind.FORCE and np.ptp(each.output[each.okay]) > 0.0]
+    judged = [_less_its_load(record) for record in moving]
     found = [(record, _inertia(record, line)) for record in judged]
     found = [(record, each) for record, each in found if each is None or not _is_within_tolerance(each, line)]
     doubts = []
@@ -84,7 +85,7 @@ def _judged(
         cure = best.cure if odds >= FAR_AHEAD and odds >= OVER_THE_NEXT * next_odds else None
         text = _text(record, line, each, ranked)
         is_right = math.fsum(each for explanation, each in ranked if explanation.is_physics)
-        if not is_off and (cure is None or best.is_a_factor) and each is not None and is_right < DOUBTFUL:
+        if not is_off and best.is_a_factor and each is not None and is_right < DOUBTFUL:
             doubts.append(Implausible(text, cure))
         if best.change.physics or not (is_off or (cure is not None and not best.is_a_factor)):
             continue
