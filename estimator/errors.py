@@ -67,6 +67,8 @@ class Cure:
         For the measured output, and for the time.
     swapped : int or None
         The torque input that is swapped with the output.
+    kind : str or None
+        What the output is instead: a position, or a speed.
     """
 
     recording: str
@@ -75,6 +77,7 @@ class Cure:
     output: float = 1.0
     time: float = 1.0
     swapped: int | None = None
+    kind: str | None = None
 
 
 class Implausible(EstimatorError, ValueError):

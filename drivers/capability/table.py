@@ -246,7 +246,7 @@ _ROWS: Final = (
         _F.ABORT_CONNECTION,
         _one(0x6007, _I16),
         _W.ACCEPTED,
-        "what the drive does without its host is not known from its data sheet",
+        "what the drive does when the host fails is not known from its data sheet",
         "whatever else stops it then has to be known",
         key="abort_connection",
     ),

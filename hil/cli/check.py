@@ -156,7 +156,7 @@ def _details(finding: Finding) -> Iterator[str]:
     yield from finding.questions
     yield from finding.remarks
     yield from (f"not the same everywhere: {each}" for each in finding.commissioned)
-    yield from (f"without its host: {each}" for each in finding.protections)
+    yield from (f"if the host fails, {each}" for each in finding.protections)
 
 
 def _register_table(finding: Finding) -> RichTable:

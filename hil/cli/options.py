@@ -26,7 +26,9 @@ if TYPE_CHECKING:
 
 Dbc = Annotated[
     Path | None,
-    typer.Option("--dbc", metavar="FILE", help="DBC file: what the frames of a logged CAN bus (MDF) mean."),
+    typer.Option(
+        "--dbc", metavar="FILE", help="DBC file, or the drives' EDS or DCF: what the frames of a logged CAN bus mean."
+    ),
 ]
 
 

@@ -12,10 +12,10 @@ from pathlib import Path
 from typing import Any
 
 from estimator.diagnosis.acquisition import as_if_not_lost
-from estimator.diagnosis.preconditions import are_whole_numbers, require_plausible_alone, require_plausible_units
+from estimator.diagnosis.preconditions import are_whole_numbers, require_plausible, require_plausible_alone
 from estimator.errors import Cure, EstimatorError, Implausible
 from estimator.physics.model import DrivelineModel
-from estimator.signals.record import Record
+from estimator.signals.record import OutputKind, Record
 from hil.errors import RecordingError
 from hil.recording.formats import read_table
 from hil.recording.scales import Role, scale_of
@@ -34,15 +34,14 @@ def tell_scales(
 ) -> None:
     """Tell of torque, output or time that is off by a factor or in sign, as ``hil diagnose`` refuses it."""
     try:
-        with with_the_line_to_write(paths, signals, dbc):
-            require_plausible_units(as_if_not_lost(records), model)
+        implausible = require_plausible(records, model)
     except Implausible as error:
-        tell(" ".join((str(error), *getattr(error, "__notes__", ()))))
+        implausible = [error]
     except EstimatorError:
-        pass  # a recording that can't tell its scales; whatever else is wrong with it, who uses it says so
-
-
-PER_MILLE = 1e-3
+        return  # whatever else is wrong with a recording, who uses it says so
+    for each in implausible:
+        add_the_line_to_write(each, paths, signals, dbc)
+        tell(" ".join((str(each), *getattr(each, "__notes__", ()))))
 
 
 def tell_scales_alone(record: Record, path: Path, signals: SignalsConfig | None, dbc: Path | None, tell: Tell) -> None:
@@ -54,7 +53,7 @@ def tell_scales_alone(record: Record, path: Path, signals: SignalsConfig | None,
         tell(" ".join((str(error), *getattr(error, "__notes__", ()))))
     if are_whole_numbers(record):
         known = signals or SignalsConfig()
-        lines = cure_lines(Cure(record.name, torque=PER_MILLE), known, read_table(path, known.request(dbc)))
+        lines = cure_lines(Cure(record.name, torque=1e-3), known, read_table(path, known.request(dbc)))
         tell(
             f"recording {record.name}: the torques are whole numbers. If they are per mille of the rated torque, as "
             f"drives send them, write in [signals], each scale times the rated torque in Nm: {'  '.join(lines)}"
@@ -69,19 +68,27 @@ def with_the_line_to_write(
     try:
         yield
     except Implausible as error:
-        cure = error.cure
-        path = None if cure is None else next((path for path in paths if path.stem == cure.recording), None)
-        if cure is not None and path is not None:
-            known = signals or SignalsConfig()
-            with suppress(RecordingError):  # the file has changed since it was read
-                table = read_table(path, known.request(dbc))
-                error.add_note("In [signals] write: " + "  ".join(cure_lines(cure, known, table)))
+        add_the_line_to_write(error, paths, signals, dbc)
         raise
+
+
+def add_the_line_to_write(
+    error: Implausible, paths: Sequence[Path], signals: SignalsConfig | None, dbc: Path | None
+) -> None:
+    """Add the lines of ``[signals]`` that cure a recording, where that is known, as a note."""
+    cure = error.cure
+    path = None if cure is None else next((path for path in paths if path.stem == cure.recording), None)
+    if cure is not None and path is not None:
+        known = signals or SignalsConfig()
+        with suppress(RecordingError):  # the file has changed since it was read
+            table = read_table(path, known.request(dbc))
+            error.add_note("In [signals] write: " + "  ".join(cure_lines(cure, known, table)))
 
 
 def cure_lines(cure: Cure, signals: SignalsConfig, table: Table) -> list[str]:
     """Return the lines that a ``[signals]`` table has to have instead of its own."""
     torques, (kind, output) = signals.torques(), signals.output()
+    kind = kind if cure.kind is None else OutputKind(cure.kind)
     time = time_signal(table, signals.time)
     if cure.swapped is not None:
         swapped = torques[cure.swapped]
@@ -93,8 +100,8 @@ def cure_lines(cure: Cure, signals: SignalsConfig, table: Table) -> list[str]:
         inputs = cure.inputs or tuple(range(len(torques)))
         scales = [_scale(table, torque, Role.TORQUE) for torque in torques]
         lines.append(_torque_line(torques, [s * cure.torque if k in inputs else s for k, s in enumerate(scales)]))
-    if cure.output != 1.0:
-        scale = _scale(table, output, Role(kind.value)) * cure.output
+    if cure.output != 1.0 or cure.kind is not None:
+        scale = (1.0 if cure.kind else _scale(table, output, Role(kind.value))) * cure.output
         lines.append(f"{kind.value} = {_entry(output.column, scale, f', at = {_quoted(output.at.value)}')}")
     if cure.time != 1.0 and time.column is not None:
         scale = scale_of(table, time.column, Role.TIME, time.given_scale) * cure.time

@@ -93,7 +93,7 @@ def text_sha256(text: str) -> str:
 
 
 def sealed(table: Table) -> Table:
-    """Return a table with its checksums among its metadata; one that says nothing of itself stays as it is."""
+    """Return a table with its checksums among its metadata; one without metadata stays as it is."""
     if not (table.metadata or table.units):
         return table
     checksums = {CHECKSUM: data_sha256(table.columns), SAID: said_sha256(_units_of(table), table.metadata)}

@@ -261,11 +261,16 @@ def _broken_line(rows: bytes, form: TextForm, skipped: tuple[int, ...]) -> str:
         if count != form.width:
             cut = row + 1 == len(lines) and count < form.width
             cure = "the file is truncated: remove its last line or record again" if cut else "fix that line"
-            if form.delimiter == "," and count == 2 * form.width:
+            if form.delimiter == "," and form.width < count <= 2 * form.width and row == 0 and _are_digits(line):
                 cure = "its numbers have decimal commas: save it with ; between cells, or with decimal points"
             where = "as in the header" if form.header_line else "as in most lines"
             return f"line {number}: expected {form.width} cells {where}, got {count}; {cure}"
     return f"expected lines shorter than {BLOCK_BYTES} bytes, got a longer one"
+
+
+def _are_digits(line: str) -> bool:
+    """Tell whether a line between commas is digits alone, as numbers with decimal commas are."""
+    return all(cell.strip().lstrip("+-").isdigit() for cell in line.split(","))
 
 
 def _tells_its_kind(column: Column) -> bool:

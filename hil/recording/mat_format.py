@@ -26,6 +26,7 @@ import numpy as np
 
 from hil.errors import RecordingError
 from hil.recording.bounds import damaged, require_columns
+from hil.recording.channels import seconds_since_first
 from hil.recording.description import described_table, description_of, metadata_of
 from hil.recording.hdf5_format import reading, text_of, write_whole
 from hil.recording.request import Request, under_names, vectors_of
@@ -256,8 +257,6 @@ def _class_of(dataset: Dataset) -> str:
 OBJECTS: Final = "__function_workspace__"
 """Variable in which MATLAB keeps what its objects hold (versions 5 to 7)."""
 
-NS: Final = 1e-9
-
 
 def with_tables(path: Path) -> dict[str, Any]:
     """Return the variables of a .mat file, tables among them as data frames."""
@@ -295,12 +294,7 @@ def columns_of(table: Any) -> dict[str, Any]:
 
 def _seconds(values: Any) -> Any:
     """Return durations in seconds, times as seconds since the first; anything else as it is."""
-    if values.dtype.kind == "m":
-        return values.astype("timedelta64[ns]").astype(np.int64) * NS
-    if values.dtype.kind == "M":
-        stamps = values.astype("datetime64[ns]").astype(np.int64)
-        return (stamps - stamps[:1]) * NS
-    return values
+    return seconds_since_first(values) if values.dtype.kind in "mM" else values
 
 
 DEEPEST: Final = 12

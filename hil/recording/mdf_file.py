@@ -21,6 +21,7 @@ import numpy as np
 
 from hil.errors import RecordingError
 from hil.recording.bounds import damaged, require_columns
+from hil.recording.bus_database import DATA_SHEETS, database_of
 from hil.recording.request import Request
 from hil.recording.resample import Series, resampled
 from hil.recording.table import Column, Kind, Table, as_column, is_column
@@ -107,9 +108,6 @@ def _quiet() -> Iterator[None]:
 BUS_EVENT: Final = 2
 """Flag of a group of bus events, ``cg_flags`` (ASAM MDF 4.1, table 51)."""
 
-LARGEST_DBC_BYTES: Final = 32 << 20
-"""One of a whole vehicle has some megabytes."""
-
 ANY_BUS: Final = 0
 """Channel of the bus, as asammdf counts: every one."""
 
@@ -122,32 +120,21 @@ def is_bus_log(mdf: MDF) -> bool:
 
 def decoded(path: Path, mdf: MDF, dbc: Path) -> MDF:
     """Return the signals of a logged bus, a J1939 one among them, as a file of their own in memory."""
+    from asammdf.blocks.utils import load_can_database
+
     if not any(int(getattr(group.channel_group, "flags", 0)) & BUS_EVENT for group in mdf.groups):
         raise RecordingError(path, "expected the frames of a bus for --dbc, got signals. Leave --dbc out.")
-    database_of(path, dbc)
-    signals = mdf.extract_bus_logging({"CAN": [(dbc, ANY_BUS)]})
+    known: Any = dbc
+    database = database_of(path, dbc)
+    if dbc.suffix.lower() in DATA_SHEETS:
+        known = load_can_database("data_sheet.dbc", contents=database.as_dbc_string().encode())
+    signals = mdf.extract_bus_logging({"CAN": [(known, ANY_BUS)]})
     if not any(group.channel_group.cycles_nr for group in signals.groups):
         raise RecordingError(
             path,
             f"--dbc {dbc}: expected a description of the frames in this file, got none of them. Is it of another bus?",
         )
     return signals
-
-
-def database_of(path: Path, dbc: Path) -> Any:
-    """Read a DBC file that says what the frames of a log mean."""
-    import cantools
-
-    if dbc.suffix.lower() != ".dbc":
-        raise RecordingError(path, f"--dbc {dbc}: expected a DBC file, named .dbc, got {dbc.suffix!r}")
-    try:
-        size = dbc.stat().st_size
-        database: Any = cantools.database.load_file(dbc, "dbc") if size <= LARGEST_DBC_BYTES else None
-    except Exception as error:
-        raise RecordingError(path, f"--dbc {dbc}: expected a DBC file, got: {type(error).__name__}: {error}") from error
-    if database is None or not database.messages:
-        raise RecordingError(path, f"--dbc {dbc}: expected a DBC file that describes messages, got one without any")
-    return database
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,7 +21,8 @@ import numpy as np
 
 from hil.errors import RecordingError
 from hil.recording.bounds import damaged, require_cells
-from hil.recording.mdf_file import database_of, foreign_table, foreign_tables
+from hil.recording.bus_database import DATA_SHEETS, database_of
+from hil.recording.mdf_file import foreign_table, foreign_tables
 from hil.recording.request import Request
 from hil.recording.table import Column, Table, as_column, is_column
 
@@ -201,10 +202,29 @@ def _bus_log(path: Path, request: Request) -> tuple[list[Group], list[str]]:
             f"--dbc {request.dbc}: expected a description of the frames in this file, got none of its "
             f"{log.frames} frames described. Is it of another bus?",
         )
+    if request.dbc.suffix.lower() in DATA_SHEETS:
+        _require_mapped(path, request.dbc, known, rows)
     start = min(frames[0][0] for frames in rows.values())
     groups = [_message(known[number], frames, start) for number, frames in rows.items()]
     odd = [f"{log.odd} lines skipped that are no frames"] if log.odd else []
     return groups, odd
+
+
+def _require_mapped(
+    path: Path, sheet: Path, known: Mapping[int, Any], rows: Mapping[int, list[tuple[float, bytes]]]
+) -> None:
+    """Refuse a data sheet by which frames have other lengths than they have in the log."""
+    others = [
+        f"0x{number:03X} has {len(frames[0][1])} bytes and {known[number].length} in the file"
+        for number, frames in rows.items()
+        if all(len(data) != known[number].length for _, data in frames)
+    ]
+    if others:
+        raise RecordingError(
+            path,
+            f"--dbc {sheet}: expected PDOs as this file maps them, got others: {'; '.join(others)}. The drive was "
+            "mapped otherwise: give a DCF as it was set up, or a DBC file.",
+        )
 
 
 def _message(message: Any, frames: list[tuple[float, bytes]], start: float) -> Group:

@@ -34,17 +34,7 @@ HELD_BYTES = 1 << 25
 
 @dataclass(frozen=True, slots=True)
 class Extent:
-    """How much a recording holds.
-
-    Attributes
-    ----------
-    n_rows
-        Its rows, N.
-    first_s, last_s
-        Time of the first and the last row [s].
-    flagged
-        Rows that are not good.
-    """
+    """How much a recording holds: rows, times of the first and the last one, and rows that are not good."""
 
     n_rows: int = 0
     first_s: float = 0.0

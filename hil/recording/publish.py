@@ -92,24 +92,10 @@ def write_table(
     replace: bool = False,
     on_loss: Callable[[Sequence[str]], None] | None = None,
 ) -> None:
-    """Write a recording, whole or not at all.
+    """Write a recording, whole or not at all; the suffix chooses the format, and its data get a checksum.
 
-    Parameters
-    ----------
-    table : Table
-        What is written. One that has units or metadata gets the checksum of its data with them.
-    path : Path or str
-        Where to; the suffix chooses the format.
-    replace : bool
-        Whether a recording of that name may be replaced.
-    on_loss : callable, optional
-        Called with what the format can't hold, one line each; the rest is written then. Without it such a table is
-        refused.
-
-    Raises
-    ------
-    RecordingError
-        As :func:`hil.recording.formats.writer_for`, if the format can't hold the content, or the disk does not.
+    ``replace`` lets it take the place of one of that name. What the format can't hold is given to ``on_loss``, a line
+    each; without it such a table is refused with a `RecordingError`, as one that the disk does not take is.
     """
     path = Path(path)
     write = writer_for(path, replace)
@@ -154,7 +140,7 @@ def _write(
 
 
 def _publish(part: Path, path: Path, form: Format) -> None:
-    """Give the files their names; a kill in between leaves a recording that says nothing of itself, never a wrong one.
+    """Give the files their names; a kill in between leaves a recording without metadata, never a wrong one.
 
     What stood next to a replaced recording goes first, for it describes that one.
     """

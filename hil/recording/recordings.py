@@ -30,15 +30,8 @@ def read_records(
 ) -> tuple[Record, ...]:
     """Read recordings that are to be explained by one model; see :func:`read_record` for the arguments.
 
-    Raises
-    ------
-    UsageError
-        If two have the same name: results are reported by it; or the same samples: they would count twice as
-        evidence, and held out they would prove nothing.
-    RecordingError
-        If one can't be read, or has another sampling period than the first.
-    InputError
-        If several can't be read; with the faults of each.
+    Refuses two of one name, by which results are reported; of the same samples, which would count twice as evidence and
+    prove nothing held out; and of different sampling periods. Where several can't be read, all faults are said.
     """
     _require_own_names(paths)
     records: list[Record] = []
@@ -133,7 +126,7 @@ _SINGLE_LINE = 100
 def self_description(metadata: Mapping[str, str]) -> list[str]:
     """Return a line for each thing that is said; long texts by their length, the rig file by its checksum."""
     if not metadata:
-        return ["says nothing of itself: no units, no rig file, no checksum"]
+        return ["no metadata: no units, no rig file, no checksum"]
     lines = []
     for key, value in metadata.items():
         if key == RIG_TEXT:

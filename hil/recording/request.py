@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, field_validator
 
 from hil.recording.table import Column, is_column
 
@@ -66,30 +66,14 @@ class FormatHints(BaseModel):
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """What a reader has to know in addition to the file.
-
-    Attributes
-    ----------
-    form : FormatHints
-        Of a text file.
-    columns : tuple of str
-        Channels that are needed, by the names or addresses they have in the file; empty for those that belong together.
-    time : str, optional
-        The channel of the time, where it is one.
-    held : tuple of str
-        Those of them whose last value counts until the next; between the others' values lie straight lines.
-    resample_s : float, optional
-        Period to which channels of different rates are brought [s].
-    dbc : Path, optional
-        What the frames of a logged CAN bus mean.
-    """
+    """What a reader has to know in addition to the file."""
 
     form: FormatHints = field(default_factory=FormatHints)
-    columns: tuple[str, ...] = ()
+    columns: tuple[str, ...] = ()  # needed, by name or address in the file; empty for those that belong together
     time: str | None = None
-    held: tuple[str, ...] = ()
-    resample_s: float | None = None
-    dbc: Path | None = None
+    held: tuple[str, ...] = ()  # of them, those whose last value counts until the next; others lie on straight lines
+    resample_s: float | None = None  # to which channels of different rates are brought
+    dbc: Path | None = None  # what the frames of a logged CAN bus mean
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -98,27 +82,13 @@ class Request:
 
     def as_document(self) -> dict[str, Any]:
         """Return it as JSON has it."""
-        return {
-            "form": self.form.model_dump(),
-            "columns": list(self.columns),
-            "time": self.time,
-            "held": list(self.held),
-            "resample_s": self.resample_s,
-            "dbc": None if self.dbc is None else str(self.dbc.absolute()),
-        }
+        document: dict[str, Any] = TypeAdapter(Request).dump_python(self, mode="json")
+        return document | {"dbc": None if self.dbc is None else str(self.dbc.absolute())}
 
     @classmethod
     def of_document(cls, document: Mapping[str, Any]) -> Request:
         """Return what `as_document` was made of."""
-        dbc = document["dbc"]
-        return cls(
-            FormatHints.model_validate(document["form"]),
-            tuple(document["columns"]),
-            document["time"],
-            tuple(document["held"]),
-            document["resample_s"],
-            None if dbc is None else Path(dbc),
-        )
+        return TypeAdapter(Request).validate_python(document)
 
 
 MOST_SLICES: Final = 512

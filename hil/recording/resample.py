@@ -152,15 +152,7 @@ HALF: Final = 0.5
 
 @dataclass(frozen=True, slots=True)
 class Series:
-    """A channel with times of its own.
-
-    Attributes
-    ----------
-    time_s, values : ndarray, shape (n,)
-        NaN is a missing value.
-    held : bool
-        Whether a value counts until the next.
-    """
+    """A channel with times of its own, shapes (n,); NaN is missing, and ``held`` a value counts until the next."""
 
     time_s: FloatArray
     values: FloatArray

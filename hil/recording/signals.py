@@ -14,8 +14,10 @@ as time. `hil look` and `hil diagnose` say the same words, for both read here.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import combinations
 from pathlib import Path
 from typing import Final
 
@@ -108,9 +110,14 @@ def to_record(table: Table, signals: SignalsConfig, tell: Tell | None = None) ->
     for signal in signed:
         numbers[signal.column] = _signed(table, signal, numbers[signal.column])
     names = [torque.column for torque in torques]
-    require_plausible_torques(table, names, numbers)
+    largest = max(map(abs, scales))
+    acting = {
+        torque.column: numbers[torque.column] * (by / largest) for torque, by in zip(torques, scales, strict=True)
+    }
+    speed = math.copysign(1.0, scale) * numbers[output.column] if kind is OutputKind.SPEED else None
+    require_plausible_torques(table, names, acting, speed)
     if tell is not None:
-        doubtful = doubts(names, output.column, numbers)
+        doubtful = [*doubts(names, output.column, numbers), *_equal([] if signals.is_own_recording else names, numbers)]
         for line in (*table.recognised, *remark, *_units_used(table, signals), *doubtful):
             tell(f"{table.path}: {line}")
     masks = {mask: in_mask(numbers[mask.column], mask) for mask in signals.mask}
@@ -192,10 +199,12 @@ def _signed(table: Table, signal: TorqueSignal | LoadSignal | OutputSignal, valu
         return with_sign(values, signal.wraps_at)
     end = wrapped_at(values)
     if end is not None:
+        scale = "" if signal.given_scale is None else f", scale = {signal.scale:g}"
+        line = f"{{ column = {signal.column!r}{scale}, wraps_at = {end:g} }}"
         raise RecordingError(
             table.path,
             f"column {signal.column}: expected a reading with a sign, got one that jumps between 0 and {end:g}: it "
-            f"was stored with a sign and read without. Write {{ column = {signal.column!r}, wraps_at = {end:g} }}.",
+            f"was stored with a sign and read without. Write {line}.",
         )
     return values
 
@@ -330,6 +339,9 @@ def _require_samples(table: Table, okay: NDArray[np.bool_]) -> None:
 CANCELS: Final = 0.01
 """Ratio of the spread of a sum of torques to theirs below which they cancel: two readings differ by more."""
 
+FOLLOWS: Final = 0.3
+"""Correlation of a torque's impulse with the change of the speed from which on one follows the other."""
+
 CLIPPED_SHARE: Final = 0.01
 CLIPPED_RUN: Final = 3
 """A reading is clipped where its greatest or least value stands that often in a row, in that share of the rows."""
@@ -338,8 +350,10 @@ DISTINCT: Final = 50
 """Fewer values are steps of a coarse reading or of a square wave, and their greatest stands for long by itself."""
 
 
-def require_plausible_torques(table: Table, names: Sequence[str], values: Mapping[str, FloatArray]) -> None:
-    """Refuse inputs of which one counts twice, or that take one another away."""
+def require_plausible_torques(
+    table: Table, names: Sequence[str], values: Mapping[str, FloatArray], speed: FloatArray | None = None
+) -> None:
+    """Refuse inputs of which one counts twice, or that take one another away; the speed tells which one is turned."""
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:
         raise RecordingError(
@@ -349,24 +363,48 @@ def require_plausible_torques(table: Table, names: Sequence[str], values: Mappin
         )
     spreads = [float(np.nanstd(values[name])) for name in names]
     if len(names) == 2 and min(spreads) > 0.0:
-        total = values[names[0]] + values[names[1]]
-        if float(np.nanstd(total)) < CANCELS * min(spreads) and abs(float(np.nanmean(total))) < CANCELS * min(spreads):
+        first, second = (values[name] for name in names)
+        off = max(float(np.nanstd(first + second)), abs(float(np.nanmean(first + second))))
+        if off < CANCELS * min(spreads):
+            alike = 0.0 if speed is None else _drives(first, speed)
+            turned = names[alike > 0.0] if abs(alike) > FOLLOWS else ""
+            cure = f"write {{ column = {turned!r}, scale = -1.0 }}" if turned else "give the one that is scale = -1.0"
             raise RecordingError(
                 table.path,
                 f"columns {names[0]} and {names[1]}: expected torques that add up, got two that cancel in every row. "
-                f"One has the other sign: write {{ column = {names[0]!r}, scale = -1.0 }} for the one that is turned.",
+                f"One is turned round: {cure}.",
             )
+
+
+def _drives(torque: FloatArray, speed: FloatArray) -> float:
+    """Return how much a speed changes with the impulse of a torque, less its friction: a correlation, or 0."""
+    width = max(1, speed.size // 20)
+    impulse = np.concatenate([[0.0], np.cumsum(np.nan_to_num(torque))])
+    pair = np.column_stack([impulse[width:-1] - impulse[: -width - 1], speed[width:] - speed[:-width]])
+    read = np.isfinite(pair).all(axis=1)
+    rubs = np.column_stack([0.5 * (speed[width:] + speed[:-width]), np.ones(read.size)])[read]
+    pair = pair[read] - rubs @ np.linalg.lstsq(rubs, pair[read], rcond=None)[0]
+    size = float(np.prod(np.linalg.norm(pair, axis=0)))
+    return float(pair[:, 0] @ pair[:, 1]) / size if size else 0.0
 
 
 def doubts(torques: Sequence[str], output: str, values: Mapping[str, FloatArray]) -> Iterator[str]:
     """Say what is odd about the channels that are read; a line each."""
-    for name in torques:
-        if len(torques) > 1 and not np.nan_to_num(values[name]).any():
-            yield f"{name}: 0 in every row. Was that inverter off, or is the channel dead?"
     for name in (*torques, output):
-        if bound := clipped_at(values[name]):
+        seen = values[name][np.isfinite(values[name])]
+        if seen.size and np.ptp(seen) == 0.0:
+            off = "Was that inverter off, or is the channel dead" if name != output else "Is the sensor dead"
+            yield f"{name}: {seen[0]:g} in every row. {off}?"
+        elif bound := clipped_at(seen):
             share, value = bound
             yield f"{name}: {share:.0%} of the rows stand at {value:g}, as a reading that is clipped does"
+
+
+def _equal(torques: Sequence[str], values: Mapping[str, FloatArray]) -> Iterator[str]:
+    """Say which torques are the same; those of a rig of ours are two readings whatever they are."""
+    for first, second in combinations(torques, 2):
+        if np.ptp(values[first]) > 0.0 and np.array_equal(values[first], values[second], equal_nan=True):
+            yield f"{first} and {second}: equal in every row. Is it one channel, logged twice?"
 
 
 def clipped_at(values: FloatArray) -> tuple[float, float] | None:

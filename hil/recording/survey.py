@@ -9,6 +9,7 @@ from dataclasses import asdict, dataclass, field
 from typing import Any, Final
 
 import numpy as np
+from pydantic import TypeAdapter
 
 from hil.recording.channels import are_row_numbers, is_even_time, time_quantity
 from hil.recording.resample import GAP, straightened
@@ -25,23 +26,7 @@ EVEN: Final = 0.5
 
 @dataclass(frozen=True, slots=True)
 class Channel:
-    """One channel in figures.
-
-    Attributes
-    ----------
-    name, unit : str
-        As the file has them; the unit is empty where it has none.
-    kind : str
-        ``number`` or ``text``.
-    rows, missing : int
-        Samples, and how many of them hold no number.
-    low, high : float or None
-        Range, in the file's own unit; None where there is no number.
-    increases : bool
-        Whether every value is above the one before.
-    wraps_at : float or None
-        Where it begins anew, if it was stored with a sign and is read without.
-    """
+    """One channel in figures; ranges are in the file's own unit."""
 
     name: str
     unit: str
@@ -51,7 +36,7 @@ class Channel:
     low: float | None
     high: float | None
     increases: bool
-    wraps_at: float | None
+    wraps_at: float | None  # where it begins anew, if it was stored with a sign and is read without
 
     @property
     def moves(self) -> bool:
@@ -61,20 +46,7 @@ class Channel:
 
 @dataclass(frozen=True, slots=True)
 class Group:
-    """Channels that share their time.
-
-    Attributes
-    ----------
-    time : str or None
-        The channel that is their time.
-    period_s : float or None
-        Usual distance of two rows; None without a time.
-    even : bool
-        Whether rows can be read as they are, every one a period after the one before.
-    gaps : int
-        Places where rows are missing.
-    channels : tuple of Channel
-    """
+    """Channels that share their time; ``even`` where every row is a period after the one before."""
 
     time: str | None
     period_s: float | None
@@ -108,11 +80,7 @@ class Survey:
     @classmethod
     def of_document(cls, document: Mapping[str, Any]) -> Survey:
         """Return what `as_document` was made of."""
-        groups = [
-            Group(**{**group, "channels": tuple(Channel(**channel) for channel in group["channels"])})
-            for group in document["groups"]
-        ]
-        return cls(tuple(groups), tuple(document["said"]), document["metadata"])
+        return TypeAdapter(Survey).validate_python(document)
 
 
 def survey_of(tables: Sequence[Table]) -> Survey:
@@ -217,17 +185,7 @@ class Guess:
 
 @dataclass(frozen=True, slots=True)
 class Roles:
-    """What was chosen of a file, and what else it could be.
-
-    Attributes
-    ----------
-    torques : tuple of Guess
-        Inputs, to be summed; empty where none is likely.
-    output : Guess or None
-        Speed or position.
-    others : tuple of Guess
-        What else could be one of them.
-    """
+    """What was chosen of a file, inputs to be summed and speed or position, and what else could be one of them."""
 
     torques: tuple[Guess, ...]
     output: Guess | None

@@ -116,47 +116,18 @@ LONGEST_CELL = 40
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """The content of one recording.
+    """The content of one recording; a `RecordingError` where it has no column or row, or columns differ in length."""
 
-    Attributes
-    ----------
-    path : Path
-        The file it is from, for messages; its stem is the recording's name.
-    columns : mapping of name to ndarray, shape (N,)
-        float64, int64, bool, or object (text).
-    units : mapping of column name to unit
-        Of the columns whose unit is known.
-    metadata : mapping of str to str
-        What else the file says of itself.
-    first_line : int or None
-        Line of the first row in a text file; None where rows have no lines.
-    remarks : tuple of str
-        What its reader recognised, had to leave out or fix, one line each.
-    skipped : tuple of int
-        Lines after the first row that are no rows, ascending.
-    master : str or None
-        The column that the file itself calls its time.
-    elsewhere : mapping of name to str
-        Channels of the file that are no columns here by that name, and what to say where one is asked for.
-    is_frame : bool
-        Whether it is of pandas, and of no file.
-
-    Raises
-    ------
-    RecordingError
-        If there is no column or no row, or columns differ in length.
-    """
-
-    path: Path
-    columns: Mapping[str, Column]
+    path: Path  #: for messages; its stem is the recording's name
+    columns: Mapping[str, Column]  #: float64, int64, bool, or object (text), shape (N,)
     units: Mapping[str, str] = field(default_factory=dict)
     metadata: Mapping[str, str] = field(default_factory=dict)
-    first_line: int | None = None
-    remarks: tuple[str, ...] = ()
-    skipped: tuple[int, ...] = ()
-    master: str | None = None
-    elsewhere: Mapping[str, str] = field(default_factory=dict)
-    is_frame: bool = False
+    first_line: int | None = None  #: of the first row in a text file
+    remarks: tuple[str, ...] = ()  #: what its reader recognised, had to leave out or fix
+    skipped: tuple[int, ...] = ()  #: lines after the first row that are no rows, ascending
+    master: str | None = None  #: the column that the file itself calls its time
+    elsewhere: Mapping[str, str] = field(default_factory=dict)  #: channels that are no columns here, and why
+    is_frame: bool = False  #: of pandas, and of no file
 
     def __post_init__(self) -> None:
         lengths = {name: column.shape[0] for name, column in self.columns.items()}
@@ -184,18 +155,10 @@ class Table:
         return f"row {row + 1}" if self.first_line is None else f"line {line_of(row, self.first_line, self.skipped)}"
 
     def numeric(self, names: Iterable[str]) -> dict[str, FloatArray]:
-        """Return columns as numbers; NaN marks a missing value.
+        """Return columns as numbers (float64, shape (N,)); NaN marks a missing value.
 
-        Returns
-        -------
-        dict of name to ndarray, shape (N,)
-            float64.
-
-        Raises
-        ------
-        RecordingError
-            With one line for each column that is missing or holds a cell that is no finite number of at most
-            `LARGEST`, or NaN.
+        Refuses with a line for each column that is missing, or holds a cell that is no finite number of at most
+        `LARGEST`, or NaN.
         """
         wanted = list(dict.fromkeys(names))
         problems = [problem for name in wanted if (problem := self._problem(name))]

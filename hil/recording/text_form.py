@@ -51,29 +51,9 @@ DELIMITER_WORDS: Final[Mapping[str, str]] = {TAB: "a tab", BLANKS: "blanks", COM
 
 @dataclass(frozen=True, slots=True)
 class TextForm:
-    """How the lines of a text recording become rows.
+    """How the lines of a text recording become rows; lines count from 1, 0 is none."""
 
-    Attributes
-    ----------
-    names : tuple of str
-        Of the columns, none twice.
-    delimiter, decimal, encoding : str
-        As in `hil.recording.request`.
-    first_row_line : int
-        Line of the first row, from 1.
-    header_line, units_line : int
-        Lines of names and units; 0 where there is none.
-    units : mapping of name to str
-        Of the columns that have one.
-    comment : str
-        What a line that is no row begins with; empty where none does.
-    trailing : bool
-        Whether every row ends in a delimiter.
-    repeated : tuple of str
-        Names that the header has more than once.
-    """
-
-    names: tuple[str, ...]
+    names: tuple[str, ...]  # none twice
     delimiter: str = COMMA
     decimal: str = "."
     encoding: str = "utf-8"
@@ -81,9 +61,9 @@ class TextForm:
     header_line: int = 1
     units_line: int = 0
     units: Mapping[str, str] = field(default_factory=dict)
-    comment: str = ""
-    trailing: bool = False
-    repeated: tuple[str, ...] = ()
+    comment: str = ""  # what a line that is no row begins with
+    trailing: bool = False  # every row ends in a delimiter
+    repeated: tuple[str, ...] = ()  # names that the header has more than once
 
     @property
     def width(self) -> int:

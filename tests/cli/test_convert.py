@@ -98,7 +98,7 @@ def test_a_foreign_text_file_is_read_as_it_is_reported(tmp_path: Path, capsys: C
     assert "expected utf-8 text" in capsys.readouterr().err
     assert hil(["convert", str(path), str(tmp_path / "a.h5"), "--encoding", "latin-1"]) == 0
     assert read_table(tmp_path / "a.h5").columns["Temperatur °C"].tolist() == [1]
-    assert "says nothing of itself" in capsys.readouterr().out
+    assert "no metadata: no units" in capsys.readouterr().out
 
 
 def test_a_bus_trace_becomes_signals_by_the_eds_files(

@@ -56,8 +56,12 @@ def looked(tmp_path: Path, columns: Columns, capsys: pytest.CaptureFixture[str])
 @pytest.mark.parametrize(
     ("spoilt", "what", "line"),
     [
-        (one_turned, "sign of input 2 turned round", 'torque = [ { column = "T_1" }, { column = "T_2", scale = -1 } ]'),
-        (output_turned, "falls where the torque rises", 'speed = { column = "w", scale = -1, at = "motor" }'),
+        (
+            one_turned,
+            "sign of torque input 2 turned round",
+            'torque = [ { column = "T_1" }, { column = "T_2", scale = -1 } ]',
+        ),
+        (output_turned, "fall where the torque rises", 'speed = { column = "w", scale = -1, at = "motor" }'),
         (in_rpm, "Is it in rpm?", 'speed = { column = "w", scale = 0.10472, at = "motor" }'),
         (per_mille, "per mille of the rated torque", 'torque = [ { column = "T_1", scale = 0.001 }, '),
     ],
@@ -72,7 +76,7 @@ def test_what_is_wrong_is_named_with_the_line_that_cures_it(
 
 def test_swapped_columns_are_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     _, _, err = looked(tmp_path, swapped(recorded(tmp_path / "run.csv")), capsys)
-    assert "Are their columns swapped?" in err
+    assert "are the columns of torque input 1 and of the output swapped?" in err
     assert 'speed = { column = "T_1", at = "motor" }' in err
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import struct
+import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -224,7 +225,7 @@ def test_a_logged_bus_is_converted_by_its_dbc(bus_log: tuple[Path, Path], tmp_pa
 @pytest.mark.parametrize(
     ("name", "content", "said"),
     [
-        ("bus.txt", DBC, "expected a DBC file, named .dbc"),
+        ("bus.txt", DBC, r"expected a DBC file \(\.dbc\), an EDS or a DCF"),
         ("other.dbc", DBC.replace("BO_ 385", "BO_ 900"), "got none of them"),
         ("empty.dbc", 'VERSION ""\n', "one without any"),
         ("broken.dbc", "BO_ what\n SG_ :::\n", "DBC file"),
@@ -241,6 +242,42 @@ def test_a_dbc_that_does_not_fit_is_refused(tmp_path: Path, name: str, content: 
         (tmp_path / name).write_text(content, encoding="ascii")
     with pytest.raises(RecordingError, match=said):
         read_table(path, Request(dbc=tmp_path / name))
+
+
+OWN_EDS = Path(__file__).parents[2] / "eds" / "inverter.eds"
+RATED_NM, RPM_COUNT = 600.0, 0.001 * 2.0 * np.pi / 60.0
+"""What the EDS says: per mille of its 0x6076, and thousandths of 1/min by its 0x60A9."""
+
+
+def log_of_two_drives(path: Path, data: bytes = b"") -> Path:
+    """Frames of TPDO 1 of nodes 1 and 2 as the EDS maps them: status word, torque, velocity."""
+    with bus_writer(path) if path.suffix == ".mf4" else can.Logger(str(path)) as log:
+        for k in range(300):
+            for node, torque in ((1, k % 70), (2, -(k % 40))):
+                frame = data or struct.pack("<Hhi", 0x1237, torque, 9000 * k)
+                log.on_message_received(
+                    can.Message(1.77e9 + 0.01 * k, 0x180 + node, is_extended_id=False, data=frame, channel=1)
+                )
+    return path
+
+
+@pytest.mark.parametrize("suffix", [".mf4", ".log", ".blf"])
+def test_a_logged_bus_is_decoded_by_the_eds_of_its_drives(suffix: str, tmp_path: Path) -> None:
+    path = log_of_two_drives(tmp_path / f"bus{suffix}")
+    found = look(path, OWN_EDS)
+    assert [guess.channel.name for guess in found.roles.torques] == ["Torque_actual_value_1", "Torque_actual_value_2"]
+    table = tomllib.loads("\n".join(found.signals))["signals"]
+    record = read_record(path, SignalsConfig.model_validate(table), dbc=OWN_EDS)
+    k = np.arange(300)
+    torque_nm = np.column_stack([k % 70, -(k % 40)]) * RATED_NM / 1000.0
+    np.testing.assert_allclose(record.torque_nm, torque_nm, atol=1e-6)
+    np.testing.assert_allclose(record.output, 9000 * k * RPM_COUNT, atol=1e-6)
+
+
+def test_an_eds_by_which_the_drive_is_not_mapped_is_named(tmp_path: Path) -> None:
+    path = log_of_two_drives(tmp_path / "bus.log", bytes(6))
+    with pytest.raises(RecordingError, match=r"0x181 has 6 bytes and 8 in the file.*give a DCF"):
+        look(path, OWN_EDS)
 
 
 def test_a_file_of_signals_takes_no_dbc(three_rates: Path, tmp_path: Path) -> None:

@@ -97,11 +97,14 @@ sets the torque it is below 0.6, in tip-ins and reversals above."""
 class Inertia:
     """The inertia that a recording fits over the nominal one, negative where the speed falls with the torque.
 
-    ``share`` is the share of the motion that follows from the torque.
+    ``share`` is the share of the motion that follows from the torque. ``apart`` is the logarithm of the ratio below the
+    first mode over that above it: 0 for a factor between units, which moves both alike, and not for a load that is
+    heavier, or a mode that is elsewhere; NaN where both are not seen.
     """
 
     ratio: float
     share: float
+    apart: float = math.nan
 
 
 NOTHING = Inertia(math.nan, 0.0)
@@ -110,27 +113,15 @@ NOTHING = Inertia(math.nan, 0.0)
 def fitted_inertia(record: Record, line: DrivelineModel, grid: Grid | None) -> Inertia | None:
     """Return the inertia that a recording fits; None where it does not tell."""
     first_hz = float(natural_frequencies_rad_s(line.values())[0]) / (2.0 * math.pi)
+    apart, found = math.nan, as_one_body(record, line, first_hz)
     if grid is not None and 0.0 < ABOVE[0] * first_hz < 0.5 / record.sample_time_s:
         below, above = (by_band(record, line, grid, low * first_hz, high * first_hz) for low, high in (BELOW, ABOVE))
-        alike = 1.0 / AGREE <= abs(below.ratio / above.ratio) <= AGREE
-        if min(below.share, above.share) >= BANDS_TELL and alike:
-            return Inertia(math.copysign(math.sqrt(abs(below.ratio * above.ratio)), below.ratio), below.share)
-    found = as_one_body(record, line, first_hz)
-    return found if found.share >= BODY_TELLS else None
-
-
-def both_bands_agree(record: Record, line: DrivelineModel, grid: Grid | None, ratio: float) -> bool:
-    """Tell whether both bands are off by about the ratio, where both are seen; True where they are not.
-
-    A factor between units moves both alike; a load that is heavier moves the lower one alone.
-    """
-    first_hz = float(natural_frequencies_rad_s(line.values())[0]) / (2.0 * math.pi)
-    if grid is None or not 0.0 < ABOVE[0] * first_hz < 0.5 / record.sample_time_s:
-        return True
-    bands = [by_band(record, line, grid, low * first_hz, high * first_hz) for low, high in (BELOW, ABOVE)]
-    if min(band.share for band in bands) < BANDS_TELL:
-        return True
-    return all(band.ratio > 0.0 and abs(math.log(band.ratio / ratio)) <= abs(0.5 * math.log(ratio)) for band in bands)
+        if min(below.share, above.share) >= BANDS_TELL:
+            apart = math.log(abs(below.ratio / above.ratio))
+            if abs(apart) <= math.log(AGREE):
+                mean = math.copysign(math.sqrt(abs(below.ratio * above.ratio)), below.ratio)
+                return Inertia(mean, max(below.share, found.share), apart)  # comparable with that of one body alone
+    return replace(found, apart=apart) if found.share >= BODY_TELLS else None
 
 
 def by_band(record: Record, line: DrivelineModel, grid: Grid, low_hz: float, high_hz: float) -> Inertia:
@@ -157,7 +148,7 @@ def by_band(record: Record, line: DrivelineModel, grid: Grid, low_hz: float, hig
 def as_one_body(record: Record, line: DrivelineModel, first_hz: float) -> Inertia:
     """Return the ratio of inertias by which the impulse of the torque changes the speed."""
     step = max(round(STRETCH_S / record.sample_time_s), FEWEST_STEPS)
-    width = max(1, round(1.0 / (first_hz * record.sample_time_s))) if first_hz > 0.0 else 1
+    width = min(step, max(1, round(1.0 / (first_hz * record.sample_time_s)))) if first_hz > 0.0 else 1
     inside = slice(width, record.okay.size - width)
     okay = record.okay[inside]
     both = okay[step:] & okay[:-step]

@@ -12,17 +12,17 @@ from scipy.signal import detrend
 from estimator.diagnosis.acquisition import as_if_not_lost
 from estimator.diagnosis.noise import noise_floor
 from estimator.diagnosis.preconditions.channels import unwrapped, with_usable_channels, without_clipped
-from estimator.diagnosis.preconditions.inertia import BODY_TELLS, Inertia, as_one_body, driven, model_warnings
+from estimator.diagnosis.preconditions.inertia import driven, model_warnings
 from estimator.diagnosis.preconditions.thinned import thinned, with_room, without_not_read
 from estimator.diagnosis.preconditions.units import require_plausible_units
 from estimator.diagnosis.result import Diagnosis
 from estimator.diagnosis.segments import Cut, cut, joined
-from estimator.errors import BadShape, Cure, Implausible, NotExciting
+from estimator.errors import BadShape, Implausible, NotExciting
 from estimator.physics.grid import Grid, grid_for
-from estimator.physics.model import DrivelineModel, Parameter, Structure, natural_frequencies_rad_s
+from estimator.physics.model import DrivelineModel, natural_frequencies_rad_s
 from estimator.physics.simulate import output_state
 from estimator.signals.outputs import outputs_apart
-from estimator.signals.record import FloatArray, OutputKind, Record
+from estimator.signals.record import FloatArray, Record
 
 FEWEST_SAMPLES = 200
 """Fewer good samples than this do not carry a model with a dozen unknowns and its hold-out."""
@@ -142,73 +142,6 @@ def require_together(records: Sequence[Record]) -> None:
             )
 
 
-FASTEST_RAD_S = 2500.0
-"""Speed of a traction motor that is not reached: 24,000 rpm. A speed in rpm is."""
-
-RPM = math.pi / 30.0
-
-CLEARLY = 0.5
-"""Share of the unexplained motion that may be left with columns changed or a torque turned round."""
-
-_BODY = DrivelineModel(Structure.ONE_MASS, {"J_M": Parameter(1.0, 0.0), "b_M": Parameter(0.0, 0.0)})
-
-
-def require_plausible_alone(record: Record) -> None:
-    """Refuse a recording whose columns are swapped, or off in sign or by a unit, whatever the model is."""
-    if record.kind is OutputKind.FORCE:
-        return
-    fastest = float(np.abs(record.output[record.okay]).max())
-    if record.kind is OutputKind.SPEED and fastest > FASTEST_RAD_S:
-        raise Implausible(
-            f"recording {record.name}: a speed of {fastest:.0f} rad/s is more than a drive reaches. Is it in rpm?",
-            Cure(record.name, output=RPM),
-        )
-    found = _moved(record)
-    _refuse_swapped(record, found)
-    _refuse_turned(record, found)
-    if found.share >= BODY_TELLS and found.ratio < 0.0:
-        raise Implausible(
-            f"recording {record.name}: the {record.kind.value} falls where the torque rises. Is the sign of one of "
-            "them turned round?",
-            Cure(record.name, output=-1.0),
-        )
-
-
-def _moved(record: Record) -> Inertia:
-    """Return the inertia that moves as one body [kg m^2], and how much of the motion the torque accounts for."""
-    return as_one_body(record, _BODY, 0.0)
-
-
-def _is_clearer(other: Inertia, found: Inertia) -> bool:
-    return other.share >= BODY_TELLS and 1.0 - other.share < CLEARLY * (1.0 - found.share)
-
-
-def _refuse_swapped(record: Record, found: Inertia) -> None:
-    for i in range(record.torque_nm.shape[1]):
-        torque, good = record.torque_nm.copy(), np.flatnonzero(record.okay)
-        torque[:, i] = np.interp(np.arange(record.okay.size), good, record.output[good])
-        other = _moved(replace(record, torque_nm=torque, output=record.torque_nm[:, i], torque_okay=None))
-        if other.ratio > 0.0 and _is_clearer(other, found):
-            raise Implausible(
-                f"recording {record.name}: torque input {i + 1} moves as the {record.kind.value} should, and vice "
-                "versa. Are their columns swapped?",
-                Cure(record.name, swapped=i),
-            )
-
-
-def _refuse_turned(record: Record, found: Inertia) -> None:
-    for i in range(record.torque_nm.shape[1] if record.torque_nm.shape[1] > 1 else 0):
-        turned = record.torque_nm.copy()
-        turned[:, i] *= -1.0
-        other = _moved(replace(record, torque_nm=turned))
-        if other.ratio > 0.0 and _is_clearer(other, found):
-            raise Implausible(
-                f"recording {record.name}: the {record.kind.value} follows the torques with the sign of input {i + 1} "
-                "turned round. All torques count positive in the direction of the speed.",
-                Cure(record.name, torque=-1.0, inputs=(i,)),
-            )
-
-
 @dataclass(frozen=True, slots=True)
 class Prepared:
     """Recordings fit for a diagnosis: cut at long gaps, without what was cut off, with what there is to say of them."""
@@ -234,6 +167,25 @@ def as_moved(records: Sequence[Record]) -> tuple[list[Record], list[str]]:
     return mended, warnings
 
 
+def require_plausible(records: Sequence[Record], model: DrivelineModel) -> list[Implausible]:
+    """Refuse recordings that can't be of a model, as a diagnosis does, and return what is doubtful."""
+    mended, _ = as_moved(records)
+    return _plausible(cut(thinned(mended, model)), model)
+
+
+def _plausible(segments: Cut, model: DrivelineModel) -> list[Implausible]:
+    """Refuse segments that can't be of a model by their recordings' names, and return what is doubtful."""
+
+    def of_recording(found: Implausible) -> Implausible:
+        cure = found.cure
+        return Implausible(str(found), cure and replace(cure, recording=segments.origin[cure.recording]))
+
+    try:
+        return [of_recording(doubt) for doubt in require_plausible_units(as_if_not_lost(segments.records), model)]
+    except Implausible as error:
+        raise of_recording(error) from None
+
+
 def prepare(records: Sequence[Record], model: DrivelineModel, holdout: Sequence[Record] = ()) -> Prepared:
     """Check and mend recordings before anything is fitted."""
     require_together([*records, *holdout] if records else records)
@@ -247,7 +199,7 @@ def prepare(records: Sequence[Record], model: DrivelineModel, holdout: Sequence[
     training = segments.of(names)
     if not training:
         raise NotExciting(" ".join(segments.warnings), tuple(names))
-    require_plausible_units(as_if_not_lost(segments.records), model)
+    warnings += map(str, _plausible(segments, model))
     warnings += [*model_warnings(model), *segments.warnings, *few, *require_excitation(as_if_not_lost(training), model)]
     unseen = segments.of(record.name for record in holdout)
     return Prepared(training, unseen, tuple(warnings), segments)

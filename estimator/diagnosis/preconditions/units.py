@@ -1,135 +1,50 @@
-"""Units: torque, output and time that are off by a factor or in sign."""
+"""Units, signs and columns that a recording can't have: refused with the line that cures it, where that is clear."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from estimator.diagnosis.inference.wording import times
-from estimator.diagnosis.preconditions.inertia import Inertia, both_bands_agree, fitted_inertia
+from estimator.diagnosis.preconditions.explanations import (
+    CLOSE,
+    LEAST_REST,
+    PHYSICS,
+    REST,
+    RPM,
+    Change,
+    Explanation,
+    changes_of,
+    column_changes,
+    explanations,
+    largest,
+    rows_for,
+    usual,
+)
+from estimator.diagnosis.preconditions.inertia import BODY_TELLS, Inertia, as_one_body, fitted_inertia
 from estimator.errors import BadModel, Cure, Implausible
 from estimator.physics.grid import Grid, grid_for
-from estimator.physics.model import DrivelineModel, Motion, parameter_unit
+from estimator.physics.model import DrivelineModel, Motion, Parameter, Structure, parameter_unit
 from estimator.signals.record import FloatArray, OutputKind, Record
-
-CLOSE = 1.35
-"""Factor within which an inertia counts as close to a known factor: the nominal value itself may be off."""
-
-
-@dataclass(frozen=True, slots=True)
-class Factor:
-    """A factor between units.
-
-    Attributes
-    ----------
-    ratio : float
-        Inertia that fits over the nominal one.
-    name, question : str
-        The factor, and what to ask.
-    output, torque : float
-        What the output, or the torque, is to be multiplied by.
-    """
-
-    ratio: float
-    name: str
-    question: str
-    output: float = 1.0
-    torque: float = 1.0
-
-    @property
-    def said(self) -> str:
-        """The factor and the question, for people."""
-        return f"{self.name}: {self.question}?"
-
-
-def _too_large(factor: float, name: str, question: str, torque: bool = False) -> Factor:
-    """Return a factor by which the output over the torque is read too large."""
-    cure = {"torque": factor} if torque else {"output": 1.0 / factor}
-    return Factor(1.0 / factor, f"1 / ({name})", question, **cure)
-
-
-def _too_small(factor: float, name: str, question: str, torque: bool = False) -> Factor:
-    """Return a factor by which it is read too small."""
-    cure = {"torque": 1.0 / factor} if torque else {"output": factor}
-    return Factor(factor, name, question, **cure)
-
-
-KNOWN: tuple[Factor, ...] = (
-    _too_large(60.0 / (2.0 * math.pi), "60/(2 pi)", "is the speed in rpm, expected rad/s"),
-    _too_large(180.0 / math.pi, "180/pi", "is the output in degrees, expected radians"),
-    _too_large(3.6, "3.6", "is the speed in km/h, expected m/s"),
-    _too_large(
-        1000.0,
-        "1000",
-        "is the torque in kNm (a force in kN) or the output in thousandths (mm), expected Nm (N) and m",
-        torque=True,
-    ),
-    _too_large(100.0, "100", "is the output in hundredths (cm, %), or the torque a share of 100 Nm"),
-    _too_small(60.0 / (2.0 * math.pi), "60/(2 pi)", "was a speed in rad/s scaled as if it were in rpm"),
-    _too_small(180.0 / math.pi, "180/pi", "was an output in radians scaled as if it were in degrees"),
-    _too_small(3.6, "3.6", "was a speed in m/s scaled as if it were in km/h"),
-    _too_small(
-        1000.0, "1000", "is the torque in mNm (a force in mN), or time in ms, expected Nm (N) and s", torque=True
-    ),
-    _too_small(2.0 * math.pi, "2 pi", "is the speed in turns per second, expected rad/s"),
-    _too_small(9.80665, "9.81", "was a force in N scaled as if it were in kp", torque=True),
-)
-
-AT_THE_WHEEL = "is the speed, the torque or the inertia at the wheel, expected at the motor shaft"
-
-
-def close_factors(ratio: float, gear_ratio: float | None = None) -> list[Factor]:
-    """Return the factors that a ratio of inertias is close to, nearest first."""
-    table = list(KNOWN)
-    if gear_ratio is not None:
-        for power, name in ((1, "the gear ratio"), (2, "the gear ratio squared")):
-            table.append(Factor(gear_ratio**power, name, AT_THE_WHEEL))
-            table.append(Factor(gear_ratio**-power, f"1 / {name}", AT_THE_WHEEL))
-    distance = {row: abs(math.log(ratio / row.ratio)) for row in table}
-    return sorted((row for row in table if distance[row] <= math.log(CLOSE)), key=distance.__getitem__)
-
 
 BEYOND = 2.5
 """Factor beyond an inertia's tolerance that is implausible: payloads, derating and closed clutches are less, the
 smallest factor between units (3.6) is more."""
 
-SLOWEST_S = 0.5
-"""A driveline sampled slower than this is more likely recorded in another unit of time."""
+FAR_AHEAD, OVER_THE_NEXT = 0.5, 4.0
+"""Odds of an explanation from which on the line that cures it is given, and how much larger than those of the next."""
 
-CLEARLY = 0.5
-"""Share of the unexplained motion that a torque turned round may leave: a mere factor is the simpler answer."""
+DOUBTFUL = 0.3
+"""Odds that nothing is wrong below which a recording whose inertia is plausible is doubted."""
 
-BETTER = 0.75
-"""The same where the inertia is inside its tolerance with that torque turned round, and outside as it was read."""
-
-SWAPPED_TELLS = 0.9
-"""Share of the motion that must follow from the torque where two columns are swapped back."""
-
-MARGIN = 1.15
-"""Factor beyond an inertia's tolerance from which on torques in whole numbers are taken for per mille."""
-
-FEWEST_VALUES = 5
-"""Different whole numbers at least: fewer are levels that were asked for."""
-
-WHOLE = 1e-6
-"""How far a whole number may be off one."""
-
-PER_MILLE, PER_CENT = 1e-3, 1e-2
-
-MOST_PER_MILLE = 50.0
-"""Ratio of inertias up to which torques in whole numbers are per mille rather than in another unit: of 20 Nm rated."""
-
-MOST_PER_CENT = 300.0
-"""Torque in per cent of a rated one that no drive exceeds."""
+FEWEST_ODDS, MOST_NAMED = 0.01, 7
+"""Odds from which on an explanation is named, and how many are."""
 
 MOST_LOAD = 10.0
 """Factor by which a load machine's torque may exceed all torque of the motor: more would turn the motor over."""
-
-NAMED = 2
-"""Known factors that a message names."""
 
 LIMITS = (0.7, 0.5, 0.35, 0.25, 0.15, 0.1, 0.07, 0.05)
 """Limits of a torque that are tried, in its largest reading: what is read beyond is not there."""
@@ -137,31 +52,129 @@ LIMITS = (0.7, 0.5, 0.35, 0.25, 0.15, 0.1, 0.07, 0.05)
 DEPTHS, TIMES = (0.5, 0.8, 0.95), (0.05, 0.3, 1.0)
 """Losses of a torque over time that are tried, and their time constants in the recording's length."""
 
-UNKNOWN = "No common unit is off by this; is one of several torques counted with the wrong sign?"
+UNKNOWN_FIT = 1.0 / 6.0
+"""Density of the inertia of a recording that does not tell it: anything from a twentieth to twenty times."""
 
 
-def require_plausible_units(records: Sequence[Record], model: DrivelineModel) -> None:
-    """Refuse recordings whose torque, output or time is off by a factor or in sign."""
-    line = replace(model, effects={})
+def require_plausible_units(records: Sequence[Record], model: DrivelineModel) -> list[Implausible]:
+    """Refuse recordings whose torque, output or time is off by a factor, in sign, or another column's.
+
+    Returns what is doubtful: recordings that could be of a model that lacks physics, and are likelier in another unit.
+    """
     for record in records:
         _require_plausible_load(record)
-    for record in map(_less_its_load, records):
-        if record.kind is OutputKind.FORCE:
+    refusal, doubts = _judged(records, replace(model, effects={}))
+    if refusal is not None:
+        raise refusal
+    return doubts
+
+
+def _judged(
+    records: Sequence[Record], line: DrivelineModel, is_cured: bool = False
+) -> tuple[Implausible | None, list[Implausible]]:
+    """Return the refusal of the recording that tells most clearly, or what is doubtful; neither where all fit."""
+    moving = [each for each in records if each.kind is not OutputKind.FORCE and np.ptp(each.output[each.okay]) > 0.0]
+    judged = [_less_its_load(record) for record in moving]
+    found = [(record, _inertia(record, line)) for record in judged]
+    found = [(record, each) for record, each in found if each is None or not _is_within_tolerance(each, line)]
+    doubts = []
+    for record, each in sorted(found, key=lambda pair: 1.0 if pair[1] is None else -pair[1].share):
+        is_off = each is not None and not _is_plausible(each, line)
+        ranked = _ranked(record, line, each, is_off)
+        (best, odds), next_odds = ranked[0], max((other for _, other in ranked[1:]), default=0.0)
+        cure = best.cure if odds >= FAR_AHEAD and odds >= OVER_THE_NEXT * next_odds else None
+        text = _text(record, line, each, ranked)
+        is_right = math.fsum(each for explanation, each in ranked if explanation.is_physics)
+        if not is_off and best.is_a_factor and each is not None and is_right < DOUBTFUL:
+            doubts.append(Implausible(text, cure))
+        if best.change.physics or not (is_off or (cure is not None and not best.is_a_factor)):
             continue
-        found = _inertia(record, line)
-        if found is not None and _is_within_tolerance(found, line):
-            continue
-        is_plausible = found is not None and _is_plausible(found, line)
-        if not is_plausible:
-            _refuse_milliseconds(record, line)
-            _refuse_swapped_columns(record, line)
-        _refuse_one_torque_turned(record, line, found, is_plausible)
-        if found is not None and (is_plausible or 1.0 < found.ratio < MOST_PER_MILLE):
-            _refuse_per_mille(record, line, found)
-        if is_plausible:
-            continue
-        if found is not None and not _is_of_the_torque_path(record, line, found):
-            raise _off_by_a_factor(record, line, found)
+        if cure is not None and not is_cured:
+            left, more = _judged([_cured(other, cure) for other in records], line, is_cured=True)
+            text += "".join(f" With that corrected, {rest}" for rest in ([left] if left else more))
+        return Implausible(text, cure), doubts
+    return None, doubts
+
+
+def _ranked(
+    record: Record, line: DrivelineModel, found: Inertia | None, is_off: bool
+) -> list[tuple[Explanation, float]]:
+    """Return all explanations with their odds, the likeliest first; of the torque's path where the inertia is off."""
+    tolerance, of_fit = CLOSE[0] * math.log1p(_tolerance(line)), CLOSE[1]
+    rows = rows_for(line)
+    all_of: list[Explanation] = []
+    for change in changes_of(record):
+        fitted = found if not change.question else _inertia(change.record, line)
+        if fitted is not None and fitted.ratio != 0.0:
+            all_of += explanations(change, fitted, rows, math.hypot(tolerance, of_fit))
+        elif not change.question:
+            torque, output = largest(record)
+            weight = (
+                change.prior * UNKNOWN_FIT * (1.0 - BODY_TELLS) ** -REST * usual((), torque, torque, output, record)
+            )
+            all_of.append(Explanation(change, (), weight, torque, output))
+    if is_off:
+        paths = [(change, _inertia(change.record, line)) for change in _of_the_torque_path(record)]
+        named = [(change, each) for change, each in paths if each is not None and _is_plausible(each, line)]
+        for change, each in sorted(named, key=lambda pair: -pair[1].share)[:1]:
+            all_of += explanations(change, each, (), math.hypot(tolerance, of_fit, PHYSICS))
+    total = math.fsum(each.weight for each in all_of) or 1.0
+    return [(each, each.weight / total) for each in sorted(all_of, key=lambda each: -each.weight)]
+
+
+def _text(
+    record: Record, line: DrivelineModel, found: Inertia | None, ranked: Sequence[tuple[Explanation, float]]
+) -> str:
+    torque = "torque" if line.motion is Motion.ROTATION else "force"
+    falls = f"is the sign of {torque} or output turned round"
+    begin = "the motion does not follow from the torque as read"
+    if found is not None:
+        begin = (
+            f"it fits an inertia {times(found.ratio)} times the nominal {_nominal(line)}, expected 1 within its "
+            f"tolerance and a factor of {BEYOND:g}"
+        )
+        if found.ratio < 0.0:
+            begin = f"the {record.kind.value} falls where the {torque} rises, and {begin}"
+    named = [
+        f"{each.question(falls)}? ({odds:.0%}{_follows(each, record, line)})"
+        for each, odds in ranked[:MOST_NAMED]
+        if odds >= FEWEST_ODDS
+    ]
+    decides = "What the drive can do decides, and whose the model file is" if len(named) > 1 else "Correct that"
+    return (
+        f"recording {record.name} is implausible: {begin}. What would explain it, with its odds: {'; '.join(named)}. "
+        f"{decides}; scales and columns stand in [signals]."
+    )
+
+
+def _follows(explanation: Explanation, record: Record, line: DrivelineModel) -> str:
+    """Return what an explanation makes of the largest torque and output that were read."""
+    torque, unit = ("torque", "Nm") if line.motion is Motion.ROTATION else ("force", "N")
+    read_nm, read = largest(record)
+    follows = f", {torque}s up to {explanation.torque_nm:.3g} {unit} then" if explanation.torque_nm != read_nm else ""
+    if explanation.output != read and explanation.change.record.kind is record.kind:
+        follows += f", a {record.kind.value} up to {explanation.output:.3g} then"
+    return follows
+
+
+def _cured(record: Record, cure: Cure) -> Record:
+    """Return a recording with a cure applied."""
+    if cure.swapped is not None or cure.kind is not None:
+        same = (
+            change
+            for change in column_changes(record)
+            if (change.cure.swapped, change.cure.kind) == (cure.swapped, cure.kind)
+        )
+        record = next(same).record
+    count = record.torque_nm.shape[1]
+    inputs = np.isin(np.arange(count), cure.inputs or range(count))
+    return replace(
+        record,
+        torque_nm=record.torque_nm * np.where(inputs, cure.torque, 1.0),
+        output=record.output * cure.output,
+        time_s=record.time_s * cure.time,
+        sample_time_s=record.sample_time_s * cure.time,
+    )
 
 
 def _less_its_load(record: Record) -> Record:
@@ -171,21 +184,6 @@ def _less_its_load(record: Record) -> Record:
     torque = record.torque_nm.copy()
     torque[:, 0] -= record.load_nm
     return replace(record, torque_nm=torque, load_nm=None)
-
-
-def _refuse_milliseconds(record: Record, line: DrivelineModel) -> None:
-    """Refuse a recording that is plausible but for its unit of time."""
-    if record.sample_time_s < SLOWEST_S:
-        return
-    shorter = 1e-3 * record.sample_time_s
-    other = _inertia(replace(record, sample_time_s=shorter, time_s=1e-3 * record.time_s), line)
-    if other is not None and _is_plausible(other, line):
-        raise Implausible(
-            f"recording {record.name} is implausible: its sampling period is {record.sample_time_s:g} s, and with "
-            f"{shorter:g} s it fits the nominal inertia. Is time in ms, expected s? Give time its scale in "
-            "[signals].",
-            Cure(record.name, time=1e-3),
-        )
 
 
 def _require_plausible_load(record: Record) -> None:
@@ -200,82 +198,45 @@ def _require_plausible_load(record: Record) -> None:
         )
 
 
-def _refuse_swapped_columns(record: Record, line: DrivelineModel) -> None:
-    """Refuse a recording that is plausible with a torque and the output exchanged."""
-    for i in range(record.torque_nm.shape[1]):
-        torque = record.torque_nm.copy()
-        good = np.flatnonzero(record.okay)
-        torque[:, i] = np.interp(np.arange(record.okay.size), good, record.output[good])
-        other = _inertia(replace(record, torque_nm=torque, output=record.torque_nm[:, i], torque_okay=None), line)
-        if other is not None and _is_within_tolerance(other, line) and other.share >= SWAPPED_TELLS:
-            raise Implausible(
-                f"recording {record.name} is implausible: it fits the nominal inertia with torque input {i + 1} and "
-                "the output exchanged. Are their columns swapped in [signals]?",
-                Cure(record.name, swapped=i),
-            )
+FASTEST_RAD_S = 2500.0
+"""Speed of a traction motor that is not reached: 24,000 rpm. A speed in rpm is."""
+
+ALONE = 0.75
+"""Odds from which on a recording is refused by itself."""
+
+_BODY = DrivelineModel(Structure.ONE_MASS, {"J_M": Parameter(1.0, 0.0), "b_M": Parameter(0.0, 0.0)})
 
 
-def _refuse_one_torque_turned(record: Record, line: DrivelineModel, found: Inertia | None, is_plausible: bool) -> None:
-    """Refuse a recording that is plausible but for the sign of one of its torques."""
-    unexplained = 1.0 if found is None else 1.0 - found.share
-    for i in range(record.torque_nm.shape[1] if record.torque_nm.shape[1] > 1 else 0):
-        turned = record.torque_nm.copy()
-        turned[:, i] *= -1.0
-        other = _inertia(replace(record, torque_nm=turned), line)
-        if other is None:
-            continue
-        rest = 1.0 - other.share
-        fits = _is_plausible(other, line) and not is_plausible and rest < CLEARLY * unexplained
-        if fits or (_is_within_tolerance(other, line) and rest < BETTER * unexplained):
-            raise Implausible(
-                f"recording {record.name} is implausible: it fits the nominal inertia only with the sign of torque "
-                f"input {i + 1} turned round. All torques count positive in the direction of the speed: give that "
-                "column a negative scale in [signals].",
-                Cure(record.name, torque=-1.0, inputs=(i,)),
-            )
-
-
-def _refuse_per_mille(record: Record, line: DrivelineModel, found: Inertia) -> None:
-    """Refuse torques in whole numbers that fit by a factor alone: per mille of a rated torque, as drives send it.
-
-    A payload is felt below the first mode and not above; where both are seen, both must be off by the factor.
-    """
-    tolerance = _tolerance(line)
-    if (1.0 - tolerance) / MARGIN <= found.ratio <= (1.0 + tolerance) * MARGIN:
+def require_plausible_alone(record: Record) -> None:
+    """Refuse a recording whose columns are swapped, or off in sign or by a unit, whatever the model is."""
+    if record.kind is OutputKind.FORCE:
         return
-    if not are_whole_numbers(record):
-        return
-    if not both_bands_agree(record, line, grid_or_none(record, line), found.ratio):
-        return
-    if _is_of_the_torque_path(record, line, found):
-        return
-    scale = float(f"{1.0 / found.ratio:.2g}")
-    raise Implausible(
-        f"recording {record.name} is implausible: its torques are whole numbers, and fit an inertia "
-        f"{times(found.ratio)} times the nominal {_nominal(line)}. Are they per mille of a rated torque of about "
-        f"{scale / PER_MILLE:.0f} Nm? "
-        "Then the scale is a thousandth of the rated torque. If they are in Nm, correct the inertia in the model file, "
-        "or its tolerance.",
-        Cure(record.name, torque=scale),
-    )
+    fastest = float(np.abs(record.output[record.okay]).max())
+    if record.kind is OutputKind.SPEED and fastest > FASTEST_RAD_S:
+        raise Implausible(
+            f"recording {record.name}: a speed of {fastest:.0f} rad/s is more than a drive reaches. Is it in rpm?",
+            Cure(record.name, output=RPM),
+        )
+    weights: list[tuple[float, Change]] = []
+    for change in (Change(record), *column_changes(record)):
+        found = as_one_body(change.record, _BODY, 0.0)
+        is_clear = found.share >= BODY_TELLS
+        if is_clear and found.ratio < 0.0 and not change.question:
+            falls = f"does the {record.kind.value} fall where the torque rises: is the sign of one of them turned round"
+            change = Change(record, 1.0, falls, Cure(record.name, output=-1.0))
+        if not change.question or (is_clear and (found.ratio > 0.0) == (change.cure.output > 0.0)):
+            weights.append((change.prior * max(1.0 - found.share, LEAST_REST) ** -REST, change))
+    weight, best = max(weights, key=lambda pair: pair[0])
+    if best.question and weight > ALONE * math.fsum(each for each, _ in weights):
+        raise Implausible(f"recording {record.name}: {best.question}?", best.cure)
 
 
-def are_whole_numbers(record: Record) -> bool:
-    """Tell whether the torques of a recording are whole numbers, more than a few levels that were asked for."""
-    read = record.torque_nm[np.isfinite(record.torque_nm).all(axis=1)]
-    return bool(np.abs(read - np.round(read)).max() <= WHOLE) and np.unique(read).size >= FEWEST_VALUES
-
-
-def _is_of_the_torque_path(record: Record, line: DrivelineModel, found: Inertia) -> bool:
-    """Tell whether a torque that stops at a limit, or is lost over time, explains more than a factor does.
-
-    Either makes an inertia look too large, and is an entry of the catalogue: not to be refused but to be found.
-    """
-    if found.ratio < 0.0:
-        return False
-    others = (_inertia(replace(record, torque_nm=torque), line) for torque in _lessened(record))
-    rest = CLEARLY * (1.0 - found.share)
-    return any(each is not None and _is_plausible(each, line) and 1.0 - each.share < rest for each in others)
+def _of_the_torque_path(record: Record) -> Iterator[Change]:
+    """Yield a torque that stops at a limit, or is lost over time: either makes an inertia look too large."""
+    for torque in _lessened(record):
+        lessened = replace(record, torque_nm=torque)
+        question = "does the torque stop at a limit, or is it lost over time"
+        yield Change(lessened, 0.1, question, factors=0, physics=True)
 
 
 def _lessened(record: Record) -> Iterable[FloatArray]:
@@ -292,7 +253,7 @@ def _lessened(record: Record) -> Iterable[FloatArray]:
             yield read * (1.0 - depth * (1.0 - np.exp(-since / (time * since[-1]))))
 
 
-def grid_or_none(record: Record, line: DrivelineModel) -> Grid | None:
+def _grid_or_none(record: Record, line: DrivelineModel) -> Grid | None:
     """Return how a line is simulated; None where its modes can't be with the recording."""
     try:
         return grid_for(line, [record])
@@ -302,7 +263,7 @@ def grid_or_none(record: Record, line: DrivelineModel) -> Grid | None:
 
 def _inertia(record: Record, line: DrivelineModel) -> Inertia | None:
     """Return the inertia that a recording fits; only as one body where the line's modes can't be simulated with it."""
-    return fitted_inertia(record, line, grid_or_none(record, line))
+    return fitted_inertia(record, line, _grid_or_none(record, line))
 
 
 def _tolerance(line: DrivelineModel) -> float:
@@ -324,29 +285,3 @@ def _nominal(line: DrivelineModel) -> str:
     names = [name for name in line.parameters if name.startswith("J")]
     total = sum(line.parameters[name].value for name in names)
     return f"{' + '.join(names)} = {total:g} {parameter_unit(names[0], line.motion)}"
-
-
-def _off_by_a_factor(record: Record, line: DrivelineModel, found: Inertia) -> Implausible:
-    """Return the refusal of a recording that fits another inertia, with the factors that are close."""
-    if found.ratio < 0.0:
-        torque = "torque" if line.motion is Motion.ROTATION else "force"
-        return Implausible(
-            f"recording {record.name} is implausible: the output falls where the {torque} rises (an inertia "
-            f"{times(found.ratio)} times the nominal {_nominal(line)} fits). Is the sign of {torque} or output turned "
-            "round? Give one of them a negative scale in [signals].",
-            Cure(record.name, output=-1.0),
-        )
-    near = close_factors(found.ratio, line.gear_ratio)[:NAMED]
-    close = " ".join(f"This is close to {factor.said}" for factor in near)
-    cures = [Cure(record.name, torque=factor.torque, output=factor.output) for factor in near[:1]]
-    if not near and found.ratio < 1.0 and np.abs(record.torque_nm).max() <= MOST_PER_CENT:
-        scale = float(f"{1.0 / found.ratio:.2g}")
-        close = f"{UNKNOWN} Or is it per cent of a rated torque of about {scale / PER_CENT:.0f} Nm?"
-        cures = [Cure(record.name, torque=scale)]
-    return Implausible(
-        f"recording {record.name} is implausible: it fits an inertia {times(found.ratio)} times the nominal "
-        f"{_nominal(line)}, expected 1 within its tolerance and a factor of {BEYOND:g}. {close or UNKNOWN} "
-        "Correct the scale in [signals] (a torque in per cent of a rated one needs one, too), or the inertia in the "
-        "model file.",
-        next((cure for cure in cures if cure != Cure(record.name)), None),
-    )

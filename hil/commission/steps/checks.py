@@ -58,7 +58,7 @@ def _configure(rig: Rig) -> None:
 def _protections(found: Found) -> list[Finding]:
     """Keep what stands between a dead host and torque, and who accepted what is missing."""
     return [
-        stated(f"{found.device} without its host: {each.name}", str(each).partition(": ")[2])
+        stated(f"{found.device} if the host fails: {each.name}", str(each).partition(": ")[2])
         for each in found.protections
     ]
 

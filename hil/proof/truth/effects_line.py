@@ -73,9 +73,9 @@ MOTOR = (
     # Dry friction that is the same at every speed: bearings, seals, an oil pump's preload.
     _motor(
         "coulomb_friction_motor",
-        draws(coulomb_nm=log(8.0, 40.0)),
-        sets(friction_motor_nm="coulomb_nm"),
-        fitted={"friction_nm": "coulomb_nm"},
+        draws(friction_nm=log(8.0, 40.0)),
+        sets(friction_motor_nm="friction_nm"),
+        fitted={"friction_nm": "friction_nm"},
     ),
     # Dry friction that is higher near standstill than while sliding.
     _motor(
@@ -273,9 +273,9 @@ LOAD = (
     # Dragging pads, wheel bearings, axle seals.
     _load(
         "coulomb_friction_load",
-        draws(coulomb_nm=log(7.0, 35.0)),
-        sets(friction_load_nm="coulomb_nm"),
-        fitted={"friction_nm": "coulomb_nm"},
+        draws(friction_nm=log(7.0, 35.0)),
+        sets(friction_load_nm="friction_nm"),
+        fitted={"friction_nm": "friction_nm"},
     ),
     # Air drag, with a head wind or a roof load.
     _load(
