@@ -131,8 +131,3 @@ def test_signal_in_the_middle_and_the_way_on(
     assert (noise["status"], noise["attempt"]) == ("done", 2)
     assert noise["history"][0]["status"] == "interrupted"
     assert (out / noise["runs"][-1]["recording"]).exists()
-
-
-def test_help_has_an_example(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["commission", "--help"]) == 0
-    assert "hil commission examples/rig.toml --out" in capsys.readouterr().out

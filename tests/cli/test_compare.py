@@ -134,8 +134,3 @@ def test_wrong_input_is_refused_and_nothing_written(
 def test_a_result_that_is_a_file_is_refused(inputs: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["compare", *inputs, "--out", inputs[0]]) == 2
     assert "which is a file" in capsys.readouterr().err
-
-
-def test_help_has_an_example(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["compare", "--help"]) == 0
-    assert "hil compare bus.toml run_1.csv run_2.csv" in " ".join(capsys.readouterr().out.split())

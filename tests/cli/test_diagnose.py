@@ -10,7 +10,7 @@ import pytest
 
 from estimator.diagnosis.first_use import COMPILING
 from hil.cli.command_line import silence
-from hil.cli.diagnose import app, progress_bar
+from hil.cli.diagnose import progress_bar
 from hil.cli.main import run
 from hil.config.model_file import read_model
 from tests.cli import bench
@@ -144,9 +144,3 @@ def test_wrong_input_is_refused_and_nothing_written(
     assert run(["diagnose", *words.replace("OUT", str(out)).split()]) == 2
     assert said in capsys.readouterr().err
     assert not out.exists()
-
-
-def test_help_has_an_example(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["diagnose", "--help"]) == 0
-    assert "hil diagnose run_1.csv run_2.csv --model bus.toml" in " ".join(capsys.readouterr().out.split())
-    assert app.registered_commands

@@ -250,11 +250,6 @@ def test_order_and_delay_are_chosen_where_they_are_left_open(
     assert "Order and delay" in (tmp_path / "report.html").read_text()
 
 
-def test_help_has_an_example(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["identify", "--help"]) == 0
-    assert "Example: hil identify run_1.csv" in capsys.readouterr().out
-
-
 @pytest.mark.parametrize(
     ("more", "named"),
     [

@@ -74,24 +74,6 @@ def test_signal_in_the_middle_keeps_the_recording_and_disarms(
     assert not (tmp_path / "run.part.csv").exists()
 
 
-def test_closing_clutch_is_a_device_problem(
-    short_rig: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    with served(read_rig(short_rig)) as (server, _):
-        server.plc.close_clutch()
-        addresses = ("--bus", server.bus_url, "--modbus", str(server.modbus))
-        status = run(["run", str(short_rig), "cruise", "--out", str(tmp_path / "r.csv"), "--pace", "fast", *addresses])
-    assert status == 3
-    assert "clutch is closed" in capsys.readouterr().err
-    assert list(tmp_path.iterdir()) == [short_rig]
-
-
-def test_bus_that_is_not_there(short_rig: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["run", str(short_rig), "cruise", "--out", str(tmp_path / "r.csv"), *NOWHERE]) == 3
-    assert "ws://127.0.0.1:9/" in capsys.readouterr().err
-    assert list(tmp_path.iterdir()) == [short_rig]
-
-
 def test_unknown_experiment(short_rig: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["run", str(short_rig), "drift", "--out", str(tmp_path / "r.csv"), *NOWHERE]) == 2
     assert "cruise, reversal, tip" in capsys.readouterr().err
@@ -104,11 +86,6 @@ def test_recording_is_never_overwritten(short_rig: Path, tmp_path: Path, capsys:
     assert run(["run", str(short_rig), "cruise", "--out", str(kept), *NOWHERE]) == 2
     assert "r.csv" in capsys.readouterr().err
     assert kept.read_text(encoding="utf-8") == "mine"
-
-
-def test_without_a_place_for_the_recording(short_rig: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["run", str(short_rig), "cruise"]) == 2
-    assert "--out" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("bus", ["socketcan:can0", "ws://10.0.0.1:54701/"])
@@ -135,11 +112,6 @@ def test_dry_run_as_json(short_rig: Path, capsys: pytest.CaptureFixture[str]) ->
     document = json.loads(capsys.readouterr().out)
     assert document["measured"] == 300
     assert document["torque_nm"]["high"] <= 500.0
-
-
-def test_help_has_an_example(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["run", "--help"]) == 0
-    assert "hil run examples/rig.toml cruise" in capsys.readouterr().out
 
 
 def test_estimates_next_to_the_recording(short_rig: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

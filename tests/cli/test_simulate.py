@@ -125,8 +125,3 @@ def test_an_output_the_model_does_not_have_is_refused(
     assert call(arguments) == 2
     assert "speed at the load is no output of one_mass" in capsys.readouterr().err
     assert files(tmp_path) == ["drive.toml", "run_1.csv"]
-
-
-def test_help_has_an_example(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["simulate", "--help"]) == 0
-    assert "hil simulate --model bus.toml --input run_1.csv" in " ".join(capsys.readouterr().out.split())

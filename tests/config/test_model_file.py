@@ -333,7 +333,7 @@ def signals_configs(draw: st.DrawFn) -> SignalsConfig:
 
 
 @given(models(), st.none() | signals_configs())
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=20, deadline=None)
 def test_what_is_written_reads_back_the_same(
     tmp_path_factory: pytest.TempPathFactory, model: DrivelineModel, signals: SignalsConfig | None
 ) -> None:

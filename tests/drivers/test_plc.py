@@ -231,33 +231,6 @@ def test_a_drive_mode_that_is_refused_is_raised() -> None:
     talk(PlcDevice(PlcSetup(DriveMode.PARALLEL), faults), conversation, clock=ImpatientClock())
 
 
-def test_what_changes_in_simulated_time_is_seen() -> None:
-    device = PlcDevice(faults=PlcFaults(clutch_closes_at_s=0.5, permissive_withdrawn_at_s=1.0))
-
-    async def conversation(plc: Plc, _: ServedPlc) -> None:
-        seen = []
-        for _step in range(3):
-            status = await plc.read_status()
-            seen.append((status.clutch, status.permissive))
-            device.step(0.5)
-        assert seen == [
-            (ClutchState.OPEN, True),
-            (ClutchState.CLOSED, True),
-            (ClutchState.CLOSED, False),
-        ]
-
-    talk(device, conversation)
-
-
-def test_beats_are_counted_and_seen() -> None:
-    async def conversation(plc: Plc, _: ServedPlc) -> None:
-        for count in range(3):
-            await plc.beat()
-            assert (await plc.read_status()).watchdog.host_count_seen == count
-
-    talk(PlcDevice(), conversation)
-
-
 class StoppedPlc(PlcDevice):
     """A PLC whose Modbus stack answers while its program stands still: no beat is seen."""
 

@@ -202,10 +202,3 @@ def test_further_channels_stand_on_the_first_page() -> None:
                 assert app.query_one(f".{name}").size.height >= 3
 
     asyncio.run(go())
-
-
-def test_a_rig_without_further_channels_has_no_panel_for_them() -> None:
-    async def script(pilot: Pilot[None], source: FakeSource, app: MonitorApp) -> None:
-        assert not app.query(".channels")
-
-    play(script)

@@ -99,15 +99,6 @@ def snapshot(m1: NodeHealth | None = None, plc: PlcHealth | None = None) -> Snap
 
 
 @pytest.mark.parametrize("draw", DRAWN)
-def test_a_panel_fits_every_size(draw: Draw) -> None:
-    shown = snapshot(node(emergency="EMCY 0x8130 life guard or heartbeat error " * 3))
-    for width, height in ((80, 22), (31, 5), (20, 3), (9, 2), (160, 50)):
-        lines = draw(shown, width, height)
-        assert len(lines) <= max(height, 2)
-        assert all(len(line) <= width for line in lines), (width, height, lines)
-
-
-@pytest.mark.parametrize("draw", DRAWN)
 def test_a_panel_draws_at_every_size_that_a_terminal_passes_through(draw: Draw) -> None:
     shown = snapshot()
     for width in (*range(LEAST_WIDTH + 30), 80, 200):

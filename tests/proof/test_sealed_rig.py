@@ -97,14 +97,6 @@ def test_a_rig_that_does_not_come_up_says_why(arguments, said):
         pass
 
 
-def test_something_else_than_a_ready_line_is_refused():
-    with (
-        pytest.raises(RunAborted, match=r"expected 'ready bus=\.\.\..*', got 'usage: "),
-        sealed_process("--help"),
-    ):
-        pass
-
-
 @pytest.mark.parametrize("end", [signal.SIGINT, signal.SIGTERM, None])
 def test_it_ends_cleanly_by_signal_and_by_the_end_of_its_input(end):
     process = subprocess.Popen(

@@ -18,7 +18,6 @@ from drivers.plc.modbus_security import Credentials
 from drivers.plc.register import Access
 from drivers.plc.register_map import load_register_map
 from drivers.resources import data_file
-from hil.simulator.fault_table import known_faults, rig_faults
 from hil.simulator.faults import LATE_BY_S, PlcFaults
 from hil.simulator.plc_device import PlcDevice
 from hil.simulator.plc_server import PlcSecurity, PlcServer, serve_plc
@@ -245,23 +244,6 @@ READ_TWO = bytes.fromhex("0001 0000 0006 01 04 0002 0002")
 TWO = bytes.fromhex("0001 0000 0007 01 04 04 2024 0001")
 ONE = bytes.fromhex("0001 0000 0005 01 04 02 2024")
 DEVICE_FAILURE = bytes.fromhex("0001 0000 0003 01 84 04")
-
-
-@pytest.mark.parametrize(
-    ("name", "field"),
-    [
-        ("exception", "exceptions_at_s"),
-        ("slow", "late_at_s"),
-        ("half_answer", "half_at_s"),
-        ("reset", "resets_at_s"),
-        ("wrong_width", "too_few_at_s"),
-        ("wrong_unit", "wrong_unit_at_s"),
-        ("wrong_transaction", "wrong_transaction_at_s"),
-    ],
-)
-def test_each_is_put_into_the_device_by_name(name: str, field: str) -> None:
-    assert f"{name}@S" in known_faults()
-    assert rig_faults([f"plc.{name}@2.5"], 0.01).plc == PlcFaults(**{field: 2.5})
 
 
 def answer_of(faults: PlcFaults, timeout_s: float) -> bytes:

@@ -183,7 +183,14 @@ def test_a_start_near_the_truth_with_a_small_initial_gain_stays_near_it() -> Non
 SLOW = {ConstantTrace: ConstantTrace(1e-5), ConstantGain: ConstantGain(1e-5)}
 
 
-@pytest.mark.parametrize("profile", PROFILES, ids=lambda profile: profile.__name__)
+@pytest.mark.parametrize(
+    "profile",
+    [
+        pytest.param(each, marks=() if each is DecreasingThenConstantTrace else pytest.mark.campaign)
+        for each in PROFILES
+    ],
+    ids=lambda profile: profile.__name__,
+)
 @pytest.mark.parametrize("excited", [True, False, None], ids=["excited", "not excited", "now and then"])
 def test_three_hours_at_10_ms_leave_the_gain_sound(profile: type[Adaptation], excited: bool | None) -> None:
     n = 1_100_000
