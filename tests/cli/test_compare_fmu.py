@@ -46,20 +46,10 @@ def test_alone_and_mapped_by_hand(files: tuple[str, str, str], capsys: pytest.Ca
     assert json.loads(capsys.readouterr().out)["recordings"]["run_1"]["rms"] == pytest.approx(0.05, rel=0.1)
 
 
-@pytest.mark.parametrize(
-    ("more", "said"),
-    [
-        ([], "runs only where you trust it: --trust-fmu"),
-        (["--trust-fmu", "--map", "speed=w"], "KEY one of torque, output, load, start"),
-        (["--trust-fmu", "--map", "output=w"], "expected a variable of the FMU, got 'w'. It has: "),
-    ],
-)
-def test_what_is_not_trusted_or_named_is_refused(
-    more: list[str], said: str, files: tuple[str, str, str], capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_what_is_not_trusted_is_refused(files: tuple[str, str, str], capsys: pytest.CaptureFixture[str]) -> None:
     _, fmu, recording = files
-    assert run(["compare", fmu, recording, *more]) == 2
-    assert said in capsys.readouterr().err
+    assert run(["compare", fmu, recording]) == 2
+    assert "runs only where you trust it: --trust-fmu" in capsys.readouterr().err
 
 
 def test_what_is_no_fmu_is_refused(

@@ -19,7 +19,7 @@ from hil.cli.main import run
 from hil.config.rig_file import read_rig
 from hil.simulator.fault_table import rig_faults
 from tests.rig.observer import assert_disarmed, power_state
-from tests.rig.serving import served
+from tests.rig.serving import addresses, served
 
 PATIENCE_S = 60.0
 
@@ -75,8 +75,7 @@ def test_hil_check_proves_it_without_a_torque(
 ) -> None:
     proof = tmp_path / "proof.json"
     with served(read_rig(quick_rig)) as (server, _):
-        addresses = ("--bus", server.bus_url, "--modbus", str(server.modbus))
-        assert run(["check", str(quick_rig), "--prove-stop", "--out", str(proof), *addresses]) == 0
+        assert run(["check", str(quick_rig), "--prove-stop", "--out", str(proof), *addresses(server)]) == 0
         assert_disarmed(server.bus_url, 1, 2)
         assert server.torque_nm == (0.0, 0.0)
     assert capsys.readouterr().out.count("agrees") == 4
@@ -95,8 +94,7 @@ def test_hil_check_names_what_it_can_not_prove(quick_rig: Path, capsys: pytest.C
     file = read_rig(quick_rig)
     without_emergencies = rig_faults(["bus.lose=1:0x082"], file.period_s)  # those of node 2
     with served(file, without_emergencies) as (server, _):
-        addresses = ("--bus", server.bus_url, "--modbus", str(server.modbus))
-        assert run(["check", str(quick_rig), "--prove-stop", "--json", *addresses]) == 3
+        assert run(["check", str(quick_rig), "--prove-stop", "--json", *addresses(server)]) == 3
         assert_disarmed(server.bus_url, 1, 2)
     devices = {device["name"]: device for device in json.loads(capsys.readouterr().out)["devices"]}
     assert devices["m1"]["result"] == "agrees"

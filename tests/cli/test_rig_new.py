@@ -21,10 +21,9 @@ from hypothesis import strategies as st
 from hil.cli.main import run
 from hil.config.new_rig import QUESTIONS, Question, answers, rig_text
 from hil.config.rig_file import read_rig
-from hil.config.schema import json_schema
 from hil.config.table import FileKind
 from hil.errors import UsageError
-from tests.cli.json_schema import Validator
+from tests.cli.test_schema import faults
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "rig.toml"
 
@@ -60,7 +59,7 @@ def test_a_vehicle_by_options(tmp_path: Path) -> None:
     assert rig.inverters.m1.product_code == rig.inverters.m2.product_code == 1026
     assert rig.inverters.m1.torque_limit_nm == rig.inverters.m2.torque_limit_nm == 90.0
     assert rig.simulation is None
-    assert Validator(json_schema(FileKind.RIG)).faults(tomllib.loads(path.read_text(encoding="utf-8"))) == []
+    assert faults(FileKind.RIG, tomllib.loads(path.read_text(encoding="utf-8"))) == []
 
 
 @settings(max_examples=20, deadline=None)

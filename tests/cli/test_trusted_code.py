@@ -125,12 +125,14 @@ def test_a_recording_that_is_read_apart_runs_nothing_of_the_folder(trapped: Path
     assert not (trapped / RAN).exists()
 
 
+@pytest.mark.campaign
 def test_a_sealed_rig_runs_nothing_of_the_folder(trapped: Path) -> None:
     with sealed_process("--seed", "5") as sealed:
         assert sealed.commitment
     assert not (trapped / RAN).exists()
 
 
+@pytest.mark.campaign
 def test_compiling_runs_nothing_of_the_folder(trapped: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(first_use, "SIDE_BY_SIDE", (((), ()),))
     first_use.compile_kernels(2)

@@ -88,6 +88,11 @@ def served(
         yield server, with_addresses(rig, server.bus_url, str(server.modbus))
 
 
+def addresses(server: RigServer) -> tuple[str, ...]:
+    """Options with which a command finds a rig that is served here."""
+    return ("--bus", server.bus_url, "--modbus", str(server.modbus))
+
+
 def fast(rig: Rig, answer_timeout_s: float = 2.0) -> FreePacer:
     return FreePacer(period_ns(rig.period_s), answer_timeout_s)
 

@@ -14,7 +14,7 @@ from estimator.identification.linear_model import LinearModel
 from estimator.identification.spectral import SpectralEstimate, good_segments, spectral_estimate
 from estimator.signals.decimate import decimate
 from estimator.signals.record import FloatArray, Record
-from tests.benchmarks.identification.local_polynomial import local_polynomial, longest_stretch
+from tests.benchmarks.identification.local_polynomial import local_polynomial
 from tests.estimator.identification.closed_loop import response
 from tests.estimator.identification.driveline import cruise
 
@@ -56,11 +56,6 @@ def test_the_truth_lies_within_the_stated_error() -> None:
     inner = np.array(deviations)[:, 4:-4]
     assert 0.85 < inner.std() < 1.15  # in units of the stated standard deviation
     assert np.mean(np.abs(inner) > 1.96) == pytest.approx(0.05, abs=0.03)
-
-
-def test_coherence_tells_noise_from_response() -> None:
-    assert spectral_estimate(record(8192, noise=0.0)).coherence[5:-5].min() > 0.99
-    assert spectral_estimate(record(8192, noise=1e3)).coherence.mean() < 0.1
 
 
 def test_segments_with_a_masked_sample_are_left_out() -> None:
@@ -183,11 +178,6 @@ def test_the_transient_is_reported_from_the_response() -> None:
 
     assert typical(local_polynomial(record)) < 0.02
     assert typical(spectral_estimate(record, 256)) > 3 * typical(local_polynomial(record))
-
-
-def test_the_longest_stretch() -> None:
-    assert longest_stretch(np.array([1, 0, 1, 1, 1, 0, 1, 1], dtype=bool)) == (2, 5)
-    assert longest_stretch(np.zeros(4, dtype=bool)) == (0, 0)
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from estimator.errors import BadSetting, BadShape
+from estimator.errors import BadSetting
 from estimator.identification.linear_model import Orders
 from estimator.identification.online.adaptation import (
     PROFILES,
@@ -206,8 +206,3 @@ def test_three_hours_at_10_ms_leave_the_gain_sound(profile: type[Adaptation], ex
     assert (estimator._memory["D"] > 0).all()
     if excited is True:
         np.testing.assert_allclose(estimator.theta, LINEAR.theta, atol=0.05)
-
-
-def test_a_start_of_the_wrong_shape_is_refused() -> None:
-    with pytest.raises(BadShape, match=r"oefo: theta\(0\) is \[1\.\], expected 4 finite numbers"):
-        Oefo(LINEAR.A, LINEAR.orders, theta=np.ones(1))
