@@ -218,7 +218,7 @@ def test_a_handshake_has_one_deadline_however_slowly_it_is_sent(
     assert took_s < 5.0
 
 
-@pytest.mark.parametrize("count", [20, MOST_WAITING + 10])
+@pytest.mark.parametrize("count", [20, pytest.param(MOST_WAITING + 10, marks=pytest.mark.campaign)])
 def test_connections_without_the_token_keep_no_host_out(bridge: CanBridge, slave: can.BusABC, count: int) -> None:
     waiting = [slow(bridge, named=False) for _ in range(count)]
     over = threading.Event()

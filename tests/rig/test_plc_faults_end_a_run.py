@@ -31,9 +31,6 @@ def in_the_middle() -> str:
         ("half_answer", r"expected an answer within 1 s, only \d+ bytes came that are no whole one"),
         ("reset", r"expected an answer, the connection was lost"),
         ("wrong_width", r"reading \d+ \w+\(s\) from address \d+: expected \d+ values, got \d+"),
-        ("hang", r"expected an answer within 1 s, none came|no answer for 1\.\d\d s"),
-        ("permissive_withdrawn", "permissive is withdrawn, expected present"),
-        ("clutch_closes", "clutch is closed, expected open"),
     ],
 )
 def test_it_ends_the_run_at_zero_torque(fault: str, named: str, in_the_middle: str) -> None:
@@ -46,7 +43,7 @@ def test_it_ends_the_run_at_zero_torque(fault: str, named: str, in_the_middle: s
     assert 0 < len(samples.rows) < 100
 
 
-@pytest.mark.parametrize("fault", ["exception", "slow", "half_answer", "reset", "wrong_width", "hang"])
+@pytest.mark.parametrize("fault", ["exception", "half_answer"])
 def test_from_the_start_on_nothing_is_armed(fault: str) -> None:
     samples = Samples()
     with served(faults=rig_faults([f"plc.{fault}@0"], period_s=0.01)) as (server, rig):

@@ -58,7 +58,7 @@ def test_check_prints_the_limits_and_refuses_one_ten_times_too_high() -> None:
         assert "rad/s" in plc.questions[1]
 
 
-@pytest.mark.parametrize("torque_nm", [450.0, 4500.0])
+@pytest.mark.parametrize("torque_nm", [pytest.param(450.0, marks=pytest.mark.campaign), 4500.0])
 def test_commissioning_asks_before_any_torque(torque_nm: float, tmp_path: Path) -> None:
     with bench(tmp_path) as rig:
         rig.server.plc._setup = PlcSetup(torque_limit_nm=torque_nm)

@@ -65,7 +65,7 @@ def test_vehicle_that_is_not_fit_is_not_armed(plc: PlcDevice, named: str) -> Non
     assert samples.rows == []
 
 
-@pytest.mark.parametrize(("hung", "other"), [("m1", 2), ("m2", 1)])
+@pytest.mark.parametrize(("hung", "other"), [("m1", 2), pytest.param("m2", 1, marks=pytest.mark.campaign)])
 def test_inverter_that_hangs_does_not_keep_the_other_armed(hung: str, other: int) -> None:
     samples = Samples()
     faults = RigFaults(**{hung: InverterFaults(hang_at_step=STEP_WITHIN)})
@@ -80,7 +80,7 @@ def test_inverter_that_hangs_does_not_keep_the_other_armed(hung: str, other: int
     assert [row.age_ns for row in stale] == [10_000_000 * (k + 1) for k in range(len(stale))]
 
 
-@pytest.mark.parametrize("deaf", ["m1", "m2"])
+@pytest.mark.parametrize("deaf", [pytest.param("m1", marks=pytest.mark.campaign), "m2"])
 def test_one_request_lost_at_the_end_is_made_again(deaf: str, monkeypatch: pytest.MonkeyPatch) -> None:
     samples, lost = Samples(), []
     with served() as (server, rig), open_devices(rig) as devices:
