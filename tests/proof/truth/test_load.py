@@ -71,7 +71,7 @@ def test_a_heavier_bus_is_pulled_more_by_a_hill(lossless, trace):
     road = np.array([[100.0, 0.001, 0.0]])  # a tenth uphill for hundreds of metres
     p = lossless._replace(road=road, metres_per_rad=0.0857, gravity_nm=8000.0, payload_share=0.5, payload_rise_s=1e-3)
     light, heavy = (
-        trace(q, [0.0] * 200, speed_rad_s=60.0)[-1, State.SPEED_L] for q in (p._replace(payload_share=0), p)
+        trace(q, [0.0] * 200, speed_rad_s=60.0)[-1, State.SPEED_L] for q in (p._replace(payload_share=0.0), p)
     )
     # weight and inertia grow alike; the motor's inertia, which helps the bus along, does not
     assert 0.0 < light - heavy < 0.02 * (60.0 - light)
