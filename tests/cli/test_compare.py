@@ -129,8 +129,3 @@ def test_wrong_input_is_refused_and_nothing_written(
     assert said in error
     assert Path(inputs[position]).name in error
     assert not (tmp_path / "result").exists()
-
-
-def test_a_result_that_is_a_file_is_refused(inputs: list[str], capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["compare", *inputs, "--out", inputs[0]]) == 2
-    assert "which is a file" in capsys.readouterr().err

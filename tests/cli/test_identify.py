@@ -287,17 +287,6 @@ def test_a_recording_too_short_is_refused(tmp_path: Path, capsys: pytest.Capture
     assert "expected at least 80 for 8 parameters" in capsys.readouterr().err
 
 
-def test_a_recording_that_is_not_there_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(arguments([tmp_path / "lost.csv"], tmp_path / "out")) == 2
-    assert "lost.csv" in capsys.readouterr().err
-
-
-def test_a_file_in_place_of_the_folder_is_refused(recordings: list[Path], tmp_path: Path) -> None:
-    (tmp_path / "out").write_text("mine")
-    assert run(arguments(recordings[:1], tmp_path / "out")) == 2
-    assert (tmp_path / "out").read_text() == "mine"
-
-
 def stiff_line(path: Path) -> Path:
     """Write 20 s of a line at 65 Hz, sampled every 10 ms as it would be: the exact motion under held torque."""
     line, rng = Line(1.6, 100.0, 262_000.0, 30.0, 0.35, 0.9), np.random.default_rng(0)

@@ -22,9 +22,6 @@ TOGETHER = "both inverters: torque actual value"
     ("faults", "named"),
     [
         (["m1.torque_gain@{}=2"], "inverter m1: torque actual value"),
-        (["m2.torque_gain@{}=0"], "inverter m2: torque actual value"),
-        (["m1.torque_gain@{}=-1"], "m1"),
-        (["m2.torque_offset@{}=100"], "inverter m2: torque actual value"),
         (["m1.torque_offset@{}=45", "m2.torque_offset@{}=45"], TOGETHER),
     ],
 )
