@@ -37,10 +37,7 @@ EFFECTS = "\n[effects.gremlins]\nx = { value = 1 }\n[effects.coulomb_friction_mo
             [("\n[parameters]", f"{EFFECTS}\n[parameters]")],
             ["effects.gremlins: unknown effect, expected one of", "effects.coulomb_friction_motor.haste: unknown"],
         ),
-        (
-            [("\n[parameters]", "\neffects.backlash = 3\n[parameters]")],
-            ["effects.backlash | expected a table | got 3"],
-        ),
+        ([("\n[parameters]", "\neffects.backlash = 3\n[parameters]")], ["effects.backlash | expected a table | got 3"]),
     ],
 )
 def test_each_fault_is_named_and_nothing_is_written(

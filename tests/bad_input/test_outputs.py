@@ -19,12 +19,7 @@ LITTLE_ROOM = 'ulimit -f 20 && exec "$@"'
 
 NOWHERE = ("--bus", "ws://127.0.0.1:9/", "--modbus", "127.0.0.1:9")
 
-COMMANDS = [
-    "diagnose REC --model MODEL --out",
-    "identify REC --out",
-    "compare MODEL REC --out",
-    "demo --seed 1 --out",
-]
+COMMANDS = ["diagnose REC --model MODEL --out", "identify REC --out", "compare MODEL REC --out", "demo --seed 1 --out"]
 
 
 def words(command: str, drive: Path) -> list[str]:

@@ -66,11 +66,7 @@ def test_what_is_wrong_from_the_start_is_not_driven(
 @pytest.mark.parametrize(
     ("fault", "said", "alive"),
     [
-        (
-            "m2.hang",
-            ["not every drive is confirmed disarmed: m2: ", "cut the power", "What ended the run"],
-            (1,),
-        ),
+        ("m2.hang", ["not every drive is confirmed disarmed: m2: ", "cut the power", "What ended the run"], (1,)),
         ("plc.clutch_closes", ["clutch is closed, expected open. The run was ended at zero torque"], (1, 2)),
         ("plc.permissive_withdrawn", ["permissive is withdrawn, expected present. The run was ended"], (1, 2)),
         ("plc.mode_changes", ["drive mode is electric, expected series as at the start"], (1, 2)),

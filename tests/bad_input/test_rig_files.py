@@ -72,11 +72,7 @@ def test_a_byte_order_mark_is_no_fault(tmp_path: Path, rig_text: str, capsys: py
     [
         ("eds", "[DeviceInfo]\nfoo", ["rig.toml: inverters.m1.eds | expected an EDS | got: EDS", "lists no object"]),
         ("eds", "", ["rig.toml: inverters.m1.eds | expected an EDS", "no section [DeviceInfo]"]),
-        (
-            "map",
-            'schema = "x"\n',
-            ["schema | expected 'hil.register_map/1'", "name | expected this key"],
-        ),
+        ("map", 'schema = "x"\n', ["schema | expected 'hil.register_map/1'", "name | expected this key"]),
         ("map", "name = 3\ncolour = 1\n", ["name | expected a valid string", "colour | expected no such key"]),
         ("model", 'schema = "hil.model/1"\n', ["structure | expected this key", "parameters | expected this key"]),
     ],

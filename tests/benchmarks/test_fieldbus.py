@@ -10,14 +10,7 @@ import pytest
 
 from hil.rig.pacing import FreePacer, period_ns
 from tests.benchmarks import fieldbus as raw_can
-from tests.benchmarks.fieldbus import (
-    DEFAULT_PERIOD_S,
-    armed,
-    compiled,
-    example_rig,
-    lateness_ns,
-    served_here,
-)
+from tests.benchmarks.fieldbus import DEFAULT_PERIOD_S, armed, compiled, example_rig, lateness_ns, served_here
 
 CYCLES = 20
 CYCLIC = {raw_can.SYNC, *raw_can.RPDOS, *raw_can.TPDOS}

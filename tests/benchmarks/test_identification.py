@@ -8,16 +8,7 @@ import numpy as np
 import pytest
 
 from tests.benchmarks.buses import CLEAN, ON_THE_ROAD
-from tests.benchmarks.identification.methods import (
-    BAND_HZ,
-    PEERS,
-    Answer,
-    Case,
-    Interval,
-    Peer,
-    make_case,
-    of_poles,
-)
+from tests.benchmarks.identification.methods import BAND_HZ, PEERS, Answer, Case, Interval, Peer, make_case, of_poles
 from tests.benchmarks.identification.rigs import buses, cruises, experiment
 from tests.benchmarks.identification.run import Judged, judge
 from tests.benchmarks.identification.scores import coverages, errors, tables

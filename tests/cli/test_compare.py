@@ -19,11 +19,7 @@ NOISE = 0.05
 def inputs(tmp_path: Path) -> list[str]:
     bench.record(tmp_path / "run_1.csv", 1, noise=NOISE)
     bench.record(tmp_path / "run_2.csv", 2, noise=2 * NOISE)
-    return [
-        str(bench.model(tmp_path / "drive.toml")),
-        str(tmp_path / "run_1.csv"),
-        str(tmp_path / "run_2.csv"),
-    ]
+    return [str(bench.model(tmp_path / "drive.toml")), str(tmp_path / "run_1.csv"), str(tmp_path / "run_2.csv")]
 
 
 def test_the_right_model_is_off_by_the_noise(inputs: list[str], capsys: pytest.CaptureFixture[str]) -> None:
@@ -113,12 +109,7 @@ def test_each_output_is_drawn(
     ],
 )
 def test_wrong_input_is_refused_and_nothing_written(
-    inputs: list[str],
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    position: int,
-    text: str | None,
-    said: str,
+    inputs: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str], position: int, text: str | None, said: str
 ) -> None:
     if text is None:
         Path(inputs[position]).unlink()

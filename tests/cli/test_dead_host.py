@@ -42,10 +42,7 @@ def await_end_of_operation(bus: str, node_id: int) -> None:
 
 @pytest.mark.parametrize("death", [signal.SIGKILL, pytest.param(signal.SIGSTOP, marks=pytest.mark.campaign)])
 def test_drives_of_a_host_that_dies_leave_operation(
-    simulate: Callable[..., Any],
-    spawn: Callable[..., subprocess.Popen[str]],
-    short_rig: Path,
-    death: signal.Signals,
+    simulate: Callable[..., Any], spawn: Callable[..., subprocess.Popen[str]], short_rig: Path, death: signal.Signals
 ) -> None:
     """Killed, or suspended as by a debugger: the heartbeat ends, and with it the torque; the rig stays up."""
     simulation = simulate(short_rig, "--real-time")

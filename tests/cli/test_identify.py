@@ -259,11 +259,7 @@ def test_order_and_delay_are_chosen_where_they_are_left_open(
     ],
 )
 def test_wrong_use_is_refused_and_nothing_written(
-    recordings: list[Path],
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    more: tuple[str, ...],
-    named: str,
+    recordings: list[Path], tmp_path: Path, capsys: pytest.CaptureFixture[str], more: tuple[str, ...], named: str
 ) -> None:
     assert run(arguments(recordings[:1], tmp_path / "out", *more)) == 2
     assert named in capsys.readouterr().err

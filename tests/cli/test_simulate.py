@@ -76,12 +76,7 @@ def test_a_position_in_translation_is_named_and_scaled(arguments: dict[str, Path
     table = np.loadtxt(arguments["--input"], delimiter=",", skiprows=1)
     table = np.column_stack([table[:, :3], 1000 * angle])
     np.savetxt(
-        arguments["--input"],
-        table,
-        delimiter=",",
-        header="t,torque_m1_nm,torque_m2_nm,x_mm",
-        comments="",
-        fmt="%.12g",
+        arguments["--input"], table, delimiter=",", header="t,torque_m1_nm,torque_m2_nm,x_mm", comments="", fmt="%.12g"
     )
     signals = '[signals]\ntime = { column = "t" }\nposition = { column = "x_mm", scale = 0.001 }\n'
     arguments["--model"].write_text(bench.MODEL.replace("rotation", "translation") + signals)
@@ -103,12 +98,7 @@ def test_a_position_in_translation_is_named_and_scaled(arguments: dict[str, Path
     ],
 )
 def test_wrong_arguments_are_refused_and_nothing_written(
-    arguments: dict[str, Path],
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    option: str,
-    name: str,
-    said: str,
+    arguments: dict[str, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str], option: str, name: str, said: str
 ) -> None:
     before = (tmp_path / "run_1.csv").read_text()
     assert call({**arguments, option: tmp_path / name}) == 2

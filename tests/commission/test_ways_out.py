@@ -67,8 +67,7 @@ def press(monkeypatch: pytest.MonkeyPatch) -> Callable[[Bench], None]:
 
 
 @pytest.mark.parametrize(
-    "step",
-    [pytest.param(step, marks=() if step in ("signs", "prbs") else pytest.mark.campaign) for step in DRIVEN],
+    "step", [pytest.param(step, marks=() if step in ("signs", "prbs") else pytest.mark.campaign) for step in DRIVEN]
 )
 def test_interrupted_in_the_middle_it_disarms_and_resumes_there(
     step: str, tmp_path: Path, press: Callable[[Bench], None]

@@ -180,12 +180,7 @@ def test_mapping_over_eight_bytes_of_objects_that_are_not_there_or_not_filled(tm
 
 
 @pytest.mark.parametrize(
-    ("mapping", "allowed", "wanted"),
-    [
-        ("1600", "1", []),
-        ("1600", "0", ["a filler"]),
-        ("1A00", "1", ["a filler"]),
-    ],
+    ("mapping", "allowed", "wanted"), [("1600", "1", []), ("1600", "0", ["a filler"]), ("1A00", "1", ["a filler"])]
 )
 def test_filler_in_a_mapping(tmp_path: Path, mapping: str, allowed: str, wanted: list[str]) -> None:
     text = edited("DummyUsage", "Dummy0005=0", f"Dummy0005={allowed}")

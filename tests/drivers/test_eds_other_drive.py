@@ -34,10 +34,7 @@ from tests.drivers.eds_bench import SHIPPED, without
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 OTHER_EDS = EXAMPLES / "other_drive.eds"
-OTHER = replace(
-    inverter_settings("m1", read_rig(EXAMPLES / "other_drive.toml")),
-    sdo_timeout_s=M1.sdo_timeout_s,
-)
+OTHER = replace(inverter_settings("m1", read_rig(EXAMPLES / "other_drive.toml")), sdo_timeout_s=M1.sdo_timeout_s)
 SIMULATED = SimulatedInverter(OTHER.node_id, OTHER.rated_torque_nm, eds_path=OTHER_EDS)
 COUNT_NM, COUNT_RAD_S = 0.45, 0.1 * 2 * pi / 60
 

@@ -11,13 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from drivers.errors import (
-    BusDown,
-    ConfigMismatch,
-    DeviceFault,
-    DeviceTimeout,
-    ProtocolViolation,
-)
+from drivers.errors import BusDown, ConfigMismatch, DeviceFault, DeviceTimeout, ProtocolViolation
 from drivers.plc.plc import GENERATOR_OFF, Plc
 from drivers.plc.register_map import RegisterMap, load_register_map
 from drivers.plc.types import ClutchState, DriveMode, PlcWatchdog, PrbsSettings, PrbsSource
@@ -70,14 +64,7 @@ def talk(device: PlcDevice, conversation: Talk, *, clock: Clock | None = None, m
 
     async def run() -> None:
         async with serve_plc(device, MAP) as served:
-            plc = Plc(
-                "127.0.0.1",
-                served.port,
-                map_,
-                timeout_s=0.2,
-                mode_timeout_s=0.05,
-                clock_ns=clock or Clock(),
-            )
+            plc = Plc("127.0.0.1", served.port, map_, timeout_s=0.2, mode_timeout_s=0.05, clock_ns=clock or Clock())
             async with plc:
                 await conversation(plc, served)
 

@@ -28,15 +28,7 @@ def cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def type_check(line: str, folder: Path, cache: Path) -> str:
     program = folder / "program.py"
     program.write_text(f"{OPENING}    {line}\n")
-    command = [
-        sys.executable,
-        "-m",
-        "mypy",
-        "--config-file=",
-        "--strict",
-        f"--cache-dir={cache}",
-        str(program),
-    ]
+    command = [sys.executable, "-m", "mypy", "--config-file=", "--strict", f"--cache-dir={cache}", str(program)]
     environment = {**os.environ, "MYPYPATH": str(ROOT)}
     return subprocess.run(command, capture_output=True, text=True, env=environment, check=False).stdout
 

@@ -11,15 +11,7 @@ from typing import Self
 from textual.pilot import Pilot
 
 from hil.monitor.app import MonitorApp
-from hil.monitor.messages import (
-    Health,
-    NodeHealth,
-    Order,
-    PlcHealth,
-    Ready,
-    Report,
-    TimingHealth,
-)
+from hil.monitor.messages import Health, NodeHealth, Order, PlcHealth, Ready, Report, TimingHealth
 from hil.sample import Sample, SampleFlag
 
 PERIOD_S = 0.01

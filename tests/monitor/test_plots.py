@@ -43,10 +43,7 @@ def test_a_gap_stays_a_gap() -> None:
     assert [column for column, _, _ in envelope(np.arange(5.0), y, 5)] == [0, 4]
 
 
-@given(
-    st.lists(st.floats(-1e6, 1e6), min_size=1, max_size=20),
-    st.floats(1e-3, 1e3),
-)
+@given(st.lists(st.floats(-1e6, 1e6), min_size=1, max_size=20), st.floats(1e-3, 1e3))
 def test_an_axis_holds_all_values_and_not_much_more(values: list[float], least: float) -> None:
     y_range = nice_range(np.array(values), least)
     span = max(max(values) - min(values), least)

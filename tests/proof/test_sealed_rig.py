@@ -80,14 +80,8 @@ def test_a_rig_that_has_gone_is_named():
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (
-            ("--seed", "5", "--effect", "rust"),
-            "status 2; it said: error: effect 'rust': expected one of none",
-        ),
-        (
-            ("--seed", "5", "--bus", "ws://192.0.2.1:0/"),
-            "status 2; it said: error: address 'ws://192.0.2.1:0/'",
-        ),
+        (("--seed", "5", "--effect", "rust"), "status 2; it said: error: effect 'rust': expected one of none"),
+        (("--seed", "5", "--bus", "ws://192.0.2.1:0/"), "status 2; it said: error: address 'ws://192.0.2.1:0/'"),
     ],
 )
 def test_a_rig_that_does_not_come_up_says_why(arguments, said):

@@ -50,8 +50,7 @@ def test_numbers_carry_their_unit_only_where_there_is_one() -> None:
 
 
 @given(
-    st_numpy.arrays(np.float64, st.integers(1, 400), elements=st.floats(-1e6, 1e6) | st.just(NAN)),
-    st.integers(1, 50),
+    st_numpy.arrays(np.float64, st.integers(1, 400), elements=st.floats(-1e6, 1e6) | st.just(NAN)), st.integers(1, 50)
 )
 def test_a_thinned_trace_keeps_ends_order_and_extremes(y: np.ndarray, stretches: int) -> None:
     kept = extremes(y, stretches)

@@ -74,10 +74,7 @@ class Samples:
 
 @contextmanager
 def served(
-    rig: Rig | None = None,
-    faults: RigFaults | None = None,
-    plc: PlcDevice | None = None,
-    bus_url: str | None = None,
+    rig: Rig | None = None, faults: RigFaults | None = None, plc: PlcDevice | None = None, bus_url: str | None = None
 ) -> Iterator[tuple[RigServer, Rig]]:
     """Serve a rig from this process; yields the server, and the rig at the server's addresses."""
     rig = rig or small_rig()

@@ -66,8 +66,5 @@ def count_of(server: RigServer) -> int:
 def test_a_beat_that_fails_meanwhile_ends_the_run_before_a_torque() -> None:
     with served() as (_, rig), open_devices(rig) as devices:
         devices.plc.close()
-        with (
-            HostBeat(devices.plc_loop, devices.plc) as beat,
-            pytest.raises(RunAborted, match="host's beats, got: PLC"),
-        ):
+        with HostBeat(devices.plc_loop, devices.plc) as beat, pytest.raises(RunAborted, match="host's beats, got: PLC"):
             beat.hand_over()

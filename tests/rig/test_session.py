@@ -15,17 +15,7 @@ from hil.rig.experiments.base import Phase
 from hil.rig.pacing import RealTimePacer, period_ns
 from hil.sample import SampleFlag
 from tests.rig.observer import assert_disarmed
-from tests.rig.serving import (
-    DRAG_NM_S,
-    DURATION_S,
-    INERTIA_KG_M2,
-    Samples,
-    changed,
-    run,
-    run_once,
-    served,
-    small_rig,
-)
+from tests.rig.serving import DRAG_NM_S, DURATION_S, INERTIA_KG_M2, Samples, changed, run, run_once, served, small_rig
 
 HALF_COUNT_NM = 0.5 * 600.0 / 1000.0
 """Half of an inverter's torque count: 0.1 % of 600 Nm."""

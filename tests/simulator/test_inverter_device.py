@@ -36,12 +36,7 @@ PATHS: dict[PowerState, tuple[Command, ...]] = {
     PowerState.READY_TO_SWITCH_ON: (Command.SHUTDOWN,),
     PowerState.SWITCHED_ON: (Command.SHUTDOWN, Command.SWITCH_ON),
     PowerState.OPERATION_ENABLED: (Command.SHUTDOWN, Command.SWITCH_ON, Command.ENABLE_OPERATION),
-    PowerState.QUICK_STOP_ACTIVE: (
-        Command.SHUTDOWN,
-        Command.SWITCH_ON,
-        Command.ENABLE_OPERATION,
-        Command.QUICK_STOP,
-    ),
+    PowerState.QUICK_STOP_ACTIVE: (Command.SHUTDOWN, Command.SWITCH_ON, Command.ENABLE_OPERATION, Command.QUICK_STOP),
 }
 """How to get into each state that is reached by commands alone."""
 

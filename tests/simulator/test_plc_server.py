@@ -50,12 +50,7 @@ def test_words_stand_where_the_shipped_map_says() -> None:
 
     async def conversation(client: AsyncModbusTcpClient) -> None:
         inputs = await client.read_input_registers(0, count=13)
-        assert inputs.registers[:4] == [
-            0x0048,
-            0x4944,
-            0x2024,
-            1,
-        ]  # vendor (high word first), device, version
+        assert inputs.registers[:4] == [0x0048, 0x4944, 0x2024, 1]  # vendor (high word first), device, version
         assert inputs.registers[4:6] == [1, 0]  # series, open
         assert inputs.registers[6:8] == [0x0000, 0x43A0]  # 320.0 as IEEE 754: 43A00000, low word first
         assert inputs.registers[8:11] == [4500, 3, 0]  # 450 Nm in steps of 0.1, PLC cycles, host count
@@ -190,10 +185,7 @@ def test_a_map_with_a_register_the_plc_does_not_know_is_refused() -> None:
 
 
 def test_a_paused_plc_keeps_the_connection_and_says_nothing() -> None:
-    with (
-        PlcServer(PlcDevice(), MAP) as server,
-        socket.create_connection((server.host, server.port)) as client,
-    ):
+    with PlcServer(PlcDevice(), MAP) as server, socket.create_connection((server.host, server.port)) as client:
         client.settimeout(0.1)
         server.pause()
         client.sendall(READ_PLC_COUNT)

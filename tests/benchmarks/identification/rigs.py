@@ -119,10 +119,7 @@ def estimates(truth: Truth) -> dict[str, tuple[Uncertain, float]]:
     if mode is None:
         nowhere = Uncertain(float("nan"), float("nan"))
         return {"resonance": (nowhere, truth.mode.frequency_hz), "damping": (nowhere, truth.mode.damping)}
-    modal = {
-        "resonance": (mode.frequency_hz, truth.mode.frequency_hz),
-        "damping": (mode.damping, truth.mode.damping),
-    }
+    modal = {"resonance": (mode.frequency_hz, truth.mode.frequency_hz), "damping": (mode.damping, truth.mode.damping)}
     try:
         found = physical_parameters(fit.model, fit.covariance)
     except BadModel:  # refused, and not counted: no interval is printed then

@@ -144,10 +144,7 @@ OTHERS = ("node ids exchanged", "second host", "two hosts at once", "clock stepp
 KINDS = (*dict.fromkeys((*TO_DRIVE, *TO_HOST, *WITH_SYNC, *OTHERS)),)
 
 
-NAMED = {
-    "PLC registers exchanged": "PLC",
-    "two hosts at once": "somebody else|[Aa]nother host",
-}
+NAMED = {"PLC registers exchanged": "PLC", "two hosts at once": "somebody else|[Aa]nother host"}
 """What a message has to name, where that is no drive."""
 
 

@@ -17,13 +17,7 @@ J_M, J_L, K, C, B_M, B_L = 1.6, 100.0, 4200.0, 9.0, 0.35, 0.9
 SAMPLE_TIME_S = 0.01
 
 # dx/dt = A x + B [T, T_0],  x = [w_M, w_L, phi_M - phi_L]
-A = np.array(
-    [
-        [-(C + B_M) / J_M, C / J_M, -K / J_M],
-        [C / J_L, -(C + B_L) / J_L, K / J_L],
-        [1.0, -1.0, 0.0],
-    ]
-)
+A = np.array([[-(C + B_M) / J_M, C / J_M, -K / J_M], [C / J_L, -(C + B_L) / J_L, K / J_L], [1.0, -1.0, 0.0]])
 B = np.array([[1.0 / J_M, 0.0], [0.0, -1.0 / J_L], [0.0, 0.0]])
 
 
@@ -52,11 +46,7 @@ class Cruise:
 
 
 def cruise(
-    seed: int,
-    duration_s: float = 22.0,
-    noise_rad_s: float = 0.05,
-    prbs_nm: float = 60.0,
-    name: str = "cruise",
+    seed: int, duration_s: float = 22.0, noise_rad_s: float = 0.05, prbs_nm: float = 60.0, name: str = "cruise"
 ) -> Cruise:
     """Simulate a cruise: torque for the mean load plus PRBS, slowly varying load torque, noisy resolver."""
     rng = np.random.default_rng(seed)

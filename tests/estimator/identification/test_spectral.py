@@ -71,12 +71,7 @@ def test_segments_with_a_masked_sample_are_left_out() -> None:
 def test_an_input_without_power_has_no_coherence_and_infinite_error() -> None:
     n = 2000
     quiet = Record(
-        "quiet",
-        0.02,
-        0.02 * np.arange(n),
-        np.zeros((n, 1)),
-        np.random.default_rng(0).normal(size=n),
-        np.ones(n, bool),
+        "quiet", 0.02, 0.02 * np.arange(n), np.zeros((n, 1)), np.random.default_rng(0).normal(size=n), np.ones(n, bool)
     )
     estimate = spectral_estimate(quiet)
     assert not estimate.coherence.any()
@@ -195,10 +190,7 @@ def test_settings_that_make_no_sense_are_refused(
 
 
 @pytest.mark.parametrize(
-    ("estimate", "why"),
-    [
-        (lambda record: local_polynomial(with_gaps(record, slice(None, -20))), "lines, expected 13"),
-    ],
+    ("estimate", "why"), [(lambda record: local_polynomial(with_gaps(record, slice(None, -20))), "lines, expected 13")]
 )
 def test_too_little_data_are_refused(
     records: list[Record], estimate: Callable[[Record], SpectralEstimate], why: str

@@ -27,15 +27,7 @@ from estimator.physics.problem import (
 )
 from estimator.physics.unknowns import Shared, effect_unknowns, nominal_unknowns
 from estimator.signals.record import FloatArray, Location, OutputKind, Record
-from tests.estimator.physics.bench import (
-    ONE_MASS,
-    SAMPLE_TIME_S,
-    TWO_MASS,
-    linear_record,
-    model,
-    random_steps,
-    scaled,
-)
+from tests.estimator.physics.bench import ONE_MASS, SAMPLE_TIME_S, TWO_MASS, linear_record, model, random_steps, scaled
 
 SIGMA = 0.05
 STARTS = {"first": Start(30.0, 0.0, 10.0, 0.01, 9.0), "second": Start(-20.0, 0.0, -4.0, -0.005, -4.0)}

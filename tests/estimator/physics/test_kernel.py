@@ -76,11 +76,7 @@ def test_a_gap_takes_little_of_their_order_from_the_steps(contact_rad: float) ->
 
 
 START = Start(load_torque_nm=12.0, angle_rad=0.3, speed_rad_s=5.0, twist_rad=0.01, load_speed_rad_s=4.0)
-OUTPUTS = [
-    (OutputKind.SPEED, Location.MOTOR),
-    (OutputKind.SPEED, Location.LOAD),
-    (OutputKind.POSITION, Location.MOTOR),
-]
+OUTPUTS = [(OutputKind.SPEED, Location.MOTOR), (OutputKind.SPEED, Location.LOAD), (OutputKind.POSITION, Location.MOTOR)]
 
 
 @pytest.mark.parametrize(("kind", "location"), OUTPUTS)

@@ -311,12 +311,7 @@ def test_at_a_kink_it_is_reported_that_no_step_fell_as_promised() -> None:
 
 def test_running_out_of_iterations_is_reported(measured: FloatArray) -> None:
     ours = minimise(
-        lambda x: decay(x) - measured,
-        decay_jacobian,
-        np.array([10.0, 4.0, -2.0]),
-        -UNBOUNDED,
-        UNBOUNDED,
-        iterations=1,
+        lambda x: decay(x) - measured, decay_jacobian, np.array([10.0, 4.0, -2.0]), -UNBOUNDED, UNBOUNDED, iterations=1
     )
     assert not ours.converged
     assert ours.jacobian is None

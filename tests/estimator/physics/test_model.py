@@ -60,9 +60,7 @@ def test_a_tolerance_is_a_share_below_one(tolerance: float) -> None:
 def test_every_fault_is_reported_at_once() -> None:
     with pytest.raises(BadModel) as refusal:
         DrivelineModel(
-            Structure.ONE_MASS,
-            {"J_M": Parameter(-2.0, 3.0), "c": Parameter(1.0, 0.1)},
-            effects={"slipping_clutch": {}},
+            Structure.ONE_MASS, {"J_M": Parameter(-2.0, 3.0), "c": Parameter(1.0, 0.1)}, effects={"slipping_clutch": {}}
         )
     assert [line.split(":")[0] for line in str(refusal.value).splitlines()] == [
         "parameters.b_M",
@@ -87,10 +85,7 @@ def test_every_fault_is_reported_at_once() -> None:
             "transport_delay.delay_s.value: expected a finite number, got nan",
         ),
         ({"transport_delay": {"delay_s": -0.01}}, "delay_s.value: expected a number 0 or greater, got -0.01"),
-        (
-            {"backlash": {"gap_rad": -0.02}},
-            "effects.backlash.gap_rad.value: expected a number 0 or greater, got -0.02",
-        ),
+        ({"backlash": {"gap_rad": -0.02}}, "effects.backlash.gap_rad.value: expected a number 0 or greater, got -0.02"),
         (
             {"stiffness_nonlinearity": {"hardening_per_rad2": 80.0, "shape": 0.0}},
             "effects.stiffness_nonlinearity.shape.value: expected a number greater than 0, got 0.0",

@@ -276,9 +276,7 @@ def test_many_simulations_in_one_call_are_those_of_single_calls() -> None:
         {"clock_drift": {"rate": 0.01}},  # which looks at torques to come
     ],
 )
-def test_what_is_alike_up_to_a_moment_is_simulated_from_there(
-    effects: Mapping[str, Mapping[str, float]],
-) -> None:
+def test_what_is_alike_up_to_a_moment_is_simulated_from_there(effects: Mapping[str, Mapping[str, float]]) -> None:
     """Through delay, filter, samples off their time, and whatever else has a memory."""
     bus = model(TWO_MASS)
     off_time = np.random.default_rng(4).uniform(-0.002, 0.002, 400)

@@ -19,10 +19,7 @@ from tests.estimator.identification.closed_loop import controlled
 from tests.estimator.identification.driveline import cruise, true_resonance, uncertain_resonance
 
 Fit = Callable[..., LinearFit]
-METHODS: dict[Method, Fit] = {
-    Method.OUTPUT_ERROR: fit_output_error,
-    Method.BOX_JENKINS: fit_box_jenkins,
-}
+METHODS: dict[Method, Fit] = {Method.OUTPUT_ERROR: fit_output_error, Method.BOX_JENKINS: fit_box_jenkins}
 THIRD = Orders(3, 3, 1)
 FREQUENCY_HZ, DAMPING = true_resonance()
 each = pytest.mark.parametrize(("method", "fit"), METHODS.items(), ids=[method.value for method in METHODS])

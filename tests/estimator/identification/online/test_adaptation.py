@@ -86,8 +86,7 @@ def test_the_papers_tuning_is_the_default() -> None:
 
 
 @pytest.mark.parametrize(
-    "profile",
-    [DecreasingGain(), ConstantForgetting(0.95), VariableForgetting(), DecreasingThenConstantTrace()],
+    "profile", [DecreasingGain(), ConstantForgetting(0.95), VariableForgetting(), DecreasingThenConstantTrace()]
 )
 def test_without_excitation_the_gain_stays_within_its_start(profile: Adaptation) -> None:
     estimator = after(profile, np.zeros(20_000))
@@ -96,8 +95,7 @@ def test_without_excitation_the_gain_stays_within_its_start(profile: Adaptation)
 
 
 @pytest.mark.parametrize(
-    "profile",
-    [DecreasingGain(), ConstantForgetting(0.98), VariableForgetting(), DecreasingThenConstantTrace()],
+    "profile", [DecreasingGain(), ConstantForgetting(0.98), VariableForgetting(), DecreasingThenConstantTrace()]
 )
 @pytest.mark.parametrize("scale", [1e-3, 1.0, 1e6])
 def test_the_gain_stays_symmetric_and_positive_through_hours(profile: Adaptation, scale: float) -> None:

@@ -9,10 +9,7 @@ from scipy.signal import lfilter
 from estimator.compiled import brief
 from estimator.errors import BadModel, BadSetting
 from estimator.identification.linear_model import LinearModel, Orders
-from estimator.identification.online.adaptation import (
-    ConstantForgetting,
-    DecreasingGain,
-)
+from estimator.identification.online.adaptation import ConstantForgetting, DecreasingGain
 from estimator.identification.online.oefo import Filtering, Oefo
 from estimator.identification.online.recursive import Reason, Status
 from estimator.identification.online.regression import is_stable

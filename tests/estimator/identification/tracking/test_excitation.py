@@ -13,13 +13,7 @@ from estimator.identification.online.adaptation import ConstantForgetting
 from estimator.identification.online.recursive import Status
 from estimator.identification.settings import Settings
 from estimator.identification.tracking.alarm import TrackingState
-from estimator.identification.tracking.poles import (
-    N_THROUGH,
-    output_density,
-    pass_torque,
-    sensitivity,
-    weight_of,
-)
+from estimator.identification.tracking.poles import N_THROUGH, output_density, pass_torque, sensitivity, weight_of
 from estimator.signals.record import FloatArray, Record
 from tests.estimator.identification.tracking import dirty_buses, roads
 from tests.estimator.identification.tracking.drives import PRBS_NM, SAMPLE_TIME_S, Line, drives

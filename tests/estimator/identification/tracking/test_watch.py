@@ -127,12 +127,7 @@ def test_a_reference_that_explains_nothing_is_given_up() -> None:
         if seen[-2:] == [TrackingState.STARTING, TrackingState.LEARNING] and seen.count(TrackingState.LEARNING) == 1:
             watch._live["theta"][4:] *= -1.0
     changes = [state for before, state in pairwise(seen) if state is not before]
-    assert changes == [
-        TrackingState.LEARNING,
-        TrackingState.STARTING,
-        TrackingState.LEARNING,
-        TrackingState.WATCHING,
-    ]
+    assert changes == [TrackingState.LEARNING, TrackingState.STARTING, TrackingState.LEARNING, TrackingState.WATCHING]
 
 
 @pytest.mark.parametrize(
