@@ -1,7 +1,5 @@
 """Signals while a command works: status 130, no traceback, nothing half written, no drive left enabled."""
 
-from __future__ import annotations
-
 import importlib
 import os
 import signal

@@ -1,7 +1,5 @@
 """Model files with faults, read by the commands that take one; and one that is good, but of another motion."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

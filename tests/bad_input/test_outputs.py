@@ -1,7 +1,5 @@
 """Places that can't be written to: refused before the work where that can be seen, and never half written."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from pathlib import Path

@@ -4,8 +4,6 @@ Each fault is written as for ``hil sim --fault``. What happens inside a run is l
 ``tests/rig/test_session_ends_early.py``; here it is what a person at the rig sees and a script reads.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path

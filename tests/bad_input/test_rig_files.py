@@ -1,7 +1,5 @@
 """Rig files with faults: every fault by its key, what was expected, what came; and exit status 2."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """Fit and simulation of a linear line next to scipy: ``python -m tests.benchmarks.fit [--pairs N]``."""
 
-from __future__ import annotations
-
 import argparse
 import sys
 from collections.abc import Mapping, Sequence

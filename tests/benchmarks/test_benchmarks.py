@@ -1,7 +1,5 @@
 """The benchmarks compare like with like: fits of one minimum, simulations of one accuracy. No time is judged."""
 
-from __future__ import annotations
-
 import pytest
 
 from estimator.physics.fit import fit

@@ -1,7 +1,5 @@
 """The benchmarks' buses are what they say: the line's mathematics, the road's spectrum, the driver, the readings."""
 
-from __future__ import annotations
-
 import ast
 from pathlib import Path
 

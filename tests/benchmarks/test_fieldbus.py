@@ -1,7 +1,5 @@
 """The fieldbus benchmarks compare like with like: the same frames, the same schedule. No time is judged."""
 
-from __future__ import annotations
-
 import shutil
 from collections import Counter
 

@@ -1,7 +1,5 @@
 """The identification benchmarks judge what they say; small forms of the campaigns."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The recursive benchmark compares one algorithm with itself and one problem with itself. No time is judged."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from estimator.identification.online.adaptation import DecreasingGain, DecreasingThenConstantTrace

@@ -1,7 +1,5 @@
 """Dirty worlds: small things that are small, one that is not, and disturbances with a colour."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The campaign of fuzzing in short: forty mutants for each reader and bus decoder, always the same."""
 
-from __future__ import annotations
-
 import itertools
 import re
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """The campaign of mutants in short: its changes, and some of them tried."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Worlds of other forms: they agree where they must, differ where they should, and are counted as they are."""
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The command line as a user has it: in this process, and as processes of their own."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 import time

@@ -1,7 +1,5 @@
 """``hil check``: what a person and a script read of it."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator
 from contextlib import contextmanager

@@ -4,8 +4,6 @@ The devices are simulated from one rig file, EDS and register map, and checked a
 be the one that is wrong.
 """
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """``hil commission``: plan, refusals, exit statuses, and the way on after Ctrl-C and after a kill."""
 
-from __future__ import annotations
-
 import json
 import signal
 import subprocess

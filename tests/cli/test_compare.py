@@ -1,7 +1,5 @@
 """``hil compare``: the figures are those of the noise, wrong input leaves nothing."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """``hil compare`` with an FMU: the same figures as the model file it was made of, and only where it is trusted."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

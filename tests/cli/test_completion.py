@@ -1,7 +1,5 @@
 """``hil completion``: what a shell is offered, asked as typer's scripts ask, and by bash itself."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

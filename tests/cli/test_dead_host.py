@@ -1,7 +1,5 @@
 """A host that dies in the middle of a run: the drives stop by themselves, seen by a third node on the bus."""
 
-from __future__ import annotations
-
 import json
 import queue
 import signal

@@ -1,7 +1,5 @@
 """``hil diagnose``: the whole line on recordings whose missing physics is known, and its refusals."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator
 from pathlib import Path

@@ -1,7 +1,5 @@
 """``hil diagnose`` with an FMU: what acts at its inputs and outputs is named, and it runs only where it is trusted."""
 
-from __future__ import annotations
-
 import json
 import re
 import shutil

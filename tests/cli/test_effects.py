@@ -1,7 +1,5 @@
 """``hil effects``: the catalogue on the terminal and for scripts."""
 
-from __future__ import annotations
-
 import json
 import re
 

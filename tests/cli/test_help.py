@@ -1,7 +1,5 @@
 """Every command, those of groups included, shows in its help an example that the program would take."""
 
-from __future__ import annotations
-
 import re
 from itertools import pairwise
 from typing import Any

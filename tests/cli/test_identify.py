@@ -1,7 +1,5 @@
 """``hil identify`` on real files: what it writes, what it prints, what it refuses."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 import json

@@ -1,7 +1,5 @@
 """``hil paper``: figures from experiments it drives, and from recordings it is given."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """``hil prove``: from the making of a sealed set to its scoreboard, by the public command alone."""
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """``hil run --trace`` and ``hil replay``: the trace next to the recording, and the recording back from the trace."""
 
-from __future__ import annotations
-
 import json
 import math
 from pathlib import Path

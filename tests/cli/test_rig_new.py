@@ -1,7 +1,5 @@
 """``hil rig new``: by options, by a person at a real terminal, with wrong answers, never over a file."""
 
-from __future__ import annotations
-
 import contextlib
 import fcntl
 import os

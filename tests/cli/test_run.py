@@ -1,7 +1,5 @@
 """``hil run``: recordings, exit statuses, and drives that are disarmed however it ends."""
 
-from __future__ import annotations
-
 import json
 import signal
 import subprocess

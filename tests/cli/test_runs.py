@@ -1,7 +1,5 @@
 """``hil runs`` as a user has it."""
 
-from __future__ import annotations
-
 import csv
 import json
 import shutil

@@ -1,7 +1,5 @@
 """``hil rig schema`` and ``hil model schema``: an editor takes what the program takes, and marks what it refuses."""
 
-from __future__ import annotations
-
 import json
 import tomllib
 from pathlib import Path

@@ -1,7 +1,5 @@
 """``hil sim``: one line when ready, a clean end on a signal, and refusals."""
 
-from __future__ import annotations
-
 import signal
 from collections.abc import Callable
 from pathlib import Path

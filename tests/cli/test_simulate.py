@@ -1,7 +1,5 @@
 """``hil simulate``: the closed-form motion comes out, wrong input leaves nothing."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path

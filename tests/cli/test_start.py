@@ -1,7 +1,5 @@
 """What takes a second to import stays out of the way of commands that do not need it."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """No code comes with a file: laws run only where they are trusted, and no process imports from its working folder."""
 
-from __future__ import annotations
-
 import multiprocessing
 import os
 import subprocess

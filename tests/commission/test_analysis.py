@@ -1,7 +1,5 @@
 """What the steps compute, against signals whose answer is known."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The folder of a commissioning: held by one call at a time, and a state file that may be a stranger's."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Every way out of a commissioning: interrupted, unplugged, refused, and continued."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from itertools import product
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A state file with every field filled, as a commissioning that went through all steps leaves it."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

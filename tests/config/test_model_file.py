@@ -1,7 +1,5 @@
 """The model file: read, written back, and refused with every fault at once."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The PLC's tables of a rig file: certificates on both sides or on none, and everything wrong named with its key."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

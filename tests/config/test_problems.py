@@ -1,7 +1,5 @@
 """Faults of TOML files in lines a person can act on."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated, Literal, Self
 

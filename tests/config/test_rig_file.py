@@ -1,7 +1,5 @@
 """The rig file: the example loads, and everything that can be wrong in one is named with its key."""
 
-from __future__ import annotations
-
 import math
 import re
 from pathlib import Path

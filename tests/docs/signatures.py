@@ -4,8 +4,6 @@ The size of an effect is chosen to be seen, not to be typical. "Without" is the 
 from the recorded torque; only load torque and initial state are taken from the recording, as ``hil compare`` does it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """What the EDS checker says of a whole file, where one fault has consequences or is reported once for many places."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The shipped EDS and every way one can be wrong."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any

@@ -3,8 +3,6 @@
 The EDS has the habits of real ones: torque in PDO2, blank PDOMapping, wrong counts, capitals, decimal formulas.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 from math import pi

@@ -1,7 +1,5 @@
 """The text of an EDS: line numbers, oddities that are borne, and files that are no text of an EDS at all."""
 
-from __future__ import annotations
-
 import errno
 import os
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What a data sheet has wrong that would be read as other numbers, and what of a drive a run has to know."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

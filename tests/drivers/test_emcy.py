@@ -1,7 +1,5 @@
 """Emergency frames: decoded, described, refused when malformed."""
 
-from __future__ import annotations
-
 import pytest
 
 from drivers.canopen.emcy import CAUSES, Emergency, cause_of, decode

@@ -1,7 +1,5 @@
 """TPDOs as they arrive: all that were asked for are waited for, and each kind is counted."""
 
-from __future__ import annotations
-
 import threading
 
 from drivers.canopen.pdo_map import MappedObject, PdoCodec, PdoLayout

@@ -1,7 +1,5 @@
 """The host's inverter against simulated ones with something wrong: each fault named, never passed over."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Every maker's drive by its data sheet: checked, a rig file written, simulated, driven; and mutants of each file."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

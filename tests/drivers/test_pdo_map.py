@@ -1,7 +1,5 @@
 """PDO layouts and frames: packed at the limits, refused beyond, compared with the objects they come from."""
 
-from __future__ import annotations
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st

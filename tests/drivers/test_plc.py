@@ -1,7 +1,5 @@
 """The PLC driver against the simulated PLC on a real Modbus TCP connection."""
 
-from __future__ import annotations
-
 import asyncio
 import math
 import re

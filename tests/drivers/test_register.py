@@ -1,7 +1,5 @@
 """One register: values to words and back, and what must not pass either way."""
 
-from __future__ import annotations
-
 import math
 import struct
 

@@ -1,7 +1,5 @@
 """The map file: all faults at once, and few requests."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

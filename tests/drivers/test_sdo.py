@@ -1,7 +1,5 @@
 """SDO against a scripted node that answers wrongly, late, or not at all."""
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field

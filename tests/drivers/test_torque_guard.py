@@ -1,7 +1,5 @@
 """The torque guard: every rule alone refuses, every limit itself passes, nothing is clamped."""
 
-from __future__ import annotations
-
 import copy
 import dataclasses
 import math

@@ -1,7 +1,5 @@
 """What has not passed the guard does not type-check."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """The exported text, executed, is the estimator of the host: every number, to the bit."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path

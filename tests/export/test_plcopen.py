@@ -1,7 +1,5 @@
 """The exported PLCopen XML: valid against the TC6 schema, and the same program when another library reads it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import fields, is_dataclass
 from datetime import UTC, datetime

@@ -1,7 +1,5 @@
 """The reader of these tests refuses what IEC 61131-3 refuses: each fault by its one difference from what is right."""
 
-from __future__ import annotations
-
 import pytest
 
 from tests.export.iec.parser import Parser

@@ -1,7 +1,5 @@
 """The exported text as a PLC programmer gets it: the standard's language, readable, complete."""
 
-from __future__ import annotations
-
 import re
 from importlib.util import find_spec
 

@@ -1,7 +1,5 @@
 """The known driveline: its response, poles and zeros against closed forms and an independent discretisation."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

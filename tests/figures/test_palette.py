@@ -1,7 +1,5 @@
 """Colours of lines differ for the colour-blind as well, and can be seen on white."""
 
-from __future__ import annotations
-
 from itertools import combinations
 
 import numpy as np

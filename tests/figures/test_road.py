@@ -1,7 +1,5 @@
 """Roads, drivers and the experiments on them."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

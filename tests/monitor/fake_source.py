@@ -1,7 +1,5 @@
 """A source that says what a test has it say, and remembers what it was sent."""
 
-from __future__ import annotations
-
 import asyncio
 import math
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """Keys of the view against a source that remembers what it was sent."""
 
-from __future__ import annotations
-
 import asyncio
 from collections.abc import Awaitable, Callable
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """The log page: every entry can be read to its end, and reading is not disturbed by what comes."""
 
-from __future__ import annotations
-
 import asyncio
 
 import pytest

@@ -1,7 +1,5 @@
 """Panels: what they say, and that they never say more than there is room for."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

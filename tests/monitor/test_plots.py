@@ -1,7 +1,5 @@
 """Text plots: dots where the values are, axes that hold them, lines that fit."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

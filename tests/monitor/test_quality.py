@@ -1,7 +1,5 @@
 """Quality of the samples: what is counted, since when, in what words."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

@@ -1,7 +1,5 @@
 """A recording or a bus trace in place of a rig."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

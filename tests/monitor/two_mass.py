@@ -1,7 +1,5 @@
 """A two-mass driveline under a PRBS, discretised by scipy: the truth that the monitor's figures are held against."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Sealed rigs driven by the public command: what is written, judged and kept; the driving itself is a stand-in here."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager

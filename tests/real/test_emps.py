@@ -5,8 +5,6 @@ Nonlinear System Identification Benchmarks, 2019; it appears here alone. Toleran
 requirement's.
 """
 
-from __future__ import annotations
-
 import csv
 import json
 from pathlib import Path

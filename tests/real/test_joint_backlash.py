@@ -7,8 +7,6 @@ frequencies and an earthquake are not. The NRMSE is the RMS error over the stand
 The bounds below were set with results in view; they guard against getting worse and prove no more.
 """
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """A diagnosis with every field filled, made by hand: the report is judged, not the diagnosis."""
 
-from __future__ import annotations
-
 import base64
 import gzip
 import re

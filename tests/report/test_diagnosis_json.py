@@ -1,7 +1,5 @@
 """diagnosis.json: the contract's keys, numbers kept, nothing JSON does not have."""
 
-from __future__ import annotations
-
 import json
 import math
 from dataclasses import replace

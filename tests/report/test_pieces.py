@@ -1,7 +1,5 @@
 """The pieces reports are made of: numbers, thinned traces, terminal summaries, folders of results."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

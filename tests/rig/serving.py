@@ -1,7 +1,5 @@
 """A small rig for tests: the example's, with short experiments, a light vehicle and no noise."""
 
-from __future__ import annotations
-
 import uuid
 from collections.abc import Iterator
 from contextlib import contextmanager

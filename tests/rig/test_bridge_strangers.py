@@ -1,7 +1,5 @@
 """The served CAN bus takes its own host and no stranger: no browser's page, no path of the disk, no endless frame."""
 
-from __future__ import annotations
-
 import base64
 import json
 import os

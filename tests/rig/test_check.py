@@ -1,7 +1,5 @@
 """Looking for devices: each is found or not on its own, and nothing is armed."""
 
-from __future__ import annotations
-
 import pytest
 
 from drivers.inverter.cia402 import PowerState

@@ -3,8 +3,6 @@
 Those of drives that hang, fault or are another from the start are looked at in ``test_session_ends_early.py``.
 """
 
-from __future__ import annotations
-
 import time
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Somebody else on the bus who commands the drives: noticed within two cycles, named, and the run is over."""
 
-from __future__ import annotations
-
 import pytest
 
 from drivers.canopen.can_link import CanLink

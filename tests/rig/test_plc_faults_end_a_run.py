@@ -1,7 +1,5 @@
 """A PLC that fails while torque is on the shaft: the run ends disarmed, and says what the PLC did."""
 
-from __future__ import annotations
-
 import pytest
 
 from drivers.plc.plc import Plc

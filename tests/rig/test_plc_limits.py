@@ -1,7 +1,5 @@
 """The PLC's limits in words; what is beyond three times the drives' own is refused, whatever made it so."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from pathlib import Path

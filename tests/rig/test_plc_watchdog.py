@@ -1,7 +1,5 @@
 """A PLC that watches its host: after one that died, the next one beats first and is let in."""
 
-from __future__ import annotations
-
 import asyncio
 
 import pytest

@@ -1,7 +1,5 @@
 """Serving a simulated rig: addresses, what it needs of the rig file, and that nothing is left behind."""
 
-from __future__ import annotations
-
 import threading
 from dataclasses import replace
 from pathlib import Path

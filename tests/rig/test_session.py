@@ -1,7 +1,5 @@
 """Whole runs on the real protocol stacks: what is recorded when nothing goes wrong."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
 
 import numpy as np

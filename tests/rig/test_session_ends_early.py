@@ -1,7 +1,5 @@
 """Runs that something ends: the reason is named, the drives are disarmed, what was recorded stays."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import pytest

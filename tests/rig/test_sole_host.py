@@ -1,7 +1,5 @@
 """A second host on a bus listens first, names what it hears, and sends nothing; of two at once at most one drives."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager

@@ -1,7 +1,5 @@
 """A run's timing record: what is counted, and that it is in the recording and the output however the run ends."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

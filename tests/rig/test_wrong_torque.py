@@ -1,7 +1,5 @@
 """Drives that give another torque than they are asked for, from some moment on or from the start: reported, ended."""
 
-from __future__ import annotations
-
 import pytest
 
 from drivers.errors import CommandRefused, WrongTorque

@@ -1,7 +1,5 @@
 """The simulated inverter as a model, stepped by hand."""
 
-from __future__ import annotations
-
 import itertools
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """The simulated inverter on the bus: NMT, PDO configuration, EMCY, heartbeat, by frames."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import suppress
 

@@ -1,7 +1,5 @@
 """The simulated PLC on Modbus TCP: requests, roles, and answers that go wrong, to bare sockets and clients."""
 
-from __future__ import annotations
-
 import asyncio
 import re
 import socket

@@ -1,7 +1,5 @@
 """The simulated rig: order within a step, determinism, callbacks, and how it ends."""
 
-from __future__ import annotations
-
 import threading
 from dataclasses import replace
 

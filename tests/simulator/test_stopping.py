@@ -1,7 +1,5 @@
 """How a simulated drive stops: option codes, the loss of its host by heartbeat or RPDO."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager

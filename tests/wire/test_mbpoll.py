@@ -1,7 +1,5 @@
 """The simulated PLC asked by `mbpoll`, a Modbus client that nobody here wrote (libmodbus underneath)."""
 
-from __future__ import annotations
-
 import re
 import shutil
 import subprocess

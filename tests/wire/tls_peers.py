@@ -1,7 +1,5 @@
 """Certificates made for a test, and peers that speak TLS with them."""
 
-from __future__ import annotations
-
 import ipaddress
 import os
 import select

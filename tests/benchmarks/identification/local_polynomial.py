@@ -15,8 +15,6 @@ No window, hence the resolution of the whole stretch, and a noise variance free 
 is so sharp that segments blur it, or the recording is short.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from estimator.errors import NotExciting

@@ -7,8 +7,6 @@
 ``paper``     coverage on the rig of ``hil paper``: both protocol stacks, a driver, a road, a payload; 30 s each
 """
 
-from __future__ import annotations
-
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass

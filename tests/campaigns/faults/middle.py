@@ -7,8 +7,6 @@ changed, and the plant's own speed. A failure is a run that continues after the 
 a shaft that got faster than the experiment has it, or a drive that is not disarmed at the end.
 """
 
-from __future__ import annotations
-
 import re
 import struct
 import sys

@@ -1,7 +1,5 @@
 """The tests' driveline with a controller that answers the measured speed, and its exact frequency response."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.signal import max_len_seq
 

@@ -1,7 +1,5 @@
 """An independent two-mass driveline for the tests: exact discretisation by scipy, nothing of this project."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

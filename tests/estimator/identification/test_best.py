@@ -1,7 +1,5 @@
 """The headline of an identification: a pole pair that the data need, intervals, and one verdict."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

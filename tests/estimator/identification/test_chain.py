@@ -1,7 +1,5 @@
 """The on-line chain: sample by sample and in blocks the same bits, and nothing raises on a value."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

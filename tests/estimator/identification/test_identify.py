@@ -1,7 +1,5 @@
 """The whole chain on eight simulated drives: what DESIGN and the paper ask of it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Every spectral estimator against the exact response: one result type, intervals that hold, what each is for."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """An identification, questioned: what it says where all is well, and where something is not."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

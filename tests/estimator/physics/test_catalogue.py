@@ -1,7 +1,5 @@
 """One contract for every entry of the catalogue: names, units, nulls, starts, words, and what it refuses to judge."""
 
-from __future__ import annotations
-
 import inspect
 import math
 import re

@@ -1,7 +1,5 @@
 """The fit finds the truth of an independent linear simulation, and its machinery does what it says."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """A joint on a bench: its torque under an imposed motion, against answers worked out by hand."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import pairwise
 

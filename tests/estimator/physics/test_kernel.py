@@ -1,7 +1,5 @@
 """The compiled simulation against closed formulas and an exact linear solution written in the tests."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

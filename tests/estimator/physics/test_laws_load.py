@@ -1,7 +1,5 @@
 """Effects at the load, against the reference."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """The bounded least squares against scipy's on problems with a known difficulty."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

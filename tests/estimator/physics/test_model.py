@@ -1,7 +1,5 @@
 """The model refuses what is missing, unknown or non-physical, every fault at once."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

@@ -1,7 +1,5 @@
 """What a recording says of the motion: speed from position, sizes, changes of sign."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

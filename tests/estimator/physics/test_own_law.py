@@ -1,7 +1,5 @@
 """A user's own law: tried before it is used, and simulated as the same law inside the kernel is."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import replace

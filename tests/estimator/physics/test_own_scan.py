@@ -1,7 +1,5 @@
 """Phases and moments by a scan: what it answers is the effect itself, and what it chooses is the best there is."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 

@@ -1,7 +1,5 @@
 """Work on all cores: order, nesting and exceptions are those of a plain loop."""
 
-from __future__ import annotations
-
 import threading
 import time
 from collections.abc import Iterator

@@ -3,8 +3,6 @@
 The interval is the noise's own: planted values lie within 4.5 standard errors of the fitted ones.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 

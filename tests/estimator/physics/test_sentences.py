@@ -1,7 +1,5 @@
 """What the catalogue says of a finding: every number that matters, in the units of the motion."""
 
-from __future__ import annotations
-
 import math
 import re
 

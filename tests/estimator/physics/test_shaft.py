@@ -1,7 +1,5 @@
 """The shaft's laws: stiffness at zero twist, hardening and softening, and what a gap does to them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

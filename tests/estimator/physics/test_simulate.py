@@ -1,7 +1,5 @@
 """Grid, outputs, and refusal of outputs that a structure does not have."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """The stepper is the simulation, one period at a time."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

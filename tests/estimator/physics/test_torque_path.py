@@ -1,7 +1,5 @@
 """Delay and lag between torque reading and shaft, against closed formulas."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.linalg import expm

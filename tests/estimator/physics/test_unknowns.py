@@ -1,7 +1,5 @@
 """What a fit may change: bounds and scales of the shared unknowns, and what every recording has of its own."""
 
-from __future__ import annotations
-
 from dataclasses import astuple, replace
 
 import numpy as np

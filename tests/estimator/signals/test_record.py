@@ -1,7 +1,5 @@
 """What a record refuses, and what it says of its torques."""
 
-from __future__ import annotations
-
 import gc
 from typing import Any
 

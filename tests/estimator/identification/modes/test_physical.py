@@ -1,7 +1,5 @@
 """The physically possible two-mass drive behind a linear model, and what the data leave open of it."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

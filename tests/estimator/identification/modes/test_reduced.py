@@ -1,7 +1,5 @@
 """The third-order equivalent of a model."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.signal import cont2discrete

@@ -1,7 +1,5 @@
 """Ellipses and intervals against what scatters: theta drawn from its covariance, roots computed anew."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

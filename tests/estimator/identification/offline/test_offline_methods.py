@@ -1,7 +1,5 @@
 """Every off-line estimator on the same cruises: one contract, and what sets them apart."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Each profile through the estimator's own loop, against equation (5) with the profile's lambdas."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What every recursive estimator of the registry promises, tried on each of them."""
 
-from __future__ import annotations
-
 import json
 import tracemalloc
 from io import BytesIO

@@ -1,7 +1,5 @@
 """Drives whose physics changes on the way, many at once: exact discretisation by scipy, nothing of this project."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Drives on a road, with a driver, whose stiffness and PRBS change on the way: the road of `hil paper`, other buses."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """Without excitation: a state of its own, an estimate that is held and less and less sure, and no alarm."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Changes of the driveline are found and reported; what is no change is none."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Iterator
 from dataclasses import replace
