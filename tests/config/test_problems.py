@@ -124,15 +124,6 @@ def test_a_long_value_is_cut() -> None:
     assert line.endswith("...")
 
 
-def test_what_is_right_is_returned() -> None:
-    whole = validate(Whole, {"pets": {"rex": {"kind": "dog", "legs": 4}}}, Path("x"), RigFileError)
-    assert whole.pets == {"rex": Dog(kind="dog", legs=4)}
-
-
-def test_nothing_is_refused_without_a_fault() -> None:
-    refuse([])
-
-
 def test_one_table_in_place_of_a_list_of_tables_is_named_with_both_ways_to_write_it() -> None:
     (line,) = lines({"inputs": {"column": "a"}})
     assert line == "inputs | expected a list of tables, [[inputs]] or [ { ... } ] | got one table, [inputs] or { ... }"

@@ -188,10 +188,6 @@ def test_heartbeat_follows_its_object_and_the_nmt_state(armed: Bench) -> None:
         assert node._producer is None
 
 
-def test_controlword_over_sdo_and_rpdo_is_one_object(armed: Bench) -> None:
-    assert objects(armed).upload(0x6040) == 0x000F
-
-
 @pytest.mark.parametrize("permille", [1001, 32767, -32768])
 def test_rpdo_beyond_max_torque_is_not_taken_and_said_in_the_statusword(armed: Bench, permille: int) -> None:
     with armed.intruder() as bus:

@@ -142,9 +142,3 @@ def test_defect_of_the_plant_stops_the_rig_and_is_raised_at_its_end() -> None:
         rig._link._thread.join(60.0)
     with pytest.raises(ZeroDivisionError, match="the plant is broken"):
         rig.close()
-
-
-def test_closing_twice_does_nothing() -> None:
-    rig = SimulatedRig(virtual_bus(new_channel()), RecordingPlant(), (SIMULATED_M1, SIMULATED_M2))
-    rig.close()
-    rig.close()

@@ -20,22 +20,6 @@ def test_values_come_in_the_order_of_the_structure() -> None:
     assert model(shuffled).values() == TWO_MASS
 
 
-def test_a_missing_parameter_is_named() -> None:
-    with pytest.raises(BadModel, match=r"^parameters.b_M: missing, one_mass needs J_M, b_M$"):
-        DrivelineModel(Structure.ONE_MASS, {"J_M": Parameter(2.0, 0.1)})
-
-
-def test_an_unknown_parameter_is_named() -> None:
-    with pytest.raises(BadModel, match=r"^parameters.k: unknown, one_mass has J_M, b_M$"):
-        one_mass(k=Parameter(4200.0, 0.1))
-
-
-@pytest.mark.parametrize("value", [0.0, -1.0, math.nan, math.inf])
-def test_an_inertia_must_be_positive(value: float) -> None:
-    with pytest.raises(BadModel, match=rf"parameters.J_M.value: expected a finite number greater than 0, got {value}"):
-        one_mass(J_M=Parameter(value, 0.1))
-
-
 @pytest.mark.parametrize("name", ["J_L", "k"])
 def test_so_must_load_inertia_and_stiffness(name: str) -> None:
     with pytest.raises(BadModel, match=rf"parameters.{name}.value: expected a finite number greater than 0, got 0"):
