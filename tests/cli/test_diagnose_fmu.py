@@ -33,7 +33,7 @@ def fmu(tmp_path_factory: pytest.TempPathFactory) -> str:
 
 def late(path: Path) -> str:
     """Write a recording under other names, its torque read earlier than it acted."""
-    bench.record(path, 1, noise=0.02, n=600)
+    bench.record(path, 1, noise=0.02, n=350)
     time, first, second, speed = np.loadtxt(path, delimiter=",", skiprows=1).T
     rows = slice(0, time.size - LATE)
     columns = [time[rows], (first + second)[LATE:], speed[rows]]
