@@ -31,7 +31,7 @@ def fits() -> list[LinearFit]:
 
 def test_the_sampled_drive_has_the_exact_response() -> None:
     model = two_mass_model(TRUTH, T_S)
-    Ad, Bd = driveline.discrete(T_S)
+    Ad, Bd = driveline.LINE.discrete(T_S)
     frequency_hz = np.array([0.2, 1.0, 8.2, 30.0])
     z = np.exp(2j * np.pi * frequency_hz * T_S)
     exact = [np.linalg.solve(at * np.eye(3) - Ad, Bd[:, 0])[0] for at in z]

@@ -38,7 +38,9 @@ def test_sampling_is_undone() -> None:
     back = to_continuous(sampled(numerator, denominator))
     np.testing.assert_allclose(back.numerator[1:], np.array(numerator) / denominator[0], rtol=1e-6)
     np.testing.assert_allclose(back.denominator[1:], np.array(denominator[1:]) / denominator[0], rtol=1e-6)
-    np.testing.assert_allclose(np.sort_complex(back.poles), np.sort_complex(np.linalg.eigvals(driveline.A)), rtol=1e-5)
+    np.testing.assert_allclose(
+        np.sort_complex(back.poles), np.sort_complex(np.linalg.eigvals(driveline.LINE.matrix)), rtol=1e-5
+    )
 
 
 @pytest.mark.parametrize("nk", [0, 1, 3])
