@@ -20,6 +20,8 @@ from hil.config.model_file import ModelFile, read_model
 from hil.recording import read_record
 from tests.real.conftest import real_recording
 
+pytestmark = pytest.mark.campaign  # two recordings are fitted, four held out: minutes
+
 MODEL = Path(__file__).parents[2] / "examples" / "joint.toml"
 
 TRAINING = ("sine_0.5Hz_0.5in", "sine_0.5Hz_1in")
