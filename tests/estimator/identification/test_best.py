@@ -83,10 +83,10 @@ def test_buses_on_which_other_minima_are_near(seed: int) -> None:
 
 
 @pytest.mark.parametrize(
-    ("buses", "independent", "good"), [(4, 3, 2), pytest.param(10, 8, 6, marks=pytest.mark.campaign)]
+    ("buses", "independent", "good"), [(2, 1, 1), pytest.param(10, 8, 6, marks=pytest.mark.campaign)]
 )
 def test_healthy_recordings_pass_their_own_residual_tests(buses: int, independent: int, good: int) -> None:
-    """A test at 95 % fails on one in twenty: on 2 or more of 4 with a probability of 1.4 %, on 3 of 10 with 1.2 %."""
+    """A test at 95 % fails on one in twenty: on both of 2 with a probability of 0.25 %, on 3 of 10 with 1.2 %."""
     found = [best_estimate(drive(draw_bus(seed), world=CLEAN)) for seed in range(5000, 5000 + buses)]
     assert sum(best.validation.independence.is_independent for best in found) >= independent
     assert sum(best.verdict is Verdict.GOOD for best in found) >= good  # tests of linearity and feedback fail, too

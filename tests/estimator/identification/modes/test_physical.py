@@ -13,20 +13,12 @@ from estimator.identification.modes.physical import (
     two_mass_start,
 )
 from estimator.identification.modes.uncertainty import Uncertain
-from estimator.identification.offline.fits import LinearFit, fit_box_jenkins
-from estimator.signals.decimate import decimate
+from estimator.identification.offline.fits import LinearFit
 from tests.estimator.identification import driveline
-from tests.estimator.identification.driveline import cruise
 
 TRUTH = np.array([driveline.J_M, driveline.J_L, driveline.K, driveline.C, driveline.B_M, driveline.B_L])
 T_S = 0.01
 TIGHT = 1e-22 * np.eye(6)
-
-
-@pytest.fixture(scope="module")
-def fits() -> list[LinearFit]:
-    """Models of third order at the recordings' own period."""
-    return [fit_box_jenkins(decimate(cruise(seed, 20.0).record, 1), Orders(3, 3, 1)) for seed in range(100, 106)]
 
 
 def test_the_sampled_drive_has_the_exact_response() -> None:

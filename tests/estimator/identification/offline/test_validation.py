@@ -12,19 +12,8 @@ from estimator.signals.decimate import decimate
 from estimator.signals.record import FloatArray, Record
 from tests.estimator.identification import driveline
 from tests.estimator.identification.closed_loop import controlled
-from tests.estimator.identification.driveline import cruise
 
 THIRD = Orders(3, 3, 1)
-
-
-@pytest.fixture(scope="module")
-def records() -> list[Record]:
-    return [decimate(cruise(seed, 20.0, name=f"run_{seed}").record, 1) for seed in range(300, 306)]
-
-
-@pytest.fixture(scope="module")
-def fits(records: list[Record]) -> list[LinearFit]:
-    return [fit_box_jenkins(record, THIRD) for record in records]
 
 
 def test_the_right_model_passes_as_often_as_it_should(records: list[Record], fits: list[LinearFit]) -> None:
@@ -80,12 +69,11 @@ def test_correlations_of_white_noise_keep_their_bound_and_p_is_uniform() -> None
 
 
 def test_a_controller_that_answers_the_speed_is_detected_and_its_effects_reported() -> None:
-    for seed in (1, 2, 3):
-        record, _ = controlled(seed, gain=200.0)
-        found = judge_feedback(validate(fit_box_jenkins(record, THIRD), record))
-        assert found.detected
-        assert "The torque follows the speed" in found.statement
-        assert "Use the Box-Jenkins model" in found.statement
+    record, _ = controlled(1, gain=200.0)
+    found = judge_feedback(validate(fit_box_jenkins(record, THIRD), record))
+    assert found.detected
+    assert "The torque follows the speed" in found.statement
+    assert "Use the Box-Jenkins model" in found.statement
 
 
 def test_in_open_loop_none_is_claimed(records: list[Record], fits: list[LinearFit]) -> None:
