@@ -1,7 +1,5 @@
 """A full disk, without one."""
 
-from __future__ import annotations
-
 import resource
 import signal
 from collections.abc import Iterator

@@ -3,8 +3,6 @@
 In a fresh clone two workers would compile the same kernels at the same time.
 """
 
-from __future__ import annotations
-
 from contextlib import suppress
 
 from estimator.diagnosis.diagnose import diagnose

@@ -1,7 +1,5 @@
 """No verdict of a test depends on what else the machine does: a fixture for a ``conftest.py``."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from importlib import import_module

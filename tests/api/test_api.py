@@ -1,7 +1,5 @@
 """``hil`` from Python: what is read, diagnosed and compared shows itself, and saves what the commands write."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

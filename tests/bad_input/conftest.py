@@ -1,7 +1,5 @@
 """The command line as `tests/cli` has it, and one way to say that a command was refused."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from pathlib import Path
 

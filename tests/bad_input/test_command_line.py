@@ -1,7 +1,5 @@
 """The command line itself: what is typed wrong is refused with the way to the help, which has an example."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 

@@ -4,8 +4,6 @@ them.
 The drive is one mass of 2 kg m^2 whose speed is known in closed form (`tests.cli.bench`).
 """
 
-from __future__ import annotations
-
 import csv
 import json
 import math

@@ -1,7 +1,5 @@
 """Effects that do not exist, or not so: in the catalogue and put into the simulated rig."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

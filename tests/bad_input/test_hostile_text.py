@@ -1,7 +1,5 @@
 """TOML, JSON and traces that no person wrote: refused by file and place, whichever command reads them."""
 
-from __future__ import annotations
-
 import json
 import struct
 import tracemalloc

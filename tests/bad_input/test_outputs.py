@@ -1,7 +1,5 @@
 """Places that can't be written to: refused before the work where that can be seen, and never half written."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from pathlib import Path
@@ -19,12 +17,7 @@ LITTLE_ROOM = 'ulimit -f 20 && exec "$@"'
 
 NOWHERE = ("--bus", "ws://127.0.0.1:9/", "--modbus", "127.0.0.1:9")
 
-COMMANDS = [
-    "diagnose REC --model MODEL --out",
-    "identify REC --out",
-    "compare MODEL REC --out",
-    "demo --seed 1 --out",
-]
+COMMANDS = ["diagnose REC --model MODEL --out", "identify REC --out", "compare MODEL REC --out", "demo --seed 1 --out"]
 
 
 def words(command: str, drive: Path) -> list[str]:

@@ -1,7 +1,5 @@
 """Recordings with faults: refused by name and line before anything is computed, and nothing is written."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

@@ -4,8 +4,6 @@ Each fault is written as for ``hil sim --fault``. What happens inside a run is l
 ``tests/rig/test_session_ends_early.py``; here it is what a person at the rig sees and a script reads.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -66,11 +64,7 @@ def test_what_is_wrong_from_the_start_is_not_driven(
 @pytest.mark.parametrize(
     ("fault", "said", "alive"),
     [
-        (
-            "m2.hang",
-            ["not every drive is confirmed disarmed: m2: ", "cut the power", "What ended the run"],
-            (1,),
-        ),
+        ("m2.hang", ["not every drive is confirmed disarmed: m2: ", "cut the power", "What ended the run"], (1,)),
         ("plc.clutch_closes", ["clutch is closed, expected open. The run was ended at zero torque"], (1, 2)),
         ("plc.permissive_withdrawn", ["permissive is withdrawn, expected present. The run was ended"], (1, 2)),
         ("plc.mode_changes", ["drive mode is electric, expected series as at the start"], (1, 2)),

@@ -1,7 +1,5 @@
 """Rig files with faults: every fault by its key, what was expected, what came; and exit status 2."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest
@@ -13,17 +11,7 @@ from tests.bad_input.conftest import Refused, with_changes
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ([("period_s = 0.01 ", 'period_s = "10ms" ')], ["period_s | expected a valid number | got '10ms'"]),
-        (
-            [("node_id = 1 ", "node_id = 200 ")],
-            ["inverters.m1.node_id | expected less than or equal to 127"],
-        ),
-        ([("port = 5020", "")], ["plc.port | expected this key | got nothing: add it"]),
-        ([("cells = 10", "cellz = 10")], ["prbs.cellz | expected one of the known keys (amplitude_nm, cells"]),
         ([("[guard] ", "[guard ")], ["line {guard}, column", "expected TOML"]),
-        ([("hil.rig/1", "hil.rig/2")], ["schema | expected 'hil.rig/1' | got 'hil.rig/2'"]),
-        ([('kind = "tip"', 'kind = "jump"')], ["experiments.tip.kind | expected one of 'cruise', 'reversal', 'tip'"]),
-        ([("ws://127.0.0.1:54701/", "")], ["can.url | expected a text that is not empty | got ''"]),
         ([("[vehicle]\ninertia_kg_m2 = 100.0", "[guard]")], ["line", "Cannot declare"]),
         (
             [("period_s = 0.01 ", 'period_s = "10ms" '), ("node_id = 1 ", "node_id = 200 "), ("cells", "cellz")],
@@ -82,11 +70,7 @@ def test_a_byte_order_mark_is_no_fault(tmp_path: Path, rig_text: str, capsys: py
     [
         ("eds", "[DeviceInfo]\nfoo", ["rig.toml: inverters.m1.eds | expected an EDS | got: EDS", "lists no object"]),
         ("eds", "", ["rig.toml: inverters.m1.eds | expected an EDS", "no section [DeviceInfo]"]),
-        (
-            "map",
-            'schema = "x"\n',
-            ["schema | expected 'hil.register_map/1'", "name | expected this key"],
-        ),
+        ("map", 'schema = "x"\n', ["schema | expected 'hil.register_map/1'", "name | expected this key"]),
         ("map", "name = 3\ncolour = 1\n", ["name | expected a valid string", "colour | expected no such key"]),
         ("model", 'schema = "hil.model/1"\n', ["structure | expected this key", "parameters | expected this key"]),
     ],

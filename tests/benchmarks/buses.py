@@ -3,8 +3,6 @@
 Nothing of ``estimator``, ``hil.simulator`` or ``hil.proof`` is imported here.
 """
 
-from __future__ import annotations
-
 import math
 from collections import deque
 from dataclasses import dataclass

@@ -5,8 +5,6 @@ a faster one is the same drive read more often. All are made by ``hil.proof.trut
 that is fitted.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -5,8 +5,6 @@ refused with a line. Whatever else happens is a miss, and the exit status says s
 in the folder ``eds`` of HIL_DATA.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import sys

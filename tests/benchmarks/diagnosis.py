@@ -5,8 +5,6 @@ in turn. Growth is that of processor time, both cores together, because it does 
 the exponent between two lengths, 1 for a time in proportion. Memory is the peak of a process of its own.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import math

@@ -9,8 +9,6 @@
 What is compared is reported as ratios of one run; a time depends on the machine and on what else runs on it.
 """
 
-from __future__ import annotations
-
 import argparse
 import math
 import shutil

@@ -1,7 +1,5 @@
 """Fit and simulation of a linear line next to scipy: ``python -m tests.benchmarks.fit [--pairs N]``."""
 
-from __future__ import annotations
-
 import argparse
 import sys
 from collections.abc import Mapping, Sequence
@@ -62,14 +60,7 @@ def by_solve_ivp(values: Values, record: Record, start: Start) -> FloatArray:
     for row, torque_nm in enumerate(record.total_torque_nm.tolist()):
         speed[row] = state[0]
         solution = solve_ivp(
-            rates,
-            (0.0, period_s),
-            state,
-            METHOD,
-            args=(torque_nm,),
-            rtol=RELATIVE,
-            atol=ABSOLUTE,
-            first_step=period_s,
+            rates, (0.0, period_s), state, METHOD, args=(torque_nm,), rtol=RELATIVE, atol=ABSOLUTE, first_step=period_s
         )
         state = solution.y[:, -1]
     return speed

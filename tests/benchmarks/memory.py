@@ -3,8 +3,6 @@
 Written as one line: peak resident memory once the recordings are loaded and once they are diagnosed [MiB], the verdict.
 """
 
-from __future__ import annotations
-
 import json
 import sys
 from pathlib import Path

@@ -4,8 +4,6 @@ Run it by ``python -m tests.benchmarks.monitor``: one line each, lateness in mil
 rig's process has someone at the other end who takes the samples and draws nothing.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 import tempfile

@@ -11,8 +11,6 @@ the proof's truth with dry friction, drag, hills, a lagging inverter and a resol
 3. **Change while the PRBS is off**: found when it is on again?
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from collections.abc import Callable, Iterator

@@ -1,7 +1,5 @@
 """``python -m tests.benchmarks.own_laws``: a simulation under a user's own law, next to one of the catalogue."""
 
-from __future__ import annotations
-
 import argparse
 import sys
 from collections.abc import Callable, Sequence

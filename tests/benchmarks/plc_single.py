@@ -4,8 +4,6 @@ Simulated cruises go through the estimator of the host (64 bit) and through the 
 executed. Printed is the worst difference at the end of any of them.
 """
 
-from __future__ import annotations
-
 import sys
 import tempfile
 from dataclasses import dataclass

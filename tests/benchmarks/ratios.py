@@ -5,8 +5,6 @@ every comparison alternates between its two sides, and what is reported is the r
 taken, and of processor time, which other programs do not stretch and in which two cores at work count twice.
 """
 
-from __future__ import annotations
-
 import os
 import platform
 import time

@@ -9,8 +9,6 @@ one of another environment::
     python -m tests.benchmarks.recursive --padasip /tmp/peers/bin/python
 """
 
-from __future__ import annotations
-
 import argparse
 import importlib.util
 import json

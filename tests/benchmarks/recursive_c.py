@@ -1,7 +1,5 @@
 """The recursive estimator in C (``recursive_oefo.c``), compiled when it is needed."""
 
-from __future__ import annotations
-
 import ctypes
 import shutil
 import subprocess

@@ -1,7 +1,5 @@
 """What the recursive estimators are timed on: a driveline of the paper's orders under a PRBS, without end if asked."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 

@@ -4,8 +4,6 @@
 filter; writes the time taken, the processor time [s] and the last weights as JSON. Imports nothing of this project.
 """
 
-from __future__ import annotations
-
 import json
 import sys
 import time

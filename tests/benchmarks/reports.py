@@ -5,8 +5,6 @@ in the system's chromium, offline. "opens" is the load event of the browser, "fi
 figures stands there. Wanted: at most 10 MB and 3 s.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 import tempfile

@@ -1,7 +1,5 @@
 """The fieldbus benchmarks compare like with like: the same frames, the same schedule. No time is judged."""
 
-from __future__ import annotations
-
 import shutil
 from collections import Counter
 
@@ -10,16 +8,7 @@ import pytest
 
 from hil.rig.pacing import FreePacer, period_ns
 from tests.benchmarks import fieldbus as raw_can
-from tests.benchmarks.fieldbus import (
-    DEFAULT_PERIOD_S,
-    armed,
-    compiled,
-    example_rig,
-    lateness_ns,
-    main,
-    quantile,
-    served_here,
-)
+from tests.benchmarks.fieldbus import DEFAULT_PERIOD_S, armed, compiled, example_rig, lateness_ns, served_here
 
 CYCLES = 20
 CYCLIC = {raw_can.SYNC, *raw_can.RPDOS, *raw_can.TPDOS}
@@ -57,14 +46,3 @@ def test_bare_loop_tells_the_lateness_of_every_cycle() -> None:
         late_ns = lateness_ns(program, 1_000_000, CYCLES, priority=0)
     assert len(late_ns) == CYCLES
     assert min(late_ns) >= 0  # it never begins a cycle before it is due
-
-
-def test_quantile_is_the_nearest_rank() -> None:
-    values = list(range(1, 101))
-    assert [quantile(values, share) for share in (0.5, 0.99, 1.0)] == [50, 99, 100]
-
-
-def test_unknown_part_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit):
-        main(["speed"])
-    assert "expected lateness, share, throughput, got speed" in capsys.readouterr().err

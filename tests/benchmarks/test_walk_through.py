@@ -1,7 +1,5 @@
 """The documented walk-through, once, on the real protocol stacks."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

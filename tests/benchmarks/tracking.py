@@ -9,8 +9,6 @@
 4. **Speed**: samples per second in blocks, and what one sample costs on the rig.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 import time

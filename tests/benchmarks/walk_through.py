@@ -5,8 +5,6 @@ noise and PRBS of another seed each time. The damping of the best estimate is he
 gap, and the verdict is printed.
 """
 
-from __future__ import annotations
-
 import argparse
 import math
 import sys

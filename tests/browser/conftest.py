@@ -1,7 +1,5 @@
 """Reports in a real browser: the system's chromium, headless, driven by playwright."""
 
-from __future__ import annotations
-
 import shutil
 import time
 from collections.abc import Iterator

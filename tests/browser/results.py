@@ -1,7 +1,5 @@
 """One result for each kind of page, made once: pages are judged, not results."""
 
-from __future__ import annotations
-
 from functools import cache
 from types import SimpleNamespace
 from typing import Any

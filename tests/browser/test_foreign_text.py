@@ -1,7 +1,5 @@
 """Whatever text stands in a result, nothing of it runs in a page: each page, opened in a real browser."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable, Mapping
 from enum import Enum

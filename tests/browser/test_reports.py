@@ -1,7 +1,5 @@
 """Each report opens offline without a complaint, is readable at any width, by keys alone, and on paper."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Iterator
 from pathlib import Path

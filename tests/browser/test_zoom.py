@@ -1,7 +1,5 @@
 """A long recording can be zoomed to its samples, and its page stays small."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -4,8 +4,6 @@ Recorded, estimated on line, entered into the store. Prints the memory of the pr
 most when the recording has been given its name; exits 1 if either is more than in the second hour.
 """
 
-from __future__ import annotations
-
 import argparse
 import resource
 import sys

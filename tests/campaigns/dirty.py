@@ -4,8 +4,6 @@ The imperfections are effects of the catalogue at a fraction of the sizes at whi
 which ones, how many and how small is drawn. What the nominal model knows of them is drawn by the caller.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from enum import Enum

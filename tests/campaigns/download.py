@@ -5,8 +5,6 @@ Where a file can't be had, the message says what to download by hand and where t
 was, and converts it where that is needed.
 """
 
-from __future__ import annotations
-
 import argparse
 import hashlib
 import http.client

@@ -5,8 +5,6 @@ gap; a generator comes in by an equality of two joints; what changes at a moment
 dependency of development, for the campaign alone.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from typing import Any
 

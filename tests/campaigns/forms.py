@@ -5,8 +5,6 @@ saturation, a lag of second order, a shaft with a stop or a slider. Nothing of `
 written from the literature, not from the law that is fitted. Bus, nominal model and tests are the proof's.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

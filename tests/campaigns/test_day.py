@@ -1,7 +1,5 @@
 """The campaign of a day, for half a minute of it."""
 
-from __future__ import annotations
-
 import pytest
 
 from tests.campaigns import day

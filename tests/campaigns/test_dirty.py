@@ -1,12 +1,9 @@
 """Dirty worlds: small things that are small, one that is not, and disturbances with a colour."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
-from hil.errors import UsageError
-from hil.proof.truth.recording import USUAL, coloured, speed_reading
+from hil.proof.truth.recording import USUAL, speed_reading
 from hil.proof.truth.specimen import EFFECTS, draw_specimen
 from tests.campaigns.dirty import FEWEST, IMPERFECTIONS, LEAST_PART, MOST, MOST_PART, Known, in_a_model_file, make_dirty
 
@@ -25,13 +22,6 @@ def test_small_effects_are_some_and_small_and_not_the_strong_one_again(strong: s
             assert LEAST_PART * abs(whole[key]) <= abs(sizes[key]) <= MOST_PART * abs(whole[key])
 
 
-@pytest.mark.campaign
-def test_the_same_seed_makes_the_same_world_and_another_another() -> None:
-    one, again, other = (make_dirty("brake_drag", seed)[0] for seed in (4, 4, 5))
-    np.testing.assert_array_equal(one.recordings[0].speed_rad_s, again.recordings[0].speed_rad_s)
-    assert one.specimen.sizes != other.specimen.sizes
-
-
 @pytest.mark.parametrize("known", list(Known))
 def test_the_model_file_knows_what_it_is_to_know(known: Known) -> None:
     case, stated = make_dirty("none", 6, known)
@@ -47,26 +37,6 @@ def test_the_model_file_knows_what_it_is_to_know(known: Known) -> None:
         assert stated[name][word] == pytest.approx(value, rel=0.15 if known is Known.OFF else 1e-12)
     if known is Known.OFF:
         assert any(stated[name][word] != value for (name, word), value in true.items())
-
-
-def test_an_imperfection_is_stated_where_a_model_file_has_words_for_all_that_is_small_in_it() -> None:
-    stated = {name: in_a_model_file(EFFECTS[name], draw_specimen(name, 1).sizes[name]) for name in IMPERFECTIONS}
-    assert stated["quadratic_friction"] == {"quadratic_nm_s2": "drag_nm_s2"}
-    assert stated["resolver_error"] == {"once_rad": "resolver_once_rad", "twice_rad": "resolver_twice_rad"}
-    unknown = {"torque_ripple", "load_imbalance", "shaft_hysteresis", "cardan_second_order"}
-    assert {name for name, words in stated.items() if not words} == unknown
-
-
-def test_an_unknown_strong_effect_is_refused() -> None:
-    with pytest.raises(UsageError, match="expected one of"):
-        make_dirty("gremlin", 1)
-
-
-def test_coloured_noise_has_its_size_and_corner() -> None:
-    noise = coloured(0.3, 2.0, (400_000,), np.random.default_rng(1))
-    assert np.std(noise) == pytest.approx(0.3, rel=0.03)
-    kept = float(noise[1:] @ noise[:-1] / (noise @ noise))
-    assert kept == pytest.approx(np.exp(-2.0 * np.pi * 2.0 * 0.01), rel=0.01)
 
 
 def test_a_sensor_without_colour_draws_what_it_always_drew() -> None:

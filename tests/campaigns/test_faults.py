@@ -1,7 +1,5 @@
 """The campaign of faults in short: each fault once, at a moment and in an experiment drawn with a fixed seed."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """The campaign of kills in short: recordings of every format killed while they are written and published."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

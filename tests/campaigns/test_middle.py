@@ -1,7 +1,5 @@
 """The man in the middle: the judge finds what is wrong, and leaves alone what is not."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

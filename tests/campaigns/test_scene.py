@@ -1,7 +1,5 @@
 """What the faults of real processes are made with: a clock and a disk of their own."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -1,10 +1,7 @@
 """Worlds of other forms: they agree where they must, differ where they should, and are counted as they are."""
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -15,7 +12,7 @@ from hil.proof.truth.driveline import TruthDriveline
 from hil.proof.truth.specimen import NOTHING, Stream, stream
 from tests.campaigns import engine, worlds
 from tests.campaigns.forms import FORMS, Line, Role, drive, make_form
-from tests.campaigns.worlds import ALL, Row, continued, parse_forms, parse_seeds, reliability, table
+from tests.campaigns.worlds import ALL, Row, continued, parse_forms, table
 
 BUS = draw_bus(stream(5, Stream.BUS))
 LINE = Line(BUS.J_M, BUS.J_L, BUS.k, BUS.c, BUS.b_M, BUS.b_L, BUS.load_torque_nm)
@@ -57,14 +54,6 @@ def test_every_kind_of_law_has_a_form_to_calibrate_on_and_another_to_judge_on() 
         parse_forms("engine,rust")
 
 
-def test_seeds_are_a_range_with_both_ends() -> None:
-    assert list(parse_seeds("3..5")) == [3, 4, 5]
-    assert list(parse_seeds("7")) == [7]
-    for wrong in ("5..3", "a..b", "-1..2", ""):
-        with pytest.raises(argparse.ArgumentTypeError, match=r"expected A\.\.B"):
-            parse_seeds(wrong)
-
-
 def _named(name: str, probability: float | None, is_there: bool, is_strong: bool = False) -> Row:
     return {"name": name, "probability": probability, "alike": [], "is_there": is_there, "is_strong": is_strong}
 
@@ -85,19 +74,6 @@ def test_the_table_counts_what_was_named_and_what_is_not_there() -> None:
     assert "| engine, 1 | 2 | 1 of 1 | 2 | 1 | 1 | 1 | 1 of 2 | 5.0, 5.0 |" in lines
     assert "| linear, 1 | 1 | 0 of 0 | 0 | 0 | 1 | 0 | 0 of 0 | 5.0, 5.0 |" in lines
     assert lines[-1].startswith("| **judge** | 2 | 1 of 1 |")
-
-
-def test_the_reliability_curve_has_the_names_of_each_bin() -> None:
-    lines = reliability(ROWS).splitlines()
-    assert lines[0] == "| stated probability | calibrate | judge |"
-    assert "| 0.9 to 0.99 |  | 0 of 1 there, stated 0.95 |" in lines
-    assert "| 0.999 to 1 |  | 1 of 1 there, stated 1 |" in lines
-
-
-def test_a_name_is_there_if_it_or_what_it_resembles_is() -> None:
-    effect: dict[str, Any] = {"name": "actuator_lag", "indistinguishable_from": ["speed_filter"], "probability": 0.9}
-    assert worlds._name(effect, {"speed_filter"}, "speed_filter")["is_strong"]
-    assert not worlds._name(effect, {"backlash"}, "backlash")["is_there"]
 
 
 def test_what_is_answered_is_not_answered_again(tmp_path: Path) -> None:

@@ -14,8 +14,6 @@ the worlds in which what is strong was named, the names that are not there, and,
 many of the names are there.
 """
 
-from __future__ import annotations
-
 import argparse
 import importlib.util
 import json

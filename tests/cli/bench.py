@@ -3,8 +3,6 @@
 J dw/dt = T - b w - T_0,  w[k+1] = a w[k] + (1 - a) (T[k] - T_0) / b,  a = exp(-b dt / J)
 """
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The model file of the bus that most recordings here are of."""
 
-from __future__ import annotations
-
 MODEL = """schema = "hil.model/1"
 structure = "two_mass"
 motion = "rotation"

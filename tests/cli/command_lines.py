@@ -1,7 +1,5 @@
 """Command lines as the program would take them, without carrying them out."""
 
-from __future__ import annotations
-
 import importlib
 import re
 import shlex

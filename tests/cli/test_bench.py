@@ -1,7 +1,5 @@
 """A joint on a bench through the commands: a spring with a gap, worked out by hand."""
 
-from __future__ import annotations
-
 import csv
 import json
 from pathlib import Path

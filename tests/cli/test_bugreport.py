@@ -1,7 +1,5 @@
 """``hil bugreport``: what is in it, and what must never be."""
 
-from __future__ import annotations
-
 import json
 import zipfile
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What every command has: --quiet, --log-level, the overview; before the command or after it."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 

@@ -1,7 +1,5 @@
 """``hil check --eds``: lines as a compiler writes them, JSON for a script, and exit status 2 for a file of no use."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path

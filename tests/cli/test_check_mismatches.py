@@ -4,8 +4,6 @@ The devices are simulated from one rig file, EDS and register map, and checked a
 be the one that is wrong.
 """
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Iterator
@@ -21,7 +19,7 @@ from hil.cli.main import run
 from hil.config.rig_file import read_rig
 from hil.simulator import rig_server
 from hil.simulator.drive_physics import SimulatedInverter
-from hil.simulator.faults import FaultAtStep, InverterFaults, RigFaults
+from hil.simulator.faults import InverterFaults, RigFaults
 from tests.rig.serving import served
 
 Edits = tuple[tuple[str, str], ...]
@@ -233,15 +231,6 @@ def test_option_code_other_than_the_eds_s_default_is_the_drive_s_own(
     assert re.search(
         rf"m1: .* 0x{index}:00 is {code}, the EDS has \d: the drive keeps its own", capsys.readouterr().out
     )
-
-
-def test_drive_in_fault_agrees_but_is_noted(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    each = Mismatch("", "", "", faults=InverterFaults(fault=FaultAtStep(0, 0x4310)))
-    with planted(tmp_path, each, monkeypatch) as command:
-        assert run(command) == 0
-    assert "m1: power state is fault, error code 0x603F is 0x4310" in capsys.readouterr().out
 
 
 def test_rigs_own_eds_with_errors_is_noted(

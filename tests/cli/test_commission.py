@@ -1,7 +1,5 @@
 """``hil commission``: plan, refusals, exit statuses, and the way on after Ctrl-C and after a kill."""
 
-from __future__ import annotations
-
 import json
 import signal
 import subprocess
@@ -15,7 +13,7 @@ from hil.commission.engine import MOST_VEHICLE_S, NAMES
 from tests.cli.conftest import EXAMPLE, await_rows
 from tests.commission.rigs import Bench, bench
 from tests.rig.observer import assert_disarmed
-from tests.rig.serving import served
+from tests.rig.serving import addresses, served
 
 NOWHERE = ("--bus", "ws://127.0.0.1:9/", "--modbus", "127.0.0.1:9")
 
@@ -26,8 +24,8 @@ def skipping_all_but(*steps: str) -> list[str]:
 
 
 def command(rig: Bench, *options: str) -> list[str]:
-    addresses = ("--bus", rig.server.bus_url, "--modbus", str(rig.server.modbus))
-    return ["commission", str(rig.source.path), "--out", str(rig.folder), "--pace", "fast", *addresses, *options]
+    words = ["commission", str(rig.source.path), "--out", str(rig.folder), "--pace", "fast"]
+    return [*words, *addresses(rig.server), *options]
 
 
 def test_plan_keeps_the_vehicle_for_less_than_forty_minutes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -114,8 +112,15 @@ def test_signal_in_the_middle_and_the_way_on(
 ) -> None:
     out = tmp_path / "out"
     with served(bus_url="ws://127.0.0.1:0/") as (server, _):
-        addresses = ("--bus", server.bus_url, "--modbus", str(server.modbus))
-        words = ["commission", str(short_rig), "--out", str(out), "--yes", *addresses, *skipping_all_but("noise")]
+        words = [
+            "commission",
+            str(short_rig),
+            "--out",
+            str(out),
+            "--yes",
+            *addresses(server),
+            *skipping_all_but("noise"),
+        ]
         process = spawn(*words)
         await_rows(out / "runs" / "noise-rest.part.csv", process)
         process.send_signal(number)
@@ -131,8 +136,3 @@ def test_signal_in_the_middle_and_the_way_on(
     assert (noise["status"], noise["attempt"]) == ("done", 2)
     assert noise["history"][0]["status"] == "interrupted"
     assert (out / noise["runs"][-1]["recording"]).exists()
-
-
-def test_help_has_an_example(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["commission", "--help"]) == 0
-    assert "hil commission examples/rig.toml --out" in capsys.readouterr().out

@@ -1,7 +1,5 @@
 """``hil compare``: the figures are those of the noise, wrong input leaves nothing."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 
@@ -19,11 +17,7 @@ NOISE = 0.05
 def inputs(tmp_path: Path) -> list[str]:
     bench.record(tmp_path / "run_1.csv", 1, noise=NOISE)
     bench.record(tmp_path / "run_2.csv", 2, noise=2 * NOISE)
-    return [
-        str(bench.model(tmp_path / "drive.toml")),
-        str(tmp_path / "run_1.csv"),
-        str(tmp_path / "run_2.csv"),
-    ]
+    return [str(bench.model(tmp_path / "drive.toml")), str(tmp_path / "run_1.csv"), str(tmp_path / "run_2.csv")]
 
 
 def test_the_right_model_is_off_by_the_noise(inputs: list[str], capsys: pytest.CaptureFixture[str]) -> None:
@@ -113,12 +107,7 @@ def test_each_output_is_drawn(
     ],
 )
 def test_wrong_input_is_refused_and_nothing_written(
-    inputs: list[str],
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    position: int,
-    text: str | None,
-    said: str,
+    inputs: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str], position: int, text: str | None, said: str
 ) -> None:
     if text is None:
         Path(inputs[position]).unlink()
@@ -129,13 +118,3 @@ def test_wrong_input_is_refused_and_nothing_written(
     assert said in error
     assert Path(inputs[position]).name in error
     assert not (tmp_path / "result").exists()
-
-
-def test_a_result_that_is_a_file_is_refused(inputs: list[str], capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["compare", *inputs, "--out", inputs[0]]) == 2
-    assert "which is a file" in capsys.readouterr().err
-
-
-def test_help_has_an_example(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["compare", "--help"]) == 0
-    assert "hil compare bus.toml run_1.csv run_2.csv" in " ".join(capsys.readouterr().out.split())

@@ -1,7 +1,5 @@
 """``hil completion``: what a shell is offered, asked as typer's scripts ask, and by bash itself."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess
@@ -38,18 +36,15 @@ def test_commands() -> None:
     assert complete("hil ") >= set(COMMANDS)
     assert complete("hil --quiet re") == offered(COMMANDS, "re")
     assert complete("hil prove ma") == {"make"}
-    assert complete("hil prov ma") == set()
 
 
 def test_options() -> None:
     assert {"--dry-run", "--out", "--quiet", "--help"} <= complete("hil run --")
-    assert complete("hil export st --si") == {"--single"}
     assert complete("hil --log-level d") == {"debug"}
     assert complete("hil run --pace f") == {"fast"}
 
 
 def test_effects() -> None:
-    assert complete("hil effects bac") == offered(EFFECTS, "bac")
     assert complete("hil sim rig.toml --effect sti") == offered(EFFECTS, "sti")
 
 

@@ -1,7 +1,5 @@
 """``hil convert`` as a user has it."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from pathlib import Path

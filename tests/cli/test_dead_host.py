@@ -1,7 +1,5 @@
 """A host that dies in the middle of a run: the drives stop by themselves, seen by a third node on the bus."""
 
-from __future__ import annotations
-
 import json
 import queue
 import signal
@@ -19,7 +17,7 @@ from hil.cli.main import run
 from hil.config.rig_file import read_rig
 from hil.simulator.fault_table import rig_faults
 from tests.rig.observer import assert_disarmed, power_state
-from tests.rig.serving import served
+from tests.rig.serving import addresses, served
 
 PATIENCE_S = 60.0
 
@@ -42,10 +40,7 @@ def await_end_of_operation(bus: str, node_id: int) -> None:
 
 @pytest.mark.parametrize("death", [signal.SIGKILL, pytest.param(signal.SIGSTOP, marks=pytest.mark.campaign)])
 def test_drives_of_a_host_that_dies_leave_operation(
-    simulate: Callable[..., Any],
-    spawn: Callable[..., subprocess.Popen[str]],
-    short_rig: Path,
-    death: signal.Signals,
+    simulate: Callable[..., Any], spawn: Callable[..., subprocess.Popen[str]], short_rig: Path, death: signal.Signals
 ) -> None:
     """Killed, or suspended as by a debugger: the heartbeat ends, and with it the torque; the rig stays up."""
     simulation = simulate(short_rig, "--real-time")
@@ -75,8 +70,7 @@ def test_hil_check_proves_it_without_a_torque(
 ) -> None:
     proof = tmp_path / "proof.json"
     with served(read_rig(quick_rig)) as (server, _):
-        addresses = ("--bus", server.bus_url, "--modbus", str(server.modbus))
-        assert run(["check", str(quick_rig), "--prove-stop", "--out", str(proof), *addresses]) == 0
+        assert run(["check", str(quick_rig), "--prove-stop", "--out", str(proof), *addresses(server)]) == 0
         assert_disarmed(server.bus_url, 1, 2)
         assert server.torque_nm == (0.0, 0.0)
     assert capsys.readouterr().out.count("agrees") == 4
@@ -95,8 +89,7 @@ def test_hil_check_names_what_it_can_not_prove(quick_rig: Path, capsys: pytest.C
     file = read_rig(quick_rig)
     without_emergencies = rig_faults(["bus.lose=1:0x082"], file.period_s)  # those of node 2
     with served(file, without_emergencies) as (server, _):
-        addresses = ("--bus", server.bus_url, "--modbus", str(server.modbus))
-        assert run(["check", str(quick_rig), "--prove-stop", "--json", *addresses]) == 3
+        assert run(["check", str(quick_rig), "--prove-stop", "--json", *addresses(server)]) == 3
         assert_disarmed(server.bus_url, 1, 2)
     devices = {device["name"]: device for device in json.loads(capsys.readouterr().out)["devices"]}
     assert devices["m1"]["result"] == "agrees"

@@ -1,8 +1,7 @@
 """``hil diagnose`` with an FMU: what acts at its inputs and outputs is named, and it runs only where it is trusted."""
 
-from __future__ import annotations
-
 import json
+import re
 import shutil
 import signal
 from pathlib import Path
@@ -10,10 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from estimator.signals.record import OutputKind
 from hil.cli.main import run
 from hil.config.model_file import read_signals
+from hil.errors import UsageError
 from hil.export.fmu import package
 from hil.plants.fmu_plant import FmuPlant
+from hil.plants.names import names
 from hil.recording import read_record, sandbox
 from tests.cli import bench
 
@@ -31,7 +33,7 @@ def fmu(tmp_path_factory: pytest.TempPathFactory) -> str:
 
 def late(path: Path) -> str:
     """Write a recording under other names, its torque read earlier than it acted."""
-    bench.record(path, 1, noise=0.02, n=600)
+    bench.record(path, 1, noise=0.02, n=350)
     time, first, second, speed = np.loadtxt(path, delimiter=",", skiprows=1).T
     rows = slice(0, time.size - LATE)
     columns = [time[rows], (first + second)[LATE:], speed[rows]]
@@ -50,7 +52,7 @@ def test_what_acts_at_an_input_is_named(fmu: str, tmp_path: Path, capsys: pytest
     recording, out = late(tmp_path / "run_1.csv"), tmp_path / "out"
     (tmp_path / "signals.toml").write_text(SIGNALS)
     mapped = [word for each in ("torque=T_M1", "output=speed_motor", "start=start.speed") for word in ("--map", each)]
-    given = ["--signals", str(tmp_path / "signals.toml"), "--trust-fmu", *mapped, "--budget-s", "3600"]
+    given = ["--signals", str(tmp_path / "signals.toml"), "--trust-fmu", *mapped, "--effort", "quick"]
     assert run(["diagnose", recording, "--model", fmu, "--out", str(out), *given]) == 0
     found = json.loads((out / "diagnosis.json").read_text())
     assert [effect["name"] for effect in found["effects"]] == ["transport_delay"]
@@ -67,13 +69,7 @@ def test_what_acts_at_an_input_is_named(fmu: str, tmp_path: Path, capsys: pytest
     [
         ([], "runs only where you trust it: --trust-fmu"),
         (["--trust-fmu", "--map", "output=w"], "expected a variable of the FMU, got 'w'. It has: "),
-        (["--trust-fmu", "--map", "output=T_M1"], "expected an output of the FMU, got an input"),
-        (["--trust-fmu", "--map", "torque=speed_motor"], "expected an input of the FMU. It has: "),
-        (["--trust-fmu", "--map", "torque=T_M1,T_M1"], "expected each name once"),
-        (["--trust-fmu", "--map", "output=speed_motor,speed_load"], "expected one name"),
-        (["--trust-fmu", "--map", "torque=T_M1", "--map", "torque=T_M2"], "expected torque once, got it twice"),
         (["--trust-fmu", "--map", "start=J_M"], "expected a finite speed_measured over run_1, got NaN or infinity"),
-        (["--trust-fmu", "--signals", "none.toml"], "none.toml"),
     ],
 )
 def test_what_is_not_trusted_or_named_is_refused(
@@ -83,6 +79,28 @@ def test_what_is_not_trusted_or_named_is_refused(
     assert run(["diagnose", str(tmp_path / "run_1.csv"), "--model", fmu, "--out", str(tmp_path / "out"), *more]) == 2
     assert said in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        (["torque=T_M1,T_M1"], "expected each name once"),
+        (["output=speed_motor,speed_load"], "expected one name"),
+        (["torque=T_M1", "torque=T_M2"], "expected torque once, got it twice"),
+        (["speed=w"], "KEY one of torque, output, load, start"),
+        (["load=w"], "load=w: expected a variable of the FMU"),
+    ],
+)
+def test_what_map_can_not_mean_is_refused(given: list[str], said: str) -> None:
+    with pytest.raises(UsageError, match=re.escape(said)):
+        names(given, ("T_M1", "T_M2", "speed_measured", "speed_load"))
+
+
+def test_inputs_and_outputs_are_not_exchanged(fmu: str) -> None:
+    with pytest.raises(UsageError, match="expected an output of the FMU, got an input"):
+        FmuPlant(Path(fmu), ["output=T_M1"], trusted=True).named(OutputKind.SPEED)
+    with pytest.raises(UsageError, match="expected an input of the FMU"):
+        FmuPlant(Path(fmu), ["torque=speed_motor"], trusted=True).named(OutputKind.SPEED)
 
 
 def test_a_recorded_angle_is_held_against_the_fmus(fmu: str, tmp_path: Path) -> None:

@@ -1,7 +1,5 @@
 """``hil effects``: the catalogue on the terminal and for scripts."""
 
-from __future__ import annotations
-
 import json
 import re
 
@@ -77,8 +75,3 @@ def test_scripts_get_bounds_and_whose_a_parameter_is(capsys: pytest.CaptureFixtu
 def test_an_unknown_effect_is_refused_with_the_nearest(capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["effects", "backlsh"]) == 2
     assert "Did you mean backlash?" in capsys.readouterr().err
-
-
-def test_help_has_an_example(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["effects", "--help"]) == 0
-    assert "hil effects backlash" in capsys.readouterr().out

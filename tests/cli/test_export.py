@@ -1,7 +1,5 @@
 """``hil export st`` and ``hil export plcopen`` on real files: what they write, what they refuse."""
 
-from __future__ import annotations
-
 import json
 import re
 from datetime import datetime

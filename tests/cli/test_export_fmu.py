@@ -1,7 +1,5 @@
 """``hil export fmu`` from the command line: a recording simulated again, and clear refusals."""
 
-from __future__ import annotations
-
 import zipfile
 from pathlib import Path
 

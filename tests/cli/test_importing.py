@@ -1,7 +1,5 @@
 """While a command imports nothing is collected, and the collector is as it was afterwards."""
 
-from __future__ import annotations
-
 import gc
 
 import pytest

@@ -1,7 +1,5 @@
 """A user's own law through the commands: named in the model file, believed or rejected, written and simulated again."""
 
-from __future__ import annotations
-
 import csv
 import json
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The log that every command keeps: what a supporter reads in it, and that no command fails for it."""
 
-from __future__ import annotations
-
 import os
 import re
 import subprocess

@@ -1,7 +1,5 @@
 """hil look and hil model new: from a file that nobody has described to one that every command reads."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from pathlib import Path

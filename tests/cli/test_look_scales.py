@@ -1,7 +1,5 @@
 """``hil look`` without a model: scales and columns that are wrong by themselves, with the line that cures them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """``hil paper``: figures from experiments it drives, and from recordings it is given."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 
@@ -108,8 +106,3 @@ def test_experiments_too_short_to_identify_from_leave_nothing(
     assert run(["paper", "--out", str(tmp_path / "out"), "--duration", "1"]) == 2
     assert "recording run_1" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
-
-
-def test_help_has_an_example(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["paper", "--help"]) == 0
-    assert "Example: hil paper --out out/paper" in capsys.readouterr().out

@@ -1,7 +1,5 @@
 """Whatever a stranger's file says, no control character of it reaches the terminal."""
 
-from __future__ import annotations
-
 import io
 import re
 from pathlib import Path

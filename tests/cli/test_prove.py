@@ -1,21 +1,30 @@
 """``hil prove``: from the making of a sealed set to its scoreboard, by the public command alone."""
 
-from __future__ import annotations
-
 import json
 import re
+from collections.abc import Sequence
+from contextlib import chdir
 from pathlib import Path
 
 import pytest
 
 from hil.cli.main import run
+from hil.proof import answers, command
 from tests.proof.conftest import recordings_of
 
 SEED = "4"
 """Of a set whose first case is quickly answered."""
 
 
-def test_a_set_is_made_answered_opened_and_scored(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_set_is_made_answered_opened_and_scored(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def in_this_process(arguments: Sequence[str], folder: Path, limit_s: float) -> None:
+        with chdir(folder):
+            assert run(list(arguments)) == 0
+
+    for module in (answers, command):  # its own process, which starts anew, is tried in test_trusted_code
+        monkeypatch.setattr(module, "run_hil", in_this_process)
     out, key = tmp_path / "proof", tmp_path / "proof.key"
     with recordings_of(1000):
         assert run(["prove", "--out", str(out), "--cases", "1", "--seed", SEED, "--no-rigs"]) == 0

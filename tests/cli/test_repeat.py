@@ -1,7 +1,5 @@
 """The error that a diagnosis gives is found again with the model it wrote, and every result says what made it."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import tomllib

@@ -1,7 +1,5 @@
 """``hil run --trace`` and ``hil replay``: the trace next to the recording, and the recording back from the trace."""
 
-from __future__ import annotations
-
 import json
 import math
 from pathlib import Path
@@ -20,15 +18,14 @@ from hil.rig.trace import SUFFIXES
 from tests.drivers.maker_files import MAKERS
 from tests.drivers.maker_rig import written_rig
 from tests.estimator.identification.tracking.drives import Line, drives
-from tests.rig.serving import served
+from tests.rig.serving import addresses, served
 
 MEASURED = ("time_s", "torque_m1_nm", "torque_m2_nm", "speed_rad_s")
 
 
 def record(rig: Path, out: Path, trace: Path) -> int:
     with served(read_rig(rig)) as (server, _):
-        addresses = ("--bus", server.bus_url, "--modbus", str(server.modbus))
-        options = ("--out", str(out), "--trace", str(trace), "--pace", "fast", *addresses)
+        options = ("--out", str(out), "--trace", str(trace), "--pace", "fast", *addresses(server))
         return run(["run", str(rig), "reversal", *options])
 
 
@@ -67,8 +64,7 @@ def test_trace_of_a_run_that_fails_is_kept_whole(short_rig: Path, tmp_path: Path
     trace = tmp_path / "bus.blf"
     with served(read_rig(short_rig)) as (server, _):
         server.plc.close_clutch()
-        addresses = ("--bus", server.bus_url, "--modbus", str(server.modbus))
-        options = ("--out", str(tmp_path / "r.csv"), "--trace", str(trace), "--pace", "fast", *addresses)
+        options = ("--out", str(tmp_path / "r.csv"), "--trace", str(trace), "--pace", "fast", *addresses(server))
         assert run(["run", str(short_rig), "cruise", *options]) == 3
     assert trace.exists()
     assert not (tmp_path / "r.csv").exists()

@@ -1,7 +1,5 @@
 """``hil run``: recordings, exit statuses, and drives that are disarmed however it ends."""
 
-from __future__ import annotations
-
 import json
 import signal
 import subprocess
@@ -17,7 +15,7 @@ from hil.errors import UsageError
 from hil.recording.formats import read_table
 from tests.cli.conftest import await_rows
 from tests.rig.observer import assert_disarmed
-from tests.rig.serving import served
+from tests.rig.serving import addresses, served
 
 NOWHERE = ("--bus", "ws://127.0.0.1:9/", "--modbus", "127.0.0.1:9")
 
@@ -39,19 +37,6 @@ def test_records_from_another_process(
     assert_disarmed(simulation.bus, 1, 2)
 
 
-def test_recording_says_what_it_is(short_rig: Path, tmp_path: Path) -> None:
-    out = tmp_path / "run.parquet"
-    with served(read_rig(short_rig)) as (server, _):
-        addresses = ("--bus", server.bus_url, "--modbus", str(server.modbus))
-        assert run(["run", str(short_rig), "reversal", "--out", str(out), "--pace", "fast", *addresses]) == 0
-    table = read_table(out)
-    assert len(table.columns["time_s"]) == 300
-    metadata = table.metadata
-    assert metadata["experiment"] == "reversal"
-    assert metadata["rig_file"] == short_rig.read_text(encoding="utf-8")
-    assert len(metadata["eds_m1_sha256"]) == 64
-
-
 @pytest.mark.parametrize(
     "number",
     [signal.SIGTERM, *(pytest.param(number, marks=pytest.mark.campaign) for number in (signal.SIGINT, signal.SIGHUP))],
@@ -61,8 +46,7 @@ def test_signal_in_the_middle_keeps_the_recording_and_disarms(
 ) -> None:
     out = tmp_path / "run.csv"
     with served(read_rig(short_rig), bus_url="ws://127.0.0.1:0/") as (server, _):
-        addresses = ("--bus", server.bus_url, "--modbus", str(server.modbus))
-        process = spawn("run", str(short_rig), "cruise", "--out", str(out), *addresses)
+        process = spawn("run", str(short_rig), "cruise", "--out", str(out), *addresses(server))
         await_rows(tmp_path / "run.part.csv", process)
         process.send_signal(number)
         _, complaints = process.communicate(timeout=60)
@@ -72,24 +56,6 @@ def test_signal_in_the_middle_keeps_the_recording_and_disarms(
     assert 0 < len(times) < 3000
     assert f"holds the {len(times)} samples" in complaints
     assert not (tmp_path / "run.part.csv").exists()
-
-
-def test_closing_clutch_is_a_device_problem(
-    short_rig: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    with served(read_rig(short_rig)) as (server, _):
-        server.plc.close_clutch()
-        addresses = ("--bus", server.bus_url, "--modbus", str(server.modbus))
-        status = run(["run", str(short_rig), "cruise", "--out", str(tmp_path / "r.csv"), "--pace", "fast", *addresses])
-    assert status == 3
-    assert "clutch is closed" in capsys.readouterr().err
-    assert list(tmp_path.iterdir()) == [short_rig]
-
-
-def test_bus_that_is_not_there(short_rig: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["run", str(short_rig), "cruise", "--out", str(tmp_path / "r.csv"), *NOWHERE]) == 3
-    assert "ws://127.0.0.1:9/" in capsys.readouterr().err
-    assert list(tmp_path.iterdir()) == [short_rig]
 
 
 def test_unknown_experiment(short_rig: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -104,11 +70,6 @@ def test_recording_is_never_overwritten(short_rig: Path, tmp_path: Path, capsys:
     assert run(["run", str(short_rig), "cruise", "--out", str(kept), *NOWHERE]) == 2
     assert "r.csv" in capsys.readouterr().err
     assert kept.read_text(encoding="utf-8") == "mine"
-
-
-def test_without_a_place_for_the_recording(short_rig: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["run", str(short_rig), "cruise"]) == 2
-    assert "--out" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("bus", ["socketcan:can0", "ws://10.0.0.1:54701/"])
@@ -137,16 +98,17 @@ def test_dry_run_as_json(short_rig: Path, capsys: pytest.CaptureFixture[str]) ->
     assert document["torque_nm"]["high"] <= 500.0
 
 
-def test_help_has_an_example(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["run", "--help"]) == 0
-    assert "hil run examples/rig.toml cruise" in capsys.readouterr().out
-
-
-def test_estimates_next_to_the_recording(short_rig: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_recording_says_what_it_is_and_estimates_stand_next_to_it(
+    short_rig: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "r.parquet"
     with served(read_rig(short_rig)) as (server, _):
-        addresses = ("--bus", server.bus_url, "--modbus", str(server.modbus))
-        options = ("--out", str(tmp_path / "r.csv"), "--pace", "fast", *addresses)
+        options = ("--out", str(out), "--pace", "fast", *addresses(server))
         assert run(["run", str(short_rig), "reversal", *options, "--json"]) == 0
+    metadata = read_table(out).metadata
+    assert metadata["experiment"] == "reversal"
+    assert metadata["rig_file"] == short_rig.read_text(encoding="utf-8")
+    assert len(metadata["eds_m1_sha256"]) == 64
     course = json.loads((tmp_path / "r.online.json").read_text(encoding="utf-8"))
     assert course["schema"] == "hil.online/1"
     assert course["samples"] == 300
@@ -158,8 +120,7 @@ def test_estimates_next_to_the_recording(short_rig: Path, tmp_path: Path, capsys
 
 def test_records_without_an_estimate(short_rig: Path, tmp_path: Path) -> None:
     with served(read_rig(short_rig)) as (server, _):
-        addresses = ("--bus", server.bus_url, "--modbus", str(server.modbus))
-        options = ("--out", str(tmp_path / "r.csv"), "--pace", "fast", "--no-estimate", *addresses)
+        options = ("--out", str(tmp_path / "r.csv"), "--pace", "fast", "--no-estimate", *addresses(server))
         assert run(["run", str(short_rig), "reversal", *options]) == 0
     assert not (tmp_path / "r.online.json").exists()
 
@@ -181,8 +142,7 @@ def test_course_that_can_not_be_kept_is_said_and_the_run_is_entered_all_the_same
     monkeypatch.setattr("hil.cli.run_job.publish", full)
     out = tmp_path / "run.csv"
     with served(read_rig(short_rig)) as (server, _):
-        addresses = ("--bus", server.bus_url, "--modbus", str(server.modbus))
-        assert run(["run", str(short_rig), "reversal", "--out", str(out), "--pace", "fast", *addresses]) == 0
+        assert run(["run", str(short_rig), "reversal", "--out", str(out), "--pace", "fast", *addresses(server)]) == 0
     assert f"{tmp_path / 'run.online.json'} is missing: {tmp_path}: no room" in capsys.readouterr().err
     assert run(["runs", "--store", str(tmp_path)]) == 0
     assert "reversal" in capsys.readouterr().out

@@ -1,7 +1,5 @@
 """``hil runs`` as a user has it."""
 
-from __future__ import annotations
-
 import csv
 import json
 import shutil
@@ -21,7 +19,7 @@ from hil.recording import Table, write_table
 from hil.recording.checksum import text_sha256
 from hil.store import RunStore, register_run, store_of
 from tests.cli.conftest import await_rows
-from tests.rig.serving import served
+from tests.rig.serving import addresses, served
 
 Capture = pytest.CaptureFixture[str]
 
@@ -232,10 +230,9 @@ def test_a_run_enters_itself_also_one_that_was_stopped(
     spawn: Callable[..., subprocess.Popen[str]], short_rig: Path, tmp_path: Path, capsys: Capture
 ) -> None:
     with served(read_rig(short_rig), bus_url="ws://127.0.0.1:0/") as (server, _):
-        addresses = ("--bus", server.bus_url, "--modbus", str(server.modbus))
-        run = ["run", str(short_rig), "reversal", *addresses, "--out"]
+        run = ["run", str(short_rig), "reversal", *addresses(server), "--out"]
         assert hil([*run, str(tmp_path / "whole.csv"), "--pace", "fast"]) == 0
-        process = spawn("run", str(short_rig), "cruise", *addresses, "--out", str(tmp_path / "cut.csv"))
+        process = spawn("run", str(short_rig), "cruise", *addresses(server), "--out", str(tmp_path / "cut.csv"))
         await_rows(tmp_path / "cut.part.csv", process)
         process.send_signal(signal.SIGINT)
         assert process.wait(60) == 130

@@ -1,7 +1,5 @@
 """A wrong scale is reported with the line that cures it wherever a recording meets a model, not only in a diagnosis."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,25 +1,29 @@
 """``hil rig schema`` and ``hil model schema``: an editor takes what the program takes, and marks what it refuses."""
 
-from __future__ import annotations
-
 import json
 import tomllib
 from pathlib import Path
 from typing import Any
 
 import pytest
+from jsonschema import Draft202012Validator
 
 from estimator.physics.model import DrivelineModel, Parameter, Structure
 from hil.cli.main import run
 from hil.config.model_file import read_model, write_model
 from hil.config.schema import json_schema
 from hil.config.table import FileKind, schema_line
-from tests.cli.json_schema import Validator
 from tests.docs.pages import blocks, pages
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 TEXTS = [path.read_text(encoding="utf-8") for path in sorted(EXAMPLES.glob("*.toml"))]
 DOCUMENTED = [block.text for page in pages() for block in blocks(page) if 'schema = "hil.' in block.text]
+
+
+def faults(kind: FileKind, document: dict[str, Any]) -> list[str]:
+    """Return where a document breaks the schema of its kind, and how."""
+    found = Draft202012Validator(json_schema(kind)).iter_errors(document)
+    return [f"{'.'.join(map(str, each.absolute_path))}: {each.message}" for each in found]
 
 
 def kind_of(document: dict[str, Any]) -> FileKind | None:
@@ -31,7 +35,7 @@ def test_every_example_fits_its_schema(text: str) -> None:
     document = tomllib.loads(text)
     kind = kind_of(document)
     assert kind is not None
-    assert Validator(json_schema(kind)).faults(document) == []
+    assert faults(kind, document) == []
 
 
 def changed(text: str, before: str, after: str) -> dict[str, Any]:
@@ -42,21 +46,20 @@ def changed(text: str, before: str, after: str) -> dict[str, Any]:
 @pytest.mark.parametrize(
     ("before", "after", "place"),
     [
-        ("period_s = 0.01 ", 'period_s = "10ms" ', ".period_s"),
-        ("node_id = 1 ", "node_id = 200 ", ".inverters.m1.node_id"),
-        ("node_id = 1 ", "node = 1 ", ".inverters.m1.node"),
-        ('mode = "cyclic_synchronous_torque"', 'mode = "torque"', ".inverters.m1.mode"),
-        ('mode = "cyclic_synchronous_torque"', "mode = 10", ".inverters.m1.mode"),
-        ("torque_limit_nm = 400.0", "torque_limit_nm = 0.0", ".inverters.m1.torque_limit_nm"),
-        ('source = "host"', 'source = "me"', ".prbs.source"),
-        ('kind = "cruise"', 'kind = "stroll"', ".experiments.cruise"),
-        ('[plc]\nhost = "127.0.0.1"', "[plc]", ".plc.host"),
+        ("period_s = 0.01 ", 'period_s = "10ms" ', "period_s"),
+        ("node_id = 1 ", "node_id = 200 ", "inverters.m1.node_id"),
+        ("node_id = 1 ", "node = 1 ", "inverters.m1: "),
+        ('mode = "cyclic_synchronous_torque"', 'mode = "torque"', "inverters.m1.mode"),
+        ('mode = "cyclic_synchronous_torque"', "mode = 10", "inverters.m1.mode"),
+        ("torque_limit_nm = 400.0", "torque_limit_nm = 0.0", "inverters.m1.torque_limit_nm"),
+        ('source = "host"', 'source = "me"', "prbs.source"),
+        ('kind = "cruise"', 'kind = "stroll"', "experiments.cruise"),
+        ('[plc]\nhost = "127.0.0.1"', "[plc]", "plc: 'host'"),
     ],
 )
 def test_a_fault_of_a_rig_file_is_marked(before: str, after: str, place: str) -> None:
     document = changed((EXAMPLES / "rig.toml").read_text(encoding="utf-8"), before, after)
-    faults = Validator(json_schema(FileKind.RIG)).faults(document)
-    assert [fault for fault in faults if fault.startswith(place)]
+    assert [fault for fault in faults(FileKind.RIG, document) if fault.startswith(place)]
 
 
 @pytest.mark.parametrize("command", ["rig", "model"])
@@ -74,5 +77,5 @@ def test_a_model_file_that_is_written_names_its_schema_and_fits_it(tmp_path: Pat
     write_model(tmp_path / "model.toml", model)
     text = (tmp_path / "model.toml").read_text(encoding="utf-8")
     assert text.splitlines()[0] == schema_line(FileKind.MODEL) == "#:schema ./model.schema.json"
-    assert Validator(json_schema(FileKind.MODEL)).faults(tomllib.loads(text)) == []
+    assert faults(FileKind.MODEL, tomllib.loads(text)) == []
     assert read_model(tmp_path / "model.toml").model == model

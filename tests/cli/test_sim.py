@@ -1,7 +1,5 @@
 """``hil sim``: one line when ready, a clean end on a signal, and refusals."""
 
-from __future__ import annotations
-
 import signal
 from collections.abc import Callable
 from pathlib import Path
@@ -63,8 +61,3 @@ def test_taken_port(short_rig: Path, capsys: pytest.CaptureFixture[str]) -> None
     printed = capsys.readouterr()
     assert "can't serve" in printed.err
     assert printed.out == ""
-
-
-def test_help_has_an_example(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["sim", "--help"]) == 0
-    assert "hil sim examples/rig.toml" in capsys.readouterr().out

@@ -1,7 +1,5 @@
 """``hil simulate``: the closed-form motion comes out, wrong input leaves nothing."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path
@@ -76,12 +74,7 @@ def test_a_position_in_translation_is_named_and_scaled(arguments: dict[str, Path
     table = np.loadtxt(arguments["--input"], delimiter=",", skiprows=1)
     table = np.column_stack([table[:, :3], 1000 * angle])
     np.savetxt(
-        arguments["--input"],
-        table,
-        delimiter=",",
-        header="t,torque_m1_nm,torque_m2_nm,x_mm",
-        comments="",
-        fmt="%.12g",
+        arguments["--input"], table, delimiter=",", header="t,torque_m1_nm,torque_m2_nm,x_mm", comments="", fmt="%.12g"
     )
     signals = '[signals]\ntime = { column = "t" }\nposition = { column = "x_mm", scale = 0.001 }\n'
     arguments["--model"].write_text(bench.MODEL.replace("rotation", "translation") + signals)
@@ -103,12 +96,7 @@ def test_a_position_in_translation_is_named_and_scaled(arguments: dict[str, Path
     ],
 )
 def test_wrong_arguments_are_refused_and_nothing_written(
-    arguments: dict[str, Path],
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    option: str,
-    name: str,
-    said: str,
+    arguments: dict[str, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str], option: str, name: str, said: str
 ) -> None:
     before = (tmp_path / "run_1.csv").read_text()
     assert call({**arguments, option: tmp_path / name}) == 2
@@ -125,8 +113,3 @@ def test_an_output_the_model_does_not_have_is_refused(
     assert call(arguments) == 2
     assert "speed at the load is no output of one_mass" in capsys.readouterr().err
     assert files(tmp_path) == ["drive.toml", "run_1.csv"]
-
-
-def test_help_has_an_example(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["simulate", "--help"]) == 0
-    assert "hil simulate --model bus.toml --input run_1.csv" in " ".join(capsys.readouterr().out.split())

@@ -1,7 +1,5 @@
 """What takes a second to import stays out of the way of commands that do not need it."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess
@@ -59,7 +57,13 @@ def test_what_is_not_needed_is_not_imported(modules: str, absent: tuple[str, ...
     assert done.stdout.split() == []
 
 
-@pytest.mark.parametrize("command", BUS_COMMANDS)
+@pytest.mark.parametrize(
+    "command",
+    [
+        pytest.param(name, marks=() if name in ("run without an estimate", "commission") else pytest.mark.campaign)
+        for name in BUS_COMMANDS
+    ],
+)
 def test_what_is_not_needed_is_not_imported_before_the_bus_is_opened(command: str, tmp_path: Path) -> None:
     line, absent = BUS_COMMANDS[command]
     environment = {**os.environ, "NUMBA_DISABLE_JIT": "1"}  # imported all the same, and nothing has to be compiled
@@ -75,7 +79,13 @@ def test_what_is_not_needed_is_not_imported_before_the_bus_is_opened(command: st
     assert sorted(set(absent) & set(json.loads((tmp_path / "modules.json").read_text()))) == []
 
 
-@pytest.mark.parametrize("first", ["drivers.canopen", "hil.rig.trace", "hil.simulator.rig_server"])
+@pytest.mark.parametrize(
+    "first",
+    [
+        "hil.rig.trace",
+        *(pytest.param(each, marks=pytest.mark.campaign) for each in ("drivers.canopen", "hil.simulator.rig_server")),
+    ],
+)
 def test_python_can_is_whole_but_for_the_format_that_is_not_used(first: str) -> None:
     program = f"import {first}, can, sys; print(can.__version__, 'asammdf' in sys.modules); import asammdf"
     done = subprocess.run([sys.executable, "-P", "-c", program], capture_output=True, text=True, check=True)

@@ -1,7 +1,5 @@
 """No code comes with a file: laws run only where they are trusted, and no process imports from its working folder."""
 
-from __future__ import annotations
-
 import multiprocessing
 import os
 import subprocess
@@ -125,12 +123,14 @@ def test_a_recording_that_is_read_apart_runs_nothing_of_the_folder(trapped: Path
     assert not (trapped / RAN).exists()
 
 
+@pytest.mark.campaign
 def test_a_sealed_rig_runs_nothing_of_the_folder(trapped: Path) -> None:
     with sealed_process("--seed", "5") as sealed:
         assert sealed.commitment
     assert not (trapped / RAN).exists()
 
 
+@pytest.mark.campaign
 def test_compiling_runs_nothing_of_the_folder(trapped: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(first_use, "SIDE_BY_SIDE", (((), ()),))
     first_use.compile_kernels(2)

@@ -1,7 +1,5 @@
 """A commissioning on a simulated rig in this process, with whatever is wrong with it."""
 
-from __future__ import annotations
-
 import uuid
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, nullcontext

@@ -1,7 +1,5 @@
 """The order of things: skip, repeat, resume, block, quit, a rig file that changed; with steps that do nothing."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

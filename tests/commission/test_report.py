@@ -1,7 +1,5 @@
 """The report and the terminal's words, from a state file alone."""
 
-from __future__ import annotations
-
 import html
 import io
 import re

@@ -1,7 +1,5 @@
 """The folder of a commissioning: held by one call at a time, and a state file that may be a stranger's."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys
@@ -13,22 +11,11 @@ import pytest
 
 from hil.cli.main import run
 from hil.commission.engine import NAMES
-from hil.commission.state import (
-    FILE_NAME,
-    LOCK,
-    Finding,
-    Note,
-    RunRecord,
-    State,
-    Status,
-    StepRecord,
-    load_state,
-    now_utc,
-    sole_use,
-)
+from hil.commission.state import FILE_NAME, LOCK, RunRecord, State, Status, StepRecord, load_state, sole_use
 from hil.errors import UsageError
 from hil.report.commission_html import commission_page
 from tests.cli.conftest import EXAMPLE
+from tests.commission.whole_state import whole_state
 
 
 def saved(folder: Path, recording: str) -> None:
@@ -105,92 +92,12 @@ def test_folder_that_takes_no_file_is_reported_by_name(tmp_path: Path) -> None:
         pass
 
 
-COURSE = {"time_s": [0.0, 0.1, 0.2], "speed_rad_s": [0.0, None, 0.2]}
-LINEAR = {
-    "theta": [-1.5, 0.7, 0.01],
-    "nk": 1,
-    "sample_time_s": 0.02,
-    "poles": [[0.7, 0.5], [0.7, -0.5]],
-    "zeros": [[0.9, 0.0]],
-    "resonance": [8.2, 0.05],
-}
-MODEL = {"structure": "one_mass", "parameters": {"J_M": [100.0, 0.2], "b_M": [0.5, 0.2]}}
-PULSES = {
-    "step_nm": 20.0,
-    "speed": [0.1, 0.01],
-    "reading": [1.0, None],
-    "course": {**COURSE, "reference_nm": [0.0, 1.0, 0.0], "reading_nm": [0.0, 1.0, 0.0]},
-}
-EVIDENCE: dict[str, Any] = {
-    "noise": {"speed_std_rad_s": 0.05, "speed_mean_rad_s": 0.0, "course": COURSE},
-    "signs": {"m1": PULSES, "m2": PULSES},
-    "scales": {
-        "gain": [1.01, 0.02],
-        "delay_s": [0.0, 0.001],
-        "extra_samples": 1,
-        "amplitude_nm": 20.0,
-        "duration_s": 20.0,
-        "resonance": [8.2, 0.05],
-        "spread": [0.02, 0.1],
-        "model": MODEL,
-    },
-    "friction": {
-        "inertia_kg_m2": [100.0, 1.0],
-        "dry_nm": [3.0, 0.1],
-        "viscous_nm_s": [0.5, 0.1],
-        "load_nm": [0.0, None],
-        "rms_rad_s": 0.1,
-        "course": {**COURSE, "torque_nm": [0.0, 1.0, 0.0]},
-    },
-    "prbs": {"amplitude_nm": 40.0, "reason": "as in the rig file", "tries": [{"amplitude_nm": 40.0}]},
-    "identification": {
-        "runs": [
-            {
-                "run": "cruise-1",
-                "best": LINEAR,
-                "batch": LINEAR,
-                "online": LINEAR,
-                "frequency_hz": [1.0, 2.0],
-                "magnitude": [0.1, 0.2],
-                "spectral": {"frequency_hz": [1.0], "magnitude": [0.1], "coherence": [0.9]},
-            }
-        ]
-    },
-    "validation": {
-        "model": MODEL,
-        "parameters": {"J_M": [100.0, 1.0]},
-        "rms_rad_s": 0.1,
-        "unseen": {"cruise-2": {"rms_rad_s": 0.1, "fit_percent": 90.0}},
-        "worst": {"name": "cruise-2", "time_s": [0.0], "simulated_rad_s": [0.0], "measured_rad_s": [0.1]},
-    },
-    "diagnosis": {
-        "verdict": "no_mismatch",
-        "headline": "nothing missing",
-        "statement": "Nothing is missing.",
-        "effects": [],
-        "report": "diagnosis/report.html",
-        "model_file": "model.toml",
-        "seconds": 4.2,
-        "parameters": {"J_M": {"nominal": 100.0, "value": 101.0, "ci95": [100.0, 102.0], "unit": "kg m^2"}},
-    },
-}
 ODD = (None, "x", "2026-99-99", "javascript:x", -1, 1e300, [], [1.0], {}, {"a": 1}, True)
 
 
-def whole_state(folder: Path) -> dict[str, Any]:
-    """A state with everything that a state may have, as its file has it."""
-    ranges = {"speed_rad_s": [-0.2, 0.2]}
-    steps = {name: StepRecord() for name in NAMES}
-    for name, record in steps.items():
-        record.begin("digest", keep_runs=False)
-        record.findings = [Finding("gain", "1", "1.1", False, "Calibrate", True)]
-        record.runs = [RunRecord("a run", f"runs/{name}.parquet", True, 1.0, ranges, ranges)]
-        record.end(Status.DONE)
-        record.begin("digest", keep_runs=True)
-        record.evidence = EVIDENCE.get(name, {})
-        record.end(Status.DONE)
-    state = State(folder, "bench", "rig.toml", 'name = "bench"', steps)
-    state.notes.append(Note(now_utc(), "the rig file was changed", "a: 1 → 2", "repeated"))
+def saved_whole(folder: Path) -> dict[str, Any]:
+    """Write a state with everything that a state may have; return what its file says."""
+    state = whole_state(folder)
     state.save()
     document: dict[str, Any] = json.loads(state.path.read_text(encoding="utf-8"))
     return document
@@ -212,7 +119,7 @@ def put(document: Any, path: tuple[Any, ...], value: Any) -> Any:
 
 
 def test_a_state_is_read_as_it_was_written(tmp_path: Path) -> None:
-    document = whole_state(tmp_path)
+    document = saved_whole(tmp_path)
     state = load_state(tmp_path, NAMES)
     assert state is not None
     again = json.loads(json.dumps(state.document()))
@@ -221,7 +128,7 @@ def test_a_state_is_read_as_it_was_written(tmp_path: Path) -> None:
 
 def test_whatever_is_changed_in_a_state_it_is_refused_by_place_or_read(tmp_path: Path) -> None:
     """Every place of the file, with every odd value: 700 of a stranger's mutations ended 22 times in a traceback."""
-    document = whole_state(tmp_path)
+    document = saved_whole(tmp_path)
     path, refusals, read = tmp_path / FILE_NAME, [], {}
     for number, place in enumerate(places(document)):
         path.write_text(json.dumps(put(document, place, ODD[number % len(ODD)])), encoding="utf-8")

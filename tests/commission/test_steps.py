@@ -1,7 +1,5 @@
 """What the steps find on rigs with a planted fault."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

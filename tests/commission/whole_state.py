@@ -1,55 +1,80 @@
 """A state file with every field filled, as a commissioning that went through all steps leaves it."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 
 from hil.commission.engine import STEPS
 from hil.commission.state import Finding, Note, RunRecord, State, Status, StepRecord, stated
 
-TIME_S = [0.0, 0.5, 1.0]
-SERIES = [0.1, None, -0.2]
-LINEAR = {"sample_time_s": 0.01, "poles": [[0.9, 0.1], [0.9, -0.1]], "zeros": [[0.5, 0.0]], "resonance": [8.2, 0.05]}
-MODEL = {
-    "structure": "two_mass",
-    "parameters": {
-        name: [value, 0.2]
-        for name, value in {"J_M": 1.6, "J_L": 95.0, "k": 4200.0, "c": 9.0, "b_M": 0.3, "b_L": 0.9}.items()
-    },
+COURSE = {"time_s": [0.0, 0.1, 0.2], "speed_rad_s": [0.0, None, 0.2]}
+LINEAR = {
+    "theta": [-1.5, 0.7, 0.01],
+    "nk": 1,
+    "sample_time_s": 0.02,
+    "poles": [[0.7, 0.5], [0.7, -0.5]],
+    "zeros": [[0.9, 0.0]],
+    "resonance": [8.2, 0.05],
 }
-
-
-def course(*names: str) -> dict[str, Any]:
-    return {"time_s": TIME_S, **dict.fromkeys(names, SERIES)}
-
-
-EVIDENCE: dict[str, dict[str, Any]] = {
-    "noise": {"speed_std_rad_s": 0.05, "course": course("speed_rad_s")},
-    "signs": {name: {"course": course("reference_nm", "reading_nm", "speed_rad_s")} for name in ("m1", "m2")},
+MODEL = {"structure": "one_mass", "parameters": {"J_M": [100.0, 0.2], "b_M": [0.5, 0.2]}}
+PULSES = {
+    "step_nm": 20.0,
+    "speed": [0.1, 0.01],
+    "reading": [1.0, None],
+    "course": {**COURSE, "reference_nm": [0.0, 1.0, 0.0], "reading_nm": [0.0, 1.0, 0.0]},
+}
+EVIDENCE: dict[str, Any] = {
+    "noise": {"speed_std_rad_s": 0.05, "speed_mean_rad_s": 0.0, "course": COURSE},
+    "signs": {"m1": PULSES, "m2": PULSES},
     "scales": {
-        "gain": [1.02, 0.01], "delay_s": [0.0, 0.001], "extra_samples": 1, "amplitude_nm": 20.0, "duration_s": 12.0,
-        "resonance": [8.2, 0.05], "spread": [0.1, 0.01], "model": MODEL,
+        "gain": [1.01, 0.02],
+        "delay_s": [0.0, 0.001],
+        "extra_samples": 1,
+        "amplitude_nm": 20.0,
+        "duration_s": 20.0,
+        "resonance": [8.2, 0.05],
+        "spread": [0.02, 0.1],
+        "model": MODEL,
     },
-    "friction": {"inertia_kg_m2": [97.0, None], "course": course("torque_nm", "speed_rad_s")},
-    "prbs": {"amplitude_nm": 30.0, "reason": "as small as the resonance needs", "tries": []},
+    "friction": {
+        "inertia_kg_m2": [100.0, 1.0],
+        "dry_nm": [3.0, 0.1],
+        "viscous_nm_s": [0.5, 0.1],
+        "load_nm": [0.0, None],
+        "rms_rad_s": 0.1,
+        "course": {**COURSE, "torque_nm": [0.0, 1.0, 0.0]},
+    },
+    "prbs": {"amplitude_nm": 40.0, "reason": "as in the rig file", "tries": [{"amplitude_nm": 40.0}]},
     "identification": {
         "runs": [
             {
-                "run": "cruise", "best": LINEAR, "online": LINEAR, "frequency_hz": [1.0, 2.0], "magnitude": [0.1, 0.2],
-                "spectral": {"frequency_hz": [1.0, 2.0], "magnitude": [0.1, None], "coherence": [0.9, 0.8]},
+                "run": "cruise-1",
+                "best": LINEAR,
+                "batch": LINEAR,
+                "online": LINEAR,
+                "frequency_hz": [1.0, 2.0],
+                "magnitude": [0.1, 0.2],
+                "spectral": {"frequency_hz": [1.0], "magnitude": [0.1], "coherence": [0.9]},
             }
         ]
     },
     "validation": {
         "model": MODEL,
-        "worst": {"name": "cruise", **course("simulated_rad_s", "measured_rad_s")},
+        "parameters": {"J_M": [100.0, 1.0]},
+        "rms_rad_s": 0.1,
+        "unseen": {"cruise-2": {"rms_rad_s": 0.1, "fit_percent": 90.0}},
+        "worst": {"name": "cruise-2", "time_s": [0.0], "simulated_rad_s": [0.0], "measured_rad_s": [0.1]},
     },
     "diagnosis": {
-        "verdict": "explained", "statement": "The shaft has a backlash.", "report": "diagnosis/report.html",
+        "verdict": "no_mismatch",
+        "headline": "nothing missing",
+        "statement": "Nothing is missing.",
+        "effects": [],
+        "report": "diagnosis/report.html",
         "model_file": "model.toml",
+        "seconds": 4.2,
+        "parameters": {"J_M": {"nominal": 100.0, "value": 101.0, "ci95": [100.0, 102.0], "unit": "kg m^2"}},
     },
-}  # fmt: skip
+}
 
 
 def whole_state(folder: Path) -> State:

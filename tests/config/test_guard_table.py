@@ -1,7 +1,5 @@
 """Defaults of what may come back: shares of the rated torques, the period, the drive's own slope."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """How a drive is to stop by itself, as the rig file has it."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

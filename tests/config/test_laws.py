@@ -1,7 +1,5 @@
 """Laws that installed packages offer by entry points."""
 
-from __future__ import annotations
-
 import sys
 from importlib.metadata import EntryPoint
 from pathlib import Path

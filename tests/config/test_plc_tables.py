@@ -1,7 +1,5 @@
 """The PLC's tables of a rig file: certificates on both sides or on none, and everything wrong named with its key."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest
@@ -78,8 +76,7 @@ def test_a_wrong_key_is_named(wrong: str, problem: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("amplitude_nm", "of"),
-    [(240.0, None), (700.0, "guard.sum_limit_nm"), (900.0, "inverters.m1.torque_limit_nm")],
+    ("amplitude_nm", "of"), [(240.0, None), (700.0, "guard.sum_limit_nm"), (900.0, "inverters.m1.torque_limit_nm")]
 )
 def test_a_prbs_of_the_plc_must_leave_the_guard_some_room(amplitude_nm: float, of: str | None, tmp_path: Path) -> None:
     text = EXAMPLE.read_text("utf-8").partition("[experiments.cruise]")[0]

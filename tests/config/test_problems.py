@@ -1,7 +1,5 @@
 """Faults of TOML files in lines a person can act on."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
@@ -93,34 +91,19 @@ def test_a_file_that_can_t_be_read_is_named(tmp_path: Path) -> None:
     ("data", "expected"),
     [
         ({"schema": 5}, ["schema | expected a valid string | got 5"]),
-        (
-            {"schema_id": "x"},
-            ["schema_id | expected one of the known keys (schema, time, inputs, pets, limits)"],
-        ),
+        ({"schema_id": "x"}, ["schema_id | expected one of the known keys (schema, time, inputs, pets, limits)"]),
         ({"inputs": [{"column": "a"}, {}]}, ["inputs.1.column | expected this key | got nothing"]),
-        (
-            {"inputs": [{"column": "a", "x": 1}]},
-            ["inputs.0.x | expected one of the known keys (column, scale)"],
-        ),
-        (
-            {"pets": {"tom": {"kind": "cat", "legs": 4}}},
-            ["pets.tom.lives | ", "pets.tom.legs | expected one of the"],
-        ),
+        ({"inputs": [{"column": "a", "x": 1}]}, ["inputs.0.x | expected one of the known keys (column, scale)"]),
+        ({"pets": {"tom": {"kind": "cat", "legs": 4}}}, ["pets.tom.lives | ", "pets.tom.legs | expected one of the"]),
         ({"pets": {"tom": {"kind": "cow"}}}, ["pets.tom.kind | expected one of 'cat', 'dog' | got 'cow'"]),
         ({"pets": {"tom": {}}}, ["pets.tom.kind | expected one of 'cat', 'dog' | got nothing: add it"]),
-        (
-            {"pets": {"tom": {"kind": "dog", "legs": {}}}},
-            ["pets.tom.legs | expected a valid integer | got a table"],
-        ),
+        ({"pets": {"tom": {"kind": "dog", "legs": {}}}}, ["pets.tom.legs | expected a valid integer | got a table"]),
         ({"limits": 5}, ["limits | expected "]),
         (
             {"limits": {"low": 0, "hihg": 1}},
             ["limits.high | expected this", "limits.hihg | expected one of the known keys (low, high)"],
         ),
-        (
-            {"limits": {"low": 2.0, "high": 1.0}},
-            ["limits.low | expected less than high | got 2.0", "limits.high | "],
-        ),
+        ({"limits": {"low": 2.0, "high": 1.0}}, ["limits.low | expected less than high | got 2.0", "limits.high | "]),
     ],
 )
 def test_a_fault_is_named_by_the_file_s_own_keys(data: dict[str, object], expected: list[str]) -> None:
@@ -139,15 +122,6 @@ def test_a_long_value_is_cut() -> None:
     (line,) = lines({"schema": ["x" * 500]})
     assert len(line.split("got ")[1]) == LONGEST_VALUE
     assert line.endswith("...")
-
-
-def test_what_is_right_is_returned() -> None:
-    whole = validate(Whole, {"pets": {"rex": {"kind": "dog", "legs": 4}}}, Path("x"), RigFileError)
-    assert whole.pets == {"rex": Dog(kind="dog", legs=4)}
-
-
-def test_nothing_is_refused_without_a_fault() -> None:
-    refuse([])
 
 
 def test_one_table_in_place_of_a_list_of_tables_is_named_with_both_ways_to_write_it() -> None:

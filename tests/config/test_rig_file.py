@@ -1,7 +1,5 @@
 """The rig file: the example loads, and everything that can be wrong in one is named with its key."""
 
-from __future__ import annotations
-
 import math
 import re
 from pathlib import Path
@@ -90,10 +88,7 @@ WRONG = [
     (("", "period_s", "nan"), "period_s | expected"),
     (("", "schema", '"hil.rig/2"'), "schema | expected 'hil.rig/1' | got 'hil.rig/2'"),
     (("can", "url", '""'), "can.url | expected"),
-    (
-        ("inverters.m1", "node_id", "128"),
-        "inverters.m1.node_id | expected less than or equal to 127 | got 128",
-    ),
+    (("inverters.m1", "node_id", "128"), "inverters.m1.node_id | expected less than or equal to 127 | got 128"),
     (("inverters.m2", "node_id", "1"), "inverters.m2.node_id | expected another node id than m1 | got 1"),
     (("inverters.m2", "node_id", "2.0"), "inverters.m2.node_id | expected a valid integer | got 2.0"),
     (("inverters.m1", "vendor_id", "0x100000000"), "inverters.m1.vendor_id | expected less than"),
@@ -108,26 +103,17 @@ WRONG = [
         "inverters.m1.mode | expected 'cyclic_synchronous_torque' or 'profile_torque' | got 'speed'",
     ),
     (("inverters.m1", "mode", "10"), "inverters.m1.mode | expected 'cyclic_synchronous_torque' or"),
-    (
-        ("inverters.m1", "heartbeat_ms", "1"),
-        "inverters.m1.heartbeat_ms | expected greater than or equal to 10",
-    ),
+    (("inverters.m1", "heartbeat_ms", "1"), "inverters.m1.heartbeat_ms | expected greater than or equal to 10"),
     (("plc", "port", "0"), "plc.port | expected greater than or equal to 1 | got 0"),
     (("plc", "host", "127"), "plc.host | expected a valid string | got 127"),
     (("guard", "rate_limit_nm_per_s", "0.0"), "guard.rate_limit_nm_per_s | expected greater than 0"),
     (("guard", "prbs_limit_nm", "-5.0"), "guard.prbs_limit_nm | expected greater than 0"),
-    (
-        ("guard", "prbs_limit_nm", "59.0"),
-        "prbs.amplitude_nm | expected a part of at most guard.prbs_limit_nm (59)",
-    ),
+    (("guard", "prbs_limit_nm", "59.0"), "prbs.amplitude_nm | expected a part of at most guard.prbs_limit_nm (59)"),
     (
         ("guard", "sum_limit_nm", "801.0"),
         "guard.sum_limit_nm | expected at most the torque limits of m1 and m2 together (800) | got 801.0",
     ),
-    (
-        ("guard", "feedback_timeout_s", "0.005"),
-        "guard.feedback_timeout_s | expected at least one period (0.01)",
-    ),
+    (("guard", "feedback_timeout_s", "0.005"), "guard.feedback_timeout_s | expected at least one period (0.01)"),
     (("prbs", "amplitude_nm", "true"), "prbs.amplitude_nm | expected a valid number | got True"),
     (("prbs", "clock_divider", "0"), "prbs.clock_divider | expected greater than or equal to 1"),
     (("prbs", "seed", "0"), "prbs.seed | expected greater than or equal to 1"),
@@ -136,10 +122,7 @@ WRONG = [
     (("prbs", "target", '"shared"'), "prbs.share_m1 | expected the part of inverter m1"),
     (("prbs", "target", '"m1"\nshare_m1 = 0.5'), "prbs.share_m1 | expected no such key while target is 'm1'"),
     (("vehicle", "inertia_kg_m2", "-1.0"), "vehicle.inertia_kg_m2 | expected greater than 0"),
-    (
-        ("experiments.cruise", "kind", '"glide"'),
-        "experiments.cruise.kind | expected one of 'cruise', 'reversal', 't",
-    ),
+    (("experiments.cruise", "kind", '"glide"'), "experiments.cruise.kind | expected one of 'cruise', 'reversal', 't"),
     (
         ("experiments.cruise", "torque_nm", "581.0"),
         "experiments.cruise.torque_nm | expected at most 580, what guard.sum_limit_nm leaves besides the PRBS",
@@ -165,10 +148,7 @@ WRONG = [
         "experiments.tip.step_nm | expected at most torque_nm of the same table (500) | got 500.5",
     ),
     (("simulation", "seed", "-1"), "simulation.seed | expected greater than or equal to 0"),
-    (
-        ("simulation", "speed_noise_rad_s", "-0.1"),
-        "simulation.speed_noise_rad_s | expected greater than or equal",
-    ),
+    (("simulation", "speed_noise_rad_s", "-0.1"), "simulation.speed_noise_rad_s | expected greater than or equal"),
 ]
 
 
@@ -259,8 +239,7 @@ def test_the_plc_s_own_register_has_ten_cells(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("target", "part_m1"),
-    [('"both"', 0.5), ('"m1"', 1.0), ('"m2"', 0.0), ('"shared"\nshare_m1 = 0.25', 0.25)],
+    ("target", "part_m1"), [('"both"', 0.5), ('"m1"', 1.0), ('"m2"', 0.0), ('"shared"\nshare_m1 = 0.25', 0.25)]
 )
 def test_the_part_of_the_prbs_that_m1_carries(target: str, part_m1: float, tmp_path: Path) -> None:
     path = changed(tmp_path, in_table("prbs", "target", target), in_table("prbs", "amplitude_nm", "40.0"))

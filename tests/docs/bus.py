@@ -1,7 +1,5 @@
 """The bus of the pictures of docs/catalogue.md, and the three tests it is driven through."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 

@@ -4,8 +4,6 @@ Run it to bring the page up to date: ``python tests/docs/catalogue_page.py`` rew
 ``<!-- facts: NAME -->`` and ``<!-- end -->``; the text around it is written by people.
 """
 
-from __future__ import annotations
-
 import re
 import sys
 from pathlib import Path

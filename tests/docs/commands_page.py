@@ -3,8 +3,6 @@
 Run it to bring the page up to date: ``python -m tests.docs.commands_page``.
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Iterator
 from enum import Enum

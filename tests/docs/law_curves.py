@@ -1,7 +1,5 @@
 """The laws of the catalogue as curves, by the kernel's own functions where it has one."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

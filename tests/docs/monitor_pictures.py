@@ -3,8 +3,6 @@
 Run it by ``python -m tests.docs.monitor_pictures``.
 """
 
-from __future__ import annotations
-
 import uuid
 from collections.abc import Sequence
 from dataclasses import replace

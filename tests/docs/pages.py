@@ -1,7 +1,5 @@
 """The documentation as text: its pages, links, code blocks and command lines."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass

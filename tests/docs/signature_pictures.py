@@ -4,8 +4,6 @@ Run it to draw them anew: ``python -m tests.docs.signature_pictures [NAME ...]``
 release draw the same bytes.
 """
 
-from __future__ import annotations
-
 import io
 import re
 import sys

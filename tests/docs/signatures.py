@@ -4,8 +4,6 @@ The size of an effect is chosen to be seen, not to be typical. "Without" is the 
 from the recorded torque; only load torque and initial state are taken from the recording, as ``hil compare`` does it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
@@ -169,9 +167,7 @@ SHOWN: dict[str, Shown] = {
         {"grade_rms_nm": 60.0}, "cruise", over_time("load torque [Nm]", LOAD_NM, lambda v: LOAD_NM + _road(v))
     ),
     "brake_drag": Shown(
-        EVENT | {"brake_nm": 60.0},
-        "cruise",
-        over_time("braking torque [Nm]", 0.0, lambda v: v["brake_nm"] * during(v)),
+        EVENT | {"brake_nm": 60.0}, "cruise", over_time("braking torque [Nm]", 0.0, lambda v: v["brake_nm"] * during(v))
     ),
     "tyre_slip": Shown({"slip_per_nm": 1e-4, "wheel_share": 0.06, "creep_rad_s": 2.0}, "tip", slip),
     "load_imbalance": Shown(
@@ -187,11 +183,7 @@ SHOWN: dict[str, Shown] = {
     "warming_friction": Shown(
         {"cold_nm_s": 2.0, "time_constant_s": 3.0},
         "cruise",
-        over_time(
-            "friction [Nm s/rad]",
-            BUS["b_L"],
-            lambda v: BUS["b_L"] + v["cold_nm_s"] * fading(v),
-        ),
+        over_time("friction [Nm s/rad]", BUS["b_L"], lambda v: BUS["b_L"] + v["cold_nm_s"] * fading(v)),
     ),
     "resolver_error": Shown(
         {"once_rad": 0.03, "twice_rad": 0.02},
@@ -208,9 +200,7 @@ SHOWN: dict[str, Shown] = {
     "lost_samples": Shown({"share": 0.15}, "cruise", _samples("lost_samples")),
     "sample_jitter": Shown({"jitter_s": 2e-3}, "cruise", _samples("sample_jitter")),
     "clock_drift": Shown(
-        {"rate": 5e-3},
-        "cruise",
-        over_time("torque's clock ahead [ms]", 0.0, lambda v: 1e3 * v["rate"] * TIME_S),
+        {"rate": 5e-3}, "cruise", over_time("torque's clock ahead [ms]", 0.0, lambda v: 1e3 * v["rate"] * TIME_S)
     ),
 }
 """Per effect: its size, the test that shows it, its law."""

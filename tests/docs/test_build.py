@@ -1,7 +1,5 @@
 """The documentation builds as a site, whole and without a warning, and a reader of it is never sent to the net."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """docs/catalogue.md says what the catalogue says, and shows what each effect does."""
 
-from __future__ import annotations
-
 import xml.etree.ElementTree as ET
 from pathlib import Path
 from typing import get_args

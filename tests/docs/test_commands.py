@@ -1,7 +1,5 @@
 """Every command line that the documentation shows would be taken by the command it names."""
 
-from __future__ import annotations
-
 import pytest
 
 from hil.cli.command_line import COMMANDS

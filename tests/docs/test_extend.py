@@ -1,7 +1,5 @@
 """The worked examples of docs/extend.md, carried out on a copy of the packages exactly as they are printed."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

@@ -1,7 +1,5 @@
 """docs/gallery.md shows what the tool says of each failure. The slow ones: ``python -m tests.docs.gallery --check``."""
 
-from __future__ import annotations
-
 import xml.etree.ElementTree as ET
 
 import pytest

@@ -1,7 +1,5 @@
 """Every link of the documentation leads somewhere, and every page can be reached from its map."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """The notebook of the documentation runs from top to bottom, and finds what it hides."""
 
-from __future__ import annotations
-
 import ast
 import json
 from pathlib import Path

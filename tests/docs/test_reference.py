@@ -1,7 +1,5 @@
 """What the reference pages list is what the program has: columns, flags, keys, registers, objects, thresholds."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The page about the tests names tests that there are, and a reason for each."""
 
-from __future__ import annotations
-
 import re
 
 from tests.docs.pages import DOCS, ROOT

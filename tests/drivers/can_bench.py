@@ -1,7 +1,5 @@
 """A simulated rig and a host on one virtual bus, for the tests of both ends."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Callable, Iterator

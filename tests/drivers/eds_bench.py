@@ -1,7 +1,5 @@
 """The shipped EDS with texts replaced, for the tests of its checker."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -4,8 +4,6 @@ Its objects are those of an EDS; it answers SDO, NMT and SYNC from its own code,
 habit is a method that a test's subclass replaces. It lives on a virtual bus, in the threads of whoever sends.
 """
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager

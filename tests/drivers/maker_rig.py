@@ -1,7 +1,5 @@
 """A drive by its maker's file, all the way: rig file written, drive simulated, checked, run and checked again."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Misbehaving Modbus TCP peers for the driver's tests: a bare TCP server that answers what the test says."""
 
-from __future__ import annotations
-
 import asyncio
 import socket
 from collections.abc import AsyncIterator, Callable

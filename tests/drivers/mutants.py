@@ -1,7 +1,5 @@
 """Mutants of an EDS: one key dropped, blanked, doubled, or with a value of another type."""
 
-from __future__ import annotations
-
 import random
 import re
 from collections.abc import Iterator

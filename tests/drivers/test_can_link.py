@@ -1,7 +1,5 @@
 """The bus: opened by URL or refused, stamped on arrival, and what happens when it goes away."""
 
-from __future__ import annotations
-
 import socket
 import threading
 from collections.abc import Iterator

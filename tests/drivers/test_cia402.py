@@ -1,7 +1,5 @@
 """The state machine: every pair of state and command against CiA 402-2, every statusword."""
 
-from __future__ import annotations
-
 import itertools
 
 import pytest

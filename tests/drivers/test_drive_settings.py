@@ -1,7 +1,5 @@
 """What a drive is given at every configuration, who asks for it, and what is refused."""
 
-from __future__ import annotations
-
 from dataclasses import FrozenInstanceError, replace
 from pathlib import Path
 

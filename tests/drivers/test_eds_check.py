@@ -1,14 +1,12 @@
 """What the EDS checker says of a whole file, where one fault has consequences or is reported once for many places."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 
 import pytest
 
 from drivers.capability.table import TABLE, Function, Without
-from drivers.datasheet.text import EdsFinding, Severity
+from drivers.datasheet.text import Severity
 from drivers.eds_check import EdsReport
 from tests.docs.pages import DOCS
 from tests.drivers.eds_bench import SHIPPED, E, N, W, checked, edited, line_of, without
@@ -48,12 +46,6 @@ def test_drive_without_a_needed_object_is_no_drive_for_this_program(tmp_path: Pa
     assert (finding.severity, finding.line) == (E, line_of(SHIPPED, "OptionalObjects")) or index == "1018"
 
 
-def test_missing_sub_index_that_is_needed_is_an_error_of_its_object(tmp_path: Path) -> None:
-    (finding,) = (each for each in checked(tmp_path, without("1018sub1")).findings if each.severity is E)
-    assert finding.line == line_of(SHIPPED, "1018")
-    assert "vendor-ID 0x1018:01" in finding.expected
-
-
 @pytest.mark.parametrize(
     ("gone", "lines"),
     [
@@ -83,13 +75,6 @@ def test_constant_that_holds_the_value_wanted_is_no_fault(tmp_path: Path) -> Non
     assert checked(tmp_path, edited("1005", "AccessType=rw", "AccessType=const")).findings == ()
     text = edited("1005", "AccessType=rw", "AccessType=const", text=edited("1005", "0x00000080", "0x00000081"))
     assert [each.severity for each in checked(tmp_path, text).findings if each.place.endswith("DefaultValue")] == [E]
-
-
-def test_list_entry_that_is_no_index(tmp_path: Path) -> None:
-    text = edited("OptionalObjects", "4=0x1016", "4=heartbeat")
-    report = checked(tmp_path, text)
-    assert places(report, W) == ["[OptionalObjects] 4", "[1016]"]
-    assert report.usable
 
 
 def test_object_described_but_not_listed_and_the_reverse(tmp_path: Path) -> None:
@@ -167,22 +152,11 @@ def test_spelling_is_reported_once(tmp_path: Path) -> None:
     assert finding.found.endswith("more")
 
 
-def test_unknown_section_is_a_note(tmp_path: Path) -> None:
-    (finding,) = checked(tmp_path, SHIPPED + "\n[OptionalObject]\n").findings
-    assert (finding.severity, finding.place) == (N, "[OptionalObject]")
-
-
 def test_type_as_canfestivals_editor_describes_it(tmp_path: Path) -> None:
     """It makes an object of each type with limits; the real type is the default of its sub-index 1."""
     text = edited("1001", "DataType=0x0005", "DataType=0x00A0")
     text += "\n[A0]\nParameterName=limited\n[A0sub1]\nParameterName=type\nDataType=0x0005\nDefaultValue=0x0005\n"
     assert checked(tmp_path, text).findings == ()
-
-
-def test_no_baud_rate_at_all(tmp_path: Path) -> None:
-    text = re.sub(r"(BaudRate_\d+)=1", r"\1=0", SHIPPED)
-    (finding,) = checked(tmp_path, text).findings
-    assert "at least one BaudRate_" in finding.expected
 
 
 @pytest.mark.parametrize(("gone", "left"), [("1800", "1A00"), ("1A00", "1800"), ("1400", "1600"), ("1600", "1400")])
@@ -204,12 +178,7 @@ def test_mapping_over_eight_bytes_of_objects_that_are_not_there_or_not_filled(tm
 
 
 @pytest.mark.parametrize(
-    ("mapping", "allowed", "wanted"),
-    [
-        ("1600", "1", []),
-        ("1600", "0", ["a filler"]),
-        ("1A00", "1", ["a filler"]),
-    ],
+    ("mapping", "allowed", "wanted"), [("1600", "1", []), ("1600", "0", ["a filler"]), ("1A00", "1", ["a filler"])]
 )
 def test_filler_in_a_mapping(tmp_path: Path, mapping: str, allowed: str, wanted: list[str]) -> None:
     text = edited("DummyUsage", "Dummy0005=0", f"Dummy0005={allowed}")
@@ -251,18 +220,6 @@ def test_no_pdo_that_carries_what_is_needed(tmp_path: Path, mapping: str) -> Non
     assert "that map 0x60" in finding.expected
     assert "0x6078:00 (16 bit)" in finding.found
     assert f"0x{mapping}:01 can not be written" in finding.found
-
-
-def test_order_of_the_report_is_that_of_the_lines(tmp_path: Path) -> None:
-    text = edited("60A9", "DefaultValue=0xFDB44700", "DefaultValue=", text=edited("DeviceInfo", "BaudRate_10=0\n", ""))
-    lines = [each.line or 0 for each in checked(tmp_path, without("1001", text)).findings]
-    assert lines == sorted(lines)
-    assert lines[0] == 0
-
-
-def test_finding_reads_as_a_sentence() -> None:
-    finding = EdsFinding(E, 3, "[6071] DataType", "an integer", "'9'", "Correct it.")
-    assert str(finding) == "[6071] DataType: expected an integer, found '9'. Correct it."
 
 
 def test_objects_of_the_table_are_those_of_the_documentation() -> None:

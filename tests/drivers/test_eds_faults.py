@@ -1,7 +1,5 @@
 """Each rule of the EDS checker: the shipped file with one fault, found with its line, and nothing else found."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

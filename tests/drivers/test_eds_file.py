@@ -1,7 +1,5 @@
 """The shipped EDS and every way one can be wrong."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -12,13 +10,11 @@ from canopen.objectdictionary import ObjectDictionary
 
 from drivers import resources
 from drivers.capability.carrier import TPDO
-from drivers.capability.carrier_search import find_carriers
 from drivers.capability.plan import plan_drive
 from drivers.datasheet.file import EdsFile
 from drivers.eds_check import check_eds
 from drivers.errors import ConfigMismatch
 from drivers.resources import data_file
-from drivers.scaling import IntegerType
 
 SHIPPED = data_file("inverter.eds")
 FEEDBACK = (0x6041, 0x6077, 0x606C)
@@ -75,23 +71,6 @@ def test_pdo_layouts_come_from_the_eds_with_the_node_id_put_in() -> None:
     assert tuple(mapped.index for mapped in layout.objects) == FEEDBACK
 
 
-def test_changed_mapping_changes_the_layout(edited: Edited) -> None:
-    search = find_carriers(edited("0x60770010", "0x60740010").sheet, TPDO, ((0x6041, 0), (0x606C, 0)))
-    (carrier,) = search.carriers
-    assert carrier.mapped_here  # 0x6074 is no object of it
-
-    search = find_carriers(edited("0x60770010", "0x60780010").sheet, TPDO, ((0x6041, 0), (0x6078, 0)))
-    (carrier,) = search.carriers
-    assert tuple(mapped.index for mapped in carrier.layout.objects) == (0x6041, 0x6078, 0x606C)
-
-
-def test_types_hold_every_object_with_its_type() -> None:
-    types = EdsFile(None, 5).types()
-    assert types[0x606C, 0] is IntegerType.INTEGER32
-    assert types[0x1018, 1] is IntegerType.UNSIGNED32
-    assert types[0x6060, 0] is IntegerType.INTEGER8
-
-
 def test_missing_file_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ConfigMismatch, match=r"none\.eds can't be read: No such file"):
         EdsFile(tmp_path / "none.eds", 5)
@@ -122,12 +101,6 @@ def test_empty_file_is_refused(tmp_path: Path) -> None:
     path.touch()
     with pytest.raises(ConfigMismatch, match=r"empty\.eds has no section \[DeviceInfo\]"):
         EdsFile(path, 5)
-
-
-def test_file_with_another_ending_is_read(tmp_path: Path) -> None:
-    path = tmp_path / "inverter.txt"
-    path.write_text(SHIPPED.read_text())
-    assert EdsFile(path, 5).sheet.value(0x60A9) == 0xFDB44700
 
 
 def test_object_that_is_not_in_the_eds_is_refused() -> None:

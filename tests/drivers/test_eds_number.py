@@ -1,7 +1,5 @@
 """Numbers and values as an EDS writes them."""
 
-from __future__ import annotations
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st

@@ -3,21 +3,15 @@
 The EDS has the habits of real ones: torque in PDO2, blank PDOMapping, wrong counts, capitals, decimal formulas.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 from math import pi
 from pathlib import Path
 
 import pytest
-from canopen import import_od
 
-from drivers.capability.carrier import RPDO, TPDO
-from drivers.capability.plan import plan_drive
 from drivers.capability.speed_unit import SpeedUnit, SpeedUnitName
 from drivers.capability.table import TABLE, Function, Without
-from drivers.datasheet.file import EdsFile
 from drivers.datasheet.text import Severity
 from drivers.eds_check import check_eds
 from drivers.errors import ConfigMismatch
@@ -34,10 +28,7 @@ from tests.drivers.eds_bench import SHIPPED, without
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 OTHER_EDS = EXAMPLES / "other_drive.eds"
-OTHER = replace(
-    inverter_settings("m1", read_rig(EXAMPLES / "other_drive.toml")),
-    sdo_timeout_s=M1.sdo_timeout_s,
-)
+OTHER = replace(inverter_settings("m1", read_rig(EXAMPLES / "other_drive.toml")), sdo_timeout_s=M1.sdo_timeout_s)
 SIMULATED = SimulatedInverter(OTHER.node_id, OTHER.rated_torque_nm, eds_path=OTHER_EDS)
 COUNT_NM, COUNT_RAD_S = 0.45, 0.1 * 2 * pi / 60
 
@@ -65,31 +56,6 @@ def test_its_habits_are_named_and_borne() -> None:
         "[MANUFACTUREROBJECTS] 4",
         "[2010] DefaultValue",
     }
-
-
-@pytest.mark.filterwarnings("ignore:The 'warn' method")
-def test_the_library_alone_would_lose_every_sub_index() -> None:
-    """Why there is a reader of this project's own."""
-    with OTHER_EDS.open(encoding="latin-1") as file:
-        theirs = import_od(file, 11)
-    assert list(theirs[0x1601].values()) == []
-    assert len(list(EdsFile(OTHER_EDS, 11).dictionary[0x1601].values())) == 5
-
-
-def test_pdo_2_carries_torque_and_feedback() -> None:
-    eds = EdsFile(OTHER_EDS, 11)
-    plan = plan_drive(eds.sheet)
-    rpdo, tpdo = plan.pdos(RPDO)[0].layout, plan.pdos(TPDO)[0].layout
-    assert (rpdo.communication_index, rpdo.cob_id) == (0x1401, 0x300 + 11)
-    assert (tpdo.communication_index, tpdo.cob_id) == (0x1801, 0x280 + 11)
-
-
-def test_compact_objects_and_texts_are_read() -> None:
-    dictionary = EdsFile(OTHER_EDS, 11).dictionary
-    assert [dictionary.get_variable(0x1003, n).data_type for n in range(9)] == [5, *[7] * 8]
-    assert dictionary.get_variable(0x1003, 0).default == 8
-    assert dictionary.get_variable(0x1008).default == "TX-4"
-    assert dictionary.get_variable(0x2000).default == 25.0
 
 
 def test_the_whole_way_to_torque(other: Bench) -> None:

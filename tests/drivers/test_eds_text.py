@@ -1,13 +1,11 @@
 """The text of an EDS: line numbers, oddities that are borne, and files that are no text of an EDS at all."""
 
-from __future__ import annotations
-
 import errno
 import os
 from pathlib import Path
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from drivers.datasheet.file import EdsFile
@@ -120,6 +118,7 @@ def test_file_of_another_kind_is_one_error(tmp_path: Path, content: str) -> None
     assert "objects" in finding.expected
 
 
+@settings(max_examples=40)
 @given(st.binary(max_size=400))
 def test_no_file_is_too_odd_to_be_answered(tmp_path_factory: pytest.TempPathFactory, content: bytes) -> None:
     """Whatever the bytes: a report, and never an error of this program."""
@@ -134,6 +133,7 @@ VALUES = ["", "0x7", "9", "09", "$NODEID+1", "-1", "0xFFFFFFFFFF", "[", "nonsens
 LINES = st.sampled_from(SECTIONS) | st.builds("{}={}".format, st.sampled_from(KEYS), st.sampled_from(VALUES))
 
 
+@settings(max_examples=40)
 @given(st.lists(LINES, max_size=30))
 def test_no_mixture_of_eds_lines_is_too_odd_either(tmp_path_factory: pytest.TempPathFactory, lines: list[str]) -> None:
     path = tmp_path_factory.getbasetemp() / "mixed.eds"

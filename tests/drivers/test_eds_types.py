@@ -1,7 +1,5 @@
 """What a data sheet has wrong that would be read as other numbers, and what of a drive a run has to know."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest
@@ -10,7 +8,6 @@ from drivers.capability.carrier import RPDO
 from drivers.datasheet.text import Severity
 from drivers.errors import ConfigMismatch
 from drivers.resources import data_file
-from drivers.scaling import IntegerType, TorqueScale
 from tests.drivers.eds_bench import E, W, checked, edited, line_of
 from tests.drivers.fake_drive import FakeDrive, on_bus
 
@@ -23,17 +20,6 @@ DefaultValue=10
 PDOMapping=0
 
 """
-
-
-def of_data_type(text: str, key: str, folder: Path) -> list[Severity]:
-    """Severities of what is said of the data type of one object."""
-    return [finding.severity for finding in checked(folder, text).findings if finding.place == f"[{key}] DataType"]
-
-
-def test_torque_read_without_its_sign_would_be_enormous() -> None:
-    """Minus 1 % of 450 Nm, sent as INTEGER16 and read as UNSIGNED16."""
-    raw = IntegerType.UNSIGNED16.decode(IntegerType.INTEGER16.encode(-10, "drive"))
-    assert TorqueScale(450.0).to_nm(raw) == pytest.approx(29_486.7)
 
 
 @pytest.mark.parametrize(
@@ -68,10 +54,6 @@ def test_torque_offset_without_a_sign_is_done_without(tmp_path: Path) -> None:
     assert finding.line == line_of(text, "60B2", "DataType")
     assert report.plan is not None
     assert 0x60B2 not in {mapped.index for mapped in report.plan.pdos(RPDO)[0].layout.objects}
-
-
-def test_max_torque_as_a_signed_number_means_the_same(tmp_path: Path) -> None:
-    assert of_data_type(edited("6072", "DataType=0x0006", "DataType=0x0003"), "6072", tmp_path) != [E]
 
 
 @pytest.mark.parametrize("value", ["0x00000065", "$NODEID", "$NODEID+0x40"])

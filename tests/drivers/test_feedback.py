@@ -1,7 +1,5 @@
 """TPDOs as they arrive: all that were asked for are waited for, and each kind is counted."""
 
-from __future__ import annotations
-
 import threading
 
 from drivers.canopen.pdo_map import MappedObject, PdoCodec, PdoLayout
@@ -9,11 +7,7 @@ from drivers.inverter.cia402 import STATUSWORD_STATE_BITS, PowerState
 from drivers.inverter.feedback import ChannelReceiver, FeedbackReceiver
 from drivers.scaling import IntegerType, TorqueScale, VelocityScale
 
-TYPES = {
-    (0x6041, 0): IntegerType.UNSIGNED16,
-    (0x6077, 0): IntegerType.INTEGER16,
-    (0x606C, 0): IntegerType.INTEGER32,
-}
+TYPES = {(0x6041, 0): IntegerType.UNSIGNED16, (0x6077, 0): IntegerType.INTEGER16, (0x606C, 0): IntegerType.INTEGER32}
 
 
 def codec(number: int, *indices: int) -> PdoCodec:

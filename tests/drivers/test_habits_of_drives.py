@@ -1,7 +1,5 @@
 """The host's inverter against drives with the habits of real ones, each one as makers and users have reported it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Heartbeats: their loss, by times passed in, and their sending."""
 
-from __future__ import annotations
-
 import threading
 
 import pytest

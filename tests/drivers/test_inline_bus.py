@@ -1,7 +1,5 @@
 """The virtual bus without a receive thread: order, turns, foreign participants, and its end."""
 
-from __future__ import annotations
-
 import threading
 from collections import defaultdict
 

@@ -1,7 +1,5 @@
 """The host's inverter against the simulated one: the whole way from check to disarm."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path

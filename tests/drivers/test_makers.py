@@ -1,7 +1,5 @@
 """Every maker's drive by its data sheet: checked, a rig file written, simulated, driven; and mutants of each file."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -35,18 +33,22 @@ def written(maker: Maker, folder: Path) -> Path:
     return path
 
 
-@pytest.fixture(params=MAKERS.values(), ids=MAKERS.keys())
-def maker(request: pytest.FixtureRequest) -> Maker:
-    made: Maker = request.param
-    return made
+def makers(*at_every_change: str) -> pytest.MarkDecorator:
+    """Try every maker's drive in the campaign, and these at every change."""
+    marks = {name: () if name in at_every_change else pytest.mark.campaign for name in MAKERS}
+    return pytest.mark.parametrize(
+        "maker", [pytest.param(made, id=name, marks=marks[name]) for name, made in MAKERS.items()]
+    )
 
 
+@makers(*MAKERS)
 def test_usable_with_the_lines_that_are_printed(maker: Maker, tmp_path: Path) -> None:
     report = check_eds(written(maker, tmp_path))
     assert report.usable, [str(each) for each in report.findings]
     assert tuple(line.key for line in report.lines) == maker.lines
 
 
+@makers("sevcon", "yiyou", "each value apart", "simpliq")
 def test_driven_without_a_flag_and_with_its_prbs_apart(maker: Maker, tmp_path: Path) -> None:
     driven = drive(written(maker, tmp_path), tmp_path, SHORT)
     assert (driven.recorded, driven.flagged, driven.before, driven.after) == (SHORT, 0, (), ())
@@ -58,6 +60,7 @@ def test_driven_without_a_flag_and_with_its_prbs_apart(maker: Maker, tmp_path: P
     assert np.abs(reference).max() > prbs.max()  # the base torque is next to it
 
 
+@makers("complete", "pre-defined PDOs", "simpliq")
 def test_mutants_run_or_are_refused_by_line(maker: Maker, tmp_path: Path) -> None:
     eds = written(maker, tmp_path)
     place = tmp_path / "mutant"

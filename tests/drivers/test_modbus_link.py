@@ -1,7 +1,5 @@
 """The Modbus connection against peers that misbehave: each way has its own error, none is silent."""
 
-from __future__ import annotations
-
 import asyncio
 import re
 

@@ -1,7 +1,5 @@
 """Certificates as files and as bytes: roles read out of them, and files that can't be used named."""
 
-from __future__ import annotations
-
 import ssl
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Oddities of makers' data sheets: what changes nothing is no hindrance, and what does is said with its line."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

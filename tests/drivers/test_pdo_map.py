@@ -1,7 +1,5 @@
 """PDO layouts and frames: packed at the limits, refused beyond, compared with the objects they come from."""
 
-from __future__ import annotations
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -43,8 +41,7 @@ def test_every_value_survives_the_frame(statusword: int, torque: int, speed: int
 
 
 @pytest.mark.parametrize(
-    "values",
-    [(-1, 0, 0), (0x10000, 0, 0), (0, 32768, 0), (0, -32769, 0), (0, 0, 2**31), (0, 0), (0, 0, 0, 0)],
+    "values", [(-1, 0, 0), (0x10000, 0, 0), (0, 32768, 0), (0, -32769, 0), (0, 0, 2**31), (0, 0), (0, 0, 0, 0)]
 )
 def test_values_that_do_not_fit_are_refused(values: tuple[int, ...]) -> None:
     with pytest.raises(CommandRefused, match=r"node 5: PDO 0x1800 .* do not fit the objects"):

@@ -1,7 +1,5 @@
 """The PLC driver against the simulated PLC on a real Modbus TCP connection."""
 
-from __future__ import annotations
-
 import asyncio
 import math
 import re
@@ -11,13 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from drivers.errors import (
-    BusDown,
-    ConfigMismatch,
-    DeviceFault,
-    DeviceTimeout,
-    ProtocolViolation,
-)
+from drivers.errors import BusDown, ConfigMismatch, DeviceFault, DeviceTimeout, ProtocolViolation
 from drivers.plc.plc import GENERATOR_OFF, Plc
 from drivers.plc.register_map import RegisterMap, load_register_map
 from drivers.plc.types import ClutchState, DriveMode, PlcWatchdog, PrbsSettings, PrbsSource
@@ -70,14 +62,7 @@ def talk(device: PlcDevice, conversation: Talk, *, clock: Clock | None = None, m
 
     async def run() -> None:
         async with serve_plc(device, MAP) as served:
-            plc = Plc(
-                "127.0.0.1",
-                served.port,
-                map_,
-                timeout_s=0.2,
-                mode_timeout_s=0.05,
-                clock_ns=clock or Clock(),
-            )
+            plc = Plc("127.0.0.1", served.port, map_, timeout_s=0.2, mode_timeout_s=0.05, clock_ns=clock or Clock())
             async with plc:
                 await conversation(plc, served)
 
@@ -229,33 +214,6 @@ def test_a_drive_mode_that_is_refused_is_raised() -> None:
             await plc.request_drive_mode(DriveMode.SERIES)
 
     talk(PlcDevice(PlcSetup(DriveMode.PARALLEL), faults), conversation, clock=ImpatientClock())
-
-
-def test_what_changes_in_simulated_time_is_seen() -> None:
-    device = PlcDevice(faults=PlcFaults(clutch_closes_at_s=0.5, permissive_withdrawn_at_s=1.0))
-
-    async def conversation(plc: Plc, _: ServedPlc) -> None:
-        seen = []
-        for _step in range(3):
-            status = await plc.read_status()
-            seen.append((status.clutch, status.permissive))
-            device.step(0.5)
-        assert seen == [
-            (ClutchState.OPEN, True),
-            (ClutchState.CLOSED, True),
-            (ClutchState.CLOSED, False),
-        ]
-
-    talk(device, conversation)
-
-
-def test_beats_are_counted_and_seen() -> None:
-    async def conversation(plc: Plc, _: ServedPlc) -> None:
-        for count in range(3):
-            await plc.beat()
-            assert (await plc.read_status()).watchdog.host_count_seen == count
-
-    talk(PlcDevice(), conversation)
 
 
 class StoppedPlc(PlcDevice):

@@ -1,7 +1,5 @@
 """A reader of the PLC's status that comes back after a loss, and gives up when it has tried enough."""
 
-from __future__ import annotations
-
 import asyncio
 from collections.abc import Awaitable, Callable
 from contextlib import AsyncExitStack

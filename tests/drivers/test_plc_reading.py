@@ -1,7 +1,5 @@
 """What registers hold, and which values no vehicle has: misread numbers are refused where they are read."""
 
-from __future__ import annotations
-
 import asyncio
 
 import pytest

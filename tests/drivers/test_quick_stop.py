@@ -1,7 +1,5 @@
 """Quick stop as a command: over when the drive says so, by state and by torque."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest

@@ -1,7 +1,5 @@
 """The bus is lost, and got back in a step of its own: nobody is armed until the drives say they are not."""
 
-from __future__ import annotations
-
 import can
 import pytest
 

@@ -1,7 +1,5 @@
 """One register: values to words and back, and what must not pass either way."""
 
-from __future__ import annotations
-
 import math
 import struct
 
@@ -128,14 +126,7 @@ def test_a_scaled_value_comes_back_within_half_a_step(value: float) -> None:
     assert abs(back - value) <= 0.05 + 1e-9
 
 
-GOOD = {
-    "kind": "input_register",
-    "address": 0,
-    "type": "uint16",
-    "access": "read",
-    "unit": "1",
-    "description": "x",
-}
+GOOD = {"kind": "input_register", "address": 0, "type": "uint16", "access": "read", "unit": "1", "description": "x"}
 
 
 @pytest.mark.parametrize(

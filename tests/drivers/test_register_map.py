@@ -1,7 +1,5 @@
 """The map file: all faults at once, and few requests."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 
@@ -100,16 +98,10 @@ def test_all_faults_at_once_each_with_its_key(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("change", "problem"),
     [
-        (
-            (r"address = 5\n", "address = 4\n"),
-            "registers.clutch.address | expected 5 or more, behind drive_mode",
-        ),
+        ((r"address = 5\n", "address = 4\n"), "registers.clutch.address | expected 5 or more, behind drive_mode"),
         ((r"address = 8\n", "address = 7\n"), "registers.torque_limit.address | expected 8 or more"),
         ((r"map_version = 1", "map_vision = 1"), "identity.map_vision | expected the name of a register"),
-        (
-            (r"map_version = 1", "map_version = 70000"),
-            "identity.map_version | expected a value that uint16 holds",
-        ),
+        ((r"map_version = 1", "map_version = 70000"), "identity.map_version | expected a value that uint16 holds"),
         ((r"vendor_code = .*?map_version = 1", ""), "identity | expected at least one register"),
     ],
 )

@@ -1,7 +1,5 @@
 """Counts to SI and back: exact at the limits, refused beyond them, never wrapped."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 

@@ -1,7 +1,5 @@
 """Drives whose fixed PDOs share command and feedback: read in one cycle, and only what is all of that cycle."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace

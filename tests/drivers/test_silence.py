@@ -1,7 +1,5 @@
 """When a heartbeat has ended: overdue, and still so after a time in which the listener was awake."""
 
-from __future__ import annotations
-
 from drivers.canopen.silence import GRACE_NS, Silence
 
 TIMEOUT_NS = 500

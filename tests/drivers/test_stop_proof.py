@@ -1,7 +1,5 @@
 """A dead host is noticed, or it is said that it is not; nothing of it commands torque."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Frames that only this host sends, when they come in: the first is kept, and only while the host drives."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import pytest

@@ -1,7 +1,5 @@
 """Supervision: what is wrong ends a run within its limit, in any pattern; what a sound drive does never does."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Callable, Iterable

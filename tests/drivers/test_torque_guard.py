@@ -1,7 +1,5 @@
 """The torque guard: every rule alone refuses, every limit itself passes, nothing is clamped."""
 
-from __future__ import annotations
-
 import copy
 import dataclasses
 import math
@@ -163,13 +161,7 @@ def test_every_broken_rule_is_named_at_once() -> None:
     guard, last_ns = guard_at()
     with pytest.raises(CommandRefused) as refusal:
         guard.check(TorqueRequest(500.0, 130.0, 400.0, -130.0), last_ns + 10 * MS, seen(2 * TIMEOUT_NS))
-    for name in (
-        "torque_limit_m1_nm",
-        "prbs_limit_nm",
-        "rate_limit_nm_per_s",
-        "sum_limit_nm",
-        "feedback_timeout_s",
-    ):
+    for name in ("torque_limit_m1_nm", "prbs_limit_nm", "rate_limit_nm_per_s", "sum_limit_nm", "feedback_timeout_s"):
         assert name in str(refusal.value)
 
 
@@ -366,9 +358,7 @@ steps = st.tuples(requests, st.integers(0, 200 * MS), st.integers(0, 60 * MS))
 
 @settings(derandomize=True, max_examples=200)
 @given(st.lists(steps, max_size=8))
-def test_whatever_is_asked_what_comes_out_is_within_every_limit(
-    course: list[tuple[TorqueRequest, int, int]],
-) -> None:
+def test_whatever_is_asked_what_comes_out_is_within_every_limit(course: list[tuple[TorqueRequest, int, int]]) -> None:
     guard = TorqueGuard(LIMITS)
     now_ns, before = 0, TorqueRequest(0.0, 0.0, 0.0, 0.0)
     for request, dt_ns, age_ns in course:

@@ -1,7 +1,5 @@
 """What has not passed the guard does not type-check."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys
@@ -28,15 +26,7 @@ def cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def type_check(line: str, folder: Path, cache: Path) -> str:
     program = folder / "program.py"
     program.write_text(f"{OPENING}    {line}\n")
-    command = [
-        sys.executable,
-        "-m",
-        "mypy",
-        "--config-file=",
-        "--strict",
-        f"--cache-dir={cache}",
-        str(program),
-    ]
+    command = [sys.executable, "-m", "mypy", "--config-file=", "--strict", f"--cache-dir={cache}", str(program)]
     environment = {**os.environ, "MYPYPATH": str(ROOT)}
     return subprocess.run(command, capture_output=True, text=True, env=environment, check=False).stdout
 

@@ -1,7 +1,5 @@
 """Caches of kernels: the old ones go with a new one, those in use and those used lately stay."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Signals while code is compiled: LLVM does not survive an exception in one of its callbacks."""
 
-from __future__ import annotations
-
 import signal
 from collections.abc import Iterator
 from contextlib import contextmanager

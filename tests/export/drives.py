@@ -1,7 +1,5 @@
 """Drives for the exported estimator: a clean cruise, and one with everything that can go wrong on a bus."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

@@ -1,7 +1,5 @@
 """One recording on the host and on the PLC: the chain of `estimator`, and the exported text as a program."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any

@@ -3,8 +3,6 @@
 Its classes were generated from the TC6 schema. It refuses elements and attributes that the schema has not got.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 

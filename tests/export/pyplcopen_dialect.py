@@ -5,8 +5,6 @@ input, and a name that is declared in two POUs (it puts the bodies of the blocks
 Statements and expressions stay as they are, but for the names.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 

@@ -5,8 +5,6 @@ it checks names, types, calls, indices and statements by its own reading of the 
 semicolon after END_IF and END_FOR; our own reader does.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The exported text, executed, is the estimator of the host: every number, to the bit."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -197,7 +195,10 @@ MUTANTS = (
 SETTINGS = Settings(adaptation=profile("decreasing_then_constant_trace:trace=1.0"))
 
 
-@pytest.mark.parametrize(("before", "after"), MUTANTS)
+@pytest.mark.parametrize(
+    ("before", "after"),
+    [pytest.param(*each, marks=[pytest.mark.campaign] * bool(number % 4)) for number, each in enumerate(MUTANTS)],
+)
 def test_a_fault_in_the_text_is_noticed(before: str, after: str, tmp_path: Path) -> None:
     assert any(not same_bits(plc, host) for plc, host in both_sides(before, after, tmp_path))
 

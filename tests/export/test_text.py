@@ -1,21 +1,18 @@
 """The exported text as a PLC programmer gets it: the standard's language, readable, complete."""
 
-from __future__ import annotations
-
 import re
 from importlib.util import find_spec
 
 import numpy as np
 import pytest
 
-from estimator.errors import BadModel, BadSetting
 from estimator.identification.linear_model import Orders
 from estimator.identification.online import regression
 from estimator.identification.settings import Settings
 from estimator.signals import decimate
 from estimator.signals.record import FloatArray
 from hil.export.plc_estimator import PlcEstimator
-from hil.export.plcopen import SectionKind, project, read_pou, read_types
+from hil.export.plcopen import SectionKind, project
 from hil.export.structured_text import POUS, Precision
 from tests.export.iec.parser import Parser
 from tests.export.iec.to_c import to_c
@@ -110,59 +107,6 @@ def test_the_origin_can_not_end_the_comment() -> None:
     assert list(blocks) == list(POUS)
 
 
-@pytest.mark.parametrize(
-    ("cycle_s", "settings", "said"),
-    [
-        (0.003, Settings(), "expected"),
-        (0.0, Settings(), "sample_time_s|expected"),
-        (-0.01, Settings(), "expected"),
-        (float("nan"), Settings(), "expected"),
-        (0.000005, Settings(), "fewer than 32767"),
-        (0.01, Settings(high_pass_hz=30.0), "Nyquist"),
-    ],
-)
-def test_what_makes_no_sense_is_refused(cycle_s: float, settings: Settings, said: str) -> None:
-    with pytest.raises(BadSetting, match=said):
-        PlcEstimator(settings, cycle_s, L)
-
-
-def test_a_filter_that_could_not_filter_is_refused() -> None:
-    with pytest.raises(BadModel, match="root of magnitude"):
-        PlcEstimator(L=np.array([1.0, -1.2]))
-
-
 def test_orders_are_in_the_head_for_the_reader() -> None:
     text = exported(PlcEstimator(Settings(orders=Orders(2, 3, 4)), L=L))
     assert "y(t) = -a1 y(t-1) - .. - a2 y(t-2) + b1 u(t-4) + .. + b3 u(t-6)" in text
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        "TYPE\n    T_A : INT;    (* no array *)\nEND_TYPE\n",
-        "TYPE\n    T_A : ARRAY[1..2] OF INT;\nEND_TYPE\n",  # no comment
-        "TYPE\n    T_A : ARRAY[1..2] OF INT;    (* a *)\nEND_TYPE\nTYPE\n",
-    ],
-)
-def test_types_that_are_laid_out_otherwise_are_refused(text: str) -> None:
-    with pytest.raises(ValueError, match=r"expected ARRAY|not laid out"):
-        read_types(text)
-
-
-@pytest.mark.parametrize(
-    ("before", "after"),
-    [
-        ("(* what it does *)\n", ""),
-        ("    a : INT;    (* a *)\n", "    a : INT    (* a *)\n"),
-        ("    a : INT;", "    a, b : INT;"),
-        ("    a : INT;    (* a *)\n", "    (* alone *)\n    a : INT;\n"),
-        ("END_VAR\n", "END_VAR;\n"),
-        ("END_PROGRAM\n", "END_PROGRAM\nEND_PROGRAM\n"),
-    ],
-)
-def test_a_pou_that_is_laid_out_otherwise_is_refused(before: str, after: str) -> None:
-    right = "(* what it does *)\nPROGRAM PRG\nVAR\n    a : INT;    (* a *)\nEND_VAR\n\na := 1;\nEND_PROGRAM\n"
-    assert read_pou(right).body == "a := 1;"
-    assert before in right
-    with pytest.raises(ValueError, match="not laid out"):
-        read_pou(right.replace(before, after))

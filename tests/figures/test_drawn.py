@@ -1,7 +1,5 @@
 """Printed figures: complete, of a size a page takes, the same bytes from the same data."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable
 from pathlib import Path

@@ -1,18 +1,17 @@
 """The known driveline: its response, poles and zeros against closed forms and an independent discretisation."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
 from hil.figures.local_model import TwoMassLine
-from tests.estimator.identification.driveline import B_L, B_M, J_L, J_M, C, K, discrete, true_resonance
+from tests.estimator.identification.driveline import B_L, B_M, J_L, J_M, C, K, true_resonance
+from tests.estimator.identification.driveline import LINE as TRUTH
 
 LINE = TwoMassLine.of({"J_M": J_M, "J_L": J_L, "k": K, "c": C, "b_M": B_M, "b_L": B_L})
 
 
 def test_it_is_discretised_exactly() -> None:
-    for mine, other in zip(LINE.discrete(0.01), discrete(0.01), strict=True):
+    for mine, other in zip(LINE.discrete(0.01), TRUTH.discrete(0.01), strict=True):
         np.testing.assert_allclose(mine, other, rtol=1e-12, atol=1e-15)
 
 
@@ -23,7 +22,9 @@ def test_its_resonance_is_that_of_the_eigenvalues() -> None:
 
 
 def test_poles_in_z_are_those_of_the_discretised_matrix() -> None:
-    np.testing.assert_allclose(np.sort_complex(LINE.poles(0.02)), np.sort_complex(np.linalg.eigvals(discrete(0.02)[0])))
+    np.testing.assert_allclose(
+        np.sort_complex(LINE.poles(0.02)), np.sort_complex(np.linalg.eigvals(TRUTH.discrete(0.02)[0]))
+    )
 
 
 def test_a_torque_held_for_no_time_at_all_has_the_continuous_response() -> None:

@@ -1,7 +1,5 @@
 """The numbers of the figures, and the band they are taken in."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,13 +1,11 @@
 """Colours of lines differ for the colour-blind as well, and can be seen on white."""
 
-from __future__ import annotations
-
 from itertools import combinations
 
 import numpy as np
 import pytest
 
-from hil.figures.palette import BLACK, BLUE, GREEN, GREY, PURPLE, SERIES, VERMILION, faded, series_colour
+from hil.figures.palette import BLACK, BLUE, GREEN, GREY, PURPLE, SERIES, VERMILION
 
 # Full loss of one kind of cone, linear RGB to linear RGB: G. M. Machado, M. M. Oliveira, L. A. F. Fernandes, "A
 # Physiologically-based Model for Simulation of Color Vision Deficiency", IEEE TVCG 15 (2009), table at severity 1.0.
@@ -62,12 +60,3 @@ def test_no_two_lines_of_a_figure_look_alike_to_anybody(sight: str, together: tu
 def test_lines_stand_out_from_white(colour: str) -> None:
     luminance = float(np.array([0.2126, 0.7152, 0.0722]) @ linear(colour))
     assert 1.05 / (luminance + 0.05) >= 3.0  # WCAG 2.1, success criterion 1.4.11: graphical objects
-
-
-def test_more_than_eight_begin_again() -> None:
-    assert [series_colour(number) for number in range(9)] == [*SERIES, SERIES[0]]
-    assert len(set(SERIES)) == 8
-
-
-def test_a_faded_colour_is_the_same_colour() -> None:
-    assert faded("#0072b2", 0.2) == "rgba(0,114,178,0.2)"

@@ -1,7 +1,5 @@
 """Roads, drivers and the experiments on them."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -50,10 +48,7 @@ def test_at_standstill_nothing_rolls() -> None:
 
 @pytest.mark.parametrize(
     ("changed", "spread_nm"),
-    [
-        ({"slope_rms": 0.003}, 0.003 * BUS.mass_kg * GRAVITY_M_S2 * BUS.metres_per_rad),
-        ({"roughness_nm": 8.0}, 8.0),
-    ],
+    [({"slope_rms": 0.003}, 0.003 * BUS.mass_kg * GRAVITY_M_S2 * BUS.metres_per_rad), ({"roughness_nm": 8.0}, 8.0)],
 )
 def test_road_and_surface_spread_as_they_are_reported(changed: dict[str, float], spread_nm: float) -> None:
     conditions = Conditions(**{**{name: getattr(CALM, name) for name in CALM.__slots__}, **changed})

@@ -1,7 +1,5 @@
 """A rig for the monitor: the example's, with a cruise at standstill and patience for a busy test machine."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

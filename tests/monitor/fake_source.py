@@ -1,7 +1,5 @@
 """A source that says what a test has it say, and remembers what it was sent."""
 
-from __future__ import annotations
-
 import asyncio
 import math
 from collections.abc import Sequence
@@ -11,15 +9,7 @@ from typing import Self
 from textual.pilot import Pilot
 
 from hil.monitor.app import MonitorApp
-from hil.monitor.messages import (
-    Health,
-    NodeHealth,
-    Order,
-    PlcHealth,
-    Ready,
-    Report,
-    TimingHealth,
-)
+from hil.monitor.messages import Health, NodeHealth, Order, PlcHealth, Ready, Report, TimingHealth
 from hil.sample import Sample, SampleFlag
 
 PERIOD_S = 0.01

@@ -1,7 +1,5 @@
 """A real terminal for tests: a pseudo-terminal with a program in it, its screen kept by pyte."""
 
-from __future__ import annotations
-
 import fcntl
 import os
 import pty

@@ -1,7 +1,5 @@
 """Texts of devices, files and operators are shown as they are: no markup, no control of the terminal."""
 
-from __future__ import annotations
-
 import asyncio
 import html
 import re

@@ -1,7 +1,5 @@
 """The rig's process: what it sends, what it keeps, and what it does when the view is gone."""
 
-from __future__ import annotations
-
 import multiprocessing
 import re
 import threading

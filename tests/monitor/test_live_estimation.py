@@ -1,7 +1,5 @@
 """The on-line chain behind the view: the same figures as the chain by itself, in whatever portions samples come."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,16 +1,12 @@
 """The log page: every entry can be read to its end, and reading is not disturbed by what comes."""
 
-from __future__ import annotations
-
 import asyncio
 
-import pytest
-
 from hil.monitor.app import MonitorApp
-from hil.monitor.messages import Kind, Notice, Samples
-from hil.monitor.panel import LogPanel, ago, log, log_lines
+from hil.monitor.messages import Kind, Notice
+from hil.monitor.panel import LogPanel, log, log_lines
 from hil.monitor.state import LiveState
-from tests.monitor.fake_source import PERIOD_S, FakeSource, sample, settled
+from tests.monitor.fake_source import PERIOD_S, FakeSource, settled
 
 LONG = " ".join(f"word{k}" for k in range(200))
 """Ten lines of a terminal of 80 columns, and more than a third of its page."""
@@ -70,17 +66,3 @@ def test_the_arrows_go_through_it_and_not_beyond() -> None:
 def test_what_is_read_stays_where_it_is_when_more_comes() -> None:
     assert shown_after("pagedown", then=LONG)[1:] == shown_after("pagedown")[1:]
     assert "news" in shown_after(then="news")[1]
-
-
-@pytest.mark.parametrize(
-    ("age_s", "words"),
-    [(-0.1, "0 s ago"), (99.4, "99 s ago"), (100.0, "2 min ago"), (5900.0, "98 min ago"), (7200.0, "2 h ago")],
-)
-def test_how_long_ago(age_s: float, words: str) -> None:
-    assert ago(age_s) == words
-
-
-def test_ages_count_from_the_latest_sample() -> None:
-    live = state("text")
-    live.take(Samples(((sample(700), None),)))
-    assert log_lines(live.snapshot(), 80)[0].split()[:3] == ["7", "s", "ago"]

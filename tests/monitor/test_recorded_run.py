@@ -1,7 +1,5 @@
 """What stays of a monitor's run: recording, course of the estimate, alarms, entry in the store."""
 
-from __future__ import annotations
-
 import json
 import multiprocessing
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """A recording or a bus trace in place of a rig."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 
@@ -86,8 +84,7 @@ def test_a_recording_of_the_four_columns_will_do(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("rows", "said"),
-    [("0,1,2,3\n0,1,2,3\n", "rise"), ("0,1,2,3\n", "got 1"), ("0,1,2,x\n", "column speed_rad_s")],
+    ("rows", "said"), [("0,1,2,3\n0,1,2,3\n", "rise"), ("0,1,2,3\n", "got 1"), ("0,1,2,x\n", "column speed_rad_s")]
 )
 def test_a_recording_that_can_not_be_played_is_refused(tmp_path: Path, rows: str, said: str) -> None:
     path = tmp_path / "r.csv"

@@ -1,7 +1,5 @@
 """What the view knows after what it was sent."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """`hil monitor` in a real terminal of 80 by 24: keys in, screen text out, drives disarmed however it ends."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal

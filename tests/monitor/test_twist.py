@@ -1,7 +1,5 @@
 """The twist filter against a driveline whose twist is known."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """What can't be watched is refused before the screen is taken, with its status and what to do."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

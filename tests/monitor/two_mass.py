@@ -1,15 +1,13 @@
 """A two-mass driveline under a PRBS, discretised by scipy: the truth that the monitor's figures are held against."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import cont2discrete
 
 from estimator.physics.twist import Shaft
 from estimator.signals.prbs import Prbs
+from tests.estimator.identification.driveline import Line
 
 FloatArray = NDArray[np.float64]
 
@@ -34,16 +32,8 @@ def driven(
     load_nm_per_sqrt_s: float = 0.0,
 ) -> Drive:
     """Drive the line at rest by a PRBS; what acts differs from the torque read by white noise, the load walks."""
-    s = shaft
-    A = np.array(
-        [
-            [-(s.c + s.b_M) / s.J_M, s.c / s.J_M, -s.k / s.J_M],
-            [s.c / s.J_L, -(s.c + s.b_L) / s.J_L, s.k / s.J_L],
-            [1.0, -1.0, 0.0],
-        ]
-    )
-    B = np.array([[1.0 / s.J_M, 0.0], [0.0, -1.0 / s.J_L], [0.0, 0.0]])
-    F, G, *_ = cont2discrete((A, B, np.eye(3), np.zeros((3, 2))), PERIOD_S)
+    line = Line(k=shaft.k, J_L=shaft.J_L, J_M=shaft.J_M, c=shaft.c, b_motor=shaft.b_M, b_load=shaft.b_L)
+    F, G = line.discrete(PERIOD_S)
     rng = np.random.default_rng(seed)
     prbs = Prbs(120.0, clock_divider=2)
     torque_nm = np.array([prbs.next() for _ in range(n)])

@@ -1,7 +1,5 @@
 """FMUs that crash, end their process, hang, fill the disk or lead elsewhere: each is named, and nothing is left."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import signal

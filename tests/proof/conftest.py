@@ -1,7 +1,5 @@
 """Recordings that are short, for tests of what is done with a recording and not of what is in it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 

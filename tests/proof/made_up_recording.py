@@ -1,7 +1,5 @@
 """A small made-up recording in a folder of its own, as a real one would be: a mass with drag under a known load."""
 
-from __future__ import annotations
-
 import hashlib
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """What is hidden in a set: the same for the same seed, every group among many; the pairs."""
 
-from __future__ import annotations
-
 from collections import Counter
 
 import pytest

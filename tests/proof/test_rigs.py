@@ -1,9 +1,9 @@
 """Sealed rigs driven by the public command: what is written, judged and kept; the driving itself is a stand-in here."""
 
-from __future__ import annotations
-
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,7 @@ from hil.errors import UsageError
 from hil.proof import rigs
 from hil.proof.command import CommandFailed
 from hil.proof.rigs import RESULTS, WIRED, run_wire
+from hil.proof.sealed_rig import Challenge, draw_challenge
 from hil.simulator.fault_table import rig_faults
 
 SEED = 7
@@ -58,6 +59,33 @@ class Tool:
         }
 
 
+@dataclass(frozen=True)
+class Sealed:
+    """A sealed rig that nobody drives; the one in its own process takes seconds to start."""
+
+    challenge: Challenge
+    bus: str = "ws://127.0.0.1:1/"
+    modbus: str = "127.0.0.1:1"
+
+    @property
+    def commitment(self) -> str:
+        return self.challenge.seal.commitment
+
+    def open(self) -> object:
+        return json.loads(json.dumps(self.challenge.seal.opened()))
+
+
+@contextmanager
+def sealed_here(*arguments: str) -> Iterator[Sealed]:
+    options = dict(zip(arguments[::2], arguments[1::2], strict=True))
+    yield Sealed(draw_challenge(int(options["--seed"]), options["--effect"]))
+
+
+@pytest.fixture
+def without_processes(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(rigs, "sealed_process", sealed_here)
+
+
 def use(monkeypatch: pytest.MonkeyPatch, tool: Tool) -> Tool:
     monkeypatch.setattr(rigs, "run_hil", tool)
     return tool
@@ -81,6 +109,7 @@ def test_the_tool_gets_addresses_and_nominal_model_and_is_judged_by_the_opened_s
     assert json.loads((tmp_path / RESULTS).read_text())["rigs"] == [row]
 
 
+@pytest.mark.usefixtures("without_processes")
 def test_a_fault_of_a_device_is_judged_by_what_it_is_to_a_diagnosis(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
@@ -92,6 +121,7 @@ def test_a_fault_of_a_device_is_judged_by_what_it_is_to_a_diagnosis(
     assert (row["outcome"], row["success"]) == ("wrong", False)
 
 
+@pytest.mark.usefixtures("without_processes")
 def test_a_vehicle_that_must_not_be_driven_is_right_when_it_is_refused_for_that_reason(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
@@ -104,6 +134,7 @@ def test_a_vehicle_that_must_not_be_driven_is_right_when_it_is_refused_for_that_
     assert (row["outcome"], row["success"]) == ("drove all the same", False)
 
 
+@pytest.mark.usefixtures("without_processes")
 def test_rigs_that_were_driven_are_not_driven_again_but_those_that_failed_are(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:

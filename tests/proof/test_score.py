@@ -48,6 +48,7 @@ def _scored(name, answer, **events):
         ("backlash", _answer("no_mismatch"), "missed", False),
         ("speed_filter", _answer("explained", _entry("actuator_lag", alike=["speed_filter"])), ALIKE, True),
         ("backlash+road_grade", _answer("explained", _entry("backlash")), "incomplete", False),
+        ("backlash", _answer("explained", _entry("backlash"), _entry("road_grade", "load")), "false_claim", False),
         ("none", _answer("no_mismatch"), "right", True),
         ("off", _answer("explained", _entry("backlash")), "invented", False),
         ("speed_stiffened_shaft", _answer("unexplained"), "abstained", True),
@@ -138,3 +139,9 @@ def test_a_size_without_counterpart_in_this_draw_is_not_compared():
     )
     found = _entry("torque_derating", depth={"value": 0.1, "ci95": [0.0, 0.2], "unit": ""})
     assert compare(_answer("explained", found).diagnosis, _truth("torque_derating", seed)) == []
+
+
+@pytest.mark.parametrize("interval", [None, [None, None]])
+def test_without_an_interval_nothing_is_said_of_it(interval):
+    answer = _answer("no_mismatch", J_M={"value": 1.6, "ci95": interval, "unit": ""})
+    assert [size.inside for size in compare(answer.diagnosis, _truth("none")) if size.what == "J_M"] == [None]

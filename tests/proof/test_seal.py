@@ -9,12 +9,7 @@ import pytest
 from hil.errors import UsageError
 from hil.proof.seal import Seal, SealBroken, canonical_json, lock, new_key, parse_key, seal, unlock, verify
 
-TRUTH = {
-    "effect": "backlash",
-    "seed": 7,
-    "hidden": {"gap_rad": 0.021478117909797107},
-    "windows": [None, [1.5, 2]],
-}
+TRUTH = {"effect": "backlash", "seed": 7, "hidden": {"gap_rad": 0.021478117909797107}, "windows": [None, [1.5, 2]]}
 
 
 @pytest.fixture

@@ -1,7 +1,5 @@
 """A set of cases may be someone else's: no name in it leads out of its folder, and nothing there is deleted."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

@@ -80,16 +80,8 @@ def test_a_rig_that_has_gone_is_named():
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (
-            ("--seed", "5", "--effect", "rust"),
-            "status 2; it said: error: effect 'rust': expected one of none",
-        ),
-        (("--seed", "-5"), "status 2; it said: error: seed: expected 0 or greater, got -5"),
-        (("--seed", "5", "--rig", "nowhere.toml"), "status 2; it said: error: nowhere.toml"),
-        (
-            ("--seed", "5", "--bus", "ws://192.0.2.1:0/"),
-            "status 2; it said: error: address 'ws://192.0.2.1:0/'",
-        ),
+        (("--seed", "5", "--effect", "rust"), "status 2; it said: error: effect 'rust': expected one of none"),
+        (("--seed", "5", "--bus", "ws://192.0.2.1:0/"), "status 2; it said: error: address 'ws://192.0.2.1:0/'"),
     ],
 )
 def test_a_rig_that_does_not_come_up_says_why(arguments, said):
@@ -97,15 +89,7 @@ def test_a_rig_that_does_not_come_up_says_why(arguments, said):
         pass
 
 
-def test_something_else_than_a_ready_line_is_refused():
-    with (
-        pytest.raises(RunAborted, match=r"expected 'ready bus=\.\.\..*', got 'usage: "),
-        sealed_process("--help"),
-    ):
-        pass
-
-
-@pytest.mark.parametrize("end", [signal.SIGINT, signal.SIGTERM, None])
+@pytest.mark.parametrize("end", [pytest.param(signal.SIGINT, marks=pytest.mark.campaign), signal.SIGTERM, None])
 def test_it_ends_cleanly_by_signal_and_by_the_end_of_its_input(end):
     process = subprocess.Popen(
         [sys.executable, "-m", "hil.proof.sealed_rig", "--seed", "1"],

@@ -1,7 +1,5 @@
 """A set of cases from the making to the scoreboard, and everything that may be tampered with on the way."""
 
-from __future__ import annotations
-
 import json
 import re
 import shutil

@@ -1,7 +1,5 @@
 """Real recordings lie outside the project; where they are absent their tests are skipped and say so."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

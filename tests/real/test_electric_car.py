@@ -4,8 +4,6 @@ The mass is within what J. Steinstraeter, J. Buberger and D. Trifonov's trips ("
 Cycles", IEEE DataPort 2020) gave in an own one-mass identification over 60 trips, about 1600 kg.
 """
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

@@ -5,8 +5,6 @@ Nonlinear System Identification Benchmarks, 2019; it appears here alone. Toleran
 requirement's.
 """
 
-from __future__ import annotations
-
 import csv
 import json
 from pathlib import Path
@@ -87,10 +85,3 @@ def test_augmented_model_simulates_the_recording(out: Path, emps: Path, tmp_path
     measured = loadmat(emps)["qm"].ravel()
     assert simulated.shape == measured.shape
     assert float(np.sqrt(np.mean((simulated - measured) ** 2))) <= 2.6e-3
-
-
-def test_with_friction_in_the_model_no_name_is_given(emps: Path, tmp_path: Path) -> None:
-    """Nor is the torque that goes with the motor's angle taken for an effect of the catalogue."""
-    model = Path(__file__).parents[2] / "hil" / "proof" / "recordings" / "emps_complete" / "model.toml"
-    assert run(["diagnose", str(emps), "--model", str(model), "--out", str(tmp_path)]) == 0
-    assert json.loads((tmp_path / "diagnosis.json").read_text())["effects"] == []

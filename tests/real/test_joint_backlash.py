@@ -7,8 +7,6 @@ frequencies and an earthquake are not. The NRMSE is the RMS error over the stand
 The bounds below were set with results in view; they guard against getting worse and prove no more.
 """
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any
@@ -21,6 +19,8 @@ from hil.cli.main import run
 from hil.config.model_file import ModelFile, read_model
 from hil.recording import read_record
 from tests.real.conftest import real_recording
+
+pytestmark = pytest.mark.campaign  # two recordings are fitted, four held out: minutes
 
 MODEL = Path(__file__).parents[2] / "examples" / "joint.toml"
 

@@ -4,8 +4,6 @@ Figures are the requirement's or hold what was measured against getting worse (d
 test says which.
 """
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

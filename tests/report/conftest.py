@@ -1,7 +1,5 @@
 """A diagnosis with every field filled, made by hand: the report is judged, not the diagnosis."""
 
-from __future__ import annotations
-
 import base64
 import gzip
 import re
@@ -163,8 +161,7 @@ def diagnosis() -> Diagnosis:
         load_torque={"run_1": Estimated(58.3, (57.9, 58.7), "Nm")},
         timing_s={"total": 4.2},
         augmented=DrivelineModel(
-            Structure.TWO_MASS,
-            {name: Parameter(1.0, 0.2) for name in Structure.TWO_MASS.parameter_names},
+            Structure.TWO_MASS, {name: Parameter(1.0, 0.2) for name in Structure.TWO_MASS.parameter_names}
         ),
         traces=(trace("run_1", False, 1), trace("run_2", False, 2), trace("unseen", True, 3)),
         warnings=("run_2 has 60 samples missing",),

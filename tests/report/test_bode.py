@@ -1,7 +1,5 @@
 """Bode plots: the band of a fitted model is that of its parameters, and no phase crosses the figure."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

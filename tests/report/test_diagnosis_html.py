@@ -1,7 +1,5 @@
 """report.html: complete, self-contained, escaped, and of a size a mail takes."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from html.parser import HTMLParser
 

@@ -1,7 +1,5 @@
 """diagnosis.json: the contract's keys, numbers kept, nothing JSON does not have."""
 
-from __future__ import annotations
-
 import json
 import math
 from dataclasses import replace
@@ -72,12 +70,7 @@ def test_where_the_mismatch_is_and_what_it_was_found_to_be_is_written(diagnosis:
         "alternatives": {},
         "share": 0.94,
         "probability": 0.999,
-        "evidence": {
-            "delta_bic": 5321.0,
-            "holdout_rms_before": 0.41,
-            "holdout_rms_after": 0.052,
-            "p_value": 1e-12,
-        },
+        "evidence": {"delta_bic": 5321.0, "holdout_rms_before": 0.41, "holdout_rms_after": 0.052, "p_value": 1e-12},
     }
 
 
@@ -99,12 +92,7 @@ def test_what_was_not_found_and_how_well_it_fits_is_written(diagnosis: Diagnosis
         "noise_floor": 0.0502,
         "outputs": [],
     }
-    assert content["parameters"]["b_L"] == {
-        "nominal": 0.9,
-        "value": 0.92,
-        "ci95": [0.8, None],
-        "unit": "Nm s/rad",
-    }
+    assert content["parameters"]["b_L"] == {"nominal": 0.9, "value": 0.92, "ci95": [0.8, None], "unit": "Nm s/rad"}
 
 
 def test_remainder_and_traces_are_given_where_they_are_known(diagnosis: Diagnosis) -> None:

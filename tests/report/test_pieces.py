@@ -1,8 +1,5 @@
 """The pieces reports are made of: numbers, thinned traces, terminal summaries, folders of results."""
 
-from __future__ import annotations
-
-import json
 from pathlib import Path
 
 import numpy as np
@@ -13,15 +10,13 @@ from hypothesis.extra import numpy as st_numpy
 from rich.console import Console, RenderableType
 
 from estimator.diagnosis.result import Diagnosis
-from estimator.physics.catalogue import EFFECTS
 from estimator.physics.model import Motion
 from estimator.signals.record import OutputKind
 from hil.errors import UsageError
-from hil.report.catalogue import catalogue_table, effect_details, entries_text, select
 from hil.report.diagnosis_html import diagnosis_summary
 from hil.report.figures import LONGEST_STRETCHES, extremes, input_lines, stretches_for
 from hil.report.numbers import listed, p_statement, shown, shown_interval, shown_p, shown_ratio
-from hil.report.outputs import publish, require_folder
+from hil.report.outputs import publish
 from hil.report.page import table
 from hil.report.wording import simulated_column
 
@@ -53,8 +48,7 @@ def test_numbers_carry_their_unit_only_where_there_is_one() -> None:
 
 
 @given(
-    st_numpy.arrays(np.float64, st.integers(1, 400), elements=st.floats(-1e6, 1e6) | st.just(NAN)),
-    st.integers(1, 50),
+    st_numpy.arrays(np.float64, st.integers(1, 400), elements=st.floats(-1e6, 1e6) | st.just(NAN)), st.integers(1, 50)
 )
 def test_a_thinned_trace_keeps_ends_order_and_extremes(y: np.ndarray, stretches: int) -> None:
     kept = extremes(y, stretches)
@@ -114,30 +108,6 @@ def test_the_terminal_tells_the_verdict_and_what_it_rests_on(diagnosis: Diagnosi
     assert [part for part in expected if part not in text] == []
 
 
-def test_the_catalogue_lists_every_entry() -> None:
-    text = rendered(catalogue_table(select(None)))
-    assert [name for name in EFFECTS if name not in text] == []
-
-
-@pytest.mark.parametrize("name", EFFECTS)
-def test_an_entry_tells_law_parameters_excitation_and_rivals(name: str) -> None:
-    entry = EFFECTS[name]
-    text = " ".join(rendered(effect_details(select(name)[0]), width=400).split())
-    expected = [entry.law, entry.excited_by, *entry.resembles, *(p.name for p in entry.parameters)]
-    assert [part for part in expected if part not in text] == []
-    content = json.loads(entries_text([entry]))["effects"][0]
-    assert content["name"] == name
-    assert content["element"] == entry.element.value
-    assert list(content["parameters"]) == [p.name for p in entry.parameters]
-
-
-@pytest.mark.parametrize(("name", "hint"), [("backlsh", "Did you mean backlash?"), ("x", "hil effects")])
-def test_an_effect_that_does_not_exist_is_refused(name: str, hint: str) -> None:
-    with pytest.raises(UsageError, match="expected one of") as refusal:
-        select(name)
-    assert hint in str(refusal.value)
-
-
 def test_results_appear_together_and_replace_older_ones(tmp_path: Path) -> None:
     folder = tmp_path / "deep" / "result"
     for text in ("old", "new"):
@@ -161,18 +131,6 @@ def test_a_folder_made_for_a_result_that_fails_is_not_left_behind(tmp_path: Path
     with pytest.raises(UsageError, match="Is a directory"):
         publish(tmp_path / "new", {"a.txt": lambda path: tmp_path.read_bytes()})
     assert not list(tmp_path.iterdir())
-
-
-@pytest.mark.parametrize("name", ["file", "file/deeper"])
-def test_a_file_is_no_folder_for_results(tmp_path: Path, name: str) -> None:
-    (tmp_path / "file").touch()
-    with pytest.raises(UsageError, match="which is a file"):
-        require_folder(tmp_path / name)
-
-
-def test_a_read_only_folder_is_refused() -> None:
-    with pytest.raises(UsageError, match="expected a folder to write into, got: "):
-        require_folder(Path("/proc/1/result"))
 
 
 @pytest.mark.parametrize(

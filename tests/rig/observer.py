@@ -1,7 +1,5 @@
 """A third node on the bus that asks the drives themselves, by plain SDO uploads (CiA 301, 7.2.4.3)."""
 
-from __future__ import annotations
-
 import queue
 
 from drivers.canopen.can_link import CanLink

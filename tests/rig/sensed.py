@@ -1,7 +1,5 @@
 """A rig file with further channels: two objects of a drive's second and third TPDO, and a register of the PLC."""
 
-from __future__ import annotations
-
 import re
 import uuid
 from collections.abc import Iterator

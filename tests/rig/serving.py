@@ -1,7 +1,5 @@
 """A small rig for tests: the example's, with short experiments, a light vehicle and no noise."""
 
-from __future__ import annotations
-
 import uuid
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -74,10 +72,7 @@ class Samples:
 
 @contextmanager
 def served(
-    rig: Rig | None = None,
-    faults: RigFaults | None = None,
-    plc: PlcDevice | None = None,
-    bus_url: str | None = None,
+    rig: Rig | None = None, faults: RigFaults | None = None, plc: PlcDevice | None = None, bus_url: str | None = None
 ) -> Iterator[tuple[RigServer, Rig]]:
     """Serve a rig from this process; yields the server, and the rig at the server's addresses."""
     rig = rig or small_rig()
@@ -86,6 +81,11 @@ def served(
     server.plc = plc or server.plc
     with server:
         yield server, with_addresses(rig, server.bus_url, str(server.modbus))
+
+
+def addresses(server: RigServer) -> tuple[str, ...]:
+    """Options with which a command finds a rig that is served here."""
+    return ("--bus", server.bus_url, "--modbus", str(server.modbus))
 
 
 def fast(rig: Rig, answer_timeout_s: float = 2.0) -> FreePacer:

@@ -1,7 +1,5 @@
 """What a drive lacks is accepted by a person, wherever a real drive may be on the bus."""
 
-from __future__ import annotations
-
 import pytest
 
 from drivers.inverter.settings import Acceptance

@@ -1,7 +1,5 @@
 """The served CAN bus takes its own host and no stranger: no browser's page, no path of the disk, no endless frame."""
 
-from __future__ import annotations
-
 import base64
 import json
 import os
@@ -218,7 +216,7 @@ def test_a_handshake_has_one_deadline_however_slowly_it_is_sent(
     assert took_s < 5.0
 
 
-@pytest.mark.parametrize("count", [20, MOST_WAITING + 10])
+@pytest.mark.parametrize("count", [20, pytest.param(MOST_WAITING + 10, marks=pytest.mark.campaign)])
 def test_connections_without_the_token_keep_no_host_out(bridge: CanBridge, slave: can.BusABC, count: int) -> None:
     waiting = [slow(bridge, named=False) for _ in range(count)]
     over = threading.Event()

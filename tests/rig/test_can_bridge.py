@@ -1,7 +1,5 @@
 """The bridge carries frames between two processes' worth of buses, and leaves nothing behind."""
 
-from __future__ import annotations
-
 import socket
 import struct
 import threading

@@ -1,7 +1,5 @@
 """The base torque after missing cycles: no faster than the guard lets it, and as planned as soon as it can be."""
 
-from __future__ import annotations
-
 from hil.rig.catch_up import CatchUp
 
 MOST_NM = 20.0

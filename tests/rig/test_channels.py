@@ -1,7 +1,5 @@
 """Further channels of a rig file: mapped, read, recorded and checked over the real protocols."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """One exchange with both inverters: lost answers are flagged samples, and too many of them end the run."""
 
-from __future__ import annotations
-
 import math
 import threading
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """However it is shared, the total is what was asked for."""
 
-from __future__ import annotations
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st

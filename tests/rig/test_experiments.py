@@ -1,7 +1,5 @@
 """Every kind of experiment on a vehicle of one inertia: speed reached, torque bounded, ended at zero."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Every single thing that speaks against driving is named, and nothing else."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest

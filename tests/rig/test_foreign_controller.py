@@ -1,7 +1,5 @@
 """Somebody else on the bus who commands the drives: noticed within two cycles, named, and the run is over."""
 
-from __future__ import annotations
-
 import pytest
 
 from drivers.canopen.can_link import CanLink
@@ -22,7 +20,7 @@ FRAMES = {
 }
 
 
-@pytest.mark.parametrize("which", FRAMES)
+@pytest.mark.parametrize("which", ["an RPDO", "SDO"])
 def test_a_frame_only_this_host_sends_ends_the_run(which: str) -> None:
     cob_id, data, named = FRAMES[which]
     samples = Samples()

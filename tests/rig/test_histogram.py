@@ -1,7 +1,5 @@
 """Bounded histograms of times: quantiles from above, by a known part, and the longest time exactly."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Listening: live values from drives that stay disarmed, whoever is missing."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """What a run estimates while it drives is what its recording says afterwards; and it stays out of the cycle's way."""
 
-from __future__ import annotations
-
 import json
 import math
 from dataclasses import replace

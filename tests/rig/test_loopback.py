@@ -1,7 +1,5 @@
 """Only this machine's own addresses are served at."""
 
-from __future__ import annotations
-
 import pytest
 
 from hil.errors import UsageError

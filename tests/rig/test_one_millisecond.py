@@ -1,7 +1,5 @@
 """The cycle at 1 ms: the same logic, on the wall clock and without it. No time is judged."""
 
-from __future__ import annotations
-
 from hil.config.rig_file import Rig
 from hil.rig.pacing import RealTimePacer, period_ns
 from tests.rig.serving import Samples, changed, fast, run_once, served, small_rig

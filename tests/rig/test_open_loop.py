@@ -1,7 +1,5 @@
 """Experiments without a speed controller: pulses that bring the vehicle back, and rest."""
 
-from __future__ import annotations
-
 import pytest
 
 from hil.config.rig_file import read_rig

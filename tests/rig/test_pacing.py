@@ -1,7 +1,5 @@
 """The two clocks of a run, and what both promise."""
 
-from __future__ import annotations
-
 import itertools
 import time
 

@@ -1,7 +1,5 @@
 """Plans from the rig file, and what a dry run says of them."""
 
-from __future__ import annotations
-
 import pytest
 
 from drivers.errors import CommandRefused

@@ -1,7 +1,5 @@
 """The PLC's limits in words; what is beyond three times the drives' own is refused, whatever made it so."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from pathlib import Path
@@ -58,7 +56,7 @@ def test_check_prints_the_limits_and_refuses_one_ten_times_too_high() -> None:
         assert "rad/s" in plc.questions[1]
 
 
-@pytest.mark.parametrize("torque_nm", [450.0, 4500.0])
+@pytest.mark.parametrize("torque_nm", [pytest.param(450.0, marks=pytest.mark.campaign), 4500.0])
 def test_commissioning_asks_before_any_torque(torque_nm: float, tmp_path: Path) -> None:
     with bench(tmp_path) as rig:
         rig.server.plc._setup = PlcSetup(torque_limit_nm=torque_nm)

@@ -1,7 +1,5 @@
 """Runs whose PRBS the PLC makes: in the measured part, inside the guard's limits, off on every way out."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

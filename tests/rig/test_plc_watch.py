@@ -1,7 +1,5 @@
 """The PLC as the cycle sees it: polled next to it, aged in its time, judged in every cycle."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 

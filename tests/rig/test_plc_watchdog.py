@@ -1,7 +1,5 @@
 """A PLC that watches its host: after one that died, the next one beats first and is let in."""
 
-from __future__ import annotations
-
 import asyncio
 
 import pytest
@@ -66,8 +64,5 @@ def count_of(server: RigServer) -> int:
 def test_a_beat_that_fails_meanwhile_ends_the_run_before_a_torque() -> None:
     with served() as (_, rig), open_devices(rig) as devices:
         devices.plc.close()
-        with (
-            HostBeat(devices.plc_loop, devices.plc) as beat,
-            pytest.raises(RunAborted, match="host's beats, got: PLC"),
-        ):
+        with HostBeat(devices.plc_loop, devices.plc) as beat, pytest.raises(RunAborted, match="host's beats, got: PLC"):
             beat.hand_over()

@@ -1,7 +1,5 @@
 """``check_rig`` with the proof: both drives, one after the other, and nothing stays armed."""
 
-from __future__ import annotations
-
 import pytest
 
 from hil.rig.check import Verdict, check_rig

@@ -1,7 +1,5 @@
 """Real-time scheduling and memory lock: given and given back, or refused with reason and cure."""
 
-from __future__ import annotations
-
 import gc
 import os
 import sys

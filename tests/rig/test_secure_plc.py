@@ -1,7 +1,5 @@
 """A whole rig whose PLC speaks Modbus/TCP Security: checked and driven as far as the host's role allows."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path

@@ -1,53 +1,65 @@
 """Whole runs on the real protocol stacks: what is recorded when nothing goes wrong."""
 
-from __future__ import annotations
-
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pytest
 
 from drivers.plc.plc import GENERATOR_OFF
 from estimator.signals.prbs import prbs_nm
-from hil.config.rig_file import PrbsTarget
+from hil.config.rig_file import PrbsTarget, Rig
 from hil.rig.build import open_devices
 from hil.rig.experiments.base import Phase
 from hil.rig.pacing import RealTimePacer, period_ns
 from hil.sample import SampleFlag
 from tests.rig.observer import assert_disarmed
-from tests.rig.serving import (
-    DRAG_NM_S,
-    DURATION_S,
-    INERTIA_KG_M2,
-    Samples,
-    changed,
-    run,
-    run_once,
-    served,
-    small_rig,
-)
+from tests.rig.serving import DRAG_NM_S, DURATION_S, INERTIA_KG_M2, Samples, changed, run, run_once, served, small_rig
 
 HALF_COUNT_NM = 0.5 * 600.0 / 1000.0
 """Half of an inverter's torque count: 0.1 % of 600 Nm."""
 
 
-@pytest.mark.parametrize("experiment", ["cruise", "reversal"])
-def test_records_the_measured_part_and_leaves_the_drives_disarmed(experiment: str) -> None:
-    samples = Samples()
+@dataclass
+class Cruise:
+    """One run that several tests look at."""
+
+    rig: Rig
+    samples: Samples = field(default_factory=Samples)
+    phases: list[Phase] = field(default_factory=list)
+    plc: dict[str, object] = field(default_factory=dict)
+
+
+@pytest.fixture(scope="module")
+def cruise() -> Cruise:
+    """Drive a cruise, with the PLC's generator on before it."""
     with served() as (server, rig):
-        summary = run_once(rig, samples, experiment=experiment)
+        made = Cruise(rig)
+        server.plc.write({"prbs_enable": True, "prbs_source": "plc", "prbs_amplitude": 50.0})
+        summary = run_once(rig, made.samples, progress=lambda phase, time_s: made.phases.append(phase))
         assert_disarmed(server.bus_url, 1, 2)
-    assert len(samples.rows) == summary.recorded == round(DURATION_S / rig.period_s)
+        made.plc.update(server.plc.values())
+    assert len(made.samples.rows) == summary.recorded
     assert summary.flagged == 0
+    return made
+
+
+def test_records_the_measured_part(cruise: Cruise) -> None:
+    samples = cruise.samples
+    assert len(samples.rows) == round(DURATION_S / cruise.rig.period_s)
     assert samples.column("time_s") == [k / 100 for k in range(100)]
     assert set(samples.column("flags")) == {SampleFlag.GOOD}
     assert set(samples.column("age_ns")) == {0}
+    assert list(dict.fromkeys(cruise.phases)) == [Phase.APPROACH, Phase.MEASURE, Phase.RELEASE, Phase.DONE]
+    assert cruise.phases.count(Phase.MEASURE) == 100
 
 
-def test_row_holds_the_torque_that_acts_from_its_time_on() -> None:
-    samples = Samples()
-    with served() as (_, rig):
-        run_once(rig, samples)
+def test_plc_generator_is_switched_off_before_a_run(cruise: Cruise) -> None:
+    assert cruise.plc["prbs_enable"] is False
+    assert cruise.plc["prbs_source"] == GENERATOR_OFF.source.value
+
+
+def test_row_holds_the_torque_that_acts_from_its_time_on(cruise: Cruise) -> None:
+    samples = cruise.samples
     for inverter in ("m1", "m2"):
         wanted = np.array(samples.column(f"torque_ref_{inverter}_nm"))
         given = np.array(samples.column(f"torque_{inverter}_nm"))
@@ -55,17 +67,14 @@ def test_row_holds_the_torque_that_acts_from_its_time_on() -> None:
         assert np.abs(given - wanted).max() <= 2 * HALF_COUNT_NM + 1e-9
     torque = np.array(samples.column("torque_m1_nm")) + np.array(samples.column("torque_m2_nm"))
     speed = np.array(samples.column("speed_rad_s"))
-    step = rig.period_s * (torque - DRAG_NM_S * speed) / INERTIA_KG_M2
+    step = cruise.rig.period_s * (torque - DRAG_NM_S * speed) / INERTIA_KG_M2
     assert np.diff(speed) == pytest.approx(step[:-1], abs=1e-3)
 
 
-def test_prbs_is_the_one_of_the_rig_file() -> None:
-    samples = Samples()
-    with served() as (_, rig):
-        run_once(rig, samples)
-    table = rig.prbs
-    expected = prbs_nm(len(samples.rows), table.amplitude_nm, table.cells, table.clock_divider, table.seed)
-    assert samples.column("prbs_nm") == expected.tolist()
+def test_prbs_is_the_one_of_the_rig_file(cruise: Cruise) -> None:
+    table = cruise.rig.prbs
+    expected = prbs_nm(100, table.amplitude_nm, table.cells, table.clock_divider, table.seed)
+    assert cruise.samples.column("prbs_nm") == expected.tolist()
 
 
 @pytest.mark.parametrize(("target", "carrier"), [(PrbsTarget.M1, "torque_m1_nm"), (PrbsTarget.M2, "torque_m2_nm")])
@@ -99,23 +108,6 @@ def test_two_runs_on_the_same_opened_rig() -> None:
         run(rig, devices, second, experiment="reversal")
         assert_disarmed(server.bus_url, 1, 2)
     assert len(first.rows) == len(second.rows) == 100
-
-
-def test_plc_generator_is_switched_off_before_a_run() -> None:
-    with served() as (server, rig):
-        server.plc.write({"prbs_enable": True, "prbs_source": "plc", "prbs_amplitude": 50.0})
-        run_once(rig, Samples())
-        values = server.plc.values()
-    assert values["prbs_enable"] is False
-    assert values["prbs_source"] == GENERATOR_OFF.source.value
-
-
-def test_progress_sees_every_phase_in_order() -> None:
-    seen: list[Phase] = []
-    with served() as (_, rig):
-        run_once(rig, Samples(), progress=lambda phase, time_s: seen.append(phase))
-    assert list(dict.fromkeys(seen)) == [Phase.APPROACH, Phase.MEASURE, Phase.RELEASE, Phase.DONE]
-    assert seen.count(Phase.MEASURE) == 100
 
 
 def test_real_time_takes_the_same_path() -> None:

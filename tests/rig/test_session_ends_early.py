@@ -1,19 +1,17 @@
 """Runs that something ends: the reason is named, the drives are disarmed, what was recorded stays."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import pytest
 
-from drivers.errors import BusDown, CommandRefused, ConfigMismatch, DeviceFault, DeviceTimeout, DriverError
+from drivers.errors import CommandRefused, DeviceTimeout
 from drivers.plc.types import DriveMode
 from hil.errors import RunAborted
 from hil.rig.build import open_devices
 from hil.rig.drive import Progress
 from hil.rig.experiments.base import Phase
 from hil.rig.stop import StopRequest
-from hil.simulator.faults import FaultAtStep, InverterFaults, RigFaults
+from hil.simulator.faults import InverterFaults, RigFaults
 from hil.simulator.plc_device import PlcDevice, PlcSetup
 from hil.simulator.rig_server import RigServer
 from tests.rig.observer import assert_disarmed
@@ -41,37 +39,6 @@ def withdraw_permissive(server: RigServer) -> None:
     server.plc.withdraw_permissive()
 
 
-def go_electric(server: RigServer) -> None:
-    server.plc.write({"drive_mode_request": "electric"})
-
-
-def go_parallel(server: RigServer) -> None:
-    server.plc.write({"drive_mode_request": "parallel"})
-
-
-def hang_plc(server: RigServer) -> None:
-    server.plc_server.pause()
-
-
-@pytest.mark.parametrize(
-    ("happens", "named"),
-    [
-        (close_clutch, "clutch is closed, expected open"),
-        (withdraw_permissive, "permissive is withdrawn, expected present"),
-        (go_electric, "drive mode is electric, expected series as at the start"),
-        (go_parallel, "drive mode is parallel, expected series or electric; clutch is closed"),
-        (hang_plc, "PLC"),
-    ],
-)
-def test_vehicle_that_is_no_longer_fit_ends_the_run(happens: Callable[[RigServer], None], named: str) -> None:
-    samples = Samples()
-    with served() as (server, rig):
-        with pytest.raises(RunAborted, match=named):
-            run_once(rig, samples, progress=in_the_middle(lambda: happens(server)))
-        assert_disarmed(server.bus_url, 1, 2)
-    assert 50 < len(samples.rows) < 100
-
-
 def test_vehicle_faster_than_the_plc_permits_ends_the_run() -> None:
     slow = PlcDevice(PlcSetup(speed_limit_rad_s=0.1))
     with served(plc=slow) as (server, rig):
@@ -96,7 +63,7 @@ def test_vehicle_that_is_not_fit_is_not_armed(plc: PlcDevice, named: str) -> Non
     assert samples.rows == []
 
 
-@pytest.mark.parametrize(("hung", "other"), [("m1", 2), ("m2", 1)])
+@pytest.mark.parametrize(("hung", "other"), [("m1", 2), pytest.param("m2", 1, marks=pytest.mark.campaign)])
 def test_inverter_that_hangs_does_not_keep_the_other_armed(hung: str, other: int) -> None:
     samples = Samples()
     faults = RigFaults(**{hung: InverterFaults(hang_at_step=STEP_WITHIN)})
@@ -111,7 +78,7 @@ def test_inverter_that_hangs_does_not_keep_the_other_armed(hung: str, other: int
     assert [row.age_ns for row in stale] == [10_000_000 * (k + 1) for k in range(len(stale))]
 
 
-@pytest.mark.parametrize("deaf", ["m1", "m2"])
+@pytest.mark.parametrize("deaf", [pytest.param("m1", marks=pytest.mark.campaign), "m2"])
 def test_one_request_lost_at_the_end_is_made_again(deaf: str, monkeypatch: pytest.MonkeyPatch) -> None:
     samples, lost = Samples(), []
     with served() as (server, rig), open_devices(rig) as devices:
@@ -132,46 +99,6 @@ def test_one_request_lost_at_the_end_is_made_again(deaf: str, monkeypatch: pytes
         assert len(lost) > 1
         assert_disarmed(server.bus_url, 1, 2)
     assert len(samples.rows) == 100
-
-
-def test_inverter_that_faults_ends_the_run() -> None:
-    samples = Samples()
-    overcurrent = FaultAtStep(step=STEP_WITHIN, emcy_code=0x2310)
-    with served(faults=RigFaults(m2=InverterFaults(fault=overcurrent))) as (server, rig):
-        with pytest.raises(DeviceFault, match=r"inverter m2.*2310"):
-            run_once(rig, samples, experiment="reversal")
-        assert_disarmed(server.bus_url, 1)
-    assert 0 < len(samples.rows) < 100
-
-
-@pytest.mark.parametrize(
-    "faults",
-    [
-        InverterFaults(ignored_writes=frozenset({0x6060})),  # the mode does not come
-        InverterFaults(ignored_writes=frozenset({0x6040})),  # the state machine is stuck
-    ],
-)
-def test_error_in_the_middle_of_arming_disarms_what_was_armed(faults: InverterFaults) -> None:
-    with served(faults=RigFaults(m2=faults)) as (server, rig):
-        with pytest.raises(DriverError, match="inverter m2"):
-            run_once(rig, Samples())
-        assert_disarmed(server.bus_url, 1, 2)
-
-
-@pytest.mark.parametrize(
-    ("faults", "error"),
-    [
-        (InverterFaults(absent=True), DeviceTimeout),
-        (InverterFaults(identity=(1, 2)), ConfigMismatch),
-    ],
-)
-def test_inverter_that_is_not_the_one_is_refused_before_arming(
-    faults: InverterFaults, error: type[DriverError]
-) -> None:
-    with served(faults=RigFaults(m2=faults)) as (server, rig):
-        with pytest.raises(error, match="inverter m2"):
-            run_once(rig, Samples())
-        assert_disarmed(server.bus_url, 1)
 
 
 def test_stop_request_ends_the_run_and_keeps_the_samples() -> None:
@@ -223,17 +150,3 @@ def test_recorder_that_fails_disarms_too() -> None:
         with pytest.raises(OSError, match="No space left"):
             run_once(rig, FullDisk())
         assert_disarmed(server.bus_url, 1, 2)
-
-
-def test_bus_that_is_not_there() -> None:
-    with served() as (_, rig):
-        nowhere = changed(rig, {"can": {"url": "ws://127.0.0.1:9/"}})
-        with pytest.raises(BusDown, match="ws://127"), open_devices(nowhere):
-            pass
-
-
-def test_plc_that_is_not_there() -> None:
-    with served() as (_, rig):
-        nowhere = changed(rig, {"plc": {"port": 9}})
-        with pytest.raises(BusDown, match="PLC"), open_devices(nowhere):
-            pass

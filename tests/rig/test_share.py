@@ -1,7 +1,5 @@
 """The part of the base torque that inverter m1 gives: each experiment's own."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

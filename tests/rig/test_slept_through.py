@@ -1,7 +1,5 @@
 """Cycles the host was too late for: their rows are there, flagged, and time advances evenly."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import pytest

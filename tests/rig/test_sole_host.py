@@ -1,7 +1,5 @@
 """A second host on a bus listens first, names what it hears, and sends nothing; of two at once at most one drives."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
@@ -21,7 +19,7 @@ from hil.rig.check import check_rig
 from hil.rig.sole_host import listening_s, require_sole_host
 from hil.simulator.rig_server import RigServer
 from tests.rig.observer import power_state
-from tests.rig.serving import EXAMPLE, changed, served, small_rig
+from tests.rig.serving import EXAMPLE, addresses, changed, served, small_rig
 
 WS = "ws://127.0.0.1:0/"
 SENDS = {
@@ -68,8 +66,6 @@ def test_what_only_a_host_sends_is_refused_by_name(which: str) -> None:
     with served(bus_url=WS) as (server, rig), sending(server.bus_url, cob_id, data):
         with pytest.raises(ForeignController, match=named), open_devices(rig):
             pass
-        with pytest.raises(ForeignController, match=named):
-            check_rig(rig)
 
 
 def test_a_refused_host_has_sent_nothing() -> None:
@@ -139,7 +135,9 @@ def _hosts_at_once(url: str, rigs: list[Rig], delays_s: list[float]) -> list[str
     return ends
 
 
-@pytest.mark.parametrize("delay_s", [0.0, 0.01, 0.1, 0.3, 0.5])
+@pytest.mark.parametrize(
+    "delay_s", [0.0, 0.1, *(pytest.param(delay_s, marks=pytest.mark.campaign) for delay_s in (0.01, 0.3, 0.5))]
+)
 @pytest.mark.parametrize("kind", ["two runs", "a run and a monitor"])
 def test_two_hosts_started_at_once_do_not_both_drive(
     kind: str, delay_s: float, monkeypatch: pytest.MonkeyPatch
@@ -180,7 +178,6 @@ def test_listens_for_ten_periods_and_the_longest_heartbeat(
 )
 def test_commands_refuse_by_exit_status_3(line: list[str], tmp_path: Path, capsys: Any) -> None:
     with served(bus_url=WS) as (server, _), sending(server.bus_url, 0x77F, b"\x05"):
-        addresses = ["--bus", server.bus_url, "--modbus", str(server.modbus)]
-        words = [line[0], str(EXAMPLE), *(word.format(out=tmp_path / "out") for word in line[1:]), *addresses]
+        words = [line[0], str(EXAMPLE), *(word.format(out=tmp_path / "out") for word in line[1:]), *addresses(server)]
         assert command(words) == 3
     assert "heartbeat of a host, node 127" in capsys.readouterr().err

@@ -1,7 +1,5 @@
 """A signal is a request, read where the run wants to read it."""
 
-from __future__ import annotations
-
 import os
 import signal
 from collections.abc import Iterator

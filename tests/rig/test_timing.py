@@ -1,7 +1,5 @@
 """A run's timing record: what is counted, and that it is in the recording and the output however the run ends."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any
@@ -13,7 +11,7 @@ from hil.config.rig_file import read_rig
 from hil.recording.formats import read_table
 from hil.rig.pacing import Tick
 from hil.rig.timing import RunTiming, timing_lines
-from tests.rig.serving import EXAMPLE, served
+from tests.rig.serving import EXAMPLE, addresses, served
 
 MS = 1_000_000
 
@@ -86,7 +84,6 @@ def run_reversal(folder: Path, out: Path, capsys: pytest.CaptureFixture[str], *o
     file = folder / "rig.toml"
     file.write_text(text, encoding="utf-8")
     with served(read_rig(file)) as (server, _):
-        addresses = ("--bus", server.bus_url, "--modbus", str(server.modbus))
-        assert hil(["run", str(file), "reversal", "--out", str(out), "--json", *addresses, *options]) == 0
+        assert hil(["run", str(file), "reversal", "--out", str(out), "--json", *addresses(server), *options]) == 0
     document: dict[str, Any] = json.loads(capsys.readouterr().out)
     return document

@@ -1,7 +1,5 @@
 """A run's bus trace next to its samples, and the samples rebuilt from it: torque and speed the same to the bit."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Drives that give another torque than they are asked for, from some moment on or from the start: reported, ended."""
 
-from __future__ import annotations
-
 import pytest
 
 from drivers.errors import CommandRefused, WrongTorque
@@ -22,9 +20,6 @@ TOGETHER = "both inverters: torque actual value"
     ("faults", "named"),
     [
         (["m1.torque_gain@{}=2"], "inverter m1: torque actual value"),
-        (["m2.torque_gain@{}=0"], "inverter m2: torque actual value"),
-        (["m1.torque_gain@{}=-1"], "m1"),
-        (["m2.torque_offset@{}=100"], "inverter m2: torque actual value"),
         (["m1.torque_offset@{}=45", "m2.torque_offset@{}=45"], TOGETHER),
     ],
 )

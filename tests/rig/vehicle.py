@@ -1,7 +1,5 @@
 """A vehicle of one inertia, stepped by hand: enough to drive a plan without a rig."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 

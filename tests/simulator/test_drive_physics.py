@@ -1,7 +1,5 @@
 """Inside a simulated drive: limits and heat, its own clock, its list of errors."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from dataclasses import replace

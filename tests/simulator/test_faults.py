@@ -1,7 +1,5 @@
 """Faults as a person writes them, and drives that misbehave without a fault: each as a real one would."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

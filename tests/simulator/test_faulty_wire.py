@@ -1,7 +1,5 @@
 """The cable that mistreats frames: what leaves at one end against what arrives at the other."""
 
-from __future__ import annotations
-
 import time
 import uuid
 from collections.abc import Iterator

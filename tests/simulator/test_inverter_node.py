@@ -1,7 +1,5 @@
 """The simulated inverter on the bus: NMT, PDO configuration, EMCY, heartbeat, by frames."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import suppress
 
@@ -188,10 +186,6 @@ def test_heartbeat_follows_its_object_and_the_nmt_state(armed: Bench) -> None:
         node = armed.rig._m1
         assert node is not None
         assert node._producer is None
-
-
-def test_controlword_over_sdo_and_rpdo_is_one_object(armed: Bench) -> None:
-    assert objects(armed).upload(0x6040) == 0x000F
 
 
 @pytest.mark.parametrize("permille", [1001, 32767, -32768])

@@ -1,7 +1,5 @@
 """The simulated PLC's program, in simulated time and with nothing connected."""
 
-from __future__ import annotations
-
 import pytest
 
 from drivers.plc.register import Value

@@ -1,7 +1,5 @@
 """The simulated PLC on Modbus TCP: requests, roles, and answers that go wrong, to bare sockets and clients."""
 
-from __future__ import annotations
-
 import asyncio
 import re
 import socket
@@ -18,7 +16,6 @@ from drivers.plc.modbus_security import Credentials
 from drivers.plc.register import Access
 from drivers.plc.register_map import load_register_map
 from drivers.resources import data_file
-from hil.simulator.fault_table import known_faults, rig_faults
 from hil.simulator.faults import LATE_BY_S, PlcFaults
 from hil.simulator.plc_device import PlcDevice
 from hil.simulator.plc_server import PlcSecurity, PlcServer, serve_plc
@@ -51,12 +48,7 @@ def test_words_stand_where_the_shipped_map_says() -> None:
 
     async def conversation(client: AsyncModbusTcpClient) -> None:
         inputs = await client.read_input_registers(0, count=13)
-        assert inputs.registers[:4] == [
-            0x0048,
-            0x4944,
-            0x2024,
-            1,
-        ]  # vendor (high word first), device, version
+        assert inputs.registers[:4] == [0x0048, 0x4944, 0x2024, 1]  # vendor (high word first), device, version
         assert inputs.registers[4:6] == [1, 0]  # series, open
         assert inputs.registers[6:8] == [0x0000, 0x43A0]  # 320.0 as IEEE 754: 43A00000, low word first
         assert inputs.registers[8:11] == [4500, 3, 0]  # 450 Nm in steps of 0.1, PLC cycles, host count
@@ -191,10 +183,7 @@ def test_a_map_with_a_register_the_plc_does_not_know_is_refused() -> None:
 
 
 def test_a_paused_plc_keeps_the_connection_and_says_nothing() -> None:
-    with (
-        PlcServer(PlcDevice(), MAP) as server,
-        socket.create_connection((server.host, server.port)) as client,
-    ):
+    with PlcServer(PlcDevice(), MAP) as server, socket.create_connection((server.host, server.port)) as client:
         client.settimeout(0.1)
         server.pause()
         client.sendall(READ_PLC_COUNT)
@@ -245,23 +234,6 @@ READ_TWO = bytes.fromhex("0001 0000 0006 01 04 0002 0002")
 TWO = bytes.fromhex("0001 0000 0007 01 04 04 2024 0001")
 ONE = bytes.fromhex("0001 0000 0005 01 04 02 2024")
 DEVICE_FAILURE = bytes.fromhex("0001 0000 0003 01 84 04")
-
-
-@pytest.mark.parametrize(
-    ("name", "field"),
-    [
-        ("exception", "exceptions_at_s"),
-        ("slow", "late_at_s"),
-        ("half_answer", "half_at_s"),
-        ("reset", "resets_at_s"),
-        ("wrong_width", "too_few_at_s"),
-        ("wrong_unit", "wrong_unit_at_s"),
-        ("wrong_transaction", "wrong_transaction_at_s"),
-    ],
-)
-def test_each_is_put_into_the_device_by_name(name: str, field: str) -> None:
-    assert f"{name}@S" in known_faults()
-    assert rig_faults([f"plc.{name}@2.5"], 0.01).plc == PlcFaults(**{field: 2.5})
 
 
 def answer_of(faults: PlcFaults, timeout_s: float) -> bytes:

@@ -1,7 +1,5 @@
 """The simulated rig: order within a step, determinism, callbacks, and how it ends."""
 
-from __future__ import annotations
-
 import threading
 from dataclasses import replace
 
@@ -144,9 +142,3 @@ def test_defect_of_the_plant_stops_the_rig_and_is_raised_at_its_end() -> None:
         rig._link._thread.join(60.0)
     with pytest.raises(ZeroDivisionError, match="the plant is broken"):
         rig.close()
-
-
-def test_closing_twice_does_nothing() -> None:
-    rig = SimulatedRig(virtual_bus(new_channel()), RecordingPlant(), (SIMULATED_M1, SIMULATED_M2))
-    rig.close()
-    rig.close()

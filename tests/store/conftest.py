@@ -1,7 +1,5 @@
 """A folder of recordings that explain themselves."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Alarms of the on-line estimate in the store: one for each change, in the words of the run."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from pathlib import Path

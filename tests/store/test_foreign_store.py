@@ -1,7 +1,5 @@
 """A list of runs may be damaged or someone else's: no file of it leads out of its folder, none hides the others."""
 
-from __future__ import annotations
-
 import json
 import os
 import sqlite3

@@ -1,7 +1,5 @@
 """The store from the recordings alone: what is entered, what is found again, what is left out."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from collections.abc import Callable

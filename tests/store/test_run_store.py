@@ -1,7 +1,5 @@
 """What goes into the store comes out of it; what can't be is refused, and nothing is half there."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from pathlib import Path

@@ -3,8 +3,6 @@
 The bus and the object dictionary are all they have in common; the state machine of the library is its own.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 

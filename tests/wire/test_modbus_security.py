@@ -1,7 +1,5 @@
 """Modbus/TCP Security: our client and our simulated PLC, and each of them against OpenSSL's own programs."""
 
-from __future__ import annotations
-
 import asyncio
 import shutil
 import ssl

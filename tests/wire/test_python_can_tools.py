@@ -4,8 +4,6 @@ The bus URL of a SocketCAN interface goes to the same library; where the kernel 
 test gets.
 """
 
-from __future__ import annotations
-
 import fcntl
 import os
 import pty

@@ -1,7 +1,5 @@
 """A bus trace read by Wireshark's own CANopen dissector: nothing malformed, and every message taken for what it is."""
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 from collections import Counter

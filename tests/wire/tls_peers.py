@@ -1,7 +1,5 @@
 """Certificates made for a test, and peers that speak TLS with them."""
 
-from __future__ import annotations
-
 import ipaddress
 import os
 import select
@@ -116,10 +114,7 @@ def openssl_exchange(port: int, credentials: Credentials, request: bytes, *optio
     command = ["openssl", "s_client", "-connect", f"127.0.0.1:{port}", "-quiet", "-verify_return_error"]
     files = ["-CAfile", credentials.ca, "-cert", credentials.certificate, "-key", credentials.key]
     with subprocess.Popen(
-        [*command, *map(str, files), *options],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
+        [*command, *map(str, files), *options], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
     ) as client:
         try:
             assert client.stdin is not None

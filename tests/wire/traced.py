@@ -1,7 +1,5 @@
 """A run on the simulated rig with its bus traced."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

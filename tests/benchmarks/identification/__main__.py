@@ -10,8 +10,6 @@
 ``accuracy``, ``coverage``, ``truth``, ``paper``   the drivelines of the tests and of the proof (``rigs.py``)
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys

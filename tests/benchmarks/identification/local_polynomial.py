@@ -15,8 +15,6 @@ No window, hence the resolution of the whole stretch, and a noise variance free 
 is so sharp that segments blur it, or the recording is short.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from estimator.errors import NotExciting
@@ -64,11 +62,7 @@ def longest_stretch(okay: BoolArray) -> tuple[int, int]:
 
 
 def _estimate(
-    frequency_hz: FloatArray,
-    u: ComplexArray,
-    y: ComplexArray,
-    half_width: int,
-    degree: int,
+    frequency_hz: FloatArray, u: ComplexArray, y: ComplexArray, half_width: int, degree: int
 ) -> SpectralEstimate:
     """Fit around every line; near either end of the band the neighbours lie to one side."""
     n_lines, width = u.shape[0], 2 * half_width + 1

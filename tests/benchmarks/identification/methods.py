@@ -1,7 +1,5 @@
 """Methods that identify a bus: this project's as a user calls them, and other tools on the same arrays."""
 
-from __future__ import annotations
-
 import contextlib
 import importlib
 import importlib.util

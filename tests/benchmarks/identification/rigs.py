@@ -7,8 +7,6 @@
 ``paper``     coverage on the rig of ``hil paper``: both protocol stacks, a driver, a road, a payload; 30 s each
 """
 
-from __future__ import annotations
-
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
@@ -119,10 +117,7 @@ def estimates(truth: Truth) -> dict[str, tuple[Uncertain, float]]:
     if mode is None:
         nowhere = Uncertain(float("nan"), float("nan"))
         return {"resonance": (nowhere, truth.mode.frequency_hz), "damping": (nowhere, truth.mode.damping)}
-    modal = {
-        "resonance": (mode.frequency_hz, truth.mode.frequency_hz),
-        "damping": (mode.damping, truth.mode.damping),
-    }
+    modal = {"resonance": (mode.frequency_hz, truth.mode.frequency_hz), "damping": (mode.damping, truth.mode.damping)}
     try:
         found = physical_parameters(fit.model, fit.covariance)
     except BadModel:  # refused, and not counted: no interval is printed then

@@ -1,7 +1,5 @@
 """Every method on every bus, in so many processes; ten healthy recordings, whose models must pass their own test."""
 
-from __future__ import annotations
-
 import math
 import os
 import time

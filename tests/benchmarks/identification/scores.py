@@ -1,7 +1,5 @@
 """Errors of the methods over many buses, how often printed intervals held the truth, and the tables of it."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass

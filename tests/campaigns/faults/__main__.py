@@ -4,8 +4,6 @@ Prints a table, Markdown, of the worst time to zero torque for each fault; exits
 torque above a limit or left, a drive not disarmed, a recording damaged, a wrong cause.
 """
 
-from __future__ import annotations
-
 import random
 import sys
 import tempfile

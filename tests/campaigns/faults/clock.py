@@ -3,8 +3,6 @@
 libfaketime does the same, but its version 0.9.10 refuses the absolute monotonic sleeps of Python 3.11.
 """
 
-from __future__ import annotations
-
 import mmap
 import shutil
 import subprocess

@@ -1,7 +1,5 @@
 """A small disk of its own: a file system in a file, mounted, that can be filled, and frozen as one that stalls is."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import threading

@@ -4,8 +4,6 @@ A kind is a fault of the simulated devices, as ``hil sim --fault`` takes it, or 
 stalls, its disk is full, or somebody else sends on its bus.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 

@@ -7,8 +7,6 @@ changed, and the plant's own speed. A failure is a run that continues after the 
 a shaft that got faster than the experiment has it, or a drive that is not disarmed at the end.
 """
 
-from __future__ import annotations
-
 import re
 import struct
 import sys
@@ -144,10 +142,7 @@ OTHERS = ("node ids exchanged", "second host", "two hosts at once", "clock stepp
 KINDS = (*dict.fromkeys((*TO_DRIVE, *TO_HOST, *WITH_SYNC, *OTHERS)),)
 
 
-NAMED = {
-    "PLC registers exchanged": "PLC",
-    "two hosts at once": "somebody else|[Aa]nother host",
-}
+NAMED = {"PLC registers exchanged": "PLC", "two hosts at once": "somebody else|[Aa]nother host"}
 """What a message has to name, where that is no drive."""
 
 

@@ -7,8 +7,6 @@ bus takes the states of the drives until none can carry torque. Prints a table o
 A disk of its own has to be mounted, which takes root; a clock of its own a C compiler. Without them it says so.
 """
 
-from __future__ import annotations
-
 import contextlib
 import random
 import re

@@ -1,7 +1,5 @@
 """The rig of the campaign: the example's, with every kind of experiment, made short, and a light vehicle."""
 
-from __future__ import annotations
-
 import struct
 from functools import partial
 from pathlib import Path

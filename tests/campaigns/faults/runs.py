@@ -1,7 +1,5 @@
 """What the campaigns of faults share: how many runs, carried out one after the other, and their table."""
 
-from __future__ import annotations
-
 import argparse
 import sys
 from collections import defaultdict

@@ -1,7 +1,5 @@
 """A host, ``hil run``, and a rig, ``hil sim``, as processes of their own, and what can be done to them."""
 
-from __future__ import annotations
-
 import os
 import re
 import subprocess

@@ -1,7 +1,5 @@
 """A cable between two programs: TCP on loopback, forwarded until it is cut, or swallowed from a moment on."""
 
-from __future__ import annotations
-
 import socket
 import threading
 from contextlib import suppress

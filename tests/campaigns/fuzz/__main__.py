@@ -5,8 +5,6 @@ longest time and the most memory; exits 1 if one ended with a traceback or a war
 was wrong is kept in ``out/fuzz``: fixed, it belongs into ``tests/campaigns/fuzz/kept``.
 """
 
-from __future__ import annotations
-
 import argparse
 import hashlib
 import json

@@ -3,8 +3,6 @@
 An input is a row of frames, each a byte that chooses who it is for, one with its length, and its data.
 """
 
-from __future__ import annotations
-
 import asyncio
 import itertools
 import struct

@@ -1,7 +1,5 @@
 """The readers of files, and the small whole files their mutants are made of."""
 
-from __future__ import annotations
-
 import io
 import json
 from collections.abc import Callable, Iterator

@@ -3,8 +3,6 @@
 A mutant follows from its random numbers alone, so that any of them can be made again.
 """
 
-from __future__ import annotations
-
 import random
 import struct
 from collections.abc import Callable, Sequence

@@ -1,7 +1,5 @@
 """What is fuzzed: one reader of files, or one decoder of frames."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Everything that is fuzzed, by name."""
 
-from __future__ import annotations
-
 from tests.campaigns.fuzz.bus import BUSES
 from tests.campaigns.fuzz.files import FILES
 from tests.campaigns.fuzz.target import Target

@@ -1,7 +1,5 @@
 """One input tried: read, refused in words, or wrong."""
 
-from __future__ import annotations
-
 import random
 import re
 import resource

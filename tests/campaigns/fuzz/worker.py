@@ -4,8 +4,6 @@ Says of each, in one line of JSON, its number, what became of it, its time and t
 sees by that line, or by its missing, where it died or hangs.
 """
 
-from __future__ import annotations
-
 import json
 import resource
 import sys

@@ -5,8 +5,6 @@ format that is written. Prints a table, Markdown, of what is left; exits 1 if a 
 or a file can't be read, or is not what was recorded.
 """
 
-from __future__ import annotations
-
 import argparse
 import random
 import sys

@@ -1,7 +1,5 @@
 """A process that records, killed at some moment, and what is wrong with what it leaves."""
 
-from __future__ import annotations
-
 import multiprocessing
 import time
 from collections.abc import Iterator

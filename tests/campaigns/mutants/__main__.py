@@ -4,8 +4,6 @@ Each mutant is tried in a process forked from one that has the libraries loaded 
 source takes the module's place when it is imported. Prints the mutants that live and are not listed, exits 1 if any.
 """
 
-from __future__ import annotations
-
 import argparse
 import importlib
 import importlib.abc

@@ -1,7 +1,5 @@
 """Mutants of a module: one small change each, of the kinds a person makes by mistake."""
 
-from __future__ import annotations
-
 import ast
 import copy
 from collections.abc import Iterator

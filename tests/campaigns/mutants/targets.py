@@ -3,8 +3,6 @@
 A mutant that lives is listed with the reason why it does no harm; another one is a fault of the tests.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 

@@ -4,8 +4,6 @@
 the exit status is 1 where the tool says something else than the page, numbers apart.
 """
 
-from __future__ import annotations
-
 import os
 import sys
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """What a failure of the gallery is, and how the tool is made to tell of it."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 import os

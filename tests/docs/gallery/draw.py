@@ -1,7 +1,5 @@
 """The pictures of docs/gallery.md: torque and speed of a recording, and what of it is flagged or lacking."""
 
-from __future__ import annotations
-
 import io
 import re
 from collections.abc import Mapping

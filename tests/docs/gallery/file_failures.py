@@ -1,7 +1,5 @@
 """Failures that files show before anything moves: rig file, data sheet, limits, recordings that are damaged."""
 
-from __future__ import annotations
-
 from functools import partial
 from pathlib import Path
 

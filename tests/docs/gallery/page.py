@@ -1,7 +1,5 @@
 """docs/gallery.md: what the tool says of each failure, put where the page has its place for it."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Failures in recordings: what can be read and yet not be believed, or not distinguished from."""
 
-from __future__ import annotations
-
 import json
 import math
 import textwrap

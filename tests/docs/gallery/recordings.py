@@ -1,7 +1,5 @@
 """Recordings of the two-mass bus, by its equations sampled exactly; and recordings read, changed and written again."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 

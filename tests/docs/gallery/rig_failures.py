@@ -1,7 +1,5 @@
 """Failures on the rig: a simulated device, the bus or the PLC goes wrong during a run, or is wrong before it."""
 
-from __future__ import annotations
-
 from functools import partial
 from pathlib import Path
 

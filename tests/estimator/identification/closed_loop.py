@@ -1,13 +1,11 @@
 """The tests' driveline with a controller that answers the measured speed, and its exact frequency response."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.signal import max_len_seq
 
 from estimator.signals.decimate import decimate
 from estimator.signals.record import FloatArray, Record
-from tests.estimator.identification.driveline import SAMPLE_TIME_S, K, discrete
+from tests.estimator.identification.driveline import LINE, SAMPLE_TIME_S, K
 
 SPEED_RAD_S, LOAD_NM, PRBS_NM = 120.0, 150.0, 60.0
 
@@ -25,7 +23,7 @@ def controlled(
     prbs = PRBS_NM * (2.0 * np.resize(max_len_seq(10, state=rng.permutation([1] * 5 + [0] * 5))[0], n) - 1.0)
     load = LOAD_NM + np.cumsum(rng.normal(0, 0.5, n))
     noise = rng.normal(0, noise_rad_s, n)
-    Ad, Bd = discrete(SAMPLE_TIME_S)
+    Ad, Bd = LINE.discrete(SAMPLE_TIME_S)
     x = np.array([SPEED_RAD_S, SPEED_RAD_S, LOAD_NM / K])
     torque, speed = np.empty(n), np.empty(n)
     for k in range(n):
@@ -46,6 +44,6 @@ def _prepared(torque_nm: FloatArray, speed_rad_s: FloatArray) -> Record:
 
 def response(frequency_hz: FloatArray) -> FloatArray:
     """Magnitude of the exact response of sampled motor speed to held motor torque [rad/s per Nm]."""
-    Ad, Bd = discrete(SAMPLE_TIME_S)
+    Ad, Bd = LINE.discrete(SAMPLE_TIME_S)
     z = np.exp(2j * np.pi * frequency_hz * SAMPLE_TIME_S)
     return np.array([abs(np.linalg.solve(at * np.eye(3) - Ad, Bd[:, 0])[0]) for at in z])

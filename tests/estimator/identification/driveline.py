@@ -1,7 +1,5 @@
 """An independent two-mass driveline for the tests: exact discretisation by scipy, nothing of this project."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,30 +14,52 @@ from estimator.signals.record import FloatArray, Record
 J_M, J_L, K, C, B_M, B_L = 1.6, 100.0, 4200.0, 9.0, 0.35, 0.9
 SAMPLE_TIME_S = 0.01
 
-# dx/dt = A x + B [T, T_0],  x = [w_M, w_L, phi_M - phi_L]
-A = np.array(
-    [
-        [-(C + B_M) / J_M, C / J_M, -K / J_M],
-        [C / J_L, -(C + B_L) / J_L, K / J_L],
-        [1.0, -1.0, 0.0],
-    ]
-)
-B = np.array([[1.0 / J_M, 0.0], [0.0, -1.0 / J_L], [0.0, 0.0]])
+
+@dataclass(frozen=True)
+class Line:
+    """A two-mass driveline from a moment on."""
+
+    from_s: float = 0.0
+    k: float = 4200.0
+    J_L: float = 100.0
+    J_M: float = 1.6
+    c: float = 9.0
+    b_motor: float = 0.35
+    b_load: float = 0.9
+
+    @property
+    def matrix(self) -> FloatArray:
+        """A of dx/dt = A x + B [T, T_0], x = [w_M, w_L, phi_M - phi_L]."""
+        return np.array(
+            [
+                [-(self.c + self.b_motor) / self.J_M, self.c / self.J_M, -self.k / self.J_M],
+                [self.c / self.J_L, -(self.c + self.b_load) / self.J_L, self.k / self.J_L],
+                [1.0, -1.0, 0.0],
+            ]
+        )
+
+    @property
+    def resonance(self) -> tuple[float, float]:
+        """Natural frequency [Hz] and damping ratio of the oscillating pair."""
+        poles = np.linalg.eigvals(self.matrix)
+        pole = poles[np.argmax(poles.imag)]
+        return abs(pole) / (2 * np.pi), -pole.real / abs(pole)
+
+    def discrete(self, sample_time_s: float = SAMPLE_TIME_S) -> tuple[FloatArray, FloatArray]:
+        """Exact zero-order-hold discretisation by the exponential of [[A, B], [0, 0]] T."""
+        block = np.zeros((5, 5))
+        block[:3, :3] = self.matrix
+        block[:3, 3:] = [[1.0 / self.J_M, 0.0], [0.0, -1.0 / self.J_L], [0.0, 0.0]]
+        exponential = expm(block * sample_time_s)
+        return exponential[:3, :3], exponential[:3, 3:]
+
+
+LINE = Line()
 
 
 def true_resonance() -> tuple[float, float]:
-    """Natural frequency [Hz] and damping ratio of the oscillating pair, from the eigenvalues of A."""
-    poles = np.linalg.eigvals(A)
-    pole = poles[np.argmax(poles.imag)]
-    return abs(pole) / (2 * np.pi), -pole.real / abs(pole)
-
-
-def discrete(sample_time_s: float) -> tuple[FloatArray, FloatArray]:
-    """Exact zero-order-hold discretisation by the exponential of [[A, B], [0, 0]] T."""
-    block = np.zeros((5, 5))
-    block[:3, :3], block[:3, 3:] = A, B
-    exponential = expm(block * sample_time_s)
-    return exponential[:3, :3], exponential[:3, 3:]
+    """Natural frequency [Hz] and damping ratio of the tests' driveline."""
+    return LINE.resonance
 
 
 @dataclass(frozen=True)
@@ -52,11 +72,7 @@ class Cruise:
 
 
 def cruise(
-    seed: int,
-    duration_s: float = 22.0,
-    noise_rad_s: float = 0.05,
-    prbs_nm: float = 60.0,
-    name: str = "cruise",
+    seed: int, duration_s: float = 22.0, noise_rad_s: float = 0.05, prbs_nm: float = 60.0, name: str = "cruise"
 ) -> Cruise:
     """Simulate a cruise: torque for the mean load plus PRBS, slowly varying load torque, noisy resolver."""
     rng = np.random.default_rng(seed)
@@ -65,7 +81,7 @@ def cruise(
     sequence = 2.0 * np.resize(max_len_seq(10, state=rng.permutation([1] * 5 + [0] * 5))[0], n) - 1.0
     load = 150.0 + 30.0 * np.sin(2 * np.pi * 0.05 * t + rng.uniform(0, 6)) + np.cumsum(rng.normal(0, 0.5, n))
     torque = 300.0 + prbs_nm * sequence
-    Ad, Bd = discrete(SAMPLE_TIME_S)
+    Ad, Bd = LINE.discrete()
     x = np.array([120.0, 120.0, 150.0 / K])
     speed = np.empty(n)
     for k in range(n):

@@ -1,7 +1,5 @@
 """The headline of an identification: a pole pair that the data need, intervals, and one verdict."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -65,6 +63,7 @@ def pair(best: BestEstimate) -> tuple[float, float]:
 def test_with_a_gap_the_damping_is_near_the_linear_one_and_what_it_depends_on_is_shown(seed: int) -> None:
     best = best_estimate(with_gap(seed))
     assert best.verdict is Verdict.NOT_LINEAR
+    assert best.band_hz == (2.0, 40.0)
     assert best.linearity.depends_on == "the torque in the shaft"
     assert pair(best)[1] == pytest.approx(DAMPING, rel=0.15)
     in_the_middle, outside = best.regions[1].mode, (best.regions[0].mode, best.regions[2].mode)
@@ -74,7 +73,7 @@ def test_with_a_gap_the_damping_is_near_the_linear_one_and_what_it_depends_on_is
     )
 
 
-@pytest.mark.parametrize("seed", [20, 32, 111])
+@pytest.mark.parametrize("seed", [20, *(pytest.param(seed, marks=pytest.mark.campaign) for seed in (32, 111))])
 def test_buses_on_which_other_minima_are_near(seed: int) -> None:
     """Of 200 those on which an output-error fit, a subspace estimate and this one are furthest off."""
     bus = draw_bus(seed)
@@ -84,10 +83,10 @@ def test_buses_on_which_other_minima_are_near(seed: int) -> None:
 
 
 @pytest.mark.parametrize(
-    ("buses", "independent", "good"), [(4, 3, 2), pytest.param(10, 8, 6, marks=pytest.mark.campaign)]
+    ("buses", "independent", "good"), [(2, 1, 1), pytest.param(10, 8, 6, marks=pytest.mark.campaign)]
 )
 def test_healthy_recordings_pass_their_own_residual_tests(buses: int, independent: int, good: int) -> None:
-    """A test at 95 % fails on one in twenty: on 2 or more of 4 with a probability of 1.4 %, on 3 of 10 with 1.2 %."""
+    """A test at 95 % fails on one in twenty: on both of 2 with a probability of 0.25 %, on 3 of 10 with 1.2 %."""
     found = [best_estimate(drive(draw_bus(seed), world=CLEAN)) for seed in range(5000, 5000 + buses)]
     assert sum(best.validation.independence.is_independent for best in found) >= independent
     assert sum(best.verdict is Verdict.GOOD for best in found) >= good  # tests of linearity and feedback fail, too
@@ -146,11 +145,6 @@ def test_a_fast_recording_keeps_its_period_and_its_answer() -> None:
     assert best.fit.model.sample_time_s == PERIOD_S / 2.0
     assert best.fit.block == 2
     assert pair(best)[0] == pytest.approx(FREQUENCY_HZ, rel=0.005)
-
-
-def test_the_band_is_what_the_sampling_allows() -> None:
-    source = cruise(9, duration_s=20.0).record
-    assert best_estimate(source).band_hz == (2.0, 40.0)
 
 
 def test_a_fit_from_the_truth_is_no_better() -> None:

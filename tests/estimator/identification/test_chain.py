@@ -1,7 +1,5 @@
 """The on-line chain: sample by sample and in blocks the same bits, and nothing raises on a value."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -156,11 +154,3 @@ def test_period_that_does_not_divide_that_of_the_models_is_refused() -> None:
 def test_signals_of_different_length_are_refused() -> None:
     with pytest.raises(BadShape, match="one shape"):
         chain().run_block(np.zeros(3), np.zeros(4), np.zeros(4), np.ones(4, dtype=bool))
-
-
-def test_memory_does_not_grow(drive: Record) -> None:
-    live = chain()
-    live.run(drive)
-    before = {name: np.asarray(value).nbytes for name, value in live.state().items()}
-    live.run(drive)
-    assert {name: np.asarray(value).nbytes for name, value in live.state().items()} == before

@@ -1,7 +1,5 @@
 """The whole chain on eight simulated drives: what DESIGN and the paper ask of it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -12,7 +10,6 @@ from estimator.identification.identify import Identification, identify, observat
 from estimator.identification.linear_model import LinearModel, Orders
 from estimator.identification.online.recursive import Status
 from estimator.identification.settings import FilterPart, Settings
-from estimator.signals.decimate import Decimator
 from tests.estimator.identification.driveline import Cruise, cruise
 
 
@@ -45,23 +42,6 @@ def test_online_and_spectral_estimate_agree_around_the_resonance(identified: lis
         assert np.count_nonzero(band) > 15
         assert np.abs(ratio_db).max() < 2.0
         assert np.abs(np.mean(ratio_db)) < 0.5
-
-
-def test_live_sample_by_sample_gives_the_same_bits(cruises: list[Cruise], identified: list[Identification]) -> None:
-    record, result = cruises[0].record, identified[0]
-    settings = Settings()
-    chain = Decimator(record.sample_time_s, 2, settings.high_pass_hz)
-    estimator = settings.estimator(result.L)
-    u, y, okay = record.total_torque_nm, record.output, record.okay
-    theta = []
-    for k in range(record.output.shape[0]):
-        kept = chain.run(u[k : k + 1], y[k : k + 1], okay[k : k + 1])
-        theta += [
-            estimator.update(float(kept.u[i]), float(kept.y[i]), bool(kept.okay[i])).theta
-            for i in range(kept.u.shape[0])
-        ]
-    n = len(result.trajectory)
-    assert np.array_equal(np.array(theta[:n]), result.trajectory.theta)
 
 
 def test_the_recording_is_not_changed(cruises: list[Cruise]) -> None:

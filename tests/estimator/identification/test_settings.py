@@ -1,7 +1,5 @@
 """Excitation that determines a model, or not."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

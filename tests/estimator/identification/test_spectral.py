@@ -1,7 +1,5 @@
 """Every spectral estimator against the exact response: one result type, intervals that hold, what each is for."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -14,7 +12,7 @@ from estimator.identification.linear_model import LinearModel
 from estimator.identification.spectral import SpectralEstimate, good_segments, spectral_estimate
 from estimator.signals.decimate import decimate
 from estimator.signals.record import FloatArray, Record
-from tests.benchmarks.identification.local_polynomial import local_polynomial, longest_stretch
+from tests.benchmarks.identification.local_polynomial import local_polynomial
 from tests.estimator.identification.closed_loop import response
 from tests.estimator.identification.driveline import cruise
 
@@ -58,11 +56,6 @@ def test_the_truth_lies_within_the_stated_error() -> None:
     assert np.mean(np.abs(inner) > 1.96) == pytest.approx(0.05, abs=0.03)
 
 
-def test_coherence_tells_noise_from_response() -> None:
-    assert spectral_estimate(record(8192, noise=0.0)).coherence[5:-5].min() > 0.99
-    assert spectral_estimate(record(8192, noise=1e3)).coherence.mean() < 0.1
-
-
 def test_segments_with_a_masked_sample_are_left_out() -> None:
     okay = np.ones(100, dtype=bool)
     okay[45] = False
@@ -76,12 +69,7 @@ def test_segments_with_a_masked_sample_are_left_out() -> None:
 def test_an_input_without_power_has_no_coherence_and_infinite_error() -> None:
     n = 2000
     quiet = Record(
-        "quiet",
-        0.02,
-        0.02 * np.arange(n),
-        np.zeros((n, 1)),
-        np.random.default_rng(0).normal(size=n),
-        np.ones(n, bool),
+        "quiet", 0.02, 0.02 * np.arange(n), np.zeros((n, 1)), np.random.default_rng(0).normal(size=n), np.ones(n, bool)
     )
     estimate = spectral_estimate(quiet)
     assert not estimate.coherence.any()
@@ -185,11 +173,6 @@ def test_the_transient_is_reported_from_the_response() -> None:
     assert typical(spectral_estimate(record, 256)) > 3 * typical(local_polynomial(record))
 
 
-def test_the_longest_stretch() -> None:
-    assert longest_stretch(np.array([1, 0, 1, 1, 1, 0, 1, 1], dtype=bool)) == (2, 5)
-    assert longest_stretch(np.zeros(4, dtype=bool)) == (0, 0)
-
-
 @pytest.mark.parametrize(
     ("estimate", "named"),
     [
@@ -205,10 +188,7 @@ def test_settings_that_make_no_sense_are_refused(
 
 
 @pytest.mark.parametrize(
-    ("estimate", "why"),
-    [
-        (lambda record: local_polynomial(with_gaps(record, slice(None, -20))), "lines, expected 13"),
-    ],
+    ("estimate", "why"), [(lambda record: local_polynomial(with_gaps(record, slice(None, -20))), "lines, expected 13")]
 )
 def test_too_little_data_are_refused(
     records: list[Record], estimate: Callable[[Record], SpectralEstimate], why: str

@@ -1,7 +1,5 @@
 """An identification, questioned: what it says where all is well, and where something is not."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +8,6 @@ import pytest
 from estimator.errors import BadModel
 from estimator.identification.identify import identify
 from estimator.identification.online.ekf import TwoMass
-from estimator.identification.online.recursive import Status
 from estimator.identification.online.registry import ESTIMATORS
 from estimator.identification.settings import Settings
 from estimator.identification.study import compare, study
@@ -51,21 +48,6 @@ def test_a_drive_that_answers_the_wrong_way_round_has_no_masses(record: Record) 
     asked = study(reversed_sign, identify(reversed_sign, SETTINGS), SETTINGS)
     assert asked.physical is None
     assert "sign" in asked.not_physical
-
-
-def test_a_model_is_tried_on_the_others(record: Record) -> None:
-    other = cruise(6, name="other").record
-    found, unseen = identify(record, SETTINGS), identify(other, SETTINGS)
-    asked = study(record, found, SETTINGS, [unseen])
-    assert [run.name for run in asked.validation.unseen] == ["other"]
-    assert asked.validation.unseen[0].fit_percent > 50.0
-
-
-def test_the_papers_estimator_next_to_itself_is_the_same(record: Record) -> None:
-    found = identify(record, SETTINGS)
-    companion = compare(record, found, SETTINGS, "oefo", ESTIMATORS["oefo"])
-    assert companion.resonance == found.online_resonance
-    assert (companion.recording, companion.estimator, companion.status) == (record.name, "oefo", Status.ESTIMATED)
 
 
 def test_an_estimator_of_masses_takes_the_samples_as_they_were_recorded(record: Record) -> None:

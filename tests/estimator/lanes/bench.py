@@ -1,7 +1,5 @@
 """A function of numbers called once with eight of each in lanes, and eight times with one."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Arithmetic in lanes is that of single numbers."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import Any

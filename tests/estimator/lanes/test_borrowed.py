@@ -1,7 +1,5 @@
 """Arrays that compiled code borrows are what they were, without an owner to count references to."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Every law in every lane is what it is alone, on whichever side of its edges each lane is."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Callable, Sequence
 from typing import Any

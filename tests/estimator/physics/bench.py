@@ -1,7 +1,5 @@
 """What the tests of physics and diagnosis share: models, torques, and a linear driveline solved exactly by scipy."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

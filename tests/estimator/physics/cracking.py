@@ -1,7 +1,5 @@
 """A shaft that cracks, and a fit of it expressed the other way round."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

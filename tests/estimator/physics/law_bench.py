@@ -1,7 +1,5 @@
 """What the tests of the laws share: one recording's torque, and the comparison of kernel and reference."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

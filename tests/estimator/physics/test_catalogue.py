@@ -1,7 +1,5 @@
 """One contract for every entry of the catalogue: names, units, nulls, starts, words, and what it refuses to judge."""
 
-from __future__ import annotations
-
 import inspect
 import math
 import re
@@ -208,13 +206,6 @@ def test_the_null_of_the_decisive_parameter_can_be_reached(entry: Effect) -> Non
         assert parameter.low < parameter.high
 
 
-@fitted
-def test_scales_are_positive_and_finite(entry: Effect, reversal: Record) -> None:
-    scales = entry.scales(GEARED, [reversal])
-    assert len(scales) == len(entry.shared_parameters)
-    assert all(math.isfinite(scale) and scale > 0 for scale in scales)
-
-
 @entries
 def test_events_have_their_moments_and_periodic_laws_their_phases(entry: Effect) -> None:
     own = [parameter.name for parameter in entry.own_parameters]
@@ -337,11 +328,6 @@ def test_what_acts_in_or_behind_the_shaft_needs_one() -> None:
         assert {Structure.TWO_MASS, Structure.THREE_MASS} <= entry.structures
         needs = entry.element is Element.SHAFT or entry.name in behind
         assert (Structure.ONE_MASS in entry.structures) is not needs
-
-
-def test_the_catalogue_can_not_be_changed() -> None:
-    with pytest.raises(TypeError):
-        EFFECTS["mine"] = EFFECTS["backlash"]  # type: ignore[index]
 
 
 def test_what_recurs_with_an_angle_needs_a_whole_period() -> None:

@@ -1,7 +1,5 @@
 """The fit finds the truth of an independent linear simulation, and its machinery does what it says."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 
@@ -11,7 +9,7 @@ import pytest
 from estimator.physics.driveline import Start
 from estimator.physics.fit import FitResult, best_fit, fit, rates, warm_start
 from estimator.physics.jacobian import jacobian_at
-from estimator.physics.layout import flat, slot
+from estimator.physics.layout import slot
 from estimator.physics.model import DrivelineModel, Parameter, Structure
 from estimator.physics.problem import (
     BAD,
@@ -27,15 +25,7 @@ from estimator.physics.problem import (
 )
 from estimator.physics.unknowns import Shared, effect_unknowns, nominal_unknowns
 from estimator.signals.record import FloatArray, Location, OutputKind, Record
-from tests.estimator.physics.bench import (
-    ONE_MASS,
-    SAMPLE_TIME_S,
-    TWO_MASS,
-    linear_record,
-    model,
-    random_steps,
-    scaled,
-)
+from tests.estimator.physics.bench import ONE_MASS, SAMPLE_TIME_S, TWO_MASS, linear_record, model, random_steps, scaled
 
 SIGMA = 0.05
 STARTS = {"first": Start(30.0, 0.0, 10.0, 0.01, 9.0), "second": Start(-20.0, 0.0, -4.0, -0.005, -4.0)}
@@ -83,12 +73,6 @@ class TestRecovery:
             assert found.speed_rad_s == pytest.approx(true.speed_rad_s, abs=0.1)
             assert found.load_speed_rad_s == pytest.approx(true.load_speed_rad_s, abs=0.2)
             assert found.twist_rad == pytest.approx(true.twist_rad, abs=2e-3)
-
-    def test_one_mass_from_its_position(self) -> None:
-        true = scaled(ONE_MASS, J_M=0.9, b_M=1.15)
-        result = fit(nominal_problem(recordings(true, kind=OutputKind.POSITION), ONE_MASS))
-        assert result.value("", "J_M") == pytest.approx(true["J_M"], rel=0.01)
-        assert result.value("", "b_M") == pytest.approx(true["b_M"], rel=0.02)
 
     def test_a_parameter_ends_at_the_edge_of_its_tolerance_and_is_reported_pinned(self) -> None:
         true = scaled(TWO_MASS, J_L=1.5)
@@ -147,16 +131,6 @@ class TestJacobian:
         assert not jacobian[:, 0].any()
         assert jacobian[:, 1:].any(axis=0).all()
 
-    def test_a_local_unknown_moves_its_own_recording_alone(self) -> None:
-        problem = nominal_problem(recordings(samples=300))
-        x = start_vector(problem)
-        jacobian = jacobian_at(problem, x, outputs_at(problem, x))
-        first, locals_each = len(problem.shared), 4
-        assert x.size == first + 2 * locals_each
-        assert not jacobian[300:, first : first + locals_each].any()
-        assert not jacobian[:300, first + locals_each :].any()
-        assert np.all(np.abs(jacobian[:300, first : first + locals_each]).max(axis=0) > 0)
-
 
 class TestMasks:
     def test_what_a_masked_sample_holds_does_not_matter(self) -> None:
@@ -185,19 +159,6 @@ class TestMasks:
         np.testing.assert_array_equal(
             fit(problems[0], start).residual, fit(replace(problems[1], local=problems[0].local), start).residual
         )
-
-
-class TestStarts:
-    def test_the_vector_is_shared_then_each_recordings_own(self) -> None:
-        problem = nominal_problem(recordings(samples=300))
-        x = start_vector(problem)
-        np.testing.assert_array_equal(x[:6], np.ones(6))
-        np.testing.assert_array_equal(local_part(problem, x, 1), problem.local[1].guess)
-        np.testing.assert_array_equal(parameters(problem, x), flat(model(TWO_MASS)))
-        low, high = bounds(problem)
-        np.testing.assert_allclose(low[:6], 0.8)
-        np.testing.assert_allclose(high[:6], 1.2)
-        assert np.all(np.isinf(np.concatenate([low[6:], high[6:]])))
 
 
 class TestRunaway:

@@ -1,7 +1,5 @@
 """A model on a recording: only load torque and initial state are estimated."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

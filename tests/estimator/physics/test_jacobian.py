@@ -1,7 +1,5 @@
 """Derivatives of recordings that fill the kernel's lanes together are those of each by itself."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The small pieces that laws share, against the mathematics they stand for."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Laws that their entries declare for a place of the simulation, and the shaft that relaxes, against the reference."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

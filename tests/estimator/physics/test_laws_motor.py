@@ -1,7 +1,5 @@
 """Effects at the motor, against the reference."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

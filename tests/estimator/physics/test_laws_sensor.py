@@ -1,7 +1,5 @@
 """Effects of the speed sensor, against the reference."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

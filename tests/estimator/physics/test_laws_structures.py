@@ -1,7 +1,5 @@
 """Structures of three masses and of one, with effects at their places, against the reference."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

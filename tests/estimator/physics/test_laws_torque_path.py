@@ -1,7 +1,5 @@
 """Effects between the torque's reading and the shaft, against the reference and closed formulas."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

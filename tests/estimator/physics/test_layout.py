@@ -1,7 +1,5 @@
 """Where each parameter stands in the kernel's vector, and what stands there without it."""
 
-from __future__ import annotations
-
 import math
 import shutil
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A linear line's sums of answers, against the Runge-Kutta steps that they are read off."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

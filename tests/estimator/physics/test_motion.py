@@ -1,7 +1,5 @@
 """What a recording says of the motion: speed from position, sizes, changes of sign."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -61,25 +59,11 @@ def test_a_reversal_must_be_clear(low: float, high: float, expected: bool) -> No
     assert reverses(record(np.ones(500), np.linspace(low, high, 500))) is expected
 
 
-def test_a_few_samples_of_the_other_sign_are_no_reversal() -> None:
-    speed = np.full(500, 5.0)
-    speed[:9] = -5.0
-    assert not reverses(record(np.ones(500), speed))
-    speed[:10] = -5.0
-    assert reverses(record(np.ones(500), speed))
-
-
 @pytest.mark.parametrize(("creep", "expected"), [(-0.04, False), (-0.06, True)])
 def test_a_backward_creep_below_a_hundredth_of_the_speed_is_no_reversal(creep: float, expected: bool) -> None:
     speed = np.full(500, 5.0)
     speed[:50] = creep
     assert reverses(record(np.ones(500), speed)) is expected
-
-
-def test_samples_that_do_not_count_are_no_reversal() -> None:
-    speed = np.full(500, 5.0)
-    speed[:50] = -5.0
-    assert not reverses(record(np.ones(500), speed, okay=speed > 0))
 
 
 @pytest.mark.parametrize(("low", "expected"), [(-100.0, True), (-9.0, False), (0.0, False), (-20.0, True)])

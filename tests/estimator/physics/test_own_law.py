@@ -1,7 +1,5 @@
 """A user's own law: tried before it is used, and simulated as the same law inside the kernel is."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import replace
@@ -188,10 +186,7 @@ def test_a_name_that_is_taken_is_refused(names: list[str]) -> None:
     [
         (lambda motor_speed, size: size, r"expected a function of \(time_s, .*, size\), got one that does not fit"),
         (lambda t, w, load, twist, torque, other: 0.0, "does not fit"),
-        (
-            lambda t, w, load, twist, torque, size: size * float("nan"),
-            "expected a finite number, got nan at time_s = ",
-        ),
+        (lambda t, w, load, twist, torque, size: size * float("nan"), "expected a finite number, got nan at time_s = "),
         (
             lambda t, w, load, twist, torque, size: size / w,
             "expected a finite number, got inf|failed with ZeroDivisionError",
@@ -210,11 +205,7 @@ def test_a_function_that_can_not_be_used_is_refused(function: Callable[..., obje
     ("parameters", "element", "said"),
     [
         ((), Element.MOTOR, "parameters: expected at least one"),
-        (
-            SIZE_OF_IT,
-            Element.TORQUE_PATH,
-            "element: expected one of motor, shaft, load, speed_sensor, got torque_path",
-        ),
+        (SIZE_OF_IT, Element.TORQUE_PATH, "element: expected one of motor, shaft, load, speed_sensor, got torque_path"),
         ((OwnParameter("size", "", 0.0, 2.0, 1.0, 1.0),), Element.MOTOR, "expected low <= start <= high"),
         ((OwnParameter("size", "", 0.0, 0.0, math.inf, 1.0),), Element.MOTOR, "expected finite numbers"),
         ((OwnParameter("size", "", 0.0, 0.0, 1.0, 0.0),), Element.MOTOR, "a start other than it"),

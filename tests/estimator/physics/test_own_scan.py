@@ -1,7 +1,5 @@
 """Phases and moments by a scan: what it answers is the effect itself, and what it chooses is the best there is."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 
@@ -36,17 +34,6 @@ class TestRest:
         project = Projector(regression([design], [noise]))
         np.testing.assert_allclose(project.rest(design @ [3.0, -2.0, 0.5]), 0.0, atol=1e-12)
         np.testing.assert_allclose(project.rest(design.T), 0.0, atol=1e-12)
-
-    def test_what_is_left_is_what_a_regression_leaves(self, design: np.ndarray, noise: np.ndarray) -> None:
-        signals = np.random.default_rng(3).standard_normal((2, SAMPLES))
-        left = Projector(regression([design], [noise])).rest(signals)
-        for signal, rest in zip(signals, left, strict=True):
-            expected = signal - design @ np.linalg.lstsq(design, signal, rcond=None)[0]
-            np.testing.assert_allclose(rest, expected, atol=1e-12)
-
-    def test_of_a_converged_fit_all_of_the_error_is_left(self, design: np.ndarray, noise: np.ndarray) -> None:
-        result = regression([design], [noise])
-        np.testing.assert_allclose(Projector(result).error, result.residual, atol=1e-12)
 
     def test_an_unknown_at_its_bound_explains_nothing(self, design: np.ndarray, noise: np.ndarray) -> None:
         """Two unknowns want 0.5 and -0.5 and get them; the third wants 4 and may be 1."""
@@ -95,21 +82,6 @@ class TestPromise:
         assert project.promise(design @ [1.0, 2.0, 3.0], -10.0, 10.0)[1] == pytest.approx(0.0, abs=1e-6)
         assert project.promise(np.zeros(SAMPLES), -10.0, 10.0) == (0.0, 0.0)
 
-    def test_no_effect_promises_to_make_it_worse(self, design: np.ndarray, noise: np.ndarray) -> None:
-        along = np.random.default_rng(7).standard_normal(SAMPLES)
-        project = Projector(regression([design], [design @ [0.3, -0.2, 0.1] - 2.0 * along + noise]))
-        size, fall = project.promise(along, 0.0, 5.0)
-        assert size == pytest.approx(0.0, abs=1e-9)
-        assert fall == pytest.approx(0.0, abs=1e-6)
-
-    def test_an_unknown_that_does_nothing_changes_no_promise(self, design: np.ndarray, noise: np.ndarray) -> None:
-        """As a phase does while its amplitude is 0."""
-        along = np.random.default_rng(7).standard_normal(SAMPLES)
-        y = design @ [0.3, -0.2, 0.1] + 1.5 * along + noise
-        idle = np.column_stack([design, np.zeros(SAMPLES)])
-        with_idle = Projector(regression([idle], [y])).promise(along, -5.0, 5.0)
-        assert with_idle == pytest.approx(Projector(regression([design], [y])).promise(along, -5.0, 5.0))
-
 
 BRAKE, IMBALANCE, RESOLVER = EFFECTS["brake_drag"], EFFECTS["load_imbalance"], EFFECTS["resolver_error"]
 
@@ -154,17 +126,6 @@ class TestBestStretch:
         found = scan(answers, error, lasting=True).best(0.7)
         assert (found.first, found.last) == (first, last)
         assert found.taken == pytest.approx(taken)
-
-    def test_the_best_size_there_follows_from_match_and_power(self) -> None:
-        """By regression on the answer of that interval alone."""
-        rng = np.random.default_rng(1)
-        answers = np.vstack([np.zeros(200), np.cumsum(rng.standard_normal((12, 200)), axis=0)])
-        error = rng.standard_normal(200) - 2.0 * (answers[9] - answers[4])
-        found = scan(answers, error).best(1.5)
-        answer = answers[found.last] - answers[found.first]
-        assert found.power == pytest.approx(answer @ answer)
-        assert -found.match / found.power == pytest.approx(-(answer @ error) / (answer @ answer))
-        assert -found.match / found.power == pytest.approx(2.0, abs=0.1)
 
     def test_where_no_interval_takes_anything_there_is_none(self) -> None:
         answers = np.cumsum(np.eye(6, 50), axis=0) - np.eye(1, 50)

@@ -1,7 +1,5 @@
 """Work on all cores: order, nesting and exceptions are those of a plain loop."""
 
-from __future__ import annotations
-
 import threading
 import time
 from collections.abc import Iterator
@@ -50,11 +48,6 @@ def test_so_many_items_are_worked_on_at_once() -> None:
     assert not meeting.broken
 
 
-def test_one_item_alone_stays_where_it_is() -> None:
-    assert concurrently(lambda _: threading.get_ident(), [0]) == [threading.get_ident()]
-    assert concurrently(lambda _: threading.get_ident(), []) == []
-
-
 def test_calls_inside_calls_never_work_on_more_than_so_many_at_once() -> None:
     """More of them than workers, each with calls inside, that wait for each other must not wait for ever."""
     lock, working, most = threading.Lock(), set[int](), 0
@@ -98,14 +91,6 @@ def test_an_exception_comes_out_and_the_next_call_works() -> None:
     with pytest.raises(Broken, match="1"):
         concurrently(work, range(4))
     assert concurrently(lambda item: item + 1, range(4)) == [1, 2, 3, 4]
-
-
-def test_an_exception_of_a_call_inside_comes_out_too() -> None:
-    def inner(item: int) -> int:
-        raise Broken(item)
-
-    with pytest.raises(Broken, match="7"):
-        concurrently(lambda item: concurrently(inner, [item, item]), [7, 7])
 
 
 @pytest.mark.parametrize("count", [1, 3, 5])

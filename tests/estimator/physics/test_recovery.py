@@ -3,8 +3,6 @@
 The interval is the noise's own: planted values lie within 4.5 standard errors of the fitted ones.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
@@ -98,10 +96,7 @@ PLANTS = {
     "warming_friction": Plant({"cold_nm_s": 3.0, "time_constant_s": 5.0}),
     "resolver_error": Plant(
         {"once_rad": 0.01, "twice_rad": 0.008},
-        (
-            {"once_phase_rad": 0.4, "twice_phase_rad": 1.0},
-            {"once_phase_rad": -0.9, "twice_phase_rad": 0.2},
-        ),
+        ({"once_phase_rad": 0.4, "twice_phase_rad": 1.0}, {"once_phase_rad": -0.9, "twice_phase_rad": 0.2}),
     ),
     "speed_filter": Plant({"time_constant_s": 0.02, "shape": 0.4}),
     "speed_sign_blind": Plant({"share": 0.6}),
@@ -153,8 +148,7 @@ def recordings(name: str, plant: Plant) -> list[Record]:
 def nearby(name: str, plant: Plant, records: list[Record]) -> Release:
     """Start a little off what was planted; a discrete choice is the planted one."""
     base = min(
-        effect_unknowns(name, GEARED, records),
-        key=lambda release: sum(_held_apart(s, plant) for s in release.shared),
+        effect_unknowns(name, GEARED, records), key=lambda release: sum(_held_apart(s, plant) for s in release.shared)
     )
 
     def moved(unknown: Shared, values: Mapping[str, float], factor: float, off: float) -> Shared:

@@ -1,7 +1,5 @@
 """The basis of a road's profile: what it can follow, and what it leaves to other laws."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from estimator.physics.effects.load import DEGREE, KNOT_SPACING_S, grade_basis

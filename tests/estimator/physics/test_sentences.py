@@ -1,7 +1,5 @@
 """What the catalogue says of a finding: every number that matters, in the units of the motion."""
 
-from __future__ import annotations
-
 import math
 import re
 
@@ -15,10 +13,7 @@ from estimator.physics.model import Motion
 # What each sentence is given, and the numbers that must stand in it; the rest is reported in the table alone.
 SENTENCES: dict[str, tuple[dict[str, float], list[str]]] = {
     "inverter_gain_mismatch": ({"gain_m1": 1.0, "gain_m2": 0.876}, ["m2", "0.876"]),
-    "torque_derating": (
-        {"depth": 0.123, "time_constant_s": 4.56, "heating_nm": 789.0},
-        ["12.3%", "4.56 s", "789 Nm"],
-    ),
+    "torque_derating": ({"depth": 0.123, "time_constant_s": 4.56, "heating_nm": 789.0}, ["12.3%", "4.56 s", "789 Nm"]),
     "torque_saturation": ({"limit_m1_nm": 45.6, "limit_m2_nm": 45.6, "limit_sum_nm": math.inf}, ["45.6 Nm"]),
     "actuator_lag": ({"time_constant_s": 0.0123}, ["12.3 ms"]),
     "transport_delay": ({"delay_s": 0.0123}, ["12.3 ms"]),

@@ -1,7 +1,5 @@
 """Simulations that go side by side, against the same ones by themselves."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 

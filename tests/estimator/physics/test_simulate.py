@@ -1,7 +1,5 @@
 """Grid, outputs, and refusal of outputs that a structure does not have."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 
@@ -17,7 +15,6 @@ from estimator.physics.driveline import Case, Start
 from estimator.physics.fit import FitResult, fit, make_problem
 from estimator.physics.free_run import free_run
 from estimator.physics.grid import FASTEST_IN_NYQUIST, RADIANS_PER_STEP, SIGN_WIDTH, grid_for, substeps_for
-from estimator.physics.kernel import state_vector
 from estimator.physics.layout import flat, flat_values, slot
 from estimator.physics.model import DrivelineModel, Load, Structure, natural_frequencies_rad_s
 from estimator.physics.problem import bounds
@@ -36,7 +33,6 @@ from tests.estimator.physics.bench import (
     record,
 )
 
-LOADS_NM = (20.0, 20.0)
 SIGMA = 0.02
 
 
@@ -173,13 +169,6 @@ def test_the_natural_frequencies_of_a_symmetric_chain() -> None:
     assert natural_frequencies_rad_s(values) == pytest.approx([20.0, 20.0 * np.sqrt(2.0)])
 
 
-def test_sub_steps_follow_the_natural_frequency() -> None:
-    values = {"J_M": 2.0, "J_L": 6.0, "k": 600.0, "c": 0.0, "b_M": 0.0, "b_L": 0.0}
-    assert substeps_for(values, 2.5 * RADIANS_PER_STEP / 20.0) == 3  # 20 rad/s
-    assert substeps_for(values, 0.5 * RADIANS_PER_STEP / 20.0) == 1
-    assert substeps_for(ONE_MASS, 0.01) == 1
-
-
 @pytest.mark.parametrize(
     ("changes", "named"),
     [
@@ -233,18 +222,6 @@ def test_dry_friction_changes_sign_within_a_share_of_the_top_speed_of_what_rever
 
 
 @pytest.mark.parametrize(
-    ("kind", "location", "state"),
-    [
-        (OutputKind.SPEED, Location.MOTOR, state_vector.SPEED),
-        (OutputKind.SPEED, Location.LOAD, state_vector.LOAD_SPEED),
-        (OutputKind.POSITION, Location.MOTOR, state_vector.ANGLE),
-    ],
-)
-def test_the_output_is_a_state(kind: OutputKind, location: Location, state: int) -> None:
-    assert output_state(record(np.ones(5), kind=kind, location=location), Structure.TWO_MASS) == state
-
-
-@pytest.mark.parametrize(
     ("kind", "location", "structure"),
     [
         (OutputKind.SPEED, Location.LOAD, Structure.ONE_MASS),
@@ -263,28 +240,12 @@ def test_an_output_that_the_structure_lacks_is_refused(
         output_state(rec, structure)
 
 
-def test_the_simulation_refuses_it_too() -> None:
-    rec = record(np.ones(5), np.arange(5.0), location=Location.LOAD)
-    line = model(ONE_MASS)
-    with pytest.raises(BadModel, match="speed at the load is no output of one_mass"):
-        simulate(grid_for(line, [rec]), rec, flat(line), Start(0.0, 0.0, 0.0))
-
-
 def test_inputs_are_summed_and_row_k_is_the_state_before_torque_k_acts() -> None:
     torque = np.array([[3.0, 1.0], [0.0, 0.0], [0.0, 0.0]])
     rec = record(torque, np.ones(3))
     line = model({"J_M": 2.0, "b_M": 0.0})
     speed = simulate(grid_for(line, [rec]), rec, flat(line), Start(0.0, 0.0, 1.0))
     np.testing.assert_allclose(speed, [1.0, 1.0 + 2.0 * SAMPLE_TIME_S, 1.0 + 2.0 * SAMPLE_TIME_S])
-
-
-def test_the_record_and_the_parameters_are_left_alone() -> None:
-    rec = record(random_steps(50, seed=2), np.ones(50))
-    line = model(TWO_MASS)
-    p, torque = flat(line), rec.torque_nm.copy()
-    simulate(grid_for(line, [rec]), rec, p, Start(5.0, 0.0, 0.0), np.ones(50))
-    np.testing.assert_array_equal(p, flat(line))
-    np.testing.assert_array_equal(rec.torque_nm, torque)
 
 
 def test_many_simulations_in_one_call_are_those_of_single_calls() -> None:
@@ -313,9 +274,7 @@ def test_many_simulations_in_one_call_are_those_of_single_calls() -> None:
         {"clock_drift": {"rate": 0.01}},  # which looks at torques to come
     ],
 )
-def test_what_is_alike_up_to_a_moment_is_simulated_from_there(
-    effects: Mapping[str, Mapping[str, float]],
-) -> None:
+def test_what_is_alike_up_to_a_moment_is_simulated_from_there(effects: Mapping[str, Mapping[str, float]]) -> None:
     """Through delay, filter, samples off their time, and whatever else has a memory."""
     bus = model(TWO_MASS)
     off_time = np.random.default_rng(4).uniform(-0.002, 0.002, 400)

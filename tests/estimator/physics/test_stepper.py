@@ -1,7 +1,5 @@
 """The stepper is the simulation, one period at a time."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -145,32 +143,9 @@ def test_the_stepper_turns_periodic_effects_by_its_own_angle(name: str) -> None:
     assert np.max(np.abs(speed - whole)) < 0.05 * effect
 
 
-@pytest.mark.parametrize("name", EFFECTS)
-def test_an_effect_of_the_stepper_is_felt(name: str) -> None:
-    with_it, without = stepped(ALONE[name])[0], stepped(model(TWO_MASS))[0]
-    assert np.max(np.abs(with_it - without)) > 0.005 * np.ptp(without)
-
-
 def test_the_stepper_has_every_law_of_the_kernel() -> None:
     """A drift needs two clocks and a road its profile: a rig simulated on one clock, on level ground, has neither."""
     elsewhere = {"clock_drift", "road_grade"}
     fitted = {entry.name for entry in CATALOGUE.values() if not entry.recognised}
     tried = {effect_of(case) for case in (*EFFECTS, *PERIODIC)}
     assert tried - {"speed_quantisation"} == fitted - elsewhere
-
-
-def test_a_step_of_one_mass_is_newtons_law() -> None:
-    stepper = Stepper(model({"J_M": 2.0, "b_M": 0.0}), 0.5, load_torque_nm=1.0)
-    assert (stepper.speed_rad_s, stepper.angle_rad) == (0.0, 0.0)
-    stepper.step(5.0)
-    assert stepper.speed_rad_s == pytest.approx(4.0 / 2.0 * 0.5)
-    assert stepper.angle_rad == pytest.approx(0.5 * 2.0 * 0.5**2)
-
-
-def test_a_delayed_torque_acts_only_after_its_delay() -> None:
-    stepper = Stepper(model({"J_M": 2.0, "b_M": 0.0}, effects={"transport_delay": {"delay_s": 0.02}}), 0.01)
-    speeds = []
-    for torque in (5.0, 0.0, 0.0, 0.0):
-        stepper.step(torque)
-        speeds.append(stepper.speed_rad_s)
-    np.testing.assert_allclose(speeds, [0.0, 0.0, 5.0 / 2.0 * 0.01, 5.0 / 2.0 * 0.01], atol=1e-15)

@@ -1,7 +1,5 @@
 """A step is distinguished from its moment on, whichever way round a fit found it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

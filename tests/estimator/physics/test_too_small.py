@@ -1,7 +1,5 @@
 """Effects that are there but too small to tell, or no case of their kind: each says so with the figure."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Delay and lag between torque reading and shaft, against closed formulas."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.linalg import expm
@@ -26,13 +24,6 @@ def run(effects: dict[str, dict[str, float]], torque: FloatArray, substeps: int)
 
 def delayed(samples: float, torque: FloatArray, substeps: int = 4) -> FloatArray:
     return run({"transport_delay": {"delay_s": samples * SAMPLE_TIME_S}}, torque, substeps)
-
-
-@pytest.mark.parametrize("samples", [1, 2, 5])
-def test_a_delay_of_whole_periods_is_the_shifted_torque(samples: int) -> None:
-    torque = random_steps(300, seed=1, hold=3)
-    shifted = np.concatenate([np.full(samples, torque[0]), torque[:-samples]])
-    np.testing.assert_array_equal(delayed(samples, torque), run({}, shifted, 4))
 
 
 @pytest.mark.parametrize("substeps", [1, 3, 4])
@@ -78,19 +69,6 @@ def test_no_sub_step_reads_beyond_the_last_sample() -> None:
     assert any(late)
 
 
-@pytest.mark.parametrize("length_s", [0.001, 0.02, 5.0])
-def test_a_lagged_step_is_the_exponential(length_s: float) -> None:
-    tau = 0.03
-    decay = np.exp(-length_s / tau)
-    mean, rise, end, slowed = lag_step(40.0, 0.0, 10.0, 0.0, low_pass(tau, 0.0, length_s))
-    place = (np.arange(20_000) + 0.5) / 20_000
-    torque = 40.0 - 30.0 * np.exp(-place * length_s / tau)
-    assert rise == pytest.approx(12.0 * float(np.mean(torque * (place - 0.5))), rel=1e-4)
-    assert end == pytest.approx(40.0 - 30.0 * decay)
-    assert slowed == pytest.approx(30.0 * decay)
-    assert mean == pytest.approx(40.0 - 30.0 * tau / length_s * (1.0 - decay))
-
-
 @pytest.mark.parametrize("shape", [0.04, 0.25, 0.5])
 @pytest.mark.parametrize("length_s", [0.001, 0.02, 5.0])
 def test_a_lagged_step_of_second_order_is_the_matrix_exponential(shape: float, length_s: float) -> None:
@@ -123,24 +101,7 @@ def test_what_came_before_a_recording_lags_into_it() -> None:
     np.testing.assert_allclose(speed, expected, rtol=0, atol=1e-10)
 
 
-@pytest.mark.parametrize("tau", [1e-4, 0.03])
-def test_an_integrator_behind_a_lag_is_the_ramp_less_what_the_lag_holds_back(tau: float) -> None:
-    torque = np.concatenate([np.zeros(5), np.full(60, 40.0)])
-    speed = run({"actuator_lag": {"time_constant_s": tau}}, torque, 1)
-    time_s = np.maximum(np.arange(65) - 5, 0) * SAMPLE_TIME_S
-    expected = 40.0 / INTEGRATOR["J_M"] * (time_s - tau * (1.0 - np.exp(-time_s / tau)))
-    np.testing.assert_allclose(speed, expected, rtol=0, atol=1e-10)
-
-
 def test_a_lag_starts_settled_at_the_first_torque() -> None:
     torque = np.full(50, 30.0)
     speed = run({"actuator_lag": {"time_constant_s": 0.5}}, torque, 2)
     np.testing.assert_allclose(speed, 15.0 * np.arange(50) * SAMPLE_TIME_S, rtol=1e-12)
-
-
-def test_delay_and_lag_add() -> None:
-    torque = random_steps(200, seed=3)
-    both = {"transport_delay": {"delay_s": 0.02}, "actuator_lag": {"time_constant_s": 0.03}}
-    shifted = np.concatenate([np.full(2, torque[0]), torque[:-2]])
-    lag_alone = run({"actuator_lag": {"time_constant_s": 0.03}}, shifted, 4)
-    np.testing.assert_array_equal(run(both, torque, 4), lag_alone)

@@ -1,7 +1,5 @@
 """What a fit may change: bounds and scales of the shared unknowns, and what every recording has of its own."""
 
-from __future__ import annotations
-
 from dataclasses import astuple, replace
 
 import numpy as np
@@ -13,7 +11,7 @@ from estimator.physics.effects.load import grade_basis
 from estimator.physics.effects.torque import ORDERS
 from estimator.physics.layout import flat, slot
 from estimator.physics.model import DrivelineModel, Parameter, Structure
-from estimator.physics.unknowns import Release, effect_unknowns, local_basis, nominal_unknowns, own_unknowns, released
+from estimator.physics.unknowns import effect_unknowns, local_basis, nominal_unknowns, own_unknowns, released
 from estimator.signals.record import OutputKind
 from tests.estimator.physics.bench import ONE_MASS, TWO_MASS, linear_record, model, random_steps
 
@@ -28,11 +26,6 @@ def test_nominal_unknowns_stay_within_their_tolerance() -> None:
         assert shared.scale * shared.high == pytest.approx(1.3 * TWO_MASS[name])
         assert shared.scale * shared.start == TWO_MASS[name]
         assert shared.slot == slot("", name)
-
-
-def test_what_is_trusted_exactly_or_is_zero_is_no_unknown() -> None:
-    line = DrivelineModel(Structure.ONE_MASS, {"J_M": Parameter(2.0, 0.0), "b_M": Parameter(0.0, 0.5)})
-    assert nominal_unknowns(line) == ()
 
 
 def test_an_effect_has_unknowns_once_per_start() -> None:
@@ -58,11 +51,6 @@ def test_a_start_may_hold_a_value_or_have_bounds_of_its_own() -> None:
     assert contact.low == contact.start == contact.high == 0.3
     assert pull == replace(usual[2], start=0.4)
     assert across.low == across.start == across.high == 1.0
-
-
-def test_a_profile_has_no_shared_unknowns() -> None:
-    rec = linear_record(TWO_MASS, random_steps(500, seed=1), CRUISE)
-    assert effect_unknowns("road_grade", model(TWO_MASS), [rec]) == [Release((), ((),))]
 
 
 def test_moments_and_phases_are_every_recordings_own() -> None:
@@ -137,12 +125,6 @@ def test_the_guess_is_read_off_a_steady_recording() -> None:
     assert start.speed_rad_s == pytest.approx(30.0, abs=0.1)
     assert start.load_speed_rad_s == pytest.approx(30.0, abs=0.1)
     assert start.load_torque_nm == pytest.approx(load, abs=0.5)
-
-
-def test_the_guess_counts_the_acceleration() -> None:
-    rec = linear_record(ONE_MASS, np.full(500, 60.0) + random_steps(500, seed=4, size_nm=1.0), Start(20.0, 0.0, 0.0))
-    basis = local_basis(model(ONE_MASS), rec, profile=False)
-    assert basis.start(basis.guess).load_torque_nm == pytest.approx(20.0, abs=0.5)
 
 
 def test_masked_first_samples_are_not_guessed_from() -> None:

@@ -1,7 +1,5 @@
 """Correlation lengths against the closed formula."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

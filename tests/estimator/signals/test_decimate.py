@@ -1,7 +1,5 @@
 """Work and memory follow from the data: what they can't carry is refused, or left out, before room is made for it."""
 
-from __future__ import annotations
-
 import math
 import tracemalloc
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """The slider against what is known of it: a spring until it yields, and the loop that Masing's rule gives."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

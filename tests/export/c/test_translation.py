@@ -1,7 +1,5 @@
 """Python as the kernel is written in, in C: the same numbers, and a clear refusal of what has no counterpart."""
 
-from __future__ import annotations
-
 import ctypes
 import math
 import shutil

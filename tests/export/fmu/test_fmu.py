@@ -3,8 +3,6 @@
 FMPy (Dassault Systèmes, BSD) checks the archives and runs them.
 """
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Mapping
 from dataclasses import replace

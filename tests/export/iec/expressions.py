@@ -3,8 +3,6 @@
 Source: IEC 61131-3, edition 2, annex B.3.1.
 """
 
-from __future__ import annotations
-
 from tests.export.iec.reader import Reader
 from tests.export.iec.tokens import NotStructuredText
 from tests.export.iec.tree import INTEGERS, REALS, Expression, Variable

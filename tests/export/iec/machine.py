@@ -1,7 +1,5 @@
 """A PLC of one function block or program: the text translated to C, compiled by gcc, called from here."""
 
-from __future__ import annotations
-
 import ctypes
 import hashlib
 import shutil

@@ -7,8 +7,6 @@ mixed without a conversion; literals fit their type; calls name inputs that ther
 Source: IEC 61131-3, edition 2, annexes B.1.3, B.1.4 and B.1.5.
 """
 
-from __future__ import annotations
-
 from tests.export.iec.statements import Statements
 from tests.export.iec.tree import ELEMENTARY, Block, Shape, Variable
 

@@ -1,7 +1,5 @@
 """What every rule of the grammar needs: the token that is due, and a refusal that names its line."""
 
-from __future__ import annotations
-
 from tests.export.iec.tokens import NotStructuredText, Token, tokens
 from tests.export.iec.tree import Block, Shape, Variable
 

@@ -3,8 +3,6 @@
 Source: IEC 61131-3, edition 2, annex B.3.2.
 """
 
-from __future__ import annotations
-
 from tests.export.iec.expressions import Expressions
 from tests.export.iec.tokens import NotStructuredText
 from tests.export.iec.tree import INTEGERS, Assign, Block, Call, Exit, Expression, For, If, Statement, Variable, While

@@ -4,8 +4,6 @@
 pass here.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 from tests.export.iec.tree import Assign, Block, Call, Exit, For, If, Statement, Variable, While

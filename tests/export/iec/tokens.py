@@ -3,8 +3,6 @@
 Source: IEC 61131-3, edition 2, annex B.1 (letters, digits and identifiers; constants) and annex C (reserved words).
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass

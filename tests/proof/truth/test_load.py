@@ -8,35 +8,11 @@ from hil.proof.truth.driveline import TruthDriveline
 from hil.proof.truth.physics import State
 
 
-def test_dry_friction_at_the_load_holds_it_and_then_slides(plain, trace):
-    p = plain._replace(friction_load_nm=30.0)
-    held = trace(p, [20.0] * 300)
-    assert abs(held[-1, State.SPEED_L]) < 1e-3
-    free, rough = (trace(q, [0.0] * 100, speed_rad_s=60.0)[-1, State.SPEED_L] for q in (plain, p))
-    assert (p.J_M + p.J_L) * (free - rough) == pytest.approx(30.0, rel=0.01)  # over one second
-
-
-def test_a_brake_comes_on_top_of_dry_friction(plain, trace):
-    p = plain._replace(b_M=0.0, b_L=0.0, friction_load_nm=30.0, brake_nm=50.0, brake_from_s=0.0, brake_to_s=40.0)
-    states = trace(p, [0.0] * 300, speed_rad_s=60.0)
-    momentum = p.J_M * states[:, State.SPEED_M] + p.J_L * states[:, State.SPEED_L]
-    assert momentum[100] - momentum[200] == pytest.approx(80.0, rel=1e-3)
-
-
 @pytest.fixture
 def slipping(plain):
     return plain._replace(
         b_M=0.0, b_L=0.0, wheel_inertia=4.0, slip_stiffness_nm=2e4, grip_nm=1500.0, relaxation_rad=4.0
     )
-
-
-def test_a_small_torque_slips_by_itself_over_the_slip_stiffness(slipping, trace):
-    torque = 40.0
-    states = trace(slipping, [torque] * 500, speed_rad_s=60.0)
-    wheels, vehicle = states[-1, State.SPEED_L], states[-1, State.SPEED_V]
-    inertia = slipping.J_M + slipping.J_L
-    to_vehicle = torque * (slipping.J_L - slipping.wheel_inertia) / inertia
-    assert (wheels - vehicle) / vehicle == pytest.approx(to_vehicle / slipping.slip_stiffness_nm, rel=0.02)
 
 
 def test_the_slip_builds_up_over_the_relaxation_length(slipping):
@@ -56,14 +32,6 @@ def test_a_tyre_gives_no_more_than_its_grip(slipping):
     assert abs(torques[0]) < 0.95 * slipping.grip_nm  # and less when it spins
     small = laws.tyre_torque(slipping, 1e-4, 60.0, 60.0)
     assert small == pytest.approx(1e-4 * slipping.slip_stiffness_nm, rel=1e-3)
-
-
-def test_a_tyre_that_hardly_slips_is_a_rigid_one(plain, slipping, trace):
-    rng = np.random.default_rng(4)
-    torques = 200.0 * rng.choice([-1.0, 1.0], 300)
-    stiff = slipping._replace(slip_stiffness_nm=2e7, grip_nm=1e6, relaxation_rad=1.0, b_M=plain.b_M, b_L=plain.b_L)
-    rigid, rolling = (trace(p, torques, speed_rad_s=60.0) for p in (plain, stiff))
-    np.testing.assert_allclose(rolling[:, State.SPEED_M], rigid[:, State.SPEED_M], atol=0.03)  # of 5 rad/s
 
 
 def test_a_slipping_tyre_keeps_the_momentum(slipping, trace):
@@ -103,7 +71,7 @@ def test_a_heavier_bus_is_pulled_more_by_a_hill(lossless, trace):
     road = np.array([[100.0, 0.001, 0.0]])  # a tenth uphill for hundreds of metres
     p = lossless._replace(road=road, metres_per_rad=0.0857, gravity_nm=8000.0, payload_share=0.5, payload_rise_s=1e-3)
     light, heavy = (
-        trace(q, [0.0] * 200, speed_rad_s=60.0)[-1, State.SPEED_L] for q in (p._replace(payload_share=0), p)
+        trace(q, [0.0] * 200, speed_rad_s=60.0)[-1, State.SPEED_L] for q in (p._replace(payload_share=0.0), p)
     )
     # weight and inertia grow alike; the motor's inertia, which helps the bus along, does not
     assert 0.0 < light - heavy < 0.02 * (60.0 - light)
@@ -114,11 +82,3 @@ def test_cold_oil_warms_to_the_data_sheet(plain):
     factors = [laws.viscosity_over_warm(p, time_s) for time_s in (0.0, 5.0, 100.0)]
     np.testing.assert_allclose(factors, [3.0, 3.0 ** np.exp(-1.0), 1.0], rtol=1e-6)
     assert laws.viscosity_over_warm(plain, 0.0) == 1.0
-
-
-def test_cold_oil_brakes_by_its_factor(plain):
-    p = plain._replace(k=0.0, c=0.0, cold_factor=3.0, warming_time_s=5.0)
-    driveline = TruthDriveline(p, 50.0)
-    driveline.advance((0.0, 0.0), 1e-3)
-    lost = (50.0 - driveline.quantity(State.SPEED_L)) * p.J_L / 1e-3
-    assert lost == pytest.approx(3.0 * p.b_L * 50.0, rel=1e-3)

@@ -4,8 +4,6 @@ import numpy as np
 import pytest
 
 from hil.proof.truth import laws
-from hil.proof.truth.driveline import TruthDriveline
-from hil.proof.truth.laws import CLUTCH_FALL_S
 from hil.proof.truth.physics import State
 
 
@@ -51,14 +49,6 @@ def test_a_clutch_that_is_too_weak_continues_slipping(alone, trace):
     np.testing.assert_allclose(np.diff(states[121:, State.SPEED_G]) / 0.01, 20.0 / 0.8, rtol=1e-6)
 
 
-def test_a_clutch_opens_quickly(alone):
-    driveline = TruthDriveline(alone)
-    driveline.advance((10.0, 0.0), 2.0 + CLUTCH_FALL_S + 1e-3)
-    speed = driveline.quantity(State.SPEED_M)
-    driveline.advance((160.0, 0.0), 0.01)
-    assert driveline.quantity(State.SPEED_M) - speed == pytest.approx(1.0, rel=1e-6)
-
-
 def test_eddy_drag_is_greatest_at_its_speed_and_odd(plain):
     p = plain._replace(eddy_nm=30.0, eddy_speed_rad_s=15.0)
     speeds = np.linspace(0.0, 100.0, 2001)
@@ -66,12 +56,6 @@ def test_eddy_drag_is_greatest_at_its_speed_and_odd(plain):
     assert speeds[np.argmax(torques)] == pytest.approx(15.0)
     assert torques.max() == pytest.approx(30.0)
     assert laws.eddy_torque(p, -40.0) == -laws.eddy_torque(p, 40.0)
-
-
-def test_eddy_drag_slows_the_motor(plain):
-    driveline = TruthDriveline(plain._replace(k=0.0, c=0.0, b_M=0.0, eddy_nm=30.0, eddy_speed_rad_s=15.0), 15.0)
-    driveline.advance((0.0, 0.0), 0.01)
-    assert driveline.quantity(State.SPEED_M) == pytest.approx(15.0 - 30.0 * 0.01 / 1.6, rel=1e-4)
 
 
 def test_currents_that_keep_to_the_surface_flatten_the_drag_but_not_its_peak(plain):

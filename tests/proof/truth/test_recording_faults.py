@@ -39,28 +39,6 @@ def test_a_faultless_chain_changes_no_row_and_samples_in_time(rows, rng):
     np.testing.assert_array_equal(sampling_instants_s(TIME_S, FAULTLESS, rng), TIME_S)
 
 
-@pytest.mark.parametrize("tau", [0.004, 0.02])
-def test_a_first_order_filter_reaches_63_percent_after_its_time_constant(plain, tau):
-    p = plain._replace(k=0.0, c=0.0, b_M=0.0, filter_time_s=tau)
-    driveline = TruthDriveline(p, 0.0)
-    driveline.advance((1.6e5, 0.0), 1e-4)  # 10 rad/s in one step
-    driveline.advance((0.0, 0.0), tau)
-    assert driveline.speed_rad_s == pytest.approx(10.0 * (1.0 - np.exp(-1.0)), rel=0.02)
-
-
-def test_a_second_order_filter_has_its_corner_and_no_gain_at_rest(plain):
-    p = plain._replace(k=0.0, c=0.0, b_M=0.0, filter_rad_s=100.0, filter_damping=0.7)
-    driveline = TruthDriveline(p, 30.0)
-    driveline.advance((0.0, 0.0), 1.0)
-    assert driveline.speed_rad_s == pytest.approx(30.0)
-    omega, read = 100.0, []
-    for step in range(4000):
-        driveline.advance((1.6 * 50.0 * np.cos(omega * step * 5e-4), 0.0), 5e-4)
-        read.append(driveline.speed_rad_s)
-    swing = np.ptp(read[-1000:]) / 2
-    assert swing == pytest.approx(50.0 / omega / (2 * 0.7), rel=0.01)  # 1 / (2 zeta) at the corner
-
-
 def test_a_blind_sensor_reads_the_magnitude(rng):
     read = speed_as_read(np.linspace(-40.0, 40.0, N), Acquisition(sign_blind=True), rng)
     np.testing.assert_allclose(read, np.abs(np.linspace(-40.0, 40.0, N)), atol=6 * SPEED_NOISE_RAD_S)

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from hil.proof.truth import laws
-from hil.proof.truth.driveline import TruthDriveline
 from hil.proof.truth.physics import State
 
 
@@ -94,46 +93,3 @@ def test_a_bent_joint_leads_and_lags_twice_per_turn(plain):
     lead = 2 * np.abs(np.fft.rfft((behind - angles)[:-1])) / 720
     assert np.argmax(lead) == 2
     assert lead[2] == pytest.approx(bend**2 / 4, rel=0.02)
-
-
-def test_a_joint_takes_and_gives_no_energy(lossless, trace):
-    p = lossless._replace(joint_angle_rad=0.2, joint_phase_rad=0.4)
-    states = trace(p, [300.0] * 10 + [0.0] * 500, speed_rad_s=20.0)[10:]
-    behind = np.array([laws.through_joint(p, angle)[0] for angle in states[:, State.ANGLE_M]])
-    elastic = 0.5 * p.k * (behind - states[:, State.ANGLE_L]) ** 2
-    energy = elastic + 0.5 * (p.J_M * states[:, State.SPEED_M] ** 2 + p.J_L * states[:, State.SPEED_L] ** 2)
-    assert np.ptp(elastic) > 1.0
-    np.testing.assert_allclose(energy, energy[0], atol=2e-3 * np.ptp(elastic))
-
-
-@pytest.mark.parametrize("at_motor", [True, False])
-def test_three_masses_ring_at_the_eigenfrequencies_of_three_masses(lossless, at_motor):
-    p = lossless._replace(extra_inertia=0.5, extra_stiffness=15000.0, extra_at_motor=at_motor)
-    first, second = (p.extra_stiffness, p.k) if at_motor else (p.k, p.extra_stiffness)
-    K = np.array([[first, -first, 0], [-first, first + second, -second], [0, -second, second]])
-    squares = np.linalg.eigvals(K / np.array([[p.J_M], [p.extra_inertia], [p.J_L]]))
-    expected = np.sqrt(np.sort(squares.real)[1:])
-    driveline = TruthDriveline(p)
-    driveline.advance((400.0, 0.0), 0.002)
-    n = 40_000
-    speed = np.empty(n)
-    for i in range(n):
-        speed[i] = driveline.quantity(State.SPEED_M)
-        driveline.advance((0.0, 0.0), 0.001)
-    power = np.abs(np.fft.rfft((speed - speed.mean()) * np.hanning(n)))
-    peaks = np.flatnonzero((power[1:-1] > power[:-2]) & (power[1:-1] > power[2:])) + 1
-    strongest = np.sort(peaks[np.argsort(power[peaks])[-2:]]) * 2 * np.pi / (n * 0.001)
-    np.testing.assert_allclose(strongest, expected, atol=2 * np.pi / (n * 0.001))
-
-
-@pytest.mark.parametrize("at_motor", [True, False])
-def test_an_extra_inertia_keeps_momentum_and_energy(lossless, trace, at_motor):
-    p = lossless._replace(extra_inertia=0.5, extra_stiffness=15000.0, extra_at_motor=at_motor)
-    states = trace(p, [300.0] * 10 + [0.0] * 500)[10:]
-    inertia = np.array([p.J_M, p.extra_inertia, p.J_L])
-    speed = states[:, [State.SPEED_M, State.SPEED_X, State.SPEED_L]]
-    angle = states[:, [State.ANGLE_M, State.ANGLE_X, State.ANGLE_L]]
-    np.testing.assert_allclose(speed @ inertia, (speed @ inertia)[0], rtol=1e-9)
-    springs = np.array([p.extra_stiffness, p.k] if at_motor else [p.k, p.extra_stiffness])
-    energy = 0.5 * (speed**2 @ inertia + np.diff(angle, axis=1) ** 2 @ springs)
-    np.testing.assert_allclose(energy, energy[0], rtol=1e-4)

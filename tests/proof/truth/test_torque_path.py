@@ -20,14 +20,6 @@ def test_a_torque_derates_exponentially_or_evenly(plain):
     assert true_torque(even, (60.0, 40.0), 2 * TIME_TO_DERATE_S) == pytest.approx(80.0)
 
 
-def test_a_derated_torque_accelerates_less_as_time_continues(plain):
-    driveline = TruthDriveline(plain._replace(derating=0.5, k=0.0, c=0.0, b_M=0.0, b_L=0.0))
-    for _ in range(3000):
-        driveline.advance((8.0, 8.0), 0.01)
-    mean = 16.0 * (1.0 - 0.5 / 2.0)
-    assert driveline.quantity(State.SPEED_M) == pytest.approx(mean * 30.0 / plain.J_M, rel=1e-3)
-
-
 @pytest.mark.parametrize(
     ("limits", "readings", "given"),
     [
@@ -41,15 +33,6 @@ def test_a_derated_torque_accelerates_less_as_time_continues(plain):
 def test_a_limit_holds_for_what_it_is_of(plain, limits, readings, given):
     p = plain._replace(limit_knee=20.0, **limits)
     assert true_torque(p, readings, 0.0) == pytest.approx(given, rel=2e-3)
-
-
-def test_a_limit_is_approached_in_a_knee(plain):
-    sharp, soft = plain._replace(limit_m1_nm=100.0, limit_knee=20.0), plain._replace(limit_m1_nm=100.0, limit_knee=6.0)
-    at_limit = [true_torque(p, (100.0, 0.0), 0.0) for p in (sharp, soft)]
-    assert 85.0 < at_limit[1] < at_limit[0] < 100.0
-    given = [true_torque(soft, (torque, 0.0), 0.0) for torque in np.linspace(0.0, 400.0, 50)]
-    assert np.all(np.diff(given) > 0.0)
-    assert given[-1] < 100.0
 
 
 def test_a_deadband_is_missing_from_each_inverter(plain):
@@ -87,10 +70,6 @@ def test_a_torque_changes_no_faster_than_its_inverter_can(plain):
     assert driveline.quantity(State.INVERTER_NM) == pytest.approx(120.0)
 
 
-def test_the_reading_and_the_true_torque_are_the_same_without_a_fault(plain):
-    assert true_torque(plain, (310.0, -45.0), 12.0) == 265.0
-
-
 def _harmonics(p, torque_nm):
     """Amplitudes of the torque over a turn, shape (65,): index is periods per turn."""
     angles = np.arange(128) * 2 * np.pi / 128
@@ -105,16 +84,3 @@ def test_cogging_needs_no_torque_and_current_ripple_grows_with_it(plain):
     current = plain._replace(ripple_share=0.1, ripple_order=4.0)
     assert _harmonics(current, 200.0)[4] == pytest.approx(20.0)
     assert not _harmonics(current, 0.0).any()
-
-
-def test_ripple_moves_a_free_motor_at_its_order(plain):
-    p = plain._replace(k=0.0, c=0.0, b_M=0.0, ripple_nm=5.0, ripple_order=4.0)
-    driveline = TruthDriveline(p, 50.0)
-    n, turn_s = 1000, 2 * np.pi / 50.0
-    speed = np.empty(n)
-    for i in range(n):
-        speed[i] = driveline.speed_rad_s
-        driveline.advance((0.0, 0.0), turn_s / n)
-    amplitude = 2 * np.abs(np.fft.rfft(speed)) / n
-    assert np.argmax(amplitude[1:]) + 1 == 4
-    assert amplitude[4] == pytest.approx(5.0 / (p.J_M * 4.0 * 50.0), rel=0.02)

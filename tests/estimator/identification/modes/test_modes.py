@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.signal import cont2discrete
@@ -26,7 +24,12 @@ def test_frequency_and_damping_of_known_poles() -> None:
 
 
 def test_the_discretised_two_mass_driveline_has_its_continuous_mode() -> None:
-    system = (driveline.A, driveline.B[:, :1], np.array([[1.0, 0.0, 0.0]]), np.zeros((1, 1)))
+    system = (
+        driveline.LINE.matrix,
+        np.array([[1.0 / driveline.J_M], [0.0], [0.0]]),
+        np.array([[1.0, 0.0, 0.0]]),
+        np.zeros((1, 1)),
+    )
     Ad, Bd, C, _, _ = cont2discrete(system, T_S)
     a = np.real(np.poly(Ad))
     b = np.real(np.poly(Ad - Bd @ C)) - a  # the numerator of C (zI - A)^-1 B

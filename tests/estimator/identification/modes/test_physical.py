@@ -1,7 +1,5 @@
 """The physically possible two-mass drive behind a linear model, and what the data leave open of it."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -15,25 +13,17 @@ from estimator.identification.modes.physical import (
     two_mass_start,
 )
 from estimator.identification.modes.uncertainty import Uncertain
-from estimator.identification.offline.fits import LinearFit, fit_box_jenkins
-from estimator.signals.decimate import decimate
+from estimator.identification.offline.fits import LinearFit
 from tests.estimator.identification import driveline
-from tests.estimator.identification.driveline import cruise
 
 TRUTH = np.array([driveline.J_M, driveline.J_L, driveline.K, driveline.C, driveline.B_M, driveline.B_L])
 T_S = 0.01
 TIGHT = 1e-22 * np.eye(6)
 
 
-@pytest.fixture(scope="module")
-def fits() -> list[LinearFit]:
-    """Models of third order at the recordings' own period."""
-    return [fit_box_jenkins(decimate(cruise(seed, 20.0).record, 1), Orders(3, 3, 1)) for seed in range(100, 106)]
-
-
 def test_the_sampled_drive_has_the_exact_response() -> None:
     model = two_mass_model(TRUTH, T_S)
-    Ad, Bd = driveline.discrete(T_S)
+    Ad, Bd = driveline.LINE.discrete(T_S)
     frequency_hz = np.array([0.2, 1.0, 8.2, 30.0])
     z = np.exp(2j * np.pi * frequency_hz * T_S)
     exact = [np.linalg.solve(at * np.eye(3) - Ad, Bd[:, 0])[0] for at in z]

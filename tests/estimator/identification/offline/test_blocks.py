@@ -1,7 +1,5 @@
 """What off-line models are fitted to."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

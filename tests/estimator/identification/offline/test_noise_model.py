@@ -1,10 +1,8 @@
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.signal import lfilter, welch
 
-from estimator.identification.offline.noise_model import fit_noise, reach, sandwich, white
+from estimator.identification.offline.noise_model import fit_noise, sandwich
 
 D = np.array([1.0, -1.5, 0.7])
 N = 20_000
@@ -43,13 +41,6 @@ def test_where_no_stretch_is_long_enough_the_order_ends_there() -> None:
     assert noise.order == 1
 
 
-@pytest.mark.parametrize("e", [np.zeros(500), np.full(500, np.nan)])
-def test_nothing_left_is_no_noise(e: np.ndarray) -> None:
-    noise = fit_noise(e, np.isfinite(e), 10)
-    assert (noise.order, noise.std) == (0, 0.0)
-    assert white(e, np.isfinite(e)).std == 0.0
-
-
 def test_it_is_stable_even_on_a_random_walk() -> None:
     walk = np.cumsum(np.random.default_rng(5).normal(size=2000))
     noise = fit_noise(walk, np.ones(2000, dtype=bool), 50)
@@ -61,10 +52,6 @@ def test_its_spectrum_is_that_of_the_residual() -> None:
     frequency_hz, density = welch(e, fs=100.0, nperseg=1024)
     model = fit_noise(e, np.ones(e.shape, dtype=bool), 2).spectrum(frequency_hz, 0.01)
     assert np.abs(10 * np.log10(model / density))[5:-5].max() < 1.5
-
-
-def test_the_memory_is_a_second() -> None:
-    assert (reach(0.01), reach(0.02), reach(2.0)) == (100, 50, 1)
 
 
 def test_the_sandwich_is_the_scatter_of_least_squares_in_coloured_noise() -> None:

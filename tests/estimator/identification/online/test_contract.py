@@ -1,7 +1,5 @@
 """What every recursive estimator of the registry promises, tried on each of them."""
 
-from __future__ import annotations
-
 import json
 import tracemalloc
 from io import BytesIO
@@ -10,10 +8,9 @@ import numpy as np
 import pytest
 
 from estimator.errors import BadModel, BadSetting, BadShape
-from estimator.identification.linear_model import LinearModel, Orders
+from estimator.identification.linear_model import LinearModel
 from estimator.identification.online.adaptation import ConstantForgetting
-from estimator.identification.online.oefo import Oefo
-from estimator.identification.online.recursive import Estimate, Memory, Reason, RecursiveEstimator, Status
+from estimator.identification.online.recursive import Estimate, Reason, RecursiveEstimator, Status
 from estimator.identification.online.registry import ESTIMATORS, Setup
 from estimator.signals.record import FloatArray
 from tests.estimator.identification.online.cases import CASES, LINEAR, TWO_MASS, Case, two_mass_data
@@ -59,15 +56,6 @@ def test_strided_signals_give_the_same_bits_and_none_is_changed(case: Case) -> N
     straight = case.make().run(u, y, okay).theta
     assert np.array_equal(straight, case.make().run(spread[:, 0], spread[:, 1], okay).theta)
     assert np.array_equal(spread, before)
-
-
-def test_an_estimate_is_a_copy(case: Case) -> None:
-    u, y, okay = case.data(200, 0.05, 0)
-    estimator = case.make()
-    first = estimator.update(float(u[0]), float(y[0]))
-    kept = first.theta.copy()
-    estimator.run(u[1:], y[1:], okay[1:])
-    assert np.array_equal(first.theta, kept)
 
 
 def test_it_finds_the_truth_without_noise(case: Case) -> None:
@@ -298,50 +286,3 @@ def test_a_state_with_a_hole_is_refused(case: Case) -> None:
 def test_the_kalman_filter_asks_for_its_start_values() -> None:
     with pytest.raises(BadModel, match="no start values for J_M, J_L, k and c"):
         ESTIMATORS["ekf"](Setup())
-
-
-def test_names_and_titles_are_reported() -> None:
-    assert next(iter(ESTIMATORS)) == "oefo"  # the paper's first
-    for name, entry in ESTIMATORS.items():
-        made = CASES[name].make()
-        assert made.state()["estimator"] == name
-        assert entry.title
-
-
-@pytest.fixture
-def memory() -> Memory:
-    return Memory({"theta": (3,), "U": (3, 3), "none": (0,)}, {"law": np.array([0.5, 2.0])}, {"work": (3,)})
-
-
-def test_a_part_is_a_view_of_the_record(memory: Memory) -> None:
-    memory["U"][1, 2] = 7.0
-    assert memory.record["U"][0, 1, 2] == 7.0
-    assert memory["none"].shape == (0,)
-
-
-def test_what_is_kept_and_settings_are_copies_and_room_is_neither(memory: Memory) -> None:
-    assert list(memory.kept) == ["theta", "U", "none"]
-    assert memory.settings["law"].tolist() == [0.5, 2.0]
-    memory.kept["theta"][:] = 1.0
-    memory.settings["law"][:] = 1.0
-    assert memory["theta"].tolist() == [0.0] * 3
-    assert memory["law"].tolist() == [0.5, 2.0]
-
-
-def test_the_same_shapes_are_the_same_type_so_that_they_share_their_code(memory: Memory) -> None:
-    again = Memory({"theta": (3,), "U": (3, 3), "none": (0,)}, {"law": np.zeros(2)}, {"work": (3,)})
-    longer = Memory({"theta": (4,), "U": (3, 3), "none": (0,)}, {"law": np.zeros(2)}, {"work": (3,)})
-    assert again.record.dtype == memory.record.dtype != longer.record.dtype
-
-
-def test_structures_side_by_side_keep_to_themselves() -> None:
-    """Each structure has code of its own: the results of one do not depend on which others there are."""
-    rng = np.random.default_rng(0)
-    u, y, okay = rng.normal(size=200), rng.normal(size=200), np.ones(200, dtype=np.bool_)
-    orders = (Orders(2, 3, 0), Orders(0, 2, 1), Orders(2, 2, 1))
-    alone = [Oefo(np.ones(1), of).run(u, y, okay).theta for of in orders]
-    estimators = [Oefo(np.ones(1), of) for of in orders]
-    for k in range(200):
-        companion = [estimator.update(u[k], y[k]).theta for estimator in estimators]
-    for theta, last in zip(alone, companion, strict=True):
-        assert np.array_equal(theta[-1], last)

@@ -3,8 +3,6 @@
 Shares nothing with the model that is identified, nor with the linear drives of :mod:`drives` and :mod:`roads`.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from estimator.signals.record import Record

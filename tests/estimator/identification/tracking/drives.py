@@ -1,61 +1,18 @@
 """Drives whose physics changes on the way, many at once: exact discretisation by scipy, nothing of this project."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import expm
 from scipy.signal import max_len_seq
 
-from estimator.signals.record import FloatArray, Record
+from estimator.signals.record import Record
+from tests.estimator.identification.driveline import SAMPLE_TIME_S, Line
 
-SAMPLE_TIME_S = 0.01
 SPEED_RAD_S = 60.0
 PRBS_NM = 120.0
 CLOCK_DIVIDER = 2
 TORQUE_STEP_NM = 1.2
 """0.1 % of 600 Nm, of two inverters."""
-
-
-@dataclass(frozen=True)
-class Line:
-    """A two-mass driveline from a moment on."""
-
-    from_s: float = 0.0
-    k: float = 4200.0
-    J_L: float = 100.0
-    J_M: float = 1.6
-    c: float = 9.0
-    b_motor: float = 0.35
-    b_load: float = 0.9
-
-    @property
-    def matrix(self) -> FloatArray:
-        """A of dx/dt = A x + B [T, T_0], x = [w_M, w_L, phi_M - phi_L]."""
-        return np.array(
-            [
-                [-(self.c + self.b_motor) / self.J_M, self.c / self.J_M, -self.k / self.J_M],
-                [self.c / self.J_L, -(self.c + self.b_load) / self.J_L, self.k / self.J_L],
-                [1.0, -1.0, 0.0],
-            ]
-        )
-
-    @property
-    def resonance(self) -> tuple[float, float]:
-        """Natural frequency [Hz] and damping ratio of the oscillating pair."""
-        poles = np.linalg.eigvals(self.matrix)
-        pole = poles[np.argmax(poles.imag)]
-        return abs(pole) / (2 * np.pi), -pole.real / abs(pole)
-
-    def discrete(self) -> tuple[FloatArray, FloatArray]:
-        """Exact zero-order-hold discretisation."""
-        block = np.zeros((5, 5))
-        block[:3, :3] = self.matrix
-        block[:3, 3:] = [[1.0 / self.J_M, 0.0], [0.0, -1.0 / self.J_L], [0.0, 0.0]]
-        exponential = expm(block * SAMPLE_TIME_S)
-        return exponential[:3, :3], exponential[:3, 3:]
 
 
 def drives(

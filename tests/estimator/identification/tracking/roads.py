@@ -1,7 +1,5 @@
 """Drives on a road, with a driver, whose stiffness and PRBS change on the way: the road of `hil paper`, other buses."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -32,10 +30,7 @@ class Drive:
 
 
 def drive(
-    seed: int,
-    duration_s: float,
-    prbs_nm: Course = lambda time_s: 120.0,
-    stiffness: Course = lambda time_s: 1.0,
+    seed: int, duration_s: float, prbs_nm: Course = lambda time_s: 120.0, stiffness: Course = lambda time_s: 1.0
 ) -> Drive:
     """Drive a bus drawn at random: PRBS amplitude [Nm] and stiffness, over that at the start, change with time."""
     conditions = draw_conditions(seed, 1)[0]

@@ -1,7 +1,5 @@
 """The standard deviations given on line, against the scatter of many drives."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The compiled search for the dominant mode against numpy's roots and `modes.resonance`."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
