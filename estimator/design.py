@@ -46,7 +46,7 @@ ITERATIONS = 8
 """Steps of a fit of what is a recording's own, which is nearly linear."""
 
 MOST_LOG_ODDS = 700.0
-"""Largest logarithm of odds that is told: its exponential is still a number."""
+"""Largest logarithm of odds that is given: its exponential is still a number."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,7 +15,7 @@ from estimator.design import Open, left_open
 from estimator.diagnosis.result import Diagnosis
 from estimator.signals.record import Record
 from hil.commission.order import Order, RigSource, as_table, rig_digest
-from hil.commission.runner import Runner, rigid_model
+from hil.commission.runner import Runner
 from hil.commission.state import now_utc
 from hil.commission.talk import Talk, What
 from hil.config.model_file import ModelFile
@@ -36,6 +36,10 @@ STEP = "solve"
 """Name of the step that drives: the first part of its recordings' names."""
 
 
+LEAST_MARGIN_RAD_S = 2.0
+"""How far a speed may leave its predicted range, at least [rad/s]: what is missing in the model is not predicted."""
+
+
 class End(Enum):
     """What a call came to."""
 
@@ -53,6 +57,7 @@ class Driven:
     table: dict[str, Any]
     recording: str
     seconds: float
+    last_rad_s: float  # Speed at its end: the next one begins there
     promised_factor: float | None
     promised_probability: float | None
 
@@ -133,7 +138,7 @@ class Solving:
     progress: Callable[[str, float], None]
 
     def run(self) -> End:
-        """Go on until it ends; what ends it is in the state."""
+        """Continue until it ends; what ends it is in the state."""
         if self.state.end is End.DECIDED:
             self.say(f"decided before: {self.state.statement}")
             return End.DECIDED
@@ -181,8 +186,9 @@ class Solving:
 
     def _drive(self, name: str, table: Any, design: Design | None = None) -> bool:
         """Drive an experiment if the operator agrees; what was driven whole is in the state."""
-        order = Order(f"next_{len(self.state.driven) + 1}", dict(table))
-        prediction = self.runner.predict(order, rigid_model(self.source.rig()), 0.0)
+        order = Order(f"next_{len(self.state.driven) + 1}", dict(table), least_margin_rad_s=LEAST_MARGIN_RAD_S)
+        model, rolling_rad_s = self.file.model, self.state.driven[-1].last_rad_s if self.state.driven else 0.0
+        prediction = self.runner.predict(order, model, rolling_rad_s)
         m1, m2, speed = prediction.torque_m1_nm, prediction.torque_m2_nm, prediction.speed_rad_s
         self.say(
             f"{name}: {prediction.seconds:.0f} s, m1 {m1.low:.0f} to {m1.high:.0f} Nm, m2 {m2.low:.0f} to "
@@ -190,7 +196,7 @@ class Solving:
         )
         if self.talk.may_command(name, not self.state.driven).what is not What.GO:
             return False
-        run = self.runner.run(STEP, order, rigid_model(self.source.rig()), 0.0, lambda _: None)
+        run = self.runner.run(STEP, order, model, rolling_rad_s, lambda _: None)
         decides = None if design is None else design.decides
         self.state.driven.append(
             Driven(
@@ -198,6 +204,7 @@ class Solving:
                 json.loads(json.dumps(dict(table))),
                 str(run.recording),
                 run.seconds,
+                run.last_rad_s,
                 None if decides is None else decides.factor,
                 None if decides is None else decides.right,
             )

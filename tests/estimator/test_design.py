@@ -54,7 +54,7 @@ def test_both_hypotheses_are_there(known: Open) -> None:
     assert [each.name for each in known.candidates] == NAMES
 
 
-def test_nothing_is_told_from_itself(known: Open) -> None:
+def test_nothing_is_distinguished_from_itself(known: Open) -> None:
     one = known.candidates[0]
     assert distance(one, one, known.line, driven(known, 60.0)) == pytest.approx(0.0, abs=1e-6)
 
