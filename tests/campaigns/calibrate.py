@@ -225,10 +225,15 @@ def written(thresholds: Thresholds, command: str) -> str:
         "# Thresholds of a verdict by likelihood, from simulated worlds (docs/diagnosis.md); written by",
         f"# {command}",
         f"tempered = {thresholds.divisor:.3g}",
-        f"least_probability = {thresholds.least_probability:.4g}",
-        *(f"{key} = {limit:.3g}" for key, limit in thresholds.limits.items()),
+        f"least_probability = {thresholds.least_probability:.4g}{_choice(thresholds.least_probability == BELIEVED)}",
+        *(f"{key} = {limit:.3g}{_choice(limit == OTHER_FORMS.get(key))}" for key, limit in thresholds.limits.items()),
     ]
     return "\n".join(lines) + "\n"
+
+
+def _choice(is_one: bool) -> str:
+    """Return what marks a threshold that worlds would let be lower: its floor is a choice."""
+    return "  # a choice, with its reason in tests/campaigns/calibrate.py" if is_one else ""
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -1,7 +1,8 @@
 """The thresholds of a verdict by likelihood, in one place; no other number decides.
 
 Those that depend on what worlds are like are data (``thresholds.toml``), written by
-``python -m tests.campaigns.calibrate``, whose command the file holds.
+``python -m tests.campaigns.calibrate``, whose command the file holds; it marks those that are a choice. Those in this
+file are choices, each with its reason.
 """
 
 from __future__ import annotations
