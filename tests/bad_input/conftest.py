@@ -23,9 +23,11 @@ def refused(capsys: pytest.CaptureFixture[str]) -> Refused:
         assert run([str(word) for word in arguments]) == status
         printed = capsys.readouterr()
         assert printed.out == ""
-        assert printed.err.startswith("error: ")
-        assert "Traceback" not in printed.err
-        return printed.err
+        notes, word, complaint = printed.err.rpartition("error: ")
+        assert word
+        assert all(line.startswith("note: ") for line in notes.splitlines())
+        assert "Traceback" not in complaint
+        return word + complaint
 
     return check
 

@@ -1,5 +1,6 @@
 """The man in the middle: the judge finds what is wrong, and leaves alone what is not."""
 
+import re
 from pathlib import Path
 
 import pytest
@@ -15,7 +16,7 @@ from tests.campaigns.faults.rig import campaign_rig
         ("leaves operation", "power state is"),
         ("speed zero", "expected one speed"),
         ("boot-up", "NMT"),
-        ("two hosts at once", "somebody else"),
+        ("two hosts at once", "somebody else|[Aa]nother host"),
         ("PLC registers exchanged", "PLC"),
     ],
 )
@@ -23,7 +24,7 @@ def test_a_fault_ends_the_run_and_none_does_not(kind: str, ends: str, tmp_path: 
     fault = Fault(kind, 1, 100, "for ever", 1, 1, 0.0)
     outcome, _ = run_with(campaign_rig(tmp_path), "tip", fault, tmp_path, 5.0)
     assert outcome.problems == []
-    assert ends in outcome.said
+    assert re.search(ends, outcome.said)
     assert bool(outcome.said) is bool(ends)
 
 

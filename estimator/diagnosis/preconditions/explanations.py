@@ -313,9 +313,11 @@ class Explanation:
     def cure(self) -> Cure | None:
         """What to correct in the recording; None where that is not known, or the model is to be corrected.
 
-        Two factors are never corrected at once: many pairs have the product of another one.
+        Two things are never corrected at once: many pairs of factors have the product of another one, and a column of
+        another kind with a factor besides fits what lacks physics.
         """
-        if any(row.part is Part.MODEL for row, _ in self.rows) or self.is_physics or len(self.rows) > 1:
+        corrected = len(self.rows) + bool(self.change.question)
+        if any(row.part is Part.MODEL for row, _ in self.rows) or self.is_physics or corrected > 1:
             return None
         cure = replace(self.change.cure, recording=self.change.record.name)
         for row, factor in self.rows:

@@ -6,7 +6,7 @@ An input is a row of frames, each a byte that chooses who it is for, one with it
 import asyncio
 import itertools
 import struct
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
@@ -224,9 +224,9 @@ MOST_INPUTS = 40
 def _bus(folder: Path) -> Iterator[Read]:
     """A host and two simulated drives on one bus, on which a third device sends an input."""
     inputs = 0
-    scene: Iterator[Bench] | None = None
+    scene: Generator[Bench, None, None] | None = None
 
-    def fresh() -> Iterator[Bench]:
+    def fresh() -> Generator[Bench, None, None]:
         with bench(settings=_PATIENT) as rig:
             for inverter in (rig.m1, rig.m2):
                 inverter.configure()
@@ -239,18 +239,21 @@ def _bus(folder: Path) -> Iterator[Read]:
         nonlocal inputs, scene
         if scene is None or inputs % MOST_INPUTS == 0:
             if scene is not None:
-                scene.close()  # type: ignore[attr-defined]  # a generator: it raises what a callback raised
+                scene.close()  # raises what a callback raised
             scene = fresh()
         inputs += 1
         try:
             _disturb(next(scene), data)
         except Exception:
-            scene = None
+            broken, scene = scene, None
+            broken.close()  # here: collected later, it would be closed by a thread that it waits for
             raise
 
-    yield read
-    if scene is not None:
-        scene.close()  # type: ignore[attr-defined]
+    try:
+        yield read
+    finally:
+        if scene is not None:
+            scene.close()
 
 
 def _disturb(rig: Bench, data: bytes) -> None:
