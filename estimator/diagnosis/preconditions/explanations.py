@@ -313,11 +313,12 @@ class Explanation:
     def cure(self) -> Cure | None:
         """What to correct in the recording; None where that is not known, or the model is to be corrected.
 
-        Two things are never corrected at once: many pairs of factors have the product of another one, and a column of
-        another kind with a factor besides fits what lacks physics.
+        Two factors are never corrected at once: many pairs have the product of another one. Nor are a column and a
+        factor out of a range: what lacks physics fits so, too.
         """
-        corrected = len(self.rows) + bool(self.change.question)
-        if any(row.part is Part.MODEL for row, _ in self.rows) or self.is_physics or corrected > 1:
+        is_fitted = bool(self.change.question) and any(row.low != row.high for row, _ in self.rows)
+        is_certain = len(self.rows) < 2 and not is_fitted
+        if any(row.part is Part.MODEL for row, _ in self.rows) or self.is_physics or not is_certain:
             return None
         cure = replace(self.change.cure, recording=self.change.record.name)
         for row, factor in self.rows:
