@@ -1,4 +1,4 @@
-"""The next experiment, judged before it is driven: how well it tells hypotheses apart, and what it makes known.
+"""The next experiment, judged before it is driven: how well it distinguishes hypotheses, what it makes known.
 
 An experiment on paper is a recording that one hypothesis would give. Another hypothesis is fitted to it: its unknowns,
 held by what earlier recordings say of them, move to where the innovations are least, and what these still are is the
@@ -86,7 +86,7 @@ class Open:
     candidates : tuple of Candidate
         The most probable first; a single one where nothing is open.
     twins : mapping of str to tuple of str
-        Effects of the candidates, and those that are the same linear system by this output: no experiment tells them.
+        Effects of the candidates, and those that are the same linear system by this output, in every experiment.
     tempered : float
         By which differences of scores are divided (``judge``).
     untested : tuple of str
@@ -151,7 +151,7 @@ def _open(search: Search, ground: Grounds, untested: tuple[str, ...]) -> Open:
 
 
 def _are_twins(one: Hypothesis, other: Hypothesis) -> bool:
-    """Tell whether two sets are the same linear system by a single output: no experiment tells them apart."""
+    """Tell whether two sets are the same linear system by a single output: no experiment distinguishes them."""
     mine, its = one.effects - other.effects, other.effects - one.effects
     if one.outputs > 1 or len(mine) != 1 or len(its) != 1:
         return False
@@ -273,7 +273,7 @@ class Expected:
 
     @property
     def factor(self) -> float:
-        """The factor by which odds change, whichever is true, between the two hypotheses that it tells best."""
+        """The factor by which odds change, whichever is true, between the two hypotheses that it distinguishes best."""
         both = np.minimum(self.gained, self.gained.T)
         return math.exp(min(float(both.max()), MOST_LOG_ODDS))
 

@@ -35,8 +35,8 @@ def question_lines(known: Open) -> Iterator[str]:
         yield f"  Neither found nor excluded so far: {', '.join(known.untested)}."
     for name, twins in known.twins.items():
         yield (
-            f"  {name} and {' and '.join(twins)} are the same linear system by this output: no experiment tells them "
-            "apart. Measure another output, such as the load's speed."
+            f"  {name} and {' and '.join(twins)} are the same linear system by this output: no experiment "
+            "distinguishes them. Measure another output, such as the load's speed."
         )
 
 
@@ -97,7 +97,7 @@ def obstacle(design: Design) -> str:
         return "no experiment that this rig may drive makes intervals clearly shorter"
     gained = math.log(max(design.factor, 1.0))
     if gained < 1e-3:
-        return "no experiment that this rig may drive tells them apart: they move the speed alike in all of them"
+        return "no experiment that this rig may drive distinguishes them: they move the speed alike in all of them"
     longer = math.log(WORTH) / gained
     return (
         f"not worth driving: no experiment within the rig's limits changes the odds by a factor of {WORTH:g}. It would "

@@ -1,4 +1,4 @@
-"""Diagnose, design, ask, drive, diagnose again: until it is decided, or nothing that may be driven would tell more."""
+"""Diagnose, design, ask, drive, diagnose again: until it is decided, or nothing that may be driven would decide it."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class End(Enum):
     """What a call came to."""
 
     DECIDED = "decided"
-    NOTHING_TELLS = "nothing that may be driven would tell"
+    NOTHING_DECIDES = "nothing that may be driven would decide"
     TIME = "the vehicle's time is used up"
     DECLINED = "the operator declined"
 
@@ -103,8 +103,8 @@ def load_state(folder: Path, source: RigSource, model: Path) -> State:
     ):
         if was != now:
             raise UsageError(
-                f"{path}: begun with another {what} than {source.path if what == 'rig file' else model}. Name the one "
-                "it was begun with, or begin anew in another folder by --out."
+                f"{path}: started with another {what} than {source.path if what == 'rig file' else model}. Name that "
+                "one, or begin anew in another folder by --out."
             )
     for each in known.driven:
         if not is_inside(folder, folder / each.recording):
@@ -156,7 +156,7 @@ class Solving:
             for line in design_lines(known, design):
                 self.say(line)
             if not design.is_worth_driving:
-                return self._ended(End.DECIDED if is_single else End.NOTHING_TELLS)
+                return self._ended(End.DECIDED if is_single else End.NOTHING_DECIDES)
             if self.state.vehicle_s + design.planned.seconds > self.most_vehicle_s:
                 self.say(f"  it needs {design.planned.seconds:.0f} s of {self._left_s:.0f} s that the vehicle is left")
                 return self._ended(End.TIME)

@@ -111,7 +111,7 @@ def test_a_folder_of_another_model_is_refused_by_name(
     state = {"schema": "hil.solve/1", "rig_sha256": "0", "model_sha256": "0", "driven": [], "end": None}
     (out / "solve.json").write_text(json.dumps(state), encoding="utf-8")
     assert run(["solve", str(EXAMPLE), "--model", str(model), "--out", str(out), "--yes"]) == 2
-    assert "begun with another rig file" in capsys.readouterr().err
+    assert "started with another rig file" in capsys.readouterr().err
     (out / "solve.json").write_text("{", encoding="utf-8")
     assert run(["solve", str(EXAMPLE), "--model", str(model), "--out", str(out), "--yes"]) == 2
     assert "Move it away" in capsys.readouterr().err
