@@ -77,6 +77,8 @@ class Plc:
         Time the PLC may leave a beat unseen [s].
     greeting_timeout_s : float
         Time it may take from the first beat to the permissive [s].
+    patience_s : float
+        Least time for each of these four [s].
     security : ClientSecurity or None
         How the connection is secured; None for plain Modbus TCP.
     clock_ns : callable
@@ -110,16 +112,19 @@ class Plc:
         mode_timeout_s: float = 1.0,
         beat_timeout_s: float = 0.5,
         greeting_timeout_s: float = 0.5,
+        patience_s: float = 0.0,
         security: ClientSecurity | None = None,
         clock_ns: Callable[[], int] = time.monotonic_ns,
     ) -> None:
         require_usable(register_map)
-        self._link = ModbusLink(host, port, register_map.device_id, timeout_s, security)
+        self._link = ModbusLink(host, port, register_map.device_id, max(timeout_s, patience_s), security)
         self._map = register_map
         self._registers = NamedRegisters(self._link, register_map)
-        self._mode_timeout_s = mode_timeout_s
-        self._watchdog = HostWatchdog(self._registers, self._link.place, beat_timeout_s, clock_ns)
-        self._greeting_timeout_s = greeting_timeout_s
+        self._mode_timeout_s = max(mode_timeout_s, patience_s)
+        self._watchdog = HostWatchdog(
+            self._registers, self._link.place, max(beat_timeout_s, patience_s), clock_ns
+        )
+        self._greeting_timeout_s = max(greeting_timeout_s, patience_s)
         self._clock_ns = clock_ns
         self._latest: PlcStatus | None = None
         self._setting_prbs = asyncio.Lock()  # who switches it off comes behind who still switches it on

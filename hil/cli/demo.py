@@ -112,7 +112,7 @@ class _Demo:
         from hil.recording import RecordingWriter
         from hil.rig.build import open_devices
         from hil.rig.metadata import run_metadata
-        from hil.rig.pacing import FreePacer, heartbeat_patience_ms, period_ns
+        from hil.rig.pacing import FreePacer, device_patience_s, period_ns
         from hil.rig.plan import plan_run
         from hil.rig.session import run_plan
         from hil.rig.stop import StopRequest, stop_on_signals
@@ -120,7 +120,7 @@ class _Demo:
         plan, stop = plan_run(rig, name), StopRequest()
         recorder = RecordingWriter(self._workshop / f"{name}.csv", run_metadata(self._rig_path, name))
         pacer = FreePacer(period_ns(rig.period_s))
-        opened = open_devices(rig, heartbeat_patience_ms(pacer))
+        opened = open_devices(rig, device_patience_s(pacer))
         with stop_on_signals(stop), recorder, opened as devices, RunProgress(plan) as progress:
             summary = run_plan(devices, plan, pacer, recorder, stop, progress.show)
         self._say(f"    {name}: {summary.recorded} samples, {summary.flagged} flagged")

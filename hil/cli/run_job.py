@@ -23,7 +23,7 @@ from hil.rig.build import open_devices
 from hil.rig.drive import RunSummary
 from hil.rig.experiments.base import Phase
 from hil.rig.live_course import course_path, statement
-from hil.rig.pacing import Pacer, disk_patience_s, heartbeat_patience_ms
+from hil.rig.pacing import Pacer, disk_patience_s, device_patience_s
 from hil.rig.plan import Plan, plan_run
 from hil.rig.realtime import NOT_ASKED, RealTimeGrants
 from hil.rig.session import run_plan
@@ -94,7 +94,7 @@ def record(job: Job, grants: RealTimeGrants) -> RunSummary:
             stop_on_signals(stop),
             recorder,
             _described_at_the_end(recorder, timing),
-            open_devices(job.rig, heartbeat_patience_ms(job.pacer)) as devices,
+            open_devices(job.rig, device_patience_s(job.pacer)) as devices,
             _traced(devices.link, job.trace) as trace,
             RunProgress(plan) as progress,
         ):

@@ -26,7 +26,7 @@ from hil.rig.dry_run import Range
 from hil.rig.experiments.base import BaseTorque, Experiment, Phase
 from hil.rig.experiments.staged import LowPass
 from hil.rig.metadata import run_metadata
-from hil.rig.pacing import FreePacer, Pacer, disk_patience_s, heartbeat_patience_ms, period_ns
+from hil.rig.pacing import FreePacer, Pacer, disk_patience_s, device_patience_s, period_ns
 from hil.rig.plan import Plan, plan_run
 from hil.rig.realtime import RealTimeGrants
 from hil.rig.session import run_plan
@@ -286,7 +286,7 @@ class Runner:
             recorder,
             self.conditions.scheduling() as grants,
             self.conditions.progress(plan) as progress,
-            open_devices(rig, heartbeat_patience_ms(pacer)) as devices,
+            open_devices(rig, device_patience_s(pacer)) as devices,
         ):
             recorder.describe("real_time", json.dumps(grants.as_json()))
             try:

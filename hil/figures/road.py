@@ -27,7 +27,7 @@ from hil.rig.drive import Progress
 from hil.rig.experiments.cruise import Cruise
 from hil.rig.experiments.registry import experiment_table
 from hil.rig.experiments.staged import Approach, LowPass, StagedExperiment, TorqueBounds
-from hil.rig.pacing import FreePacer, heartbeat_patience_ms, period_ns
+from hil.rig.pacing import FreePacer, device_patience_s, period_ns
 from hil.rig.plan import Plan, plan_run
 from hil.rig.session import run_plan
 from hil.rig.stop import StopRequest
@@ -313,7 +313,7 @@ def drive(
         served = with_addresses(rig, server.bus_url, str(server.modbus))
         plan = _plan(served, conditions, duration_s)
         pacer = FreePacer(period_ns(rig.period_s))
-        with recorder, open_devices(served, heartbeat_patience_ms(pacer)) as devices:
+        with recorder, open_devices(served, device_patience_s(pacer)) as devices:
             run_plan(devices, plan, pacer, recorder, stop, progress)
     return Driven(path, conditions, line)
 

@@ -42,14 +42,14 @@ class Devices:
 
 
 @contextmanager
-def open_devices(rig: Rig, least_host_timeout_ms: int = 0) -> Iterator[Devices]:
+def open_devices(rig: Rig, patience_s: float = 0.0) -> Iterator[Devices]:
     """Open bus and PLC of a rig; both are closed at the end of the block. No device is changed.
 
     Parameters
     ----------
-    least_host_timeout_ms
-        The drives, when they are configured, are ordered to wait for the host's heartbeat at least so long [ms]; see
-        `hil.rig.pacing.heartbeat_patience_ms`.
+    patience_s
+        Least time that the drives, when they are configured, wait for the host's heartbeat, and the host for the PLC
+        [s]; see `hil.rig.pacing.device_patience_s`.
 
     Raises
     ------
@@ -66,15 +66,15 @@ def open_devices(rig: Rig, least_host_timeout_ms: int = 0) -> Iterator[Devices]:
     """
     _require_acceptances(rig)
     with CanLink.open(rig.can.url) as link, PlcLoop() as loop:
-        m1, m2 = (Inverter(link, _watching(inverter_settings(name, rig), least_host_timeout_ms)) for name in NAMES)
+        m1, m2 = (Inverter(link, _watching(inverter_settings(name, rig), patience_s)) for name in NAMES)
         require_sole_host(link, rig, min(m1.settings.host_heartbeat_s, m2.settings.host_heartbeat_s))
-        with connected_plc(rig.plc, loop) as plc:
+        with connected_plc(rig.plc, loop, patience_s) as plc:
             channels = Channels(rig.channels, rig.register_map, {"m1": m1, "m2": m2}, loop, plc)
             yield Devices(link, m1, m2, TorqueGuard(rig.guard_limits), loop, plc, channels, rig.vehicle.inertia_kg_m2)
 
 
-def _watching(settings: InverterSettings, least_ms: int) -> InverterSettings:
-    return replace(settings, host_timeout_ms=max(settings.host_timeout_ms, least_ms))
+def _watching(settings: InverterSettings, patience_s: float) -> InverterSettings:
+    return replace(settings, host_timeout_ms=max(settings.host_timeout_ms, round(patience_s * 1000)))
 
 
 def _require_acceptances(rig: Rig) -> None:
@@ -92,9 +92,9 @@ def _require_acceptances(rig: Rig) -> None:
 
 
 @contextmanager
-def connected_plc(table: PlcTable, loop: PlcLoop) -> Iterator[Plc]:
+def connected_plc(table: PlcTable, loop: PlcLoop, patience_s: float) -> Iterator[Plc]:
     """Connect to the PLC on its loop; disconnected at the end of the block."""
-    plc = plc_client(table)
+    plc = plc_client(table, patience_s)
     loop.call(plc.connect())
     try:
         yield plc
@@ -102,11 +102,11 @@ def connected_plc(table: PlcTable, loop: PlcLoop) -> Iterator[Plc]:
         loop.call(_close(plc))
 
 
-def plc_client(table: PlcTable) -> Plc:
-    """Make the PLC's client, not connected yet."""
+def plc_client(table: PlcTable, patience_s: float = 0.0) -> Plc:
+    """Make the PLC's client, not connected yet; it waits at least ``patience_s`` for whatever it waits for."""
     register_map = load_register_map(table.map or data_file("plc.toml"))
     security = None if table.security is None else table.security.client
-    return Plc(table.host, table.port, register_map, security=security)
+    return Plc(table.host, table.port, register_map, patience_s=patience_s, security=security)
 
 
 def inverter_settings(name: str, rig: Rig) -> InverterSettings:

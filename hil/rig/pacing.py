@@ -81,14 +81,14 @@ def disk_patience_s(pacer: Pacer) -> float:
     return 0.0 if pacer.poll_patience_s == 0.0 else DISK_PATIENCE_S
 
 
-FREE_HEARTBEAT_MS = 1000
-"""How long the drives wait for the heartbeat of a host without a clock [ms]: it uses a processor up, and its heartbeat,
-which is of the wall clock, has to share that."""
+FREE_PATIENCE_S = 5.0
+"""How long host, drives and PLC wait for each other at least where the host keeps no clock [s of the wall clock]: such a
+run uses the processors up, and the machine may be busy with others."""
 
 
-def heartbeat_patience_ms(pacer: Pacer) -> int:
-    """How long the drives wait for the host's heartbeat at least [ms]: as the rig file has it where a clock is kept."""
-    return 0 if pacer.poll_patience_s == 0.0 else FREE_HEARTBEAT_MS
+def device_patience_s(pacer: Pacer) -> float:
+    """How long host and devices wait for each other at least [s]: as set for each of them where a clock is kept."""
+    return 0.0 if pacer.poll_patience_s == 0.0 else FREE_PATIENCE_S
 
 
 class RealTimePacer:
@@ -158,7 +158,7 @@ class FreePacer:
 
     __slots__ = ("_answer_timeout_s", "_cycle", "_period_ns")
 
-    def __init__(self, period_ns: int, answer_timeout_s: float = 1.0) -> None:
+    def __init__(self, period_ns: int, answer_timeout_s: float = FREE_PATIENCE_S) -> None:
         self._period_ns = period_ns
         self._answer_timeout_s = answer_timeout_s
         self._cycle = -1

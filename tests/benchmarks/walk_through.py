@@ -18,7 +18,7 @@ from hil.figures.local_model import TwoMassLine
 from hil.recording.signals import read_record
 from hil.recording.writer import RecordingWriter
 from hil.rig.build import open_devices
-from hil.rig.pacing import FreePacer, heartbeat_patience_ms, period_ns
+from hil.rig.pacing import FreePacer, device_patience_s, period_ns
 from hil.rig.plan import plan_run
 from hil.rig.session import run_plan
 from hil.rig.stop import StopRequest
@@ -47,7 +47,7 @@ def walk(seed: int, recording: Path, effect: str = GAP, experiment: str = "cruis
     with RigServer(plant, rig, address, Address("127.0.0.1", 0), seed=seed) as server:
         served = with_addresses(rig, server.bus_url, str(server.modbus))
         pacer = FreePacer(period_ns(rig.period_s))
-        opened = open_devices(served, heartbeat_patience_ms(pacer))
+        opened = open_devices(served, device_patience_s(pacer))
         with RecordingWriter(recording, {}) as recorder, opened as devices:
             run_plan(devices, plan_run(served, experiment), pacer, recorder, StopRequest(), lambda phase, time_s: None)
     return best_estimate(read_record(recording))

@@ -7,7 +7,7 @@ from drivers.inverter.check import Difference
 from hil.config.new_rig import answers, new_drive, rig_text
 from hil.config.rig_file import Rig, read_rig
 from hil.rig.build import open_devices
-from hil.rig.pacing import FREE_HEARTBEAT_MS
+from hil.rig.pacing import FREE_PATIENCE_S
 from tests.rig.serving import Samples, changed, run, served
 
 SAMPLES = 400
@@ -45,7 +45,7 @@ def drive(eds: Path, folder: Path, samples: int = SAMPLES) -> Driven:
         "simulation": {"speed_noise_rad_s": 0.0, "torque_noise_permille": 0.5},
     }
     kept = Samples()
-    with served(changed(rig, quick)) as (_, at), open_devices(at, FREE_HEARTBEAT_MS) as devices:
+    with served(changed(rig, quick)) as (_, at), open_devices(at, FREE_PATIENCE_S) as devices:
         before = (*devices.m1.check(), *devices.m2.check())
         summary = run(at, devices, kept)
         after = (*devices.m1.check(), *devices.m2.check())

@@ -16,7 +16,7 @@ from drivers.inverter.inverter import Inverter
 from hil.cli.main import run as command
 from hil.config.rig_file import read_rig
 from hil.rig.build import inverter_settings, open_devices
-from hil.rig.pacing import FREE_HEARTBEAT_MS
+from hil.rig.pacing import FREE_PATIENCE_S
 from tests.benchmarks.data_sheets import RAN, REFUSED, maker_files, mutant_verdicts, verdict
 from tests.drivers.maker_files import COMPLETE, MAKERS, U8, U32, Entry, Maker, pdo, pdos
 from tests.drivers.maker_rig import drive, written_rig
@@ -123,7 +123,7 @@ def test_dcf_gives_node_id_and_bit_rate(tmp_path: Path) -> None:
 def test_dcf_device_and_rig_file_are_compared(tmp_path: Path) -> None:
     """Rated torque and node id are not the DCF's; its option code is written, for somebody chose it."""
     rig = written_rig(written(MAKERS["epos, commissioned"], tmp_path), tmp_path)
-    with served(rig) as (_, at), open_devices(at, FREE_HEARTBEAT_MS) as devices:
+    with served(rig) as (_, at), open_devices(at, FREE_PATIENCE_S) as devices:
         assert [str(each) for each in devices.m1.commissioned()] == [
             "object 6076 0x6076:00: DCF 512871, device 600000, rig file 600000"
         ]
@@ -150,7 +150,7 @@ def test_parameter_value_says_nothing_in_an_eds(tmp_path: Path) -> None:
 
 def test_identifiers_of_another_node_are_replaced_and_the_others_switched_off(tmp_path: Path) -> None:
     rig = written_rig(written(MAKERS["sevcon"], tmp_path), tmp_path)
-    with served(rig) as (_, at), open_devices(at, FREE_HEARTBEAT_MS) as devices:
+    with served(rig) as (_, at), open_devices(at, FREE_PATIENCE_S) as devices:
         for inverter in (devices.m1, devices.m2):
             node, sdo = inverter.settings.node_id, inverter._sdo
             assert sdo.upload(0x1801, 1) == 0x302

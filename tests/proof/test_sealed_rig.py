@@ -16,7 +16,7 @@ from hil.proof.rigs import sealed_process
 from hil.proof.seal import verify
 from hil.proof.sealed_rig import RIG_FILE
 from hil.rig.build import open_devices
-from hil.rig.pacing import FreePacer, heartbeat_patience_ms, period_ns
+from hil.rig.pacing import FreePacer, device_patience_s, period_ns
 from hil.rig.plan import plan_run
 from hil.rig.session import run_plan
 from hil.rig.stop import StopRequest
@@ -62,7 +62,7 @@ def test_torque_moves_the_hidden_driveline():
         rig = rig.model_copy(update={"experiments": {"short": short}})
         samples = []
         pacer = FreePacer(period_ns(rig.period_s))
-        with open_devices(rig, heartbeat_patience_ms(pacer)) as devices:
+        with open_devices(rig, device_patience_s(pacer)) as devices:
             run_plan(devices, plan_run(rig, "short"), pacer, _List(samples), StopRequest(), lambda *_: None)
     assert len(samples) == 200
     assert max(sample.speed_rad_s for sample in samples) > 2.0

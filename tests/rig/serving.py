@@ -10,7 +10,7 @@ from typing import Any
 from hil.config.rig_file import Rig, read_rig
 from hil.rig.build import Devices, open_devices
 from hil.rig.drive import Progress, RunSummary
-from hil.rig.pacing import FreePacer, Pacer, period_ns
+from hil.rig.pacing import FREE_PATIENCE_S, FreePacer, Pacer, device_patience_s, period_ns
 from hil.rig.plan import plan_run
 from hil.rig.session import run_plan
 from hil.rig.stop import StopRequest
@@ -88,7 +88,7 @@ def addresses(server: RigServer) -> tuple[str, ...]:
     return ("--bus", server.bus_url, "--modbus", str(server.modbus))
 
 
-def fast(rig: Rig, answer_timeout_s: float = 2.0) -> FreePacer:
+def fast(rig: Rig, answer_timeout_s: float = FREE_PATIENCE_S) -> FreePacer:
     return FreePacer(period_ns(rig.period_s), answer_timeout_s)
 
 
@@ -108,5 +108,6 @@ def run(
 
 def run_once(rig: Rig, samples: Samples, **arguments: Any) -> RunSummary:
     """Open the devices, run, close them."""
-    with open_devices(rig) as devices:
+    pacer = arguments.setdefault("pacer", fast(rig))
+    with open_devices(rig, device_patience_s(pacer)) as devices:
         return run(rig, devices, samples, **arguments)

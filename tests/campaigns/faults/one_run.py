@@ -9,18 +9,15 @@ import uuid
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
-from functools import partial
 from pathlib import Path
 from unittest import mock
 
 from drivers.canopen.can_link import CanLink
 from drivers.errors import BusDown
-from drivers.plc.plc import Plc
 from hil.config.rig_file import Rig
 from hil.errors import RecordingError
 from hil.recording import RecordingWriter, read_table, writer
 from hil.recording.writer import Unbuffered, WritingThread
-from hil.rig import build
 from hil.rig.build import open_devices
 from hil.rig.experiments.base import Phase
 from hil.rig.pacing import FreePacer, Tick, period_ns
@@ -36,6 +33,9 @@ from tests.rig.observer import DISARMED, power_state
 
 PATIENCE_S = 0.05
 """Of the wall clock, for an answer of a simulated drive that may not come."""
+
+BUSY_S = 20.0
+"""Of the wall clock, for whatever is well: the machine may be busy."""
 
 COUNT_NM = 0.6 + 1e-9
 """One per mille of rated torque: torques on the bus are rounded to it."""
@@ -161,7 +161,8 @@ def _drive(
             met = True
             act()
 
-    with _patient_with_the_plc(kind), _disk(kind, moment), recorder, open_devices(rig) as devices:
+    patience_s = 0.0 if kind.spec.startswith("plc.") else BUSY_S
+    with _disk(kind, moment), recorder, open_devices(rig, patience_s) as devices:
         run_plan(devices, plan_run(rig, experiment), pacer, recorder, stop, progress)
 
 
@@ -173,16 +174,6 @@ def _action(kind: Kind, stop: StopRequest, server: RigServer, stack: ExitStack):
         stranger = stack.enter_context(CanLink.open(server.bus_url))
         return lambda: stranger.send(int(cob_id, 16), bytes.fromhex(data))
     return lambda: None
-
-
-@contextmanager
-def _patient_with_the_plc(kind: Kind) -> Iterator[None]:
-    """Leave the wall clock out of a run whose PLC is well: the machine may be busy."""
-    if kind.spec.startswith("plc."):
-        yield
-        return
-    with mock.patch.object(build, "Plc", partial(Plc, timeout_s=20.0, beat_timeout_s=20.0)):
-        yield
 
 
 @contextmanager
