@@ -23,7 +23,7 @@ from hil.rig.build import open_devices
 from hil.rig.drive import RunSummary
 from hil.rig.experiments.base import Phase
 from hil.rig.live_course import course_path, statement
-from hil.rig.pacing import Pacer, disk_patience_s, device_patience_s
+from hil.rig.pacing import Pacer, device_patience_s, disk_patience_s
 from hil.rig.plan import Plan, plan_run
 from hil.rig.realtime import NOT_ASKED, RealTimeGrants
 from hil.rig.session import run_plan

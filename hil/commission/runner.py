@@ -26,7 +26,7 @@ from hil.rig.dry_run import Range
 from hil.rig.experiments.base import BaseTorque, Experiment, Phase
 from hil.rig.experiments.staged import LowPass
 from hil.rig.metadata import run_metadata
-from hil.rig.pacing import FreePacer, Pacer, disk_patience_s, device_patience_s, period_ns
+from hil.rig.pacing import FreePacer, Pacer, device_patience_s, disk_patience_s, period_ns
 from hil.rig.plan import Plan, plan_run
 from hil.rig.realtime import RealTimeGrants
 from hil.rig.session import run_plan

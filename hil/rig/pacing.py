@@ -82,8 +82,8 @@ def disk_patience_s(pacer: Pacer) -> float:
 
 
 FREE_PATIENCE_S = 5.0
-"""How long host, drives and PLC wait for each other at least where the host keeps no clock [s of the wall clock]: such a
-run uses the processors up, and the machine may be busy with others."""
+"""How long host, drives and PLC wait for each other at least where the host keeps no clock [s of the wall clock]: such
+a run uses the processors up, and the machine may be busy with others."""
 
 
 def device_patience_s(pacer: Pacer) -> float:
