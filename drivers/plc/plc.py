@@ -121,9 +121,7 @@ class Plc:
         self._map = register_map
         self._registers = NamedRegisters(self._link, register_map)
         self._mode_timeout_s = max(mode_timeout_s, patience_s)
-        self._watchdog = HostWatchdog(
-            self._registers, self._link.place, max(beat_timeout_s, patience_s), clock_ns
-        )
+        self._watchdog = HostWatchdog(self._registers, self._link.place, max(beat_timeout_s, patience_s), clock_ns)
         self._greeting_timeout_s = max(greeting_timeout_s, patience_s)
         self._clock_ns = clock_ns
         self._latest: PlcStatus | None = None
