@@ -41,7 +41,7 @@ def answer_every(syncs: int, link: CanLink) -> None:
 
 
 @contextmanager
-def armed(syncs: int = 1) -> Iterator[tuple[Devices, Cycle]]:
+def armed(syncs: int = 1, answer_timeout_s: float = 2.0) -> Iterator[tuple[Devices, Cycle]]:
     with served() as (_, rig), open_devices(rig) as devices:
         devices.m1.configure()
         devices.m2.configure()
@@ -49,7 +49,7 @@ def armed(syncs: int = 1) -> Iterator[tuple[Devices, Cycle]]:
         with ArmedDrives(devices, StopRequest()):
             yield (
                 devices,
-                Cycle(devices.link, devices.m1, devices.m2, devices.guard, PERIOD_NS, answer_timeout_s=0.05),
+                Cycle(devices.link, devices.m1, devices.m2, devices.guard, PERIOD_NS, answer_timeout_s),
             )
 
 
@@ -86,7 +86,7 @@ def test_value_that_never_came_is_nan() -> None:
 
 def test_answers_missing_for_the_feedback_timeout_end_the_run() -> None:
     pacer = FreePacer(PERIOD_NS)
-    with armed(syncs=40) as (_, cycle):
+    with armed(syncs=40, answer_timeout_s=0.05) as (_, cycle):
         for _ in range(21):
             cycle.step(pacer.next(), NO_TORQUE, 0.0, SampleFlag.GOOD)
         with pytest.raises(DeviceTimeout, match=r"inverter m2: no TPDO for 0\.210 s, .* more than 0\.2 s"):
