@@ -13,7 +13,7 @@ from enum import Enum
 
 import numpy as np
 
-from estimator.identification.linear_model import Orders
+from estimator.identification.linear_model import LinearModel, Orders
 from estimator.identification.modes.physical import RESPONDING
 from estimator.identification.modes.uncertainty import Cancellation, UncertainMode, pole_zero_map, uncertain_modes
 from estimator.identification.offline.fits import LinearFit, fit_of, solved
@@ -74,6 +74,9 @@ class BestEstimate:
         The Box-Jenkins model it is taken from.
     two_mass : LinearFit
         The one of third order, which physical parameters are taken from.
+    problem : Problem
+    x : ndarray
+        Its problem and minimum.
     mode : UncertainMode or None
         The pole pair, None where the data carry none.
     reason : str
@@ -93,6 +96,8 @@ class BestEstimate:
 
     fit: LinearFit
     two_mass: LinearFit
+    problem: Problem
+    x: FloatArray
     mode: UncertainMode | None
     reason: str
     band_hz: tuple[float, float]
@@ -139,6 +144,8 @@ def best_estimate(record: Record, high_pass_hz: float = HIGH_PASS_HZ) -> BestEst
     return BestEstimate(
         fit=chosen.fit,
         two_mass=rungs[0].fit,
+        problem=rungs[0].problem,
+        x=rungs[0].x,
         mode=mode,
         reason=reason,
         band_hz=band_hz,
@@ -164,25 +171,39 @@ def _rung(data: Record, orders: Orders) -> _Rung:
 
 def _needed_pair(fit: LinearFit, band_hz: tuple[float, float], rigid: LinearFit) -> tuple[UncertainMode | None, str]:
     """Return the pair of the highest peak that the data need, or why there is none."""
+    mode, reason = known_pair(fit.model, fit.covariance, band_hz)
+    has_pair = mode is not None or reason != _no_pair(band_hz)
+    return (None, ONE_MASS_DOES) if has_pair and criterion(rigid) <= criterion(fit) else (mode, reason)
+
+
+def _within(band_hz: tuple[float, float]) -> str:
+    return f"between {band_hz[0]:g} and {band_hz[1]:.3g} Hz"
+
+
+def _no_pair(band_hz: tuple[float, float]) -> str:
+    return f"the model has no oscillating pole pair {_within(band_hz)}"
+
+
+def known_pair(
+    model: LinearModel, covariance: FloatArray, band_hz: tuple[float, float]
+) -> tuple[UncertainMode | None, str]:
+    """Return the pair of the highest peak that no zero cancels and whose frequency is known, or why there is none."""
     low, high = band_hz
-    within = f"between {low:g} and {high:.3g} Hz"
-    pairs = [each for each in uncertain_modes(fit.model, fit.covariance) if low <= each.frequency_hz.value <= high]
+    pairs = [each for each in uncertain_modes(model, covariance) if low <= each.frequency_hz.value <= high]
     if not pairs:
-        return None, f"the model has no oscillating pole pair {within}"
-    if criterion(rigid) <= criterion(fit):
-        return None, ONE_MASS_DOES
-    cancelled = [_frequency_hz(one, fit) for one in pole_zero_map(fit.model, fit.covariance).cancellations]
+        return None, _no_pair(band_hz)
+    cancelled = [_frequency_hz(one, model) for one in pole_zero_map(model, covariance).cancellations]
     needed = [each for each in pairs if not np.isclose(each.frequency_hz.value, cancelled, rtol=1e-6).any()]
     if not needed:
         return None, f"the pole pair at {pairs[0].frequency_hz.value:.3g} Hz and a pair of zeros can't be distinguished"
     sure = [each for each in needed if _half_width(each) <= MOST_UNCERTAIN * each.frequency_hz.value]
     if not sure:
-        return None, f"a pole pair {within} is there, its frequency not known to better than a half"
+        return None, f"a pole pair {_within(band_hz)} is there, its frequency not known to better than a half"
     return sure[0], ""
 
 
-def _frequency_hz(one: Cancellation, fit: LinearFit) -> float:
-    return float(abs(np.log(one.pole)) / (2.0 * np.pi * fit.model.sample_time_s)) if one.pole.imag else 0.0
+def _frequency_hz(one: Cancellation, model: LinearModel) -> float:
+    return float(abs(np.log(one.pole)) / (2.0 * np.pi * model.sample_time_s)) if one.pole.imag else 0.0
 
 
 def _half_width(mode: UncertainMode) -> float:

@@ -30,6 +30,9 @@ from estimator.identification.spectral import SpectralEstimate, spectral_estimat
 from estimator.signals.decimate import decimate
 from estimator.signals.record import FloatArray, Record
 
+VALUES_PER_WIDTH = 4
+"""Frequencies of the spectral estimate within its resolution: the eye follows a curve between them."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Identification:
@@ -121,7 +124,7 @@ def identify(record: Record, settings: Settings | None = None) -> Identification
     n = _samples_holding(data, settings.samples)
     trajectory = estimator.run(data.total_torque_nm[:n], data.output[:n], data.okay[:n])
     online = estimator.model(data.sample_time_s)
-    spectral, no_spectral = _spectral(offline, settings.segment_s)
+    spectral, no_spectral = _spectral(offline)
     return Identification(
         name=record.name,
         data=data,
@@ -144,8 +147,8 @@ def _samples_holding(data: Record, good: int | None) -> int:
     return int(np.searchsorted(np.cumsum(data.okay), good)) + 1
 
 
-def _spectral(data: Record, segment_s: float) -> tuple[SpectralEstimate | None, str]:
+def _spectral(data: Record) -> tuple[SpectralEstimate | None, str]:
     try:
-        return spectral_estimate(data, round(segment_s / data.sample_time_s)), ""
+        return spectral_estimate(data, VALUES_PER_WIDTH), ""
     except NotExciting as error:
         return None, str(error)

@@ -103,8 +103,6 @@ class Settings:
         What of the batch model's A makes L.
     band_hz : tuple of float
         Where the resonance is looked for [Hz].
-    segment_s : float
-        Segment of the spectral estimate [s].
     """
 
     orders: Orders = field(default_factory=Orders)
@@ -115,7 +113,6 @@ class Settings:
     adaptation: Adaptation = field(default_factory=DecreasingThenConstantTrace)
     filter_part: FilterPart = FilterPart.OSCILLATING
     band_hz: tuple[float, float] = (2.0, 25.0)
-    segment_s: float = 5.12
 
     def __post_init__(self) -> None:
         low, high = self.band_hz

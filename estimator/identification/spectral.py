@@ -1,27 +1,95 @@
-"""Spectral transfer-function estimate: what the data say by frequency without a model, to hold the models against.
+"""Frequency response without a model, to hold the models against.
 
-Welch's averaged cross-spectra with a Hann window and half overlap (P. D. Welch, IEEE Trans. Audio and
-Electroacoustics 15, 1967)::
+*Local polynomial method*, for any torque. The discrete Fourier transforms of one unbroken stretch obey (R. Pintelon and
+J. Schoukens, System Identification: A Frequency Domain Approach, 2nd ed., 2012, chapter 7)::
 
-    G(f) = S_yu(f) / S_uu(f),        coherence(f) = |S_yu|^2 / (S_uu S_yy)
+    Y(k) = G(k) U(k) + T(k) + V(k)
 
-Half-overlapping Hann segments are not independent; Welch's formula gives ``n_d = K / (1 + 2 rho^2 (K-1)/K)``
-for K of them, with rho = 1/6 the correlation of the window with itself half its length on.
+with T the transform of begin and end of the stretch: leakage. G and T are smooth in frequency, U is not, so that around
+each frequency both are polynomials of degree R over 2n + 1 lines, found by least squares::
+
+    Y(r) = U(r) (G + g_1 r + .. + g_R r^R) + (T + t_1 r + .. + t_R r^R) + V(r)
+    var V = sum |residual|^2 / (2n + 1 - 2 (R + 1)),      var G = var V [(K^H K)^-1]_11
+
+There is no window, hence no blurred peak. Stretches between long gaps are averaged by their variances.
+
+*Periodic torque* (ibid., chapters 3 and 4): at the lines of the period the response is that of the mean over the
+periods, and its variance that of their scatter. Lines that carry no torque detect distortion: at even lines an even one
+(a gap, an asymmetric friction), at odd lines that were left out an odd one (dry friction, saturation).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import get_window
+from scipy.stats import chi2, t
 
 from estimator.errors import NotExciting
 from estimator.identification.linear_model import ComplexArray
 from estimator.identification.offline.problem import gaps
 from estimator.signals.decimate import Blocks, block_of
-from estimator.signals.record import BoolArray, FloatArray, Record
-from estimator.signals.settings import Requirement, require
+from estimator.signals.record import BoolArray, FloatArray, IntArray, Record
+
+DEGREE = 2
+"""R. The usual choice: odd terms cancel at the middle line, so that the bias is that of a fourth-order term."""
+
+COLUMNS = 2 * (DEGREE + 1)
+
+HALF_WIDTH_HZ = 0.2
+"""Half of what the polynomials span: the half-power band of a resonance of 8 Hz with 5 % damping is 0.8 Hz."""
+
+FEWEST_NEIGHBOURS = 6
+"""Lines to either side at least: of 13 lines 7 are left for the variance."""
+
+SHORT_S = 0.03
+"""Gaps up to this long are bridged by straight lines [s]: under a quarter of a period at 8 Hz, a resonance's."""
+
+SHORTEST_S = 2.0
+"""Shorter stretches have their 13 lines over more than 6 Hz."""
+
+FEWEST_PERIODS = 4
+"""The first is left out: it holds the transient."""
+
+SAME = 0.9
+"""Correlation of a torque with itself a period later from which on it is called periodic."""
+
+EXCITED = 0.05
+"""Power of a line that carries torque, in parts of that of the strong ones."""
+
+Z95 = 1.959963984540054
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Distortion:
+    """What a periodic torque leaves at lines that carry none; arrays of shape (K,).
+
+    Attributes
+    ----------
+    frequency_hz : ndarray
+    amplitude, noise : ndarray
+        Of the output at each line, and the standard deviation that noise gives it [output unit].
+    is_even : ndarray of bool
+        Whether the line is an even multiple of the fundamental.
+    """
+
+    frequency_hz: FloatArray
+    amplitude: FloatArray
+    noise: FloatArray
+    is_even: BoolArray
+
+    @property
+    def noise_rms(self) -> float:
+        """RMS amplitude that noise gives a line of the mean over the periods [output unit]."""
+        return float(np.sqrt(2.0 * np.mean(self.noise**2)))
+
+    def level(self, even: bool) -> tuple[float, float]:
+        """Return the RMS amplitude beyond the noise at even or odd lines, and how probable it is by noise alone."""
+        amplitude, noise = (each[self.is_even == even] for each in (self.amplitude, self.noise))
+        if not amplitude.size:
+            return float("nan"), float("nan")
+        beyond = float(np.mean(amplitude**2 - 2.0 * noise**2))
+        return float(np.sqrt(max(beyond, 0.0))), float(chi2.sf(np.sum((amplitude / noise) ** 2), 2 * amplitude.size))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,12 +104,14 @@ class SpectralEstimate:
     coherence : ndarray
         0 to 1: the part of the output's power that the input explains, at the resolution of the method.
     magnitude_std : ndarray
-        Standard deviation of ``|response|``; infinite where the coherence is 0. Divided by the magnitude, that of the
-        phase [rad].
+        Of ``|response|``, such that 1.96 of it hold 95 %; infinite where the coherence is 0. Divided by the magnitude,
+        that of the phase [rad].
     n_averages : float
         Independent averages behind each value.
     used_samples, bridged_samples : int
-        Samples inside the segments, and how many of the recording were missing and bridged; 0 where not counted.
+        Samples of the stretches, and how many of the recording were missing and bridged.
+    distortion : Distortion or None
+        Of a periodic torque that leaves lines out.
     """
 
     frequency_hz: FloatArray
@@ -51,85 +121,53 @@ class SpectralEstimate:
     n_averages: float
     used_samples: int = 0
     bridged_samples: int = 0
+    distortion: Distortion | None = None
 
 
-def from_spectra(
-    frequency_hz: FloatArray,
-    s_yu: ComplexArray,
-    s_uu: FloatArray,
-    s_yy: FloatArray,
-    n_averages: float,
-) -> SpectralEstimate:
-    """Return the estimate of averaged spectra.
+@dataclass(frozen=True, slots=True, eq=False)
+class _Local:
+    """Estimate of one stretch: response, its variance, noise and explained power of the output per sample."""
 
-    Random error of the magnitude (J. S. Bendat and A. G. Piersol, Random Data, chapter "Statistical errors in advanced
-    estimates"), for n_d independent averages; the same number, in radians, is that of the phase::
-
-        std|G| / |G| = sqrt((1 - coherence) / (2 n_d coherence))
-    """
-    tiny = np.finfo(np.float64).tiny
-    response = s_yu / np.maximum(s_uu, tiny)
-    coherence = np.minimum(np.abs(s_yu) ** 2 / np.maximum(s_uu * s_yy, tiny), 1.0)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        std = np.abs(response) * np.sqrt((1.0 - coherence) / (2.0 * n_averages * coherence))
-    std[coherence == 0.0] = np.inf
-    return SpectralEstimate(frequency_hz, response, coherence, std, float(n_averages))
+    response: ComplexArray
+    variance: FloatArray
+    noise: FloatArray
+    explained: FloatArray
+    freedom: int
 
 
-__all__ = ["SpectralEstimate", "good_segments", "spectral_estimate"]
-
-HANN_OVERLAP_CORRELATION = 1.0 / 6.0
-"""sum w(t) w(t + n/2) / sum w(t)^2 of a Hann window of n samples: (1/16) / (3/8)."""
-
-FEWEST_SEGMENTS = 3
-"""Fewer segments than this say nothing of the coherence: that of a single one is 1 whatever the data."""
-
-
-def good_segments(okay: BoolArray, length: int) -> list[int]:
-    """Return the starts of the half-overlapping segments that hold no masked sample."""
-    return [s for s in range(0, okay.shape[0] - length + 1, length // 2) if okay[s : s + length].all()]
-
-
-SHORT_S = 0.03
-"""Gaps up to this long are bridged by straight lines [s]: under a quarter of a period at 8 Hz, a resonance's."""
-
-SHORTEST_S = 1.0
-"""Segments are halved down to this length [s] where long gaps leave too few: below, a resonance is one line wide."""
-
-
-def spectral_estimate(record: Record, segment_samples: int = 256) -> SpectralEstimate:
+def spectral_estimate(record: Record, values_per_width: int = 1) -> SpectralEstimate:
     """Estimate the transfer function from total torque to output.
 
-    Short gaps are bridged, segments lie between long ones; they are halved until there are three of them. Samples
-    faster than 10 ms are averaged in blocks first, which changes both spectra alike.
+    Parameters
+    ----------
+    record : Record
+        Without slow drift: high-passed or differenced. Samples faster than 10 ms are averaged in blocks first, which
+        changes both spectra alike; short gaps are bridged.
+    values_per_width : int
+        Frequencies within the width of the polynomials; at 1 the values are independent of each other.
     """
-    block = block_of(record.sample_time_s)
-    period_s = block * record.sample_time_s
-    length = segment_samples // block
-    require(
-        "spectral estimate",
-        (Requirement("segment_samples", segment_samples, length >= 8, f"{8 * block} or more samples"),),
-    )
     okay = record.okay if record.read is None else record.okay & record.read
     usable, bridged = _bridged_mask(okay, SHORT_S / record.sample_time_s)
-    blocks = Blocks(usable, block)
-    starts = good_segments(blocks.okay, length)
-    while len(starts) < FEWEST_SEGMENTS and length * period_s / 2.0 >= SHORTEST_S:
-        length //= 2
-        starts = good_segments(blocks.okay, length)
-    if len(starts) < FEWEST_SEGMENTS:
+    block = block_of(record.sample_time_s)
+    blocks, period_s = Blocks(usable, block), block * record.sample_time_s
+    u, y = (blocks.mean(_bridge(x, okay)) for x in (record.total_torque_nm, record.output))
+    stretches = _stretches(blocks.okay, max(2 * (2 * FEWEST_NEIGHBOURS + 1), round(SHORTEST_S / period_s)))
+    if not stretches:
         raise NotExciting(
-            f"recording {record.name}: {len(starts)} unbroken segments of {length * period_s:.3g} s, expected "
-            f"{FEWEST_SEGMENTS} or more. Record longer, or with fewer long gaps.",
+            f"recording {record.name}: no unbroken stretch of {SHORTEST_S:g} s and of "
+            f"{2 * (2 * FEWEST_NEIGHBOURS + 1) * period_s:.3g} s or more. Record longer, or with fewer long gaps.",
             ("frequency response",),
         )
-    signals = (blocks.mean(_bridge(x, okay)) for x in (record.total_torque_nm, record.output))
-    u, y = (_spectra(x, starts, length) for x in signals)
-    covered = np.zeros(blocks.okay.shape, dtype=np.bool_)
-    for start in starts:
-        covered[start : start + length] = True
-    estimate = _estimate(u, y, length, period_s)
-    return replace(estimate, used_samples=int(covered.sum()) * block, bridged_samples=bridged)
+    begin, end = max(stretches, key=lambda each: each[1] - each[0])
+    period = _period(u[begin:end])
+    if period is not None:
+        return _periodic(u[begin:end], y[begin:end], period, period_s, block, bridged)
+    duration_s = (end - begin) * period_s
+    step_hz = (2 * _neighbours(duration_s) + 1) / duration_s / values_per_width
+    frequency_hz: FloatArray = step_hz * np.arange(1, int(0.5 / period_s / step_hz) + 1, dtype=np.float64)
+    parts = [_local(u[a:b], y[a:b], frequency_hz, period_s) for a, b in stretches]
+    used = block * sum(b - a for a, b in stretches)
+    return _averaged(frequency_hz, parts, [b - a for a, b in stretches], used, bridged)
 
 
 def _bridged_mask(okay: BoolArray, longest: float) -> tuple[BoolArray, int]:
@@ -143,21 +181,132 @@ def _bridged_mask(okay: BoolArray, longest: float) -> tuple[BoolArray, int]:
 
 def _bridge(x: FloatArray, okay: BoolArray) -> FloatArray:
     rows = np.arange(x.shape[0])
-    return np.asarray(np.interp(rows, rows[okay], x[okay]), dtype=np.float64)
+    return np.asarray(np.interp(rows, rows[okay], x[okay]) if okay.any() else np.zeros(x.shape), dtype=np.float64)
 
 
-def _spectra(x: FloatArray, starts: list[int], length: int) -> ComplexArray:
-    """Return the windowed Fourier transform of each segment, shape (K, M), frequency 0 left out."""
-    window = get_window("hann", length)
-    segments = np.stack([x[s : s + length] for s in starts])
-    centred = segments - segments.mean(axis=1, keepdims=True)
-    return np.asarray(np.fft.rfft(centred * window, axis=1)[:, 1:], dtype=np.complex128)
+def _stretches(okay: BoolArray, shortest: int) -> list[tuple[int, int]]:
+    return [(a, b) for a, b in gaps(~okay) if b - a >= shortest]
 
 
-def _estimate(u: ComplexArray, y: ComplexArray, length: int, sample_time_s: float) -> SpectralEstimate:
-    s_uu, s_yy = np.mean(np.abs(u) ** 2, axis=0), np.mean(np.abs(y) ** 2, axis=0)
-    s_yu = np.mean(y * np.conj(u), axis=0)
-    k = u.shape[0]
-    n_averages = k / (1.0 + 2.0 * HANN_OVERLAP_CORRELATION**2 * (k - 1) / k)
-    frequency_hz = np.fft.rfftfreq(length, sample_time_s)[1:].astype(np.float64)
-    return from_spectra(frequency_hz, s_yu, s_uu, s_yy, n_averages)
+def _neighbours(duration_s: float) -> int:
+    return max(FEWEST_NEIGHBOURS, round(HALF_WIDTH_HZ * duration_s))
+
+
+def _local(u: FloatArray, y: FloatArray, frequency_hz: FloatArray, period_s: float) -> _Local:
+    """Fit the polynomials around each frequency; near either end of the band their lines lie to one side."""
+    n = u.shape[0]
+    half, lines = _neighbours(n * period_s), (n - 1) // 2
+    half = min(half, (lines - 1) // 2)
+    width = 2 * half + 1
+    U, Y = (np.fft.rfft(x - x.mean())[1 : lines + 1] for x in (u, y))
+    at = frequency_hz * n * period_s - 1.0
+    first = np.clip(np.rint(at).astype(np.int64) - half, 0, lines - width)
+    around = first[:, np.newaxis] + np.arange(width)
+    powers = ((around - at[:, np.newaxis]) / half)[:, :, np.newaxis] ** np.arange(DEGREE + 1)
+    scale = np.sqrt(np.mean(np.abs(U[around]) ** 2, axis=1, keepdims=True) + np.finfo(np.float64).tiny)
+    K = np.concatenate([(U[around] / scale)[:, :, np.newaxis] * powers, powers.astype(np.complex128)], axis=2)
+    KH = K.conj().transpose(0, 2, 1)
+    inverse = np.linalg.pinv(KH @ K, hermitian=True)
+    theta = (inverse @ (KH @ Y[around][:, :, np.newaxis]))[:, :, 0]
+    residual = Y[around] - (K @ theta[:, :, np.newaxis])[:, :, 0]
+    freedom = width - COLUMNS
+    noise = np.sum(np.abs(residual) ** 2, axis=1) / freedom
+    G = theta[:, 0] / scale[:, 0]
+    variance = noise * inverse[:, 0, 0].real / scale[:, 0] ** 2
+    variance[inverse[:, 0, 0].real <= 0.0] = np.inf
+    return _Local(G, variance, noise / n, np.abs(theta[:, 0]) ** 2 / n, freedom)
+
+
+def _averaged(
+    frequency_hz: FloatArray, parts: list[_Local], sizes: list[int], used: int, bridged: int
+) -> SpectralEstimate:
+    """Average stretches by their variances."""
+    tiny = np.finfo(np.float64).tiny
+    weights = np.array([1.0 / np.maximum(part.variance, tiny) for part in parts])
+    total = np.maximum(weights.sum(axis=0), tiny)
+    response = np.sum(weights / total * np.array([part.response for part in parts]), axis=0)
+    noise, explained = (
+        np.average([getattr(part, name) for part in parts], axis=0, weights=sizes) for name in ("noise", "explained")
+    )
+    coherence = explained / np.maximum(explained + noise, tiny)
+    freedom = float(np.average([part.freedom for part in parts], weights=sizes)) * len(parts)
+    std = np.where(coherence > 0.0, np.sqrt(0.5 / total) * _widening(freedom), np.inf)
+    n_averages = float(sum(part.freedom + COLUMNS for part in parts))
+    return SpectralEstimate(frequency_hz, response, coherence, std, n_averages, used, bridged)
+
+
+def _widening(freedom: float) -> float:
+    """Return by how much the quantile of a variance known from so many complex values exceeds the normal one."""
+    return float(t.ppf(0.975, 2.0 * freedom)) / Z95
+
+
+def _period(u: FloatArray) -> int | None:
+    """Return the samples of a period of a torque that repeats itself often enough; None for any other."""
+    n = u.shape[0]
+    x = u - u.mean()
+    lags = np.arange(n // FEWEST_PERIODS + 1)
+    power = np.concatenate([[0.0], np.cumsum(x**2)])
+    overlap = np.fft.irfft(np.abs(np.fft.rfft(x, 2 * n)) ** 2)[: lags.size]
+    size = np.sqrt(power[n - lags] * (power[n] - power[lags]))
+    correlation = overlap / np.maximum(size, np.finfo(np.float64).tiny)
+    below = np.flatnonzero(correlation < 0.5 * SAME)
+    if not below.size:
+        return None
+    beyond = correlation[below[0] :]
+    if not beyond.max() >= SAME:
+        return None
+    first = int(np.argmax(beyond >= SAME))
+    near = beyond[first : first + max(below[0], 1)]
+    return int(below[0]) + first + int(np.argmax(near))
+
+
+def _periodic(u: FloatArray, y: FloatArray, period: int, period_s: float, block: int, bridged: int) -> SpectralEstimate:
+    """Average the periods of a stretch, the first one left out."""
+    count = u.shape[0] // period - 1
+    rows = u.shape[0] - count * period
+    U, Y = (np.fft.rfft(x[rows:].reshape(count, period))[:, 1 : (period + 1) // 2] for x in (u, y))
+    mean_u, mean_y = U.mean(axis=0), Y.mean(axis=0)
+    power = np.abs(mean_u) ** 2
+    excited = power > EXCITED * np.quantile(power, 1.0 - min(0.5, 8.0 / power.size))
+    line = np.arange(1, power.size + 1)
+    G = mean_y[excited] / mean_u[excited]
+    everywhere = np.interp(line, line[excited], G.real) + 1j * np.interp(line, line[excited], G.imag)
+    scatter = np.abs(Y - mean_y - everywhere * (U - mean_u)) ** 2
+    noise = _smoothed(scatter.sum(axis=0) / (count - 1))
+    std = np.sqrt(0.5 * noise[excited] / count) / np.abs(mean_u[excited]) * _widening((count - 1) * SMOOTHED)
+    explained = np.abs(mean_y[excited]) ** 2
+    return SpectralEstimate(
+        line[excited] / (period * period_s),
+        G,
+        explained / np.maximum(explained + noise[excited], np.finfo(np.float64).tiny),
+        std,
+        float(count),
+        block * count * period,
+        bridged,
+        _distortion(line, excited, mean_y - everywhere * mean_u, noise / count, period, period_s),
+    )
+
+
+SMOOTHED = 5
+"""Neighbouring lines whose noise is averaged: it is smooth in frequency."""
+
+
+def _smoothed(noise: FloatArray) -> FloatArray:
+    width = min(SMOOTHED, noise.size)
+    padded = np.pad(noise, (width // 2, width - 1 - width // 2), mode="reflect" if noise.size > width else "edge")
+    return np.convolve(padded, np.ones(width) / width, mode="valid")
+
+
+def _distortion(
+    line: IntArray, excited: BoolArray, left: ComplexArray, noise: FloatArray, period: int, period_s: float
+) -> Distortion | None:
+    """Return what is left between the first and the last excited line where no torque is."""
+    silent = ~excited & (line > line[excited][0]) & (line < line[excited][-1])
+    if 2 * int(silent.sum()) < int(excited.sum()):  # every line carries torque but for a few weak ones
+        return None
+    return Distortion(
+        line[silent] / (period * period_s),
+        2.0 / period * np.abs(left[silent]),
+        2.0 / period * np.sqrt(0.5 * noise[silent]),
+        line[silent] % 2 == 0,
+    )

@@ -147,9 +147,9 @@ def _publish(
     from hil.report.identification_files import PAGE, publish_identification
     from hil.report.identification_json import FILE_NAME
     from hil.report.identification_page import compared_summary, summary
-    from hil.report.identification_wording import verdict, warnings
+    from hil.report.identification_wording import joint_statement, verdict, warnings
 
-    text, nominal = publish_identification(out, records, settings, studies, model, made, choice, compared)
+    text, nominal, together = publish_identification(out, records, settings, studies, model, made, choice, compared)
     if as_json:
         say(text, nl=False)
         return
@@ -157,6 +157,8 @@ def _publish(
     for each in studies:
         console.print(verdict(each), highlight=False, markup=False)
     console.print(summary(studies, nominal))
+    if together is not None:
+        console.print(joint_statement(together), highlight=False, markup=False)
     if compared:
         console.print(compared_summary(compared))
     for text in warnings(studies):

@@ -187,9 +187,6 @@ LOW_HZ, HIGH_HZ = 0.8, 20.0
 COHERENT = 0.5
 """A line is used where at least half of the speed's power is the torque's, in both tests."""
 
-SEGMENT_S = 2.56
-"""Length of a segment: lines 0.4 Hz apart, narrower than a resonance of 8 Hz with 5 % damping (0.8 Hz)."""
-
 FEWEST_LINES = 6
 
 
@@ -215,8 +212,7 @@ def response_ratio(first: Record, second: Record) -> ResponseRatio:
 def _response(record: Record) -> SpectralEstimate:
     from estimator.identification.spectral import spectral_estimate  # half a second, and the bus comes first
 
-    samples = 2 * round(SEGMENT_S / record.sample_time_s / 2)
-    return spectral_estimate(decimate(record, 1, HIGH_PASS_HZ), samples)
+    return spectral_estimate(decimate(record, 1, HIGH_PASS_HZ))
 
 
 def _ratio(a: SpectralEstimate, b: SpectralEstimate, use: BoolArray) -> ResponseRatio:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from estimator.identification.identify import identify
+from estimator.identification.joint import Together, joint_estimate
 from estimator.identification.modes.modes import Mode
 from estimator.identification.offline.orders import OrderChoice
 from estimator.identification.settings import Settings
@@ -48,14 +49,18 @@ def publish_identification(
     made: Provenance,
     choice: OrderChoice | None = None,
     compared: Sequence[Compared] = (),
-) -> tuple[str, Mode | None]:
-    """Write both files or none; return the text of the first, and the mode of the model file."""
+) -> tuple[str, Mode | None, Together | None]:
+    """Write both files or none; return the text of the first, the mode of the model file, and the joint estimate."""
     models = [
         LocalModel.with_expected(record, each.found, model) for record, each in zip(records, studies, strict=True)
     ]
     nominal = models[0].reference_mode
-    text = identification_text([each.found for each in studies], settings, nominal, studies, choice, compared, made)
-    page = identification_page(models, studies, choice, compared, made)
+    together = None
+    if len(studies) > 1:
+        together = joint_estimate([each.name for each in studies], [each.best for each in studies])
+    found = [each.found for each in studies]
+    text = identification_text(found, settings, nominal, studies, choice, compared, made, together)
+    page = identification_page(models, studies, choice, compared, made, together)
     publish(
         folder,
         {
@@ -63,4 +68,4 @@ def publish_identification(
             PAGE: lambda path: path.write_text(page, encoding="utf-8"),
         },
     )
-    return text, nominal
+    return text, nominal, together

@@ -9,8 +9,10 @@ from typing import Any, Final
 import numpy as np
 
 from estimator.identification.identify import Identification
+from estimator.identification.joint import Together
 from estimator.identification.linear_model import ComplexArray, LinearModel
 from estimator.identification.modes.modes import Mode
+from estimator.identification.modes.physical import PhysicalEstimate
 from estimator.identification.modes.uncertainty import Uncertain
 from estimator.identification.offline.fits import FreeRun
 from estimator.identification.offline.orders import OrderChoice
@@ -19,7 +21,7 @@ from estimator.identification.settings import Settings
 from estimator.identification.spectral import SpectralEstimate
 from estimator.identification.study import Compared, Study
 from hil.provenance import Provenance
-from hil.report.identification_wording import best_statement, verdict
+from hil.report.identification_wording import best_statement, joint_statement, verdict
 from hil.report.numbers import json_number
 
 
@@ -60,7 +62,29 @@ def studied(each: Study) -> dict[str, Any]:
             }
             for one in each.roots.cancellations
         ],
-        "physical": _physical(each),
+        "physical": _physical(each.physical, each.not_physical),
+    }
+
+
+def _joint(together: Together | None) -> dict[str, Any] | None:
+    """Return the joint estimate; frequency and damping are null where the data carry no pole pair."""
+    if together is None:
+        return None
+    joint, _ = together
+    content: dict[str, Any] = {"statement": joint_statement(together)}
+    if joint is None:
+        return content
+    mode = joint.mode
+    return content | {
+        "recordings": list(joint.names),
+        "disagreeing": {name: json_number(p_value) for name, p_value in joint.disagreeing.items()},
+        "frequency_hz": None if mode is None else _uncertain(mode.frequency_hz),
+        "damping": None if mode is None else _uncertain(mode.damping),
+        "sample_time_s": joint.model.sample_time_s,
+        "A": joint.model.A.tolist(),
+        "B": joint.model.B.tolist(),
+        "covariance": joint.covariance.tolist(),
+        "physical": _physical(joint.physical, joint.not_physical),
     }
 
 
@@ -128,10 +152,10 @@ def _test(test: CorrelationTest) -> dict[str, Any]:
     }
 
 
-def _physical(each: Study) -> dict[str, Any]:
-    if each.physical is None:
-        return {"parameters": {}, "sums": {}, "reason": each.not_physical}
-    groups = {"parameters": each.physical.parameters, "sums": each.physical.sums}
+def _physical(physical: PhysicalEstimate | None, reason: str) -> dict[str, Any]:
+    if physical is None:
+        return {"parameters": {}, "sums": {}, "reason": reason}
+    groups = {"parameters": physical.parameters, "sums": physical.sums}
     content: dict[str, Any] = {
         group: {
             name: _uncertain(one.estimate)
@@ -155,6 +179,7 @@ def identification_text(
     choice: OrderChoice | None = None,
     compared: Sequence[Compared] = (),
     made: Provenance | None = None,
+    together: Together | None = None,
 ) -> str:
     """Return the text of the file."""
     extras: list[dict[str, Any]] = [studied(each) for each in studies] or [{} for _ in results]
@@ -174,6 +199,7 @@ def identification_text(
         "nominal_resonance": _mode(nominal),
         "order_choice": None if choice is None else _choice(choice),
         "recordings": [_recording(result) | extra for result, extra in zip(results, extras, strict=True)],
+        "joint": _joint(together),
         "compared": [_compared(each) for each in compared],
     }
     if made is not None:
@@ -236,6 +262,16 @@ def _spectral(estimate: SpectralEstimate) -> dict[str, Any]:
         "n_averages": estimate.n_averages,
         "used_samples": estimate.used_samples,
         "bridged_samples": estimate.bridged_samples,
+        "distortion": None
+        if estimate.distortion is None
+        else {
+            name: {"rms": json_number(level), "p_value": json_number(p_value)}
+            for name, (level, p_value) in (
+                ("even", estimate.distortion.level(even=True)),
+                ("odd", estimate.distortion.level(even=False)),
+            )
+        }
+        | {"noise": json_number(estimate.distortion.noise_rms)},
     }
 
 

@@ -14,6 +14,7 @@ from rich.box import SIMPLE_HEAD
 from rich.console import RenderableType
 from rich.table import Table
 
+from estimator.identification.joint import Together
 from estimator.identification.modes.modes import Mode
 from estimator.identification.modes.uncertainty import UncertainRoot
 from estimator.identification.offline.orders import OrderChoice
@@ -28,7 +29,15 @@ from hil.report import page as html
 from hil.report.bode import response_figure, responses_figure
 from hil.report.figures import Line, Panel, Style, time_figure
 from hil.report.identification_figures import PoleSet, course_figure, known_sets, pole_figure, residual_figure
-from hil.report.identification_wording import best_statement, headline, plus_minus, statement, verdict, warnings
+from hil.report.identification_wording import (
+    best_statement,
+    headline,
+    joint_statement,
+    plus_minus,
+    statement,
+    verdict,
+    warnings,
+)
 from hil.report.made import facts, made_section
 from hil.report.numbers import shown, shown_interval, shown_p
 from hil.report.terminal import rendered
@@ -78,9 +87,20 @@ def _spectral(study: Study) -> str:
     if spectral is None:
         return f"No spectral estimate. {study.found.no_spectral}"
     bridged = f", {spectral.bridged_samples} missing ones bridged" if spectral.bridged_samples else ""
+    samples = f"{spectral.used_samples} of {study.found.offline.okay.size} samples{bridged}"
+    if spectral.distortion is None:
+        return f"Frequency response without a model, from {samples}: polynomials over {spectral.n_averages:.0f} lines."
+    levels = " and ".join(
+        f"{name} {shown(level)} (p = {p_value:.2g})"
+        for name, (level, p_value) in (
+            ("even", spectral.distortion.level(even=True)),
+            ("odd", spectral.distortion.level(even=False)),
+        )
+    )
     return (
-        f"Spectral estimate of {spectral.used_samples} of {study.found.offline.okay.size} samples{bridged}: "
-        f"{spectral.n_averages:.0f} independent averages, a line every {spectral.frequency_hz[0]:.2g} Hz."
+        f"Frequency response without a model, from {samples}: mean of {spectral.n_averages:.0f} periods, at "
+        f"{spectral.frequency_hz.size} lines. Distortion, the output's amplitude at a line without torque: {levels}; "
+        f"noise {shown(spectral.distortion.noise_rms)}."
     )
 
 
@@ -231,18 +251,21 @@ def _numbers(each: Study) -> tuple[str, ...]:
     )
 
 
-def physical_tables(studies: Sequence[Study]) -> list[Any]:
+def physical_tables(studies: Sequence[Study], together: Together | None = None) -> list[Any]:
     """Return the drive's parameters of every recording: one row each, then what is open and why."""
     rows, warnings, is_open = [], [], []
-    for each in studies:
-        if each.physical is None:
-            warnings.append(html.warning(f"{each.name}: no two-mass drive. {each.not_physical}"))
+    drives = [(each.name, each.physical, each.not_physical) for each in studies]
+    if together is not None and (joint := together[0]) is not None:
+        drives.append(("together", joint.physical, joint.not_physical))
+    for recording, physical, reason in drives:
+        if physical is None:
+            warnings.append(html.warning(f"{recording}: no two-mass drive. {reason}"))
             continue
-        both = {**each.physical.parameters, **each.physical.sums}
+        both = {**physical.parameters, **physical.sums}
         rows += [
             html.Row(
                 (
-                    each.name,
+                    recording,
                     name,
                     shown(one.estimate.value),
                     shown_interval(one.estimate.ci95),
@@ -253,7 +276,7 @@ def physical_tables(studies: Sequence[Study]) -> list[Any]:
             )
             for name, one in both.items()
         ]
-        is_open += [html.note(f"{each.name}: {one.statement}") for one in both.values() if not one.is_determined]
+        is_open += [html.note(f"{recording}: {one.statement}") for one in both.values() if not one.is_determined]
     headings = ("recording", "parameter", "value", "95 % interval", "unit", "")
     table = html.table(headings, rows, numbers=(2, 3)) if rows else None
     return [table, *warnings, html.details("What is open, and what would determine it", *is_open) if is_open else None]
@@ -300,6 +323,7 @@ def identification_page(
     choice: OrderChoice | None = None,
     compared: Sequence[Compared] = (),
     made: Provenance | None = None,
+    together: Together | None = None,
 ) -> str:
     """Return the text of the page."""
     drawn = list(zip(models, studies, strict=True))[:MOST_DRAWN]
@@ -311,12 +335,13 @@ def identification_page(
                 headline(studies),
                 [html.paragraph(verdict(each), kind="statement") for each in studies],
                 html.paragraph(statement(models, studies)),
+                None if together is None else html.paragraph(joint_statement(together)),
                 [html.warning(f"Note: {text}") for text in warnings(studies)],
                 html.tiles(_tiles(studies)),
                 facts=facts(made),
             ),
             html.section("Resonance and damping", numbers_table(models, studies)),
-            html.section("Physical parameters", html.note(PHYSICAL), physical_tables(studies)),
+            html.section("Physical parameters", html.note(PHYSICAL), physical_tables(studies, together)),
             html.section("Order and delay", orders_table(choice)) if choice is not None else None,
             html.section("Recursive estimators compared", compared_table(compared)) if compared else None,
             _together(models) if len(models) > 1 else None,

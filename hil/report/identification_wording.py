@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from estimator.identification.best import SEEN, Verdict
+from estimator.identification.joint import Together
 from estimator.identification.modes.uncertainty import Uncertain
 from estimator.identification.offline.validation import Validation
 from estimator.identification.online.recursive import Status
@@ -80,6 +81,24 @@ def best_statement(each: Study) -> str:
             for one in best.regions
         )
         text += f" By torque in the shaft: {seen}."
+    return text
+
+
+def joint_statement(together: Together) -> str:
+    """Return what several recordings say together in a sentence or two, or why they say nothing."""
+    joint, reason = together
+    if joint is None:
+        return f"No joint estimate: {reason}."
+    text = f"{listed(joint.names)} together: "
+    text += (
+        f"no resonance, {joint.reason}."
+        if joint.mode is None
+        else f"resonance at {plus_minus(joint.mode.frequency_hz, 'Hz')}, damping {plus_minus(joint.mode.damping)} "
+        f"(95 %), by one Box-Jenkins model of order {joint.model.orders.na} with a noise model for each."
+    )
+    if joint.disagreeing:
+        left_out = ", ".join(f"{name} (p = {p_value:.2g})" for name, p_value in joint.disagreeing.items())
+        text += f" Left out, not the same line as the others: {left_out}."
     return text
 
 

@@ -17,7 +17,6 @@ from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult
 from estimator.physics.layout import slot
 from estimator.physics.model import Structure
-from estimator.signals.decimate import block_of
 from estimator.signals.record import FloatArray, Record
 
 SEGMENT = 256
@@ -87,9 +86,6 @@ def _octaves(frequency: FloatArray) -> FloatArray:
 COHERENT = 0.5
 """Share of the output's power that the torque must explain before a response is compared there."""
 
-FEWEST_BLOCKS = 8
-"""Blocks of samples that a segment holds at least (``spectral_estimate``)."""
-
 
 def responses(before: FitResult, after: FitResult) -> dict[str, Response]:
     """Return the response of each recording and of both models in it; recordings too short or masked have none.
@@ -102,12 +98,11 @@ def responses(before: FitResult, after: FitResult) -> dict[str, Response]:
     if before.problem.grid.structure is Structure.JOINT:
         return found
     for record, first, second in zip(before.problem.records, before.outputs, after.outputs, strict=True):
-        segment = max(SEGMENT, FEWEST_BLOCKS * block_of(record.sample_time_s))
         try:
-            measured = spectral_estimate(_differenced(record, record.output), segment)
+            measured = spectral_estimate(_differenced(record, record.output))
         except NotExciting:  # not this recording: it is too short, or masked throughout
             continue
-        simulated = [spectral_estimate(_differenced(record, output), segment) for output in (first, second)]
+        simulated = [spectral_estimate(_differenced(record, output)) for output in (first, second)]
         found[record.name] = _response(measured, *simulated)
     return found
 

@@ -1,13 +1,14 @@
 """How right the identified models are, over many buses, next to other tools.
 
 ``python -m tests.benchmarks.identification [buses] [clean] [healthy] [accuracy] [coverage] [truth] [paper]
-[--buses N] ...``
+[responses] [joint] [--buses N] ...``
 
 ``buses``     buses of the benchmarks' own on rough roads, with a driver: every method of ours and of the peers on the
               same data; errors, and how often printed intervals held the truth (by default)
 ``clean``     the same without road and driver
 ``healthy``   ten clean recordings, and the same ten on the road: how many pass the residual test of their own model
 ``accuracy``, ``coverage``, ``truth``, ``paper``   the drivelines of the tests and of the proof (``rigs.py``)
+``responses``, ``joint``   frequency responses without a model, and one model of several recordings (``lines.py``)
 """
 
 import argparse
@@ -18,7 +19,7 @@ from functools import partial
 from pathlib import Path
 
 from tests.benchmarks.buses import CLEAN, ON_THE_ROAD, World
-from tests.benchmarks.identification import rigs
+from tests.benchmarks.identification import lines, rigs
 from tests.benchmarks.identification.run import healthy_table, judge_all, missing
 from tests.benchmarks.identification.scores import document, tables
 from tests.benchmarks.ratios import machine
@@ -47,6 +48,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "accuracy": lambda _: rigs.accuracy(),
         "coverage": lambda options: rigs.coverage_table(options.buses, rigs.cruises),
         "truth": lambda options: rigs.truth_part(options.buses),
+        "responses": lambda options: lines.responses_table(options.buses),
+        "joint": lambda options: lines.joint_table(options.buses),
         "paper": lambda options: rigs.coverage_table(options.buses, rigs.paper_rig),
     }
     parser = argparse.ArgumentParser(

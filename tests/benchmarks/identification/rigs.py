@@ -16,13 +16,13 @@ import numpy as np
 
 from estimator.errors import BadModel
 from estimator.identification.best import best_estimate
-from estimator.identification.identify import identify
+from estimator.identification.identify import VALUES_PER_WIDTH, identify
 from estimator.identification.linear_model import LinearModel, Orders
 from estimator.identification.modes.modes import Mode, two_mass_resonance
 from estimator.identification.modes.physical import physical_parameters
 from estimator.identification.modes.uncertainty import Uncertain
 from estimator.identification.offline.fits import fit_box_jenkins
-from estimator.identification.spectral import SpectralEstimate
+from estimator.identification.spectral import SpectralEstimate, spectral_estimate
 from estimator.signals.decimate import decimate
 from estimator.signals.record import Record
 from hil.figures.road import draw_conditions
@@ -32,7 +32,6 @@ from hil.proof.truth.case import record as drive
 from hil.proof.truth.specimen import draw_specimen
 from hil.recording.signals import read_record
 from hil.rig.stop import StopRequest
-from tests.benchmarks.identification.local_polynomial import local_polynomial
 from tests.benchmarks.identification.scores import Rate
 from tests.benchmarks.ratios import table
 from tests.estimator.identification import driveline
@@ -183,7 +182,7 @@ def experiment(truth: Truth) -> Experiment:
         truth.record.name,
         _errors(result.online_resonance, truth.mode),
         _errors(None if mode is None else mode.mode, truth.mode),
-        worst_db(result.online, local_polynomial(result.data), truth.mode),
+        worst_db(result.online, spectral_estimate(result.data, VALUES_PER_WIDTH), truth.mode),
     )
 
 

@@ -72,17 +72,23 @@ class Cruise:
 
 
 def cruise(
-    seed: int, duration_s: float = 22.0, noise_rad_s: float = 0.05, prbs_nm: float = 60.0, name: str = "cruise"
+    seed: int,
+    duration_s: float = 22.0,
+    noise_rad_s: float = 0.05,
+    prbs_nm: float = 60.0,
+    name: str = "cruise",
+    line: Line = LINE,
+    test_nm: FloatArray | None = None,
 ) -> Cruise:
-    """Simulate a cruise: torque for the mean load plus PRBS, slowly varying load torque, noisy resolver."""
+    """Simulate a cruise: torque for the mean load plus PRBS or ``test_nm``, varying load torque, noisy resolver."""
     rng = np.random.default_rng(seed)
     n = round(duration_s / SAMPLE_TIME_S)
     t = SAMPLE_TIME_S * np.arange(n)
     sequence = 2.0 * np.resize(max_len_seq(10, state=rng.permutation([1] * 5 + [0] * 5))[0], n) - 1.0
     load = 150.0 + 30.0 * np.sin(2 * np.pi * 0.05 * t + rng.uniform(0, 6)) + np.cumsum(rng.normal(0, 0.5, n))
-    torque = 300.0 + prbs_nm * sequence
-    Ad, Bd = LINE.discrete()
-    x = np.array([120.0, 120.0, 150.0 / K])
+    torque = 300.0 + (prbs_nm * sequence if test_nm is None else test_nm)
+    Ad, Bd = line.discrete()
+    x = np.array([120.0, 120.0, 150.0 / line.k])
     speed = np.empty(n)
     for k in range(n):
         speed[k] = x[0]
@@ -97,7 +103,7 @@ def cruise(
         output=speed + rng.normal(0, noise_rad_s, n),
         okay=np.ones(n, dtype=bool),
     )
-    return Cruise(record, *true_resonance())
+    return Cruise(record, *line.resonance)
 
 
 def uncertain_resonance(model: LinearModel, covariance: FloatArray) -> UncertainMode | None:
