@@ -68,7 +68,7 @@ def responses_table(count: int) -> str:
 
 
 def joint_table(count: int) -> str:
-    """Tell how right one model of three recordings of 20 s is, and how often recordings are told to disagree."""
+    """Tell how right one model of three recordings of 20 s is, and how often recordings are named as disagreeing."""
     single, joint, held, false, found = [], [], [], 0, 0
     for seed in range(count):
         line = drawn(seed)
@@ -94,7 +94,7 @@ def joint_table(count: int) -> str:
         ),
     ]
     text = table(("model", "RMS error of frequency", "of damping", "95 % intervals hold"), rows)
-    return f"{text}\nOf {count}: {false} told to disagree though of one line; {found} times the stiffer one named.\n"
+    return f"{text}\nOf {count}: {false} named as disagreeing though of one line; {found} times the stiffer one named.\n"
 
 
 def _fitted(seed: int, lines: list[Line]) -> Iterator[BestEstimate]:
