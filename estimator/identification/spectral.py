@@ -51,6 +51,9 @@ SHORTEST_S = 2.0
 FEWEST_PERIODS = 4
 """The first is left out: it holds the transient."""
 
+SHORTEST_PERIOD = 32
+"""Samples: fewer lines than 15 say little of a response."""
+
 SAME = 0.9
 """Correlation of a torque with itself a period later from which on it is called periodic."""
 
@@ -250,14 +253,13 @@ def _period(u: FloatArray) -> int | None:
     size = np.sqrt(power[n - lags] * (power[n] - power[lags]))
     correlation = overlap / np.maximum(size, np.finfo(np.float64).tiny)
     below = np.flatnonzero(correlation < 0.5 * SAME)
-    if not below.size:
+    if not below.size or below[0] >= lags.size - 1:
         return None
-    beyond = correlation[below[0] :]
-    if not beyond.max() >= SAME:
+    again = np.flatnonzero(correlation[below[0] :] >= SAME) + below[0]
+    if not again.size:
         return None
-    first = int(np.argmax(beyond >= SAME))
-    near = beyond[first : first + max(below[0], 1)]
-    return int(below[0]) + first + int(np.argmax(near))
+    period = again[0] + int(np.argmax(correlation[again[0] : again[0] + below[0]]))
+    return int(period * -(-SHORTEST_PERIOD // period))  # of a shorter one, several make one
 
 
 def _periodic(u: FloatArray, y: FloatArray, period: int, period_s: float, block: int, bridged: int) -> SpectralEstimate:

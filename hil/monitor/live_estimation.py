@@ -11,16 +11,26 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from estimator.errors import EstimatorError
+from estimator.errors import EstimatorError, NotExciting
 from estimator.identification.chain import OnlineEstimate
 from estimator.identification.modes.modes import Mode
 from estimator.identification.online.recursive import Status
 from estimator.identification.tracking.alarm import Alarm
+from estimator.signals.decimate import high_passed
+from estimator.signals.record import FloatArray, Record
 from hil.child import safe_path
 from hil.monitor.plot import Ring
 from hil.monitor.snapshot import ComplexArray, Estimation, History, Model
 from hil.rig.live import USUAL, LiveEstimate, OnlineSetup, tracking_chain
 from hil.sample import Sample
+
+SPECTRUM_S = 30.0
+"""What the response without a model is estimated from [s]."""
+
+SPECTRUM_EVERY_S = 2.0
+
+KNOWN = 0.5
+"""Coherence from which on a frequency is shown."""
 
 HISTORY_EVERY_NS = 250_000_000
 """Time between two points of the history [ns]."""
@@ -36,6 +46,8 @@ TRAIL_MODELS = 60
 RESPONSE_POINTS = 160
 
 KEPT_ALARMS = 20
+
+VALUES_PER_WIDTH = 2
 
 NS_PER_S = 1_000_000_000
 
@@ -64,6 +76,10 @@ class LiveEstimation:
         self._history = Ring(HISTORY_POINTS, 5)
         self._trail: deque[ComplexArray] = deque(maxlen=TRAIL_MODELS)
         self._alarms: deque[Alarm] = deque(maxlen=KEPT_ALARMS)
+        self._samples = Ring(round(SPECTRUM_S / period_s), 3)
+        self._since_spectrum = 0
+        self._last_cycle: int | None = None
+        self._measured = (np.empty(0), np.empty(0))
         self._refused: str | None = None
         self._kept_ns = 0
         self._points = 0
@@ -82,6 +98,9 @@ class LiveEstimation:
         """Begin anew with the next sample: a run is about to be measured. The history continues."""
         self._live_estimate, self._refused = None, None
         self._waiting = []
+        self._samples.clear()
+        self._last_cycle = None
+        self._measured = (np.empty(0), np.empty(0))
         self._trail.clear()
         self._live = True
         try:
@@ -105,8 +124,12 @@ class LiveEstimation:
         n_alarms = len(live.course.alarms)
         for sample in samples:
             live(sample)
+            self._keep(sample)
             if live.latest is not None:
                 self._remember(live.latest, sample.t_ns)
+        self._since_spectrum += len(samples)
+        if self._since_spectrum * self._period_s >= SPECTRUM_EVERY_S:
+            self._since_spectrum, self._measured = 0, self._spectrum()
         alarms = tuple(live.course.alarms[n_alarms:])
         for alarm in alarms:
             if self._alarms and not self._alarms[-1].settled:  # it comes once more, settled
@@ -143,6 +166,31 @@ class LiveEstimation:
             state=None if latest is None else latest.state,
         )
 
+    def _keep(self, sample: Sample) -> None:
+        """Keep a sample for the spectrum, and the cycles that were left out before it as missing."""
+        missing = 0 if self._last_cycle is None else sample.cycle - self._last_cycle - 1
+        for _ in range(min(missing, round(SPECTRUM_S / self._period_s))):
+            self._samples.append((0.0, 0.0, 0.0))
+        self._last_cycle = sample.cycle
+        torque_nm, speed = sample.torque_m1_nm + sample.torque_m2_nm, sample.speed_rad_s
+        okay = sample.counts and math.isfinite(torque_nm + speed)
+        self._samples.append((torque_nm, speed, 1.0) if okay else (0.0, 0.0, 0.0))
+
+    def _spectrum(self) -> tuple[FloatArray, FloatArray]:
+        """Return where the response without a model is known, and its magnitude there."""
+        from estimator.identification.spectral import spectral_estimate  # scipy's statistics: not before the bus
+
+        torque_nm, speed, okay = self._samples.rows().T
+        good = okay > 0.0
+        time_s = self._period_s * np.arange(good.size)
+        record = Record("live", self._period_s, time_s, torque_nm[:, np.newaxis], speed, good, torque_okay=good)
+        try:
+            found = spectral_estimate(high_passed(record), VALUES_PER_WIDTH)
+        except NotExciting:
+            return np.empty(0), np.empty(0)
+        known = found.coherence > KNOWN
+        return found.frequency_hz[known], np.abs(found.response[known])
+
     def _status(self) -> str:
         if self._refused is not None:
             return f"no estimate: {self._refused}"
@@ -175,6 +223,8 @@ class LiveEstimation:
             zeros=model.zeros,
             trail=np.concatenate(self._trail) if self._trail else np.empty(0, dtype=np.complex128),
             sample_time_s=model.sample_time_s,
+            measured_hz=self._measured[0],
+            measured_gain=self._measured[1],
         )
 
 

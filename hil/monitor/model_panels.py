@@ -9,7 +9,7 @@ import numpy as np
 
 from estimator.identification.tracking.alarm import Alarm, TrackingState
 from hil.monitor.plot import AXIS, Canvas, Range, height_of, nice_range, strip, time_axis, title, with_axis, wrapped
-from hil.monitor.snapshot import Estimation, Snapshot
+from hil.monitor.snapshot import Estimation, Model, Snapshot
 
 WIDEST_BAND = 0.5
 """Share of the value beyond which a band of two standard deviations is cut in a plot, and called UNSURE in words."""
@@ -85,7 +85,7 @@ def resonance_in_words(estimation: Estimation) -> str:
 LARGEST_REACH = 2.0
 """Real part up to which poles and zeros are in the picture; a spare zero may be anywhere."""
 
-RESPONSE = "response w/T [dB]"
+RESPONSE = "response w/T [dB], + measured"
 
 ROOM_OF_TITLE = 6
 """Characters of a title besides its text and its value, a short rule included."""
@@ -108,8 +108,21 @@ def response(snapshot: Snapshot, width: int, height: int) -> list[str]:
     x = np.log10(model.frequency_hz)
     y_range = nice_range(decibel, 20.0)
     low_hz, high_hz = float(model.frequency_hz[0]), float(model.frequency_hz[-1])
-    plot = strip(x, decibel, Range(math.log10(low_hz), math.log10(high_hz)), y_range, width, height - 2)
-    return [head, *plot, _frequency_axis(low_hz, high_hz, width)]
+    x_range = Range(math.log10(low_hz), math.log10(high_hz))
+    plot = strip(x, decibel, x_range, y_range, width, height - 2)
+    return [head, *_with_measured(plot, model, x_range, y_range), _frequency_axis(low_hz, high_hz, width)]
+
+
+def _with_measured(plot: list[str], model: Model, x_range: Range, y_range: Range) -> list[str]:
+    """Mark the response of the last samples without a model by crosses, over the line of the model."""
+    lines = [list(line) for line in plot]
+    inside = (np.log10(model.measured_hz) - x_range.low) / (x_range.high - x_range.low)
+    height = height_of(20.0 * np.log10(np.maximum(model.measured_gain, 1e-12)), y_range, len(lines))
+    for share, row in zip(inside.tolist(), height.tolist(), strict=True):
+        column = AXIS + round(share * (len(lines[0]) - AXIS - 1)) if lines else 0
+        if 0.0 <= share <= 1.0 and 0 <= round(row) < len(lines):
+            lines[round(row)][column] = "+"
+    return ["".join(line) for line in lines]
 
 
 def poles(snapshot: Snapshot, width: int, height: int) -> list[str]:

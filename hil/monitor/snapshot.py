@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 
 import numpy as np
@@ -254,6 +254,8 @@ class Model:
         Poles of models before, oldest first, shape (m,).
     sample_time_s
         Its period [s].
+    measured_hz, measured_gain
+        Shape (m,): the response of the last samples without a model, where it is known; empty before there are enough.
     """
 
     frequency_hz: FloatArray
@@ -262,6 +264,8 @@ class Model:
     zeros: ComplexArray
     trail: ComplexArray
     sample_time_s: float
+    measured_hz: FloatArray = field(default_factory=lambda: np.empty(0))
+    measured_gain: FloatArray = field(default_factory=lambda: np.empty(0))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -62,6 +62,17 @@ def test_the_resonance_is_that_of_the_line(rows: list[Sample]) -> None:
     assert len(seen.model.trail) >= 4
 
 
+def test_the_response_without_a_model_goes_through_the_same_peak(rows: list[Sample]) -> None:
+    """Also where cycles were left out: their place in time is kept."""
+    for shown in (rows, [row for row in rows if row.cycle % 500 > 1]):
+        model = fed(shown, 10).look(rows[-1].t_ns).model
+        assert model is not None
+        near = (model.measured_hz > 5.0) & (model.measured_hz < 12.0)
+        assert near.sum() > 10
+        gain = np.interp(model.measured_hz[near], model.frequency_hz, model.gain)
+        assert np.abs(20.0 * np.log10(model.measured_gain[near] / gain)).max() < 4.0
+
+
 def test_what_a_flagged_sample_says_does_not_matter(rows: list[Sample]) -> None:
     def lost(torque_nm: float, speed_rad_s: float) -> float:
         stale = SampleFlag.M1_STALE

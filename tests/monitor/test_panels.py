@@ -120,6 +120,18 @@ def test_channels_have_their_names_units_and_last_values() -> None:
     assert lines[2].strip() == "+3 more channels"
 
 
+def test_the_response_without_a_model_is_marked_over_its_frequency() -> None:
+    shown = snapshot()
+    model = shown.estimation.model
+    assert model is not None
+    measured = replace(model, measured_hz=np.array([2.0, 8.0]), measured_gain=np.array([0.2, 5.0]))
+    lines = model_panels.response(replace(shown, estimation=replace(shown.estimation, model=measured)), 60, 12)
+    marks = [(row, line.index("+")) for row, line in enumerate(lines[1:-1]) if "+" in line]
+    assert len(marks) == 2
+    assert lines[-1].index(" 5 ") < marks[0][1] < lines[-1].index("10")  # 8 Hz, the higher one
+    assert marks[1][1] < lines[-1].index(" 5 ")
+
+
 def test_the_peak_of_the_response_stands_over_its_frequency() -> None:
     lines = model_panels.response(snapshot(), 60, 12)
     peak = next(line for line in lines[1:] if any(ord(letter) > 0x2800 for letter in line))

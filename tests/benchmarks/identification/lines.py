@@ -94,7 +94,7 @@ def joint_table(count: int) -> str:
         ),
     ]
     text = table(("model", "RMS error of frequency", "of damping", "95 % intervals hold"), rows)
-    return f"{text}\nOf {count}: {false} named as disagreeing though of one line; {found} times the stiffer one named.\n"
+    return f"{text}\nOf {count}: {false} of one line named as disagreeing; the stiffer one named {found} times.\n"
 
 
 def _fitted(seed: int, lines: list[Line]) -> Iterator[BestEstimate]:
