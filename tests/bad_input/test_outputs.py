@@ -26,24 +26,8 @@ def words(command: str, drive: Path) -> list[str]:
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-@pytest.mark.parametrize(("place", "said"), [("drive.toml", "which is a file"), ("run_1.csv/sub", "which is a file")])
-def test_a_file_is_no_folder(refused: Refused, drive: Path, command: str, place: str, said: str) -> None:
-    before = (drive / place.partition("/")[0]).read_bytes()
-    complaint = refused(*words(command, drive), drive / place)
-    assert f"{drive / place}: expected a folder to write into" in complaint
-    assert said in complaint
-    assert (drive / place.partition("/")[0]).read_bytes() == before
-
-
-@pytest.mark.parametrize("command", COMMANDS)
 def test_a_place_where_nothing_can_be_made(refused: Refused, drive: Path, command: str) -> None:
     assert "/proc/result: expected a folder to write into, got: " in refused(*words(command, drive), "/proc/result")
-
-
-def test_a_simulation_has_no_place_either(refused: Refused, drive: Path) -> None:
-    model, recording = drive / "drive.toml", drive / "run_1.csv"
-    complaint = refused("simulate", "--model", model, "--input", recording, "--out", "/proc/simulated.csv")
-    assert "/proc: expected a folder to write into, got: " in complaint
 
 
 @pytest.mark.parametrize(
@@ -58,10 +42,6 @@ def test_a_run_is_not_started_without_a_place(refused: Refused, short_rig: Path,
     out = short_rig.parent / name
     assert f"{out}: {said}" in refused("run", short_rig, "cruise", "--out", out, *NOWHERE)
     assert list(short_rig.parent.iterdir()) == [short_rig]
-
-
-def test_a_run_is_not_started_where_nothing_can_be_made(refused: Refused, short_rig: Path) -> None:
-    assert "expected a place to write" in refused("run", short_rig, "cruise", "--out", "/proc/run.csv", *NOWHERE)
 
 
 @pytest.mark.parametrize("name", ["run.csv", pytest.param("run.parquet", marks=pytest.mark.campaign)])

@@ -5,8 +5,6 @@ import zipfile
 from pathlib import Path
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from hil.cli.main import run
 from hil.store import RunEntry, RunStore
@@ -85,13 +83,6 @@ def test_what_helps_stays(text: str) -> None:
     assert sum(found.counts.values()) == 0
 
 
-def test_paths_of_the_program_stay_and_names_of_files() -> None:
-    found = redaction()
-    assert found.text('File "/opt/hil/cli/main.py", line 3') == 'File "<hil>/cli/main.py", line 3'
-    assert found.text("read /data/customer/rig.toml") == "read [folder]/rig.toml"
-    assert found.text("/opt/hillside/a.csv") == "[folder]/a.csv"
-
-
 def test_secrets_in_a_document_go_at_any_depth() -> None:
     document = {
         "plc": {"security": {"key": "k1", "roles": ["a"]}},
@@ -103,24 +94,6 @@ def test_secrets_in_a_document_go_at_any_depth() -> None:
     assert json.loads(text)["n"] == 3
     assert not [secret for secret in ("k1", "p1") if secret in text]
     assert json.loads(text)["token"] == ["[removed]", "[removed]"]
-
-
-def test_comments_of_a_rig_file_are_taken_out_and_texts_with_a_hash_stay() -> None:
-    text = (
-        'name = "cell #2"  # Anna says: pin 1234\n# bert 0171 5550\nx = \'#3\' # y\nlong = """\n# kept\n"""\nn = 1 # z'
-    )
-    found = redaction()
-    assert found.toml(text) == 'name = "cell #2"\n\nx = \'#3\'\nlong = """\n# kept\n"""\nn = 1'
-    assert found.counts["comments"] == 4
-
-
-PRINTABLE = st.text(st.characters(min_codepoint=33, max_codepoint=126, exclude_characters="\"'\\#"), min_size=6)
-
-
-@given(secret=PRINTABLE, before=PRINTABLE, name=st.sampled_from(["password", "key", "plc_token", "certificate", "ca"]))
-def test_a_secret_in_quotes_is_taken_out_whatever_it_is(secret: str, before: str, name: str) -> None:
-    text = redaction().text(f'{before}\n{name} = "{secret}" # comment\n')
-    assert secret not in text.removeprefix(before).replace("[removed]", "")
 
 
 def contents(path: Path) -> dict[str, str]:
@@ -173,15 +146,6 @@ def test_the_last_run_is_reported_without_notes_and_secrets(state: Path, tmp_pat
     assert json.loads(text)["experiment"] == "last"
     assert "cell 2" in text
     assert not [private for private in ("hunter2", "tired", str(tmp_path)) if private in text]
-
-
-def test_a_rig_file_that_can_not_be_read_by_the_program_is_in_it(state: Path, tmp_path: Path) -> None:
-    rig = tmp_path / "rig.toml"
-    rig.write_bytes(b'schema = "hil.rig/1"\nname = broken \xff\npassword = "hunter2"\n')
-    assert run(["bugreport", str(tmp_path / "report.zip"), "--rig", str(rig)]) == 0
-    text = contents(tmp_path / "report.zip")["rig/rig.toml"]
-    assert "name = broken" in text
-    assert "hunter2" not in text
 
 
 def test_it_never_replaces_a_file_and_names_what_is_missing(

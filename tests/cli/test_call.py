@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-from hil.cli.command_line import COMMANDS, SPEAKERS, Call, overview
+from hil.cli.command_line import COMMANDS, Call, overview
 from hil.cli.main import run
 from hil.errors import UsageError
 
@@ -20,10 +20,6 @@ from hil.errors import UsageError
 )
 def test_common_options_stand_anywhere(line: str) -> None:
     assert Call.parse(line.split(), COMMANDS) == Call("run", ("rig.toml", "cruise"), True, "debug")
-
-
-def test_after_two_dashes_nothing_is_an_option() -> None:
-    assert Call.parse(["effects", "--", "--quiet"], COMMANDS) == Call("effects", ("--", "--quiet"))
 
 
 @pytest.mark.parametrize(
@@ -45,19 +41,6 @@ def test_quiet_prints_nothing_but_what_json_prints(capsys: pytest.CaptureFixture
     assert capsys.readouterr() == ("", "")
     assert Call("diagnose", ("--json",), quiet=True).silent is False
     assert Call("diagnose", (), quiet=True).silent is True
-
-
-def test_errors_are_reported_all_the_same(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["--quiet", "identify", "nowhere.csv", "--out", "out"]) == 2
-    printed = capsys.readouterr()
-    assert printed.out == ""
-    assert "nowhere.csv" in printed.err
-
-
-def test_what_a_command_is_called_for_is_not_silenced(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["--quiet", "effects"]) == 0
-    assert "backlash" in capsys.readouterr().out
-    assert set(COMMANDS) >= SPEAKERS
 
 
 @pytest.mark.parametrize("columns", [40, 80, 200])

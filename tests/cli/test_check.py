@@ -12,8 +12,6 @@ from hil.config.rig_file import read_rig
 from hil.simulator.faults import FaultAtStep, InverterFaults, PlcFaults, RigFaults
 from tests.rig.serving import served
 
-NOWHERE = ("--bus", "ws://127.0.0.1:9/", "--modbus", "127.0.0.1:9")
-
 
 @contextmanager
 def rig_with(faults: RigFaults, path: Path) -> Iterator[tuple[str, ...]]:
@@ -59,15 +57,3 @@ def test_drive_in_fault_is_noted(short_rig: Path, options: tuple[str, ...], caps
     assert len(notes) == 1
     assert "power state is fault, error code 0x603F is 0x2310 continuous over-current, motor side" in notes[0]
     assert "Fix the cause at the drive, reset the fault." in notes[0]
-
-
-def test_nothing_there(short_rig: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["check", str(short_rig), *NOWHERE]) == 3
-    printed = capsys.readouterr()
-    assert "can, m1, m2, plc" in printed.err
-    assert "[plc]" in printed.out
-
-
-def test_address_that_is_none(short_rig: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["check", str(short_rig), "--modbus", "nonsense"]) == 2
-    assert "HOST:PORT" in capsys.readouterr().err

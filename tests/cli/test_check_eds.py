@@ -1,7 +1,6 @@
 """``hil check --eds``: lines as a compiler writes them, JSON for a script, and exit status 2 for a file of no use."""
 
 import json
-import re
 from pathlib import Path
 
 import pytest
@@ -20,27 +19,6 @@ def faulty(tmp_path: Path) -> Path:
     text = Path(SHIPPED).read_text().replace("DefaultValue=0xFDB44700", "DefaultValue=fast")
     path.write_text(text.replace("LSS_Supported=0\n", ""))
     return path
-
-
-def test_shipped_eds_has_nothing_to_remark(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["check", "--eds", SHIPPED]) == 0
-    *table, verdict = capsys.readouterr().out.splitlines()
-    assert verdict == f"{SHIPPED}: usable: nothing to remark"
-    assert not any("none:" in row for row in table)
-    assert f"{'torque offset':32} 0x60B2:00" in table
-
-
-def test_warnings_are_reported_and_borne(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["check", "--eds", OTHER]) == 0
-    printed = capsys.readouterr()
-    *lines, verdict = printed.out.splitlines()
-    assert verdict == f"{OTHER}: usable: 11 warnings, 2 notes"
-    assert lines[13].startswith("controlword ")
-    assert all(
-        re.match(rf"{re.escape(OTHER)}:\d+: (warning|note): \[?\w+.*: expected .*, found .*\.$", line)
-        for line in lines[:13]
-    )
-    assert printed.err == ""
 
 
 def test_error_is_reported_with_its_line(faulty: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -67,14 +45,6 @@ def test_json(faulty: Path, capsys: pytest.CaptureFixture[str]) -> None:
     }
 
 
-@pytest.mark.parametrize("options", [(), ("--json",)])
-def test_file_that_is_not_there(tmp_path: Path, options: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["check", "--eds", str(tmp_path / "none.eds"), *options]) == 2
-    printed = capsys.readouterr()
-    assert "No such file or directory" in printed.out
-    assert "none.eds is not usable: 1 error" in printed.err
-
-
 @pytest.mark.parametrize("content", [b"", b"\x00\x01\x02", "[DeviceInfo]".encode("utf-16"), b"[can]\n"])
 def test_file_that_is_no_eds(tmp_path: Path, content: bytes, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "no.eds"
@@ -95,13 +65,6 @@ def test_rig_and_eds_together(short_rig: Path, capsys: pytest.CaptureFixture[str
     assert document["schema"] == "hil.check/1"
     assert len(document["devices"]) == 4
     assert document["eds"][0]["usable"]
-
-
-def test_rig_is_not_looked_for_with_an_eds_of_no_use(
-    short_rig: Path, faulty: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert run(["check", str(short_rig), "--bus", "ws://127.0.0.1:9/", "--eds", str(faulty)]) == 2
-    assert "m1" not in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(

@@ -150,15 +150,6 @@ MAPPED = [each for each in DIFFERENCES if each.name.startswith("PDO")]
 """What a run maps anew, whatever the drive has: a remark, for `hil run` does not refuse it either."""
 
 
-@pytest.mark.parametrize("each", MAPPED, ids=_name)
-def test_a_pdo_that_a_run_maps_anew_is_a_remark(
-    each: Mismatch, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    with planted(tmp_path, each, monkeypatch) as command:
-        assert run([*command, "--json"]) == 0
-    assert each.name in capsys.readouterr().out
-
-
 @pytest.mark.parametrize("each", [each for each in DIFFERENCES if each not in MAPPED], ids=_name)
 def test_difference_of_an_inverter_is_named(
     each: Mismatch, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
@@ -209,35 +200,3 @@ def test_device_that_is_not_there_or_another_is_named(
     assert f": {device}: expected all there and as described" in printed.err
     (note,) = (line for line in printed.out.splitlines() if line.startswith(f"{device}: "))
     assert said in note
-
-
-def test_unreachable_plc_is_named(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    with planted(tmp_path, Mismatch("", "", ""), monkeypatch) as command:
-        assert run([*command, "--modbus", "127.0.0.1:9"]) == 3
-    printed = capsys.readouterr()
-    assert ": plc: expected all there" in printed.err
-    assert "127.0.0.1:9" in printed.out
-
-
-@pytest.mark.parametrize(("index", "code"), [("6007", 3), ("605A", 2), ("605E", 2)])
-def test_option_code_other_than_the_eds_s_default_is_the_drive_s_own(
-    index: str, code: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    each = Mismatch("", "", "", device=(eds_default(index, str(code)),))
-    with planted(tmp_path, each, monkeypatch) as command:
-        assert run(command) == 0
-    assert re.search(
-        rf"m1: .* 0x{index}:00 is {code}, the EDS has \d: the drive keeps its own", capsys.readouterr().out
-    )
-
-
-def test_rigs_own_eds_with_errors_is_noted(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    unreadable = (r"(?s)(\[605A\]\n(?:(?!\[).)*?DefaultValue=)\d+", r"\g<1>six")
-    with planted(tmp_path, Mismatch("", "", "", host=(unreadable,)), monkeypatch) as command:
-        run(command)
-    out = capsys.readouterr().out
-    assert "m1.eds has errors (1). See: hil check --eds" in out

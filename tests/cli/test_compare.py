@@ -8,7 +8,6 @@ import pytest
 
 from hil.cli.main import run
 from tests.cli import bench
-from tests.report.conftest import figures
 
 NOISE = 0.05
 
@@ -84,17 +83,6 @@ def test_each_output_has_its_figures(two_outputs: list[str], capsys: pytest.Capt
     together = content["models"]["drive.toml"]["outputs"]["angle_rad"]
     assert together["rms"] == pytest.approx(0.01, rel=0.2)
     assert "the output dead_rad_s2 is not used: it stays at 0.25" in said.err
-
-
-def test_each_output_is_drawn(
-    two_outputs: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("COLUMNS", "120")  # a narrower terminal folds names
-    assert run(["compare", *two_outputs, "--out", str(tmp_path / "result")]) == 0
-    assert "run_1:angle_rad" in capsys.readouterr().out
-    page = (tmp_path / "result" / "compare.html").read_text()
-    assert page.count('class="plotly-graph-div"') == 2 * (1 + 2 + 1)  # over time, a spectrum each, residuals
-    assert "angle_rad: error [rad]" in figures(page)
 
 
 @pytest.mark.parametrize(

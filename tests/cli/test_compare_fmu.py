@@ -34,25 +34,3 @@ def test_an_fmu_is_as_far_off_as_its_model_file(
     assert other["load_torque"] == pytest.approx(own["load_torque"], abs=1e-4)
     page = (tmp_path / "out" / "compare.html").read_text()
     assert '"drive.fmu"' in figures(page)
-
-
-def test_alone_and_mapped_by_hand(files: tuple[str, str, str], capsys: pytest.CaptureFixture[str]) -> None:
-    _, fmu, recording = files
-    capsys.readouterr()
-    mapped = ("torque=T_M1", "output=speed_motor", "load=T_load", "start=start.speed")
-    assert run(["compare", fmu, recording, "--trust-fmu", "--json", *(w for m in mapped for w in ("--map", m))]) == 0
-    assert json.loads(capsys.readouterr().out)["recordings"]["run_1"]["rms"] == pytest.approx(0.05, rel=0.1)
-
-
-def test_what_is_not_trusted_is_refused(files: tuple[str, str, str], capsys: pytest.CaptureFixture[str]) -> None:
-    _, fmu, recording = files
-    assert run(["compare", fmu, recording]) == 2
-    assert "runs only where you trust it: --trust-fmu" in capsys.readouterr().err
-
-
-def test_what_is_no_fmu_is_refused(
-    files: tuple[str, str, str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    (tmp_path / "broken.fmu").write_bytes(b"PK none")
-    assert run(["compare", str(tmp_path / "broken.fmu"), files[2], "--trust-fmu"]) == 2
-    assert "broken.fmu: expected an FMU" in capsys.readouterr().err

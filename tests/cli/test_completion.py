@@ -1,7 +1,6 @@
 """``hil completion``: what a shell is offered, asked as typer's scripts ask, and by bash itself."""
 
 import os
-import shutil
 import subprocess
 import sys
 from collections.abc import Iterable
@@ -9,12 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from estimator.physics.catalogue import EFFECTS
 from hil.cli.command_line import COMMANDS
 from hil.cli.main import run
 
 RIG = Path(__file__).resolve().parents[2] / "examples" / "rig.toml"
-HIL = Path(sys.executable).with_name("hil")
 
 
 def complete(line: str) -> set[str]:
@@ -38,36 +35,13 @@ def test_commands() -> None:
     assert complete("hil prove ma") == {"make"}
 
 
-def test_options() -> None:
-    assert {"--dry-run", "--out", "--quiet", "--help"} <= complete("hil run --")
-    assert complete("hil --log-level d") == {"debug"}
-    assert complete("hil run --pace f") == {"fast"}
-
-
-def test_effects() -> None:
-    assert complete("hil sim rig.toml --effect sti") == offered(EFFECTS, "sti")
-
-
 def test_experiments_of_the_rig_file_on_the_line(tmp_path: Path) -> None:
     assert {"cruise", "reversal", "tip"} <= complete(f"hil run {RIG} ")
     assert complete(f"hil run --pace fast {RIG} re") == {"reversal"}
     assert complete(f"hil run {tmp_path / 'none.toml'} re") == set()
 
 
-@pytest.mark.skipif(shutil.which("bash") is None or not HIL.exists(), reason="needs bash and hil installed")
-def test_bash_asks_by_the_script(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["completion", "bash"]) == 0
-    ask = f'COMP_WORDS=(hil run --dr); COMP_CWORD=2; _hil_completion {HIL}; printf "%s\\n" "${{COMPREPLY[@]}}"'
-    command = ["bash", "--noprofile", "--norc", "-c", f"{capsys.readouterr().out}\n{ask}"]
-    assert subprocess.run(command, capture_output=True, text=True, check=True).stdout == "--dry-run\n"
-
-
 @pytest.mark.parametrize(("shell", "word"), [("zsh", "compdef"), ("fish", "complete --command hil")])
 def test_other_shells_have_a_script(shell: str, word: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["completion", shell]) == 0
     assert word in capsys.readouterr().out
-
-
-def test_another_shell_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["completion", "tcsh"]) == 2
-    assert "bash" in capsys.readouterr().err

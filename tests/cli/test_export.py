@@ -1,7 +1,6 @@
 """``hil export st`` and ``hil export plcopen`` on real files: what they write, what they refuse."""
 
 import json
-import re
 from datetime import datetime
 from pathlib import Path
 
@@ -63,14 +62,6 @@ def test_plcopen_has_the_same_content(
     expected = project(PlcEstimator(Settings(), 0.01, np.array(L), "identification.json, recording run_2"), precision)
     written = datetime.fromisoformat(text.partition('creationDateTime="')[2].partition('"')[0])
     assert text == plcopen_xml(expected, written, version)
-
-
-def test_without_a_model_the_filter_is_adapted(tmp_path: Path) -> None:
-    out = tmp_path / "estimator.st"
-    assert run(["export", "st", "--adaptive", "--cycle", "0.02", "--out", str(out)]) == 0
-    text = out.read_text(encoding="ascii")
-    assert re.search(r"ADAPT_FILTER +: BOOL := TRUE;", text)
-    assert "Call it once per cycle of 0.02 s" in text
 
 
 def test_the_example_is_what_the_command_writes_today(tmp_path: Path) -> None:
@@ -187,16 +178,3 @@ def test_a_filter_that_rounding_makes_unstable_is_refused(
     assert run([*arguments, str(tmp_path / "single"), "--single"]) == 2
     assert "rounded to REAL, oefo: L has a root of magnitude 1" in capsys.readouterr().err
     assert not (tmp_path / "single").exists()
-
-
-@BOTH
-def test_other_orders_for_a_and_b_are_exported(what: str, identified: Path, tmp_path: Path) -> None:
-    path, out = _changed(identified, tmp_path, "settings", na=2, nb=3), tmp_path / "estimator"
-    assert run(["export", what, str(path), "--run", "run_1", "--out", str(out)]) == 0
-    assert "a1 .. a2, b1 .. b3" in out.read_text(encoding="ascii")
-
-
-@BOTH
-def test_a_folder_is_no_file_to_write(what: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["export", what, "--adaptive", "--out", str(tmp_path)]) == 2
-    assert f"{tmp_path}: expected the name of a file to write, got a folder" in capsys.readouterr().err

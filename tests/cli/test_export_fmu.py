@@ -59,12 +59,6 @@ def test_without_a_compiler_it_says_what_to_do(
     assert not any(name.startswith("binaries") for name in names)
 
 
-def test_what_is_of_the_recorder_is_left_out_and_reported(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    drift = "\n[effects.clock_drift]\nrate = { value = 1e-4 }\n"
-    exported(tmp_path, "--sources-only", text=bench.MODEL + drift)
-    assert "clock_drift is of what records, not of the line" in capsys.readouterr().out
-
-
 @pytest.mark.parametrize(
     ("text", "name", "said"),
     [

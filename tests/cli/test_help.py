@@ -7,7 +7,6 @@ from typing import Any
 import pytest
 
 from hil.cli.main import run
-from hil.cli.printing import flowing
 from tests.cli.command_lines import every_command, examples, parse
 
 EVERY = list(every_command())
@@ -19,14 +18,6 @@ def test_every_help_has_an_example_of_its_command_that_parses(name: str, command
     assert any(line.split()[1 : 1 + len(name.split())] == name.split() for line in lines)
     for line in lines:
         parse(line)
-
-
-def test_several_examples_of_one_epilog_are_all_found() -> None:
-    assert examples("Example: hil a b.c --d 1.5. First look: hil a --dry; hil e") == [
-        "hil a b.c --d 1.5",
-        "hil a --dry",
-        "hil e",
-    ]
 
 
 @pytest.mark.parametrize("wrong", ["hil effects --colour", "hil export st", "hil rig paint", "hil nothing"])
@@ -57,12 +48,3 @@ def test_no_word_of_a_help_is_taken_for_markup(
     printed = capsys.readouterr().out
     for parameter in command.params:
         assert (parameter.help or "").replace(r"\[", "[") in printed, f"{parameter.name}: a bracket is written \\["
-
-
-def test_a_list_in_a_help_stays_a_list() -> None:
-    assert flowing("First\nof it.\n\nThen\nthis:\n\n  one\n  two\n") == "First of it.\n\nThen this:\n\n  one\n  two"
-
-
-def test_h_alone_is_the_overview(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["-h"]) == 0
-    assert "Commands:" in capsys.readouterr().out

@@ -45,17 +45,6 @@ def test_the_level_is_that_of_the_option(level: str, reported: bool) -> None:
     assert ("hil effects" in log()) is reported
 
 
-def test_the_option_goes_before_the_variable(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("HIL_LOG", "error")
-    assert run(["effects", "--log-level", "info"], keep_log=True) == 0
-    assert "hil effects" in log()
-
-
-def test_off_keeps_none() -> None:
-    assert run(["effects", "--log-level", "off"], keep_log=True) == 0
-    assert not log_file().exists()
-
-
 @pytest.mark.parametrize("where", ["option", "variable"])
 def test_an_unknown_level_is_refused(
     where: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
@@ -89,12 +78,6 @@ def test_it_rotates_and_keeps_a_few(monkeypatch: pytest.MonkeyPatch) -> None:
     kept = sorted(log_file().parent.iterdir())
     assert [path.name for path in kept] == ["hil.log", *(f"hil.log.{n}" for n in range(1, command_log.KEPT + 1))]
     assert all(path.stat().st_size <= 500 for path in kept)
-
-
-def test_without_a_place_for_it_the_command_continues(state: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    state.write_text("a file where the folder should be", encoding="utf-8")
-    assert run(["effects", "backlash"], keep_log=True) == 0
-    assert "note: no log is kept" in capsys.readouterr().err
 
 
 def test_the_console_script_keeps_it() -> None:

@@ -44,16 +44,6 @@ def test_what_look_prints_is_all_it_takes_to_read_the_file(
     assert record.output[0] == pytest.approx(920.0 * 2.0 * np.pi / 60.0)
 
 
-def test_look_as_json(german: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["look", str(german), "--json"]) == 0
-    document = json.loads(capsys.readouterr().out)
-    assert document["schema"] == "hil.look/1"
-    assert document["torque"] == ["Drehmoment M1 [Nm]", "Drehmoment M2 [Nm]"]
-    assert document["output"] == {"kind": "speed", "column": "Drehzahl [1/min]"}
-    assert document["groups"][0]["period_s"] == pytest.approx(0.01)
-    assert [channel["unit"] for channel in document["groups"][0]["channels"]] == ["s", "Nm", "Nm", "1/min", "°C"]
-
-
 def contract(path: Path, *more: str) -> None:
     head = "time_s,torque_m1_nm,torque_m2_nm,speed_rad_s"
     path.write_text("\n".join([head, *more, *rows(",", TIME, TIME, TIME**2, 3.0 * TIME)]))
@@ -81,15 +71,6 @@ def uneven(path: Path) -> None:
     path.write_text("\n".join(["t,u,w", *rows(",", stamps, np.sin(TIME), np.cos(TIME))]))
 
 
-def test_one_row_shows_no_period(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    header, row = "time_s,torque_m1_nm,torque_m2_nm,speed_rad_s", "0.0,1.0,2.0,3.0"
-    (tmp_path / "run.csv").write_text(f"{header}\n{row}\n", encoding="utf-8")
-    assert run(["look", str(tmp_path / "run.csv")]) == 0
-    printed = capsys.readouterr().out
-    assert "one row: no period" in printed
-    assert printed.endswith("[signals]\n# one row shows no period and nothing that moves: look at a longer recording\n")
-
-
 @pytest.mark.parametrize(
     ("make", "said"),
     [
@@ -109,14 +90,6 @@ def test_what_can_t_be_reported_is_left_to_a_person(
     assert said in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("name", ["gone.csv", "run.xlsx", "broken.mf4", "cut.csv"])
-def test_what_can_t_be_read_is_refused(tmp_path: Path, name: str, capsys: pytest.CaptureFixture[str]) -> None:
-    if name != "gone.csv":
-        (tmp_path / name).write_text("t,u\n0,1\n1")
-    assert run(["look", str(tmp_path / name)]) == 2
-    assert "expected" in capsys.readouterr().err
-
-
 def test_a_new_model_file_reads_the_recording_it_was_made_for(
     german: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -134,16 +107,6 @@ def test_a_new_model_file_reads_the_recording_it_was_made_for(
     before = path.read_text()
     assert run(["model", "new", str(path), "--yes", *VALUES]) == 2
     assert path.read_text() == before
-
-
-def test_values_are_asked_for_at_a_terminal(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    answers = iter(["one_mass", "", "-1", "2.5", "0.4", "0.7", ""])
-    monkeypatch.setattr("sys.stdin.isatty", lambda: True)
-    monkeypatch.setattr("builtins.input", lambda _: next(answers))
-    assert run(["model", "new", str(tmp_path / "m.toml")]) == 0
-    parameters = read_model(tmp_path / "m.toml").model.parameters
-    assert (parameters["J_M"].value, parameters["J_M"].tolerance) == (2.5, 0.4)
-    assert (parameters["b_M"].value, parameters["b_M"].tolerance) == (0.7, 0.2)
 
 
 def identification(path: Path) -> None:

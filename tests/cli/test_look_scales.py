@@ -7,8 +7,6 @@ import numpy as np
 import pytest
 
 from hil.cli.main import run
-from hil.config.model_file import read_signals
-from hil.recording.signals import read_record
 from tests.cli import bench
 
 Columns = dict[str, np.ndarray]
@@ -20,10 +18,6 @@ def recorded(path: Path) -> Columns:
     time, first, second, speed = np.loadtxt(path, delimiter=",", skiprows=1).T
     share = np.where(np.sin(0.4 * time) > 0.0, 0.4, -0.4) * (first + second)
     return {"t": time, "T_1": first + share, "T_2": second - share, "w": speed}
-
-
-def swapped(columns: Columns) -> Columns:
-    return {**columns, "T_1": columns["w"], "w": columns["T_1"] + columns["T_2"], "T_2": 0.0 * columns["t"]}
 
 
 def one_turned(columns: Columns) -> Columns:
@@ -70,26 +64,3 @@ def test_what_is_wrong_is_named_with_the_line_that_cures_it(
     _, _, err = looked(tmp_path, spoilt(recorded(tmp_path / "run.csv")), capsys)
     assert what in err
     assert line in err
-
-
-def test_swapped_columns_are_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    _, _, err = looked(tmp_path, swapped(recorded(tmp_path / "run.csv")), capsys)
-    assert "are the columns of torque input 1 and of the output swapped?" in err
-    assert 'speed = { column = "T_1", at = "motor" }' in err
-
-
-def test_the_lines_read_a_sound_file_and_nothing_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    columns = recorded(tmp_path / "run.csv")
-    path, out, err = looked(tmp_path, columns, capsys)
-    assert err == ""
-    (tmp_path / "signals.toml").write_text(out[out.index("[signals]") :])
-    record = read_record(path, read_signals(tmp_path / "signals.toml"))
-    assert record.torque_nm.T == pytest.approx(np.array([columns["T_1"], columns["T_2"]]), rel=1e-9)
-
-
-def test_lines_that_do_not_read_the_file_yet_are_said_to(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    columns = recorded(tmp_path / "run.csv")
-    shares = {"t": columns["t"], "torque [%]": columns["T_1"] + columns["T_2"], "w": columns["w"]}
-    _, out, err = looked(tmp_path, shares, capsys)
-    assert "in %: give scale = rated value * 0.01" in out
-    assert "by these lines the file can't be read yet" in err

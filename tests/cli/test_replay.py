@@ -60,36 +60,6 @@ def test_trace_of_drives_that_get_one_sum_has_no_prbs(tmp_path: Path, capsys: py
     assert all(math.isnan(value) for value in table.columns["prbs_nm"])
 
 
-def test_trace_of_a_run_that_fails_is_kept_whole(short_rig: Path, tmp_path: Path) -> None:
-    trace = tmp_path / "bus.blf"
-    with served(read_rig(short_rig)) as (server, _):
-        server.plc.close_clutch()
-        options = ("--out", str(tmp_path / "r.csv"), "--trace", str(trace), "--pace", "fast", *addresses(server))
-        assert run(["run", str(short_rig), "cruise", *options]) == 3
-    assert trace.exists()
-    assert not (tmp_path / "r.csv").exists()
-
-
-def test_trace_that_exists_is_refused_before_anything_is_armed(
-    short_rig: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    trace = tmp_path / "bus.blf"
-    trace.write_text("mine", encoding="utf-8")
-    assert record(short_rig, tmp_path / "r.csv", trace) == 2
-    assert "never overwritten" in capsys.readouterr().err
-    assert trace.read_text(encoding="utf-8") == "mine"
-
-
-def test_trace_that_can_not_be_read_writes_nothing(
-    short_rig: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    trace, out = tmp_path / "bus.log", tmp_path / "again.csv"
-    trace.write_text("no trace\n", encoding="utf-8")
-    assert run(["replay", str(trace), "--rig", str(short_rig), "--out", str(out)]) == 2
-    assert "bus.log: expected a bus trace" in capsys.readouterr().err
-    assert not out.exists()
-
-
 def test_replay_of_a_run_is_the_run_to_the_bit(
     short_rig: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -117,6 +87,7 @@ def written(recording: Path, duration_s: float, *lines: Line) -> Path:
     return recording
 
 
+@pytest.mark.campaign
 def test_the_filter_of_an_earlier_run_is_the_papers(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The estimate is that of the chain with L of the file; and another than with a filter that follows."""
     recording, out = written(tmp_path / "drive.csv", 30.0, Line()), tmp_path / "identified"
@@ -135,16 +106,6 @@ def test_the_filter_of_an_earlier_run_is_the_papers(tmp_path: Path, capsys: pyte
     options = ["replay", str(recording), "--filter", str(identified_in), "--filter-run", "other"]
     assert run(options) == 2
     assert "expected a recording of" in capsys.readouterr().err
-
-
-def test_replay_of_a_recording_tells_resonance_and_alarms(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    recording = written(tmp_path / "drive.csv", 75.0, Line(), Line(45.0, k=3360.0))
-    assert run(["replay", str(recording), "--speed", "1000"]) == 0
-    printed = capsys.readouterr()
-    assert "resonance 7.3" in printed.out
-    assert printed.out.count("alarm: resonance_hz changed from 8.2") == 1  # though it came twice: before it had settled
-    assert "had not settled" not in printed.out
-    assert printed.err == ""
 
 
 @pytest.mark.parametrize(

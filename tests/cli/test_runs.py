@@ -2,7 +2,6 @@
 
 import csv
 import json
-import shutil
 import signal
 import subprocess
 import sys
@@ -17,7 +16,7 @@ from hil.cli.main import run as hil
 from hil.config.rig_file import read_rig
 from hil.recording import Table, write_table
 from hil.recording.checksum import text_sha256
-from hil.store import RunStore, register_run, store_of
+from hil.store import RunStore, register_run
 from tests.cli.conftest import await_rows
 from tests.rig.serving import addresses, served
 
@@ -100,11 +99,6 @@ def test_the_list_says_what_ended_a_run_and_show_what_to_do_then(folder: Path, c
     assert "PLC: clutch is closed. Fix the cause, run again." in capsys.readouterr().out
 
 
-def test_an_empty_answer_is_an_answer(folder: Path, capsys: Capture) -> None:
-    assert hil(["runs", "--experiment", "none"]) == 0
-    assert capsys.readouterr().out == "no such run\n"
-
-
 def test_one_run_is_shown_with_the_state_of_its_recording(folder: Path, capsys: Capture) -> None:
     assert hil(["runs", "show", "1"]) == 0
     said = capsys.readouterr().out
@@ -153,15 +147,6 @@ def test_two_runs_are_compared_down_to_their_rig_files(folder: Path, capsys: Cap
     assert (rows["J_M [kg m^2]"]["a"], rows["J_M [kg m^2]"]["b"]) == (1.52, None)
 
 
-def test_notes_and_results_are_added(folder: Path, capsys: Capture) -> None:
-    assert hil(["runs", "note", "2", "Wind [left]"]) == 0
-    (folder / "diagnosis.json").write_text('{"verdict": "unexplained"}', encoding="utf-8")
-    assert hil(["runs", "attach", "2", "diagnosis", "diagnosis.json"]) == 0
-    capsys.readouterr()
-    (run,) = documents(capsys, "--text", "wind [LEFT]")["runs"]
-    assert (run["id"], run["verdict"], run["notes"][0]["text"]) == (2, "unexplained", "Wind [left]")
-
-
 def test_nothing_is_deleted_without_being_asked(folder: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch) -> None:
     assert hil(["runs", "delete", "1"]) == 2
     assert "Expected --yes" in capsys.readouterr().err
@@ -197,15 +182,6 @@ def test_runs_are_exported_as_a_table_and_as_an_archive(folder: Path, capsys: Ca
     assert len(json.loads((folder / "all.json").read_text(encoding="utf-8"))["runs"]) == 3
     for out in ("all.csv", "all.xlsx"):
         assert hil(["runs", "export", "--out", out]) == 2
-
-
-def test_a_list_that_is_gone_is_made_again(folder: Path, capsys: Capture) -> None:
-    shutil.rmtree(store_of(folder))
-    assert hil(["runs"]) == 2
-    assert "hil runs rebuild --store ." in capsys.readouterr().err
-    assert hil(["runs", "rebuild"]) == 0
-    assert "3 entered" in capsys.readouterr().out
-    assert len(documents(capsys)["runs"]) == 3
 
 
 @pytest.mark.parametrize(

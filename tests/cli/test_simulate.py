@@ -1,6 +1,5 @@
 """``hil simulate``: the closed-form motion comes out, wrong input leaves nothing."""
 
-import json
 import re
 from pathlib import Path
 
@@ -47,27 +46,6 @@ def test_the_simulation_is_the_motion_in_closed_form(
     assert float(load[1]) == pytest.approx(bench.LOAD, abs=0.02)
 
 
-def test_a_script_gets_json(arguments: dict[str, Path], capsys: pytest.CaptureFixture[str]) -> None:
-    words = [str(word) for pair in arguments.items() for word in pair]
-    assert run(["simulate", *words, "--json"]) == 0
-    document = json.loads(capsys.readouterr().out)
-    assert (document["schema"], document["recording"], document["samples"]) == ("hil.simulate/1", "run_1", 1500)
-    assert document["constant_load"]["unit"] == "Nm"
-    assert document["constant_load"]["value"] == pytest.approx(bench.LOAD, abs=0.02)
-    assert document["rms"]["unit"] == "rad/s"
-    assert 0.0 <= document["rms"]["value"] < 0.01
-
-
-def test_missing_samples_have_their_row_too(arguments: dict[str, Path]) -> None:
-    lines = arguments["--input"].read_text().splitlines()
-    lines[100] = ",".join([lines[100].split(",")[0], "nan", "nan", "nan"])
-    arguments["--input"].write_text("\n".join(lines) + "\n")
-    assert call(arguments) == 0
-    rows = np.loadtxt(arguments["--out"], delimiter=",", skiprows=1)
-    assert rows.shape == (1500, 2)
-    assert np.isfinite(rows).all()
-
-
 def test_a_position_in_translation_is_named_and_scaled(arguments: dict[str, Path]) -> None:
     truth = bench.record(arguments["--input"], 1)
     angle = np.concatenate([[0.0], np.cumsum(0.5 * (truth[1:] + truth[:-1]) * bench.DT)])
@@ -103,13 +81,3 @@ def test_wrong_arguments_are_refused_and_nothing_written(
     assert said in capsys.readouterr().err
     assert files(tmp_path) == ["drive.toml", "run_1.csv"]
     assert (tmp_path / "run_1.csv").read_text() == before
-
-
-def test_an_output_the_model_does_not_have_is_refused(
-    arguments: dict[str, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    signals = '[signals]\nspeed = { column = "speed_rad_s", at = "load" }\n'
-    arguments["--model"].write_text(bench.MODEL + signals)
-    assert call(arguments) == 2
-    assert "speed at the load is no output of one_mass" in capsys.readouterr().err
-    assert files(tmp_path) == ["drive.toml", "run_1.csv"]

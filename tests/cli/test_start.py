@@ -77,16 +77,3 @@ def test_what_is_not_needed_is_not_imported_before_the_bus_is_opened(command: st
     )
     assert done.returncode == 0, done.stderr
     assert sorted(set(absent) & set(json.loads((tmp_path / "modules.json").read_text()))) == []
-
-
-@pytest.mark.parametrize(
-    "first",
-    [
-        "hil.rig.trace",
-        *(pytest.param(each, marks=pytest.mark.campaign) for each in ("drivers.canopen", "hil.simulator.rig_server")),
-    ],
-)
-def test_python_can_is_whole_but_for_the_format_that_is_not_used(first: str) -> None:
-    program = f"import {first}, can, sys; print(can.__version__, 'asammdf' in sys.modules); import asammdf"
-    done = subprocess.run([sys.executable, "-P", "-c", program], capture_output=True, text=True, check=True)
-    assert done.stdout.split()[1] == "False"

@@ -91,12 +91,6 @@ def test_program_that_was_killed_left_its_step_interrupted(world: World) -> None
     assert "killed" in world.state().steps["first"].because
 
 
-def test_skipped_with_its_reason(world: World) -> None:
-    assert world.call(skip={"first": "done by hand"}) == ["second", "third"]
-    record = world.state().steps["first"]
-    assert (record.status, record.because) == (Status.SKIPPED, "done by hand")
-
-
 def test_repeated_and_what_is_computed_from_it(world: World) -> None:
     world.call()
     assert world.call(repeat=frozenset({"second"})) == ["second", "third"]
@@ -132,38 +126,11 @@ def test_person_continues_skips_or_quits(world: World) -> None:
         world.call(person("q"), repeat=frozenset({"second"}))
 
 
-def test_person_repeats_what_is_outside(world: World) -> None:
-    world.findings["second"] = [Finding("noise", "little", "much", False)]
-    assert world.call(person("y", "r", "y")) == ["first", "second", "second", "third"]
-
-
 def test_changed_rig_file_is_noticed_and_its_steps_are_done_again(world: World) -> None:
     world.call()
     world.text = world.text.replace("amplitude_nm = 120.0", "amplitude_nm = 60.0")
     assert world.call() == list(NAMES)
     assert "prbs.amplitude_nm: 120.0 → 60.0" in world.state().notes[0].changes
-
-
-def test_comment_in_the_rig_file_is_no_change(world: World) -> None:
-    world.call()
-    world.text = "# looked at by two\n" + world.text
-    assert world.call() == []
-
-
-def test_results_are_kept_for_a_reason(world: World) -> None:
-    world.call()
-    world.text = world.text.replace("amplitude_nm = 120.0", "amplitude_nm = 60.0")
-    assert world.call(Script(True, keep="only the amplitude")) == []
-    assert world.state().notes[0].steps == "kept: only the amplitude"
-    assert world.call() == []
-
-
-def test_changed_rig_file_and_a_person(world: World) -> None:
-    world.call()
-    world.text = world.text.replace("amplitude_nm = 120.0", "amplitude_nm = 60.0")
-    with pytest.raises(KeyboardInterrupt):
-        world.call(person("q"))
-    assert world.call(person("k", "only the amplitude")) == []
 
 
 @pytest.mark.parametrize("damage", ["", "{", '{"schema": "hil.other/1"}', '{"schema": "hil.commission/1"}', "[1]"])
@@ -220,9 +187,3 @@ def test_answer_that_is_none_is_reported_what_would_be() -> None:
     assert asked[0].endswith(go)
     assert asked[1:3] == [f"  expected y or yes or s or q, got {got}\n{go}" for got in ("what?", "nothing")]
     assert asked[3:] == ["  Because: ", "  A reason is needed, it is recorded. Because: "]
-
-
-def test_answers_stand_for_what_they_say() -> None:
-    assert person("y").may_command("any", True) == Answer(What.GO)
-    assert person("").after("any", 1, True) == Answer(What.QUIT)
-    assert person().after("any", 0, False) == Answer(What.GO)

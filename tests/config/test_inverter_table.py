@@ -23,16 +23,6 @@ def test_without_a_word_the_eds_s_codes_count_and_the_deadline_is_150_ms(tmp_pat
     assert (settings.rpdo_deadline_ms, settings.option_codes, settings.torque_slope_nm_per_s) == (150, {}, None)
 
 
-def test_what_the_rig_file_gives_reaches_the_driver(tmp_path: Path) -> None:
-    codes = "[inverters.m1.option_codes]\nabort_connection = 3\nquick_stop = 5\nfault_reaction = -1\n"
-    path = with_keys(tmp_path, "rpdo_deadline_ms = 50", "torque_slope_nm_per_s = 900.0", tables=codes)
-    rig = read_rig(path)
-    settings = inverter_settings("m1", rig)
-    assert (settings.rpdo_deadline_ms, settings.torque_slope_nm_per_s) == (50, 900.0)
-    assert settings.option_codes == {0x6007: 3, 0x605A: 5, 0x605E: -1}
-    assert rig.inverters.m2.option_codes.by_object == {}
-
-
 def test_time_outs_are_each_drive_s_own(tmp_path: Path) -> None:
     rig = read_rig(with_keys(tmp_path, "sdo_timeout_s = 1.5", "mode_timeout_s = 8.0", "state_timeout_s = 4.0"))
     m1, m2 = inverter_settings("m1", rig), inverter_settings("m2", rig)
@@ -69,10 +59,3 @@ def test_node_guarding_is_refused_with_the_reason(key: str, tmp_path: Path) -> N
     [line] = problems_of(with_keys(tmp_path, f"{key} = 100"))
     assert line.startswith(f"inverters.m1.{key} | expected no such key: node guarding needs remote frames")
     assert line.endswith("heartbeat_ms sets its period | got 100")
-
-
-def test_a_period_too_long_for_the_deadline_is_named_where_it_is_given(tmp_path: Path) -> None:
-    deadline = (r"^# rpdo_deadline_ms = 150 ", "rpdo_deadline_ms = 200 ")
-    path = changed(tmp_path, (r"^period_s = 0.01 ", "period_s = 0.15 "), deadline)
-    problems = [line for line in problems_of(path) if "rpdo_deadline_ms" in line]
-    assert [line.split(" | ")[0] for line in problems] == ["inverters.m1.rpdo_deadline_ms"]

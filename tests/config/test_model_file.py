@@ -116,28 +116,6 @@ def test_a_joint_needs_both_its_motion_and_what_it_takes(tmp_path: Path, signals
     assert read_model(path).on_bench
 
 
-def test_a_joint_has_no_further_outputs(tmp_path: Path) -> None:
-    path = tmp_path / "joint.toml"
-    parameters = "k = { value = 1, tolerance = 0.2 }\nc = { value = 1, tolerance = 0.2 }"
-    signals = 'position = { column = "x" }\nforce = { column = "F" }\n'
-    outputs = 'outputs = [ { kind = "speed", at = "load", column = "w" } ]\n'
-    head = f'schema = "hil.model/1"\nstructure = "joint"\n[parameters]\n{parameters}\n[signals]\n{signals}'
-    path.write_text(head + outputs)
-    with pytest.raises(ModelFileError, match=r"signals\.outputs \| expected no further output .* \| got 'w'"):
-        read_model_for_recordings(path)
-    path.write_text(head)
-    assert read_model_for_recordings(path).on_bench
-
-
-def test_the_example_of_the_linear_drive_is_a_nominal_model() -> None:
-    file = read_model(Path(__file__).parents[2] / "examples" / "emps.toml")
-    assert file.model.structure is Structure.ONE_MASS
-    assert file.model.motion is Motion.TRANSLATION
-    assert file.model.effects == {}
-    assert file.signals is not None
-    assert file.signals.output()[0] is OutputKind.POSITION
-
-
 @pytest.mark.parametrize(
     ("line", "said"),
     [
@@ -232,31 +210,6 @@ def test_a_wrong_addition_is_refused_by_its_key(tmp_path: Path, added: str, said
     assert any(line.startswith(said) for line in lines), lines
 
 
-def test_every_fault_is_reported_at_once(tmp_path: Path) -> None:
-    text = ONE_MASS.replace("1.6", "'x'").replace("b_M", "bM").replace('"rotation"', "3")
-    assert [line.split(" |")[0].split(":")[0] for line in refusal(tmp_path, f"{text}[effects.gremlins]")] == [
-        "motion",
-        "parameters.J_M.value",
-        "parameters.b_M",
-        "parameters.bM",
-        "effects.gremlins",
-    ]
-
-
-def test_a_file_without_its_tables_is_refused(tmp_path: Path) -> None:
-    lines = refusal(tmp_path, "")
-    assert [line.split(" |")[0] for line in lines] == ["schema", "structure", "parameters"]
-
-
-def test_text_that_is_not_toml_is_refused_by_line(tmp_path: Path) -> None:
-    assert refusal(tmp_path, "schema = \n")[0].startswith("line 1")
-
-
-def test_a_file_that_is_not_there_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(ModelFileError, match="No such file"):
-        read_model(tmp_path / "model.toml")
-
-
 finite = st.floats(min_value=1e-12, max_value=1e12)
 
 
@@ -313,14 +266,6 @@ def test_what_is_written_reads_back_the_same(
     file = read_model(path)
     assert file.model == model
     assert file.signals == signals
-
-
-def test_a_second_writing_replaces_the_first_and_leaves_nothing_next_to(tmp_path: Path) -> None:
-    model = read_model(write(tmp_path, ONE_MASS)).model
-    write_model(tmp_path / "model.toml", replace(model, motion=Motion.TRANSLATION))
-    assert read_model(tmp_path / "model.toml").model.motion is Motion.TRANSLATION
-    assert "J_M = {value = 1.6, tolerance = 0.2} # kg\n" in (tmp_path / "model.toml").read_text()
-    assert [path.name for path in tmp_path.iterdir()] == ["model.toml"]
 
 
 def test_an_interval_that_is_not_finite_is_left_out(tmp_path: Path) -> None:

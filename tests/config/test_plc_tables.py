@@ -42,13 +42,6 @@ def test_both_sides(tmp_path: Path) -> None:
     assert rig.simulation.plc_security.credentials.certificate == tmp_path / "plc.pem"
 
 
-def test_neither() -> None:
-    rig = read_rig(EXAMPLE)
-    assert rig.plc.security is None
-    assert rig.simulation is not None
-    assert rig.simulation.plc_security is None
-
-
 @pytest.mark.parametrize(("more", "got"), [(HOST, "None"), (PLC + ROLES, "a table")])
 def test_one_side_alone_is_refused(more: str, got: str, tmp_path: Path) -> None:
     (problem,) = problems_of(rig_file(tmp_path, more))

@@ -8,13 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from estimator.errors import BadSetting
 from estimator.signals.multisine import Lines, Multisine, crest_factor, excited_lines, multisine_nm
 from hil.commission.order import Order, RigSource
 from hil.commission.runner import rigid_model
 from hil.config.rig_file import read_rig, with_experiment_of
 from hil.design.candidates import Limits, candidates
-from hil.design.design import free_key, on_paper
+from hil.design.design import on_paper
 from hil.errors import HilError, RigFileError, UsageError
 from hil.rig.experiments.base import Phase
 from hil.rig.experiments.registry import build_experiment
@@ -61,10 +60,6 @@ def test_most_of_what_is_proposed_passes_guard_and_limits() -> None:
         assert max(map(abs, planned.speed_rad_s)) <= 1.2 * limits.speed_rad_s
         passed.append(name)
     assert len(passed) >= 6
-
-
-def test_names_that_are_taken_are_not_taken_again() -> None:
-    assert free_key(["cruise", "next_1", "next_3"]) == "next_2"
 
 
 def test_a_file_with_one_experiment_is_driven_with_the_rig(tmp_path: Path) -> None:
@@ -117,11 +112,6 @@ def test_one_line_in_four_is_left_out_to_detect_distortion() -> None:
     odd, kept = (set(excited_lines(1000, 0.01, 0.5, 30.0, each, 3)) for each in (Lines.ODD, Lines.ODD_RANDOM))
     assert kept < odd
     assert len(odd - kept) == len(odd) // 4
-
-
-def test_a_band_of_one_line_is_no_multisine() -> None:
-    with pytest.raises(BadSetting, match="two or more lines"):
-        multisine_nm(100, np.array([3]), 10.0)
 
 
 MULTISINE = "multisine = {{ amplitude_nm = {}, period_s = 5.0, lowest_hz = 0.5, highest_hz = {} }}\n"

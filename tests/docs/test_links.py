@@ -33,11 +33,6 @@ def test_every_page_is_on_the_map() -> None:
     assert [str(page) for page in DOCS.rglob("*.md") if page.resolve() not in reached | {(DOCS / "index.md")}] == []
 
 
-def test_the_pages_have_links_at_all() -> None:
-    """A pattern that found none would pass everything above."""
-    assert sum(len(relative(page)) for page in PAGES) > 50
-
-
 def test_decisions_are_numbered_without_gaps() -> None:
     numbers = sorted(int(page.name.partition("-")[0]) for page in (DOCS / "decisions").glob("*.md"))
     assert numbers == list(range(1, len(numbers) + 1))

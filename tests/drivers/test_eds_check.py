@@ -27,13 +27,6 @@ def test_missing_section_is_named(tmp_path: Path, section: str, severity: Severi
     assert report.usable is (severity is W)
 
 
-@pytest.mark.parametrize("index", ["1000", "1001"])
-def test_missing_mandatory_object_of_no_use_here_is_a_warning(tmp_path: Path, index: str) -> None:
-    report = checked(tmp_path, without(index))
-    assert places(report, Severity.ERROR) == []
-    assert places(report, Severity.WARNING) == [f"[{index}]", f"[MandatoryObjects] {int(index) - 999}"]
-
-
 NEEDED = [row.function for row in TABLE.values() if row.without is Without.REFUSED]
 
 
@@ -77,31 +70,6 @@ def test_constant_that_holds_the_value_wanted_is_no_fault(tmp_path: Path) -> Non
     assert [each.severity for each in checked(tmp_path, text).findings if each.place.endswith("DefaultValue")] == [E]
 
 
-def test_object_described_but_not_listed_and_the_reverse(tmp_path: Path) -> None:
-    text = edited("OptionalObjects", "33=0x60A9", "33=0x60AA")
-    warnings = [each for each in checked(tmp_path, text).findings if each.severity is W]
-    assert [(each.place, each.line) for each in warnings] == [
-        ("[OptionalObjects] 33", line_of(text, "OptionalObjects", "33")),
-        ("[60A9]", line_of(text, "60A9")),
-    ]
-    assert checked(tmp_path, text).usable
-
-
-def test_object_listed_twice_or_in_another_list(tmp_path: Path) -> None:
-    text = edited("ManufacturerObjects", "SupportedObjects=0", "SupportedObjects=1\n1=0x6502", text=SHIPPED + "\n")
-    (finding,) = checked(tmp_path, text).findings
-    assert "listed once" in finding.expected
-    moved = edited("OptionalObjects", "35=0x6502\n", "", text=edited("OptionalObjects", "=35", "=34", text=text))
-    (finding,) = checked(tmp_path, moved).findings
-    assert (finding.place, finding.expected) == ("[ManufacturerObjects] 1", "0x6502 under [OptionalObjects]")
-
-
-def test_sub_index_without_its_object(tmp_path: Path) -> None:
-    text = SHIPPED + "\n[2000sub1]\nParameterName=x\nDataType=5\nAccessType=rw\n"
-    (finding,) = checked(tmp_path, text).findings
-    assert (finding.place, finding.severity) == ("[2000sub1]", W)
-
-
 def test_object_that_is_used_and_one_that_is_not(tmp_path: Path) -> None:
     """The same fault is an error in the one and a warning in the other."""
     vendors = "\n[2000]\nParameterName=x\nDataType=0x99\nAccessType=rw\n"
@@ -132,31 +100,6 @@ def test_compact_description(tmp_path: Path, keys: str, said: list[str]) -> None
     findings = checked(tmp_path, listed + COMPACT.format(keys)).findings
     assert [each.severity for each in findings] == [W] * len(said)
     assert all(expected in finding.expected for expected, finding in zip(said, findings, strict=True))
-
-
-def test_sub_indices_of_a_variable_are_not_read(tmp_path: Path) -> None:
-    report = checked(tmp_path, edited("1018", "ObjectType=0x9", "ObjectType=0x7"))
-    assert any("since it has sub-indices" in each.expected and each.severity is W for each in report.findings)
-    assert not report.usable
-
-
-def test_missing_object_type_is_no_fault(tmp_path: Path) -> None:
-    """CiA 306: without the key it is a variable."""
-    assert checked(tmp_path, edited("6071", "ObjectType=0x7\n", "")).findings == ()
-
-
-def test_spelling_is_reported_once(tmp_path: Path) -> None:
-    text = re.sub(r"(?m)^\[(\w+)\]$", lambda match: f"[{match[1].upper()}]", SHIPPED)
-    (finding,) = checked(tmp_path, text).findings
-    assert (finding.severity, finding.line) == (N, 1)
-    assert finding.found.endswith("more")
-
-
-def test_type_as_canfestivals_editor_describes_it(tmp_path: Path) -> None:
-    """It makes an object of each type with limits; the real type is the default of its sub-index 1."""
-    text = edited("1001", "DataType=0x0005", "DataType=0x00A0")
-    text += "\n[A0]\nParameterName=limited\n[A0sub1]\nParameterName=type\nDataType=0x0005\nDefaultValue=0x0005\n"
-    assert checked(tmp_path, text).findings == ()
 
 
 @pytest.mark.parametrize(("gone", "left"), [("1800", "1A00"), ("1A00", "1800"), ("1400", "1600"), ("1600", "1400")])

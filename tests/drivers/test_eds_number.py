@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.datasheet.types import DATA_TYPES, DataType, Formula, octal_matters, read_formula, read_number
+from drivers.datasheet.types import DATA_TYPES, DataType, Formula, read_formula, read_number
 
 INTEGERS = [kind for kind in DATA_TYPES.values() if kind.is_integer]
 
@@ -40,13 +40,6 @@ def test_every_number_is_read_back_from_all_three_ways_to_write_it(number: int) 
 
 
 @pytest.mark.parametrize(
-    ("text", "matters"), [("010", True), ("09", True), ("001", False), ("0", False), ("0x10", False)]
-)
-def test_leading_zero_matters_where_it_changes_the_number(text: str, matters: bool) -> None:
-    assert octal_matters(text) is matters
-
-
-@pytest.mark.parametrize(
     ("text", "formula"),
     [
         ("$NODEID+0x180", Formula(0x180, of_node_id=True, node_id_first=True, hexadecimal=True)),
@@ -79,7 +72,3 @@ def test_integer_is_taken_up_to_the_ends_of_its_type_and_no_further(kind: DataTy
 @pytest.mark.parametrize(("text", "value"), [("0xFFFF", -1), ("0x8000", -32768), ("0x7FFF", 32767), ("0x10000", None)])
 def test_hexadecimal_number_is_the_bit_pattern(text: str, value: int | None) -> None:
     assert DATA_TYPES[0x03].integer(text, 1) == value
-
-
-def test_decimal_number_is_no_bit_pattern() -> None:
-    assert DATA_TYPES[0x03].integer("65535", 1) is None

@@ -1,7 +1,5 @@
 """The text of an EDS: line numbers, oddities that are borne, and files that are no text of an EDS at all."""
 
-import errno
-import os
 from pathlib import Path
 
 import pytest
@@ -93,20 +91,6 @@ def test_file_that_is_no_text_is_refused(tmp_path: Path, content: bytes, said: s
     assert said in report.findings[0].found
     with pytest.raises(ConfigMismatch, match=said):
         EdsFile(tmp_path / "file.eds", 5)
-
-
-def test_folder_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(EdsUnreadable, match="Is a directory"):
-        read_eds_text(tmp_path)
-
-
-def test_file_without_permission_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def refuse(*_: object) -> None:  # a test may be run as root, who may read everything
-        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
-
-    monkeypatch.setattr(Path, "open", refuse)
-    with pytest.raises(EdsUnreadable, match=r"file\.eds can't be read: Permission denied\. Expected an EDS"):
-        read_eds_text(tmp_path / "file.eds")
 
 
 @pytest.mark.parametrize("content", ["", "; nothing but a comment\n", "schema = 1\n[can]\nurl = 'x'\n"])

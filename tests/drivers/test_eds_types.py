@@ -91,40 +91,9 @@ class CountsSync(FakeDrive):
             super().take_sync(data)
 
 
-def test_drive_that_counts_syncs_is_reported_and_set_to_take_ours(tmp_path: Path) -> None:
-    path = tmp_path / "drive.eds"
-    path.write_text(with_counter(), encoding="utf-8")
-    with on_bus(CountsSync, eds_path=path) as (drive, inverter, link):
-        assert inverter.check() == ()
-        assert inverter.remarks() == ("SYNC counter overflow 0x1019:00 is 10, a run gives it 0 (this program)",)
-        inverter.configure()
-        assert drive.objects[0x1019, 0] == 0
-        assert inverter.await_feedback(link.sync(), 5.0) is not None
-        inverter.raise_if_faulted()
-
-
-def test_drive_that_counts_syncs_with_another_value_than_its_eds_is_a_difference(tmp_path: Path) -> None:
-    path = tmp_path / "drive.eds"
-    path.write_text(with_counter(), encoding="utf-8")
-    with on_bus(CountsSync, eds_path=path) as (drive, inverter, _):
-        drive.objects[0x1019, 0] = 5
-        [difference] = inverter.check()
-        assert str(difference).endswith("SYNC counter overflow 0x1019:00 is 5, expected 0 (this program)")
-
-
 def test_drive_that_counts_syncs_for_good_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "drive.eds"
     path.write_text(with_counter("const"), encoding="utf-8")
     with pytest.raises(ConfigMismatch, match=r"0x1019:00 that is 0 or can be written, found 10 for good"):
         with on_bus(CountsSync, eds_path=path):
             pass
-
-
-@pytest.mark.parametrize("data_type", ["", "byte", "0x0009"])
-def test_sync_counter_without_an_integer_type_is_as_none(data_type: str, tmp_path: Path) -> None:
-    path = tmp_path / "drive.eds"
-    before, after = with_counter().split("[1019]")
-    path.write_text(f"{before}[1019]{after.replace('DataType=0x0005', f'DataType={data_type}', 1)}", encoding="utf-8")
-    with on_bus(FakeDrive, eds_path=path) as (_, inverter, link):
-        inverter.configure()
-        assert inverter.await_feedback(link.sync(), 5.0) is not None

@@ -18,7 +18,7 @@ from hil.config.rig_file import read_rig
 from hil.rig.build import inverter_settings, open_devices
 from hil.rig.pacing import FREE_PATIENCE_S
 from tests.benchmarks.data_sheets import RAN, REFUSED, maker_files, mutant_verdicts, verdict
-from tests.drivers.maker_files import COMPLETE, MAKERS, U8, U32, Entry, Maker, pdo, pdos
+from tests.drivers.maker_files import COMPLETE, MAKERS, U32, Entry, Maker, pdo, pdos
 from tests.drivers.maker_rig import drive, written_rig
 from tests.real.conftest import real_recording
 from tests.rig.serving import changed, served
@@ -60,6 +60,7 @@ def test_driven_without_a_flag_and_with_its_prbs_apart(maker: Maker, tmp_path: P
     assert np.abs(reference).max() > prbs.max()  # the base torque is next to it
 
 
+@pytest.mark.campaign
 @makers("complete", "pre-defined PDOs", "simpliq")
 def test_mutants_run_or_are_refused_by_line(maker: Maker, tmp_path: Path) -> None:
     eds = written(maker, tmp_path)
@@ -89,25 +90,6 @@ def test_commands_of_a_new_user(tmp_path: Path, capsys: pytest.CaptureFixture[st
     accepted = read_rig(usual).inverters.m1.accepted.by_name
     assert set(accepted) == {"supported_modes", "heartbeat_consumer", "rpdo_deadline"}
     assert str(accepted["rpdo_deadline"]) == "accepted by A. Nyone: a relay of its own"
-
-
-def test_on_a_vehicle_guesses_are_comments(tmp_path: Path) -> None:
-    eds, rig = written(MAKERS["technosoft"], tmp_path), tmp_path / "rig.toml"
-    options = "--plc 10.0.0.1:502 --product-code 1 --rated-torque-nm 10 --torque-limit-nm 5 --inertia-kg-m2 1"
-    arguments = ["rig", "new", str(rig), "--eds", str(eds), "--yes", "--speed-rad-s", "9", *options.split()]
-    assert command(arguments) == 0
-    table = read_rig(rig).inverters.m1
-    assert (table.accepted.by_name, table.speed_unit) == ({}, None)
-    assert table.option_codes.abort_connection == 2
-    assert rig.read_text().count("# accepted.rpdo_deadline = ") == 2
-
-
-def test_file_of_no_use_is_refused_with_its_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    eds = written(COMPLETE.but(0x6071), tmp_path)
-    rig = tmp_path / "rig.toml"
-    assert command(["rig", "new", str(rig), "--eds", str(eds), "--simulated", "--yes"]) == 2
-    assert "expected target torque 0x6071:00" in capsys.readouterr().err
-    assert not rig.exists()
 
 
 def test_dcf_gives_node_id_and_bit_rate(tmp_path: Path) -> None:
@@ -190,35 +172,6 @@ def test_mapping_with_little_room_carries_the_sum(room: int, tmp_path: Path) -> 
     path = written(narrow, tmp_path)
     objects = plan_drive(EdsFile(path, 1).sheet).pdos(RPDO)[0].layout.objects
     assert [mapped.index for mapped in objects] == [0x6040, 0x6071, 0x60B2][:room]
-    assert drive(path, tmp_path, SHORT).flagged == 0
-
-
-def test_multiplexed_pdo_and_one_of_another_type_are_passed_over(tmp_path: Path) -> None:
-    odd = {**COMPLETE.objects[0x1600], 0: Entry(U8, default="0xFE")}  # type: ignore[dict-item]
-    typed = {**COMPLETE.objects[0x1A00], 0: Entry(U32, default="1")}  # type: ignore[dict-item]
-    path = written(COMPLETE.having({0x1600: odd, 0x1A00: typed}), tmp_path)
-    plan = plan_drive(EdsFile(path, 1).sheet)
-    assert [carrier.layout.mapping_index for carrier in plan.carriers] == [0x1600, 0x1A01]
-    assert drive(path, tmp_path, SHORT).flagged == 0
-
-
-@pytest.mark.parametrize("gone", [0x1601, 0x1401, 0x1801, 0x1A01])
-def test_pdo_parameter_without_the_other_is_no_hindrance(gone: int, tmp_path: Path) -> None:
-    """The library looks for the second wherever the first is."""
-    assert drive(written(COMPLETE.but(gone), tmp_path), tmp_path, SHORT).flagged == 0
-
-
-def test_offset_of_no_known_type_is_not_written_either(tmp_path: Path) -> None:
-    odd = COMPLETE.having({0x60B2: Entry(0x99, "rww", "0", 1)})
-    assert drive(written(odd, tmp_path), tmp_path, SHORT).flagged == 0
-
-
-def test_object_of_no_known_kind_is_no_hindrance(tmp_path: Path) -> None:
-    head = "[1601]\nParameterName=object 1601\nObjectType={}\n"
-    text = COMPLETE.text()
-    assert head.format("0x9") in text
-    path = tmp_path / "drive.eds"
-    path.write_text(text.replace(head.format("0x9"), head.format("-1")))
     assert drive(path, tmp_path, SHORT).flagged == 0
 
 

@@ -101,15 +101,6 @@ def test_what_does_is_said_with_its_line(name: str, tmp_path: Path) -> None:
     assert any(said in str(each) and each.line is not None for each in errors), [str(each) for each in errors]
 
 
-@pytest.mark.parametrize("count", [65, 253, 254, 255])
-def test_count_of_mapped_objects_above_64(count: int, tmp_path: Path) -> None:
-    """254 and 255 stand for a multiplexed PDO (CiA 301, 7.5.2.36); the numbers between are not allowed."""
-    many = COMPLETE.having({0x1A01: {0: Entry(U8, "const", str(count)), 1: Entry(U32, "const")}}).but(0x1800, 0x1A00)
-    findings = check_eds(written(many, tmp_path)).findings
-    said = "a multiplexed PDO" if count >= 254 else "not allowed, at most 64 (CiA 301)"
-    assert any(f"0x1A01:00 is {count}: {said}" in each.found for each in findings)
-
-
 @pytest.mark.parametrize(
     ("node", "rate", "read"),
     [

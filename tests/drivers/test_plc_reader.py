@@ -30,12 +30,6 @@ def test_pauses_double_up_to_the_longest() -> None:
     assert list(Backoff(attempts=1).pauses_s()) == []
 
 
-@pytest.mark.parametrize("wrong", [(0.0, 1.0, 3), (-1.0, 1.0, 3), (2.0, 1.0, 3), (0.1, 1.0, 0)])
-def test_a_back_off_that_makes_no_sense_is_refused(wrong: tuple[float, float, int]) -> None:
-    with pytest.raises(ConfigMismatch, match="expected at least one attempt and 0 < first_s <= longest_s"):
-        Backoff(*wrong)
-
-
 def test_a_plc_that_comes_back_is_read_again() -> None:
     """Gone at the first attempt and at the second, there at the third; then lost in between two reads."""
     port = free_port()

@@ -73,15 +73,6 @@ def test_zero_is_plausible_everywhere(name: str) -> None:
     assert reading(name, there, (0, 0)).problem is None
 
 
-def test_what_is_no_value_at_all_is_reported() -> None:
-    there = register("float32", "Nm", HIGH)
-    nothing = reading("torque_limit", there, (0x7FC0, 0))
-    assert (nothing.value, nothing.shown) == (None, "–")
-    assert "a finite number" in str(nothing.problem)
-    with pytest.raises(ProtocolViolation, match="a finite number"):
-        nothing.required()
-
-
 def test_limit_that_can_not_be_is_not_believed_in_a_run_either() -> None:
     """A speed limit of 1e-43 rad/s, or of 1e25, would hold nothing back, or everything."""
 

@@ -9,7 +9,6 @@ import pytest
 
 from estimator.identification.chain import OnlineTrajectory
 from estimator.identification.linear_model import Orders
-from estimator.identification.online.adaptation import Adaptation
 from estimator.identification.online.recursive import Status, Trajectory
 from estimator.identification.settings import Settings
 from estimator.signals.record import FloatArray
@@ -66,21 +65,6 @@ def test_orders_delay_and_periods_are_free(
 @pytest.mark.parametrize("name", PROFILES)
 def test_every_adaptation_profile(name: str, tmp_path: Path) -> None:
     estimator = PlcEstimator(Settings(adaptation=profile(name)), L=RESONANCE)
-    assert_equal_bits(on_plc(estimator, bad_drive(), tmp_path), on_host(estimator, bad_drive()))
-
-
-def test_forgetting_without_excitation_ends_at_the_first_gain(tmp_path: Path) -> None:
-    adaptation: Adaptation = profile("constant_forgetting:lambda1=0.8")
-    estimator = PlcEstimator(Settings(adaptation=adaptation), L=RESONANCE)
-    assert_equal_bits(on_plc(estimator, still_drive(), tmp_path), on_host(estimator, still_drive()))
-
-
-def test_a_trace_that_is_reached_and_held(tmp_path: Path) -> None:
-    estimator = PlcEstimator(Settings(adaptation=profile(TRACE_REACHED)), L=RESONANCE)
-    host = estimator.oefo()
-    kept = estimator.decimator().run(*summed(bad_drive()))
-    host.run(kept.u, kept.y, kept.okay)
-    assert np.trace(host.F) == pytest.approx(1.0)
     assert_equal_bits(on_plc(estimator, bad_drive(), tmp_path), on_host(estimator, bad_drive()))
 
 

@@ -21,12 +21,6 @@ def test_its_resonance_is_that_of_the_eigenvalues() -> None:
     assert (mode.frequency_hz, mode.damping) == pytest.approx(true_resonance())
 
 
-def test_poles_in_z_are_those_of_the_discretised_matrix() -> None:
-    np.testing.assert_allclose(
-        np.sort_complex(LINE.poles(0.02)), np.sort_complex(np.linalg.eigvals(TRUTH.discrete(0.02)[0]))
-    )
-
-
 def test_a_torque_held_for_no_time_at_all_has_the_continuous_response() -> None:
     f = np.array([0.5, 1.03, 5.0, 8.2, 20.0])
     s = 2j * np.pi * f

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from estimator.identification.identify import identify
-from hil.figures.local_model import LocalModel, Reference, TwoMassLine, decibels, degrees, row_of
+from hil.figures.local_model import LocalModel, Reference, TwoMassLine, row_of
 from tests.estimator.identification.driveline import B_L, B_M, J_L, J_M, C, K, cruise, true_resonance
 
 LINE = TwoMassLine(J_M, J_L, K, C, B_M, B_L)
@@ -48,12 +48,6 @@ def test_without_resonance_spectrum_or_reference_there_are_no_such_numbers(model
     row = row_of(LocalModel(model.record, bare))
     for value in (row.online_hz, row.offline_damping, row.reference_hz, row.spectral_db, row.error("hz", "online")):
         assert math.isnan(value)
-
-
-def test_phase_has_no_line_across_the_figure() -> None:
-    angle = degrees(np.exp(1j * np.deg2rad(np.array([170.0, 178.0, -176.0, -170.0]))))
-    np.testing.assert_allclose(angle, [170.0, np.nan, -176.0, -170.0])
-    assert decibels(np.array([10.0 + 0j]))[0] == pytest.approx(20.0)
 
 
 def test_the_third_order_equivalent_keeps_the_resonance(model: LocalModel) -> None:

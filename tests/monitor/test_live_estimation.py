@@ -7,9 +7,8 @@ from estimator.identification.tracking.alarm import TrackingState
 from estimator.physics.twist import Shaft
 from hil.monitor.live_estimation import LiveEstimation
 from hil.rig.live import LiveEstimate, OnlineSetup, tracking_chain, tracking_settings
-from hil.sample import Sample, SampleFlag
+from hil.sample import Sample
 from hil.simulator.driveline import DEFAULT_BUS
-from tests.estimator.identification.tracking import roads
 from tests.estimator.identification.tracking.drives import drives
 from tests.monitor.fake_source import sample
 from tests.monitor.two_mass import PERIOD_S, driven
@@ -50,38 +49,6 @@ def test_portions_do_not_matter_and_a_run_says_the_same(rows: list[Sample]) -> N
         assert seen.damping == alone.latest.resonance.damping
 
 
-def test_the_resonance_is_that_of_the_line(rows: list[Sample]) -> None:
-    seen = fed(rows, 10).look(rows[-1].t_ns)
-    assert seen.status == "estimated"
-    assert seen.resonance_hz == pytest.approx(RESONANCE_HZ, rel=0.01)
-    assert seen.damping == pytest.approx(DAMPING, rel=0.15)
-    assert seen.model is not None
-    peak_hz = seen.model.frequency_hz[np.argmax(seen.model.gain)]
-    assert peak_hz == pytest.approx(RESONANCE_HZ, rel=0.03)
-    assert seen.history.time_s[-1] <= 0.0
-    assert len(seen.model.trail) >= 4
-
-
-def test_what_a_flagged_sample_says_does_not_matter(rows: list[Sample]) -> None:
-    def lost(torque_nm: float, speed_rad_s: float) -> float:
-        stale = SampleFlag.M1_STALE
-        changed = [sample(r.cycle, torque_nm, speed_rad_s, flags=stale) if r.cycle % 200 == 7 else r for r in rows]
-        return fed(changed, 10).look(0).resonance_hz
-
-    assert lost(9e3, 9e3) == lost(0.0, -1.0) == pytest.approx(RESONANCE_HZ, rel=0.02)
-
-
-def test_samples_wait_until_the_chain_is_compiled(rows: list[Sample]) -> None:
-    ready = False
-    live = LiveEstimation(PERIOD_S, is_ready=lambda: ready)
-    live.begin()
-    live.take(rows[:1000])
-    assert "being compiled" in live.look(0).status
-    ready = True
-    live.take(rows[1000:])
-    assert live.look(0).resonance_hz == fed(rows, 10).look(0).resonance_hz
-
-
 def test_the_history_outlives_a_run_and_the_trail_does_not(rows: list[Sample]) -> None:
     live = fed(rows, 10)
     points = len(live.look(0).history.time_s)
@@ -91,14 +58,6 @@ def test_the_history_outlives_a_run_and_the_trail_does_not(rows: list[Sample]) -
     assert len(seen.history.time_s) == points > 10
     assert seen.model is None
     assert seen.status == "waits for samples"
-
-
-def test_a_period_the_models_have_no_multiple_of_is_reported() -> None:
-    live = LiveEstimation(0.003)
-    live.begin()
-    live.take([sample(0)])
-    assert "no estimate" in live.look(0).status
-    assert "0.003" in live.look(0).status
 
 
 def test_without_excitation_the_estimate_is_held_and_says_so() -> None:
@@ -114,15 +73,6 @@ def test_without_excitation_the_estimate_is_held_and_says_so() -> None:
     assert seen.resonance_hz == pytest.approx(before.resonance_hz, rel=0.005)
     assert seen.resonance_std_hz > 1.5 * before.resonance_std_hz
     assert seen.model is not None
-
-
-def test_a_model_of_noise_is_not_shown() -> None:
-    drive = roads.drive(5, 30.0, prbs_nm=lambda time_s: 0.0).record
-    pairs = zip(drive.total_torque_nm.tolist(), drive.output.tolist(), strict=True)
-    seen = fed([sample(k, torque, speed) for k, (torque, speed) in enumerate(pairs)], 100).look(0)
-    assert seen.state is TrackingState.NOT_EXCITED
-    assert np.isnan(seen.resonance_hz)
-    assert seen.model is None
 
 
 def test_the_filter_of_an_earlier_run_is_used(rows: list[Sample]) -> None:

@@ -2,6 +2,8 @@
 
 import asyncio
 
+import pytest
+
 from hil.monitor.app import MonitorApp
 from hil.monitor.messages import Kind, Notice
 from hil.monitor.panel import LogPanel, log, log_lines
@@ -17,14 +19,6 @@ def state(*texts: str) -> LiveState:
     for text in texts:
         live.take(Notice(0, Kind.FAULT, text))
     return live
-
-
-def test_an_entry_is_there_to_its_last_word() -> None:
-    lines = log_lines(state(LONG, "/a/path/" + 200 * "x").snapshot(), 80)
-    assert all(len(line) <= 80 for line in lines)
-    text = " ".join(" ".join(lines).split())
-    assert LONG in text
-    assert text.replace(" ", "").count("x") == 200
 
 
 def test_the_title_says_what_part_is_shown() -> None:
@@ -55,14 +49,10 @@ def shown_after(*keys: str, then: str = "") -> list[str]:
     return lines
 
 
+@pytest.mark.campaign
 def test_the_arrows_go_through_it_and_not_beyond() -> None:
     first, second, last = shown_after(), shown_after("down"), shown_after(*["pagedown"] * 20)
     assert second[1:-1] == first[2:]
     assert last[-1].split()[-1] == "word199"
     assert len(last) == len(first)
     assert shown_after("pagedown", *["pageup"] * 3) == first
-
-
-def test_what_is_read_stays_where_it_is_when_more_comes() -> None:
-    assert shown_after("pagedown", then=LONG)[1:] == shown_after("pagedown")[1:]
-    assert "news" in shown_after(then="news")[1]

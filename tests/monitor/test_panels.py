@@ -13,7 +13,7 @@ from hil.monitor import panel as head_panels
 from hil.monitor import panel as log_panel
 from hil.monitor.messages import Began, Kind, NodeHealth, Notice, PlcHealth, Ready, Samples
 from hil.monitor.panel import LEAST_WIDTH, Draw, drawn
-from hil.monitor.snapshot import Activity, History, Model, Snapshot
+from hil.monitor.snapshot import History, Model, Snapshot
 from hil.monitor.state import LiveState
 from hil.rig.experiments.base import Phase
 from hil.sample import SampleFlag
@@ -107,33 +107,6 @@ def test_a_panel_draws_at_every_size_that_a_terminal_passes_through(draw: Draw) 
     assert drawn(draw, shown, LEAST_WIDTH, 1)
 
 
-@pytest.mark.parametrize("draw", DRAWN)
-def test_a_panel_draws_when_nothing_is_known_yet(draw: Draw) -> None:
-    empty = LiveState("bus", PERIOD_S, None, can_drive=False, channel_units={"accel_rad_s2": "rad/s^2"}).snapshot()
-    assert all(len(line) <= 40 for line in draw(empty, 40, 8))
-
-
-def test_channels_have_their_names_units_and_last_values() -> None:
-    lines = signal_panels.channels(snapshot(), 60, 3)
-    assert lines[0].split() == ["torque_shaft_0_nm", "[Nm]", "1048.5"]
-    assert lines[1].split() == ["torque_shaft_1_nm", "[Nm]", "--"]
-    assert lines[2].strip() == "+3 more channels"
-
-
-def test_the_peak_of_the_response_stands_over_its_frequency() -> None:
-    lines = model_panels.response(snapshot(), 60, 12)
-    peak = next(line for line in lines[1:] if any(ord(letter) > 0x2800 for letter in line))
-    at = next(column for column, letter in enumerate(peak) if ord(letter) > 0x2800)
-    ticks = lines[-1]
-    assert ticks.index("5") < at < ticks.index("10")
-
-
-def test_poles_and_zeros_are_letters_in_the_plane() -> None:
-    text = "\n".join(model_panels.poles(snapshot(), 72, 19)[1:])
-    assert text.count("x") == 3  # the pair shows once: it is the upper half
-    assert text.count("o") == 1
-
-
 def test_without_excitation_the_estimate_says_so_in_words() -> None:
     shown = snapshot()
     reason = "not excited: switch the PRBS on"
@@ -174,26 +147,6 @@ def test_what_is_wrong_is_said_in_words(m1: NodeHealth | None, plc: PlcHealth | 
         text = "\n".join(draw(shown, 120, 30))
         assert words in text
         assert "TROUBLE" in text
-
-
-def test_of_a_bus_that_is_lost_nothing_old_is_shown() -> None:
-    healthy = snapshot()
-    lost = replace(healthy, headline=replace(healthy.headline, activity=Activity.LOST))
-    for draw in (bus_panels.brief, bus_panels.full):
-        text = "\n".join(draw(lost, 80, 30))
-        assert "LOST" in text
-        assert "OK" not in text
-        assert "operation enabled" not in text
-
-
-def test_a_permit_that_is_withdrawn_is_said_so() -> None:
-    plc = PlcHealth(replace(STATUS, permissive=False, clutch=ClutchState.CLOSED), 0.05, None)
-    assert "plc series clutch closed NO PERMIT" in bus_panels.brief(snapshot(plc=plc), 40, 9)
-    assert "permissive WITHDRAWN" in "\n".join(bus_panels.full(snapshot(plc=plc), 80, 30))
-
-
-def test_the_headline_says_what_is_driven() -> None:
-    assert head_panels.headline(snapshot(), 80, 1)[0].startswith("RUNNING cruise measure 7.0 s of 30 s")
 
 
 def interrupted(n_stale: int) -> Snapshot:
@@ -248,36 +201,3 @@ def test_a_source_that_says_nothing_is_reported(silent_s: float, reported: bool)
     shown = live.snapshot(silent_s)
     assert ("NO NEWS for 3 s" in head_panels.headline(shown, 80, 1)[0]) == reported
     assert bus_panels.full(shown, 80, 22)[0].endswith("NO NEWS 3 s" if reported else "OK")
-
-
-def test_a_long_message_says_where_the_rest_is() -> None:
-    long = replace(snapshot(), headline=replace(snapshot().headline, message="word " * 40))
-    (line,) = head_panels.message(long, 80, 1)
-    assert line.endswith("… (5: log)")
-    assert len(line) == 80
-
-
-def test_a_value_that_is_hardly_known_is_called_unsure() -> None:
-    shown = snapshot()
-    wild = replace(shown, estimation=replace(shown.estimation, resonance_std_hz=15.0, damping_std=1.7))
-    assert model_panels.resonance(wild, 80, 8)[0].endswith("8.00 ±30 Hz UNSURE")
-    assert model_panels.damping(wild, 80, 8)[0].endswith("0.0500 ±3.4 UNSURE")
-    history = replace(shown.estimation.history, frequency_std_hz=np.full(50, 15.0))
-    wide = replace(shown, estimation=replace(shown.estimation, history=history))
-    labels = [float(line.split("┤")[0]) for line in model_panels.resonance(wide, 80, 8) if "┤" in line]
-    assert min(labels) >= 0.0
-
-
-def test_an_estimate_before_the_measured_part_waits() -> None:
-    live = LiveState("bus", PERIOD_S, None, can_drive=True)
-    live.take(Began("cruise", "runs/cruise.parquet", 30.0))
-    live.take(Samples(((sample(0), Phase.APPROACH),)))
-    assert model_panels.figures(live.snapshot(), 31, 5)[0].endswith("not measuring yet")
-
-
-def test_why_there_is_no_estimate_can_be_read_in_full() -> None:
-    shown = interrupted(0)
-    reason = shown.estimation.status
-    assert len(reason) > 40
-    for draw, width, height in ((model_panels.figures, 32, 5), (model_panels.standing, 80, 2)):
-        assert reason in " ".join(" ".join(draw(shown, width, height)).split())

@@ -1,13 +1,11 @@
 """Text plots: dots where the values are, axes that hold them, lines that fit."""
 
-import math
-
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hil.monitor.plot import AXIS, Canvas, Range, Ring, envelope, nice_range, strip
+from hil.monitor.plot import Canvas, Ring, envelope, nice_range
 
 
 @pytest.mark.parametrize(
@@ -20,25 +18,12 @@ def test_each_dot_of_a_cell(x: int, y: int, shown: str) -> None:
     assert canvas.lines() == [shown]
 
 
-def test_a_rising_line_rises() -> None:
-    x = np.linspace(0.0, 1.0, 50)
-    lines = strip(x, x, Range(0.0, 1.0), Range(0.0, 1.0), AXIS + 10, 5)
-    rows = [next(row for row, line in enumerate(lines) if line[AXIS + column] != " ") for column in range(10)]
-    assert rows == sorted(rows, reverse=True)
-    assert (rows[0], rows[-1]) == (4, 0)
-
-
 def test_an_envelope_shows_a_single_peak_among_many_samples() -> None:
     y = np.zeros(10_000)
     y[4321] = 7.0
     found = envelope(np.linspace(0.0, 99.0, y.size), y, 100)
     assert max(high for _, _, high in found) == 7.0
     assert [column for column, _, _ in found] == list(range(100))
-
-
-def test_a_gap_stays_a_gap() -> None:
-    y = np.array([1.0, math.nan, math.nan, math.nan, 1.0])
-    assert [column for column, _, _ in envelope(np.arange(5.0), y, 5)] == [0, 4]
 
 
 @given(st.lists(st.floats(-1e6, 1e6), min_size=1, max_size=20), st.floats(1e-3, 1e3))

@@ -33,19 +33,6 @@ def test_a_limit_of_the_drive_is_counted_and_takes_nothing_from_the_sample() -> 
     assert seen(GOOD, SampleFlag.M2_LIMITED).standing_s == 0.0
 
 
-def test_cycles_before_the_first_answer_are_no_fault() -> None:
-    quality = seen(M1 | M2, M1 | M2, M2, GOOD, GOOD)
-    assert (quality.samples, quality.good, quality.against) == (2, 2, ())
-
-
-def test_a_new_stretch_begins_with_nothing() -> None:
-    watch = QualityWatch(PERIOD_S)
-    for cycle, flag in enumerate((GOOD, M1)):
-        watch.take(sample(cycle, flags=flag))
-    watch.begin()
-    assert watch.look(sample(1).t_ns) == Quality()
-
-
 def test_the_time_without_a_good_sample_counts_until_the_next() -> None:
     n = round(STANDS_STILL_S / PERIOD_S)
     short, long = seen(GOOD, *[M1] * (n - 1)), seen(GOOD, *[M1] * n)
@@ -54,12 +41,6 @@ def test_the_time_without_a_good_sample_counts_until_the_next() -> None:
     assert long.standing_s == pytest.approx(STANDS_STILL_S)
     assert long.why == "m1 silent"
     assert seen(GOOD, *[M1] * n, GOOD).standing_s == 0.0
-
-
-def test_a_drive_that_never_answers_stands_still_too() -> None:
-    quality = seen(*[M2] * 100)
-    assert quality.samples == 0
-    assert quality.standing_s == pytest.approx(0.99)
 
 
 def test_a_number_that_is_missing_without_a_flag_counts_too() -> None:

@@ -1,9 +1,7 @@
 """A recording or a bus trace in place of a rig."""
 
-from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from hil.config.rig_file import read_rig
@@ -64,23 +62,6 @@ def test_a_recording_comes_back_as_the_samples_it_is_of(tmp_path: Path, suffix: 
         for row in SAMPLES:
             writer.append(row)
     assert recorded_samples(path) == (SAMPLES, {})
-
-
-def test_the_channels_of_a_recording_come_back_with_their_units(tmp_path: Path) -> None:
-    rows = [replace(row, channels=(2.0 * row.cycle, -1.0)) for row in SAMPLES]
-    units = {"speed_load_rad_s": "rad/s", "torque_shaft_nm": "Nm"}
-    with RecordingWriter(tmp_path / "r.parquet", channel_units=units) as writer:
-        for row in rows:
-            writer.append(row)
-    assert recorded_samples(tmp_path / "r.parquet") == (rows, units)
-
-
-def test_a_recording_of_the_four_columns_will_do(tmp_path: Path) -> None:
-    path = tmp_path / "r.csv"
-    path.write_text("time_s,torque_m1_nm,torque_m2_nm,speed_rad_s\n0,1,2,3\n0.01,1,2,nan\n", encoding="utf-8")
-    (first, second), _ = recorded_samples(path)
-    assert (first.torque_m1_nm, first.torque_m2_nm, first.speed_rad_s, first.prbs_nm) == (1.0, 2.0, 3.0, 0.0)
-    assert np.isnan(second.speed_rad_s)
 
 
 @pytest.mark.parametrize(

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from estimator.physics.twist import Shaft
-from hil.monitor.messages import Began, Ended, Kind, Lost, Notice, Over, Ready, Samples, outcome
+from hil.monitor.messages import Began, Kind, Lost, Notice, Over, Ready, Samples
 from hil.monitor.snapshot import Activity
-from hil.monitor.state import WINDOWS_S, LiveState
+from hil.monitor.state import LiveState
 from hil.rig.experiments.base import Phase
 from hil.sample import SampleFlag
 from hil.simulator.driveline import DEFAULT_BUS
@@ -40,14 +40,6 @@ def test_a_run_from_order_to_end() -> None:
     assert "3000 samples, 2 flagged, run 7, runs/cruise.parquet" in live.snapshot().headline.message
 
 
-def test_a_run_that_failed_says_why() -> None:
-    failed = Over("cruise", None, 0, 0, stopped=False, reason="inverter m2: no TPDO")
-    assert outcome(failed) == "cruise ENDED EARLY: inverter m2: no TPDO (nothing recorded)"
-    live = state()
-    live.take(failed)
-    assert live.snapshot().log[-1].kind is Kind.FAULT
-
-
 def test_channels_are_those_of_the_samples_with_their_names_and_units() -> None:
     units = {"speed_load_rad_s": "rad/s", "torque_shaft_nm": "Nm"}
     live = LiveState("bus", PERIOD_S, None, can_drive=True, channel_units=units)
@@ -69,39 +61,12 @@ def test_a_flagged_sample_is_a_gap_and_not_a_value() -> None:
     np.testing.assert_allclose(signals.time_s, [-PERIOD_S, 0.0], atol=1e-12)
 
 
-def test_the_window_holds_what_it_says_at_every_zoom() -> None:
-    live = state()
-    live.take(Samples(tuple((sample(k), None) for k in range(8000))))
-    live.zoom(-len(WINDOWS_S))
-    spans = []
-    for window_s in WINDOWS_S:
-        signals = live.snapshot().signals
-        assert signals.window_s == window_s
-        spans.append(-signals.time_s[0])
-        live.zoom(1)
-    np.testing.assert_allclose(spans, WINDOWS_S, atol=1.01 * PERIOD_S)
-
-
 def test_a_lost_bus_is_reported_once_and_its_return_too() -> None:
     live = state()
     for report in (Ready(), Lost("no bus"), Lost("no bus"), Ready()):
         live.take(report)
     assert [notice.text for notice in live.snapshot().log] == ["no bus", "the bus is there again"]
     assert live.activity is Activity.LISTENING
-
-
-def test_the_end_stays_known() -> None:
-    live = state()
-    live.take(Ended("gone"))
-    assert live.activity is Activity.ENDED
-    assert live.ended == Ended("gone")
-    assert live.snapshot().headline.message == "gone"
-
-
-def test_samples_that_were_not_sent_are_reported() -> None:
-    live = state()
-    live.take(Samples(((sample(0), None),), lost=12))
-    assert "12 samples not shown" in live.snapshot().log[-1].text
 
 
 @pytest.mark.parametrize("kind", [kind for kind in Kind if kind is not Kind.INFO])

@@ -49,6 +49,7 @@ def test_an_interrupted_demo_leaves_nothing_running_and_nothing_half_written(tmp
         CanLink.open(url.group())
 
 
+@pytest.mark.campaign
 def test_the_rig_file_has_the_addresses_of_this_run_and_a_device_that_differs_ends_it(tmp_path):
     demo = _Demo(Console(quiet=True), 5, tmp_path, tmp_path / "out")
     with sealed_process("--seed", "5") as sealed:

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from hil.errors import UsageError
-from hil.proof.seal import Seal, SealBroken, canonical_json, lock, new_key, parse_key, seal, unlock, verify
+from hil.proof.seal import Seal, SealBroken, lock, new_key, parse_key, seal, unlock, verify
 
 TRUTH = {"effect": "backlash", "seed": 7, "hidden": {"gap_rad": 0.021478117909797107}, "windows": [None, [1.5, 2]]}
 
@@ -30,11 +30,6 @@ def test_the_commitment_tells_nothing_and_differs_each_time(sealed):
     assert len(sealed.commitment) == 64
 
 
-def test_order_of_entries_does_not_matter(sealed):
-    turned = Seal(sealed.nonce, dict(reversed(TRUTH.items())))
-    assert turned.commitment == sealed.commitment
-
-
 @pytest.mark.parametrize(
     ("key", "value"), [("effect", "none"), ("seed", 7.5), ("hidden", {"gap_rad": 0.02}), ("windows", [])]
 )
@@ -42,20 +37,6 @@ def test_a_changed_entry_is_named(sealed, key, value):
     opened = _read_back(sealed)
     opened["truth"][key] = value
     with pytest.raises(SealBroken, match=rf"changed after it was sealed: truth\.{key}\."):
-        verify(sealed.commitment, opened)
-
-
-def test_a_removed_and_an_added_entry_are_named(sealed):
-    opened = _read_back(sealed)
-    opened["truth"]["more"] = opened["truth"].pop("seed")
-    with pytest.raises(SealBroken, match=r"truth\.more, truth\.seed"):
-        verify(sealed.commitment, opened)
-
-
-def test_a_changed_nonce_is_named(sealed):
-    opened = _read_back(sealed)
-    opened["nonce"] = "0" * 64
-    with pytest.raises(SealBroken, match="the nonce, or every entry"):
         verify(sealed.commitment, opened)
 
 
@@ -91,16 +72,6 @@ def test_a_damaged_seal_is_refused_by_name(sealed, damage, message):
         verify(sealed.commitment, opened)
 
 
-def test_something_that_is_no_seal_is_refused(sealed):
-    with pytest.raises(SealBroken, match="expected an object"):
-        verify(sealed.commitment, ["truth"])
-
-
-def test_numbers_json_does_not_have_are_refused():
-    with pytest.raises(ValueError, match="Out of range float"):
-        canonical_json({"gap_rad": float("nan")})
-
-
 SECRET = b"backlash of 0.04 rad"
 
 
@@ -114,10 +85,6 @@ def test_what_was_locked_comes_back_and_can_not_be_read_before(tmp_path: Path, k
     path.write_bytes(lock(key, "case_001", SECRET))
     assert SECRET not in path.read_bytes()
     assert unlock(key, "case_001", path) == SECRET
-
-
-def test_equal_truths_look_different(key: bytes) -> None:
-    assert lock(key, "case_001", SECRET) != lock(key, "case_001", SECRET)
 
 
 @pytest.mark.parametrize("place", [0, 15, 40, -1], ids=["magic", "nonce", "content", "tag"])

@@ -9,7 +9,7 @@ import pytest
 from hil.cli.main import run
 from hil.errors import UsageError
 from hil.proof.answers import answer, judge_set
-from hil.proof.command import MARK, replace_own
+from hil.proof.command import replace_own
 from hil.proof.sealed_set import CASES, COMMITMENTS, SCHEMA, VERDICTS, VERDICTS_LIST
 
 NAMES = ["{outside}", "../victim", "..", ".", "", "a/b", "a\\b", ".hidden", "case_001/../../victim", "x\0y"]
@@ -56,12 +56,6 @@ def test_a_file_named_by_a_path_is_refused(tmp_path: Path, victim: Path, name: s
         judge_set(folder, bytes(32), 1, silent)
 
 
-@pytest.mark.parametrize("entry", [None, [], {}, {"commitment": "0" * 64}, {"files": {}}, {"files": ["a"]}, 1])
-def test_an_entry_that_is_none_is_refused(tmp_path: Path, entry: object) -> None:
-    with pytest.raises(UsageError, match=r"commitments\.json: case_001"):
-        answer(set_with(tmp_path, {"case_001": entry}), 1, silent)
-
-
 @pytest.mark.parametrize("linked", [CASES, VERDICTS])
 def test_a_link_that_leads_out_of_the_set_is_refused(tmp_path: Path, victim: Path, linked: str) -> None:
     folder = set_with(tmp_path / "set", {"case_001": shown()})
@@ -82,14 +76,3 @@ def test_a_folder_that_the_tool_did_not_make_is_not_replaced(tmp_path: Path, vic
     with pytest.raises(UsageError, match="got something else"):
         replace_own(tmp_path / "link", built)
     assert [path.name for path in victim.iterdir()] == ["thesis.txt"]
-
-
-def test_a_folder_that_the_tool_made_is_replaced(tmp_path: Path) -> None:
-    built, place = tmp_path / "built", tmp_path / "verdicts" / "case_001"
-    built.mkdir()
-    for name in ("old", "new"):
-        for file in built.iterdir():
-            file.unlink()
-        (built / name).write_text(name)
-        replace_own(place, built)
-        assert {path.name for path in place.iterdir()} == {name, MARK}

@@ -55,6 +55,7 @@ def test_the_devices_are_on_the_wire_and_the_truth_comes_when_asked(tmp_path):
         pass
 
 
+@pytest.mark.campaign
 def test_torque_moves_the_hidden_driveline():
     with sealed_process("--seed", "5", "--effect", "backlash") as sealed:
         rig = _rig_at(sealed)
@@ -69,6 +70,7 @@ def test_torque_moves_the_hidden_driveline():
     assert all(sample.flags == 0 for sample in samples)
 
 
+@pytest.mark.campaign
 def test_a_rig_that_has_gone_is_named():
     with sealed_process("--seed", "5") as sealed:
         sealed._pipes.process.send_signal(signal.SIGTERM)

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import warnings
 from pathlib import Path
 
 import h5py
 import numpy as np
-import pandas as pd
 import pytest
 import scipy.io
 
@@ -65,19 +63,6 @@ def test_structs_and_matrices_are_read_by_address(tmp_path: Path, time: str, tor
     read(tmp_path / "drive.mat", time, torque, speed)
 
 
-@pytest.mark.parametrize("version", ["v7", "v7.3"])
-def test_a_timetable_is_read_by_the_names_of_its_variables(tmp_path: Path, version: str) -> None:
-    table = pd.DataFrame(
-        {"T": TORQUE, "w": SPEED}, index=pd.Index(pd.to_timedelta(TIME, unit="s").as_unit("ms"), name="Time")
-    )
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # the library's, of pandas' options and of units of time
-        from matio import save_to_mat
-
-        save_to_mat(str(tmp_path / "drive.mat"), {"log": table, "other": np.eye(2)}, version=version)
-    read(tmp_path / "drive.mat", "log.Time", "log.T", "log.w")
-
-
 def test_a_struct_of_version_73_is_read_by_address(tmp_path: Path) -> None:
     path = tmp_path / "drive.mat"
     with h5py.File(path, "w", userblock_size=512) as file:
@@ -88,12 +73,6 @@ def test_a_struct_of_version_73_is_read_by_address(tmp_path: Path) -> None:
     content[:128] = b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\x00\x02IM"
     path.write_bytes(content)
     read(path, "log.t", "d(:,2)", "log.m.w")
-
-
-def test_a_matrix_of_hdf5_is_read_by_address(tmp_path: Path) -> None:
-    with h5py.File(tmp_path / "drive.h5", "w") as file:
-        file["run/data"] = np.column_stack([TIME, TORQUE, SPEED])
-    read(tmp_path / "drive.h5", "run/data[:, 0]", "run/data[:, 1]", "run/data(:,3)")
 
 
 def test_an_address_that_is_not_there_is_refused_with_those_that_are(tmp_path: Path) -> None:

@@ -48,11 +48,6 @@ def test_the_lines_are_those_to_write(cure: Cure, lines: list[str]) -> None:
     assert cure_lines(cure, SignalsConfig.model_validate(SIGNALS), TABLE) == lines
 
 
-def test_a_period_in_the_wrong_unit_is_cured_as_one() -> None:
-    signals = SignalsConfig.model_validate({**SIGNALS, "time": {"sample_time_s": 10.0}})
-    assert cure_lines(Cure("run", time=1e-3), signals, TABLE) == ["time = { sample_time_s = 0.01 }"]
-
-
 def test_the_line_is_a_note_of_the_refusal(tmp_path: Path) -> None:
     write_table(TABLE, tmp_path / "run.csv")
     signals = SignalsConfig.model_validate(SIGNALS)
@@ -61,10 +56,3 @@ def test_the_line_is_a_note_of_the_refusal(tmp_path: Path) -> None:
     assert refusal.value.__notes__ == [
         'In [signals] write: torque = [ { column = "T1", scale = 600 }, { column = "T2", scale = 3 } ]'
     ]
-
-
-@pytest.mark.parametrize("cure", [None, Cure("another", torque=2.0)])
-def test_without_a_cure_there_is_no_line(tmp_path: Path, cure: Cure | None) -> None:
-    with pytest.raises(Implausible) as refusal, with_the_line_to_write([tmp_path / "run.csv"], None):
-        raise Implausible("recording run is implausible", cure)
-    assert not hasattr(refusal.value, "__notes__")

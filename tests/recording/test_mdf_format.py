@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 from asammdf import MDF, Signal
 
-from hil.errors import RecordingError
-from hil.recording import SignalsConfig, Table, read_record, read_table, write_table
+from hil.recording import Table, read_table, write_table
 from hil.recording.formats import read_metadata
 
 RIG = 'name = "bench"\n\n[guard]\n  indented = 1\n'
@@ -50,11 +49,6 @@ def test_a_time_that_does_not_increase_is_no_master(tmp_path: Path, times: list[
     read = read_table(tmp_path / "a.mf4")
     assert list(read.columns) == ["time_s", "x"]
     np.testing.assert_array_equal(read.columns["time_s"], times)
-
-
-def test_a_recording_of_time_alone_is_kept(tmp_path: Path) -> None:
-    write_table(Table(Path("a"), {"time_s": np.arange(3.0)}), tmp_path / "a.mf4")
-    assert list(read_table(tmp_path / "a.mf4").columns) == ["time_s"]
 
 
 def foreign(path: Path) -> None:
@@ -104,19 +98,6 @@ def test_of_other_programs_the_groups_of_one_time_are_the_recording(theirs: Path
     assert [remark.split(":")[0] for remark in table.remarks] == ["gear", "temperature"]
 
 
-def test_a_foreign_file_is_read_through_signals_of_a_model_file(theirs: Path) -> None:
-    signals = SignalsConfig.model_validate(
-        {
-            "time": {"column": "time"},
-            "torque": [{"column": "Motor Torque", "scale": 2.0}],
-            "speed": {"column": "speed"},
-        }
-    )
-    record = read_record(theirs, signals)
-    assert record.torque_nm[:, 0].tolist() == (2.0 * np.arange(20)).tolist()
-    assert np.flatnonzero(~record.okay).tolist() == [1, 6, 11, 16]
-
-
 def test_a_file_its_writer_never_finished_is_finalised_in_a_copy(tmp_path: Path) -> None:
     """What a logger leaves that lost its power: flags in the identification, no cycle count, no data length."""
     path = tmp_path / "torn.mf4"
@@ -145,16 +126,3 @@ def test_a_file_its_writer_never_finished_is_finalised_in_a_copy(tmp_path: Path)
     assert table.columns["speed"][:49].tolist() == np.arange(49.0).tolist()
     assert any("never finished" in remark for remark in table.remarks)
     assert path.read_bytes() == torn
-
-
-def test_a_file_that_can_not_be_finalised_is_refused(ours: Path) -> None:
-    content = bytearray(ours.read_bytes()[:400])
-    content[:8] = b"UnFinMF "
-    struct.pack_into("<H", content, 60, 0x01 | 0x04)
-    ours.write_bytes(content)
-    with pytest.raises(RecordingError, match=r"run\.mf4: expected "):
-        read_table(ours)
-
-
-def test_metadata_of_a_foreign_file_are_read(theirs: Path) -> None:
-    assert read_metadata(theirs)["comment"] == "second lap"

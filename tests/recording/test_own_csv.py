@@ -10,9 +10,8 @@ import pytest
 
 from hil.errors import RecordingError
 from hil.recording import RecordingWriter, own_csv, read_table
-from hil.recording.checksum import CHECKSUM, data_sha256
-from hil.recording.description import sidecar_of
-from hil.recording.recordings import facts_of, read_facts
+from hil.recording.checksum import data_sha256
+from hil.recording.recordings import read_facts
 from tests.recording.test_writer import sample
 
 ROW = "1.0,0.5,nan,-0.0,5e-324,1e+16,16,inf,0.1,0.0\n"
@@ -39,13 +38,6 @@ def test_the_checksum_is_that_of_the_table(
     assert own_csv.data_sha256_at(path, own_csv.extent(path).n_rows) == data_sha256(read_table(path).columns)
 
 
-def test_the_facts_are_those_of_the_table(recorded: Path) -> None:
-    facts, expected = read_facts(recorded), facts_of(read_table(recorded))
-    assert facts == expected
-    assert (facts.extent.n_rows, facts.metadata["experiment"]) == (200, "cruise")
-    assert facts.extent.duration_s == pytest.approx(2.0)
-
-
 @pytest.mark.parametrize(
     ("before", "after", "said"),
     [
@@ -59,19 +51,6 @@ def test_a_changed_recording_is_refused_as_the_table_is(recorded: Path, before: 
     for reads in (read_facts, read_table):
         with pytest.raises(RecordingError, match=said):
             reads(recorded)
-
-
-def test_a_changed_description_is_refused(recorded: Path) -> None:
-    companion = sidecar_of(recorded)
-    companion.write_text(companion.read_text("utf-8").replace("cruise", "bruise"), "utf-8")
-    with pytest.raises(RecordingError, match="expected the units and metadata it was written with"):
-        read_facts(recorded)
-
-
-def test_others_are_read_as_tables(tmp_path: Path) -> None:
-    (tmp_path / "foreign.csv").write_text("t,v\n0,1\n0.1,2\n", "utf-8")
-    facts = read_facts(tmp_path / "foreign.csv")
-    assert (facts.extent.n_rows, facts.extent.duration_s, dict(facts.metadata)) == (2, 0.0, {})
 
 
 def test_the_cells_in_memory_do_not_grow_with_the_recording(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -96,7 +75,3 @@ def test_the_cells_in_memory_do_not_grow_with_the_recording(tmp_path: Path, monk
         most.append(max(held))
     assert most[1] < 80_000 * 8 * 2
     assert most[1] < 1.5 * most[0]
-
-
-def test_a_recording_says_its_checksum(recorded: Path) -> None:
-    assert read_facts(recorded).metadata[CHECKSUM] == data_sha256(read_table(recorded).columns)

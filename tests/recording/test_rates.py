@@ -57,14 +57,6 @@ def three_rates(tmp_path: Path) -> Path:
     return path
 
 
-def test_a_channel_of_another_group_is_not_called_missing(three_rates: Path) -> None:
-    with pytest.raises(RecordingError) as refusal:
-        read_record(three_rates, signals())
-    assert "it is in this file, but every 0.00" in str(refusal.value)
-    assert "resample_s" in str(refusal.value)
-    assert "missing" not in str(refusal.value)
-
-
 def test_groups_of_different_rates_are_brought_to_one_period_and_that_is_said(three_rates: Path) -> None:
     said: list[str] = []
     record = read_record(three_rates, signals(resample_s=0.01), tell=said.append)
@@ -89,36 +81,10 @@ def test_the_times_of_the_channels_asked_for_are_read_whatever_else_is_in_the_fi
     assert read_table(three_rates).columns.keys() == {"time", "gear", "count"}
 
 
-def test_a_name_of_two_groups_is_numbered(three_rates: Path) -> None:
-    table = read_table(three_rates)
-    assert "gear (2)" in table.elsewhere
-    assert any(remark.startswith("gear: another channel has that name") for remark in table.remarks)
-
-
-def test_look_prints_the_table_that_reads_it(three_rates: Path) -> None:
-    found = look(three_rates)
-    assert [group.period_s for group in found.survey.groups] == pytest.approx([0.01, 0.005, 0.002, 1.0, 1.0])
-    assert found.signals == (
-        "[signals]",
-        'time = { column = "time" }',
-        'torque = [ { column = "T_M1" }, { column = "T_M2" } ]   # in kNm, read times 1000',
-        'speed = { column = "n_M", at = "motor" }   # in rpm, read times 0.10472',
-        "resample_s = 0.01   # channels have times of their own",
-    )
-
-
 @pytest.fixture
 def somewhere(tmp_path: Path) -> Path:
     (tmp_path / "a.mf4").write_bytes(b"")
     return tmp_path / "a.mf4"
-
-
-def test_a_held_channel_keeps_its_last_value(somewhere: Path) -> None:
-    steps = Series(np.array([0.0, 1.0, 2.0]), np.array([1.0, 5.0, 3.0]), held=True)
-    time, columns, said = resampled(somewhere, {"gear": steps}, 0.5)
-    assert time.tolist() == [0.0, 0.5, 1.0, 1.5, 2.0]
-    assert columns["gear"].tolist() == [1.0, 1.0, 5.0, 5.0, 3.0]
-    assert said == ["gear: 1 s brought to 0.5 s, the last value held"]
 
 
 @pytest.mark.parametrize("period_s", [0.01, 0.05], ids=["as fast", "thinned"])
@@ -272,18 +238,6 @@ def test_a_logged_bus_is_decoded_by_the_eds_of_its_drives(suffix: str, tmp_path:
     torque_nm = np.column_stack([k % 70, -(k % 40)]) * RATED_NM / 1000.0
     np.testing.assert_allclose(record.torque_nm, torque_nm, atol=1e-6)
     np.testing.assert_allclose(record.output, 9000 * k * RPM_COUNT, atol=1e-6)
-
-
-def test_an_eds_by_which_the_drive_is_not_mapped_is_named(tmp_path: Path) -> None:
-    path = log_of_two_drives(tmp_path / "bus.log", bytes(6))
-    with pytest.raises(RecordingError, match=r"0x181 has 6 bytes and 8 in the file.*give a DCF"):
-        look(path, OWN_EDS)
-
-
-def test_a_file_of_signals_takes_no_dbc(three_rates: Path, tmp_path: Path) -> None:
-    (tmp_path / "bus.dbc").write_text(DBC, encoding="ascii")
-    with pytest.raises(RecordingError, match="Leave --dbc out"):
-        read_table(three_rates, Request(dbc=tmp_path / "bus.dbc"))
 
 
 def test_the_low_pass_is_that_of_the_on_line_chain() -> None:

@@ -119,23 +119,3 @@ def test_what_is_lost_is_reported_and_the_rest_is_kept_with_a_checksum_of_its_ow
     read = read_table(tmp_path / "a.mf4")
     assert read.columns["word"].tolist() == ["a", "c"]
     assert (read.units["x"], read.metadata["note"]) == ("m", "kept")
-
-
-def test_a_plain_csv_stays_one_file(tmp_path: Path) -> None:
-    write_table(Table(Path("a"), {"x": np.arange(3.0), "word": as_text(["a", "b", "c"])}), tmp_path / "a.csv")
-    assert [path.name for path in tmp_path.iterdir()] == ["a.csv"]
-
-
-def test_metadata_that_mean_something_next_to_a_csv_are_refused_there(tmp_path: Path) -> None:
-    table = Table(Path("a"), {"x": np.arange(3.0)}, {}, {"units": "metric"})
-    with pytest.raises(RecordingError, match=r"metadata units: lost: \.csv can't hold it"):
-        write_table(table, tmp_path / "a.csv")
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_a_replaced_recording_leaves_nothing_of_the_old_one(tmp_path: Path, own_table: Table) -> None:
-    write_table(own_table, tmp_path / "a.csv")
-    plain = Table(Path("a"), {"x": np.arange(3.0)})
-    write_table(plain, tmp_path / "a.csv", replace=True)
-    assert [path.name for path in tmp_path.iterdir()] == ["a.csv"]
-    assert list(read_table(tmp_path / "a.csv").columns) == ["x"]

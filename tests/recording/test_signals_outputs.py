@@ -10,7 +10,6 @@ import pytest
 from pydantic import ValidationError
 
 from estimator.signals.record import Location, OutputKind
-from hil.errors import RecordingError
 from hil.problems import problem_lines
 from hil.recording import SignalsConfig, Table
 from hil.recording.signals import to_record
@@ -53,13 +52,6 @@ def test_each_column_has_one_role(keys: dict[str, Any], first: str, further: lis
     assert config.output()[1].column == first
     assert [each.column for each in config.further()] == further
     assert set(config.columns()) >= {first, *further}
-
-
-def test_what_an_imposed_motion_takes_may_be_named_as_the_torque_at_the_shaft() -> None:
-    config = signals(position={"column": "x"}, outputs=[{"kind": "torque", "at": "shaft", "column": "F", "scale": 3.0}])
-    assert config.names_bench
-    assert [(each.column, each.scale) for each in config.torques()] == [("F", 3.0)]
-    assert config.further() == []
 
 
 @pytest.mark.parametrize(
@@ -111,22 +103,3 @@ def test_a_measured_load_torque_is_an_input(changed: Changed) -> None:
     assert np.flatnonzero(~record.okay).tolist() == [0, 7]
     assert record.torque_okay is None
     assert to_record(changed(), SignalsConfig()).known_load_nm == 0.0
-
-
-@pytest.mark.parametrize("column", ["torque_m1_nm", "speed_rad_s"])
-def test_a_load_torque_is_no_other_signal_too(column: str) -> None:
-    with pytest.raises(ValidationError) as caught:
-        signals(load={"column": column})
-    assert "expected a column of its own" in problem_lines(SignalsConfig, caught.value)[0]
-
-
-def test_a_load_torque_without_a_number_is_refused(changed: Changed) -> None:
-    with pytest.raises(RecordingError, match="torque_ref_nm: expected a load torque, got no number"):
-        to_record(changed(torque_ref_nm=np.full(40, np.nan)), signals(**LOAD))
-
-
-def test_a_joint_has_no_load() -> None:
-    with pytest.raises(ValidationError) as caught:
-        signals(position={"column": "x"}, force={"column": "F"}, **LOAD)
-    (line,) = problem_lines(SignalsConfig, caught.value)
-    assert "no such key next to an imposed motion" in line

@@ -114,12 +114,6 @@ def test_remainder_and_traces_are_given_where_they_are_known(diagnosis: Diagnosi
     ]
 
 
-def test_a_profile_goes_with_its_effect(diagnosis: Diagnosis) -> None:
-    profile = diagnosis_json(diagnosis)["effects"][1]["profiles"]["run_1"]
-    assert profile["unit"] == "Nm"
-    assert [len(profile[key]) for key in ("time_s", "value", "low", "high")] == [16] * 4
-
-
 @pytest.mark.parametrize("verdict", list(Verdict))
 def test_what_is_not_known_is_null(diagnosis: Diagnosis, verdict: Verdict) -> None:
     nothing = Mismatch(False, None, {}, None, None, math.nan)
@@ -173,10 +167,6 @@ def test_what_the_pictures_rest_on_is_written(diagnosis: Diagnosis) -> None:
     assert seen["response_p_values"]["run_1"] == {"retuned": 1e-20, "augmented": 0.6}
     (picture,) = seen["pictures"]
     assert [len(picture[key]) for key in ("x", "data", "low", "high", "law")] == [20] * 5
-
-
-def test_without_a_discrepancy_the_key_is_null(diagnosis: Diagnosis) -> None:
-    assert diagnosis_json(replace(diagnosis, discrepancy=None))["discrepancy"] is None
 
 
 def test_nominal_values_that_are_off_are_given_as_a_ratio(diagnosis: Diagnosis) -> None:

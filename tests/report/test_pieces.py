@@ -17,7 +17,6 @@ from hil.report.diagnosis_html import diagnosis_summary
 from hil.report.figures import LONGEST_STRETCHES, extremes, input_lines, stretches_for
 from hil.report.numbers import listed, p_statement, shown, shown_interval, shown_p, shown_ratio
 from hil.report.outputs import publish
-from hil.report.page import table
 from hil.report.wording import simulated_column
 
 NAN = float("nan")
@@ -59,17 +58,6 @@ def test_a_thinned_trace_keeps_ends_order_and_extremes(y: np.ndarray, stretches:
     if not np.isnan(y).all():
         assert np.nanmax(y[kept]) == np.nanmax(y)
         assert np.nanmin(y[kept]) == np.nanmin(y)
-
-
-def test_a_gap_stays_a_gap() -> None:
-    y = np.zeros(1000)
-    y[300:500] = NAN
-    kept = extremes(y, 20)
-    assert np.isnan(y[kept]).sum() == 4
-
-
-def test_a_short_trace_is_kept_whole() -> None:
-    assert extremes(np.zeros(10), 5).tolist() == list(range(10))
 
 
 def test_recordings_share_the_size_of_a_page() -> None:
@@ -127,20 +115,8 @@ def test_a_result_that_fails_leaves_the_older_ones(tmp_path: Path) -> None:
     assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {"a.txt": "old"}
 
 
-def test_a_folder_made_for_a_result_that_fails_is_not_left_behind(tmp_path: Path) -> None:
-    with pytest.raises(UsageError, match="Is a directory"):
-        publish(tmp_path / "new", {"a.txt": lambda path: tmp_path.read_bytes()})
-    assert not list(tmp_path.iterdir())
-
-
 @pytest.mark.parametrize(
     ("value", "expected"), [(0.02, "p = 0.02"), (1e-300, "p < 1e-100"), (0.0, "p < 1e-100"), (float("nan"), "p = –")]
 )
 def test_a_probability_is_stated_as_far_as_it_means_something(value: float, expected: str) -> None:
     assert p_statement(value) == expected
-
-
-def test_a_column_of_sentences_is_prose_and_one_of_words_is_not() -> None:
-    long = "explains 74 % of what backlash explains"
-    assert table(("effect", "why not"), [("stiffness_nonlinearity", long)]).kind(1) == "prose"
-    assert table(("recording", "parameter", "value"), [("cruise", "J_M", long)], numbers=[2]).kind(2) == "number"

@@ -6,7 +6,7 @@ from drivers.canopen.can_link import CanLink
 from drivers.errors import ForeignController
 from hil.rig.experiments.base import Phase
 from tests.rig.observer import assert_disarmed
-from tests.rig.serving import Samples, changed, run_once, served, small_rig
+from tests.rig.serving import Samples, run_once, served, small_rig
 
 AT_S = 0.3
 TWO_CYCLES_S = 0.02
@@ -50,19 +50,3 @@ def test_another_hosts_heartbeat_is_none_of_ours() -> None:
     with served(rig) as (server, at), CanLink.open(server.bus_url) as monitor:
         monitor.produce_heartbeat(0.02, rig.monitor_node_id)
         assert run_once(at, Samples()).recorded > 0
-
-
-def test_the_hosts_node_id_is_the_rig_files() -> None:
-    rig = changed(small_rig(), {"can": {"host_node_id": 100}})
-    heard: list[bytes] = []
-    with served(rig) as (server, at), CanLink.open(server.bus_url) as observer:
-        observer.subscribe(0x764, lambda data, t_ns: heard.append(data))
-        run_once(at, Samples())
-    assert heard[0] == b"\x05"
-
-
-def test_default_node_ids_are_free_ones() -> None:
-    rig = changed(small_rig(), {"inverters.m1": {"node_id": 127}, "inverters.m2": {"node_id": 125}})
-    assert (rig.host_node_id, rig.monitor_node_id) == (126, 124)
-    rig = changed(small_rig(), {"can": {"monitor_node_id": 127}})
-    assert (rig.host_node_id, rig.monitor_node_id) == (126, 127)

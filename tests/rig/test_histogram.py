@@ -3,7 +3,6 @@
 import math
 
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -35,17 +34,3 @@ def test_the_longest_time_is_exact_and_nothing_is_lost() -> None:
     assert histogram.total == sum(count for _, count in histogram.bins()) == 5000
     edges = [edge for edge, _ in histogram.bins()]
     assert edges == sorted(set(edges))
-
-
-def test_memory_does_not_grow_with_the_run() -> None:
-    histogram = filled([round(2.0 ** (k / 1000.0)) for k in range(63_000)])
-    assert len(histogram.bins()) < 7500
-
-
-def test_nothing_counted_has_no_quantile() -> None:
-    assert Histogram().quantile_ns(0.5) is None
-
-
-@pytest.mark.parametrize("time_ns", [-5, 0])
-def test_time_that_does_not_pass_counts_as_none(time_ns: int) -> None:
-    assert filled([time_ns]).bins() == [(0, 1)]

@@ -2,10 +2,9 @@
 
 from hil.config.rig_file import Rig
 from hil.rig.pacing import RealTimePacer, period_ns
-from tests.rig.serving import Samples, changed, fast, run_once, served, small_rig
+from tests.rig.serving import Samples, changed, run_once, served, small_rig
 
 PERIOD_S = 0.001
-MS = 1_000_000
 DURATION_S = 0.2
 
 
@@ -14,15 +13,6 @@ def rig_at_one_millisecond() -> Rig:
     patient = {"feedback_timeout_s": 10.0}  # a test machine may be busy
     rig: Rig = changed(small_rig(), {"experiments.reversal": quick, "guard": patient})
     return rig.model_copy(update={"period_s": PERIOD_S})
-
-
-def test_a_run_without_a_clock_has_a_sample_each_millisecond() -> None:
-    samples = Samples()
-    with served(rig_at_one_millisecond()) as (_, rig):
-        summary = run_once(rig, samples, experiment="reversal", pacer=fast(rig))
-    assert samples.column("time_s") == [k / 1000 for k in range(200)]
-    assert summary.timing.period_ns == MS
-    assert summary.flagged == 0
 
 
 def test_a_run_on_the_clock_has_a_row_each_millisecond_late_or_not() -> None:

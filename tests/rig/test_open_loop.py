@@ -6,7 +6,7 @@ from hil.config.rig_file import read_rig
 from hil.errors import RigFileError, RunAborted
 from hil.rig.experiments.base import Phase
 from hil.rig.experiments.open_loop import OpenLoop
-from hil.rig.experiments.pulses import Pulses, Rest
+from hil.rig.experiments.pulses import Pulses
 from hil.rig.plan import plan_run
 from tests.rig.serving import EXAMPLE
 from tests.rig.vehicle import PERIOD_S, RigidVehicle, drive
@@ -27,12 +27,6 @@ def test_pulses_bring_speed_and_place_back() -> None:
     assert abs(vehicle.angle_rad) < 0.05  # the ramps of 20 and 40 ms between the steps differ; the swing is 0.4 rad
     assert course.phase[-1] is Phase.DONE
     assert course.torque_nm[-1] == 0.0
-
-
-def test_rest_asks_for_nothing() -> None:
-    course = drive(OpenLoop(Rest(2.0), 0.0, 0.5, PERIOD_S), RigidVehicle())
-    assert set(course.torque_nm) == {0.0}
-    assert course.phase.count(Phase.MEASURE) == 200
 
 
 def test_vehicle_that_moves_is_refused_before_any_torque() -> None:

@@ -8,12 +8,11 @@ import pytest
 
 from hil.commission.talk import Script
 from hil.errors import RunAborted
-from hil.rig.check import Verdict, check_rig
 from hil.rig.plc_watch import MOST_OF_RATED, plc_limits
-from hil.simulator.plc_device import PlcDevice, PlcSetup
+from hil.simulator.plc_device import PlcSetup
 from tests.commission.rigs import bench
 from tests.commission.test_engine import person
-from tests.rig.serving import changed, served, small_rig
+from tests.rig.serving import changed, small_rig
 from tests.rig.test_fitness import FIT
 
 RATED_NM, RPM = 600.0, 2.0 * math.pi / 60.0
@@ -39,21 +38,6 @@ def test_a_speed_limit_in_another_unit_is_not_believed(source: str, factor: floa
     _, speed = plc_limits(replace(FIT, speed_limit_rad_s=320.0 * factor), rig, drives_rad_s)
     assert speed.believed is (factor == 1.0)
     assert f"{source} 300 rad/s (2,865 rpm)" in speed.question
-
-
-def test_a_speed_limit_with_nothing_to_compare_is_only_asked() -> None:
-    _, speed = plc_limits(replace(FIT, speed_limit_rad_s=3056.0), small_rig(), None)
-    assert (speed.believed, speed.most) == (True, None)
-    assert "3,056 rad/s (29,183 rpm)" in speed.question
-
-
-def test_check_prints_the_limits_and_refuses_one_ten_times_too_high() -> None:
-    for torque_nm, verdict in ((450.0, Verdict.AGREES), (4500.0, Verdict.DIFFERS)):
-        with served(plc=PlcDevice(PlcSetup(torque_limit_nm=torque_nm))) as (_, rig):
-            plc = check_rig(rig)[-1]
-        assert plc.verdict is verdict
-        assert f"the PLC allows {torque_nm:,g} Nm" in plc.questions[0]
-        assert "rad/s" in plc.questions[1]
 
 
 @pytest.mark.parametrize("torque_nm", [pytest.param(450.0, marks=pytest.mark.campaign), 4500.0])

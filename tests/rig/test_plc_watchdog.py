@@ -10,7 +10,6 @@ from drivers.plc.register_map import load_register_map
 from drivers.resources import data_file
 from hil.errors import RunAborted
 from hil.rig.build import open_devices
-from hil.rig.check import check_rig
 from hil.rig.plc_loop import HostBeat
 from hil.simulator.addresses import Address
 from hil.simulator.rig_server import HOST_TIMEOUT_S, RigServer
@@ -36,13 +35,6 @@ def test_a_run_after_a_dead_host() -> None:
         for _ in range(2):
             lose_a_host(server)
             assert run_once(rig, Samples()).recorded > 0
-
-
-def test_a_check_after_a_dead_host() -> None:
-    with served() as (server, rig):
-        lose_a_host(server)
-        [plc] = [finding for finding in check_rig(rig) if finding.device == "plc"]
-    assert plc.notes == ()
 
 
 def test_the_host_beats_while_it_configures_and_arms() -> None:

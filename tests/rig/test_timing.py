@@ -26,14 +26,6 @@ def test_period_lateness_and_missed_cycles_are_counted() -> None:
     assert timing.period.total == 2
 
 
-def test_answers_are_counted_by_age_or_as_missing() -> None:
-    timing = RunTiming(10 * MS)
-    timing.begin(Tick(0, 0, 0), 0)
-    timing.answer(2 * MS)
-    timing.answer(None)
-    assert (timing.reply_age.max_ns, timing.reply_age.total, timing.unanswered) == (2 * MS, 1, 1)
-
-
 def test_document_has_the_histograms_and_their_quantiles() -> None:
     timing = RunTiming(10 * MS)
     for cycle in range(100):
@@ -62,6 +54,7 @@ def test_recording_keeps_timing_and_what_the_system_gave(
     assert not json.loads(metadata["real_time"])["scheduling"]["given"]
 
 
+@pytest.mark.campaign
 def test_real_time_run_says_what_was_granted(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "run.csv"
     printed = run_reversal(tmp_path, out, capsys, "--pace", "real")

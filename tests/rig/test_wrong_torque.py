@@ -2,11 +2,11 @@
 
 import pytest
 
-from drivers.errors import CommandRefused, WrongTorque
+from drivers.errors import WrongTorque
 from hil.sample import SampleFlag
 from hil.simulator.fault_table import rig_faults
 from tests.rig.observer import assert_disarmed
-from tests.rig.serving import Samples, changed, run_once, served, small_rig
+from tests.rig.serving import Samples, run_once, served, small_rig
 
 FROM_S = 4.3
 """In the middle of the measured part."""
@@ -56,11 +56,3 @@ def test_what_a_healthy_drive_does_is_recorded(fault: str) -> None:
         assert run_once(at, samples).recorded > 0
     if "weak" in fault:
         assert any(row.flags & SampleFlag.M1_LIMITED for row in samples.rows)
-
-
-def test_the_rig_file_limits_the_speed() -> None:
-    rig = changed(small_rig(), {"guard": {"speed_limit_rad_s": 0.2}})
-    with served(rig) as (server, at):
-        with pytest.raises(CommandRefused, match=r"speed is .* at most 0\.2 rad/s either way \(speed_limit_rad_s\)"):
-            run_once(at, Samples())
-        assert_disarmed(server.bus_url, 1, 2)

@@ -10,7 +10,7 @@ import pytest
 from estimator.identification.tracking.alarm import Alarm, Level
 from hil.recording import read_table
 from hil.store import RunStore, entry_of, register_run
-from hil.store.entry import ONLINE, alarms_of, found_changes, results_of, run_facts, statements
+from hil.store.entry import ONLINE, alarms_of, found_changes, results_of, run_facts
 from hil.store.rebuild import ONLINE_SCHEMA
 from hil.store.run_files import remove_files
 
@@ -71,17 +71,6 @@ def test_another_programs_document_has_no_alarms(tmp_path: Path, record: Record,
         store.attach(number, ONLINE, text)
         assert alarms_of(store.get(number)) == []
         assert store.get(number).alarms == 0
-
-
-def test_an_alarm_that_is_written_otherwise_is_shown_as_it_stands() -> None:
-    (line,) = statements({"alarms": [{"settled": True, "quantity": "damping"}]})
-    assert "damping" in line
-
-
-def test_an_alarm_comes_back_from_json_as_it_was() -> None:
-    assert Alarm.from_json(json.loads(json.dumps(SETTLED.as_json()))) == SETTLED
-    with pytest.raises(KeyError):
-        Alarm.from_json({})
 
 
 def test_a_recording_that_is_deleted_takes_its_course_along(tmp_path: Path, record: Record) -> None:

@@ -126,6 +126,7 @@ def test_player_plays_a_trace_onto_the_bus(tmp_path: Path) -> None:
     assert heard == played
 
 
+@pytest.mark.campaign
 def test_viewer_shows_both_drives(tmp_path: Path) -> None:
     """It needs a terminal: a pseudo-terminal wide enough for its table."""
     with served(bus_url="ws://127.0.0.1:0/") as (server, rig):

@@ -41,11 +41,6 @@ def test_a_sensor_elsewhere_in_the_line_has_no_clock_of_its_own(state: int, seed
     assert len(mended[0].channels) == 1
 
 
-def test_a_constant_lag_is_no_other_clock() -> None:
-    late = np.interp(TIME_S - 0.03, TIME_S, states()[:, LOAD_SPEED])
-    assert with_usable_channels([with_channel(late)])[1] == []
-
-
 @pytest.mark.parametrize("ppm", [-2000.0, 2000.0])
 def test_a_channel_by_another_clock_is_left_out(ppm: float) -> None:
     drifting = np.interp(TIME_S * (1.0 + ppm * 1e-6), TIME_S, states()[:, LOAD_SPEED])
@@ -73,12 +68,3 @@ def test_where_a_channel_is_dead_it_is_not_used() -> None:
     (channel,) = mended[0].channels
     assert np.flatnonzero(~channel.okay).tolist() == list(range(999, 1400))
     assert "from 9.99 to 13.99 s, while the motor moves" in warning
-
-
-def test_a_channel_that_stands_with_the_motor_is_not_dead() -> None:
-    still = np.zeros(N)
-    still[2000:] = 5.0 * np.sin(TIME_S[2000:] - TIME_S[2000])
-    channel = Channel(OutputKind.SPEED, Location.LOAD, "w2", np.round(still, 2), np.ones(N, dtype=np.bool_))
-    mended, warnings = with_usable_channels([replace(record(100.0 * still, still), channels=(channel,))])
-    assert warnings == []
-    assert mended[0].channels[0].okay.all()

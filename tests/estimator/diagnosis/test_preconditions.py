@@ -10,9 +10,9 @@ import pytest
 from estimator.diagnosis import diagnose
 from estimator.diagnosis.preconditions import FEWEST_SAMPLES, prepare
 from estimator.diagnosis.result import Verdict
-from estimator.errors import BadModel, BadShape, NotExciting
+from estimator.errors import BadShape, NotExciting
 from estimator.physics.driveline import Start
-from estimator.signals.record import Location, OutputKind, Record
+from estimator.signals.record import OutputKind, Record
 from tests.estimator.physics.bench import ONE_MASS, linear_record, model, random_steps
 
 LINE = model(ONE_MASS)
@@ -20,15 +20,6 @@ LINE = model(ONE_MASS)
 
 def drive(name: str = "run_1", samples: int = 400) -> Record:
     return linear_record(ONE_MASS, random_steps(samples, seed=1), Start(0.0, 0.0, 3.0), sigma=0.01, name=name)
-
-
-def test_recordings_that_belong_together_pass() -> None:
-    prepare([drive("a"), drive("b", 600)], LINE, [drive("c")])
-
-
-def test_no_recording_at_all() -> None:
-    with pytest.raises(BadShape, match="no recording was given, expected at least one"):
-        prepare([], LINE, [drive()])
 
 
 @pytest.mark.parametrize("holdout", [False, True])
@@ -45,20 +36,11 @@ def test_different_sampling_periods() -> None:
         prepare([drive(), slow], LINE, [])
 
 
-def test_a_period_that_differs_by_rounding_passes() -> None:
-    prepare([drive(), replace(drive("b"), sample_time_s=0.01 * (1.0 + 1e-4))], LINE, [])
-
-
 def test_different_outputs() -> None:
     position = replace(drive("turned"), kind=OutputKind.POSITION)
     message = r"recording turned: output is position at the motor, expected speed at the motor as in run_1"
     with pytest.raises(BadShape, match=message):
         prepare([drive()], LINE, [position])
-
-
-def test_an_output_that_the_structure_lacks() -> None:
-    with pytest.raises(BadModel, match="recording run_1: speed at the load is no output of one_mass"):
-        prepare([replace(drive(), location=Location.LOAD)], LINE, [])
 
 
 @pytest.mark.parametrize("samples", [FEWEST_SAMPLES - 1, 20])
@@ -72,16 +54,6 @@ def test_too_much_masked() -> None:
     rec = drive()
     with pytest.raises(NotExciting, match="run_1: 150 good samples, expected at least 200"):
         prepare([replace(rec, okay=np.arange(400) < 150)], LINE, [])
-
-
-def test_good_samples_in_scraps_only() -> None:
-    """300 good samples in stretches of 0.3 s, 2 s apart: none of them can tell its own start and load."""
-    rec = drive(samples=2300)
-    scraps = replace(rec, okay=np.arange(2300) % 230 < 30)
-    message = "run_1: gaps of more than 1 s cut it into 10 segments, none of which holds 2 s of good samples; it is not"
-    with pytest.raises(NotExciting, match=message) as refusal:
-        prepare([scraps], LINE, [])
-    assert refusal.value.names == ("run_1",)
 
 
 def test_another_number_of_torques() -> None:
@@ -110,14 +82,6 @@ def test_a_torque_that_never_changes() -> None:
     with pytest.raises(NotExciting, match=message) as refusal:
         prepare([drive(), flat], LINE, [])
     assert refusal.value.names == ("dead",)
-
-
-def test_an_output_that_never_changes_where_it_counts() -> None:
-    rec = drive()
-    okay = np.arange(400) >= 50
-    frozen = replace(rec, output=np.where(okay, 3.25, np.nan), okay=okay)
-    with pytest.raises(NotExciting, match=r"run_1: the output is constant at 3.25, expected it to vary"):
-        prepare([frozen], LINE, [])
 
 
 def test_the_diagnosis_refuses_before_it_fits() -> None:

@@ -29,16 +29,6 @@ def test_a_reading_cut_off_is_found(limit: float, sign: float) -> None:
     assert np.array_equal(found[0].rows, SWING >= limit)
 
 
-def test_both_limits() -> None:
-    found = clipped("speed", np.clip(SWING, -8.0, 8.5), SEEN)
-    assert {each.value for each in found} == {-8.0, 8.5}
-
-
-def test_noise_at_the_limit_is_cut_off_too() -> None:
-    noisy = SWING + 0.5 * np.random.default_rng(1).standard_normal(N)
-    assert [each.value for each in clipped("speed", np.minimum(noisy, 7.0), SEEN)] == [7.0]
-
-
 SOUND: dict[str, FloatArray] = {
     "a swing": SWING,
     "a swing read in coarse steps": np.round(SWING),
@@ -84,9 +74,3 @@ def test_a_torque_at_its_limit_is_reported_and_stays() -> None:
     assert len(warnings) == 1
     assert "recording run: torque input 2 stands at its limit 8 in " in warnings[0]
     assert "the verdict can't be trusted: mask these rows" in warnings[0]
-
-
-def test_sound_recordings_pass_as_they_are() -> None:
-    whole = drive()
-    records, warnings = without_clipped([whole])
-    assert (records[0] is whole, warnings) == (True, [])

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from estimator.diagnosis.preconditions import prepare
-from estimator.diagnosis.preconditions.channels import period_of, unwrapped
+from estimator.diagnosis.preconditions.channels import unwrapped
 from estimator.diagnosis.preconditions.thinned import not_read, without_not_read
 from estimator.physics.driveline import Start
 from estimator.signals.record import FloatArray, OutputKind, Record
@@ -80,13 +80,6 @@ def test_what_was_read_stays(name: str) -> None:
     assert not_read("speed", SOUND[name], SEEN, may_rest=False) == []
 
 
-def test_a_position_may_rest() -> None:
-    position = drive(OutputKind.POSITION).output
-    position[GAP] = position[GAP.start]
-    assert not_read("position", position, SEEN, may_rest=True) == []
-    assert not_read("speed", position, SEEN, may_rest=False) != []
-
-
 @pytest.mark.parametrize("period", [2.0 * np.pi, 0.5])
 def test_a_wrapped_position_is_put_together_again(period: float) -> None:
     record = drive(OutputKind.POSITION, sigma=1e-4)
@@ -97,14 +90,3 @@ def test_a_wrapped_position_is_put_together_again(period: float) -> None:
     assert record.name in warning
     if period > 1.0:
         assert np.ptp(offset) == pytest.approx(0.0, abs=1e-9)
-
-
-def test_what_does_not_wrap_stays() -> None:
-    position = drive(OutputKind.POSITION, sigma=1e-4).output
-    lost = position.copy() + 100.0
-    lost[::50] = 0.0
-    off = position.copy()
-    off[[500, 900]] += 5.0, 9.0
-    step = position + np.where(TIME_S > 15.0, 4.0 * np.ptp(position), 0.0)
-    for values in (position, lost, off, step, np.zeros(N)):
-        assert period_of(values, SEEN) is None

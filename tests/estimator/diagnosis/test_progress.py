@@ -62,6 +62,7 @@ def test_an_exception_from_it_cancels(after: float) -> None:
     assert [share for share in reported if share >= after] == reported[-1:]
 
 
+@pytest.mark.campaign
 def test_without_anybody_listening_the_answer_is_the_same() -> None:
     records = rubbing(lambda speed: 12.0)
     heard = diagnose(records, LINE, progress=lambda message, share: None)

@@ -11,9 +11,8 @@ import pytest
 from estimator.diagnosis import diagnose
 from estimator.diagnosis.chain import replay
 from estimator.diagnosis.noise import noise_floor
-from estimator.diagnosis.preconditions import prepare
 from estimator.diagnosis.result import Course, Discrepancy, Equivalent, Estimated, Profile, Response, Verdict
-from estimator.diagnosis.segments import FEWEST_SAMPLES, LONG_S, LONG_SAMPLES, cut, joined, segments, tiles
+from estimator.diagnosis.segments import FEWEST_SAMPLES, LONG_S, cut, joined, segments
 from estimator.errors import NotExciting
 from estimator.physics.driveline import Start
 from estimator.signals.record import Record, sliced
@@ -46,18 +45,6 @@ def drive(samples: int = 3000, bad: Rows = (), name: str = "run", load_nm: float
 )
 def test_where_segments_are(bad: Rows, parts: Rows) -> None:
     assert segments(drive(bad=bad)) == [slice(*part) for part in parts]
-
-
-def test_a_few_lost_samples_are_no_gap_where_sampling_is_slow() -> None:
-    slow = replace(drive(bad=[(1000, 1000 + LONG_SAMPLES)]), sample_time_s=1.0)
-    assert segments(slow) == [slice(0, 3000)]
-
-
-def test_a_recording_without_long_gaps_stays_as_it_is() -> None:
-    whole = drive(bad=[(700, 740)])
-    found = cut([whole])
-    assert found.records[0] is whole
-    assert (dict(found.rows), found.warnings) == ({}, ())
 
 
 def test_segments_keep_the_time_and_go_by_names_of_their_own() -> None:
@@ -99,19 +86,6 @@ def test_of_a_segment_of_a_part_time_counts_from_the_very_beginning() -> None:
     assert quarter.offset_s is not None
     assert quarter.torque_okay is not None
     assert quarter.offset_s.shape == quarter.torque_okay.shape == (200,)
-
-
-def test_a_held_out_recording_in_scraps_is_reported_and_not_used() -> None:
-    ready = prepare([drive()], LINE, [replace(drive(name="unseen"), okay=np.arange(3000) % 300 < 100)])
-    assert ready.holdout == ()
-    assert "recording unseen: gaps of more than 1 s cut it into 10 segments, none of which" in ready.warnings[0]
-
-
-def test_tiles_are_all_rows_each_from_where_a_segment_begins() -> None:
-    whole = drive(bad=[(500, 900), (905, 1400)])
-    parts = tiles(whole)
-    assert [part.time_s.size for part in parts] == [1400, 1600]
-    assert tiles(drive(bad=[(500, 540)]))[0].time_s.size == 3000
 
 
 def test_a_part_too_short_for_the_noise_is_left_to_the_others() -> None:
@@ -193,14 +167,3 @@ def test_courses_intervals_and_texts_are_joined() -> None:
     assert merged.time_s[4] == whole.time_s[1500]
     assert result.discrepancy.responses["run"] is response[1]
     assert profile[0].unit == "Nm"
-
-
-def test_names_of_many_segments_are_not_mixed_up() -> None:
-    bad = [(310 * i + 200, 310 * i + 310) for i in range(14)]
-    parts = cut([drive(4500, bad=bad)])
-    assert len(parts.records) > 10
-    base = diagnose([drive(600)], LINE)
-    said = replace(
-        base, statement="run#12 and run#1", traces=(), load_torque={}, mismatch=replace(base.mismatch, time_s={})
-    )
-    assert joined(said, parts).statement == "run and run"

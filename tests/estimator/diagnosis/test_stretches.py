@@ -17,13 +17,6 @@ def lasting(samples: int, name: str = "run") -> Record:
     return record(np.zeros(samples), np.zeros(samples), name=name)
 
 
-def test_what_is_short_enough_is_left_whole() -> None:
-    records = [lasting(MOST_SAMPLES // 2, "a"), lasting(MOST_SAMPLES // 2, "b")]
-    found = cut(records)
-    assert [each.output.size for each in found.records] == [MOST_SAMPLES // 2] * 2
-    assert found.warnings == ()
-
-
 def test_of_what_is_longer_stretches_from_beginning_to_end_are_used() -> None:
     rec = lasting(10 * MOST_SAMPLES)
     parts = stretches(rec, [slice(0, rec.output.size)], share_of([rec]))
@@ -47,10 +40,3 @@ def test_many_short_recordings_stay_whole() -> None:
     found = cut(records)
     assert [each.output.size for each in found.records] == [samples] * len(records)
     assert found.warnings == ()
-
-
-def test_it_is_reported() -> None:
-    (warning,) = cut([lasting(2 * MOST_SAMPLES)]).warnings
-    assert warning == (
-        "recording run: 300 s of its 600 s are used, in 5 stretches, each with its own initial state and constant load."
-    )

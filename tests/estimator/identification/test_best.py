@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from estimator.identification.best import BestEstimate, Verdict, best_estimate
-from estimator.identification.linear_model import LinearModel, Orders
+from estimator.identification.linear_model import Orders
 from estimator.identification.modes.physical import NAMES, two_mass_model
 from estimator.identification.modes.uncertainty import Uncertain
 from estimator.identification.offline.fits import LinearFit, fit_box_jenkins, fit_output_error, problem_of
@@ -91,18 +91,6 @@ def test_healthy_recordings_pass_their_own_residual_tests(buses: int, independen
     assert sum(best.validation.independence.is_independent for best in found) >= independent
     assert sum(best.verdict is Verdict.GOOD for best in found) >= good  # tests of linearity and feedback fail, too
     assert all(best.linearity.is_linear for best in found)
-
-
-def test_one_mass_has_no_pair() -> None:
-    rng = np.random.default_rng(0)
-    torque = 150.0 + prbs_nm(3000, 60.0)
-    speed = 60.0 + LinearModel((-0.9995,), (1e-4,), 1, PERIOD_S).simulate(torque - 150.0)
-    measured = speed + 0.04 * rng.normal(size=3000)
-    record = Record("one", PERIOD_S, PERIOD_S * np.arange(3000), torque[:, np.newaxis], measured, np.ones(3000, bool))
-    best = best_estimate(record)
-    assert best.mode is None
-    assert best.verdict is Verdict.ONE_MASS
-    assert best.reason
 
 
 def lost(record: Record, okay: BoolArray) -> Record:

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from estimator.errors import BadModel, BadSetting, BadShape
+from estimator.errors import BadSetting
 from estimator.identification.linear_model import LinearModel, Orders
 
 MODEL = LinearModel(a=(-1.5, 0.7), b=(0.4, -0.1, 0.3), nk=2, sample_time_s=0.02)
@@ -16,21 +16,6 @@ def test_the_difference_equation_is_the_stated_convention() -> None:
         past_u = [u[t - 2 - j] if t >= 2 + j else 0.0 for j in range(3)]
         y[t] = 1.5 * past_y[0] - 0.7 * past_y[1] + 0.4 * past_u[0] - 0.1 * past_u[1] + 0.3 * past_u[2]
     np.testing.assert_allclose(MODEL.simulate(u), y, atol=1e-12)
-
-
-def test_theta_there_and_back() -> None:
-    assert LinearModel.from_theta(MODEL.theta, MODEL.orders, 0.02) == MODEL
-    assert MODEL.orders == Orders(na=2, nb=3, nk=2)
-    assert MODEL.orders.names == ("a_1", "a_2", "b_1", "b_2", "b_3")
-    assert MODEL.A.tolist() == [1.0, -1.5, 0.7]
-    assert MODEL.B.tolist() == [0.0, 0.0, 0.4, -0.1, 0.3]
-
-
-def test_poles_and_zeros_are_roots_in_z() -> None:
-    np.testing.assert_allclose(np.polyval([1.0, -1.5, 0.7], MODEL.poles), 0.0, atol=1e-12)
-    np.testing.assert_allclose(np.polyval([0.4, -0.1, 0.3], MODEL.zeros), 0.0, atol=1e-12)
-    assert MODEL.is_stable
-    assert not LinearModel((-1.0,), (1.0,), 1, 0.02).is_stable
 
 
 def test_the_frequency_response_is_that_of_a_settled_sine() -> None:
@@ -61,13 +46,3 @@ def test_the_state_continues_an_interrupted_simulation() -> None:
 def test_impossible_orders_are_refused(orders: tuple[int, int, int], named: str) -> None:
     with pytest.raises(BadSetting, match=named):
         Orders(*orders)
-
-
-def test_coefficients_that_are_not_finite_are_refused() -> None:
-    with pytest.raises(BadModel, match="finite"):
-        LinearModel((np.nan,), (1.0,), 1, 0.02)
-
-
-def test_a_theta_of_the_wrong_length_is_refused() -> None:
-    with pytest.raises(BadShape, match=r"shape \(3,\), expected \(5,\)"):
-        LinearModel.from_theta(np.zeros(3), MODEL.orders, 0.02)

@@ -1,14 +1,12 @@
 """Effects at the load, against the reference."""
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from estimator.physics.driveline import Start
-from estimator.physics.grid import Grid, grid_for
-from estimator.physics.kernel.state_vector import LOAD_SPEED
+from estimator.physics.grid import Grid
 from estimator.physics.layout import flat_values
 from estimator.physics.simulate import simulate
 from estimator.signals.record import FloatArray
@@ -17,7 +15,6 @@ from tests.estimator.physics.bench import SAMPLE_TIME_S, TWO_MASS, model
 from tests.estimator.physics.law_bench import (
     SIGN_WIDTH,
     START,
-    SUBSTEPS,
     TIME_S,
     TORQUE,
     assert_law,
@@ -68,25 +65,6 @@ def test_dry_friction_at_the_load_deflects_before_it_slides() -> None:
     assert np.max(np.abs(rigid - expected)) > 2e-3 * np.ptp(expected)
 
 
-def test_a_brake_deflects_before_it_slides_and_lets_go() -> None:
-    from_s, to_s = BRAKED_S
-    brake = {"brake_nm": 60.0, "presliding_rad": 0.004, "from_s": from_s, "to_s": to_s}
-    assert_law({"brake_drag": brake}, against_bristles(lasting(60.0, from_s, to_s), 0.004), tolerance=1e-3)
-
-
-def test_a_load_that_sticks_stands_still() -> None:
-    """A torque below that of breaking away deflects the bristles, and no more."""
-    line, pushed = model(TWO_MASS), np.full(400, 20.0)
-    stuck = flat_values(TWO_MASS, {"coulomb_friction_load": {"friction_nm": 60.0, "presliding_rad": 1e-5}})
-    rec, grid = measured(np.ones(400), pushed), grid_for(line, [measured()])
-    at_rest = Start(load_torque_nm=12.0, angle_rad=0.0, speed_rad_s=0.0)
-    speed = simulate(grid, rec, stuck, at_rest, output=LOAD_SPEED)
-    assert np.max(np.abs(speed)) < 1e-2
-    assert np.max(np.abs(speed[-50:])) < 1e-3
-    rounded = simulate(grid, rec, flat_values(TWO_MASS, {"coulomb_friction_load": {"friction_nm": 60.0}}), at_rest)
-    assert np.all(rounded[-50:] > 1e-3)
-
-
 def test_air_drag_grows_with_the_square_of_the_loads_speed() -> None:
     line = two_mass(drag=lambda t, w: 15.0 * w * abs(w))
     assert_law({"aerodynamic_drag": {"drag_nm_s2": 15.0}}, solved(line))
@@ -112,17 +90,6 @@ def test_warming_oil_loses_viscous_friction() -> None:
     cold, tau = 25.0, 0.7
     line = two_mass(drag=lambda t, w: cold * np.exp(-t / tau) * w)
     assert_law({"warming_friction": {"cold_nm_s": cold, "time_constant_s": tau}}, solved(line))
-
-
-def test_in_a_part_of_a_recording_time_counts_from_its_beginning() -> None:
-    cold, tau = 40.0, 0.7
-    line = two_mass(drag=lambda t, w: cold * np.exp(-(t + 0.6) / tau) * w)
-    effects = {"warming_friction": {"cold_nm_s": cold, "time_constant_s": tau}}
-    assert_law(effects, solved(line), replace(measured(), began_s=-0.6))
-    brake = lasting(60.0, 0.5, 1.6)
-    line = two_mass(drag=lambda t, w: brake(t) * sign(w))
-    effects = {"brake_drag": {"brake_nm": 60.0, "from_s": 1.1, "to_s": 2.2}}
-    assert_law(effects, solved(line, (0.5, 1.6)), replace(measured(), began_s=-0.6), tolerance=3e-4)
 
 
 @pytest.mark.parametrize("motor_turns", [1.0, 3.3])
@@ -239,13 +206,3 @@ def test_friction_brakes_the_wheel_and_air_the_vehicle() -> None:
         "aerodynamic_drag": {"drag_nm_s2": 15.0},
     }
     assert_same(kernel_output(effects, measured()), expected, kernel_output({"tyre_slip": tyre}, measured()))
-
-
-def test_a_road_acts_next_to_the_constant_load() -> None:
-    profile = 40.0 * np.sin(2.0 * np.pi * TIME_S / 1.5)
-    steps = Held.of(profile, SAMPLE_TIME_S)
-    line = two_mass(drag=lambda t, w: steps.at(t))
-    expected = solved(line, tuple(TIME_S[1:-1]))
-    grid = Grid(model(TWO_MASS).structure, SUBSTEPS, SIGN_WIDTH)
-    out = simulate(grid, measured(), flat_values(TWO_MASS, {}), START, profile)
-    assert_same(out, expected, kernel_output({}, measured()))

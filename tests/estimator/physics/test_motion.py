@@ -7,22 +7,12 @@ from estimator.physics.motion import (
     measured_speed,
     reverses,
     speed_by_place,
-    speed_scale,
     torque_reverses,
-    torque_scale,
 )
 from estimator.signals.record import OutputKind
 from tests.estimator.physics.bench import record
 
 TIME_S = np.arange(500) * 0.01
-
-
-def test_a_measured_speed_is_passed_on_but_for_masked_samples() -> None:
-    okay = np.ones(500, dtype=bool)
-    okay[7:9] = False
-    speed = measured_speed(record(np.ones(500), TIME_S, okay=okay))
-    assert np.all(np.isnan(speed[7:9]))
-    np.testing.assert_array_equal(speed[okay], TIME_S[okay])
 
 
 @pytest.mark.parametrize("sample_time_s", [0.01, 0.001, 0.05])
@@ -35,20 +25,6 @@ def test_the_speed_of_a_parabola_is_exact_inside(sample_time_s: float) -> None:
     half = max(1, round(0.01 / sample_time_s))
     assert inside.sum() == 500 - 2 * half
     np.testing.assert_allclose(speed[inside], 6.0 * time_s[inside], rtol=1e-9, atol=1e-9)
-
-
-def test_a_masked_position_leaves_no_speed_around_it() -> None:
-    okay = np.ones(500, dtype=bool)
-    okay[100] = False
-    speed = measured_speed(record(np.ones(500), TIME_S, kind=OutputKind.POSITION, okay=okay))
-    assert set(np.flatnonzero(np.isnan(speed))) == {0, 99, 101, 499}
-
-
-def test_scales_are_the_99th_percentile_of_the_largest_recording() -> None:
-    ramp = np.arange(1001) / 10.0
-    small, large = record(ramp, ramp, name="a"), record(np.column_stack([ramp, -3.0 * ramp]), -2.0 * ramp, name="b")
-    assert torque_scale([small, large]) == pytest.approx(198.0)
-    assert speed_scale([small, large]) == pytest.approx(198.0)
 
 
 @pytest.mark.parametrize(
@@ -69,14 +45,6 @@ def test_a_backward_creep_below_a_hundredth_of_the_speed_is_no_reversal(creep: f
 @pytest.mark.parametrize(("low", "expected"), [(-100.0, True), (-9.0, False), (0.0, False), (-20.0, True)])
 def test_a_torque_reversal_must_be_a_tenth_of_the_torque(low: float, expected: bool) -> None:
     assert torque_reverses(record(np.linspace(low, 100.0, 500))) is expected
-
-
-def test_a_short_pulse_is_measured_by_its_peak_and_rest_by_one() -> None:
-    torque = np.zeros(500)
-    assert torque_scale([record(torque)]) == 1.0
-    torque[100:103] = -400.0
-    assert torque_scale([record(torque)]) == 400.0
-    assert speed_scale([record(torque, torque)]) == 400.0
 
 
 def test_a_swing_that_repeats_passes_each_place_at_one_speed() -> None:

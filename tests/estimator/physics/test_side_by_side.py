@@ -8,7 +8,7 @@ import pytest
 
 from estimator.physics.driveline import Case, Start
 from estimator.physics.grid import Grid
-from estimator.physics.kernel.side_by_side import go_side_by_side, kin_together, leading_kin
+from estimator.physics.kernel.side_by_side import go_side_by_side
 from estimator.physics.layout import flat, slot
 from estimator.physics.model import DrivelineModel, EffectValue, Parameter, Structure
 from estimator.physics.simulate import simulate_each, simulate_records
@@ -123,28 +123,6 @@ def test_lines_of_several_makes_in_any_order_are_each_as_alone() -> None:
     together = simulate_each(grid, rec, mixed)
     alone = np.array([simulate_each(grid, rec, [case])[0] for case in mixed])
     assert_same_to_rounding(together, alone)
-
-
-def test_lines_that_are_fed_alike_next_to_others() -> None:
-    """As the columns of a Jacobian: most have the lag of the first, one has another, one another torque."""
-    line = line_with(TWO_MASS, ON_THE_SHAFT["gap behind a lag"])
-    grid, rec = Grid(line.structure, SUBSTEPS, 0.02), record(random_steps(400, seed=7), np.ones(400))
-    lines = [flat(line) for _ in range(6)]
-    for i, p in enumerate(lines):
-        p[slot("", "k")] *= 1.0 + 0.01 * i
-    lines[2][slot("actuator_lag", "time_constant_s")] *= 1.1
-    lines[4][slot("inverter_gain_mismatch", "gain_m1")] = 1.05
-    cases = [Case(p, START) for p in lines]
-    assert_same_to_rounding(
-        simulate_each(grid, rec, cases), np.array([simulate_each(grid, rec, [case])[0] for case in cases])
-    )
-
-
-def test_kin_follow_each_other() -> None:
-    p = np.array([flat(line_with(TWO_MASS, effects)) for effects in (SLIDER, {}, SLIDER, QUADRATIC, {}, SLIDER)])
-    order = kin_together(p)
-    assert order.tolist() == [0, 2, 5, 1, 4, 3]
-    assert [leading_kin(p, order[i:]) for i in (0, 3, 5)] == [3, 2, 1]
 
 
 @pytest.mark.parametrize("place", ["between_kg_m2", "behind_kg_m2"])

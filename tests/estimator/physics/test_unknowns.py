@@ -1,16 +1,14 @@
 """What a fit may change: bounds and scales of the shared unknowns, and what every recording has of its own."""
 
-from dataclasses import astuple, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from estimator.physics.driveline import Start
 from estimator.physics.effect import Held, Within
-from estimator.physics.effects.load import grade_basis
 from estimator.physics.effects.torque import ORDERS
 from estimator.physics.layout import flat, slot
-from estimator.physics.model import DrivelineModel, Parameter, Structure
 from estimator.physics.unknowns import effect_unknowns, local_basis, nominal_unknowns, own_unknowns, released
 from estimator.signals.record import OutputKind
 from tests.estimator.physics.bench import ONE_MASS, TWO_MASS, linear_record, model, random_steps
@@ -89,17 +87,6 @@ def test_own_parameters_are_put_into_their_recordings_vector_alone() -> None:
     assert np.isinf(basis.low[: basis.own_rows.start]).all()
 
 
-def test_three_masses_start_with_two_twists() -> None:
-    values = TWO_MASS | {"J_2": 0.8, "k_2": 9000.0, "c_2": 4.0}
-    line = DrivelineModel(
-        Structure.THREE_MASS, {name: Parameter(values[name], 0.2) for name in Structure.THREE_MASS.parameter_names}
-    )
-    rec = linear_record(TWO_MASS, random_steps(500, seed=2), CRUISE)
-    basis = local_basis(line, rec, profile=False)
-    start = basis.start(np.arange(1.0, 7.0) / basis.scale)
-    np.testing.assert_allclose(astuple(start), [1.0, 0.0, 2.0, 3.0, 4.0, 5.0, 6.0, 0.0])
-
-
 @pytest.mark.parametrize("kind", [OutputKind.SPEED, OutputKind.POSITION])
 @pytest.mark.parametrize("values", [ONE_MASS, TWO_MASS])
 def test_unknowns_and_start_are_one_to_one(values: dict[str, float], kind: OutputKind) -> None:
@@ -125,27 +112,3 @@ def test_the_guess_is_read_off_a_steady_recording() -> None:
     assert start.speed_rad_s == pytest.approx(30.0, abs=0.1)
     assert start.load_speed_rad_s == pytest.approx(30.0, abs=0.1)
     assert start.load_torque_nm == pytest.approx(load, abs=0.5)
-
-
-def test_masked_first_samples_are_not_guessed_from() -> None:
-    rec = linear_record(ONE_MASS, random_steps(500, seed=5), Start(0.0, 3.0, 10.0), kind=OutputKind.POSITION)
-    rec.okay[:20] = False
-    rec.output[:20] = np.nan
-    basis = local_basis(model(ONE_MASS), rec, profile=False)
-    start = basis.start(basis.guess)
-    assert start.angle_rad == pytest.approx(rec.output[20])
-    assert np.isfinite([start.speed_rad_s, start.load_torque_nm]).all()
-
-
-def test_a_profile_adds_a_load_over_time_and_nothing_else() -> None:
-    rec = linear_record(ONE_MASS, random_steps(1000, seed=6), Start(0.0, 0.0, 10.0))
-    plain = local_basis(model(ONE_MASS), rec, profile=False)
-    basis = local_basis(model(ONE_MASS), rec, profile=True)
-    splines = grade_basis(rec.time_s)
-    assert plain.extra_load(plain.guess) is None
-    assert basis.guess.size == plain.guess.size + splines.shape[0]
-    np.testing.assert_array_equal(basis.extra_load(basis.guess), np.zeros(1000))
-    x = basis.guess.copy()
-    x[-2] = 3.0
-    np.testing.assert_allclose(basis.extra_load(x), 3.0 * basis.scale[-2] * splines[-2])
-    assert basis.start(x) == plain.start(plain.guess)

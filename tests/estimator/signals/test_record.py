@@ -55,13 +55,6 @@ def recording(size: int) -> Record:
     return Record("run", 0.01, time_s, np.ones((size, 2)), np.zeros(size), np.ones(size, dtype=bool))
 
 
-def test_recordings_alike_are_not_taken_for_each_other() -> None:
-    one, other = recording(5), recording(5)
-    assert one.total_torque_nm is one.total_torque_nm
-    assert one.total_torque_nm is not other.total_torque_nm
-    np.testing.assert_allclose(one.since_start_s, 0.01 * np.arange(5), atol=1e-12)
-
-
 def test_it_is_forgotten_with_the_recording() -> None:
     class Weight:
         alive = 0
@@ -95,18 +88,3 @@ def test_even_stamps_give_their_step(period_s: float, start_s: float) -> None:
 def test_jitter_does_not_spoil_it(seed: int, jitter_s: float) -> None:
     jitter = jitter_s * np.random.default_rng(seed).standard_normal(3000)
     assert uniform_period_s(0.01 * np.arange(3000) + jitter) == 0.01
-
-
-def test_rounding_does_not_spoil_it() -> None:
-    period_s = 1.0 / 120.0
-    assert uniform_period_s(np.round(period_s * np.arange(3000), 3)) == pytest.approx(period_s, rel=1e-6)
-
-
-def test_a_period_that_is_not_round_is_kept() -> None:
-    """A clock 20 ppm fast, with a jitter that determines the period to 1 ppm."""
-    jitter = 1e-4 * np.random.default_rng(1).standard_normal(30_000)
-    assert uniform_period_s(0.0100002 * np.arange(30_000) + jitter) == pytest.approx(0.0100002, rel=1e-6)
-
-
-def test_two_stamps_give_their_difference() -> None:
-    assert uniform_period_s(np.array([1.0, 1.25])) == 0.25

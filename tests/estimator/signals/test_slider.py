@@ -27,7 +27,3 @@ def test_back_and_forth_it_yields_twice_its_width_behind_each_turn(top: float) -
     found = carried(np.concatenate([up, down]), WIDTH)[up.size :]
     behind = top - down
     assert found == pytest.approx(WIDTH - np.minimum(behind, 2.0 * WIDTH))
-
-
-def test_a_single_value_moves_nothing() -> None:
-    assert carried(np.array([3.0]), WIDTH).tolist() == [0.0]

@@ -65,20 +65,3 @@ def test_a_payload_that_goes_leaves_the_speed_and_quickens_the_bus(lossless, tra
     for part, share in ((first, 1.0), (last, 0.7)):
         rate = np.gradient(momentum_m[part] + share * p.J_L * momentum_l[part], 0.01)
         assert rate.mean() == pytest.approx(100.0, rel=0.01)
-
-
-def test_a_heavier_bus_is_pulled_more_by_a_hill(lossless, trace):
-    road = np.array([[100.0, 0.001, 0.0]])  # a tenth uphill for hundreds of metres
-    p = lossless._replace(road=road, metres_per_rad=0.0857, gravity_nm=8000.0, payload_share=0.5, payload_rise_s=1e-3)
-    light, heavy = (
-        trace(q, [0.0] * 200, speed_rad_s=60.0)[-1, State.SPEED_L] for q in (p._replace(payload_share=0.0), p)
-    )
-    # weight and inertia grow alike; the motor's inertia, which helps the bus along, does not
-    assert 0.0 < light - heavy < 0.02 * (60.0 - light)
-
-
-def test_cold_oil_warms_to_the_data_sheet(plain):
-    p = plain._replace(cold_factor=3.0, warming_time_s=5.0)
-    factors = [laws.viscosity_over_warm(p, time_s) for time_s in (0.0, 5.0, 100.0)]
-    np.testing.assert_allclose(factors, [3.0, 3.0 ** np.exp(-1.0), 1.0], rtol=1e-6)
-    assert laws.viscosity_over_warm(plain, 0.0) == 1.0

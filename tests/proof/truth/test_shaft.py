@@ -72,15 +72,6 @@ def test_hysteresis_damps_a_large_swing_and_leaves_a_small_one(lossless, trace, 
     assert peaks[1] < 0.6
 
 
-def test_an_open_gap_carries_no_hysteresis(plain, trace, twist):
-    p = plain._replace(gap_rad=0.02, hysteresis_stiffness=1600.0, hysteresis_slip_rad=0.03, b_M=0.0)
-    states = trace(p, [100.0] * 600 + [-100.0] * 100, period_s=0.001)
-    across = np.abs(twist(states)) < 0.5 * p.gap_rad - 1e-4
-    inside = across[:-1] & across[1:] & (np.arange(across.size - 1) >= 600)
-    assert inside.any()
-    np.testing.assert_allclose(np.diff(states[:, State.SPEED_M])[inside] / 0.001, -100.0 / p.J_M, rtol=1e-6)
-
-
 def test_a_bent_joint_leads_and_lags_twice_per_turn(plain):
     bend = 0.2
     p = plain._replace(joint_angle_rad=bend)

@@ -81,6 +81,7 @@ def _longer_rates(time_s, y, p, torque):
     ]
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("at_motor", [True, False])
 def test_agrees_with_a_stiff_integration_of_four_masses_and_their_laws(plain, trace, at_motor):
     p = plain._replace(

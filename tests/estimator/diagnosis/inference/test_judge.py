@@ -13,7 +13,6 @@ from estimator.diagnosis.inference.judge import (
     levels,
     probability_of,
     shares,
-    shares_with_grade,
     tempered_by,
     verdict_of,
 )
@@ -43,32 +42,12 @@ def test_an_effect_that_takes_anothers_place_has_its_share_too() -> None:
     assert found == pytest.approx({"lag": 0.6, "payload": 0.35})
 
 
-def test_a_step_without_a_new_effect_changes_all_in_proportion() -> None:
-    written_another_way = shares(path(("", 100.0), ("lag", 60.0), ("lag brake", 40.0), ("lag brake", 10.0)))
-    assert written_another_way == pytest.approx({"lag": 0.6, "brake": 0.3})
-    dropped = shares(path(("", 100.0), ("lag", 60.0), ("lag brake", 40.0), ("brake", 41.0)))
-    assert dropped == pytest.approx({"brake": 0.59})
-
-
 def test_a_set_leaves_no_more_than_one_that_it_holds() -> None:
     """However poor the least-squares fit of the larger one is: what it does not gain is not shared out either."""
     assert levels(path(("", 100.0), ("lag", 10.0), ("lag brake", 60.0), ("brake", 50.0))) == [100.0, 10.0, 10.0, 50.0]
     assert shares(path(("", 100.0), ("lag", 10.0), ("lag brake", 60.0), ("lag brake slip", 40.0))) == pytest.approx(
         {"lag": 0.9, "brake": 0.0, "slip": 0.0}
     )
-
-
-def test_a_grade_has_what_no_other_effect_is_needed_for() -> None:
-    """A brake that was found before the grade leaves hardly more without it: the error goes with the grade."""
-    nothing, best = path(("", 100.0), ("brake lag road_grade", 4.0))
-    without = path(("lag road_grade", 4.1), ("brake road_grade", 34.0), ("brake lag", 30.0))
-    visited = {each.effects: each for each in without}
-    found = shares_with_grade(best, visited, nothing)
-    assert found == pytest.approx({"brake": 0.001, "lag": 0.3, "road_grade": 0.659})
-
-
-def test_without_effects_nothing_is_shared_out() -> None:
-    assert shares(path(("", 100.0))) == {}
 
 
 def test_a_probability_sums_over_all_sets_that_hold_the_effect_or_a_look_alike() -> None:

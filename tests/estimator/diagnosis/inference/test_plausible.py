@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
-from estimator.diagnosis.inference.disturbances import Limits, Size, limits_for
+from estimator.diagnosis.inference.disturbances import Limits, limits_for
 from estimator.diagnosis.inference.likelihood import Hypothesis
-from estimator.diagnosis.inference.plausible import LOOSE, is_plausible, loosened, may_be_loose
-from estimator.diagnosis.inference.search import GRADE
+from estimator.diagnosis.inference.plausible import LOOSE, is_plausible, loosened
 from estimator.physics.fit import FitResult, not_fitted
 from estimator.physics.problem import make_problem, start_vector
 from estimator.physics.unknowns import effect_unknowns, nominal_unknowns
@@ -52,13 +50,6 @@ def test_values_that_are_no_case_of_an_effect(name: str, values: Mapping[str, fl
     assert is_plausible(hypothesis_with({name: values}), BENCH.model, BENCH.records) is expected
 
 
-def test_a_load_that_walks_beyond_all_torque_is_no_road() -> None:
-    hypothesis = hypothesis_with({})
-    sizes = hypothesis.sizes.copy()
-    sizes[Size.WALK] = np.log(1e5)
-    assert not is_plausible(replace(hypothesis, effects=frozenset({GRADE}), sizes=sizes), BENCH.model, BENCH.records)
-
-
 def at(hypothesis: Hypothesis, name: str, x: float) -> Hypothesis:
     plain: FitResult = hypothesis.plain
     moved = plain.x.copy()
@@ -76,11 +67,3 @@ def test_friction_that_warms_is_described_somewhere_between_cold_and_warm() -> N
     assert low == pytest.approx((1.0 - BENCH.model.parameters["b_L"].tolerance) / LOOSE)
     assert is_plausible(at(at_bound, "b_L", 0.2), BENCH.model, BENCH.records)  # 1.2 when cold
     assert not is_plausible(at(at_bound, "b_L", 2.0), BENCH.model, BENCH.records)  # 2 to 3
-
-
-def test_nothing_is_loose_that_no_effect_changes() -> None:
-    lag = {"actuator_lag": {"time_constant_s": 0.01}}
-    assert loosened(at(hypothesis_with(lag), "b_L", 1.0 - BENCH.model.parameters["b_L"].tolerance), BENCH.model) is None
-    k = next(each for each in nominal_unknowns(BENCH.model) if each.name == "k")
-    assert may_be_loose(k, frozenset({"stiffness_change"}), BENCH.model)
-    assert not may_be_loose(k, frozenset({"warming_friction", GRADE}), BENCH.model)

@@ -142,15 +142,6 @@ def test_all_outputs_of_a_recording_are_whitened_together(missing: tuple[int, ..
     assert filtered.logs.sum() == pytest.approx(np.log(np.diag(lower)).sum(), abs=2e-3)
 
 
-def test_recordings_are_whitened_each_by_itself(result: FitResult) -> None:
-    uses = [np.ones(30, dtype=bool), np.ones(50, dtype=bool)]
-    stacked = np.random.default_rng(3).standard_normal(80)
-    line = line_of(result)
-    whole = of_one_output(line, uses)(SIZES)(stacked)
-    dense = cholesky(block_diag(*(covariance(line, SIZES, use.size) for use in uses)), lower=True)
-    np.testing.assert_allclose(whole, solve_triangular(dense, stacked, lower=True), rtol=2e-4, atol=1e-4)
-
-
 @pytest.mark.parametrize("seed", range(3))
 def test_the_sizes_that_made_an_error_are_found(result: FitResult, seed: int) -> None:
     count = 700

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from estimator.diagnosis.line.blocks import lines, spread_stretches
-from estimator.diagnosis.line.motion import block_mean, block_mean_of
+from estimator.diagnosis.line.motion import block_mean
 from estimator.diagnosis.line.tangent import block_length
 from estimator.physics.driveline import Start
 from estimator.physics.fit import fit
@@ -28,13 +28,6 @@ def test_fast_sampling_is_cut_into_blocks_and_slow_sampling_is_not() -> None:
     assert line.size == 1500 // length
     middle = block_mean(states[:, TWIST], length)
     assert np.max(np.abs(line.motion.twist - middle)) < 0.02 * np.ptp(middle)
-
-
-def test_masked_samples_do_not_count_in_a_block() -> None:
-    values, use = np.array([1.0, 99.0, 3.0, 4.0, 99.0, 99.0]), np.array([True, False, True, True, False, False])
-    mean, weight = block_mean_of(values, use, 2)
-    np.testing.assert_array_equal(mean, [1.0, 3.5, 0.0])
-    np.testing.assert_array_equal(weight, [1, 2, 0])
 
 
 def test_a_long_recording_is_used_in_stretches_from_end_to_end() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from estimator.diagnosis.line.motion import AROUND, FormPlace, change_around, form_changes, motion_of
+from estimator.diagnosis.line.motion import FormPlace, form_changes, motion_of
 from estimator.physics.driveline import Start
 from estimator.physics.fit import fit, not_fitted
 from estimator.physics.problem import make_problem, start_vector
@@ -46,18 +46,6 @@ def changes(**effects: dict[str, float]) -> FloatArray:
     record = linear_record(TWO_MASS, TORQUE_NM, Start(0.0, 0.0, -3.0, 0.0, -3.0))
     problem = make_problem(model(TWO_MASS, effects=effects), [record], ())
     return form_changes(not_fitted(problem, start_vector(problem)), 0)
-
-
-def test_a_jump_counts_for_the_samples_around_it() -> None:
-    step = np.where(np.arange(30) < 12, -3.0, 4.0)
-    change = change_around(step)
-    assert set(np.flatnonzero(change)) == set(range(12 - AROUND, 12 + AROUND))
-    assert np.all(change[change > 0.0] == 7.0)
-
-
-def test_a_line_without_such_a_law_has_no_error_of_form() -> None:
-    assert not changes().any()
-    assert not changes(generator_coupled={"inertia_kg_m2": 1.0, "from_s": 0.0, "to_s": 2.0}).any()
 
 
 def test_dry_friction_changes_by_twice_its_size_at_a_reversal_and_at_its_place() -> None:

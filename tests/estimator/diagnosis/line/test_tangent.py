@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.diagnosis.line.motion import block_mean, simulated
+from estimator.diagnosis.line.motion import simulated
 from estimator.diagnosis.line.tangent import tangent
 from estimator.physics.driveline import Start
 from estimator.physics.fit import FitResult, fit
@@ -42,13 +42,6 @@ def test_a_linear_line_answers_exactly(at_load: bool) -> None:
     assert np.max(np.abs(line.answer(motor, load) - exact)) < 1e-5 * np.ptp(exact)
 
 
-def test_the_answer_to_an_initial_state_is_the_free_motion() -> None:
-    line = tangent(result_of(), 0, 1)
-    start = Start(0.0, 0.0, 0.0, twist_rad=float(line.scale[1]))
-    exact = exact_states(TWO_MASS, np.zeros(SAMPLES), start)[:, SPEED]
-    np.testing.assert_allclose(line.free(SAMPLES)[1], exact, atol=1e-4 * np.ptp(exact))
-
-
 @pytest.mark.parametrize("at_load", [False, True])
 def test_a_line_with_a_gap_answers_as_its_simulation_does(at_load: bool) -> None:
     result = result_of({"backlash": {"gap_rad": 0.01, "contact_rad": 0.001}})
@@ -69,13 +62,3 @@ def test_many_answers_at_once_are_those_to_each_alone(effects: dict[str, dict[st
     found = line.answers(-1.0, 0.5, torques)
     np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-12 * np.abs(expected).max())
     assert not found[1, :700].any()
-
-
-def test_blocks_of_samples_are_their_average() -> None:
-    result = result_of()
-    fine, coarse = tangent(result, 0, 1), tangent(result, 0, 5)
-    held = np.repeat(walk(5)[: SAMPLES // 5], 5)
-    nothing = np.zeros(SAMPLES)
-    expected = block_mean(fine.answer(held, nothing), 5)
-    found = coarse.answer(held[::5], nothing[::5])
-    assert np.max(np.abs(found - expected)) < 1e-4 * np.ptp(expected)

@@ -16,19 +16,16 @@ from estimator.physics.driveline import Start
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult, fit
 from estimator.physics.problem import make_problem
-from estimator.signals.record import FloatArray, OutputKind
+from estimator.signals.record import FloatArray
 from tests.estimator.diagnosis.planted import SIGMA, drive_torque, nominal_fit, quiet
 from tests.estimator.physics.bench import (
-    ANGLE,
     LOAD_SPEED,
-    ONE_MASS,
     SPEED,
     TWIST,
     TWO_MASS,
     exact_states,
     linear_record,
     model,
-    random_steps,
 )
 
 START = Start(5.0, 0.0, 2.0, 0.0, 2.0)
@@ -122,25 +119,6 @@ def test_an_answer_is_the_exact_response_per_unit(pool: list[Candidate], element
     assert np.max(np.abs(answer - expected)) < 2e-3 * np.ptp(expected)
 
 
-def test_a_delay_of_one_period_is_the_difference_to_the_torque_before(pool: list[Candidate]) -> None:
-    torque = drive_torque(1)
-    late = np.concatenate([[torque[0]], torque[:-1]])
-    expected = response(late - torque, np.zeros_like(torque))
-    answer = first(pick(pool, Element.TORQUE_PATH, "a torque one period late"))
-    assert np.max(np.abs(answer - expected)) < 1e-3 * np.ptp(expected)
-
-
-def test_the_answer_to_an_error_of_the_reading_is_the_error(pool: list[Candidate]) -> None:
-    """Waves are in the phase of each recording: cosine and sine of the first, then of the second."""
-    states = exact_states(TWO_MASS, drive_torque(1), START)
-    turns = [c for c in pool if c.element is Element.SPEED_SENSOR and c.law == "a wave of w 1 times per motor turn"]
-    expected = states[:, SPEED] * np.sin(states[:, ANGLE] - states[0, ANGLE])
-    assert turns[0].answers.shape == (3000, 4)
-    np.testing.assert_allclose(turns[0].answers[:1500, 1], expected, atol=5e-3 * np.ptp(expected))
-    assert not turns[0].answers[1500:, :2].any()
-    assert not turns[0].answers[:1500, 2:].any()
-
-
 def test_load_steps_are_on_a_grid_each_in_one_recording(result: FitResult, pool: list[Candidate]) -> None:
     steps = [c for c in pool if c.law.startswith("a load step")]
     per_recording = int(14.99 / STEP_EVERY_S) - 1
@@ -174,32 +152,6 @@ def test_every_input_but_the_last_may_count_more_than_its_reading() -> None:
     expected = response(shares[:, 1], np.zeros(1500))
     answer = first(pick(pool, Element.TORQUE_PATH, "T_2"))
     assert np.max(np.abs(answer - expected)) < 1e-3 * np.ptp(expected)
-
-
-def test_one_mass_has_no_shaft_and_its_load_acts_at_the_motor() -> None:
-    rec = linear_record(ONE_MASS, random_steps(600, seed=3), REST)
-    view = scene(fit(make_problem(model(ONE_MASS), [rec], ())), SIGMA)
-    assert elements(view.result) == (
-        Element.TORQUE_PATH,
-        Element.MOTOR,
-        Element.SPEED_SENSOR,
-        Element.ACQUISITION,
-    )
-    assert {c.element for c in everywhere(view) if c.law.startswith("a load step")} == {Element.MOTOR}
-
-
-def test_a_position_has_no_error_of_the_speed_reading() -> None:
-    rec = linear_record(TWO_MASS, random_steps(600, seed=3), START, kind=OutputKind.POSITION)
-    view = scene(fit(make_problem(model(TWO_MASS), [rec], ())), SIGMA)
-    assert elements(view.result) == (Element.TORQUE_PATH, Element.MOTOR, Element.SHAFT, Element.LOAD)
-    assert everywhere(view)
-
-
-def test_a_law_that_is_zero_throughout_has_no_answer() -> None:
-    """The line stands still but for the noise of nothing: no speed, no friction."""
-    rec = linear_record(TWO_MASS, np.zeros(400), REST)
-    pool = at(scene(fit(make_problem(model(TWO_MASS), [rec], ())), SIGMA), Element.TORQUE_PATH)
-    assert not pick(pool, Element.TORQUE_PATH, "T |T|").answers.any()
 
 
 def test_a_profile_of_the_fit_continues_in_the_answers() -> None:

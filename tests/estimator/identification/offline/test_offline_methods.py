@@ -91,14 +91,6 @@ def test_the_noise_model_makes_more_of_the_same_data(buses: int) -> None:
     assert scatter[Method.BOX_JENKINS] < 0.7 * scatter[Method.OUTPUT_ERROR]
 
 
-def test_intervals_of_the_noise_model_hold_the_truth(fits: list[LinearFit]) -> None:
-    """At 95 %, 3 of 6 or fewer have a probability of 0.2 %. The rates of 200: tests.benchmarks.identification."""
-    held = np.zeros(2)
-    for mode in map(mode_of, fits):
-        held += mode.frequency_hz.covers(FREQUENCY_HZ), mode.damping.covers(DAMPING)
-    assert held.min() >= 4
-
-
 def test_in_closed_loop_the_noise_model_keeps_the_truth() -> None:
     """Sensor noise comes back through the torque."""
     for seed in (1, 2):
