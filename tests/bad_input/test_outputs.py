@@ -9,6 +9,7 @@ import pytest
 from hil.config.rig_file import read_rig
 from hil.recording import read_table
 from tests.bad_input.conftest import Refused
+from tests.chosen import campaign
 from tests.rig.observer import assert_disarmed
 from tests.rig.serving import served
 
@@ -64,7 +65,7 @@ def test_a_full_disk_ends_the_run_disarmed_and_keeps_what_fitted(short_rig: Path
     assert f"{kept} holds the {samples} samples up to there" in done.stderr
 
 
-@pytest.mark.parametrize("options", [[], ["--json"]])
+@pytest.mark.parametrize("options", [[], campaign(["--json"])])
 def test_standard_output_that_takes_nothing(options: list[str]) -> None:
     with Path("/dev/full").open("w") as full:
         done = subprocess.run(

@@ -202,6 +202,7 @@ def test_a_look_makes_no_store(
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.campaign
 def test_a_run_enters_itself_also_one_that_was_stopped(
     spawn: Callable[..., subprocess.Popen[str]], short_rig: Path, tmp_path: Path, capsys: Capture
 ) -> None:

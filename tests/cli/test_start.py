@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.chosen import campaign
+
 SCIPY = ("scipy.interpolate", "scipy.linalg", "scipy.optimize", "scipy.signal", "scipy.special", "scipy.stats")
 OF_FILES = ("asammdf", "h5py", "matplotlib", "pandas", "plotly", "pyarrow")
 SLOW = (*SCIPY, *OF_FILES, "textual")
@@ -45,8 +47,8 @@ sys.exit(f"no bus was opened: status {run(sys.argv[1:])}")
     ("modules", "absent"),
     [
         ("hil.cli.main, hil.cli.command_line", (*SLOW, "can", "numba", "numpy", "pydantic", "rich", "scipy", "typer")),
-        ("hil.monitor.host", SLOW),
-        ("hil.monitor.opening", (*OF_FILES, "scipy.signal", "scipy.stats", "textual")),
+        campaign(("hil.monitor.host", SLOW)),
+        campaign(("hil.monitor.opening", (*OF_FILES, "scipy.signal", "scipy.stats", "textual"))),
         ("hil.monitor.opening, hil.monitor.app", (*OF_FILES, "scipy.signal", "scipy.stats")),
     ],
     ids=["help", "monitor: process of the rig", "monitor: before that is started", "monitor: process of the view"],
@@ -60,7 +62,7 @@ def test_what_is_not_needed_is_not_imported(modules: str, absent: tuple[str, ...
 @pytest.mark.parametrize(
     "command",
     [
-        pytest.param(name, marks=() if name in ("run without an estimate", "commission") else pytest.mark.campaign)
+        pytest.param(name, marks=() if name == "run without an estimate" else pytest.mark.campaign)
         for name in BUS_COMMANDS
     ],
 )

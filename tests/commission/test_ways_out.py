@@ -13,6 +13,7 @@ from hil.errors import RunAborted
 from hil.recording import read_table
 from hil.rig.experiments.base import Phase
 from hil.rig.stop import StopRequest
+from tests.chosen import campaign
 from tests.commission.rigs import Bench, Quiet, bench
 from tests.rig.observer import assert_disarmed
 
@@ -117,8 +118,8 @@ def test_after_an_interruption_whole_runs_are_kept_and_the_rest_is_driven(
     ("fault", "error", "reported"),
     [
         ("plc.permissive_withdrawn@3.0", RunAborted, "permissive is withdrawn"),
-        ("m1.fault@3.0", DriverError, "inverter m1"),
-        ("m2.hang@3.0", RunAborted, "cut the power of the drive named"),
+        campaign(("m1.fault@3.0", DriverError, "inverter m1")),
+        campaign(("m2.hang@3.0", RunAborted, "cut the power of the drive named")),
     ],
 )
 def test_lost_permission_or_device_ends_it_at_zero_torque(
@@ -152,7 +153,11 @@ def test_speed_outside_its_band_ends_the_run(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("fault", "device"),
-    [("m1.absent", "m1"), pytest.param("m2.absent", "m2", marks=pytest.mark.campaign), ("plc.hang@0.0", "plc")],
+    [
+        ("m1.absent", "m1"),
+        pytest.param("m2.absent", "m2", marks=pytest.mark.campaign),
+        campaign(("plc.hang@0.0", "plc")),
+    ],
 )
 def test_a_device_that_is_not_there_blocks_and_is_found_once_it_is_back(
     fault: str, device: str, tmp_path: Path

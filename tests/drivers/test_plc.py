@@ -56,12 +56,21 @@ async def start(plc: Plc, settings: PrbsSettings = SETTINGS) -> PrbsSettings:
 Talk = Callable[[Plc, ServedPlc], Awaitable[None]]
 
 
-def talk(device: PlcDevice, conversation: Talk, *, clock: Clock | None = None, map_: RegisterMap = MAP) -> None:
+def talk(
+    device: PlcDevice,
+    conversation: Talk,
+    *,
+    clock: Clock | None = None,
+    map_: RegisterMap = MAP,
+    timeout_s: float = 30.0,
+) -> None:
     """Serve a device, connect, talk, disconnect."""
 
     async def run() -> None:
         async with serve_plc(device, MAP) as served:
-            plc = Plc("127.0.0.1", served.port, map_, timeout_s=0.2, mode_timeout_s=0.05, clock_ns=clock or Clock())
+            plc = Plc(
+                "127.0.0.1", served.port, map_, timeout_s=timeout_s, mode_timeout_s=0.5, clock_ns=clock or Clock()
+            )
             async with plc:
                 await conversation(plc, served)
 
@@ -257,7 +266,7 @@ def test_a_plc_that_hangs_is_a_timeout_and_can_come_back() -> None:
         served.resume()
         assert (await plc.read_status()).permissive
 
-    talk(PlcDevice(), conversation)
+    talk(PlcDevice(), conversation, timeout_s=0.5)
 
 
 @pytest.mark.parametrize("name", sorted(MAP.identity))

@@ -15,6 +15,7 @@ from estimator.identification.settings import Settings
 from hil.export.plc_estimator import PlcEstimator
 from hil.export.plcopen import project
 from hil.export.structured_text import Precision
+from tests.chosen import one_in
 from tests.export.pyplcopen_dialect import in_dialect
 
 pyplcopen = pytest.importorskip("pyplcopen", reason="pyplcopen, which has a compiler of IEC 61131-3, is not installed")
@@ -35,7 +36,7 @@ def diagnostics(text: str) -> list[str]:
 
 
 @pytest.mark.parametrize("precision", Precision)
-@pytest.mark.parametrize("estimator", ESTIMATORS, ids=range(len(ESTIMATORS)))
+@pytest.mark.parametrize("estimator", one_in(3, ESTIMATORS), ids=range(len(ESTIMATORS)))
 def test_the_program_compiles(estimator: PlcEstimator, precision: Precision) -> None:
     assert diagnostics(in_dialect(project(estimator, precision))) == []
 

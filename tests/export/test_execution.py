@@ -14,6 +14,7 @@ from estimator.identification.settings import Settings
 from estimator.signals.record import FloatArray
 from hil.export.plc_estimator import PROFILES, PlcEstimator, profile
 from hil.export.structured_text import Precision
+from tests.chosen import campaign, one_in
 from tests.estimator.identification.tracking import roads
 from tests.export.drives import bad_drive, clean_drive, still_drive
 from tests.export.iec.machine import Machine
@@ -36,7 +37,9 @@ TRACE_REACHED = "decreasing_then_constant_trace:trace=1.0"
 """The paper's profile with a trace that so short a drive comes down to."""
 
 
-@pytest.mark.parametrize("drive", [clean_drive(), bad_drive(), still_drive()], ids=["clean", "bad", "still"])
+@pytest.mark.parametrize(
+    "drive", [campaign(clean_drive()), bad_drive(), campaign(still_drive())], ids=["clean", "bad", "still"]
+)
 @pytest.mark.parametrize("L", [RESONANCE, np.ones(1), None], ids=["fixed", "none", "adapted"])
 def test_every_number_is_the_hosts_to_the_bit(drive: Cycles, L: FloatArray | None, tmp_path: Path) -> None:
     estimator = PlcEstimator(L=L)
@@ -48,7 +51,7 @@ def test_every_number_is_the_hosts_to_the_bit(drive: Cycles, L: FloatArray | Non
     [
         (Orders(4, 4, 1), 0.02, 0.02),  # nothing to decimate: a low-pass of one tap
         (Orders(2, 3, 0), 0.01, 0.02),
-        (Orders(3, 2, 5), 0.005, 0.02),
+        campaign((Orders(3, 2, 5), 0.005, 0.02)),
         (Orders(0, 6, 1), 0.01, 0.01),  # no poles at all
         pytest.param(Orders(1, 1, 1), 0.01, 0.04, marks=pytest.mark.campaign),
         pytest.param(Orders(7, 5, 2), 0.01, 0.02, marks=pytest.mark.campaign),
@@ -62,7 +65,7 @@ def test_orders_delay_and_periods_are_free(
     assert_equal_bits(on_plc(estimator, bad_drive(), tmp_path), on_host(estimator, bad_drive()))
 
 
-@pytest.mark.parametrize("name", PROFILES)
+@pytest.mark.parametrize("name", one_in(3, PROFILES))
 def test_every_adaptation_profile(name: str, tmp_path: Path) -> None:
     estimator = PlcEstimator(Settings(adaptation=profile(name)), L=RESONANCE)
     assert_equal_bits(on_plc(estimator, bad_drive(), tmp_path), on_host(estimator, bad_drive()))
@@ -181,7 +184,7 @@ SETTINGS = Settings(adaptation=profile("decreasing_then_constant_trace:trace=1.0
 
 @pytest.mark.parametrize(
     ("before", "after"),
-    [pytest.param(*each, marks=[pytest.mark.campaign] * bool(number % 4)) for number, each in enumerate(MUTANTS)],
+    [pytest.param(*each, marks=[pytest.mark.campaign] * bool(number % 12)) for number, each in enumerate(MUTANTS)],
 )
 def test_a_fault_in_the_text_is_noticed(before: str, after: str, tmp_path: Path) -> None:
     assert any(not same_bits(plc, host) for plc, host in both_sides(before, after, tmp_path))

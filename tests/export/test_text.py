@@ -66,6 +66,7 @@ def test_what_is_handed_over_has_a_named_type() -> None:
         for filter_L in (L, None)
     ],
 )
+@pytest.mark.campaign
 def test_an_independent_parser_reads_the_same_program(precision: Precision, filter_L: FloatArray | None) -> None:
     if find_spec("blark") is None:
         pytest.skip("blark, a parser of IEC 61131-3, is not installed: pip install blark==0.8.3")

@@ -75,6 +75,7 @@ def test_the_map_shows_the_models_their_third_order_and_the_dominant_pole(models
     assert close.get_ylim()[0] < pole.imag < close.get_ylim()[1]
 
 
+@pytest.mark.campaign
 def test_the_same_data_make_the_same_bytes_whatever_the_users_settings(
     models: list[LocalModel], tmp_path: Path
 ) -> None:

@@ -10,6 +10,7 @@ from hil.monitor.app import MonitorApp
 from hil.monitor.messages import Began, Choice, Kind, Mark, Notice, Ready
 from hil.monitor.panel import printable
 from hil.monitor.state import LiveState
+from tests.chosen import campaign
 from tests.monitor.fake_source import PERIOD_S, FakeSource, settled
 
 TEXT = "[bold]x[/]"
@@ -35,7 +36,7 @@ def shown(*keys: str, text: str = TEXT, coming: tuple[object, ...] = ()) -> str:
     return html.unescape(re.sub(r"<[^>]*>", "", drawn[0])).replace("\xa0", " ")
 
 
-@pytest.mark.parametrize("text", [TEXT, WRONG])
+@pytest.mark.parametrize("text", [TEXT, campaign(WRONG)])
 def test_names_of_the_rig_file_and_the_folder(text: str) -> None:
     asked = shown("e", "enter", text=text)
     assert f"> {text}" in asked

@@ -89,6 +89,7 @@ def test_it_listens_tells_its_health_and_resets(rig_path: Path, tmp_path: Path) 
     assert list(source.poll())[-1] == Ended()
 
 
+@pytest.mark.campaign
 def test_a_store_that_can_not_be_used_costs_no_recording(rig_path: Path, tmp_path: Path) -> None:
     out = tmp_path / "runs"
     out.mkdir()

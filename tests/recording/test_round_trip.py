@@ -18,6 +18,7 @@ from hil.recording.checksum import CHECKSUMS
 from hil.recording.formats import FORMATS, read_metadata
 from hil.recording.publish import losses
 from hil.recording.table import as_text
+from tests.chosen import one_in
 
 WRITABLE = [suffix for suffix, form in FORMATS.items() if form.write]
 
@@ -47,7 +48,7 @@ def tables(draw: st.DrawFn) -> Table:
 
 @given(tables(), st.permutations(WRITABLE))
 @example(Table(Path("a.csv"), {"0": as_text([" ", ""])}), list(WRITABLE))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=15, deadline=None)
 def test_through_every_format_in_any_order_nothing_is_lost(table: Table, order: list[str]) -> None:
     with tempfile.TemporaryDirectory() as folder:
         now = table
@@ -79,7 +80,7 @@ def every_kind() -> Table:
     )
 
 
-@pytest.mark.parametrize(("first", "second"), list(itertools.product(WRITABLE, WRITABLE)))
+@pytest.mark.parametrize(("first", "second"), one_in(4, itertools.product(WRITABLE, WRITABLE)))
 def test_each_pair_of_formats_round_trips(tmp_path: Path, every_kind: Table, first: str, second: str) -> None:
     for suffix, name in ((first, "a"), (second, "b"), (first, "c")):
         every_kind = replace(every_kind, path=tmp_path / name)
@@ -91,7 +92,7 @@ def test_each_pair_of_formats_round_trips(tmp_path: Path, every_kind: Table, fir
 
 
 @given(texts=st.lists(st.text(st.characters(codec="utf-8"), max_size=4), min_size=1, max_size=4))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=12, deadline=None)
 def test_any_text_is_kept_or_refused_by_its_column(texts: list[str]) -> None:
     for suffix in WRITABLE:
         table = Table(Path("a"), {"time_s": np.arange(float(len(texts))), "word": as_text(texts)})

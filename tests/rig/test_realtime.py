@@ -8,6 +8,7 @@ import pytest
 
 from hil.rig import realtime
 from hil.rig.realtime import NOT_ASKED, Grant, real_time
+from tests.chosen import campaign
 
 linux = pytest.mark.skipif(sys.platform != "linux", reason="SCHED_FIFO and mlockall are asked for as Linux has them")
 
@@ -39,7 +40,7 @@ def test_refused_scheduling_is_said_with_its_cure(monkeypatch: pytest.MonkeyPatc
 
 
 @linux
-@pytest.mark.parametrize(("may", "words"), [(False, "CAP_IPC_LOCK"), (True, "granted")])
+@pytest.mark.parametrize(("may", "words"), [(False, "CAP_IPC_LOCK"), campaign((True, "granted"))])
 def test_memory_is_not_locked_within_a_limit(monkeypatch: pytest.MonkeyPatch, may: bool, words: str) -> None:
     """Within a limit the lock would hold now, and an allocation fail in the middle of the run."""
     monkeypatch.setattr(realtime, "_may_lock_all", lambda: may)

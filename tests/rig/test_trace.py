@@ -11,6 +11,7 @@ from hil.rig.replay import replay
 from hil.rig.trace import SUFFIXES, BusTrace
 from hil.sample import Sample, SampleFlag
 from hil.simulator.faults import InverterFaults, RigFaults
+from tests.chosen import one_in
 from tests.rig.serving import changed, small_rig
 from tests.wire.traced import traced_run
 
@@ -26,7 +27,7 @@ def column(rows: list[Sample], name: str) -> list[float]:
     return [getattr(row, name) for row in rows]
 
 
-@pytest.mark.parametrize("suffix", SUFFIXES)
+@pytest.mark.parametrize("suffix", one_in(3, SUFFIXES))
 def test_replay_gives_torque_and_speed_of_the_run(tmp_path: Path, suffix: str) -> None:
     path = tmp_path / f"run{suffix}"
     live = traced_run(path).rows

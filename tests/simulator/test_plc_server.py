@@ -31,7 +31,7 @@ PLC_COUNT_0 = bytes.fromhex("0001 0000 0005 01 04 02 0000")
 
 def ask(port: int, conversation: Callable[[AsyncModbusTcpClient], Awaitable[None]]) -> None:
     async def run() -> None:
-        client = AsyncModbusTcpClient("127.0.0.1", port=port, timeout=1, retries=0, reconnect_delay=0)
+        client = AsyncModbusTcpClient("127.0.0.1", port=port, timeout=30, retries=0, reconnect_delay=0)
         assert await client.connect()
         try:
             await conversation(client)
@@ -139,7 +139,7 @@ def test_two_clients_see_one_device() -> None:
 def test_it_is_gone_when_closed_even_with_a_client_connected() -> None:
     server = PlcServer(PlcDevice(), MAP).start()
     with socket.create_connection((server.host, server.port)) as client:
-        client.settimeout(5.0)
+        client.settimeout(60.0)
         client.sendall(READ_PLC_COUNT)
         assert client.recv(64) == PLC_COUNT_0
         server.close()

@@ -16,6 +16,7 @@ from hil.cli.main import run
 from hil.errors import StoreError
 from hil.store import RunStore, register_run, store_of
 from hil.store.rebuild import rebuild
+from tests.chosen import one_in
 from tests.full_disk import largest_file
 
 Record = Callable[..., Path]
@@ -43,7 +44,7 @@ def change(folder: Path, key: str, value: object) -> None:
 
 
 @pytest.mark.parametrize(
-    "name", ["{outside}", "../thesis.csv", "x/../../thesis.csv", "link.csv", ".", "", "x\0y", "x" * 400]
+    "name", one_in(3, ["{outside}", "../thesis.csv", "x/../../thesis.csv", "link.csv", ".", "", "x\0y", "x" * 400])
 )
 def test_a_run_that_leads_out_of_the_folder_is_reported_and_harms_nothing(
     filled: Path, name: str, capsys: Capture
@@ -111,7 +112,7 @@ def test_a_damaged_run_hides_no_other_and_is_read_again_from_its_recording(
 GARBAGE = [b"", b"{", b"[]", b"\xff\xfe", b"[" * 100_000, b'{"schema": "hil.run_card/1", "run": 3}', b'{"schema": 1}']
 
 
-@pytest.mark.parametrize("name", ["1.json", "1.note_1.json", "1.result_1.json", "1.result_1.document"])
+@pytest.mark.parametrize("name", one_in(3, ["1.json", "1.note_1.json", "1.result_1.json", "1.result_1.document"]))
 def test_a_file_of_the_list_that_is_something_else_is_shown_as_damaged(
     filled: Path, name: str, capsys: Capture
 ) -> None:

@@ -85,6 +85,7 @@ def await_line(process: subprocess.Popen[str], word: str) -> None:
     raise AssertionError(f"{process.args} ended without saying {word!r}")
 
 
+@pytest.mark.campaign
 def test_logger_logs_every_frame_of_a_run(tmp_path: Path) -> None:
     logged, traced = tmp_path / "logged.log", tmp_path / "traced.log"
     with served(bus_url="ws://127.0.0.1:0/") as (server, rig):

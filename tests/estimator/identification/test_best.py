@@ -100,6 +100,7 @@ def lost(record: Record, okay: BoolArray) -> Record:
     return replace(record, output=output, okay=okay, torque_nm=record.torque_nm[rows], torque_okay=okay)
 
 
+@pytest.mark.campaign
 def test_lost_rows_cost_no_more_than_what_they_held() -> None:
     source = cruise(7, duration_s=30.0).record
     okay = np.ones(source.okay.shape, dtype=bool)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from estimator.lanes import choose, every, like, some
+from tests.chosen import campaign
 from tests.estimator.lanes.bench import in_both_ways
 
 RNG = np.random.default_rng(5)
@@ -23,10 +24,10 @@ def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
     "function",
     [
         lambda x, y: x + y - 2.0,
-        lambda x, y: 3 * x - y,
-        lambda x, y: x * y,
+        campaign(lambda x, y: 3 * x - y),
+        campaign(lambda x, y: x * y),
         lambda x, y: x / y,
-        lambda x, y: -abs(x) + float(y),
+        campaign(lambda x, y: -abs(x) + float(y)),
         lambda x, y: min(x, y) + max(x, 0.5),
         lambda x, y: math.copysign(x, y) + math.sqrt(abs(y)),
         lambda x, y: choose(x < y, x, choose(x * y > 4.0, 7.0, y)),
@@ -62,7 +63,12 @@ def test_a_variable_is_one_number_first_and_lanes_later() -> None:
 
 @pytest.mark.parametrize(
     ("function", "low", "high"),
-    [(math.exp, -700.0, 700.0), (math.exp, -1.0, 1.0), (math.log, 1e-300, 1e300), (math.log, 0.5, 2.0)],
+    [
+        (math.exp, -700.0, 700.0),
+        campaign((math.exp, -1.0, 1.0)),
+        (math.log, 1e-300, 1e300),
+        campaign((math.log, 0.5, 2.0)),
+    ],
 )
 def test_elementary_functions_are_right_to_rounding(
     function: Callable[[float], float], low: float, high: float

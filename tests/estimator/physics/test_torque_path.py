@@ -11,6 +11,7 @@ from estimator.physics.grid import Grid
 from estimator.physics.layout import flat
 from estimator.physics.simulate import simulate
 from estimator.signals.record import FloatArray
+from tests.chosen import campaign
 from tests.estimator.physics.bench import SAMPLE_TIME_S, model, random_steps, record
 
 REST = Start(0.0, 0.0, 0.0)
@@ -56,8 +57,8 @@ def test_a_held_torque_as_a_line(start: float, length: float, mean: float, jump:
     assert found == pytest.approx(expected, rel=1e-12, abs=1e-12)
 
 
-@pytest.mark.parametrize("shape", [0.04, 0.25, 0.5])
-@pytest.mark.parametrize("length_s", [0.001, 0.02, 5.0])
+@pytest.mark.parametrize("shape", [0.04, campaign(0.25), 0.5])
+@pytest.mark.parametrize("length_s", [campaign(0.001), 0.02, campaign(5.0)])
 def test_a_lagged_step_of_second_order_is_the_matrix_exponential(shape: float, length_s: float) -> None:
     tau, torque, lagged, rising = 0.03, 40.0, 10.0, 25.0
     mean, rise, end, risen = lag_step(torque, 0.0, lagged, rising, low_pass(tau, shape, length_s))

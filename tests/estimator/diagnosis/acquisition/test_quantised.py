@@ -29,6 +29,7 @@ def test_the_step_is_found(step: float, rounding) -> None:
     assert ci95[0] <= value <= ci95[1]
 
 
+@pytest.mark.campaign
 def test_the_interval_knows_that_a_level_is_rounded_alike_each_time() -> None:
     """Of 60 steps written with five decimals; 95 % intervals hold fewer than 51 of 60 once in a hundred."""
     steps = np.random.default_rng(5).uniform(0.3, 1.0, 60)

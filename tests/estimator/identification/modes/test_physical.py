@@ -106,6 +106,7 @@ def blurred(number: int) -> tuple[list[LinearModel], np.ndarray]:
     return [LinearModel.from_theta(theta, Orders(3, 3, 1), T_S) for theta in thetas], covariance
 
 
+@pytest.mark.campaign
 def test_every_estimate_is_a_line_that_can_be_and_none_is_refused() -> None:
     """Of 12 intervals of 95 %, fewer than 9 hold the truth in one of 400 trials."""
     models, covariance = blurred(12)
