@@ -10,10 +10,8 @@ import can
 import numpy as np
 import pytest
 
-from drivers.canopen.pdo_map import MAX_MAPPED, read_layout
 from drivers.datasheet.types import octal_matters, read_formula, read_number
 from drivers.eds_check.check import check_eds
-from drivers.errors import ConfigMismatch
 from drivers.plc.register_map import RegisterMapError, load_register_map
 from drivers.resources import data_file
 from hil.cli.main import run
@@ -168,22 +166,6 @@ def test_a_blf_that_unpacks_to_much_or_never_ends_is_refused(
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     assert peak < 128 << 20
-
-
-@pytest.mark.parametrize("count", [MAX_MAPPED + 1, 255, 1_600_000_000])
-def test_a_mapping_of_more_objects_than_a_pdo_has_is_refused(tmp_path: Path, count: int) -> None:
-    with pytest.raises(ConfigMismatch, match=f"expected at most {MAX_MAPPED} objects"):
-        read_layout(lambda index, subindex: count, 0x1800, 0x1A00)
-    text = data_file("inverter.eds").read_text("utf-8")
-    head, found, rest = text.partition("[1A00sub0]")
-    assert found
-    section, bracket, rest = rest.partition("\n[")
-    lines = [line for line in section.splitlines() if not line.startswith(("DefaultValue", "DataType"))]
-    changed = "\n".join([*lines, "DataType=0x0007", f"DefaultValue={count}"])
-    (tmp_path / "x.eds").write_text(head + found + changed + bracket + rest, "utf-8")
-    said = " ".join(str(finding) for finding in check_eds(tmp_path / "x.eds").findings)
-    assert "mapped objects" in said or count in (254, 255)
-    assert not check_eds(tmp_path / "x.eds").usable
 
 
 @pytest.mark.parametrize("text", ["9" * 5000, "0" + "7" * 5000, "0x" + "f" * 5000, "-" + "1" * 5000])

@@ -3,21 +3,16 @@
 import contextlib
 import io
 import json
-import math
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pytest
-from rich.console import Console
 
 from estimator.identification.identify import identify
 from estimator.identification.linear_model import LinearModel
-from estimator.identification.online.recursive import Status
-from estimator.identification.study import Compared
 from hil.cli.main import run
 from hil.recording import read_record
-from hil.report.identification_page import compared_summary
 from tests.cli.bus_model import MODEL
 from tests.estimator.identification.driveline import cruise, true_resonance
 
@@ -104,12 +99,6 @@ def test_the_models_read_back_are_those_of_the_estimator_to_the_bit(recordings: 
     np.testing.assert_array_equal(poles, online.poles)
 
 
-def test_a_model_file_adds_what_was_expected(both: Identified) -> None:
-    nominal = both.document["nominal_resonance"]
-    assert (nominal["frequency_hz"], nominal["damping"]) == pytest.approx(true_resonance())
-    assert "model file" in both.said
-
-
 def test_samples_and_period_can_be_chosen_and_the_json_printed_is_the_file(
     recordings: list[Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -169,21 +158,6 @@ def test_the_report_says_what_was_identified(both: Identified) -> None:
         (name, estimator) for name in ("run_1", "run_2") for estimator in ("rls", "ekf")
     ]
     assert all((each["status"] == "estimated") == (not each["reason"]) for each in compared)
-
-
-def test_the_terminal_says_why_a_compared_estimate_is_invalid(capsys: pytest.CaptureFixture[str]) -> None:
-    cases = (
-        Compared("run_1", "riv", None, 85.0, Status.ESTIMATED),
-        *(
-            Compared("run_1", name, None, math.nan, Status.INVALID, "a pole on the unit circle")
-            for name in ("rls", "oeepm")
-        ),
-    )
-    Console(width=80).print(compared_summary(cases))
-    printed = capsys.readouterr().out
-    assert "run_1, rls: a pole on the unit circle" in printed
-    assert "run_1, oeepm: a pole on the unit circle" in printed
-    assert "run_1, riv:" not in printed
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,6 @@
 """``hil run --trace`` and ``hil replay``: the trace next to the recording, and the recording back from the trace."""
 
 import json
-import math
 from pathlib import Path
 
 import pytest
@@ -16,8 +15,6 @@ from hil.report.identification_input import identified
 from hil.rig.live import FORGETTING
 from hil.rig.trace import SUFFIXES
 from tests.chosen import one_in
-from tests.drivers.maker_files import MAKERS
-from tests.drivers.maker_rig import written_rig
 from tests.estimator.identification.tracking.drives import Line, drives
 from tests.rig.serving import addresses, served
 
@@ -43,22 +40,6 @@ def test_recording_comes_back_from_its_trace(
     for name in MEASURED:
         assert one.columns[name].tolist() == other.columns[name].tolist(), name
     assert other.metadata["replayed_from"] == trace.name
-
-
-def test_trace_of_drives_that_get_one_sum_has_no_prbs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    eds, rig, again = tmp_path / "drive.eds", tmp_path / "rig.toml", tmp_path / "again.csv"
-    eds.write_text(MAKERS["yiyou"].text())
-    written_rig(eds, tmp_path)
-    trace = tmp_path / "bus.log"
-    frames = ("201#0F006400", "202#0F006400", "080#", "181#37020A0064000000", "182#37020A0064000000")
-    lines = [f"({0.01 * k + 0.001 * n:.6f}) can0 {frame}" for k in range(20) for n, frame in enumerate(frames)]
-    trace.write_text("\n".join(lines) + "\n")
-    assert run(["replay", str(trace), "--rig", str(rig), "--out", str(again)]) == 2
-    assert "base torque and PRBS as one sum (0x6071). For every cycle: --all." in capsys.readouterr().err
-    assert run(["replay", str(trace), "--rig", str(rig), "--out", str(again), "--all"]) == 0
-    table = read_table(again)
-    assert set(table.columns["torque_ref_nm"]) == {120.0}
-    assert all(math.isnan(value) for value in table.columns["prbs_nm"])
 
 
 def test_replay_of_a_run_is_the_run_to_the_bit(

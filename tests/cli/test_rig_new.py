@@ -15,7 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hil.cli.main import run
-from hil.config.new_rig import QUESTIONS, Question, answers, rig_text
+from hil.config.new_rig import QUESTIONS, answers, rig_text
 from hil.config.rig_file import read_rig
 from hil.config.table import FileKind
 from hil.errors import UsageError
@@ -96,23 +96,6 @@ def test_all_wrong_options_are_named_at_once() -> None:
         answers(VEHICLE | wrong, simulated=False)
     named = {line.split()[0].removeprefix("--").replace("-", "_") for line in str(refused.value).splitlines()}
     assert named == set(wrong) - {"node_m1", "rated_torque_nm"}
-
-
-def test_a_wrong_answer_is_asked_again_with_what_would_fit() -> None:
-    said: list[str] = []
-    script = {"node_m2": iter(["1", "x", "2"]), "torque_limit_nm": iter(["", "700", "90"])}
-
-    def ask(question: Question, default: str, wrong: str) -> str:
-        said.append(wrong)
-        return next(script.get(question.name, iter([default or VEHICLE.get(question.name, "600")])))
-
-    found = answers({}, simulated=False, ask=ask)
-    assert (found["node_m2"], found["torque_limit_nm"]) == (2, 90.0)
-    complaints = [text for text in said if text]
-    assert len(complaints) == 4
-    assert "another node than m1 (1)" in complaints[0]
-    assert "there is no default" in complaints[2]
-    assert "at most the rated torque" in complaints[3]
 
 
 def test_a_file_that_is_there_stays(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -111,3 +111,39 @@ def test_course_that_can_not_be_kept_is_said_and_the_run_is_entered_all_the_same
     assert f"{tmp_path / 'run.online.json'} is missing: {tmp_path}: no room" in capsys.readouterr().err
     assert run(["runs", "--store", str(tmp_path)]) == 0
     assert "reversal" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    "number",
+    [signal.SIGHUP, *(pytest.param(number, marks=pytest.mark.campaign) for number in (signal.SIGINT, signal.SIGTERM))],
+)
+def test_serves_until_a_signal_and_prints_one_line(
+    simulate: Callable[..., Any], short_rig: Path, number: signal.Signals
+) -> None:
+    simulation = simulate(short_rig)
+    assert simulation.bus.startswith("ws://127.0.0.1:")
+    assert not simulation.bus.endswith(":0/")
+    simulation.process.send_signal(number)
+    rest, complaints = simulation.process.communicate(timeout=60)
+    assert simulation.process.returncode == 0
+    assert (rest, complaints) == ("", "")
+
+
+@pytest.mark.parametrize(
+    ("options", "named"),
+    [
+        (("--bus", "ws://0.0.0.0:0/"), "this machine only"),
+        (("--bus", "socketcan:can0"), "expected ws://HOST:PORT/"),
+        (("--modbus", "10.0.0.1:502"), "this machine only"),
+        (("--modbus", "nonsense"), "expected HOST:PORT"),
+        (("--effect", "backlash:gap"), "expected key=number"),
+        (("--effect", "gremlins"), "gremlins"),
+    ],
+)
+def test_refuses_what_it_can_t_serve(
+    short_rig: Path, options: tuple[str, ...], named: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(["sim", str(short_rig), *options]) == 2
+    printed = capsys.readouterr()
+    assert named in printed.err
+    assert printed.out == ""

@@ -73,32 +73,6 @@ def test_runs_are_listed_with_what_tells_them_apart(folder: Path, capsys: Captur
     assert "stopped by the operator" in lines[2]
 
 
-@pytest.mark.parametrize(
-    ("options", "ids"),
-    [
-        (["--experiment", "tip"], [3]),
-        (["--since", "2026-11-22"], [2, 3]),
-        (["--until", "2026-11-22"], [1, 2]),
-        (["--verdict", "explained"], [1]),
-        (["--rig", "bench", "--text", "OPERATOR"], [3]),
-        (["--text", "nothing of the kind"], []),
-    ],
-)
-def test_filters(folder: Path, capsys: Capture, options: list[str], ids: list[int]) -> None:
-    assert [run["id"] for run in documents(capsys, *options)["runs"]] == ids
-
-
-def test_the_list_says_what_ended_a_run_and_show_what_to_do_then(folder: Path, capsys: Capture) -> None:
-    write_table(Table(folder / "d.csv", {"time_s": np.arange(5) * 0.1, "speed_rad_s": np.ones(5)}), folder / "d.csv")
-    register_run(folder / "d.csv", "PLC: clutch is closed. Fix the cause, run again.")
-    assert hil(["runs"]) == 0
-    said = capsys.readouterr().out
-    assert "PLC: clutch is closed" in said
-    assert "Mend" not in said
-    assert hil(["runs", "show", "4"]) == 0
-    assert "PLC: clutch is closed. Fix the cause, run again." in capsys.readouterr().out
-
-
 def test_one_run_is_shown_with_the_state_of_its_recording(folder: Path, capsys: Capture) -> None:
     assert hil(["runs", "show", "1"]) == 0
     said = capsys.readouterr().out
@@ -135,16 +109,6 @@ def test_alarms_are_listed_and_shown(folder: Path, capsys: Capture) -> None:
     assert hil(["runs", "show", "2", "--store", str(folder), "--json"]) == 0
     document = json.loads(capsys.readouterr().out)
     assert document["alarms"] == len(document["alarm_statements"]) == 1
-
-
-def test_two_runs_are_compared_down_to_their_rig_files(folder: Path, capsys: Capture) -> None:
-    assert hil(["runs", "compare", "1", "2"]) == 0
-    said = capsys.readouterr().out
-    assert "-speed = 10\n+speed = 20\n" in said
-    assert "experiment" not in said  # the same in both
-    rows = {row["what"]: row for row in documents(capsys, "compare", "1", "2")["rows"]}
-    assert (rows["experiment"]["differs"], rows["verdict"]["differs"]) == (False, True)
-    assert (rows["J_M [kg m^2]"]["a"], rows["J_M [kg m^2]"]["b"]) == (1.52, None)
 
 
 def test_nothing_is_deleted_without_being_asked(folder: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,18 +1,14 @@
 """No code comes with a file: laws run only where they are trusted, and no process imports from its working folder."""
 
-import multiprocessing
-import os
 import sys
 from pathlib import Path
 
 import pytest
 
 from estimator.diagnosis import first_use
-from hil.child import safe_path
 from hil.cli.main import run
 from hil.proof.command import run_hil
 from hil.proof.rigs import sealed_process
-from hil.simulator.driveline import simulation_model
 from tests.cli import bench
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -114,23 +110,3 @@ def test_compiling_runs_nothing_of_the_folder(trapped: Path, monkeypatch: pytest
     monkeypatch.setattr(first_use, "SIDE_BY_SIDE", (((), ()),))
     first_use.compile_kernels(2)
     assert not (trapped / RAN).exists()
-
-
-def test_a_spawned_process_runs_nothing_of_the_folder(trapped: Path) -> None:
-    process = multiprocessing.get_context("spawn").Process(target=os.getpid)
-    with safe_path():
-        process.start()
-    process.join()
-    assert process.exitcode == 0
-    assert not (trapped / RAN).exists()
-
-
-def test_the_api_asks_for_trust_too(folder: Path) -> None:
-    from hil.config.rig_file import read_rig
-    from hil.errors import ModelFileError
-
-    simulation = read_rig(folder / "rig.toml").simulation
-    assert simulation is not None
-    with pytest.raises(ModelFileError, match="--trust-laws"):
-        simulation_model(simulation)
-    assert "J_M" in simulation_model(simulation, trust_laws=True).values()

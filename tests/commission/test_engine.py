@@ -9,7 +9,7 @@ from hil.commission.engine import Asked, Commissioning
 from hil.commission.order import RigSource
 from hil.commission.state import Finding, State, Status, StepRecord, load_state
 from hil.commission.step import Job, Outcome, Step
-from hil.commission.talk import Answer, Person, Script, Talk, What
+from hil.commission.talk import Person, Script, Talk
 from hil.errors import RunAborted, UsageError
 from tests.commission.rigs import EXAMPLE
 
@@ -97,14 +97,6 @@ def test_repeated_and_what_is_computed_from_it(world: World) -> None:
     assert world.state().steps["second"].history[0].status is Status.DONE
 
 
-def test_repeating_what_another_with_torque_builds_on_says_so(world: World, monkeypatch: pytest.MonkeyPatch) -> None:
-    world.call()
-    orders = property(lambda step: lambda job: ["run"] if step.name == "second" else [])
-    monkeypatch.setattr(engine.Step, "orders", orders)
-    assert world.call(repeat=frozenset({"first"})) == ["first"]
-    assert any("driven before first was repeated; again by --repeat second" in line for line in world.said)
-
-
 def test_blocking_finding_ends_it_and_is_done_again(world: World) -> None:
     world.findings["first"] = [Finding("sign", "forward", "backward", False, "Swap two phases", blocking=True)]
     with pytest.raises(RunAborted, match=r"step first: sign: expected forward, got backward\. Swap two phases"):
@@ -124,13 +116,6 @@ def test_person_continues_skips_or_quits(world: World) -> None:
     assert world.state().steps["second"].because == "no torque today"
     with pytest.raises(KeyboardInterrupt):
         world.call(person("q"), repeat=frozenset({"second"}))
-
-
-def test_changed_rig_file_is_noticed_and_its_steps_are_done_again(world: World) -> None:
-    world.call()
-    world.text = world.text.replace("amplitude_nm = 120.0", "amplitude_nm = 60.0")
-    assert world.call() == list(NAMES)
-    assert "prbs.amplitude_nm: 120.0 → 60.0" in world.state().notes[0].changes
 
 
 @pytest.mark.parametrize("damage", ["", "{", '{"schema": "hil.other/1"}', '{"schema": "hil.commission/1"}', "[1]"])
@@ -172,18 +157,3 @@ def test_what_ended_a_step_is_reported_where_the_state_can_not_be_kept(
 
 def _full_disk(descriptor: int) -> None:
     raise OSError(28, "No space left on device")
-
-
-def test_answer_that_is_none_is_reported_what_would_be() -> None:
-    asked: list[str] = []
-    answers = iter(["what?", "", "s", "", "no torque today"])
-
-    def ask(question: str) -> str:
-        asked.append(question)
-        return next(answers)
-
-    assert Person(ask).may_command("any", True) == Answer(What.SKIP, "no torque today")
-    go = "  Go? [y]es, [s]kip, [q]uit: "
-    assert asked[0].endswith(go)
-    assert asked[1:3] == [f"  expected y or yes or s or q, got {got}\n{go}" for got in ("what?", "nothing")]
-    assert asked[3:] == ["  Because: ", "  A reason is needed, it is recorded. Because: "]

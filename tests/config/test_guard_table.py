@@ -82,6 +82,11 @@ def test_a_limit_that_limits_nothing_is_refused_by_its_key(tmp_path: Path, keys:
         rig_with(tmp_path, given(keys))
 
 
+def test_the_largest_times_are_taken(tmp_path: Path) -> None:
+    error = error_of(tmp_path, given("torque_error_time_s = 1\ntorque_response_s = 10"))
+    assert (error.time_s, error.response_s) == (1.0, 10.0)
+
+
 @pytest.mark.parametrize(
     ("keys", "problem"),
     [

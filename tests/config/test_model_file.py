@@ -1,9 +1,7 @@
 """The model file: read, written back, and refused with every fault at once."""
 
-from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -268,15 +266,6 @@ def test_what_is_written_reads_back_the_same(
     assert file.signals == signals
 
 
-def test_an_interval_that_is_not_finite_is_left_out(tmp_path: Path) -> None:
-    model = read_model(write(tmp_path, ONE_MASS)).model
-    loose = EffectValue(np.float64(3.0), (float("nan"), float("inf")))
-    effects = {"coulomb_friction_motor": {"friction_nm": loose}}
-    write_model(tmp_path / "out.toml", replace(model, effects=effects))
-    read = read_model(tmp_path / "out.toml").model
-    assert read.effects["coulomb_friction_motor"]["friction_nm"] == EffectValue(3.0)
-
-
 def test_an_effect_that_is_known_roughly_says_how_far_it_is_trusted(tmp_path: Path) -> None:
     text = ONE_MASS + "\n[effects.coulomb_friction_motor]\nfriction_nm = { value = 5.0, tolerance = 0.3 }\n"
     (tmp_path / "m.toml").write_text(text)
@@ -292,18 +281,3 @@ def test_a_tolerance_of_an_effect_is_a_share_below_one(tmp_path: Path, tolerance
     (tmp_path / "m.toml").write_text(text)
     with pytest.raises(ModelFileError, match=r"coulomb_friction_motor\.friction_nm\.tolerance"):
         read_model(tmp_path / "m.toml")
-
-
-def test_every_key_of_signals_is_written_as_it_was_read(tmp_path: Path) -> None:
-    text = """
-    [signals]
-    time = { column = "t", scale = 0.001 }
-    torque = [ { column = "a", wraps_at = 6553.6, hold = true }, { column = "data[:, 3]" } ]
-    speed = { column = "n [1/min]", at = "load" }
-    mask = [ { column = "gear", min = 1.0 } ]
-    resample_s = 0.01
-    format = { delimiter = ";", decimal = ",", encoding = "latin-1", header_line = 1, units_line = 2, comment = "#" }
-    """
-    file = read_model(write(tmp_path, ONE_MASS + text))
-    write_model(tmp_path / "again.toml", file.model, file.signals)
-    assert read_model(tmp_path / "again.toml").signals == file.signals

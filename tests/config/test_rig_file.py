@@ -178,25 +178,6 @@ def test_an_unknown_key_is_named_with_those_that_are_known(table: str, tmp_path:
     assert all(key in problem for key in TABLES[table])
 
 
-def test_all_faults_at_once(tmp_path: Path) -> None:
-    path = changed(
-        tmp_path,
-        in_table("inverters.m2", "node_id", "200"),
-        in_table("prbs", "seed", '"one"'),
-        in_table("experiments.tip", "kind", '"tap"'),
-        without("guard", "sum_limit_nm"),
-        (r"^name = [^\n]*", "nmae = 1"),
-    )
-    assert {problem.split(" | ")[0] for problem in problems_of(path)} == {
-        "name",
-        "nmae",
-        "inverters.m2.node_id",
-        "prbs.seed",
-        "experiments.tip.kind",
-        "guard.sum_limit_nm",
-    }
-
-
 @pytest.mark.parametrize(
     ("target", "part_m1"), [('"both"', 0.5), ('"m1"', 1.0), ('"m2"', 0.0), ('"shared"\nshare_m1 = 0.25', 0.25)]
 )

@@ -15,11 +15,8 @@ from hil.config.rig_file import read_rig, with_experiment_of
 from hil.design.candidates import Limits, candidates
 from hil.design.design import on_paper
 from hil.errors import HilError, RigFileError, UsageError
-from hil.rig.experiments.base import Phase
-from hil.rig.experiments.registry import build_experiment
 from hil.rig.plan import plan_run
 from tests.rig.serving import EXAMPLE
-from tests.rig.vehicle import RigidVehicle, drive
 
 SOURCE = RigSource(EXAMPLE, EXAMPLE.read_text(encoding="utf-8"))
 NEXT = '[experiments.next_1]\nkind = "coast"\nspeed_rad_s = 20.0\nduration_s = 5.0\ntorque_nm = 300.0\n'
@@ -83,17 +80,6 @@ def test_a_file_that_has_not_one_experiment_is_refused(tmp_path: Path, text: str
     file.write_text(text, encoding="utf-8")
     with pytest.raises(RigFileError, match=message):
         with_experiment_of(EXAMPLE, str(file))
-
-
-def test_coast_and_ramp_do_what_they_say(tmp_path: Path) -> None:
-    ramp = '\n[experiments.ramp]\nkind = "ramp"\nduration_s = 8.0\ntorque_nm = 300.0\nslew_nm_per_s = 900.0\n'
-    rig = read_rig(rig_with(tmp_path, "\n" + NEXT + ramp + "swing_nm = 100.0\nramp_s = 2.0\n"))
-    coast, ramped = (drive(build_experiment(rig, name), RigidVehicle()) for name in ("next_1", "ramp"))
-    measured = [t for t, phase in zip(coast.torque_nm, coast.phase, strict=True) if phase is Phase.MEASURE]
-    assert set(measured[50:]) == {0.0}
-    seen = [t for t, phase in zip(ramped.torque_nm, ramped.phase, strict=True) if phase is Phase.MEASURE]
-    assert max(seen) == pytest.approx(100.0, abs=1.0)
-    assert min(seen) == pytest.approx(-100.0, abs=1.0)
 
 
 @pytest.mark.parametrize("lines", Lines)

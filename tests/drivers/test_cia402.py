@@ -7,10 +7,14 @@ import pytest
 from drivers.errors import ProtocolViolation
 from drivers.inverter.cia402 import (
     AUTOMATIC,
+    FAULT_STATES,
+    STATUSWORD_STATE_BITS,
+    TORQUE_STATES,
     TOWARDS_OPERATION,
     Command,
     PowerState,
     StatusBit,
+    TorqueMode,
     command_of,
     next_state,
     state_of,
@@ -55,6 +59,11 @@ def test_towards_operation_reaches_it_from_every_state_but_fault(state: PowerSta
     assert state in (S.OPERATION_ENABLED, S.FAULT)
 
 
+def test_disable_voltage_leads_out_of_every_torque_state_but_the_fault_reaction() -> None:
+    for state in TORQUE_STATES - FAULT_STATES:
+        assert next_state(state, C.DISABLE_VOLTAGE) is S.SWITCH_ON_DISABLED
+
+
 @pytest.mark.parametrize("statusword", range(0x80))
 def test_every_statusword_is_one_state_or_refused(statusword: int) -> None:
     # Table "State coding" of CiA 402-2 as masks and values: bit 5 counts in four states only.
@@ -74,6 +83,11 @@ def test_every_statusword_is_one_state_or_refused(statusword: int) -> None:
     else:
         with pytest.raises(ProtocolViolation, match=f"0x{statusword:04X}.*Check that the EDS"):
             state_of(statusword)
+
+
+@pytest.mark.parametrize("state", PowerState)
+def test_other_bits_do_not_change_the_state(state: PowerState) -> None:
+    assert state_of(STATUSWORD_STATE_BITS[state] | 0xFF90) is state
 
 
 @pytest.mark.parametrize("controlword", range(0x100))
@@ -101,6 +115,16 @@ def test_fault_reset_counts_on_its_rising_edge_alone() -> None:
     assert command_of(0x0080, previous=0x000F) is C.FAULT_RESET
 
 
+@pytest.mark.parametrize("command", Command)
+def test_every_command_survives_its_controlword(command: Command) -> None:
+    assert command_of(command.value) is command
+
+
+def test_modes_name_themselves_and_their_support_bit() -> None:
+    assert TorqueMode(10).title == "10 (cyclic synchronous torque)"
+    assert (TorqueMode.PROFILE_TORQUE.support_bit, TorqueMode(10).support_bit) == (1 << 3, 1 << 9)
+
+
 def test_bits_of_the_statusword_next_to_the_state_are_those_of_the_standard() -> None:
     """CiA 402-2, object 6041h; bit 12 as in cyclic synchronous torque mode."""
     assert {bit.name: bit.value for bit in StatusBit} == {
@@ -109,6 +133,18 @@ def test_bits_of_the_statusword_next_to_the_state_are_those_of_the_standard() ->
         "REMOTE": 0x0200,
         "INTERNAL_LIMIT_ACTIVE": 0x0800,
         "FOLLOWS_TARGET": 0x1000,
+    }
+
+
+def test_words_of_the_commands_are_those_of_the_standard() -> None:
+    """CiA 402-2, table "Command coding", don't-care bits 0 but for those that every state allows to be 1."""
+    assert {command.name: command.value for command in Command} == {
+        "DISABLE_VOLTAGE": 0x0000,
+        "QUICK_STOP": 0x0002,
+        "SHUTDOWN": 0x0006,
+        "SWITCH_ON": 0x0007,
+        "ENABLE_OPERATION": 0x000F,
+        "FAULT_RESET": 0x0080,
     }
 
 

@@ -11,7 +11,7 @@ from drivers.errors import ConfigMismatch
 from drivers.inverter.drive_settings import drive_settings
 from drivers.inverter.inverter import InverterSettings
 from drivers.resources import data_file
-from tests.drivers.can_bench import M1
+from tests.drivers.can_bench import M1, SIMULATED_M1, bench
 
 NODE_GUARDING = """
 [100C]
@@ -111,6 +111,17 @@ def test_node_guarding_is_switched_off(tmp_path: Path, factor: int | str) -> Non
     assert settings[0x100C, 0] == settings[0x100D, 0] == (0, "this program")
 
 
+def test_node_guarding_that_can_t_be_written_is_left_alone(tmp_path: Path) -> None:
+    fixed = NODE_GUARDING.format(guard_ms=0, factor=0).replace("AccessType=rw", "AccessType=ro")
+    assert not {(0x100C, 0), (0x100D, 0)} & {*given(replace(M1, eds_path=changed_eds(tmp_path, more=fixed)))}
+
+
+def test_half_of_node_guarding_is_none_and_left_alone(tmp_path: Path) -> None:
+    guard_time, factor = NODE_GUARDING.format(guard_ms=100, factor=3).split("\n\n")
+    for half in (guard_time, f"\n{factor}"):
+        assert not {(0x100C, 0), (0x100D, 0)} & {*given(replace(M1, eds_path=changed_eds(tmp_path, more=half)))}
+
+
 SYNC = "[1005]\nParameterName=COB-ID SYNC message\nObjectType=0x7\nDataType=0x0007\nAccessType="
 
 
@@ -124,6 +135,54 @@ def test_sync_comes_by_its_usual_identifier_or_the_drive_is_refused(tmp_path: Pa
             given(settings)
     else:
         assert given(settings).get((0x1005, 0)) == ((0x80, "this program") if access == "rw" else None)
+
+
+def test_slope_and_codes_are_in_the_drive_after_configuring_and_in_the_list_before() -> None:
+    settings = replace(M1, torque_slope_nm_per_s=300.0, option_codes={0x605A: 5})
+    with bench(settings=settings) as rig:
+        assert rig.m1.check() == ()
+        assert rig.m1.remarks() == (
+            "quick stop option code 0x605A:00 is 6, a run gives it 5 (rig file)",
+            "torque slope 0x6087:00 is 100000, a run gives it 500 (rig file)",
+        )
+        rig.m1._sdo.download(0x605A, 0, 2)
+        assert [(each.what, each.expected, each.found) for each in rig.m1.check()] == [
+            ("quick stop option code 0x605A:00", "5", "2")
+        ]
+        rig.m1.configure()
+        assert rig.m1.check() == rig.m1.remarks() == ()
+        assert rig.m1._sdo.upload(0x6087) == 500
+        assert rig.m1._sdo.upload(0x1400, 5) == M1.rpdo_deadline_ms
+
+
+def test_a_drive_with_a_name_tells_it_in_segments(tmp_path: Path) -> None:
+    named = """
+[1008]
+ParameterName=Manufacturer device name
+ObjectType=0x7
+DataType=0x0009
+AccessType=const
+DefaultValue=Traction inverter
+PDOMapping=0
+"""
+    eds = changed_eds(tmp_path, more=named)
+    with bench(simulated=replace(SIMULATED_M1, eds_path=eds)) as rig:
+        assert rig.m1._sdo.upload_text(0x1008) == "Traction inverter"
+        with pytest.raises(ConfigMismatch, match=r"object 0x1008:00 refused .*Object does not exist"):
+            rig.m2._sdo.upload_text(0x1008)
+
+
+def test_a_drive_that_is_guarded_is_found_and_set_right(tmp_path: Path) -> None:
+    """Some other master left it on; the EDS has it off."""
+    eds = changed_eds(tmp_path, more=NODE_GUARDING.format(guard_ms=0, factor=0))
+    with bench(settings=replace(M1, eds_path=eds), simulated=replace(SIMULATED_M1, eds_path=eds)) as rig:
+        rig.m1._sdo.download(0x100C, 0, 100)
+        [difference] = rig.m1.check()
+        assert str(difference) == (
+            "inverter m1 (node 5): guard time (heartbeat instead) 0x100C:00 is 100, expected 0 (this program)"
+        )
+        rig.m1.configure()
+        assert rig.m1.check() == ()
 
 
 EMCY = "[1014]\nParameterName=COB-ID EMCY\nObjectType=0x7\nDataType=0x0007\nAccessType=ro\nDefaultValue=$NODEID+0x80\n"

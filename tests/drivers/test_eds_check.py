@@ -1,15 +1,17 @@
 """What the EDS checker says of a whole file, where one fault has consequences or is reported once for many places."""
 
-import re
 from pathlib import Path
 
 import pytest
 
+from drivers.capability.carrier import RPDO
 from drivers.capability.table import TABLE, Function, Without
 from drivers.datasheet.text import Severity
 from drivers.eds_check import EdsReport
-from tests.docs.pages import DOCS
+from drivers.errors import ConfigMismatch
+from drivers.resources import data_file
 from tests.drivers.eds_bench import SHIPPED, E, N, W, checked, edited, line_of, without
+from tests.drivers.fake_drive import FakeDrive, on_bus
 
 
 def places(report: EdsReport, severity: Severity) -> list[str]:
@@ -135,21 +137,6 @@ def test_filler_in_a_mapping(tmp_path: Path, mapping: str, allowed: str, wanted:
     assert all(any(want in each for each in said) for want in wanted)
 
 
-def test_node_guarding_is_reported_and_switched_off(tmp_path: Path) -> None:
-    """It excludes the heartbeat; where it can't be switched off that is an error."""
-    described = "\n[{}]\nParameterName=x\nDataType={}\nAccessType=rw\nDefaultValue={}\n"
-    listed = edited("OptionalObjects", "SupportedObjects=35", "SupportedObjects=37\n36=0x100C\n37=0x100D")
-    off = listed + described.format("100C", 6, 0) + described.format("100D", 5, 0)
-    assert checked(tmp_path, off).findings == ()
-    blank = listed + described.format("100C", 6, "") + described.format("100D", 5, "")
-    assert checked(tmp_path, blank).usable
-    on = listed + described.format("100C", 6, 100) + described.format("100D", 5, 3)
-    assert places(checked(tmp_path, on), W) == ["[100C] DefaultValue"]
-    assert places(
-        checked(tmp_path, on.replace("AccessType=rw\nDefaultValue=3", "AccessType=ro\nDefaultValue=3")), E
-    ) == ["[100C] DefaultValue"]
-
-
 @pytest.mark.parametrize("mapping", ["1600", "1A00"])
 def test_no_pdo_that_carries_what_is_needed(tmp_path: Path, mapping: str) -> None:
     """It is mapped by each run where it can be, and otherwise there is none."""
@@ -165,13 +152,80 @@ def test_no_pdo_that_carries_what_is_needed(tmp_path: Path, mapping: str) -> Non
     assert f"0x{mapping}:01 can not be written" in finding.found
 
 
-def test_objects_of_the_table_are_those_of_the_documentation() -> None:
-    """Each has its row, with what is done without it."""
-    table = (DOCS / "supported-protocols.md").read_text().partition("| object | name | used for | without |")[2]
-    rows = [row.split("|") for row in table.partition("\n\n")[0].splitlines()[2:]]
-    without = {index: row[4].strip() for row in rows for index in re.findall(r"0x(\w{4})", row[1])}
-    without |= {f"605{digit}": without["605A"] for digit in "BCD"}  # "0x605A to 0x605E"
-    for row in TABLE.values():
-        for part in (part for way in row.ways for part in way):
-            refused = without[f"{part.index:04X}"].startswith("refused")
-            assert refused is (row.without is Without.REFUSED) or part.index == 0x1018, f"0x{part.index:04X}"
+COUNTER = """[1019]
+ParameterName=Synchronous counter overflow value
+ObjectType=0x7
+DataType=0x0005
+AccessType=rw
+DefaultValue=10
+PDOMapping=0
+
+"""
+
+
+@pytest.mark.parametrize(
+    ("index", "old", "new"),
+    [
+        ("6077", "0x0003", "0x0006"),
+        ("6077", "0x0003", "0x0004"),
+        ("6071", "0x0003", "0x0006"),
+        ("606C", "0x0004", "0x0007"),
+        ("606C", "0x0004", "0x0003"),
+        ("6061", "0x0002", "0x0005"),
+        ("6041", "0x0006", "0x0007"),
+    ],
+)
+def test_used_object_of_another_sign_or_width_is_an_error_of_the_check(
+    index: str, old: str, new: str, tmp_path: Path
+) -> None:
+    text = edited(index, f"DataType={old}", f"DataType={new}")
+    report = checked(tmp_path, text)
+    assert not report.usable
+    [finding] = [each for each in report.findings if each.place == f"[{index}] DataType" and each.severity is E]
+    assert finding.line == line_of(text, index, "DataType")
+
+
+def test_torque_offset_without_a_sign_is_done_without(tmp_path: Path) -> None:
+    """Base torque and PRBS go into the target torque as a sum, so that nothing is read as another number."""
+    text = edited("60B2", "DataType=0x0003", "DataType=0x0006")
+    report = checked(tmp_path, text)
+    assert report.usable
+    [finding] = [each for each in report.findings if each.place == "[60B2] DataType"]
+    assert finding.severity is W
+    assert finding.line == line_of(text, "60B2", "DataType")
+    assert report.plan is not None
+    assert 0x60B2 not in {mapped.index for mapped in report.plan.pdos(RPDO)[0].layout.objects}
+
+
+def with_counter(access: str = "rw") -> str:
+    text = data_file("inverter.eds").read_text(encoding="utf-8")
+    text = text.replace("[1029]", COUNTER.replace("AccessType=rw", f"AccessType={access}") + "[1029]", 1)
+    count = next(line for line in text.split("[OptionalObjects]")[1].splitlines() if line.startswith("SupportedObj"))
+    number = int(count.split("=")[1])
+    return text.replace(count, f"SupportedObjects={number + 1}\n{number + 1}=0x1019", 1)
+
+
+@pytest.mark.parametrize(("access", "severity"), [("rw", W), ("const", E)])
+def test_sync_counter_is_reported(access: str, severity: Severity, tmp_path: Path) -> None:
+    reported = [
+        each for each in checked(tmp_path, with_counter(access)).findings if each.place == "[1019] DefaultValue"
+    ]
+    assert [each.severity for each in reported] == [severity]
+
+
+class CountsSync(FakeDrive):
+    """Takes no SYNC without a counter while 0x1019 is not 0, and says so by EMCY 0x8240 (CiA 301, 7.2.2.5)."""
+
+    def take_sync(self, data: bytes) -> None:
+        if self.objects[0x1019, 0] and len(data) != 1:
+            self.link.send(0x080 + self.node_id, bytes.fromhex("40 82 11 00 00 00 00 00"))
+        else:
+            super().take_sync(data)
+
+
+def test_drive_that_counts_syncs_for_good_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "drive.eds"
+    path.write_text(with_counter("const"), encoding="utf-8")
+    with pytest.raises(ConfigMismatch, match=r"0x1019:00 that is 0 or can be written, found 10 for good"):
+        with on_bus(CountsSync, eds_path=path):
+            pass

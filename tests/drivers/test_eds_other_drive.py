@@ -18,6 +18,7 @@ from drivers.errors import ConfigMismatch
 from drivers.inverter.cia402 import PowerState
 from drivers.inverter.inverter import Inverter
 from drivers.inverter.settings import Acceptance
+from drivers.resources import data_file
 from hil.config.rig_file import read_rig
 from hil.rig.build import inverter_settings
 from hil.simulator.drive_physics import SimulatedInverter
@@ -74,6 +75,14 @@ def test_the_whole_way_to_torque(other: Bench) -> None:
     assert other.m1.check() == ()
 
 
+def test_drive_is_refused_with_the_shipped_eds(other: Bench) -> None:
+    """It is another device, another unit of speed, and its torque is in another PDO."""
+    with bench(settings=replace(OTHER, eds_path=None), simulated=SIMULATED) as rig:
+        with pytest.raises(ConfigMismatch, match="SI unit velocity 0x60A9"):
+            rig.m1.configure()
+        assert rig.rig.torque_nm[0] == 0.0
+
+
 NEEDED = [row.function for row in TABLE.values() if row.without is Without.REFUSED]
 OPTIONAL = [row.function for row in TABLE.values() if row.without in (Without.DONE, Without.RIG_FILE)]
 ACCEPTED = {
@@ -124,3 +133,9 @@ def whole_way(rig: Bench, eds: Path) -> None:
     m1.fault()
     m1.configure()
     m1.arm()
+
+
+def test_shipped_eds_goes_the_whole_way() -> None:
+    """Without this the test above might fail for another reason than the missing object."""
+    with bench() as rig:
+        whole_way(rig, data_file("inverter.eds"))

@@ -5,9 +5,14 @@ import threading
 import pytest
 
 from drivers.canopen.heartbeat import (
+    HEARTBEAT_COB_ID,
+    HOST_NODE_ID,
+    NMT_COB_ID,
     HeartbeatMonitor,
     HeartbeatProducer,
+    NmtCommand,
     NmtState,
+    nmt_frame,
 )
 from drivers.canopen.node_monitor import NodeMonitor
 from drivers.canopen.silence import GRACE_NS
@@ -72,6 +77,10 @@ def test_producer_ends_with_its_bus() -> None:
     producer.stop()
 
 
+def test_nmt_frame_is_command_and_node() -> None:
+    assert nmt_frame(NmtCommand.ENTER_PRE_OPERATIONAL, 5) == b"\x80\x05"
+
+
 def node_monitor(timeout_ms: int = 1_000_000) -> NodeMonitor:
     return NodeMonitor("node 5", timeout_ms * MS)
 
@@ -92,6 +101,32 @@ def test_node_that_left_its_nmt_state_is_a_fault() -> None:
     monitor.on_heartbeat(b"\x00", 0)
     with pytest.raises(DeviceFault, match="NMT state is INITIALISING, expected OPERATIONAL"):
         monitor.raise_if_unwell(0)
+
+
+def test_node_that_took_its_emergency_back_is_named_with_it() -> None:
+    monitor = node_monitor()
+    monitor.expect(NmtState.OPERATIONAL)
+    monitor.on_emergency(bytes.fromhex("30 81 11 00 00 00 00 00"), 0)
+    monitor.on_emergency(bytes(8), 0)
+    monitor.on_heartbeat(b"\x7f", 0)
+    with pytest.raises(DeviceFault, match=r"PRE-OPERATIONAL, expected OPERATIONAL\. It sent EMCY 0x8130"):
+        monitor.raise_if_unwell(0)
+
+
+def test_toggle_bit_of_node_guarding_is_no_state() -> None:
+    monitor = node_monitor()
+    monitor.expect(NmtState.OPERATIONAL)
+    monitor.on_heartbeat(b"\x85", 0)
+    monitor.raise_if_unwell(0)
+
+
+def test_awaited_state_that_does_not_come_names_the_one_seen() -> None:
+    monitor = node_monitor()
+    with pytest.raises(DeviceTimeout, match="reports nothing so far after 0 s, expected OPERATIONAL"):
+        monitor.await_state(NmtState.OPERATIONAL, 0.0, ask=lambda: None)
+    monitor.on_heartbeat(b"\x7f", 0)
+    with pytest.raises(DeviceTimeout, match="reports PRE-OPERATIONAL after 0 s, expected OPERATIONAL"):
+        monitor.await_state(NmtState.OPERATIONAL, 0.0, ask=lambda: None)
 
 
 def test_state_is_asked_for_again_until_it_is_reported() -> None:
@@ -117,3 +152,36 @@ def test_the_first_emergency_stays_until_it_is_reset() -> None:
         monitor.raise_if_unwell(0)
     monitor.on_emergency(bytes(8), 0)
     monitor.raise_if_unwell(0)
+
+
+def test_identifiers_and_codes_are_those_of_cia_301() -> None:
+    """Tables "NMT node control" and "heartbeat protocol"; the predefined connection set."""
+    assert (NMT_COB_ID, HEARTBEAT_COB_ID, HOST_NODE_ID) == (0x000, 0x700, 127)
+    assert {command.name: command.value for command in NmtCommand} == {
+        "START": 1,
+        "STOP": 2,
+        "ENTER_PRE_OPERATIONAL": 128,
+        "RESET_NODE": 129,
+        "RESET_COMMUNICATION": 130,
+    }
+    assert {state.name: state.value for state in NmtState} == {
+        "INITIALISING": 0,
+        "STOPPED": 4,
+        "OPERATIONAL": 5,
+        "PRE_OPERATIONAL": 127,
+    }
+
+
+def test_a_heartbeat_may_be_sent_between_two() -> None:
+    sent: list[tuple[int, bytes]] = []
+    began = threading.Event()
+
+    def send(cob_id: int, data: bytes) -> None:
+        sent.append((cob_id, data))
+        began.set()
+
+    producer = HeartbeatProducer(send, 9, period_s=3600.0, state=lambda: NmtState.OPERATIONAL)
+    assert began.wait(60.0)
+    producer.beat()
+    producer.stop()
+    assert sent == [(0x709, b"\x05"), (0x709, b"\x05")]

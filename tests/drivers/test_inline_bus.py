@@ -66,31 +66,6 @@ def test_frames_of_many_threads_come_one_at_a_time_each_threads_in_order(channel
     assert dict(got) == {cob_id: list(range(500)) for cob_id in range(4)}
 
 
-def test_two_that_answer_each_other_in_two_threads_do_not_wait_for_each_other(channel: str) -> None:
-    """Each thread is inside the other's receiver when it answers: waiting there would be for ever."""
-    met = threading.Barrier(2, timeout=10.0)
-    got: list[int] = []
-    with InlineBus(channel) as one, InlineBus(channel) as other:
-
-        def take(bus: InlineBus, message: can.Message) -> None:
-            got.append(message.arbitration_id)
-            if message.arbitration_id < 10:
-                met.wait()
-                bus.send(frame(message.arbitration_id + 10, b""))
-                met.wait()
-
-        one.receive_by(lambda message: take(one, message))
-        other.receive_by(lambda message: take(other, message))
-        threads = [
-            threading.Thread(target=bus.send, args=(frame(cob_id, b""),)) for bus, cob_id in ((one, 1), (other, 2))
-        ]
-        for thread in threads:
-            thread.start()
-        for thread in threads:
-            thread.join(60.0)
-    assert sorted(got) == [1, 2, 11, 12]
-
-
 def test_nobody_is_called_after_the_end_and_nothing_can_be_sent(channel: str) -> None:
     got: list[can.Message] = []
     with InlineBus(channel) as here:

@@ -8,7 +8,7 @@ import pytest
 
 from drivers.canopen.can_link import CanLink
 from drivers.errors import CommandRefused, DeviceTimeout, ForeignController, ProtocolViolation
-from drivers.inverter.cia402 import PowerState, TorqueMode
+from drivers.inverter.cia402 import PowerState
 from drivers.inverter.inverter import Inverter
 from drivers.resources import data_file
 from hil.simulator.plant import RigidPlant
@@ -94,19 +94,6 @@ def test_a_drive_that_another_host_has_enabled_gets_no_nmt_command(armed: Bench)
         with pytest.raises(ForeignController, match=r"m1 \(node 5\): power state is operation enabled"):
             Inverter(link, M1).configure()
         assert armed.rig.torque_nm[0] == pytest.approx(120.0)
-
-
-def test_profile_torque_follows_its_slope() -> None:
-    settings = replace(M1, mode=TorqueMode.PROFILE_TORQUE)
-    with bench(settings=settings) as rig:
-        rig.m1.configure()
-        rig.m1._sdo.download(0x6087, 0, 5000)  # 5000 per mille/s: 50 per mille, 30 Nm, in one period of 10 ms
-        rig.m1.arm()
-        torques_nm = []
-        for _ in range(4):
-            rig.cycle(guarded(75.0, 6.0))
-            torques_nm.append(rig.rig.torque_nm[0])
-        assert torques_nm == pytest.approx([36.0, 66.0, 81.0, 81.0])
 
 
 def test_changed_mapping_in_the_eds_is_configured_and_used(tmp_path: Path) -> None:

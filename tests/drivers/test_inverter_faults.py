@@ -67,16 +67,6 @@ def test_configuration_that_does_not_hold_is_refused(index: int, tmp_path: Path)
             rig.m1.configure()
 
 
-def test_option_code_of_the_drive_s_own_is_kept_and_reported() -> None:
-    with bench() as rig:
-        rig.m1._sdo.download(0x605A, 0, 2)
-        assert rig.m1.check() == ()
-        (remark,) = rig.m1.remarks()
-        assert remark.startswith("quick stop option code 0x605A:00 is 2, the EDS has 6: the drive keeps its own.")
-        rig.m1.configure()
-        assert rig.m1._sdo.upload(0x605A) == 2
-
-
 def test_drive_whose_own_code_leaves_the_torque_is_refused_until_the_rig_file_has_another() -> None:
     with bench() as rig:
         rig.m1._sdo.download(0x6007, 0, 0)
@@ -143,15 +133,3 @@ def test_drive_that_hangs_can_not_be_disarmed_and_every_step_is_reported() -> No
             rig.m1.disarm()
         [note] = failed.value.__notes__
         assert "0x6040:00" in note
-
-
-def test_drive_that_ignores_the_controlword_is_taken_down_by_nmt() -> None:
-    """Confirmed by the statusword, not by the acknowledgement: the last resort is the network."""
-    with bench() as rig:
-        start(rig)
-        rig.cycle(guarded(120.0))
-        rig.rig._m1._server.ignored_writes = frozenset({0x6040, 0x6071, 0x60B2})
-        with pytest.raises(DeviceTimeout, match=r"power state is operation enabled after .* expected without torque"):
-            rig.m1.disarm()
-        rig.m1._sdo.upload(0x6041)  # answered after the NMT command before it
-        assert rig.rig.torque_nm[0] == 0.0

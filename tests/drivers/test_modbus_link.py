@@ -1,12 +1,10 @@
 """The Modbus connection against peers that misbehave: each way has its own error, none is silent."""
 
 import asyncio
-import re
 
 import pytest
 
 from drivers.errors import BusDown, DeviceFault, DeviceTimeout, ProtocolViolation
-from drivers.plc.modbus_dial import Dial
 from drivers.plc.modbus_link import EXCEPTION_TEXT, ModbusLink
 from drivers.plc.register import RegisterKind
 from tests.drivers.modbus_peers import Answer, frame, free_port, peer
@@ -124,19 +122,6 @@ def test_a_late_answer_is_not_taken_for_that_of_the_next_request_and_is_no_wrong
     asyncio.run(run())
 
 
-@pytest.mark.parametrize(
-    ("answer", "got"),
-    [
-        (lambda request: b"HTTP/1.1 400 Bad Request\r\n\r\n", "only 28 bytes came that are no whole one (48 54 54 50"),
-        (lambda request: frame(request, b"\x03\x04\x12\x34\xab\xcd")[:6], "only 6 bytes came that are no whole one"),
-    ],
-    ids=["not Modbus", "half an answer"],
-)
-def test_what_is_no_whole_answer_is_shown(answer: Answer, got: str) -> None:
-    with pytest.raises(DeviceTimeout, match=re.escape(f"expected an answer within 0.1 s, {got}")):
-        read_from(answer, timeout_s=TIMEOUT_S)
-
-
 def test_a_lost_connection_is_not_a_timeout_and_ends_the_wait_at_once() -> None:
     """A wait to its end would take the hour, which no test is given."""
 
@@ -166,26 +151,6 @@ def test_no_server_is_a_bus_that_is_down() -> None:
     port = free_port()
     with pytest.raises(BusDown, match=f"PLC at 127.0.0.1:{port}.*expected a Modbus TCP server"):
         asyncio.run(ModbusLink("127.0.0.1", port, 1, TIMEOUT_S).open())
-
-
-def test_connecting_has_a_time_of_its_own_and_answers_have_theirs_after_it() -> None:
-    async def run() -> tuple[float | None, float | None]:
-        async with peer(lambda request: frame(request, b"\x03\x02\x00\x01")) as port:
-            dial = Dial("127.0.0.1", port, TIMEOUT_S, None, "PLC")
-            dial._connecting_s = 7.0
-            params, connect = dial.client.ctx.comm_params, dial.client.connect
-            during = []
-
-            async def watched() -> bool:
-                during.append(params.timeout_connect)
-                return await connect()
-
-            dial.client.connect = watched  # type: ignore[method-assign]
-            await dial.open()
-            dial.close()
-            return during[0], params.timeout_connect
-
-    assert asyncio.run(run()) == (7.0, TIMEOUT_S)
 
 
 def test_nothing_is_sent_before_it_is_open_or_after_it_is_closed() -> None:

@@ -1,7 +1,6 @@
 """The PLC driver against the simulated PLC on a real Modbus TCP connection."""
 
 import asyncio
-import math
 import re
 from collections.abc import Awaitable, Callable
 from dataclasses import replace
@@ -99,29 +98,6 @@ def test_the_status_in_si_units() -> None:
     talk(device, conversation, clock=clock)
 
 
-def test_other_units_are_turned_into_the_driver_s_own(tmp_path: Path) -> None:
-    device = PlcDevice(PlcSetup(speed_limit_rad_s=3000.0, torque_limit_nm=0.4))
-
-    async def conversation(plc: Plc, _: ServedPlc) -> None:
-        status = await plc.read_status()
-        assert status.speed_limit_rad_s == pytest.approx(3000.0 * 2.0 * math.pi / 60.0)
-        assert status.torque_limit_nm == pytest.approx(400.0)
-        await start(plc)
-        assert device.values()["prbs_amplitude"] == pytest.approx(0.0605, rel=1e-6)
-        assert (await plc.read_status()).prbs.amplitude_nm == pytest.approx(60.5, rel=1e-6)
-
-    talk(device, conversation, map_=load_register_map(in_other_units(tmp_path)))
-
-
-def in_other_units(folder: Path) -> Path:
-    """The shipped map, its speeds in revolutions per minute and its torques in kNm."""
-    path = folder / "map.toml"
-    path.write_text(
-        MAP_TEXT.replace('unit = "rad/s"', 'unit = "1/min"').replace('unit = "Nm"', 'unit = "kNm"'), "utf-8"
-    )
-    return path
-
-
 def test_prbs_settings_arrive_and_the_generator_runs() -> None:
     device = PlcDevice()
 
@@ -139,19 +115,6 @@ def test_prbs_settings_arrive_and_the_generator_runs() -> None:
     talk(device, conversation)
 
 
-def test_who_switches_it_off_comes_behind_who_still_switches_it_on() -> None:
-    device = PlcDevice()
-
-    async def conversation(plc: Plc, _: ServedPlc) -> None:
-        on = asyncio.create_task(start(plc))
-        await asyncio.sleep(0)
-        await plc.stop_prbs()
-        await on
-        assert (await plc.read_status()).prbs == GENERATOR_OFF
-
-    talk(device, conversation)
-
-
 @pytest.mark.parametrize("change", [{"clock_divider": 0}, {"seed": 0}, {"seed": 1024}, {"amplitude_nm": -1.0}])
 def test_a_setting_the_plc_refuses_is_raised(change: dict[str, int]) -> None:
     async def conversation(plc: Plc, _: ServedPlc) -> None:
@@ -160,25 +123,6 @@ def test_a_setting_the_plc_refuses_is_raised(change: dict[str, int]) -> None:
         assert not (await plc.read_status()).prbs.enabled
 
     talk(PlcDevice(), conversation)
-
-
-class LimitingPlc(PlcDevice):
-    """A PLC whose program quietly limits the amplitude to 50 Nm."""
-
-    __slots__ = ()
-
-    def values(self) -> dict[str, bool | int | float | str]:
-        values = super().values()
-        return {**values, "prbs_amplitude": min(float(values["prbs_amplitude"]), 50.0)}
-
-
-def test_a_setting_the_plc_quietly_changes_is_raised() -> None:
-    async def conversation(plc: Plc, _: ServedPlc) -> None:
-        with pytest.raises(ProtocolViolation, match=r"prbs_amplitude.*expected to read back .* as written, got"):
-            await start(plc)
-        assert not (await plc.read_status()).prbs.enabled
-
-    talk(LimitingPlc(), conversation)
 
 
 def test_a_drive_mode_is_confirmed_by_the_status() -> None:

@@ -1,5 +1,6 @@
 """Counts to SI and back: exact at the limits, refused beyond them, never wrapped."""
 
+import dataclasses
 import math
 
 import pytest
@@ -20,6 +21,11 @@ def test_every_type_holds_its_limits_and_nothing_beyond(kind: IntegerType) -> No
     for value in (kind.low - 1, kind.high + 1):
         with pytest.raises(CommandRefused, match=rf"here: {value} does not fit {kind.name}"):
             kind.encode(value, "here")
+
+
+def test_type_limits_are_those_of_the_standard() -> None:
+    assert (IntegerType.INTEGER16.low, IntegerType.INTEGER16.high) == (-32768, 32767)
+    assert (IntegerType.UNSIGNED32.low, IntegerType.UNSIGNED32.high) == (0, 4294967295)
 
 
 @given(st.integers(-32768, 32767))
@@ -65,6 +71,25 @@ def test_every_speed_count_survives_the_way_to_rad_s_and_back(raw: int) -> None:
     assert scale.to_raw(scale.to_rad_s(raw), "here") == raw
 
 
+@pytest.mark.parametrize("counts", [2**31, -(2**31) - 1, math.nan])
+def test_speed_that_does_not_fit_is_refused(counts: float) -> None:
+    scale = VelocityScale.from_object(MILLI_RPM, "here")
+    with pytest.raises(CommandRefused, match=r"here: speed .* \(INTEGER32\)"):
+        scale.to_raw(scale.rad_s_per_count * counts, "here")
+
+
+def test_codes_and_ranges_are_those_of_cia_301() -> None:
+    """Table "Object dictionary data types"; the code is what an EDS has as DataType."""
+    assert {kind.name: (kind.value, kind.size_bytes, kind.low, kind.high) for kind in IntegerType} == {
+        "INTEGER8": (0x02, 1, -128, 127),
+        "INTEGER16": (0x03, 2, -32768, 32767),
+        "INTEGER32": (0x04, 4, -2147483648, 2147483647),
+        "UNSIGNED8": (0x05, 1, 0, 255),
+        "UNSIGNED16": (0x06, 2, 0, 65535),
+        "UNSIGNED32": (0x07, 4, 0, 4294967295),
+    }
+
+
 @pytest.mark.parametrize(("prefix", "power"), [(0x09, 9), (0xF7, -9)])
 def test_the_largest_powers_of_ten_are_taken_and_the_next_are_not(prefix: int, power: int) -> None:
     radians_per_second = 0x00100300
@@ -73,3 +98,11 @@ def test_the_largest_powers_of_ten_are_taken_and_the_next_are_not(prefix: int, p
     beyond = (prefix + (1 if power > 0 else -1)) << 24 | radians_per_second
     with pytest.raises(ConfigMismatch, match="a power of ten from -9 to 9"):
         VelocityScale.from_object(beyond, "m1")
+
+
+@pytest.mark.parametrize(
+    ("scale", "name"), [(TorqueScale(600.0), "rated_torque_nm"), (VelocityScale(0.1), "rad_s_per_count")]
+)
+def test_a_scale_can_t_be_changed(scale: object, name: str) -> None:
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        setattr(scale, name, 1.0)

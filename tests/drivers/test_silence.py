@@ -1,6 +1,6 @@
 """When a heartbeat has ended: overdue, and still so after a time in which the listener was awake."""
 
-from drivers.canopen.silence import Silence
+from drivers.canopen.silence import GRACE_NS, Silence
 
 TIMEOUT_NS = 500
 GRACE = 100
@@ -40,6 +40,13 @@ def test_a_long_time_between_two_looks_counts_as_the_longest_there_is() -> None:
     assert silence.has_ended(overdue_ns + 4 * 10**9)
 
 
+def test_short_looks_count_as_long_as_they_are() -> None:
+    silence = listening(LOOK)
+    overdue_ns = START_NS + TIMEOUT_NS + 1
+    assert not any(silence.has_ended(overdue_ns + later) for later in range(0, GRACE, 5))
+    assert silence.has_ended(overdue_ns + GRACE)
+
+
 def test_a_beat_begins_the_grace_anew() -> None:
     silence = listening()
     overdue_ns = START_NS + TIMEOUT_NS + 1
@@ -47,3 +54,23 @@ def test_a_beat_begins_the_grace_anew() -> None:
     silence.beat(overdue_ns)
     assert not silence.has_ended(overdue_ns + TIMEOUT_NS + 1)
     assert silence.has_ended(overdue_ns + TIMEOUT_NS + 1 + GRACE)
+
+
+def test_its_length_is_counted_from_the_last_beat() -> None:
+    silence = Silence(TIMEOUT_NS)
+    assert silence.length_ns(START_NS) == 0
+    assert not silence.has_ended(START_NS)
+    silence.beat(START_NS)
+    assert silence.length_ns(START_NS + 7) == 7
+    silence.end()
+    assert silence.length_ns(START_NS + 7) == 0
+    assert not silence.has_ended(START_NS + 10**9)
+
+
+def test_without_a_word_the_grace_is_a_tenth_of_a_second() -> None:
+    assert GRACE_NS == 100_000_000
+    silence = Silence(TIMEOUT_NS)
+    silence.beat(0)
+    assert not silence.has_ended(TIMEOUT_NS + 1)
+    assert not silence.has_ended(TIMEOUT_NS + GRACE_NS)
+    assert silence.has_ended(TIMEOUT_NS + 1 + GRACE_NS)

@@ -54,6 +54,23 @@ def test_nothing_counts_before_and_after(bus: Bus, strangers: Strangers) -> None
     strangers.raise_if_seen()
 
 
+def test_what_was_seen_is_forgotten_at_the_end(bus: Bus, strangers: Strangers) -> None:
+    strangers.watch()
+    bus.arrive(0x080)
+    strangers.end()
+    strangers.raise_if_seen()
+    strangers.watch()
+    strangers.raise_if_seen()
+
+
+def test_watching_twice_forgets_nothing(bus: Bus, strangers: Strangers) -> None:
+    strangers.watch()
+    bus.arrive(0x080)
+    strangers.watch()
+    with pytest.raises(ForeignController, match="SYNC"):
+        strangers.raise_if_seen()
+
+
 def test_an_identifier_claimed_twice_has_one_callback_and_the_last_name(bus: Bus, strangers: Strangers) -> None:
     strangers.claim(0x080, "another SYNC")
     assert len(bus.callbacks[0x080]) == 1

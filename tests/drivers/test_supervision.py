@@ -289,6 +289,11 @@ def test_a_speed_that_jumps_in_every_second_cycle_ends_it() -> None:
     assert (speeds([(40.0 * (k % 2), 40.0) for k in range(100)]) or math.inf) <= 6
 
 
+def test_quick_changes_of_both_are_no_difference() -> None:
+    """100 rad/s² sampled a period apart: 1 rad/s."""
+    assert speeds([(1.0 * k, 1.0 * (k + 1)) for k in range(-50, 50)]) is None
+
+
 def test_a_speed_that_runs_away_against_the_torque_ends_it() -> None:
     def run(share: float, torque_nm: float = 100.0) -> int | None:
         made = supervised(inertia_kg_m2=10.0)
@@ -336,6 +341,13 @@ def test_one_tpdo_per_sync() -> None:
     assert messages(*pair * 500) == 2 * MOST_SURPLUS, "one kind of two"
     assert messages(*([2] + [1] * 200) * 20) is None, "a controller that hears a frame twice"
     assert messages(*[1, 0, 0] * 500) == 3 * (MOST_MISSING - 1)
+
+
+def test_late_ones_are_awaited_for_as_long_as_feedback_may_be_old() -> None:
+    for begins in range(80, 120):
+        assert messages(0, *[1] * begins, *[0] * 12, 13, *[1] * 50) is None, "a drive that stops for 12 cycles"
+    assert messages(*[0] * 5, *[1] * 14, *[2] * 5, *[1] * 50) is None
+    assert messages(*[0] * 5, *[1] * 30, *[2] * 5) == 35 + MOST_SURPLUS, "these were lost"
 
 
 def test_doubtful_rows_are_those_of_the_drive_that_is() -> None:

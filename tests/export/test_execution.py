@@ -1,7 +1,6 @@
 """The exported text, executed, is the estimator of the host: every number, to the bit."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -111,16 +110,6 @@ def test_the_example_program_keeps_the_last_estimate_that_may_be_used(tmp_path: 
     estimated = [k for k in range(len(host)) if host[k].status is Status.ESTIMATED]
     assert out.estimates == len(estimated) > 100
     assert [*out.theta] == theta[estimated[-1]].tolist()
-
-
-def test_a_reset_forgets_everything(tmp_path: Path) -> None:
-    drive, at = bad_drive(), 1001  # in the middle of a sample of the model
-    estimator = PlcEstimator(L=None)
-    kept = on_plc(estimator, drive, tmp_path, reset_at=at)
-    rest = Cycles(*(array[at:] for array in vars(drive).values()))
-    before = (at + 1) // 2
-    after = replace(kept, **{name: values[before:] for name, values in vars(kept).items()})
-    assert_equal_bits(after, on_host(estimator, rest))
 
 
 def test_what_is_undetermined_is_named_as_on_the_host(tmp_path: Path) -> None:

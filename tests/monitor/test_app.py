@@ -2,18 +2,16 @@
 
 import asyncio
 from collections.abc import Awaitable, Callable
-from dataclasses import replace
 
 import pytest
 from textual.pilot import Pilot
 
 from hil.monitor.app import MonitorApp
 from hil.monitor.layout import PAGES
-from hil.monitor.messages import Began, Choice, Ended, Mark, Quit, Ready, Samples, Start, Stop
-from hil.monitor.panel import Panel
+from hil.monitor.messages import Began, Choice, Ended, Quit, Ready, Start, Stop
 from hil.monitor.snapshot import Activity
 from hil.monitor.state import LiveState
-from tests.monitor.fake_source import PERIOD_S, FakeSource, ended, sample, settled
+from tests.monitor.fake_source import PERIOD_S, FakeSource, ended, settled
 from tests.monitor.test_panels import snapshot
 
 CHOICES = (Choice("cruise", "holds a speed"), Choice("tip", "steps the torque"))
@@ -63,24 +61,6 @@ def test_stop_at_once_by_either_key_and_from_the_help() -> None:
         assert activity(app) is Activity.STOPPING
 
     play(script)
-
-
-def test_a_mark_has_the_time_of_its_key_and_the_text_typed() -> None:
-    async def script(pilot: Pilot[None], source: FakeSource, app: MonitorApp) -> None:
-        await pilot.press("m")
-        assert source.sent == []  # nothing is being recorded
-        source.coming = [Began("cruise", "runs/c.parquet", 30.0)]
-        await settled(pilot)
-        await pilot.press("m", *"axe x", "enter")
-        await pilot.press("m", "enter")
-        await pilot.press("m", "escape")
-
-    source, _ = play(script)
-    first, second = source.sent
-    assert isinstance(first, Mark)
-    assert isinstance(second, Mark)
-    assert (first.text, second.text) == ("axe x", "mark")
-    assert first.t_ns < second.t_ns
 
 
 @pytest.mark.parametrize(("key", "interrupted"), [("q", False), ("ctrl+c", True)])
@@ -136,20 +116,3 @@ def test_the_view_survives_every_resize_while_a_model_is_shown(page: str) -> Non
             assert app.is_running
 
     play(script)
-
-
-def test_further_channels_stand_on_the_first_page() -> None:
-    units = {"speed_load_rad_s": "rad/s"}
-    source = FakeSource(coming=[Ready(), Samples(((replace(sample(0), channels=(12.5,)), None),))])
-    app = MonitorApp(source, LiveState("bus", PERIOD_S, None, True, channel_units=units))
-
-    async def go() -> None:
-        async with app.run_test(size=(80, 24)) as pilot:
-            await settled(pilot)
-            (panel,) = app.query(".channels").results(Panel)
-            assert panel.size.height == 1
-            assert str(panel.render()).split() == ["speed_load_rad_s", "[rad/s]", "12.5"]
-            for name in ("torque", "speed", "prbs", "twist"):
-                assert app.query_one(f".{name}").size.height >= 3
-
-    asyncio.run(go())

@@ -4,19 +4,13 @@ from pathlib import Path
 
 import pytest
 
-from hil.config.rig_file import read_rig
-from hil.errors import RecordingError, UsageError
+from hil.errors import RecordingError
 from hil.monitor.messages import Began, Over, Report, Samples
 from hil.monitor.opening import open_recording
 from hil.monitor.source import ReplaySource, recorded_samples
 from hil.recording.writer import RecordingWriter
-from hil.rig.build import open_devices
-from hil.rig.experiments.base import Phase
-from hil.rig.trace import BusTrace
 from hil.sample import Sample, SampleFlag
 from tests.monitor.fake_source import sample
-from tests.rig.serving import Samples as Recorded
-from tests.rig.serving import run, served
 
 SAMPLES = [sample(k, 0.5 * k, 0.1 * k, 120.0, SampleFlag(k % 7 == 3)) for k in range(100)]
 
@@ -72,19 +66,3 @@ def test_a_recording_that_can_not_be_played_is_refused(tmp_path: Path, rows: str
     path.write_text(f"time_s,torque_m1_nm,torque_m2_nm,speed_rad_s\n{rows}", encoding="utf-8")
     with pytest.raises(RecordingError, match=said):
         open_recording(path, None, 1.0, None)
-
-
-def test_a_bus_trace_is_played_with_its_rig_file_and_refused_without(rig_path: Path, tmp_path: Path) -> None:
-    trace, recorded = tmp_path / "run.blf", Recorded()
-    with served() as (_, rig), open_devices(rig) as devices, BusTrace(trace) as tap:
-        devices.link.trace_by(tap.take)
-        run(rig, devices, recorded)
-        devices.link.trace_by(None)
-    with pytest.raises(UsageError, match=r"run\.blf"):
-        open_recording(trace, None, 1.0, None)
-    opening = open_recording(trace, read_rig(rig_path), 1e6, None)
-    with opening.source:
-        reports = list(opening.source.poll())
-    rows = [row for report in reports if isinstance(report, Samples) for row in report.rows]
-    assert len(rows) > len(recorded.rows)  # what was before and after it, too
-    assert [row.torque_m1_nm for row, phase in rows if phase is Phase.MEASURE] == recorded.column("torque_m1_nm")

@@ -8,7 +8,6 @@ import pytest
 
 from estimator.physics.catalogue import EFFECTS
 from hil.config.model_file import read_model_for_recordings
-from hil.errors import UsageError
 from hil.proof import real
 from hil.proof.command import CommandFailed
 from hil.proof.real import agreement, read_real, run_real
@@ -96,17 +95,6 @@ def test_what_was_found_is_compared_with_what_is_known(tool, world):
     assert read_real(out) == json.loads(json.dumps([case]))
 
 
-def test_a_case_that_is_done_is_not_run_again_until_its_question_changes(tool, world):
-    room, *_ = world
-    run(world)
-    run(world)
-    assert len(tool.seen) == 1
-    model = room / "trolley" / "model.toml"
-    model.write_text(model.read_text().replace("value = 8.0", "value = 7.0"))
-    run(world)
-    assert len(tool.seen) == 2
-
-
 def test_a_command_that_fails_is_a_result_and_is_tried_again(tool, world, monkeypatch):
     def broken(arguments, folder, limit_s):
         raise CommandFailed("hil diagnose: ended with status 3")
@@ -119,15 +107,6 @@ def test_a_command_that_fails_is_a_result_and_is_tried_again(tool, world, monkey
     assert reported == [("trolley/only diagnosed", 1, 1)]
     monkeypatch.setattr(real, "run_hil", tool)
     assert run(world)[0]["runs"][0]["fault"] is None
-
-
-@pytest.mark.parametrize(
-    "text", ["{", '{"schema": "hil.real/1", "cases": []}', '{"schema": "hil.real/2", "cases": [1]}']
-)
-def test_results_of_something_else_are_refused(tmp_path, text):
-    (tmp_path / "real.json").write_text(text)
-    with pytest.raises(UsageError, match="remove it"):
-        read_real(tmp_path)
 
 
 KNOWN = KnownValue(what="drag", found="effects.aerodynamic_drag.drag_nm_s2", value=0.5, unit="x", within=0.1)

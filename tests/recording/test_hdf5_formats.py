@@ -108,21 +108,3 @@ def test_a_v73_file_of_matlab_is_read(theirs: Path) -> None:
     assert table.columns["on"].dtype == np.bool_
     assert dict(table.metadata) == {"gain": "35.15", "note": "lap 2"} == dict(read_metadata(theirs))
     assert {re.split("[:(]", remark)[0] for remark in table.remarks} == {"matrix", "other"}
-
-
-def test_an_hdf5_file_of_another_program_is_read(tmp_path: Path) -> None:
-    path = tmp_path / "theirs.h5"
-    rows = np.array([(k * 0.1, k) for k in range(6)], dtype=[("time", "f8"), ("count", "u2")])
-    with h5py.File(path, "w") as file:
-        file.attrs["vehicle"] = "bus 17"
-        file["drive/speed"] = np.arange(6.0)
-        file["drive/speed"].attrs["units"] = "rad/s"
-        file["log"] = rows
-        file["words"] = np.array([b"a"] * 6)
-        file["short"] = np.arange(2.0)
-        file["picture"] = np.zeros((4, 4))
-    table = read_table(path)
-    assert sorted(table.columns) == ["drive/speed", "log/count", "log/time", "words"]
-    assert dict(table.units) == {"drive/speed": "rad/s"}
-    assert dict(table.metadata) == {"vehicle": "bus 17"}
-    assert {re.split("[:(]", remark)[0] for remark in table.remarks} == {"picture", "short"}

@@ -11,7 +11,6 @@ import pytest
 from asammdf import MDF, Signal
 
 from hil.recording import Table, read_table, write_table
-from hil.recording.formats import read_metadata
 
 RIG = 'name = "bench"\n\n[guard]\n  indented = 1\n'
 
@@ -40,17 +39,6 @@ def test_other_tools_find_one_timed_group_with_units_and_comments(ours: Path, ow
     assert attached["rig.toml"].decode() == RIG
 
 
-@pytest.mark.parametrize("times", [[0.0, 1.0, 1.0], [0.0, np.nan, 1.0], [2.0, 1.0, 0.0]])
-def test_a_time_that_does_not_increase_is_no_master(tmp_path: Path, times: list[float]) -> None:
-    write_table(Table(Path("a"), {"time_s": np.array(times), "x": np.arange(3.0)}), tmp_path / "a.mf4")
-    with MDF(tmp_path / "a.mf4") as mdf:
-        master = mdf.groups[0].channels[0]
-        assert (master.name, master.sync_type) == ("row", 4)
-    read = read_table(tmp_path / "a.mf4")
-    assert list(read.columns) == ["time_s", "x"]
-    np.testing.assert_array_equal(read.columns["time_s"], times)
-
-
 def foreign(path: Path) -> None:
     """Two groups of one rate, one of another, an array, and samples their own file calls invalid."""
     fast, slow = np.arange(20) * 0.01, np.arange(4) * 0.1
@@ -68,18 +56,6 @@ def foreign(path: Path) -> None:
         mdf.append([Signal(np.arange(20.0), fast, name="gear")])
         mdf.header.description = "second lap"
         mdf.save(path)
-
-
-def test_a_file_of_version_3_is_read(tmp_path: Path) -> None:
-    """It has no attachments, where ours describe themselves."""
-    path = tmp_path / "old.mdf"
-    with MDF(version="3.30") as mdf:
-        mdf.append([Signal(np.arange(20.0), 0.01 * np.arange(20), name="speed", unit="rad/s")])
-        mdf.save(path)
-    table = read_table(path)
-    assert table.columns["speed"].tolist() == list(range(20))
-    assert table.units["speed"] == "rad/s"
-    assert "start_time" in read_metadata(path)
 
 
 @pytest.fixture

@@ -97,23 +97,6 @@ def test_a_gap_is_missing_samples(somewhere: Path, period_s: float) -> None:
     assert 6.0 - 2 * period_s < missing.max() <= 6.0 + 2 * period_s
 
 
-@pytest.mark.parametrize(
-    ("one", "two", "period_s", "said"),
-    [
-        ([0.0, 1.0, 2.0], [5.0, 6.0, 7.0], 0.1, "s in common for resample_s"),
-        ([0.0, 2.0, 1.0], [0.0, 1.0, 2.0], 0.1, "expected times that run forward, got 1 s after 2 s"),
-        ([0.0, np.nan, np.nan], [0.0, 1.0, 2.0], 0.1, "expected two samples or more, got 1"),
-        ([0.0, 1.0, 2.0], [0.0, 1.0, 2.0], 1e-9, "expected at most 16777216 cells"),
-    ],
-)
-def test_what_can_t_be_brought_together_is_refused(
-    somewhere: Path, one: list[float], two: list[float], period_s: float, said: str
-) -> None:
-    series = {"a": Series(np.array(one), np.arange(3.0)), "b": Series(np.array(two), np.arange(3.0))}
-    with pytest.raises(RecordingError, match=said):
-        resampled(somewhere, series, period_s)
-
-
 DBC = """VERSION ""
 BS_:
 BU_: M1
@@ -242,15 +225,3 @@ def test_a_logged_bus_is_decoded_by_the_eds_of_its_drives(suffix: str, tmp_path:
 
 def test_the_low_pass_is_that_of_the_on_line_chain() -> None:
     assert (resample.EDGE, resample.HALF_LENGTH) == (decimate.EDGE, decimate.HALF_LENGTH)
-
-
-def test_mdf_3_under_the_name_that_inca_gives_it(tmp_path: Path) -> None:
-    time = np.arange(0.0, LONG_S, 0.01)
-    with MDF(version="3.30") as mdf:
-        mdf.append([Signal(slow(time), time, name=name, unit="Nm") for name in ("T_M1", "T_M2")])
-        mdf.append([Signal(slow(time), time + 0.001, name="n_M", unit="rpm")])
-        mdf.save(tmp_path / "drive.mdf")
-    (tmp_path / "drive.mdf").rename(tmp_path / "drive.dat")
-    record = read_record(tmp_path / "drive.dat", signals(resample_s=0.01))
-    np.testing.assert_allclose(record.torque_nm[:, 0], slow(record.time_s), atol=0.1)
-    assert look(tmp_path / "drive.dat").signals[-1] == "resample_s = 0.01   # channels have times of their own"

@@ -80,17 +80,6 @@ def test_a_mask_takes_rows_out_and_keeps_their_torque(changed: Changed, own_tabl
     np.testing.assert_array_equal(record.torque_nm[:, 0], own_table.columns["torque_m1_nm"])
 
 
-def test_a_mask_on_a_torque_holds_it_where_it_is_outside(changed: Changed) -> None:
-    torque = np.arange(40.0)
-    torque[9] = 9999.0
-    record = to_record(
-        changed(torque_m1_nm=torque), signals(mask=[{"column": "torque_m1_nm", "min": -100, "max": 100}])
-    )
-    assert record.torque_nm[8:11, 0].tolist() == [8.0, 8.0, 10.0]
-    assert np.flatnonzero(~record.okay).tolist() == [9]
-    assert record.torque_okay is None
-
-
 def with_time(changed: Changed, time_s: np.ndarray) -> Table:
     table = changed(time_s=time_s)
     return Table(table.path, table.columns, first_line=2)
@@ -128,33 +117,6 @@ def test_a_rate_that_changes_is_refused(tmp_path: Path) -> None:
     )
     with pytest.raises(RecordingError, match=r"expected a constant rate, a mean step of 0\.01 s over 100 rows"):
         to_record(table, SignalsConfig())
-
-
-def test_jitter_of_time_stamps_is_no_fault(changed: Changed) -> None:
-    rng = np.random.default_rng(3)
-    jitter = rng.uniform(-0.002, 0.002, size=40)
-    jitter[[0, -1]] = 0.0
-    record = to_record(changed(time_s=np.arange(40) * 0.01 + jitter), SignalsConfig())
-    assert record.sample_time_s == 0.01
-
-
-def test_a_logger_with_its_own_csv_is_read(tmp_path: Path) -> None:
-    lines = ["Time [s];Velocity [km/h];Throttle [%];Motor Torque [Nm];Temperature [°C];Braking Signal "]
-    lines += [f"{0.1 * k:.1f};{3.6 * k};{k % 10};{2 * k};21;0" for k in range(50)]
-    (tmp_path / "Trip.csv").write_bytes("\r\n".join([*lines, ""]).encode("latin-1"))
-    record = read_record(
-        tmp_path / "Trip.csv",
-        signals(
-            time={"column": "Time [s]"},
-            torque=[{"column": "Motor Torque [Nm]"}],
-            speed={"column": "Velocity [km/h]", "scale": 1 / 3.6, "at": "load"},
-            mask=[{"column": "Throttle [%]", "min": 2.0}],
-            format={"delimiter": ";", "encoding": "latin-1"},
-        ),
-    )
-    assert (record.sample_time_s, record.location) == (0.1, Location.LOAD)
-    np.testing.assert_allclose(record.output, np.arange(50))
-    assert np.flatnonzero(~record.okay)[:4].tolist() == [0, 1, 10, 11]
 
 
 @pytest.fixture
@@ -271,22 +233,6 @@ def test_channels_that_can_not_be_what_they_are_named_are_refused(
 ) -> None:
     with pytest.raises(RecordingError, match=said):
         _lines_of(_drive(tmp_path / "a.csv", **changed), signals)
-
-
-@pytest.mark.parametrize(
-    ("keys", "times", "counted"),
-    [
-        ({"from_s": 1.0, "to_s": 2.0}, (1.0, 2.0), 101),
-        ({"from_s": 1.0}, (1.0, 3.99), 300),
-        ({"stretches": [[0.5, 1.0], [2.0, 3.0]]}, (0.5, 3.0), 51 + 101),
-    ],
-)
-def test_only_the_stretches_named_are_read(
-    keys: dict[str, object], times: tuple[float, float], counted: int, tmp_path: Path
-) -> None:
-    record = read_record(_drive(tmp_path / "a.csv"), SignalsConfig.model_validate({**_BY_NAME, **keys}))
-    assert (record.time_s[0], record.time_s[-1]) == pytest.approx(times)
-    assert int(record.okay.sum()) == counted
 
 
 @pytest.mark.parametrize("keys", [{"from_s": 2.0, "to_s": 1.0}, {"from_s": 1.0, "stretches": [[0.0, 1.0]]}])

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from pydantic import ValidationError
 
+from estimator.errors import Cure, Implausible
 from estimator.signals.record import Location, OutputKind
+from hil.plants.scales import cure_lines, with_the_line_to_write
 from hil.problems import problem_lines
-from hil.recording import SignalsConfig, Table
+from hil.recording import SignalsConfig, Table, write_table
 from hil.recording.signals import to_record
 
 Changed = Callable[..., Table]
@@ -103,3 +106,49 @@ def test_a_measured_load_torque_is_an_input(changed: Changed) -> None:
     assert np.flatnonzero(~record.okay).tolist() == [0, 7]
     assert record.torque_okay is None
     assert to_record(changed(), SignalsConfig()).known_load_nm == 0.0
+
+
+TABLE = Table(
+    Path("run.csv"),
+    {name: np.arange(20.0) for name in ("t", "T1", "T2", "n")},
+    {"t": "s", "T1": "kNm", "T2": "kNm", "n": "1/min"},
+)
+SIGNALS: dict[str, Any] = {
+    "time": {"column": "t"},
+    "torque": [{"column": "T1"}, {"column": "T2", "scale": 5.0}],
+    "speed": {"column": "n", "scale": 2.0},
+}
+
+
+@pytest.mark.parametrize(
+    ("cure", "lines"),
+    [
+        (
+            Cure("run", torque=0.6),
+            ['torque = [ { column = "T1", scale = 600 }, { column = "T2", scale = 3 } ]'],
+        ),
+        (
+            Cure("run", torque=-1.0, inputs=(1,)),
+            ['torque = [ { column = "T1", scale = 1000 }, { column = "T2", scale = -5 } ]'],
+        ),
+        (Cure("run", output=0.5), ['speed = { column = "n", at = "motor" }']),
+        (Cure("run", output=-1.0), ['speed = { column = "n", scale = -2, at = "motor" }']),
+        (Cure("run", time=1e-3), ['time = { column = "t", scale = 0.001 }']),
+        (
+            Cure("run", swapped=1),
+            ['torque = [ { column = "T1" }, { column = "n" } ]', 'speed = { column = "T2", at = "motor" }'],
+        ),
+    ],
+)
+def test_the_lines_are_those_to_write(cure: Cure, lines: list[str]) -> None:
+    assert cure_lines(cure, SignalsConfig.model_validate(SIGNALS), TABLE) == lines
+
+
+def test_the_line_is_a_note_of_the_refusal(tmp_path: Path) -> None:
+    write_table(TABLE, tmp_path / "run.csv")
+    signals = SignalsConfig.model_validate(SIGNALS)
+    with pytest.raises(Implausible) as refusal, with_the_line_to_write([tmp_path / "run.csv"], signals):
+        raise Implausible("recording run is implausible", Cure("run", torque=0.6))
+    assert refusal.value.__notes__ == [
+        'In [signals] write: torque = [ { column = "T1", scale = 600 }, { column = "T2", scale = 3 } ]'
+    ]

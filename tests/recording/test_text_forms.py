@@ -111,16 +111,6 @@ def test_a_name_that_comes_twice_is_numbered_so_that_neither_is_taken_by_chance(
         table.numeric(["T"])
 
 
-def test_a_comment_between_rows_is_skipped_and_lines_still_count(tmp_path: Path) -> None:
-    rows = lines()
-    rows[5:5] = ["# gear changed"]
-    rows[20] = rows[20].replace(".", "x", 1)
-    table = read_table(written(tmp_path, "\n".join(["# bench", "t,T,n", *rows])))
-    assert table.n_rows == ROWS
-    with pytest.raises(RecordingError, match="line 23, column t"):
-        table.numeric(["t"])
-
-
 @pytest.mark.parametrize(
     ("stamp", "start"),
     [
@@ -221,17 +211,6 @@ def test_a_row_left_out_is_no_jitter(tmp_path: Path, row: int) -> None:
     path = stamped(tmp_path, np.arange(ROWS) * 0.01 + (np.arange(ROWS) >= row) * 0.01)
     with pytest.raises(RecordingError, match=f"line {row + 2}, column t: expected a uniform step"):
         read_record(path, SIGNALS)
-
-
-def test_uneven_rows_are_brought_to_a_period_only_where_that_is_said(tmp_path: Path) -> None:
-    stamps = np.sort(np.random.default_rng(5).uniform(0.0, 0.6, ROWS))
-    with pytest.raises(RecordingError, match="uneven rows need resample_s"):
-        read_record(stamped(tmp_path, stamps), SIGNALS)
-    said: list[str] = []
-    path = stamped(tmp_path, stamps)
-    record = read_record(path, SIGNALS.model_copy(update={"resample_s": 0.01}), tell=said.append)
-    assert record.sample_time_s == pytest.approx(0.01)
-    assert any(line.startswith(f"{path}: T: ") and "brought to 0.01 s" in line for line in said)
 
 
 @pytest.mark.parametrize("line", ["1," * 3_000_000, "," * 3_000_000, "a;" * 3_000_000 + "\n1\n"])

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import subprocess
 import sys
-import threading
 import time
 from pathlib import Path
 
@@ -13,7 +12,6 @@ import pytest
 
 from hil.errors import RecordingError
 from hil.recording import RecordingWriter, columns, read_record, read_table
-from hil.recording import writer as writer_module
 from hil.recording.checksum import CHECKSUM, SAID, data_sha256, said_sha256
 from hil.recording.formats import FORMATS
 from hil.recording.own_csv import HEADER
@@ -21,7 +19,6 @@ from hil.recording.writer import NOT_ENDED
 from hil.sample import Sample, SampleFlag
 from hil.store import RunStore
 from hil.store.rebuild import rebuild
-from tests.full_disk import largest_file
 
 WRITABLE = [suffix for suffix, form in FORMATS.items() if form.write]
 
@@ -179,34 +176,3 @@ def test_a_killed_run_describes_itself_and_is_listed_as_what_it_is(tmp_path: Pat
     with RunStore(tmp_path) as store:
         (run,) = store.find()
     assert (run.entry.rig_name, run.entry.samples, run.entry.outcome) == ("bench", 12, NOT_ENDED)
-
-
-def test_a_disk_without_room_for_the_last_words_leaves_a_recording_that_describes_itself(tmp_path: Path) -> None:
-    def run() -> None:
-        with RecordingWriter(tmp_path / "run.csv", SAYS) as writer:
-            writer.append(sample(1))
-            writer.describe("timing", "x" * 100_000)
-            with largest_file(4096):
-                writer.__exit__(None, None, None)
-
-    with pytest.raises(RecordingError, match="room for the description"):
-        run()
-    assert read_table(tmp_path / "run.csv").metadata["outcome"] == NOT_ENDED
-    assert {path.name for path in tmp_path.iterdir()} == {"run.csv", "run.csv.json"}
-
-
-@pytest.mark.parametrize("hangs", ["write_sidecar", "_begin"])
-def test_a_disk_that_never_takes_the_first_bytes_is_reported(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, hangs: str
-) -> None:
-    free = threading.Event()
-    monkeypatch.setattr(writer_module, "FIRST_WRITE_S", 0.2)
-    owner = writer_module if hangs == "write_sidecar" else RecordingWriter
-    monkeypatch.setattr(owner, hangs, lambda *_: free.wait(60))
-    with pytest.raises(RecordingError, match=r"first bytes within 0\.2 s"), RecordingWriter(tmp_path / "run.csv"):
-        pass
-    free.set()
-    until = time.monotonic() + 10
-    while list(tmp_path.iterdir()) and time.monotonic() < until:
-        time.sleep(0.01)
-    assert not list(tmp_path.iterdir())

@@ -21,7 +21,7 @@ from drivers.canopen.can_link import open_bus
 from drivers.canopen.remote_bus import token_file
 from hil.simulator import can_bridge
 from hil.simulator.addresses import Address
-from hil.simulator.can_bridge import LONGEST_FRAME_BYTES, MOST_WAITING, CanBridge
+from hil.simulator.can_bridge import LONGEST_FRAME_BYTES, CanBridge
 
 
 @pytest.fixture(autouse=True)
@@ -198,25 +198,6 @@ def test_a_handshake_has_one_deadline_however_slowly_it_is_sent(
     thread.join()
     connection.close()
     assert took_s < 5.0
-
-
-@pytest.mark.parametrize("count", [20, pytest.param(MOST_WAITING + 10, marks=pytest.mark.campaign)])
-def test_connections_without_the_token_keep_no_host_out(bridge: CanBridge, slave: can.BusABC, count: int) -> None:
-    waiting = [slow(bridge, named=False) for _ in range(count)]
-    over = threading.Event()
-    connections, texts = [each for each, _ in waiting], [text for _, text in waiting]
-    thread = threading.Thread(target=drip, args=(connections, texts, over))
-    thread.start()
-    begun = time.monotonic()
-    with open_bus(bridge.url) as host:
-        host.send(can.Message(arbitration_id=0x80, is_extended_id=False))
-        assert slave.recv(5.0) is not None
-    took_s = time.monotonic() - begun
-    over.set()
-    thread.join()
-    for connection in connections:
-        connection.close()
-    assert took_s < 2.0
 
 
 def test_a_host_of_the_same_user_finds_the_token_of_the_port(bridge: CanBridge, slave: can.BusABC) -> None:

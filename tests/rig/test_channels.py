@@ -1,6 +1,5 @@
 """Further channels of a rig file: mapped, read, recorded and checked over the real protocols."""
 
-import math
 from pathlib import Path
 
 import numpy as np
@@ -15,9 +14,7 @@ from hil.rig.build import open_devices
 from hil.rig.plan import plan_run
 from hil.rig.session import run_plan
 from hil.rig.stop import StopRequest
-from hil.sample import SampleFlag
 from hil.simulator.driveline import simulation_model
-from hil.simulator.fault_table import rig_faults
 from hil.simulator.rig_server import required_simulation
 from tests.rig.sensed import CHANNELS, sensed_rig, served_with_sensors, write_rig
 from tests.rig.serving import Samples, fast, run_once
@@ -66,18 +63,6 @@ def test_a_channel_is_that_of_the_sync_of_its_row(tmp_path: Path) -> None:
     motor, second = samples.column("speed_rad_s"), [row.channels[0] for row in samples.rows]
     assert np.ptp(motor) > 1.0
     np.testing.assert_allclose(second, motor, atol=0.0015)
-
-
-def test_a_channel_that_is_lost_is_missing_in_its_own_column_alone(tmp_path: Path) -> None:
-    samples = Samples()
-    with served_with_sensors(sensed_rig(tmp_path), rig_faults(["bus.lose@1=0.01"], 0.01)) as at:
-        run_once(at, samples, experiment="reversal", pacer=fast(at, 0.05))
-    lost = [row for row in samples.rows if row.flags is SampleFlag.CHANNEL_LOST]
-    assert lost
-    assert all(row.counts and any(map(math.isnan, row.channels)) for row in lost)
-    assert all(math.isfinite(row.torque_m2_nm) for row in lost)
-    whole = [row for row in samples.rows if not row.flags & SampleFlag.CHANNEL_LOST]
-    assert all(map(math.isfinite, (value for row in whole for value in row.channels)))
 
 
 @pytest.mark.parametrize(

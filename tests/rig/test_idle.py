@@ -10,7 +10,7 @@ from hil.rig.build import open_devices
 from hil.rig.idle import Listening
 from hil.rig.timing import RunTiming
 from hil.sample import SampleFlag
-from hil.simulator.faults import FaultAtStep, InverterFaults, RigFaults
+from hil.simulator.faults import InverterFaults, RigFaults
 from tests.rig.sensed import sensed_rig, served_with_sensors
 from tests.rig.serving import fast, served
 
@@ -41,19 +41,6 @@ def test_a_missing_drive_is_reported_and_the_other_is_heard() -> None:
     assert sample.flags is SampleFlag.M2_STALE
     assert math.isfinite(sample.torque_m1_nm)
     assert math.isnan(sample.torque_m2_nm)
-
-
-def test_a_fault_is_reset_when_asked() -> None:
-    faults = RigFaults(m1=InverterFaults(fault=FaultAtStep(5, 0x3220)))
-    with served(faults=faults) as (_, rig), open_devices(rig) as devices:
-        listening = Listening(devices, fast(rig), RunTiming(10_000_000))
-        listening.begin()
-        for _ in range(10):
-            listening.step()
-        assert "0x3220" in str(devices.m1.fault())
-        assert listening.reset_faults() == ()
-        assert devices.m1.fault() is None
-        listening.plc.finish()
 
 
 def test_a_lost_bus_ends_it() -> None:

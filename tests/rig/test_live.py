@@ -128,14 +128,6 @@ def test_a_long_course_is_thinned_the_same_by_run_and_replay(
         assert len(column) < most
 
 
-def test_other_phases_are_not_estimated_from() -> None:
-    live = LiveEstimate(tracking_chain(0.01))
-    for sample in driven()[:100]:
-        live(sample, Phase.APPROACH)
-    assert live.course.samples == 0
-    assert live.latest is None
-
-
 @pytest.mark.parametrize("speed", [2.0, 50.0])
 def test_speed_is_that_of_the_clock(speed: float) -> None:
     now = [0.0]

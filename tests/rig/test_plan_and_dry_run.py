@@ -1,4 +1,4 @@
-"""Plans from the rig file, and what a dry run says of them."""
+"""On paper before anything is driven: plan, dry run, and whether the vehicle is fit."""
 
 import pytest
 

@@ -11,15 +11,13 @@ from drivers.plc.register import Value
 from drivers.plc.types import PrbsSource
 from hil.config.rig_file import PrbsTarget, Rig
 from hil.errors import RunAborted
-from hil.rig.build import Devices, open_devices
 from hil.rig.drive import Progress
-from hil.rig.dry_run import dry_run
 from hil.rig.experiments.base import Phase
 from hil.rig.plan import plan_run
 from hil.simulator.plc_device import PlcPrbs as Generator
 from hil.simulator.rig_server import RigServer
 from tests.rig.observer import assert_disarmed
-from tests.rig.serving import Samples, changed, run, run_once, served, small_rig
+from tests.rig.serving import Samples, changed, run_once, served, small_rig
 
 AMPLITUDE_NM = 120.0
 HALF_COUNT_NM = 0.5 * 600.0 / 1000.0
@@ -113,17 +111,6 @@ class TestEveryWayOut:
         assert "Switch it off at the PLC before the drives are armed again" in str(said.value)
         assert isinstance(said.value.__cause__, RunAborted)
 
-    def test_a_lost_connection_is_made_again_to_switch_it_off(self) -> None:
-        async def drop(devices: Devices) -> None:
-            devices.plc.close()
-
-        with served(plc_rig()) as (server, rig), open_devices(rig) as devices:
-            lose = half_way(lambda: devices.plc_loop.call(drop(devices)))
-            with pytest.raises(RunAborted, match=r"PLC: expected its status, got: .*expected an open connection"):
-                run(rig, devices, Samples(), progress=lose)
-            assert_disarmed(server.bus_url, 1, 2)
-            assert generator_of(server) == OFF
-
 
 class TestSomebodyElseWritesThere:
     @pytest.mark.parametrize(
@@ -163,16 +150,3 @@ class TestTheGuard:
         assert kept.torque_limit_m2_nm == full.torque_limit_m2_nm - 90.0
         assert kept.sum_limit_nm == full.sum_limit_nm - 120.0
         assert plc.torque_limits == full == host.torque_limits
-
-    def test_a_base_torque_that_leaves_no_room_ends_the_run(self) -> None:
-        """400 Nm of each inverter, 60 Nm of it the PLC's: 341 Nm of base torque fit without the PRBS only."""
-        greedy = {
-            "experiments.reversal": {"swing_nm": 682.0, "torque_nm": 682.0, "share_m1": 0.5},
-            "guard": {"sum_limit_nm": 10_000.0},
-        }
-        with served(changed(plc_rig(), greedy)) as (server, rig):
-            with pytest.raises(RunAborted, match="expected at least the 401 Nm this experiment may ask for"):
-                run_once(rig, Samples(), experiment="reversal")
-            assert_disarmed(server.bus_url, 1, 2)
-        with pytest.raises(CommandRefused, match="expected at most 340 Nm either way"):
-            dry_run(rig, "reversal")

@@ -106,30 +106,6 @@ def test_answer_after_its_time_does_not_count(written: Callable[..., Path]) -> N
     assert column(rows, "age_ns") == [0, PERIOD_NS, 0]
 
 
-def test_cycles_that_did_not_take_place_are_flagged_rows(written: Callable[..., Path]) -> None:
-    path = written(*cycle(0, 10), *cycle(10, 20), *cycle(40, 30), *cycle(50, 40), *cycle(60, 50))
-    rows = list(replay(path, small_rig()))
-    assert column(rows, "time_s") == pytest.approx([0.00, 0.01, 0.02, 0.03, 0.04, 0.05, 0.06])
-    assert sum(bool(row.flags & SampleFlag.LATE) for row in rows) >= 2
-    assert [row.torque_m1_nm for row in rows if not row.flags] == [6.0, 12.0, 24.0, 30.0]
-
-
-@pytest.mark.parametrize(
-    ("rows", "reason"),
-    [
-        ([], "expected SYNC"),
-        ([*cycle(0, 1, prbs=0), *cycle(10, 1, prbs=0)], "measured part .* got none"),
-        ([*cycle(0, 1), *cycle(10, 1, prbs=0), *cycle(20, 1), *cycle(30, 1)], "got a second"),
-        ([*cycle(0, 1), (3, TPDO_M1, b"\x00"), *cycle(10, 1)], "frame of 1 bytes.*rig file is not the one"),
-    ],
-)
-def test_trace_that_is_no_run_is_refused(
-    written: Callable[..., Path], rows: list[tuple[int, int, bytes]], reason: str
-) -> None:
-    with pytest.raises(RecordingError, match=reason):
-        list(replay(written(*rows), small_rig()))
-
-
 def trc(version: str, rows: list[tuple[int, int, bytes]]) -> str:
     """PEAK's text log in one of the versions that python-can reads, as PCAN-View and its description have them."""
     start = "45000.5"  # days since 30 December 1899

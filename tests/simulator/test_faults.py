@@ -197,23 +197,6 @@ def test_a_speed_turned_halved_or_stuck_from_a_moment_on() -> None:
     assert stuck[3:] == [stuck[2]] * 3
 
 
-@pytest.mark.parametrize(("every", "expected"), [(1, 6), (2, 5)])
-def test_a_second_tpdo_with_no_speed(every: int, expected: int) -> None:
-    """Four SYNCs, and from the third on, or at the fourth alone, one frame more."""
-    frames: list[bytes] = []
-    with bench(m1(f"second_tpdo@0.03={every}"), plant=RigidPlant(1.0, 0.01)) as rig:
-        armed(rig)
-        rig.link.subscribe(0x180 + M1.node_id, lambda data, t_ns: frames.append(data))
-        for _ in range(4):
-            rig.cycle(guarded(100.0))
-            rig.m1._sdo.upload(0x6041)  # answered after every TPDO of this SYNC
-    assert len(frames) == expected
-    assert frames[-1] != frames[-2]
-    assert [a for a, b in zip(frames[-1], frames[-2], strict=True) if a != b] == [0] * sum(
-        a != b for a, b in zip(frames[-1], frames[-2], strict=True)
-    )
-
-
 def test_swapped_node_ids_are_found_by_the_serial_numbers() -> None:
     rig = changed(small_rig(), {f"inverters.m{number}": {"serial_number": number} for number in (1, 2)})
     swapped = rig_faults(("bus.swapped_nodes",), rig.period_s)

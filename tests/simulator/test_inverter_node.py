@@ -105,38 +105,6 @@ def test_pdo_that_is_on_is_not_changed(index: int, subindex: int, value: int, re
         objects(rig).download(index, subindex, value)
 
 
-@pytest.mark.parametrize(
-    ("entry", "reason"),
-    [
-        (0x60760020, "0x06040041"),  # not mappable
-        (0x20000010, "0x06040041"),  # not there
-        (0x60410020, "0x06040041"),  # another length
-    ],
-)
-def test_object_that_can_not_be_mapped_is_refused(entry: int, reason: str) -> None:
-    with bench() as rig:
-        sdo = objects(rig)
-        sdo.download(0x1800, 1, 0x185 | 1 << 31)
-        with pytest.raises(ConfigMismatch, match="0x08000022"):  # the number of objects is not 0 yet
-            sdo.download(0x1A00, 1, 0x60410010)
-        sdo.download(0x1A00, 0, 0)
-        with pytest.raises(ConfigMismatch, match=reason):
-            sdo.download(0x1A00, 1, entry)
-
-
-def test_heartbeat_follows_its_object_and_the_nmt_state(armed: Bench) -> None:
-    with armed.intruder() as bus:
-        assert received(bus, 0x700 + M1.node_id) == b"\x05"
-        nmt(armed, NmtCommand.STOP)
-        while received(bus, 0x700 + M1.node_id) != b"\x04":
-            pass
-        nmt(armed, NmtCommand.ENTER_PRE_OPERATIONAL)
-        objects(armed).download(0x1017, 0, 0)
-        node = armed.rig._m1
-        assert node is not None
-        assert node._producer is None
-
-
 @pytest.mark.parametrize("permille", [1001, 32767, -32768])
 def test_rpdo_beyond_max_torque_is_not_taken_and_said_in_the_statusword(armed: Bench, permille: int) -> None:
     with armed.intruder() as bus:

@@ -14,7 +14,7 @@ from drivers.inverter.inverter import Inverter
 from hil.simulator.inverter_device import InverterDevice, ObjectRefused
 from hil.simulator.plant import RigidPlant
 from hil.simulator.simulated_rig import SimulatedRig
-from hil.simulator.stopping import GRACE_NS, NS_PER_MS, HeartbeatConsumer, RpdoDeadline
+from hil.simulator.stopping import GRACE_NS, NS_PER_MS
 from tests.drivers.can_bench import M1, M2, SIMULATED_M1, SIMULATED_M2, Bench, bench, guarded, new_channel, virtual_bus
 from tests.simulator.test_inverter_device import PERIOD_S, QUIET, device
 
@@ -153,27 +153,6 @@ LOOKS = range(0, GRACE_NS + 1, 10 * NS_PER_MS)
 """A drive looks every 10 ms, for as long as one that was held up itself needs to hear its host again."""
 
 
-def ended(consumer: HeartbeatConsumer, now_ns: int) -> bool:
-    return any(consumer.lost(now_ns + later_ns) for later_ns in LOOKS)
-
-
-def test_watching_begins_with_the_first_heartbeat() -> None:
-    consumer = HeartbeatConsumer(127, timeout_ms=500)
-    assert not consumer.lost(LONG_NS)
-    consumer.beat(LONG_NS)
-    assert not consumer.lost(LONG_NS + 500 * NS_PER_MS)
-    assert ended(consumer, LONG_NS + 500 * NS_PER_MS + 1)
-
-
-def test_a_loss_counts_once_until_the_heartbeat_is_back() -> None:
-    consumer = HeartbeatConsumer(127, timeout_ms=500)
-    consumer.beat(0)
-    assert ended(consumer, LONG_NS)
-    assert not ended(consumer, LONG_NS)
-    consumer.beat(LONG_NS)
-    assert ended(consumer, 2 * LONG_NS)
-
-
 def test_a_drive_without_its_host_gives_no_torque_and_leaves_operation() -> None:
     with bench() as rig:
         for inverter in (rig.m1, rig.m2):
@@ -228,17 +207,6 @@ def driven(real_time: bool = False) -> Iterator[Bench]:
         yield made
 
 
-def test_a_deadline_runs_from_the_first_rpdo_and_is_missed_once() -> None:
-    deadline = RpdoDeadline(DEADLINE_MS)
-    assert not deadline.missed(10**12)
-    deadline.received(0)
-    assert not deadline.missed(DEADLINE_MS * NS_PER_MS)
-    assert deadline.missed(DEADLINE_MS * NS_PER_MS + 1)
-    assert not deadline.missed(10**12)
-    deadline.received(10**12)
-    assert deadline.missed(2 * 10**12)
-
-
 def test_in_simulated_time_the_syncs_count_and_not_the_clock() -> None:
     """Ten SYNCs of 10 ms without a command are within 100 ms, however long they take; the eleventh is not."""
     with driven() as rig:
@@ -250,15 +218,6 @@ def test_in_simulated_time_the_syncs_count_and_not_the_clock() -> None:
         assert rig.cycle().state is PowerState.SWITCH_ON_DISABLED
         with pytest.raises(DeviceFault, match="EMCY 0x8250 RPDO timeout: the host's command did not come in time"):
             rig.m1.raise_if_faulted()
-
-
-def test_a_command_that_comes_again_ends_the_emergency_and_gives_no_torque() -> None:
-    with driven() as rig:
-        for _ in range(15):
-            rig.cycle()
-        with pytest.raises(DeviceFault, match=r"power state is switch on disabled.*The drive left it by itself"):
-            rig.cycle(guarded(120.0))
-        assert rig.rig.torque_nm[0] == 0.0
 
 
 def until_without_torque(rig: Bench) -> None:
@@ -281,18 +240,6 @@ def test_a_host_whose_heart_stops_is_missed_without_any_frame() -> None:
         until_without_torque(rig)
         with pytest.raises(DeviceFault, match="EMCY 0x8130 life guard or heartbeat error"):
             rig.m1.raise_if_faulted()
-
-
-def test_a_new_host_is_not_blamed_for_the_death_of_the_one_before() -> None:
-    with driven() as rig:
-        rig.link.stop_heartbeat()
-        until_without_torque(rig)
-        for inverter in (rig.m1, rig.m2):
-            inverter.configure()
-        rig.m1.arm()
-        rig.cycle(guarded(60.0))
-        rig.m1.raise_if_faulted()
-        assert rig.rig.torque_nm[0] == pytest.approx(60.0)
 
 
 def test_a_drive_that_is_reset_watches_nobody_until_it_is_configured() -> None:

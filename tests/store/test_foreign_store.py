@@ -173,20 +173,6 @@ def test_two_processes_write_at_once_and_nothing_is_lost(filled: Path) -> None:
         assert [text for text in texts if text.startswith(who)] == [f"{who} {k}" for k in range(count)]
 
 
-def test_unfinished_files_of_killed_processes_are_removed_and_no_others(tmp_path: Path) -> None:
-    kill = (
-        "import os, sys; from pathlib import Path; from hil.files import whole\n"
-        "with whole(Path(sys.argv[1])) as part: part.write_text('half'); os._exit(9)"
-    )
-    subprocess.run([sys.executable, "-c", kill, str(tmp_path / "a.parquet")], check=False, timeout=60)
-    (unfinished,) = tmp_path.iterdir()
-    mine = [tmp_path / name for name in (".a.csv.part", ".notes", ".a.csv.ffffffff-1.part")]
-    for path in mine:
-        path.write_text("mine")
-    assert rebuild(tmp_path).removed == [unfinished]
-    assert all(path.exists() for path in mine)
-
-
 def test_a_listing_reads_the_small_files_alone(tmp_path: Path, record: Record) -> None:
     """As 10,000 runs are listed in some seconds, 500 are in half of one."""
     register_run(record("a.csv"))

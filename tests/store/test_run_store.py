@@ -6,11 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from hil.errors import StoreError, UsageError
+from hil.errors import UsageError
 from hil.recording.checksum import text_sha256
 from hil.recording.formats import read_metadata
 from hil.store import RunEntry, RunFilter, RunStore, register_run
-from hil.store.entry import COMPLETE
 
 Record = Callable[..., Path]
 
@@ -55,16 +54,6 @@ def test_notes_and_results_are_kept_in_order(tmp_path: Path, record: Record) -> 
     assert run.attachments[0].as_json() == {"verdict": "unexplained"}
     assert run.attachments[2].as_json() is None
     assert [attachment.document for attachment in listed.attachments] == ["", "", ""]
-
-
-def test_an_attached_document_stays_as_it_was(tmp_path: Path, record: Record) -> None:
-    number = register_run(record("a.csv"))
-    result = tmp_path / "identification.json"
-    result.write_text("{}", encoding="utf-8")
-    with RunStore(tmp_path) as store:
-        store.attach(number, "identification", result)
-        result.write_text('{"later": 1}', encoding="utf-8")
-        assert store.get(number).attachments[0].document == "{}"
 
 
 @pytest.fixture
@@ -136,31 +125,6 @@ def test_a_run_that_is_none_is_refused(tmp_path: Path, record: Record, call: str
     more = {"note": ("x",), "attach": ("model", "x"), "move": (RunEntry(recording=tmp_path / "b.csv"),)}.get(call, ())
     with RunStore(tmp_path) as store, pytest.raises(UsageError, match="got 99, which is none"):
         getattr(store, call)(99, *more)
-
-
-def test_what_can_not_be_entered_is_refused(tmp_path: Path, record: Record) -> None:
-    number = register_run(record("a.csv"))
-    with RunStore(tmp_path) as store:
-        with pytest.raises(UsageError, match="expected a note, got an empty one"):
-            store.note(number, "  ")
-        with pytest.raises(UsageError, match=r"gone\.json: expected a file to attach, got: No such file"):
-            store.attach(number, "model", tmp_path / "gone.json")
-        with pytest.raises(StoreError, match="expected a recording inside"):
-            store.add_run(RunEntry(recording=tmp_path.parent / "elsewhere.csv"))
-    with pytest.raises(StoreError, match="expected an open store"):
-        store.find()
-    with pytest.raises(StoreError, match="expected an existing folder"), RunStore(tmp_path / "nowhere"):
-        pass
-
-
-def test_a_recording_that_says_nothing_is_entered_as_what_it_is(tmp_path: Path) -> None:
-    path = tmp_path / "foreign.csv"
-    path.write_text("t,v\n0,1\n1,2\n", encoding="utf-8")
-    number = register_run(path)
-    with RunStore(tmp_path) as store:
-        entry = store.get(number).entry
-    assert (entry.samples, entry.duration_s, entry.experiment, entry.rig_sha256) == (2, 0.0, "", "")
-    assert entry.outcome == COMPLETE
 
 
 def test_a_store_moves_with_its_folder(tmp_path: Path, record: Record) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -34,7 +33,7 @@ from estimator.signals.record import FloatArray, Record
 from tests.estimator.diagnosis.plain import Bench
 from tests.estimator.diagnosis.planted import SIGMA, drive_torque, rubbing
 from tests.estimator.diagnosis.regression import regression
-from tests.estimator.physics.bench import ONE_MASS, SAMPLE_TIME_S, linear_record, model, random_steps, record, scaled
+from tests.estimator.physics.bench import ONE_MASS, linear_record, model, random_steps, scaled
 
 COULOMB = "coulomb_friction_motor"
 FRICTION_NM = 12.0
@@ -109,30 +108,6 @@ def test_whichever_inverter_is_wrong_the_intervals_hold_the_line(wrong: str) -> 
         low, high = parameter.ci95
         assert low <= ONE_MASS[name] <= high
         assert high / low >= 1.0 / gain - 0.01
-
-
-def by_another_clock(values: Mapping[str, float], seed: int, rate: float) -> Record:
-    """Speeds of a single mass taken at ``(1 + rate) t``, exact under held torques: the torque's clock is right."""
-    samples, line = 3000, Start(5.0, 0.0, 2.0)
-    torque = random_steps(samples + 100, seed, hold=20)
-    on_time = linear_record(values, torque, line).output
-    instants_s = SAMPLE_TIME_S * (1.0 + rate) * np.arange(samples)
-    held = np.floor(instants_s / SAMPLE_TIME_S + 1e-9).astype(int)
-    left = np.exp(-values["b_M"] / values["J_M"] * (instants_s - SAMPLE_TIME_S * held))
-    speed = left * on_time[held] + (1.0 - left) * (torque[held] - line.load_torque_nm) / values["b_M"]
-    noise = SIGMA * np.random.default_rng(seed).standard_normal(samples)
-    return record(torque[:samples], speed + noise, name=f"run_{seed}")
-
-
-def test_whichever_clock_is_right_the_intervals_hold_the_line() -> None:
-    """The fit keeps to the speed's: by it an inertia is off by the rate, many times what the noise leaves open."""
-    rate = 0.002
-    records = [by_another_clock(ONE_MASS, seed, rate) for seed in (1, 2)]
-    result = assembled(records, "clock_drift")
-    assert result.value("clock_drift", "rate") == pytest.approx(rate, rel=0.02)
-    inertia = retuned_parameters(result, LINE, whole=True)["J_M"]
-    assert inertia.value == pytest.approx(ONE_MASS["J_M"] / (1.0 + rate), rel=2e-4)
-    assert inertia.ci95[0] < inertia.value < ONE_MASS["J_M"] < inertia.ci95[1] < (1.0 + 2.0 * rate) * ONE_MASS["J_M"]
 
 
 class TestAnEffect:

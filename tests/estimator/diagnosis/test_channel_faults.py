@@ -2,15 +2,34 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from estimator.diagnosis.hypotheses import NOTHING, everything
+from estimator.diagnosis.inference.looks import Screen, promising
 from estimator.diagnosis.preconditions.channels import with_usable_channels
 from estimator.physics.driveline import Start
+from estimator.physics.grid import grid_for
+from estimator.physics.layout import flat_values
+from estimator.physics.model import DrivelineModel, natural_frequencies_rad_s
+from estimator.physics.simulate import simulate
 from estimator.signals.record import Channel, FloatArray, Location, OutputKind, Record
-from tests.estimator.physics.bench import ANGLE, LOAD_SPEED, SPEED, TWO_MASS, exact_states, random_steps, record
+from tests.estimator.diagnosis.plain import Bench
+from tests.estimator.physics.bench import (
+    ANGLE,
+    LOAD_SPEED,
+    SAMPLE_TIME_S,
+    SPEED,
+    TWO_MASS,
+    exact_states,
+    model,
+    random_steps,
+    record,
+    scaled,
+)
 
 N, DT = 4000, 0.01
 TIME_S = DT * np.arange(N)
@@ -68,3 +87,33 @@ def test_where_a_channel_is_dead_it_is_not_used() -> None:
     (channel,) = mended[0].channels
     assert np.flatnonzero(~channel.okay).tolist() == list(range(999, 1400))
     assert "from 9.99 to 13.99 s, while the motor moves" in warning
+
+
+SIGMA = 0.02
+
+
+def drifting(line: DrivelineModel, true: Mapping[str, float], rate: float, samples: int) -> list[Record]:
+    records = []
+    for seed in (1, 2):
+        rec = record(random_steps(samples, seed, hold=30), name=f"run_{seed}")
+        p = flat_values(true, {"clock_drift": {"rate": rate}})
+        clean = simulate(grid_for(line, [rec]), rec, p, Start(0.0, 0.0, 2.0, 0.0, 2.0))
+        noise = SIGMA * np.random.default_rng(seed).standard_normal(samples)
+        records.append(replace(rec, output=clean + noise))
+    return records
+
+
+@pytest.mark.parametrize(("samples", "stiffer"), [(1500, 1.0), (6000, 1.0), (3000, 2.2), (3000, 8.0)])
+@pytest.mark.parametrize("periods", [-0.65, 0.65])
+def test_the_rate_is_found_on_slow_and_fast_lines(periods: float, samples: int, stiffer: float) -> None:
+    given = scaled(TWO_MASS, k=stiffer)
+    line, true = model(given), scaled(given, J_M=1.1, k=0.93, c=1.15)
+    duration_s = samples * SAMPLE_TIME_S
+    rate = periods * 2.0 * np.pi / natural_frequencies_rad_s(true)[-1] / duration_s
+    records = drifting(line, true, rate, samples)
+    bench = Bench(line, records, everything(records))
+    nominal = bench.fit(NOTHING)
+    looks = promising(Screen(nominal, line).looks("clock_drift"))
+    found = bench.fit(frozenset({"clock_drift"}), nominal, [look.release for look in looks])
+    assert found.value("clock_drift", "rate") == pytest.approx(rate, rel=0.01)
+    assert found.rms == pytest.approx(SIGMA, rel=0.05)

@@ -9,13 +9,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.diagnosis.preconditions.inertia import fitted_inertia
 from estimator.diagnosis.preconditions.units import BEYOND, require_plausible_units
-from estimator.errors import Cure, Implausible
+from estimator.errors import Implausible
 from estimator.physics.driveline import Start
 from estimator.physics.effect import Element
-from estimator.physics.grid import grid_for
-from estimator.physics.model import Motion
 from estimator.signals.record import FloatArray, OutputKind, Record
 from tests.estimator.diagnosis.planted import Moved, recordings
 from tests.estimator.physics.bench import ONE_MASS, TWO_MASS, linear_record, model, random_steps, scaled
@@ -103,27 +100,6 @@ def test_missing_physics_passes(law: str) -> None:
     assert require_plausible_units(recordings(*LAWS[law]), model(TWO_MASS)) == []
 
 
-def test_a_control_that_holds_the_speed_on_a_hill_passes() -> None:
-    """The torque follows the road here: seen as one body it would be an inertia of a fraction of the true one."""
-    inertia, wanted, dt = 20.0, 50.0, 0.01
-    rng = np.random.default_rng(1)
-    speed, torques, held = [wanted], [], 0.0
-    for k in range(3000):
-        error = wanted - speed[-1]
-        held += 8.0 * error * dt
-        torques.append(60.0 * error + held)
-        hill = 50.0 * math.sin(0.4 * k * dt)
-        speed.append(speed[-1] + dt / inertia * (torques[-1] - 4.0 * speed[-1] - hill))
-    rec = drive(ONE_MASS)
-    noisy = np.array(speed[:-1]) + 0.01 * rng.standard_normal(3000)
-    closed = replace(
-        rec, time_s=dt * np.arange(3000), torque_nm=np.array(torques)[:, None], output=noisy, okay=np.ones(3000, bool)
-    )
-    line = model(ONE_MASS)
-    assert fitted_inertia(closed, line, grid_for(line, [closed])) is None
-    require_plausible_units([closed], line)
-
-
 @pytest.mark.parametrize(("factor", "refused"), [(0.95, False), (1.05, True)])
 def test_the_tolerance_widens_what_is_plausible(factor: float, refused: bool) -> None:
     """A model trusted to a factor is taken at its word."""
@@ -133,36 +109,6 @@ def test_the_tolerance_widens_what_is_plausible(factor: float, refused: bool) ->
             require_plausible_units([wrong], model(ONE_MASS, 0.5))
     else:
         require_plausible_units([wrong], model(ONE_MASS, 0.5))
-
-
-def test_a_speed_in_km_per_h_moves_along_a_line() -> None:
-    with pytest.raises(Implausible, match="is the speed in km/h, expected m/s") as refusal:
-        require_plausible_units([output(3.6)(drive())], model(TWO_MASS, motion=Motion.TRANSLATION))
-    assert refusal.value.cure == Cure("run", output=pytest.approx(1.0 / 3.6))
-
-
-AMBIGUOUS: dict[str, tuple[Change, tuple[str, ...]]] = {
-    "a torque at the wheel": (torque(6.0, 6.0), ("torque that at the wheel", "turns per second", "speed that at the")),
-    "rpm and per cent": (
-        lambda record: output(9.55)(torque(1.0 / 6.0, 1.0 / 6.0)(record)),
-        ("in degrees", "in rpm, expected rad/s, and is the torque in per cent of a rated torque of about 600 Nm"),
-    ),
-}
-
-
-@pytest.mark.parametrize("fault", AMBIGUOUS)
-def test_where_several_explain_it_all_are_named_and_no_line_is_given(fault: str) -> None:
-    change, named = AMBIGUOUS[fault]
-    with pytest.raises(Implausible) as refusal:
-        require_plausible_units([change(drive())], model(TWO_MASS))
-    assert refusal.value.cure is None
-    assert all(each in str(refusal.value) for each in named)
-
-
-def test_a_factor_that_physics_could_make_is_a_doubt_and_no_refusal() -> None:
-    (doubt,) = require_plausible_units([torque(0.4, 0.4)(drive())], model(TWO_MASS))
-    assert "per cent of a rated torque of about 250 Nm" in str(doubt)
-    assert doubt.cure == Cure("run", torque=2.5)
 
 
 def lessened(change: Callable[[FloatArray], FloatArray], values: dict[str, float]) -> Record:

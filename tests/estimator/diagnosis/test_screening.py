@@ -18,7 +18,7 @@ from estimator.physics.model import DrivelineModel
 from estimator.physics.unknowns import Release, Shared
 from estimator.signals.record import Record
 from tests.estimator.diagnosis.plain import Bench
-from tests.estimator.diagnosis.planted import SIGMA, TIGHT, disturbed, drive_torque, rubbing
+from tests.estimator.diagnosis.planted import SIGMA, TIGHT, disturbed, drive_torque
 from tests.estimator.physics.bench import (
     ONE_MASS,
     SPEED,
@@ -78,14 +78,6 @@ class TestLinear:
         promises = [look.promise for look in wrong_gain[0]]
         assert len(promises) == 2
         assert promises[0] > 1.2 * promises[1] > 0.0
-
-
-def test_a_nonlinear_law_is_promised_to_first_order() -> None:
-    """Dry friction: the direction holds no further than it goes, but it tells the order of size, and the sign."""
-    (look,), retuned, fitted = looked_at(model(ONE_MASS), rubbing(lambda speed: 12.0), "coulomb_friction_motor")
-    gained = retuned.squares - fitted.squares
-    assert 0.5 * gained < look.promise < 1.05 * gained
-    assert 4.0 < starts(look.release.shared)["friction_nm"] < 24.0
 
 
 AMPLITUDE_NM, RATIO, PHASES = 8.0, 5.6, (0.5, -2.0)

@@ -1,22 +1,29 @@
-"""Long gaps cut recordings into segments, and what is found in these is given for the recordings."""
+"""What of a recording is used: segments between gaps, stretches, thinned samples, and what is held out."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
 from estimator.diagnosis import diagnose
 from estimator.diagnosis.chain import replay
-from estimator.diagnosis.noise import noise_floor
+from estimator.diagnosis.hypotheses import NOTHING, Effects, everything
+from estimator.diagnosis.inference.figures import BLOCK_S, EVERY_S, blocks, foreign_outputs
+from estimator.diagnosis.noise import LONGEST_S, MOST_SAMPLES, noise_floor, share_of, stretches
 from estimator.diagnosis.result import Course, Discrepancy, Equivalent, Estimated, Profile, Response, Verdict
 from estimator.diagnosis.segments import FEWEST_SAMPLES, LONG_S, cut, joined, segments
 from estimator.errors import NotExciting
 from estimator.physics.driveline import Start
+from estimator.physics.effects.load import KNOT_SPACING_S
+from estimator.physics.fit import FitResult
 from estimator.signals.record import Record, sliced
-from tests.estimator.physics.bench import ONE_MASS, SAMPLE_TIME_S, linear_record, model, random_steps
+from tests.estimator.diagnosis.plain import Bench
+from tests.estimator.diagnosis.planted import SIGMA, drive_torque, rubbing
+from tests.estimator.physics.bench import ONE_MASS, SAMPLE_TIME_S, linear_record, model, random_steps, record
 
 Rows = Sequence[tuple[int, int]]
 LINE = model(ONE_MASS)
@@ -167,3 +174,67 @@ def test_courses_intervals_and_texts_are_joined() -> None:
     assert merged.time_s[4] == whole.time_s[1500]
     assert result.discrepancy.responses["run"] is response[1]
     assert profile[0].unit == "Nm"
+
+
+def lasting(samples: int, name: str = "run") -> Record:
+    return record(np.zeros(samples), np.zeros(samples), name=name)
+
+
+def test_of_what_is_longer_stretches_from_beginning_to_end_are_used() -> None:
+    rec = lasting(10 * MOST_SAMPLES)
+    parts = stretches(rec, [slice(0, rec.output.size)], share_of([rec]))
+    assert sum(part.stop - part.start for part in parts) == pytest.approx(MOST_SAMPLES, rel=0.01)
+    assert max(part.stop - part.start for part in parts) <= LONGEST_S / rec.sample_time_s
+    assert (parts[0].start, parts[-1].stop) == (0, rec.output.size)
+    gaps = [after.start - before.stop for before, after in pairwise(parts)]
+    assert min(gaps) > 0
+    assert max(gaps) - min(gaps) <= 1
+
+
+def test_recordings_share_what_may_be_used_by_their_length() -> None:
+    found = cut([lasting(3 * MOST_SAMPLES, "long"), lasting(MOST_SAMPLES, "short")])
+    used = {name: sum(r.output.size for r in found.records if r.name.startswith(name)) for name in ("long", "short")}
+    assert used["long"] == pytest.approx(3 * used["short"], rel=0.01)
+
+
+def test_many_short_recordings_stay_whole() -> None:
+    samples = round(0.5 * LONGEST_S / 0.01)
+    records = [lasting(samples, f"run_{i}") for i in range(2 * MOST_SAMPLES // samples)]
+    found = cut(records)
+    assert [each.output.size for each in found.records] == [samples] * len(records)
+    assert found.warnings == ()
+
+
+COULOMB: Effects = frozenset({"coulomb_friction_motor"})
+SAMPLES = 1200
+
+
+def with_friction(seeds: tuple[int, ...] = (1, 2)) -> list[Record]:
+    return rubbing(lambda speed: 12.0, seeds, SAMPLES)
+
+
+def fits(records: list[Record], effects: Effects) -> tuple[FitResult, FitResult]:
+    bench = Bench(LINE, records, everything(records))
+    return bench.fit(NOTHING), bench.fit(effects, bench.fit(NOTHING))
+
+
+class TestBlocks:
+    def test_they_are_kept_out_all_along_and_not_at_the_ends(self) -> None:
+        out = blocks(record(np.zeros(2000), np.zeros(2000)))
+        assert out.mean() == pytest.approx(BLOCK_S / EVERY_S, abs=0.01)
+        assert not out[:50].any()
+        assert not out[-50:].any()
+        short = blocks(record(np.zeros(100), np.zeros(100)))
+        assert short.mean() == pytest.approx(BLOCK_S / EVERY_S, abs=0.05)
+        assert BLOCK_S < KNOT_SPACING_S  # so that the profile on both sides can predict it
+
+
+def test_foreign_recordings_get_their_own_load_and_start_and_nothing_else() -> None:
+    records = with_friction()
+    _, fitted = fits(records, COULOMB)
+    torque = drive_torque(11, SAMPLES)
+    elsewhere = linear_record(ONE_MASS, torque, Start(8.0, 0.0, -4.0), sigma=SIGMA, name="elsewhere")
+    (output,) = foreign_outputs(fitted, LINE, [elsewhere], [elsewhere.okay], COULOMB)
+    (again,) = foreign_outputs(fitted, model(ONE_MASS, 0.9), [elsewhere], [elsewhere.okay], COULOMB)
+    np.testing.assert_array_equal(output, again)
+    assert np.std(output - elsewhere.output) > 2.0 * SIGMA  # it has no friction, the fit has

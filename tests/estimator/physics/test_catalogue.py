@@ -15,7 +15,6 @@ from estimator.physics.effect import Effect, Element, Held
 from estimator.physics.grid import grid_for
 from estimator.physics.kernel import slots
 from estimator.physics.layout import flat, flat_values, slot
-from estimator.physics.model import Structure
 from estimator.physics.simulate import simulate
 from estimator.signals.record import FloatArray, OutputKind, Record
 from tests.estimator.physics.bench import TWO_MASS, assert_same_to_rounding, linear_record, model, random_steps, record
@@ -222,15 +221,6 @@ def test_two_inverters_with_the_same_share_all_along_can_not_be_distinguished(re
     assert entry.testable(GEARED, [same, other]) is None
 
 
-def test_what_acts_in_or_behind_the_shaft_needs_one() -> None:
-    """Friction at the load of a single mass is friction at the motor; a tyre needs two sides to slip between."""
-    behind = {"coulomb_friction_load", "tyre_slip"}
-    for entry in EFFECTS.values():
-        assert {Structure.TWO_MASS, Structure.THREE_MASS} <= entry.structures
-        needs = entry.element is Element.SHAFT or entry.name in behind
-        assert (Structure.ONE_MASS in entry.structures) is not needs
-
-
 def test_what_recurs_with_an_angle_needs_a_whole_period() -> None:
     """Over less it is any law of the angle, such as gravity."""
     swing = record(random_steps(1000, 1), 0.3 * np.sin(0.02 * np.arange(1000)), kind=OutputKind.POSITION)
@@ -251,11 +241,3 @@ def test_what_holds_a_load_that_swings_is_no_hypothesis_where_it_turns_on(name: 
     testable, untestable = open_hypotheses(GEARED, [driven])
     assert name not in testable
     assert name not in untestable
-
-
-def test_gravity_may_have_a_larger_moment_than_all_torque_on_a_small_arc_only() -> None:
-    torque = np.full(1000, 5.0)
-    for swing_rad, expected in ((0.6, True), (9.0, False)):
-        to_and_fro = record(torque, 0.5 * swing_rad * np.sin(0.05 * np.arange(1000)), kind=OutputKind.POSITION)
-        found = EFFECTS["gravity"].implausible(GEARED, [to_and_fro], {"moment_nm": 50.0, "motor_turns_per_turn": 1.0})
-        assert (not found) is expected

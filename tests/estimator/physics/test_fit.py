@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from estimator.physics.driveline import Start
-from estimator.physics.fit import FitResult, best_fit, fit, rates, warm_start
+from estimator.physics.fit import FitResult, fit, rates, warm_start
 from estimator.physics.jacobian import jacobian_at
 from estimator.physics.layout import slot
-from estimator.physics.model import DrivelineModel, Parameter, Structure
+from estimator.physics.model import DrivelineModel
 from estimator.physics.problem import (
     BAD,
     Problem,
@@ -24,8 +24,8 @@ from estimator.physics.problem import (
     start_vector,
 )
 from estimator.physics.unknowns import Shared, effect_unknowns, nominal_unknowns
-from estimator.signals.record import FloatArray, Location, OutputKind, Record
-from tests.estimator.physics.bench import ONE_MASS, SAMPLE_TIME_S, TWO_MASS, linear_record, model, random_steps, scaled
+from estimator.signals.record import Location, OutputKind, Record
+from tests.estimator.physics.bench import ONE_MASS, TWO_MASS, linear_record, model, random_steps, scaled
 
 SIGMA = 0.05
 STARTS = {"first": Start(30.0, 0.0, 10.0, 0.01, 9.0), "second": Start(-20.0, 0.0, -4.0, -0.005, -4.0)}
@@ -153,21 +153,6 @@ class TestRunaway:
         assert result.rms == pytest.approx(SIGMA, rel=0.1)
 
 
-def test_of_several_starts_the_best_counts() -> None:
-    """Under a square wave of ten samples a delay of eight looks like two too early: small starts end at zero."""
-    torque = 100.0 * np.tile(np.repeat([1.0, -1.0], 5), 60)
-    late = np.concatenate([np.full(8, torque[0]), torque[:-8]])
-    rec = replace(linear_record(ONE_MASS, late, Start(0.0, 0.0, 0.0), sigma=0.01), torque_nm=torque[:, None])
-    line = model(ONE_MASS)
-    problems = [
-        make_problem(line, [rec], (*nominal_unknowns(line), *release.shared))
-        for release in effect_unknowns("transport_delay", line, [rec])
-    ]
-    alone = [fit(problem).value("transport_delay", "delay_s") for problem in problems]
-    assert alone[0] == pytest.approx(0.0, abs=1e-9)
-    assert best_fit(problems).value("transport_delay", "delay_s") == pytest.approx(0.08, abs=1e-3)
-
-
 def test_a_warm_start_begins_where_the_last_fit_ended() -> None:
     records = recordings()
     line = model(TWO_MASS)
@@ -201,25 +186,3 @@ def test_of_one_mass_the_acceleration_before_and_after_a_torque_steps() -> None:
     assert after == pytest.approx((TORQUE_NM - drag) / ONE_MASS["J_M"], rel=2e-3)
     was = np.append(TORQUE_NM[0], TORQUE_NM[:-1])
     assert before == pytest.approx((was - drag) / ONE_MASS["J_M"], rel=2e-3)
-
-
-def test_of_a_joint_straight_lines_to_the_neighbours() -> None:
-    stiffness, time_s = 100.0, SAMPLE_TIME_S * np.arange(300)
-    twist: FloatArray = 0.1 * np.sin(3.0 * time_s)
-    line = DrivelineModel(Structure.JOINT, {"k": Parameter(stiffness, 0.0), "c": Parameter(0.0, 0.0)})
-    record = Record(
-        "bench",
-        SAMPLE_TIME_S,
-        time_s,
-        (stiffness * twist)[:, None],
-        stiffness * twist,
-        np.ones(300, dtype=bool),
-        OutputKind.FORCE,
-        imposed=twist,
-    )
-    ((before, after),) = rates(fitted(record, line))
-    secants = stiffness * np.diff(twist) / SAMPLE_TIME_S
-    assert after[:-1] == pytest.approx(secants, abs=1e-6)
-    assert before[1:] == pytest.approx(secants, abs=1e-6)
-    assert before[0] == after[0]
-    assert after[-1] == before[-1]

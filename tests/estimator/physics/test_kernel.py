@@ -1,5 +1,6 @@
 """The compiled simulation against closed formulas and an exact linear solution written in the tests."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -9,6 +10,7 @@ from estimator.physics.driveline import Start
 from estimator.physics.grid import Grid, grid_for
 from estimator.physics.kernel import state_vector
 from estimator.physics.kernel.rates import met
+from estimator.physics.laws import BEYOND, hyperbolic_tangent, power
 from estimator.physics.layout import flat
 from estimator.physics.simulate import simulate
 from estimator.signals.record import FloatArray, Location, OutputKind
@@ -126,3 +128,19 @@ def test_exact_states_agree_with_the_matrix_exponential_of_a_single_mass() -> No
     speed = exact_states(ONE_MASS, torque, Start(0.0, 0.0, 0.0))[:, 1]
     time_s = np.arange(200) * SAMPLE_TIME_S
     np.testing.assert_allclose(speed, 2.0 * (1.0 - np.exp(-0.2 * time_s)), atol=1e-12)
+
+
+LAST_BIT = np.finfo(float).eps
+
+
+def test_the_hyperbolic_tangent_is_the_librarys_to_the_last_two_bits() -> None:
+    sizes = np.concatenate([np.geomspace(1e-300, 2.0 * BEYOND, 20_000), np.linspace(0.0, 1.1 * BEYOND, 20_000)[1:]])
+    for size in sizes:
+        assert hyperbolic_tangent(size) == pytest.approx(math.tanh(size), rel=2.0 * LAST_BIT, abs=0.0)
+        assert hyperbolic_tangent(-size) == -hyperbolic_tangent(size)
+
+
+@pytest.mark.parametrize("exponent", [0.3, 1.0, 2.0, -0.5, 7.5])
+def test_a_power_is_the_librarys_to_13_digits(exponent: float) -> None:
+    for size in np.concatenate([np.geomspace(1e-6, 1e3, 5_000), [1.0]]):
+        assert power(size, exponent) == pytest.approx(size**exponent, rel=1e-13, abs=0.0)

@@ -5,13 +5,10 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from estimator.physics.driveline import Start
-from estimator.physics.grid import Grid
-from estimator.physics.layout import flat_values
-from estimator.physics.simulate import simulate
+from estimator.physics.effects.load import KNOT_SPACING_S, grade_basis
 from estimator.signals.record import FloatArray
 from tests.estimator.physics import reference
-from tests.estimator.physics.bench import SAMPLE_TIME_S, TWO_MASS, model
+from tests.estimator.physics.bench import SAMPLE_TIME_S, TWO_MASS
 from tests.estimator.physics.law_bench import (
     SIGN_WIDTH,
     START,
@@ -162,22 +159,6 @@ def test_the_traction_of_a_tyre_may_build_up_as_it_rolls_and_ends_where_it_slide
     assert_law({"tyre_slip": values}, expected)
 
 
-@pytest.mark.parametrize("share", [0.02, 0.3, 0.7])
-@pytest.mark.parametrize("slip", [1e-5, 1e-4, 1e-3])
-def test_a_stiff_tyre_in_large_steps_still_shows_its_slip(slip: float, share: float) -> None:
-    """A vehicle on the move: steps of 2.5 ms leave half of the slip's effect wrong at most, or a 500th of all."""
-    start = Start(12.0, 0.0, 20.0, 0.0, 20.0)
-    values = {"slip_per_nm": slip, "wheel_share": share, "creep_rad_s": 1.0}
-    coarse, fine, rigid = (
-        simulate(
-            Grid(model(TWO_MASS).structure, substeps, SIGN_WIDTH), measured(), flat_values(TWO_MASS, effects), start
-        )
-        for substeps, effects in ((4, {"tyre_slip": values}), (100, {"tyre_slip": values}), (100, {}))
-    )
-    effect = np.max(np.abs(fine - rigid))
-    assert np.max(np.abs(coarse - fine)) < max(0.5 * effect, 0.002 * np.ptp(rigid))
-
-
 def test_friction_brakes_the_wheel_and_air_the_vehicle() -> None:
     """Behind a slipping tyre the two loads act at different places."""
     v, slip, share, creep = TWO_MASS, 2e-3, 0.2, 2.0
@@ -206,3 +187,27 @@ def test_friction_brakes_the_wheel_and_air_the_vehicle() -> None:
         "aerodynamic_drag": {"drag_nm_s2": 15.0},
     }
     assert_same(kernel_output(effects, measured()), expected, kernel_output({"tyre_slip": tyre}, measured()))
+
+
+class TestRoadGradeBasis:
+    TIME_S = np.arange(2001) * 0.01
+
+    def test_with_the_first_spline_they_would_sum_to_one(self) -> None:
+        """A cubic B-spline over [0, d] that starts the partition of unity is (1 - t/d)^3."""
+        first = np.maximum(1.0 - self.TIME_S / KNOT_SPACING_S, 0.0) ** 3
+        np.testing.assert_allclose(grade_basis(self.TIME_S).sum(axis=0) + first, 1.0, atol=1e-12)
+
+    def test_with_a_constant_it_reproduces_every_cubic(self) -> None:
+        t = self.TIME_S / 20.0
+        design = np.vstack([np.ones_like(t), grade_basis(self.TIME_S)]).T
+        cubic = 3.0 - 2.0 * t + 5.0 * t**2 - 4.0 * t**3
+        left = cubic - design @ np.linalg.lstsq(design, cubic, rcond=None)[0]
+        np.testing.assert_allclose(left, 0.0, atol=1e-10)
+
+    def test_a_smooth_road_is_followed_and_a_step_is_not(self) -> None:
+        design = np.vstack([np.ones_like(self.TIME_S), grade_basis(self.TIME_S)]).T
+        hill = np.sin(2 * np.pi * self.TIME_S / 15.0)
+        step = np.where(self.TIME_S > 9.0, 1.0, -1.0)
+        left = [profile - design @ np.linalg.lstsq(design, profile, rcond=None)[0] for profile in (hill, step)]
+        assert np.sqrt(np.mean(left[0] ** 2)) < 5e-3
+        assert np.sqrt(np.mean(left[1] ** 2)) > 0.1

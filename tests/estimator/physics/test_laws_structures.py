@@ -74,18 +74,6 @@ def test_the_first_shaft_of_three_masses_may_have_a_gap() -> None:
     assert_same(out, states(three_masses(shaft=shaft))[:, 1], three_mass_output({}), tolerance=1e-3)
 
 
-def test_loads_of_three_masses_act_on_the_last_and_friction_on_the_first() -> None:
-    brake = lasting(60.0, 0.5, 1.6)
-    line = three_masses(
-        friction=lambda t, w: 20.0 * np.tanh(w / SIGN_WIDTH), drag=lambda t, w: brake(t) * np.tanh(w / SIGN_WIDTH)
-    )
-    effects = {
-        "coulomb_friction_motor": {"friction_nm": 20.0},
-        "brake_drag": {"brake_nm": 60.0, "from_s": 0.5, "to_s": 1.6},
-    }
-    assert_same(three_mass_output(effects), states(line, (0.5, 1.6))[:, 1], three_mass_output({}))
-
-
 def one_mass_output(effects: dict[str, dict[str, float]], turning: FloatArray) -> FloatArray:
     grid = Grid(Structure.ONE_MASS, SUBSTEPS, SIGN_WIDTH)
     return simulate(grid, measured(turning), flat_values(ONE_MASS, effects), Start(12.0, 0.0, 1.5))

@@ -1,11 +1,9 @@
 """Effects between the torque's reading and the shaft, against the reference and closed formulas."""
 
-import math
-
 import numpy as np
 import pytest
 
-from estimator.physics.inputs import shaft_torque, shaft_torque_from
+from estimator.physics.inputs import shaft_torque
 from estimator.physics.layout import flat_values
 from estimator.signals.record import FloatArray
 from tests.estimator.physics import reference
@@ -77,23 +75,6 @@ def test_derating_lets_the_torque_fall_towards_its_depth(depth: float) -> None:
     effects = {"torque_derating": {"depth": depth, "time_constant_s": tau}}
     np.testing.assert_allclose(supplied(TORQUE[:, None], **effects), TORQUE * left, rtol=1e-12)
     assert_law(effects, solved(two_mass(), held=held(TORQUE * left)))
-
-
-@pytest.mark.parametrize("begun", [0.0, 0.7])
-def test_derating_by_the_torques_own_heat_is_a_winding_of_first_order(begun: float) -> None:
-    """tau dh/dt + h = (T / T_n)^2, solved from sample to sample, a held torque each."""
-    tau, rated, depth = 0.8, 60.0, 0.3
-    warm = [begun]
-    for torque in TORQUE:
-        end = (torque / rated) ** 2
-        warm.append(end + (warm[-1] - end) * math.exp(-SAMPLE_TIME_S / tau))
-    effects = {"torque_derating": {"depth": depth, "time_constant_s": tau, "heating_nm": rated}}
-    p = flat_values(TWO_MASS, effects)
-    torque, behind = shaft_torque_from(TORQUE[:, None], TIME_S, SAMPLE_TIME_S, p, begun)
-    np.testing.assert_allclose(torque, TORQUE * (1.0 - depth * np.array(warm[:-1])), rtol=1e-12)
-    assert behind == pytest.approx(warm[-1])
-    if begun == 0.0:
-        assert_law(effects, solved(two_mass(), held=held(torque)))
 
 
 def test_the_torque_path_acts_in_the_order_gain_limit_derating() -> None:

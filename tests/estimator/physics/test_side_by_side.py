@@ -1,17 +1,15 @@
 """Simulations that go side by side, against the same ones by themselves."""
 
 from collections.abc import Mapping
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from estimator.physics.driveline import Case, Start
 from estimator.physics.grid import Grid
-from estimator.physics.kernel.side_by_side import go_side_by_side
 from estimator.physics.layout import flat, slot
 from estimator.physics.model import DrivelineModel, EffectValue, Parameter, Structure
-from estimator.physics.simulate import simulate_each, simulate_records
+from estimator.physics.simulate import simulate_each
 from estimator.signals.record import FloatArray
 from tests.estimator.physics.bench import (
     ONE_MASS,
@@ -152,29 +150,3 @@ def test_what_has_its_beginning_in_common_continues_from_there() -> None:
     together = simulate_each(grid, rec, cases, alike_s=np.minimum(begins, 3.9))
     alone = np.array([simulate_each(grid, rec, [case])[0] for case in cases])
     assert_same_to_rounding(together, alone)
-
-
-def test_recordings_of_different_lengths_side_by_side() -> None:
-    line = model(TWO_MASS, effects=SLIDER | {"stiffness_change": {"change": -0.3, "from_s": 1.0, "to_s": 2.0}})
-    grid = Grid(line.structure, SUBSTEPS, 0.02)
-    records = [record(random_steps(n, seed=n), np.ones(n), name=f"run {n}") for n in (400, 150, 377)]
-    cases = [
-        Case(flat(line), replace(START, speed_rad_s=5.0 + i), np.full(n, 3.0 * i))
-        for i, n in enumerate((400, 150, 377))
-    ]
-    together = [each for (each,) in simulate_records(grid, [[record] for record in records], cases)]
-    for rec, case, output in zip(records, cases, together, strict=True):
-        assert output.shape == rec.output.shape
-        assert_same_to_rounding(output, simulate_each(grid, rec, [case])[0])
-
-
-def test_what_is_linear_or_another_make_goes_alone() -> None:
-    rows = np.arange(3)
-    bent = np.array([flat(model(TWO_MASS, effects=SLIDER))] * 3)
-    assert go_side_by_side((1, 2), bent, rows)
-    assert not go_side_by_side((1, 2), bent, rows[:1])
-    assert not go_side_by_side((1, 2), np.array([flat(model(TWO_MASS))] * 3), rows)
-    other = bent.copy()
-    other[2, slot("backlash", "gap_rad")] = 0.01
-    assert not go_side_by_side((1, 2), other, rows)
-    assert go_side_by_side((1, 2), other, rows[:2])

@@ -12,7 +12,7 @@ from estimator.errors import BadModel
 from estimator.physics.driveline import Case, Start
 from estimator.physics.fit import FitResult, fit, make_problem
 from estimator.physics.free_run import free_run
-from estimator.physics.grid import SIGN_WIDTH, grid_for, substeps_for
+from estimator.physics.grid import grid_for, substeps_for
 from estimator.physics.layout import flat, flat_values, slot
 from estimator.physics.model import DrivelineModel, Load, Structure, natural_frequencies_rad_s
 from estimator.physics.problem import bounds
@@ -158,14 +158,6 @@ def test_a_fast_decay_is_integrated_as_well_as_a_fast_oscillation(values: dict[s
     assert np.max(np.abs(speed - exact)) < 1e-4 * np.ptp(exact)
 
 
-def test_dry_friction_changes_sign_within_a_share_of_the_top_speed_of_what_reverses() -> None:
-    slow = record(np.ones(401), np.linspace(-20.0, 20.0, 401), name="slow")
-    fast = record(np.ones(401), np.linspace(100.0, 200.0, 401), name="fast")
-    line = model(ONE_MASS)
-    assert grid_for(line, [slow, fast]).sign_width == pytest.approx(SIGN_WIDTH * 19.8)  # 99th percentile
-    assert grid_for(line, [fast]).sign_width == pytest.approx(SIGN_WIDTH * 199.0)
-
-
 @pytest.mark.parametrize(
     ("kind", "location", "structure"),
     [
@@ -191,23 +183,6 @@ def test_inputs_are_summed_and_row_k_is_the_state_before_torque_k_acts() -> None
     line = model({"J_M": 2.0, "b_M": 0.0})
     speed = simulate(grid_for(line, [rec]), rec, flat(line), Start(0.0, 0.0, 1.0))
     np.testing.assert_allclose(speed, [1.0, 1.0 + 2.0 * SAMPLE_TIME_S, 1.0 + 2.0 * SAMPLE_TIME_S])
-
-
-def test_many_simulations_in_one_call_are_those_of_single_calls() -> None:
-    """Each with its own parameters, start and load: none leaves anything to the next."""
-    rng = np.random.default_rng(3)
-    bus = model(TWO_MASS)
-    recording = replace(record(random_steps(400, seed=3)), offset_s=rng.uniform(-0.002, 0.002, 400))
-    cases = []
-    for i in range(4):
-        p = flat(bus)
-        p[slot("", "k")] *= 1.0 + 0.1 * i
-        p[slot("torque_ripple", "amplitude_nm")] = 3.0 * i
-        cases.append(Case(p, Start(5.0 * i, 0.0, 1.0 + i), rng.standard_normal(400) if i % 2 else None))
-    grid = grid_for(bus, [recording])
-    single = [simulate(grid, recording, case.p, case.start, case.extra_load_nm) for case in cases]
-    np.testing.assert_array_equal(simulate_each(grid, recording, cases), single)
-    assert np.ptp([out[-1] for out in single]) > 0.1
 
 
 @pytest.mark.parametrize(

@@ -95,26 +95,6 @@ def test_unspoilt_outputs_do_not_depend_on_a_bad_value() -> None:
         assert np.array_equal(kept.y, outputs[0].y)
 
 
-def test_after_a_long_gap_the_mean_is_not_trusted_at_once() -> None:
-    y, okay = tone(8.2, 2000), np.ones(2000, dtype=bool)
-    okay[400:1000] = False
-    kept = chain(y, okay)
-    back = np.flatnonzero(kept.okay & (np.arange(1000) > 500))[0]
-    window_only_s = (1000 + low_pass_taps(2).shape[0]) * SAMPLE_TIME_S
-    half_life_s = np.log(2) / (2 * np.pi * 0.3)  # the held share of the mean falls below one half after this
-    assert back * 0.02 == pytest.approx(window_only_s + half_life_s, abs=0.04)
-
-
-def test_the_delay_is_taken_out_of_the_time_base() -> None:
-    n = 1000
-    pulse = np.exp(-0.5 * ((np.arange(n) - 600) / 6.0) ** 2)
-    source = Record("pulse", 0.01, 0.01 * np.arange(n), pulse[:, None], pulse, np.ones(n, dtype=bool))
-    kept = decimate(source, 2)
-    assert kept.time_s[np.argmax(kept.output)] == pytest.approx(6.0)
-    assert kept.time_s[0] == pytest.approx(-HALF_LENGTH * 0.02)
-    assert kept.sample_time_s == pytest.approx(0.02)
-
-
 def test_the_recording_is_not_changed_and_torques_are_summed() -> None:
     source = record()
     before = (source.torque_nm.copy(), source.output.copy(), source.okay.copy())

@@ -107,11 +107,6 @@ def test_an_event_is_sometimes_absent_from_one_recording_and_never_from_all(name
     assert present[0] == 0
 
 
-def test_a_data_sheet_can_be_right():
-    specimen = draw_specimen("none", SEED, nominal_error=0.0)
-    assert all(value == getattr(specimen.bus, name) for name, value in specimen.nominal.items())
-
-
 def test_sensors_have_the_resolution_and_noise_they_state(nothing):
     for recording in nothing.recordings:
         counts = recording.torque_m1_nm / TORQUE_QUANTUM_NM
@@ -121,16 +116,6 @@ def test_sensors_have_the_resolution_and_noise_they_state(nothing):
         error = recording.torque_m1_nm + recording.torque_m2_nm - recording.torque_ref_nm
         assert abs(error.mean()) < 0.08
         assert 0.5 < np.std(error) < 1.0
-
-
-def test_the_truth_knows_where_the_load_was_disturbed():
-    seed = next(seed for seed in range(100) if len(draw_specimen("brake_drag", seed).sizes["brake_drag"]) == 1)
-    braked = draw_specimen("brake_drag", seed)
-    disturbance_nm = record(braked, 0).disturbance_nm
-    assert disturbance_nm[0] == 0.0
-    assert disturbance_nm.max() == pytest.approx(braked.sizes["brake_drag"]["brake_nm"], abs=1e-3)
-    hills = draw_specimen("road_grade", SEED)
-    assert np.ptp(record(hills, 0).disturbance_nm) > 10.0
 
 
 def test_the_simulator_does_not_load_the_estimator():

@@ -14,7 +14,6 @@ from hil.proof.truth.recording import (
     Acquisition,
     Rows,
     as_recorded,
-    runs,
     sampling_instants_s,
     speed_as_read,
 )
@@ -63,14 +62,6 @@ def test_a_curved_sensor_misses_its_share_at_the_stated_speed(rng):
     assert backwards.mean() == pytest.approx(-0.975 * 0.5 * CURVATURE_SPEED_RAD_S, abs=0.01)
 
 
-def test_jitter_stays_within_its_size_and_a_clock_runs_away(rng):
-    deviation = sampling_instants_s(TIME_S, Acquisition(jitter_s=0.002), rng) - TIME_S
-    assert 0.0019 < np.abs(deviation).max() <= 0.002
-    assert np.std(deviation) == pytest.approx(0.002 / np.sqrt(3), rel=0.05)
-    drifting = sampling_instants_s(TIME_S, Acquisition(clock_error=-0.001), rng)
-    np.testing.assert_allclose(drifting, 0.999 * TIME_S)
-
-
 def test_a_speed_sampled_late_is_the_speed_of_that_moment(plain, rng):
     """Off-grid sampling is exact: a driveline stopped at each instant anew has the same speeds."""
     torques = 100.0 * rng.choice([-1.0, 1.0], 40)
@@ -110,14 +101,3 @@ def test_a_lost_sample_may_be_a_zero_that_nobody_flagged(rows, rng):
     assert lost.flags is None
     assert 0.01 * N < np.count_nonzero(lost.torque_m1_nm == 0.0) < 0.03 * N
     assert np.isfinite(lost.torque_m1_nm).all()
-
-
-def test_runs_have_no_more_than_their_most_and_spare_the_first_sample():
-    for seed in range(20):
-        hit = runs(N, 0.3, 1, np.random.default_rng(seed))
-        assert not hit[0]
-    sparse = runs(200_000, 1e-3, 4, np.random.default_rng(1))
-    edges = np.flatnonzero(np.diff(sparse.astype(int)))
-    lengths = edges[1::2] - edges[::2]
-    assert set(lengths) >= {1, 2, 3, 4}
-    assert np.median(lengths) <= 4

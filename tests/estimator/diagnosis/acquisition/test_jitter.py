@@ -114,21 +114,3 @@ def test_a_few_wild_rows_are_no_jitter() -> None:
         errors.append(read - truth.speed())
         slopes.append(slopes_of(truth))
     assert hidden_jitter(records, errors, slopes, [record.okay for record in records]) is None
-
-
-@pytest.mark.parametrize("delay_s", [0.00014, 0.0003])
-def test_a_delay_that_comes_and_goes_is_no_jitter(delay_s: float) -> None:
-    """So does an error that depends on an angle, where the simulated one drifts off the true one.
-
-    Its mean is zero: no coefficient for all rows follows it. But neighbours have it in common.
-    """
-    records, errors, slopes = [], [], []
-    for i, (kind, truth) in enumerate(zip(KINDS, drives(1), strict=True)):
-        rng = np.random.default_rng(i)
-        record = truth.record(kind)
-        steep = 100.0 * rng.standard_normal(SAMPLES)
-        late_s = np.sqrt(2.0) * delay_s * np.sin(2.0 * np.pi * record.time_s / 8.0 + i)
-        records.append(record)
-        slopes.append(np.stack([steep, steep]))
-        errors.append(steep * late_s + 0.05 * rng.standard_normal(SAMPLES))
-    assert hidden_jitter(records, errors, slopes, [record.okay for record in records]) is None

@@ -110,29 +110,3 @@ def test_of_a_torque_that_jumps_between_levels_zeros_are_lost() -> None:
     finding = only(lost)
     for record, where in zip(lost, rows, strict=True):
         np.testing.assert_array_equal(finding.touched(record)[1:-1, 2], where[1:-1])
-
-
-def test_a_torque_that_begins_at_zero_for_longer_is_kept() -> None:
-    rows = rows_of(3, 0.03)
-    records = []
-    for record, where in zip(healthy(3, 3), rows, strict=True):
-        where[:10] = False
-        torque = np.where(where[:, None], 0.0, record.torque_nm)
-        torque[:8] = 0.0
-        records.append(replace(record, torque_nm=torque))
-    finding = only(records)
-    assert not any(finding.rows(record)[:8].any() for record in records)
-
-
-def test_zeros_that_the_values_near_zero_let_expect_are_kept() -> None:
-    """A reading in coarse steps is at zero now and then while the line stands still."""
-    rows = rows_of(5, 0.03)
-    records = [replace(r, output=0.1 * np.round(10.0 * r.output)) for r in healthy(5)]
-    still = 0.1 * np.round(np.random.default_rng(5).standard_normal(1000))
-    with_rest = [replace(r, output=np.concatenate([still, r.output[1000:]])) for r in records]
-    lost = [replace(r, output=np.where(where, 0.0, r.output)) for r, where in zip(with_rest, rows, strict=True)]
-    (finding,) = (f for f in recognise(lost) if f.name == "lost_samples")
-    for record, healthy_one, where in zip(lost, with_rest, rows, strict=True):
-        meant = (healthy_one.output == 0.0) & ~where
-        assert meant.sum() > 300
-        assert not finding.rows(record)[meant].any()

@@ -9,9 +9,7 @@ import numpy as np
 import pytest
 
 from estimator.diagnosis.hypotheses import everything, open_hypotheses
-from estimator.diagnosis.inference.disturbances import Size
 from estimator.diagnosis.inference.judge import Decision, decide, grounds
-from estimator.diagnosis.inference.likelihood import compared, fitted
 from estimator.diagnosis.inference.search import Search
 from estimator.physics.model import EffectValue
 from estimator.signals.record import Record
@@ -101,26 +99,3 @@ def test_an_effect_that_is_known_wrongly_and_held_is_a_mismatch() -> None:
     held = knowing(bench, "coulomb_friction_motor", "friction_nm", 5.0, 0.0)
     nothing = searched(held).nothing()
     assert nothing.plain.rms > 1.5 * SIGMA
-
-
-def test_a_grade_is_tried_in_the_place_of_a_load_s_law() -> None:
-    """Else a brake that was found first, and takes the largest part of a grade, would keep it."""
-    search = searched(bench_with("aerodynamic_drag", {"drag_nm_s2": 0.05}))
-    search.names = ["aerodynamic_drag", "road_grade"]
-    assert search.run().effects == {"aerodynamic_drag"}
-    assert frozenset({"road_grade"}) in search.visited
-
-
-def test_only_a_load_that_is_a_grade_may_walk_far() -> None:
-    """A set in which something else stands in a grade's place does not keep the grade as a disturbance."""
-    search = searched(bench_with("coulomb_friction_motor", {"friction_nm": 8.0}))
-    nothing = search.nothing()
-    far = nothing.limits.freed()
-    sizes = nothing.sizes.copy()
-    sizes[Size.WALK] = far.high[Size.WALK]
-    graded = replace(nothing, effects=frozenset({"road_grade"}), sizes=sizes, limits=far)
-    most = search.limits.high[Size.WALK]
-    rough = compared(nothing.effects, nothing.plain, graded, search.limits, len(search.names))
-    whole = fitted(nothing.effects, nothing.plain, graded.sizes, search.limits, len(search.names))
-    assert rough.sizes[Size.WALK] <= most
-    assert whole.sizes[Size.WALK] <= most

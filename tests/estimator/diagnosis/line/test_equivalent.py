@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from scipy.linalg import block_diag
@@ -105,13 +103,3 @@ def test_the_motion_that_goes_with_the_input_is_the_true_one() -> None:
     twist = exact_states(TWO_MASS, torque, start, extra_load_nm=extra)[:, TWIST]
     middle = 0.5 * (twist + np.append(twist[1:], twist[-1]))
     assert np.std(found.motion.twist - middle) < 0.03 * np.std(middle)
-
-
-def test_masked_stretches_widen_the_band() -> None:
-    rec = linear_record(TWO_MASS, drive_torque(1), Start(5.0, 0.0, 2.0, 0.0, 2.0), sigma=SIGMA, seed=1)
-    okay = rec.okay.copy()
-    okay[600:900] = False
-    result = fit(make_problem(model(TWO_MASS), [replace(rec, okay=okay)], ()))
-    (found,) = explain(result, lines(result), Place.MOTOR, SIGMA).inputs
-    assert np.isfinite(found.value).all()
-    assert found.std[750] > 1.1 * np.median(found.std[okay])

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 import pytest
 
-from estimator.diagnosis.line.motion import motion_of
 from estimator.diagnosis.unnamed.forms import STEP_EVERY_S
 from estimator.diagnosis.unnamed.pursuit import candidates
 from estimator.diagnosis.unnamed.scene import Scene, elements, scene
@@ -17,7 +15,7 @@ from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult, fit
 from estimator.physics.problem import make_problem
 from estimator.signals.record import FloatArray
-from tests.estimator.diagnosis.planted import SIGMA, drive_torque, nominal_fit, quiet
+from tests.estimator.diagnosis.planted import SIGMA, drive_torque
 from tests.estimator.physics.bench import (
     LOAD_SPEED,
     SPEED,
@@ -142,29 +140,3 @@ def test_what_sets_in_at_a_moment_does_so_in_one_recording_and_names_it(pool: li
     assert late[2001:].any()
     assert early[501:1500].any()
     assert not early[1500:].any()
-
-
-def test_every_input_but_the_last_may_count_more_than_its_reading() -> None:
-    shares = np.column_stack([0.3 * drive_torque(1), 0.7 * drive_torque(1) + 20.0, np.full(1500, -20.0)])
-    rec = replace(linear_record(TWO_MASS, drive_torque(1), START), torque_nm=shares)
-    pool = at(scene(fit(make_problem(model(TWO_MASS), [rec], ())), SIGMA), Element.TORQUE_PATH)
-    assert [c.law for c in pool if c.law in ("T_1", "T_2", "T_3")] == ["T_1", "T_2"]
-    expected = response(shares[:, 1], np.zeros(1500))
-    answer = first(pick(pool, Element.TORQUE_PATH, "T_2"))
-    assert np.max(np.abs(answer - expected)) < 1e-3 * np.ptp(expected)
-
-
-def test_a_profile_of_the_fit_continues_in_the_answers() -> None:
-    records = quiet()
-    line = model(TWO_MASS)
-    hill = [
-        linear_record(TWO_MASS, r.total_torque_nm, START, extra_load_nm=40.0 * np.sin(0.4 * r.time_s), name=r.name)
-        for r in records
-    ]
-    followed = fit(make_problem(line, hill, (), profile=True))
-    assert followed.rms < 0.02 * nominal_fit(hill).rms
-    moved = motion_of(followed, 0)
-    assert np.max(np.abs(moved.speed - hill[0].output)) < 0.01 * np.ptp(hill[0].output)
-    step = pick(at(scene(followed, SIGMA), Element.LOAD), Element.LOAD, "a load step at 5.0 s in run_1")
-    expected = response(np.zeros(1500), np.where(np.arange(1500) >= 500, 1.0, 0.0))
-    assert np.max(np.abs(first(step) - expected)) < 1e-2 * np.ptp(expected)

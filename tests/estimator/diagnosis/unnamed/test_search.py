@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.diagnosis.unnamed.element_search import ElementSearch
+from estimator.diagnosis.unnamed.element_search import ElementSearch, outliers
+from estimator.diagnosis.unnamed.forms import peaks
 from estimator.diagnosis.unnamed.scene import scene
 from estimator.diagnosis.unnamed.search import LEAST_ROUNDS, ROUNDS, best_unnamed, searches_at, unnamed_laws
 from estimator.physics.driveline import Start
@@ -139,3 +140,27 @@ def test_single_readings_that_are_off_are_the_acquisitions() -> None:
     assert found.element is Element.ACQUISITION
     assert found.terms[0] == ("the single readings that are off", pytest.approx(1.0, rel=0.05))
     assert found.rms == pytest.approx(SIGMA, rel=0.1)
+
+
+def test_orders_of_waves_are_found_strongest_first() -> None:
+    time_s = np.arange(0.0, 30.0, 0.01)
+    angle = 20.0 * time_s + 0.6 * time_s**2
+    wave = 3.0 * np.cos(3.0 * angle + 1.0) + 0.5 * np.sin(0.4 * angle)
+    found = peaks([wave, wave[::-1]], [angle, angle[::-1]])
+    assert found[0] == pytest.approx(3.0, abs=0.01)
+    assert np.min(np.abs(found - 0.4)) < 0.01
+
+
+def test_what_does_not_turn_has_no_orders() -> None:
+    assert peaks([np.ones(100)], [np.zeros(100)]).size == 0
+
+
+def test_strays_are_distinguished_from_a_swing_and_from_noise() -> None:
+    rng = np.random.default_rng(3)
+    time_s = np.arange(0.0, 30.0, 0.01)
+    error = 0.2 * np.sin(2 * np.pi * 1.0 * time_s) + 0.02 * rng.standard_normal(time_s.size)
+    assert not outliers([error])[0].any()
+    for seed in range(10):
+        assert not outliers([np.random.default_rng(seed).standard_normal(9000)])[0].any()
+    error[[100, 2000]] += [0.6, -0.6]
+    assert np.flatnonzero(outliers([error])[0]).tolist() == [100, 2000]

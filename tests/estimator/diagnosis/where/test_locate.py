@@ -44,12 +44,6 @@ class TestTime:
         assert low == pytest.approx(5.0, abs=WINDOW_S)
         assert high == pytest.approx(8.0, abs=WINDOW_S)
 
-    def test_two_bursts_are_two_intervals_and_close_ones_are_one(self) -> None:
-        apart = intervals(fitted(drive(burst(3.0, 5.0) + burst(9.0, 12.0))), SIGMA)["run_1"]
-        close = intervals(fitted(drive(burst(3.0, 5.0) + burst(5.8, 8.0))), SIGMA)["run_1"]
-        assert [round(low) for low, _ in apart] == [3, 9]
-        assert len(close) == 1
-
     def test_noise_is_no_mismatch(self) -> None:
         assert intervals(fitted(drive(np.zeros(2000))), SIGMA) == {}
 

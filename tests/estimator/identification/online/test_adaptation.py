@@ -17,7 +17,6 @@ from estimator.identification.online.adaptation import (
     DecreasingThenConstantTrace,
     GainLaw,
     VariableForgetting,
-    VariableForgettingThenConstantTrace,
 )
 from estimator.identification.online.oefo import Oefo
 from estimator.identification.online.recursive import Reason, Status
@@ -102,25 +101,6 @@ def test_the_gain_stays_symmetric_and_positive_through_hours(profile: Adaptation
 def test_gains_out_of_range_are_refused(law: dict[str, float], named: str) -> None:
     with pytest.raises(BadSetting, match=f"adaptation gain: {named} is"):
         GainLaw(**law)
-
-
-def test_a_constant_gain_stays_and_corrects_along_the_gradient(u: FloatArray) -> None:
-    estimator = after(ConstantGain(0.05), u)
-    assert np.array_equal(estimator.F, 0.05 * np.eye(3))
-    y = np.random.default_rng(3).normal(size=300)
-    estimator = Oefo(np.ones(1), MOVING_AVERAGE, ConstantGain(0.05))
-    theta = np.zeros(3)
-    for row, value in zip(regressors(u), y, strict=True):
-        theta = theta + 0.05 * row * (value - theta @ row) / (1 + 0.05 * row @ row)
-    np.testing.assert_allclose(estimator.run(u, y, np.ones(300, dtype=bool)).theta[-1], theta, rtol=1e-9)
-
-
-def test_variable_forgetting_forgets_until_the_trace_is_held(u: FloatArray) -> None:
-    profile = VariableForgettingThenConstantTrace(0.9, 0.95, 0.993, trace=0.05)
-    forgetting = VariableForgetting(0.9, 0.95)
-    before = next(n for n in range(5, 300) if np.trace(after(profile, u[:n]).F) <= 0.05 * (1 + 1e-9))
-    np.testing.assert_allclose(after(profile, u[: before - 1]).F, after(forgetting, u[: before - 1]).F, rtol=1e-12)
-    assert np.trace(after(profile, u).F) == pytest.approx(0.05, rel=1e-12)
 
 
 FAST = {ConstantTrace: ConstantTrace(0.2), ConstantGain: ConstantGain(0.2)}
