@@ -195,7 +195,7 @@ def without_sections(pattern: str) -> Maker:
 
 
 FOR_GOOD = {0: Entry(U8, "ro", "2"), 1: Entry(U32, "const", "$NODEID+0x200"), 2: Entry(U8, default="255")}
-"""Communication parameter whose identifier can't be written_odd, as in Elmo SimplIQ drives."""
+"""Communication parameter whose identifier can't be written, as in Elmo SimplIQ drives."""
 
 USABLE = {
     "spaces in formulas": COMPLETE.but(habit=lambda text: text.replace("$NODEID+", "$NODEID + ")),
@@ -237,7 +237,7 @@ USABLE = {
 REFUSED_ODD = {
     "identifier of another node for good": (
         COMPLETE.having({0x1400: FOR_GOOD | {1: Entry(U32, "const", "0x201")}}).but(0x1401, 0x1601),
-        "0x1400:01 can not be written_odd and has not COB-ID 0x27F",
+        "0x1400:01 can not be written and has not COB-ID 0x27F",
     ),
     "fixed command with a speed": (
         COMPLETE.having({0x1600: fixed("0x60400010", "0x60710010", "0x60FF0020")}).but(0x1401, 0x1601),

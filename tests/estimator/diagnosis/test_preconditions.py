@@ -95,7 +95,7 @@ def test_the_diagnosis_refuses_before_it_fits() -> None:
     assert called == ["checking the recordings"]
 
 
-N = 2000
+N = 3000
 TIME_S = 0.01 * np.arange(N)
 SWING = 10.0 * np.sin(TIME_S) + 0.5 * np.sin(9.0 * TIME_S)
 SEEN = np.ones(N, dtype=bool)
@@ -161,11 +161,10 @@ def test_a_torque_at_its_limit_is_reported_and_stays() -> None:
 
 EXCITED_LINE = model(TWO_MASS)
 SIGMA = 0.02
-N_EXCITED = 3000
 
 
 def noise(size: float, seed: int) -> np.ndarray:
-    return size * np.random.default_rng(seed).standard_normal(N_EXCITED)
+    return size * np.random.default_rng(seed).standard_normal(N)
 
 
 def excited_drive(torque_nm: np.ndarray, name: str = "run") -> Record:
@@ -182,8 +181,8 @@ def test_noise_alone_is_refused() -> None:
 
 def test_zeros_of_lost_readings_are_no_noise() -> None:
     """At 84 rad/s every lost reading is a spike, and 3 % of them are more than all that the torque moves."""
-    run = linear_record(TWO_MASS, random_steps(N_EXCITED, 1), Start(84.0, 0.0, 84.0, 0.0, 84.0), sigma=SIGMA)
-    lost = np.random.default_rng(3).random(N_EXCITED) < 0.03
+    run = linear_record(TWO_MASS, random_steps(N, 1), Start(84.0, 0.0, 84.0, 0.0, 84.0), sigma=SIGMA)
+    lost = np.random.default_rng(3).random(N) < 0.03
     read = replace(run, output=np.where(lost, 0.0, np.round(run.output, 5)))
     with pytest.raises(NotExciting):
         require_excitation([read], EXCITED_LINE)
@@ -194,7 +193,7 @@ def test_a_torque_that_moves_nothing_is_refused() -> None:
     """The line coasts: it moves, but the torque has no part in it."""
     coast = record(
         noise(0.02, 1),
-        80.0 * np.exp(-0.05 * 0.01 * np.arange(N_EXCITED)) + noise(SIGMA, 2),
+        80.0 * np.exp(-0.05 * 0.01 * np.arange(N)) + noise(SIGMA, 2),
         name="coast",
     )
     with pytest.raises(NotExciting, match=r"less than its noise of .*: the torque excites nothing") as refusal:
@@ -203,7 +202,7 @@ def test_a_torque_that_moves_nothing_is_refused() -> None:
 
 
 def slow_torque() -> np.ndarray:
-    return 100.0 * np.sin(0.4 * 0.01 * np.arange(N_EXCITED))
+    return 100.0 * np.sin(0.4 * 0.01 * np.arange(N))
 
 
 def test_a_mode_that_is_not_excited_is_reported() -> None:
@@ -215,7 +214,7 @@ def test_a_mode_that_is_not_excited_is_reported() -> None:
 
 def test_a_mode_too_fast_for_the_sampling_is_reported() -> None:
     stiff = model(scaled(TWO_MASS, k=100.0))
-    (warning,) = require_excitation([excited_drive(random_steps(N_EXCITED, 1))], stiff)
+    (warning,) = require_excitation([excited_drive(random_steps(N, 1))], stiff)
     assert "first mode is at 83.2 Hz, beyond the 50 Hz that a sampling period of 0.01 s can show" in warning
 
 
@@ -235,18 +234,17 @@ def test_values_that_are_hardly_meant_are_reported(changes: dict[str, float], sa
 
 def test_they_are_among_the_warnings_of_a_diagnosis() -> None:
     damped = model(scaled(TWO_MASS, c=100.0))
-    ready = prepare([excited_drive(random_steps(N_EXCITED, 1))], damped)
+    ready = prepare([excited_drive(random_steps(N, 1))], damped)
     assert any("times critically" in warning for warning in ready.warnings)
     assert ready.records == ready.segments.records
     assert replace(ready, warnings=()).holdout == ()
 
 
-N_READ = 3000
 GAP = slice(1000, 1400)
 
 
 def drive_not_read(kind: OutputKind = OutputKind.SPEED, sigma: float = 0.02) -> Record:
-    return linear_record(ONE_MASS, random_steps(N_READ, seed=1), Start(0.0, 0.0, 3.0), sigma=sigma, kind=kind)
+    return linear_record(ONE_MASS, random_steps(N, seed=1), Start(0.0, 0.0, 3.0), sigma=sigma, kind=kind)
 
 
 def interpolated(values: FloatArray, gap: slice = GAP) -> FloatArray:
@@ -262,7 +260,7 @@ def test_an_interpolated_gap_is_found_and_masked(digits: int, length: int) -> No
     speed = np.round(interpolated(drive_not_read().output + 0.05 * TIME_S**2, gap), digits)
     (record,), (warning,) = without_not_read([replace(drive_not_read(), output=speed)])
     assert not record.okay[gap].any()
-    assert record.okay.sum() >= N_READ - length - 4
+    assert record.okay.sum() >= N - length - 4
     assert "straight lines" in warning
     assert record.name in warning
 
@@ -272,7 +270,7 @@ def test_a_reading_that_has_stopped_is_found_and_masked() -> None:
     speed[GAP] = speed[GAP.start]
     (record,), (warning,) = without_not_read([replace(drive_not_read(), output=speed)])
     assert not record.okay[GAP].any()
-    assert record.okay.sum() >= N_READ - 404
+    assert record.okay.sum() >= N - 404
     assert "stands still" in warning
 
 
@@ -286,11 +284,11 @@ def test_what_is_masked_is_a_gap_of_the_diagnosis() -> None:
     assert any("straight lines" in warning for warning in ready.warnings)
 
 
-noise_read = 0.02 * np.random.default_rng(3).standard_normal(N_READ)
+noise_read = 0.02 * np.random.default_rng(3).standard_normal(N)
 swing = 10.0 * np.sin(TIME_S) + 0.5 * np.sin(9.0 * TIME_S)
 SOUND_READ: dict[str, FloatArray] = {
     "a noisy drive": drive_not_read().output,
-    "a drive_not_read without noise": drive_not_read(sigma=0.0).output,
+    "a drive without noise": drive_not_read(sigma=0.0).output,
     "a swing without noise": swing,
     "a swing read in coarse steps": np.round(swing),
     "a swing read in fine steps": np.round(swing, 2),
@@ -299,7 +297,7 @@ SOUND_READ: dict[str, FloatArray] = {
     "at rest, and moving": np.where(TIME_S < 10.0, 0.0, swing + noise_read),
     "a free fall without noise": 9.81 * TIME_S,
     "settled to the last bit": 30.0 * (1.0 - np.exp(-10.0 * TIME_S)),
-    "nothing": np.zeros(N_READ),
+    "nothing": np.zeros(N),
 }
 
 
