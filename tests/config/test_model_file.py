@@ -157,11 +157,8 @@ def test_a_wrong_line_is_refused_by_its_key(tmp_path: Path, line: str, said: str
     [
         ("k = { value = 1, tolerance = 0 }", "parameters.k: unknown, one_mass has J_M, b_M"),
         ("[geometry]\ngear_ratio = 0", "geometry.gear_ratio | expected greater than 0 | got 0"),
-        ("[geometry]\nratio = 5", "geometry.gear_ratio | expected this key"),
         ('[load]\nconstant = "everyone\'s"', "load.constant | expected"),
-        ("[load]\nconstant = nan", "load.constant | expected"),
         ("[load]\nconst = 5", "load.const | expected one of the known keys (constant)"),
-        ("[geometries]", "geometries | expected one of the known keys (schema, structure,"),
         ("[effects.gremlins]\nsize = { value = 1 }", "effects.gremlins: unknown effect, expected one of"),
         (
             "[effects.backlash]\ngap_rad = { value = 1 }",
@@ -191,11 +188,9 @@ def test_a_wrong_line_is_refused_by_its_key(tmp_path: Path, line: str, said: str
             "signals.time | expected either column or sample_time_s",
         ),
         ("[signals]\ntime = { sample_time_s = 0 }", "signals.time.sample_time_s | expected greater than 0 | got 0"),
-        ("[signals]\ntorque = [ { colum = 'a' } ]", "signals.torque.0.column | expected this key"),
         ("[signals]\nmask = [ { column = 'a' } ]", "signals.mask.0 | expected min, max or both | got 'neither'"),
         ("[signals]\nmask = [ { column = 'a', min = 2, max = 1 } ]", "signals.mask.0.max | expected 2.0 or more"),
         ("[signals]\nformat = { encoding = 'klingon' }", "signals.format.encoding | expected a text encoding such as"),
-        ("[signals]\nformat = { delimiter = ';;' }", "signals.format.delimiter | expected"),
         (
             "[signals]\nformat = { delimiter = '.' }",
             "signals.format.delimiter | expected a character that can't be part",

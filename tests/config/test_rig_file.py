@@ -64,16 +64,12 @@ class TestTheExample:
 WRONG = [
     (("", "name", '""'), "name | expected"),
     (("", "period_s", "0.0"), "period_s | expected greater than or equal to 0.001 | got 0.0"),
-    (("", "period_s", "0.0009"), "period_s | expected greater than or equal to 0.001 | got 0.0009"),
     (("", "period_s", '"10ms"'), "period_s | expected a valid number | got '10ms'"),
-    (("", "period_s", "nan"), "period_s | expected"),
     (("", "schema", '"hil.rig/2"'), "schema | expected 'hil.rig/1' | got 'hil.rig/2'"),
     (("can", "url", '""'), "can.url | expected"),
     (("inverters.m1", "node_id", "128"), "inverters.m1.node_id | expected less than or equal to 127 | got 128"),
     (("inverters.m2", "node_id", "1"), "inverters.m2.node_id | expected another node id than m1 | got 1"),
-    (("inverters.m2", "node_id", "2.0"), "inverters.m2.node_id | expected a valid integer | got 2.0"),
     (("inverters.m1", "vendor_id", "0x100000000"), "inverters.m1.vendor_id | expected less than"),
-    (("inverters.m1", "product_code", "-1"), "inverters.m1.product_code | expected greater than"),
     (("inverters.m1", "rated_torque_nm", "inf"), "inverters.m1.rated_torque_nm | expected a finite number"),
     (
         ("inverters.m2", "torque_limit_nm", "601.0"),
@@ -83,12 +79,9 @@ WRONG = [
         ("inverters.m1", "mode", '"speed"'),
         "inverters.m1.mode | expected 'cyclic_synchronous_torque' or 'profile_torque' | got 'speed'",
     ),
-    (("inverters.m1", "mode", "10"), "inverters.m1.mode | expected 'cyclic_synchronous_torque' or"),
     (("inverters.m1", "heartbeat_ms", "1"), "inverters.m1.heartbeat_ms | expected greater than or equal to 10"),
     (("plc", "port", "0"), "plc.port | expected greater than or equal to 1 | got 0"),
-    (("plc", "host", "127"), "plc.host | expected a valid string | got 127"),
     (("guard", "rate_limit_nm_per_s", "0.0"), "guard.rate_limit_nm_per_s | expected greater than 0"),
-    (("guard", "prbs_limit_nm", "-5.0"), "guard.prbs_limit_nm | expected greater than 0"),
     (("guard", "prbs_limit_nm", "59.0"), "prbs.amplitude_nm | expected a part of at most guard.prbs_limit_nm (59)"),
     (
         ("guard", "sum_limit_nm", "801.0"),
@@ -96,8 +89,6 @@ WRONG = [
     ),
     (("guard", "feedback_timeout_s", "0.005"), "guard.feedback_timeout_s | expected at least one period (0.01)"),
     (("prbs", "amplitude_nm", "true"), "prbs.amplitude_nm | expected a valid number | got True"),
-    (("prbs", "clock_divider", "0"), "prbs.clock_divider | expected greater than or equal to 1"),
-    (("prbs", "seed", "0"), "prbs.seed | expected greater than or equal to 1"),
     (("prbs", "seed", "1024"), "prbs.seed | expected at most 1023, what 10 cells hold | got 1024"),
     (("prbs", "source", '"moon"'), "prbs.source | expected 'plc' or 'host' | got 'moon'"),
     (("prbs", "target", '"shared"'), "prbs.share_m1 | expected the part of inverter m1"),
@@ -128,7 +119,6 @@ WRONG = [
         ("experiments.tip", "step_nm", "500.5"),
         "experiments.tip.step_nm | expected at most torque_nm of the same table (500) | got 500.5",
     ),
-    (("simulation", "seed", "-1"), "simulation.seed | expected greater than or equal to 0"),
     (("simulation", "speed_noise_rad_s", "-0.1"), "simulation.speed_noise_rad_s | expected greater than or equal"),
 ]
 

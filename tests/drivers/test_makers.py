@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.benchmarks.data_sheets import RAN, REFUSED, maker_files, mutant_verdicts, verdict
 
 from drivers.canopen.can_link import CanLink
 from drivers.canopen.pdo_map import COB_ID_INVALID
@@ -20,6 +19,7 @@ from hil.cli.main import run as command
 from hil.config.rig_file import read_rig
 from hil.rig.build import inverter_settings, open_devices
 from hil.rig.pacing import FREE_PATIENCE_S
+from tests.benchmarks.data_sheets import RAN, REFUSED, maker_files, mutant_verdicts, verdict
 from tests.chosen import one_in
 from tests.drivers.maker_files import (
     COMPLETE,

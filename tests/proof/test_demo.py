@@ -24,6 +24,7 @@ SEED_OF_NONE = 115
 """A seed whose bus hides nothing: the quickest to diagnose."""
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("stop", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.campaign)])
 def test_an_interrupted_demo_leaves_nothing_running_and_nothing_half_written(tmp_path, stop):
     workshop, out = tmp_path / "tmp", tmp_path / "out"

@@ -118,6 +118,7 @@ def test_a_speed_limit_in_another_unit_is_not_believed(source: str, factor: floa
     assert f"{source} 300 rad/s (2,865 rpm)" in speed.question
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("torque_nm", [pytest.param(450.0, marks=pytest.mark.campaign), 4500.0])
 def test_commissioning_asks_before_any_torque(torque_nm: float, tmp_path: Path) -> None:
     with bench(tmp_path) as rig:

@@ -212,6 +212,7 @@ def own_frequency_hz(sizes: Mapping[str, float]) -> float:
 HUNG = pytest.mark.xfail(reason="named, but as an inertia that hangs at the motor by a spring", strict=True)
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize(
     "at_motor", [pytest.param(True, marks=(pytest.mark.campaign, HUNG)), False], ids=["motor", "load"]
 )

@@ -59,6 +59,7 @@ def pair(best: BestEstimate) -> tuple[float, float]:
     return best.mode.frequency_hz.value, best.mode.damping.value
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("seed", [1, *(pytest.param(seed, marks=pytest.mark.campaign) for seed in (2, 3))])
 def test_with_a_gap_the_damping_is_near_the_linear_one_and_what_it_depends_on_is_shown(seed: int) -> None:
     best = best_estimate(with_gap(seed))
@@ -73,6 +74,7 @@ def test_with_a_gap_the_damping_is_near_the_linear_one_and_what_it_depends_on_is
     )
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("seed", [20, *(pytest.param(seed, marks=pytest.mark.campaign) for seed in (32, 111))])
 def test_buses_on_which_other_minima_are_near(seed: int) -> None:
     """Of 200 those on which an output-error fit, a subspace estimate and this one are furthest off."""
@@ -82,6 +84,7 @@ def test_buses_on_which_other_minima_are_near(seed: int) -> None:
         assert value == pytest.approx(truth, rel=within)
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize(
     ("buses", "independent", "good"), [(2, 1, 1), pytest.param(10, 8, 6, marks=pytest.mark.campaign)]
 )

@@ -78,6 +78,7 @@ def test_the_damping_is_unbiased() -> None:
     assert max(bias.values()) < 0.01
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("buses", [4, pytest.param(12, marks=pytest.mark.campaign)])
 def test_the_noise_model_makes_more_of_the_same_data(buses: int) -> None:
     """On a road, with a driver, in frequency; every dozen of the benchmark's 200 buses has a ratio below 0.5."""

@@ -44,6 +44,7 @@ def test_a_stiffness_drop_is_found_and_reported(drop: float) -> None:
         assert f"{settled.time_s:.1f} s" in settled.statement
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize(
     "share_in_10_s", [0.01, -0.03, *(pytest.param(share, marks=pytest.mark.campaign) for share in (-0.01, 0.03))]
 )
@@ -71,6 +72,7 @@ def test_payload_and_rough_road_are_no_alarm() -> None:
         assert play(record).alarms == ()
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize(
     "prbs_nm",
     [
