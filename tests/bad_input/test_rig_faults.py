@@ -18,6 +18,7 @@ from hil.rig.live_course import course_path
 from hil.simulator.fault_table import rig_faults
 from hil.store import store_of
 from tests.bad_input.conftest import Refused
+from tests.chosen import campaign
 from tests.rig.observer import assert_disarmed
 from tests.rig.serving import served
 
@@ -39,12 +40,18 @@ def rig_with(rig: Path, *faults: str) -> Iterator[tuple[str, ...]]:
     ("fault", "said", "alive"),
     [
         ("m1.absent", ["inverter m1 (node 1): no SDO answer", "Check that the drive is powered"], (2,)),
-        ("m2.hang@0", ["inverter m2 (node 2): no SDO answer", "Check that the drive is powered"], (1,)),
-        ("m2.wrong_identity", ["vendor-ID 0x1018:01 is 0x00000BAD, expected 0x000003E7 (rig file)"], (1, 2)),
-        ("m1.refuse_mode", ["inverter m1 (node 1): mode of operation is 0", "expected 10 (cyclic synch"], (1, 2)),
-        ("m2.stuck", ["inverter m2 (node 2): power state is switch on disabled", "expected ready to sw"], (1, 2)),
+        campaign(("m2.hang@0", ["inverter m2 (node 2): no SDO answer", "Check that the drive is powered"], (1,))),
+        campaign(("m2.wrong_identity", ["vendor-ID 0x1018:01 is 0x00000BAD, expected 0x000003E7 (rig file)"], (1, 2))),
+        campaign(
+            ("m1.refuse_mode", ["inverter m1 (node 1): mode of operation is 0", "expected 10 (cyclic synch"], (1, 2))
+        ),
+        campaign(
+            ("m2.stuck", ["inverter m2 (node 2): power state is switch on disabled", "expected ready to sw"], (1, 2))
+        ),
         ("plc.clutch_closes@0", ["clutch is closed, expected open. Nothing was armed"], (1, 2)),
-        ("plc.permissive_withdrawn@0", ["permissive is withdrawn, expected present. Nothing was armed"], (1, 2)),
+        campaign(
+            ("plc.permissive_withdrawn@0", ["permissive is withdrawn, expected present. Nothing was armed"], (1, 2))
+        ),
         ("plc.hang@0", ["PLC at 127.0.0.1", "expected an answer within 5 s, none came"], (1, 2)),
     ],
 )
@@ -64,9 +71,11 @@ def test_what_is_wrong_from_the_start_is_not_driven(
     [
         ("m2.hang", ["not every drive is confirmed disarmed: m2: ", "cut the power", "What ended the run"], (1,)),
         ("plc.clutch_closes", ["clutch is closed, expected open. The run was ended at zero torque"], (1, 2)),
-        ("plc.permissive_withdrawn", ["permissive is withdrawn, expected present. The run was ended"], (1, 2)),
-        ("plc.mode_changes", ["drive mode is electric, expected series as at the start"], (1, 2)),
-        ("plc.hang", ["PLC"], (1, 2)),
+        campaign(
+            ("plc.permissive_withdrawn", ["permissive is withdrawn, expected present. The run was ended"], (1, 2))
+        ),
+        campaign(("plc.mode_changes", ["drive mode is electric, expected series as at the start"], (1, 2))),
+        campaign(("plc.hang", ["PLC"], (1, 2))),
     ],
 )
 def test_what_goes_wrong_within_ends_the_run_and_keeps_the_recording(

@@ -4,7 +4,7 @@ Each sealed rig conceals one effect that has a look-alike. ``hil solve`` drives 
 most; the fixed program is the demo's cruise, reversal and tip. Both verdicts are those of ``hil solve``: decided, or
 open. Only then is the seal opened. ``DIR/experiments.jsonl`` has a line for each rig; called again, it continues.
 
-The table counts what was decided, and right: every concealed effect named, nothing else, and no look-alike beside it.
+The table counts what was decided, and right: every concealed effect named, nothing else, and no look-alike besides it.
 The last line holds the promise of each designed experiment against what came: how often the design said it would tell,
 and how often it was decided after it.
 """

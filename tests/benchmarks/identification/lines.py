@@ -94,7 +94,8 @@ def joint_table(count: int) -> str:
         ),
     ]
     text = table(("model", "RMS error of frequency", "of damping", "95 % intervals hold"), rows)
-    return f"{text}\nOf {count}: {false} named as disagreeing though of one line; {found} times the stiffer one named.\n"
+    named = f"{false} named as disagreeing though of one line; {found} times the stiffer one named"
+    return f"{text}\nOf {count}: {named}.\n"
 
 
 def _fitted(seed: int, lines: list[Line]) -> Iterator[BestEstimate]:
