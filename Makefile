@@ -40,16 +40,14 @@ campaign: $(READY)
 	$(BIN)/python -m tests.campaigns.mutants
 	$(BIN)/python -m tests.campaigns.fuzz
 	$(BIN)/python -m tests.campaigns.day
-	$(BIN)/python -m pytest tests/browser/test_foreign_text.py tests/plants tests/rig/test_foreign_controller.py
+	$(BIN)/python -m pytest tests/browser/test_foreign_text.py tests/plants tests/rig/test_sole_host.py
 
 # Speed as ratios to scipy, a bare C loop, raw python-can; growth with the length, memory: docs/benchmarks.md.
 bench: $(READY)
 	$(BIN)/python -m tests.benchmarks.fit
 	$(BIN)/python -m tests.benchmarks.diagnosis
-	$(BIN)/python -m tests.benchmarks.own_laws
 	$(BIN)/python -m tests.benchmarks.fieldbus
 	$(BIN)/python -m tests.benchmarks.recursive
-	$(BIN)/python -m tests.benchmarks.reports
 
 # The manual as pages: out/docs/index.html.
 docs: $(READY)

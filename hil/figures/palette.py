@@ -2,7 +2,7 @@
 
 The set of M. Okabe and K. Ito (Color Universal Design, 2008) without its yellow, which can't be seen on white, and the
 wine red and indigo of P. Tol's "muted" set. Lines and points differ in dash, mark or number, too: nothing
-is said by colour alone. `tests/figures/test_palette.py` holds the differences in simulated colour blindness.
+is said by colour alone. `tests/figures/test_numbers.py` holds the differences in simulated colour blindness.
 """
 
 from __future__ import annotations

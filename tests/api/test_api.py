@@ -56,12 +56,6 @@ def test_columns_by_plain_strings(recording: Path) -> None:
         hil.Record.from_pandas(frame.drop(columns="s"), torque="T1", speed="n")
 
 
-def test_the_public_names_are_shown() -> None:
-    functions = {"compare", "diagnose", "identify", "look", "read", "read_model"}
-    assert set(dir(hil)) == {*functions, "Record", "__version__"}
-    assert all(callable(getattr(hil, name)) for name in functions)
-
-
 def test_a_look_shows_channels_and_the_table_that_reads_them(recording: Path) -> None:
     found = hil.look(recording)
     assert found.signals == ""
@@ -131,8 +125,3 @@ def test_models_are_compared(model: Path, recording: Path, tmp_path: Path) -> No
     assert "other.toml" in result._repr_html_()
     assert {"drive.toml", "other.toml"} <= {trace.name for trace in result.plot().data}
     assert (result.save(tmp_path / "out") / "compare.html").exists()
-
-
-def test_importing_hil_imports_nothing_large() -> None:
-    with pytest.raises(AttributeError, match="no attribute 'reed'"):
-        hil.reed  # noqa: B018

@@ -1,6 +1,6 @@
 """The command line as `tests/cli` has it, and one way to say that a command was refused."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -45,11 +45,3 @@ def drive(tmp_path: Path) -> Path:
     bench.record(folder / "run_1.csv", 1, noise=0.02)
     bench.model(folder / "drive.toml")
     return folder
-
-
-def with_changes(text: str, changes: Sequence[tuple[str, str]]) -> str:
-    """Replace the first occurrence of each; it must be there."""
-    for before, after in changes:
-        assert before in text
-        text = text.replace(before, after, 1)
-    return text

@@ -1,8 +1,5 @@
 """The command line itself: what is typed wrong is refused with the way to the help, which has an example."""
 
-import subprocess
-import sys
-
 import pytest
 
 from drivers.errors import BusDown, CommandRefused, ConfigMismatch, DeviceFault, DeviceTimeout, ProtocolViolation
@@ -31,29 +28,6 @@ from tests.bad_input.conftest import Refused
 )
 def test_wrong_use_is_refused_with_the_way_to_the_help(refused: Refused, line: str, said: str) -> None:
     assert said in refused(*line.split())
-
-
-def test_nothing_at_all_prints_the_overview(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run([]) == 2
-    printed = capsys.readouterr()
-    assert "Start with: hil demo" in printed.out
-    assert all(command in printed.out for command in COMMANDS)
-
-
-@pytest.mark.parametrize("command", COMMANDS)
-def test_every_help_has_an_example(command: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run([command, "--help"]) == 0
-    assert f"Example: hil {command}" in " ".join(capsys.readouterr().out.split())
-
-
-def test_help_of_a_table_keeps_its_brackets(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["sim", "--help"]) == 0
-    assert "[simulation]" in capsys.readouterr().out
-
-
-def test_the_module_is_the_command() -> None:
-    done = subprocess.run([sys.executable, "-m", "hil", "--version"], capture_output=True, text=True, check=True)
-    assert done.stdout.startswith("hil ")
 
 
 @pytest.mark.parametrize(

@@ -83,36 +83,6 @@ def test_refused_with_the_reason_and_nothing_is_written(refused: Refused, drive:
     assert not (drive / "out").exists()
 
 
-def test_a_model_in_another_unit_is_refused_like_a_recording(refused: Refused, drive: Path) -> None:
-    """2 kg m^2 written as 20 000 kg cm^2."""
-    model = bench.model(drive / "drive.toml", bench.MODEL.replace(f"value = {bench.J}", "value = 2e4"))
-    complaint = refused("diagnose", drive / "run_1.csv", "--model", model, "--out", drive / "out")
-    assert "it fits an inertia 0.0001 times the nominal J_M = 20000 kg m^2" in complaint
-    assert "is the inertia in the model file" in complaint
-
-
-NON_PHYSICAL = {
-    "nan": ("parameters.J_M.value", "nan"),
-    "0.0": ("parameters.J_M.value: expected a finite number greater than 0, got 0.0", "0.0"),
-    "-2.0": ("parameters.J_M.value: expected a finite number greater than 0, got -2.0", "-2.0"),
-    "inf": ("parameters.J_M.value", "inf"),
-}
-
-
-@pytest.mark.parametrize("value", NON_PHYSICAL)
-def test_a_value_that_can_t_be_is_refused(refused: Refused, drive: Path, value: str) -> None:
-    said, written = NON_PHYSICAL[value]
-    model = bench.model(drive / "drive.toml", bench.MODEL.replace(f"value = {bench.J}", f"value = {written}"))
-    assert said in refused("diagnose", drive / "run_1.csv", "--model", model, "--out", drive / "out")
-
-
-@pytest.mark.parametrize("tolerance", ["1.0", "-0.1", "20"])
-def test_a_tolerance_that_can_t_be_is_refused(refused: Refused, drive: Path, tolerance: str) -> None:
-    model = bench.model(drive / "drive.toml", bench.MODEL.replace("tolerance = 0.2", f"tolerance = {tolerance}", 1))
-    complaint = refused("diagnose", drive / "run_1.csv", "--model", model, "--out", drive / "out")
-    assert "parameters.J_M.tolerance: expected a relative tolerance from 0 up to 1" in complaint
-
-
 def diagnosed(drive: Path) -> tuple[dict[str, Any], str]:
     """Diagnose the drive's recording; give the content of diagnosis.json and the report."""
     out = drive / "out"

@@ -1,14 +1,22 @@
 """Places that can't be written to: refused before the work where that can be seen, and never half written."""
 
+import importlib
+import os
+import signal
 import subprocess
 import sys
+import time
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any, NoReturn
 
 import pytest
 
+from hil.cli.main import run
 from hil.config.rig_file import read_rig
 from hil.recording import read_table
 from tests.bad_input.conftest import Refused
+from tests.chosen import campaign
 from tests.rig.observer import assert_disarmed
 from tests.rig.serving import served
 
@@ -26,24 +34,8 @@ def words(command: str, drive: Path) -> list[str]:
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-@pytest.mark.parametrize(("place", "said"), [("drive.toml", "which is a file"), ("run_1.csv/sub", "which is a file")])
-def test_a_file_is_no_folder(refused: Refused, drive: Path, command: str, place: str, said: str) -> None:
-    before = (drive / place.partition("/")[0]).read_bytes()
-    complaint = refused(*words(command, drive), drive / place)
-    assert f"{drive / place}: expected a folder to write into" in complaint
-    assert said in complaint
-    assert (drive / place.partition("/")[0]).read_bytes() == before
-
-
-@pytest.mark.parametrize("command", COMMANDS)
 def test_a_place_where_nothing_can_be_made(refused: Refused, drive: Path, command: str) -> None:
     assert "/proc/result: expected a folder to write into, got: " in refused(*words(command, drive), "/proc/result")
-
-
-def test_a_simulation_has_no_place_either(refused: Refused, drive: Path) -> None:
-    model, recording = drive / "drive.toml", drive / "run_1.csv"
-    complaint = refused("simulate", "--model", model, "--input", recording, "--out", "/proc/simulated.csv")
-    assert "/proc: expected a folder to write into, got: " in complaint
 
 
 @pytest.mark.parametrize(
@@ -58,10 +50,6 @@ def test_a_run_is_not_started_without_a_place(refused: Refused, short_rig: Path,
     out = short_rig.parent / name
     assert f"{out}: {said}" in refused("run", short_rig, "cruise", "--out", out, *NOWHERE)
     assert list(short_rig.parent.iterdir()) == [short_rig]
-
-
-def test_a_run_is_not_started_where_nothing_can_be_made(refused: Refused, short_rig: Path) -> None:
-    assert "expected a place to write" in refused("run", short_rig, "cruise", "--out", "/proc/run.csv", *NOWHERE)
 
 
 @pytest.mark.parametrize("name", ["run.csv", pytest.param("run.parquet", marks=pytest.mark.campaign)])
@@ -84,7 +72,7 @@ def test_a_full_disk_ends_the_run_disarmed_and_keeps_what_fitted(short_rig: Path
     assert f"{kept} holds the {samples} samples up to there" in done.stderr
 
 
-@pytest.mark.parametrize("options", [[], ["--json"]])
+@pytest.mark.parametrize("options", [[], campaign(["--json"])])
 def test_standard_output_that_takes_nothing(options: list[str]) -> None:
     with Path("/dev/full").open("w") as full:
         done = subprocess.run(
@@ -92,3 +80,65 @@ def test_standard_output_that_takes_nothing(options: list[str]) -> None:
         )
     assert done.returncode == 2
     assert done.stderr == "error: [Errno 28] No space left on device\n"
+
+
+Spawn = Callable[..., subprocess.Popen[str]]
+
+
+def others(than: signal.Signals) -> list[Any]:
+    """Signals that are tried in the campaign: they are taken in one place, whichever comes."""
+    ends = {signal.SIGINT, signal.SIGTERM, signal.SIGHUP}
+    return [pytest.param(each, marks=pytest.mark.campaign) for each in sorted(ends - {than})]
+
+
+def opened_by(process: subprocess.Popen[str], pipe: Path) -> int:
+    """Wait until a process opens a named pipe to read; give the end to write to."""
+    while process.poll() is None:
+        try:
+            return os.open(pipe, os.O_WRONLY | os.O_NONBLOCK)
+        except OSError:  # nobody reads yet, and shall have the processor to come to it
+            time.sleep(0.01)
+    raise AssertionError(process.communicate())
+
+
+@pytest.mark.parametrize("number", [*others(signal.SIGHUP), signal.SIGHUP])
+@pytest.mark.parametrize(
+    "command",
+    ["identify PIPE --out OUT", pytest.param("diagnose PIPE --model MODEL --out OUT", marks=pytest.mark.campaign)],
+)
+def test_while_it_reads(spawn: Spawn, drive: Path, command: str, number: signal.Signals) -> None:
+    """The recording is a named pipe with nothing in it: the command is at it, and stays there."""
+    pipe, out = drive / "pipe.csv", drive / "out"
+    os.mkfifo(pipe)
+    words = {"PIPE": str(pipe), "MODEL": str(drive / "drive.toml"), "OUT": str(out)}
+    process = spawn(*(words.get(word, word) for word in command.split()))
+    writing = opened_by(process, pipe)
+    process.send_signal(number)
+    printed, complaint = process.communicate(timeout=60)
+    os.close(writing)
+    assert (process.returncode, printed, complaint) == (130, "", "interrupted\n")
+    assert not out.exists()
+
+
+@pytest.mark.parametrize("number", [*others(signal.SIGINT), signal.SIGINT])
+def test_while_it_computes(spawn: Spawn, drive: Path, number: signal.Signals) -> None:
+    """The model is whole as soon as the pipe has been emptied and closed; the fit takes far longer."""
+    pipe, out = drive / "pipe.toml", drive / "out"
+    os.mkfifo(pipe)
+    process = spawn("diagnose", str(drive / "run_1.csv"), "--model", str(pipe), "--out", str(out))
+    writing = opened_by(process, pipe)
+    os.write(writing, (drive / "drive.toml").read_bytes())
+    os.close(writing)
+    process.send_signal(number)
+    printed, complaint = process.communicate(timeout=60)
+    assert (process.returncode, printed, complaint) == (130, "", "interrupted\n")
+    assert not out.exists()
+
+
+def test_while_it_imports(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    def interrupt(name: str) -> NoReturn:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(importlib, "import_module", interrupt)
+    assert run(["effects"]) == 130
+    assert capsys.readouterr().err == "interrupted\n"

@@ -85,12 +85,6 @@ def test_what_is_no_recording_is_refused(
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.parametrize(("name", "said"), [("none.csv", "No such file"), ("folder.csv", "Is a directory")])
-def test_what_can_t_be_read_is_refused(refused: Refused, tmp_path: Path, name: str, said: str) -> None:
-    (tmp_path / "folder.csv").mkdir()
-    assert said in refused("identify", tmp_path / name, "--out", tmp_path / "out")
-
-
 @pytest.mark.parametrize(
     ("command", "change", "said"),
     [
@@ -114,15 +108,4 @@ def test_what_carries_no_answer_is_refused(
     complaint = refused(command, path, "--model", model, "--out", drive / "out")
     assert complaint.startswith("error: recording run_1: ")
     assert said in complaint
-    assert not (drive / "out").exists()
-
-
-def test_a_hold_out_that_was_used_is_refused(refused: Refused, drive: Path) -> None:
-    used, copy = drive / "run_1.csv", drive / "copy.csv"
-    copy.write_bytes(used.read_bytes())
-    rest = ("--model", drive / "drive.toml", "--out", drive / "out")
-    assert "got 'run_1' twice" in refused("diagnose", used, "--holdout", used, *rest)
-    assert f"{copy}: expected samples of its own, got those of {used}" in refused(
-        "diagnose", used, "--holdout", copy, *rest
-    )
     assert not (drive / "out").exists()

@@ -4,14 +4,12 @@ Each fault is written as for ``hil sim --fault``. What happens inside a run is l
 ``tests/rig/test_session_ends_early.py``; here it is what a person at the rig sees and a script reads.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 import pytest
 
-from drivers.inverter.cia402 import PowerState
 from hil.cli.main import run
 from hil.config.rig_file import read_rig
 from hil.recording import read_table
@@ -20,7 +18,8 @@ from hil.rig.live_course import course_path
 from hil.simulator.fault_table import rig_faults
 from hil.store import store_of
 from tests.bad_input.conftest import Refused
-from tests.rig.observer import assert_disarmed, power_state
+from tests.chosen import campaign
+from tests.rig.observer import assert_disarmed
 from tests.rig.serving import served
 
 NOWHERE = ("--bus", "ws://127.0.0.1:9/", "--modbus", "127.0.0.1:9")
@@ -41,12 +40,18 @@ def rig_with(rig: Path, *faults: str) -> Iterator[tuple[str, ...]]:
     ("fault", "said", "alive"),
     [
         ("m1.absent", ["inverter m1 (node 1): no SDO answer", "Check that the drive is powered"], (2,)),
-        ("m2.hang@0", ["inverter m2 (node 2): no SDO answer", "Check that the drive is powered"], (1,)),
-        ("m2.wrong_identity", ["vendor-ID 0x1018:01 is 0x00000BAD, expected 0x000003E7 (rig file)"], (1, 2)),
-        ("m1.refuse_mode", ["inverter m1 (node 1): mode of operation is 0", "expected 10 (cyclic synch"], (1, 2)),
-        ("m2.stuck", ["inverter m2 (node 2): power state is switch on disabled", "expected ready to sw"], (1, 2)),
+        campaign(("m2.hang@0", ["inverter m2 (node 2): no SDO answer", "Check that the drive is powered"], (1,))),
+        campaign(("m2.wrong_identity", ["vendor-ID 0x1018:01 is 0x00000BAD, expected 0x000003E7 (rig file)"], (1, 2))),
+        campaign(
+            ("m1.refuse_mode", ["inverter m1 (node 1): mode of operation is 0", "expected 10 (cyclic synch"], (1, 2))
+        ),
+        campaign(
+            ("m2.stuck", ["inverter m2 (node 2): power state is switch on disabled", "expected ready to sw"], (1, 2))
+        ),
         ("plc.clutch_closes@0", ["clutch is closed, expected open. Nothing was armed"], (1, 2)),
-        ("plc.permissive_withdrawn@0", ["permissive is withdrawn, expected present. Nothing was armed"], (1, 2)),
+        campaign(
+            ("plc.permissive_withdrawn@0", ["permissive is withdrawn, expected present. Nothing was armed"], (1, 2))
+        ),
         ("plc.hang@0", ["PLC at 127.0.0.1", "expected an answer within 5 s, none came"], (1, 2)),
     ],
 )
@@ -66,9 +71,11 @@ def test_what_is_wrong_from_the_start_is_not_driven(
     [
         ("m2.hang", ["not every drive is confirmed disarmed: m2: ", "cut the power", "What ended the run"], (1,)),
         ("plc.clutch_closes", ["clutch is closed, expected open. The run was ended at zero torque"], (1, 2)),
-        ("plc.permissive_withdrawn", ["permissive is withdrawn, expected present. The run was ended"], (1, 2)),
-        ("plc.mode_changes", ["drive mode is electric, expected series as at the start"], (1, 2)),
-        ("plc.hang", ["PLC"], (1, 2)),
+        campaign(
+            ("plc.permissive_withdrawn", ["permissive is withdrawn, expected present. The run was ended"], (1, 2))
+        ),
+        campaign(("plc.mode_changes", ["drive mode is electric, expected series as at the start"], (1, 2))),
+        campaign(("plc.hang", ["PLC"], (1, 2))),
     ],
 )
 def test_what_goes_wrong_within_ends_the_run_and_keeps_the_recording(
@@ -84,15 +91,6 @@ def test_what_goes_wrong_within_ends_the_run_and_keeps_the_recording(
     assert set(short_rig.parent.iterdir()) == {short_rig, out, sidecar_of(out), course_path(out), store_of(out.parent)}
 
 
-def test_a_drive_that_faults_ends_the_run(short_rig: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    out = short_rig.parent / "run.csv"
-    with rig_with(short_rig, f"m1.fault@{WITHIN_S}") as addresses:
-        assert run(["run", str(short_rig), "reversal", "--out", str(out), "--pace", "fast", *addresses]) == 3
-        assert power_state(addresses[1], 1) is PowerState.FAULT
-        assert_disarmed(addresses[1], 2)
-    assert "EMCY 0x2310 continuous over-current" in capsys.readouterr().err
-
-
 @pytest.mark.parametrize("command", [("check",), ("run", "reversal", "--out", "run.csv")])
 def test_a_rig_that_is_not_there(short_rig: Path, command: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
     name, *rest = (word.replace("run.csv", str(short_rig.parent / "run.csv")) for word in command)
@@ -101,20 +99,3 @@ def test_a_rig_that_is_not_there(short_rig: Path, command: tuple[str, ...], caps
     said = " ".join((printed.out + printed.err).split())
     assert "CAN bus 'ws://127.0.0.1:9/' can't be opened: [Errno 111] Connection refused" in said
     assert list(short_rig.parent.iterdir()) == [short_rig]
-
-
-def test_a_plc_that_is_not_there(refused: Refused, short_rig: Path) -> None:
-    out = short_rig.parent / "run.csv"
-    with rig_with(short_rig) as addresses:
-        complaint = refused("run", short_rig, "reversal", "--out", out, *addresses[:2], *NOWHERE[2:], status=3)
-        assert_disarmed(addresses[1], 1, 2)
-    assert "PLC at 127.0.0.1:9 (device id 1): expected a Modbus TCP server" in complaint
-    assert "Check [plc] host and port of the rig file" in complaint
-
-
-def test_the_option_of_hil_sim(simulate: Callable[..., Any], refused: Refused, short_rig: Path) -> None:
-    simulation = simulate(short_rig, "--fault", "m2.wrong_identity", "--fault", "plc.hang@9")
-    out = short_rig.parent / "run.csv"
-    complaint = refused("run", short_rig, "cruise", "--out", out, *simulation.addresses, status=3)
-    assert "inverter m2 (node 2): vendor-ID" in complaint
-    assert_disarmed(simulation.bus, 1, 2)

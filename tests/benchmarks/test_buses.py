@@ -1,14 +1,10 @@
 """The benchmarks' buses are what they say: the line's mathematics, the road's spectrum, the driver, the readings."""
 
-import ast
-from pathlib import Path
-
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.signal import welch
 
-from tests.benchmarks import buses
 from tests.benchmarks.buses import (
     CLEAN,
     FRONT_SHARE,
@@ -74,15 +70,3 @@ def test_a_recording_follows_the_line_from_its_own_torques() -> None:
     left = record.output - forced
     rest = left - np.column_stack(unknown) @ np.linalg.lstsq(np.column_stack(unknown), left, rcond=None)[0]
     assert rest.std() < 2.0 * bus.noise_rad_s
-
-
-def test_the_truth_is_written_apart_from_the_product() -> None:
-    """Of the product only the type of a recording is known here."""
-    imported = set()
-    for node in ast.walk(ast.parse(Path(buses.__file__).read_text())):
-        if isinstance(node, ast.ImportFrom):
-            imported.add(node.module)
-        elif isinstance(node, ast.Import):
-            imported |= {name.name for name in node.names}
-    product = {name for name in imported if name and name.split(".")[0] in {"estimator", "hil", "drivers"}}
-    assert product == {"estimator.signals.record"}

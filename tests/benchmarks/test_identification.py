@@ -51,6 +51,7 @@ def test_every_peer_finds_the_resonance_of_a_bus_on_the_road(peer: Peer, road_ca
     assert found.damping == pytest.approx(road_case.truth["damping"], rel=0.1)
 
 
+@pytest.mark.campaign
 def test_every_method_is_asked_about_a_bus_and_reported_in_the_tables(judged: Judged) -> None:
     text = tables([judged])
     assert judged.seed == 3
@@ -80,6 +81,7 @@ def test_coverage_counts_what_the_intervals_hold() -> None:
     assert frequency.error_rms == pytest.approx(100 * math.sqrt((0.01**2 + 0.1**2) / 2) / 8)
 
 
+@pytest.mark.campaign
 def test_experiments_keep_the_limits_on_both_simulators() -> None:
     for source in (cruises, buses):
         for truth in source(1):

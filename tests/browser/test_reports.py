@@ -16,6 +16,7 @@ from hil.report.identification_page import identification_page
 from hil.report.paper_page import paper_page
 from tests.browser.conftest import Opened, opened
 from tests.browser.results import comparisons, identified, paper_results
+from tests.chosen import one_in
 from tests.commission.whole_state import whole_state
 from tests.report.conftest import diagnosis as hand_made_diagnosis
 
@@ -34,7 +35,7 @@ PAGES: dict[str, Callable[[], str]] = {
 }
 
 
-@pytest.fixture(scope="module", params=PAGES)
+@pytest.fixture(scope="module", params=one_in(2, PAGES))
 def report(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("pages") / f"{request.param}.html"
     path.write_text(PAGES[request.param](), encoding="utf-8")

@@ -8,6 +8,7 @@ from tests.campaigns.kills.__main__ import WRITABLE, campaign, report
 from tests.campaigns.kills.recording import ROWS, Left, _judge, record
 
 
+@pytest.mark.campaign
 def test_kills_while_writing_and_publishing(tmp_path: Path) -> None:
     found = campaign(tmp_path, len(WRITABLE), seed=3)
     assert set(found) == set(WRITABLE)

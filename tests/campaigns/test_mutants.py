@@ -49,6 +49,7 @@ def test_what_is_listed_is_a_change_there_is(module: str) -> None:
     assert set(TARGETS[module].equivalent) <= set(changes(source_of(module).read_text("utf-8")))
 
 
+@pytest.mark.campaign
 @pytest.mark.timeout(900)
 def test_some_mutants_of_the_guard_are_all_found() -> None:
     """In processes of their own: this one has the modules loaded already."""

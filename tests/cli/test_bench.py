@@ -8,9 +8,6 @@ import numpy as np
 import pytest
 
 from hil.cli.main import run
-from hil.config.rig_file import SimulationTable
-from hil.errors import ModelFileError
-from hil.simulator.driveline import simulation_model
 
 STIFFNESS, GAP, OFFSET, NOISE = 2000.0, 0.02, 4.0, 0.5
 
@@ -69,18 +66,3 @@ def test_the_gap_of_a_joint_is_named_and_simulates_again(files: tuple[Path, Path
     with simulated.open() as file:
         torque = np.array([float(row["force_sim_nm"]) for row in csv.DictReader(file)])
     assert float(np.sqrt(np.mean((torque - true) ** 2))) < 0.5 * NOISE
-
-
-def test_a_joint_is_no_driveline(
-    files: tuple[Path, Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    model, small, _ = files
-    assert run(["identify", str(small), "--model", str(model), "--out", str(tmp_path / "out")]) == 2
-    assert "structure | expected a driveline" in capsys.readouterr().err
-    assert not (tmp_path / "out").exists()
-
-
-def test_a_rig_can_not_have_a_joint(files: tuple[Path, Path, Path]) -> None:
-    table = SimulationTable.model_construct(model=files[0])
-    with pytest.raises(ModelFileError, match=r"structure \| expected a driveline for a rig to drive"):
-        simulation_model(table)

@@ -1,15 +1,19 @@
 """``hil bugreport``: what is in it, and what must never be."""
 
 import json
+import os
+import re
+import subprocess
+import sys
 import zipfile
 from pathlib import Path
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from hil.cli.main import run
 from hil.store import RunEntry, RunStore
+from hil.support import command_log
+from hil.support.command_log import log_file
 from hil.support.redact import Redaction
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "rig.toml"
@@ -85,13 +89,6 @@ def test_what_helps_stays(text: str) -> None:
     assert sum(found.counts.values()) == 0
 
 
-def test_paths_of_the_program_stay_and_names_of_files() -> None:
-    found = redaction()
-    assert found.text('File "/opt/hil/cli/main.py", line 3') == 'File "<hil>/cli/main.py", line 3'
-    assert found.text("read /data/customer/rig.toml") == "read [folder]/rig.toml"
-    assert found.text("/opt/hillside/a.csv") == "[folder]/a.csv"
-
-
 def test_secrets_in_a_document_go_at_any_depth() -> None:
     document = {
         "plc": {"security": {"key": "k1", "roles": ["a"]}},
@@ -103,24 +100,6 @@ def test_secrets_in_a_document_go_at_any_depth() -> None:
     assert json.loads(text)["n"] == 3
     assert not [secret for secret in ("k1", "p1") if secret in text]
     assert json.loads(text)["token"] == ["[removed]", "[removed]"]
-
-
-def test_comments_of_a_rig_file_are_taken_out_and_texts_with_a_hash_stay() -> None:
-    text = (
-        'name = "cell #2"  # Anna says: pin 1234\n# bert 0171 5550\nx = \'#3\' # y\nlong = """\n# kept\n"""\nn = 1 # z'
-    )
-    found = redaction()
-    assert found.toml(text) == 'name = "cell #2"\n\nx = \'#3\'\nlong = """\n# kept\n"""\nn = 1'
-    assert found.counts["comments"] == 4
-
-
-PRINTABLE = st.text(st.characters(min_codepoint=33, max_codepoint=126, exclude_characters="\"'\\#"), min_size=6)
-
-
-@given(secret=PRINTABLE, before=PRINTABLE, name=st.sampled_from(["password", "key", "plc_token", "certificate", "ca"]))
-def test_a_secret_in_quotes_is_taken_out_whatever_it_is(secret: str, before: str, name: str) -> None:
-    text = redaction().text(f'{before}\n{name} = "{secret}" # comment\n')
-    assert secret not in text.removeprefix(before).replace("[removed]", "")
 
 
 def contents(path: Path) -> dict[str, str]:
@@ -175,15 +154,6 @@ def test_the_last_run_is_reported_without_notes_and_secrets(state: Path, tmp_pat
     assert not [private for private in ("hunter2", "tired", str(tmp_path)) if private in text]
 
 
-def test_a_rig_file_that_can_not_be_read_by_the_program_is_in_it(state: Path, tmp_path: Path) -> None:
-    rig = tmp_path / "rig.toml"
-    rig.write_bytes(b'schema = "hil.rig/1"\nname = broken \xff\npassword = "hunter2"\n')
-    assert run(["bugreport", str(tmp_path / "report.zip"), "--rig", str(rig)]) == 0
-    text = contents(tmp_path / "report.zip")["rig/rig.toml"]
-    assert "name = broken" in text
-    assert "hunter2" not in text
-
-
 def test_it_never_replaces_a_file_and_names_what_is_missing(
     state: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -195,3 +165,76 @@ def test_it_never_replaces_a_file_and_names_what_is_missing(
     assert run(["bugreport", str(tmp_path / "b.zip"), "--rig", str(tmp_path / "none.toml")]) == 2
     assert "none.toml" in capsys.readouterr().err
     assert not (tmp_path / "b.zip").exists()
+
+
+@pytest.fixture(autouse=True)
+def log_state(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A state folder of this test's own, and the log at its default level."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    monkeypatch.delenv("HIL_LOG")
+    return tmp_path / "state"
+
+
+def log() -> str:
+    return log_file().read_text(encoding="utf-8")
+
+
+def test_it_tells_command_version_and_end() -> None:
+    assert run(["effects", "backlash"], keep_log=True) == 0
+    lines = log().splitlines()
+    assert [line.split(" INFO hil: ")[1].split()[0] for line in lines] == ["hil", "version", "ended"]
+    assert "hil effects backlash" in lines[0]
+    assert all(re.match(rf"\d{{4}}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{{3}}Z {os.getpid()} ", line) for line in lines)
+
+
+def test_it_tells_the_error_with_its_place_in_the_program() -> None:
+    assert run(["identify", "nowhere.csv", "--out", "out"], keep_log=True) == 2
+    assert "ERROR hil: ended by RecordingError" in log()
+    assert "Traceback" in log()
+
+
+@pytest.mark.parametrize(("level", "reported"), [("error", False), ("warning", False), ("info", True), ("debug", True)])
+def test_the_level_is_that_of_the_option(level: str, reported: bool) -> None:
+    assert run(["--log-level", level, "effects"], keep_log=True) == 0
+    assert ("hil effects" in log()) is reported
+
+
+@pytest.mark.parametrize("where", ["option", "variable"])
+def test_an_unknown_level_is_refused(
+    where: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    if where == "variable":
+        monkeypatch.setenv("HIL_LOG", "loud")
+    options = ["--log-level", "loud"] if where == "option" else []
+    assert run([*options, "effects"], keep_log=True) == 2
+    error = capsys.readouterr().err
+    assert "expected one of debug, info, warning, error, off, got 'loud'" in error
+    assert ("--log-level" if where == "option" else "HIL_LOG") in error
+
+
+def test_nobody_else_can_read_it_and_it_holds_no_secret() -> None:
+    log_file().parent.mkdir(parents=True)
+    old = log_file().with_name("hil.log.1")
+    for path in (log_file(), old):
+        path.touch(mode=0o644)
+    assert run(["effects", "--password", "hunter2", "wss://bert:hunter2@plc.example/"], keep_log=True) == 2
+    for path in (log_file(), old):
+        assert path.stat().st_mode & 0o077 == 0
+    assert "hil effects --password" in log()
+    assert "hunter2" not in log()
+    assert "bert" not in log()
+
+
+def test_it_rotates_and_keeps_a_few(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(command_log, "BYTES", 500)
+    for _ in range(12):
+        assert run(["effects", "backlash"], keep_log=True) == 0
+    kept = sorted(log_file().parent.iterdir())
+    assert [path.name for path in kept] == ["hil.log", *(f"hil.log.{n}" for n in range(1, command_log.KEPT + 1))]
+    assert all(path.stat().st_size <= 500 for path in kept)
+
+
+def test_the_console_script_keeps_it() -> None:
+    done = subprocess.run([sys.executable, "-m", "hil", "effects", "backlash"], capture_output=True, check=True)
+    assert done.returncode == 0
+    assert "hil effects backlash" in log()

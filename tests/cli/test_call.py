@@ -1,13 +1,19 @@
-"""What every command has: --quiet, --log-level, the overview; before the command or after it."""
+"""The command line itself: common options, help and its examples, completion."""
 
+import os
+import re
 import subprocess
 import sys
+from collections.abc import Iterable
+from itertools import pairwise
+from typing import Any
 
 import pytest
 
-from hil.cli.command_line import COMMANDS, SPEAKERS, Call, overview
+from hil.cli.command_line import COMMANDS, Call, overview
 from hil.cli.main import run
 from hil.errors import UsageError
+from tests.cli.command_lines import every_command, examples, parse
 
 
 @pytest.mark.parametrize(
@@ -20,10 +26,6 @@ from hil.errors import UsageError
 )
 def test_common_options_stand_anywhere(line: str) -> None:
     assert Call.parse(line.split(), COMMANDS) == Call("run", ("rig.toml", "cruise"), True, "debug")
-
-
-def test_after_two_dashes_nothing_is_an_option() -> None:
-    assert Call.parse(["effects", "--", "--quiet"], COMMANDS) == Call("effects", ("--", "--quiet"))
 
 
 @pytest.mark.parametrize(
@@ -47,19 +49,6 @@ def test_quiet_prints_nothing_but_what_json_prints(capsys: pytest.CaptureFixture
     assert Call("diagnose", (), quiet=True).silent is True
 
 
-def test_errors_are_reported_all_the_same(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["--quiet", "identify", "nowhere.csv", "--out", "out"]) == 2
-    printed = capsys.readouterr()
-    assert printed.out == ""
-    assert "nowhere.csv" in printed.err
-
-
-def test_what_a_command_is_called_for_is_not_silenced(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["--quiet", "effects"]) == 0
-    assert "backlash" in capsys.readouterr().out
-    assert set(COMMANDS) >= SPEAKERS
-
-
 @pytest.mark.parametrize("columns", [40, 80, 200])
 def test_the_overview_fits_the_terminal(columns: int, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("COLUMNS", str(columns))
@@ -75,3 +64,65 @@ def test_the_overview_imports_nothing_that_takes_time() -> None:
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert done.stderr.strip() == "[]"
+
+
+def complete(line: str) -> set[str]:
+    """Return what stands for the last word of a line."""
+    asked = {"_HIL_COMPLETE": "complete_bash", "COMP_WORDS": line, "COMP_CWORD": str(len(line.split(" ")) - 1)}
+    program = "from hil.cli.main import main; main()"
+    done = subprocess.run(
+        [sys.executable, "-P", "-c", program], env={**os.environ, **asked}, capture_output=True, text=True, check=True
+    )
+    assert done.stderr == ""
+    return set(done.stdout.split())
+
+
+def offered(found: Iterable[str], begun: str) -> set[str]:
+    return {name for name in found if name.startswith(begun)}
+
+
+def test_commands() -> None:
+    assert complete("hil ") >= set(COMMANDS)
+    assert complete("hil --quiet re") == offered(COMMANDS, "re")
+    assert complete("hil prove ma") == {"make"}
+
+
+EVERY = list(every_command())
+
+
+@pytest.mark.parametrize(("name", "command"), EVERY, ids=[name for name, _ in EVERY])
+def test_every_help_has_an_example_of_its_command_that_parses(name: str, command: Any) -> None:
+    lines = examples(command.epilog or "")
+    assert any(line.split()[1 : 1 + len(name.split())] == name.split() for line in lines)
+    for line in lines:
+        parse(line)
+
+
+@pytest.mark.parametrize("wrong", ["hil effects --colour", "hil export st", "hil rig paint", "hil nothing"])
+def test_a_wrong_example_would_be_noticed(wrong: str) -> None:
+    with pytest.raises(Exception, match=r"No such|Missing|unexpected|no such"):
+        parse(wrong)
+
+
+@pytest.mark.parametrize("name", [name for name, _ in EVERY])
+def test_every_help_prints_its_example_and_flows(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run([*name.split(), "-h"]) == 0
+    printed = capsys.readouterr().out
+    assert f"Usage: hil {name}" in printed
+    assert f"Example: hil {name}" in " ".join(printed.split())
+    above_boxes = re.split(r"^╭", printed, maxsplit=1, flags=re.MULTILINE)[0]
+    for line, following in pairwise(line.strip() for line in above_boxes.splitlines()):
+        if line and following:  # a line is broken only where the next word has no room
+            assert len(line) + 1 + len(following.split()[0]) > 78
+    assert "…" not in above_boxes
+
+
+@pytest.mark.parametrize(("name", "command"), EVERY, ids=[name for name, _ in EVERY])
+def test_no_word_of_a_help_is_taken_for_markup(
+    name: str, command: Any, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "2000")  # so that every text is on one line
+    assert run([*name.split(), "--help"]) == 0
+    printed = capsys.readouterr().out
+    for parameter in command.params:
+        assert (parameter.help or "").replace(r"\[", "[") in printed, f"{parameter.name}: a bracket is written \\["

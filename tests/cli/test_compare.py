@@ -86,17 +86,6 @@ def test_each_output_has_its_figures(two_outputs: list[str], capsys: pytest.Capt
     assert "the output dead_rad_s2 is not used: it stays at 0.25" in said.err
 
 
-def test_each_output_is_drawn(
-    two_outputs: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("COLUMNS", "120")  # a narrower terminal folds names
-    assert run(["compare", *two_outputs, "--out", str(tmp_path / "result")]) == 0
-    assert "run_1:angle_rad" in capsys.readouterr().out
-    page = (tmp_path / "result" / "compare.html").read_text()
-    assert page.count('class="plotly-graph-div"') == 2 * (1 + 2 + 1)  # over time, a spectrum each, residuals
-    assert "angle_rad: error [rad]" in figures(page)
-
-
 @pytest.mark.parametrize(
     ("position", "text", "said"),
     [
@@ -118,3 +107,29 @@ def test_wrong_input_is_refused_and_nothing_written(
     assert said in error
     assert Path(inputs[position]).name in error
     assert not (tmp_path / "result").exists()
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, str, str]:
+    """Return a model file, the FMU made of it, which takes a compiler its time, and a recording."""
+    folder = tmp_path_factory.mktemp("exported")
+    bench.record(folder / "run_1.csv", 1, noise=0.05)
+    (folder / "drive.toml").write_text(bench.MODEL)
+    names = tuple(str(folder / name) for name in ("drive.toml", "drive.fmu", "run_1.csv"))
+    assert run(["export", "fmu", names[0], "--out", names[1]]) == 0
+    return names[0], names[1], names[2]
+
+
+def test_an_fmu_is_as_far_off_as_its_model_file(
+    files: tuple[str, str, str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    model, fmu, recording = files
+    capsys.readouterr()
+    command = ["compare", model, recording, "--model", fmu, "--trust-fmu", "--out", str(tmp_path / "out"), "--json"]
+    assert run(command) == 0
+    models = json.loads(capsys.readouterr().out)["models"]
+    own, other = (models[name]["recordings"]["run_1"] for name in ("drive.toml", "drive.fmu"))
+    assert other["rms"] == pytest.approx(own["rms"], rel=1e-6)
+    assert other["load_torque"] == pytest.approx(own["load_torque"], abs=1e-4)
+    page = (tmp_path / "out" / "compare.html").read_text()
+    assert '"drive.fmu"' in figures(page)

@@ -1,6 +1,5 @@
 """``hil convert`` as a user has it."""
 
-import json
 from collections.abc import Callable
 from pathlib import Path
 
@@ -39,15 +38,6 @@ def test_there_and_back_is_the_same_file(source: Path, tmp_path: Path, suffix: s
     assert losses(read_table(source), read_table(back)) == []
 
 
-def test_json_says_what_is_in_it(source: Path, tmp_path: Path, capsys: Capture) -> None:
-    assert hil(["convert", str(source), str(tmp_path / "run.h5"), "--json"]) == 0
-    document = json.loads(capsys.readouterr().out)
-    assert (document["schema"], document["rows"], document["lost"]) == ("hil.convert/1", 20, [])
-    assert document["columns"][0] == {"name": "time_s", "kind": "float", "unit": "s"}
-    assert document["columns"][2]["kind"] == "text"
-    assert document["metadata"]["rig_file"] == "a = 1\n"
-
-
 def test_what_is_lost_or_left_out_is_said_on_standard_error(tmp_path: Path, capsys: Capture) -> None:
     parquet, mdf = tmp_path / "a.parquet", tmp_path / "a.mf4"
     write_table(Table(parquet, {"x": np.arange(2.0), "word": as_text(["a\0b", "c"])}), parquet)
@@ -55,16 +45,6 @@ def test_what_is_lost_or_left_out_is_said_on_standard_error(tmp_path: Path, caps
     said = capsys.readouterr()
     assert said.err == f"{mdf}: lost: column word: 1 of 2 cells change, the first in row 1: 'a\\x00b' becomes 'a'\n"
     assert "2 rows, 2 columns, not all of it" in said.out
-
-
-def test_an_existing_file_is_replaced_only_by_force(source: Path, tmp_path: Path, capsys: Capture) -> None:
-    target = tmp_path / "out.csv"
-    target.write_text("mine", encoding="utf-8")
-    assert hil(["convert", str(source), str(target)]) == 2
-    assert "Replace it with --force" in capsys.readouterr().err
-    assert target.read_text(encoding="utf-8") == "mine"
-    assert hil(["convert", str(source), str(target), "--force"]) == 0
-    assert target.read_bytes() == source.read_bytes()
 
 
 @pytest.mark.parametrize(
@@ -87,16 +67,6 @@ def test_wrong_use_leaves_nothing(
     assert hil(["convert", *arguments]) == 2
     assert said in capsys.readouterr().err
     assert sorted(tmp_path.iterdir()) == before
-
-
-def test_a_foreign_text_file_is_read_as_it_is_reported(tmp_path: Path, capsys: Capture) -> None:
-    path = tmp_path / "trip.csv"
-    path.write_bytes("Zeit;Temperatur °C\n0,5;1\n".encode("latin-1"))
-    assert hil(["convert", str(path), str(tmp_path / "a.h5")]) == 2
-    assert "expected utf-8 text" in capsys.readouterr().err
-    assert hil(["convert", str(path), str(tmp_path / "a.h5"), "--encoding", "latin-1"]) == 0
-    assert read_table(tmp_path / "a.h5").columns["Temperatur °C"].tolist() == [1]
-    assert "no metadata: no units" in capsys.readouterr().out
 
 
 def test_a_bus_trace_becomes_signals_by_the_eds_files(

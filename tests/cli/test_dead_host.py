@@ -80,11 +80,6 @@ def test_hil_check_proves_it_without_a_torque(
     assert kept["made"]["models"][0]["file"] == str(quick_rig)
 
 
-def test_a_proof_without_a_trial_is_refused(quick_rig: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["check", str(quick_rig), "--out", "proof.json"]) == 2
-    assert "expected --prove-stop, whose proof it keeps" in capsys.readouterr().err
-
-
 def test_hil_check_names_what_it_can_not_prove(quick_rig: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = read_rig(quick_rig)
     without_emergencies = rig_faults(["bus.lose=1:0x082"], file.period_s)  # those of node 2

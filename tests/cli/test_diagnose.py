@@ -14,7 +14,6 @@ from hil.cli.main import run
 from hil.config.model_file import read_model
 from tests.cli import bench
 
-OUTPUTS = ["augmented.toml", "diagnosis.json", "report.html"]
 DRY_NM = 2.0
 
 
@@ -49,14 +48,6 @@ def test_the_dry_friction_that_was_put_in_is_found(result: Path) -> None:
     assert content["fit"]["augmented"] < 0.2 * content["fit"]["retuned"]
 
 
-def test_all_three_results_are_whole_and_alone(result: Path) -> None:
-    assert sorted(path.name for path in result.iterdir()) == OUTPUTS
-    page = (result / "report.html").read_text()
-    assert page.endswith("</html>\n")
-    assert "Recording run_3" in page
-    assert "held out" in page
-
-
 def test_the_augmented_model_is_valid_input_and_keeps_the_signals(result: Path, bench_folder: Path) -> None:
     file = read_model(result / "augmented.toml")
     assert list(file.model.effects) == ["coulomb_friction_motor"]
@@ -82,13 +73,6 @@ def test_a_full_disk_takes_the_files_but_not_the_verdict(
     assert not out.exists()
 
 
-def test_no_progress_is_shown_where_nobody_looks(capsys: pytest.CaptureFixture[str]) -> None:
-    with progress_bar() as progress:
-        progress("fitting", 0.5)
-    captured = capsys.readouterr()
-    assert (captured.out, captured.err) == ("", "")
-
-
 @pytest.mark.parametrize("quiet", [False, True])
 def test_that_it_compiles_is_said_once_to_a_log_too(quiet: bool, capsys: pytest.CaptureFixture[str]) -> None:
     with silence(quiet), progress_bar() as progress:
@@ -97,15 +81,6 @@ def test_that_it_compiles_is_said_once_to_a_log_too(quiet: bool, capsys: pytest.
     captured = capsys.readouterr()
     assert captured.out == ""
     assert captured.err == ("" if quiet else f"preparing ({COMPILING})\n")
-
-
-def test_progress_is_shown_on_a_terminal(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("FORCE_COLOR", "1")  # rich takes standard error for a terminal
-    with progress_bar() as progress:
-        progress("fitting the nominal", 0.5)
-    captured = capsys.readouterr()
-    assert captured.out == ""
-    assert "fitting the nominal" in captured.err
 
 
 @pytest.mark.parametrize(

@@ -3,20 +3,15 @@
 import json
 import re
 import shutil
-import signal
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from estimator.signals.record import OutputKind
 from hil.cli.main import run
-from hil.config.model_file import read_signals
 from hil.errors import UsageError
 from hil.export.fmu import package
-from hil.plants.fmu_plant import FmuPlant
 from hil.plants.names import names
-from hil.recording import read_record, sandbox
 from tests.cli import bench
 
 LATE = 3
@@ -96,40 +91,6 @@ def test_what_map_can_not_mean_is_refused(given: list[str], said: str) -> None:
         names(given, ("T_M1", "T_M2", "speed_measured", "speed_load"))
 
 
-def test_inputs_and_outputs_are_not_exchanged(fmu: str) -> None:
-    with pytest.raises(UsageError, match="expected an output of the FMU, got an input"):
-        FmuPlant(Path(fmu), ["output=T_M1"], trusted=True).named(OutputKind.SPEED)
-    with pytest.raises(UsageError, match="expected an input of the FMU"):
-        FmuPlant(Path(fmu), ["torque=speed_motor"], trusted=True).named(OutputKind.SPEED)
-
-
-def test_a_recorded_angle_is_held_against_the_fmus(fmu: str, tmp_path: Path) -> None:
-    bench.record(tmp_path / "run_1.csv", 1, n=400)
-    time, first, second, speed = np.loadtxt(tmp_path / "run_1.csv", delimiter=",", skiprows=1).T
-    angle = np.concatenate([[0.0], bench.DT * np.cumsum(0.5 * (speed[1:] + speed[:-1]))])
-    columns = np.column_stack([time, first + second, angle])
-    np.savetxt(tmp_path / "turned.csv", columns, delimiter=",", header="t,T,x", comments="")
-    (tmp_path / "signals.toml").write_text(SIGNALS.replace("speed", "position").replace('"w"', '"x"'))
-    record = read_record(tmp_path / "turned.csv", read_signals(tmp_path / "signals.toml"))
-    found = FmuPlant(Path(fmu), ["torque=T_M1"], trusted=True).run(record)
-    assert found.rms < 0.01 * np.ptp(record.output)
-
-
-def test_an_interruption_ends_the_process_of_the_fmu(fmu: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """It may not return by itself: Ctrl-C in a callback of CVode's was of no effect."""
-    bench.record(tmp_path / "run_1.csv", 1, n=300)
-    plant = FmuPlant(Path(fmu), [], trusted=True)
-    process = plant._sandbox._process
-
-    def interrupted(stream: object) -> None:
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(sandbox, "receive", interrupted)
-    with pytest.raises(KeyboardInterrupt):
-        plant.run(read_record(tmp_path / "run_1.csv"))
-    assert process.returncode == -signal.SIGKILL
-
-
 HANGS = """#include <fcntl.h>
 #include <unistd.h>
 fmi2Status fmi2EnterInitializationMode(Instance c) {{
@@ -168,20 +129,3 @@ def test_one_that_hangs_ends_with_the_budget(
     expected = "Not decided: the search was ended after 20 s" if good else "in 3 s (--budget-s)"
     assert expected in printed.out + printed.err
     assert len((tmp_path / "begun").read_bytes()) > good
-
-
-def test_a_model_file_takes_no_map(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (tmp_path / "drive.toml").write_text(bench.MODEL)
-    bench.record(tmp_path / "run_1.csv", 1, n=300)
-    given = ["--model", str(tmp_path / "drive.toml"), "--map", "torque=T_M1", "--out", str(tmp_path / "out")]
-    assert run(["diagnose", str(tmp_path / "run_1.csv"), *given]) == 2
-    assert "expected with an FMU" in capsys.readouterr().err
-
-
-def test_a_model_file_has_its_own_signals(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    model, recording = tmp_path / "drive.toml", tmp_path / "run_1.csv"
-    model.write_text(bench.MODEL)
-    bench.record(recording, 1, n=300)
-    given = ["--model", str(model), "--signals", str(model), "--out", str(tmp_path / "out")]
-    assert run(["diagnose", str(recording), *given]) == 2
-    assert "a model file has its own [signals]" in capsys.readouterr().err

@@ -1,6 +1,5 @@
 """``hil effects``: the catalogue on the terminal and for scripts."""
 
-import json
 import re
 
 import pytest
@@ -13,12 +12,6 @@ def test_every_effect_is_listed(capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["effects"]) == 0
     out = capsys.readouterr().out
     assert [name for name in EFFECTS if name not in out] == []
-
-
-def test_every_effect_is_listed_for_scripts(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["effects", "--json"]) == 0
-    content = json.loads(capsys.readouterr().out)
-    assert [entry["name"] for entry in content["effects"]] == list(EFFECTS)
 
 
 @pytest.mark.parametrize("name", EFFECTS)
@@ -61,15 +54,6 @@ def test_a_parameter_is_reported_with_unit_null_bounds_and_meaning(
     table = [re.split(r" {2,}", line.strip()) for line in capsys.readouterr().out.splitlines()]
     for row in rows:
         assert row in table
-
-
-def test_scripts_get_bounds_and_whose_a_parameter_is(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["effects", "brake_drag", "--json"]) == 0
-    (entry,) = json.loads(capsys.readouterr().out)["effects"]
-    brake, begin = entry["parameters"]["brake_nm"], entry["parameters"]["from_s"]
-    assert (brake["bounds_in_scales"], brake["optional"], brake["per_recording"]) == ([0.0, 60.0], False, False)
-    assert (begin["bounds_in_scales"], begin["optional"], begin["per_recording"]) == ([0.0, None], True, True)
-    assert entry["resembles"] == list(EFFECTS["brake_drag"].resembles)
 
 
 def test_an_unknown_effect_is_refused_with_the_nearest(capsys: pytest.CaptureFixture[str]) -> None:

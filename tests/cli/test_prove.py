@@ -69,22 +69,6 @@ def test_the_key_of_another_set_is_not_overwritten(tmp_path: Path, capsys: pytes
     assert key.read_text() == "mine"
 
 
-def test_the_key_of_a_set_that_was_deleted_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (tmp_path / "proof.key").write_text("old")
-    assert run(["prove", "--out", str(tmp_path / "proof"), "--no-rigs"]) == 2
-    said = " ".join(capsys.readouterr().err.split())
-    assert "expected the set that this key opens" in said
-    assert "Remove the key to make a new set" in said
-    assert [path.name for path in tmp_path.iterdir()] == ["proof.key"]
-
-
-def test_a_rig_whose_clutch_is_closed_is_not_driven(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["prove", "wire", str(tmp_path), "--only", "clutch_closed"]) == 0
-    said = capsys.readouterr().out
-    assert "clutch is closed, expected open. Nothing was armed" in said
-    assert "1 of 1 rigs as they should be" in said
-
-
 @pytest.mark.campaign
 @pytest.mark.timeout(1800)  # eight rigs, each driven and diagnosed
 def test_what_is_concealed_in_the_rigs_is_found_over_the_wire(tmp_path: Path) -> None:

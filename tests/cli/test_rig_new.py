@@ -1,13 +1,11 @@
 """``hil rig new``: by options, by a person at a real terminal, with wrong answers, never over a file."""
 
-import contextlib
 import fcntl
 import os
 import pty
 import subprocess
 import sys
 import termios
-import time
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
@@ -17,7 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hil.cli.main import run
-from hil.config.new_rig import QUESTIONS, Question, answers, rig_text
+from hil.config.new_rig import QUESTIONS, answers, rig_text
 from hil.config.rig_file import read_rig
 from hil.config.table import FileKind
 from hil.errors import UsageError
@@ -79,12 +77,6 @@ def test_whatever_the_limit_the_file_holds_together(
     assert document["guard"]["sum_limit_nm"] <= 2.0 * limit_nm
 
 
-def test_on_a_vehicle_nothing_that_limits_torque_has_a_default() -> None:
-    with pytest.raises(UsageError) as refused:
-        answers({}, simulated=False)
-    assert {"--rated-torque-nm", "--torque-limit-nm"} <= {line.split()[0] for line in str(refused.value).splitlines()}
-
-
 def test_all_wrong_options_are_named_at_once() -> None:
     wrong = {
         "name": " ",
@@ -104,37 +96,6 @@ def test_all_wrong_options_are_named_at_once() -> None:
         answers(VEHICLE | wrong, simulated=False)
     named = {line.split()[0].removeprefix("--").replace("-", "_") for line in str(refused.value).splitlines()}
     assert named == set(wrong) - {"node_m1", "rated_torque_nm"}
-
-
-def test_a_wrong_answer_is_asked_again_with_what_would_fit() -> None:
-    said: list[str] = []
-    script = {"node_m2": iter(["1", "x", "2"]), "torque_limit_nm": iter(["", "700", "90"])}
-
-    def ask(question: Question, default: str, wrong: str) -> str:
-        said.append(wrong)
-        return next(script.get(question.name, iter([default or VEHICLE.get(question.name, "600")])))
-
-    found = answers({}, simulated=False, ask=ask)
-    assert (found["node_m2"], found["torque_limit_nm"]) == (2, 90.0)
-    complaints = [text for text in said if text]
-    assert len(complaints) == 4
-    assert "another node than m1 (1)" in complaints[0]
-    assert "there is no default" in complaints[2]
-    assert "at most the rated torque" in complaints[3]
-
-
-def test_what_is_given_is_not_asked() -> None:
-    def ask(question: Question, default: str, wrong: str) -> str:
-        assert question.name not in VEHICLE
-        return default
-
-    assert set(answers(VEHICLE, simulated=False, ask=ask)) == {question.name for question in QUESTIONS}
-
-
-def test_nobody_there_to_ask_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["rig", "new", str(tmp_path / "rig.toml")]) == 2
-    assert "--yes" in capsys.readouterr().err
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_file_that_is_there_stays(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -174,17 +135,6 @@ def read_until(end: int, text: str) -> str:
     return seen
 
 
-def ended_by_ctrl_c(process: subprocess.Popen[bytes], end: int) -> int:
-    """Press Ctrl-C as a person does, when the prompt waits; once more where it was between the prompt and the wait."""
-    for _ in range(4):
-        while Path(f"/proc/{process.pid}/stat").read_text().rpartition(")")[2].split()[0] != "S":
-            time.sleep(0.01)
-        os.write(end, b"\x03")
-        with contextlib.suppress(subprocess.TimeoutExpired):
-            return process.wait(timeout=25)  # one more while the program ends would end it by the signal itself
-    raise AssertionError("still there after four times Ctrl-C")
-
-
 def test_a_person_at_a_terminal(terminal: tuple[subprocess.Popen[bytes], int, Path]) -> None:
     process, end, path = terminal
     for question in QUESTIONS:
@@ -196,19 +146,3 @@ def test_a_person_at_a_terminal(terminal: tuple[subprocess.Popen[bytes], int, Pa
     assert "written" in read_until(end, "hil check")
     assert process.wait(timeout=60) == 0
     assert read_rig(path).inverters.m2.torque_limit_nm == 90.0
-
-
-def test_ctrl_c_writes_nothing(terminal: tuple[subprocess.Popen[bytes], int, Path]) -> None:
-    process, end, path = terminal
-    read_until(end, "Name of the rig")
-    assert ended_by_ctrl_c(process, end) == 130
-    assert list(path.parent.iterdir()) == []
-
-
-def test_the_end_of_the_input_writes_nothing(terminal: tuple[subprocess.Popen[bytes], int, Path]) -> None:
-    process, end, path = terminal
-    read_until(end, "Name of the rig")
-    os.write(end, b"\x04")
-    assert "the end of the input" in read_until(end, "end of the input")
-    assert process.wait(timeout=60) == 2
-    assert list(path.parent.iterdir()) == []

@@ -20,6 +20,7 @@ from tests.rig.serving import addresses, served
 NOWHERE = ("--bus", "ws://127.0.0.1:9/", "--modbus", "127.0.0.1:9")
 
 
+@pytest.mark.campaign
 def test_records_from_another_process(
     simulate: Callable[..., Any], short_rig: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -58,20 +59,6 @@ def test_signal_in_the_middle_keeps_the_recording_and_disarms(
     assert not (tmp_path / "run.part.csv").exists()
 
 
-def test_unknown_experiment(short_rig: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["run", str(short_rig), "drift", "--out", str(tmp_path / "r.csv"), *NOWHERE]) == 2
-    assert "cruise, reversal, tip" in capsys.readouterr().err
-    assert list(tmp_path.iterdir()) == [short_rig]
-
-
-def test_recording_is_never_overwritten(short_rig: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    kept = tmp_path / "r.csv"
-    kept.write_text("mine", encoding="utf-8")
-    assert run(["run", str(short_rig), "cruise", "--out", str(kept), *NOWHERE]) == 2
-    assert "r.csv" in capsys.readouterr().err
-    assert kept.read_text(encoding="utf-8") == "mine"
-
-
 @pytest.mark.parametrize("bus", ["socketcan:can0", "ws://10.0.0.1:54701/"])
 def test_fast_is_for_simulated_rigs_only(
     short_rig: Path, tmp_path: Path, bus: str, capsys: pytest.CaptureFixture[str]
@@ -89,13 +76,6 @@ def test_dry_run_opens_no_bus_and_writes_nothing(
     assert "30.0 s of it recorded" in printed
     assert "speed in the recorded part" in printed
     assert list(tmp_path.iterdir()) == [short_rig]
-
-
-def test_dry_run_as_json(short_rig: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["run", str(short_rig), "reversal", "--dry-run", "--json"]) == 0
-    document = json.loads(capsys.readouterr().out)
-    assert document["measured"] == 300
-    assert document["torque_nm"]["high"] <= 500.0
 
 
 def test_recording_says_what_it_is_and_estimates_stand_next_to_it(
@@ -118,21 +98,6 @@ def test_recording_says_what_it_is_and_estimates_stand_next_to_it(
     assert summary == {name: value for name, value in course.items() if name not in ("course", "every")}
 
 
-def test_records_without_an_estimate(short_rig: Path, tmp_path: Path) -> None:
-    with served(read_rig(short_rig)) as (server, _):
-        options = ("--out", str(tmp_path / "r.csv"), "--pace", "fast", "--no-estimate", *addresses(server))
-        assert run(["run", str(short_rig), "reversal", *options]) == 0
-    assert not (tmp_path / "r.online.json").exists()
-
-
-def test_course_is_never_overwritten(short_rig: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    kept = tmp_path / "r.online.json"
-    kept.write_text("mine", encoding="utf-8")
-    assert run(["run", str(short_rig), "cruise", "--out", str(tmp_path / "r.csv"), *NOWHERE]) == 2
-    assert "r.online.json" in capsys.readouterr().err
-    assert kept.read_text(encoding="utf-8") == "mine"
-
-
 def test_course_that_can_not_be_kept_is_said_and_the_run_is_entered_all_the_same(
     short_rig: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -146,3 +111,39 @@ def test_course_that_can_not_be_kept_is_said_and_the_run_is_entered_all_the_same
     assert f"{tmp_path / 'run.online.json'} is missing: {tmp_path}: no room" in capsys.readouterr().err
     assert run(["runs", "--store", str(tmp_path)]) == 0
     assert "reversal" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    "number",
+    [signal.SIGHUP, *(pytest.param(number, marks=pytest.mark.campaign) for number in (signal.SIGINT, signal.SIGTERM))],
+)
+def test_serves_until_a_signal_and_prints_one_line(
+    simulate: Callable[..., Any], short_rig: Path, number: signal.Signals
+) -> None:
+    simulation = simulate(short_rig)
+    assert simulation.bus.startswith("ws://127.0.0.1:")
+    assert not simulation.bus.endswith(":0/")
+    simulation.process.send_signal(number)
+    rest, complaints = simulation.process.communicate(timeout=60)
+    assert simulation.process.returncode == 0
+    assert (rest, complaints) == ("", "")
+
+
+@pytest.mark.parametrize(
+    ("options", "named"),
+    [
+        (("--bus", "ws://0.0.0.0:0/"), "this machine only"),
+        (("--bus", "socketcan:can0"), "expected ws://HOST:PORT/"),
+        (("--modbus", "10.0.0.1:502"), "this machine only"),
+        (("--modbus", "nonsense"), "expected HOST:PORT"),
+        (("--effect", "backlash:gap"), "expected key=number"),
+        (("--effect", "gremlins"), "gremlins"),
+    ],
+)
+def test_refuses_what_it_can_t_serve(
+    short_rig: Path, options: tuple[str, ...], named: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(["sim", str(short_rig), *options]) == 2
+    printed = capsys.readouterr()
+    assert named in printed.err
+    assert printed.out == ""

@@ -2,7 +2,6 @@
 
 import csv
 import json
-import shutil
 import signal
 import subprocess
 import sys
@@ -17,7 +16,7 @@ from hil.cli.main import run as hil
 from hil.config.rig_file import read_rig
 from hil.recording import Table, write_table
 from hil.recording.checksum import text_sha256
-from hil.store import RunStore, register_run, store_of
+from hil.store import RunStore, register_run
 from tests.cli.conftest import await_rows
 from tests.rig.serving import addresses, served
 
@@ -74,37 +73,6 @@ def test_runs_are_listed_with_what_tells_them_apart(folder: Path, capsys: Captur
     assert "stopped by the operator" in lines[2]
 
 
-@pytest.mark.parametrize(
-    ("options", "ids"),
-    [
-        (["--experiment", "tip"], [3]),
-        (["--since", "2026-11-22"], [2, 3]),
-        (["--until", "2026-11-22"], [1, 2]),
-        (["--verdict", "explained"], [1]),
-        (["--rig", "bench", "--text", "OPERATOR"], [3]),
-        (["--text", "nothing of the kind"], []),
-    ],
-)
-def test_filters(folder: Path, capsys: Capture, options: list[str], ids: list[int]) -> None:
-    assert [run["id"] for run in documents(capsys, *options)["runs"]] == ids
-
-
-def test_the_list_says_what_ended_a_run_and_show_what_to_do_then(folder: Path, capsys: Capture) -> None:
-    write_table(Table(folder / "d.csv", {"time_s": np.arange(5) * 0.1, "speed_rad_s": np.ones(5)}), folder / "d.csv")
-    register_run(folder / "d.csv", "PLC: clutch is closed. Fix the cause, run again.")
-    assert hil(["runs"]) == 0
-    said = capsys.readouterr().out
-    assert "PLC: clutch is closed" in said
-    assert "Mend" not in said
-    assert hil(["runs", "show", "4"]) == 0
-    assert "PLC: clutch is closed. Fix the cause, run again." in capsys.readouterr().out
-
-
-def test_an_empty_answer_is_an_answer(folder: Path, capsys: Capture) -> None:
-    assert hil(["runs", "--experiment", "none"]) == 0
-    assert capsys.readouterr().out == "no such run\n"
-
-
 def test_one_run_is_shown_with_the_state_of_its_recording(folder: Path, capsys: Capture) -> None:
     assert hil(["runs", "show", "1"]) == 0
     said = capsys.readouterr().out
@@ -141,25 +109,6 @@ def test_alarms_are_listed_and_shown(folder: Path, capsys: Capture) -> None:
     assert hil(["runs", "show", "2", "--store", str(folder), "--json"]) == 0
     document = json.loads(capsys.readouterr().out)
     assert document["alarms"] == len(document["alarm_statements"]) == 1
-
-
-def test_two_runs_are_compared_down_to_their_rig_files(folder: Path, capsys: Capture) -> None:
-    assert hil(["runs", "compare", "1", "2"]) == 0
-    said = capsys.readouterr().out
-    assert "-speed = 10\n+speed = 20\n" in said
-    assert "experiment" not in said  # the same in both
-    rows = {row["what"]: row for row in documents(capsys, "compare", "1", "2")["rows"]}
-    assert (rows["experiment"]["differs"], rows["verdict"]["differs"]) == (False, True)
-    assert (rows["J_M [kg m^2]"]["a"], rows["J_M [kg m^2]"]["b"]) == (1.52, None)
-
-
-def test_notes_and_results_are_added(folder: Path, capsys: Capture) -> None:
-    assert hil(["runs", "note", "2", "Wind [left]"]) == 0
-    (folder / "diagnosis.json").write_text('{"verdict": "unexplained"}', encoding="utf-8")
-    assert hil(["runs", "attach", "2", "diagnosis", "diagnosis.json"]) == 0
-    capsys.readouterr()
-    (run,) = documents(capsys, "--text", "wind [LEFT]")["runs"]
-    assert (run["id"], run["verdict"], run["notes"][0]["text"]) == (2, "unexplained", "Wind [left]")
 
 
 def test_nothing_is_deleted_without_being_asked(folder: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -199,15 +148,6 @@ def test_runs_are_exported_as_a_table_and_as_an_archive(folder: Path, capsys: Ca
         assert hil(["runs", "export", "--out", out]) == 2
 
 
-def test_a_list_that_is_gone_is_made_again(folder: Path, capsys: Capture) -> None:
-    shutil.rmtree(store_of(folder))
-    assert hil(["runs"]) == 2
-    assert "hil runs rebuild --store ." in capsys.readouterr().err
-    assert hil(["runs", "rebuild"]) == 0
-    assert "3 entered" in capsys.readouterr().out
-    assert len(documents(capsys)["runs"]) == 3
-
-
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
@@ -226,6 +166,7 @@ def test_a_look_makes_no_store(
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.campaign
 def test_a_run_enters_itself_also_one_that_was_stopped(
     spawn: Callable[..., subprocess.Popen[str]], short_rig: Path, tmp_path: Path, capsys: Capture
 ) -> None:

@@ -1,6 +1,5 @@
 """``hil rig schema`` and ``hil model schema``: an editor takes what the program takes, and marks what it refuses."""
 
-import json
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -9,7 +8,6 @@ import pytest
 from jsonschema import Draft202012Validator
 
 from estimator.physics.model import DrivelineModel, Parameter, Structure
-from hil.cli.main import run
 from hil.config.model_file import read_model, write_model
 from hil.config.schema import json_schema
 from hil.config.table import FileKind, schema_line
@@ -60,15 +58,6 @@ def changed(text: str, before: str, after: str) -> dict[str, Any]:
 def test_a_fault_of_a_rig_file_is_marked(before: str, after: str, place: str) -> None:
     document = changed((EXAMPLES / "rig.toml").read_text(encoding="utf-8"), before, after)
     assert [fault for fault in faults(FileKind.RIG, document) if fault.startswith(place)]
-
-
-@pytest.mark.parametrize("command", ["rig", "model"])
-def test_it_is_printed_and_written(command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run([command, "schema"]) == 0
-    printed = capsys.readouterr().out
-    assert json.loads(printed)["$schema"].endswith("2020-12/schema")
-    assert run([command, "schema", "--out", str(tmp_path / "new" / "s.json")]) == 0
-    assert (tmp_path / "new" / "s.json").read_text(encoding="utf-8") == printed
 
 
 def test_a_model_file_that_is_written_names_its_schema_and_fits_it(tmp_path: Path) -> None:

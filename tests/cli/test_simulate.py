@@ -1,13 +1,16 @@
 """``hil simulate``: the closed-form motion comes out, wrong input leaves nothing."""
 
+import hashlib
 import json
 import re
+import tomllib
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from hil.cli.main import run
+from hil.recording import Table, csv_format, read_table
 from tests.cli import bench
 
 
@@ -47,27 +50,6 @@ def test_the_simulation_is_the_motion_in_closed_form(
     assert float(load[1]) == pytest.approx(bench.LOAD, abs=0.02)
 
 
-def test_a_script_gets_json(arguments: dict[str, Path], capsys: pytest.CaptureFixture[str]) -> None:
-    words = [str(word) for pair in arguments.items() for word in pair]
-    assert run(["simulate", *words, "--json"]) == 0
-    document = json.loads(capsys.readouterr().out)
-    assert (document["schema"], document["recording"], document["samples"]) == ("hil.simulate/1", "run_1", 1500)
-    assert document["constant_load"]["unit"] == "Nm"
-    assert document["constant_load"]["value"] == pytest.approx(bench.LOAD, abs=0.02)
-    assert document["rms"]["unit"] == "rad/s"
-    assert 0.0 <= document["rms"]["value"] < 0.01
-
-
-def test_missing_samples_have_their_row_too(arguments: dict[str, Path]) -> None:
-    lines = arguments["--input"].read_text().splitlines()
-    lines[100] = ",".join([lines[100].split(",")[0], "nan", "nan", "nan"])
-    arguments["--input"].write_text("\n".join(lines) + "\n")
-    assert call(arguments) == 0
-    rows = np.loadtxt(arguments["--out"], delimiter=",", skiprows=1)
-    assert rows.shape == (1500, 2)
-    assert np.isfinite(rows).all()
-
-
 def test_a_position_in_translation_is_named_and_scaled(arguments: dict[str, Path]) -> None:
     truth = bench.record(arguments["--input"], 1)
     angle = np.concatenate([[0.0], np.cumsum(0.5 * (truth[1:] + truth[:-1]) * bench.DT)])
@@ -105,11 +87,58 @@ def test_wrong_arguments_are_refused_and_nothing_written(
     assert (tmp_path / "run_1.csv").read_text() == before
 
 
-def test_an_output_the_model_does_not_have_is_refused(
-    arguments: dict[str, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+FLAGGED, HELD = (300, 312), (700, 760)
+
+
+def flagged(path: Path) -> None:
+    """Record with twelve flagged rows that hold nonsense, and a speed reading that stands still for a while."""
+    bench.record(path, 1, noise=0.05)
+    numbers = read_table(path).numeric(["time_s", "torque_m1_nm", "torque_m2_nm", "speed_rad_s"])
+    flags = np.zeros(numbers["time_s"].size, dtype=np.int64)
+    flags[slice(*FLAGGED)] = 1
+    for name in ("torque_m1_nm", "torque_m2_nm", "speed_rad_s"):
+        numbers[name][slice(*FLAGGED)] = 0.0
+    numbers["speed_rad_s"][slice(*HELD)] = numbers["speed_rad_s"][HELD[0]]
+    csv_format.write(Table(path, {**numbers, "flags": flags}), path)
+
+
+def test_compare_and_simulate_give_the_error_of_the_diagnosis(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    signals = '[signals]\nspeed = { column = "speed_rad_s", at = "load" }\n'
-    arguments["--model"].write_text(bench.MODEL + signals)
-    assert call(arguments) == 2
-    assert "speed at the load is no output of one_mass" in capsys.readouterr().err
-    assert files(tmp_path) == ["drive.toml", "run_1.csv"]
+    recording, model, out = tmp_path / "run_1.csv", bench.model(tmp_path / "drive.toml"), tmp_path / "out"
+    flagged(recording)
+    command = ["diagnose", str(recording), "--model", str(model), "--out", str(out), "--budget-s", "300"]
+    assert run(command) == 0
+    reported = json.loads((out / "diagnosis.json").read_text())["fit"]["augmented"]
+    augmented = str(out / "augmented.toml")
+    used = tomllib.loads(Path(augmented).read_text())["prepared"]["recordings"][0]
+    capsys.readouterr()
+    assert run(["compare", augmented, str(recording), "--json"]) == 0
+    compared = json.loads(capsys.readouterr().out)["recordings"]["run_1"]
+    assert compared["rms"] == pytest.approx(reported, rel=0.005)
+    assert compared["samples_used"] == used["samples_used"] == 1500 - 12 - 60
+    assert (
+        run(["simulate", "--model", augmented, "--input", str(recording), "--out", str(out / "s.csv"), "--json"]) == 0
+    )
+    assert json.loads(capsys.readouterr().out)["rms"]["value"] == pytest.approx(reported, rel=0.005)
+
+
+def test_every_result_says_what_made_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    recording, model = tmp_path / "run_1.csv", bench.model(tmp_path / "drive.toml")
+    bench.record(recording, 1, noise=0.05)
+    lines = {
+        "diagnosis.json": ["diagnose", str(recording), "--model", str(model)],
+        "compare.json": ["compare", str(model), str(recording)],
+        "identification.json": ["identify", str(recording), "--model", str(model)],
+    }
+    for name, line in lines.items():
+        out = tmp_path / name.partition(".")[0]
+        assert run([*line, "--out", str(out)]) == 0
+        made = json.loads((out / name).read_text())["made"]
+        assert made["command"].startswith(f"hil {line[0]} ")
+        assert made["program"].startswith("hil ")
+        for key, path in (("models", model), ("recordings", recording)):
+            assert made[key] == [{"file": str(path), "sha256": hashlib.sha256(path.read_bytes()).hexdigest()}]
+        page = next(out.glob("*.html")).read_text()
+        assert "How this was made" in page
+        assert made["recordings"][0]["sha256"] in page

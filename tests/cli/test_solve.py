@@ -60,6 +60,7 @@ def test_a_lag_or_a_delay_is_open_and_the_design_says_what_would_tell(
     assert (tmp_path / "next.toml").exists() is said["worth_driving"]
 
 
+@pytest.mark.campaign
 def test_the_test_for_the_parameters_is_one_that_the_rig_drives(
     tmp_path: Path, model: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

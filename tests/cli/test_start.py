@@ -1,5 +1,6 @@
 """What takes a second to import stays out of the way of commands that do not need it."""
 
+import gc
 import json
 import os
 import subprocess
@@ -7,6 +8,9 @@ import sys
 from pathlib import Path
 
 import pytest
+
+from hil.cli.importing import without_collecting
+from tests.chosen import campaign
 
 SCIPY = ("scipy.interpolate", "scipy.linalg", "scipy.optimize", "scipy.signal", "scipy.special", "scipy.stats")
 OF_FILES = ("asammdf", "h5py", "matplotlib", "pandas", "plotly", "pyarrow")
@@ -45,8 +49,8 @@ sys.exit(f"no bus was opened: status {run(sys.argv[1:])}")
     ("modules", "absent"),
     [
         ("hil.cli.main, hil.cli.command_line", (*SLOW, "can", "numba", "numpy", "pydantic", "rich", "scipy", "typer")),
-        ("hil.monitor.host", SLOW),
-        ("hil.monitor.opening", (*OF_FILES, "scipy.signal", "scipy.stats", "textual")),
+        campaign(("hil.monitor.host", SLOW)),
+        campaign(("hil.monitor.opening", (*OF_FILES, "scipy.signal", "scipy.stats", "textual"))),
         ("hil.monitor.opening, hil.monitor.app", (*OF_FILES, "scipy.signal", "scipy.stats")),
     ],
     ids=["help", "monitor: process of the rig", "monitor: before that is started", "monitor: process of the view"],
@@ -60,7 +64,7 @@ def test_what_is_not_needed_is_not_imported(modules: str, absent: tuple[str, ...
 @pytest.mark.parametrize(
     "command",
     [
-        pytest.param(name, marks=() if name in ("run without an estimate", "commission") else pytest.mark.campaign)
+        pytest.param(name, marks=() if name == "run without an estimate" else pytest.mark.campaign)
         for name in BUS_COMMANDS
     ],
 )
@@ -79,14 +83,15 @@ def test_what_is_not_needed_is_not_imported_before_the_bus_is_opened(command: st
     assert sorted(set(absent) & set(json.loads((tmp_path / "modules.json").read_text()))) == []
 
 
-@pytest.mark.parametrize(
-    "first",
-    [
-        "hil.rig.trace",
-        *(pytest.param(each, marks=pytest.mark.campaign) for each in ("drivers.canopen", "hil.simulator.rig_server")),
-    ],
-)
-def test_python_can_is_whole_but_for_the_format_that_is_not_used(first: str) -> None:
-    program = f"import {first}, can, sys; print(can.__version__, 'asammdf' in sys.modules); import asammdf"
-    done = subprocess.run([sys.executable, "-P", "-c", program], capture_output=True, text=True, check=True)
-    assert done.stdout.split()[1] == "False"
+@pytest.mark.parametrize("enabled", [True, False])
+@pytest.mark.parametrize("fails", [True, False])
+def test_the_collector_is_as_it_was(enabled: bool, fails: bool) -> None:
+    (gc.enable if enabled else gc.disable)()
+    try:
+        with pytest.raises(ImportError) if fails else without_collecting(), without_collecting():
+            assert not gc.isenabled()
+            if fails:
+                raise ImportError
+        assert gc.isenabled() is enabled
+    finally:
+        gc.enable()

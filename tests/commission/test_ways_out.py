@@ -1,7 +1,6 @@
 """Every way out of a commissioning: interrupted, unplugged, refused, and continued."""
 
 from collections.abc import Callable
-from itertools import product
 from pathlib import Path
 
 import pytest
@@ -14,6 +13,7 @@ from hil.errors import RunAborted
 from hil.recording import read_table
 from hil.rig.experiments.base import Phase
 from hil.rig.stop import StopRequest
+from tests.chosen import campaign
 from tests.commission.rigs import Bench, Quiet, bench
 from tests.rig.observer import assert_disarmed
 
@@ -91,6 +91,7 @@ def test_interrupted_in_the_middle_it_disarms_and_resumes_there(
     assert settled == list(NAMES[: NAMES.index(step)])
 
 
+@pytest.mark.campaign
 def test_after_an_interruption_whole_runs_are_kept_and_the_rest_is_driven(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -117,8 +118,8 @@ def test_after_an_interruption_whole_runs_are_kept_and_the_rest_is_driven(
     ("fault", "error", "reported"),
     [
         ("plc.permissive_withdrawn@3.0", RunAborted, "permissive is withdrawn"),
-        ("m1.fault@3.0", DriverError, "inverter m1"),
-        ("m2.hang@3.0", RunAborted, "cut the power of the drive named"),
+        campaign(("m1.fault@3.0", DriverError, "inverter m1")),
+        campaign(("m2.hang@3.0", RunAborted, "cut the power of the drive named")),
     ],
 )
 def test_lost_permission_or_device_ends_it_at_zero_torque(
@@ -134,6 +135,7 @@ def test_lost_permission_or_device_ends_it_at_zero_torque(
     assert torque == (0.0, 0.0) or "cut the power" in record.because  # a drive that hangs can't be ordered anything
 
 
+@pytest.mark.campaign
 def test_speed_outside_its_band_ends_the_run(tmp_path: Path) -> None:
     with bench(tmp_path, miswired=True) as rig:  # the signs were skipped: the speed control drives away with m2
         with pytest.raises(RunAborted, match=r"speed band: the speed is -?\d+\.\d rad/s, expected"):
@@ -142,51 +144,20 @@ def test_speed_outside_its_band_ends_the_run(tmp_path: Path) -> None:
         assert rig.job().state.steps["scales"].status is Status.INTERRUPTED
 
 
-def test_rolling_vehicle_is_no_standstill(tmp_path: Path) -> None:
-    with bench(tmp_path) as rig:
-        for _ in range(100):
-            rig.server._plant.advance((300.0, 300.0), 0.01)
-        with pytest.raises(RunAborted, match="expected standstill"):
-            rig.call("signs")
-        assert_disarmed(rig.server.bus_url, 1, 2)
-
-
-LOST = {"m1.hang@2.0": "m1", "m2.hang@2.0": "m2", "plc.hang@2.0": "PLC", "bus.off@2.0": "bus"}
 """What is lost after two seconds of simulated time, and what has to be named."""
 
-OTHERS = {"m1": 2, "m2": 1}
 """CANopen node that is still there when an inverter is lost."""
 
-SHORT_FORM = {("friction", "bus.off@2.0")}
 """Every device in every step is a campaign; this one leaves both drives to themselves."""
 
 
 @pytest.mark.parametrize(
-    ("step", "fault"),
-    [
-        pytest.param(step, fault, marks=() if (step, fault) in SHORT_FORM else pytest.mark.campaign)
-        for step, fault in product(DRIVEN, LOST)
-    ],
-)
-def test_a_lost_device_is_named_and_the_step_is_done_once_it_is_back(step: str, fault: str, tmp_path: Path) -> None:
-    with bench(tmp_path, changes=SHORT, faults=[fault]) as rig:
-        with pytest.raises((RunAborted, DriverError)) as ended:
-            rig.call(step)
-        record = rig.job().state.steps[step]
-        if fault.startswith("plc"):
-            assert_disarmed(rig.server.bus_url, 1, 2)
-        elif LOST[fault] in OTHERS:
-            assert_disarmed(rig.server.bus_url, OTHERS[LOST[fault]])
-    assert LOST[fault] in str(ended.value)
-    assert record.status is Status.INTERRUPTED
-    assert LOST[fault] in record.because
-    with bench(tmp_path, changes=SHORT) as mended:
-        assert mended.call(step).steps[step].status is Status.DONE
-
-
-@pytest.mark.parametrize(
     ("fault", "device"),
-    [("m1.absent", "m1"), pytest.param("m2.absent", "m2", marks=pytest.mark.campaign), ("plc.hang@0.0", "plc")],
+    [
+        ("m1.absent", "m1"),
+        pytest.param("m2.absent", "m2", marks=pytest.mark.campaign),
+        campaign(("plc.hang@0.0", "plc")),
+    ],
 )
 def test_a_device_that_is_not_there_blocks_and_is_found_once_it_is_back(
     fault: str, device: str, tmp_path: Path

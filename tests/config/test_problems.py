@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 
 from hil.config.table import Table
 from hil.errors import FileProblem, ModelFileError, RigFileError
-from hil.problems import LONGEST_VALUE, Fault, read_toml, refuse, validate
+from hil.problems import Fault, read_toml, refuse, validate
 
 
 class Column(Table):
@@ -80,13 +80,6 @@ def test_what_is_not_toml_is_named_with_its_line(
     assert str(refusal.value) == f"{path}: {problem}"
 
 
-def test_a_file_that_can_t_be_read_is_named(tmp_path: Path) -> None:
-    with pytest.raises(RigFileError, match=r"expected a readable TOML file \| got: No such file"):
-        read_toml(tmp_path / "none.toml", RigFileError)
-    with pytest.raises(RigFileError, match="got: Is a directory"):
-        read_toml(tmp_path, RigFileError)
-
-
 @pytest.mark.parametrize(
     ("data", "expected"),
     [
@@ -111,22 +104,6 @@ def test_a_fault_is_named_by_the_file_s_own_keys(data: dict[str, object], expect
     assert len(found) == len(expected)
     for line, opening in zip(found, expected, strict=True):
         assert line.startswith(opening)
-
-
-def test_a_union_s_members_do_not_show_as_keys() -> None:
-    keys = {line.split(" | ")[0] for line in lines({"time": {"colunm": "t"}})}
-    assert keys == {"time.column", "time.colunm", "time.sample_time_s"}
-
-
-def test_a_long_value_is_cut() -> None:
-    (line,) = lines({"schema": ["x" * 500]})
-    assert len(line.split("got ")[1]) == LONGEST_VALUE
-    assert line.endswith("...")
-
-
-def test_one_table_in_place_of_a_list_of_tables_is_named_with_both_ways_to_write_it() -> None:
-    (line,) = lines({"inputs": {"column": "a"}})
-    assert line == "inputs | expected a list of tables, [[inputs]] or [ { ... } ] | got one table, [inputs] or { ... }"
 
 
 def test_a_list_of_tables_in_place_of_one_is_refused_in_words_of_toml() -> None:

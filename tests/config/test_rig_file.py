@@ -1,6 +1,5 @@
 """The rig file: the example loads, and everything that can be wrong in one is named with its key."""
 
-import math
 import re
 from pathlib import Path
 
@@ -9,8 +8,6 @@ import pytest
 from drivers.inverter.cia402 import TorqueMode
 from drivers.plc.types import PrbsSource
 from drivers.resources import data_file
-from drivers.torque_guard import ErrorLimits, GuardLimits
-from hil.config.experiment_tables import CruiseTable, ReversalTable, TipTable
 from hil.config.rig_file import PrbsTarget, read_rig
 from hil.errors import RigFileError
 
@@ -58,41 +55,21 @@ class TestTheExample:
         assert rig.simulation is not None
         assert rig.simulation.speed_noise_rad_s == 0.05
 
-    def test_its_guard_limits(self) -> None:
-        error = ErrorLimits(m1_nm=30.0, m2_nm=30.0, sum_nm=math.hypot(30.0, 30.0), time_s=0.12, response_s=0.01)
-        expected = GuardLimits(400.0, 400.0, 120.0, 2000.0, 700.0, 0.2, 1.0, math.inf, 0.01, error)
-        assert read_rig(EXAMPLE).guard_limits == expected
-
-    def test_it_has_one_experiment_of_each_kind(self) -> None:
-        kinds = {name: type(table) for name, table in read_rig(EXAMPLE).experiments.items()}
-        assert kinds == {"cruise": CruiseTable, "reversal": ReversalTable, "tip": TipTable}
-
     def test_it_can_t_be_changed_afterwards(self) -> None:
         rig = read_rig(EXAMPLE)
         with pytest.raises(ValueError, match="frozen"):
             rig.guard.sum_limit_nm = 9999.0  # type: ignore[misc]
 
-    def test_its_inverters_are_those_of_the_shipped_eds(self) -> None:
-        eds = data_file("inverter.eds").read_text("utf-8")
-        numbers = dict(re.findall(r"^(VendorNumber|ProductNumber)=(\S+)", eds, flags=re.MULTILINE))
-        for inverter in (read_rig(EXAMPLE).inverters.m1, read_rig(EXAMPLE).inverters.m2):
-            assert inverter.vendor_id == int(numbers["VendorNumber"], 0)
-            assert inverter.product_code == int(numbers["ProductNumber"], 0)
-
 
 WRONG = [
     (("", "name", '""'), "name | expected"),
     (("", "period_s", "0.0"), "period_s | expected greater than or equal to 0.001 | got 0.0"),
-    (("", "period_s", "0.0009"), "period_s | expected greater than or equal to 0.001 | got 0.0009"),
     (("", "period_s", '"10ms"'), "period_s | expected a valid number | got '10ms'"),
-    (("", "period_s", "nan"), "period_s | expected"),
     (("", "schema", '"hil.rig/2"'), "schema | expected 'hil.rig/1' | got 'hil.rig/2'"),
     (("can", "url", '""'), "can.url | expected"),
     (("inverters.m1", "node_id", "128"), "inverters.m1.node_id | expected less than or equal to 127 | got 128"),
     (("inverters.m2", "node_id", "1"), "inverters.m2.node_id | expected another node id than m1 | got 1"),
-    (("inverters.m2", "node_id", "2.0"), "inverters.m2.node_id | expected a valid integer | got 2.0"),
     (("inverters.m1", "vendor_id", "0x100000000"), "inverters.m1.vendor_id | expected less than"),
-    (("inverters.m1", "product_code", "-1"), "inverters.m1.product_code | expected greater than"),
     (("inverters.m1", "rated_torque_nm", "inf"), "inverters.m1.rated_torque_nm | expected a finite number"),
     (
         ("inverters.m2", "torque_limit_nm", "601.0"),
@@ -102,12 +79,9 @@ WRONG = [
         ("inverters.m1", "mode", '"speed"'),
         "inverters.m1.mode | expected 'cyclic_synchronous_torque' or 'profile_torque' | got 'speed'",
     ),
-    (("inverters.m1", "mode", "10"), "inverters.m1.mode | expected 'cyclic_synchronous_torque' or"),
     (("inverters.m1", "heartbeat_ms", "1"), "inverters.m1.heartbeat_ms | expected greater than or equal to 10"),
     (("plc", "port", "0"), "plc.port | expected greater than or equal to 1 | got 0"),
-    (("plc", "host", "127"), "plc.host | expected a valid string | got 127"),
     (("guard", "rate_limit_nm_per_s", "0.0"), "guard.rate_limit_nm_per_s | expected greater than 0"),
-    (("guard", "prbs_limit_nm", "-5.0"), "guard.prbs_limit_nm | expected greater than 0"),
     (("guard", "prbs_limit_nm", "59.0"), "prbs.amplitude_nm | expected a part of at most guard.prbs_limit_nm (59)"),
     (
         ("guard", "sum_limit_nm", "801.0"),
@@ -115,8 +89,6 @@ WRONG = [
     ),
     (("guard", "feedback_timeout_s", "0.005"), "guard.feedback_timeout_s | expected at least one period (0.01)"),
     (("prbs", "amplitude_nm", "true"), "prbs.amplitude_nm | expected a valid number | got True"),
-    (("prbs", "clock_divider", "0"), "prbs.clock_divider | expected greater than or equal to 1"),
-    (("prbs", "seed", "0"), "prbs.seed | expected greater than or equal to 1"),
     (("prbs", "seed", "1024"), "prbs.seed | expected at most 1023, what 10 cells hold | got 1024"),
     (("prbs", "source", '"moon"'), "prbs.source | expected 'plc' or 'host' | got 'moon'"),
     (("prbs", "target", '"shared"'), "prbs.share_m1 | expected the part of inverter m1"),
@@ -147,7 +119,6 @@ WRONG = [
         ("experiments.tip", "step_nm", "500.5"),
         "experiments.tip.step_nm | expected at most torque_nm of the same table (500) | got 500.5",
     ),
-    (("simulation", "seed", "-1"), "simulation.seed | expected greater than or equal to 0"),
     (("simulation", "speed_noise_rad_s", "-0.1"), "simulation.speed_noise_rad_s | expected greater than or equal"),
 ]
 
@@ -197,47 +168,6 @@ def test_an_unknown_key_is_named_with_those_that_are_known(table: str, tmp_path:
     assert all(key in problem for key in TABLES[table])
 
 
-def test_all_faults_at_once(tmp_path: Path) -> None:
-    path = changed(
-        tmp_path,
-        in_table("inverters.m2", "node_id", "200"),
-        in_table("prbs", "seed", '"one"'),
-        in_table("experiments.tip", "kind", '"tap"'),
-        without("guard", "sum_limit_nm"),
-        (r"^name = [^\n]*", "nmae = 1"),
-    )
-    assert {problem.split(" | ")[0] for problem in problems_of(path)} == {
-        "name",
-        "nmae",
-        "inverters.m2.node_id",
-        "prbs.seed",
-        "experiments.tip.kind",
-        "guard.sum_limit_nm",
-    }
-
-
-def test_all_faults_across_tables_at_once(tmp_path: Path) -> None:
-    path = changed(
-        tmp_path,
-        in_table("prbs", "target", '"m2"'),
-        in_table("prbs", "amplitude_nm", "200.0"),
-        in_table("guard", "sum_limit_nm", "900.0"),
-        in_table("experiments.tip", "torque_nm", "450.0"),
-    )
-    assert [problem.split(" | ")[0] for problem in problems_of(path)] == [
-        "guard.sum_limit_nm",
-        "prbs.amplitude_nm",
-        "experiments.cruise.torque_nm",
-        "experiments.tip.torque_nm",
-    ]
-
-
-def test_the_plc_s_own_register_has_ten_cells(tmp_path: Path) -> None:
-    path = changed(tmp_path, in_table("prbs", "source", '"plc"'), in_table("prbs", "cells", "11"))
-    (problem,) = problems_of(path)
-    assert problem.startswith("prbs.cells | expected 10, the PLC's own shift register")
-
-
 @pytest.mark.parametrize(
     ("target", "part_m1"), [('"both"', 0.5), ('"m1"', 1.0), ('"m2"', 0.0), ('"shared"\nshare_m1 = 0.25', 0.25)]
 )
@@ -275,10 +205,6 @@ class TestFilesItNames:
     ) -> None:
         (problem,) = problems_of(changed(tmp_path, change))
         assert re.match(rf"{key} \| expected an existing file, looked for {tmp_path}/none9*\.\w+ \| got 'none", problem)
-
-    def test_a_path_that_is_no_text_is_named(self, tmp_path: Path) -> None:
-        (problem,) = problems_of(changed(tmp_path, (r'^# eds = "inverter.eds"', "eds = 5")))
-        assert problem == "inverters.m1.eds | expected the path of a file, as text | got 5"
 
     @pytest.mark.parametrize(
         ("content", "problem"),

@@ -8,19 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from estimator.errors import BadSetting
 from estimator.signals.multisine import Lines, Multisine, crest_factor, excited_lines, multisine_nm
 from hil.commission.order import Order, RigSource
 from hil.commission.runner import rigid_model
 from hil.config.rig_file import read_rig, with_experiment_of
 from hil.design.candidates import Limits, candidates
-from hil.design.design import free_key, on_paper
+from hil.design.design import on_paper
 from hil.errors import HilError, RigFileError, UsageError
-from hil.rig.experiments.base import Phase
-from hil.rig.experiments.registry import build_experiment
 from hil.rig.plan import plan_run
 from tests.rig.serving import EXAMPLE
-from tests.rig.vehicle import RigidVehicle, drive
 
 SOURCE = RigSource(EXAMPLE, EXAMPLE.read_text(encoding="utf-8"))
 NEXT = '[experiments.next_1]\nkind = "coast"\nspeed_rad_s = 20.0\nduration_s = 5.0\ntorque_nm = 300.0\n'
@@ -63,10 +59,6 @@ def test_most_of_what_is_proposed_passes_guard_and_limits() -> None:
     assert len(passed) >= 6
 
 
-def test_names_that_are_taken_are_not_taken_again() -> None:
-    assert free_key(["cruise", "next_1", "next_3"]) == "next_2"
-
-
 def test_a_file_with_one_experiment_is_driven_with_the_rig(tmp_path: Path) -> None:
     """Its table is in the text that a recording keeps of the rig file."""
     file = tmp_path / "next.toml"
@@ -90,17 +82,6 @@ def test_a_file_that_has_not_one_experiment_is_refused(tmp_path: Path, text: str
         with_experiment_of(EXAMPLE, str(file))
 
 
-def test_coast_and_ramp_do_what_they_say(tmp_path: Path) -> None:
-    ramp = '\n[experiments.ramp]\nkind = "ramp"\nduration_s = 8.0\ntorque_nm = 300.0\nslew_nm_per_s = 900.0\n'
-    rig = read_rig(rig_with(tmp_path, "\n" + NEXT + ramp + "swing_nm = 100.0\nramp_s = 2.0\n"))
-    coast, ramped = (drive(build_experiment(rig, name), RigidVehicle()) for name in ("next_1", "ramp"))
-    measured = [t for t, phase in zip(coast.torque_nm, coast.phase, strict=True) if phase is Phase.MEASURE]
-    assert set(measured[50:]) == {0.0}
-    seen = [t for t, phase in zip(ramped.torque_nm, ramped.phase, strict=True) if phase is Phase.MEASURE]
-    assert max(seen) == pytest.approx(100.0, abs=1.0)
-    assert min(seen) == pytest.approx(-100.0, abs=1.0)
-
-
 @pytest.mark.parametrize("lines", Lines)
 def test_a_multisine_has_power_at_its_lines_alone_and_no_high_peak(lines: Lines) -> None:
     excited = excited_lines(1000, 0.01, 0.5, 30.0, lines, 3)
@@ -117,11 +98,6 @@ def test_one_line_in_four_is_left_out_to_detect_distortion() -> None:
     odd, kept = (set(excited_lines(1000, 0.01, 0.5, 30.0, each, 3)) for each in (Lines.ODD, Lines.ODD_RANDOM))
     assert kept < odd
     assert len(odd - kept) == len(odd) // 4
-
-
-def test_a_band_of_one_line_is_no_multisine() -> None:
-    with pytest.raises(BadSetting, match="two or more lines"):
-        multisine_nm(100, np.array([3]), 10.0)
 
 
 MULTISINE = "multisine = {{ amplitude_nm = {}, period_s = 5.0, lowest_hz = 0.5, highest_hz = {} }}\n"

@@ -26,15 +26,6 @@ def test_every_effect_has_a_section_in_the_order_of_the_catalogue() -> None:
         assert f"\n### {name}\n" in text
 
 
-def test_sections_stand_under_the_heading_of_their_element() -> None:
-    text = PAGE.read_text(encoding="utf-8")
-    for part in text.split("\n## ")[1:]:
-        element = part.partition("\n")[0].lower().replace(" ", "_")
-        for line in part.splitlines():
-            if line.startswith("### "):
-                assert EFFECTS[line.removeprefix("### ")].element.value == element
-
-
 def test_the_facts_are_those_of_the_catalogue() -> None:
     for name, facts in facts_on_page().items():
         assert facts == facts_of(EFFECTS[name]), CURE

@@ -78,13 +78,6 @@ def test_every_object_that_is_configured_is_listed(index: int) -> None:
     assert f"0x{index:04X}" in page or (first < index < last and f"0x{first:04X} to 0x{last:04X}" in page)
 
 
-def test_every_402_object_in_the_drivers_is_listed() -> None:
-    sources = "".join(path.read_text(encoding="utf-8") for path in (ROOT / "drivers").rglob("*.py"))
-    used = set(re.findall(r"0x60[4-9A-F][0-9A-F]|0x6007|0x6502", sources)) - {"0x605B", "0x605C", "0x605D"}
-    assert len(used) > 15
-    assert {index for index in used if index not in text("supported-protocols.md")} == set()
-
-
 def test_the_thresholds_of_a_verdict_are_those_of_the_code() -> None:
     page = re.sub(r"\s+", " ", text("diagnosis.md"))
     for said in (

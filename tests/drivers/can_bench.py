@@ -26,8 +26,8 @@ M1 = InverterSettings(
     torque_limit_nm=400.0,
     heartbeat_ms=10,
     sdo_timeout_s=2.0,
-    mode_timeout_s=0.2,
-    state_timeout_s=0.2,
+    mode_timeout_s=1.0,
+    state_timeout_s=1.0,
 )
 """Patient, for a loaded machine is slow and not at fault."""
 

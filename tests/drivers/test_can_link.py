@@ -7,16 +7,16 @@ from contextlib import contextmanager
 
 import can
 import pytest
-from can.interfaces.virtual import VirtualBus
-from can_remote import RemoteServer
 
-from drivers.canopen.can_link import CanLink
+from drivers.canopen.can_link import BUS_OFF, CanLink
 from drivers.canopen.heartbeat import HOST_NODE_ID
 from drivers.canopen.remote_bus import BoundedRemoteBus
-from drivers.errors import BusDown, ProtocolViolation
+from drivers.errors import BusDown, CommandRefused, ProtocolViolation
+from drivers.inverter.cia402 import PowerState
+from drivers.inverter.reconnect import reconnect
 from hil.simulator.addresses import Address
 from hil.simulator.can_bridge import CanBridge
-from tests.drivers.can_bench import frame, new_channel, virtual_bus
+from tests.drivers.can_bench import M1, M2, bench, frame, guarded, new_channel, virtual_bus
 
 
 @pytest.fixture
@@ -141,26 +141,6 @@ def test_server_of_another_kind_is_refused(answer: bytes, reason: str) -> None:
         CanLink.open(url)
 
 
-@pytest.fixture
-def server_without_bus() -> Iterator[str]:
-    """A CAN server whose own bus is not there."""
-    with RemoteServer("127.0.0.1", 0, interface="nosuchinterface", channel="x") as server:
-        server.handle_error = lambda request, client_address: None  # it prints what the client receives anyway
-        server.daemon_threads = False
-        thread = threading.Thread(target=server.serve_forever, args=(0.01,), daemon=True)
-        thread.start()
-        try:
-            yield f"ws://127.0.0.1:{server.server_port}/"
-        finally:
-            server.shutdown()
-            thread.join()
-
-
-def test_server_whose_own_bus_is_not_there_is_refused(server_without_bus: str) -> None:
-    with pytest.raises(BusDown, match="the server opened no bus"):
-        CanLink.open(server_without_bus)
-
-
 def test_frames_travel_both_ways_through_a_server(channel: str) -> None:
     event = threading.Event()
     with (
@@ -205,19 +185,6 @@ def test_bus_that_goes_away_is_bus_down_at_every_call(channel: str) -> None:
         for _ in range(2):
             with pytest.raises(BusDown, match=r"receiving ended .*closed bus"):
                 link.sync()
-
-
-class _BusyBus(VirtualBus):
-    """A bus whose adapter takes no frame, as with a full transmit buffer."""
-
-    def send(self, msg: can.Message, timeout: float | None = None) -> None:
-        raise can.CanOperationError("transmit buffer full")
-
-
-def test_bus_that_refuses_a_frame_is_bus_down(channel: str) -> None:
-    with CanLink(_BusyBus(channel)) as link:
-        with pytest.raises(BusDown, match=r"frame 0x205 can't be sent \(transmit buffer full\)"):
-            link.send(0x205, b"")
 
 
 def test_closed_link_is_bus_down(channel: str) -> None:
@@ -281,3 +248,87 @@ def test_callback_that_can_not_answer_any_more_is_no_defect(channel: str) -> Non
     with pytest.raises(BusDown, match=r"receiving ended .CAN bus is closed"):
         link.sync()
     link.close()
+
+
+def error_frame(error_class: int) -> can.Message:
+    """As an adapter passes it on to its host alone."""
+    return can.Message(arbitration_id=error_class, is_error_frame=True, data=bytes(8))
+
+
+def test_bus_off_is_bus_down_at_every_call() -> None:
+    with bench() as rig:
+        rig.m1.configure()
+        rig.link._take(error_frame(BUS_OFF))
+        for step in (rig.link.sync, rig.m1.raise_if_faulted, rig.m1.check):
+            with pytest.raises(BusDown, match="bus-off: the controller has left the bus"):
+                step()
+
+
+def test_controller_that_says_it_is_off_the_bus_is_bus_down() -> None:
+    class OffBus(can.interfaces.virtual.VirtualBus):
+        @property
+        def state(self) -> can.BusState:
+            return can.BusState.ERROR
+
+    link = CanLink(OffBus(new_channel()))
+    with link:
+        assert link._thread is not None
+        link._thread.join(60.0)
+        with pytest.raises(BusDown, match="bus-off"):
+            link.sync()
+
+
+def test_drives_are_disarmed_before_anything_else_and_usable_after_it() -> None:
+    with bench() as rig:
+        for inverter in (rig.m1, rig.m2):
+            inverter.configure()
+            inverter.arm()
+        rig.cycle(guarded(120.0), guarded(60.0))
+        rig.link._take(error_frame(BUS_OFF))
+        link, (m1, _) = reconnect(f"virtual:{rig.channel}", (M1, M2), patience_s=0.0)
+        with link:
+            assert rig.rig.torque_nm == (0.0, 0.0)
+            with pytest.raises(CommandRefused, match="while disarmed"):
+                m1.command(guarded(120.0))
+            m1.configure()
+            m1.arm()
+            m1.command(guarded(60.0))
+            feedback = m1.await_feedback(link.sync(), 5.0)
+            assert feedback is not None
+            assert feedback.state is PowerState.OPERATION_ENABLED
+        with pytest.raises(BusDown):
+            rig.link.sync()
+
+
+def test_bus_that_is_not_there_is_tried_for_so_long_and_no_longer(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("drivers.inverter.reconnect.RETRY_S", 0.001)
+    tries: list[str] = []
+
+    def refuse(url: str) -> CanLink:
+        tries.append(url)
+        raise BusDown(f"CAN bus {url!r} can't be opened")
+
+    monkeypatch.setattr(CanLink, "open", refuse)
+    with pytest.raises(BusDown, match="can't be opened"):
+        reconnect("virtual:nowhere", (M1,), patience_s=0.05)
+    assert len(tries) > 1
+
+
+def test_bus_that_comes_back_is_used(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("drivers.inverter.reconnect.RETRY_S", 0.001)
+    channel, tries = new_channel(), []
+    opened = CanLink.open
+
+    def third_time(url: str) -> CanLink:
+        tries.append(url)
+        if len(tries) < 3:
+            raise BusDown("not yet")
+        return opened(url)
+
+    monkeypatch.setattr(CanLink, "open", third_time)
+    link, inverters = reconnect(f"virtual:{channel}", (), patience_s=5.0)
+    with link, virtual_bus(channel) as device:
+        link.sync()
+        message = device.recv(5.0)
+    assert message is not None
+    assert (message.arbitration_id, inverters, len(tries)) == (0x080, (), 3)

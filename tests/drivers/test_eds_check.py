@@ -1,15 +1,17 @@
 """What the EDS checker says of a whole file, where one fault has consequences or is reported once for many places."""
 
-import re
 from pathlib import Path
 
 import pytest
 
+from drivers.capability.carrier import RPDO
 from drivers.capability.table import TABLE, Function, Without
 from drivers.datasheet.text import Severity
 from drivers.eds_check import EdsReport
-from tests.docs.pages import DOCS
+from drivers.errors import ConfigMismatch
+from drivers.resources import data_file
 from tests.drivers.eds_bench import SHIPPED, E, N, W, checked, edited, line_of, without
+from tests.drivers.fake_drive import FakeDrive, on_bus
 
 
 def places(report: EdsReport, severity: Severity) -> list[str]:
@@ -25,13 +27,6 @@ def test_missing_section_is_named(tmp_path: Path, section: str, severity: Severi
     (finding,) = (each for each in report.findings if each.place == f"[{section}]")
     assert (finding.severity, finding.line) == (severity, None)
     assert report.usable is (severity is W)
-
-
-@pytest.mark.parametrize("index", ["1000", "1001"])
-def test_missing_mandatory_object_of_no_use_here_is_a_warning(tmp_path: Path, index: str) -> None:
-    report = checked(tmp_path, without(index))
-    assert places(report, Severity.ERROR) == []
-    assert places(report, Severity.WARNING) == [f"[{index}]", f"[MandatoryObjects] {int(index) - 999}"]
 
 
 NEEDED = [row.function for row in TABLE.values() if row.without is Without.REFUSED]
@@ -77,31 +72,6 @@ def test_constant_that_holds_the_value_wanted_is_no_fault(tmp_path: Path) -> Non
     assert [each.severity for each in checked(tmp_path, text).findings if each.place.endswith("DefaultValue")] == [E]
 
 
-def test_object_described_but_not_listed_and_the_reverse(tmp_path: Path) -> None:
-    text = edited("OptionalObjects", "33=0x60A9", "33=0x60AA")
-    warnings = [each for each in checked(tmp_path, text).findings if each.severity is W]
-    assert [(each.place, each.line) for each in warnings] == [
-        ("[OptionalObjects] 33", line_of(text, "OptionalObjects", "33")),
-        ("[60A9]", line_of(text, "60A9")),
-    ]
-    assert checked(tmp_path, text).usable
-
-
-def test_object_listed_twice_or_in_another_list(tmp_path: Path) -> None:
-    text = edited("ManufacturerObjects", "SupportedObjects=0", "SupportedObjects=1\n1=0x6502", text=SHIPPED + "\n")
-    (finding,) = checked(tmp_path, text).findings
-    assert "listed once" in finding.expected
-    moved = edited("OptionalObjects", "35=0x6502\n", "", text=edited("OptionalObjects", "=35", "=34", text=text))
-    (finding,) = checked(tmp_path, moved).findings
-    assert (finding.place, finding.expected) == ("[ManufacturerObjects] 1", "0x6502 under [OptionalObjects]")
-
-
-def test_sub_index_without_its_object(tmp_path: Path) -> None:
-    text = SHIPPED + "\n[2000sub1]\nParameterName=x\nDataType=5\nAccessType=rw\n"
-    (finding,) = checked(tmp_path, text).findings
-    assert (finding.place, finding.severity) == ("[2000sub1]", W)
-
-
 def test_object_that_is_used_and_one_that_is_not(tmp_path: Path) -> None:
     """The same fault is an error in the one and a warning in the other."""
     vendors = "\n[2000]\nParameterName=x\nDataType=0x99\nAccessType=rw\n"
@@ -132,31 +102,6 @@ def test_compact_description(tmp_path: Path, keys: str, said: list[str]) -> None
     findings = checked(tmp_path, listed + COMPACT.format(keys)).findings
     assert [each.severity for each in findings] == [W] * len(said)
     assert all(expected in finding.expected for expected, finding in zip(said, findings, strict=True))
-
-
-def test_sub_indices_of_a_variable_are_not_read(tmp_path: Path) -> None:
-    report = checked(tmp_path, edited("1018", "ObjectType=0x9", "ObjectType=0x7"))
-    assert any("since it has sub-indices" in each.expected and each.severity is W for each in report.findings)
-    assert not report.usable
-
-
-def test_missing_object_type_is_no_fault(tmp_path: Path) -> None:
-    """CiA 306: without the key it is a variable."""
-    assert checked(tmp_path, edited("6071", "ObjectType=0x7\n", "")).findings == ()
-
-
-def test_spelling_is_reported_once(tmp_path: Path) -> None:
-    text = re.sub(r"(?m)^\[(\w+)\]$", lambda match: f"[{match[1].upper()}]", SHIPPED)
-    (finding,) = checked(tmp_path, text).findings
-    assert (finding.severity, finding.line) == (N, 1)
-    assert finding.found.endswith("more")
-
-
-def test_type_as_canfestivals_editor_describes_it(tmp_path: Path) -> None:
-    """It makes an object of each type with limits; the real type is the default of its sub-index 1."""
-    text = edited("1001", "DataType=0x0005", "DataType=0x00A0")
-    text += "\n[A0]\nParameterName=limited\n[A0sub1]\nParameterName=type\nDataType=0x0005\nDefaultValue=0x0005\n"
-    assert checked(tmp_path, text).findings == ()
 
 
 @pytest.mark.parametrize(("gone", "left"), [("1800", "1A00"), ("1A00", "1800"), ("1400", "1600"), ("1600", "1400")])
@@ -192,21 +137,6 @@ def test_filler_in_a_mapping(tmp_path: Path, mapping: str, allowed: str, wanted:
     assert all(any(want in each for each in said) for want in wanted)
 
 
-def test_node_guarding_is_reported_and_switched_off(tmp_path: Path) -> None:
-    """It excludes the heartbeat; where it can't be switched off that is an error."""
-    described = "\n[{}]\nParameterName=x\nDataType={}\nAccessType=rw\nDefaultValue={}\n"
-    listed = edited("OptionalObjects", "SupportedObjects=35", "SupportedObjects=37\n36=0x100C\n37=0x100D")
-    off = listed + described.format("100C", 6, 0) + described.format("100D", 5, 0)
-    assert checked(tmp_path, off).findings == ()
-    blank = listed + described.format("100C", 6, "") + described.format("100D", 5, "")
-    assert checked(tmp_path, blank).usable
-    on = listed + described.format("100C", 6, 100) + described.format("100D", 5, 3)
-    assert places(checked(tmp_path, on), W) == ["[100C] DefaultValue"]
-    assert places(
-        checked(tmp_path, on.replace("AccessType=rw\nDefaultValue=3", "AccessType=ro\nDefaultValue=3")), E
-    ) == ["[100C] DefaultValue"]
-
-
 @pytest.mark.parametrize("mapping", ["1600", "1A00"])
 def test_no_pdo_that_carries_what_is_needed(tmp_path: Path, mapping: str) -> None:
     """It is mapped by each run where it can be, and otherwise there is none."""
@@ -222,13 +152,80 @@ def test_no_pdo_that_carries_what_is_needed(tmp_path: Path, mapping: str) -> Non
     assert f"0x{mapping}:01 can not be written" in finding.found
 
 
-def test_objects_of_the_table_are_those_of_the_documentation() -> None:
-    """Each has its row, with what is done without it."""
-    table = (DOCS / "supported-protocols.md").read_text().partition("| object | name | used for | without |")[2]
-    rows = [row.split("|") for row in table.partition("\n\n")[0].splitlines()[2:]]
-    without = {index: row[4].strip() for row in rows for index in re.findall(r"0x(\w{4})", row[1])}
-    without |= {f"605{digit}": without["605A"] for digit in "BCD"}  # "0x605A to 0x605E"
-    for row in TABLE.values():
-        for part in (part for way in row.ways for part in way):
-            refused = without[f"{part.index:04X}"].startswith("refused")
-            assert refused is (row.without is Without.REFUSED) or part.index == 0x1018, f"0x{part.index:04X}"
+COUNTER = """[1019]
+ParameterName=Synchronous counter overflow value
+ObjectType=0x7
+DataType=0x0005
+AccessType=rw
+DefaultValue=10
+PDOMapping=0
+
+"""
+
+
+@pytest.mark.parametrize(
+    ("index", "old", "new"),
+    [
+        ("6077", "0x0003", "0x0006"),
+        ("6077", "0x0003", "0x0004"),
+        ("6071", "0x0003", "0x0006"),
+        ("606C", "0x0004", "0x0007"),
+        ("606C", "0x0004", "0x0003"),
+        ("6061", "0x0002", "0x0005"),
+        ("6041", "0x0006", "0x0007"),
+    ],
+)
+def test_used_object_of_another_sign_or_width_is_an_error_of_the_check(
+    index: str, old: str, new: str, tmp_path: Path
+) -> None:
+    text = edited(index, f"DataType={old}", f"DataType={new}")
+    report = checked(tmp_path, text)
+    assert not report.usable
+    [finding] = [each for each in report.findings if each.place == f"[{index}] DataType" and each.severity is E]
+    assert finding.line == line_of(text, index, "DataType")
+
+
+def test_torque_offset_without_a_sign_is_done_without(tmp_path: Path) -> None:
+    """Base torque and PRBS go into the target torque as a sum, so that nothing is read as another number."""
+    text = edited("60B2", "DataType=0x0003", "DataType=0x0006")
+    report = checked(tmp_path, text)
+    assert report.usable
+    [finding] = [each for each in report.findings if each.place == "[60B2] DataType"]
+    assert finding.severity is W
+    assert finding.line == line_of(text, "60B2", "DataType")
+    assert report.plan is not None
+    assert 0x60B2 not in {mapped.index for mapped in report.plan.pdos(RPDO)[0].layout.objects}
+
+
+def with_counter(access: str = "rw") -> str:
+    text = data_file("inverter.eds").read_text(encoding="utf-8")
+    text = text.replace("[1029]", COUNTER.replace("AccessType=rw", f"AccessType={access}") + "[1029]", 1)
+    count = next(line for line in text.split("[OptionalObjects]")[1].splitlines() if line.startswith("SupportedObj"))
+    number = int(count.split("=")[1])
+    return text.replace(count, f"SupportedObjects={number + 1}\n{number + 1}=0x1019", 1)
+
+
+@pytest.mark.parametrize(("access", "severity"), [("rw", W), ("const", E)])
+def test_sync_counter_is_reported(access: str, severity: Severity, tmp_path: Path) -> None:
+    reported = [
+        each for each in checked(tmp_path, with_counter(access)).findings if each.place == "[1019] DefaultValue"
+    ]
+    assert [each.severity for each in reported] == [severity]
+
+
+class CountsSync(FakeDrive):
+    """Takes no SYNC without a counter while 0x1019 is not 0, and says so by EMCY 0x8240 (CiA 301, 7.2.2.5)."""
+
+    def take_sync(self, data: bytes) -> None:
+        if self.objects[0x1019, 0] and len(data) != 1:
+            self.link.send(0x080 + self.node_id, bytes.fromhex("40 82 11 00 00 00 00 00"))
+        else:
+            super().take_sync(data)
+
+
+def test_drive_that_counts_syncs_for_good_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "drive.eds"
+    path.write_text(with_counter("const"), encoding="utf-8")
+    with pytest.raises(ConfigMismatch, match=r"0x1019:00 that is 0 or can be written, found 10 for good"):
+        with on_bus(CountsSync, eds_path=path):
+            pass

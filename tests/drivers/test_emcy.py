@@ -40,11 +40,6 @@ def test_the_longest_known_code_names_the_cause(code: int, cause: str) -> None:
     assert cause_of(code) == cause
 
 
-def test_message_shows_manufacturer_data_only_where_there_is_any() -> None:
-    assert str(Emergency(0x3220, 1, bytes(5))) == "EMCY 0x3220 DC link under-voltage (error register 0x01)"
-    assert "manufacturer data 0a 00 00 00 00" in str(Emergency(0x3220, 1, b"\x0a\0\0\0\0"))
-
-
 def test_only_code_00xx_is_a_reset() -> None:
     assert Emergency(0x0000, 0, bytes(5)).is_reset
     assert not Emergency(0x1000, 0, bytes(5)).is_reset

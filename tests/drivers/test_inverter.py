@@ -8,11 +8,11 @@ import pytest
 
 from drivers.canopen.can_link import CanLink
 from drivers.errors import CommandRefused, DeviceTimeout, ForeignController, ProtocolViolation
-from drivers.inverter.cia402 import PowerState, TorqueMode
+from drivers.inverter.cia402 import PowerState
 from drivers.inverter.inverter import Inverter
 from drivers.resources import data_file
 from hil.simulator.plant import RigidPlant
-from tests.drivers.can_bench import HASTY_M1, M1, SIMULATED_M1, Bench, bench, frame, guarded, new_channel, repeat
+from tests.drivers.can_bench import HASTY_M1, M1, Bench, bench, frame, guarded, new_channel, repeat
 
 
 @pytest.fixture
@@ -27,16 +27,6 @@ def armed(healthy: Bench) -> Bench:
         inverter.configure()
         inverter.arm()
     return healthy
-
-
-def test_check_of_the_right_device_finds_nothing(healthy: Bench) -> None:
-    assert healthy.m1.check() == ()
-    assert healthy.m2.check() == ()
-
-
-def test_configured_device_still_agrees(healthy: Bench) -> None:
-    healthy.m1.configure()
-    assert healthy.m1.check() == ()
 
 
 def test_armed_drive_gives_no_torque_until_commanded(armed: Bench) -> None:
@@ -98,38 +88,12 @@ def test_command_still_waiting_for_sync_does_not_survive_disarming(armed: Bench)
     assert armed.cycle().state is PowerState.SWITCH_ON_DISABLED
 
 
-def test_drive_can_be_armed_again(armed: Bench) -> None:
-    armed.m1.disarm()
-    armed.m1.arm()
-    assert armed.cycle(guarded(30.0)).state is PowerState.OPERATION_ENABLED
-    assert armed.rig.torque_nm[0] == pytest.approx(30.0)
-
-
 def test_a_drive_that_another_host_has_enabled_gets_no_nmt_command(armed: Bench) -> None:
     armed.cycle(guarded(120.0))
     with CanLink.open(f"virtual:{armed.channel}") as link:
         with pytest.raises(ForeignController, match=r"m1 \(node 5\): power state is operation enabled"):
             Inverter(link, M1).configure()
         assert armed.rig.torque_nm[0] == pytest.approx(120.0)
-
-
-def test_unconfigured_drive_is_not_armed_by_disarming(healthy: Bench) -> None:
-    healthy.m1.disarm()
-    healthy.m1.configure()
-    assert healthy.cycle().state is PowerState.SWITCH_ON_DISABLED
-
-
-def test_profile_torque_follows_its_slope() -> None:
-    settings = replace(M1, mode=TorqueMode.PROFILE_TORQUE)
-    with bench(settings=settings) as rig:
-        rig.m1.configure()
-        rig.m1._sdo.download(0x6087, 0, 5000)  # 5000 per mille/s: 50 per mille, 30 Nm, in one period of 10 ms
-        rig.m1.arm()
-        torques_nm = []
-        for _ in range(4):
-            rig.cycle(guarded(75.0, 6.0))
-            torques_nm.append(rig.rig.torque_nm[0])
-        assert torques_nm == pytest.approx([36.0, 66.0, 81.0, 81.0])
 
 
 def test_changed_mapping_in_the_eds_is_configured_and_used(tmp_path: Path) -> None:
@@ -147,35 +111,11 @@ def test_changed_mapping_in_the_eds_is_configured_and_used(tmp_path: Path) -> No
         assert rig.m1.check() == ()
 
 
-def test_rpdo_that_maps_more_than_the_command_is_mapped_anew(tmp_path: Path) -> None:
-    eds = tmp_path / "more.eds"
-    text = data_file("inverter.eds").read_text()
-    sub0, sub3 = "[1600sub0]\nParameterName=Number of mapped objects", "[1600sub3]"
-    extra = "[1600sub4]\nParameterName=Mapped object 4\nDataType=0x7\nAccessType=rw\nDefaultValue=0x60600008\n\n"
-    head, tail = text.split(sub0)
-    eds.write_text(head + sub0 + tail.replace("DefaultValue=3", "DefaultValue=4", 1).replace(sub3, extra + sub3))
-    with bench(settings=replace(M1, eds_path=eds), simulated=replace(SIMULATED_M1, eds_path=eds)) as rig:
-        (remark,) = rig.m1.remarks()
-        assert "0x6060:00 (8 bit)], a run gives it [COB-ID 0x205, transmission type 1, maps 0x6040:00" in remark
-        assert rig.m1.check() == ()
-        rig.m1.configure()
-        assert rig.m1.remarks() == ()
-
-
 def test_tpdo_of_another_length_is_a_violation(armed: Bench) -> None:
     with armed.intruder() as bus:
         bus.send(frame(0x185, bytes(5)))
         with pytest.raises(ProtocolViolation, match=r"frame of 5 bytes, expected 8.*configure it again"):
             repeat(armed.m1.raise_if_faulted)
-
-
-def test_tpdo_before_configuring_is_left_alone(healthy: Bench) -> None:
-    """A drive that is operational with another mapping sends frames this program can't read yet."""
-    with healthy.intruder() as bus:
-        bus.send(frame(0x185, bytes(5)))
-    healthy.m1.check()
-    healthy.m1.raise_if_faulted()
-    assert healthy.m1.latest is None
 
 
 def test_absent_node_is_a_timeout_everywhere() -> None:

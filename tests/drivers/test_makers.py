@@ -1,5 +1,6 @@
 """Every maker's drive by its data sheet: checked, a rig file written, simulated, driven; and mutants of each file."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,8 @@ from drivers.canopen.can_link import CanLink
 from drivers.canopen.pdo_map import COB_ID_INVALID
 from drivers.capability.carrier import RPDO
 from drivers.capability.plan import plan_drive
-from drivers.datasheet.file import EdsFile
+from drivers.datasheet.file import Commissioning, EdsFile, read_commissioning
+from drivers.datasheet.text import Severity, read_eds_text
 from drivers.eds_check import check_eds
 from drivers.errors import ConfigMismatch
 from drivers.inverter.inverter import Inverter
@@ -18,7 +20,23 @@ from hil.config.rig_file import read_rig
 from hil.rig.build import inverter_settings, open_devices
 from hil.rig.pacing import FREE_PATIENCE_S
 from tests.benchmarks.data_sheets import RAN, REFUSED, maker_files, mutant_verdicts, verdict
-from tests.drivers.maker_files import COMPLETE, MAKERS, U8, U32, Entry, Maker, pdo, pdos
+from tests.chosen import one_in
+from tests.drivers.maker_files import (
+    COMPLETE,
+    EPOS_DCF,
+    FIXED,
+    I8,
+    I16,
+    MAKERS,
+    U8,
+    U16,
+    U32,
+    Entry,
+    Maker,
+    fixed,
+    pdo,
+    pdos,
+)
 from tests.drivers.maker_rig import drive, written_rig
 from tests.real.conftest import real_recording
 from tests.rig.serving import changed, served
@@ -60,6 +78,7 @@ def test_driven_without_a_flag_and_with_its_prbs_apart(maker: Maker, tmp_path: P
     assert np.abs(reference).max() > prbs.max()  # the base torque is next to it
 
 
+@pytest.mark.campaign
 @makers("complete", "pre-defined PDOs", "simpliq")
 def test_mutants_run_or_are_refused_by_line(maker: Maker, tmp_path: Path) -> None:
     eds = written(maker, tmp_path)
@@ -91,25 +110,6 @@ def test_commands_of_a_new_user(tmp_path: Path, capsys: pytest.CaptureFixture[st
     assert str(accepted["rpdo_deadline"]) == "accepted by A. Nyone: a relay of its own"
 
 
-def test_on_a_vehicle_guesses_are_comments(tmp_path: Path) -> None:
-    eds, rig = written(MAKERS["technosoft"], tmp_path), tmp_path / "rig.toml"
-    options = "--plc 10.0.0.1:502 --product-code 1 --rated-torque-nm 10 --torque-limit-nm 5 --inertia-kg-m2 1"
-    arguments = ["rig", "new", str(rig), "--eds", str(eds), "--yes", "--speed-rad-s", "9", *options.split()]
-    assert command(arguments) == 0
-    table = read_rig(rig).inverters.m1
-    assert (table.accepted.by_name, table.speed_unit) == ({}, None)
-    assert table.option_codes.abort_connection == 2
-    assert rig.read_text().count("# accepted.rpdo_deadline = ") == 2
-
-
-def test_file_of_no_use_is_refused_with_its_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    eds = written(COMPLETE.but(0x6071), tmp_path)
-    rig = tmp_path / "rig.toml"
-    assert command(["rig", "new", str(rig), "--eds", str(eds), "--simulated", "--yes"]) == 2
-    assert "expected target torque 0x6071:00" in capsys.readouterr().err
-    assert not rig.exists()
-
-
 def test_dcf_gives_node_id_and_bit_rate(tmp_path: Path) -> None:
     eds, rig = written(MAKERS["epos, commissioned"], tmp_path), tmp_path / "rig.toml"
     options = "--plc 10.0.0.1:502 --vendor-id 1 --product-code 1 --rated-torque-nm 10 --torque-limit-nm 5"
@@ -118,29 +118,6 @@ def test_dcf_gives_node_id_and_bit_rate(tmp_path: Path) -> None:
     read = read_rig(rig)
     assert (read.inverters.m1.node_id, read.inverters.m2.node_id) == (1, 2)
     assert read.can.url == "socketcan:can0?bitrate=250000"
-
-
-def test_dcf_device_and_rig_file_are_compared(tmp_path: Path) -> None:
-    """Rated torque and node id are not the DCF's; its option code is written, for somebody chose it."""
-    rig = written_rig(written(MAKERS["epos, commissioned"], tmp_path), tmp_path)
-    with served(rig) as (_, at), open_devices(at, FREE_PATIENCE_S) as devices:
-        assert [str(each) for each in devices.m1.commissioned()] == [
-            "object 6076 0x6076:00: DCF 512871, device 600000, rig file 600000"
-        ]
-        assert [each.what for each in devices.m2.commissioned()] == ["node id", "object 6076 0x6076:00"]
-        devices.m1._sdo.download(0x6007, 0, 1)
-        assert [each.found for each in devices.m1.check()] == ["1"]
-        devices.m1.configure()
-        assert devices.m1._sdo.upload(0x6007) == 3
-
-
-def test_what_is_by_the_node_id_holds_for_every_node(tmp_path: Path) -> None:
-    path = written(MAKERS["epos, commissioned"], tmp_path)
-    for node_id in (1, 2):
-        sheet = EdsFile(path, node_id).sheet
-        assert sheet.value(0x1014) == 0x80 + node_id
-        assert plan_drive(sheet).pdos(RPDO)[0].layout.cob_id == 0x200 + node_id
-        assert sheet.value(0x1400, 2) == 1
 
 
 def test_parameter_value_says_nothing_in_an_eds(tmp_path: Path) -> None:
@@ -193,35 +170,6 @@ def test_mapping_with_little_room_carries_the_sum(room: int, tmp_path: Path) -> 
     assert drive(path, tmp_path, SHORT).flagged == 0
 
 
-def test_multiplexed_pdo_and_one_of_another_type_are_passed_over(tmp_path: Path) -> None:
-    odd = {**COMPLETE.objects[0x1600], 0: Entry(U8, default="0xFE")}  # type: ignore[dict-item]
-    typed = {**COMPLETE.objects[0x1A00], 0: Entry(U32, default="1")}  # type: ignore[dict-item]
-    path = written(COMPLETE.having({0x1600: odd, 0x1A00: typed}), tmp_path)
-    plan = plan_drive(EdsFile(path, 1).sheet)
-    assert [carrier.layout.mapping_index for carrier in plan.carriers] == [0x1600, 0x1A01]
-    assert drive(path, tmp_path, SHORT).flagged == 0
-
-
-@pytest.mark.parametrize("gone", [0x1601, 0x1401, 0x1801, 0x1A01])
-def test_pdo_parameter_without_the_other_is_no_hindrance(gone: int, tmp_path: Path) -> None:
-    """The library looks for the second wherever the first is."""
-    assert drive(written(COMPLETE.but(gone), tmp_path), tmp_path, SHORT).flagged == 0
-
-
-def test_offset_of_no_known_type_is_not_written_either(tmp_path: Path) -> None:
-    odd = COMPLETE.having({0x60B2: Entry(0x99, "rww", "0", 1)})
-    assert drive(written(odd, tmp_path), tmp_path, SHORT).flagged == 0
-
-
-def test_object_of_no_known_kind_is_no_hindrance(tmp_path: Path) -> None:
-    head = "[1601]\nParameterName=object 1601\nObjectType={}\n"
-    text = COMPLETE.text()
-    assert head.format("0x9") in text
-    path = tmp_path / "drive.eds"
-    path.write_text(text.replace(head.format("0x9"), head.format("-1")))
-    assert drive(path, tmp_path, SHORT).flagged == 0
-
-
 @pytest.mark.parametrize(
     "name", ["elmo_gold.dcf", "epos4_50_15.dcf", "sevcon_gen4.eds", "technosoft_ipos.eds", "yiyou.eds"]
 )
@@ -237,3 +185,114 @@ def test_every_file_of_the_folder_and_its_mutants(tmp_path: Path) -> None:
         found = {"": verdict(eds, tmp_path, 400)} | dict(mutant_verdicts(eds, tmp_path, 100, 1, 400))
         missed |= {f"{eds.name} {each}": what for each, what in found.items() if what not in (RAN, REFUSED)}
     assert missed == {}
+
+
+SHORT_RUN = 20
+
+
+def without_sections(pattern: str) -> Maker:
+    return COMPLETE.but(habit=lambda text: re.sub(rf"(?ms)^\[({pattern})\]\n.*?(?=^\[)", "", text))
+
+
+FOR_GOOD = {0: Entry(U8, "ro", "2"), 1: Entry(U32, "const", "$NODEID+0x200"), 2: Entry(U8, default="255")}
+"""Communication parameter whose identifier can't be written, as in Elmo SimplIQ drives."""
+
+USABLE = {
+    "spaces in formulas": COMPLETE.but(habit=lambda text: text.replace("$NODEID+", "$NODEID + ")),
+    "commands that can only be written": COMPLETE.having(
+        {index: Entry(kind, "wo", "", 1) for index, kind in {0x6040: U16, 0x6060: I8, 0x6071: I16, 0x60B2: I16}.items()}
+    ),
+    "heartbeat consumer that can't be read back": COMPLETE.having(
+        {0x1016: {0: Entry(U8, "ro", "1"), 1: Entry(U32, "wo")}}
+    ).but(lines=("accepted.heartbeat_consumer", "accepted.rpdo_deadline")),
+    "max torque left free": COMPLETE.having({0x6072: Entry(U16, "rww", "0", 1)}),
+    "SYNC left blank": COMPLETE.having({0x1005: Entry(U32)}),
+    "no device type and error register": COMPLETE.but(0x1000, 0x1001),
+    "no sub-index 0": without_sections("1018sub0|140[01]sub0|180[01]sub0"),
+    "mapped, and PDOMapping is 0": FIXED.but(habit=lambda text: text.replace("PDOMapping=1", "PDOMapping=0")),
+    "default beyond its limit": COMPLETE.but(
+        habit=lambda text: text.replace("DefaultValue=1000\n", "DefaultValue=1000\nHighLimit=9\n")
+    ),
+    "few mapping entries listed": COMPLETE.having(
+        {
+            **pdos(0x1400, pdo("$NODEID+0x200", "255", room=1), pdo("$NODEID+0x300", "255", room=2)),
+            **pdos(0x1800, pdo("$NODEID+0x180", "255", room=1), pdo("$NODEID+0x280", "255", room=2)),
+        }
+    ),
+    "identifiers of 29 bits, all the same": COMPLETE.having(
+        {**pdos(0x1400, pdo("0x20000201", "255")), **pdos(0x1800, pdo("0x20000201", "255"))}
+    ).but(0x1401, 0x1601, 0x1801, 0x1A01),
+    "identifiers for good, and a blank mapping": COMPLETE.having(
+        {
+            0x1400: FOR_GOOD,
+            0x1800: FOR_GOOD | {1: Entry(U32, "ro", "$NODEID+0x40000180")},
+            0x1A00: {n: Entry(U32 if n else U8) for n in range(9)},
+        }
+    ),
+    "no identifier, by the node id": COMPLETE.having(
+        {**pdos(0x1400, pdo("$NODEID+0x80000000", "255")), **pdos(0x1800, pdo("$NODEID+0x80000000", "255"))}
+    ),
+}
+
+REFUSED_ODD = {
+    "identifier of another node for good": (
+        COMPLETE.having({0x1400: FOR_GOOD | {1: Entry(U32, "const", "0x201")}}).but(0x1401, 0x1601),
+        "0x1400:01 can not be written and has not COB-ID 0x27F",
+    ),
+    "fixed command with a speed": (
+        COMPLETE.having({0x1600: fixed("0x60400010", "0x60710010", "0x60FF0020")}).but(0x1401, 0x1601),
+        "one RPDO or several that map 0x6040, 0x6071",
+    ),
+    "mapping that can't be read": (
+        COMPLETE.but(0x1801, 0x1A01).having({0x1A00: {n: Entry(U32 if n else U8, "wo") for n in range(9)}}),
+        "one TPDO or several",
+    ),
+    "65 mapped objects": (
+        COMPLETE.but(0x1801, 0x1A01).having({0x1A00: {0: Entry(U8, "const", "65"), 1: Entry(U32, "const")}}),
+        "0x1A00:00 is 65: not allowed, at most 64",
+    ),
+}
+
+
+def written_odd(maker: Maker, folder: Path) -> Path:
+    path = folder / f"drive{maker.suffix}"
+    path.write_text(maker.text(), encoding="latin-1")
+    return path
+
+
+@pytest.mark.parametrize("name", one_in(3, USABLE))
+def test_what_changes_nothing_is_no_hindrance(name: str, tmp_path: Path) -> None:
+    path = written_odd(USABLE[name], tmp_path)
+    report = check_eds(path)
+    assert report.usable, [str(each) for each in report.findings if each.severity is Severity.ERROR]
+    assert tuple(line.key for line in report.lines) == USABLE[name].lines
+    driven = drive(path, tmp_path, SHORT_RUN)
+    assert (driven.recorded, driven.flagged, driven.before, driven.after) == (SHORT_RUN, 0, (), ())
+
+
+@pytest.mark.parametrize("name", REFUSED_ODD)
+def test_what_does_is_said_with_its_line(name: str, tmp_path: Path) -> None:
+    maker, said = REFUSED_ODD[name]
+    errors = [each for each in check_eds(written_odd(maker, tmp_path)).findings if each.severity is Severity.ERROR]
+    assert any(said in str(each) and each.line is not None for each in errors), [str(each) for each in errors]
+
+
+@pytest.mark.parametrize(
+    ("node", "rate", "read"),
+    [
+        ("0x7F", "0xFA", Commissioning(127, 250, "front")),
+        ("0", "1000", Commissioning(None, 1000, "front")),
+        ("128", "250000", Commissioning(None, None, "front")),
+        ("", "250 kbit", Commissioning(None, None, "front")),
+    ],
+)
+def test_commissioning_that_can_not_be_is_left_out_and_reported(
+    node: str, rate: str, read: Commissioning, tmp_path: Path
+) -> None:
+    text = EPOS_DCF.text().replace("NodeID=1", f"NodeID={node}").replace("Baudrate=250", f"Baudrate={rate}")
+    path = tmp_path / "drive.dcf"
+    path.write_text(text)
+    assert read_commissioning(read_eds_text(path)) == read
+    reported = [each.place for each in check_eds(path).findings if each.place.startswith("[DeviceComissioning]")]
+    wrong = [("NodeID", node and read.node_id is None), ("Baudrate", read.bit_rate_kbit_s is None)]
+    assert reported == [f"[DeviceComissioning] {key}" for key, is_wrong in wrong if is_wrong]

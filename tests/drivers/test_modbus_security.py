@@ -46,20 +46,6 @@ def test_a_file_that_is_not_there_is_named(missing: str, tmp_path: Path) -> None
         client_context(credentials)
 
 
-def test_a_file_that_is_no_certificate_is_named(tmp_path: Path) -> None:
-    text = tmp_path / "text.pem"
-    text.write_text("hello", "utf-8")
-    with pytest.raises(ConfigMismatch, match=r"^ca \(.*text\.pem\): expected PEM files"):
-        client_context(replace(Authority(tmp_path).issue("client"), ca=text))
-
-
-def test_a_key_of_another_certificate_is_refused(tmp_path: Path) -> None:
-    authority = Authority(tmp_path)
-    one, other = authority.issue("one"), authority.issue("other")
-    with pytest.raises(ConfigMismatch, match=r"one\.pem, .*other\.key\): expected PEM files that belong together"):
-        client_context(replace(one, key=other.key))
-
-
 def test_a_key_with_a_password_is_refused_and_nobody_is_asked(tmp_path: Path) -> None:
     hidden = Authority(tmp_path).issue("client", password=b"secret")
     with pytest.raises(ConfigMismatch, match="expected a private key without a password"):

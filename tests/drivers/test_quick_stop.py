@@ -37,16 +37,6 @@ def test_quick_stop_ends_as_its_option_code_has_it(code: int, state: PowerState)
         rig.m1.disarm()
 
 
-def test_command_still_waiting_for_sync_does_not_survive_it() -> None:
-    with bench() as rig:
-        running(rig)
-        rig.m1.command(guarded(300.0))
-        rig.m1.quick_stop()
-        for _ in range(3):
-            rig.cycle()
-        assert rig.rig.torque_nm[0] == 0.0
-
-
 def test_drive_that_does_not_leave_operation_is_reported() -> None:
     with bench() as rig:
         running(rig)

@@ -5,7 +5,6 @@ from pathlib import Path
 
 import pytest
 
-from drivers.errors import ConfigMismatch
 from drivers.plc.register import RegisterKind
 from drivers.plc.register_map import (
     ENUMS,
@@ -119,27 +118,3 @@ def test_what_is_not_toml_is_refused(content: bytes, problem: str, tmp_path: Pat
     path.write_bytes(content)
     with pytest.raises(RegisterMapError, match=problem):
         load_register_map(path)
-
-
-def test_a_map_that_is_not_there_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(RegisterMapError, match="expected a readable file"):
-        load_register_map(tmp_path / "none.toml")
-
-
-def test_a_map_the_driver_can_t_use_is_refused_with_all_reasons(tmp_path: Path) -> None:
-    path = changed(
-        tmp_path,
-        (r"\[registers.plc_count\]", "[registers.plc_counter]"),
-        (r"open = 0, closed = 1", "open = 0, closed = 1, ajar = 2"),
-        (r'(\[registers.prbs_seed\].*?)access = "read_write"', r'\1access = "read"'),
-        (r'(\[registers.host_count\].*?)type = "uint16"', r'\1type = "int16"'),
-    )
-    with pytest.raises(ConfigMismatch) as refusal:
-        require_usable(load_register_map(path))
-    for reason in (
-        "expected a register plc_count, there is none",
-        "clutch: expected names out of closed, open, got ajar",
-        "prbs_seed: expected access read_write, got read",
-        "host_count: expected type uint16 or uint32, got int16",
-    ):
-        assert reason in str(refusal.value)

@@ -8,7 +8,7 @@ import pytest
 from drivers.errors import ConfigMismatch, DeviceFault
 from drivers.inverter.cia402 import PowerState
 from drivers.inverter.settings import Acceptance
-from hil.simulator.faults import FaultAtStep, InverterFaults
+from hil.simulator.faults import InverterFaults
 from tests.drivers.can_bench import M1, SIMULATED_M1, Bench, bench
 from tests.drivers.eds_bench import without
 
@@ -38,15 +38,6 @@ def test_every_way_to_abort_the_connection_is_proved_and_a_fault_it_makes_is_res
         assert rig.m1.prove_stop(PERIOD_S) == ()
         assert rig.m1._power.state() is PowerState.SWITCH_ON_DISABLED
         assert rig.m1.fault() is None
-
-
-def test_drive_can_be_used_after_the_proof() -> None:
-    with bench(settings=QUICK) as rig:
-        rig.m1.prove_stop(PERIOD_S)
-        rig.m1.configure()
-        rig.m1.arm()
-        assert rig.cycle().state is PowerState.OPERATION_ENABLED
-        rig.m1.raise_if_faulted()
 
 
 def test_drive_that_does_nothing_without_its_host_is_found() -> None:
@@ -105,27 +96,6 @@ def test_what_the_drive_lacks_is_refused_until_somebody_accepts_it_by_name(
     assert protections[name].proof == seen
     other = {"rpdo_deadline": "heartbeat_consumer", "heartbeat_consumer": "rpdo_deadline"}[name]
     assert protections[other].proof.startswith("proven after 0.")
-
-
-def test_drive_that_stops_by_itself_without_a_deadline_is_reported(tmp_path: Path) -> None:
-    """It has none of CiA 301, but a watchdog of its maker's."""
-    eds = tmp_path / "own.eds"
-    eds.write_text(without("1400sub5"))
-    settings = replace(QUICK, eds_path=eds, accepted={"rpdo_deadline": Acceptance("A. Nyone", "own watchdog")})
-    with bench(settings=settings, simulated=replace(SIMULATED_M1, eds_path=eds)) as rig:
-        node = rig.rig._m1
-        assert node is not None
-        rig.m1._send_command = lambda command: node._device.fail(0xFF01)  # type: ignore[assignment]
-        assert rig.m1.prove_stop(PERIOD_S) == ()
-        [own] = [each for each in rig.m1.protections() if each.name == "drive_watchdog"]
-    assert own.proof.startswith("proven without commands and SYNC:")
-    assert "power state fault" in own.proof
-
-
-def test_drive_in_fault_is_not_proved() -> None:
-    with bench(InverterFaults(fault=FaultAtStep(0, 0x2310)), settings=QUICK) as rig:
-        with pytest.raises(DeviceFault, match="power state is fault, error code 0x603F is 0x2310"):
-            rig.m1.prove_stop(PERIOD_S)
 
 
 def test_drive_that_somebody_drives_is_left_alone() -> None:

@@ -54,11 +54,6 @@ def test_both_hypotheses_are_there(known: Open) -> None:
     assert [each.name for each in known.candidates] == NAMES
 
 
-def test_nothing_is_distinguished_from_itself(known: Open) -> None:
-    one = known.candidates[0]
-    assert distance(one, one, known.line, driven(known, 60.0)) == pytest.approx(0.0, abs=1e-6)
-
-
 def test_more_time_tells_more_and_the_right_one_becomes_surer(known: Open) -> None:
     short, long = (expected(known, driven(known, 60.0, cycles)) for cycles in (200, 800))
     assert 0.5 < short.right < long.right <= 1.0

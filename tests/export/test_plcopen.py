@@ -1,10 +1,7 @@
 """The exported PLCopen XML: valid against the TC6 schema, and the same program when another library reads it."""
 
-from collections.abc import Iterator
-from dataclasses import fields, is_dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -14,13 +11,14 @@ from estimator.identification.linear_model import Orders
 from estimator.identification.settings import Settings
 from hil.export import Tc6
 from hil.export.plc_estimator import PlcEstimator
-from hil.export.plcopen import Project, plcopen_xml, project
+from hil.export.plcopen import plcopen_xml, project
 from hil.export.structured_text import Precision
+from tests.chosen import one_in
 from tests.export.drives import bad_drive
 from tests.export.iec.parser import Parser
 from tests.export.iec.to_c import to_c
 from tests.export.plc_runs import assert_equal_bits, execute, exported, on_host
-from tests.export.plcopen_reading import as_structured_text, read_plcopen, text_of
+from tests.export.plcopen_reading import as_structured_text, read_plcopen
 
 SCHEMA = etree.XMLSchema(etree.parse(Path(__file__).parent / "schema" / "tc6_xml_v201.xsd"))
 WRITTEN = datetime(2026, 2, 3, 4, 5, 6, tzinfo=UTC)
@@ -51,7 +49,7 @@ def test_it_is_valid_against_the_schema(estimator: PlcEstimator, precision: Prec
 
 
 @pytest.mark.parametrize("precision", Precision)
-@pytest.mark.parametrize("estimator", ESTIMATORS, ids=range(len(ESTIMATORS)))
+@pytest.mark.parametrize("estimator", one_in(3, ESTIMATORS), ids=range(len(ESTIMATORS)))
 def test_another_library_reads_the_same_program(estimator: PlcEstimator, precision: Precision) -> None:
     read = as_structured_text(read_plcopen(document(estimator, precision)))
     assert to_c(Parser(read).blocks()) == to_c(Parser(exported(estimator, precision)).blocks())
@@ -63,40 +61,8 @@ def test_what_it_read_is_executed_and_equals_the_host_to_the_bit(tmp_path: Path)
     assert_equal_bits(execute(read, bad_drive(), tmp_path), on_host(estimator, bad_drive()))
 
 
-def test_what_it_read_has_every_text() -> None:
-    written = project(PlcEstimator(L=L))
-    read = read_plcopen(plcopen_xml(written, WRITTEN))
-    assert sorted(_texts(read)) == sorted(_bodies_and_comments(written))
-    assert read.content_header.comment == written.comment
-
-
-def test_the_header_says_what_wrote_it_and_when() -> None:
-    header = read_plcopen(document(PlcEstimator())).file_header
-    assert (header.product_name, header.creation_date_time.to_datetime()) == ("hil", WRITTEN)
-
-
 def test_the_versions_differ_in_the_namespace_alone() -> None:
     written = project(PlcEstimator(L=L))
     newer, older = (plcopen_xml(written, WRITTEN, version) for version in (Tc6.V2_01, Tc6.V2_0))
     assert newer.count("tc6_0201") == 1
     assert older == newer.replace("tc6_0201", "tc6_0200")
-
-
-def _texts(part: Any) -> Iterator[str]:
-    """Yield every formatted text below a part of what was read."""
-    if isinstance(part, list):
-        for each in part:
-            yield from _texts(each)
-    elif hasattr(part, "w3_org_1999_xhtml_element"):
-        yield text_of(part)
-    elif is_dataclass(part):
-        for field in fields(part):
-            yield from _texts(getattr(part, field.name))
-
-
-def _bodies_and_comments(written: Project) -> Iterator[str]:
-    yield from (kind.comment for kind in written.types)
-    for pou in written.pous:
-        yield from (pou.comment, pou.body)
-        for section in pou.sections:
-            yield from filter(None, (section.comment, *(variable.comment for variable in section.variables)))

@@ -7,9 +7,7 @@ import numpy as np
 import pytest
 
 from estimator.identification.linear_model import Orders
-from estimator.identification.online import regression
 from estimator.identification.settings import Settings
-from estimator.signals import decimate
 from estimator.signals.record import FloatArray
 from hil.export.plc_estimator import PlcEstimator
 from hil.export.plcopen import SectionKind, project
@@ -68,6 +66,7 @@ def test_what_is_handed_over_has_a_named_type() -> None:
         for filter_L in (L, None)
     ],
 )
+@pytest.mark.campaign
 def test_an_independent_parser_reads_the_same_program(precision: Precision, filter_L: FloatArray | None) -> None:
     if find_spec("blark") is None:
         pytest.skip("blark, a parser of IEC 61131-3, is not installed: pip install blark==0.8.3")
@@ -96,15 +95,6 @@ def test_a_number_reads_back_as_itself(value: float, double: str, single: str) -
     assert Precision.SINGLE.literal(value) == single
     assert float(double) == value
     assert np.float32(single) == np.float32(value)
-
-
-def test_decimator_and_estimator_agree_on_what_is_no_measurement() -> None:
-    assert regression.LARGEST == decimate.LARGEST == Precision.DOUBLE.largest
-
-
-def test_the_origin_can_not_end_the_comment() -> None:
-    blocks = Parser(exported(PlcEstimator(L=L, origin="a *) b (* c é"))).blocks()
-    assert list(blocks) == list(POUS)
 
 
 def test_orders_are_in_the_head_for_the_reader() -> None:

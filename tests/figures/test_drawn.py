@@ -63,12 +63,6 @@ def test_every_experiment_has_its_responses_and_spare_panels_are_empty(models: l
     assert [axes.axison for axes in five.axes[8:12]] == [True, False, False, False]
 
 
-def test_without_a_reference_none_is_drawn(models: list[LocalModel]) -> None:
-    figure = drawn(lambda: responses_figure([LocalModel(models[0].record, models[0].found)]))
-    assert "truth" not in words(figure)
-    assert "truth" not in words(drawn(lambda: poles_figure([LocalModel(models[0].record, models[0].found)])))
-
-
 def test_the_map_shows_the_models_their_third_order_and_the_dominant_pole(models: list[LocalModel]) -> None:
     figure = drawn(lambda: poles_figure(models))
     assert "dominant pole" in words(figure)
@@ -81,6 +75,7 @@ def test_the_map_shows_the_models_their_third_order_and_the_dominant_pole(models
     assert close.get_ylim()[0] < pole.imag < close.get_ylim()[1]
 
 
+@pytest.mark.campaign
 def test_the_same_data_make_the_same_bytes_whatever_the_users_settings(
     models: list[LocalModel], tmp_path: Path
 ) -> None:

@@ -42,10 +42,6 @@ def test_a_level_road_without_wind_takes_what_the_laws_say() -> None:
     assert loads(CALM, count=3) == pytest.approx(force_n * BUS.metres_per_rad)
 
 
-def test_at_standstill_nothing_rolls() -> None:
-    assert loads(CALM, speed_rad_s=0.0, count=1) == pytest.approx(0.0)
-
-
 @pytest.mark.parametrize(
     ("changed", "spread_nm"),
     [({"slope_rms": 0.003}, 0.003 * BUS.mass_kg * GRAVITY_M_S2 * BUS.metres_per_rad), ({"roughness_nm": 8.0}, 8.0)],
@@ -86,6 +82,7 @@ def test_a_driver_corrects_with_a_lag_and_ends_no_cruise() -> None:
     assert moved.max() > 1.0
 
 
+@pytest.mark.campaign
 def test_an_experiment_is_recorded_over_the_protocols_and_the_same_seed_makes_the_same_file(tmp_path: Path) -> None:
     conditions = draw_conditions(4, 1)[0]
     first = drive(tmp_path / "a.csv", conditions, 3.0, StopRequest())

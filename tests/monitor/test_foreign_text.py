@@ -10,7 +10,8 @@ from hil.monitor.app import MonitorApp
 from hil.monitor.messages import Began, Choice, Kind, Mark, Notice, Ready
 from hil.monitor.panel import printable
 from hil.monitor.state import LiveState
-from tests.monitor.fake_source import PERIOD_S, FakeSource, health, node, settled
+from tests.chosen import campaign
+from tests.monitor.fake_source import PERIOD_S, FakeSource, settled
 
 TEXT = "[bold]x[/]"
 WRONG = "[/red] [[x]"
@@ -35,7 +36,7 @@ def shown(*keys: str, text: str = TEXT, coming: tuple[object, ...] = ()) -> str:
     return html.unescape(re.sub(r"<[^>]*>", "", drawn[0])).replace("\xa0", " ")
 
 
-@pytest.mark.parametrize("text", [TEXT, WRONG])
+@pytest.mark.parametrize("text", [TEXT, campaign(WRONG)])
 def test_names_of_the_rig_file_and_the_folder(text: str) -> None:
     asked = shown("e", "enter", text=text)
     assert f"> {text}" in asked
@@ -44,20 +45,7 @@ def test_names_of_the_rig_file_and_the_folder(text: str) -> None:
     assert text in shown(text=text)
 
 
-@pytest.mark.parametrize("text", [TEXT, WRONG])
-def test_an_emcy_and_a_mark(text: str) -> None:
-    coming = (
-        health(node(emergency=f"EMCY 0x3220 {text}")),
-        Notice(0, Kind.EMCY, f"m1: EMCY 0x3220 {text}"),
-        Notice(0, Kind.MARK, f"{text} (at 1.00 s of the recording)"),
-    )
-    log = shown("5", coming=coming)
-    assert f"EMCY 0x3220 {text}" in log
-    assert f"{text} (at 1.00 s" in log
-    assert f"mark: {text} (at 1.00 s" in log  # the line of the last message
-    assert f"EMCY 0x3220 {text}" in shown("4", coming=coming)
-
-
+@pytest.mark.campaign
 def test_a_mark_is_sent_as_it_was_typed() -> None:
     source = FakeSource(coming=[Ready(), Began("cruise", "c.parquet", 30.0)])
     app = MonitorApp(source, LiveState("bus", PERIOD_S, None, True))

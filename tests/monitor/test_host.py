@@ -6,9 +6,10 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
-from datetime import UTC, datetime
 from multiprocessing.connection import Connection
 from pathlib import Path
+
+import pytest
 
 from drivers.canopen.can_link import CanLink
 from drivers.canopen.heartbeat import HEARTBEAT_COB_ID
@@ -17,7 +18,6 @@ from hil.monitor.host import Job, SessionStop
 from hil.monitor.messages import Ended, Health, Kind, Lost, Notice, Over, Ready, Report, Reset, Samples, Start
 from hil.monitor.opening import open_rig
 from hil.monitor.outbox import Outbox
-from hil.monitor.recorded_run import recording_path
 from hil.monitor.source import RigSource
 from hil.rig.experiments.base import Phase
 from hil.simulator.addresses import with_addresses
@@ -50,6 +50,7 @@ def await_report(source: RigSource, seen: list[Report], kind: type[Report]) -> R
     raise AssertionError(f"no {kind} in {[type(report).__name__ for report in seen]}")
 
 
+@pytest.mark.campaign
 def test_its_heartbeat_has_a_node_id_of_its_own(rig_path: Path, tmp_path: Path) -> None:
     """As ``hil monitor`` opens a rig: drives and other hosts can tell its heartbeat from that of ``hil run``."""
     rig = read_rig(rig_path)
@@ -69,6 +70,7 @@ def test_its_heartbeat_has_a_node_id_of_its_own(rig_path: Path, tmp_path: Path) 
     assert heard[rig.host_node_id] == []
 
 
+@pytest.mark.campaign
 def test_it_listens_tells_its_health_and_resets(rig_path: Path, tmp_path: Path) -> None:
     with hosted(rig_path, tmp_path) as (source, seen):
         health = await_report(source, seen, Health)
@@ -87,6 +89,7 @@ def test_it_listens_tells_its_health_and_resets(rig_path: Path, tmp_path: Path) 
     assert list(source.poll())[-1] == Ended()
 
 
+@pytest.mark.campaign
 def test_a_store_that_can_not_be_used_costs_no_recording(rig_path: Path, tmp_path: Path) -> None:
     out = tmp_path / "runs"
     out.mkdir()
@@ -108,6 +111,7 @@ def test_a_store_that_can_not_be_used_costs_no_recording(rig_path: Path, tmp_pat
     assert any(isinstance(report, Notice) and report.kind is Kind.FAULT for report in seen)
 
 
+@pytest.mark.campaign
 def test_a_bus_that_is_lost_is_named_as_a_person_knows_it(rig_path: Path, tmp_path: Path) -> None:
     seen: list[Report] = []
     with ExitStack() as stack:
@@ -140,15 +144,6 @@ def test_the_outbox_keeps_the_last_samples_and_says_how_many_are_lost() -> None:
         outbox.sample(sample(25), None)
         again = near.recv()
         assert (len(again.rows), again.lost) == (1, 0)
-
-
-def test_a_view_that_is_gone_does_not_keep_the_cycle_waiting() -> None:
-    near, far = multiprocessing.Pipe()
-    near.close()
-    with Outbox(far) as outbox:
-        for k in range(1000):
-            outbox.sample(sample(k), None)
-    assert not any(thread.name == "to the view" for thread in threading.enumerate())
 
 
 def test_a_view_that_takes_nothing_does_not_keep_the_cycle_waiting() -> None:
@@ -185,13 +180,3 @@ def test_the_end_of_a_session_ends_its_run_and_those_that_would_begin() -> None:
         assert stop.requested
     with session.of_run() as stop:
         assert stop.requested
-
-
-def test_recordings_never_share_a_name(tmp_path: Path) -> None:
-    now = datetime(2026, 1, 2, 3, 4, 5, tzinfo=UTC)
-    names = []
-    for _ in range(3):
-        path = recording_path(tmp_path, "cruise", now)
-        path.touch()
-        names.append(path.name)
-    assert names == [f"cruise-20260102-030405{suffix}.parquet" for suffix in ("", "-2", "-3")]

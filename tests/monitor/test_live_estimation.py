@@ -9,7 +9,6 @@ from hil.monitor.live_estimation import LiveEstimation
 from hil.rig.live import LiveEstimate, OnlineSetup, tracking_chain, tracking_settings
 from hil.sample import Sample, SampleFlag
 from hil.simulator.driveline import DEFAULT_BUS
-from tests.estimator.identification.tracking import roads
 from tests.estimator.identification.tracking.drives import drives
 from tests.monitor.fake_source import sample
 from tests.monitor.two_mass import PERIOD_S, driven
@@ -104,14 +103,6 @@ def test_the_history_outlives_a_run_and_the_trail_does_not(rows: list[Sample]) -
     assert seen.status == "waits for samples"
 
 
-def test_a_period_the_models_have_no_multiple_of_is_reported() -> None:
-    live = LiveEstimation(0.003)
-    live.begin()
-    live.take([sample(0)])
-    assert "no estimate" in live.look(0).status
-    assert "0.003" in live.look(0).status
-
-
 def test_without_excitation_the_estimate_is_held_and_says_so() -> None:
     record = drives(5, 1, 60.0, prbs_nm=lambda time_s: 120.0 if time_s < 40.0 else 0.0)[0]
     pairs = zip(record.total_torque_nm.tolist(), record.output.tolist(), strict=True)
@@ -125,15 +116,6 @@ def test_without_excitation_the_estimate_is_held_and_says_so() -> None:
     assert seen.resonance_hz == pytest.approx(before.resonance_hz, rel=0.005)
     assert seen.resonance_std_hz > 1.5 * before.resonance_std_hz
     assert seen.model is not None
-
-
-def test_a_model_of_noise_is_not_shown() -> None:
-    drive = roads.drive(5, 30.0, prbs_nm=lambda time_s: 0.0).record
-    pairs = zip(drive.total_torque_nm.tolist(), drive.output.tolist(), strict=True)
-    seen = fed([sample(k, torque, speed) for k, (torque, speed) in enumerate(pairs)], 100).look(0)
-    assert seen.state is TrackingState.NOT_EXCITED
-    assert np.isnan(seen.resonance_hz)
-    assert seen.model is None
 
 
 def test_the_filter_of_an_earlier_run_is_used(rows: list[Sample]) -> None:

@@ -1,23 +1,28 @@
 """Panels: what they say, and that they never say more than there is room for."""
 
+import asyncio
 import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from drivers.plc.types import ClutchState, DriveMode, PlcStatus, PlcWatchdog, PrbsSettings, PrbsSource
 from estimator.identification.tracking.alarm import Alarm, Level, TrackingState
 from hil.monitor import bus_panels, model_panels, signal_panels
 from hil.monitor import panel as head_panels
 from hil.monitor import panel as log_panel
+from hil.monitor.app import MonitorApp
 from hil.monitor.messages import Began, Kind, NodeHealth, Notice, PlcHealth, Ready, Samples
-from hil.monitor.panel import LEAST_WIDTH, Draw, drawn
-from hil.monitor.snapshot import Activity, History, Model, Snapshot
+from hil.monitor.panel import LEAST_WIDTH, Draw, LogPanel, drawn, log, log_lines
+from hil.monitor.plot import Canvas, Ring, envelope, nice_range
+from hil.monitor.snapshot import History, Model, Snapshot
 from hil.monitor.state import LiveState
 from hil.rig.experiments.base import Phase
 from hil.sample import SampleFlag
-from tests.monitor.fake_source import PERIOD_S, health, node, sample
+from tests.monitor.fake_source import PERIOD_S, FakeSource, health, node, sample, settled
 
 DRAWN: tuple[Draw, ...] = (
     signal_panels.torque,
@@ -188,26 +193,6 @@ def test_what_is_wrong_is_said_in_words(m1: NodeHealth | None, plc: PlcHealth | 
         assert "TROUBLE" in text
 
 
-def test_of_a_bus_that_is_lost_nothing_old_is_shown() -> None:
-    healthy = snapshot()
-    lost = replace(healthy, headline=replace(healthy.headline, activity=Activity.LOST))
-    for draw in (bus_panels.brief, bus_panels.full):
-        text = "\n".join(draw(lost, 80, 30))
-        assert "LOST" in text
-        assert "OK" not in text
-        assert "operation enabled" not in text
-
-
-def test_a_permit_that_is_withdrawn_is_said_so() -> None:
-    plc = PlcHealth(replace(STATUS, permissive=False, clutch=ClutchState.CLOSED), 0.05, None)
-    assert "plc series clutch closed NO PERMIT" in bus_panels.brief(snapshot(plc=plc), 40, 9)
-    assert "permissive WITHDRAWN" in "\n".join(bus_panels.full(snapshot(plc=plc), 80, 30))
-
-
-def test_the_headline_says_what_is_driven() -> None:
-    assert head_panels.headline(snapshot(), 80, 1)[0].startswith("RUNNING cruise measure 7.0 s of 30 s")
-
-
 def interrupted(n_stale: int) -> Snapshot:
     """A run whose first inverter falls silent for so many cycles."""
     live = LiveState("bus", PERIOD_S, None, can_drive=True)
@@ -217,39 +202,6 @@ def interrupted(n_stale: int) -> Snapshot:
     live.take(Samples(tuple((sample(k, 20.0, 0.1, 120.0, flag), Phase.MEASURE) for k, flag in enumerate(flags))))
     live.take(health())
     return live.snapshot()
-
-
-def test_an_estimate_that_stands_still_says_so_and_why() -> None:
-    shown = interrupted(210)
-    for width in (31, 80):
-        lines = model_panels.figures(shown, width, 5)
-        assert lines[0].endswith("STANDS STILL 2.1 s")
-        assert lines[1] == "m1 silent"
-    assert model_panels.standing(shown, 80, 1) == ["estimate: STANDS STILL 2.1 s, m1 silent"]
-    for draw in (signal_panels.torque, signal_panels.speed, signal_panels.twist):
-        assert draw(shown, 47, 5)[0].endswith("NO VALUE: m1 silent")
-
-
-def test_lost_samples_are_counted_and_do_not_hide_the_present_value() -> None:
-    shown = interrupted(10)
-    assert "2 % masked" in " ".join(model_panels.figures(shown, 80, 5))
-    assert "(m1 silent 10x)" in " ".join(model_panels.standing(shown, 80, 2))
-    assert "20.0 (" in signal_panels.torque(shown, 47, 5)[0]
-    assert "samples 98 % good in 10 s" in bus_panels.brief(shown, 31, 7)
-    assert "m1 silent 10x" in bus_panels.full(shown, 80, 22)
-
-
-def test_while_the_drives_are_armed_nothing_old_is_shown() -> None:
-    live = LiveState("bus", PERIOD_S, None, can_drive=True)
-    for report in (Ready(), health(node(n_emergencies=7))):
-        live.take(report)
-    live.starting("cruise")
-    live.take(health(node(n_emergencies=7)))  # was on its way
-    for draw in (bus_panels.brief, bus_panels.full):
-        text = "\n".join(draw(live.snapshot(), 80, 22))
-        assert "arming" in text
-        assert "OK" not in text
-        assert "answers" not in text
 
 
 @pytest.mark.parametrize(("silent_s", "reported"), [(0.5, False), (3.2, True)])
@@ -262,34 +214,86 @@ def test_a_source_that_says_nothing_is_reported(silent_s: float, reported: bool)
     assert bus_panels.full(shown, 80, 22)[0].endswith("NO NEWS 3 s" if reported else "OK")
 
 
-def test_a_long_message_says_where_the_rest_is() -> None:
-    long = replace(snapshot(), headline=replace(snapshot().headline, message="word " * 40))
-    (line,) = head_panels.message(long, 80, 1)
-    assert line.endswith("… (5: log)")
-    assert len(line) == 80
+@pytest.mark.parametrize(
+    ("x", "y", "shown"),
+    [(0, 0, "⠁"), (1, 0, "⠈"), (0, 1, "⠂"), (0, 3, "⡀"), (1, 3, "⢀")],  # Unicode: dots 1, 4, 2, 7, 8
+)
+def test_each_dot_of_a_cell(x: int, y: int, shown: str) -> None:
+    canvas = Canvas(1, 1)
+    canvas.dot(x, y)
+    assert canvas.lines() == [shown]
 
 
-def test_a_value_that_is_hardly_known_is_called_unsure() -> None:
-    shown = snapshot()
-    wild = replace(shown, estimation=replace(shown.estimation, resonance_std_hz=15.0, damping_std=1.7))
-    assert model_panels.resonance(wild, 80, 8)[0].endswith("8.00 ±30 Hz UNSURE")
-    assert model_panels.damping(wild, 80, 8)[0].endswith("0.0500 ±3.4 UNSURE")
-    history = replace(shown.estimation.history, frequency_std_hz=np.full(50, 15.0))
-    wide = replace(shown, estimation=replace(shown.estimation, history=history))
-    labels = [float(line.split("┤")[0]) for line in model_panels.resonance(wide, 80, 8) if "┤" in line]
-    assert min(labels) >= 0.0
+def test_an_envelope_shows_a_single_peak_among_many_samples() -> None:
+    y = np.zeros(10_000)
+    y[4321] = 7.0
+    found = envelope(np.linspace(0.0, 99.0, y.size), y, 100)
+    assert max(high for _, _, high in found) == 7.0
+    assert [column for column, _, _ in found] == list(range(100))
 
 
-def test_an_estimate_before_the_measured_part_waits() -> None:
+@given(st.lists(st.floats(-1e6, 1e6), min_size=1, max_size=20), st.floats(1e-3, 1e3))
+def test_an_axis_holds_all_values_and_not_much_more(values: list[float], least: float) -> None:
+    y_range = nice_range(np.array(values), least)
+    span = max(max(values) - min(values), least)
+    slack = 1e-6 * max(1.0, *(abs(value) for value in values))
+    assert y_range.low <= min(values) + slack
+    assert y_range.high >= max(values) - slack
+    assert y_range.high - y_range.low <= 1.7 * span + slack  # two steps of at most 2.5 eighths each, at most
+
+
+@given(st.integers(1, 30), st.integers(0, 200))
+def test_a_ring_keeps_the_last_rows(length: int, rows: int) -> None:
+    ring = Ring(length, 2)
+    for k in range(rows):
+        ring.append((float(k), float(-k)))
+    kept = np.arange(max(0, rows - length), rows, dtype=float)
+    np.testing.assert_array_equal(ring.rows(), np.column_stack([kept, -kept]))
+
+
+LONG = " ".join(f"word{k}" for k in range(200))
+"""Ten lines of a terminal of 80 columns, and more than a third of its page."""
+
+
+def state(*texts: str) -> LiveState:
     live = LiveState("bus", PERIOD_S, None, can_drive=True)
-    live.take(Began("cruise", "runs/cruise.parquet", 30.0))
-    live.take(Samples(((sample(0), Phase.APPROACH),)))
-    assert model_panels.figures(live.snapshot(), 31, 5)[0].endswith("not measuring yet")
+    for text in texts:
+        live.take(Notice(0, Kind.FAULT, text))
+    return live
 
 
-def test_why_there_is_no_estimate_can_be_read_in_full() -> None:
-    shown = interrupted(0)
-    reason = shown.estimation.status
-    assert len(reason) > 40
-    for draw, width, height in ((model_panels.figures, 32, 5), (model_panels.standing, 80, 2)):
-        assert reason in " ".join(" ".join(draw(shown, width, height)).split())
+def test_the_title_says_what_part_is_shown() -> None:
+    shown = state(*[LONG] * 3).snapshot()
+    n_lines = len(log_lines(shown, 80))
+    head = log(shown, 80, 11, top=4)[0]
+    assert f"lines 5 to 14 of {n_lines}" in head
+    assert "lines" not in log(shown, 80, n_lines + 1)[0]
+    assert log(state().snapshot(), 80, 5)[1] == "nothing yet"
+
+
+def shown_after(*keys: str, then: str = "") -> list[str]:
+    """Lines of the log page after keys, and after one more entry."""
+    live = state(*[f"{k} {LONG}" for k in range(5)])
+    lines: list[str] = []
+
+    async def go() -> None:
+        app = MonitorApp(FakeSource(), live, page="log")
+        async with app.run_test(size=(80, 24)) as pilot:
+            await settled(pilot)
+            await pilot.press(*keys)
+            if then:
+                live.take(Notice(0, Kind.FAULT, then))
+            await settled(pilot)
+            lines.extend(app.query_one(LogPanel).render().plain.splitlines())
+
+    asyncio.run(go())
+    return lines
+
+
+@pytest.mark.campaign
+def test_the_arrows_go_through_it_and_not_beyond() -> None:
+    first, second, last = shown_after(), shown_after("down"), shown_after(*["pagedown"] * 20)
+    assert second[1:-1] == first[2:]
+    assert last[-1].split()[-1] == "word199"
+    assert len(last) == len(first)
+    assert shown_after("pagedown", *["pageup"] * 3) == first

@@ -7,7 +7,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Protocol, cast
 
-import numpy as np
 import pytest
 
 from drivers.errors import DeviceTimeout
@@ -88,6 +87,7 @@ def drive(rig_path: Path, monkeypatch: pytest.MonkeyPatch) -> Drive:
     return run
 
 
+@pytest.mark.campaign
 def test_a_change_is_kept_next_to_the_recording_and_in_the_store(
     rows: list[Sample], drive: Drive, tmp_path: Path
 ) -> None:
@@ -115,24 +115,3 @@ def test_what_is_kept_is_what_a_replay_gives(rows: list[Sample], drive: Drive, t
     record = read_record(Path(over.recording))
     play_record(record, tracking_settings(), Pace(), lambda course, time_s: None).write(again)
     assert again.read_bytes() == Path(over.recording).with_suffix(".online.json").read_bytes()
-
-
-def test_the_filter_of_an_earlier_run_is_that_of_the_replay_too(
-    rows: list[Sample], drive: Drive, tmp_path: Path
-) -> None:
-    setup = OnlineSetup(tracking_settings(), np.array([1.0, -0.92, 0.88]))
-    over = drive(rows[:1500], tmp_path, setup)
-    assert over.recording is not None
-    again = tmp_path / "again.json"
-    play_record(read_record(Path(over.recording)), setup.settings, Pace(), lambda course, time_s: None, setup.L).write(
-        again
-    )
-    kept = Path(over.recording).with_suffix(".online.json").read_bytes()
-    assert again.read_bytes() == kept
-    assert json.loads(kept)["settings"]["filter_L"] == [1.0, -0.92, 0.88]
-
-
-def test_a_run_without_a_sample_leaves_nothing(drive: Drive, tmp_path: Path) -> None:
-    over = drive([], tmp_path / "runs")
-    assert (over.recording, over.run_id, over.alarms) == (None, None, 0)
-    assert list((tmp_path / "runs").iterdir()) == []

@@ -1,24 +1,16 @@
 """A recording or a bus trace in place of a rig."""
 
-from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-from hil.config.rig_file import read_rig
-from hil.errors import RecordingError, UsageError
+from hil.errors import RecordingError
 from hil.monitor.messages import Began, Over, Report, Samples
 from hil.monitor.opening import open_recording
 from hil.monitor.source import ReplaySource, recorded_samples
 from hil.recording.writer import RecordingWriter
-from hil.rig.build import open_devices
-from hil.rig.experiments.base import Phase
-from hil.rig.trace import BusTrace
 from hil.sample import Sample, SampleFlag
 from tests.monitor.fake_source import sample
-from tests.rig.serving import Samples as Recorded
-from tests.rig.serving import run, served
 
 SAMPLES = [sample(k, 0.5 * k, 0.1 * k, 120.0, SampleFlag(k % 7 == 3)) for k in range(100)]
 
@@ -66,23 +58,6 @@ def test_a_recording_comes_back_as_the_samples_it_is_of(tmp_path: Path, suffix: 
     assert recorded_samples(path) == (SAMPLES, {})
 
 
-def test_the_channels_of_a_recording_come_back_with_their_units(tmp_path: Path) -> None:
-    rows = [replace(row, channels=(2.0 * row.cycle, -1.0)) for row in SAMPLES]
-    units = {"speed_load_rad_s": "rad/s", "torque_shaft_nm": "Nm"}
-    with RecordingWriter(tmp_path / "r.parquet", channel_units=units) as writer:
-        for row in rows:
-            writer.append(row)
-    assert recorded_samples(tmp_path / "r.parquet") == (rows, units)
-
-
-def test_a_recording_of_the_four_columns_will_do(tmp_path: Path) -> None:
-    path = tmp_path / "r.csv"
-    path.write_text("time_s,torque_m1_nm,torque_m2_nm,speed_rad_s\n0,1,2,3\n0.01,1,2,nan\n", encoding="utf-8")
-    (first, second), _ = recorded_samples(path)
-    assert (first.torque_m1_nm, first.torque_m2_nm, first.speed_rad_s, first.prbs_nm) == (1.0, 2.0, 3.0, 0.0)
-    assert np.isnan(second.speed_rad_s)
-
-
 @pytest.mark.parametrize(
     ("rows", "said"), [("0,1,2,3\n0,1,2,3\n", "rise"), ("0,1,2,3\n", "got 1"), ("0,1,2,x\n", "column speed_rad_s")]
 )
@@ -91,19 +66,3 @@ def test_a_recording_that_can_not_be_played_is_refused(tmp_path: Path, rows: str
     path.write_text(f"time_s,torque_m1_nm,torque_m2_nm,speed_rad_s\n{rows}", encoding="utf-8")
     with pytest.raises(RecordingError, match=said):
         open_recording(path, None, 1.0, None)
-
-
-def test_a_bus_trace_is_played_with_its_rig_file_and_refused_without(rig_path: Path, tmp_path: Path) -> None:
-    trace, recorded = tmp_path / "run.blf", Recorded()
-    with served() as (_, rig), open_devices(rig) as devices, BusTrace(trace) as tap:
-        devices.link.trace_by(tap.take)
-        run(rig, devices, recorded)
-        devices.link.trace_by(None)
-    with pytest.raises(UsageError, match=r"run\.blf"):
-        open_recording(trace, None, 1.0, None)
-    opening = open_recording(trace, read_rig(rig_path), 1e6, None)
-    with opening.source:
-        reports = list(opening.source.poll())
-    rows = [row for report in reports if isinstance(report, Samples) for row in report.rows]
-    assert len(rows) > len(recorded.rows)  # what was before and after it, too
-    assert [row.torque_m1_nm for row, phase in rows if phase is Phase.MEASURE] == recorded.column("torque_m1_nm")

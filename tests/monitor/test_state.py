@@ -1,15 +1,14 @@
 """What the view knows after what it was sent."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from estimator.physics.twist import Shaft
-from hil.monitor.messages import Began, Ended, Kind, Lost, Notice, Over, Ready, Samples, outcome
-from hil.monitor.snapshot import Activity
-from hil.monitor.state import WINDOWS_S, LiveState
+from hil.monitor.messages import Began, Kind, Lost, Notice, Over, Ready, Samples
+from hil.monitor.snapshot import NO_VALUE, STANDS_STILL_S, Activity, Quality, QualityWatch
+from hil.monitor.state import LiveState
 from hil.rig.experiments.base import Phase
 from hil.sample import SampleFlag
 from hil.simulator.driveline import DEFAULT_BUS
@@ -40,25 +39,6 @@ def test_a_run_from_order_to_end() -> None:
     assert "3000 samples, 2 flagged, run 7, runs/cruise.parquet" in live.snapshot().headline.message
 
 
-def test_a_run_that_failed_says_why() -> None:
-    failed = Over("cruise", None, 0, 0, stopped=False, reason="inverter m2: no TPDO")
-    assert outcome(failed) == "cruise ENDED EARLY: inverter m2: no TPDO (nothing recorded)"
-    live = state()
-    live.take(failed)
-    assert live.snapshot().log[-1].kind is Kind.FAULT
-
-
-def test_channels_are_those_of_the_samples_with_their_names_and_units() -> None:
-    units = {"speed_load_rad_s": "rad/s", "torque_shaft_nm": "Nm"}
-    live = LiveState("bus", PERIOD_S, None, can_drive=True, channel_units=units)
-    read = [(1.0, 5.0), (2.0, math.nan)]
-    live.take(Samples(tuple((replace(sample(k), channels=read[k]), None) for k in range(2))))
-    first, second = live.snapshot().signals.channels
-    assert [(each.name, each.unit) for each in (first, second)] == list(units.items())
-    np.testing.assert_array_equal(first.values, [1.0, 2.0])
-    np.testing.assert_array_equal(second.values, [5.0, math.nan])
-
-
 def test_a_flagged_sample_is_a_gap_and_not_a_value() -> None:
     live = state()
     rows = ((sample(0, 10.0, 1.0), None), (sample(1, 999.0, 9.0, flags=SampleFlag.M1_STALE), None))
@@ -69,39 +49,12 @@ def test_a_flagged_sample_is_a_gap_and_not_a_value() -> None:
     np.testing.assert_allclose(signals.time_s, [-PERIOD_S, 0.0], atol=1e-12)
 
 
-def test_the_window_holds_what_it_says_at_every_zoom() -> None:
-    live = state()
-    live.take(Samples(tuple((sample(k), None) for k in range(8000))))
-    live.zoom(-len(WINDOWS_S))
-    spans = []
-    for window_s in WINDOWS_S:
-        signals = live.snapshot().signals
-        assert signals.window_s == window_s
-        spans.append(-signals.time_s[0])
-        live.zoom(1)
-    np.testing.assert_allclose(spans, WINDOWS_S, atol=1.01 * PERIOD_S)
-
-
 def test_a_lost_bus_is_reported_once_and_its_return_too() -> None:
     live = state()
     for report in (Ready(), Lost("no bus"), Lost("no bus"), Ready()):
         live.take(report)
     assert [notice.text for notice in live.snapshot().log] == ["no bus", "the bus is there again"]
     assert live.activity is Activity.LISTENING
-
-
-def test_the_end_stays_known() -> None:
-    live = state()
-    live.take(Ended("gone"))
-    assert live.activity is Activity.ENDED
-    assert live.ended == Ended("gone")
-    assert live.snapshot().headline.message == "gone"
-
-
-def test_samples_that_were_not_sent_are_reported() -> None:
-    live = state()
-    live.take(Samples(((sample(0), None),), lost=12))
-    assert "12 samples not shown" in live.snapshot().log[-1].text
 
 
 @pytest.mark.parametrize("kind", [kind for kind in Kind if kind is not Kind.INFO])
@@ -120,3 +73,45 @@ def test_a_recording_is_played_and_not_driven() -> None:
     assert not live.is_driving
     live.take(Over("", "cruise.csv", 3000, 0, stopped=False, reason=None))
     assert live.activity is Activity.PLAYED
+
+
+GOOD, M1, M2, LATE = SampleFlag.GOOD, SampleFlag.M1_STALE, SampleFlag.M2_STALE, SampleFlag.LATE
+
+
+def seen(*flags: SampleFlag) -> Quality:
+    """Quality after samples with these flags, at the time of the last."""
+    watch = QualityWatch(PERIOD_S)
+    for cycle, flag in enumerate(flags):
+        watch.take(sample(cycle, flags=flag))
+    return watch.look(sample(len(flags) - 1).t_ns)
+
+
+def test_reasons_are_counted_the_most_frequent_first() -> None:
+    quality = seen(GOOD, LATE, M1, M1 | M2, GOOD)
+    assert (quality.samples, quality.good) == (5, 2)
+    assert quality.reasons == "m1 silent 2x, m2 silent 1x, cycle late 1x"
+    assert quality.bad_share == pytest.approx(0.6)
+
+
+def test_a_limit_of_the_drive_is_counted_and_takes_nothing_from_the_sample() -> None:
+    quality = seen(GOOD, SampleFlag.M1_LIMITED, SampleFlag.M1_LIMITED | M2)
+    assert (quality.samples, quality.good) == (3, 2)
+    assert quality.reasons == "m1 in its internal limit 2x, m2 silent 1x"
+    assert seen(GOOD, SampleFlag.M2_LIMITED).standing_s == 0.0
+
+
+def test_the_time_without_a_good_sample_counts_until_the_next() -> None:
+    n = round(STANDS_STILL_S / PERIOD_S)
+    short, long = seen(GOOD, *[M1] * (n - 1)), seen(GOOD, *[M1] * n)
+    assert not short.stands_still
+    assert long.stands_still
+    assert long.standing_s == pytest.approx(STANDS_STILL_S)
+    assert long.why == "m1 silent"
+    assert seen(GOOD, *[M1] * n, GOOD).standing_s == 0.0
+
+
+def test_a_number_that_is_missing_without_a_flag_counts_too() -> None:
+    watch = QualityWatch(PERIOD_S)
+    assert watch.take(sample(0)) == 0
+    assert watch.take(sample(1, speed_rad_s=math.nan)) == NO_VALUE
+    assert watch.look(sample(1).t_ns).reasons == "no value 1x"

@@ -48,6 +48,7 @@ def assert_restored(terminal: Terminal) -> None:
     assert LEAVE_SCREEN in terminal.output
 
 
+@pytest.mark.campaign
 def test_a_day_at_the_rig(rig_path: Path, tmp_path: Path) -> None:
     out = tmp_path / "runs"
     with watched(rig_path, out) as (terminal, server):
@@ -120,6 +121,7 @@ def test_a_killed_view_leaves_nothing_armed(rig_path: Path, tmp_path: Path) -> N
         assert_disarmed(server.bus_url, 1, 2)
 
 
+@pytest.mark.campaign
 def test_a_terminal_that_goes_away_leaves_nothing_armed(rig_path: Path, tmp_path: Path) -> None:
     with watched(rig_path, tmp_path / "runs") as (terminal, server):
         start(terminal)
@@ -140,6 +142,7 @@ def test_a_killed_rig_process_is_reported(rig_path: Path, tmp_path: Path) -> Non
         assert "without saying that the drives are" in terminal.text.replace("\n", " ")
 
 
+@pytest.mark.campaign
 def test_a_dead_drive_ends_the_run_and_shows(rig_path: Path, tmp_path: Path) -> None:
     with watched(rig_path, tmp_path / "runs") as (terminal, server):
         start(terminal)

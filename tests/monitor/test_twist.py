@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from estimator.identification.modes.modes import two_mass_resonance
-from estimator.physics.model import DrivelineModel, Parameter, Structure
 from estimator.physics.twist import Shaft, TwistFilter, Uncertainty
 from tests.monitor.two_mass import PERIOD_S, driven
 
@@ -51,12 +50,6 @@ def test_a_gap_is_bridged_by_the_model() -> None:
     np.testing.assert_allclose(found[900:], drive.twist_rad[900:], atol=1e-4)
 
 
-def test_there_is_no_twist_before_the_first_good_sample() -> None:
-    twist = TwistFilter(SHAFT, PERIOD_S)
-    assert math.isnan(twist.step(math.nan, math.nan, okay=False))
-    assert twist.step(0.0, 60.0, okay=True) == 0.0  # a line in motion is no twisted one
-
-
 def test_k_and_c_of_a_resonance_are_those_it_is_of() -> None:
     free = replace(SHAFT, b_M=0.0, b_L=0.0)
     mode = two_mass_resonance(free.J_M, free.J_L, free.k, free.c, free.b_M, free.b_L)
@@ -64,19 +57,3 @@ def test_k_and_c_of_a_resonance_are_those_it_is_of() -> None:
     other = replace(free, k=1.0, c=1.0).with_resonance(mode)
     assert (other.k, other.c) == (pytest.approx(free.k), pytest.approx(free.c))
     assert other.source == "resonance"
-
-
-def test_the_state_stays_when_the_numbers_change() -> None:
-    drive = driven(SHAFT, 400, seed=5)
-    twist = TwistFilter(SHAFT, PERIOD_S)
-    for k in range(399):
-        twist.step(float(drive.torque_nm[k]), float(drive.speed_rad_s[k]), okay=True)
-    twist.use(SHAFT)
-    assert twist.step(float(drive.torque_nm[399]), float(drive.speed_rad_s[399]), True) == pytest.approx(
-        drive.twist_rad[399], abs=1e-9
-    )
-
-
-def test_only_two_masses_in_rotation_have_this_shaft() -> None:
-    one = DrivelineModel(Structure.ONE_MASS, parameters={"J_M": Parameter(1.0, 0.1), "b_M": Parameter(0.1, 0.1)})
-    assert Shaft.of_model(one, "one") is None

@@ -33,6 +33,7 @@ def test_a_terminal_that_is_too_small(rig_path: Path, columns: int, rows: int) -
         assert LEAVE_SCREEN not in terminal.output  # it was never taken
 
 
+@pytest.mark.campaign
 def test_a_rig_that_is_not_there(rig_path: Path, tmp_path: Path) -> None:
     with Terminal("monitor", str(rig_path), *NOWHERE, "--out", str(tmp_path / "runs")) as terminal:
         assert terminal.await_end() == 3
@@ -88,8 +89,3 @@ def test_wrong_use(
     assert run(["monitor", *(names.get(word, word) for word in arguments), *PICTURE]) == 2
     assert said in capsys.readouterr().err
     assert not Path("picture.svg").exists()
-
-
-def test_a_picture_into_a_folder_that_is_not_there(rig_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["monitor", str(rig_path), "--snapshot", "no/such/folder.svg"]) == 2
-    assert "no/such" in capsys.readouterr().err

@@ -24,6 +24,7 @@ SEED_OF_NONE = 115
 """A seed whose bus hides nothing: the quickest to diagnose."""
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("stop", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.campaign)])
 def test_an_interrupted_demo_leaves_nothing_running_and_nothing_half_written(tmp_path, stop):
     workshop, out = tmp_path / "tmp", tmp_path / "out"
@@ -49,6 +50,7 @@ def test_an_interrupted_demo_leaves_nothing_running_and_nothing_half_written(tmp
         CanLink.open(url.group())
 
 
+@pytest.mark.campaign
 def test_the_rig_file_has_the_addresses_of_this_run_and_a_device_that_differs_ends_it(tmp_path):
     demo = _Demo(Console(quiet=True), 5, tmp_path, tmp_path / "out")
     with sealed_process("--seed", "5") as sealed:

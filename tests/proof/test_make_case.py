@@ -45,14 +45,6 @@ def test_the_judge_gets_the_truth_and_fresh_recordings(folder):
     assert not np.array_equal(seen["torque_ref_nm"], fresh["torque_ref_nm"])
 
 
-def test_an_unknown_effect_is_wrong_use(tmp_path, capsys):
-    with pytest.raises(SystemExit) as exit_:
-        main(["--effect", "rust", "--seed", "1", "--out", str(tmp_path / "out")])
-    assert exit_.value.code == 2
-    assert "effect 'rust': expected one of" in capsys.readouterr().err
-    assert not (tmp_path / "out").exists()
-
-
 def test_lost_samples_are_written_as_nan_with_a_column_of_flags(tmp_path):
     specimens = (draw_specimen("lost_samples", seed) for seed in range(50))
     seed = next(s.seed for s in specimens if s.sizes["lost_samples"]["m2"] and not s.sizes["lost_samples"]["as_zero"])
@@ -64,23 +56,3 @@ def test_lost_samples_are_written_as_nan_with_a_column_of_flags(tmp_path):
     assert lost.any()
     assert np.all(table["flags"][lost] > 0)
     assert read_record(tmp_path / "case" / "run_1.csv").okay.sum() == np.count_nonzero(table["flags"] == 0)
-
-
-def test_reported_stamps_are_written_to_the_microsecond(tmp_path):
-    reported = (draw_specimen("sample_jitter", seed) for seed in range(50))
-    seed = next(s.seed for s in reported if s.sizes["sample_jitter"]["stamps_told"])
-    main(["--effect", "sample_jitter", "--seed", str(seed), "--out", str(tmp_path)])
-    record = read_record(tmp_path / "case" / "run_1.csv")
-    deviation = record.time_s - 0.01 * np.arange(3000)
-    assert 0.0005 < np.abs(deviation).max() < 0.0025
-    assert record.sample_time_s == pytest.approx(0.01, rel=1e-4)
-
-
-def test_a_right_data_sheet_can_be_asked_for_and_a_worse_one_not(tmp_path, brief):
-    assert main(["--effect", "none", "--seed", "4", "--nominal-error", "0", "--out", str(tmp_path)]) == 0
-    model = tomllib.loads((tmp_path / "case" / "model.toml").read_text())
-    true = json.loads((tmp_path / "sealed" / "truth.json").read_text())["true"]
-    for name, entry in model["parameters"].items():
-        assert entry["value"] == pytest.approx(true[name], rel=1e-5)
-    with pytest.raises(SystemExit):
-        main(["--effect", "none", "--seed", "4", "--nominal-error", "0.3", "--out", str(tmp_path)])

@@ -8,14 +8,12 @@ import pytest
 
 from estimator.physics.catalogue import EFFECTS
 from hil.config.model_file import read_model_for_recordings
-from hil.errors import UsageError
 from hil.proof import real
 from hil.proof.command import CommandFailed
 from hil.proof.real import agreement, read_real, run_real
 from hil.proof.real_files import (
     KnownValue,
     RealFileError,
-    case_folders,
     known_cases,
     read_case,
     read_truth,
@@ -97,37 +95,6 @@ def test_what_was_found_is_compared_with_what_is_known(tool, world):
     assert read_real(out) == json.loads(json.dumps([case]))
 
 
-def test_a_case_that_is_done_is_not_run_again_until_its_question_changes(tool, world):
-    room, *_ = world
-    run(world)
-    run(world)
-    assert len(tool.seen) == 1
-    model = room / "trolley" / "model.toml"
-    model.write_text(model.read_text().replace("value = 8.0", "value = 7.0"))
-    run(world)
-    assert len(tool.seen) == 2
-
-
-def test_another_truth_is_judged_anew_without_asking_again(tool, world):
-    room, *_ = world
-    run(world)
-    truth = room / "trolley" / "truth.toml"
-    truth.write_text(truth.read_text().replace("within = 0.1", "within = 0.01"))
-    (case,) = run(world)
-    assert len(tool.seen) == 1
-    assert not case["runs"][0]["agreements"][0]["within"]
-
-
-def test_a_case_that_is_not_asked_for_keeps_what_was_found(tool, world):
-    room, data, out = world
-    made_up.write_case(room, data, name="glider")
-    run(world)
-    run(world, names=["glider"])
-    assert {case["name"] for case in read_real(out)} == {"glider", "trolley"}
-    run(world)
-    assert len(tool.seen) == 2
-
-
 def test_a_command_that_fails_is_a_result_and_is_tried_again(tool, world, monkeypatch):
     def broken(arguments, folder, limit_s):
         raise CommandFailed("hil diagnose: ended with status 3")
@@ -140,15 +107,6 @@ def test_a_command_that_fails_is_a_result_and_is_tried_again(tool, world, monkey
     assert reported == [("trolley/only diagnosed", 1, 1)]
     monkeypatch.setattr(real, "run_hil", tool)
     assert run(world)[0]["runs"][0]["fault"] is None
-
-
-@pytest.mark.parametrize(
-    "text", ["{", '{"schema": "hil.real/1", "cases": []}', '{"schema": "hil.real/2", "cases": [1]}']
-)
-def test_results_of_something_else_are_refused(tmp_path, text):
-    (tmp_path / "real.json").write_text(text)
-    with pytest.raises(UsageError, match="remove it"):
-        read_real(tmp_path)
 
 
 KNOWN = KnownValue(what="drag", found="effects.aerodynamic_drag.drag_nm_s2", value=0.5, unit="x", within=0.1)
@@ -167,11 +125,6 @@ KNOWN = KnownValue(what="drag", found="effects.aerodynamic_drag.drag_nm_s2", val
 def test_a_known_value_is_sought_where_the_diagnosis_has_it(place, found, inside, within):
     got = agreement(KNOWN.model_copy(update={"found": place}), DIAGNOSIS)
     assert (got.found, got.inside, got.within) == (found, inside, within)
-
-
-def test_a_value_of_several_recordings_is_no_one_value():
-    loads = {"load_torque": {"a": {"value": 1.0}, "b": {"value": 2.0}}}
-    assert agreement(KNOWN.model_copy(update={"found": "load_torque"}), DIAGNOSIS | loads).found is None
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -212,20 +165,6 @@ def test_a_wrong_case_file_is_refused_by_key(tmp_path, before, after, reported):
     with pytest.raises(RealFileError) as caught:
         read_case(folder)
     assert reported in str(caught.value)
-
-
-def test_an_unknown_case_is_refused(world):
-    room, *_ = world
-    with pytest.raises(UsageError, match=r"glider: expected names of real recordings \(trolley\)"):
-        case_folders(["glider"], room)
-
-
-def test_a_wrong_truth_file_is_refused(world):
-    room, *_ = world
-    truth = room / "trolley" / "truth.toml"
-    truth.write_text(made_up.TRUTH.replace("effects.aerodynamic_drag.drag_nm_s2", "the drag"))
-    with pytest.raises(RealFileError, match=r"values.0.found \| expected"):
-        read_truth(room / "trolley")
 
 
 def test_a_recording_is_cut_to_its_rows_and_shown_channels_to_the_last_bit(tmp_path):

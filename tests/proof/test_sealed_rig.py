@@ -21,6 +21,7 @@ from hil.rig.plan import plan_run
 from hil.rig.session import run_plan
 from hil.rig.stop import StopRequest
 from hil.simulator.addresses import with_addresses
+from tests.chosen import campaign
 
 
 @dataclass
@@ -55,6 +56,7 @@ def test_the_devices_are_on_the_wire_and_the_truth_comes_when_asked(tmp_path):
         pass
 
 
+@pytest.mark.campaign
 def test_torque_moves_the_hidden_driveline():
     with sealed_process("--seed", "5", "--effect", "backlash") as sealed:
         rig = _rig_at(sealed)
@@ -69,6 +71,7 @@ def test_torque_moves_the_hidden_driveline():
     assert all(sample.flags == 0 for sample in samples)
 
 
+@pytest.mark.campaign
 def test_a_rig_that_has_gone_is_named():
     with sealed_process("--seed", "5") as sealed:
         sealed._pipes.process.send_signal(signal.SIGTERM)
@@ -81,7 +84,9 @@ def test_a_rig_that_has_gone_is_named():
     ("arguments", "said"),
     [
         (("--seed", "5", "--effect", "rust"), "status 2; it said: error: effect 'rust': expected one of none"),
-        (("--seed", "5", "--bus", "ws://192.0.2.1:0/"), "status 2; it said: error: address 'ws://192.0.2.1:0/'"),
+        campaign(
+            (("--seed", "5", "--bus", "ws://192.0.2.1:0/"), "status 2; it said: error: address 'ws://192.0.2.1:0/'")
+        ),
     ],
 )
 def test_a_rig_that_does_not_come_up_says_why(arguments, said):
@@ -89,7 +94,8 @@ def test_a_rig_that_does_not_come_up_says_why(arguments, said):
         pass
 
 
-@pytest.mark.parametrize("end", [pytest.param(signal.SIGINT, marks=pytest.mark.campaign), signal.SIGTERM, None])
+@pytest.mark.campaign
+@pytest.mark.parametrize("end", [signal.SIGINT, signal.SIGTERM, None])
 def test_it_ends_cleanly_by_signal_and_by_the_end_of_its_input(end):
     process = subprocess.Popen(
         [sys.executable, "-m", "hil.proof.sealed_rig", "--seed", "1"],

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import random
-import shutil
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
@@ -13,11 +12,11 @@ import pytest
 
 from hil.errors import RecordingError
 from hil.recording import RecordingWriter, Table, read_table, write_table
-from hil.recording.checksum import CHECKSUM, CHECKSUMS, data_sha256, sealed, text_sha256
-from hil.recording.description import sidecar_of
-from hil.recording.formats import FORMATS, read_metadata
+from hil.recording.checksum import CHECKSUMS, data_sha256, sealed, text_sha256
+from hil.recording.formats import FORMATS
 from hil.recording.publish import losses
 from hil.recording.table import as_text
+from tests.chosen import one_in
 from tests.full_disk import largest_file
 
 WRITABLE = [suffix for suffix, form in FORMATS.items() if form.write]
@@ -48,7 +47,7 @@ def damaged(whole: bytes, dice: random.Random) -> bytes:
     )
 
 
-@pytest.mark.parametrize("suffix", WRITABLE)
+@pytest.mark.parametrize("suffix", one_in(2, WRITABLE))
 def test_a_damaged_recording_is_refused_or_read_as_it_was(tmp_path: Path, reported: Table, suffix: str) -> None:
     path, dice = tmp_path / f"run{suffix}", random.Random(4)
     write_table(reported, path)
@@ -77,28 +76,6 @@ def read_or_refusal(path: Path) -> Table | str:
         return read_table(path)
     except RecordingError as refusal:
         return str(refusal)
-
-
-def test_a_csv_changed_by_hand_is_refused_with_both_checksums(tmp_path: Path, reported: Table) -> None:
-    path = tmp_path / "run.csv"
-    write_table(reported, path)
-    expected = read_metadata(path)[CHECKSUM]
-    table = read_table(path)
-    path.write_text(path.read_text(encoding="utf-8").replace("gear 3", "gear 9", 1), encoding="utf-8")
-    got = data_sha256({**table.columns, "gear": as_text([*table.columns["gear"].tolist()[:3], "gear 9"])})
-    with pytest.raises(RecordingError, match=rf"SHA-256 {expected[:12]}…, got (?!{got[:12]})\w+….*run\.csv\.json"):
-        read_table(path)
-    sidecar_of(path).unlink()  # the cure the message gives
-    assert read_table(path).columns["gear"][3] == "gear 9"
-
-
-def test_a_rig_file_that_was_changed_in_the_description_is_refused(tmp_path: Path, reported: Table) -> None:
-    path = tmp_path / "run.csv"
-    write_table(reported, path)
-    companion = sidecar_of(path)
-    companion.write_text(companion.read_text(encoding="utf-8").replace("bench", "bus 17", 1), encoding="utf-8")
-    with pytest.raises(RecordingError, match="expected the rig file it was recorded with, SHA-256"):
-        read_table(path)
 
 
 def test_the_checksum_knows_cells_names_and_kinds_and_nothing_else(reported: Table) -> None:
@@ -157,26 +134,11 @@ def test_a_full_disk_at_the_end_of_a_run_costs_the_description_and_no_sample(tmp
     assert read_table(tmp_path / "run.csv").n_rows == 20
 
 
-def test_a_disk_without_room_for_the_description_is_reported_before_the_first_row(tmp_path: Path) -> None:
-    writer = RecordingWriter(tmp_path / "run.csv", {"note": "x" * 100_000})
-    with pytest.raises(RecordingError, match="expected room for the recording"), largest_file(50_000), writer:
-        raise AssertionError("the run began")
-    assert list(tmp_path.iterdir()) == []
-
-
 @pytest.mark.parametrize("suffix", WRITABLE)
 def test_a_place_that_takes_no_file_is_reported(reported: Table, suffix: str) -> None:
     path = Path(f"/proc/run{suffix}")
     with pytest.raises(RecordingError, match=rf"/proc/run{suffix}: expected room for the recording, got: "):
         write_table(reported, path)
-
-
-def test_a_folder_that_can_not_be_written_is_reported(tmp_path: Path, reported: Table) -> None:
-    (tmp_path / "taken.h5").mkdir()
-    with pytest.raises(RecordingError, match="got a folder"):
-        write_table(reported, tmp_path / "taken.h5", replace=True)
-    shutil.rmtree(tmp_path / "taken.h5")
-    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize("suffix", WRITABLE)

@@ -10,8 +10,7 @@ import h5py
 import numpy as np
 import pytest
 
-from hil.errors import RecordingError
-from hil.recording import SignalsConfig, Table, read_record, read_table, write_table
+from hil.recording import Table, read_table, write_table
 from hil.recording.formats import read_metadata
 from hil.recording.mat_format import variable_names
 from hil.recording.table import as_text
@@ -109,48 +108,3 @@ def test_a_v73_file_of_matlab_is_read(theirs: Path) -> None:
     assert table.columns["on"].dtype == np.bool_
     assert dict(table.metadata) == {"gain": "35.15", "note": "lap 2"} == dict(read_metadata(theirs))
     assert {re.split("[:(]", remark)[0] for remark in table.remarks} == {"matrix", "other"}
-
-
-def test_a_v73_file_is_read_through_signals_of_a_model_file(theirs: Path) -> None:
-    signals = SignalsConfig.model_validate(
-        {"time": {"column": "t"}, "torque": [{"column": "vir", "scale": 35.15}], "position": {"column": "qm"}}
-    )
-    record = read_record(theirs, signals)
-    assert record.torque_nm[:, 0].tolist() == (35.15 * np.arange(30.0)).tolist()
-
-
-def test_an_hdf5_file_of_another_program_is_read(tmp_path: Path) -> None:
-    path = tmp_path / "theirs.h5"
-    rows = np.array([(k * 0.1, k) for k in range(6)], dtype=[("time", "f8"), ("count", "u2")])
-    with h5py.File(path, "w") as file:
-        file.attrs["vehicle"] = "bus 17"
-        file["drive/speed"] = np.arange(6.0)
-        file["drive/speed"].attrs["units"] = "rad/s"
-        file["log"] = rows
-        file["words"] = np.array([b"a"] * 6)
-        file["short"] = np.arange(2.0)
-        file["picture"] = np.zeros((4, 4))
-    table = read_table(path)
-    assert sorted(table.columns) == ["drive/speed", "log/count", "log/time", "words"]
-    assert dict(table.units) == {"drive/speed": "rad/s"}
-    assert dict(table.metadata) == {"vehicle": "bus 17"}
-    assert {re.split("[:(]", remark)[0] for remark in table.remarks} == {"picture", "short"}
-
-
-@pytest.mark.parametrize("suffix", [".h5", ".mat"])
-def test_a_description_that_is_damaged_is_refused(tmp_path: Path, mixed: Table, suffix: str) -> None:
-    path = tmp_path / f"run{suffix}"
-    write_table(mixed, path)
-    with h5py.File(path, "r+") as file:
-        name = "columns/time_s" if suffix == ".h5" else "time_s"
-        file.move(name, f"{name}_gone")
-    with pytest.raises(RecordingError, match=r"column time_s: expected it under the name time_s, got none"):
-        read_table(path)
-    with h5py.File(path, "r+") as file:
-        if suffix == ".h5":
-            file["recording_json"][()] = b"{"
-        else:
-            file["recording_json"][0, 0] = ord("[")
-    for read in (read_table, read_metadata):
-        with pytest.raises(RecordingError, match=r"expected a description hil\.recording/1 inside, got a damaged one"):
-            read(path)

@@ -10,9 +10,7 @@ import numpy as np
 import pytest
 from asammdf import MDF, Signal
 
-from hil.errors import RecordingError
-from hil.recording import SignalsConfig, Table, read_record, read_table, write_table
-from hil.recording.formats import read_metadata
+from hil.recording import Table, read_table, write_table
 
 RIG = 'name = "bench"\n\n[guard]\n  indented = 1\n'
 
@@ -41,22 +39,6 @@ def test_other_tools_find_one_timed_group_with_units_and_comments(ours: Path, ow
     assert attached["rig.toml"].decode() == RIG
 
 
-@pytest.mark.parametrize("times", [[0.0, 1.0, 1.0], [0.0, np.nan, 1.0], [2.0, 1.0, 0.0]])
-def test_a_time_that_does_not_increase_is_no_master(tmp_path: Path, times: list[float]) -> None:
-    write_table(Table(Path("a"), {"time_s": np.array(times), "x": np.arange(3.0)}), tmp_path / "a.mf4")
-    with MDF(tmp_path / "a.mf4") as mdf:
-        master = mdf.groups[0].channels[0]
-        assert (master.name, master.sync_type) == ("row", 4)
-    read = read_table(tmp_path / "a.mf4")
-    assert list(read.columns) == ["time_s", "x"]
-    np.testing.assert_array_equal(read.columns["time_s"], times)
-
-
-def test_a_recording_of_time_alone_is_kept(tmp_path: Path) -> None:
-    write_table(Table(Path("a"), {"time_s": np.arange(3.0)}), tmp_path / "a.mf4")
-    assert list(read_table(tmp_path / "a.mf4").columns) == ["time_s"]
-
-
 def foreign(path: Path) -> None:
     """Two groups of one rate, one of another, an array, and samples their own file calls invalid."""
     fast, slow = np.arange(20) * 0.01, np.arange(4) * 0.1
@@ -76,18 +58,6 @@ def foreign(path: Path) -> None:
         mdf.save(path)
 
 
-def test_a_file_of_version_3_is_read(tmp_path: Path) -> None:
-    """It has no attachments, where ours describe themselves."""
-    path = tmp_path / "old.mdf"
-    with MDF(version="3.30") as mdf:
-        mdf.append([Signal(np.arange(20.0), 0.01 * np.arange(20), name="speed", unit="rad/s")])
-        mdf.save(path)
-    table = read_table(path)
-    assert table.columns["speed"].tolist() == list(range(20))
-    assert table.units["speed"] == "rad/s"
-    assert "start_time" in read_metadata(path)
-
-
 @pytest.fixture
 def theirs(tmp_path: Path) -> Path:
     foreign(tmp_path / "theirs.mf4")
@@ -102,19 +72,6 @@ def test_of_other_programs_the_groups_of_one_time_are_the_recording(theirs: Path
     assert table.units["Motor Torque"] == "Nm"
     assert table.metadata["comment"] == "second lap"
     assert [remark.split(":")[0] for remark in table.remarks] == ["gear", "temperature"]
-
-
-def test_a_foreign_file_is_read_through_signals_of_a_model_file(theirs: Path) -> None:
-    signals = SignalsConfig.model_validate(
-        {
-            "time": {"column": "time"},
-            "torque": [{"column": "Motor Torque", "scale": 2.0}],
-            "speed": {"column": "speed"},
-        }
-    )
-    record = read_record(theirs, signals)
-    assert record.torque_nm[:, 0].tolist() == (2.0 * np.arange(20)).tolist()
-    assert np.flatnonzero(~record.okay).tolist() == [1, 6, 11, 16]
 
 
 def test_a_file_its_writer_never_finished_is_finalised_in_a_copy(tmp_path: Path) -> None:
@@ -145,16 +102,3 @@ def test_a_file_its_writer_never_finished_is_finalised_in_a_copy(tmp_path: Path)
     assert table.columns["speed"][:49].tolist() == np.arange(49.0).tolist()
     assert any("never finished" in remark for remark in table.remarks)
     assert path.read_bytes() == torn
-
-
-def test_a_file_that_can_not_be_finalised_is_refused(ours: Path) -> None:
-    content = bytearray(ours.read_bytes()[:400])
-    content[:8] = b"UnFinMF "
-    struct.pack_into("<H", content, 60, 0x01 | 0x04)
-    ours.write_bytes(content)
-    with pytest.raises(RecordingError, match=r"run\.mf4: expected "):
-        read_table(ours)
-
-
-def test_metadata_of_a_foreign_file_are_read(theirs: Path) -> None:
-    assert read_metadata(theirs)["comment"] == "second lap"

@@ -16,6 +16,7 @@ LEAST_RIGHT = 0.8
 """Share of the mistakes; what else is listed has others that fit as well."""
 
 
+@pytest.mark.campaign
 def test_no_mistake_has_a_wrong_cure_or_goes_without_a_word(tmp_path: Path) -> None:
     came = {name: judge(mistake, tmp_path).kind for name, mistake in MISTAKES.items()}
     counts = Counter(came.values())

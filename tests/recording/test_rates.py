@@ -57,14 +57,6 @@ def three_rates(tmp_path: Path) -> Path:
     return path
 
 
-def test_a_channel_of_another_group_is_not_called_missing(three_rates: Path) -> None:
-    with pytest.raises(RecordingError) as refusal:
-        read_record(three_rates, signals())
-    assert "it is in this file, but every 0.00" in str(refusal.value)
-    assert "resample_s" in str(refusal.value)
-    assert "missing" not in str(refusal.value)
-
-
 def test_groups_of_different_rates_are_brought_to_one_period_and_that_is_said(three_rates: Path) -> None:
     said: list[str] = []
     record = read_record(three_rates, signals(resample_s=0.01), tell=said.append)
@@ -89,36 +81,10 @@ def test_the_times_of_the_channels_asked_for_are_read_whatever_else_is_in_the_fi
     assert read_table(three_rates).columns.keys() == {"time", "gear", "count"}
 
 
-def test_a_name_of_two_groups_is_numbered(three_rates: Path) -> None:
-    table = read_table(three_rates)
-    assert "gear (2)" in table.elsewhere
-    assert any(remark.startswith("gear: another channel has that name") for remark in table.remarks)
-
-
-def test_look_prints_the_table_that_reads_it(three_rates: Path) -> None:
-    found = look(three_rates)
-    assert [group.period_s for group in found.survey.groups] == pytest.approx([0.01, 0.005, 0.002, 1.0, 1.0])
-    assert found.signals == (
-        "[signals]",
-        'time = { column = "time" }',
-        'torque = [ { column = "T_M1" }, { column = "T_M2" } ]   # in kNm, read times 1000',
-        'speed = { column = "n_M", at = "motor" }   # in rpm, read times 0.10472',
-        "resample_s = 0.01   # channels have times of their own",
-    )
-
-
 @pytest.fixture
 def somewhere(tmp_path: Path) -> Path:
     (tmp_path / "a.mf4").write_bytes(b"")
     return tmp_path / "a.mf4"
-
-
-def test_a_held_channel_keeps_its_last_value(somewhere: Path) -> None:
-    steps = Series(np.array([0.0, 1.0, 2.0]), np.array([1.0, 5.0, 3.0]), held=True)
-    time, columns, said = resampled(somewhere, {"gear": steps}, 0.5)
-    assert time.tolist() == [0.0, 0.5, 1.0, 1.5, 2.0]
-    assert columns["gear"].tolist() == [1.0, 1.0, 5.0, 5.0, 3.0]
-    assert said == ["gear: 1 s brought to 0.5 s, the last value held"]
 
 
 @pytest.mark.parametrize("period_s", [0.01, 0.05], ids=["as fast", "thinned"])
@@ -129,23 +95,6 @@ def test_a_gap_is_missing_samples(somewhere: Path, period_s: float) -> None:
     missing = raster[np.isnan(columns["n"])]
     assert 4.0 <= missing.min() < 4.0 + 2 * period_s
     assert 6.0 - 2 * period_s < missing.max() <= 6.0 + 2 * period_s
-
-
-@pytest.mark.parametrize(
-    ("one", "two", "period_s", "said"),
-    [
-        ([0.0, 1.0, 2.0], [5.0, 6.0, 7.0], 0.1, "s in common for resample_s"),
-        ([0.0, 2.0, 1.0], [0.0, 1.0, 2.0], 0.1, "expected times that run forward, got 1 s after 2 s"),
-        ([0.0, np.nan, np.nan], [0.0, 1.0, 2.0], 0.1, "expected two samples or more, got 1"),
-        ([0.0, 1.0, 2.0], [0.0, 1.0, 2.0], 1e-9, "expected at most 16777216 cells"),
-    ],
-)
-def test_what_can_t_be_brought_together_is_refused(
-    somewhere: Path, one: list[float], two: list[float], period_s: float, said: str
-) -> None:
-    series = {"a": Series(np.array(one), np.arange(3.0)), "b": Series(np.array(two), np.arange(3.0))}
-    with pytest.raises(RecordingError, match=said):
-        resampled(somewhere, series, period_s)
 
 
 DBC = """VERSION ""
@@ -274,29 +223,5 @@ def test_a_logged_bus_is_decoded_by_the_eds_of_its_drives(suffix: str, tmp_path:
     np.testing.assert_allclose(record.output, 9000 * k * RPM_COUNT, atol=1e-6)
 
 
-def test_an_eds_by_which_the_drive_is_not_mapped_is_named(tmp_path: Path) -> None:
-    path = log_of_two_drives(tmp_path / "bus.log", bytes(6))
-    with pytest.raises(RecordingError, match=r"0x181 has 6 bytes and 8 in the file.*give a DCF"):
-        look(path, OWN_EDS)
-
-
-def test_a_file_of_signals_takes_no_dbc(three_rates: Path, tmp_path: Path) -> None:
-    (tmp_path / "bus.dbc").write_text(DBC, encoding="ascii")
-    with pytest.raises(RecordingError, match="Leave --dbc out"):
-        read_table(three_rates, Request(dbc=tmp_path / "bus.dbc"))
-
-
 def test_the_low_pass_is_that_of_the_on_line_chain() -> None:
     assert (resample.EDGE, resample.HALF_LENGTH) == (decimate.EDGE, decimate.HALF_LENGTH)
-
-
-def test_mdf_3_under_the_name_that_inca_gives_it(tmp_path: Path) -> None:
-    time = np.arange(0.0, LONG_S, 0.01)
-    with MDF(version="3.30") as mdf:
-        mdf.append([Signal(slow(time), time, name=name, unit="Nm") for name in ("T_M1", "T_M2")])
-        mdf.append([Signal(slow(time), time + 0.001, name="n_M", unit="rpm")])
-        mdf.save(tmp_path / "drive.mdf")
-    (tmp_path / "drive.mdf").rename(tmp_path / "drive.dat")
-    record = read_record(tmp_path / "drive.dat", signals(resample_s=0.01))
-    np.testing.assert_allclose(record.torque_nm[:, 0], slow(record.time_s), atol=0.1)
-    assert look(tmp_path / "drive.dat").signals[-1] == "resample_s = 0.01   # channels have times of their own"

@@ -18,6 +18,7 @@ from hil.recording.checksum import CHECKSUMS
 from hil.recording.formats import FORMATS, read_metadata
 from hil.recording.publish import losses
 from hil.recording.table import as_text
+from tests.chosen import one_in
 
 WRITABLE = [suffix for suffix, form in FORMATS.items() if form.write]
 
@@ -47,7 +48,7 @@ def tables(draw: st.DrawFn) -> Table:
 
 @given(tables(), st.permutations(WRITABLE))
 @example(Table(Path("a.csv"), {"0": as_text([" ", ""])}), list(WRITABLE))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=15, deadline=None)
 def test_through_every_format_in_any_order_nothing_is_lost(table: Table, order: list[str]) -> None:
     with tempfile.TemporaryDirectory() as folder:
         now = table
@@ -79,7 +80,7 @@ def every_kind() -> Table:
     )
 
 
-@pytest.mark.parametrize(("first", "second"), list(itertools.product(WRITABLE, WRITABLE)))
+@pytest.mark.parametrize(("first", "second"), one_in(4, itertools.product(WRITABLE, WRITABLE)))
 def test_each_pair_of_formats_round_trips(tmp_path: Path, every_kind: Table, first: str, second: str) -> None:
     for suffix, name in ((first, "a"), (second, "b"), (first, "c")):
         every_kind = replace(every_kind, path=tmp_path / name)
@@ -91,7 +92,7 @@ def test_each_pair_of_formats_round_trips(tmp_path: Path, every_kind: Table, fir
 
 
 @given(texts=st.lists(st.text(st.characters(codec="utf-8"), max_size=4), min_size=1, max_size=4))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=12, deadline=None)
 def test_any_text_is_kept_or_refused_by_its_column(texts: list[str]) -> None:
     for suffix in WRITABLE:
         table = Table(Path("a"), {"time_s": np.arange(float(len(texts))), "word": as_text(texts)})
@@ -119,23 +120,3 @@ def test_what_is_lost_is_reported_and_the_rest_is_kept_with_a_checksum_of_its_ow
     read = read_table(tmp_path / "a.mf4")
     assert read.columns["word"].tolist() == ["a", "c"]
     assert (read.units["x"], read.metadata["note"]) == ("m", "kept")
-
-
-def test_a_plain_csv_stays_one_file(tmp_path: Path) -> None:
-    write_table(Table(Path("a"), {"x": np.arange(3.0), "word": as_text(["a", "b", "c"])}), tmp_path / "a.csv")
-    assert [path.name for path in tmp_path.iterdir()] == ["a.csv"]
-
-
-def test_metadata_that_mean_something_next_to_a_csv_are_refused_there(tmp_path: Path) -> None:
-    table = Table(Path("a"), {"x": np.arange(3.0)}, {}, {"units": "metric"})
-    with pytest.raises(RecordingError, match=r"metadata units: lost: \.csv can't hold it"):
-        write_table(table, tmp_path / "a.csv")
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_a_replaced_recording_leaves_nothing_of_the_old_one(tmp_path: Path, own_table: Table) -> None:
-    write_table(own_table, tmp_path / "a.csv")
-    plain = Table(Path("a"), {"x": np.arange(3.0)})
-    write_table(plain, tmp_path / "a.csv", replace=True)
-    assert [path.name for path in tmp_path.iterdir()] == ["a.csv"]
-    assert list(read_table(tmp_path / "a.csv").columns) == ["x"]

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from pydantic import ValidationError
 
+from estimator.errors import Cure, Implausible
 from estimator.signals.record import Location, OutputKind
-from hil.errors import RecordingError
+from hil.plants.scales import cure_lines, with_the_line_to_write
 from hil.problems import problem_lines
-from hil.recording import SignalsConfig, Table
+from hil.recording import SignalsConfig, Table, write_table
 from hil.recording.signals import to_record
 
 Changed = Callable[..., Table]
@@ -53,13 +55,6 @@ def test_each_column_has_one_role(keys: dict[str, Any], first: str, further: lis
     assert config.output()[1].column == first
     assert [each.column for each in config.further()] == further
     assert set(config.columns()) >= {first, *further}
-
-
-def test_what_an_imposed_motion_takes_may_be_named_as_the_torque_at_the_shaft() -> None:
-    config = signals(position={"column": "x"}, outputs=[{"kind": "torque", "at": "shaft", "column": "F", "scale": 3.0}])
-    assert config.names_bench
-    assert [(each.column, each.scale) for each in config.torques()] == [("F", 3.0)]
-    assert config.further() == []
 
 
 @pytest.mark.parametrize(
@@ -113,20 +108,47 @@ def test_a_measured_load_torque_is_an_input(changed: Changed) -> None:
     assert to_record(changed(), SignalsConfig()).known_load_nm == 0.0
 
 
-@pytest.mark.parametrize("column", ["torque_m1_nm", "speed_rad_s"])
-def test_a_load_torque_is_no_other_signal_too(column: str) -> None:
-    with pytest.raises(ValidationError) as caught:
-        signals(load={"column": column})
-    assert "expected a column of its own" in problem_lines(SignalsConfig, caught.value)[0]
+TABLE = Table(
+    Path("run.csv"),
+    {name: np.arange(20.0) for name in ("t", "T1", "T2", "n")},
+    {"t": "s", "T1": "kNm", "T2": "kNm", "n": "1/min"},
+)
+SIGNALS: dict[str, Any] = {
+    "time": {"column": "t"},
+    "torque": [{"column": "T1"}, {"column": "T2", "scale": 5.0}],
+    "speed": {"column": "n", "scale": 2.0},
+}
 
 
-def test_a_load_torque_without_a_number_is_refused(changed: Changed) -> None:
-    with pytest.raises(RecordingError, match="torque_ref_nm: expected a load torque, got no number"):
-        to_record(changed(torque_ref_nm=np.full(40, np.nan)), signals(**LOAD))
+@pytest.mark.parametrize(
+    ("cure", "lines"),
+    [
+        (
+            Cure("run", torque=0.6),
+            ['torque = [ { column = "T1", scale = 600 }, { column = "T2", scale = 3 } ]'],
+        ),
+        (
+            Cure("run", torque=-1.0, inputs=(1,)),
+            ['torque = [ { column = "T1", scale = 1000 }, { column = "T2", scale = -5 } ]'],
+        ),
+        (Cure("run", output=0.5), ['speed = { column = "n", at = "motor" }']),
+        (Cure("run", output=-1.0), ['speed = { column = "n", scale = -2, at = "motor" }']),
+        (Cure("run", time=1e-3), ['time = { column = "t", scale = 0.001 }']),
+        (
+            Cure("run", swapped=1),
+            ['torque = [ { column = "T1" }, { column = "n" } ]', 'speed = { column = "T2", at = "motor" }'],
+        ),
+    ],
+)
+def test_the_lines_are_those_to_write(cure: Cure, lines: list[str]) -> None:
+    assert cure_lines(cure, SignalsConfig.model_validate(SIGNALS), TABLE) == lines
 
 
-def test_a_joint_has_no_load() -> None:
-    with pytest.raises(ValidationError) as caught:
-        signals(position={"column": "x"}, force={"column": "F"}, **LOAD)
-    (line,) = problem_lines(SignalsConfig, caught.value)
-    assert "no such key next to an imposed motion" in line
+def test_the_line_is_a_note_of_the_refusal(tmp_path: Path) -> None:
+    write_table(TABLE, tmp_path / "run.csv")
+    signals = SignalsConfig.model_validate(SIGNALS)
+    with pytest.raises(Implausible) as refusal, with_the_line_to_write([tmp_path / "run.csv"], signals):
+        raise Implausible("recording run is implausible", Cure("run", torque=0.6))
+    assert refusal.value.__notes__ == [
+        'In [signals] write: torque = [ { column = "T1", scale = 600 }, { column = "T2", scale = 3 } ]'
+    ]

@@ -84,17 +84,6 @@ def test_when_too_many_wait_the_run_ends_and_keeps_them(
     assert read_table(tmp_path / "run.csv").n_rows == appended
 
 
-def test_a_run_without_a_clock_waits_for_room(tmp_path: Path, disk: Disk, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(writer, "CAPACITY", 2)
-    with RecordingWriter(tmp_path / "run.csv", patience_s=60.0) as recorder:
-        recorder.append(sample(0))
-        assert disk.began.wait(60.0)
-        recorder.append(sample(1))
-        threading.Timer(0.01, disk.continues.set).start()
-        recorder.append(sample(2))
-    assert read_table(tmp_path / "run.csv").n_rows == 3
-
-
 def test_a_disk_that_hangs_for_good_does_not_hang_the_program(
     tmp_path: Path, disk: Disk, monkeypatch: pytest.MonkeyPatch
 ) -> None:

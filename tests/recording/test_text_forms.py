@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from hil.errors import RecordingError
-from hil.recording import SignalsConfig, Table, read_record, read_table
-from hil.recording.request import FormatHints, Request
+from hil.recording import SignalsConfig, read_record, read_table
 from hil.recording.scales import wrapped_at
 from hil.recording.text_form import CellKind, kind_of
 
@@ -95,12 +94,6 @@ def test_unicode_is_recognised_under_every_suffix(tmp_path: Path, suffix: str, e
     assert read_table(path).columns["n"].tolist() == SPEED.tolist()
 
 
-def test_another_encoding_is_set_by_hand(tmp_path: Path) -> None:
-    path = written(tmp_path, text("t,T,n [°/s]"), encoding="latin-1")
-    with pytest.raises(RecordingError, match=r"line 1: expected utf-8 text, got byte 0xb0.*latin-1"):
-        read_table(path)
-
-
 def test_empty_cells_are_missing_samples(tmp_path: Path) -> None:
     rows = lines()
     rows[7] = rows[7].split(",")[0] + ",,"
@@ -110,28 +103,12 @@ def test_empty_cells_are_missing_samples(tmp_path: Path) -> None:
     assert record.torque_nm[7, 0] == TORQUE[6]
 
 
-def test_without_a_header_columns_are_called_by_number(tmp_path: Path) -> None:
-    table = read_table(written(tmp_path, text()))
-    assert list(table.columns) == ["1", "2", "3"]
-    assert table.remarks == ("no line of names: columns are called 1 to 3",)
-
-
 def test_a_name_that_comes_twice_is_numbered_so_that_neither_is_taken_by_chance(tmp_path: Path) -> None:
     path = written(tmp_path, text("t,T,T"))
     table = read_table(path)
     assert list(table.columns) == ["t", "T (1)", "T (2)"]
     with pytest.raises(RecordingError, match=r"line 1: column T comes twice or more, as T \(1\) and T \(2\)"):
         table.numeric(["T"])
-
-
-def test_a_comment_between_rows_is_skipped_and_lines_still_count(tmp_path: Path) -> None:
-    rows = lines()
-    rows[5:5] = ["# gear changed"]
-    rows[20] = rows[20].replace(".", "x", 1)
-    table = read_table(written(tmp_path, "\n".join(["# bench", "t,T,n", *rows])))
-    assert table.n_rows == ROWS
-    with pytest.raises(RecordingError, match="line 23, column t"):
-        table.numeric(["t"])
 
 
 @pytest.mark.parametrize(
@@ -159,16 +136,6 @@ def test_a_time_since_the_epoch_is_a_time(tmp_path: Path, scale: float, unit: st
     assert record.sample_time_s == 0.01
 
 
-def test_what_was_set_by_hand_counts(tmp_path: Path) -> None:
-    content = "\n".join(["a;b;c", "x;y;z", "made on;1;2", *lines(";", ","), "!end"])
-    hints = FormatHints(delimiter=";", decimal=",", header_line=2, units_line=0, comment="!")
-    with pytest.raises(RecordingError, match="line 3, column x: expected a finite number or nan, got 'made on'"):
-        read_table(written(tmp_path, content), Request(hints)).numeric(["x"])
-    hints = FormatHints(delimiter=";", header_line=0, skip_lines=3, comment="!")
-    table = read_table(written(tmp_path, content), Request(hints))
-    assert table.columns["3"].tolist() == SPEED.tolist()
-
-
 @pytest.mark.parametrize(
     ("torque", "speed", "factors"),
     [
@@ -191,32 +158,12 @@ def test_units_count_where_no_scale_is_given(
     assert sum("times" in line for line in said) == sum(factor != 1.0 for factor in factors)
 
 
-def test_a_unit_in_a_name_counts_like_one_in_a_line_of_its_own(tmp_path: Path) -> None:
-    path = written(tmp_path, text("t [ms],Drehmoment [kNm],n (1/min)"))
-    table = read_table(path)
-    assert dict(table.units) == {"t [ms]": "ms", "Drehmoment [kNm]": "kNm", "n (1/min)": "1/min"}
-
-
-def test_a_scale_that_is_given_counts_and_the_unit_does_not(tmp_path: Path) -> None:
-    path = written(tmp_path, text("t,T,n", "s,Nm,1/min"))
-    signals = SignalsConfig.model_validate(
-        {"time": {"column": "t"}, "torque": [{"column": "T"}], "speed": {"column": "n", "scale": 0.5}}
-    )
-    np.testing.assert_array_equal(read_record(path, signals).output, 0.5 * SPEED)
-
-
 @pytest.mark.parametrize(("unit", "factor"), [("%", "0.01"), ("‰", "0.001"), ("per mille", "0.001")])
 def test_a_share_of_a_rated_value_needs_a_scale_and_the_message_says_which(
     tmp_path: Path, unit: str, factor: str
 ) -> None:
     path = written(tmp_path, text("t,T,n", f"s,{unit},rad/s"))
     with pytest.raises(RecordingError, match=rf"column T: .* in {unit} of a rated value .* scale = RATED \* {factor}"):
-        read_record(path, SIGNALS)
-
-
-def test_swapped_columns_are_reported_by_their_units(tmp_path: Path) -> None:
-    path = written(tmp_path, text("t,T,n", "s,rad/s,Nm"))
-    with pytest.raises(RecordingError, match=r"column T: expected a torque, got a speed in rad/s. Are two columns sw"):
         read_record(path, SIGNALS)
 
 
@@ -246,29 +193,9 @@ def test_what_only_looks_like_a_wrap_is_left_alone(values: np.ndarray) -> None:
     assert wrapped_at(values) is None
 
 
-@pytest.mark.parametrize("bits", [8, 16])
-def test_a_wrap_is_found_at_its_number_of_bits(bits: int) -> None:
-    signed = np.round(0.1 * 2.0**bits * np.sin(np.arange(400) / 9.0))
-    assert wrapped_at(np.where(signed < 0, signed + 2.0**bits, signed) * 0.5) == 0.5 * 2.0**bits
-
-
 def stamped(tmp_path: Path, stamps: np.ndarray) -> Path:
     rows = [",".join([f"{t:.6f}", *row.split(",")[1:]]) for t, row in zip(stamps, lines(), strict=True)]
     return written(tmp_path, "\n".join(["t,T,n", *rows]))
-
-
-def test_stamps_coarser_than_the_period_are_rows_of_one_period(tmp_path: Path) -> None:
-    record = read_record(stamped(tmp_path, np.floor(np.arange(ROWS) * 0.004 / 0.01) * 0.01), SIGNALS)
-    assert record.sample_time_s == pytest.approx(0.004, rel=0.01)
-    assert (np.diff(record.time_s) > 0).all()
-
-
-def test_stamps_that_jitter_by_most_of_a_period_are_rows_of_one_period(tmp_path: Path) -> None:
-    late = np.random.default_rng(3).uniform(0.0, 0.8, ROWS) * 0.01
-    said: list[str] = []
-    record = read_record(stamped(tmp_path, TIME + late), SIGNALS, tell=said.append)
-    assert record.sample_time_s == pytest.approx(0.01, rel=0.02)
-    assert "stamps that jitter" in said[-1]
 
 
 @pytest.mark.parametrize("row", [1, 5, 30, 50, 58])
@@ -284,23 +211,6 @@ def test_a_row_left_out_is_no_jitter(tmp_path: Path, row: int) -> None:
     path = stamped(tmp_path, np.arange(ROWS) * 0.01 + (np.arange(ROWS) >= row) * 0.01)
     with pytest.raises(RecordingError, match=f"line {row + 2}, column t: expected a uniform step"):
         read_record(path, SIGNALS)
-
-
-def test_uneven_rows_are_brought_to_a_period_only_where_that_is_said(tmp_path: Path) -> None:
-    stamps = np.sort(np.random.default_rng(5).uniform(0.0, 0.6, ROWS))
-    with pytest.raises(RecordingError, match="uneven rows need resample_s"):
-        read_record(stamped(tmp_path, stamps), SIGNALS)
-    said: list[str] = []
-    path = stamped(tmp_path, stamps)
-    record = read_record(path, SIGNALS.model_copy(update={"resample_s": 0.01}), tell=said.append)
-    assert record.sample_time_s == pytest.approx(0.01)
-    assert any(line.startswith(f"{path}: T: ") and "brought to 0.01 s" in line for line in said)
-
-
-def test_a_table_is_as_it_was_where_nothing_was_recognised(tmp_path: Path) -> None:
-    table = read_table(written(tmp_path, text("t,T,n")))
-    assert isinstance(table, Table)
-    assert (table.remarks, table.first_line, dict(table.units)) == ((), 2, {})
 
 
 @pytest.mark.parametrize("line", ["1," * 3_000_000, "," * 3_000_000, "a;" * 3_000_000 + "\n1\n"])

@@ -9,7 +9,6 @@ from pathlib import Path
 
 import pytest
 
-from hil.cli.main import run as hil
 from hil.errors import RecordingError
 from hil.recording import Table, write_table
 from hil.recording.description import sidecar_of
@@ -51,21 +50,6 @@ def test_record_that_can_not_be_read_is_refused(recorded: Callable[..., Path], t
         require_even_cycles([recorded(".parquet", text)])
 
 
-def test_recording_without_a_record_passes(tmp_path: Path, own_table: Table) -> None:
-    path = tmp_path / "run.csv"
-    write_table(own_table, path)
-    require_even_cycles([path])
-
-
-def test_identify_refuses_and_writes_nothing(
-    recorded: Callable[..., Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    path = recorded(".csv", json.dumps({**EVEN, "late": 400}))
-    assert hil(["identify", str(path), "--out", str(tmp_path / "out")]) == 2
-    assert "400 late by more than half a period" in capsys.readouterr().err
-    assert not (tmp_path / "out").exists()
-
-
 def test_file_next_to_that_is_not_ours_is_left_alone(tmp_path: Path, own_table: Table) -> None:
     path = tmp_path / "run.csv"
     write_table(replace(own_table, units={}, metadata={}), path)
@@ -75,18 +59,3 @@ def test_file_next_to_that_is_not_ours_is_left_alone(tmp_path: Path, own_table: 
     with pytest.raises(RecordingError, match="describes another recording"):
         write_table(own_table, path)
     assert list(tmp_path.iterdir()) == [sidecar_of(path)]
-
-
-def test_damaged_file_next_to_is_refused_by_name(tmp_path: Path, own_table: Table) -> None:
-    path = tmp_path / "run.csv"
-    write_table(own_table, path)
-    sidecar_of(path).write_text("{", encoding="utf-8")
-    with pytest.raises(RecordingError, match=r"run\.csv\.json: expected the description"):
-        read_metadata(path)
-
-
-def test_damaged_parquet_is_refused_by_name(tmp_path: Path) -> None:
-    path = tmp_path / "run.parquet"
-    path.write_bytes(b"PAR1")
-    with pytest.raises(RecordingError, match=r"run\.parquet: expected a whole Parquet file"):
-        read_metadata(path)

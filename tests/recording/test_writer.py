@@ -5,24 +5,20 @@ from __future__ import annotations
 import math
 import subprocess
 import sys
-import threading
 import time
 from pathlib import Path
 
 import pytest
 
 from hil.errors import RecordingError
-from hil.files import part_of
 from hil.recording import RecordingWriter, columns, read_record, read_table
-from hil.recording import writer as writer_module
 from hil.recording.checksum import CHECKSUM, SAID, data_sha256, said_sha256
 from hil.recording.formats import FORMATS
 from hil.recording.own_csv import HEADER
-from hil.recording.writer import NOT_ENDED, WritingThread
+from hil.recording.writer import NOT_ENDED
 from hil.sample import Sample, SampleFlag
 from hil.store import RunStore
 from hil.store.rebuild import rebuild
-from tests.full_disk import largest_file
 
 WRITABLE = [suffix for suffix, form in FORMATS.items() if form.write]
 
@@ -107,12 +103,6 @@ def test_a_killed_run_leaves_every_appended_row_readable(tmp_path: Path, suffix:
         assert not writer.path.exists()
 
 
-def test_a_run_without_samples_leaves_no_file(tmp_path: Path) -> None:
-    with RecordingWriter(tmp_path / "run.csv"):
-        pass
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_a_recording_is_never_overwritten(tmp_path: Path) -> None:
     (tmp_path / "run.csv").write_text("mine")
     with (
@@ -121,16 +111,6 @@ def test_a_recording_is_never_overwritten(tmp_path: Path) -> None:
     ):
         pass
     assert (tmp_path / "run.csv").read_text() == "mine"
-
-
-def test_the_rest_of_a_killed_run_is_not_overwritten(tmp_path: Path) -> None:
-    (tmp_path / "run.part.csv").write_text("theirs")
-    with (
-        pytest.raises(RecordingError, match="left by a run that was killed"),
-        RecordingWriter(tmp_path / "run.csv"),
-    ):
-        pass
-    assert (tmp_path / "run.part.csv").read_text() == "theirs"
 
 
 @pytest.mark.parametrize("suffix", WRITABLE)
@@ -156,41 +136,6 @@ def test_a_recording_that_cannot_be_made_is_refused_before_the_run(tmp_path: Pat
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_place_that_cannot_be_written_is_refused_before_the_run(tmp_path: Path) -> None:
-    with (
-        pytest.raises(RecordingError, match="expected a place to write, got: File name too long"),
-        RecordingWriter(tmp_path / f"{'x' * 249}.csv"),
-    ):
-        pass
-
-
-def test_a_closed_writer_takes_no_sample(tmp_path: Path) -> None:
-    writer = RecordingWriter(tmp_path / "run.csv")
-    with pytest.raises(RecordingError, match="expected an open writer"):
-        writer.append(sample(0))
-    writer.__exit__(None, None, None)
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_a_recording_there_is_no_room_for_stays_in_the_part_file(tmp_path: Path) -> None:
-    """A folder stands where Parquet is written to before it gets its name: the write fails, as on a full disk."""
-    path = tmp_path / "run.parquet"
-    part_of(path).mkdir()
-    writer = RecordingWriter(path)
-    with pytest.raises(RecordingError, match=r"run\.parquet: expected room for the recording, got: .*run\.part\.csv"):
-        with writer:
-            writer.append(sample(1))
-    assert writer.kept == tmp_path / "run.part.csv"
-    assert read_table(writer.kept).n_rows == 1
-
-
-def test_what_is_kept_is_known_when_the_run_is_over(tmp_path: Path) -> None:
-    with RecordingWriter(tmp_path / "run.csv") as writer:
-        assert writer.kept is None
-        writer.append(sample(1))
-    assert writer.kept == tmp_path / "run.csv"
-
-
 @pytest.mark.parametrize("left", [HEADER + "\n", HEADER, HEADER[:7], ""])
 def test_a_part_file_without_a_sample_blocks_no_name(tmp_path: Path, left: str) -> None:
     (tmp_path / "run.part.csv").write_text(left)
@@ -209,23 +154,6 @@ def test_one_with_anything_else_in_it_does(tmp_path: Path, left: str) -> None:
     ):
         pass
     assert (tmp_path / "run.part.csv").read_text() == left
-
-
-def test_nor_is_one_taken_from_a_run_that_has_just_begun(tmp_path: Path) -> None:
-    with RecordingWriter(tmp_path / "run.csv") as first:
-        with pytest.raises(RecordingError, match="that continues"), RecordingWriter(tmp_path / "run.csv"):
-            pass
-        first.append(sample(0))
-    check(tmp_path / "run.csv", 1)
-
-
-def test_a_disk_that_is_full_from_the_start_is_reported_with_the_name_and_leaves_nothing(tmp_path: Path) -> None:
-    from tests.recording.test_damage import largest_file
-
-    refusal = pytest.raises(RecordingError, match=r"run\.csv: expected room for the recording, got: .*too large")
-    with refusal, largest_file(10), RecordingWriter(tmp_path / "run.csv"):
-        pass
-    assert list(tmp_path.iterdir()) == []
 
 
 SAYS = {"schema": "hil.recording/1", "experiment": "cruise", "rig_file": 'name = "bench"\n'}
@@ -248,59 +176,3 @@ def test_a_killed_run_describes_itself_and_is_listed_as_what_it_is(tmp_path: Pat
     with RunStore(tmp_path) as store:
         (run,) = store.find()
     assert (run.entry.rig_name, run.entry.samples, run.entry.outcome) == ("bench", 12, NOT_ENDED)
-
-
-def test_a_run_that_continues_is_not_listed_yet(tmp_path: Path) -> None:
-    with RecordingWriter(tmp_path / "run.csv", SAYS) as writer:
-        writer.append(sample(1))
-        assert rebuild(tmp_path).found == 0
-    assert rebuild(tmp_path).found == 1
-
-
-def test_a_disk_without_room_for_the_last_words_leaves_a_recording_that_describes_itself(tmp_path: Path) -> None:
-    def run() -> None:
-        with RecordingWriter(tmp_path / "run.csv", SAYS) as writer:
-            writer.append(sample(1))
-            writer.describe("timing", "x" * 100_000)
-            with largest_file(4096):
-                writer.__exit__(None, None, None)
-
-    with pytest.raises(RecordingError, match="room for the description"):
-        run()
-    assert read_table(tmp_path / "run.csv").metadata["outcome"] == NOT_ENDED
-    assert {path.name for path in tmp_path.iterdir()} == {"run.csv", "run.csv.json"}
-
-
-@pytest.mark.parametrize("hangs", ["write_sidecar", "_begin"])
-def test_a_disk_that_never_takes_the_first_bytes_is_reported(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, hangs: str
-) -> None:
-    free = threading.Event()
-    monkeypatch.setattr(writer_module, "FIRST_WRITE_S", 0.2)
-    owner = writer_module if hangs == "write_sidecar" else RecordingWriter
-    monkeypatch.setattr(owner, hangs, lambda *_: free.wait(60))
-    with pytest.raises(RecordingError, match=r"first bytes within 0\.2 s"), RecordingWriter(tmp_path / "run.csv"):
-        pass
-    free.set()
-    until = time.monotonic() + 10
-    while list(tmp_path.iterdir()) and time.monotonic() < until:
-        time.sleep(0.01)
-    assert not list(tmp_path.iterdir())
-
-
-def test_a_disk_that_never_takes_the_first_row_is_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    free = threading.Event()
-    monkeypatch.setattr(writer_module, "FIRST_WRITE_S", 0.2)
-    monkeypatch.setattr(WritingThread, "_write", lambda *_: free.wait(60))
-
-    def run() -> None:
-        with RecordingWriter(tmp_path / "run.csv") as writer:
-            try:
-                for k in range(100):
-                    writer.append(sample(k))
-                    time.sleep(0.01)
-            finally:
-                free.set()
-
-    with pytest.raises(RecordingError, match="takes the first bytes"):
-        run()

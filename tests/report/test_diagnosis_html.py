@@ -139,16 +139,6 @@ def test_the_other_answers_are_pages_too(diagnosis: Diagnosis, verdict: Verdict,
     assert "Where simulation and recording differ" not in reader.sections
 
 
-def test_effects_that_explain_only_a_part_are_named_as_such(diagnosis: Diagnosis) -> None:
-    assert "; what is left is more than noise" in diagnosis_page(replace(diagnosis, verdict=Verdict.PARTLY_EXPLAINED))
-
-
-def test_a_mismatch_without_a_name_tells_what_to_check(diagnosis: Diagnosis) -> None:
-    page = read(diagnosis_page(replace(diagnosis, verdict=Verdict.UNEXPLAINED, effects=()))).text
-    assert "What to check: couplings" in page
-    assert "What to check" not in read(diagnosis_page(diagnosis)).text
-
-
 def test_faults_of_the_acquisition_have_their_own_section(diagnosis: Diagnosis) -> None:
     lost = replace(
         diagnosis.effects[0], name="lost_samples", element=Element.ACQUISITION, statement="a frame is missing"
@@ -157,12 +147,6 @@ def test_faults_of_the_acquisition_have_their_own_section(diagnosis: Diagnosis) 
     first = reader.sections.index("Recognised in the recordings themselves")
     assert reader.sections[first + 1] == "The physics found"
     assert reader.text.count("a frame is missing") == 1
-
-
-def test_a_page_without_a_discrepancy_is_whole(diagnosis: Diagnosis) -> None:
-    reader = read(diagnosis_page(replace(diagnosis, discrepancy=None)))
-    assert "Over frequency" not in reader.sections
-    assert "Where simulation and recording differ" in reader.sections
 
 
 def test_parameters_are_drawn_between_their_tolerances() -> None:
@@ -192,6 +176,7 @@ def long_trace(number: int) -> Trace:
     )
 
 
+@pytest.mark.campaign
 def test_many_long_recordings_stay_under_fifteen_megabytes(diagnosis: Diagnosis) -> None:
     traces = tuple(long_trace(number) for number in range(MOST_DRAWN + 1))
     seen = diagnosis.discrepancy
@@ -225,8 +210,3 @@ def test_share_and_probability_of_an_effect_are_shown(diagnosis: Diagnosis) -> N
     page = diagnosis_page(diagnosis)
     assert page.count("% of the squared error explained") == 1
     assert "94% of the squared error explained; probability 99.9 %. Evidence:" in page
-
-
-def test_thinned_recordings_are_reported(diagnosis: Diagnosis) -> None:
-    assert "One in 10 samples was used" in diagnosis_page(diagnosis, one_in=10)
-    assert "samples was used" not in diagnosis_page(diagnosis)

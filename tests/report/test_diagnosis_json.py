@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from estimator.diagnosis.result import Diagnosis, Mismatch, Remainder, Slight, Stray, UnnamedLaw, Verdict
+from estimator.diagnosis.result import Diagnosis, Mismatch, Stray, UnnamedLaw, Verdict
 from estimator.physics.effect import Element
 from hil.report.diagnosis_json import diagnosis_json, diagnosis_text
 from hil.report.numbers import json_number
@@ -95,31 +95,6 @@ def test_what_was_not_found_and_how_well_it_fits_is_written(diagnosis: Diagnosis
     assert content["parameters"]["b_L"] == {"nominal": 0.9, "value": 0.92, "ci95": [0.8, None], "unit": "Nm s/rad"}
 
 
-def test_remainder_and_traces_are_given_where_they_are_known(diagnosis: Diagnosis) -> None:
-    content = diagnosis_json(diagnosis)
-    assert content["remainder"] is None
-    assert content["traces"] == []
-    left = Remainder(0.06, 2.0, Element.LOAD, (0.0, 0.4), "a slow course")
-    slight = Slight("resolver_error", 0.001, {"once_rad": 4e-4, "twice_rad": math.nan})
-    content = diagnosis_json(replace(diagnosis, remainder=left, slight=(slight,)))
-    assert content["remainder"] == {
-        "share": 0.06,
-        "times_noise": 2.0,
-        "element": "load",
-        "band_hz": [0.0, 0.4],
-        "law": "a slow course",
-    }
-    assert content["traces"] == [
-        {"name": "resolver_error", "share": 0.001, "parameters": {"once_rad": 4e-4, "twice_rad": None}}
-    ]
-
-
-def test_a_profile_goes_with_its_effect(diagnosis: Diagnosis) -> None:
-    profile = diagnosis_json(diagnosis)["effects"][1]["profiles"]["run_1"]
-    assert profile["unit"] == "Nm"
-    assert [len(profile[key]) for key in ("time_s", "value", "low", "high")] == [16] * 4
-
-
 @pytest.mark.parametrize("verdict", list(Verdict))
 def test_what_is_not_known_is_null(diagnosis: Diagnosis, verdict: Verdict) -> None:
     nothing = Mismatch(False, None, {}, None, None, math.nan)
@@ -151,32 +126,6 @@ def test_a_law_without_a_name_is_written(diagnosis):
         "rms_before": 0.12,
         "rms_after": 0.051,
     }
-
-
-def test_what_the_pictures_rest_on_is_written(diagnosis: Diagnosis) -> None:
-    seen = diagnosis_json(diagnosis)["discrepancy"]
-    assert seen["element"] == "shaft"
-    assert seen["laws"][1] == {
-        "element": "motor",
-        "terms": [{"law": "w_M |w_M|", "coefficient": 0.01}],
-        "rms_after": 0.6,
-        "delta_bic": 35.0,
-        "p_value": 2.8e-10,
-    }
-    assert [(each["place"], each["plausible"]) for each in seen["places"]] == [
-        ("motor", False),
-        ("shaft", True),
-        ("load", False),
-        ("sensor", False),
-    ]
-    assert seen["bands"][0] == {"band_hz": [6.25, 12.5], "power_to_floor": 218.2, "p_value": 0.0}
-    assert seen["response_p_values"]["run_1"] == {"retuned": 1e-20, "augmented": 0.6}
-    (picture,) = seen["pictures"]
-    assert [len(picture[key]) for key in ("x", "data", "low", "high", "law")] == [20] * 5
-
-
-def test_without_a_discrepancy_the_key_is_null(diagnosis: Diagnosis) -> None:
-    assert diagnosis_json(replace(diagnosis, discrepancy=None))["discrepancy"] is None
 
 
 def test_nominal_values_that_are_off_are_given_as_a_ratio(diagnosis: Diagnosis) -> None:

@@ -10,15 +10,19 @@ from hypothesis.extra import numpy as st_numpy
 from rich.console import Console, RenderableType
 
 from estimator.diagnosis.result import Diagnosis
+from estimator.identification.identify import identify
+from estimator.identification.linear_model import LinearModel
+from estimator.identification.modes.uncertainty import square_root
 from estimator.physics.model import Motion
 from estimator.signals.record import OutputKind
 from hil.errors import UsageError
+from hil.report import bode
 from hil.report.diagnosis_html import diagnosis_summary
 from hil.report.figures import LONGEST_STRETCHES, extremes, input_lines, stretches_for
 from hil.report.numbers import listed, p_statement, shown, shown_interval, shown_p, shown_ratio
 from hil.report.outputs import publish
-from hil.report.page import table
 from hil.report.wording import simulated_column
+from tests.estimator.identification.driveline import cruise
 
 NAN = float("nan")
 
@@ -59,17 +63,6 @@ def test_a_thinned_trace_keeps_ends_order_and_extremes(y: np.ndarray, stretches:
     if not np.isnan(y).all():
         assert np.nanmax(y[kept]) == np.nanmax(y)
         assert np.nanmin(y[kept]) == np.nanmin(y)
-
-
-def test_a_gap_stays_a_gap() -> None:
-    y = np.zeros(1000)
-    y[300:500] = NAN
-    kept = extremes(y, 20)
-    assert np.isnan(y[kept]).sum() == 4
-
-
-def test_a_short_trace_is_kept_whole() -> None:
-    assert extremes(np.zeros(10), 5).tolist() == list(range(10))
 
 
 def test_recordings_share_the_size_of_a_page() -> None:
@@ -127,12 +120,6 @@ def test_a_result_that_fails_leaves_the_older_ones(tmp_path: Path) -> None:
     assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {"a.txt": "old"}
 
 
-def test_a_folder_made_for_a_result_that_fails_is_not_left_behind(tmp_path: Path) -> None:
-    with pytest.raises(UsageError, match="Is a directory"):
-        publish(tmp_path / "new", {"a.txt": lambda path: tmp_path.read_bytes()})
-    assert not list(tmp_path.iterdir())
-
-
 @pytest.mark.parametrize(
     ("value", "expected"), [(0.02, "p = 0.02"), (1e-300, "p < 1e-100"), (0.0, "p < 1e-100"), (float("nan"), "p = –")]
 )
@@ -140,7 +127,29 @@ def test_a_probability_is_stated_as_far_as_it_means_something(value: float, expe
     assert p_statement(value) == expected
 
 
-def test_a_column_of_sentences_is_prose_and_one_of_words_is_not() -> None:
-    long = "explains 74 % of what backlash explains"
-    assert table(("effect", "why not"), [("stiffness_nonlinearity", long)]).kind(1) == "prose"
-    assert table(("recording", "parameter", "value"), [("cruise", "J_M", long)], numbers=[2]).kind(2) == "number"
+def test_the_band_of_a_model_is_what_its_parameters_make_of_it() -> None:
+    fit = identify(cruise(1).record).batch
+    f = np.array([4.0, 8.0, 16.0])
+    normal = np.random.default_rng(1).normal(size=(4000, fit.model.theta.size))
+    drawn = fit.model.theta + normal @ square_root(fit.covariance).T
+    models = [LinearModel.from_theta(theta, fit.model.orders, fit.model.sample_time_s) for theta in drawn]
+    ratios = np.array([model.response(f) for model in models]) / fit.model.response(f)
+    apart = np.maximum(np.log(np.abs(ratios)).std(axis=0), np.angle(ratios).std(axis=0))
+    np.testing.assert_allclose(bode.spread_of(fit, f), 1.96 * apart, rtol=0.1)
+
+
+@pytest.mark.parametrize("first", [-200.0, 100.0, 170.0])
+def test_the_band_of_a_phase_does_not_cross_the_figure(first: float) -> None:
+    f = np.geomspace(1.0, 10.0, 50)
+    response = np.exp(1j * np.deg2rad(first - np.linspace(0.0, 150.0, 50)))
+    figure = bode.panels()
+    bode.estimate(figure, f, response, np.full(50, 0.02), np.ones(50), "#777777", "estimate")
+    phases = [trace for trace in figure.data if trace.yaxis == "y2" and trace.mode == "lines"]
+    assert phases
+    assert all(np.abs(np.diff(np.asarray(trace.y))).max() < 10.0 for trace in phases)
+    inside = np.rad2deg(np.angle(response))
+    lows, highs = phases[::2], phases[1::2]
+    held = [
+        any(low.y[i] <= inside[i] <= high.y[i] for low, high in zip(lows, highs, strict=True)) for i in range(f.size)
+    ]
+    assert all(held)

@@ -18,11 +18,10 @@ import can
 import pytest
 
 from drivers.canopen.can_link import open_bus
-from drivers.canopen.remote_bus import forget_token, keep_token, kept_token, token_file
-from drivers.errors import BusDown
+from drivers.canopen.remote_bus import token_file
 from hil.simulator import can_bridge
 from hil.simulator.addresses import Address
-from hil.simulator.can_bridge import LONGEST_FRAME_BYTES, MOST_HOSTS, MOST_WAITING, CanBridge
+from hil.simulator.can_bridge import LONGEST_FRAME_BYTES, CanBridge
 
 
 @pytest.fixture(autouse=True)
@@ -105,13 +104,6 @@ def test_nothing_but_a_websocket_is_served(bridge: CanBridge) -> None:
         connection.close()
 
 
-@pytest.mark.parametrize("origin", ["http://evil.example", "null", "http://127.0.0.1", ""])
-def test_a_page_in_a_browser_is_refused_even_with_the_token(bridge: CanBridge, origin: str) -> None:
-    connection, answer = upgrade(bridge, None, f"Origin: {origin}")
-    assert status_of(answer) == 403
-    connection.close()
-
-
 def test_who_names_the_token_is_served(bridge: CanBridge, slave: can.BusABC) -> None:
     connection, answer = upgrade(bridge)
     assert status_of(answer) == 101
@@ -171,14 +163,6 @@ def test_what_is_no_frame_of_a_bus_reaches_no_device(
     assert capfd.readouterr().out == ""  # the line of hil sim is for scripts
 
 
-def test_a_few_hosts_and_no_more(bridge: CanBridge) -> None:
-    hosts = [upgrade(bridge)[0] for _ in range(MOST_HOSTS)]
-    extra, answer = upgrade(bridge)
-    assert status_of(answer) == 503
-    for each in (*hosts, extra):
-        each.close()
-
-
 def drip(connections: list[socket.socket], texts: list[bytes], over: threading.Event) -> None:
     """Send each its text, one byte every 0.1 s: a socket's own time-out never comes."""
     for number in range(max(map(len, texts))):
@@ -216,62 +200,9 @@ def test_a_handshake_has_one_deadline_however_slowly_it_is_sent(
     assert took_s < 5.0
 
 
-@pytest.mark.parametrize("count", [20, pytest.param(MOST_WAITING + 10, marks=pytest.mark.campaign)])
-def test_connections_without_the_token_keep_no_host_out(bridge: CanBridge, slave: can.BusABC, count: int) -> None:
-    waiting = [slow(bridge, named=False) for _ in range(count)]
-    over = threading.Event()
-    connections, texts = [each for each, _ in waiting], [text for _, text in waiting]
-    thread = threading.Thread(target=drip, args=(connections, texts, over))
-    thread.start()
-    begun = time.monotonic()
-    with open_bus(bridge.url) as host:
-        host.send(can.Message(arbitration_id=0x80, is_extended_id=False))
-        assert slave.recv(5.0) is not None
-    took_s = time.monotonic() - begun
-    over.set()
-    thread.join()
-    for connection in connections:
-        connection.close()
-    assert took_s < 2.0
-
-
-def test_a_host_may_last_longer_than_its_handshake(
-    bridge: CanBridge, slave: can.BusABC, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(can_bridge, "HANDSHAKE_S", 0.2)
-    with open_bus(bridge.url) as host:
-        time.sleep(0.5)
-        host.send(can.Message(arbitration_id=0x80, is_extended_id=False))
-        assert slave.recv(5.0) is not None
-
-
 def test_a_host_of_the_same_user_finds_the_token_of_the_port(bridge: CanBridge, slave: can.BusABC) -> None:
     """A rig file names the port alone."""
     assert token_file(bridge.port).stat().st_mode & 0o077 == 0
     with open_bus(f"ws://127.0.0.1:{bridge.port}/") as host:
         host.send(can.Message(arbitration_id=0x80, is_extended_id=False))
         assert slave.recv(5.0) is not None
-
-
-def test_another_user_is_reported_to_give_the_whole_url(
-    bridge: CanBridge, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path / "another"))
-    with pytest.raises(BusDown, match="give the whole URL that hil sim has printed"):
-        open_bus(f"ws://127.0.0.1:{bridge.port}/")
-
-
-def test_the_token_goes_with_its_server() -> None:
-    with CanBridge(Address("127.0.0.1", 0), "a") as bridge:
-        port = bridge.port
-        assert kept_token(port) is not None
-    assert kept_token(port) is None
-    keep_token(port, "of another server")
-    forget_token(port, "mine")
-    assert kept_token(port) == "of another server"
-
-
-def test_no_two_servers_have_one_token() -> None:
-    with CanBridge(Address("127.0.0.1", 0), "a") as one, CanBridge(Address("127.0.0.1", 0), "b") as other:
-        assert urlsplit(one.url).path != urlsplit(other.url).path
-        assert len(urlsplit(one.url).path) > 30

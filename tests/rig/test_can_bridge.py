@@ -1,4 +1,4 @@
-"""The bridge carries frames between two processes' worth of buses, and leaves nothing behind."""
+"""The CAN bridge: frames both ways, and the addresses it may be served at."""
 
 import socket
 import struct
@@ -8,8 +8,8 @@ import uuid
 import can
 import pytest
 
-from drivers.errors import BusDown
-from hil.simulator.addresses import Address
+from hil.errors import UsageError
+from hil.simulator.addresses import Address, bus_address, host_port, modbus_address
 from hil.simulator.can_bridge import CanBridge
 
 ANY_PORT = Address("127.0.0.1", 0)
@@ -35,16 +35,6 @@ def test_carries_frames_both_ways_and_ends_every_thread() -> None:
     assert threading.active_count() == threads
 
 
-def test_host_sees_the_bridge_close() -> None:
-    bridge = CanBridge(ANY_PORT, str(uuid.uuid4()))
-    with bridge:
-        host = remote(bridge.url)
-    with pytest.raises(Exception, match="Socket closed"):
-        host.recv(5.0)
-    host.socket.close()
-    host._is_shutdown = True  # the library's own shutdown can't end a connection that is already cut
-
-
 def test_host_that_dies_in_the_middle_of_frames_is_no_defect() -> None:
     """Its connection is reset while frames are under way; a traceback of the library's thread fails the test."""
     channel = str(uuid.uuid4())
@@ -60,7 +50,32 @@ def test_host_that_dies_in_the_middle_of_frames_is_no_defect() -> None:
     assert threading.active_count() == threads
 
 
-def test_taken_port_is_refused() -> None:
-    with CanBridge(ANY_PORT, "a") as first:
-        with pytest.raises(BusDown, match=r"can't serve at 127\.0\.0\.1"):
-            CanBridge(Address("127.0.0.1", first.port), "b")
+@pytest.mark.parametrize(
+    ("text", "address"),
+    [
+        ("127.0.0.1:5020", Address("127.0.0.1", 5020)),
+        ("localhost:0", Address("127.0.0.1", 0)),
+        ("[::1]:502", Address("::1", 502)),
+    ],
+)
+def test_reads_loopback_addresses(text: str, address: Address) -> None:
+    assert modbus_address(text) == address
+    assert bus_address(f"ws://{text}/") == address
+
+
+def test_reads_addresses_of_other_machines_to_connect_to() -> None:
+    assert host_port("plc.example:502") == Address("plc.example", 502)
+
+
+@pytest.mark.parametrize("text", ["0.0.0.0:502", "192.168.0.7:502", "example.org:502", "[::]:0"])
+def test_refuses_what_others_could_reach(text: str) -> None:
+    with pytest.raises(UsageError, match="this machine only"):
+        modbus_address(text)
+    with pytest.raises(UsageError, match="this machine only"):
+        bus_address(f"ws://{text}/")
+
+
+@pytest.mark.parametrize("url", ["socketcan:can0", "wss://127.0.0.1:1/", "127.0.0.1:0"])
+def test_refuses_a_bus_url_of_another_kind(url: str) -> None:
+    with pytest.raises(UsageError, match="expected ws://"):
+        bus_address(url)

@@ -1,28 +1,23 @@
 """Further channels of a rig file: mapped, read, recorded and checked over the real protocols."""
 
-import math
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from hil.config.rig_file import read_rig
-from hil.errors import RigFileError, UsageError
+from hil.errors import RigFileError
 from hil.recording import RecordingWriter, read_table
 from hil.recording.signals import read_record
 from hil.recording.signals_config import SignalsConfig
 from hil.rig.build import open_devices
-from hil.rig.check import Verdict, check_rig
 from hil.rig.plan import plan_run
 from hil.rig.session import run_plan
 from hil.rig.stop import StopRequest
-from hil.sample import SampleFlag
 from hil.simulator.driveline import simulation_model
-from hil.simulator.fault_table import rig_faults
-from hil.simulator.plant import RigidPlant
-from hil.simulator.rig_server import RigServer, required_simulation
+from hil.simulator.rig_server import required_simulation
 from tests.rig.sensed import CHANNELS, sensed_rig, served_with_sensors, write_rig
-from tests.rig.serving import ANY_PORT, Samples, fast, run_once
+from tests.rig.serving import Samples, fast, run_once
 
 OUTPUTS = SignalsConfig.model_validate(
     {
@@ -70,45 +65,6 @@ def test_a_channel_is_that_of_the_sync_of_its_row(tmp_path: Path) -> None:
     np.testing.assert_allclose(second, motor, atol=0.0015)
 
 
-def test_a_channel_that_is_lost_is_missing_in_its_own_column_alone(tmp_path: Path) -> None:
-    samples = Samples()
-    with served_with_sensors(sensed_rig(tmp_path), rig_faults(["bus.lose@1=0.01"], 0.01)) as at:
-        run_once(at, samples, experiment="reversal", pacer=fast(at, 0.05))
-    lost = [row for row in samples.rows if row.flags is SampleFlag.CHANNEL_LOST]
-    assert lost
-    assert all(row.counts and any(map(math.isnan, row.channels)) for row in lost)
-    assert all(math.isfinite(row.torque_m2_nm) for row in lost)
-    whole = [row for row in samples.rows if not row.flags & SampleFlag.CHANNEL_LOST]
-    assert all(map(math.isfinite, (value for row in whole for value in row.channels)))
-
-
-def test_a_check_shows_what_each_channel_reads(tmp_path: Path) -> None:
-    with served_with_sensors(sensed_rig(tmp_path)) as at:
-        findings = check_rig(at)
-    assert {finding.verdict for finding in findings} == {Verdict.AGREES}
-    read = {each.channel.column: each for finding in findings for each in finding.channels}
-    assert set(read) == set(at.channel_units)
-    assert read["speed_load_rad_s"].value == 0.0
-    assert read["speed_load_rad_s"].channel.source == "m2 0x60E5:01"
-    assert read["accel_rad_s2"].channel.source == "PLC register acceleration"
-
-
-def test_a_writer_that_does_not_know_the_channels_refuses_their_samples(tmp_path: Path) -> None:
-    samples = Samples()
-    with served_with_sensors(sensed_rig(tmp_path)) as at:
-        run_once(at, samples)
-    with (
-        pytest.raises(Exception, match="expected samples with 10 cells"),
-        RecordingWriter(tmp_path / "a.csv") as writer,
-    ):
-        writer.append(samples.rows[0])
-
-
-def test_a_driveline_without_such_places_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(UsageError, match="speed_load_rad_s"):
-        RigServer(RigidPlant(10.0, 0.5), sensed_rig(tmp_path), "virtual:none", ANY_PORT)
-
-
 @pytest.mark.parametrize(
     ("old", "new", "expected"),
     [
@@ -138,11 +94,6 @@ def test_a_channel_that_can_not_be_is_refused_with_its_key(tmp_path: Path, old: 
     with pytest.raises(RigFileError, match=expected) as refusal:
         read_rig(path)
     assert str(path) in str(refusal.value)
-
-
-def test_a_column_can_be_given_once(tmp_path: Path) -> None:
-    with pytest.raises(RigFileError, match=r"channels\.3\.column \| expected another column"):
-        read_rig(write_rig(tmp_path, CHANNELS + CHANNELS.split("\n\n")[0]))
 
 
 def test_a_drive_without_a_free_tpdo_is_refused_before_anything_is_connected(tmp_path: Path) -> None:

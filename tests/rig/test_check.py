@@ -1,12 +1,15 @@
-"""Looking for devices: each is found or not on its own, and nothing is armed."""
+"""`hil check`: the rig as described, the proof that the drives stop, and what somebody has accepted."""
 
 import pytest
 
 from drivers.inverter.cia402 import PowerState
+from drivers.inverter.settings import Acceptance
 from hil.rig.check import Verdict, check_rig
+from hil.simulator.addresses import is_simulated_bus
 from hil.simulator.fault_table import rig_faults
-from tests.rig.observer import power_state
-from tests.rig.serving import changed, served
+from hil.simulator.faults import InverterFaults, RigFaults
+from tests.rig.observer import assert_disarmed, power_state
+from tests.rig.serving import changed, served, small_rig
 
 
 def test_rig_as_described_agrees_and_stays_as_it_is() -> None:
@@ -42,3 +45,52 @@ def test_vehicle_that_is_not_fit_is_a_note_not_a_fault() -> None:
         plc = check_rig(rig)[-1]
     assert plc.verdict is Verdict.AGREES
     assert plc.notes == ("clutch is closed, expected open",)
+
+
+QUICK = {"inverters.m1": {"rpdo_deadline_ms": 50}, "inverters.m2": {"rpdo_deadline_ms": 50}}
+
+
+def test_both_drives_prove_it_and_are_disabled_after_it() -> None:
+    with served(changed(small_rig(), QUICK)) as (server, rig):
+        findings = check_rig(rig, prove_stop=True)
+        assert_disarmed(server.bus_url, 1, 2)
+    assert {finding.verdict for finding in findings} == {Verdict.AGREES}
+
+
+def test_a_drive_that_ignores_what_watches_its_host_fails_and_the_other_is_still_proved() -> None:
+    faults = RigFaults(m1=InverterFaults(ignored_writes=frozenset({0x1016})))
+    with served(changed(small_rig(), QUICK), faults) as (server, rig):
+        findings = {finding.device: finding for finding in check_rig(rig, prove_stop=True)}
+        assert_disarmed(server.bus_url, 1, 2)
+    assert findings["m1"].verdict is Verdict.FAILED
+    assert "object 0x1016:01 reads 0" in findings["m1"].notes[0]
+    assert findings["m2"].verdict is Verdict.AGREES
+
+
+FILLED_IN = ("A. Nyone", "a relay of its own")
+
+
+@pytest.mark.parametrize(
+    ("by", "why"),
+    [("NAME", FILLED_IN[1]), (FILLED_IN[0], "REASON"), (FILLED_IN[0], " ... "), ("<name>", FILLED_IN[1]), (" ", "-")],
+)
+def test_a_line_that_was_only_pasted_is_nobodys_acceptance(by: str, why: str) -> None:
+    assert not Acceptance(by, why).is_by_a_person
+    assert Acceptance(*FILLED_IN).is_by_a_person
+
+
+@pytest.mark.parametrize(
+    ("url", "simulated"),
+    [
+        ("virtual:a", True),
+        ("socketcan:vcan0", True),
+        ("ws://127.0.0.1:54701/token/", True),
+        ("ws://[::1]:1/", True),
+        ("socketcan:can0", False),
+        ("ws://10.0.0.7:1/", False),
+        ("ws://vehicle:1/", False),
+        ("ws://:x/", False),
+    ],
+)
+def test_where_drives_are_simulated(url: str, simulated: bool) -> None:
+    assert is_simulated_bus(url) is simulated

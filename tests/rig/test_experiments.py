@@ -1,16 +1,25 @@
-"""Every kind of experiment on a vehicle of one inertia: speed reached, torque bounded, ended at zero."""
+"""Experiments: what they ask for, open and closed loop, their excitation and its share of both inverters."""
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from hil.errors import RunAborted
+from hil.config.rig_file import read_rig
+from hil.errors import HilError, RigFileError, RunAborted
+from hil.rig.excitation import Split
 from hil.rig.experiments.base import MeasureLaw, Phase
 from hil.rig.experiments.cruise import Cruise
+from hil.rig.experiments.open_loop import OpenLoop
+from hil.rig.experiments.pulses import Pulses
 from hil.rig.experiments.reversal import Reversal
 from hil.rig.experiments.staged import Approach, StagedExperiment, TorqueBounds
 from hil.rig.experiments.tip import Tip
+from hil.rig.plan import plan_run
+from tests.rig.serving import EXAMPLE
 from tests.rig.vehicle import INERTIA_KG_M2, PERIOD_S, RigidVehicle, drive
 
 BOUNDS = TorqueBounds(torque_nm=500.0, slew_nm_per_s=4000.0)
@@ -86,13 +95,93 @@ def test_tip_steps_through_zero_torque_and_keeps_its_mean_speed() -> None:
     assert np.mean(course.measured(course.speed_rad_s)) == pytest.approx(30.0, abs=1.5)
 
 
-def test_vehicle_that_does_not_move_ends_the_approach() -> None:
-    with pytest.raises(RunAborted, match=r"approach: the speed is 0\.00 rad/s after 5 s, expected it steady at 40\.00"):
-        drive(staged(cruise(), timeout_s=5.0), RigidVehicle(inertia_kg_m2=math.inf))
-
-
 def test_a_resolver_whose_error_goes_round_with_the_shaft_does_not_keep_the_vehicle_from_being_there() -> None:
     """An error of 3 rad/s at the start speed, nine times a second; the speed itself is steady after some time."""
     law = cruise(speed_rad_s=60.0)
     course = drive(staged(law), RigidVehicle(resolver_error_rad=0.05))
     assert Phase.MEASURE in course.phase
+
+
+shares = st.floats(0.0, 1.0)
+torques = st.floats(-1e3, 1e3)
+
+
+@given(shares, shares, torques, torques)
+def test_total_is_kept(base_m1: float, prbs_m1: float, base_nm: float, prbs_nm: float) -> None:
+    request = Split(base_m1, prbs_m1).request(base_nm, prbs_nm)
+    assert request.base_m1_nm + request.base_m2_nm == pytest.approx(base_nm, abs=1e-9)
+    assert request.prbs_m1_nm + request.prbs_m2_nm == pytest.approx(prbs_nm, abs=1e-9)
+
+
+def test_one_inverter_alone_can_carry_the_prbs() -> None:
+    request = Split(base_m1=0.5, prbs_m1=0.0).request(100.0, 40.0)
+    assert (request.total_m1_nm, request.total_m2_nm) == (50.0, 90.0)
+
+
+def test_larger_base_share() -> None:
+    assert Split(0.3, 0.5).largest_base_share == 0.7
+
+
+RIG = Path("examples/rig.toml")
+
+
+def test_the_inverters_share_the_base_torque_as_the_experiment_says() -> None:
+    rig = read_rig(RIG)
+    shares = {name: plan_run(rig, name).split.base_m1 for name in rig.experiments}
+    assert shares == {"cruise": 0.5, "reversal": 0.65, "tip": 0.35}
+    request = plan_run(rig, "reversal").split.request(200.0, 40.0)
+    assert (request.base_m1_nm, request.base_m2_nm) == pytest.approx((130.0, 70.0))
+    assert (request.prbs_m1_nm, request.prbs_m2_nm) == pytest.approx((20.0, 20.0))  # the PRBS has a share of its own
+
+
+def test_a_share_beyond_all_of_it_is_refused_with_its_key(tmp_path: Path) -> None:
+    path = tmp_path / "rig.toml"
+    path.write_text(RIG.read_text().replace("share_m1 = 0.65", "share_m1 = 1.65"))
+    with pytest.raises(HilError, match=r"experiments\.reversal.*share_m1"):
+        read_rig(path)
+
+
+STEP_NM, INERTIA = 20.0, 100.0
+
+
+def pulses(most_speed_rad_s: float = 1.0) -> OpenLoop:
+    return OpenLoop(Pulses(STEP_NM, 1.0, 18.0), 1000.0, most_speed_rad_s, PERIOD_S)
+
+
+def test_pulses_bring_speed_and_place_back() -> None:
+    vehicle = RigidVehicle(inertia_kg_m2=INERTIA, friction_nm_s=0.0)
+    course = drive(pulses(), vehicle)
+    assert max(course.torque_nm) == STEP_NM == -min(course.torque_nm)
+    assert max(course.speed_rad_s) == pytest.approx(STEP_NM * 1.0 / INERTIA, rel=0.03)  # J dw = T dt
+    assert abs(vehicle.speed_rad_s) < 0.01
+    assert abs(vehicle.angle_rad) < 0.05  # the ramps of 20 and 40 ms between the steps differ; the swing is 0.4 rad
+    assert course.phase[-1] is Phase.DONE
+    assert course.torque_nm[-1] == 0.0
+
+
+def test_vehicle_that_moves_is_refused_before_any_torque() -> None:
+    with pytest.raises(RunAborted, match=r"the speed is 3\.00 rad/s at the beginning, expected standstill"):
+        drive(pulses(), RigidVehicle(speed_rad_s=3.0))
+
+
+def test_vehicle_that_runs_away_ends_it() -> None:
+    with pytest.raises(RunAborted, match=r"expected at most 0\.1 rad/s either way"):
+        drive(pulses(most_speed_rad_s=0.1), RigidVehicle(inertia_kg_m2=INERTIA))
+
+
+def test_rig_file_has_them_and_holds_them_against_its_limits(tmp_path) -> None:  # type: ignore[no-untyped-def]
+    text = EXAMPLE.read_text(encoding="utf-8")
+    tables = (
+        '\n[experiments.p]\nkind = "pulses"\nduration_s = 6.0\nstep_nm = 20.0\nstep_s = 1.0\nslew_nm_per_s = 500.0\n'
+        'most_speed_rad_s = 1.0\nshare_m1 = 1.0\n[experiments.r]\nkind = "rest"\nduration_s = 1.0\n'
+    )
+    path = tmp_path / "rig.toml"
+    path.write_text(text + tables, encoding="utf-8")
+    rig = read_rig(path)
+    plan = plan_run(rig, "p")
+    assert plan.prbs_nm(Phase.MEASURE) == 0.0
+    assert plan.needs.torque_of_one_nm == 20.0
+    assert plan_run(rig, "r").needs.torque_of_one_nm == 0.0
+    path.write_text((text + tables).replace("step_nm = 20.0", "step_nm = 900.0"), encoding="utf-8")
+    with pytest.raises(RigFileError, match=r"experiments\.p\.torque_nm"):
+        read_rig(path)

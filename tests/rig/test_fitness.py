@@ -45,8 +45,3 @@ def test_torque_limit_below_what_the_run_needs() -> None:
     (reason,) = reasons_against(replace(FIT, torque_limit_nm=399.9), NEEDS)
     assert "399.9 Nm" in reason
     assert "400 Nm" in reason
-
-
-def test_change_between_two_fit_modes_is_a_change() -> None:
-    electric = replace(FIT, drive_mode=DriveMode.ELECTRIC)
-    assert list(changes(FIT, electric, NEEDS)) == ["drive mode is electric, expected series as at the start"]

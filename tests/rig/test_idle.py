@@ -10,27 +10,9 @@ from hil.rig.build import open_devices
 from hil.rig.idle import Listening
 from hil.rig.timing import RunTiming
 from hil.sample import SampleFlag
-from hil.simulator.faults import FaultAtStep, InverterFaults, RigFaults
-from tests.rig.observer import assert_disarmed
+from hil.simulator.faults import InverterFaults, RigFaults
 from tests.rig.sensed import sensed_rig, served_with_sensors
 from tests.rig.serving import fast, served
-
-
-def test_both_answer_and_stay_disarmed() -> None:
-    with served() as (server, rig), open_devices(rig) as devices:
-        listening = Listening(devices, fast(rig), RunTiming(10_000_000))
-        listening.begin()
-        samples = [listening.step() for _ in range(50)]
-        assert listening.troubles == (None, None)
-        assert server.torque_nm == (0.0, 0.0)
-        listening.plc.finish()
-        assert_disarmed(server.bus_url, 1, 2)
-    assert not any(sample.flags for sample in samples)
-    assert all(math.isfinite(sample.speed_rad_s) for sample in samples)
-    assert {sample.torque_ref_nm for sample in samples} == {0.0}
-    assert [sample.time_s for sample in samples[:3]] == [0.0, 0.01, 0.02]
-    assert listening.timing.cycles == 50
-    assert listening.timing.unanswered == 0
 
 
 def test_channels_are_read_at_rest_too(tmp_path: Path) -> None:
@@ -59,27 +41,6 @@ def test_a_missing_drive_is_reported_and_the_other_is_heard() -> None:
     assert sample.flags is SampleFlag.M2_STALE
     assert math.isfinite(sample.torque_m1_nm)
     assert math.isnan(sample.torque_m2_nm)
-
-
-def test_a_fault_is_reset_when_asked() -> None:
-    faults = RigFaults(m1=InverterFaults(fault=FaultAtStep(5, 0x3220)))
-    with served(faults=faults) as (_, rig), open_devices(rig) as devices:
-        listening = Listening(devices, fast(rig), RunTiming(10_000_000))
-        listening.begin()
-        for _ in range(10):
-            listening.step()
-        assert "0x3220" in str(devices.m1.fault())
-        assert listening.reset_faults() == ()
-        assert devices.m1.fault() is None
-        listening.plc.finish()
-
-
-def test_a_fault_that_stays_is_said() -> None:
-    faults = RigFaults(m2=InverterFaults(absent=True))
-    with served(faults=faults) as (_, rig), open_devices(rig) as devices:
-        listening = Listening(devices, fast(rig), RunTiming(10_000_000))
-        (failure,) = listening.reset_faults()
-    assert "m2" in failure
 
 
 def test_a_lost_bus_ends_it() -> None:

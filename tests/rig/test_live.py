@@ -2,23 +2,20 @@
 
 import json
 import math
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from estimator.errors import BadSetting
 from estimator.signals.record import Record
 from hil.recording import RecordingWriter, read_record
 from hil.rig import live_course
 from hil.rig.build import open_devices
 from hil.rig.experiments.base import Phase
-from hil.rig.live import LiveEstimate, Pace, play_record, play_samples, tracking_chain, tracking_settings
+from hil.rig.live import LiveEstimate, Pace, play_record, tracking_chain, tracking_settings
 from hil.rig.plan import plan_run
 from hil.rig.session import run_plan
 from hil.rig.stop import StopRequest
-from hil.rig.trace import is_trace
 from hil.sample import Sample, SampleFlag
 from tests.estimator.identification.tracking.drives import drives
 from tests.rig.observer import assert_disarmed
@@ -131,37 +128,6 @@ def test_a_long_course_is_thinned_the_same_by_run_and_replay(
         assert len(column) < most
 
 
-def test_the_file_of_a_long_course_has_a_bound(tmp_path: Path) -> None:
-    course, chain = live_course.Course(tracking_chain(0.01)), tracking_chain(0.01)
-    drive = drives(22, 1, 8.0)[0]
-    block = chain.run_block(drive.time_s, chain.torque_of(drive), drive.output, drive.okay)
-    sizes = []
-    for estimates in (1.9 * live_course.MOST, 3.9 * live_course.MOST):
-        while course.summary()["estimates"] < estimates:
-            course.extend(block)
-        course.write(tmp_path / "long.json")
-        sizes.append((tmp_path / "long.json").stat().st_size)
-    assert max(sizes) < 14e6
-    assert sizes[1] < 1.1 * sizes[0]
-
-
-def test_an_estimate_without_excitation_says_so() -> None:
-    drive = drives(24, 1, 30.0, prbs_nm=lambda time_s: 0.0 if time_s >= 20.0 else 120.0)[0]
-    course = play_record(drive, tracking_settings(), Pace(), lambda course, time_s: None)
-    assert course.statement.startswith("resonance 8.")
-    assert "; not excited: at the resonance the torque moves the output less" in course.statement
-    assert course.summary()["final"]["status"] == "not_excited"
-    assert "PRBS" in course.summary()["final"]["reason"]
-
-
-def test_other_phases_are_not_estimated_from() -> None:
-    live = LiveEstimate(tracking_chain(0.01))
-    for sample in driven()[:100]:
-        live(sample, Phase.APPROACH)
-    assert live.course.samples == 0
-    assert live.latest is None
-
-
 @pytest.mark.parametrize("speed", [2.0, 50.0])
 def test_speed_is_that_of_the_clock(speed: float) -> None:
     now = [0.0]
@@ -177,30 +143,3 @@ def test_speed_is_that_of_the_clock(speed: float) -> None:
     times = np.array(reported)
     assert times[:, 1] == pytest.approx(times[:, 0] / speed)
     assert len(reported) > 8.0 / speed * 9
-
-
-def test_samples_of_a_trace_may_be_played_at_a_speed_too() -> None:
-    slept: list[float] = []
-    pace = Pace(10.0, clock=lambda: 0.0, sleep=slept.append)
-    course = play_samples(driven()[:400], 0.01, tracking_settings(), pace, lambda course, time_s: None)
-    assert course.samples == 400
-    assert slept == pytest.approx([0.099, 0.199, 0.299, 0.399])
-
-
-def test_missing_speed_is_masked() -> None:
-    live = LiveEstimate(tracking_chain(0.01))
-    for k, sample in enumerate(driven()):
-        live(replace(sample, speed_rad_s=math.nan) if 900 <= k < 950 else sample)
-    assert live.latest is not None
-    assert live.latest.resonance is not None
-
-
-def test_period_that_does_not_fit_is_refused() -> None:
-    with pytest.raises(BadSetting, match=r"0\.003"):
-        tracking_chain(0.003)
-
-
-def test_traces_are_reported_by_their_suffix() -> None:
-    assert is_trace(Path("a.BLF"))
-    assert is_trace(Path("a.trc"))
-    assert not is_trace(Path("a.csv"))

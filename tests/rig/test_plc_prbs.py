@@ -11,17 +11,13 @@ from drivers.plc.register import Value
 from drivers.plc.types import PrbsSource
 from hil.config.rig_file import PrbsTarget, Rig
 from hil.errors import RunAborted
-from hil.rig.build import Devices, open_devices
 from hil.rig.drive import Progress
-from hil.rig.dry_run import dry_run
 from hil.rig.experiments.base import Phase
-from hil.rig.pacing import RealTimePacer, period_ns
 from hil.rig.plan import plan_run
-from hil.rig.stop import StopRequest
 from hil.simulator.plc_device import PlcPrbs as Generator
 from hil.simulator.rig_server import RigServer
 from tests.rig.observer import assert_disarmed
-from tests.rig.serving import Samples, changed, run, run_once, served, small_rig
+from tests.rig.serving import Samples, changed, run_once, served, small_rig
 
 AMPLITUDE_NM = 120.0
 HALF_COUNT_NM = 0.5 * 600.0 / 1000.0
@@ -105,30 +101,7 @@ def test_the_recording_holds_what_the_plc_reported_and_nothing_made_up() -> None
     assert set(reported[known]) == {AMPLITUDE_NM, -AMPLITUDE_NM}
 
 
-def test_the_host_asks_for_the_base_torque_alone() -> None:
-    with served(plc_rig()) as (_, rig):
-        plan = plan_run(rig, "cruise")
-        assert plan.prbs_nm(Phase.MEASURE) == 0.0
-    assert plan.plc_prbs is not None
-    assert plan.plc_prbs.m1.prbs_nm + plan.plc_prbs.m2.prbs_nm == AMPLITUDE_NM
-
-
 class TestEveryWayOut:
-    def test_ctrl_c(self) -> None:
-        stop = StopRequest()
-        with served(plc_rig()) as (server, rig):
-            with pytest.raises(KeyboardInterrupt):
-                run_once(rig, Samples(), stop=stop, progress=half_way(stop.request))
-            assert_disarmed(server.bus_url, 1, 2)
-            assert generator_of(server) == OFF
-
-    def test_the_vehicle_is_no_longer_fit(self) -> None:
-        with served(plc_rig()) as (server, rig):
-            with pytest.raises(RunAborted, match="clutch is closed"):
-                run_once(rig, Samples(), progress=half_way(server.plc.close_clutch))
-            assert_disarmed(server.bus_url, 1, 2)
-            assert generator_of(server) == OFF
-
     def test_a_plc_that_falls_silent(self) -> None:
         with served(plc_rig()) as (server, rig):
             with pytest.raises(RunAborted, match=r"generator confirmed off, got: .*What ended the run: PLC: ") as said:
@@ -137,17 +110,6 @@ class TestEveryWayOut:
             assert server.plc.values()["prbs_enable"] is True
         assert "Switch it off at the PLC before the drives are armed again" in str(said.value)
         assert isinstance(said.value.__cause__, RunAborted)
-
-    def test_a_lost_connection_is_made_again_to_switch_it_off(self) -> None:
-        async def drop(devices: Devices) -> None:
-            devices.plc.close()
-
-        with served(plc_rig()) as (server, rig), open_devices(rig) as devices:
-            lose = half_way(lambda: devices.plc_loop.call(drop(devices)))
-            with pytest.raises(RunAborted, match=r"PLC: expected its status, got: .*expected an open connection"):
-                run(rig, devices, Samples(), progress=lose)
-            assert_disarmed(server.bus_url, 1, 2)
-            assert generator_of(server) == OFF
 
 
 class TestSomebodyElseWritesThere:
@@ -164,25 +126,6 @@ class TestSomebodyElseWritesThere:
                 run_once(rig, Samples(), progress=half_way(lambda: server.plc.write(change)))
             assert_disarmed(server.bus_url, 1, 2)
             assert generator_of(server) == OFF
-
-    def test_while_the_host_makes_the_prbs(self) -> None:
-        running: dict[str, Value] = {"prbs_enable": True, "prbs_source": "plc", "prbs_amplitude": 50.0}
-        with served() as (server, rig):
-            with pytest.raises(RunAborted, match=r"set to on, 50 Nm, .*expected off"):
-                run_once(rig, Samples(), progress=half_way(lambda: server.plc.write(running)))
-            assert_disarmed(server.bus_url, 1, 2)
-
-
-def test_real_time_takes_the_same_path() -> None:
-    patient = {"guard": {"feedback_timeout_s": 1.0}, "experiments.cruise": {"duration_s": 0.5, "speed_rad_s": 0.0}}
-    samples = Samples()
-    with served(changed(plc_rig(), patient)) as (server, rig):
-        run_once(rig, samples, pacer=RealTimePacer(period_ns(rig.period_s)))
-        assert_disarmed(server.bus_url, 1, 2)
-        assert generator_of(server) == OFF
-    on_the_shaft = beyond_the_host(samples, "m1") + beyond_the_host(samples, "m2")
-    assert (np.abs(np.abs(on_the_shaft) - AMPLITUDE_NM) <= 4 * HALF_COUNT_NM + 1e-9).sum() > len(samples.rows) / 2
-    assert np.isnan(samples.column("prbs_nm")).sum() > len(samples.rows) / 2
 
 
 class TestTheGuard:
@@ -207,22 +150,3 @@ class TestTheGuard:
         assert kept.torque_limit_m2_nm == full.torque_limit_m2_nm - 90.0
         assert kept.sum_limit_nm == full.sum_limit_nm - 120.0
         assert plc.torque_limits == full == host.torque_limits
-
-    def test_a_base_torque_that_leaves_no_room_ends_the_run(self) -> None:
-        """400 Nm of each inverter, 60 Nm of it the PLC's: 341 Nm of base torque fit without the PRBS only."""
-        greedy = {
-            "experiments.reversal": {"swing_nm": 682.0, "torque_nm": 682.0, "share_m1": 0.5},
-            "guard": {"sum_limit_nm": 10_000.0},
-        }
-        with served(changed(plc_rig(), greedy)) as (server, rig):
-            with pytest.raises(RunAborted, match="expected at least the 401 Nm this experiment may ask for"):
-                run_once(rig, Samples(), experiment="reversal")
-            assert_disarmed(server.bus_url, 1, 2)
-        with pytest.raises(CommandRefused, match="expected at most 340 Nm either way"):
-            dry_run(rig, "reversal")
-
-    def test_a_dry_run_predicts_the_same_range_whoever_makes_it(self) -> None:
-        by_host, by_plc = dry_run(small_rig(), "cruise"), dry_run(plc_rig(), "cruise")
-        assert by_plc.torque_m1_nm == by_host.torque_m1_nm
-        assert by_plc.torque_m2_nm == by_host.torque_m2_nm
-        assert by_plc.speed_measured_rad_s == by_host.speed_measured_rad_s

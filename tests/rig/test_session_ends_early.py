@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import pytest
 
-from drivers.errors import CommandRefused, DeviceTimeout
+from drivers.errors import DeviceTimeout
 from drivers.plc.types import DriveMode
 from hil.errors import RunAborted
 from hil.rig.build import open_devices
@@ -13,9 +13,8 @@ from hil.rig.experiments.base import Phase
 from hil.rig.stop import StopRequest
 from hil.simulator.faults import InverterFaults, RigFaults
 from hil.simulator.plc_device import PlcDevice, PlcSetup
-from hil.simulator.rig_server import RigServer
 from tests.rig.observer import assert_disarmed
-from tests.rig.serving import Samples, changed, fast, run, run_once, served, small_rig
+from tests.rig.serving import Samples, fast, run, run_once, served
 
 STEP_WITHIN = 250
 """A SYNC inside the measured part of the small rig's reversal, which is SYNC 200 to 300 or so."""
@@ -29,14 +28,6 @@ def in_the_middle(action: Callable[[], None]) -> Progress:
             action()
 
     return show
-
-
-def close_clutch(server: RigServer) -> None:
-    server.plc.close_clutch()
-
-
-def withdraw_permissive(server: RigServer) -> None:
-    server.plc.withdraw_permissive()
 
 
 def test_vehicle_faster_than_the_plc_permits_ends_the_run() -> None:
@@ -108,37 +99,6 @@ def test_stop_request_ends_the_run_and_keeps_the_samples() -> None:
             run_once(rig, samples, stop=stop, progress=in_the_middle(stop.request))
         assert_disarmed(server.bus_url, 1, 2)
     assert len(samples.rows) == 51
-
-
-def test_interrupt_out_of_nowhere_disarms_too() -> None:
-    def interrupt() -> None:
-        raise KeyboardInterrupt
-
-    samples = Samples()
-    with served() as (server, rig):
-        with pytest.raises(KeyboardInterrupt):
-            run_once(rig, samples, progress=in_the_middle(interrupt))
-        assert_disarmed(server.bus_url, 1, 2)
-    assert len(samples.rows) == 51
-
-
-def test_stop_before_arming_arms_nothing() -> None:
-    stop = StopRequest()
-    stop.request()
-    with served() as (server, rig):
-        with pytest.raises(KeyboardInterrupt):
-            run_once(rig, Samples(), stop=stop)
-        assert_disarmed(server.bus_url, 1, 2)
-
-
-def test_torque_the_guard_refuses_ends_the_run() -> None:
-    samples = Samples()
-    tight = changed(small_rig(), {"guard": {"prbs_limit_nm": 50.0}})
-    with served(tight) as (server, rig):
-        with pytest.raises(CommandRefused, match="PRBS torque is"):
-            run_once(rig, samples)
-        assert_disarmed(server.bus_url, 1, 2)
-    assert samples.rows == []
 
 
 def test_recorder_that_fails_disarms_too() -> None:

@@ -9,10 +9,6 @@ import pytest
 from hil.rig.stop import STOP_SIGNALS, StopRequest, interrupt_on_signals, stop_on_signals
 
 
-def test_nothing_happens_unasked() -> None:
-    StopRequest().raise_if_requested()
-
-
 @pytest.mark.parametrize("number", STOP_SIGNALS)
 def test_signal_ends_the_run_at_the_next_look_and_not_before(number: signal.Signals) -> None:
     stop = StopRequest()
@@ -50,10 +46,3 @@ def test_program_that_was_started_to_outlive_its_terminal_does() -> None:
     with stop_on_signals(stop):
         os.kill(os.getpid(), signal.SIGHUP)
     assert not stop.requested
-
-
-def test_handlers_are_put_back() -> None:
-    before = [signal.getsignal(number) for number in STOP_SIGNALS]
-    with stop_on_signals(StopRequest()):
-        pass
-    assert [signal.getsignal(number) for number in STOP_SIGNALS] == before

@@ -29,14 +29,6 @@ def test_power_is_constant_above_the_base_speed(speed_rad_s: float, torque_nm: f
     assert bool((made.read(0x6041) or 0) & StatusBit.INTERNAL_LIMIT_ACTIVE) is (torque_nm < 600.0)
 
 
-def test_a_weakened_field_takes_more_current_for_the_same_torque() -> None:
-    made = limited(base_speed_rad_s=100.0)
-    made.write(0x6071, 300)
-    for speed_rad_s, current in ((50.0, 300), (200.0, 600)):
-        made.step(speed_rad_s, PERIOD_S)
-        assert (made.read(0x6077), made.read(0x6078)) == (300, current)
-
-
 def test_heat_rises_as_its_closed_form() -> None:
     limits = DriveLimits(continuous_permille=500.0, thermal_time_constant_s=10.0)
     heat = Heat(limits)
@@ -97,22 +89,12 @@ def test_a_brown_out_is_a_fault_that_stays_until_the_supply_is_back() -> None:
     assert made.read(0x603F) == 0
 
 
-def test_without_drift_every_sample_is_that_of_its_sync() -> None:
-    clock = SampleClock(0.0)
-    assert [clock.sample(float(k), 10.0 * k) for k in range(5)] == [(float(k), 10.0 * k) for k in range(5)]
-
-
 @pytest.mark.parametrize("drift", [0.125, -0.125])
 def test_the_age_grows_by_the_drift_and_wraps_after_a_period(drift: float) -> None:
     """Of a speed that grows by 1 per SYNC, what is read is behind by its age."""
     clock = SampleClock(drift * 1e6)
     ages = [k - clock.sample(float(k), 0.0)[0] for k in range(17)]
     assert ages == pytest.approx([0.0] + [(k * drift) % 1.0 for k in range(1, 17)])
-
-
-def test_a_torque_that_is_not_fresh_is_that_of_the_sync_before() -> None:
-    clock = SampleClock(1e5)
-    assert [clock.sample(0.0, torque)[1] for torque in (1.0, 2.0, 3.0)] == [1.0, 1.0, 2.0]
 
 
 @pytest.mark.parametrize(

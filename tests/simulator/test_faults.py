@@ -7,7 +7,6 @@ import pytest
 from drivers.errors import ConfigMismatch
 from drivers.inverter.cia402 import PowerState, state_of
 from drivers.inverter.cia402 import PowerState as S
-from drivers.plc.types import ClutchState, DriveMode
 from hil.errors import UsageError
 from hil.rig.build import open_devices
 from hil.rig.check import check_rig
@@ -28,10 +27,8 @@ from hil.simulator.faults import (
     WrongTorque,
 )
 from hil.simulator.plant import RigidPlant
-from hil.simulator.plc_device import PlcDevice
 from hil.simulator.rig_server import RigServer
 from tests.drivers.can_bench import M1, Bench, bench, guarded
-from tests.rig.observer import read_object
 from tests.rig.serving import ANY_PORT, changed, small_rig
 
 PERIOD_S = 0.01
@@ -86,27 +83,6 @@ PERIOD_S = 0.01
 )
 def test_each_fault_is_put_into_its_device(text: str, faults: RigFaults) -> None:
     assert rig_faults([text], PERIOD_S) == faults
-
-
-def test_several_add_up() -> None:
-    faults = rig_faults(["m1.refuse_mode", "m1.stuck", "plc.clutch_closes@1", "m2.absent"], PERIOD_S)
-    assert faults == RigFaults(
-        m1=InverterFaults(ignored_writes=frozenset({0x6040, 0x6060})),
-        m2=InverterFaults(absent=True),
-        plc=PlcFaults(clutch_closes_at_s=1.0),
-    )
-
-
-def test_what_adds_up_may_come_with_several_sizes() -> None:
-    faults = rig_faults(["m1.lacks=0x6072", "m1.lacks=0x6007", "m1.weak_cooling=500", "m1.coarse_torque=5"], PERIOD_S)
-    assert faults.m1.missing_objects == {0x6007, 0x6072}
-    assert faults.m1.limits == DriveLimits(continuous_permille=500.0, torque_step_permille=5)
-    stuck = rig_faults(["m1.torque_gain@1=0", "m1.torque_offset@1=500"], PERIOD_S).m1.wrong_torque
-    assert stuck.given(-300.0, 100) == 500.0
-
-
-def test_none_is_no_fault() -> None:
-    assert rig_faults([], PERIOD_S) == RigFaults()
 
 
 @pytest.mark.parametrize(
@@ -168,20 +144,6 @@ def test_a_moment_too_many_or_too_few_is_refused(texts: list[str], said: str) ->
         rig_faults(texts, PERIOD_S)
 
 
-def test_a_plc_may_be_unfit_from_the_start() -> None:
-    device = PlcDevice(faults=PlcFaults(clutch_closes_at_s=0.0, permissive_withdrawn_at_s=0.0))
-    assert device.clutch is ClutchState.CLOSED
-    assert device.values()["permissive"] is False
-
-
-def test_the_driver_changes_the_mode() -> None:
-    device = PlcDevice(faults=PlcFaults(mode_changes_at_s=0.5))
-    device.step(0.49)
-    assert device.values()["drive_mode"] == DriveMode.SERIES.value
-    device.step(0.01)
-    assert device.values()["drive_mode"] == DriveMode.ELECTRIC.value
-
-
 def m1(*texts: str) -> InverterFaults:
     return rig_faults([f"m1.{text}" for text in texts], PERIOD_S).m1
 
@@ -233,34 +195,6 @@ def test_a_speed_turned_halved_or_stuck_from_a_moment_on() -> None:
     stuck = speeds(m1("speed_stuck@0.04"), 6)
     assert stuck[:3] == pytest.approx(true[:3], abs=0.3)
     assert stuck[3:] == [stuck[2]] * 3
-
-
-@pytest.mark.parametrize(("every", "expected"), [(1, 6), (2, 5)])
-def test_a_second_tpdo_with_no_speed(every: int, expected: int) -> None:
-    """Four SYNCs, and from the third on, or at the fourth alone, one frame more."""
-    frames: list[bytes] = []
-    with bench(m1(f"second_tpdo@0.03={every}"), plant=RigidPlant(1.0, 0.01)) as rig:
-        armed(rig)
-        rig.link.subscribe(0x180 + M1.node_id, lambda data, t_ns: frames.append(data))
-        for _ in range(4):
-            rig.cycle(guarded(100.0))
-            rig.m1._sdo.upload(0x6041)  # answered after every TPDO of this SYNC
-    assert len(frames) == expected
-    assert frames[-1] != frames[-2]
-    assert [a for a, b in zip(frames[-1], frames[-2], strict=True) if a != b] == [0] * sum(
-        a != b for a, b in zip(frames[-1], frames[-2], strict=True)
-    )
-
-
-def test_swapped_node_ids_go_with_the_drive_and_not_with_its_number() -> None:
-    """The drive behind m1 has serial number 1, wherever its node id is."""
-    rig = small_rig()
-    for texts, serials in (((), [1, 2]), (("bus.swapped_nodes",), [2, 1])):
-        with RigServer(
-            RigidPlant(1.0, 0.01), rig, "virtual:swapped", ANY_PORT, rig_faults(texts, rig.period_s)
-        ) as server:
-            nodes = (rig.inverters.m1.node_id, rig.inverters.m2.node_id)
-            assert [read_object(server.bus_url, node_id, 0x1018, 4) for node_id in nodes] == serials
 
 
 def test_swapped_node_ids_are_found_by_the_serial_numbers() -> None:

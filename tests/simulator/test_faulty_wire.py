@@ -76,41 +76,6 @@ def test_lost_frames_are_as_many_as_asked_for_and_the_same_for_the_same_seed() -
     assert 120 < len(arrived[0]) < 190  # 200 draws of 0.8: outside with a chance below 1e-5
 
 
-def test_only_pdos_are_meant_unless_a_cob_id_is_named() -> None:
-    with cable(BusFaults(lose=some(1.0))) as ends:
-        assert ends.from_device(3, SDO) == [0, 1, 2]
-        assert ends.from_device(3, TPDO) == []
-    with cable(BusFaults(lose=some(1.0, SDO))) as ends:
-        assert ends.from_device(3, SDO) == []
-        assert ends.from_device(3, TPDO) == [0, 1, 2]
-
-
-def test_heartbeats_in_between_do_not_change_which_pdos_are_lost() -> None:
-    arrived = []
-    for beats in (0, 7):
-        with cable(BusFaults(lose=some(0.5))) as ends:
-            ends.from_device(beats, 0x705)
-            ends.from_device(beats, 0x186)
-            arrived.append(ends.from_device(50))
-    assert arrived[0] == arrived[1]
-
-
-def test_a_fault_begins_at_its_sync() -> None:
-    with cable(BusFaults(lose=some(1.0, step=2))) as ends:
-        assert ends.from_device(1) == [0]
-        ends.host.send(frame(SYNC, b""))
-        assert len(ends.from_device(1)) == 2
-        ends.host.send(frame(SYNC, b""))
-        assert len(ends.from_device(1)) == 2
-
-
-def test_corrupted_frames_are_one_byte_short() -> None:
-    with cable(BusFaults(corrupt=some(1.0))) as ends:
-        ends.from_device(1)
-        [message] = ends.at_host
-        assert (bytes(message.data), message.dlc) == (b"\0", 1)
-
-
 def test_repeated_frames_come_twice_in_a_row() -> None:
     with cable(BusFaults(repeat=some(1.0))) as ends:
         assert ends.from_device(3) == [0, 0, 1, 1, 2, 2]

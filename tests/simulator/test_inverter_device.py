@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from drivers.inverter.cia402 import STATUSWORD_STATE_BITS, Command, PowerState, TorqueMode, next_state, state_of
+from drivers.inverter.cia402 import STATUSWORD_STATE_BITS, Command, PowerState, next_state, state_of
 from drivers.scaling import VelocityScale
 from hil.simulator.drive_physics import SimulatedInverter
 from hil.simulator.faults import FaultAtStep, InverterFaults
@@ -121,27 +121,6 @@ def test_a_torque_beyond_max_torque_is_refused_and_the_one_before_holds(
     assert not (made.read(0x6041) or 0) & 1 << 11
 
 
-def test_profile_torque_starts_its_slope_at_zero_each_time_it_is_enabled() -> None:
-    made = enabled(mode=TorqueMode.PROFILE_TORQUE)
-    made.write(0x6087, 10_000)  # per mille per second: 100 counts, 60 Nm, in a period
-    made.write(0x6071, 250)
-    steps_nm = []
-    for _ in range(4):
-        made.step(0.0, PERIOD_S)
-        steps_nm.append(made.torque_nm)
-    assert steps_nm == pytest.approx([60.0, 120.0, 150.0, 150.0])
-    made.write(0x6040, Command.SWITCH_ON.value)
-    made.write(0x6040, Command.ENABLE_OPERATION.value)
-    made.step(0.0, PERIOD_S)
-    assert made.torque_nm == pytest.approx(60.0)
-
-
-def test_speed_reading_is_in_milli_rpm() -> None:
-    made = device()
-    made.step(100.0, PERIOD_S)
-    assert made.read(0x606C) == round(100.0 * 60 / (2 * np.pi) * 1000)
-
-
 def test_noise_has_the_size_it_is_given() -> None:
     """4000 draws: their standard deviation is within 5 % of the true one, by 4.5 of its own."""
     made = enabled(SimulatedInverter(5, torque_noise_counts=1.0, speed_noise_rad_s=0.05))
@@ -156,23 +135,6 @@ def test_noise_has_the_size_it_is_given() -> None:
     assert np.mean(rad_s) == pytest.approx(100.0, abs=0.005)
     assert np.std(torque) == pytest.approx(np.sqrt(1.0 + 1 / 12), rel=0.05)  # rounding adds 1/12 of a count squared
     assert np.mean(torque) == pytest.approx(100.0, abs=0.1)
-
-
-def test_fault_comes_at_its_step_and_takes_the_torque_away() -> None:
-    made = enabled(replace(QUIET, faults=InverterFaults(fault=FaultAtStep(2, 0x2310))))
-    made.write(0x6071, 100)
-    made.step(0.0, PERIOD_S)
-    assert (made.torque_nm, made.read(0x1001)) == (60.0, 0)
-    made.step(0.0, PERIOD_S)
-    assert (made.torque_nm, made.read(0x1001), made.state) == (0.0, 0x03, PowerState.FAULT)
-
-
-@pytest.mark.parametrize("mode", [0, 1, 3, -1])
-def test_mode_it_does_not_know_is_refused(mode: int) -> None:
-    made = device()
-    with pytest.raises(ObjectRefused, match="0x06090030"):
-        made.write(0x6060, mode)
-    assert made.read(0x6061) == 0
 
 
 def test_reset_goes_back_to_power_on() -> None:

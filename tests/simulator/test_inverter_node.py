@@ -9,8 +9,6 @@ import pytest
 from drivers.canopen.heartbeat import NMT_COB_ID, NmtCommand, nmt_frame
 from drivers.canopen.sdo import SdoChannel
 from drivers.errors import ConfigMismatch, DeviceTimeout, ProtocolViolation
-from drivers.inverter.cia402 import PowerState
-from hil.simulator.faults import FaultAtStep, InverterFaults
 from tests.drivers.can_bench import M1, Bench, bench, frame, guarded
 
 
@@ -70,14 +68,6 @@ def test_nmt_for_others_or_of_no_sense_changes_nothing(armed: Bench, data: bytes
     assert armed.rig.torque_nm[0] == pytest.approx(120.0)
 
 
-def test_command_waiting_for_sync_dies_with_nmt_operational(armed: Bench) -> None:
-    armed.m1.command(guarded(180.0))
-    nmt(armed, NmtCommand.ENTER_PRE_OPERATIONAL)
-    nmt(armed, NmtCommand.START)
-    assert armed.cycle().state is PowerState.SWITCH_ON_DISABLED
-    assert armed.rig.torque_nm[0] == 0.0
-
-
 def test_stopped_node_answers_no_sdo(armed: Bench) -> None:
     nmt(armed, NmtCommand.STOP)
     client = objects(armed)._client
@@ -113,79 +103,6 @@ def test_reset_node_boots_with_the_values_of_its_eds(armed: Bench) -> None:
 def test_pdo_that_is_on_is_not_changed(index: int, subindex: int, value: int, reason: str) -> None:
     with bench() as rig, pytest.raises(ConfigMismatch, match=reason):
         objects(rig).download(index, subindex, value)
-
-
-@pytest.mark.parametrize(
-    ("entry", "reason"),
-    [
-        (0x60760020, "0x06040041"),  # not mappable
-        (0x20000010, "0x06040041"),  # not there
-        (0x60410020, "0x06040041"),  # another length
-    ],
-)
-def test_object_that_can_not_be_mapped_is_refused(entry: int, reason: str) -> None:
-    with bench() as rig:
-        sdo = objects(rig)
-        sdo.download(0x1800, 1, 0x185 | 1 << 31)
-        with pytest.raises(ConfigMismatch, match="0x08000022"):  # the number of objects is not 0 yet
-            sdo.download(0x1A00, 1, 0x60410010)
-        sdo.download(0x1A00, 0, 0)
-        with pytest.raises(ConfigMismatch, match=reason):
-            sdo.download(0x1A00, 1, entry)
-
-
-def test_mapping_over_eight_bytes_is_refused() -> None:
-    with bench() as rig:
-        sdo = objects(rig)
-        sdo.download(0x1800, 1, 0x185 | 1 << 31)
-        sdo.download(0x1A00, 0, 0)
-        sdo.download(0x1A00, 1, 0x606C0020)
-        sdo.download(0x1A00, 2, 0x606C0020)
-        with pytest.raises(ConfigMismatch, match="0x06040042"):
-            sdo.download(0x1A00, 0, 3)
-        sdo.download(0x1A00, 0, 2)
-
-
-def test_transmission_type_2_answers_every_second_sync(armed: Bench) -> None:
-    nmt(armed, NmtCommand.ENTER_PRE_OPERATIONAL)
-    objects(armed).download(0x1800, 2, 2)
-    nmt(armed, NmtCommand.START)
-    assert answers(armed, syncs=6) == 3
-
-
-def test_tpdo_that_is_switched_off_is_not_sent(armed: Bench) -> None:
-    nmt(armed, NmtCommand.ENTER_PRE_OPERATIONAL)
-    objects(armed).download(0x1800, 1, 0x185 | 1 << 31)
-    nmt(armed, NmtCommand.START)
-    assert answers(armed, syncs=1) == 0
-
-
-def test_rpdo_of_another_length_is_not_processed_and_reported(armed: Bench) -> None:
-    with armed.intruder() as bus:
-        bus.send(frame(0x205, bytes(5)))
-        armed.cycle()
-        assert received(bus, 0x080 + M1.node_id)[:2] == b"\x10\x82"
-    assert armed.rig.torque_nm[0] == pytest.approx(120.0)
-
-
-def test_fault_from_power_on_is_reported_after_the_boot_up() -> None:
-    with bench(InverterFaults(fault=FaultAtStep(0, 0x3220))) as rig, rig.intruder() as bus:
-        nmt(rig, NmtCommand.RESET_NODE)
-        assert received(bus, 0x700 + M1.node_id) == b"\x00"
-        assert received(bus, 0x080 + M1.node_id) == bytes.fromhex("20 32 05 00 00 00 00 00")
-
-
-def test_heartbeat_follows_its_object_and_the_nmt_state(armed: Bench) -> None:
-    with armed.intruder() as bus:
-        assert received(bus, 0x700 + M1.node_id) == b"\x05"
-        nmt(armed, NmtCommand.STOP)
-        while received(bus, 0x700 + M1.node_id) != b"\x04":
-            pass
-        nmt(armed, NmtCommand.ENTER_PRE_OPERATIONAL)
-        objects(armed).download(0x1017, 0, 0)
-        node = armed.rig._m1
-        assert node is not None
-        assert node._producer is None
 
 
 @pytest.mark.parametrize("permille", [1001, 32767, -32768])

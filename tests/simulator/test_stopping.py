@@ -8,14 +8,13 @@ from dataclasses import replace
 import pytest
 
 from drivers.canopen.can_link import CanLink
-from drivers.canopen.heartbeat import HEARTBEAT_COB_ID
 from drivers.errors import DeviceFault
 from drivers.inverter.cia402 import Command, PowerState, TorqueMode
 from drivers.inverter.inverter import Inverter
 from hil.simulator.inverter_device import InverterDevice, ObjectRefused
 from hil.simulator.plant import RigidPlant
 from hil.simulator.simulated_rig import SimulatedRig
-from hil.simulator.stopping import GRACE_NS, NS_PER_MS, HeartbeatConsumer, RpdoDeadline
+from hil.simulator.stopping import GRACE_NS, NS_PER_MS
 from tests.drivers.can_bench import M1, M2, SIMULATED_M1, SIMULATED_M2, Bench, bench, guarded, new_channel, virtual_bus
 from tests.simulator.test_inverter_device import PERIOD_S, QUIET, device
 
@@ -87,23 +86,6 @@ def test_shutdown_and_disable_operation_stay_in_operation_until_the_ramp_is_over
     assert course(slowly) == ramp(SLOPE_STEP, _S.OPERATION_ENABLED, final)
 
 
-def test_a_command_that_is_repeated_does_not_begin_the_ramp_anew() -> None:
-    made = running(x605B=1)
-    seen = []
-    for _ in range(6):
-        made.write(0x6040, Command.SHUTDOWN.value)
-        seen += course(made, 1)
-    assert seen == ramp(SLOPE_STEP, _S.OPERATION_ENABLED, _S.READY_TO_SWITCH_ON)
-
-
-def test_operation_that_is_enabled_again_ends_the_ramp() -> None:
-    made = running(x605B=1)
-    made.write(0x6040, Command.SHUTDOWN.value)
-    course(made, 2)
-    made.write(0x6040, Command.ENABLE_OPERATION.value)
-    assert course(made, 1) == [(250, _S.OPERATION_ENABLED)]
-
-
 def test_disable_voltage_ends_every_ramp_at_once() -> None:
     made = running(x605A=1)
     made.write(0x6040, Command.QUICK_STOP.value)
@@ -153,13 +135,6 @@ def test_abort_connection(code: int, first: tuple[int, PowerState], last: tuple[
     assert (seen[0], seen[-1]) == (first, last)
 
 
-def test_a_lost_connection_is_no_fault_of_a_drive_without_torque() -> None:
-    made = device(QUIET)
-    made.write(0x6007, 1)
-    made.lose_connection(0x8130)
-    assert made.state is _S.SWITCH_ON_DISABLED
-
-
 @pytest.mark.parametrize(
     ("index", "code"), [(0x6007, 4), (0x605A, 9), (0x605A, -1), (0x605B, 2), (0x605C, 2), (0x605D, 0), (0x605E, -1)]
 )
@@ -176,52 +151,6 @@ LONG_NS = 3600 * 1_000_000_000
 
 LOOKS = range(0, GRACE_NS + 1, 10 * NS_PER_MS)
 """A drive looks every 10 ms, for as long as one that was held up itself needs to hear its host again."""
-
-
-def ended(consumer: HeartbeatConsumer, now_ns: int) -> bool:
-    return any(consumer.lost(now_ns + later_ns) for later_ns in LOOKS)
-
-
-def test_watching_begins_with_the_first_heartbeat() -> None:
-    consumer = HeartbeatConsumer(127, timeout_ms=500)
-    assert not consumer.lost(LONG_NS)
-    consumer.beat(LONG_NS)
-    assert not consumer.lost(LONG_NS + 500 * NS_PER_MS)
-    assert ended(consumer, LONG_NS + 500 * NS_PER_MS + 1)
-
-
-def test_a_drive_that_stood_still_hears_its_host_before_it_judges() -> None:
-    consumer = HeartbeatConsumer(127, timeout_ms=500)
-    consumer.beat(0)
-    assert not consumer.lost(LONG_NS)
-    consumer.beat(LONG_NS + 1)
-    assert not consumer.lost(LONG_NS + GRACE_NS)
-
-
-def test_time_in_which_the_drive_itself_stood_still_does_not_count() -> None:
-    consumer = HeartbeatConsumer(127, timeout_ms=500)
-    consumer.beat(0)
-    assert not consumer.lost(LONG_NS)
-    assert not consumer.lost(2 * LONG_NS)
-    assert not consumer.lost(3 * LONG_NS)
-    assert ended(consumer, 4 * LONG_NS)
-
-
-def test_a_loss_counts_once_until_the_heartbeat_is_back() -> None:
-    consumer = HeartbeatConsumer(127, timeout_ms=500)
-    consumer.beat(0)
-    assert ended(consumer, LONG_NS)
-    assert not ended(consumer, LONG_NS)
-    consumer.beat(LONG_NS)
-    assert ended(consumer, 2 * LONG_NS)
-
-
-def test_the_object_holds_node_and_time() -> None:
-    consumer = HeartbeatConsumer.from_object(0x007F_01F4)
-    assert consumer.cob_id == HEARTBEAT_COB_ID + 127
-    consumer.beat(0)
-    assert not consumer.lost(500 * NS_PER_MS)
-    assert ended(consumer, 501 * NS_PER_MS)
 
 
 def test_a_drive_without_its_host_gives_no_torque_and_leaves_operation() -> None:
@@ -278,17 +207,6 @@ def driven(real_time: bool = False) -> Iterator[Bench]:
         yield made
 
 
-def test_a_deadline_runs_from_the_first_rpdo_and_is_missed_once() -> None:
-    deadline = RpdoDeadline(DEADLINE_MS)
-    assert not deadline.missed(10**12)
-    deadline.received(0)
-    assert not deadline.missed(DEADLINE_MS * NS_PER_MS)
-    assert deadline.missed(DEADLINE_MS * NS_PER_MS + 1)
-    assert not deadline.missed(10**12)
-    deadline.received(10**12)
-    assert deadline.missed(2 * 10**12)
-
-
 def test_in_simulated_time_the_syncs_count_and_not_the_clock() -> None:
     """Ten SYNCs of 10 ms without a command are within 100 ms, however long they take; the eleventh is not."""
     with driven() as rig:
@@ -300,24 +218,6 @@ def test_in_simulated_time_the_syncs_count_and_not_the_clock() -> None:
         assert rig.cycle().state is PowerState.SWITCH_ON_DISABLED
         with pytest.raises(DeviceFault, match="EMCY 0x8250 RPDO timeout: the host's command did not come in time"):
             rig.m1.raise_if_faulted()
-
-
-def test_between_two_syncs_no_simulated_time_passes() -> None:
-    """Its own heartbeat, by which it looks for its host too, goes by the wall clock: every 10 ms."""
-    with driven() as rig:
-        for _ in range(10):
-            rig.cycle()
-        time.sleep(0.1)
-        assert rig.rig.torque_nm[0] == pytest.approx(120.0)
-
-
-def test_a_command_that_comes_again_ends_the_emergency_and_gives_no_torque() -> None:
-    with driven() as rig:
-        for _ in range(15):
-            rig.cycle()
-        with pytest.raises(DeviceFault, match=r"power state is switch on disabled.*The drive left it by itself"):
-            rig.cycle(guarded(120.0))
-        assert rig.rig.torque_nm[0] == 0.0
 
 
 def until_without_torque(rig: Bench) -> None:
@@ -340,18 +240,6 @@ def test_a_host_whose_heart_stops_is_missed_without_any_frame() -> None:
         until_without_torque(rig)
         with pytest.raises(DeviceFault, match="EMCY 0x8130 life guard or heartbeat error"):
             rig.m1.raise_if_faulted()
-
-
-def test_a_new_host_is_not_blamed_for_the_death_of_the_one_before() -> None:
-    with driven() as rig:
-        rig.link.stop_heartbeat()
-        until_without_torque(rig)
-        for inverter in (rig.m1, rig.m2):
-            inverter.configure()
-        rig.m1.arm()
-        rig.cycle(guarded(60.0))
-        rig.m1.raise_if_faulted()
-        assert rig.rig.torque_nm[0] == pytest.approx(60.0)
 
 
 def test_a_drive_that_is_reset_watches_nobody_until_it_is_configured() -> None:

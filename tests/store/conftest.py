@@ -11,7 +11,6 @@ from hil.recording.checksum import text_sha256
 
 RIG = 'schema = "hil.rig/1"\nname = "bench"\n'
 
-STARTED = "2026-11-21T10:00:00+00:00"
 
 N_ROWS = 50
 

@@ -6,12 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from hil.errors import RecordingError, StoreError, UsageError
+from hil.errors import UsageError
 from hil.recording.checksum import text_sha256
 from hil.recording.formats import read_metadata
 from hil.store import RunEntry, RunFilter, RunStore, register_run
-from hil.store.entry import COMPLETE
-from tests.docs.pages import DOCS, blocks
 
 Record = Callable[..., Path]
 
@@ -37,22 +35,6 @@ def test_a_registered_run_is_what_its_recording_says(tmp_path: Path, record: Rec
     assert (run.verdict, run.notes, run.attachments) == ("", (), ())
 
 
-def test_a_run_registered_twice_is_one_run(tmp_path: Path, record: Record) -> None:
-    path = record("a.csv")
-    assert register_run(path) == register_run(path)
-    with RunStore(tmp_path) as store:
-        assert len(store.find()) == 1
-
-
-def test_a_name_used_again_is_another_run(tmp_path: Path, record: Record) -> None:
-    first = register_run(record("a.csv"))
-    for file in (tmp_path / "a.csv", tmp_path / "a.csv.json"):
-        file.unlink()
-    record("b.csv").rename(tmp_path / "a.csv")
-    (tmp_path / "b.csv.json").rename(tmp_path / "a.csv.json")
-    assert register_run(tmp_path / "a.csv") != first
-
-
 def test_notes_and_results_are_kept_in_order(tmp_path: Path, record: Record) -> None:
     number = register_run(record("a.csv"))
     result = tmp_path / "diagnosis.json"
@@ -72,25 +54,6 @@ def test_notes_and_results_are_kept_in_order(tmp_path: Path, record: Record) -> 
     assert run.attachments[0].as_json() == {"verdict": "unexplained"}
     assert run.attachments[2].as_json() is None
     assert [attachment.document for attachment in listed.attachments] == ["", "", ""]
-
-
-def test_an_attached_document_stays_as_it_was(tmp_path: Path, record: Record) -> None:
-    number = register_run(record("a.csv"))
-    result = tmp_path / "identification.json"
-    result.write_text("{}", encoding="utf-8")
-    with RunStore(tmp_path) as store:
-        store.attach(number, "identification", result)
-        result.write_text('{"later": 1}', encoding="utf-8")
-        assert store.get(number).attachments[0].document == "{}"
-
-
-def test_a_file_that_is_no_text_is_known_by_its_name(tmp_path: Path, record: Record) -> None:
-    number = register_run(record("a.csv"))
-    (tmp_path / "plot.png").write_bytes(b"\x89PNG\xff")
-    with RunStore(tmp_path) as store:
-        store.attach(number, "picture", tmp_path / "plot.png")
-        (attachment,) = store.get(number).attachments
-    assert (attachment.path, attachment.document) == (tmp_path / "plot.png", "")
 
 
 @pytest.fixture
@@ -164,39 +127,6 @@ def test_a_run_that_is_none_is_refused(tmp_path: Path, record: Record, call: str
         getattr(store, call)(99, *more)
 
 
-def test_what_can_not_be_entered_is_refused(tmp_path: Path, record: Record) -> None:
-    number = register_run(record("a.csv"))
-    with RunStore(tmp_path) as store:
-        with pytest.raises(UsageError, match="expected a note, got an empty one"):
-            store.note(number, "  ")
-        with pytest.raises(UsageError, match=r"gone\.json: expected a file to attach, got: No such file"):
-            store.attach(number, "model", tmp_path / "gone.json")
-        with pytest.raises(StoreError, match="expected a recording inside"):
-            store.add_run(RunEntry(recording=tmp_path.parent / "elsewhere.csv"))
-    with pytest.raises(StoreError, match="expected an open store"):
-        store.find()
-    with pytest.raises(StoreError, match="expected an existing folder"), RunStore(tmp_path / "nowhere"):
-        pass
-
-
-def test_a_damaged_recording_is_not_registered(tmp_path: Path, record: Record) -> None:
-    path = record("a.csv")
-    path.write_text(path.read_text(encoding="utf-8").replace("0.01,", "0.02,"), encoding="utf-8")
-    with pytest.raises(RecordingError, match="SHA-256"):
-        register_run(path)
-    assert not (tmp_path / "hil_runs").exists()
-
-
-def test_a_recording_that_says_nothing_is_entered_as_what_it_is(tmp_path: Path) -> None:
-    path = tmp_path / "foreign.csv"
-    path.write_text("t,v\n0,1\n1,2\n", encoding="utf-8")
-    number = register_run(path)
-    with RunStore(tmp_path) as store:
-        entry = store.get(number).entry
-    assert (entry.samples, entry.duration_s, entry.experiment, entry.rig_sha256) == (2, 0.0, "", "")
-    assert entry.outcome == COMPLETE
-
-
 def test_a_store_moves_with_its_folder(tmp_path: Path, record: Record) -> None:
     home = tmp_path / "sub"
     register_run(record("sub/a.csv"))
@@ -212,10 +142,3 @@ def test_results_go_with_a_registration(tmp_path: Path, record: Record) -> None:
     number = register_run(path, results={"online": companion})
     with RunStore(tmp_path) as store:
         assert [attachment.kind for attachment in store.get(number).attachments] == ["online"]
-
-
-def test_the_example_of_the_manual_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (script,) = (block.text for block in blocks(DOCS / "run-store.md") if block.language == "python")
-    monkeypatch.chdir(tmp_path)
-    exec(compile(script, "run-store.md", "exec"), {})
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["coast.mf4", "hil_runs"]

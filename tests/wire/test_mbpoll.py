@@ -75,11 +75,6 @@ def test_input_registers(server: PlcServer, device: PlcDevice) -> None:
     assert [int(values[address]) for address in range(6)] == expected
 
 
-def test_a_float_with_its_low_word_first(server: PlcServer, device: PlcDevice) -> None:
-    values = read(server, f"{INPUT}:float", MAP["speed_limit"].address)
-    assert float(values[MAP["speed_limit"].address]) == device.values()["speed_limit"] == 210.25
-
-
 @pytest.mark.parametrize("at_s", [0.0, 1.0])
 def test_a_discrete_input(at_s: float) -> None:
     withdrawn = PlcDevice(faults=PlcFaults(permissive_withdrawn_at_s=at_s))

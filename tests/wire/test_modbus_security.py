@@ -6,7 +6,6 @@ import ssl
 import subprocess
 from collections.abc import Iterator
 from dataclasses import replace
-from datetime import timedelta
 from pathlib import Path
 
 import pytest
@@ -26,7 +25,6 @@ from tests.wire.tls_peers import SERVER_NAME, Authority, der_text, needs_openssl
 MAP = load_register_map(data_file("plc.toml"))
 HOLDING, INPUT, COIL = RegisterKind.HOLDING_REGISTER, RegisterKind.INPUT_REGISTER, RegisterKind.COIL
 ROLES = {"operator": Access.READ_WRITE, "viewer": Access.READ}
-YESTERDAY = timedelta(days=-1)
 SEED_ADDRESS = 5
 PATIENT_S = 20.0
 PRINTABLE_STRING = 0x13
@@ -127,26 +125,10 @@ class TestCertificates:
         with pytest.raises(ConfigMismatch, match=r"its certificate is for another name: set server_name"):
             connect_and_read(plc.port, security)
 
-    def test_a_plc_whose_certificate_has_expired(self, authority: Authority) -> None:
-        old = PlcSecurity(authority.issue(SERVER_NAME, lifetime=YESTERDAY), ROLES)
-        with PlcServer(PlcDevice(), MAP, security=old) as server:
-            with pytest.raises(ConfigMismatch, match="its certificate has expired: renew it"):
-                connect_and_read(server.port, with_role(authority, "viewer"))
-
     def test_a_plc_of_another_authority(self, plc: PlcServer, tmp_path: Path) -> None:
         stranger = with_role(Authority(tmp_path, "stranger"), "operator")
         with pytest.raises(ConfigMismatch, match="its certificate is not signed by the authority of 'ca'"):
             connect_and_read(plc.port, stranger)
-
-    def test_a_client_of_another_authority(self, plc: PlcServer, authority: Authority, tmp_path: Path) -> None:
-        stranger = Authority(tmp_path, "stranger").issue("client", der_text("operator"))
-        with pytest.raises(ConfigMismatch, match="does not accept this client's certificate"):
-            connect_and_read(plc.port, ClientSecurity(replace(stranger, ca=authority.path), SERVER_NAME))
-
-    def test_a_client_whose_certificate_has_expired(self, plc: PlcServer, authority: Authority) -> None:
-        old = authority.issue("client", der_text("operator"), lifetime=YESTERDAY)
-        with pytest.raises(ConfigMismatch, match="does not accept this client's certificate"):
-            connect_and_read(plc.port, ClientSecurity(old, SERVER_NAME))
 
     @pytest.mark.parametrize("newest", [ssl.TLSVersion.TLSv1_2, ssl.TLSVersion.TLSv1_3])
     def test_a_client_without_a_certificate(
@@ -201,10 +183,6 @@ class TestOnlyOneSideSpeaksTls:
         with pytest.raises(BusDown, match=r"whether it wants TLS: then it needs \[plc\.security\]"):
             connect_and_read(plc.port, None)
 
-    def test_nobody_there_at_all(self, authority: Authority) -> None:
-        with pytest.raises(BusDown, match="expected a Modbus TCP server"):
-            connect_and_read(1, with_role(authority, "viewer"))
-
 
 @needs_openssl
 class TestOpensslAsPlc:
@@ -217,12 +195,6 @@ class TestOpensslAsPlc:
             with pytest.raises(ConfigMismatch, match="does not know the authority that signed this client's"):
                 connect_and_read(port, security)
 
-    def test_the_client_s_certificate_has_expired(self, authority: Authority) -> None:
-        old = ClientSecurity(authority.issue("client", der_text("operator"), lifetime=YESTERDAY), SERVER_NAME)
-        with openssl_server(authority.issue(SERVER_NAME)) as port:
-            with pytest.raises(ConfigMismatch, match="this client's certificate has expired: renew it"):
-                connect_and_read(port, old)
-
     def test_it_got_no_certificate(self, authority: Authority, monkeypatch: pytest.MonkeyPatch) -> None:
         def bare(credentials: Credentials) -> ssl.SSLContext:
             context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
@@ -232,11 +204,6 @@ class TestOpensslAsPlc:
         monkeypatch.setattr(drivers.plc.modbus_dial, "client_context", bare)
         with openssl_server(authority.issue(SERVER_NAME)) as port:
             with pytest.raises(ConfigMismatch, match="requires a client certificate and got none"):
-                connect_and_read(port, with_role(authority, "operator"))
-
-    def test_its_tls_is_too_old(self, authority: Authority) -> None:
-        with openssl_server(authority.issue(SERVER_NAME), "-tls1_1", "-cipher", "ALL:@SECLEVEL=0") as port:
-            with pytest.raises(ConfigMismatch, match=r"does not take TLS 1\.2 or newer.*update its firmware"):
                 connect_and_read(port, with_role(authority, "operator"))
 
 

@@ -85,6 +85,7 @@ def await_line(process: subprocess.Popen[str], word: str) -> None:
     raise AssertionError(f"{process.args} ended without saying {word!r}")
 
 
+@pytest.mark.campaign
 def test_logger_logs_every_frame_of_a_run(tmp_path: Path) -> None:
     logged, traced = tmp_path / "logged.log", tmp_path / "traced.log"
     with served(bus_url="ws://127.0.0.1:0/") as (server, rig):
@@ -126,6 +127,7 @@ def test_player_plays_a_trace_onto_the_bus(tmp_path: Path) -> None:
     assert heard == played
 
 
+@pytest.mark.campaign
 def test_viewer_shows_both_drives(tmp_path: Path) -> None:
     """It needs a terminal: a pseudo-terminal wide enough for its table."""
     with served(bus_url="ws://127.0.0.1:0/") as (server, rig):

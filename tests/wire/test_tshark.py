@@ -8,7 +8,7 @@ from pathlib import Path
 import can
 import pytest
 
-from tests.wire.traced import EXCESS_TEMPERATURE, traced_fault, traced_run
+from tests.wire.traced import traced_fault, traced_run
 
 TSHARK = shutil.which("tshark")
 
@@ -63,11 +63,6 @@ def test_every_kind_of_message_is_reported_as_often_as_it_was_sent(trace: Path) 
         0xE: "heartbeat",
     }
     assert set(reported) == set(names), "a kind of message is missing on the bus, or one came that nobody sends"
-
-
-def test_emergency_is_reported_with_its_error_code(trace: Path) -> None:
-    codes = [frame["canopen.em.err_code"] for frame in dissected(trace) if frame["canopen.em.err_code"]]
-    assert {int(code, 16) for code in codes} == {EXCESS_TEMPERATURE}
 
 
 def test_a_malformed_frame_would_be_reported(tmp_path: Path) -> None:

@@ -15,11 +15,10 @@ from estimator.physics.model import DrivelineModel
 from estimator.physics.simulate import simulate
 from estimator.signals.record import BoolArray, FloatArray, Record
 from tests.estimator.diagnosis.planted import SIGMA, drive_torque
-from tests.estimator.physics.bench import TWO_MASS, model, random_steps, record
+from tests.estimator.physics.bench import TWO_MASS, model, record
 
 SEEDS = (3, 4)
 DRIVES = tuple(drive_torque(seed) for seed in SEEDS)
-SHAKES = tuple(random_steps(1500, seed, hold=3) for seed in SEEDS)
 
 
 @dataclass(frozen=True)

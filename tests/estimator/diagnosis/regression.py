@@ -45,11 +45,3 @@ def autoregressive(correlation: float, samples: int, rng: np.random.Generator) -
     gain = np.sqrt(1.0 - correlation**2)
     series: FloatArray = lfilter([gain], [1.0, -correlation], rng.standard_normal(samples + 300))[300:]
     return series
-
-
-def of_rms(rms: float, unknowns: int, samples: int = 2000) -> FitResult:
-    """A fit that leaves white errors of exactly this RMS; the same errors, scaled, for every RMS."""
-    rng = np.random.default_rng(0)
-    design, errors = rng.standard_normal((samples, 6)), rng.standard_normal(samples)
-    left = errors - design @ np.linalg.lstsq(design, errors, rcond=None)[0]
-    return regression([design[:, :unknowns]], [rms * left / np.sqrt(np.mean(left**2))])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -12,17 +11,15 @@ from estimator.diagnosis.acquisition import Finding, Sized
 from estimator.diagnosis.assemble import (
     acquired_effects,
     augmented_model,
-    load_torques,
     moments_in,
     parameters_of,
-    profile_size,
     profiles_of,
     retuned_parameters,
 )
 from estimator.diagnosis.chain import Chain
 from estimator.diagnosis.diagnose import diagnose
 from estimator.diagnosis.hypotheses import NOTHING, everything
-from estimator.diagnosis.intervals import Z95, interval, interval_both_ways, reported_covariance
+from estimator.diagnosis.intervals import reported_covariance
 from estimator.diagnosis.result import Evidence, FoundEffect
 from estimator.physics.catalogue import EFFECTS, effect_problems
 from estimator.physics.driveline import Start
@@ -36,7 +33,7 @@ from estimator.signals.record import FloatArray, Record
 from tests.estimator.diagnosis.plain import Bench
 from tests.estimator.diagnosis.planted import SIGMA, drive_torque, rubbing
 from tests.estimator.diagnosis.regression import regression
-from tests.estimator.physics.bench import ONE_MASS, SAMPLE_TIME_S, linear_record, model, random_steps, record, scaled
+from tests.estimator.physics.bench import ONE_MASS, linear_record, model, random_steps, scaled
 
 COULOMB = "coulomb_friction_motor"
 FRICTION_NM = 12.0
@@ -113,55 +110,6 @@ def test_whichever_inverter_is_wrong_the_intervals_hold_the_line(wrong: str) -> 
         assert high / low >= 1.0 / gain - 0.01
 
 
-def test_the_other_way_is_as_uncertain_as_the_factor_between_both() -> None:
-    """The factor is the gain's: its own relative variance comes on top, and their covariance twice."""
-    records = []
-    for seed, share in ((1, 0.5), (2, 0.65)):
-        torque, other = drive_torque(seed, 1200), random_steps(1200, seed + 20, size_nm=20.0, hold=7)
-        read = np.column_stack([share * torque + other, (1.0 - share) * torque - other])
-        record = linear_record(ONE_MASS, read @ [1.0, 0.9], Start(5.0, 0.0, 2.0), sigma=SIGMA, seed=seed)
-        records.append(replace(record, torque_nm=read, name=f"run_{seed}"))
-    result = assembled(records, "inverter_gain_mismatch")
-    names = [(shared.effect, shared.name) for shared in result.problem.shared]
-    (gain,) = (i for i, s in enumerate(result.problem.shared) if s.effect and s.low < s.high)
-    inertia, cov = names.index(("", "J_M")), reported_covariance(result)
-    other = np.zeros(result.x.size)
-    other[inertia], other[gain] = 1.0 / result.x[inertia], -1.0 / result.x[gain]  # of ln(J / g)
-    relative = float(np.sqrt(other @ cov @ other))
-    scale = result.problem.shared[inertia].scale
-    expected = scale * result.x[inertia] / result.x[gain] * np.array([1.0 - Z95 * relative, 1.0 + Z95 * relative])
-    low, high = interval_both_ways(result, cov, inertia)
-    assert (low, high) == pytest.approx(
-        (min(interval(result, cov, inertia)[0], expected[0]), max(interval(result, cov, inertia)[1], expected[1])),
-        rel=1e-6,
-    )
-    assert np.ptp(expected) > 1.2 * np.ptp(interval(result, cov, inertia)) / result.x[gain]
-
-
-def by_another_clock(values: Mapping[str, float], seed: int, rate: float) -> Record:
-    """Speeds of a single mass taken at ``(1 + rate) t``, exact under held torques: the torque's clock is right."""
-    samples, line = 3000, Start(5.0, 0.0, 2.0)
-    torque = random_steps(samples + 100, seed, hold=20)
-    on_time = linear_record(values, torque, line).output
-    instants_s = SAMPLE_TIME_S * (1.0 + rate) * np.arange(samples)
-    held = np.floor(instants_s / SAMPLE_TIME_S + 1e-9).astype(int)
-    left = np.exp(-values["b_M"] / values["J_M"] * (instants_s - SAMPLE_TIME_S * held))
-    speed = left * on_time[held] + (1.0 - left) * (torque[held] - line.load_torque_nm) / values["b_M"]
-    noise = SIGMA * np.random.default_rng(seed).standard_normal(samples)
-    return record(torque[:samples], speed + noise, name=f"run_{seed}")
-
-
-def test_whichever_clock_is_right_the_intervals_hold_the_line() -> None:
-    """The fit keeps to the speed's: by it an inertia is off by the rate, many times what the noise leaves open."""
-    rate = 0.002
-    records = [by_another_clock(ONE_MASS, seed, rate) for seed in (1, 2)]
-    result = assembled(records, "clock_drift")
-    assert result.value("clock_drift", "rate") == pytest.approx(rate, rel=0.02)
-    inertia = retuned_parameters(result, LINE, whole=True)["J_M"]
-    assert inertia.value == pytest.approx(ONE_MASS["J_M"] / (1.0 + rate), rel=2e-4)
-    assert inertia.ci95[0] < inertia.value < ONE_MASS["J_M"] < inertia.ci95[1] < (1.0 + 2.0 * rate) * ONE_MASS["J_M"]
-
-
 class TestAnEffect:
     def test_it_has_value_interval_and_unit(self, friction: FoundEffect) -> None:
         (name,) = friction.parameters
@@ -170,10 +118,6 @@ class TestAnEffect:
         assert found.value == pytest.approx(FRICTION_NM, rel=0.03)
         assert found.ci95[0] < found.value < found.ci95[1]
         assert found.ci95[1] - found.ci95[0] < 0.1 * FRICTION_NM
-
-    def test_units_of_a_translation_are_newtons(self, rubbed: FitResult) -> None:
-        found = effect_of(COULOMB, rubbed, Motion.TRANSLATION)
-        assert found.parameters["friction_nm"].unit == "N"
 
 
 @pytest.fixture(scope="module")
@@ -198,12 +142,6 @@ class TestAProfile:
             inside += list((profile.low <= true) & (true <= profile.high))
         assert np.mean(inside) > 0.6  # a spline of 2 s knots follows a 6 s wave to about its noise
 
-    def test_its_size_is_the_rms_of_the_profile(self, road: FitResult) -> None:
-        found = profile_size(road, reported_covariance(road), LINE)["grade_rms_nm"]
-        assert found.value == pytest.approx(25.0 / np.sqrt(2.0), rel=0.1)
-        assert 0.0 <= found.ci95[0] < found.value < found.ci95[1]
-        assert found.unit == "Nm"
-
 
 @pytest.fixture(scope="module")
 def brake() -> FoundEffect:
@@ -225,15 +163,6 @@ class TestAnEvent:
         for name in ("run_1", "run_2"):
             ((begin, end),) = brake.time_s[name]
             assert (begin - 100.0, end - 100.0) == pytest.approx(BRAKED_S[name], abs=0.05)
-
-    def test_a_recording_without_it_has_none(self, brake: FoundEffect) -> None:
-        assert set(brake.time_s) == {"run_1", "run_2"}
-
-    def test_its_moments_are_no_parameters(self, brake: FoundEffect) -> None:
-        """A parameter holds for all recordings, and for those to come."""
-        assert list(brake.parameters) == ["brake_nm"]
-        low, high = brake.parameters["brake_nm"].ci95
-        assert low < FRICTION_NM < high
 
 
 class TestAcquired:
@@ -259,15 +188,6 @@ class TestAcquired:
         n = effective_samples([0.1 * error for error in self.BEFORE])
         assert acquired.evidence.delta_bic == pytest.approx(n * np.log(100.0) - np.log(n))
 
-    def test_unseen_are_the_last_three_tenths(self, acquired: FoundEffect) -> None:
-        last = np.concatenate([self.BEFORE[0][700:], self.BEFORE[1][350:]])
-        rms = float(np.sqrt(np.mean(last**2)))
-        assert acquired.evidence.holdout_rms_before == pytest.approx(rms)
-        assert acquired.evidence.holdout_rms_after == pytest.approx(0.1 * rms)
-
-    def test_without_findings_there_are_none(self) -> None:
-        assert acquired_effects(Chain((), (), ()), self.BEFORE, self.BEFORE) == ()
-
 
 class TestParameters:
     def test_before_and_after_with_interval_and_unit(self, rubbed: FitResult) -> None:
@@ -288,22 +208,6 @@ class TestParameters:
         edges = (NOMINAL["J_M"] * (1.0 - tolerance), NOMINAL["J_M"] * (1.0 + tolerance))
         assert by_whole[False].ci95 == pytest.approx(edges)
 
-    def test_one_that_is_trusted_exactly_stays(self) -> None:
-        records = rubbing(lambda speed: 0.0)
-        exact = model(ONE_MASS, tolerance=0.0)
-        result = Bench(exact, records, everything(records)).fit(NOTHING)
-        for name, parameter in retuned_parameters(result, exact, whole=True).items():
-            assert parameter.value == parameter.nominal == ONE_MASS[name]
-            assert parameter.ci95 == (ONE_MASS[name], ONE_MASS[name])
-
-    def test_each_recording_has_its_load_torque(self, rubbed: FitResult) -> None:
-        torques = load_torques(rubbed, LINE)
-        assert list(torques) == ["run_1", "run_2"]
-        for torque in torques.values():
-            assert torque.value == pytest.approx(5.0, abs=0.5)
-            assert torque.ci95[0] < torque.value < torque.ci95[1]
-            assert torque.unit == "Nm"
-
 
 class TestAugmentedModel:
     def test_it_has_the_new_values_and_the_effect(self, rubbed: FitResult, friction: FoundEffect) -> None:
@@ -319,12 +223,6 @@ class TestAugmentedModel:
         (unseen,) = rubbing(lambda speed: FRICTION_NM, seeds=(9,))
         assert free_run(found, unseen).rms < 1.3 * SIGMA
         assert free_run(LINE, unseen).rms > 3.0 * SIGMA
-
-    def test_effects_that_the_model_had_stay(self, rubbed: FitResult, friction: FoundEffect) -> None:
-        having = model(NOMINAL, effects={"transport_delay": {"delay_s": 0.01}})
-        found = augmented_model(rubbed, having, [friction])
-        assert set(found.effects) == {"transport_delay", COULOMB}
-        assert augmented_model(rubbed, having, []).effects == having.effects
 
 
 def test_a_held_value_is_reported_at_its_null_where_a_model_file_needs_it() -> None:

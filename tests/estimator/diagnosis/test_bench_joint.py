@@ -19,6 +19,7 @@ def test_a_spring_and_a_damper_miss_nothing(zero_error: float) -> None:
     assert diagnosed(Joint(zero_error=zero_error)).verdict is Verdict.NO_MISMATCH
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize(
     ("joint", "named"),
     [

@@ -2,15 +2,34 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from estimator.diagnosis.hypotheses import NOTHING, everything
+from estimator.diagnosis.inference.looks import Screen, promising
 from estimator.diagnosis.preconditions.channels import with_usable_channels
 from estimator.physics.driveline import Start
+from estimator.physics.grid import grid_for
+from estimator.physics.layout import flat_values
+from estimator.physics.model import DrivelineModel, natural_frequencies_rad_s
+from estimator.physics.simulate import simulate
 from estimator.signals.record import Channel, FloatArray, Location, OutputKind, Record
-from tests.estimator.physics.bench import ANGLE, LOAD_SPEED, SPEED, TWO_MASS, exact_states, random_steps, record
+from tests.estimator.diagnosis.plain import Bench
+from tests.estimator.physics.bench import (
+    ANGLE,
+    LOAD_SPEED,
+    SAMPLE_TIME_S,
+    SPEED,
+    TWO_MASS,
+    exact_states,
+    model,
+    random_steps,
+    record,
+    scaled,
+)
 
 N, DT = 4000, 0.01
 TIME_S = DT * np.arange(N)
@@ -39,11 +58,6 @@ def test_a_sensor_elsewhere_in_the_line_has_no_clock_of_its_own(state: int, seed
     mended, warnings = with_usable_channels([with_channel(states(seed)[:, state], kind, seed=seed)])
     assert warnings == []
     assert len(mended[0].channels) == 1
-
-
-def test_a_constant_lag_is_no_other_clock() -> None:
-    late = np.interp(TIME_S - 0.03, TIME_S, states()[:, LOAD_SPEED])
-    assert with_usable_channels([with_channel(late)])[1] == []
 
 
 @pytest.mark.parametrize("ppm", [-2000.0, 2000.0])
@@ -75,10 +89,31 @@ def test_where_a_channel_is_dead_it_is_not_used() -> None:
     assert "from 9.99 to 13.99 s, while the motor moves" in warning
 
 
-def test_a_channel_that_stands_with_the_motor_is_not_dead() -> None:
-    still = np.zeros(N)
-    still[2000:] = 5.0 * np.sin(TIME_S[2000:] - TIME_S[2000])
-    channel = Channel(OutputKind.SPEED, Location.LOAD, "w2", np.round(still, 2), np.ones(N, dtype=np.bool_))
-    mended, warnings = with_usable_channels([replace(record(100.0 * still, still), channels=(channel,))])
-    assert warnings == []
-    assert mended[0].channels[0].okay.all()
+SIGMA = 0.02
+
+
+def drifting(line: DrivelineModel, true: Mapping[str, float], rate: float, samples: int) -> list[Record]:
+    records = []
+    for seed in (1, 2):
+        rec = record(random_steps(samples, seed, hold=30), name=f"run_{seed}")
+        p = flat_values(true, {"clock_drift": {"rate": rate}})
+        clean = simulate(grid_for(line, [rec]), rec, p, Start(0.0, 0.0, 2.0, 0.0, 2.0))
+        noise = SIGMA * np.random.default_rng(seed).standard_normal(samples)
+        records.append(replace(rec, output=clean + noise))
+    return records
+
+
+@pytest.mark.parametrize(("samples", "stiffer"), [(1500, 1.0), (6000, 1.0), (3000, 2.2), (3000, 8.0)])
+@pytest.mark.parametrize("periods", [-0.65, 0.65])
+def test_the_rate_is_found_on_slow_and_fast_lines(periods: float, samples: int, stiffer: float) -> None:
+    given = scaled(TWO_MASS, k=stiffer)
+    line, true = model(given), scaled(given, J_M=1.1, k=0.93, c=1.15)
+    duration_s = samples * SAMPLE_TIME_S
+    rate = periods * 2.0 * np.pi / natural_frequencies_rad_s(true)[-1] / duration_s
+    records = drifting(line, true, rate, samples)
+    bench = Bench(line, records, everything(records))
+    nominal = bench.fit(NOTHING)
+    looks = promising(Screen(nominal, line).looks("clock_drift"))
+    found = bench.fit(frozenset({"clock_drift"}), nominal, [look.release for look in looks])
+    assert found.value("clock_drift", "rate") == pytest.approx(rate, rel=0.01)
+    assert found.rms == pytest.approx(SIGMA, rel=0.05)

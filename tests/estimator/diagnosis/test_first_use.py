@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from estimator.diagnosis import diagnose, first_use
-from estimator.diagnosis.first_use import COMPILING, is_first_use, signatures
+from estimator.diagnosis import diagnose
+from estimator.diagnosis.first_use import COMPILING, signatures
 from estimator.physics.effect import Element
 from estimator.physics.layout import named
 from estimator.physics.own_law import OwnLaw, OwnParameter
@@ -51,11 +51,6 @@ def test_it_is_the_first_use_where_nothing_has_been_kept_for_this_place(tmp_path
     """The same version in another place has kernels of its own, which numba doesn't look for here."""
     done = _in_a_process_of_its_own(FOUND_KEPT, tmp_path)
     assert done.split() == ["True", "True", "False"]
-
-
-def test_where_nothing_is_compiled_there_is_no_first_use(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(first_use, "IS_COMPILED", False)
-    assert not is_first_use(2)
 
 
 @pytest.mark.parametrize("first", [True, False])

@@ -6,20 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from estimator.diagnosis.hypotheses import everything, open_hypotheses, with_effect
+from estimator.diagnosis.hypotheses import open_hypotheses, with_effect
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.driveline import Start
-from estimator.physics.effect import Element
-from estimator.physics.model import Motion, Structure
-from estimator.signals.record import OutputKind
-from tests.estimator.diagnosis.planted import quiet
 from tests.estimator.physics.bench import ONE_MASS, TWO_MASS, linear_record, model, random_steps
 
 COULOMB = frozenset({"coulomb_friction_motor"})
-
-
-def test_an_effect_is_added() -> None:
-    assert with_effect(frozenset({"backlash"}), "actuator_lag") == {"backlash", "actuator_lag"}
 
 
 def test_an_effect_replaces_its_special_cases() -> None:
@@ -30,21 +22,9 @@ def test_an_effect_replaces_its_special_cases() -> None:
     }
 
 
-def test_every_sample_that_counts_is_used() -> None:
-    records = quiet(seeds=(1,), values=ONE_MASS, samples=300)
-    records[0].okay[5] = False
-    (use,) = everything(records)
-    np.testing.assert_array_equal(use, records[0].okay)
-
-
 class TestOpenHypotheses:
     REVERSAL = linear_record(ONE_MASS, random_steps(1000, 1, hold=50), Start(0.0, 0.0, 0.5), sigma=0.01)
     FORWARD = linear_record(ONE_MASS, random_steps(1000, 2), Start(0.0, 0.0, 50.0), sigma=0.01)
-
-    def test_one_mass_has_no_shaft_effects(self) -> None:
-        testable, untestable = open_hypotheses(model(ONE_MASS), [self.REVERSAL])
-        assert {EFFECTS[name].element for name in testable} == set(Element) - {Element.SHAFT}
-        assert all(Structure.ONE_MASS in EFFECTS[name].structures for name in {*testable, *untestable})
 
     def test_what_can_not_be_tested_is_given_with_its_reason(self) -> None:
         testable, untestable = open_hypotheses(model(ONE_MASS), [self.FORWARD])
@@ -74,13 +54,3 @@ class TestOpenHypotheses:
         fitted = {name for name, entry in EFFECTS.items() if not entry.recognised}
         assert set(testable) == fitted - {"torque_nonlinearity", "load_imbalance"}
         assert set(untestable) == {"torque_nonlinearity", "load_imbalance"}  # one size of torque, and less than a turn
-
-    def test_a_position_has_no_effects_of_a_speed_sensor(self) -> None:
-        angle = linear_record(ONE_MASS, random_steps(1000, 1, hold=50), Start(0.0, 0.0, 0.5), kind=OutputKind.POSITION)
-        testable, untestable = open_hypotheses(model(ONE_MASS), [angle])
-        assert not {"resolver_error", "speed_filter", "speed_sign_blind"} & {*testable, *untestable}
-
-    def test_where_nothing_turns_nothing_repeats_with_the_turn(self) -> None:
-        sliding = model(ONE_MASS, motion=Motion.TRANSLATION)
-        testable, untestable = open_hypotheses(sliding, [self.REVERSAL])
-        assert not [name for name in {*testable, *untestable} if EFFECTS[name].phases]

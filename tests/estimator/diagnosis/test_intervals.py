@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -15,9 +16,18 @@ from estimator.diagnosis.intervals import (
     interval_that_follows,
     reported_covariance,
 )
+from estimator.diagnosis.noise import (
+    Gain,
+    gain_from_squares,
+    noise_floor,
+    unpredictable,
+)
+from estimator.physics.driveline import Start
 from estimator.physics.fit import FitResult
-from estimator.signals.record import FloatArray
+from estimator.signals.correlation import effective_samples
+from estimator.signals.record import FloatArray, Record
 from tests.estimator.diagnosis.regression import autoregressive, regression
+from tests.estimator.physics.bench import TWO_MASS, linear_record, random_steps
 
 REPETITIONS, SAMPLES = 200, 2000
 TRUE = np.array([1.0, 2.0, 3.0])
@@ -68,20 +78,6 @@ def test_correlated_errors_are_covered_as_well_as_the_window_sees_them(correlati
     assert white >= least(0.95)
 
 
-def test_taken_for_white_the_same_errors_would_be_covered_half_the_time() -> None:
-    """The variance of a mean of AR(0.9) errors is (1 + a) / (1 - a) = 19 times that of white ones."""
-    naive = 2.0 * stats.norm.cdf(Z95 / np.sqrt(19.0)) - 1.0
-    assert coverage(0.9)[0] > naive + 0.4
-
-
-def test_the_covariance_of_white_errors_is_the_textbooks() -> None:
-    rng = np.random.default_rng(1)
-    design = rng.standard_normal((50_000, 3)) * [1.0, 3.0, 0.2]
-    result = regression([design], [design @ TRUE + 0.5 * rng.standard_normal(50_000)])
-    expected = 0.25 * np.linalg.inv(design.T @ design)
-    np.testing.assert_allclose(np.diag(covariance(result)), np.diag(expected), rtol=0.06)
-
-
 @pytest.mark.parametrize("beyond", [-1.0, 1.0])
 def test_an_interval_begins_before_it_ends_where_a_fit_is_beyond_a_bound_by_its_last_digit(beyond: float) -> None:
     rng = np.random.default_rng(2)
@@ -92,16 +88,6 @@ def test_an_interval_begins_before_it_ends_where_a_fit_is_beyond_a_bound_by_its_
     pinned = replace(result, problem=replace(result.problem, shared=(shared,)))
     low, high = interval(pinned, np.zeros((1, 1)), 0)
     assert low == high == shared.scale * held
-
-
-def test_the_interval_is_in_the_parameters_unit() -> None:
-    rng = np.random.default_rng(2)
-    design, noise = rng.standard_normal((400, 1)), rng.standard_normal(400)
-    plain, large = (regression([design], [design[:, 0] + noise], scale=scale) for scale in (1.0, 50.0))
-    low, high = interval(plain, covariance(plain), 0)
-    assert low < 1.0 < high
-    assert interval(large, covariance(large), 0) == pytest.approx((50.0 * low, 50.0 * high))
-    assert 0.5 * (high - low) == pytest.approx(Z95 * np.sqrt(covariance(plain)[0, 0]))
 
 
 def test_a_nominal_parameter_at_the_edge_of_its_tolerance_keeps_its_uncertainty() -> None:
@@ -127,17 +113,6 @@ def test_an_effects_parameter_at_its_bound_is_held_there() -> None:
     assert cov[0, 0] > 0.0
 
 
-def test_recordings_are_not_correlated_across_their_ends() -> None:
-    """Cut in two where the errors jump together, the cross products over the cut fall away."""
-    rng = np.random.default_rng(4)
-    design, output = np.ones((600, 1)), autoregressive(0.9, 600, rng)
-    whole = covariance(regression([design], [output]))[0, 0]
-    halves = covariance(regression([design[:300], design[300:]], [output[:300], output[300:]]))[0, 0]
-    swapped = covariance(regression([design[300:], design[:300]], [output[300:], output[:300]]))[0, 0]
-    assert halves == pytest.approx(swapped)
-    assert halves != pytest.approx(whole)
-
-
 class TestReported:
     """White errors of the regression's own, and in addition one that keeps its value for a second."""
 
@@ -153,10 +128,6 @@ class TestReported:
         rng = np.random.default_rng(100 + seed)
         held = np.repeat(rng.standard_normal((self.SAMPLES // 100, 3)), 100, axis=0)
         return regression([held], [held @ TRUE + self.errors(coherent, seed)])
-
-    def test_noise_alone_is_reported_as_it_is(self) -> None:
-        result = self.result(0.0)
-        assert np.diag(reported_covariance(result)) == pytest.approx(np.diag(covariance(result)), rel=0.2)
 
     def test_what_is_no_noise_counts_for_as_long_as_it_keeps_its_value(self) -> None:
         """100 times its mean square takes the place of sigma^2; from twenty noisy values some of it is predicted."""
@@ -198,3 +169,117 @@ def test_the_interval_of_what_follows_stays_on_its_side_of_zero() -> None:
     size = abs(float(result.x[0]))
     assert interval_that_follows(result, cov, lambda fit: abs(float(fit.x[0])))[0] == 0.0 < size
     assert interval_that_follows(result, cov, lambda fit: -abs(float(fit.x[0])))[1] == 0.0
+
+
+START = Start(20.0, 0.0, 10.0, 0.005, 10.0)
+SIGMA = 0.05
+
+
+def drive(sigma: float = SIGMA, seed: int = 1, samples: int = 3000) -> Record:
+    return linear_record(TWO_MASS, random_steps(samples, seed), START, sigma=sigma, seed=seed, name=f"run_{seed}")
+
+
+@pytest.mark.parametrize("sigma", [0.01, 0.05, 0.3])
+def test_the_floor_of_a_linear_driveline_is_its_noise(sigma: float) -> None:
+    """A predictor of finite order errs upward: it passes part of its past's noise on."""
+    assert sigma * 0.97 < noise_floor([drive(sigma)]) < sigma * 1.15
+
+
+def test_slow_physics_that_is_missing_is_not_noise() -> None:
+    rec = drive()
+    swing = 0.5 * np.sin(2 * np.pi * 0.2 * rec.time_s)
+    assert noise_floor([replace(rec, output=rec.output + swing)]) < 1.15 * SIGMA
+
+
+def test_what_a_masked_sample_holds_does_not_matter() -> None:
+    rec = drive()
+    okay = np.random.default_rng(4).random(rec.output.size) > 0.05
+    spoilt = np.where(okay, rec.output, np.nan)
+    floor = noise_floor([replace(rec, okay=okay, output=spoilt)])
+    assert floor == noise_floor([replace(rec, okay=okay)])
+    assert 0.97 * SIGMA < floor < 1.2 * SIGMA
+
+
+@pytest.mark.parametrize("every", [5, 10, 15])
+def test_a_sample_lost_in_every_few_does_not_hide_the_noise(every: int) -> None:
+    """No window of twenty samples is whole here; a floor of zero would call any model wrong."""
+    rec = drive()
+    okay = np.arange(rec.output.size) % every != 0
+    assert 0.97 * SIGMA < noise_floor([replace(rec, okay=okay)]) < 1.3 * SIGMA
+
+
+class TestUnpredictable:
+    """What a series' own past does not predict."""
+
+    @pytest.mark.parametrize("a", [0.0, 0.5, 0.9])
+    def test_of_a_first_order_series_it_is_the_innovation(self, a: float) -> None:
+        rng = np.random.default_rng(9)
+        errors = [autoregressive(a, 4000, rng), autoregressive(a, 2000, rng)]
+        assert unpredictable(errors) == pytest.approx(np.sqrt(1.0 - a**2), rel=0.05)
+
+    def test_a_slow_swing_is_predicted_and_the_noise_on_it_is_not(self) -> None:
+        time_s = np.arange(4000) * 0.01
+        noise = 0.05 * np.random.default_rng(10).standard_normal(4000)
+        assert unpredictable([np.sin(2 * np.pi * 0.3 * time_s) + noise]) == pytest.approx(0.05, rel=0.15)
+
+
+def white(samples: int, seed: int) -> np.ndarray:
+    return np.random.default_rng(seed).standard_normal(samples)
+
+
+def test_bic_and_f_test_by_hand() -> None:
+    errors = [white(400, 1)]
+    n = effective_samples(errors)
+    found = gain_from_squares(500.0, 400.0, added=2, unknowns=5, errors=errors)
+    assert found.n_effective == n
+    assert found.delta_bic == pytest.approx(n * math.log(1.25) - 2 * math.log(n))
+    assert found.p_value == pytest.approx(stats.f.sf(0.25 * (n - 5) / 2, 2, n - 5))
+
+
+def test_correlated_errors_weigh_as_many_as_they_are_worth() -> None:
+    errors = [autoregressive(0.9, 4000, np.random.default_rng(2))]
+    found = gain_from_squares(500.0, 400.0, added=1, unknowns=5, errors=errors)
+    assert found.n_effective == effective_samples(errors)
+    assert found.n_effective < 800.0
+    assert found.delta_bic == pytest.approx(found.n_effective * math.log(1.25) - math.log(found.n_effective))
+
+
+def gained(design: np.ndarray, y: np.ndarray) -> Gain:
+    """What the last column of a regression gains over the first."""
+    smaller, larger = (regression([columns], [y]).residual for columns in (design[:, :1], design))
+    return gain_from_squares(float(smaller @ smaller), float(larger @ larger), 1, design.shape[1], [larger])
+
+
+class TestFalseAlarms:
+    """A regressor that has nothing to do with the output, added to a constant."""
+
+    REPETITIONS = 400
+
+    def p_values(self, correlation: float) -> np.ndarray:
+        found = []
+        for seed in range(self.REPETITIONS):
+            rng = np.random.default_rng(seed)
+            y, x = (autoregressive(correlation, 600, rng) for _ in range(2))
+            design = np.column_stack([np.ones(600), x])
+            found.append(gained(design, y).p_value)
+        return np.array(found)
+
+    @staticmethod
+    def most(share: float, repetitions: int) -> int:
+        """Most alarms to be expected of a test of this level, with 99.9 %."""
+        return int(stats.binom.ppf(0.999, repetitions, share))
+
+    @pytest.mark.parametrize("correlation", [0.0, 0.5, 0.9])
+    @pytest.mark.parametrize("level", [0.05, 0.01])
+    def test_are_no_more_than_the_level(self, correlation: float, level: float) -> None:
+        alarms = int(np.sum(self.p_values(correlation) < level))
+        assert alarms <= self.most(level, self.REPETITIONS)
+
+    def test_without_the_correlation_taken_into_account_they_would_be_many(self) -> None:
+        """The test above can fail: with every sample counted as independent it does."""
+        found = []
+        for seed in range(self.REPETITIONS):
+            rng = np.random.default_rng(seed)
+            y, x = (autoregressive(0.9, 600, rng) for _ in range(2))
+            found.append(stats.pearsonr(x, y).pvalue)
+        assert np.sum(np.array(found) < 0.05) > 3 * self.most(0.05, self.REPETITIONS)

@@ -6,7 +6,7 @@ import re
 
 import pytest
 
-from estimator.diagnosis.inference.wording import PLACE_NAMES, is_phrase, law_in_words
+from estimator.diagnosis.inference.wording import law_in_words
 from estimator.diagnosis.unnamed.laws import LAWS
 from estimator.physics.effect import Element
 
@@ -46,16 +46,3 @@ def test_a_law_is_said_by_what_it_goes_with(element: Element, terms: list[tuple[
 def test_no_formula_is_said(element: Element, name: str) -> None:
     said = law_in_words(element, [(name, 0.5)])
     assert not re.search(r"w_|\^|\||\b[Tt]\b", said), said
-
-
-@pytest.mark.parametrize("element", Element)
-def test_every_element_has_a_place(element: Element) -> None:
-    assert PLACE_NAMES[element]
-
-
-@pytest.mark.parametrize("name", sorted({name for laws in LAWS.values() for name in laws}))
-def test_what_needs_words_is_a_phrase(name: str) -> None:
-    """A formula has no word of more than five letters but those of its own functions and signals."""
-    words = [word.strip("()|^-/") for word in name.split()]
-    in_words = any(word.isalpha() and len(word) > 5 for word in words)
-    assert is_phrase(name) is in_words

@@ -9,15 +9,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.diagnosis.preconditions.inertia import as_one_body, fitted_inertia
 from estimator.diagnosis.preconditions.units import BEYOND, require_plausible_units
-from estimator.errors import Cure, Implausible
+from estimator.errors import Implausible
 from estimator.physics.driveline import Start
 from estimator.physics.effect import Element
-from estimator.physics.grid import grid_for
-from estimator.physics.model import Motion
 from estimator.signals.record import FloatArray, OutputKind, Record
-from tests.estimator.diagnosis.planted import Moved, recordings, rubbing
+from tests.estimator.diagnosis.planted import Moved, recordings
 from tests.estimator.physics.bench import ONE_MASS, TWO_MASS, linear_record, model, random_steps, scaled
 
 Change = Callable[[Record], Record]
@@ -77,12 +74,6 @@ def test_a_position_in_other_units(direction: float) -> None:
         require_plausible_units([wrong], model(TWO_MASS))
 
 
-def test_the_gear_ratio_is_a_known_factor() -> None:
-    line = replace(model(TWO_MASS), gear_ratio=13.0)
-    with pytest.raises(Implausible, match=r"is the speed that at the wheel, .* a gear ratio of about 13"):
-        require_plausible_units([output(1.0 / 13.0)(drive())], line)
-
-
 @pytest.mark.parametrize("values", [TWO_MASS, ONE_MASS], ids=["two masses", "one mass"])
 @pytest.mark.parametrize("kind", [OutputKind.SPEED, OutputKind.POSITION])
 def test_right_units_pass(values: dict[str, float], kind: OutputKind) -> None:
@@ -109,31 +100,6 @@ def test_missing_physics_passes(law: str) -> None:
     assert require_plausible_units(recordings(*LAWS[law]), model(TWO_MASS)) == []
 
 
-def test_friction_in_one_mass_passes() -> None:
-    require_plausible_units(rubbing(lambda speed: 40.0), model(ONE_MASS))
-
-
-def test_a_control_that_holds_the_speed_on_a_hill_passes() -> None:
-    """The torque follows the road here: seen as one body it would be an inertia of a fraction of the true one."""
-    inertia, wanted, dt = 20.0, 50.0, 0.01
-    rng = np.random.default_rng(1)
-    speed, torques, held = [wanted], [], 0.0
-    for k in range(3000):
-        error = wanted - speed[-1]
-        held += 8.0 * error * dt
-        torques.append(60.0 * error + held)
-        hill = 50.0 * math.sin(0.4 * k * dt)
-        speed.append(speed[-1] + dt / inertia * (torques[-1] - 4.0 * speed[-1] - hill))
-    rec = drive(ONE_MASS)
-    noisy = np.array(speed[:-1]) + 0.01 * rng.standard_normal(3000)
-    closed = replace(
-        rec, time_s=dt * np.arange(3000), torque_nm=np.array(torques)[:, None], output=noisy, okay=np.ones(3000, bool)
-    )
-    line = model(ONE_MASS)
-    assert fitted_inertia(closed, line, grid_for(line, [closed])) is None
-    require_plausible_units([closed], line)
-
-
 @pytest.mark.parametrize(("factor", "refused"), [(0.95, False), (1.05, True)])
 def test_the_tolerance_widens_what_is_plausible(factor: float, refused: bool) -> None:
     """A model trusted to a factor is taken at its word."""
@@ -143,67 +109,6 @@ def test_the_tolerance_widens_what_is_plausible(factor: float, refused: bool) ->
             require_plausible_units([wrong], model(ONE_MASS, 0.5))
     else:
         require_plausible_units([wrong], model(ONE_MASS, 0.5))
-
-
-def test_a_force_as_output_is_not_judged() -> None:
-    require_plausible_units([replace(output(1e6)(drive()), kind=OutputKind.FORCE)], model(TWO_MASS))
-
-
-def test_too_short_to_tell() -> None:
-    rec = drive(ONE_MASS)
-    short = replace(
-        rec, time_s=rec.time_s[:900], torque_nm=rec.torque_nm[:900], output=rec.output[:900], okay=rec.okay[:900]
-    )
-    assert as_one_body(short, model(ONE_MASS), 0.0).share == 0.0
-
-
-def test_a_speed_in_km_per_h_moves_along_a_line() -> None:
-    with pytest.raises(Implausible, match="is the speed in km/h, expected m/s") as refusal:
-        require_plausible_units([output(3.6)(drive())], model(TWO_MASS, motion=Motion.TRANSLATION))
-    assert refusal.value.cure == Cure("run", output=pytest.approx(1.0 / 3.6))
-
-
-AMBIGUOUS: dict[str, tuple[Change, tuple[str, ...]]] = {
-    "a torque at the wheel": (torque(6.0, 6.0), ("torque that at the wheel", "turns per second", "speed that at the")),
-    "rpm and per cent": (
-        lambda record: output(9.55)(torque(1.0 / 6.0, 1.0 / 6.0)(record)),
-        ("in degrees", "in rpm, expected rad/s, and is the torque in per cent of a rated torque of about 600 Nm"),
-    ),
-}
-
-
-@pytest.mark.parametrize("fault", AMBIGUOUS)
-def test_where_several_explain_it_all_are_named_and_no_line_is_given(fault: str) -> None:
-    change, named = AMBIGUOUS[fault]
-    with pytest.raises(Implausible) as refusal:
-        require_plausible_units([change(drive())], model(TWO_MASS))
-    assert refusal.value.cure is None
-    assert all(each in str(refusal.value) for each in named)
-
-
-def test_where_the_model_has_no_gear_ratio_it_comes_first() -> None:
-    with pytest.raises(
-        Implausible, match=r"What would explain it, with its odds: is the (torque|speed) that at the wheel"
-    ):
-        require_plausible_units([torque(6.0, 6.0)(drive())], model(TWO_MASS))
-
-
-def test_no_rated_torque_is_named_that_no_drive_has() -> None:
-    with pytest.raises(Implausible) as refusal:
-        require_plausible_units([torque(1e-6, 1e-6)(drive())], model(TWO_MASS))
-    assert "rated" not in str(refusal.value)
-
-
-def test_what_is_left_after_the_line_is_said() -> None:
-    wrong = replace(torque(1.0, -1.0)(drive()), name="turned")
-    with pytest.raises(Implausible, match=r"With that corrected, recording (run|turned) is implausible"):
-        require_plausible_units([wrong, output(30.0 / math.pi)(drive())], model(TWO_MASS))
-
-
-def test_a_factor_that_physics_could_make_is_a_doubt_and_no_refusal() -> None:
-    (doubt,) = require_plausible_units([torque(0.4, 0.4)(drive())], model(TWO_MASS))
-    assert "per cent of a rated torque of about 250 Nm" in str(doubt)
-    assert doubt.cure == Cure("run", torque=2.5)
 
 
 def lessened(change: Callable[[FloatArray], FloatArray], values: dict[str, float]) -> Record:
@@ -287,24 +192,6 @@ def test_per_mille_of_a_rated_torque_are_reported_with_their_scale(rated_nm: flo
         require_plausible_units([in_per_mille(rated_nm)(drive(values))], model(values))
     assert refusal.value.cure is not None
     assert refusal.value.cure.torque == pytest.approx(rated_nm / 1e3, rel=0.2)
-
-
-def test_whole_newton_metres_and_a_payload_are_no_per_mille() -> None:
-    whole = replace(drive(), torque_nm=np.round(drive().torque_nm))
-    require_plausible_units([whole], model(TWO_MASS))
-    require_plausible_units([whole], model(scaled(TWO_MASS, J_L=0.5)))
-
-
-def test_per_mille_within_the_tolerance_change_no_verdict() -> None:
-    """At a rated torque near 1000 Nm there is nothing to tell, and nothing that goes wrong."""
-    require_plausible_units([in_per_mille(950.0)(drive())], model(TWO_MASS))
-
-
-def test_a_torque_in_per_cent_is_reported_with_its_scale() -> None:
-    with pytest.raises(Implausible, match="per cent of a rated torque of about") as refusal:
-        require_plausible_units([torque(1.0 / 5.0, 1.0 / 5.0)(drive())], model(TWO_MASS))
-    assert refusal.value.cure is not None
-    assert refusal.value.cure.torque == pytest.approx(5.0, rel=0.2)
 
 
 def test_a_torque_turned_round_is_reported_where_the_inertia_is_hardly_off() -> None:

@@ -1,23 +1,29 @@
-"""Long gaps cut recordings into segments, and what is found in these is given for the recordings."""
+"""What of a recording is used: segments between gaps, stretches, thinned samples, and what is held out."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
 from estimator.diagnosis import diagnose
 from estimator.diagnosis.chain import replay
-from estimator.diagnosis.noise import noise_floor
-from estimator.diagnosis.preconditions import prepare
+from estimator.diagnosis.hypotheses import NOTHING, Effects, everything
+from estimator.diagnosis.inference.figures import BLOCK_S, EVERY_S, blocks, foreign_outputs
+from estimator.diagnosis.noise import LONGEST_S, MOST_SAMPLES, noise_floor, share_of, stretches
 from estimator.diagnosis.result import Course, Discrepancy, Equivalent, Estimated, Profile, Response, Verdict
-from estimator.diagnosis.segments import FEWEST_SAMPLES, LONG_S, LONG_SAMPLES, cut, joined, segments, tiles
+from estimator.diagnosis.segments import FEWEST_SAMPLES, LONG_S, cut, joined, segments
 from estimator.errors import NotExciting
 from estimator.physics.driveline import Start
+from estimator.physics.effects.load import KNOT_SPACING_S
+from estimator.physics.fit import FitResult
 from estimator.signals.record import Record, sliced
-from tests.estimator.physics.bench import ONE_MASS, SAMPLE_TIME_S, linear_record, model, random_steps
+from tests.estimator.diagnosis.plain import Bench
+from tests.estimator.diagnosis.planted import SIGMA, drive_torque, rubbing
+from tests.estimator.physics.bench import ONE_MASS, SAMPLE_TIME_S, linear_record, model, random_steps, record
 
 Rows = Sequence[tuple[int, int]]
 LINE = model(ONE_MASS)
@@ -46,18 +52,6 @@ def drive(samples: int = 3000, bad: Rows = (), name: str = "run", load_nm: float
 )
 def test_where_segments_are(bad: Rows, parts: Rows) -> None:
     assert segments(drive(bad=bad)) == [slice(*part) for part in parts]
-
-
-def test_a_few_lost_samples_are_no_gap_where_sampling_is_slow() -> None:
-    slow = replace(drive(bad=[(1000, 1000 + LONG_SAMPLES)]), sample_time_s=1.0)
-    assert segments(slow) == [slice(0, 3000)]
-
-
-def test_a_recording_without_long_gaps_stays_as_it_is() -> None:
-    whole = drive(bad=[(700, 740)])
-    found = cut([whole])
-    assert found.records[0] is whole
-    assert (dict(found.rows), found.warnings) == ({}, ())
 
 
 def test_segments_keep_the_time_and_go_by_names_of_their_own() -> None:
@@ -99,19 +93,6 @@ def test_of_a_segment_of_a_part_time_counts_from_the_very_beginning() -> None:
     assert quarter.offset_s is not None
     assert quarter.torque_okay is not None
     assert quarter.offset_s.shape == quarter.torque_okay.shape == (200,)
-
-
-def test_a_held_out_recording_in_scraps_is_reported_and_not_used() -> None:
-    ready = prepare([drive()], LINE, [replace(drive(name="unseen"), okay=np.arange(3000) % 300 < 100)])
-    assert ready.holdout == ()
-    assert "recording unseen: gaps of more than 1 s cut it into 10 segments, none of which" in ready.warnings[0]
-
-
-def test_tiles_are_all_rows_each_from_where_a_segment_begins() -> None:
-    whole = drive(bad=[(500, 900), (905, 1400)])
-    parts = tiles(whole)
-    assert [part.time_s.size for part in parts] == [1400, 1600]
-    assert tiles(drive(bad=[(500, 540)]))[0].time_s.size == 3000
 
 
 def test_a_part_too_short_for_the_noise_is_left_to_the_others() -> None:
@@ -195,12 +176,65 @@ def test_courses_intervals_and_texts_are_joined() -> None:
     assert profile[0].unit == "Nm"
 
 
-def test_names_of_many_segments_are_not_mixed_up() -> None:
-    bad = [(310 * i + 200, 310 * i + 310) for i in range(14)]
-    parts = cut([drive(4500, bad=bad)])
-    assert len(parts.records) > 10
-    base = diagnose([drive(600)], LINE)
-    said = replace(
-        base, statement="run#12 and run#1", traces=(), load_torque={}, mismatch=replace(base.mismatch, time_s={})
-    )
-    assert joined(said, parts).statement == "run and run"
+def lasting(samples: int, name: str = "run") -> Record:
+    return record(np.zeros(samples), np.zeros(samples), name=name)
+
+
+def test_of_what_is_longer_stretches_from_beginning_to_end_are_used() -> None:
+    rec = lasting(10 * MOST_SAMPLES)
+    parts = stretches(rec, [slice(0, rec.output.size)], share_of([rec]))
+    assert sum(part.stop - part.start for part in parts) == pytest.approx(MOST_SAMPLES, rel=0.01)
+    assert max(part.stop - part.start for part in parts) <= LONGEST_S / rec.sample_time_s
+    assert (parts[0].start, parts[-1].stop) == (0, rec.output.size)
+    gaps = [after.start - before.stop for before, after in pairwise(parts)]
+    assert min(gaps) > 0
+    assert max(gaps) - min(gaps) <= 1
+
+
+def test_recordings_share_what_may_be_used_by_their_length() -> None:
+    found = cut([lasting(3 * MOST_SAMPLES, "long"), lasting(MOST_SAMPLES, "short")])
+    used = {name: sum(r.output.size for r in found.records if r.name.startswith(name)) for name in ("long", "short")}
+    assert used["long"] == pytest.approx(3 * used["short"], rel=0.01)
+
+
+def test_many_short_recordings_stay_whole() -> None:
+    samples = round(0.5 * LONGEST_S / 0.01)
+    records = [lasting(samples, f"run_{i}") for i in range(2 * MOST_SAMPLES // samples)]
+    found = cut(records)
+    assert [each.output.size for each in found.records] == [samples] * len(records)
+    assert found.warnings == ()
+
+
+COULOMB: Effects = frozenset({"coulomb_friction_motor"})
+SAMPLES = 1200
+
+
+def with_friction(seeds: tuple[int, ...] = (1, 2)) -> list[Record]:
+    return rubbing(lambda speed: 12.0, seeds, SAMPLES)
+
+
+def fits(records: list[Record], effects: Effects) -> tuple[FitResult, FitResult]:
+    bench = Bench(LINE, records, everything(records))
+    return bench.fit(NOTHING), bench.fit(effects, bench.fit(NOTHING))
+
+
+class TestBlocks:
+    def test_they_are_kept_out_all_along_and_not_at_the_ends(self) -> None:
+        out = blocks(record(np.zeros(2000), np.zeros(2000)))
+        assert out.mean() == pytest.approx(BLOCK_S / EVERY_S, abs=0.01)
+        assert not out[:50].any()
+        assert not out[-50:].any()
+        short = blocks(record(np.zeros(100), np.zeros(100)))
+        assert short.mean() == pytest.approx(BLOCK_S / EVERY_S, abs=0.05)
+        assert BLOCK_S < KNOT_SPACING_S  # so that the profile on both sides can predict it
+
+
+def test_foreign_recordings_get_their_own_load_and_start_and_nothing_else() -> None:
+    records = with_friction()
+    _, fitted = fits(records, COULOMB)
+    torque = drive_torque(11, SAMPLES)
+    elsewhere = linear_record(ONE_MASS, torque, Start(8.0, 0.0, -4.0), sigma=SIGMA, name="elsewhere")
+    (output,) = foreign_outputs(fitted, LINE, [elsewhere], [elsewhere.okay], COULOMB)
+    (again,) = foreign_outputs(fitted, model(ONE_MASS, 0.9), [elsewhere], [elsewhere.okay], COULOMB)
+    np.testing.assert_array_equal(output, again)
+    assert np.std(output - elsewhere.output) > 2.0 * SIGMA  # it has no friction, the fit has

@@ -63,13 +63,6 @@ def test_a_joint_keeps_twelve_samples_a_period_of_what_it_takes() -> None:
     assert 1.0 / (12.0 * 50.0) >= thin.sample_time_s > 0.5 / (12.0 * 50.0)
 
 
-def test_the_reference_is_averaged_as_the_torque_is() -> None:
-    torque = random_steps(MOST_SAMPLES + 1000, 1)
-    fast = replace(record(torque, np.zeros(torque.size)), sample_time_s=0.001, reference_nm=torque)
-    (thin,) = thinned([fast], LINE)
-    np.testing.assert_array_equal(thin.reference_nm, thin.total_torque_nm)
-
-
 def test_the_line_found_is_the_same() -> None:
     """Torque that changes every 10 ms, read every millisecond, more often than is used."""
     torque = np.repeat(random_steps(MOST_SAMPLES // 10 + 1, 1, mean_nm=20.0), 10)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from estimator.identification.best import BestEstimate, Verdict, best_estimate
-from estimator.identification.linear_model import LinearModel, Orders
+from estimator.identification.linear_model import Orders
 from estimator.identification.modes.physical import NAMES, two_mass_model
 from estimator.identification.modes.uncertainty import Uncertain
 from estimator.identification.offline.fits import LinearFit, fit_box_jenkins, fit_output_error, problem_of
@@ -59,6 +59,7 @@ def pair(best: BestEstimate) -> tuple[float, float]:
     return best.mode.frequency_hz.value, best.mode.damping.value
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("seed", [1, *(pytest.param(seed, marks=pytest.mark.campaign) for seed in (2, 3))])
 def test_with_a_gap_the_damping_is_near_the_linear_one_and_what_it_depends_on_is_shown(seed: int) -> None:
     best = best_estimate(with_gap(seed))
@@ -73,6 +74,7 @@ def test_with_a_gap_the_damping_is_near_the_linear_one_and_what_it_depends_on_is
     )
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("seed", [20, *(pytest.param(seed, marks=pytest.mark.campaign) for seed in (32, 111))])
 def test_buses_on_which_other_minima_are_near(seed: int) -> None:
     """Of 200 those on which an output-error fit, a subspace estimate and this one are furthest off."""
@@ -82,6 +84,7 @@ def test_buses_on_which_other_minima_are_near(seed: int) -> None:
         assert value == pytest.approx(truth, rel=within)
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize(
     ("buses", "independent", "good"), [(2, 1, 1), pytest.param(10, 8, 6, marks=pytest.mark.campaign)]
 )
@@ -93,18 +96,6 @@ def test_healthy_recordings_pass_their_own_residual_tests(buses: int, independen
     assert all(best.linearity.is_linear for best in found)
 
 
-def test_one_mass_has_no_pair() -> None:
-    rng = np.random.default_rng(0)
-    torque = 150.0 + prbs_nm(3000, 60.0)
-    speed = 60.0 + LinearModel((-0.9995,), (1e-4,), 1, PERIOD_S).simulate(torque - 150.0)
-    measured = speed + 0.04 * rng.normal(size=3000)
-    record = Record("one", PERIOD_S, PERIOD_S * np.arange(3000), torque[:, np.newaxis], measured, np.ones(3000, bool))
-    best = best_estimate(record)
-    assert best.mode is None
-    assert best.verdict is Verdict.ONE_MASS
-    assert best.reason
-
-
 def lost(record: Record, okay: BoolArray) -> Record:
     """Return a recording in which rows were lost whole: no output, and the torque held from the row before."""
     rows = np.maximum.accumulate(np.where(okay, np.arange(okay.size), 0))
@@ -112,6 +103,7 @@ def lost(record: Record, okay: BoolArray) -> Record:
     return replace(record, output=output, okay=okay, torque_nm=record.torque_nm[rows], torque_okay=okay)
 
 
+@pytest.mark.campaign
 def test_lost_rows_cost_no_more_than_what_they_held() -> None:
     source = cruise(7, duration_s=30.0).record
     okay = np.ones(source.okay.shape, dtype=bool)

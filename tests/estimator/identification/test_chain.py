@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.errors import BadSetting, BadShape
+from estimator.errors import BadSetting
 from estimator.identification.chain import OnlineChain, OnlineTrajectory
 from estimator.identification.identify import identify
 from estimator.identification.online.adaptation import ConstantForgetting
@@ -100,13 +100,6 @@ def test_a_state_of_other_settings_is_refused() -> None:
         chain().restore(state)
 
 
-def test_time_is_that_of_the_sample_the_estimate_stands_for(drive: Record) -> None:
-    live = chain()
-    course = live.run(drive)
-    assert live.delay_s == pytest.approx(0.16)
-    assert course.time_s == pytest.approx(drive.time_s[::2] - 0.16)
-
-
 @pytest.mark.parametrize("L", [None, "batch"])
 def test_finds_the_resonance_with_and_without_a_batch_model(cruises: list[Cruise], L: str | None) -> None:
     first, *others = cruises[:4]
@@ -127,30 +120,3 @@ def test_no_value_raises_or_stays(drive: Record, bad: float) -> None:
     assert np.isfinite(course.estimates.theta).all()
     if not np.isfinite(bad):
         assert course.frequency_hz[BEFORE_THE_CHANGE] == pytest.approx(Line().resonance[0], rel=0.02)
-
-
-@pytest.mark.parametrize(("torque", "output"), [(0.0, 0.0), (100.0, 5.0)])
-def test_constant_signals_have_no_resonance(torque: float, output: float) -> None:
-    n = 3000
-    course = chain().run_block(0.01 * np.arange(n), np.full(n, torque), np.full(n, output), np.ones(n, dtype=bool))
-    assert np.isnan(course.frequency_hz).all()
-    assert course[-1].resonance is None
-    assert course[-1].estimate.reason.message
-
-
-def test_torque_that_was_not_read_yet_is_not_looked_up_ahead(drive: Record) -> None:
-    read = np.ones(drive.torque_nm.shape, dtype=bool)
-    read[:5] = False
-    record = replace(drive, torque_okay=read)
-    assert np.isnan(chain().torque_of(record)[:5]).all()
-    assert (chain().torque_of(record)[5:] == drive.total_torque_nm[5:]).all()
-
-
-def test_period_that_does_not_divide_that_of_the_models_is_refused() -> None:
-    with pytest.raises(BadSetting, match=r"0\.003 s"):
-        OnlineChain(Settings(), 0.003)
-
-
-def test_signals_of_different_length_are_refused() -> None:
-    with pytest.raises(BadShape, match="one shape"):
-        chain().run_block(np.zeros(3), np.zeros(4), np.zeros(4), np.ones(4, dtype=bool))

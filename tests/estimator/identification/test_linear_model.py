@@ -1,8 +1,12 @@
 import numpy as np
 import pytest
 
-from estimator.errors import BadModel, BadSetting, BadShape
+from estimator.errors import BadSetting, NotExciting
 from estimator.identification.linear_model import LinearModel, Orders
+from estimator.identification.settings import excitation_order, require_excitation
+from estimator.identification.triangular import ROWS, singular_values, solve_least_squares, triangular
+from estimator.signals.prbs import prbs_nm
+from estimator.signals.record import FloatArray
 
 MODEL = LinearModel(a=(-1.5, 0.7), b=(0.4, -0.1, 0.3), nk=2, sample_time_s=0.02)
 
@@ -16,21 +20,6 @@ def test_the_difference_equation_is_the_stated_convention() -> None:
         past_u = [u[t - 2 - j] if t >= 2 + j else 0.0 for j in range(3)]
         y[t] = 1.5 * past_y[0] - 0.7 * past_y[1] + 0.4 * past_u[0] - 0.1 * past_u[1] + 0.3 * past_u[2]
     np.testing.assert_allclose(MODEL.simulate(u), y, atol=1e-12)
-
-
-def test_theta_there_and_back() -> None:
-    assert LinearModel.from_theta(MODEL.theta, MODEL.orders, 0.02) == MODEL
-    assert MODEL.orders == Orders(na=2, nb=3, nk=2)
-    assert MODEL.orders.names == ("a_1", "a_2", "b_1", "b_2", "b_3")
-    assert MODEL.A.tolist() == [1.0, -1.5, 0.7]
-    assert MODEL.B.tolist() == [0.0, 0.0, 0.4, -0.1, 0.3]
-
-
-def test_poles_and_zeros_are_roots_in_z() -> None:
-    np.testing.assert_allclose(np.polyval([1.0, -1.5, 0.7], MODEL.poles), 0.0, atol=1e-12)
-    np.testing.assert_allclose(np.polyval([0.4, -0.1, 0.3], MODEL.zeros), 0.0, atol=1e-12)
-    assert MODEL.is_stable
-    assert not LinearModel((-1.0,), (1.0,), 1, 0.02).is_stable
 
 
 def test_the_frequency_response_is_that_of_a_settled_sine() -> None:
@@ -63,11 +52,77 @@ def test_impossible_orders_are_refused(orders: tuple[int, int, int], named: str)
         Orders(*orders)
 
 
-def test_coefficients_that_are_not_finite_are_refused() -> None:
-    with pytest.raises(BadModel, match="finite"):
-        LinearModel((np.nan,), (1.0,), 1, 0.02)
+@pytest.mark.parametrize("shape", [(200, 7), (7, 7), (3, 7), (50, 1), (1, 1)])
+@pytest.mark.parametrize("scale", [1e-200, 1.0, 1e200])
+def test_the_triangle_is_that_of_the_textbook(shape: tuple[int, int], scale: float) -> None:
+    A = np.random.default_rng(0).normal(size=shape)
+    R = triangular(scale * A) / scale
+    expected = np.linalg.qr(A)[1]
+    np.testing.assert_allclose(np.abs(R), np.abs(expected), atol=1e-12)
+    assert np.array_equal(R, np.triu(R))
 
 
-def test_a_theta_of_the_wrong_length_is_refused() -> None:
-    with pytest.raises(BadShape, match=r"shape \(3,\), expected \(5,\)"):
-        LinearModel.from_theta(np.zeros(3), MODEL.orders, 0.02)
+def test_singular_values_and_solution_agree_with_the_library() -> None:
+    rng = np.random.default_rng(1)
+    A, b = rng.normal(size=(300, 9)) * np.logspace(0, -5, 9), rng.normal(size=300)
+    np.testing.assert_allclose(singular_values(A), np.linalg.svd(A, compute_uv=False), rtol=1e-10)
+    np.testing.assert_allclose(solve_least_squares(A, b), np.linalg.lstsq(A, b, rcond=None)[0], rtol=1e-9)
+
+
+def test_a_matrix_longer_than_what_is_reduced_at_a_time_and_its_rows_that_count() -> None:
+    A, b = (np.random.default_rng(4).normal(size=shape) for shape in ((2 * ROWS + 9, 3), 2 * ROWS + 9))
+    rows = np.arange(b.size) % 7 != 0
+    R = triangular(A, b, rows=rows)
+    both = np.column_stack([A, b])[rows]
+    np.testing.assert_allclose(R.T @ R, both.T @ both, rtol=1e-9, atol=1e-7)
+    np.testing.assert_allclose(solve_least_squares(A, b), np.linalg.lstsq(A, b, rcond=None)[0], rtol=1e-9)
+
+
+N = 600
+T = np.arange(N)
+ORDERS = Orders(4, 4, 1)
+
+
+def refused(u: FloatArray, y: FloatArray | None = None, good: int = N) -> NotExciting:
+    okay = T < good
+    output = np.random.default_rng(0).normal(size=N) if y is None else y
+    with pytest.raises(NotExciting) as refusal:
+        require_excitation("run_7", u, output, okay, ORDERS)
+    assert "run_7" in str(refusal.value)
+    return refusal.value
+
+
+@pytest.mark.parametrize(
+    ("u", "order"),
+    [
+        (np.zeros(N), 0),
+        (np.full(N, 3.0), 1),
+        (np.sin(0.3 * T), 2),
+        (2.0 + np.sin(0.3 * T), 3),
+        (np.sin(0.3 * T) + 0.1 * np.sin(1.1 * T + 1), 4),
+        (prbs_nm(N, 60.0, cells=3), 7),
+        (prbs_nm(N, 60.0), 8),
+    ],
+)
+def test_the_order_is_that_of_the_textbook(u: FloatArray, order: int) -> None:
+    assert excitation_order(u, 8) == order
+
+
+def test_a_prbs_that_moves_the_output_is_enough() -> None:
+    require_excitation("run_7", prbs_nm(N, 60.0), np.sin(T), T < 80, ORDERS)
+
+
+def test_a_sine_leaves_all_but_two_undetermined() -> None:
+    assert refused(np.sin(0.3 * T)).names == ("a_2", "a_3", "a_4", "b_2", "b_3", "b_4")
+
+
+def test_too_few_good_samples_are_refused() -> None:
+    refusal = refused(prbs_nm(N, 60.0), good=79)
+    assert "79 good samples, expected at least 80" in str(refusal)
+    assert refusal.names == ORDERS.names
+
+
+def test_an_output_that_never_moves_is_refused() -> None:
+    refusal = refused(prbs_nm(N, 60.0), y=np.full(N, 120.0))
+    assert "never changes" in str(refusal)
+    assert refusal.names == ORDERS.names

@@ -35,6 +35,7 @@ def test_a_good_run_is_sure_of_its_resonance_and_of_the_motor(record: Record) ->
     assert asked.not_physical == ""
 
 
+@pytest.mark.campaign
 def test_the_course_is_the_on_line_estimate_itself(record: Record) -> None:
     found = identify(record, SETTINGS)
     course = study(record, found, SETTINGS).course
@@ -43,6 +44,7 @@ def test_the_course_is_the_on_line_estimate_itself(record: Record) -> None:
     assert len(course) == found.data.okay.shape[0]
 
 
+@pytest.mark.campaign
 def test_a_drive_that_answers_the_wrong_way_round_has_no_masses(record: Record) -> None:
     reversed_sign = replace(record, output=-record.output)
     asked = study(reversed_sign, identify(reversed_sign, SETTINGS), SETTINGS)

@@ -7,12 +7,17 @@ from typing import Any
 import numba
 import numpy as np
 import pytest
+from numba.core.unsafe import refcount
 
+from estimator.compiled import IS_COMPILED, compiled
+from estimator.lanes import borrowed
 from estimator.physics import laws
 from estimator.physics.effects.drag import cold_part, quadratic_law
 from estimator.physics.effects.dry_friction import stribeck_law
 from estimator.physics.effects.load import carcass, coupling, gripped
 from estimator.physics.effects.shaft import damping_share, loading_rate, pressed, stiffness_factor
+from estimator.signals.record import FloatArray
+from tests.chosen import one_in
 from tests.estimator.lanes.bench import in_both_ways
 
 EITHER_SIDE = (-25.0, -0.7, -0.01, 0.0, 0.3, 0.625, 1.0, 45.0)
@@ -51,7 +56,7 @@ LAWS: list[tuple[Callable[..., Any], Sequence[Sequence[float]]]] = [
 ]
 
 
-@pytest.mark.parametrize(("law", "values"), LAWS, ids=lambda value: getattr(value, "__name__", ""))
+@pytest.mark.parametrize(("law", "values"), one_in(3, LAWS), ids=lambda value: getattr(value, "__name__", ""))
 def test_a_law_is_the_same_in_every_lane(law: Callable[..., Any], values: Sequence[Sequence[float]]) -> None:
     grid = np.array(list(itertools.product(*values)))
     shuffled = np.random.default_rng(3).permutation(grid)  # so that lanes differ in every argument
@@ -60,3 +65,39 @@ def test_a_law_is_the_same_in_every_lane(law: Callable[..., Any], values: Sequen
     with np.errstate(invalid="ignore"):
         together, alone = in_both_ways(compiled, tuple(sorted_too.T))
     np.testing.assert_allclose(together, alone, rtol=1e-13, atol=1e-15 * np.abs(alone).max())
+
+
+get_refcount: Any = refcount.get_refcount
+
+
+@compiled
+def counted(values: FloatArray, borrowing: bool) -> tuple[int, int]:
+    """Return how many references there are before and behind five more."""
+    before, others = get_refcount(values), []
+    for _ in range(5):
+        others.append(borrowed(values) if borrowing else values)
+    return before, get_refcount(values) + 0 * len(others)
+
+
+@compiled
+def changed(values: FloatArray) -> FloatArray:
+    own = 2.0 * values
+    taken = borrowed(own)
+    taken[0] += 1.0
+    return own
+
+
+def test_what_is_written_to_a_borrowed_array_is_the_owners() -> None:
+    assert changed(np.array([1.0, 2.0])).tolist() == [3.0, 4.0]
+
+
+def test_python_borrows_the_array_itself() -> None:
+    values = np.arange(3.0)
+    assert borrowed(values) is values
+
+
+@pytest.mark.skipif(not IS_COMPILED, reason="Python counts references to whatever it is given")
+@pytest.mark.parametrize(("borrowing", "more"), [(False, 5), (True, 0)])
+def test_no_references_to_a_borrowed_array_are_counted(borrowing: bool, more: int) -> None:
+    before, behind = counted(np.arange(3.0), borrowing)
+    assert behind - before == more

@@ -1,11 +1,8 @@
 """One contract for every entry of the catalogue: names, units, nulls, starts, words, and what it refuses to judge."""
 
-import inspect
 import math
-import re
 from collections.abc import Mapping
 from dataclasses import replace
-from types import MappingProxyType
 
 import numpy as np
 import pytest
@@ -14,11 +11,10 @@ from estimator.diagnosis.hypotheses import open_hypotheses
 from estimator.physics import inputs as torque_path
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.driveline import Start
-from estimator.physics.effect import Effect, Element, Held, Place
+from estimator.physics.effect import Effect, Element, Held
 from estimator.physics.grid import grid_for
 from estimator.physics.kernel import slots
 from estimator.physics.layout import flat, flat_values, slot
-from estimator.physics.model import Motion, Structure
 from estimator.physics.simulate import simulate
 from estimator.signals.record import FloatArray, OutputKind, Record
 from tests.estimator.physics.bench import TWO_MASS, assert_same_to_rounding, linear_record, model, random_steps, record
@@ -35,27 +31,10 @@ CONTRACT = {
     Element.SPEED_SENSOR: "resolver_error speed_filter speed_sign_blind speed_quantisation",
     Element.ACQUISITION: "stale_samples lost_samples sample_jitter clock_drift",
 }
-ELEMENT_OF = {name: element for element, names in CONTRACT.items() for name in names.split()}
 
 # The last part of a parameter's name, and the units it may stand for (rotation).
-UNIT_OF_SUFFIX = MappingProxyType(
-    {
-        "nm": "Nm",
-        "rad": "rad",
-        "s": "s",
-        "hz": "Hz",
-        "rad_s": "rad/s",
-        "nm_s": "Nm s/rad",
-        "nm_s2": "Nm s^2/rad^2",
-        "kg_m2": "kg m^2",
-        "per_nm": "1/Nm",
-        "per_rad2": "1/rad^2",
-        "nm_per_rad": "Nm/rad",
-    }
-)
 
 # Parameters of a turning machine alone: their unit is an angle whatever the motion is called.
-OF_A_TURN = frozenset({"once_rad", "twice_rad"})
 
 entries = pytest.mark.parametrize("entry", EFFECTS.values(), ids=list(EFFECTS))
 laws = pytest.mark.parametrize("entry", [e for e in EFFECTS.values() if not e.profile], ids=lambda e: e.name)
@@ -107,12 +86,6 @@ def start_values(entry: Effect, records: list[Record]) -> list[dict[str, float]]
     ]
 
 
-@pytest.mark.parametrize("name", ELEMENT_OF)
-def test_every_name_of_the_contract_has_an_entry_at_its_element(name: str) -> None:
-    """Further entries are extensions."""
-    assert EFFECTS[name].element is ELEMENT_OF[name]
-
-
 @entries
 def test_it_names_only_effects_of_the_catalogue(entry: Effect) -> None:
     for group in (entry.resembles, entry.equivalent, entry.contains):
@@ -121,23 +94,6 @@ def test_it_names_only_effects_of_the_catalogue(entry: Effect) -> None:
         assert entry.name not in group
     assert set(entry.equivalent) <= set(entry.resembles)
     assert set(entry.contains) <= set(EFFECTS)
-
-
-@entries
-def test_parameters_are_named_with_their_unit(entry: Effect) -> None:
-    for parameter in entry.parameters:
-        suffixes = [suffix for suffix in UNIT_OF_SUFFIX if parameter.name.endswith(f"_{suffix}")]
-        named = UNIT_OF_SUFFIX[max(suffixes, key=len)] if suffixes else ""
-        assert named == parameter.unit(Motion.ROTATION)
-
-
-@entries
-def test_no_unit_of_translation_speaks_of_radians(entry: Effect) -> None:
-    for parameter in entry.parameters:
-        if parameter.name in OF_A_TURN or parameter.name in entry.phases:
-            continue
-        assert "rad" not in parameter.unit(Motion.TRANSLATION)
-        assert "Nm" not in parameter.unit(Motion.TRANSLATION)
 
 
 @laws
@@ -182,42 +138,12 @@ def test_every_start_changes_the_simulation(entry: Effect, reversal: Record) -> 
 
 
 @fitted
-def test_starts_lie_inside_the_bounds(entry: Effect, reversal: Record) -> None:
-    starts = entry.starts(GEARED, [reversal])
-    assert starts
-    for start in starts:
-        for parameter, x in zip(entry.shared_parameters, start, strict=True):
-            if not isinstance(x, Held):
-                assert parameter.low <= x <= parameter.high
-
-
-@fitted
-def test_one_start_at_least_is_fitted_at_all(entry: Effect, reversal: Record) -> None:
-    for start in entry.starts(GEARED, [reversal]):
-        assert any(not isinstance(x, Held) for x in start)
-
-
-@fitted
 def test_the_null_of_the_decisive_parameter_can_be_reached(entry: Effect) -> None:
     """Others may stop short of theirs; a limit that nothing reaches is as good as none."""
     first = entry.parameters[0]
     assert first.low <= first.null <= first.high or first.null == math.inf
     for parameter in entry.parameters:
         assert parameter.low < parameter.high
-
-
-@entries
-def test_events_have_their_moments_and_periodic_laws_their_phases(entry: Effect) -> None:
-    own = [parameter.name for parameter in entry.own_parameters]
-    assert entry.event is (own == ["from_s", "to_s"])
-    assert set(entry.phases) == {name for name in own if name.endswith("phase_rad")}
-    assert set(entry.phases.values()) <= {parameter.name for parameter in entry.shared_parameters}
-
-
-@entries
-def test_own_parameters_stand_last_and_may_be_left_out(entry: Effect) -> None:
-    assert entry.parameters == entry.shared_parameters + entry.own_parameters
-    assert all(parameter.optional for parameter in entry.own_parameters)
 
 
 @entries
@@ -237,19 +163,6 @@ def test_every_entry_has_its_law_in_the_simulation(entry: Effect) -> None:
     assert entry.acting is not None or not missing, (
         f"{entry.name}: the simulation does not read {', '.join(missing)}. Give the entry acting=Acting(place, law) "
         "(estimator/physics/effect.py), or a place in estimator/physics/kernel/slots.py and the law that reads it."
-    )
-
-
-@entries
-def test_a_declared_law_takes_the_parameters_of_its_entry(entry: Effect) -> None:
-    if entry.acting is None:
-        return
-    law = getattr(entry.acting.law, "py_func", entry.acting.law)
-    given = 2 if entry.acting.place in (Place.TORQUE, Place.SHAFT_LOSS) else 1
-    takes = len(inspect.signature(law).parameters)
-    assert takes == given + len(entry.parameters), (
-        f"{entry.name}: its law takes {takes} arguments, expected {given} for its place and one per parameter: "
-        f"{', '.join(each.name for each in entry.parameters)}"
     )
 
 
@@ -308,28 +221,6 @@ def test_two_inverters_with_the_same_share_all_along_can_not_be_distinguished(re
     assert entry.testable(GEARED, [same, other]) is None
 
 
-@pytest.mark.parametrize("name", ["actuator_lag", "transport_delay", "stiffness_nonlinearity"])
-def test_what_any_recording_can_tell_is_not_refused(name: str, forward: Record) -> None:
-    assert EFFECTS[name].testable(model(TWO_MASS), [forward]) is None
-
-
-@entries
-def test_every_field_for_people_is_filled(entry: Effect) -> None:
-    for text in (entry.title, entry.law, entry.source, entry.excited_by, *(p.meaning for p in entry.parameters)):
-        assert len(text) > 3
-    assert entry.title != entry.name
-    assert re.search(r"\d", entry.source)
-
-
-def test_what_acts_in_or_behind_the_shaft_needs_one() -> None:
-    """Friction at the load of a single mass is friction at the motor; a tyre needs two sides to slip between."""
-    behind = {"coulomb_friction_load", "tyre_slip"}
-    for entry in EFFECTS.values():
-        assert {Structure.TWO_MASS, Structure.THREE_MASS} <= entry.structures
-        needs = entry.element is Element.SHAFT or entry.name in behind
-        assert (Structure.ONE_MASS in entry.structures) is not needs
-
-
 def test_what_recurs_with_an_angle_needs_a_whole_period() -> None:
     """Over less it is any law of the angle, such as gravity."""
     swing = record(random_steps(1000, 1), 0.3 * np.sin(0.02 * np.arange(1000)), kind=OutputKind.POSITION)
@@ -350,11 +241,3 @@ def test_what_holds_a_load_that_swings_is_no_hypothesis_where_it_turns_on(name: 
     testable, untestable = open_hypotheses(GEARED, [driven])
     assert name not in testable
     assert name not in untestable
-
-
-def test_gravity_may_have_a_larger_moment_than_all_torque_on_a_small_arc_only() -> None:
-    torque = np.full(1000, 5.0)
-    for swing_rad, expected in ((0.6, True), (9.0, False)):
-        to_and_fro = record(torque, 0.5 * swing_rad * np.sin(0.05 * np.arange(1000)), kind=OutputKind.POSITION)
-        found = EFFECTS["gravity"].implausible(GEARED, [to_and_fro], {"moment_nm": 50.0, "motor_turns_per_turn": 1.0})
-        assert (not found) is expected

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from estimator.physics.driveline import Start
-from estimator.physics.fit import FitResult, best_fit, fit, rates, warm_start
+from estimator.physics.fit import FitResult, fit, rates, warm_start
 from estimator.physics.jacobian import jacobian_at
 from estimator.physics.layout import slot
-from estimator.physics.model import DrivelineModel, Parameter, Structure
+from estimator.physics.model import DrivelineModel
 from estimator.physics.problem import (
     BAD,
     Problem,
@@ -24,8 +24,8 @@ from estimator.physics.problem import (
     start_vector,
 )
 from estimator.physics.unknowns import Shared, effect_unknowns, nominal_unknowns
-from estimator.signals.record import FloatArray, Location, OutputKind, Record
-from tests.estimator.physics.bench import ONE_MASS, SAMPLE_TIME_S, TWO_MASS, linear_record, model, random_steps, scaled
+from estimator.signals.record import Location, OutputKind, Record
+from tests.estimator.physics.bench import ONE_MASS, TWO_MASS, linear_record, model, random_steps, scaled
 
 SIGMA = 0.05
 STARTS = {"first": Start(30.0, 0.0, 10.0, 0.01, 9.0), "second": Start(-20.0, 0.0, -4.0, -0.005, -4.0)}
@@ -64,16 +64,6 @@ class TestRecovery:
             assert abs(result.x[i] * shared.scale - TRUE[shared.name]) < 4.0 * errors[i] * shared.scale
             assert result.value("", shared.name) == result.x[i] * shared.scale
 
-    def test_load_torque_and_initial_state_of_each_recording(self) -> None:
-        records = recordings()
-        result = fit(nominal_problem(records))
-        for i, true in enumerate(STARTS.values()):
-            found = start_of(result.problem, result.x, i)
-            assert found.load_torque_nm == pytest.approx(true.load_torque_nm, abs=1.0)
-            assert found.speed_rad_s == pytest.approx(true.speed_rad_s, abs=0.1)
-            assert found.load_speed_rad_s == pytest.approx(true.load_speed_rad_s, abs=0.2)
-            assert found.twist_rad == pytest.approx(true.twist_rad, abs=2e-3)
-
     def test_a_parameter_ends_at_the_edge_of_its_tolerance_and_is_reported_pinned(self) -> None:
         true = scaled(TWO_MASS, J_L=1.5)
         result = fit(nominal_problem(recordings(true)))
@@ -85,14 +75,6 @@ class TestRecovery:
 
 
 class TestJacobian:
-    def test_one_that_was_let_go_is_found_again(self) -> None:
-        result = fit(nominal_problem(recordings(samples=300)))
-        light = result.light()
-        assert light.derivative is None
-        assert result.derivative is not None
-        scale = np.abs(result.jacobian).max(axis=0)
-        np.testing.assert_allclose(light.jacobian / scale, result.jacobian / scale, atol=0.01)  # a last small step away
-
     def test_it_agrees_with_central_differences(self) -> None:
         problem = nominal_problem(recordings(samples=300))
         x = start_vector(problem) * 1.01
@@ -119,17 +101,6 @@ class TestJacobian:
         largest = np.max(np.abs(column))
         np.testing.assert_allclose(column, here - back, atol=decay * largest)
         assert np.max(np.abs(column - (ahead - here))) > 0.01 * largest > 2.0 * decay * largest
-
-    def test_the_rounding_of_another_way_to_simulate_is_no_derivative(self) -> None:
-        """How fast a derating comes changes nothing while it has no depth."""
-        rec = linear_record(ONE_MASS, random_steps(300, 8), Start(0.0, 0.0, 0.0))
-        when = (Shared("torque_derating", "time_constant_s", 100.0, 0.1, 10.0, 1.0),)
-        problem = make_problem(model(ONE_MASS), [rec], when)
-        x = start_vector(problem)
-        (output,) = outputs_at(problem, x)
-        jacobian = jacobian_at(problem, x, [np.nextafter(output, np.inf)])
-        assert not jacobian[:, 0].any()
-        assert jacobian[:, 1:].any(axis=0).all()
 
 
 class TestMasks:
@@ -181,27 +152,6 @@ class TestRunaway:
         result = fit(make_problem(model(TRUE), records, self.explosive(1e-12)))
         assert result.rms == pytest.approx(SIGMA, rel=0.1)
 
-    def test_a_fit_that_starts_there_ends_and_is_finite(self) -> None:
-        records = recordings(samples=300)
-        result = fit(make_problem(model(TRUE), records, self.explosive(1.0)))
-        assert np.isfinite(result.x).all()
-        assert np.isfinite(result.residual).all()
-
-
-def test_of_several_starts_the_best_counts() -> None:
-    """Under a square wave of ten samples a delay of eight looks like two too early: small starts end at zero."""
-    torque = 100.0 * np.tile(np.repeat([1.0, -1.0], 5), 60)
-    late = np.concatenate([np.full(8, torque[0]), torque[:-8]])
-    rec = replace(linear_record(ONE_MASS, late, Start(0.0, 0.0, 0.0), sigma=0.01), torque_nm=torque[:, None])
-    line = model(ONE_MASS)
-    problems = [
-        make_problem(line, [rec], (*nominal_unknowns(line), *release.shared))
-        for release in effect_unknowns("transport_delay", line, [rec])
-    ]
-    alone = [fit(problem).value("transport_delay", "delay_s") for problem in problems]
-    assert alone[0] == pytest.approx(0.0, abs=1e-9)
-    assert best_fit(problems).value("transport_delay", "delay_s") == pytest.approx(0.08, abs=1e-3)
-
 
 def test_a_warm_start_begins_where_the_last_fit_ended() -> None:
     records = recordings()
@@ -217,20 +167,6 @@ def test_a_warm_start_begins_where_the_last_fit_ended() -> None:
     for i in range(2):
         assert start_of(problem, x, i) == start_of(warm.problem, warm.x, i)
         assert not problem.local[i].extra_load(local_part(problem, x, i)).any()
-
-
-def test_a_warm_start_from_other_recordings_keeps_values_not_scaled_unknowns() -> None:
-    """The scale of an effect's parameter is read off the recordings."""
-    line = model(TWO_MASS)
-    large = recordings()
-    small = [linear_record(TRUE, random_steps(400, 5, size_nm=10.0), STARTS["first"], sigma=SIGMA, name="small")]
-    gaps = [effect_unknowns("backlash", line, recs)[1].shared for recs in (large, small)]
-    shared = [(*nominal_unknowns(line), *gap) for gap in gaps]
-    assert gaps[0][0].scale == pytest.approx(10.0 * gaps[1][0].scale)
-    warm = fit(make_problem(line, large, shared[0]))
-    problem = make_problem(line, small, shared[1])
-    carried = parameters(problem, warm_start(problem, warm))
-    np.testing.assert_allclose(carried, warm.p)
 
 
 TORQUE_NM = random_steps(400, 1)
@@ -250,34 +186,3 @@ def test_of_one_mass_the_acceleration_before_and_after_a_torque_steps() -> None:
     assert after == pytest.approx((TORQUE_NM - drag) / ONE_MASS["J_M"], rel=2e-3)
     was = np.append(TORQUE_NM[0], TORQUE_NM[:-1])
     assert before == pytest.approx((was - drag) / ONE_MASS["J_M"], rel=2e-3)
-
-
-def test_of_a_position_the_speed_on_both_sides() -> None:
-    """Within what the speed, 10 rad/s^2 at most, changes by in a sub-step."""
-    line = model(ONE_MASS, tolerance=0.0)
-    found = fitted(linear_record(ONE_MASS, TORQUE_NM, START, kind=OutputKind.POSITION), line)
-    ((before, after),) = rates(found)
-    assert before == pytest.approx(after, abs=0.1)
-    assert after[:-1] == pytest.approx(np.diff(found.outputs[0]) / SAMPLE_TIME_S, abs=0.1)
-
-
-def test_of_a_joint_straight_lines_to_the_neighbours() -> None:
-    stiffness, time_s = 100.0, SAMPLE_TIME_S * np.arange(300)
-    twist: FloatArray = 0.1 * np.sin(3.0 * time_s)
-    line = DrivelineModel(Structure.JOINT, {"k": Parameter(stiffness, 0.0), "c": Parameter(0.0, 0.0)})
-    record = Record(
-        "bench",
-        SAMPLE_TIME_S,
-        time_s,
-        (stiffness * twist)[:, None],
-        stiffness * twist,
-        np.ones(300, dtype=bool),
-        OutputKind.FORCE,
-        imposed=twist,
-    )
-    ((before, after),) = rates(fitted(record, line))
-    secants = stiffness * np.diff(twist) / SAMPLE_TIME_S
-    assert after[:-1] == pytest.approx(secants, abs=1e-6)
-    assert before[1:] == pytest.approx(secants, abs=1e-6)
-    assert before[0] == after[0]
-    assert after[-1] == before[-1]

@@ -9,7 +9,7 @@ from estimator.lanes import LANES
 from estimator.physics import simulate as simulate_module
 from estimator.physics import simulate as together_module
 from estimator.physics.grid import Grid
-from estimator.physics.jacobian import changes, fill_differences, jacobian_at
+from estimator.physics.jacobian import fill_differences, jacobian_at
 from estimator.physics.model import DrivelineModel
 from estimator.physics.problem import Problem, make_problem, outputs_at, own_part, start_vector
 from estimator.physics.unknowns import Shared, nominal_unknowns, own_unknowns
@@ -35,14 +35,6 @@ def of_one_recording(
         moved[:, np.newaxis], one, output[np.newaxis], use[np.newaxis], STEPS, limits, leasts, both, begins, found
     )
     return found
-
-
-def test_samples_that_count_are_reported_per_step(output: np.ndarray) -> None:
-    moved = output + STEPS[:, np.newaxis] * np.random.default_rng(2).standard_normal((2, 50))
-    use = np.arange(50) % 3 > 0
-    np.testing.assert_array_equal(
-        of_one_recording(moved, output, use), ((moved - output) / STEPS[:, np.newaxis])[:, use]
-    )
 
 
 @pytest.mark.parametrize(("ran_to", "stays_at"), [(np.nan, 7.0), (np.inf, 7.0), (-np.inf, -7.0), (9.0, 7.0)])
@@ -171,12 +163,3 @@ def test_derivatives_are_those_of_each_recording_by_itself(
     size = np.abs(alone).max(axis=0)
     assert (size > 0.0).sum() >= x.size - 2 * len(sizes)  # a moment that is nowhere moves nothing
     assert (np.abs(found - alone) <= 1e-5 * size + 1e-6).all()  # rounding, of outputs of some rad/s over the step
-
-
-def test_changes_are_the_columns_of_one_recording() -> None:
-    problem = problem_of(model(TWO_MASS, effects=GAP), recordings(300, 280, 290))
-    x = start_vector(problem)
-    outputs, columns = outputs_at(problem, x), np.array([2, 0, own_part(problem, 1).start])
-    rows = slice(int(problem.use[0].sum()), int(problem.use[0].sum() + problem.use[1].sum()))
-    found = changes(problem, x, 1, columns, outputs)
-    np.testing.assert_allclose(found, jacobian_at(problem, x, outputs)[rows, columns], atol=1e-6 * np.abs(found).max())

@@ -1,23 +1,18 @@
 """A joint on a bench: its torque under an imposed motion, against answers worked out by hand."""
 
-from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from estimator.errors import BadModel, BadShape
-from estimator.physics import joint
 from estimator.physics.driveline import Start
 from estimator.physics.fit import fit
 from estimator.physics.grid import grid_for
-from estimator.physics.kernel import state_vector
 from estimator.physics.layout import flat_values
-from estimator.physics.model import DrivelineModel, Parameter, Structure, natural_frequencies_rad_s, parameter_unit
-from estimator.physics.motion import motor_angle
+from estimator.physics.model import DrivelineModel, Parameter, Structure
 from estimator.physics.problem import make_problem
-from estimator.physics.simulate import output_state, simulate
+from estimator.physics.simulate import simulate
 from estimator.physics.unknowns import nominal_unknowns
 from estimator.signals.record import FloatArray, OutputKind, Record
 
@@ -47,15 +42,6 @@ def torque(
     record = recording(twist)
     p = flat_values({"k": STIFFNESS, "c": damping}, effects)
     return simulate(grid_for(MODEL, [record]), record, p, start)
-
-
-def test_damping_acts_where_the_faces_touch_only() -> None:
-    twist = up_and_down(0.1)
-    gap = {"backlash": {"gap_rad": 0.06}}
-    damping = torque(twist, gap, DAMPING) - torque(twist, gap)
-    open_gap = np.abs(twist) < 0.029
-    assert damping[open_gap] == pytest.approx(0.0, abs=1e-9)
-    assert np.abs(damping[(np.abs(twist) > 0.031) & (np.abs(twist) < 0.095)]) == pytest.approx(DAMPING * 0.2)
 
 
 def test_a_slider_follows_its_law_and_forgets_where_it_began() -> None:
@@ -124,17 +110,6 @@ def test_a_gap_in_series_with_a_slider_moves_with_it() -> None:
         assert float(np.abs(found[end - 10])) == pytest.approx(friction, rel=1e-3)
 
 
-def test_motion_is_what_was_imposed() -> None:
-    record = recording(0.3 + up_and_down(0.1))
-    grid, p = grid_for(MODEL, [record]), flat_values(MODEL.values(), {})
-    start = Start(0.0, 0.0, 0.0, 0.02)
-    assert simulate(grid, record, p, start, output=state_vector.TWIST) == pytest.approx(up_and_down(0.1) + 0.02)
-    assert simulate(grid, record, p, start, output=state_vector.ANGLE) == pytest.approx(motor_angle(record))
-    assert np.all(simulate(grid, record, p, start, output=state_vector.LOAD_SPEED) == 0.0)
-    speed = simulate(grid, record, p, start, output=state_vector.SPEED)
-    assert speed[100:400] == pytest.approx(np.full(300, 0.2), rel=1e-6)
-
-
 def test_a_fit_finds_spring_damper_gap_and_offset_again() -> None:
     phase = np.arange(4000) * PERIOD_S
     twist = 0.1 * np.sin(2.0 * np.pi * phase) * (1.0 + phase) / 4.0
@@ -147,29 +122,3 @@ def test_a_fit_finds_spring_damper_gap_and_offset_again() -> None:
     assert found.value("", "k") == pytest.approx(1200.0, rel=1e-3)
     assert found.value("", "c") == pytest.approx(6.0, rel=1e-2)
     assert found.rms == pytest.approx(0.1, rel=0.05)
-
-
-def test_a_joint_has_a_spring_and_a_damper_and_no_mode() -> None:
-    assert Structure.JOINT.parameter_names == ("k", "c")
-    assert [parameter_unit(name, MODEL.motion) for name in ("k", "c")] == ["Nm/rad", "Nm s/rad"]
-    assert natural_frequencies_rad_s(MODEL.values()).tolist() == [0.0]
-    assert output_state(recording(up_and_down(0.1)), Structure.JOINT) == joint.TORQUE
-
-
-def test_structure_and_recording_must_agree() -> None:
-    bench = recording(up_and_down(0.1))
-    with pytest.raises(BadModel, match=r"got an imposed motion, expected .* the model is a two_mass"):
-        output_state(bench, Structure.TWO_MASS)
-    with pytest.raises(BadModel, match="got force as the output, expected the torque under an imposed motion"):
-        output_state(replace(bench, imposed=None), Structure.JOINT)
-    with pytest.raises(ValueError, match="imposed motion, got none"):
-        joint.imposed_in(replace(bench, imposed=None))
-
-
-def test_an_imposed_motion_is_known_throughout() -> None:
-    with pytest.raises(BadShape, match="imposed has shape"):
-        replace(recording(up_and_down(0.1)), imposed=np.zeros(3))
-    broken = up_and_down(0.1)
-    broken[5] = np.nan
-    with pytest.raises(BadShape, match="imposed motion holds NaN"):
-        recording(broken)

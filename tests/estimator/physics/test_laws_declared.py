@@ -4,14 +4,13 @@ import math
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
 from estimator.physics.grid import Grid
 from estimator.physics.layout import flat_values
 from estimator.physics.simulate import simulate
 from estimator.signals.record import FloatArray, OutputKind
 from tests.estimator.physics import reference
-from tests.estimator.physics.bench import ONE_MASS, SAMPLE_TIME_S, TWO_MASS, model
+from tests.estimator.physics.bench import SAMPLE_TIME_S, TWO_MASS, model
 from tests.estimator.physics.law_bench import (
     SIGN_WIDTH,
     START,
@@ -20,7 +19,6 @@ from tests.estimator.physics.law_bench import (
     TORQUE,
     assert_law,
     assert_same,
-    kernel_output,
     measured,
     solved,
     start_vector,
@@ -70,18 +68,6 @@ def test_a_spring_to_the_ground_pulls_the_load_back() -> None:
     assert_law({"grounded_spring": {"stiffness_nm_per_rad": 90.0}}, solved(line))
 
 
-def test_a_spring_to_the_ground_holds_a_single_mass() -> None:
-    omega, damping = math.sqrt(500.0 / 20.0), 0.5 * 4.0 / 20.0
-    rec = measured(torque_nm=np.zeros(TIME_S.size))
-    grid = Grid(model(ONE_MASS).structure, SUBSTEPS, SIGN_WIDTH)
-    start = replace(START, load_torque_nm=0.0)
-    p = flat_values(ONE_MASS, {"grounded_spring": {"stiffness_nm_per_rad": 500.0}})
-    damped = math.sqrt(omega**2 - damping**2)
-    swing = np.cos(damped * TIME_S) - damping / damped * np.sin(damped * TIME_S)
-    expected = START.speed_rad_s * np.exp(-damping * TIME_S) * swing
-    assert simulate(grid, rec, p, start) == pytest.approx(expected, abs=1e-6)
-
-
 def test_gravity_pulls_by_the_sine_of_the_recorded_angle() -> None:
     angle = 3.0 * np.sin(2.0 * TIME_S) - TIME_S
     rec = replace(measured(angle), kind=OutputKind.POSITION)
@@ -109,11 +95,3 @@ def test_a_branch_of_the_shaft_relaxes() -> None:
     held = Held.of(TORQUE, SAMPLE_TIME_S)
     expected = reference.solve(line, np.append(start_vector(), 0.0), held, TIME_S)[:, reference.SPEED]
     assert_law({"viscoelastic_shaft": {"branch_share": share, "relaxation_s": time_s}}, expected)
-
-
-def test_a_branch_that_relaxes_at_once_is_a_damper() -> None:
-    time_s = 1e-4
-    branch = {"branch_share": 30.0 / (TWO_MASS["k"] * time_s), "relaxation_s": time_s}
-    damped = kernel_output({}, measured(), TWO_MASS | {"c": TWO_MASS["c"] + 30.0})
-    relaxing = kernel_output({"viscoelastic_shaft": branch}, measured())
-    assert relaxing == pytest.approx(damped, abs=0.02 * float(np.ptp(damped)))

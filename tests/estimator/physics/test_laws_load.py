@@ -1,23 +1,17 @@
 """Effects at the load, against the reference."""
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from estimator.physics.driveline import Start
-from estimator.physics.grid import Grid, grid_for
-from estimator.physics.kernel.state_vector import LOAD_SPEED
-from estimator.physics.layout import flat_values
-from estimator.physics.simulate import simulate
+from estimator.physics.effects.load import KNOT_SPACING_S, grade_basis
 from estimator.signals.record import FloatArray
 from tests.estimator.physics import reference
-from tests.estimator.physics.bench import SAMPLE_TIME_S, TWO_MASS, model
+from tests.estimator.physics.bench import SAMPLE_TIME_S, TWO_MASS
 from tests.estimator.physics.law_bench import (
     SIGN_WIDTH,
     START,
-    SUBSTEPS,
     TIME_S,
     TORQUE,
     assert_law,
@@ -68,25 +62,6 @@ def test_dry_friction_at_the_load_deflects_before_it_slides() -> None:
     assert np.max(np.abs(rigid - expected)) > 2e-3 * np.ptp(expected)
 
 
-def test_a_brake_deflects_before_it_slides_and_lets_go() -> None:
-    from_s, to_s = BRAKED_S
-    brake = {"brake_nm": 60.0, "presliding_rad": 0.004, "from_s": from_s, "to_s": to_s}
-    assert_law({"brake_drag": brake}, against_bristles(lasting(60.0, from_s, to_s), 0.004), tolerance=1e-3)
-
-
-def test_a_load_that_sticks_stands_still() -> None:
-    """A torque below that of breaking away deflects the bristles, and no more."""
-    line, pushed = model(TWO_MASS), np.full(400, 20.0)
-    stuck = flat_values(TWO_MASS, {"coulomb_friction_load": {"friction_nm": 60.0, "presliding_rad": 1e-5}})
-    rec, grid = measured(np.ones(400), pushed), grid_for(line, [measured()])
-    at_rest = Start(load_torque_nm=12.0, angle_rad=0.0, speed_rad_s=0.0)
-    speed = simulate(grid, rec, stuck, at_rest, output=LOAD_SPEED)
-    assert np.max(np.abs(speed)) < 1e-2
-    assert np.max(np.abs(speed[-50:])) < 1e-3
-    rounded = simulate(grid, rec, flat_values(TWO_MASS, {"coulomb_friction_load": {"friction_nm": 60.0}}), at_rest)
-    assert np.all(rounded[-50:] > 1e-3)
-
-
 def test_air_drag_grows_with_the_square_of_the_loads_speed() -> None:
     line = two_mass(drag=lambda t, w: 15.0 * w * abs(w))
     assert_law({"aerodynamic_drag": {"drag_nm_s2": 15.0}}, solved(line))
@@ -112,17 +87,6 @@ def test_warming_oil_loses_viscous_friction() -> None:
     cold, tau = 25.0, 0.7
     line = two_mass(drag=lambda t, w: cold * np.exp(-t / tau) * w)
     assert_law({"warming_friction": {"cold_nm_s": cold, "time_constant_s": tau}}, solved(line))
-
-
-def test_in_a_part_of_a_recording_time_counts_from_its_beginning() -> None:
-    cold, tau = 40.0, 0.7
-    line = two_mass(drag=lambda t, w: cold * np.exp(-(t + 0.6) / tau) * w)
-    effects = {"warming_friction": {"cold_nm_s": cold, "time_constant_s": tau}}
-    assert_law(effects, solved(line), replace(measured(), began_s=-0.6))
-    brake = lasting(60.0, 0.5, 1.6)
-    line = two_mass(drag=lambda t, w: brake(t) * sign(w))
-    effects = {"brake_drag": {"brake_nm": 60.0, "from_s": 1.1, "to_s": 2.2}}
-    assert_law(effects, solved(line, (0.5, 1.6)), replace(measured(), began_s=-0.6), tolerance=3e-4)
 
 
 @pytest.mark.parametrize("motor_turns", [1.0, 3.3])
@@ -195,22 +159,6 @@ def test_the_traction_of_a_tyre_may_build_up_as_it_rolls_and_ends_where_it_slide
     assert_law({"tyre_slip": values}, expected)
 
 
-@pytest.mark.parametrize("share", [0.02, 0.3, 0.7])
-@pytest.mark.parametrize("slip", [1e-5, 1e-4, 1e-3])
-def test_a_stiff_tyre_in_large_steps_still_shows_its_slip(slip: float, share: float) -> None:
-    """A vehicle on the move: steps of 2.5 ms leave half of the slip's effect wrong at most, or a 500th of all."""
-    start = Start(12.0, 0.0, 20.0, 0.0, 20.0)
-    values = {"slip_per_nm": slip, "wheel_share": share, "creep_rad_s": 1.0}
-    coarse, fine, rigid = (
-        simulate(
-            Grid(model(TWO_MASS).structure, substeps, SIGN_WIDTH), measured(), flat_values(TWO_MASS, effects), start
-        )
-        for substeps, effects in ((4, {"tyre_slip": values}), (100, {"tyre_slip": values}), (100, {}))
-    )
-    effect = np.max(np.abs(fine - rigid))
-    assert np.max(np.abs(coarse - fine)) < max(0.5 * effect, 0.002 * np.ptp(rigid))
-
-
 def test_friction_brakes_the_wheel_and_air_the_vehicle() -> None:
     """Behind a slipping tyre the two loads act at different places."""
     v, slip, share, creep = TWO_MASS, 2e-3, 0.2, 2.0
@@ -241,11 +189,25 @@ def test_friction_brakes_the_wheel_and_air_the_vehicle() -> None:
     assert_same(kernel_output(effects, measured()), expected, kernel_output({"tyre_slip": tyre}, measured()))
 
 
-def test_a_road_acts_next_to_the_constant_load() -> None:
-    profile = 40.0 * np.sin(2.0 * np.pi * TIME_S / 1.5)
-    steps = Held.of(profile, SAMPLE_TIME_S)
-    line = two_mass(drag=lambda t, w: steps.at(t))
-    expected = solved(line, tuple(TIME_S[1:-1]))
-    grid = Grid(model(TWO_MASS).structure, SUBSTEPS, SIGN_WIDTH)
-    out = simulate(grid, measured(), flat_values(TWO_MASS, {}), START, profile)
-    assert_same(out, expected, kernel_output({}, measured()))
+class TestRoadGradeBasis:
+    TIME_S = np.arange(2001) * 0.01
+
+    def test_with_the_first_spline_they_would_sum_to_one(self) -> None:
+        """A cubic B-spline over [0, d] that starts the partition of unity is (1 - t/d)^3."""
+        first = np.maximum(1.0 - self.TIME_S / KNOT_SPACING_S, 0.0) ** 3
+        np.testing.assert_allclose(grade_basis(self.TIME_S).sum(axis=0) + first, 1.0, atol=1e-12)
+
+    def test_with_a_constant_it_reproduces_every_cubic(self) -> None:
+        t = self.TIME_S / 20.0
+        design = np.vstack([np.ones_like(t), grade_basis(self.TIME_S)]).T
+        cubic = 3.0 - 2.0 * t + 5.0 * t**2 - 4.0 * t**3
+        left = cubic - design @ np.linalg.lstsq(design, cubic, rcond=None)[0]
+        np.testing.assert_allclose(left, 0.0, atol=1e-10)
+
+    def test_a_smooth_road_is_followed_and_a_step_is_not(self) -> None:
+        design = np.vstack([np.ones_like(self.TIME_S), grade_basis(self.TIME_S)]).T
+        hill = np.sin(2 * np.pi * self.TIME_S / 15.0)
+        step = np.where(self.TIME_S > 9.0, 1.0, -1.0)
+        left = [profile - design @ np.linalg.lstsq(design, profile, rcond=None)[0] for profile in (hill, step)]
+        assert np.sqrt(np.mean(left[0] ** 2)) < 5e-3
+        assert np.sqrt(np.mean(left[1] ** 2)) > 0.1

@@ -31,14 +31,6 @@ def test_dry_friction_is_a_constant_torque_against_the_motion() -> None:
     assert_law({"coulomb_friction_motor": {"friction_nm": 30.0}}, solved(line))
 
 
-@pytest.mark.parametrize("creep_rad_s", [0.02, 0.6])
-def test_dry_friction_creeps_over_a_width_of_its_own(creep_rad_s: float) -> None:
-    line = two_mass(friction=lambda t, w: 30.0 * float(np.tanh(w / creep_rad_s)))
-    assert_law(
-        {"coulomb_friction_motor": {"friction_nm": 30.0, "creep_rad_s": creep_rad_s}}, solved(line), tolerance=3e-4
-    )
-
-
 def test_stribeck_friction_falls_with_speed() -> None:
     line = two_mass(friction=lambda t, w: (15.0 + 25.0 * np.exp(-((w / 0.8) ** 2))) * sign(w))
     values = {"excess_nm": 25.0, "coulomb_nm": 15.0, "stribeck_rad_s": 0.8}
@@ -76,14 +68,6 @@ def test_friction_that_deflects_before_it_slides_is_one_more_state(excess_nm: fl
 def test_quadratic_friction_grows_with_the_square_of_the_speed() -> None:
     line = two_mass(friction=lambda t, w: 4.0 * w * abs(w))
     assert_law({"quadratic_friction": {"quadratic_nm_s2": 4.0}}, solved(line))
-
-
-@pytest.mark.parametrize("exponent", [1.7, 2.1])
-def test_drag_may_grow_with_another_power_of_the_speed(exponent: float) -> None:
-    """At the speed it is given for, it is what the square would be."""
-    line = two_mass(friction=lambda t, w: 4.0 * 3.0**2 * abs(w / 3.0) ** exponent * np.sign(w))
-    effects = {"quadratic_friction": {"quadratic_nm_s2": 4.0, "exponent": exponent, "at_rad_s": 3.0}}
-    assert_law(effects, solved(line))
 
 
 @pytest.mark.parametrize(("from_s", "to_s"), [(0.5, 1.6), (0.5037, 1.7012), (0.9, 9.0)])

@@ -5,17 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.physics.grid import Grid
-from estimator.physics.kernel import sensing, state_vector
-from estimator.physics.layout import flat_values
-from estimator.physics.simulate import simulate
-from estimator.signals.record import FloatArray, Location, OutputKind
+from estimator.signals.record import FloatArray, Location
 from tests.estimator.physics import reference
-from tests.estimator.physics.bench import SAMPLE_TIME_S, TWO_MASS, assert_same_to_rounding, model
+from tests.estimator.physics.bench import SAMPLE_TIME_S
 from tests.estimator.physics.law_bench import (
-    SIGN_WIDTH,
     START,
-    SUBSTEPS,
     TIME_S,
     TORQUE,
     assert_law,
@@ -49,17 +43,6 @@ def test_a_resolver_errs_once_and_twice_per_measured_turn() -> None:
     assert_law({"resolver_error": RESOLVER}, read_by_resolver(true_speed(), TURNED), measured(TURNING))
 
 
-def test_the_read_angle_is_off_by_the_amplitudes_reported() -> None:
-    """The reading of a constant speed, summed up, is the angle with e_1 once and e_2 twice per turn."""
-    speed = 2.0 * np.pi
-    angle = np.linspace(0.0, 2.0 * np.pi, 4001)
-    p = flat_values(TWO_MASS, {"resolver_error": {"once_rad": 0.02, "twice_rad": 0.03}})
-    read = np.array([sensing.reading(speed, sensing.read_angle(phi, p), p) for phi in angle])
-    step = np.diff(angle) * 0.5 * (read[1:] + read[:-1]) / speed
-    off = np.concatenate([[0.0], np.cumsum(step)]) - angle
-    np.testing.assert_allclose(off, 0.02 * np.sin(angle) + 0.03 * np.sin(2.0 * angle), atol=1e-6)
-
-
 @pytest.mark.parametrize("tau", [0.004, 0.03])
 def test_a_filter_is_one_more_state_that_the_line_does_not_feel(tau: float) -> None:
     def rhs(t: float, x: FloatArray, torque: float) -> FloatArray:
@@ -82,12 +65,6 @@ def test_a_filter_of_second_order_is_two_more(shape: float) -> None:
     start = np.append(start_vector(), [START.speed_rad_s, 0.0])
     expected = reference.solve(rhs, start, Held.of(TORQUE, SAMPLE_TIME_S), TIME_S)[:, 4]
     assert_law({"speed_filter": {"time_constant_s": tau, "shape": shape}}, expected)
-
-
-def test_a_filter_whose_second_pole_is_far_away_is_of_first_order() -> None:
-    first = kernel_output({"speed_filter": {"time_constant_s": 0.03}}, measured())
-    second = kernel_output({"speed_filter": {"time_constant_s": 0.03, "shape": 1e-9}}, measured())
-    np.testing.assert_allclose(second, first, atol=1e-7)
 
 
 @pytest.mark.parametrize("share", [1.0, 0.4])
@@ -127,19 +104,6 @@ def test_a_reading_passes_resolver_filter_magnitude_and_steps_in_this_order() ->
     assert np.isclose(out, 0.25 * np.round(np.abs(filtered) / 0.25), atol=1e-12).mean() > 0.98
     without_order = 0.25 * np.round(np.abs(read_by_resolver(true_speed(), TURNED)) / 0.25)
     assert np.isclose(out, without_order, atol=1e-12).mean() < 0.8
-
-
-def test_a_measured_position_does_not_pass_the_speed_sensor() -> None:
-    rec = replace(measured(TIME_S), kind=OutputKind.POSITION)
-    effects = {"speed_filter": {"time_constant_s": 0.05}, "speed_sign_blind": {"share": 1.0}}
-    assert_same_to_rounding(kernel_output(effects, rec), kernel_output({}, rec))
-
-
-def test_a_state_asked_for_is_the_true_one() -> None:
-    grid = Grid(model(TWO_MASS).structure, SUBSTEPS, SIGN_WIDTH)
-    p = flat_values(TWO_MASS, {"speed_filter": {"time_constant_s": 0.05}})
-    out = simulate(grid, measured(), p, START, output=state_vector.SPEED)
-    assert_same_to_rounding(out, kernel_output({}, measured()))
 
 
 @pytest.mark.parametrize("location", [Location.MOTOR, Location.LOAD])

@@ -74,30 +74,11 @@ def test_the_first_shaft_of_three_masses_may_have_a_gap() -> None:
     assert_same(out, states(three_masses(shaft=shaft))[:, 1], three_mass_output({}), tolerance=1e-3)
 
 
-def test_loads_of_three_masses_act_on_the_last_and_friction_on_the_first() -> None:
-    brake = lasting(60.0, 0.5, 1.6)
-    line = three_masses(
-        friction=lambda t, w: 20.0 * np.tanh(w / SIGN_WIDTH), drag=lambda t, w: brake(t) * np.tanh(w / SIGN_WIDTH)
-    )
-    effects = {
-        "coulomb_friction_motor": {"friction_nm": 20.0},
-        "brake_drag": {"brake_nm": 60.0, "from_s": 0.5, "to_s": 1.6},
-    }
-    assert_same(three_mass_output(effects), states(line, (0.5, 1.6))[:, 1], three_mass_output({}))
-
-
-def test_a_slider_that_yields_at_once_stays_in_its_bounds_before_a_light_mass() -> None:
-    out = three_mass_output({"shaft_hysteresis": {"friction_nm": 100.0, "yield_rad": 1e-9}})
-    assert np.isfinite(out).all()
-    assert np.ptp(out) < 2.0 * np.ptp(three_mass_output({}))
-
-
 def one_mass_output(effects: dict[str, dict[str, float]], turning: FloatArray) -> FloatArray:
     grid = Grid(Structure.ONE_MASS, SUBSTEPS, SIGN_WIDTH)
     return simulate(grid, measured(turning), flat_values(ONE_MASS, effects), Start(12.0, 0.0, 1.5))
 
 
-SIGN = {"friction_nm": 30.0}
 ONE_MASS_EFFECTS: dict[str, tuple[dict[str, dict[str, float]], Law, Law]] = {
     "generator": (
         {"generator_coupled": {"inertia_kg_m2": 15.0, "from_s": 0.5, "to_s": 1.6}},
@@ -148,11 +129,3 @@ def test_one_mass_carries_what_has_no_shaft(name: str) -> None:
     expected = reference.solve(rhs, np.array([1.5]), Held.of(TORQUE, SAMPLE_TIME_S), TIME_S, (0.5, 1.6))[:, 0]
     turning = np.full(TIME_S.size, 10.0)
     assert_same(one_mass_output(effects, turning), expected, one_mass_output({}, turning))
-
-
-def test_friction_at_motor_and_load_of_one_mass_adds() -> None:
-    """The structure has one inertia and both frictions act on it."""
-    both = {"coulomb_friction_motor": {"friction_nm": 20.0}, "brake_drag": {"brake_nm": 10.0, "to_s": 9.0}}
-    turning = np.ones(TIME_S.size)
-    one = {"coulomb_friction_motor": {"friction_nm": 30.0}}
-    np.testing.assert_allclose(one_mass_output(both, turning), one_mass_output(one, turning), atol=1e-9)

@@ -1,14 +1,11 @@
 """Effects between the torque's reading and the shaft, against the reference and closed formulas."""
 
-import math
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from estimator.physics.inputs import limited, recorded_shaft_torque, shaft_torque, shaft_torque_from
+from estimator.physics.inputs import shaft_torque
 from estimator.physics.layout import flat_values
-from estimator.signals.record import FloatArray, Record
+from estimator.signals.record import FloatArray
 from tests.estimator.physics import reference
 from tests.estimator.physics.bench import SAMPLE_TIME_S, TWO_MASS, random_steps
 from tests.estimator.physics.law_bench import (
@@ -43,33 +40,6 @@ def test_a_gain_scales_the_reading_of_its_inverter(gain_m1: float, gain_m2: floa
     assert_law(effects, expected, measured(torque_nm=BOTH))
 
 
-def test_gains_beyond_two_inputs_stay_at_one() -> None:
-    three = np.column_stack([BOTH, np.full(SAMPLES, 5.0)])
-    out = supplied(three, inverter_gain_mismatch={"gain_m1": 2.0, "gain_m2": 3.0})
-    np.testing.assert_allclose(out, 2.0 * BOTH[:, 0] + 3.0 * BOTH[:, 1] + 5.0)
-    np.testing.assert_allclose(supplied(BOTH[:, :1], inverter_gain_mismatch={"gain_m1": 2.0}), 2.0 * BOTH[:, 0])
-
-
-def test_what_is_kept_of_a_recording_is_that_of_the_same_parameters() -> None:
-    """Asked for again in another order, of those alike in what acts on the torque, too."""
-    each = [
-        flat_values(TWO_MASS | {"k": stiffness}, effects)
-        for stiffness in (TWO_MASS["k"], 2.0 * TWO_MASS["k"])
-        for effects in (
-            {},
-            {"inverter_gain_mismatch": {"gain_m1": 1.1, "gain_m2": 0.9}},
-            {"torque_saturation": {"limit_m1_nm": 30.0}},
-            {"torque_saturation": {"limit_sum_nm": 50.0, "sharpness": 4.0}},
-            {"torque_derating": {"depth": -0.2, "time_constant_s": 1.0}},
-            {"torque_derating": {"depth": -0.2, "time_constant_s": 2.0}},
-        )
-    ]
-    run = Record("run", TIME_S[1] - TIME_S[0], TIME_S, BOTH, np.zeros_like(TIME_S), np.ones(TIME_S.size, dtype=bool))
-    found = [recorded_shaft_torque(run, p) for p in [*each, *each[::-1], *each]]
-    np.testing.assert_array_equal(found, [shaft_torque(BOTH, TIME_S, p) for p in [*each, *each[::-1], *each]])
-    assert recorded_shaft_torque(run, each[-1]) is found[-1]
-
-
 def knee(torque_nm: FloatArray, limit_nm: float, sharpness: float) -> FloatArray:
     """A torque that nears its limit, written down as the entry has it."""
     return np.asarray(torque_nm / (1.0 + np.abs(torque_nm / limit_nm) ** sharpness) ** (1.0 / sharpness))
@@ -98,14 +68,6 @@ def test_saturation_cuts_each_inverter_and_then_the_sum(name: str) -> None:
     assert_law({"torque_saturation": limits}, solved(two_mass(), held=held(expected)), measured(torque_nm=BOTH))
 
 
-@pytest.mark.parametrize("sharpness", [2.0, 10.0, 99.0])
-def test_a_knee_starts_on_the_line_and_ends_at_the_limit(sharpness: float) -> None:
-    torque = np.array([-1e6, -80.0, -1e-3, 0.0, 1e-3, 80.0, 1e6])
-    out = limited(torque, 80.0, sharpness)
-    middle = 80.0 * 2.0 ** (-1.0 / sharpness)
-    np.testing.assert_allclose(out, [-80.0, -middle, -1e-3, 0.0, 1e-3, middle, 80.0], rtol=1e-6)
-
-
 @pytest.mark.parametrize("depth", [0.3, -0.1])
 def test_derating_lets_the_torque_fall_towards_its_depth(depth: float) -> None:
     tau = 0.8
@@ -113,23 +75,6 @@ def test_derating_lets_the_torque_fall_towards_its_depth(depth: float) -> None:
     effects = {"torque_derating": {"depth": depth, "time_constant_s": tau}}
     np.testing.assert_allclose(supplied(TORQUE[:, None], **effects), TORQUE * left, rtol=1e-12)
     assert_law(effects, solved(two_mass(), held=held(TORQUE * left)))
-
-
-@pytest.mark.parametrize("begun", [0.0, 0.7])
-def test_derating_by_the_torques_own_heat_is_a_winding_of_first_order(begun: float) -> None:
-    """tau dh/dt + h = (T / T_n)^2, solved from sample to sample, a held torque each."""
-    tau, rated, depth = 0.8, 60.0, 0.3
-    warm = [begun]
-    for torque in TORQUE:
-        end = (torque / rated) ** 2
-        warm.append(end + (warm[-1] - end) * math.exp(-SAMPLE_TIME_S / tau))
-    effects = {"torque_derating": {"depth": depth, "time_constant_s": tau, "heating_nm": rated}}
-    p = flat_values(TWO_MASS, effects)
-    torque, behind = shaft_torque_from(TORQUE[:, None], TIME_S, SAMPLE_TIME_S, p, begun)
-    np.testing.assert_allclose(torque, TORQUE * (1.0 - depth * np.array(warm[:-1])), rtol=1e-12)
-    assert behind == pytest.approx(warm[-1])
-    if begun == 0.0:
-        assert_law(effects, solved(two_mass(), held=held(torque)))
 
 
 def test_the_torque_path_acts_in_the_order_gain_limit_derating() -> None:
@@ -141,15 +86,6 @@ def test_the_torque_path_acts_in_the_order_gain_limit_derating() -> None:
     each = np.clip(BOTH * [1.5, 1.0], -80.0, 80.0)
     total = np.clip(each.sum(axis=1), -100.0, 100.0)
     np.testing.assert_allclose(supplied(BOTH, **effects), total * (1.0 - 0.4 * (1.0 - np.exp(-TIME_S / 0.5))))
-
-
-def test_without_effects_the_readings_are_summed_and_left_alone() -> None:
-    before = BOTH.copy()
-    np.testing.assert_array_equal(supplied(BOTH), BOTH.sum(axis=1))
-    supplied(
-        BOTH, inverter_gain_mismatch={"gain_m1": 2.0}, torque_saturation={"limit_m1_nm": 10.0, "limit_m2_nm": 10.0}
-    )
-    np.testing.assert_array_equal(before, BOTH)
 
 
 @pytest.mark.parametrize("tau", [0.004, 0.05])
@@ -189,14 +125,6 @@ def test_a_drifting_clock_stretches_the_torque(rate: float) -> None:
     assert_law({"clock_drift": {"rate": rate}}, expected, tolerance=2e-4)
 
 
-@pytest.mark.parametrize("rate", [0.002, -0.002])
-def test_in_a_part_of_a_recording_the_clock_has_drifted_since_its_beginning(rate: float) -> None:
-    """It began 8 s before: 0.8 periods off already at the part's first sample."""
-    rec = replace(measured(), began_s=-8.0)
-    expected = solved(two_mass(), held=Held.of(TORQUE, SAMPLE_TIME_S, late_s=-8.0 * rate, pace=1.0 + rate))
-    assert_law({"clock_drift": {"rate": rate}}, expected, rec, tolerance=2e-4)
-
-
 OVERTONE = {"overtone_in_step": 0.3 * np.cos(0.5), "overtone_across": 0.3 * np.sin(0.5)}
 
 
@@ -213,17 +141,6 @@ def test_a_ripple_follows_the_measured_angle(order: float) -> None:
     line = two_mass(ripple=lambda t: 25.0 * _pulsating(order * np.interp(t, TIME_S, angle) + 0.7))
     effects = {"torque_ripple": {"amplitude_nm": 25.0, "order": order, "phase_rad": 0.7} | OVERTONE}
     assert_law(effects, solved(line), measured(turning))
-
-
-def test_a_ripple_may_grow_with_the_torque() -> None:
-    turning = np.full(SAMPLES, 10.0)
-    line = two_mass()
-
-    def rhs(t: float, x: FloatArray, torque: float) -> FloatArray:
-        return line(t, x, torque * (1.0 + 0.2 * _pulsating(6.0 * 10.0 * t + 0.7)))
-
-    effects = {"torque_ripple": {"share": 0.2, "order": 6.0, "share_phase_rad": 0.7} | OVERTONE}
-    assert_law(effects, solved(rhs), measured(turning))
 
 
 def test_a_lag_acts_behind_a_delay_and_before_the_ripple() -> None:

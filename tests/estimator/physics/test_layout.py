@@ -11,7 +11,7 @@ from estimator import compiled as module
 from estimator.compiled import compiled
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.layout import LOAD, NOMINAL, SIZE, flat, slot
-from tests.estimator.physics.bench import ONE_MASS, TWO_MASS, model
+from tests.estimator.physics.bench import TWO_MASS, model
 
 SOURCE = Path(module.__file__).parent
 
@@ -40,14 +40,6 @@ def test_a_changed_source_changes_the_digest(copy: Path, changed: str) -> None:
     assert module._digest() != before
 
 
-def test_the_cache_lies_where_the_user_keeps_caches(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    assert module._cache_folder() == tmp_path / "hil" / f"kernel-{module._digest()}"
-    monkeypatch.delenv("XDG_CACHE_HOME")
-    monkeypatch.setenv("HOME", str(tmp_path))
-    assert module._cache_folder().parent == tmp_path / ".cache" / "hil"
-
-
 def test_compiled_code_divides_as_arrays_do() -> None:
     def reciprocal(value: float) -> float:
         return 1.0 / value
@@ -65,11 +57,6 @@ class TestLayout:
         slots = [slot("", name) for name in (*NOMINAL, LOAD)]
         slots += [slot(entry.name, p.name) for entry in EFFECTS.values() for p in entry.parameters]
         assert sorted(slots) == list(range(SIZE))
-
-    def test_a_smaller_structure_leaves_the_rest_at_zero(self) -> None:
-        vector = flat(model(ONE_MASS))
-        assert vector[slot("", "J_M")] == ONE_MASS["J_M"]
-        assert [vector[slot("", name)] for name in ("J_L", "k", "c", "b_L")] == [0.0] * 4
 
     def test_effects_are_at_their_null_unless_the_model_has_them(self) -> None:
         vector = flat(model(TWO_MASS, effects={"backlash": {"gap_rad": 0.03}}))

@@ -5,7 +5,6 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 
-from estimator.physics.catalogue import BUILT_IN
 from estimator.physics.driveline import Start
 from estimator.physics.grid import Grid
 from estimator.physics.kernel import linear, state_vector
@@ -50,7 +49,6 @@ EFFECTS: dict[str, Mapping[str, Mapping[str, float]]] = {
     "an offset": {"torque_bias": {"offset_nm": 9.0, "time_constant_s": 1.0}},
     "a ripple": {"torque_ripple": {"amplitude_nm": 2.0, "order": 6.0}},
 }
-WITHOUT_BRISTLES = {("stribeck_friction", "excess_nm"), ("stribeck_friction", "coulomb_nm")}
 """What makes the line nonlinear unless friction is described by bristles."""
 
 LINES = {"one mass": ONE_MASS, "two masses": TWO_MASS, "three masses": THREE_MASS}
@@ -111,22 +109,3 @@ def test_what_is_nonlinear_slips_or_drags_is_not_linear() -> None:
         curved = p.copy()
         curved[slot(effect, parameter)] = 0.1
         assert not linear.is_linear(elastic, curved)
-
-
-@pytest.mark.parametrize(
-    ("begun", "ended", "beyond"), [(3.0, 2.5, True), (-3.0, -2.5, True), (3.0, 1.9, False), (3.0, -3.0, False)]
-)
-def test_dry_friction_is_constant_on_one_side_of_zero(begun: float, ended: float, beyond: bool) -> None:
-    assert linear.is_beyond(begun, ended, 2.0) is beyond
-
-
-def test_whatever_is_nonlinear_in_the_catalogue_takes_the_sub_steps() -> None:
-    """A new effect is not taken for linear before its entry says so."""
-    nulls = flat(model(TWO_MASS))
-    elastic = Line(2, True, False, False, ())
-    for name, entry in BUILT_IN.items():
-        for parameter in entry.parameters:
-            p = nulls.copy()
-            p[slot(name, parameter.name)] += 1.0
-            nonlinear = (name, parameter.name) in WITHOUT_BRISTLES or not entry.linear
-            assert linear.is_linear(elastic, p) is (not nonlinear or not np.isfinite(parameter.null))

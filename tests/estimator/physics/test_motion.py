@@ -1,28 +1,22 @@
 """What a recording says of the motion: speed from position, sizes, changes of sign."""
 
+import math
+
 import numpy as np
 import pytest
 
+from estimator.errors import BadModel
+from estimator.physics.model import DrivelineModel, Motion, Parameter, Structure, parameter_unit
 from estimator.physics.motion import (
     measured_speed,
     reverses,
     speed_by_place,
-    speed_scale,
     torque_reverses,
-    torque_scale,
 )
 from estimator.signals.record import OutputKind
-from tests.estimator.physics.bench import record
+from tests.estimator.physics.bench import ONE_MASS, TWO_MASS, model, record
 
 TIME_S = np.arange(500) * 0.01
-
-
-def test_a_measured_speed_is_passed_on_but_for_masked_samples() -> None:
-    okay = np.ones(500, dtype=bool)
-    okay[7:9] = False
-    speed = measured_speed(record(np.ones(500), TIME_S, okay=okay))
-    assert np.all(np.isnan(speed[7:9]))
-    np.testing.assert_array_equal(speed[okay], TIME_S[okay])
 
 
 @pytest.mark.parametrize("sample_time_s", [0.01, 0.001, 0.05])
@@ -35,20 +29,6 @@ def test_the_speed_of_a_parabola_is_exact_inside(sample_time_s: float) -> None:
     half = max(1, round(0.01 / sample_time_s))
     assert inside.sum() == 500 - 2 * half
     np.testing.assert_allclose(speed[inside], 6.0 * time_s[inside], rtol=1e-9, atol=1e-9)
-
-
-def test_a_masked_position_leaves_no_speed_around_it() -> None:
-    okay = np.ones(500, dtype=bool)
-    okay[100] = False
-    speed = measured_speed(record(np.ones(500), TIME_S, kind=OutputKind.POSITION, okay=okay))
-    assert set(np.flatnonzero(np.isnan(speed))) == {0, 99, 101, 499}
-
-
-def test_scales_are_the_99th_percentile_of_the_largest_recording() -> None:
-    ramp = np.arange(1001) / 10.0
-    small, large = record(ramp, ramp, name="a"), record(np.column_stack([ramp, -3.0 * ramp]), -2.0 * ramp, name="b")
-    assert torque_scale([small, large]) == pytest.approx(198.0)
-    assert speed_scale([small, large]) == pytest.approx(198.0)
 
 
 @pytest.mark.parametrize(
@@ -71,14 +51,6 @@ def test_a_torque_reversal_must_be_a_tenth_of_the_torque(low: float, expected: b
     assert torque_reverses(record(np.linspace(low, 100.0, 500))) is expected
 
 
-def test_a_short_pulse_is_measured_by_its_peak_and_rest_by_one() -> None:
-    torque = np.zeros(500)
-    assert torque_scale([record(torque)]) == 1.0
-    torque[100:103] = -400.0
-    assert torque_scale([record(torque)]) == 400.0
-    assert speed_scale([record(torque, torque)]) == 400.0
-
-
 def test_a_swing_that_repeats_passes_each_place_at_one_speed() -> None:
     swing = np.cos(2.0 * np.pi * TIME_S)
     assert speed_by_place(record(np.ones(500), swing, kind=OutputKind.POSITION)) > 0.9
@@ -90,3 +62,87 @@ def test_swings_of_different_speed_and_a_motion_that_continues_do_not() -> None:
     slow_then_fast = np.abs(np.mod(phase, 1.0) - 0.5)  # to and fro, each time at one speed
     assert speed_by_place(record(np.ones(1000), slow_then_fast, kind=OutputKind.POSITION)) < 0.5
     assert speed_by_place(record(np.ones(500), TIME_S + np.sin(TIME_S), kind=OutputKind.POSITION)) == 0.0
+
+
+def one_mass(**parameters: Parameter) -> DrivelineModel:
+    nominal = {"J_M": Parameter(2.0, 0.1), "b_M": Parameter(0.5, 0.1)}
+    return DrivelineModel(Structure.ONE_MASS, nominal | parameters)
+
+
+@pytest.mark.parametrize("name", ["c", "b_M", "b_L"])
+def test_damping_may_be_zero_but_not_negative(name: str) -> None:
+    assert model(TWO_MASS | {name: 0.0}).values()[name] == 0.0
+    with pytest.raises(BadModel, match=rf"parameters.{name}.value: expected a finite number 0 or greater, got -0.1"):
+        model(TWO_MASS | {name: -0.1})
+
+
+@pytest.mark.parametrize("tolerance", [-0.1, 1.0, math.nan])
+def test_a_tolerance_is_a_share_below_one(tolerance: float) -> None:
+    with pytest.raises(BadModel, match=rf"parameters.J_M.tolerance: expected .* from 0 up to 1, got {tolerance}"):
+        one_mass(J_M=Parameter(2.0, tolerance))
+
+
+def test_every_fault_is_reported_at_once() -> None:
+    with pytest.raises(BadModel) as refusal:
+        DrivelineModel(
+            Structure.ONE_MASS, {"J_M": Parameter(-2.0, 3.0), "c": Parameter(1.0, 0.1)}, effects={"slipping_clutch": {}}
+        )
+    assert [line.split(":")[0] for line in str(refusal.value).splitlines()] == [
+        "parameters.b_M",
+        "parameters.c",
+        "parameters.J_M.value",
+        "parameters.J_M.tolerance",
+        "effects.slipping_clutch",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("effects", "message"),
+    [
+        ({"slipping_clutch": {}}, "effects.slipping_clutch: unknown effect, expected one of inverter_gain_mismatch, "),
+        ({"transport_delay": {}}, "effects.transport_delay.delay_s: missing, expected delay_s, before_nm"),
+        (
+            {"transport_delay": {"delay_s": 0.01, "tau": 1.0}},
+            "effects.transport_delay.tau: unknown parameter, expected delay_s, before_nm",
+        ),
+        (
+            {"transport_delay": {"delay_s": math.nan}},
+            "transport_delay.delay_s.value: expected a finite number, got nan",
+        ),
+        ({"transport_delay": {"delay_s": -0.01}}, "delay_s.value: expected a number 0 or greater, got -0.01"),
+        ({"backlash": {"gap_rad": -0.02}}, "effects.backlash.gap_rad.value: expected a number 0 or greater, got -0.02"),
+        (
+            {"stiffness_nonlinearity": {"hardening_per_rad2": 80.0, "shape": 0.0}},
+            "effects.stiffness_nonlinearity.shape.value: expected a number greater than 0, got 0.0",
+        ),
+        (
+            {"backlash": {"gap_rad": 0.02, "pull": 1.5}},
+            "effects.backlash.pull.value: expected a number 0 or greater, up to 1, got 1.5",
+        ),
+    ],
+)
+def test_a_wrong_effect_is_refused(effects: dict[str, dict[str, float]], message: str) -> None:
+    with pytest.raises(BadModel, match=message):
+        model(TWO_MASS, effects=effects)
+
+
+def test_a_shaft_effect_makes_no_sense_without_a_shaft() -> None:
+    message = "effects.backlash: makes no sense in one_mass, expected joint, three_mass, two_mass"
+    with pytest.raises(BadModel, match=message):
+        model(ONE_MASS, effects={"backlash": {"gap_rad": 0.02, "contact_rad": 0.001}})
+
+
+@pytest.mark.parametrize(
+    ("name", "rotation", "translation"),
+    [
+        ("J_M", "kg m^2", "kg"),
+        ("J_L", "kg m^2", "kg"),
+        ("k", "Nm/rad", "N/m"),
+        ("c", "Nm s/rad", "N s/m"),
+        ("b_M", "Nm s/rad", "N s/m"),
+        ("b_L", "Nm s/rad", "N s/m"),
+    ],
+)
+def test_units_of_the_contract(name: str, rotation: str, translation: str) -> None:
+    assert parameter_unit(name, Motion.ROTATION) == rotation
+    assert parameter_unit(name, Motion.TRANSLATION) == translation

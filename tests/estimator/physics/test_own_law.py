@@ -10,15 +10,13 @@ import pytest
 
 from estimator.diagnosis.hypotheses import open_hypotheses
 from estimator.errors import BadModel
-from estimator.physics.catalogue import EFFECTS
 from estimator.physics.driveline import Start
 from estimator.physics.effect import Element
 from estimator.physics.grid import Grid, grid_for
-from estimator.physics.layout import SIZE, flat, flat_values, named, slot
+from estimator.physics.layout import flat, flat_values, named
 from estimator.physics.model import EffectValue, Structure
 from estimator.physics.own_law import TRIAL, OwnLaw, OwnParameter
 from estimator.physics.simulate import simulate
-from estimator.physics.stepper import Stepper
 from estimator.signals.record import FloatArray
 from tests.estimator.physics import bench
 
@@ -42,10 +40,6 @@ def air(time_s: Any, motor_speed: Any, load_speed: Any, twist: Any, torque: Any,
 
 def cubic(time_s: Any, motor_speed: Any, load_speed: Any, twist: Any, torque: Any, size: float) -> Any:
     return bench.TWO_MASS["k"] * size * twist**3
-
-
-def bent(time_s: Any, motor_speed: Any, load_speed: Any, twist: Any, torque: Any, size: float) -> Any:
-    return size * time_s + size * motor_speed**2
 
 
 def law(function: Callable[..., object], element: Element = Element.MOTOR, name: str = "mine") -> OwnLaw:
@@ -89,13 +83,7 @@ def test_one_mass_has_a_motor_for_it() -> None:
     assert np.abs(mine - known).max() < 1e-3 * np.abs(known - without).max()
 
 
-def test_an_error_of_the_reading_is_added_to_it() -> None:
-    without = simulated({})
-    time_s = bench.SAMPLE_TIME_S * np.arange(without.size)
-    misread = simulated({"mine": {"size": 0.02}}, bench.TWO_MASS, law(bent, Element.SPEED_SENSOR))
-    assert misread == pytest.approx(without + 0.02 * time_s + 0.02 * without**2, rel=1e-9)
-
-
+@pytest.mark.campaign
 def test_the_output_is_smooth_enough_to_differentiate() -> None:
     at = {
         step: simulated({"mine": {"size": 0.01 * (1.0 + step)}}, bench.TWO_MASS, law(square))
@@ -142,15 +130,6 @@ def test_a_law_that_failed_in_one_simulation_is_asked_again_in_the_next() -> Non
     with pytest.raises(BadModel, match="no map for so late"):
         simulate(grid, long, p, START)
     assert np.isfinite(simulate(grid, short, p, START)).all()
-
-
-def test_its_name_finds_it_in_catalogue_and_layout() -> None:
-    mine, other = named([law(square), law(air, Element.LOAD, "other")])
-    assert (mine, other) == ("mine", "other")
-    assert EFFECTS[mine].element is Element.MOTOR
-    assert Structure.ONE_MASS not in EFFECTS[other].structures
-    assert (slot(mine, "size"), slot(other, "size")) == (SIZE, SIZE + 1)
-    assert flat_values({}, {}, (mine, other)).size == SIZE + 2
 
 
 def test_a_law_belongs_to_its_model_and_to_no_other() -> None:
@@ -224,22 +203,6 @@ def test_functions_of_arrays_are_reported_from_functions_of_numbers() -> None:
     assert not law(square_by_cases).takes_arrays
     for function in (square, square_by_cases):
         assert law(function)(TRIAL, {"size": 2.0}) == pytest.approx(2.0 * TRIAL[1] * np.abs(TRIAL[1]))
-
-
-def test_what_it_says_of_itself() -> None:
-    entry = law(square).effect()
-    assert (
-        entry.sentence({"size": 0.5}, bench.model(bench.ONE_MASS).motion)
-        == "the law mine acts at the motor (size = 0.5)"
-    )
-    assert entry.law == "Python function laws:it"
-
-
-def test_a_simulated_rig_can_not_have_it() -> None:
-    line = replace(bench.model(bench.TWO_MASS), laws=named([law(square)]))
-    with pytest.raises(BadModel, match=r"effects.mine: expected effects of the catalogue"):
-        Stepper(replace(line, effects={"mine": {"size": EffectValue(0.1)}}), 0.01)
-    Stepper(replace(line, effects={"mine": {"size": EffectValue(0.0)}}), 0.01)
 
 
 def test_a_function_of_numbers_is_compiled_where_that_can_be() -> None:

@@ -1,7 +1,7 @@
 """Phases and moments by a scan: what it answers is the effect itself, and what it chooses is the best there is."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ from scipy.optimize import lsq_linear
 
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.layout import SIZE, slot
-from estimator.physics.own_scan import MOST_CELLS, SHORTEST_CELL_S, Projector, Simulate, Stretch, cells, scan, waves
+from estimator.physics.own_scan import MOST_CELLS, SHORTEST_CELL_S, Projector, Simulate, cells, scan, waves
 from estimator.physics.unknowns import own_unknowns
 from estimator.signals.record import FloatArray
 from tests.estimator.diagnosis.regression import regression
@@ -34,12 +34,6 @@ class TestRest:
         project = Projector(regression([design], [noise]))
         np.testing.assert_allclose(project.rest(design @ [3.0, -2.0, 0.5]), 0.0, atol=1e-12)
         np.testing.assert_allclose(project.rest(design.T), 0.0, atol=1e-12)
-
-    def test_an_unknown_at_its_bound_explains_nothing(self, design: np.ndarray, noise: np.ndarray) -> None:
-        """Two unknowns want 0.5 and -0.5 and get them; the third wants 4 and may be 1."""
-        project = Projector(regression([design], [design @ [0.5, -0.5, 4.0] + 0.1 * noise], bound=1.0))
-        assert np.linalg.norm(project.rest(design[:, 2])) > 0.9 * np.linalg.norm(design[:, 2])
-        np.testing.assert_allclose(project.rest(design[:, 0]), 0.0, atol=1e-12)
 
 
 class TestPromise:
@@ -76,11 +70,6 @@ class TestPromise:
         size, fall = Projector(result).promise(along, -10.0, 10.0)
         assert size == pytest.approx(2.5)
         assert fall == pytest.approx(result.squares)
-
-    def test_a_direction_that_re_tuning_has_promises_nothing(self, design: np.ndarray, noise: np.ndarray) -> None:
-        project = Projector(regression([design], [noise]))
-        assert project.promise(design @ [1.0, 2.0, 3.0], -10.0, 10.0)[1] == pytest.approx(0.0, abs=1e-6)
-        assert project.promise(np.zeros(SAMPLES), -10.0, 10.0) == (0.0, 0.0)
 
 
 BRAKE, IMBALANCE, RESOLVER = EFFECTS["brake_drag"], EFFECTS["load_imbalance"], EFFECTS["resolver_error"]
@@ -127,11 +116,6 @@ class TestBestStretch:
         assert (found.first, found.last) == (first, last)
         assert found.taken == pytest.approx(taken)
 
-    def test_where_no_interval_takes_anything_there_is_none(self) -> None:
-        answers = np.cumsum(np.eye(6, 50), axis=0) - np.eye(1, 50)
-        assert scan(answers, answers[-1]).best(1.0) == Stretch(0, 0, 0.0, 0.0, 0.0)
-        assert scan(answers, -answers[-1]).best(1.0).taken > 0.0
-
 
 class TestCells:
     TIME_S = np.arange(1200) * 0.01
@@ -175,14 +159,6 @@ class TestWaves:
         (wave,) = waves(IMBALANCE, np.zeros(SIZE), sizes, each(run), still)
         assert (wave.phase, wave.amplitude) == ("phase_rad", "amplitude_nm")
         np.testing.assert_allclose(wave.answers, [np.cos(self.ANGLE), -np.sin(self.ANGLE)], atol=1e-9)
-
-    @pytest.mark.parametrize(
-        ("sizes", "found"),
-        [({"once_rad": 0.1, "twice_rad": 0.0}, ["once_phase_rad"]), ({"once_rad": 0.0, "twice_rad": 0.0}, [])],
-    )
-    def test_an_amplitude_that_is_not_tried_has_no_wave(self, sizes: Mapping[str, float], found: list[str]) -> None:
-        answers = waves(RESOLVER, np.zeros(SIZE), sizes, each(lambda _: np.zeros(3)), np.zeros(3))
-        assert [wave.phase for wave in answers] == found
 
     def test_every_amplitude_answers_with_the_others_silent(self) -> None:
         """Whatever sizes the parameter vector came with."""

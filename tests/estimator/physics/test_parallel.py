@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from estimator.physics.jacobian import jacobian_at
-from estimator.physics.parallel import available_cores, concurrently, work_on, workers
+from estimator.physics.parallel import concurrently, work_on, workers
 from estimator.physics.problem import make_problem, outputs_at, start_vector
 from estimator.physics.unknowns import nominal_unknowns
 from tests.estimator.physics.bench import TWO_MASS, model, random_steps, record
@@ -39,13 +39,6 @@ def test_results_come_in_the_order_of_the_items() -> None:
         return item**2
 
     assert concurrently(work, range(6)) == [item**2 for item in range(6)]
-
-
-def test_so_many_items_are_worked_on_at_once() -> None:
-    """They wait for each other: one after the other would break the barrier."""
-    meeting = threading.Barrier(workers(), timeout=10.0)
-    concurrently(lambda _: meeting.wait(), range(workers()))
-    assert not meeting.broken
 
 
 def test_calls_inside_calls_never_work_on_more_than_so_many_at_once() -> None:
@@ -100,12 +93,6 @@ def test_so_many_cores_as_were_asked_for_work(count: int) -> None:
     concurrently(lambda _: meeting.wait(), range(count))
     assert not meeting.broken
     assert workers() == count
-
-
-def test_a_process_may_use_one_core_at_least() -> None:
-    assert available_cores() >= 1
-    with pytest.raises(ValueError, match="expected 1 or more, got 0"):
-        work_on(0)
 
 
 def test_a_jacobian_is_the_same_to_the_last_bit_on_any_number_of_cores() -> None:

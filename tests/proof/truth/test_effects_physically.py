@@ -54,14 +54,6 @@ def test_a_nonlinear_shaft_is_conservative(lossless, trace, twist, field, potent
     np.testing.assert_allclose(energy, energy[0], rtol=2e-5)
 
 
-def test_only_the_first_inverter_has_another_gain(plain):
-    p = plain._replace(gain_m1=0.9, k=0.0, c=0.0, b_M=0.0)
-    for torque, expected in (((100.0, 0.0), 90.0), ((0.0, 100.0), 100.0)):
-        driveline = TruthDriveline(p)
-        driveline.advance(torque, 0.1)
-        assert driveline.quantity(State.SPEED_M) == pytest.approx(expected * 0.1 / p.J_M, rel=1e-9)
-
-
 def test_the_brake_takes_its_torque_in_its_time_alone(plain, trace):
     p = plain._replace(b_M=0.0, b_L=0.0, brake_nm=100.0, brake_from_s=2.0, brake_to_s=5.0)
     states = trace(p, [0.0] * 800, speed_rad_s=60.0)
@@ -110,11 +102,3 @@ def test_a_maxwell_branch_is_stiff_when_fast_and_gone_when_slow(plain, trace, tw
     up = np.flatnonzero((speed[:-1] < 0) & (speed[1:] >= 0))
     frequency = 2 * np.pi * (up.size - 1) / ((up[-1] - up[0]) * 0.001)
     assert frequency == pytest.approx(np.sqrt(6200.0 * (1 / p.J_M + 1 / p.J_L)), rel=2e-3)
-
-
-def test_a_second_branch_relaxes_six_times_as_fast(plain, trace):
-    p = plain._replace(maxwell_stiffness=2000.0, maxwell_time_s=0.6, maxwell_fast_share=0.2)
-    states = trace(p, [400.0] * 10, period_s=1e-4)[-1]
-    assert states[State.MAXWELL_FAST_NM] == pytest.approx(0.2 * states[State.MAXWELL_NM], rel=5e-3)
-    alone = trace(p._replace(maxwell_fast_share=0.0), [400.0] * 10)[-1]
-    assert alone[State.MAXWELL_FAST_NM] == 0.0

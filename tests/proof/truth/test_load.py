@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hil.proof.truth import laws
-from hil.proof.truth.driveline import TruthDriveline
+from hil.proof.truth.driveline import TruthDriveline, bring_to_speed
 from hil.proof.truth.physics import State
 
 
@@ -67,18 +67,30 @@ def test_a_payload_that_goes_leaves_the_speed_and_quickens_the_bus(lossless, tra
         assert rate.mean() == pytest.approx(100.0, rel=0.01)
 
 
-def test_a_heavier_bus_is_pulled_more_by_a_hill(lossless, trace):
-    road = np.array([[100.0, 0.001, 0.0]])  # a tenth uphill for hundreds of metres
-    p = lossless._replace(road=road, metres_per_rad=0.0857, gravity_nm=8000.0, payload_share=0.5, payload_rise_s=1e-3)
-    light, heavy = (
-        trace(q, [0.0] * 200, speed_rad_s=60.0)[-1, State.SPEED_L] for q in (p._replace(payload_share=0.0), p)
-    )
-    # weight and inertia grow alike; the motor's inertia, which helps the bus along, does not
-    assert 0.0 < light - heavy < 0.02 * (60.0 - light)
+EFFECTS = {
+    "nothing": {},
+    "friction": {"friction_motor_nm": 20.0},
+    "drag": {"quadratic_motor": 0.02, "quadratic_load": 0.01},
+    "gain": {"gain_m1": 0.9},
+    "late": {"delay_s": 0.03, "current_loop_time_s": 0.02},
+    "gap": {"gap_rad": 0.03},
+}
 
 
-def test_cold_oil_warms_to_the_data_sheet(plain):
-    p = plain._replace(cold_factor=3.0, warming_time_s=5.0)
-    factors = [laws.viscosity_over_warm(p, time_s) for time_s in (0.0, 5.0, 100.0)]
-    np.testing.assert_allclose(factors, [3.0, 3.0 ** np.exp(-1.0), 1.0], rtol=1e-6)
-    assert laws.viscosity_over_warm(plain, 0.0) == 1.0
+@pytest.mark.parametrize("speed", [0.0, 70.0])
+@pytest.mark.parametrize("changes", EFFECTS.values(), ids=EFFECTS)
+def test_a_held_pedal_holds_the_speed(plain, changes, speed):
+    rolling = bring_to_speed(plain._replace(load_torque_nm=50.0, **changes), speed, share_m1=0.4)
+    start = rolling.driveline.quantity(State.SPEED_L)
+    rolling.driveline.advance((0.4 * rolling.torque_nm, 0.6 * rolling.torque_nm), 10.0)
+    assert start == pytest.approx(speed, abs=0.4)
+    assert rolling.driveline.quantity(State.SPEED_L) == pytest.approx(start, abs=0.05)
+
+
+def test_hills_and_brake_begin_with_the_recording(plain):
+    p = plain._replace(brake_nm=50.0, brake_from_s=0.0, brake_to_s=10.0)
+    driveline = bring_to_speed(p, 60.0, 0.5).driveline
+    assert driveline.quantity(State.SPEED_L) == pytest.approx(60.0, abs=0.4)
+    assert driveline.quantity(State.TIME_S) == 0.0
+    assert driveline.quantity(State.ANGLE_L) == 0.0
+    assert driveline.physics == p

@@ -58,29 +58,9 @@ def test_eddy_drag_is_greatest_at_its_speed_and_odd(plain):
     assert laws.eddy_torque(p, -40.0) == -laws.eddy_torque(p, 40.0)
 
 
-def test_currents_that_keep_to_the_surface_flatten_the_drag_but_not_its_peak(plain):
-    p = plain._replace(eddy_nm=30.0, eddy_speed_rad_s=15.0)
-    flat = p._replace(eddy_exponent=0.9)
-    assert laws.eddy_torque(flat, 15.0) == pytest.approx(30.0)
-    for speed in (3.0, 60.0):
-        assert 30.0 > laws.eddy_torque(flat, speed) > laws.eddy_torque(p, speed)
-
-
-def test_friction_by_direction_is_more_forward_and_as_much_less_backward(plain):
-    p = plain._replace(viscous_forward=0.4, dry_forward_nm=2.0)
-    assert laws.torque_by_direction(p, 10.0) == pytest.approx(6.0)
-    assert laws.torque_by_direction(p, -10.0) == pytest.approx(6.0)
-    assert laws.torque_by_direction(p, 0.0) == 0.0
-
-
 def test_gears_lose_a_share_of_the_power_whoever_drives(plain):
     p = plain._replace(efficiency=0.95, efficiency_back=0.9)
     assert laws.behind_gears(p, 100.0, 10.0) == pytest.approx(95.0)
     assert laws.behind_gears(p, -100.0, -10.0) == pytest.approx(-95.0)
     assert laws.behind_gears(p, -90.0, 10.0) == pytest.approx(-100.0)
     assert laws.behind_gears(p, 100.0, 0.0) == 100.0
-
-
-def test_a_fast_motor_draws_more_along(plain):
-    p = plain._replace(drawn_share=0.2, drawn_half_rad_s=20.0)
-    assert [laws.inertia_over_rotor(p, speed) for speed in (0.0, 20.0, -20.0)] == pytest.approx([1.0, 1.1, 1.1])

@@ -14,7 +14,6 @@ from hil.proof.truth.recording import (
     Acquisition,
     Rows,
     as_recorded,
-    runs,
     sampling_instants_s,
     speed_as_read,
 )
@@ -37,12 +36,6 @@ def rows(rng):
 def test_a_faultless_chain_changes_no_row_and_samples_in_time(rows, rng):
     assert as_recorded(rows, FAULTLESS, rng) is rows
     np.testing.assert_array_equal(sampling_instants_s(TIME_S, FAULTLESS, rng), TIME_S)
-
-
-def test_a_blind_sensor_reads_the_magnitude(rng):
-    read = speed_as_read(np.linspace(-40.0, 40.0, N), Acquisition(sign_blind=True), rng)
-    np.testing.assert_allclose(read, np.abs(np.linspace(-40.0, 40.0, N)), atol=6 * SPEED_NOISE_RAD_S)
-    assert read.min() >= 0.0
 
 
 def test_a_coarse_number_has_its_step_and_no_offset(rng):
@@ -69,14 +62,6 @@ def test_a_curved_sensor_misses_its_share_at_the_stated_speed(rng):
     assert backwards.mean() == pytest.approx(-0.975 * 0.5 * CURVATURE_SPEED_RAD_S, abs=0.01)
 
 
-def test_jitter_stays_within_its_size_and_a_clock_runs_away(rng):
-    deviation = sampling_instants_s(TIME_S, Acquisition(jitter_s=0.002), rng) - TIME_S
-    assert 0.0019 < np.abs(deviation).max() <= 0.002
-    assert np.std(deviation) == pytest.approx(0.002 / np.sqrt(3), rel=0.05)
-    drifting = sampling_instants_s(TIME_S, Acquisition(clock_error=-0.001), rng)
-    np.testing.assert_allclose(drifting, 0.999 * TIME_S)
-
-
 def test_a_speed_sampled_late_is_the_speed_of_that_moment(plain, rng):
     """Off-grid sampling is exact: a driveline stopped at each instant anew has the same speeds."""
     torques = 100.0 * rng.choice([-1.0, 1.0], 40)
@@ -100,18 +85,6 @@ def test_stale_speeds_repeat_the_last_good_one_and_leave_the_torques(rows, rng):
     assert stale.flags is None
 
 
-def test_rows_can_be_stale_as_a_whole_and_in_a_beat(rows, rng):
-    stale = as_recorded(rows, Acquisition(stale_every=20, stale_rows=True), rng)
-    for before, after in zip(
-        (rows.torque_m1_nm, rows.torque_m2_nm, rows.speed_rad_s),
-        (stale.torque_m1_nm, stale.torque_m2_nm, stale.speed_rad_s),
-        strict=True,
-    ):
-        repeated = np.flatnonzero(np.diff(after) == 0.0) + 1
-        np.testing.assert_array_equal(repeated, np.arange(19, N, 20))
-        np.testing.assert_array_equal(after[repeated], before[repeated - 1])
-
-
 def test_lost_samples_are_nan_and_flagged_in_their_row(rows, rng):
     lost = as_recorded(rows, Acquisition(lost_share=0.02, lost_most=10, lost_m2=True, lost_speed=True), rng)
     gone = np.isnan(lost.torque_m2_nm)
@@ -128,31 +101,3 @@ def test_a_lost_sample_may_be_a_zero_that_nobody_flagged(rows, rng):
     assert lost.flags is None
     assert 0.01 * N < np.count_nonzero(lost.torque_m1_nm == 0.0) < 0.03 * N
     assert np.isfinite(lost.torque_m1_nm).all()
-
-
-def test_wrong_bits_hit_single_speeds_and_hit_them_hard(rows, rng):
-    spiked = as_recorded(rows, Acquisition(spike_share=0.01, spike_rad_s=6.0), rng)
-    error = np.abs(spiked.speed_rad_s - rows.speed_rad_s)
-    assert 0.004 * N < np.count_nonzero(error) < 0.02 * N
-    assert error[error > 0.0].min() >= 0.3 * 6.0
-    assert error.max() <= 6.0
-
-
-def test_losses_come_last(rows, rng):
-    """What was lost is lost: nothing repeats it, and nothing is added to it."""
-    everything = Acquisition(
-        stale_share=0.05, lost_share=0.05, lost_speed=True, lost_as_zero=True, spike_share=0.5, spike_rad_s=9.0
-    )
-    lost = as_recorded(rows, everything, rng).speed_rad_s == 0.0
-    assert np.count_nonzero(lost) == pytest.approx(0.05 * N, rel=0.3)
-
-
-def test_runs_have_no_more_than_their_most_and_spare_the_first_sample():
-    for seed in range(20):
-        hit = runs(N, 0.3, 1, np.random.default_rng(seed))
-        assert not hit[0]
-    sparse = runs(200_000, 1e-3, 4, np.random.default_rng(1))
-    edges = np.flatnonzero(np.diff(sparse.astype(int)))
-    lengths = edges[1::2] - edges[::2]
-    assert set(lengths) >= {1, 2, 3, 4}
-    assert np.median(lengths) <= 4

@@ -70,26 +70,3 @@ def test_hysteresis_damps_a_large_swing_and_leaves_a_small_one(lossless, trace, 
         peaks.append(swing[-300:].max() / swing[:300].max())
     assert peaks[0] == pytest.approx(1.0, abs=0.01)
     assert peaks[1] < 0.6
-
-
-def test_an_open_gap_carries_no_hysteresis(plain, trace, twist):
-    p = plain._replace(gap_rad=0.02, hysteresis_stiffness=1600.0, hysteresis_slip_rad=0.03, b_M=0.0)
-    states = trace(p, [100.0] * 600 + [-100.0] * 100, period_s=0.001)
-    across = np.abs(twist(states)) < 0.5 * p.gap_rad - 1e-4
-    inside = across[:-1] & across[1:] & (np.arange(across.size - 1) >= 600)
-    assert inside.any()
-    np.testing.assert_allclose(np.diff(states[:, State.SPEED_M])[inside] / 0.001, -100.0 / p.J_M, rtol=1e-6)
-
-
-def test_a_bent_joint_leads_and_lags_twice_per_turn(plain):
-    bend = 0.2
-    p = plain._replace(joint_angle_rad=bend)
-    angles = np.linspace(0.0, 2 * np.pi, 721)
-    behind, slope = np.array([laws.through_joint(p, angle) for angle in angles]).T
-    np.testing.assert_allclose(np.tan(behind[1:80]), np.cos(bend) * np.tan(angles[1:80]), rtol=1e-12)
-    np.testing.assert_allclose(np.gradient(behind, angles)[1:-1], slope[1:-1], atol=2e-5)
-    assert slope.max() == pytest.approx(1 / np.cos(bend))
-    assert slope.min() == pytest.approx(np.cos(bend))
-    lead = 2 * np.abs(np.fft.rfft((behind - angles)[:-1])) / 720
-    assert np.argmax(lead) == 2
-    assert lead[2] == pytest.approx(bend**2 / 4, rel=0.02)

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from hil.proof.truth import laws
-from hil.proof.truth.driveline import TruthDriveline, true_torque
+from hil.proof.truth.driveline import true_torque
 from hil.proof.truth.laws import TIME_TO_DERATE_S
-from hil.proof.truth.physics import State
 
 
 def test_a_torque_derates_exponentially_or_evenly(plain):
@@ -35,13 +34,6 @@ def test_a_limit_holds_for_what_it_is_of(plain, limits, readings, given):
     assert true_torque(p, readings, 0.0) == pytest.approx(given, rel=2e-3)
 
 
-def test_a_deadband_is_missing_from_each_inverter(plain):
-    p = plain._replace(deadband_nm=10.0)
-    assert true_torque(p, (8.0, -9.0), 0.0) == 0.0
-    assert true_torque(p, (30.0, 30.0), 0.0) == pytest.approx(40.0)
-    assert true_torque(p, (-30.0, 8.0), 0.0) == pytest.approx(-20.0)
-
-
 def test_a_machine_saturates_of_each_sign_by_itself(plain):
     p = plain._replace(saturating_nm=400.0, saturating_back_nm=1200.0)
     assert true_torque(p, (200.0, 200.0), 0.0) == pytest.approx(400.0 * math.log(1.0 + math.sqrt(2.0)))
@@ -53,21 +45,6 @@ def test_an_offset_comes_and_has_come_by_half_at_its_time(plain):
     p = plain._replace(bias_nm=20.0, bias_half_s=5.0)
     given = [true_torque(p, (60.0, 40.0), time_s) - 100.0 for time_s in (0.0, 5.0, 1e6)]
     assert given == pytest.approx([0.0, 10.0, 20.0], abs=1e-3)
-
-
-def test_inverters_that_are_blocked_give_nothing_for_an_instant(plain):
-    p = plain._replace(dropout_every_s=1.0, dropout_s=0.045)
-    given = np.array([true_torque(p, (60.0, 40.0), time_s) for time_s in np.arange(0.0, 3.0, 0.01)])
-    assert set(given.tolist()) == {0.0, 100.0}
-    assert np.count_nonzero(given == 0.0) == 15
-
-
-def test_a_torque_changes_no_faster_than_its_inverter_can(plain):
-    driveline = TruthDriveline(plain._replace(slew_nm_s=5000.0))
-    driveline.advance((60.0, 60.0), 0.01)
-    assert driveline.quantity(State.INVERTER_NM) == pytest.approx(50.0)
-    driveline.advance((60.0, 60.0), 0.02)
-    assert driveline.quantity(State.INVERTER_NM) == pytest.approx(120.0)
 
 
 def _harmonics(p, torque_nm):

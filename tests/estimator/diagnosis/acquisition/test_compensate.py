@@ -16,21 +16,12 @@ from tests.estimator.diagnosis.acquisition.bench import (
     TORQUE_NOISE,
     Truth,
     drive,
-    drives,
     prbs,
     random_rows,
     stale,
 )
 
 ROWS = (0, 1, 2)
-
-
-def simulated(truth: Truth, record: Record) -> FloatArray:
-    return truth.line.speed(record.total_torque_nm, truth.start)
-
-
-def error_rms(truth: Truth, record: Record) -> float:
-    return float(np.std((simulated(truth, record) - record.output)[record.okay]))
 
 
 def torque_error(truth: Truth, record: Record, rows: BoolArray) -> float:
@@ -65,28 +56,6 @@ def test_a_smooth_torque_and_one_that_steps_at_any_row_have_no_clock() -> None:
     assert clock_of(np.cumsum(rng.standard_normal(SAMPLES)), every) is None
     assert clock_of(prbs(rng, 60.0, 1), every) is None
     assert clock_of(prbs(rng, 60.0, 2), ~every) is None
-
-
-def test_without_a_clock_a_torque_is_interpolated_and_unknown() -> None:
-    torque = np.array([0.0, 1.0, 99.0, 99.0, 4.0, 5.0])
-    filled, known = fill(torque, torque < 50.0)
-    np.testing.assert_allclose(filled, np.arange(6.0))
-    np.testing.assert_array_equal(known, torque < 50.0)
-
-
-def test_a_torque_is_held_at_the_ends() -> None:
-    filled, known = fill(np.array([99.0, 1.0, 2.0, 99.0]), np.array([False, True, True, False]))
-    assert filled.tolist() == [1.0, 1.0, 2.0, 2.0]
-    assert known.tolist() == [False, True, True, False]
-
-
-def test_a_step_of_another_size_is_not_the_clocks() -> None:
-    rng = np.random.default_rng(1)
-    torque = prbs(rng, 60.0, 3) + np.where(np.arange(SAMPLES) < 1501, 0.0, 400.0)
-    torque += TORQUE_NOISE * rng.standard_normal(SAMPLES)
-    trusted = np.arange(SAMPLES) != 1501
-    assert not fill(torque, trusted)[1][1501]
-    assert fill(torque, np.arange(SAMPLES) != 1201)[1][1201]
 
 
 def commanded(rng: np.random.Generator, noise: float = TORQUE_NOISE, lag: float = 0.0) -> tuple[FloatArray, FloatArray]:
@@ -129,15 +98,6 @@ def test_a_reference_that_was_lost_with_the_torque_tells_nothing(gone: float) ->
     np.testing.assert_array_equal(filled, plain)
 
 
-def test_one_that_follows_something_else_is_interpolated() -> None:
-    rng = np.random.default_rng(5)
-    _, torque = commanded(rng)
-    trusted = ~random_rows(rng, 0.1, 4.0)
-    filled, known = fill(torque, trusted, 100.0 * rng.standard_normal(SAMPLES))
-    np.testing.assert_array_equal(known, trusted)
-    np.testing.assert_array_equal(filled, fill(torque, trusted)[0])
-
-
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_simulation_is_shown_as_the_recording_would_show_it(kind: str) -> None:
     truth, rows = drive(kind, 6), random_rows(np.random.default_rng(3), 0.1)
@@ -146,10 +106,3 @@ def test_a_simulation_is_shown_as_the_recording_would_show_it(kind: str) -> None
     assert np.std(shown - raw.output) < 1.1 * NOISE
     assert np.std(truth.speed() - raw.output) > 2.0 * NOISE
     np.testing.assert_array_equal(as_read(truth.speed(), raw, {"lost_samples": {"share": 0.1}}), truth.speed())
-
-
-def test_a_simulation_is_rounded_to_the_sensor_s_steps() -> None:
-    (truth, *_) = drives(1)
-    record = truth.record()
-    shown = as_read(np.array([0.9, 1.1, -1.6]), record, {"speed_quantisation": {"step_rad_s": 0.5}})
-    assert shown.tolist() == [1.0, 1.0, -1.5]

@@ -54,15 +54,6 @@ def test_what_the_recording_says_is_lost(lose, cells: list[bool], share: float, 
         np.testing.assert_array_equal(finding.rows(record), where)
 
 
-def test_bursts_are_worth_fewer_samples() -> None:
-    def width(burst: float) -> float:
-        rows = rows_of(2, 0.05, burst)
-        ci95 = only([row_flagged(r, w) for r, w in zip(healthy(2), rows, strict=True)]).parameters["share"].ci95
-        return ci95[1] - ci95[0]
-
-    assert width(6.0) > 2.0 * width(1.0)
-
-
 @pytest.mark.parametrize("channels", [(0,), (1, 2), (0, 1, 2)])
 @pytest.mark.parametrize(("share", "burst"), [(0.02, 1.0), (0.05, 4.0)])
 def test_zeros_without_a_flag_are_lost(channels: tuple[int, ...], share: float, burst: float) -> None:
@@ -78,15 +69,6 @@ def test_zeros_without_a_flag_are_lost(channels: tuple[int, ...], share: float, 
     for record, where in zip(records, rows, strict=True):
         assert not finding.rows(record)[~where].any()
         assert not np.delete(finding.touched(record), channels, axis=1).any()
-
-
-def test_lost_zeros_between_values_near_zero_are_lost_too() -> None:
-    """The reversal runs through zero all the time: what it lost there lies between values that are near zero."""
-    rows = rows_of(4, 0.03, 2.0)
-    records = [replace(r, output=np.where(where, 0.0, r.output)) for r, where in zip(healthy(4), rows, strict=True)]
-    finding = only(records)
-    for record, where in zip(records, rows, strict=True):
-        np.testing.assert_array_equal(finding.rows(record)[1:-1], where[1:-1])
 
 
 def test_of_a_torque_that_rests_at_zero_what_is_lost_with_the_speed_is_lost() -> None:
@@ -128,46 +110,3 @@ def test_of_a_torque_that_jumps_between_levels_zeros_are_lost() -> None:
     finding = only(lost)
     for record, where in zip(lost, rows, strict=True):
         np.testing.assert_array_equal(finding.touched(record)[1:-1, 2], where[1:-1])
-
-
-@pytest.mark.parametrize("noise_nm", [0.0, 0.3])
-def test_a_level_at_zero_is_one_of_its_levels(noise_nm: float) -> None:
-    assert not recognise(jumping(healthy(7), [-60.0, 0.0, 171.6, 244.2], noise_nm))
-
-
-@pytest.mark.parametrize("at_start", [True, False])
-def test_zeros_at_an_end_are_lost_where_as_many_are_elsewhere(at_start: bool) -> None:
-    rows = rows_of(3, 0.03, 4.0)
-    for where in rows:
-        where[:3] = where[-3:] = False
-        where[slice(0, 2) if at_start else slice(-2, None)] = True
-    records = [replace(r, output=np.where(w, 0.0, r.output)) for r, w in zip(healthy(3, 3), rows, strict=True)]
-    finding = only(records)
-    (far_from_zero, *_) = records
-    np.testing.assert_array_equal(finding.rows(far_from_zero), rows[0])
-
-
-def test_a_torque_that_begins_at_zero_for_longer_is_kept() -> None:
-    rows = rows_of(3, 0.03)
-    records = []
-    for record, where in zip(healthy(3, 3), rows, strict=True):
-        where[:10] = False
-        torque = np.where(where[:, None], 0.0, record.torque_nm)
-        torque[:8] = 0.0
-        records.append(replace(record, torque_nm=torque))
-    finding = only(records)
-    assert not any(finding.rows(record)[:8].any() for record in records)
-
-
-def test_zeros_that_the_values_near_zero_let_expect_are_kept() -> None:
-    """A reading in coarse steps is at zero now and then while the line stands still."""
-    rows = rows_of(5, 0.03)
-    records = [replace(r, output=0.1 * np.round(10.0 * r.output)) for r in healthy(5)]
-    still = 0.1 * np.round(np.random.default_rng(5).standard_normal(1000))
-    with_rest = [replace(r, output=np.concatenate([still, r.output[1000:]])) for r in records]
-    lost = [replace(r, output=np.where(where, 0.0, r.output)) for r, where in zip(with_rest, rows, strict=True)]
-    (finding,) = (f for f in recognise(lost) if f.name == "lost_samples")
-    for record, healthy_one, where in zip(lost, with_rest, rows, strict=True):
-        meant = (healthy_one.output == 0.0) & ~where
-        assert meant.sum() > 300
-        assert not finding.rows(record)[meant].any()

@@ -6,14 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy import stats
 
 from estimator.diagnosis.acquisition import OUTPUT, Finding, recognise
-from estimator.diagnosis.acquisition.finding import LEVEL
 from estimator.diagnosis.acquisition.quantised import chance_repeats, lattice_step
-from estimator.diagnosis.acquisition.stale import LateTorque, pooled_p_value
 from estimator.signals.record import BoolArray, Record
-from tests.estimator.diagnosis.acquisition.bench import healthy, periodic_rows, random_rows, stale
+from tests.estimator.diagnosis.acquisition.bench import healthy, random_rows, stale
 
 SPEED, TORQUES, M1, M1_AND_SPEED, ROWS = (0,), (1, 2), (1,), (0, 1), (0, 1, 2)
 
@@ -66,21 +63,6 @@ def test_a_stale_torque_is_shown_by_the_speed_that_answered(channels: tuple[int,
     assert cells[:, 2].any() == (channels == TORQUES)
 
 
-@pytest.mark.parametrize("every", [7, 20])
-@pytest.mark.parametrize("channels", [SPEED, ROWS])
-def test_regular_staleness_is_found(every: int, channels: tuple[int, ...]) -> None:
-    records = spoiled(healthy(4, 3), [periodic_rows(every)] * 3, channels)
-    assert only(records).parameters["share"].value == pytest.approx(1.0 / every, rel=0.05)
-
-
-@pytest.mark.parametrize(("burst", "complete"), [(3.0, 0.95), (8.0, 0.6)])
-def test_bursts_are_found(burst: float, complete: float) -> None:
-    rows = random(5, 0.05, burst)
-    finding = only(spoiled(healthy(5, 3), rows, ROWS))
-    found = np.concatenate([finding.cells[kind][:, OUTPUT] for kind in ("cruise", "reversal", "tip")])
-    assert np.mean(found[np.concatenate(rows)]) > complete
-
-
 def test_whole_rows_are_distinguished_from_single_channels() -> None:
     rows = random(6, 0.05)
     assert "in whole rows" in only(spoiled(healthy(6), rows, ROWS)).statement
@@ -88,29 +70,9 @@ def test_whole_rows_are_distinguished_from_single_channels() -> None:
     assert "in torque 1" in only(spoiled(healthy(6), rows, M1)).statement
 
 
-def test_one_stale_row_in_a_thousand_is_no_finding() -> None:
-    assert recognise(spoiled(healthy(7), random(7, 0.001), ROWS)) == ()
-
-
 def test_a_torque_recorded_a_row_late_throughout_is_a_delay_and_not_stale() -> None:
     late = [replace(record, torque_nm=np.roll(record.torque_nm, 1, axis=0)) for record in healthy(8)]
     assert recognise(late) == ()
-
-
-def test_early_answers_count_against_those_of_the_same_recording() -> None:
-    """One recording that the predictor follows poorly has more of them everywhere; the others' do not make it stale."""
-
-    def counted(early: int, repeats: int, early_others: int, others: int) -> LateTorque:
-        return LateTorque(np.zeros(0, dtype=np.bool_), early, repeats, early_others, others)
-
-    poor = counted(13, 230, 5, 540)
-    good = counted(0, 130, 0, 360)
-    alone, among = pooled_p_value([poor]), pooled_p_value([good, poor, good])
-    exactly = float(stats.binom.sf(12, 230, 6 / 542))
-    assert exactly < alone < 3.0 * exactly
-    assert LEVEL < alone < among < 1e-4
-    assert pooled_p_value([counted(13, 230, 0, 540), good]) < LEVEL
-    assert pooled_p_value([good, good]) == pytest.approx(1.0)
 
 
 def test_flagged_repeats_are_lost_and_not_stale() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from estimator.diagnosis.inference.descent import Effort, descended, extended, light
+from estimator.diagnosis.inference.descent import Effort, descended, extended
 from estimator.physics.fit import FitResult, fit, not_fitted, warm_start
 from estimator.physics.jacobian import jacobian_at
 from estimator.physics.problem import Problem, make_problem, start_vector
@@ -66,15 +66,3 @@ def test_from_a_carried_derivative_the_effect_is_found(nominal: FitResult) -> No
     ended = descended(begun, by_noise, Effort(derivatives=6, steps=30))
     assert ended.value("actuator_lag", "time_constant_s") == pytest.approx(0.008, rel=0.05)
     assert ended.rms == pytest.approx(SIGMA, rel=0.05)
-
-
-def test_a_start_beyond_its_bounds_is_simulated_at_them(nominal: FitResult) -> None:
-    x = nominal.x.copy()
-    x[0] = 5.0
-    begun = extended(nominal.problem, x, nominal)
-    assert begun.x[0] == nominal.problem.shared[0].high
-    assert begun.residual == pytest.approx(not_fitted(nominal.problem, begun.x).residual)
-
-
-def test_a_small_derivative_is_kept(nominal: FitResult) -> None:
-    assert light(nominal).derivative is nominal.derivative

@@ -51,22 +51,7 @@ def test_nothing_missing_is_reported_with_the_noise() -> None:
     assert content["fit"]["noise_floor"] == pytest.approx(SIGMA, rel=0.05)
 
 
-def test_recordings_kept_out_of_the_fit_are_simulated_with_what_was_found() -> None:
-    bench = bench_with("coulomb_friction_motor", {"friction_nm": 8.0})
-    answer = diagnose(bench.records[:1], bench.model, bench.records[1:])
-    assert [(trace.name, trace.holdout) for trace in answer.traces] == [("run_3", False), ("run_4", True)]
-    unseen = answer.traces[1]
-    assert float(np.sqrt(np.mean((unseen.augmented - unseen.measured) ** 2))) == pytest.approx(SIGMA, rel=0.1)
-    assert answer.fit.holdout_augmented == pytest.approx(SIGMA, rel=0.1)
-    assert answer.fit.holdout_retuned > 5.0 * SIGMA
-    evidence = answer.effects[0].evidence
-    assert (evidence.holdout_rms_before, evidence.holdout_rms_after) == (
-        answer.fit.holdout_retuned,
-        answer.fit.holdout_augmented,
-    )
-    assert "on samples not used for the fit it falls from" in answer.statement
-
-
+@pytest.mark.campaign
 def test_without_recordings_kept_out_blocks_of_the_others_are() -> None:
     """A law of noise alone would leave less on fitted samples than on others."""
     bench = bench_with("coulomb_friction_motor", {"friction_nm": 8.0})
@@ -105,6 +90,7 @@ def test_when_its_time_is_up_nothing_is_decided_and_nothing_rejected() -> None:
     assert "coulomb_friction_motor" in effort["untried"]
 
 
+@pytest.mark.campaign
 def test_the_effort_is_the_same_on_any_number_of_cores() -> None:
     bench = bench_with("coulomb_friction_motor", {"friction_nm": 8.0})
     contents = []

@@ -9,10 +9,7 @@ import numpy as np
 import pytest
 
 from estimator.diagnosis.hypotheses import everything, open_hypotheses
-from estimator.diagnosis.inference.disturbances import Size
-from estimator.diagnosis.inference.judge import Decision, decide, free_rms, grounds
-from estimator.diagnosis.inference.likelihood import compared, fitted
-from estimator.diagnosis.inference.remainder import tests as examined
+from estimator.diagnosis.inference.judge import Decision, decide, grounds
 from estimator.diagnosis.inference.search import Search
 from estimator.physics.model import EffectValue
 from estimator.signals.record import Record
@@ -68,15 +65,6 @@ def test_every_set_is_fitted_once_and_the_best_of_them_is_taken() -> None:
     assert search.without(best, next(iter(best.effects))) is search.visited[frozenset()]
 
 
-def test_the_price_of_an_unknown_is_that_of_schwarz() -> None:
-    search = searched(bench_with(*PLAIN))
-    nothing = search.nothing()
-    n = nothing.plain.residual.size
-    assert nothing.score == pytest.approx(nothing.minus_twice_log + nothing.unknowns * np.log(n))
-    dearer = replace(nothing, effects=frozenset({"road_grade"}), choices=3.0)
-    assert dearer.score == pytest.approx(nothing.score + np.log(n) + 6.0)
-
-
 @pytest.mark.parametrize("wave_hz", [3.5, 11.0])
 def test_a_wave_that_no_effect_makes_is_a_remainder(wave_hz: float) -> None:
     """A wave in the reading, in step with neither speed nor angle."""
@@ -89,12 +77,6 @@ def test_a_wave_that_no_effect_makes_is_a_remainder(wave_hz: float) -> None:
     decision = decide(search, grounds(search))
     assert "has a line in its spectrum" in {test.name for test in decision.failed}
     assert not decision.named
-
-
-def test_noise_passes_its_tests() -> None:
-    nothing = searched(bench_with(*PLAIN)).nothing()
-    assert [test.name for test in examined(nothing) if test.failed] == []
-    assert free_rms(nothing) == pytest.approx(SIGMA, rel=0.05)
 
 
 def knowing(bench: Bench, name: str, key: str, value: float, tolerance: float) -> Bench:
@@ -117,33 +99,3 @@ def test_an_effect_that_is_known_wrongly_and_held_is_a_mismatch() -> None:
     held = knowing(bench, "coulomb_friction_motor", "friction_nm", 5.0, 0.0)
     nothing = searched(held).nothing()
     assert nothing.plain.rms > 1.5 * SIGMA
-
-
-def test_a_search_that_is_over_tells_the_best_so_far() -> None:
-    search = searched(bench_with("coulomb_friction_motor", {"friction_nm": 8.0}))
-    search.most = 0
-    assert search.run() is search.nothing()
-    assert search.stopped
-
-
-def test_a_grade_is_tried_in_the_place_of_a_load_s_law() -> None:
-    """Else a brake that was found first, and takes the largest part of a grade, would keep it."""
-    search = searched(bench_with("aerodynamic_drag", {"drag_nm_s2": 0.05}))
-    search.names = ["aerodynamic_drag", "road_grade"]
-    assert search.run().effects == {"aerodynamic_drag"}
-    assert frozenset({"road_grade"}) in search.visited
-
-
-def test_only_a_load_that_is_a_grade_may_walk_far() -> None:
-    """A set in which something else stands in a grade's place does not keep the grade as a disturbance."""
-    search = searched(bench_with("coulomb_friction_motor", {"friction_nm": 8.0}))
-    nothing = search.nothing()
-    far = nothing.limits.freed()
-    sizes = nothing.sizes.copy()
-    sizes[Size.WALK] = far.high[Size.WALK]
-    graded = replace(nothing, effects=frozenset({"road_grade"}), sizes=sizes, limits=far)
-    most = search.limits.high[Size.WALK]
-    rough = compared(nothing.effects, nothing.plain, graded, search.limits, len(search.names))
-    whole = fitted(nothing.effects, nothing.plain, graded.sizes, search.limits, len(search.names))
-    assert rough.sizes[Size.WALK] <= most
-    assert whole.sizes[Size.WALK] <= most

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from estimator.diagnosis.hypotheses import everything, open_hypotheses
-from estimator.diagnosis.inference.judge import Grounds, decide, free_rms, grounds
+from estimator.diagnosis.inference.judge import Grounds, decide, grounds
 from estimator.diagnosis.inference.rivals import Law, best_law, rival_laws, searches_around
 from estimator.diagnosis.inference.search import Search
 from estimator.diagnosis.unnamed import scene
@@ -23,11 +22,6 @@ from tests.estimator.physics.bench import TWO_MASS, model
 def searched(records: list[Record]) -> Search:
     line = model(TWO_MASS, TIGHT)
     return Search(line, records, everything(records), open_hypotheses(line, records)[0])
-
-
-def test_in_noise_no_law_pays_for_itself() -> None:
-    nothing = searched(quiet()).nothing()
-    assert best_law(nothing, searches_around(nothing)) is None
 
 
 def test_a_planted_law_is_scored_by_the_likelihood_it_gains() -> None:
@@ -83,10 +77,3 @@ def test_a_name_stands_where_a_law_added_to_it_is_more_probable_still(friction: 
     assert named(friction, law(ground, -100.0), None) == ["coulomb_friction_motor"]
     assert named(friction, law(ground, 100.0), law(ground, 150.0)) == ["coulomb_friction_motor"]
     assert named(friction, law(ground, 150.0), law(ground, 100.0)) == []
-
-
-def test_a_law_that_leaves_the_error_as_it_is_takes_nothing(friction: tuple[Search, Grounds]) -> None:
-    """It makes the innovations smaller; the name explains what goes wrong over seconds."""
-    ground = friction[1]
-    trace = replace(law(ground, 100.0), rms=free_rms(ground.nothing))
-    assert rival_laws(ground, trace, None) == ()

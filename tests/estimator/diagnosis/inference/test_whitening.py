@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from functools import partial
 from itertools import pairwise
 from operator import itemgetter
@@ -23,14 +22,12 @@ from estimator.diagnosis.inference.disturbances import (
     readings,
     starts,
     whitener,
-    whitener_of,
 )
 from estimator.diagnosis.line.motion import LASTS
 from estimator.physics.driveline import Start
-from estimator.physics.fit import FitResult, fit, not_fitted
-from estimator.physics.problem import make_problem, start_vector
-from estimator.signals.outputs import outputs_apart
-from estimator.signals.record import BoolArray, Channel, FloatArray, Location, OutputKind
+from estimator.physics.fit import FitResult, fit
+from estimator.physics.problem import make_problem
+from estimator.signals.record import BoolArray, FloatArray
 from tests.estimator.diagnosis.planted import drive_torque
 from tests.estimator.physics.bench import SAMPLE_TIME_S, TWO_MASS, linear_record, model
 
@@ -120,35 +117,6 @@ def test_innovations_are_those_of_the_covariance_written_out(result: FitResult, 
     lower = cholesky(covariance(line, SIZES, count, unread)[np.ix_(use, use)], lower=True)
     np.testing.assert_allclose(filtered(signals), solve_triangular(lower, signals, lower=True), rtol=2e-4, atol=1e-4)
     assert filtered.logs.sum() == pytest.approx(np.log(np.diag(lower)).sum(), abs=5e-4)
-
-
-@pytest.mark.parametrize("missing", [(), (3, 4, 17), tuple(range(20, 40))])
-def test_all_outputs_of_a_recording_are_whitened_together(missing: tuple[int, ...]) -> None:
-    count = 60
-    record = linear_record(TWO_MASS, drive_torque(1)[:count], Start(5.0, 0.0, 2.0, 0.0, 2.0))
-    seen: BoolArray = np.ones(count, dtype=bool)
-    seen[list(missing)] = False
-    shaft = Channel(OutputKind.TORQUE, Location.SHAFT, "shaft_nm", np.zeros(count), seen)
-    at_load = Channel(OutputKind.POSITION, Location.LOAD, "load_rad", np.zeros(count), record.okay)
-    records = outputs_apart([replace(record, channels=(shaft, at_load))], lambda _: 1.0)
-    result = not_fitted(problem := make_problem(model(TWO_MASS), records, ()), start_vector(problem))
-    sizes = np.concatenate([SIZES, np.log([20.0, 7.0, 0.1, 0.01, 0.02, 0.03])])
-    filtered = whitener_of(result, sizes)
-    use = np.concatenate(problem.use)
-    lower = cholesky(covariance(line_of(result), sizes, count)[np.ix_(use, use)], lower=True)
-    signals = np.random.default_rng(2).standard_normal((int(use.sum()), 3))
-    dense = solve_triangular(lower, signals, lower=True)
-    np.testing.assert_allclose((filtered(signals) ** 2).sum(axis=0), (dense**2).sum(axis=0), rtol=2e-3)
-    assert filtered.logs.sum() == pytest.approx(np.log(np.diag(lower)).sum(), abs=2e-3)
-
-
-def test_recordings_are_whitened_each_by_itself(result: FitResult) -> None:
-    uses = [np.ones(30, dtype=bool), np.ones(50, dtype=bool)]
-    stacked = np.random.default_rng(3).standard_normal(80)
-    line = line_of(result)
-    whole = of_one_output(line, uses)(SIZES)(stacked)
-    dense = cholesky(block_diag(*(covariance(line, SIZES, use.size) for use in uses)), lower=True)
-    np.testing.assert_allclose(whole, solve_triangular(dense, stacked, lower=True), rtol=2e-4, atol=1e-4)
 
 
 @pytest.mark.parametrize("seed", range(3))

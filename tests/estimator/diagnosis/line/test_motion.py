@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
-import numpy as np
+from dataclasses import replace
 
-from estimator.diagnosis.line.motion import AROUND, FormPlace, change_around, form_changes, motion_of
+import numpy as np
+import pytest
+
+from estimator.diagnosis.line.blocks import lines, spread_stretches
+from estimator.diagnosis.line.motion import FormPlace, block_mean, form_changes, motion_of, simulated
+from estimator.diagnosis.line.tangent import block_length, tangent
 from estimator.physics.driveline import Start
-from estimator.physics.fit import fit, not_fitted
+from estimator.physics.fit import FitResult, fit, not_fitted
+from estimator.physics.model import EffectValue
 from estimator.physics.problem import make_problem, start_vector
 from estimator.signals.record import FloatArray
 from tests.estimator.diagnosis.planted import drive_torque
@@ -20,6 +26,7 @@ from tests.estimator.physics.bench import (
     exact_states,
     linear_record,
     model,
+    record,
 )
 
 START = Start(5.0, 0.0, 2.0, 0.0, 2.0)
@@ -48,18 +55,6 @@ def changes(**effects: dict[str, float]) -> FloatArray:
     return form_changes(not_fitted(problem, start_vector(problem)), 0)
 
 
-def test_a_jump_counts_for_the_samples_around_it() -> None:
-    step = np.where(np.arange(30) < 12, -3.0, 4.0)
-    change = change_around(step)
-    assert set(np.flatnonzero(change)) == set(range(12 - AROUND, 12 + AROUND))
-    assert np.all(change[change > 0.0] == 7.0)
-
-
-def test_a_line_without_such_a_law_has_no_error_of_form() -> None:
-    assert not changes().any()
-    assert not changes(generator_coupled={"inertia_kg_m2": 1.0, "from_s": 0.0, "to_s": 2.0}).any()
-
-
 def test_dry_friction_changes_by_twice_its_size_at_a_reversal_and_at_its_place() -> None:
     at_motor = changes(coulomb_friction_motor={"friction_nm": SIZE_NM})
     assert at_motor[FormPlace.MOTOR].max() == 2.0 * SIZE_NM
@@ -74,3 +69,83 @@ def test_a_gap_changes_what_the_shaft_carries_while_it_is_crossed() -> None:
     in_shaft = changes(backlash={"gap_rad": GAP_RAD, "contact_rad": 1e-3})
     assert 0.0 < in_shaft[FormPlace.SHAFT].max() <= TWO_MASS["k"] * GAP_RAD
     assert not in_shaft[[FormPlace.MOTOR, FormPlace.LOAD]].any()
+
+
+SAMPLES = 1500
+
+
+def result_of(effects: dict[str, dict[str, float]] | None = None) -> FitResult:
+    line = model(TWO_MASS)
+    given = {name: {k: EffectValue(v, (v, v)) for k, v in e.items()} for name, e in (effects or {}).items()}
+    rec = linear_record(TWO_MASS, drive_torque(1), START)
+    return fit(make_problem(replace(line, effects=given), [rec], ()))
+
+
+def walk(seed: int) -> FloatArray:
+    return np.cumsum(np.random.default_rng(seed).standard_normal(SAMPLES))
+
+
+@pytest.mark.parametrize("at_load", [False, True])
+def test_a_linear_line_answers_exactly(at_load: bool) -> None:
+    line = tangent(result_of(), 0, 1)
+    assert line.phi.shape == (1, 3, 3)
+    torque, nothing = walk(3), np.zeros(SAMPLES)
+    motor, load = (nothing, torque) if at_load else (torque, nothing)
+    exact = exact_states(TWO_MASS, motor, Start(0.0, 0.0, 0.0), extra_load_nm=load)[:, SPEED]
+    assert np.max(np.abs(line.answer(motor, load) - exact)) < 1e-5 * np.ptp(exact)
+
+
+@pytest.mark.parametrize("at_load", [False, True])
+def test_a_line_with_a_gap_answers_as_its_simulation_does(at_load: bool) -> None:
+    result = result_of({"backlash": {"gap_rad": 0.01, "contact_rad": 0.001}})
+    line = tangent(result, 0, 1)
+    assert line.phi.shape == (SAMPLES, 3, 3)
+    force, nothing = 1e-4 * walk(4), np.zeros(SAMPLES)
+    motor, load = (nothing, force) if at_load else (force, nothing)
+    nudged = simulated(result, 0, (motor, load)) - result.outputs[0]
+    assert np.max(np.abs(line.answer(motor, load) - nudged)) < 0.02 * np.ptp(nudged)
+
+
+@pytest.mark.parametrize("effects", [None, {"backlash": {"gap_rad": 0.01, "contact_rad": 0.001}}])
+def test_many_answers_at_once_are_those_to_each_alone(effects: dict[str, dict[str, float]] | None) -> None:
+    line = tangent(result_of(effects), 0, 1)
+    late = np.where(np.arange(SAMPLES) >= 700, walk(6), 0.0)
+    torques = np.array([walk(5), late, np.zeros(SAMPLES)])
+    expected = [line.answer(-each, 0.5 * each) for each in torques]
+    found = line.answers(-1.0, 0.5, torques)
+    np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-12 * np.abs(expected).max())
+    assert not found[1, :700].any()
+
+
+def test_fast_sampling_is_cut_into_blocks_and_slow_sampling_is_not() -> None:
+    states = exact_states(TWO_MASS, drive_torque(1), START, sample_time_s=1e-3)
+    slow = linear_record(TWO_MASS, drive_torque(1), START)
+    fast = record(drive_torque(1), states[:, SPEED], sample_time_s=1e-3)
+    result = fit(make_problem(model(TWO_MASS), [fast], ()))
+    length = block_length(result)
+    assert 5 <= length <= 10
+    assert block_length(fit(make_problem(model(TWO_MASS), [slow], ()))) == 1
+    (line,) = lines(result)
+    assert line.size == 1500 // length
+    middle = block_mean(states[:, TWIST], length)
+    assert np.max(np.abs(line.motion.twist - middle)) < 0.02 * np.ptp(middle)
+
+
+def test_a_long_recording_is_used_in_stretches_from_end_to_end() -> None:
+    used = spread_stretches(100_000, 10_000)
+    assert used.sum() == 9_000
+    assert used[0]
+    assert used[-1]
+    assert spread_stretches(500, 10_000).all()
+
+
+def test_a_line_that_grew_slower_keeps_its_blocks_where_they_are_asked_for() -> None:
+    """A law over blocks is one of that length: blocks of the slower line's own would not match it."""
+    stiff = {**TWO_MASS, "k": 4.0 * TWO_MASS["k"]}
+    fast = record(drive_torque(1), exact_states(stiff, drive_torque(1), START, 1e-3)[:, SPEED], sample_time_s=1e-3)
+    slower = fit(make_problem(model(TWO_MASS), [fast], ()))
+    length = block_length(fit(make_problem(model(stiff), [fast], ())))
+    assert block_length(slower) > length
+    (line,) = lines(slower, length=length)
+    assert line.length == length
+    assert line.size == 1500 // length

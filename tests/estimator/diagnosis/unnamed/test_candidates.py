@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 import pytest
 
-from estimator.diagnosis.line.motion import motion_of
 from estimator.diagnosis.unnamed.forms import STEP_EVERY_S
 from estimator.diagnosis.unnamed.pursuit import candidates
 from estimator.diagnosis.unnamed.scene import Scene, elements, scene
@@ -16,19 +14,16 @@ from estimator.physics.driveline import Start
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult, fit
 from estimator.physics.problem import make_problem
-from estimator.signals.record import FloatArray, OutputKind
-from tests.estimator.diagnosis.planted import SIGMA, drive_torque, nominal_fit, quiet
+from estimator.signals.record import FloatArray
+from tests.estimator.diagnosis.planted import SIGMA, drive_torque
 from tests.estimator.physics.bench import (
-    ANGLE,
     LOAD_SPEED,
-    ONE_MASS,
     SPEED,
     TWIST,
     TWO_MASS,
     exact_states,
     linear_record,
     model,
-    random_steps,
 )
 
 START = Start(5.0, 0.0, 2.0, 0.0, 2.0)
@@ -122,25 +117,6 @@ def test_an_answer_is_the_exact_response_per_unit(pool: list[Candidate], element
     assert np.max(np.abs(answer - expected)) < 2e-3 * np.ptp(expected)
 
 
-def test_a_delay_of_one_period_is_the_difference_to_the_torque_before(pool: list[Candidate]) -> None:
-    torque = drive_torque(1)
-    late = np.concatenate([[torque[0]], torque[:-1]])
-    expected = response(late - torque, np.zeros_like(torque))
-    answer = first(pick(pool, Element.TORQUE_PATH, "a torque one period late"))
-    assert np.max(np.abs(answer - expected)) < 1e-3 * np.ptp(expected)
-
-
-def test_the_answer_to_an_error_of_the_reading_is_the_error(pool: list[Candidate]) -> None:
-    """Waves are in the phase of each recording: cosine and sine of the first, then of the second."""
-    states = exact_states(TWO_MASS, drive_torque(1), START)
-    turns = [c for c in pool if c.element is Element.SPEED_SENSOR and c.law == "a wave of w 1 times per motor turn"]
-    expected = states[:, SPEED] * np.sin(states[:, ANGLE] - states[0, ANGLE])
-    assert turns[0].answers.shape == (3000, 4)
-    np.testing.assert_allclose(turns[0].answers[:1500, 1], expected, atol=5e-3 * np.ptp(expected))
-    assert not turns[0].answers[1500:, :2].any()
-    assert not turns[0].answers[:1500, 2:].any()
-
-
 def test_load_steps_are_on_a_grid_each_in_one_recording(result: FitResult, pool: list[Candidate]) -> None:
     steps = [c for c in pool if c.law.startswith("a load step")]
     per_recording = int(14.99 / STEP_EVERY_S) - 1
@@ -164,55 +140,3 @@ def test_what_sets_in_at_a_moment_does_so_in_one_recording_and_names_it(pool: li
     assert late[2001:].any()
     assert early[501:1500].any()
     assert not early[1500:].any()
-
-
-def test_every_input_but_the_last_may_count_more_than_its_reading() -> None:
-    shares = np.column_stack([0.3 * drive_torque(1), 0.7 * drive_torque(1) + 20.0, np.full(1500, -20.0)])
-    rec = replace(linear_record(TWO_MASS, drive_torque(1), START), torque_nm=shares)
-    pool = at(scene(fit(make_problem(model(TWO_MASS), [rec], ())), SIGMA), Element.TORQUE_PATH)
-    assert [c.law for c in pool if c.law in ("T_1", "T_2", "T_3")] == ["T_1", "T_2"]
-    expected = response(shares[:, 1], np.zeros(1500))
-    answer = first(pick(pool, Element.TORQUE_PATH, "T_2"))
-    assert np.max(np.abs(answer - expected)) < 1e-3 * np.ptp(expected)
-
-
-def test_one_mass_has_no_shaft_and_its_load_acts_at_the_motor() -> None:
-    rec = linear_record(ONE_MASS, random_steps(600, seed=3), REST)
-    view = scene(fit(make_problem(model(ONE_MASS), [rec], ())), SIGMA)
-    assert elements(view.result) == (
-        Element.TORQUE_PATH,
-        Element.MOTOR,
-        Element.SPEED_SENSOR,
-        Element.ACQUISITION,
-    )
-    assert {c.element for c in everywhere(view) if c.law.startswith("a load step")} == {Element.MOTOR}
-
-
-def test_a_position_has_no_error_of_the_speed_reading() -> None:
-    rec = linear_record(TWO_MASS, random_steps(600, seed=3), START, kind=OutputKind.POSITION)
-    view = scene(fit(make_problem(model(TWO_MASS), [rec], ())), SIGMA)
-    assert elements(view.result) == (Element.TORQUE_PATH, Element.MOTOR, Element.SHAFT, Element.LOAD)
-    assert everywhere(view)
-
-
-def test_a_law_that_is_zero_throughout_has_no_answer() -> None:
-    """The line stands still but for the noise of nothing: no speed, no friction."""
-    rec = linear_record(TWO_MASS, np.zeros(400), REST)
-    pool = at(scene(fit(make_problem(model(TWO_MASS), [rec], ())), SIGMA), Element.TORQUE_PATH)
-    assert not pick(pool, Element.TORQUE_PATH, "T |T|").answers.any()
-
-
-def test_a_profile_of_the_fit_continues_in_the_answers() -> None:
-    records = quiet()
-    line = model(TWO_MASS)
-    hill = [
-        linear_record(TWO_MASS, r.total_torque_nm, START, extra_load_nm=40.0 * np.sin(0.4 * r.time_s), name=r.name)
-        for r in records
-    ]
-    followed = fit(make_problem(line, hill, (), profile=True))
-    assert followed.rms < 0.02 * nominal_fit(hill).rms
-    moved = motion_of(followed, 0)
-    assert np.max(np.abs(moved.speed - hill[0].output)) < 0.01 * np.ptp(hill[0].output)
-    step = pick(at(scene(followed, SIGMA), Element.LOAD), Element.LOAD, "a load step at 5.0 s in run_1")
-    expected = response(np.zeros(1500), np.where(np.arange(1500) >= 500, 1.0, 0.0))
-    assert np.max(np.abs(first(step) - expected)) < 1e-2 * np.ptp(expected)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -35,14 +34,6 @@ def test_what_re_tuning_explains_is_not_a_law() -> None:
     assert np.max(np.abs(free.T @ ground.rest(drag))) < 1e-8 * np.max(np.abs(ground.jacobian)) * np.linalg.norm(drag)
 
 
-def test_a_column_of_the_jacobian_is_nothing_at_all() -> None:
-    result = nominal_fit(quiet((1,)))
-    ground = ground_of(scene(result, SIGMA))
-    path = pursue(pool_of([ground.jacobian[:, [2]]]), ground)
-    assert path.chosen == []
-    assert path.alone.tolist() == [0.0]
-
-
 def test_a_group_is_worth_its_coefficients_and_not_more() -> None:
     """Two columns that carry the error, one of them twice, among columns of noise: rank 2, not 3."""
     rng = np.random.default_rng(5)
@@ -61,14 +52,6 @@ def test_a_group_is_worth_its_coefficients_and_not_more() -> None:
     np.testing.assert_allclose(planted @ coefficients, signal @ [0.1, -0.05], atol=0.005)
     assert left @ left == pytest.approx(path.squares[1], rel=1e-6)
     assert left.std() == pytest.approx(0.02, rel=0.1)
-
-
-def test_what_re_tuning_explains_is_of_where_the_fit_ended() -> None:
-    """A fit's own derivative is of the place before its last step."""
-    result = nominal_fit(quiet((1,)))
-    plain = ground_of(scene(result, SIGMA))
-    before = replace(result, derivative=1.01 * result.jacobian + 0.1)
-    np.testing.assert_array_equal(ground_of(scene(before, SIGMA)).jacobian, plain.jacobian)
 
 
 def test_what_is_left_is_computed_and_not_promised(monkeypatch: pytest.MonkeyPatch) -> None:

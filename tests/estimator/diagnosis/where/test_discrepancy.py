@@ -10,13 +10,15 @@ import pytest
 from estimator.diagnosis.hypotheses import NOTHING, everything
 from estimator.diagnosis.unnamed import ROUNDS, scene, searches_at
 from estimator.diagnosis.where.discrepancy import discrepancy, effects_added, without_effect
+from estimator.diagnosis.where.locate import error_spectrum, responses
+from estimator.physics.driveline import Start
 from estimator.physics.effect import Element
-from estimator.physics.fit import FitResult
+from estimator.physics.fit import FitResult, fit
 from estimator.physics.model import Motion
-from estimator.physics.problem import outputs_at
+from estimator.physics.problem import make_problem
 from tests.estimator.diagnosis.plain import Bench
-from tests.estimator.diagnosis.planted import SIGMA, nominal_fit, recordings, rubbing
-from tests.estimator.physics.bench import ONE_MASS, model
+from tests.estimator.diagnosis.planted import SIGMA, drive_torque, nominal_fit, quiet, recordings, rubbing
+from tests.estimator.physics.bench import ONE_MASS, TWO_MASS, linear_record, model
 
 FRICTION_NM = 6.0
 
@@ -46,17 +48,6 @@ class TestPicture:
         inside = (picture.low <= picture.law) & (picture.law <= picture.high)
         assert inside.mean() > 0.6
         assert picture.explained > 0.8
-
-    def test_a_wrong_law_does_not_lie_on_its_data(self, rubbed: tuple[FitResult, FitResult]) -> None:
-        """The data come from the recordings: half the friction in the model leaves them where they were."""
-        retuned, final = rubbed
-        index = next(i for i, s in enumerate(final.problem.shared) if s.effect)
-        x = final.x.copy()
-        x[index] *= 0.5
-        halved = replace(final, x=x, outputs=outputs_at(final.problem, x))
-        (picture,) = discrepancy(retuned, halved, SIGMA).pictures
-        away = np.abs(picture.x) > 0.3 * np.max(np.abs(picture.x))
-        assert np.median(np.abs(picture.law[away])) < 0.6 * np.median(np.abs(picture.data[away]))
 
     def test_a_law_without_a_name_is_drawn_where_nothing_is_named(self) -> None:
         result = nominal_fit(recordings(Element.MOTOR, lambda m: m.speed * np.abs(m.speed), 0.1))
@@ -102,3 +93,51 @@ def test_what_a_first_look_has_found_is_not_looked_for_again(rounds: int, monkey
     plain, begun = discrepancy(result, result, SIGMA, rounds=rounds), searches_at(scene(result, SIGMA))
     monkeypatch.setattr("estimator.diagnosis.unnamed.search.first", None)
     assert discrepancy(result, result, SIGMA, rounds=rounds, begun=begun).laws == plain.laws
+
+
+START = Start(5.0, 0.0, 2.0, 0.0, 2.0)
+
+
+def test_a_softer_shaft_is_seen_in_the_response_and_the_true_one_is_not() -> None:
+    rec = linear_record(TWO_MASS, drive_torque(1, 6000), START, sigma=SIGMA, seed=4)
+    true = fit(make_problem(model(TWO_MASS), [rec], ()))
+    soft = fit(make_problem(model({**TWO_MASS, "k": 0.8 * TWO_MASS["k"]}), [rec], ()))
+    (response,) = responses(soft, true).values()
+    assert response.p_before < 1e-6
+    assert response.p_after > 0.01
+    inside = np.abs(np.abs(response.after) - np.abs(response.measured)) <= 1.96 * response.std
+    assert inside.mean() > 0.85
+
+
+def test_a_recording_without_unbroken_segments_has_no_response() -> None:
+    rec = linear_record(TWO_MASS, drive_torque(1), START, sigma=SIGMA, seed=4)
+    okay = np.arange(rec.okay.size) % 100 >= 5  # gaps of 50 ms are too long to bridge, 0.95 s too short for a segment
+    result = fit(make_problem(model(TWO_MASS), [replace(rec, okay=okay)], ()))
+    assert responses(result, result) == {}
+
+
+def test_a_tone_stands_in_its_band_alone() -> None:
+    records = quiet((1, 2, 3))
+    tone = [replace(r, output=r.output + 0.05 * np.sin(2 * np.pi * 8.0 * r.time_s)) for r in records]
+    result = fit(make_problem(model(TWO_MASS), tone, ()))
+    spectrum = error_spectrum(result, result, SIGMA)
+    loud = [(b.low_hz, b.high_hz) for b in spectrum.bands if b.p_value < 0.01]
+    assert len(loud) == 1
+    assert loud[0][0] <= 8.0 < loud[0][1]
+    assert spectrum.frequency_hz[np.argmax(spectrum.before)] == pytest.approx(8.0, abs=0.4)
+    assert np.median(spectrum.before) == pytest.approx(spectrum.floor, rel=0.15)
+
+
+def test_bands_share_the_frequencies_out() -> None:
+    result = nominal_fit(quiet((1,)))
+    spectrum = error_spectrum(result, result, SIGMA)
+    edges = [(b.low_hz, b.high_hz) for b in spectrum.bands]
+    assert [low for low, _ in edges[1:]] == [high for _, high in edges[:-1]]
+    assert edges[0][0] <= spectrum.frequency_hz[0]
+    assert edges[-1][1] >= spectrum.frequency_hz[-1]
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_noise_alone_stands_in_no_band(seed: int) -> None:
+    result = fit(make_problem(model(TWO_MASS), quiet((seed + 10, seed + 20)), ()))
+    assert min(b.p_value for b in error_spectrum(result, result, SIGMA).bands) > 0.001

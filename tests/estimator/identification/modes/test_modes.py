@@ -3,7 +3,7 @@ import pytest
 from scipy.signal import cont2discrete
 
 from estimator.identification.linear_model import LinearModel
-from estimator.identification.modes.modes import modes, resonance, two_mass_resonance
+from estimator.identification.modes.modes import modes, resonance
 from tests.estimator.identification import driveline
 
 T_S = 0.02
@@ -39,19 +39,6 @@ def test_the_discretised_two_mass_driveline_has_its_continuous_mode() -> None:
     assert (mode.frequency_hz, mode.damping) == pytest.approx(driveline.true_resonance())
 
 
-def test_the_two_mass_formula_agrees() -> None:
-    mode = two_mass_resonance(1.6, 100.0, 4200.0, 9.0, 0.35, 0.9)
-    assert mode is not None
-    assert (mode.frequency_hz, mode.damping) == pytest.approx(driveline.true_resonance())
-    assert two_mass_resonance(1.6, 100.0, 10.0, 500.0, 0.35, 0.9) is None  # overdamped
-
-
-def test_the_height_is_that_of_the_peak() -> None:
-    model = with_poles((8.2, 0.02))
-    mode = modes(model)[0]
-    assert mode.height == pytest.approx(abs(model.response(np.array([8.2])))[0], rel=0.05)
-
-
 def test_the_dominant_mode_wins_not_the_first() -> None:
     mode = resonance(with_poles((6.0, 0.4), (12.0, 0.03)))
     assert mode is not None
@@ -82,8 +69,3 @@ def test_a_cancelled_pair_does_not_win() -> None:
 )
 def test_where_there_is_no_resonance_none_is_named(model: LinearModel) -> None:
     assert resonance(model) is None
-
-
-def test_the_band_can_be_chosen() -> None:
-    model = with_poles((8.2, 0.05), (16.0, 0.05))
-    assert resonance(model, (10.0, 25.0)).frequency_hz == pytest.approx(16.0)  # type: ignore[union-attr]

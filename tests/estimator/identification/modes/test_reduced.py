@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from scipy.signal import cont2discrete
 
 from estimator.errors import BadModel
 from estimator.identification.linear_model import LinearModel
@@ -10,37 +9,9 @@ from estimator.identification.modes.modes import resonance
 from estimator.identification.modes.reduced import state_space, third_order, to_continuous
 from estimator.identification.offline.fits import fit_output_error
 from estimator.signals.decimate import decimate
-from tests.estimator.identification import driveline
 from tests.estimator.identification.driveline import Cruise
 
 PERIOD_S = 0.01
-
-
-def sampled(numerator: list[float], denominator: list[float]) -> LinearModel:
-    b, a, _ = cont2discrete((numerator, denominator), PERIOD_S)
-    return LinearModel(tuple(a[1:].tolist()), tuple(b.ravel()[1:].tolist()), 1, PERIOD_S)
-
-
-def two_mass() -> tuple[list[float], list[float]]:
-    """Numerator and denominator of motor speed over motor torque, by hand."""
-    J_M, J_L, k, c, b_M, b_L = (getattr(driveline, name) for name in ("J_M", "J_L", "K", "C", "B_M", "B_L"))
-    denominator = [
-        J_M * J_L,
-        J_M * (c + b_L) + J_L * (c + b_M),
-        (J_M + J_L) * k + c * (b_M + b_L) + b_M * b_L,
-        k * (b_M + b_L),
-    ]
-    return [J_L, c + b_L, k], denominator
-
-
-def test_sampling_is_undone() -> None:
-    numerator, denominator = two_mass()
-    back = to_continuous(sampled(numerator, denominator))
-    np.testing.assert_allclose(back.numerator[1:], np.array(numerator) / denominator[0], rtol=1e-6)
-    np.testing.assert_allclose(back.denominator[1:], np.array(denominator[1:]) / denominator[0], rtol=1e-6)
-    np.testing.assert_allclose(
-        np.sort_complex(back.poles), np.sort_complex(np.linalg.eigvals(driveline.LINE.matrix)), rtol=1e-5
-    )
 
 
 @pytest.mark.parametrize("nk", [0, 1, 3])
@@ -83,13 +54,6 @@ def test_the_response_changes_by_no_more_than_the_bound(small: float) -> None:
     assert reduced.model.is_stable
 
 
-def test_a_state_that_does_nothing_is_left_out_exactly() -> None:
-    model = fourth_order(0.0)
-    reduced = third_order(model)
-    np.testing.assert_allclose(reduced.model.response(FREQUENCY_HZ), model.response(FREQUENCY_HZ), rtol=1e-6)
-    assert reduced.hankel[3] < 1e-8 * reduced.hankel[0]
-
-
 @pytest.mark.parametrize("nk", [0, 1, 2])
 def test_what_is_of_third_order_or_less_stays_what_it_is(nk: int) -> None:
     model = LinearModel((-1.6, 0.8), (0.1, 0.05), nk, T_S)
@@ -114,18 +78,3 @@ def test_the_papers_fourth_order_models_keep_their_resonance(cruises: list[Cruis
         assert mode is not None
         assert mode.frequency_hz == pytest.approx(drive.resonance_hz, rel=0.01)
         assert mode.damping == pytest.approx(drive.damping, rel=0.15)
-
-
-def test_an_unstable_model_is_refused() -> None:
-    with pytest.raises(BadModel, match="expected all below 1"):
-        third_order(LinearModel((-1.1, 0.0), (1.0,), 1, T_S))
-
-
-def test_poles_that_crowd_together_at_one_are_no_exception() -> None:
-    """Four of them within 0.01 of 1, as a fit to a recording of one mass gives: powers of A overflow by rounding."""
-    poles = [0.9968 + 0.002j, 0.9968 - 0.002j, 0.98977, 0.99755]
-    model = LinearModel(tuple(np.real(np.poly(poles))[1:].tolist()), (5e-5, -1.5e-4, 1.49e-4, -4.9e-5), 1, 0.01)
-    found = third_order(model)
-    frequency_hz = np.geomspace(0.5, 40.0, 30)
-    off = np.abs(found.model.response(frequency_hz) - model.response(frequency_hz))
-    assert off.max() <= 1.1 * found.largest_error

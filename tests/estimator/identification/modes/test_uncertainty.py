@@ -1,7 +1,5 @@
 """Ellipses and intervals against what scatters: theta drawn from its covariance, roots computed anew."""
 
-import math
-
 import numpy as np
 import pytest
 
@@ -9,8 +7,6 @@ from estimator.errors import BadShape
 from estimator.identification.linear_model import LinearModel
 from estimator.identification.modes.modes import resonance
 from estimator.identification.modes.uncertainty import (
-    Uncertain,
-    UncertainRoot,
     pole_zero_map,
     propagate,
     uncertain_modes,
@@ -24,16 +20,6 @@ def test_a_linear_function_has_its_exact_covariance() -> None:
     value, covariance = propagate(lambda x: G @ x, np.arange(4.0), S @ S.T)
     np.testing.assert_allclose(value, G @ np.arange(4.0))
     np.testing.assert_allclose(covariance, G @ S @ S.T @ G.T, rtol=1e-9)
-
-
-def test_an_interval_of_two_standard_deviations_or_so() -> None:
-    one = Uncertain(10.0, 2.0)
-    assert one.ci95 == pytest.approx((10 - 3.91993, 10 + 3.91993), abs=1e-4)
-    assert one.covers(6.1)
-    assert not one.covers(6.0)
-    assert one.is_determined
-    assert not Uncertain(3.0, 2.0).is_determined
-    assert not Uncertain(3.0, math.inf).is_determined
 
 
 T_S = 0.02
@@ -71,20 +57,6 @@ def test_ellipses_hold_95_percent_of_the_roots() -> None:
     assert inside / 4000 == pytest.approx(0.95, abs=0.015)
 
 
-def test_the_outline_is_the_95_percent_contour_and_closed() -> None:
-    root = UncertainRoot(0.5 + 0.5j, np.array([[4e-4, 1e-4], [1e-4, 1e-4]]))
-    outline = root.ellipse()
-    d = np.array([(outline - root.value).real, (outline - root.value).imag])
-    np.testing.assert_allclose(np.sum(d * (np.linalg.inv(root.covariance) @ d), axis=0), 5.9915, rtol=1e-4)
-    assert outline[0] == pytest.approx(outline[-1])
-
-
-def test_a_real_root_has_a_segment() -> None:
-    outline = UncertainRoot(0.9 + 0j, np.diag([1e-4, 0.0])).ellipse()
-    assert not outline.imag.any()
-    assert outline.real.max() == pytest.approx(0.9 + 1.96e-2, abs=1e-5)
-
-
 def test_intervals_are_as_wide_as_frequency_and_damping_scatter() -> None:
     P = covariance()
     (found,) = uncertain_modes(MODEL, P)
@@ -93,11 +65,6 @@ def test_intervals_are_as_wide_as_frequency_and_damping_scatter() -> None:
     assert len(scattered) == 4000
     assert found.frequency_hz.std == pytest.approx(np.std([mode.frequency_hz for mode in scattered]), rel=0.04)
     assert found.damping.std == pytest.approx(np.std([mode.damping for mode in scattered]), rel=0.04)
-
-
-def test_a_double_root_is_of_unknown_place() -> None:
-    double = model_of([0.5, 0.5], [])
-    assert all(np.isinf(root.covariance[0, 0]) for root in pole_zero_map(double, 1e-6 * np.eye(3)).poles)
 
 
 def near_cancelling(apart: float) -> LinearModel:
@@ -112,16 +79,6 @@ def test_a_pair_closer_to_its_zeros_than_they_are_certain_is_flagged() -> None:
     assert flagged[0].pole == pytest.approx(0.6 * np.exp(1.9j))
     assert "can't be distinguished" in flagged[0].statement
     assert pole_zero_map(near_cancelling(0.05), P).cancellations == ()
-
-
-def test_pole_and_zero_that_move_together_do_not_cancel_for_their_large_ellipses() -> None:
-    """Both are uncertain by 0.1, their difference of 0.02 by nothing: they are two."""
-    model = model_of([0.5], [0.48])
-    along = np.array([-1.0, 0.0, -model.b[0]])  # d pole = d zero
-    P = 0.01 * np.outer(along, along) + 1e-12 * np.eye(3)
-    roots = pole_zero_map(model, P)
-    assert np.sqrt(roots.poles[0].covariance[0, 0]) == pytest.approx(0.1, rel=1e-3)
-    assert roots.cancellations == ()
 
 
 def test_false_flags_are_as_rare_as_the_confidence_says_where_they_cancel() -> None:

@@ -18,12 +18,6 @@ def test_the_autoregression_comes_back() -> None:
     assert noise.std == pytest.approx(0.3, rel=0.02)
 
 
-def test_what_it_whitens_is_white() -> None:
-    e = coloured(1)
-    w = fit_noise(e, np.ones(N, dtype=bool), 10).whiten(e)[10:]
-    assert abs(w[1:] @ w[:-1]) / (w @ w) < 3 / np.sqrt(N)
-
-
 def test_masked_samples_are_not_looked_at() -> None:
     okay = np.ones(N, dtype=bool)
     okay[np.random.default_rng(2).integers(0, N, 1500)] = False
@@ -33,12 +27,6 @@ def test_masked_samples_are_not_looked_at() -> None:
     complete = noise.complete(okay)
     assert not complete[:2].any()
     assert all(okay[k - 2 : k + 1].all() for k in np.flatnonzero(complete)[:200])
-
-
-def test_where_no_stretch_is_long_enough_the_order_ends_there() -> None:
-    okay = np.arange(N) % 3 != 0  # stretches of two
-    noise = fit_noise(np.where(okay, coloured(4), 0.0), okay, 30)
-    assert noise.order == 1
 
 
 def test_it_is_stable_even_on_a_random_walk() -> None:

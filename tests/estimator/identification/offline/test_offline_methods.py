@@ -10,7 +10,7 @@ from estimator.errors import BadSetting, NotExciting
 from estimator.identification.linear_model import Orders
 from estimator.identification.modes.uncertainty import UncertainMode
 from estimator.identification.offline.fits import LinearFit, Method, fit_box_jenkins, fit_output_error
-from estimator.signals.decimate import decimate, high_passed
+from estimator.signals.decimate import MOST, block_of, decimate, first_part, high_passed
 from estimator.signals.record import Record
 from tests.benchmarks.buses import draw_bus, drive
 from tests.estimator.identification.closed_loop import controlled
@@ -78,6 +78,7 @@ def test_the_damping_is_unbiased() -> None:
     assert max(bias.values()) < 0.01
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("buses", [4, pytest.param(12, marks=pytest.mark.campaign)])
 def test_the_noise_model_makes_more_of_the_same_data(buses: int) -> None:
     """On a road, with a driver, in frequency; every dozen of the benchmark's 200 buses has a ratio below 0.5."""
@@ -89,14 +90,6 @@ def test_the_noise_model_makes_more_of_the_same_data(buses: int) -> None:
             values.append(mode_of(METHODS[method](record, THIRD)).frequency_hz.value / frequency_hz - 1.0)
     scatter = {method: np.sqrt(np.mean(np.square(values))) for method, values in errors.items()}
     assert scatter[Method.BOX_JENKINS] < 0.7 * scatter[Method.OUTPUT_ERROR]
-
-
-def test_intervals_of_the_noise_model_hold_the_truth(fits: list[LinearFit]) -> None:
-    """At 95 %, 3 of 6 or fewer have a probability of 0.2 %. The rates of 200: tests.benchmarks.identification."""
-    held = np.zeros(2)
-    for mode in map(mode_of, fits):
-        held += mode.frequency_hz.covers(FREQUENCY_HZ), mode.damping.covers(DAMPING)
-    assert held.min() >= 4
 
 
 def test_in_closed_loop_the_noise_model_keeps_the_truth() -> None:
@@ -138,3 +131,15 @@ def test_what_can_not_be_determined_is_refused_by_name(method: Method, fit: Fit,
 def test_a_period_that_is_not_that_of_the_time_stamps_is_refused(method: Method, fit: Fit, record: Record) -> None:
     with pytest.raises(BadSetting, match=r"time stamps are 0\.01 s apart.*wrong by 2"):
         fit(replace(record, sample_time_s=0.005), THIRD)
+
+
+@pytest.mark.parametrize("sample_time_s", [0.001, 0.01, 0.02])
+def test_of_a_long_recording_the_first_part_is_taken(sample_time_s: float) -> None:
+    most = MOST * block_of(sample_time_s)
+    n = most + 1000
+    time_s = sample_time_s * np.arange(n)
+    record = Record("long", sample_time_s, time_s, np.ones((n, 1)), time_s, np.ones(n, dtype=bool))
+    part = first_part(record)
+    assert part.time_s.shape == part.output.shape == part.okay.shape == (most,)
+    assert np.array_equal(part.output, record.output[:most])
+    assert first_part(part) is part

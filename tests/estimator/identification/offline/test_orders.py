@@ -1,10 +1,8 @@
 import numpy as np
 import pytest
 
-from estimator.errors import BadSetting
 from estimator.identification.linear_model import Orders
 from estimator.identification.offline.orders import select_orders
-from estimator.signals.record import Record
 from tests.estimator.identification.closed_loop import controlled
 from tests.estimator.identification.driveline import cruise
 
@@ -14,12 +12,7 @@ DURATION_S = 20.0
 AMONG = [Orders(2, 2, 1), Orders(3, 3, 1), Orders(4, 4, 1), Orders(3, 3, 2)]
 
 
-def delayed(record: Record, samples: int) -> Record:
-    torque = np.roll(record.torque_nm, samples, axis=0)
-    okay = np.arange(record.okay.shape[0]) >= samples
-    return Record(record.name, record.sample_time_s, record.time_s, torque, record.output, record.okay & okay)
-
-
+@pytest.mark.campaign
 def test_three_states_and_one_sample_of_delay_are_found() -> None:
     """The truth wins in most runs, and its criterion is never far from the best; too low an order always is."""
     chosen = []
@@ -40,20 +33,3 @@ def test_a_load_that_swings_by_itself_costs_one_order_and_no_more() -> None:
     assert choice.chosen in AMONG[1:3]
     slow = extra.poles[np.abs(np.log(extra.poles)) < 0.02]
     assert all(np.abs(extra.zeros - pole).min() < 0.1 for pole in slow)
-
-
-def test_a_longer_delay_is_found() -> None:
-    late = delayed(cruise(400, DURATION_S).record, -1)  # torque written down one sample early
-    assert select_orders(late, [Orders(3, 3, 1), Orders(3, 3, 2)]).chosen.nk == 2
-
-
-def test_unseen_recordings_stand_next_to() -> None:
-    choice = select_orders(cruise(400, 15.0).record, AMONG[:2], [cruise(401, 15.0).record])
-    assert all(80 < candidate.unseen_fit_percent < 100 for candidate in choice.candidates)
-    assert choice.candidates[0].criterion == 0.0
-    assert "Free-run fit on unseen recordings" in choice.statement
-
-
-def test_no_candidate_is_refused() -> None:
-    with pytest.raises(BadSetting, match="0 candidates"):
-        select_orders(cruise(400, 30.0).record, [])

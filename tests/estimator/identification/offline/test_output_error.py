@@ -4,7 +4,6 @@ import pytest
 from estimator.errors import NotExciting
 from estimator.identification.linear_model import LinearModel, Orders
 from estimator.identification.offline.fits import LinearFit, fit_output_error
-from estimator.identification.offline.starts import arx, candidates
 from estimator.signals.prbs import prbs_nm
 from estimator.signals.record import BoolArray, FloatArray, Record
 
@@ -76,23 +75,6 @@ def test_masked_outputs_may_be_no_numbers_and_nothing_is_changed() -> None:
     assert not simulated[:40].any()
     for array, copy in zip((source.torque_nm, source.output, source.okay), before, strict=True):
         assert np.array_equal(array, copy, equal_nan=array.dtype == np.float64)
-
-
-def test_several_starts_reach_one_minimum() -> None:
-    u, y, okay = prbs_nm(N, 60.0), noisy(4), np.ones(N, dtype=bool)
-    starts = list(candidates(u, y, okay, TRUTH.orders, 0.02))
-    assert len(starts) == 3
-    assert all(start.is_stable for start in starts)
-    biased, iterated = starts[0], starts[1]
-    assert np.abs(iterated.theta - TRUTH.theta).max() < np.abs(biased.theta - TRUTH.theta).max()
-
-
-def test_where_no_stretch_is_unbroken_there_is_still_a_start() -> None:
-    okay = np.arange(N) % 3 != 0
-    u, y = prbs_nm(N, 60.0), noisy(5)
-    assert arx(u, y, okay, TRUTH.orders, 0.02) is None
-    fit = fitted(y, okay)
-    np.testing.assert_allclose(fit.model.poles, TRUTH.poles, atol=0.02)
 
 
 def test_the_model_is_stable_even_where_the_data_grow() -> None:

@@ -1,7 +1,5 @@
 """Without excitation: a state of its own, an estimate that is held and less and less sure, and no alarm."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from scipy.signal import lfilter
@@ -61,6 +59,7 @@ def test_prbs_off_is_a_state_of_its_own(world: object, seed: int) -> None:
     assert np.nanmedian(course.frequency_std_hz[on]) < 0.3 * std_hz[-1]
 
 
+@pytest.mark.campaign
 def test_so_it_is_with_a_bus_that_is_no_two_masses() -> None:
     for seed in (1, 4):
         course = play(dirty_buses.drive(seed, END_S, off_in_between))
@@ -75,33 +74,6 @@ def test_a_change_while_the_prbs_is_off_is_alarmed_when_it_is_on_again() -> None
         assert ON_S < first.time_s < ON_S + 10.0
         assert first.changed_between_s[0] < 70.0 < first.changed_between_s[1]
         assert settled.after.value == pytest.approx(after.resonance[0], rel=0.01)
-
-
-def test_without_prbs_from_the_start_nothing_is_claimed_until_it_is_on() -> None:
-    for seed in (5, 6, 7):
-        drive = roads.drive(seed, 80.0, lambda time_s: 0.0 if time_s < 50.0 else PRBS_NM)
-        course = play(drive.record)
-        off = between(course, 20.0, 50.0)
-        assert (course.state[off] == TrackingState.NOT_EXCITED).mean() > 0.8
-        assert np.isnan(course.frequency_hz[off]).mean() > 0.8
-        found_hz = np.nanmedian(course.frequency_hz[between(course, 75.0, 80.0)])
-        assert found_hz == pytest.approx(drive.frequency_hz[0], rel=0.01)
-        assert course.alarms == ()
-
-
-def test_a_prbs_that_drowns_in_the_noise_is_no_excitation() -> None:
-    for record in drives(33, 4, 60.0, road_nm=1000.0, prbs_nm=lambda time_s: 4.0, hold_nm_s_per_rad=2.0):
-        course = play(record)
-        assert (course.state[between(course, 25.0, 60.0)] == TrackingState.NOT_EXCITED).mean() > 0.8
-        assert course.alarms == ()
-
-
-def test_missing_samples_are_no_lack_of_excitation() -> None:
-    record = drives(34, 1, 60.0)[0]
-    okay = record.okay.copy()
-    okay[4000:5000] = False
-    course = play(replace(record, okay=okay))
-    assert not (course.state == TrackingState.NOT_EXCITED).any()
 
 
 FREQUENCY_HZ, DAMPING, RHO = 8.2, 0.06, 0.003 + 0.001j
@@ -135,10 +107,3 @@ def test_sensitivity_is_the_derivative_of_the_modes_output() -> None:
     slope = (mode_output(FREQUENCY_HZ + step, u) - mode_output(FREQUENCY_HZ - step, u)) / (2.0 * step)
     psi, _ = through_the_mode(u)
     assert psi == pytest.approx(np.diff(slope, prepend=0.0), abs=1e-6 * np.abs(slope).max())
-
-
-def test_density_is_that_of_the_output_at_its_peak() -> None:
-    u = np.random.default_rng(2).normal(size=100_000)
-    peak = abs(RHO / (1.0 - abs(pole_at(FREQUENCY_HZ)))) ** 2
-    _, density = through_the_mode(u)
-    assert density.mean() == pytest.approx(peak, rel=0.1)
