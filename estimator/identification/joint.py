@@ -23,7 +23,7 @@ from scipy.stats import chi2
 from threadpoolctl import threadpool_limits
 
 from estimator.errors import BadModel
-from estimator.identification.best import BestEstimate, known_pair
+from estimator.identification.best import BestEstimate, Verdict, known_pair
 from estimator.identification.linear_model import LinearModel
 from estimator.identification.modes.physical import PhysicalEstimate, physical_parameters
 from estimator.identification.modes.uncertainty import UncertainMode
@@ -51,6 +51,8 @@ class Joint:
         The recordings that agree and that it is of.
     disagreeing : dict of str to float
         The others, each with the probability of so large a difference by chance.
+    doubtful : tuple of str
+        Recordings among ``names`` that the two-mass model is not good for by itself; the intervals may be too narrow.
     model : LinearModel
         Of the two-mass order, at the recordings' own period.
     covariance : ndarray, shape (na+nb, na+nb)
@@ -62,6 +64,7 @@ class Joint:
 
     names: tuple[str, ...]
     disagreeing: dict[str, float]
+    doubtful: tuple[str, ...]
     model: LinearModel
     covariance: FloatArray
     mode: UncertainMode | None
@@ -75,7 +78,7 @@ Together = tuple[Joint | None, str]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Share:
+class _Experiment:
     """One recording in the joint fit: its problem, its own minimum x and the scale of its innovations."""
 
     name: str
@@ -98,58 +101,65 @@ def joint_estimate(names: Sequence[str], estimates: Sequence[BestEstimate]) -> T
     names, estimates
         Of the recordings, one each; the estimates' two-mass fits are shared.
     """
-    shares = [
-        _Share(name, each.problem, each.x, each.two_mass.noise.std) for name, each in zip(names, estimates, strict=True)
+    experiments = [
+        _Experiment(name, each.problem, each.x, each.two_mass.noise.std)
+        for name, each in zip(names, estimates, strict=True)
     ]
-    if len(shares) < 2:
+    if len(experiments) < 2:
         return None, "there is one recording"
-    if len({round(each.problem.sample_time_s, 9) for each in shares}) > 1:
+    if len({round(each.problem.sample_time_s, 9) for each in experiments}) > 1:
         return None, "the recordings are sampled at different periods"
     disagreeing: dict[str, float] = {}
     while True:
         with threadpool_limits(1):  # as `Problem.solve`
-            xs, information = _solved(shares)
-        paid = np.array([share.cost(x) - share.cost(share.own) for share, x in zip(shares, xs, strict=True)])
-        odd_one = _disagreeing(shares, paid)
-        if odd_one is None:
+            xs, information = _solved(experiments)
+        ratio = np.array([each.cost(x) - each.cost(each.own) for each, x in zip(experiments, xs, strict=True)])
+        outlier = _disagreeing(experiments, ratio)
+        if outlier is None:
             break
-        if len(shares) == 2:
-            return None, f"{shares[0].name} and {shares[1].name} do not agree on one line"
-        degrees = shares[odd_one].problem.orders.n_parameters
-        disagreeing[shares[odd_one].name] = float(chi2.sf(paid[odd_one], degrees))
-        del shares[odd_one]
-    model = shares[0].problem.model(xs[0])
+        if len(experiments) == 2:
+            return None, f"{experiments[0].name} and {experiments[1].name} do not agree on one line"
+        degrees = experiments[outlier].problem.orders.n_parameters
+        disagreeing[experiments[outlier].name] = float(chi2.sf(ratio[outlier], degrees))
+        del experiments[outlier]
+    model = experiments[0].problem.model(xs[0])
     covariance: FloatArray = np.linalg.pinv(information, hermitian=True).astype(np.float64)
     mode, reason = known_pair(model, covariance, estimates[0].band_hz)
     try:
         physical, not_physical = physical_parameters(model, covariance), ""
     except BadModel as error:
         physical, not_physical = None, str(error)
-    kept = tuple(share.name for share in shares)
-    return Joint(kept, disagreeing, model, covariance, mode, reason, physical, not_physical), ""
+    kept = tuple(each.name for each in experiments)
+    good = {name for name, each in zip(names, estimates, strict=True) if _is_good(each)}
+    doubtful = tuple(name for name in kept if name not in good)
+    return Joint(kept, disagreeing, doubtful, model, covariance, mode, reason, physical, not_physical), ""
 
 
-def _disagreeing(shares: Sequence[_Share], paid: FloatArray) -> int | None:
+def _is_good(best: BestEstimate) -> bool:
+    return best.verdict in (Verdict.GOOD, Verdict.CLOSED_LOOP) and best.fit.model.orders == best.two_mass.model.orders
+
+
+def _disagreeing(experiments: Sequence[_Experiment], ratio: FloatArray) -> int | None:
     """Return which recording pays most for sharing, if they do not agree; None if they do."""
-    degrees = shares[0].problem.orders.n_parameters
-    if chi2.sf(float(paid.sum()), (len(shares) - 1) * degrees) > SIGNIFICANCE:
+    degrees = experiments[0].problem.orders.n_parameters
+    if chi2.sf(float(ratio.sum()), (len(experiments) - 1) * degrees) > SIGNIFICANCE:
         return None
-    size = np.array([share.cost(share.own) for share in shares])
-    matters = paid / size > MATTERS
-    return int(np.argmax(np.where(matters, paid, -np.inf))) if matters.any() else None
+    size = np.array([each.cost(each.own) for each in experiments])
+    matters = ratio / size > MATTERS
+    return int(np.argmax(np.where(matters, ratio, -np.inf))) if matters.any() else None
 
 
-def _solved(shares: Sequence[_Share]) -> tuple[list[FloatArray], FloatArray]:
+def _solved(experiments: Sequence[_Experiment]) -> tuple[list[FloatArray], FloatArray]:
     """Return the x of every recording at the joint minimum, and the information on theta there."""
-    n = shares[0].problem.orders.n_parameters
-    xs = _start(shares, n)
-    cost = sum(share.cost(x) for share, x in zip(shares, xs, strict=True))
+    n = experiments[0].problem.orders.n_parameters
+    xs = _start(experiments, n)
+    cost = sum(each.cost(x) for each, x in zip(experiments, xs, strict=True))
     for _ in range(MOST_STEPS):
-        steps = _gauss_newton(shares, xs, n)
+        steps = _gauss_newton(experiments, xs, n)
         size = 1.0
         while size >= SMALLEST_STEP:
             tried = [x + size * step for x, step in zip(xs, steps, strict=True)]
-            after = sum(share.cost(x) for share, x in zip(shares, tried, strict=True))
+            after = sum(each.cost(x) for each, x in zip(experiments, tried, strict=True))
             if after < cost:
                 break
             size *= 0.5
@@ -159,38 +169,40 @@ def _solved(shares: Sequence[_Share]) -> tuple[list[FloatArray], FloatArray]:
         xs, cost = tried, after
         if settled:
             break
-    rows = np.concatenate([_reduced(share, x, n, of_theta=True)[0] for share, x in zip(shares, xs, strict=True)])
+    rows = np.concatenate([_reduced(each, x, n, of_theta=True)[0] for each, x in zip(experiments, xs, strict=True)])
     return xs, rows.T @ rows
 
 
-def _start(shares: Sequence[_Share], n: int) -> list[FloatArray]:
+def _start(experiments: Sequence[_Experiment], n: int) -> list[FloatArray]:
     """Return every x with the parameters of the one recording that suits all of them best."""
     candidates = [
-        [np.concatenate([leader.own[:n], share.own[n:]]) for share in shares]
-        for leader in shares
+        [np.concatenate([leader.own[:n], each.own[n:]]) for each in experiments]
+        for leader in experiments
     ]  # fmt: skip
-    started = [[share.problem.with_free_response(x) for share, x in zip(shares, xs, strict=True)] for xs in candidates]
-    return min(started, key=lambda xs: sum(share.cost(x) for share, x in zip(shares, xs, strict=True)))
+    started = [
+        [each.problem.with_free_response(x) for each, x in zip(experiments, xs, strict=True)] for xs in candidates
+    ]
+    return min(started, key=lambda xs: sum(each.cost(x) for each, x in zip(experiments, xs, strict=True)))
 
 
 def _reduced(
-    share: _Share, x: FloatArray, n: int, *, of_theta: bool = False
+    experiment: _Experiment, x: FloatArray, n: int, *, of_theta: bool = False
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
     """Return slopes by the shared parameters and residual, without what the recording's own ones explain; and Q, R."""
-    w = share.problem.residual(x) / share.std
-    J = share.problem.jacobian(x, of_theta=of_theta) / share.std
+    w = experiment.problem.residual(x) / experiment.std
+    J = experiment.problem.jacobian(x, of_theta=of_theta) / experiment.std
     Q, R = np.linalg.qr(J[:, n:])
     return J[:, :n] - Q @ (Q.T @ J[:, :n]), w - Q @ (Q.T @ w), Q, R, J[:, :n]
 
 
-def _gauss_newton(shares: Sequence[_Share], xs: Sequence[FloatArray], n: int) -> list[FloatArray]:
-    parts = [_reduced(share, x, n) for share, x in zip(shares, xs, strict=True)]
+def _gauss_newton(experiments: Sequence[_Experiment], xs: Sequence[FloatArray], n: int) -> list[FloatArray]:
+    parts = [_reduced(each, x, n) for each, x in zip(experiments, xs, strict=True)]
     A, r = (np.concatenate([part[i] for part in parts]) for i in (0, 1))
     scale = np.maximum(np.linalg.norm(A, axis=0), np.finfo(np.float64).tiny)
     shared = -np.linalg.lstsq(A / scale, r, rcond=None)[0] / scale
     steps = []
-    for share, x, (_, _, Q, R, J) in zip(shares, xs, parts, strict=True):
-        w = share.problem.residual(x) / share.std
+    for each, x, (_, _, Q, R, J) in zip(experiments, xs, parts, strict=True):
+        w = each.problem.residual(x) / each.std
         own = -np.linalg.lstsq(R, Q.T @ (w + J @ shared), rcond=None)[0]
         steps.append(np.concatenate([shared, own]))
     return steps

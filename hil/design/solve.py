@@ -143,25 +143,37 @@ class Solving:
             self.say(f"decided before: {self.state.statement}")
             return End.DECIDED
         self.state.end = None
-        if not self.given and not self.state.driven and not self._drive(*_first(self.source.rig())):
-            return self._ended(End.DECLINED)
+        if not self.given and not self.state.driven and (end := self._drive(*_first(self.source.rig()))):
+            return self._ended(end)
         while True:
             known, _ = self._diagnosed()
-            if known.is_decided and not known.untested:
-                return self._ended(End.DECIDED)
-            design = designed(self.source, known, Aim.DECIDE, self.progress) if is_needed(known, Aim.DECIDE) else None
-            if design is None:
-                return self._ended(End.DECIDED)
-            is_single = len(known.candidates) == 1
+            found = self._next(known)
+            end = found if isinstance(found, End) else self._drive(*found)
+            if end is not None:
+                return self._ended(end)
+
+    def _next(self, known: Open) -> tuple[str, dict[str, Any], Design | None] | End:
+        """Return what to drive next, by name, table and design, or how it ends.
+
+        That nothing is missing can only be decided when the rig file's own experiments have all been driven: what acts
+        for a while, or at some speed, is in none of the few seconds that a design takes.
+        """
+        is_open = not known.is_decided or bool(known.untested)
+        if is_open and is_needed(known, Aim.DECIDE):
+            design = designed(self.source, known, Aim.DECIDE, self.progress)
             for line in design_lines(known, design):
                 self.say(line)
-            if not design.is_worth_driving:
-                return self._ended(End.DECIDED if is_single else End.NOTHING_DECIDES)
-            if self.state.vehicle_s + design.planned.seconds > self.most_vehicle_s:
-                self.say(f"  it needs {design.planned.seconds:.0f} s of {self._left_s:.0f} s that the vehicle is left")
-                return self._ended(End.TIME)
-            if not self._drive(design.planned.name, design.planned.table, design):
-                return self._ended(End.DECLINED)
+            if design.is_worth_driving:
+                return design.planned.name, dict(design.planned.table), design
+            if len(known.candidates) > 1:
+                return End.NOTHING_DECIDES
+        if not self.given and not known.candidates[0].effects:
+            done = {each.name for each in self.state.driven}
+            for name, table in self.source.rig().experiments.items():
+                if name not in done:
+                    self.say(f"nothing is missing so far: {name} of the rig file is still to be driven")
+                    return name, as_table(table), None
+        return End.DECIDED
 
     @property
     def _left_s(self) -> float:
@@ -184,18 +196,21 @@ class Solving:
             self.say(line)
         return known, diagnosis
 
-    def _drive(self, name: str, table: Any, design: Design | None = None) -> bool:
-        """Drive an experiment if the operator agrees; what was driven whole is in the state."""
+    def _drive(self, name: str, table: Any, design: Design | None = None) -> End | None:
+        """Drive an experiment if there is time and the operator agrees; what was driven whole is in the state."""
         order = Order(f"next_{len(self.state.driven) + 1}", dict(table), least_margin_rad_s=LEAST_MARGIN_RAD_S)
         model, rolling_rad_s = self.file.model, self.state.driven[-1].last_rad_s if self.state.driven else 0.0
         prediction = self.runner.predict(order, model, rolling_rad_s)
+        if self.state.vehicle_s + prediction.seconds > self.most_vehicle_s:
+            self.say(f"{name}: it needs {prediction.seconds:.0f} s of {self._left_s:.0f} s that the vehicle is left")
+            return End.TIME
         m1, m2, speed = prediction.torque_m1_nm, prediction.torque_m2_nm, prediction.speed_rad_s
         self.say(
             f"{name}: {prediction.seconds:.0f} s, m1 {m1.low:.0f} to {m1.high:.0f} Nm, m2 {m2.low:.0f} to "
             f"{m2.high:.0f} Nm, speed {speed.low:.1f} to {speed.high:.1f} rad/s, through the torque guard"
         )
         if self.talk.may_command(name, not self.state.driven).what is not What.GO:
-            return False
+            return End.DECLINED
         run = self.runner.run(STEP, order, model, rolling_rad_s, lambda _: None)
         decides = None if design is None else design.decides
         self.state.driven.append(
@@ -210,7 +225,7 @@ class Solving:
             )
         )
         self._save()
-        return True
+        return None
 
     def _ended(self, end: End) -> End:
         self.state.end = end

@@ -78,6 +78,7 @@ def _joint(together: Together | None) -> dict[str, Any] | None:
     return content | {
         "recordings": list(joint.names),
         "disagreeing": {name: json_number(p_value) for name, p_value in joint.disagreeing.items()},
+        "doubtful": list(joint.doubtful),
         "frequency_hz": None if mode is None else _uncertain(mode.frequency_hz),
         "damping": None if mode is None else _uncertain(mode.damping),
         "sample_time_s": joint.model.sample_time_s,

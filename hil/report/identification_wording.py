@@ -99,6 +99,8 @@ def joint_statement(together: Together) -> str:
     if joint.disagreeing:
         left_out = ", ".join(f"{name} (p = {p_value:.2g})" for name, p_value in joint.disagreeing.items())
         text += f" Left out, not the same line as the others: {left_out}."
+    if joint.doubtful:
+        text += f" The model is not a good one of {listed(joint.doubtful)} by itself: the intervals may be too narrow."
     return text
 
 
