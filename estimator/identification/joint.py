@@ -30,9 +30,15 @@ from estimator.identification.modes.uncertainty import UncertainMode
 from estimator.identification.offline.problem import SETTLED, Problem
 from estimator.signals.record import FloatArray
 
-MOST_STEPS = 30
-SMALLEST_STEP = 1e-3
-"""Share of a Gauss-Newton step below which it is given up."""
+MOST_STARTS = 3
+"""Recordings whose own parameters are followed as a start, the best first: the valley has more than one floor."""
+
+MOST_STEPS = 60
+FIRST_DAMPING = 1e-3
+"""Levenberg and Marquardt's, of the shared parameters scaled by their slopes."""
+
+MOST_DAMPING = 1e6
+"""From here on a step is too short to matter: there is none that is better."""
 
 SIGNIFICANCE = 0.001
 """False alarms of the agreement, on recordings of one drive."""
@@ -152,57 +158,82 @@ def _disagreeing(experiments: Sequence[_Experiment], ratio: FloatArray) -> int |
 def _solved(experiments: Sequence[_Experiment]) -> tuple[list[FloatArray], FloatArray]:
     """Return the x of every recording at the joint minimum, and the information on theta there."""
     n = experiments[0].problem.orders.n_parameters
-    xs = _start(experiments, n)
-    cost = sum(each.cost(x) for each, x in zip(experiments, xs, strict=True))
-    for _ in range(MOST_STEPS):
-        steps = _gauss_newton(experiments, xs, n)
-        size = 1.0
-        while size >= SMALLEST_STEP:
-            tried = [x + size * step for x, step in zip(xs, steps, strict=True)]
-            after = sum(each.cost(x) for each, x in zip(experiments, tried, strict=True))
-            if after < cost:
-                break
-            size *= 0.5
-        else:
-            break
-        settled = cost - after < SETTLED * cost
-        xs, cost = tried, after
-        if settled:
-            break
-    rows = np.concatenate([_reduced(each, x, n, of_theta=True)[0] for each, x in zip(experiments, xs, strict=True)])
+    begins = sorted((_start(experiments, leader, n) for leader in experiments), key=lambda xs: _cost(experiments, xs))
+    ends = [_descended(experiments, xs, n) for xs in begins[:MOST_STARTS]]
+    xs = min(ends, key=lambda xs: _cost(experiments, xs))
+    slopes = [_Slopes.at(each, x, n, of_theta=True) for each, x in zip(experiments, xs, strict=True)]
+    rows = np.concatenate([_without(np.linalg.qr(part.own)[0], part.shared) for part in slopes])
     return xs, rows.T @ rows
 
 
-def _start(experiments: Sequence[_Experiment], n: int) -> list[FloatArray]:
-    """Return every x with the parameters of the one recording that suits all of them best."""
-    candidates = [
-        [np.concatenate([leader.own[:n], each.own[n:]]) for each in experiments]
-        for leader in experiments
-    ]  # fmt: skip
-    started = [
-        [each.problem.with_free_response(x) for each, x in zip(experiments, xs, strict=True)] for xs in candidates
-    ]
-    return min(started, key=lambda xs: sum(each.cost(x) for each, x in zip(experiments, xs, strict=True)))
+def _cost(experiments: Sequence[_Experiment], xs: Sequence[FloatArray]) -> float:
+    return sum(each.cost(x) for each, x in zip(experiments, xs, strict=True))
 
 
-def _reduced(
-    experiment: _Experiment, x: FloatArray, n: int, *, of_theta: bool = False
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Return slopes by the shared parameters and residual, without what the recording's own ones explain; and Q, R."""
-    w = experiment.problem.residual(x) / experiment.std
-    J = experiment.problem.jacobian(x, of_theta=of_theta) / experiment.std
-    Q, R = np.linalg.qr(J[:, n:])
-    return J[:, :n] - Q @ (Q.T @ J[:, :n]), w - Q @ (Q.T @ w), Q, R, J[:, :n]
+def _start(experiments: Sequence[_Experiment], leader: _Experiment, n: int) -> list[FloatArray]:
+    """Return every x with the shared parameters of one recording."""
+    xs = [np.concatenate([leader.own[:n], each.own[n:]]) for each in experiments]
+    return [each.problem.with_free_response(x) for each, x in zip(experiments, xs, strict=True)]
 
 
-def _gauss_newton(experiments: Sequence[_Experiment], xs: Sequence[FloatArray], n: int) -> list[FloatArray]:
-    parts = [_reduced(each, x, n) for each, x in zip(experiments, xs, strict=True)]
-    A, r = (np.concatenate([part[i] for part in parts]) for i in (0, 1))
+def _descended(experiments: Sequence[_Experiment], xs: list[FloatArray], n: int) -> list[FloatArray]:
+    """Follow the descent by Levenberg's and Marquardt's steps to its end."""
+    cost, damping, parts = _cost(experiments, xs), FIRST_DAMPING, None
+    for _ in range(MOST_STEPS):
+        parts = parts or [_Slopes.at(each, x, n) for each, x in zip(experiments, xs, strict=True)]
+        tried = [x + step for x, step in zip(xs, _steps(parts, damping), strict=True)]
+        after = _cost(experiments, tried)
+        if not after < cost:
+            damping *= 8.0
+            if damping > MOST_DAMPING:
+                break
+            continue
+        settled = cost - after < SETTLED * cost and damping <= FIRST_DAMPING
+        xs, cost, damping, parts = tried, after, 0.125 * damping, None
+        if settled:
+            break
+    return xs
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Slopes:
+    """Whitened errors of one recording, and their slopes by what is shared and by what is its own."""
+
+    w: FloatArray
+    shared: FloatArray
+    own: FloatArray
+
+    @classmethod
+    def at(cls, experiment: _Experiment, x: FloatArray, n: int, *, of_theta: bool = False) -> _Slopes:
+        """Linearise at x; ``n`` parameters are shared."""
+        J = experiment.problem.jacobian(x, of_theta=of_theta) / experiment.std
+        return cls(experiment.problem.residual(x) / experiment.std, J[:, :n], J[:, n:])
+
+    def damped(self, damping: float) -> _Slopes:
+        """Append the rows of Levenberg's and Marquardt's damping of the recording's own unknowns."""
+        rows = np.sqrt(damping) * np.diag(np.linalg.norm(self.own, axis=0))
+        nothing = np.zeros((rows.shape[0], self.shared.shape[1]))
+        return _Slopes(
+            np.concatenate([self.w, rows[0] * 0.0]),
+            np.concatenate([self.shared, nothing]),
+            np.concatenate([self.own, rows]),
+        )
+
+
+def _steps(parts: Sequence[_Slopes], damping: float) -> list[FloatArray]:
+    """Return the damped Gauss-Newton step of every x, what each recording has of its own eliminated."""
+    damped = [part.damped(damping) for part in parts]
+    factors = [np.linalg.qr(part.own) for part in damped]
+    A = np.concatenate([_without(Q, part.shared) for part, (Q, _) in zip(damped, factors, strict=True)])
+    r = np.concatenate([_without(Q, part.w) for part, (Q, _) in zip(damped, factors, strict=True)])
     scale = np.maximum(np.linalg.norm(A, axis=0), np.finfo(np.float64).tiny)
-    shared = -np.linalg.lstsq(A / scale, r, rcond=None)[0] / scale
-    steps = []
-    for each, x, (_, _, Q, R, J) in zip(experiments, xs, parts, strict=True):
-        w = each.problem.residual(x) / each.std
-        own = -np.linalg.lstsq(R, Q.T @ (w + J @ shared), rcond=None)[0]
-        steps.append(np.concatenate([shared, own]))
-    return steps
+    rows = np.concatenate([A / scale, np.sqrt(damping) * np.eye(scale.size)])
+    shared = -np.linalg.lstsq(rows, np.concatenate([r, np.zeros(scale.size)]), rcond=None)[0] / scale
+    return [
+        np.concatenate([shared, -np.linalg.lstsq(R, Q.T @ (part.w + part.shared @ shared), rcond=None)[0]])
+        for part, (Q, R) in zip(damped, factors, strict=True)
+    ]
+
+
+def _without(Q: FloatArray, x: FloatArray) -> FloatArray:
+    return np.asarray(x - Q @ (Q.T @ x), dtype=np.float64)
