@@ -244,9 +244,12 @@ def _widening(freedom: float) -> float:
 
 
 def _period(u: FloatArray) -> int | None:
-    """Return the samples of a period of a torque that repeats itself often enough; None for any other."""
-    n = u.shape[0]
-    x = u - u.mean()
+    """Return the samples of a period of a torque that repeats itself often enough; None for any other.
+
+    Judged by its changes: steps to and fro repeat themselves, too, but excite few lines; a PRBS on them excites all.
+    """
+    x = np.diff(u)
+    n = x.shape[0]
     lags = np.arange(n // FEWEST_PERIODS + 1)
     power = np.concatenate([[0.0], np.cumsum(x**2)])
     overlap = np.fft.irfft(np.abs(np.fft.rfft(x, 2 * n)) ** 2)[: lags.size]
@@ -259,7 +262,8 @@ def _period(u: FloatArray) -> int | None:
     if not again.size:
         return None
     period = again[0] + int(np.argmax(correlation[again[0] : again[0] + below[0]]))
-    return int(period * -(-SHORTEST_PERIOD // period))  # of a shorter one, several make one
+    period *= -(-SHORTEST_PERIOD // period)  # of a shorter one, several make one
+    return int(period) if period * FEWEST_PERIODS <= n else None
 
 
 def _periodic(u: FloatArray, y: FloatArray, period: int, period_s: float, block: int, bridged: int) -> SpectralEstimate:

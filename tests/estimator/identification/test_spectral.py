@@ -89,6 +89,22 @@ def test_stretches_between_long_gaps_are_averaged_and_short_gaps_bridged(records
     assert estimate.used_samples == okay.sum() + 1
 
 
+def test_a_prbs_on_steps_to_and_fro_is_not_taken_for_periodic(records: list[Record]) -> None:
+    """The steps repeat themselves; what excites the resonance does not."""
+    whole = records[0]
+    step_nm = 300.0 * (np.arange(whole.okay.size) // 200 % 2)
+    estimate = spectral_estimate(replace(whole, torque_nm=whole.torque_nm + step_nm[:, np.newaxis]))
+    assert around(estimate, 5.0, 12.0).sum() > 10
+    assert estimate.distortion is None
+
+
+def test_a_short_slow_recording_of_a_short_period_has_an_estimate() -> None:
+    """26 samples hold no four periods of 32."""
+    u = np.resize([1.0, -1.0, 0.5, -0.5, 0.2], 30)
+    record = replace(recorded(u, scipy.signal.lfilter(B, A, u)), sample_time_s=0.1, time_s=0.1 * np.arange(30))
+    assert np.isfinite(spectral_estimate(record).response).all()
+
+
 def test_too_short_stretches_are_refused(records: list[Record]) -> None:
     okay = np.arange(records[0].okay.size) % 40 > 10  # gaps of 0.11 s, and 0.29 s between them
     with pytest.raises(NotExciting, match="no unbroken stretch of 2 s") as refusal:
