@@ -155,7 +155,7 @@ class Solving:
     def _next(self, known: Open) -> tuple[str, dict[str, Any], Design | None] | End:
         """Return what to drive next, by name, table and design, or how it ends.
 
-        That nothing is missing is decided after the rig file's own experiments: a short run may miss what acts for a while.
+        That nothing is missing is decided after all of the rig file: a short run may miss what acts for a while.
         """
         is_open = not known.is_decided or bool(known.untested)
         if is_open and is_needed(known, Aim.DECIDE):

@@ -92,7 +92,7 @@ def test_stretches_between_long_gaps_are_averaged_and_short_gaps_bridged(records
 def test_a_prbs_on_steps_to_and_fro_is_not_taken_for_periodic(records: list[Record]) -> None:
     """The steps repeat themselves; what excites the resonance does not."""
     whole = records[0]
-    step_nm = 300.0 * (np.arange(whole.okay.size) // 200 % 2)
+    step_nm = 1000.0 * (np.arange(whole.okay.size) // 200 % 2)
     estimate = spectral_estimate(replace(whole, torque_nm=whole.torque_nm + step_nm[:, np.newaxis]))
     assert around(estimate, 5.0, 12.0).sum() > 10
     assert estimate.distortion is None
