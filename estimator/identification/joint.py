@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 from scipy.stats import chi2
@@ -42,6 +43,10 @@ MOST_DAMPING = 1e6
 
 SIGNIFICANCE = 0.001
 """False alarms of the agreement, on recordings of one drive."""
+
+SAME_SAMPLES = 0.3
+"""Share of the shorter recording that is the other's, from which on they are refused: at the best of 600 shifts chance
+makes 4.5 / sqrt(300) = 0.26 of 300 independent samples."""
 
 MATTERS = 0.01
 """Growth of the innovations' variance below which a disagreement does not matter, however significant."""
@@ -98,6 +103,14 @@ class _Experiment:
             w = self.problem.residual(x) / self.std
             return float(w @ w) if np.isfinite(w).all() else np.inf
 
+    def holds_samples_of(self, other: _Experiment) -> bool:
+        """Tell whether the innovations go together, at any shift: those of other samples are independent."""
+        mine, its = self.problem.residual(self.own), other.problem.residual(other.own)
+        size = 2 * max(mine.size, its.size)
+        together = np.fft.irfft(np.fft.rfft(mine, size) * np.conj(np.fft.rfft(its, size)), size)
+        shorter = self.std * other.std * min(mine.size, its.size)
+        return float(np.abs(together).max()) > SAME_SAMPLES * shorter
+
 
 def joint_estimate(names: Sequence[str], estimates: Sequence[BestEstimate]) -> Together:
     """Return the estimate from all recordings that agree, or why there is none.
@@ -115,6 +128,9 @@ def joint_estimate(names: Sequence[str], estimates: Sequence[BestEstimate]) -> T
         return None, "there is one recording"
     if len({round(each.problem.sample_time_s, 9) for each in experiments}) > 1:
         return None, "the recordings are sampled at different periods"
+    for one, other in combinations(experiments, 2):
+        if one.holds_samples_of(other):
+            return None, f"{one.name} and {other.name} hold the same samples, which count once: leave one out"
     disagreeing: dict[str, float] = {}
     while True:
         with threadpool_limits(1):  # as `Problem.solve`

@@ -102,7 +102,7 @@ def _tell_scales_alone(found: Look, dbc: Path | None) -> None:
 
     signals = signals_of("\n".join(found.signals)) if found.signals else None
     try:
-        record = read_record(found.path, signals, dbc=dbc)
+        record = read_record(found.path, signals, dbc=dbc, tell=tell)
     except RecordingError as error:
         tell(f"by these lines the file can't be read yet: {error}")
         return

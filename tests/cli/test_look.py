@@ -185,10 +185,28 @@ def per_mille(columns: Columns) -> Columns:
     return {**columns, "T_1": np.round(columns["T_1"] * 5.0), "T_2": np.round(columns["T_2"] * 5.0)}
 
 
+def with_contracts_names(columns: Columns, time: np.ndarray) -> Columns:
+    """Return columns that need no table, at another time."""
+    names = ("torque_m1_nm", "torque_m2_nm", "speed_rad_s")
+    return {"time_s": time} | dict(zip(names, list(columns.values())[1:], strict=True))
+
+
+def in_ms(columns: Columns) -> Columns:
+    return with_contracts_names(columns, 1e3 * columns["t"])
+
+
+def in_days(columns: Columns) -> Columns:
+    return with_contracts_names(columns, 45_000.0 + columns["t"] / 86_400.0)
+
+
+def one_dead(columns: Columns) -> Columns:
+    return with_contracts_names({**columns, "T_2": 0.0 * columns["T_2"]}, columns["t"])
+
+
 def looked(tmp_path: Path, columns: Columns, capsys: pytest.CaptureFixture[str]) -> tuple[Path, str, str]:
     path = tmp_path / "drive.csv"
     rows = np.column_stack(list(columns.values()))
-    np.savetxt(path, rows, delimiter=",", header=",".join(columns), comments="", fmt="%.12g")
+    np.savetxt(path, rows, delimiter=",", header=",".join(columns), comments="", fmt="%.17g")
     assert run(["look", str(path)]) == 0
     said = capsys.readouterr()
     return path, said.out, said.err
@@ -204,6 +222,9 @@ def looked(tmp_path: Path, columns: Columns, capsys: pytest.CaptureFixture[str])
         ),
         (output_turned, "fall where the torque rises", 'speed = { column = "w", scale = -1, at = "motor" }'),
         (in_rpm, "Is it in rpm?", 'speed = { column = "w", scale = 0.10472, at = "motor" }'),
+        (in_ms, "Is time in ms, expected s?", 'time = { column = "time_s", scale = 0.001 }'),
+        (in_days, "Is time in days, expected s?", 'time = { column = "time_s", scale = 86400 }'),
+        (one_dead, "0 in every row", "Was that inverter off, or is the channel dead?"),
         (per_mille, "per mille of the rated torque", 'torque = [ { column = "T_1", scale = 0.001 }, '),
     ],
 )

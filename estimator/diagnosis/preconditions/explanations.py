@@ -167,18 +167,24 @@ UNLIKELY = 0.02
 """Prior of a period that no driveline is sampled with, and of each that rows may have."""
 
 
+DAY_S = 86_400.0
+
+TIME_UNITS = {1e-3: "ms", 1e-6: "us", DAY_S: "days"}
+"""Units of time that a column may have, by their size [s]."""
+
+
 def changes_of(record: Record) -> Iterator[Change]:
     """Yield a recording as it was read, then with what may be wrong undone."""
     in_range = FASTEST_S <= record.sample_time_s <= SLOWEST_S
     yield Change(record, 1.0 if in_range else UNLIKELY, factors=2)
     yield from column_changes(record)
-    factors = {1e-3: 0.1, 1e-6: 0.05, 60.0: 0.005, 0.1: 0.01, 10.0: 0.01, 0.5: 0.002, 2.0: 0.002}
+    factors = {1e-3: 0.1, 1e-6: 0.05, DAY_S: 0.05, 60.0: 0.005, 0.1: 0.01, 10.0: 0.01, 0.5: 0.002, 2.0: 0.002}
     if record.sample_time_s == 1.0:
         factors |= dict.fromkeys(PERIODS, UNLIKELY)
     for factor, prior in factors.items():
         period_s = factor * record.sample_time_s
         if FASTEST_S <= period_s <= SLOWEST_S and record.okay.size * period_s >= SHORTEST_S:
-            unit = {1e-3: "Is time in ms, expected s", 1e-6: "Is time in us, expected s"}.get(factor)
+            unit = f"Is time in {TIME_UNITS[factor]}, expected s" if factor in TIME_UNITS else None
             text = f"is the sampling period {period_s:.3g} s, as read {record.sample_time_s:.3g} s? "
             timed = replace(record, sample_time_s=period_s, time_s=factor * record.time_s)
             yield Change(

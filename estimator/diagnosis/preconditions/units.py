@@ -11,10 +11,13 @@ import numpy as np
 from estimator.diagnosis.inference.wording import times
 from estimator.diagnosis.preconditions.explanations import (
     CLOSE,
+    FASTEST_S,
     LEAST_REST,
     PHYSICS,
     REST,
     RPM,
+    SLOWEST_S,
+    TIME_UNITS,
     Change,
     Explanation,
     changes_of,
@@ -204,11 +207,15 @@ FASTEST_RAD_S = 2500.0
 ALONE = 0.75
 """Odds from which on a recording is refused by itself."""
 
+SLOWEST_LOGGED_S = 5.0
+"""Vehicles are logged once a second by telemetry; slower than this, a time in milliseconds is more likely."""
+
 _BODY = DrivelineModel(Structure.ONE_MASS, {"J_M": Parameter(1.0, 0.0), "b_M": Parameter(0.0, 0.0)})
 
 
 def require_plausible_alone(record: Record) -> None:
     """Refuse a recording whose columns are swapped, or off in sign or by a unit, whatever the model is."""
+    _require_plausible_period(record)
     if record.kind is OutputKind.FORCE:
         return
     fastest = float(np.abs(record.output[record.okay]).max())
@@ -229,6 +236,20 @@ def require_plausible_alone(record: Record) -> None:
     weight, best = max(weights, key=lambda pair: pair[0])
     if best.question and weight > ALONE * math.fsum(each for each, _ in weights):
         raise Implausible(f"recording {record.name}: {best.question}?", best.cure)
+
+
+def _require_plausible_period(record: Record) -> None:
+    """Refuse a period at which nobody sees a driveline, where another unit of time makes it a usual one."""
+    period_s = record.sample_time_s
+    if FASTEST_S <= period_s <= SLOWEST_LOGGED_S:
+        return
+    for factor, unit in TIME_UNITS.items():
+        if FASTEST_S < factor * period_s <= SLOWEST_S:
+            raise Implausible(
+                f"recording {record.name}: sampled every {period_s:.3g} s, no driveline is. Is time in {unit}, "
+                f"expected s? Then it is {factor * period_s:.3g} s.",
+                Cure(record.name, time=factor),
+            )
 
 
 def _of_the_torque_path(record: Record) -> Iterator[Change]:

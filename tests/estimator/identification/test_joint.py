@@ -7,6 +7,7 @@ import pytest
 
 from estimator.identification.best import BestEstimate, Verdict, best_estimate
 from estimator.identification.joint import joint_estimate
+from estimator.signals.record import sliced
 from tests.estimator.identification.driveline import J_L, LINE, Line, cruise
 
 STIFFER = replace(LINE, k=1.1 * LINE.k)
@@ -50,6 +51,16 @@ def test_a_recording_that_the_model_is_not_good_for_is_named(four: list[BestEsti
     joint, _ = joint_estimate("ab", [four[0], replace(four[1], verdict=Verdict.NOT_LINEAR)])
     assert joint is not None
     assert joint.doubtful == ("b",)
+
+
+def test_the_same_samples_do_not_count_twice() -> None:
+    """A part of a recording under another name, at another time and rounded."""
+    whole = cruise(7, 20.0, 0.1, 30.0).record
+    part = sliced(whole, slice(700, 1700))
+    part = replace(part, time_s=part.time_s + 5.0, output=part.output.round(3))
+    joint, reason = joint_estimate(("whole", "part"), [best_estimate(whole), best_estimate(part)])
+    assert joint is None
+    assert reason == "whole and part hold the same samples, which count once: leave one out"
 
 
 def test_two_that_do_not_agree_have_no_joint_estimate(four: list[BestEstimate]) -> None:
