@@ -150,9 +150,6 @@ def retuned_parameters(result: FitResult, model: DrivelineModel, whole: bool) ->
     """Return every nominal parameter before and after; one trusted exactly stays what it was.
 
     Of a plant simulated elsewhere there are none.
-
-    Without the ``whole`` physics in the fit its intervals are what the nominal values are trusted to: how far a
-    parameter shifts to follow what is left out is in no covariance of the errors.
     """
     if model.plant is not None:
         return {}

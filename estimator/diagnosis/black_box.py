@@ -3,12 +3,6 @@
 Both are those of the compiled simulation, without a line of their own. On a free inertia of 1 kg m^2 the change of
 speed over a period is the mean torque that reached the shaft in it. Turned round, an inertia that is driven by the
 change of a speed moves at that speed, and the sensor shows of it what it would of the plant's.
-
-The plant's own simulation takes long. What a changed parameter changes is simulated on a line that answers much as the
-plant does, and added to the plant's output without the change (space mapping: Bandler and others, IEEE Trans. MTT
-42(12), 1994). So derivatives and first looks are those of that line; every output that is compared with a recording is
-the plant's. By that line are also judged how a disturbance of the torque shows in the output, the time scale on which
-that moves, and in which unit the torque is; it takes no part in what is simulated.
 """
 
 from __future__ import annotations
@@ -97,24 +91,12 @@ class _Known:
 
 @dataclass
 class BlackBox:
-    """A plant simulated by another program, with the catalogue's effects at its inputs and its output.
+    """A plant simulated by another program, with the catalogue's effects at its inputs and its output."""
 
-    Attributes
-    ----------
-    run : callable
-        The plant alone.
-    starts : collection of str
-        What of the initial state it can be given: names of attributes of ``Start``.
-    line : DrivelineModel
-        A line that answers much as it does.
-    has_start : bool
-        Whether the initial state of that line means the same.
-    """
-
-    run: Simulated
-    starts: Collection[str]
-    line: DrivelineModel
-    has_start: bool
+    run: Simulated  # the plant alone
+    starts: Collection[str]  # what of the initial state it can be given
+    line: DrivelineModel  # a line that answers much as it does
+    has_start: bool  # whether the initial state of that line means the same
     _known: dict[bytes, FloatArray] = field(default_factory=dict)
     _around: WeakKeyDictionary[Record, deque[_Known]] = field(default_factory=WeakKeyDictionary)
     _alone: threading.Lock = field(default_factory=threading.Lock)
@@ -140,7 +122,6 @@ class BlackBox:
         return changed
 
     def _read(self, record: Record, case: Case) -> FloatArray:
-        """Return what the sensor shows of the plant's output, shape (N,)."""
         steps = FINER if (case.p[_WITHIN] != 0.0).any() else 1
         fine = _finer(record) if steps > 1 else record
         output = self._output(fine, case, np.repeat(load_of(case, record), steps))

@@ -28,24 +28,12 @@ from estimator.signals.record import BoolArray, FloatArray, Record
 
 @dataclass(frozen=True, slots=True)
 class Chain:
-    """Recordings and what is recognised of the chain that made them.
+    """Recordings and what is recognised of the chain that made them."""
 
-    Attributes
-    ----------
-    raw : tuple of Record
-        As read.
-    records : tuple of Record
-        With the faults compensated, and without what jitter adds in the mean, for fits.
-    findings : tuple of Finding
-        What was recognised.
-    shifts : tuple of ndarray, shape (N,)
-        What hidden jitter adds to the readings of each recording in the mean; empty where there is none.
-    """
-
-    raw: tuple[Record, ...]
-    records: tuple[Record, ...]
-    findings: tuple[Finding, ...]
-    shifts: tuple[FloatArray, ...] = ()
+    raw: tuple[Record, ...]  # as read
+    records: tuple[Record, ...]  # with the faults compensated, and without what jitter adds in the mean, for fits
+    findings: tuple[Finding, ...]  # what was recognised
+    shifts: tuple[FloatArray, ...] = ()  # (N,)
 
     @property
     def apart(self) -> list[Record]:

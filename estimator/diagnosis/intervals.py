@@ -41,12 +41,7 @@ def covariance(result: FitResult) -> FloatArray:
 
 
 def reported_covariance(result: FitResult) -> FloatArray:
-    """Return the covariance that intervals are reported from, shape (U, U): of the noise, and of what is no noise.
-
-    The part of the error that its own past predicts is physics written another way, or the torque reading's own
-    noise. It pulls the unknowns as an error would that keeps its value for ``COHERENT_S``: its mean square times that
-    many samples takes the place of the noise's variance in ``sigma^2 (J'J)^-1``.
-    """
+    """Return the covariance that intervals are reported from, shape (U, U): of the noise, and of what is no noise."""
     free = _free(result)
     full = covariance(result)
     full[np.ix_(free, free)] += coherent_variance(result) * _bread(result.jacobian[:, free])

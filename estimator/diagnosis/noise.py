@@ -25,12 +25,7 @@ FEWEST_PREDICTED = 2 * (2 * PREDICTOR_ORDER + 1)
 
 
 def noise_floor(records: Sequence[Record]) -> float:
-    """Estimate the noise of the reading, from the data alone.
-
-    The floor is the RMS error of a linear one-step predictor that sees the last outputs and torques. A predictor
-    follows whatever moves slowly, missing physics included, so what it leaves is the noise of the sensor [unit of
-    the output]. Recordings, or segments, too short for a predictor of their own are left to the others.
-    """
+    """Estimate the noise of the reading, from the data alone."""
     squares, count = 0.0, 0
     pairs = [(record, _usable(record)) for record in records]
     long = [(record, usable) for record, usable in pairs if usable.sum() >= FEWEST_PREDICTED]
@@ -90,25 +85,14 @@ SMALLEST_P = 1e-300
 
 @dataclass(frozen=True, slots=True)
 class Gain:
-    """What a larger model gains over a smaller one.
+    """What a larger model gains over a smaller one."""
 
-    Attributes
-    ----------
-    delta_bic : float
-        Information gained, residual correlation taken into account; positive speaks for the larger model.
-    p_value : float
-        Probability of so large a gain if the smaller model were true, for one hypothesis.
-    n_effective : float
-        Independent samples the larger model's residual is worth.
-    """
-
-    delta_bic: float
+    delta_bic: float  # information gained, residual correlation taken into account
     p_value: float
-    n_effective: float
+    n_effective: float  # independent samples the larger model's residual is worth
 
 
 def residuals_by_record(result: FitResult) -> list[FloatArray]:
-    """Split a fit's stacked residual into one array per recording."""
     sizes = np.cumsum([int(use.sum()) for use in result.problem.use])[:-1]
     return list(np.split(result.residual, sizes))
 

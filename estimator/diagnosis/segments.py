@@ -4,10 +4,6 @@ Over a short gap the simulation continues with the torque it has. Over a long on
 not read, or the model does not hold there (a mask: another brake, a gear change). So each segment is a recording of its
 own, with its own initial state and, as every recording, its own constant load torque: a road is not as steep behind a
 gap as before it. Time continues (``Record.began_s``), for laws over time.
-
-Users know their recordings by name, and get everything by it: intervals and courses of all its segments, one after the
-other; simulations over its whole time, NaN where no segment is; as constant load torque the mean of its segments',
-each counting by its good samples; and the response of the segment with the most of them.
 """
 
 from __future__ import annotations
@@ -52,27 +48,13 @@ FEWEST_FOR_START = 10
 
 @dataclass(frozen=True, slots=True)
 class Cut:
-    """Recordings, cut.
+    """Recordings, cut."""
 
-    Attributes
-    ----------
-    whole : tuple of Record
-        As they were given.
-    records : tuple of Record
-        What is left of them for a fit; a recording without long gaps as it is.
-    rows : mapping of str to slice
-        Of each segment, by its name: its rows in its recording. Recordings that are not cut are not in it.
-    origin : mapping of str to str
-        Name of every record to the name of its recording.
-    warnings : tuple of str
-        What was left out.
-    """
-
-    whole: tuple[Record, ...]
-    records: tuple[Record, ...]
-    rows: Mapping[str, slice]
-    origin: Mapping[str, str]
-    warnings: tuple[str, ...] = ()
+    whole: tuple[Record, ...]  # as they were given
+    records: tuple[Record, ...]  # what is left of them for a fit
+    rows: Mapping[str, slice]  # of each segment, by its name
+    origin: Mapping[str, str]  # name of every record to the name of its recording
+    warnings: tuple[str, ...] = ()  # what was left out
 
     def of(self, names: Iterable[str]) -> tuple[Record, ...]:
         """Return what is left of the recordings of these names."""

@@ -66,39 +66,16 @@ class Verdict(Enum):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BestEstimate:
-    """The headline of one recording.
+    """The headline of one recording."""
 
-    Attributes
-    ----------
-    fit : LinearFit
-        The Box-Jenkins model it is taken from.
-    two_mass : LinearFit
-        The one of third order, which physical parameters are taken from.
-    mode : UncertainMode or None
-        The pole pair, None where the data carry none.
-    reason : str
-        Why there is none.
-    band_hz : tuple of float
-        Where it was looked for [Hz].
-    validation : Validation
-        Of the fit on its recording.
-    feedback : Feedback
-        Whether the torque followed the speed.
-    linearity : Linearity
-        Whether a linear model is enough.
-    regions : tuple of RegionalMode
-        The resonance by region of the shaft's torque [Nm]; empty where the drive is linear.
-    verdict : Verdict
-    """
-
-    fit: LinearFit
-    two_mass: LinearFit
-    mode: UncertainMode | None
-    reason: str
-    band_hz: tuple[float, float]
-    validation: Validation
-    feedback: Feedback
-    linearity: Linearity
+    fit: LinearFit  # the Box-Jenkins model it is taken from
+    two_mass: LinearFit  # the one of third order, which physical parameters are taken from
+    mode: UncertainMode | None  # the pole pair, None where the data carry none
+    reason: str  # why there is none
+    band_hz: tuple[float, float]  # where it was looked for [Hz]
+    validation: Validation  # of the fit on its recording
+    feedback: Feedback  # whether the torque followed the speed
+    linearity: Linearity  # whether a linear model is enough
     regions: tuple[RegionalMode, ...]
     verdict: Verdict
 
@@ -121,7 +98,6 @@ class _Rung:
 
 
 def best_estimate(record: Record, high_pass_hz: float = HIGH_PASS_HZ) -> BestEstimate:
-    """Return the best estimate of a recording."""
     record = first_part(record)
     data = high_passed(record, high_pass_hz)
     rungs = [_rung(data, RESPONDING)]

@@ -4,9 +4,6 @@ Welch's averaged cross-spectra with a Hann window and half overlap (P. D. Welch,
 Electroacoustics 15, 1967)::
 
     G(f) = S_yu(f) / S_uu(f),        coherence(f) = |S_yu|^2 / (S_uu S_yy)
-
-Half-overlapping Hann segments are not independent; Welch's formula gives ``n_d = K / (1 + 2 rho^2 (K-1)/K)``
-for K of them, with rho = 1/6 the correlation of the window with itself half its length on.
 """
 
 from __future__ import annotations
@@ -26,29 +23,13 @@ from estimator.signals.settings import Requirement, require
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SpectralEstimate:
-    """Transfer function by frequency; all arrays of shape (M,), frequency 0 left out.
-
-    Attributes
-    ----------
-    frequency_hz : ndarray
-    response : ndarray of complex
-        Output unit per input unit.
-    coherence : ndarray
-        0 to 1: the part of the output's power that the input explains, at the resolution of the method.
-    magnitude_std : ndarray
-        Standard deviation of ``|response|``; infinite where the coherence is 0. Divided by the magnitude, that of the
-        phase [rad].
-    n_averages : float
-        Independent averages behind each value.
-    used_samples, bridged_samples : int
-        Samples inside the segments, and how many of the recording were missing and bridged; 0 where not counted.
-    """
+    """Transfer function by frequency; all arrays of shape (M,), frequency 0 left out."""
 
     frequency_hz: FloatArray
-    response: ComplexArray
+    response: ComplexArray  # output unit per input unit
     coherence: FloatArray
-    magnitude_std: FloatArray
-    n_averages: float
+    magnitude_std: FloatArray  # standard deviation of ``|response|``
+    n_averages: float  # independent averages behind each value
     used_samples: int = 0
     bridged_samples: int = 0
 
@@ -64,8 +45,6 @@ def from_spectra(
 
     Random error of the magnitude (J. S. Bendat and A. G. Piersol, Random Data, chapter "Statistical errors in advanced
     estimates"), for n_d independent averages; the same number, in radians, is that of the phase::
-
-        std|G| / |G| = sqrt((1 - coherence) / (2 n_d coherence))
     """
     tiny = np.finfo(np.float64).tiny
     response = s_yu / np.maximum(s_uu, tiny)

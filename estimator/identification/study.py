@@ -33,28 +33,14 @@ from estimator.signals.record import Record
 
 @dataclass(frozen=True, slots=True)
 class Compared:
-    """What one estimator made of one recording.
+    """What one estimator made of one recording."""
 
-    Attributes
-    ----------
-    recording, estimator : str
-        Names.
-    resonance : Mode or None
-        Of its last model.
-    fit_percent : float
-        Free-run fit of that model over the whole recording, high-passed, at the model's period; NaN where unstable.
-    status : Status
-        Of its last estimate.
-    reason : str
-        Why it has that status and what to do; empty where nothing is wrong.
-    """
-
-    recording: str
+    recording: str  # names
     estimator: str
-    resonance: Mode | None
+    resonance: Mode | None  # of its last model
     fit_percent: float
-    status: Status
-    reason: str = ""
+    status: Status  # of its last estimate
+    reason: str = ""  # why it has that status and what to do
 
 
 def compare(

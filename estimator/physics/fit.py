@@ -114,7 +114,6 @@ class FitResult:
         return float(self.p[next(s.slot for s in self.problem.shared if (s.effect, s.name) == (effect, name))])
 
     def values_of(self, effect: str) -> dict[str, float]:
-        """Return the values of an effect's parameters that all recordings share."""
         return {
             s.name: float(x) * s.scale for s, x in zip(self.problem.shared, self.x, strict=False) if s.effect == effect
         }
@@ -257,12 +256,6 @@ def _scales(problem: Problem) -> FloatArray:
 
 
 def rates(result: FitResult) -> list[FloatArray]:
-    """Return the rates of the simulated outputs before and after each sample, shape (2, N) for each recording.
-
-    A torque that steps at a sample makes two of them; what was before the first one is unknown, and taken for what
-    follows. A joint follows an imposed motion, which is known at the samples alone: its rates are those of straight
-    lines to the neighbours.
-    """
     if result.problem.grid.structure is Structure.JOINT:
         pairs = zip(result.outputs, result.problem.records, strict=True)
         return [_secants(output, record.sample_time_s) for output, record in pairs]

@@ -29,24 +29,12 @@ NOTHING_KNOWN: Own = MappingProxyType({})
 
 @dataclass(frozen=True, slots=True)
 class FreeRun:
-    """A free-run simulation of one recording.
+    """A free-run simulation of one recording."""
 
-    Attributes
-    ----------
-    output : ndarray, shape (N,)
-        Simulated output, in the unit of the recording's.
-    rms : float
-        RMS of its error over the good samples.
-    start : Start
-        Load torque and initial state that were estimated.
-    further : tuple of ndarray, shape (N,)
-        Simulated further outputs, in the order of the recording's channels, each in its own unit.
-    """
-
-    output: FloatArray
-    rms: float
-    start: Start
-    further: tuple[FloatArray, ...] = ()
+    output: FloatArray  # (N,): simulated output, in the unit of the recording's
+    rms: float  # RMS of its error over the good samples
+    start: Start  # load torque and initial state that were estimated
+    further: tuple[FloatArray, ...] = ()  # (N,)
 
 
 def free_run(model: DrivelineModel, record: Record, known: Own = NOTHING_KNOWN) -> FreeRun:

@@ -140,26 +140,14 @@ Key = TypeVar("Key", bound=Hashable)
 
 
 class Inputs(NamedTuple):
-    """What drives a line in each of K simulations.
+    """What drives a line in each of K simulations."""
 
-    Attributes
-    ----------
-    torque, load : ndarray, shape (T, N) and (L, N)
-        Torque on its shaft and load torque, each that any of them has [Nm].
-    fed_by, loaded_by : ndarray of int, shape (K,)
-        Which of these each has: most have the same.
-    p : ndarray, shape (K, layout.SIZE)
-        Parameters.
-    state : ndarray, shape (K, STATES)
-        The kernel's start state, which a simulation overwrites.
-    """
-
-    torque: FloatArray
-    load: FloatArray
-    fed_by: IntArray
-    loaded_by: IntArray
-    p: FloatArray
-    state: FloatArray
+    torque: FloatArray  # (T, N): torque on its shaft and load torque, each that any of them has [Nm]
+    load: FloatArray  # (T, N): torque on its shaft and load torque, each that any of them has [Nm]
+    fed_by: IntArray  # (K,): which of these each has
+    loaded_by: IntArray  # (K,): which of these each has
+    p: FloatArray  # (K, layout.SIZE): parameters
+    state: FloatArray  # (K, STATES): the kernel's start state, which a simulation overwrites
 
 
 def inputs_of(records: Sequence[Record], of: Sequence[int], cases: Sequence[Case]) -> Inputs:

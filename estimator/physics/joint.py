@@ -6,14 +6,6 @@ Equation (translation: read N, m, N s/m)::
 
 ``e`` is the twist; ``f`` belongs to ``stiffness_nonlinearity``, ``T_h z``, y and m to ``shaft_hysteresis``. The
 constant torque ``T_0`` and the twist at the start are unknown in every recording.
-
-``backlash`` is a gap in series with all of them: of the twist they get ``e``, and the gap takes the rest, at most half
-of itself to either side. Faces only push: they touch on one side where the torque is positive, on the other where it is
-negative; in between there is none, and no damping. Where the slider has moved, the gap has moved with it.
-
-So a constant torque is one of two with a gap. ``T_0`` stays where the gap is open: the zero of the load cell. A preload
-behind the gap, unknown in every recording, too, does not: of a slider that yields at another torque one way than the
-other. Without a gap they are the same.
 """
 
 from __future__ import annotations
@@ -51,7 +43,6 @@ class Imposed(NamedTuple):
 
 
 def imposed_in(record: Record) -> Imposed:
-    """Return the imposed motion of a recording, which is the same in every simulation of it."""
     if record.imposed is None:
         raise ValueError(f"recording {record.name}: a joint is simulated from an imposed motion, got none")
     return Imposed(record.imposed - record.imposed[0], _rate(record))

@@ -25,13 +25,7 @@ from estimator.signals.record import FloatArray
 
 
 class Projector:
-    """Takes out of stacked signals what the unknowns of a fit could explain, to first order.
-
-    Attributes
-    ----------
-    error : ndarray, shape (R,)
-        What is left of the fit's own error once the unknowns that are not at a bound have moved freely.
-    """
+    """Takes out of stacked signals what the unknowns of a fit could explain, to first order."""
 
     def __init__(self, result: FitResult) -> None:
         low, high = bounds(result.problem)
@@ -106,18 +100,10 @@ class Wave:
 
 @dataclass(frozen=True, slots=True)
 class Cells:
-    """Answers to an event of unit size from the first moment of a grid to each of its moments.
+    """Answers to an event of unit size from the first moment of a grid to each of its moments."""
 
-    Attributes
-    ----------
-    moments_s : ndarray, shape (M,)
-        Time since the recording began [s].
-    answers : ndarray, shape (M, R)
-        The first row is 0: no event.
-    """
-
-    moments_s: FloatArray
-    answers: FloatArray
+    moments_s: FloatArray  # (M,): time since the recording began [s]
+    answers: FloatArray  # (M, R): the first row is 0: no event
 
 
 def waves(entry: Effect, p: FloatArray, sizes: Mapping[str, float], run: Simulate, still: FloatArray) -> list[Wave]:
@@ -185,18 +171,10 @@ class Stretch:
 
 @dataclass(frozen=True, slots=True)
 class Scan:
-    """What a grid of answers and an error have to say to each other, for every interval of the grid at once.
+    """What a grid of answers and an error have to say to each other, for every interval of the grid at once."""
 
-    Attributes
-    ----------
-    along : ndarray, shape (M, M)
-        Product of the error with the answer from row a to row b.
-    power : ndarray, shape (M, M)
-        Squared norm of that answer.
-    """
-
-    along: FloatArray
-    power: FloatArray
+    along: FloatArray  # (M, M): product of the error with the answer from row a to row b
+    power: FloatArray  # (M, M): squared norm of that answer
 
     def best(self, size: float) -> Stretch:
         """Return the interval in which an event of a size takes most away."""

@@ -30,28 +30,15 @@ Rows = slice | IntArray
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """What is fitted to what.
-
-    Attributes
-    ----------
-    p : ndarray, shape (layout.SIZE,)
-        Parameter vector; unknowns overwrite their slots.
-    local : tuple of LocalBasis
-        What each recording has of its own; a further output has that of the recording it is of.
-    use : tuple of ndarray of bool
-        Per recording, which samples count.
-    leads : tuple of int
-        Which recording's own unknowns each recording has; those that have their own come first. By default as
-        ``Record.lead`` says.
-    """
+    """What is fitted to what."""
 
     grid: Grid
     records: tuple[Record, ...]
-    p: FloatArray
+    p: FloatArray  # (layout.SIZE,): parameter vector
     shared: tuple[Shared, ...]
-    local: tuple[LocalBasis, ...]
-    use: tuple[BoolArray, ...]
-    leads: tuple[int, ...] = ()
+    local: tuple[LocalBasis, ...]  # what each recording has of its own
+    use: tuple[BoolArray, ...]  # per recording, which samples count
+    leads: tuple[int, ...] = ()  # which recording's own unknowns each recording has
 
     def __post_init__(self) -> None:
         if not self.leads:
@@ -182,7 +169,6 @@ def simulated_each(
 def simulated_cases(
     problem: Problem, cases: Sequence[Case], index: int, alike_s: FloatArray | None = None
 ) -> FloatArray:
-    """Return the same for cases of a recording."""
     drive = problem.drives[index]
     records = [problem.records[i] for i in drive]
     outputs = simulate_outputs(problem.grid, records, cases, alike_s)

@@ -22,19 +22,7 @@ FINER = 2
 
 
 class Stepper:
-    """Advances a driveline by one period of constant torque at a time.
-
-    Parameters
-    ----------
-    model : DrivelineModel
-        With its effects.
-    period_s : float
-        Length of a step [s].
-    load_torque_nm : float
-        Constant load torque [Nm].
-    speed_rad_s : float
-        Speed of the whole line at the beginning [rad/s].
-    """
+    """Advances a driveline by one period of constant torque at a time."""
 
     def __init__(
         self, model: DrivelineModel, period_s: float, load_torque_nm: float = 0.0, speed_rad_s: float = 0.0

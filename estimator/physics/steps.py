@@ -46,7 +46,6 @@ def moments_of(result: FitResult, name: str) -> list[Moments]:
 
 
 def inside(record: Record, moment_s: float) -> bool:
-    """Tell whether a moment is inside a recording, away from its ends."""
     first, last = (float(end) for end in record.since_start_s[[0, -1]])
     return first + EDGE_S <= moment_s <= last - EDGE_S
 

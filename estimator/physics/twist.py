@@ -2,14 +2,6 @@
 
 The twist is not measured; it follows from the motor's motion, since what the motor's torque does not spend on its own
 inertia and friction goes into the shaft::
-
-    J_M dw_M/dt = T - b_M w_M - k phi - c (w_M - w_L)
-    J_L dw_L/dt = k phi + c (w_M - w_L) - b_L w_L - T_L          T_L: load torque, a random walk
-    dphi/dt     = w_M - w_L
-
-Known: total torque T (held over one period, as everywhere here) and motor speed w_M at each sample. Unknown, and so
-estimated: w_L, phi, T_L. The gain is the stationary one of the discrete algebraic Riccati equation (Anderson and
-Moore, Optimal Filtering, 1979, chapter 4). phi is that of a linear shaft: a backlash's free play is not in it.
 """
 
 from __future__ import annotations
@@ -30,21 +22,11 @@ TWIST = 2
 
 @dataclass(frozen=True, slots=True)
 class Uncertainty:
-    """How far signals and model are trusted; the first two are the bus's own figures (docs/formats.md).
+    """How far signals and model are trusted; the first two are the bus's own figures (docs/formats.md)."""
 
-    Attributes
-    ----------
-    speed_rad_s
-        Standard deviation of the speed reading [rad/s].
-    torque_nm
-        Standard deviation of the torque over one period, beyond its reading [Nm].
-    load_nm_per_sqrt_s
-        How fast the load torque walks: standard deviation after one second [Nm].
-    """
-
-    speed_rad_s: float = 0.05
-    torque_nm: float = 1.0
-    load_nm_per_sqrt_s: float = 50.0
+    speed_rad_s: float = 0.05  # standard deviation of the speed reading [rad/s]
+    torque_nm: float = 1.0  # standard deviation of the torque over one period, beyond its reading [Nm]
+    load_nm_per_sqrt_s: float = 50.0  # how fast the load torque walks
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +43,6 @@ class Shaft:
 
     @classmethod
     def of_model(cls, model: DrivelineModel, source: str) -> Shaft | None:
-        """Take them from a model; None where it is no two-mass model of a rotation."""
         if model.structure is not Structure.TWO_MASS or model.motion is not Motion.ROTATION:
             return None
         values = model.values()
@@ -79,17 +60,7 @@ class Shaft:
 
 
 class TwistFilter:
-    """The filter with its state.
-
-    Parameters
-    ----------
-    shaft
-        The model.
-    period_s
-        Time between two samples [s].
-    uncertainty
-        How far signals and model are trusted.
-    """
+    """The filter with its state."""
 
     def __init__(self, shaft: Shaft, period_s: float, uncertainty: Uncertainty | None = None) -> None:
         self._period_s = period_s

@@ -118,7 +118,6 @@ def _unknown(effect: str, parameter: EffectParameter, scale: float, x: float | H
 
 
 def _own_unknowns(entry: Effect, record: Record) -> tuple[Shared, ...]:
-    """Return a recording's own parameters of an effect: moments within the recording, other ones as they are."""
     since = record.since_start_s
     first, last = float(since[0]), float(since[-1]) + record.sample_time_s
     return tuple(
@@ -135,29 +134,15 @@ LOAD_TORQUE, TWIST, PRELOAD = 0, 1, 2
 
 @dataclass(frozen=True, slots=True)
 class LocalBasis:
-    """The unknowns of one recording: load torque, initial state, own parameters of effects, a load profile.
-
-    Attributes
-    ----------
-    scale : ndarray, shape (L,)
-        Size of each unknown, in its unit.
-    guess : ndarray, shape (L,)
-        Where a fit starts, in units of ``scale``.
-    own : tuple of Shared
-        Own parameters of effects, O of them; they stand behind the load torque and the initial state.
-    profile : ndarray, shape (K, N)
-        Basis of the load profile, whose K unknowns stand last; K = 0 without one.
-    held : tuple of int
-        Unknowns that stay where a fit starts: others say as much.
-    """
+    """The unknowns of one recording: load torque, initial state, own parameters of effects, a load profile."""
 
     structure: Structure
     has_angle: bool
-    scale: FloatArray
-    guess: FloatArray
-    own: tuple[Shared, ...]
-    profile: FloatArray
-    held: tuple[int, ...] = ()
+    scale: FloatArray  # (L,): size of each unknown, in its unit
+    guess: FloatArray  # (L,): where a fit starts, in units of ``scale``
+    own: tuple[Shared, ...]  # own parameters of effects, O of them
+    profile: FloatArray  # (K, N): basis of the load profile, whose K unknowns stand last
+    held: tuple[int, ...] = ()  # unknowns that stay where a fit starts
 
     @property
     def low(self) -> FloatArray:

@@ -2,18 +2,7 @@
 
 The model between u and y survives any linear filter that both pass through. Two are used, in this order:
 
-1. First-order high-pass: each signal minus its exponentially weighted mean, ``m += (1 - p)(x - m)`` with the
-   pole ``p = exp(-2 pi f_c T)``. It takes away what a road grade or the driver does slowly, which a model of
-   the driveline can't explain. Trials gave 0.3 Hz; see DESIGN "Identification".
-2. Linear-phase low-pass (FIR, Hamming window) ahead of keeping every M-th sample. It delays by a whole number
-   of the *kept* samples, which :func:`decimate` takes out of the time base.
-
 The same causal loop serves the rig on line, sample by sample, and a recording as a block, with equal bits.
-
-Masks: a sample that is not okay, or no number up to 1e30, is replaced by the last good one and spoils every output
-whose low-pass window holds it. It also enters the running mean; while more than half of that mean is such
-held values, outputs stay spoilt. The first outputs, whose window reaches back before the recording, are
-spoilt too.
 """
 
 from __future__ import annotations
@@ -157,22 +146,7 @@ def low_pass_taps(factor: int) -> FloatArray:
 
 
 class Decimator:
-    """The chain with its state, for samples as they come.
-
-    Parameters
-    ----------
-    sample_time_s : float
-        Sampling period of the samples that will come [s].
-    factor : int
-        One in ``factor`` samples is kept.
-    high_pass_hz : float
-        Corner of the high-pass [Hz].
-
-    Raises
-    ------
-    BadSetting
-        If the factor is below 1 or above `MOST_FACTOR`, or the corner is not between 0 and the new Nyquist frequency.
-    """
+    """The chain with its state, for samples as they come."""
 
     __slots__ = ("_counters", "_factor", "_level", "_share", "_taps", "_window", "sample_time_s")
 
@@ -308,15 +282,7 @@ def block_of(sample_time_s: float) -> int:
 
 
 class Blocks:
-    """Means over whole blocks, of the measured samples of each; what is left over at the end is not used.
-
-    Parameters
-    ----------
-    okay : ndarray of bool, shape (N,)
-        Which samples were measured.
-    size : int
-        Samples of a block.
-    """
+    """Means over whole blocks, of the measured samples of each; what is left over at the end is not used."""
 
     def __init__(self, okay: BoolArray, size: int) -> None:
         self._size, self._n = size, okay.shape[0] // size
@@ -325,7 +291,6 @@ class Blocks:
         """Blocks of which half or more was measured, shape (n,)."""
 
     def mean(self, x: FloatArray) -> FloatArray:
-        """Return the means of x, shape (N,) or (N, m): shape (n,) or (n, m), 0 where a block is not okay."""
         good = self._good.reshape(self._n, self._size, *(1,) * (x.ndim - 1))
         parts = x[: self._n * self._size].reshape(self._n, self._size, *x.shape[1:])
         count = np.maximum(good.sum(axis=1), 1)

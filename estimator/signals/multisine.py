@@ -58,26 +58,7 @@ def excited_lines(
 
 
 def multisine_nm(period_samples: int, excited: IntArray, amplitude_nm: float) -> FloatArray:
-    """Return one period with equal power at every line and phases that make its peak small.
-
-    Parameters
-    ----------
-    period_samples : int
-        Length of a period.
-    excited : ndarray, shape (F,)
-        Lines that carry power (``excited_lines``).
-    amplitude_nm : float
-        Largest magnitude [Nm].
-
-    Returns
-    -------
-    ndarray, shape (period_samples,)
-
-    Raises
-    ------
-    BadSetting
-        If there are fewer than two lines, or the amplitude is no positive number.
-    """
+    """Return one period with equal power at every line and phases that make its peak small."""
     require(
         "multi-sine",
         (

@@ -54,7 +54,6 @@ def by_output(records: Sequence[Record]) -> list[slice]:
 
 
 def _alone(record: Record, channel: Channel, lead: Record) -> Record:
-    """Return a further output as a recording; its name says of which, and which it is."""
     return replace(
         record,
         name=f"{record.name}:{channel.label}",

@@ -67,25 +67,13 @@ class Location(Enum):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Channel:
-    """A further measured output of a recording.
+    """A further measured output of a recording."""
 
-    Attributes
-    ----------
-    kind, location
-        What it is, and where it is measured.
-    label : str
-        The column it was read from; names it in results.
-    output : ndarray, shape (N,)
-        Its readings [rad/s, rad, Nm, rad/s^2; translation m/s, m, N, m/s^2].
-    okay : ndarray of bool, shape (N,)
-        False where a reading must not be used.
-    """
-
-    kind: OutputKind
+    kind: OutputKind  # what it is, and where it is measured
     location: Location
-    label: str
-    output: FloatArray
-    okay: BoolArray
+    label: str  # the column it was read from
+    output: FloatArray  # (N,): its readings [rad/s, rad, Nm, rad/s^2; translation m/s, m, N, m/s^2]
+    okay: BoolArray  # (N,): false where a reading must not be used
 
 
 @dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
@@ -209,7 +197,6 @@ class Record:
 
     @property
     def read(self) -> BoolArray | None:
-        """Where every torque was read and is to be trusted, shape (N,); None where all of them were."""
         return None if self.torque_okay is None else np.asarray(self.torque_trusted.all(axis=1), dtype=np.bool_)
 
     @property

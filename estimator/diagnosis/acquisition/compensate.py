@@ -19,13 +19,7 @@ UNREAD = frozenset({"stale_samples", "lost_samples"})
 
 
 def compensate(records: Sequence[Record], findings: Sequence[Finding]) -> tuple[Record, ...]:
-    """Return the records as they would be without what was found.
-
-    Outputs that are stale or lost are masked. Torques that are stale or lost are filled in, by their reference or
-    their clock where they have one, and ``torque_okay`` is False where that leaves them unknown. Stamped jitter becomes
-    ``offset_s``, and the time uniform. Quantisation can't be undone. Records nothing was found in are returned
-    as they are.
-    """
+    """Return the records as they would be without what was found."""
     return tuple(_compensated(record, findings) for record in records)
 
 
@@ -85,7 +79,6 @@ def as_read(output: FloatArray, record: Record, effects: Mapping[str, Mapping[st
 
 
 def _repeating(output: FloatArray, record: Record) -> FloatArray:
-    """Repeat the simulated value where the recording repeats its own: the row last renewed is shown."""
     (stale,) = repeated([np.where(flagged(record), np.nan, record.output)]).rows
     renewed = np.maximum.accumulate(np.where(stale, 0, np.arange(output.size)))
     shown: FloatArray = output[renewed]

@@ -82,27 +82,13 @@ class Sized(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One effect of the acquisition or of the sensor's resolution.
+    """One effect of the acquisition or of the sensor's resolution."""
 
-    Attributes
-    ----------
-    name : str
-        As in the catalogue.
-    parameters : mapping of str to Sized
-        As in the catalogue.
-    cells : mapping of recording's name to ndarray of bool, shape (N, 1 + M)
-        The readings it touches: the output, then each torque input.
-    p_value : float
-        Probability of as much by chance in recordings without the effect.
-    statement : str
-        One sentence for an engineer.
-    """
-
-    name: str
+    name: str  # as in the catalogue
     parameters: Mapping[str, Sized]
-    cells: Mapping[str, BoolArray]
-    p_value: float
-    statement: str
+    cells: Mapping[str, BoolArray]  # (N, 1 + M): the readings it touches
+    p_value: float  # probability of as much by chance in recordings without the effect
+    statement: str  # one sentence for an engineer
 
     def touched(self, record: Record) -> BoolArray:
         """Return the readings of a recording that are touched, shape (N, 1 + M); none where it has not been seen."""
@@ -110,7 +96,6 @@ class Finding:
         return no_cells(record) if cells is None else cells
 
     def rows(self, record: Record) -> BoolArray:
-        """Return the rows of a recording with at least one touched reading, shape (N,)."""
         return any_of(self.touched(record))
 
 

@@ -22,23 +22,11 @@ ROWS_PER_REGRESSOR = 5
 
 @dataclass(frozen=True, slots=True)
 class Prediction:
-    """A predictor's errors on one recording.
+    """A predictor's errors on one recording."""
 
-    Attributes
-    ----------
-    rows : ndarray of int, shape (n,)
-        Rows that were predicted.
-    error : ndarray, shape (n,)
-        Reading less prediction, in those rows [unit of the output].
-    regressors : int
-        Number of coefficients.
-    gain : float
-        Answer of the output to one unit of torque in the row before [unit of the output per Nm].
-    """
-
-    rows: np.ndarray[tuple[int], np.dtype[np.intp]]
-    error: FloatArray
-    regressors: int
+    rows: np.ndarray[tuple[int], np.dtype[np.intp]]  # (n,): rows that were predicted
+    error: FloatArray  # (n,): reading less prediction, in those rows [unit of the output]
+    regressors: int  # number of coefficients
     gain: float
 
     @property

@@ -50,18 +50,9 @@ def decimal_place(values: FloatArray) -> float:
 
 @dataclass(frozen=True, slots=True)
 class ChanceRepeats:
-    """How often a reading equals the one before by chance.
+    """How often a reading equals the one before by chance."""
 
-    Attributes
-    ----------
-    expected : float
-        Best estimate of their number.
-    upper : float
-        With the error of that estimate added twice, and at least as many as there are of any other change: on a lattice
-        with a coarser one inside (values interpolated between counts) these stand out likewise.
-    """
-
-    expected: float
+    expected: float  # best estimate of their number
     upper: float
 
 

@@ -77,25 +77,13 @@ on a lattice a small fraction."""
 
 @dataclass(frozen=True, slots=True)
 class Repeated:
-    """What one channel's repeats say.
+    """What one channel's repeats say."""
 
-    Attributes
-    ----------
-    rows : tuple of ndarray of bool, shape (N,)
-        Per recording, rows that repeat where a repeat tells.
-    total : int
-        Rows in which a repeat would tell.
-    expected, upper : float
-        Repeats by chance among these: best estimate, and the most it may be.
-    catch_up : float
-        Median change after a repeat, over the usual one; 0 without repeats.
-    """
-
-    rows: tuple[BoolArray, ...]
-    total: int
-    expected: float
+    rows: tuple[BoolArray, ...]  # (N,): per recording, rows that repeat where a repeat tells
+    total: int  # rows in which a repeat would tell
+    expected: float  # repeats by chance among these
     upper: float
-    catch_up: float
+    catch_up: float  # median change after a repeat, over the usual one
 
     @property
     def count(self) -> int:
@@ -163,7 +151,6 @@ AS_GOOD = 0.003
 
 
 def followed(torque: FloatArray, trusted: BoolArray, reference: FloatArray) -> tuple[FloatArray, BoolArray, bool]:
-    """Return a torque as its reference tells it."""
     regressors = _regressors(np.where(~trusted & (reference == 0.0), np.nan, reference))  # lost with the torque
     predicted = all_of(np.isfinite(regressors))
     read = predicted & trusted
@@ -276,22 +263,12 @@ ANSWERED = 0.5
 
 @dataclass(frozen=True, slots=True)
 class LateTorque:
-    """What one recording says of some torque inputs together.
+    """What one recording says of some torque inputs together."""
 
-    Attributes
-    ----------
-    rows : ndarray of bool, shape (N,)
-        Rows whose torques repeat while the output answers the next one.
-    early, repeats : int
-        Clear steps that were answered early, of those before which the torque repeats.
-    early_others, others : int
-        The same of those before which it does not.
-    """
-
-    rows: BoolArray
-    early: int
+    rows: BoolArray  # (N,): rows whose torques repeat while the output answers the next one
+    early: int  # clear steps that were answered early, of those before which the torque repeats
     repeats: int
-    early_others: int
+    early_others: int  # the same of those before which it does not
     others: int
 
 
@@ -334,7 +311,6 @@ def _late(again: BoolArray, step: FloatArray, early: FloatArray, clear: BoolArra
 
 
 def _next_fresh(torque: FloatArray, stale: BoolArray) -> FloatArray:
-    """Return in each row the torque of the next row that is not stale, shape (N,)."""
     rows = np.where(stale, torque.size - 1, np.arange(torque.size))
     following: FloatArray = torque[np.minimum.accumulate(rows[::-1])[::-1]]
     return following

@@ -433,7 +433,6 @@ def _compared(worse: float) -> str:
 
 
 def _remainder(seen: _Seen) -> Remainder | None:
-    """Return what is left beyond noise and drift; None where nothing is."""
     believed, law = seen.believed, seen.left
     if not seen.failed:
         return None

@@ -26,25 +26,14 @@ from estimator.signals.record import BoolArray, FloatArray, Location, OutputKind
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """The linear line as disturbances see it, sampled.
-
-    Attributes
-    ----------
-    f : ndarray, shape (n, n)
-    torque, load, shaft : ndarray, shape (n,)
-        How a torque held for a sample, at the motor, against the load and more in the first shaft, moves the state.
-    h : ndarray, shape (C, n)
-        How each output shows the state.
-    direct : float
-        How the load shows in the output at once: 1 for a joint, whose torque is read.
-    """
+    """The linear line as disturbances see it, sampled."""
 
     f: FloatArray
-    torque: FloatArray
-    load: FloatArray
-    h: FloatArray
-    direct: float = 0.0
-    shaft: FloatArray = field(default_factory=lambda: np.zeros(0))
+    torque: FloatArray  # (n,)
+    load: FloatArray  # (n,)
+    h: FloatArray  # (C, n): how each output shows the state
+    direct: float = 0.0  # how the load shows in the output at once
+    shaft: FloatArray = field(default_factory=lambda: np.zeros(0))  # (n,)
 
 
 def line_of(result: FitResult) -> Line:
@@ -144,23 +133,12 @@ def readings(sizes: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True, slots=True)
 class Whitener:
-    """Kalman filters for recordings: a linear map of their errors to innovations of variance 1.
-
-    Attributes
-    ----------
-    f, h : Terms
-        Of the transition, shape (m, m), and of how the outputs show the state, shape (C, m).
-    gains : tuple of Gains
-        Of each recording.
-    use : tuple of ndarray of bool, shape (N_i, C)
-    rows : tuple of Rows
-        Where the samples of each recording that count stand among all, its outputs in turn.
-    """
+    """Kalman filters for recordings: a linear map of their errors to innovations of variance 1."""
 
     f: Terms
     h: Terms
-    gains: tuple[Gains, ...]
-    use: tuple[BoolArray, ...]
+    gains: tuple[Gains, ...]  # of each recording
+    use: tuple[BoolArray, ...]  # (N_i, C)
     rows: tuple[Rows, ...]
 
     def __call__(self, stacked: FloatArray) -> FloatArray:

@@ -108,17 +108,10 @@ def _held(basis: LocalBasis, x: FloatArray) -> LocalBasis:
 
 @dataclass(frozen=True, slots=True)
 class Unseen:
-    """The samples that judge: those of recordings kept out of the fit, else blocks of the recordings themselves.
-
-    Attributes
-    ----------
-    line : DrivelineModel
-    chain : Chain
-        Of recordings kept out of every fit; empty where there are none.
-    """
+    """The samples that judge: those of recordings kept out of the fit, else blocks of the recordings themselves."""
 
     line: DrivelineModel
-    chain: Chain
+    chain: Chain  # of recordings kept out of every fit
 
     def rms(self, hypothesis: Hypothesis, whole: FitResult, is_whole: bool, seen: Chain, is_as_read: bool) -> float:
         """Return the RMS of a hypothesis' free-run error in blocks of 0.6 s every 2 s [unit of the output].
@@ -209,25 +202,15 @@ DIMENSIONS = {
 
 @dataclass(frozen=True)
 class FreeRuns:
-    """Free runs before and after, on the recordings at their own rate.
-
-    Attributes
-    ----------
-    is_whole : bool
-        Whether what is believed leaves nothing but its disturbances.
-    before, after : FitResult
-        The nominal model, re-tuned; with the effects that are believed: every measured output.
-    held_before, held_after : float
-        RMS of their errors on samples that no fit has seen [unit of the output].
-    """
+    """Free runs before and after, on the recordings at their own rate."""
 
     chain: Chain
     unseen: Unseen
     believed: Hypothesis
-    is_whole: bool
-    before: FitResult
+    is_whole: bool  # whether what is believed leaves nothing but its disturbances
+    before: FitResult  # the nominal model, re-tuned
     after: FitResult
-    held_before: float
+    held_before: float  # RMS of their errors on samples that no fit has seen [unit of the output]
     held_after: float
 
     @cached_property
@@ -350,7 +333,6 @@ def effects_of(runs: FreeRuns, decision: Decision) -> tuple[FoundEffect, ...]:
 
 
 def traces_of(runs: FreeRuns, decision: Decision) -> tuple[FoundEffect, ...]:
-    """Return the traces that what is believed holds."""
     traces = tuple(each for each in decision.traces if each.name in runs.believed.effects)
     if not traces:
         return ()

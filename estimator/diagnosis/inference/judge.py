@@ -1,11 +1,4 @@
-"""The judge: from the sets of effects that were fitted to what is believed, and nothing after that.
-
-Every explanation is a hypothesis with a score: sets of names, a law without a name, such a law added to the names, and
-nominal values off their data sheet. A score is minus twice a log-probability, prior included, if the model were the
-world. Worlds are written in other forms than the model, and what they leave takes part in every difference of scores:
-these are divided by what is calibrated (``calibration``) and by what the best set leaves that is no noise
-(``remainder``).
-"""
+"""The judge: from the sets of effects that were fitted to what is believed, and nothing after that."""
 
 from __future__ import annotations
 
@@ -46,28 +39,14 @@ class Score(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Belief:
-    """What is believed of one effect of the best set.
-
-    Attributes
-    ----------
-    names : frozenset of str
-        The effect, those it can't be distinguished from, and those that hold it or are one of it.
-    probability : float
-        Of this effect or one of those it can't be distinguished from.
-    share : float
-        Share of the re-tuned model's squared free-run error that goes with it.
-    score : float
-        By which the score rises without it.
-    alike : mapping of str to mapping of str to float
-        Effects that explain as much in its place, with their values there.
-    """
+    """What is believed of one effect of the best set."""
 
     name: str
     names: frozenset[str]
-    probability: float
-    share: float
-    score: float
-    alike: Mapping[str, Mapping[str, float]]
+    probability: float  # of this effect or one of those it can't be distinguished from
+    share: float  # share of the re-tuned model's squared free-run error that goes with it
+    score: float  # by which the score rises without it
+    alike: Mapping[str, Mapping[str, float]]  # effects that explain as much in its place, with their values there
     objection: str = ""
 
     @property
@@ -121,12 +100,7 @@ def levels(path: Sequence[Hypothesis]) -> list[float]:
 
 
 def shares(path: Sequence[Hypothesis]) -> dict[str, float]:
-    """Return the share of the re-tuned model's squared free-run error that goes with each effect of the last set.
-
-    Along the way from the nominal model to the best set, each effect has what is left less from where it was added. One
-    that takes another's place has its share, too; what a step without a new effect changes all have in proportion.
-    Together they are what the last set explains.
-    """
+    """Return the share of the re-tuned model's squared free-run error that goes with each effect of the last set."""
     found: dict[str, float] = {}
     left = levels(path)
     for (one, before), (other, after) in pairwise(zip(path, left, strict=True)):
@@ -193,49 +167,26 @@ def probability_of(names: Collection[str], scores: Sequence[Score], tempered: fl
 
 @dataclass(frozen=True, slots=True)
 class Grounds:
-    """What a decision rests on, before any threshold is applied.
+    """What a decision rests on, before any threshold is applied."""
 
-    Attributes
-    ----------
-    best, nothing : Hypothesis
-        The best set of effects, and the re-tuned model.
-    shares : mapping of str to float
-        Of each effect of the best set (``shares``).
-    tests : tuple of Test
-    scores : tuple of Score
-        Of all sets that were fitted to their end and that a machine can be.
-    beliefs : tuple of Belief
-        Of every effect of the best set that is large enough to be distinguished from another way of sampling.
-    """
-
-    best: Hypothesis
+    best: Hypothesis  # the best set of effects, and the re-tuned model
     nothing: Hypothesis
-    shares: Mapping[str, float]
+    shares: Mapping[str, float]  # of each effect of the best set (``shares``)
     tests: tuple[Test, ...]
-    scores: tuple[Score, ...]
+    scores: tuple[Score, ...]  # of all sets that were fitted to their end and that a machine can be
     beliefs: tuple[Belief, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
 class Decision:
-    """What is believed.
-
-    Attributes
-    ----------
-    named, traces : tuple of Belief
-        Effects that are established, the weightiest first; those among them that hardly move the error.
-    doubted : tuple of Belief
-        Effects of the best set that are not established.
-    failed : tuple of Test
-        What the best set leaves that noise has not.
-    """
+    """What is believed."""
 
     best: Hypothesis
     nothing: Hypothesis
-    named: tuple[Belief, ...]
+    named: tuple[Belief, ...]  # effects that are established, the weightiest first
     traces: tuple[Belief, ...]
-    doubted: tuple[Belief, ...]
-    failed: tuple[Test, ...]
+    doubted: tuple[Belief, ...]  # effects of the best set that are not established
+    failed: tuple[Test, ...]  # what the best set leaves that noise has not
 
 
 def tempered_by(tests: Sequence[Test], samples: int, factor: float) -> float:

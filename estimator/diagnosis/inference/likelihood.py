@@ -150,28 +150,14 @@ WITH_MOMENTS = 1
 
 @dataclass(frozen=True)
 class Hypothesis:
-    """A set of effects, fitted.
-
-    Attributes
-    ----------
-    effects : frozenset of str
-    plain : FitResult
-        Unknowns, simulations and errors; no derivative.
-    sizes : ndarray, shape (S,)
-        Logarithms of the disturbances' sizes and times (`whitener.Size`).
-    limits : Limits
-    minus_twice_log : float
-        Minus twice the log-likelihood of the recordings, and of the disturbances' prior.
-    choices : float
-        Logarithm of the number of sets of effects of this size it was chosen among.
-    """
+    """A set of effects, fitted."""
 
     effects: Effects
-    plain: FitResult
-    sizes: FloatArray
+    plain: FitResult  # unknowns, simulations and errors
+    sizes: FloatArray  # (S,): logarithms of the disturbances' sizes and times (`whitener.Size`)
     limits: Limits
-    minus_twice_log: float
-    choices: float
+    minus_twice_log: float  # minus twice the log-likelihood of the recordings, and of the disturbances' prior
+    choices: float  # logarithm of the number of sets of effects of this size it was chosen among
 
     @property
     def outputs(self) -> int:
@@ -186,7 +172,6 @@ class Hypothesis:
 
     @property
     def score(self) -> float:
-        """Minus twice the log-likelihood with the price of the unknowns and of the choice (Schwarz, 1978)."""
         n = self.plain.residual.size
         freed = "road_grade" in self.effects
         return self.minus_twice_log + (self.unknowns + freed) * math.log(n) + 2.0 * self.choices
@@ -289,7 +274,6 @@ def samples_of(plain: FitResult) -> FloatArray:
 
 
 def of_first_outputs(hypothesis: Hypothesis) -> Hypothesis:
-    """Return what a hypothesis says of the recordings' first outputs alone."""
     plain = hypothesis.plain.first_outputs()
     if plain is hypothesis.plain:
         return hypothesis

@@ -353,7 +353,6 @@ class Answers:
     around: list[tuple[FitResult, list[dict[bytes, FloatArray]]]] = field(default_factory=list)
 
     def near(self, fit: FitResult) -> list[dict[bytes, FloatArray]]:
-        """Return what is known of each recording around a motion like that of a fit."""
         for other, known in self.around:
             if _difference(fit, other) < SAME_MOTION:
                 return known

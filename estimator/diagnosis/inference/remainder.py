@@ -46,13 +46,7 @@ DISTURBANCES = {
 
 @dataclass(frozen=True, slots=True)
 class Test:
-    """One property that noise has: how far an error is from it, and the most that noise shows.
-
-    ``name`` says what an error that fails it does.
-    ``is_share`` where the value is the share of the error's variance that is no noise: information about the laws, in
-    the units of a score over the number of samples, that no hypothesis has found. Differences of scores count by it.
-    ``key`` is the limit's name where it is calibrated.
-    """
+    """One property that noise has: how far an error is from it, and the most that noise shows."""
 
     name: str
     value: float
@@ -67,7 +61,6 @@ class Test:
 
 
 def tests(best: Hypothesis) -> tuple[Test, ...]:
-    """Return the tests of what a hypothesis leaves."""
     problem = best.plain.problem
     errors = residuals(best, best.white.residual)
     whole = np.concatenate(errors)

@@ -41,21 +41,11 @@ CLEARLY = 3.0
 
 @dataclass(frozen=True, slots=True)
 class FreeLine:
-    """The nominal line with its values free.
+    """The nominal line with its values free."""
 
-    Attributes
-    ----------
-    score : float
-        That of a hypothesis (``likelihood``): a value that is wrong is chosen among all values and effects.
-    leaves_noise : bool
-        Whether what it leaves passes for noise: then no physics need be missing.
-    strays : tuple of Stray
-        What clearly left its tolerance, the clearest first; at least one.
-    """
-
-    score: float
-    leaves_noise: bool
-    strays: tuple[Stray, ...]
+    score: float  # that of a hypothesis (``likelihood``)
+    leaves_noise: bool  # whether what it leaves passes for noise
+    strays: tuple[Stray, ...]  # what clearly left its tolerance, the clearest first
 
 
 def free_line(search: Search) -> FreeLine | None:
@@ -98,23 +88,12 @@ LOOKING_ROUNDS = 6
 
 @dataclass(frozen=True, slots=True)
 class Law:
-    """The law without a name that makes the recordings most probable together with a set of effects.
-
-    Attributes
-    ----------
-    element : Element
-    terms : tuple of (str, float)
-        Functions of what happens in the line, each with its coefficient.
-    score : float
-        That of the hypothesis with the law (``likelihood``).
-    rms : float
-        RMS of the free-run error with it [unit of the output].
-    """
+    """The law without a name that makes the recordings most probable together with a set of effects."""
 
     element: Element
-    terms: tuple[tuple[str, float], ...]
-    score: float
-    rms: float
+    terms: tuple[tuple[str, float], ...]  # functions of what happens in the line, each with its coefficient
+    score: float  # that of the hypothesis with the law (``likelihood``)
+    rms: float  # RMS of the free-run error with it [unit of the output]
 
 
 def searches_around(hypothesis: Hypothesis) -> list[ElementSearch]:
@@ -178,24 +157,13 @@ def _rms(search: ElementSearch) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Rivals:
-    """What the names of the best set are weighed against.
+    """What the names of the best set are weighed against."""
 
-    Attributes
-    ----------
-    alone, added : Law or None
-        The best law without a name: instead of all effects, and on top of the best set of these.
-    sheet : FreeLine or None
-    searches : list of ElementSearch
-        For the law alone, element by element.
-    scores : tuple of Score
-        Those of all these.
-    """
-
-    alone: Law | None
+    alone: Law | None  # the best law without a name
     added: Law | None
     sheet: FreeLine | None
-    searches: list[ElementSearch]
-    scores: tuple[Score, ...]
+    searches: list[ElementSearch]  # for the law alone, element by element
+    scores: tuple[Score, ...]  # those of all these
 
 
 def rivals_of(search: Search, ground: Grounds) -> Rivals:
@@ -210,13 +178,7 @@ def rivals_of(search: Search, ground: Grounds) -> Rivals:
 
 
 def rival_laws(ground: Grounds, alone: Law | None, added: Law | None) -> tuple[Score, ...]:
-    """Return laws without a name as hypotheses: one instead of all effects, and one added to the best set of these.
-
-    Where the law alone is more probable than names and a law for what they leave, the names imitate it, unless it is
-    another form of theirs (`_at_its_place`). Laws are sought in the first output alone: what they gain over the same
-    set without them counts there. One that leaves the free-run error as it was is a trace, and no other explanation of
-    what the names explain.
-    """
+    """Return laws without a name as hypotheses: one instead of all effects, and one added to the best set of these."""
     best, first = of_first_outputs(ground.best), of_first_outputs(ground.nothing)
     offset = ground.best.score - best.score
     found = []

@@ -68,36 +68,20 @@ MOST_EFFECTS = 8
 
 @dataclass
 class Search:
-    """Hypotheses on a model and recordings; each set of effects is fitted once.
-
-    Attributes
-    ----------
-    visited : dict of set of effects to Hypothesis
-        Those that were fitted to their end.
-    path : list of Hypothesis
-        Each better than the one before, from the nominal model to the best.
-    rivals : dict of str to float
-        Best score of a set with each effect that was fitted at all, to values that are a case of it.
-    implausible : dict of str to float
-        The same of others.
-    foreseen : dict of str to float
-        The least score that a score test promises for each effect on top of the set that was looked at last.
-    work : Work
-        What was simulated so far; no further change is tried after ``most`` free runs of all recordings: ``stopped``.
-    """
+    """Hypotheses on a model and recordings; each set of effects is fitted once."""
 
     model: DrivelineModel
     records: Sequence[Record]
     use: Sequence[BoolArray]
     names: Sequence[str]
     grid: Grid | None = None
-    visited: dict[Effects, Hypothesis] = field(default_factory=dict)
+    visited: dict[Effects, Hypothesis] = field(default_factory=dict)  # those that were fitted to their end
     rough: dict[Effects, Hypothesis] = field(default_factory=dict)
     path: list[Hypothesis] = field(default_factory=list)
     rivals: dict[str, float] = field(default_factory=dict)
-    implausible: dict[str, float] = field(default_factory=dict)
+    implausible: dict[str, float] = field(default_factory=dict)  # the same of others
     foreseen: dict[str, float] = field(default_factory=dict)
-    work: Work = field(default_factory=Work)
+    work: Work = field(default_factory=Work)  # what was simulated so far
     most: float = math.inf
     progress: Progress = silent
     stopped: bool = False
@@ -159,7 +143,6 @@ class Search:
         return round(self.work.samples / sum(r.time_s.size for r in self.records if r.lead is None))
 
     def nothing(self) -> Hypothesis:
-        """Fit the nominal model."""
         if NOTHING not in self.visited:
             own = tuple(own_unknowns(self.model.effects, record) for record in self.records)
             problem = self._problem(NOTHING, Release(nominal_unknowns(self.model), own))
@@ -391,7 +374,6 @@ class Search:
         return self._better(concurrently(lambda name: self.without(current, name), sorted(current.effects)), current)
 
     def _best_exchange(self, current: Hypothesis) -> Hypothesis | None:
-        """Return the best hypothesis with a look-alike in the place of one effect; None where none is better."""
         nearest = concurrently(lambda name: self._nearest(current, name), sorted(current.effects))
         for _, base, view in nearest:
             self._learn(base, view)

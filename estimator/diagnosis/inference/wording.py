@@ -102,19 +102,13 @@ MOST_NAMES = 4
 
 @dataclass(frozen=True, slots=True)
 class Context:
-    """What a statement adds to the verdict.
-
-    Attributes
-    ----------
-    can_be_retuned : bool
-        False for a plant whose parameters are not fitted.
-    """
+    """What a statement adds to the verdict."""
 
     remainder: Remainder | None = None
     traces: Sequence[str] = ()
     strays: Sequence[Stray] = ()
     untestable: Sequence[UntestableEffect] = ()
-    can_be_retuned: bool = True
+    can_be_retuned: bool = True  # false for a plant whose parameters are not fitted
 
 
 def statement(
@@ -166,7 +160,6 @@ def _headline(verdict: Verdict, fit: Fit, effects: Sequence[FoundEffect], effort
 
 
 def _fall(fit: Fit) -> str:
-    """Say what becomes of the error, on the recordings and on samples not used for the fit."""
     said = f"the free-run error {_change(fit.retuned, fit.augmented)} {fit.unit}"
     if math.isfinite(fit.holdout_retuned) and math.isfinite(fit.holdout_augmented):
         said += f", on samples not used for the fit it {_change(fit.holdout_retuned, fit.holdout_augmented)} {fit.unit}"
@@ -214,7 +207,6 @@ def _wrong_values(left: str, strays: Sequence[Stray]) -> str:
 
 
 def off_the_sheet(strays: Sequence[Stray]) -> str:
-    """Say which values are what, and what the data sheet says."""
     said = []
     for stray in strays:
         trusted = f"{100.0 * stray.tolerance:.2g} %"

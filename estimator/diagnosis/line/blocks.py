@@ -45,7 +45,6 @@ DRIVES = {Element.TORQUE_PATH: 1.0, Element.MOTOR: -1.0, Element.SHAFT: 1.0, Ele
 
 
 def places(result: FitResult) -> tuple[Place, ...]:
-    """Return the places that a fit's structure has."""
     if result.problem.grid.structure is Structure.JOINT:
         return (Place.SHAFT,)
     if result.problem.grid.structure is Structure.ONE_MASS:
@@ -54,7 +53,6 @@ def places(result: FitResult) -> tuple[Place, ...]:
 
 
 def size_at(result: FitResult, place: Place) -> float:
-    """Return the size in use of what acts at a place: torque, or speed at the sensor."""
     records = result.problem.records
     return speed_scale(records) if place is Place.SENSOR else torque_scale(records)
 
@@ -68,34 +66,16 @@ STRETCH = 3000
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """One recording of a fit, in blocks.
-
-    Attributes
-    ----------
-    record : Record
-    length : int
-        Samples per block.
-    tangent : Tangent
-    error : ndarray, shape (B,)
-        Measured less simulated output, averaged over the block's good samples; 0 where there are none.
-    weight : ndarray, shape (B,)
-        How many samples of the block count.
-    motion : Motion
-        As the fit has it, in the middle of each block.
-    reading : Motion
-        The same at the moments at which the output was read.
-    stretches : ndarray of bool, shape (B,)
-        Where laws are fitted: everywhere, or in stretches spread over a long recording.
-    """
+    """One recording of a fit, in blocks."""
 
     record: Record
-    length: int
+    length: int  # samples per block
     tangent: Tangent
-    error: FloatArray
-    weight: FloatArray
-    motion: Motion
-    reading: Motion
-    stretches: BoolArray
+    error: FloatArray  # (B,): measured less simulated output, averaged over the block's good samples
+    weight: FloatArray  # (B,): how many samples of the block count
+    motion: Motion  # as the fit has it, in the middle of each block
+    reading: Motion  # the same at the moments at which the output was read
+    stretches: BoolArray  # (B,): where laws are fitted
 
     @property
     def okay(self) -> BoolArray:
@@ -152,7 +132,6 @@ def _line(result: FitResult, index: int, length: int, force: Force) -> Line:
 
 
 def spread_stretches(blocks: int, most: int) -> BoolArray:
-    """Return which blocks of a recording are used: all, or evenly spread stretches of at most so many; (blocks,)."""
     used = np.ones(blocks, dtype=np.bool_)
     if blocks <= most:
         return used

@@ -27,28 +27,14 @@ from estimator.signals.record import FloatArray
 
 
 class Chain(NamedTuple):
-    """The line as the input sees it, over B blocks, or 1 that stands for all.
+    """The line as the input sees it, over B blocks, or 1 that stands for all."""
 
-    Attributes
-    ----------
-    phi : ndarray, shape (B, n, n)
-        How the state moves on.
-    drive : ndarray, shape (B, n)
-        How the input acts on it.
-    c, direct : ndarray, shapes (B, n) and (B,)
-        How state and input show in the output.
-    memory : float
-        Share of the input that is there in the next block.
-    walk : float
-        Variance of its change from block to block.
-    """
-
-    phi: FloatArray
-    drive: FloatArray
-    c: FloatArray
-    direct: FloatArray
-    memory: float
-    walk: float
+    phi: FloatArray  # (B, n, n): how the state moves on
+    drive: FloatArray  # (B, n): how the input acts on it
+    c: FloatArray  # (B, n): how state and input show in the output
+    direct: FloatArray  # (B, n): how state and input show in the output
+    memory: float  # share of the input that is there in the next block
+    walk: float  # variance of its change from block to block
 
 
 class Filtered(NamedTuple):
@@ -215,38 +201,21 @@ SEARCH_TOLERANCE = 0.15
 
 @dataclass(frozen=True, slots=True)
 class Input:
-    """The input at one place of one recording; arrays of shape (B,), one value per block.
+    """The input at one place of one recording; arrays of shape (B,), one value per block."""
 
-    Attributes
-    ----------
-    value, std : ndarray
-        Estimate and its standard error: torque that drives the motor, torque the shaft carries beyond its law, torque
-        against the load [Nm], or error of the reading [unit of the output].
-    motion : Motion
-        What then happens in the line, in the middle of each block.
-    """
-
-    value: FloatArray
+    value: FloatArray  # estimate and its standard error
     std: FloatArray
-    motion: Motion
+    motion: Motion  # what then happens in the line, in the middle of each block
 
 
 @dataclass(frozen=True, slots=True)
 class Explanation:
-    """The inputs at one place, one per recording.
-
-    Attributes
-    ----------
-    rate : float
-        Standard deviation of the walk's change in one second [unit of the input].
-    log_likelihood : float
-        Of the error, at the best rate.
-    """
+    """The inputs at one place, one per recording."""
 
     place: Place
     inputs: tuple[Input, ...]
-    rate: float
-    log_likelihood: float
+    rate: float  # standard deviation of the walk's change in one second [unit of the input]
+    log_likelihood: float  # of the error, at the best rate
 
 
 def explain(result: FitResult, cut: Sequence[Line], place: Place, floor: float) -> Explanation:

@@ -67,12 +67,10 @@ def _case(problem: Problem, x: FloatArray, index: int, load_nm: FloatArray) -> C
 
 
 def motion_of(result: FitResult, index: int) -> Motion:
-    """Simulate every state of one recording at a fit, at every sample."""
     return motion_in_blocks(result.problem.records[index], states_of(result, index), 1)
 
 
 def states_of(result: FitResult, index: int, force: Force = NO_FORCE) -> dict[str, FloatArray]:
-    """Simulate every state of one recording at a fit; the angle is by the recording's own output."""
     wanted = (state_vector.SPEED, state_vector.TWIST, state_vector.LOAD_SPEED)
     speed, twist, load_speed = (simulated(result, index, force, state) for state in wanted)
     if result.problem.grid.structure is Structure.ONE_MASS:
@@ -82,7 +80,6 @@ def states_of(result: FitResult, index: int, force: Force = NO_FORCE) -> dict[st
 
 
 def motion_in_blocks(record: Record, states: dict[str, FloatArray], length: int) -> Motion:
-    """Return sampled states of one recording, with its time and torque, averaged over blocks."""
     return Motion(
         block_mean(record.time_s, length),
         block_mean(record.total_torque_nm, length),

@@ -34,21 +34,11 @@ def terms_of(matrix: FloatArray) -> Terms:
 
 
 class Gains(NamedTuple):
-    """What the filter of a recording does with N samples of C outputs.
+    """What the filter of a recording does with N samples of C outputs."""
 
-    Attributes
-    ----------
-    predictor : ndarray, shape (N, C, m)
-        How the innovation of each output moves the next state's prediction.
-    cross : ndarray, shape (N, C, C)
-        How it moves the predictions of the outputs after it.
-    spread : ndarray, shape (N, C)
-        Standard deviation of each innovation; infinite where it was not observed.
-    """
-
-    predictor: FloatArray
-    cross: FloatArray
-    spread: FloatArray
+    predictor: FloatArray  # (N, C, m): how the innovation of each output moves the next state's prediction
+    cross: FloatArray  # (N, C, C): how it moves the predictions of the outputs after it
+    spread: FloatArray  # (N, C): standard deviation of each innovation
 
 
 @inlined
@@ -112,7 +102,6 @@ def is_as_before(observed: BoolArray, t: int) -> bool:
 
 @inlined
 def add_input(at_input: FloatArray, n: int, variance: float, p: FloatArray) -> None:
-    """Add to a covariance what input n of this variance does to it."""
     for i in range(p.shape[0]):
         for k in range(p.shape[0]):
             p[i, k] += variance * at_input[n, i] * at_input[n, k]
@@ -130,7 +119,6 @@ def fill_gains(
     unread: FloatArray,
     gains: Gains,
 ) -> None:
-    """Fill the gains of a recording."""
     count, m = h.shape
     room = (np.empty((m, m)), np.empty((count, m)), np.empty((count, m)), np.zeros(m), np.empty(count))
     fill_gains_in(f, h, q, r, prior.copy(), observed, at_input, unread, gains, room)

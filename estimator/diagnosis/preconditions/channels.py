@@ -42,7 +42,6 @@ def period_of(values: FloatArray, seen: BoolArray) -> float | None:
 
 
 def _motion(steps: FloatArray, jumps: BoolArray, at: int) -> float:
-    """Return the step that the motion itself makes at a jump: the mean of those around it."""
     around = [i for i in (at - 1, at + 1) if 0 <= i < steps.size and not jumps[i]]
     return float(np.mean(steps[around])) if around else 0.0
 

@@ -37,34 +37,17 @@ TURNS_AND_LINES = (Motion.ROTATION, Motion.TRANSLATION)
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One mistake that is a factor.
+    """One mistake that is a factor."""
 
-    Attributes
-    ----------
-    question : str
-        What to ask; ``{0}`` is the factor, ``{1}`` its inverse, ``{2}`` and ``{3}`` the rated value behind per cent and
-        per mille.
-    low, high : float
-        What the column is to be multiplied by is between them, evenly in its logarithm.
-    prior : float
-        How often it is made, over how often a recording is right and the model lacks physics.
-    kinds, motions
-        The outputs and motions it can be made with.
-    reads : (float, float) or None
-        Between them is the largest torque as it is read, where the mistake says that; else any usual torque.
-    whole : bool
-        Whether the torques then are whole numbers.
-    """
-
-    question: str
+    question: str  # what to ask
     part: Part
-    low: float
+    low: float  # what the column is to be multiplied by is between them, evenly in its logarithm
     high: float
     prior: float
     kinds: tuple[OutputKind, ...] = (OutputKind.SPEED, OutputKind.POSITION, OutputKind.ACCELERATION)
-    motions: tuple[Motion, ...] = (Motion.ROTATION,)
+    motions: tuple[Motion, ...] = (Motion.ROTATION,)  # the outputs and motions it can be made with
     reads: tuple[float, float] | None = None
-    whole: bool = False
+    whole: bool = False  # whether the torques then are whole numbers
 
 
 _SPEED, _POSITION = (OutputKind.SPEED,), (OutputKind.POSITION,)

@@ -111,7 +111,6 @@ NOTHING = Inertia(math.nan, 0.0)
 
 
 def fitted_inertia(record: Record, line: DrivelineModel, grid: Grid | None) -> Inertia | None:
-    """Return the inertia that a recording fits; None where it does not tell."""
     first_hz = float(natural_frequencies_rad_s(line.values())[0]) / (2.0 * math.pi)
     apart, found = math.nan, as_one_body(record, line, first_hz)
     if grid is not None and 0.0 < ABOVE[0] * first_hz < 0.5 / record.sample_time_s:
@@ -168,7 +167,6 @@ def as_one_body(record: Record, line: DrivelineModel, first_hz: float) -> Inerti
 
 
 def _integrals(record: Record) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return speed, impulse of the torque, and angle; each of shape (N,)."""
     speed = measured_speed(record)
     good = np.flatnonzero(np.isfinite(speed))
     speed = np.interp(np.arange(speed.size), good, speed[good])

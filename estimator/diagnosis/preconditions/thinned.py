@@ -68,7 +68,6 @@ def not_read(channel: str, values: FloatArray, seen: BoolArray, may_rest: bool) 
 
 
 def _runs(rows: BoolArray) -> list[tuple[int, int]]:
-    """Return first and behind the last of each run of true values."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], rows.astype(np.int8), [0]])))
     return [(int(first), int(last)) for first, last in edges.reshape(-1, 2)]
 

@@ -148,7 +148,6 @@ def _text(
 
 
 def _follows(explanation: Explanation, record: Record, line: DrivelineModel) -> str:
-    """Return what an explanation makes of the largest torque and output that were read."""
     torque, unit = ("torque", "Nm") if line.motion is Motion.ROTATION else ("force", "N")
     read_nm, read = largest(record)
     follows = f", {torque}s up to {explanation.torque_nm:.3g} {unit} then" if explanation.torque_nm != read_nm else ""
@@ -158,7 +157,6 @@ def _follows(explanation: Explanation, record: Record, line: DrivelineModel) -> 
 
 
 def _cured(record: Record, cure: Cure) -> Record:
-    """Return a recording with a cure applied."""
     if cure.swapped is not None or cure.kind is not None:
         same = (
             change

@@ -1,11 +1,4 @@
-"""The search for a law at one element: its state, the first look, and further looks from where the law has led.
-
-The first look goes by what the error of the re-tuned model promises; single readings that are off by far, which no
-motion of the line explains, are set aside. A large mismatch is more than a small disturbance of the re-tuned model. A
-further round simulates with the law found and with what it changes of the parameters, looks at the error from there,
-and chooses anew; a step that does not make the simulation better is shortened (Gauss-Newton over the model's unknowns
-and the law's coefficients).
-"""
+"""The search for a law at one element: its state, the first look, and further looks from where the law has led."""
 
 from __future__ import annotations
 
@@ -41,20 +34,11 @@ small thing left out but a way to cancel what is there."""
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """A law and what it costs.
-
-    Attributes
-    ----------
-    terms : tuple of (str, float)
-        Its terms with their coefficients or, of several coefficients, the RMS of what they do.
-    coefficients : int
-    choices : float
-        Logarithm of the number of laws it was chosen among.
-    """
+    """A law and what it costs."""
 
     terms: tuple[tuple[str, float], ...]
     coefficients: int
-    choices: float
+    choices: float  # logarithm of the number of laws it was chosen among
 
     def information(self, before: float, after: float, n: float) -> float:
         """Return what the law gains in BIC, its choice paid for."""
@@ -66,42 +50,20 @@ NO_LAW = Found((), 0, 0.0)
 
 @dataclass(frozen=True, slots=True)
 class ElementSearch:
-    """The state of the search at one element.
-
-    Attributes
-    ----------
-    view, ground : Scene, Ground
-        Where it looks from, and what re-tuning could explain there.
-    pool : int
-        How many forms were tried.
-    forms : list of Form
-        Those that further rounds choose from.
-    weights : list of ndarray, shape (B,)
-        The law that ``view`` is simulated with, per recording: zero in the first round.
-    law : Found
-        That law; in the first round the one the path promises.
-    mean_square : float
-        What it leaves of the error.
-    errors : list of ndarray
-        That error, per recording.
-    stuck : bool
-        True where no step made the simulation better.
-    rounds : int
-        How many the search at all elements has behind it.
-    """
+    """The state of the search at one element."""
 
     element: Element
-    view: Scene
+    view: Scene  # where it looks from, and what re-tuning could explain there
     ground: Ground
-    pool: int
-    forms: list[Form]
+    pool: int  # how many forms were tried
+    forms: list[Form]  # those that further rounds choose from
     path: Path
-    weights: list[FloatArray]
-    law: Found
-    mean_square: float
-    errors: list[FloatArray]
-    stuck: bool
-    rounds: int = 1
+    weights: list[FloatArray]  # (B,): the law that ``view`` is simulated with, per recording
+    law: Found  # that law
+    mean_square: float  # what it leaves of the error
+    errors: list[FloatArray]  # that error, per recording
+    stuck: bool  # true where no step made the simulation better
+    rounds: int = 1  # how many the search at all elements has behind it
 
 
 def worthwhile(state: ElementSearch) -> int:
@@ -121,7 +83,6 @@ def worthwhile(state: ElementSearch) -> int:
 
 
 def cost(state: ElementSearch, terms: int, named: tuple[tuple[str, float], ...] = ()) -> Found:
-    """Return the law of the first terms of a path, with what it costs."""
     return Found(named, state.path.coefficients[terms], terms * math.log(state.pool))
 
 
@@ -175,7 +136,6 @@ def outliers(errors: Sequence[FloatArray]) -> list[BoolArray]:
 
 
 def distance_from_neighbours(error: FloatArray) -> FloatArray:
-    """Return how far each value is from its neighbours' median; 0 at the ends, with neighbours on one side only."""
     distance: FloatArray = error - median_filter(error, NEIGHBOURS, mode="nearest")
     ends = NEIGHBOURS // 2
     distance[:ends] = distance[-ends:] = 0.0
@@ -208,12 +168,6 @@ def first(view: Scene, ground: Ground, element: Element) -> ElementSearch:
 
 
 def first_along_motion(view: Scene, plain: Ground, element: Element) -> ElementSearch:
-    """Look for a law as a function of the motion that goes with an unknown input at the element's place.
-
-    Along the true motion the line with other parameters and a law is the line as it is under further torques, exactly,
-    however large they are: a better start for a large mismatch. The motion holds some of the error, and a law may copy
-    it from there; whether it is one shows when it is simulated.
-    """
     inputs = view.explanations[PLACES[element]].inputs
     cut = tuple(replace(line, motion=each.motion) for line, each in zip(view.cut, inputs, strict=True))
     along = replace(view, cut=cut)
@@ -244,12 +198,7 @@ def _from(view: Scene, element: Element, ground: Ground) -> ElementSearch:
 
 
 def _without_outliers(state: ElementSearch) -> ElementSearch:
-    """Take single readings that are off for the law, where that is worth a coefficient each.
-
-    They have pulled the fit away from the others: a slow error that is no reason to doubt them. How far the rest is
-    from its neighbours shows how many samples are independent. A torque that is missing for a moment stands out
-    in the innovations, too, and not in what is read.
-    """
+    """Take single readings that are off for the law, where that is worth a coefficient each."""
     errors = state.ground.split(state.ground.error)
     off = [seen & near(read) for seen, read in zip(outliers(errors), outliers(state.view.as_read), strict=True)]
     count = sum(int(each.sum()) for each in off)
@@ -300,7 +249,6 @@ def _given_up(state: ElementSearch) -> ElementSearch:
 
 
 def without_law(state: ElementSearch) -> FitResult:
-    """Return the model that a state has come to, simulated without its law."""
     result = state.view.result
     outputs = tuple(simulated(result, i) for i in range(len(state.view.cut)))
     return replace(result, outputs=outputs)
@@ -333,7 +281,6 @@ def _mean_square(errors: Sequence[FloatArray]) -> float:
 
 
 def _squares(view: Scene, result: FitResult) -> float:
-    """Return the sum of squares of the error of simulated outputs, whitened where the view is."""
     if view.filter is None:
         left = residual_at(result.problem, result.outputs)
         return float(left @ left)

@@ -227,7 +227,6 @@ def _changes(result: FitResult, element: Element, motions: Sequence[Motion]) -> 
 
 
 def _steps(result: FitResult, element: Element, motions: Sequence[Motion]) -> list[Form]:
-    """Return steps of the load torque at every moment of a grid, and slow courses, each in one recording alone."""
     one_mass = result.problem.grid.structure is Structure.ONE_MASS
     if element is not (Element.MOTOR if one_mass else Element.LOAD):
         return []

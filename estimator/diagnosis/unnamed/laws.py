@@ -63,7 +63,6 @@ def peaked(speed: FloatArray, share: float) -> FloatArray:
 
 
 def fading(speed: FloatArray, share: float) -> FloatArray:
-    """Return a friction that fades away over a share of the top speed (Stribeck)."""
     friction: FloatArray = sign(speed) * np.exp(-np.abs(speed) / (share * top_of(speed)))
     return friction
 
@@ -101,7 +100,6 @@ def rising(values: FloatArray, motion: Motion, time_s: float) -> FloatArray:
 
 
 def at_low_speed(values: FloatArray, motion: Motion, share: float) -> FloatArray:
-    """Return a signal that fades with the speed, over a share of its top."""
     faded: FloatArray = values / (1.0 + (motion.speed / (share * top_of(motion.speed))) ** 2)
     return faded
 
@@ -143,12 +141,10 @@ def _twist_rate(m: Motion) -> FloatArray:
 
 
 def _of(function: Callable[[FloatArray, float], FloatArray], signal: Law, size: float) -> Law:
-    """Return a function with one size of a signal."""
     return lambda m: function(signal(m), size)
 
 
 def _with(function: Callable[[FloatArray, Motion, float], FloatArray], signal: Law, time_s: float) -> Law:
-    """Return a function with one time of a signal and of its course."""
     return lambda m: function(signal(m), m, time_s)
 
 

@@ -4,9 +4,6 @@ A law acts as a torque at motor, shaft or load, in the torque path, or as an err
 the motion that goes with an unknown input at its own place (``line.equivalent``), so that it is taken at
 the speed and the twist that were there and not at those of a simulation that lacks it. The answer of the output to it
 is that of the linearised line.
-
-What re-tuning could explain is projected out first. Pati, Rezaiifar, Krishnaprasad, Asilomar 1993, on the Gram matrix
-of all answers: a choice costs one sweep of it.
 """
 
 from __future__ import annotations
@@ -32,20 +29,10 @@ BATCH = 2**18
 
 @dataclass(frozen=True, slots=True)
 class Pool:
-    """Laws without a name at one element: functions with a coefficient each, and the output's answers to them.
+    """Laws without a name at one element: functions with a coefficient each, and the output's answers to them."""
 
-    Attributes
-    ----------
-    laws : tuple of str
-        The laws, as text.
-    group : ndarray of int, shape (width,)
-        To which law each function belongs, in order.
-    answers : ndarray, shape (width, rows)
-        Change of the output per unit of each coefficient, over the blocks in use of all recordings.
-    """
-
-    laws: tuple[str, ...]
-    group: IntArray
+    laws: tuple[str, ...]  # the laws, as text
+    group: IntArray  # (width,): to which law each function belongs, in order
     answers: FloatArray
 
     def of(self, laws: Sequence[int]) -> FloatArray:
@@ -115,37 +102,18 @@ Indices = NDArray[np.intp]
 
 @dataclass(frozen=True, slots=True)
 class Path:
-    """A pursuit.
-
-    Attributes
-    ----------
-    squares, coefficients : list
-        Sum of squares left after 0, 1, 2 ... groups, and how many coefficients those have.
-    chosen : list of int
-        Groups, in order.
-    columns, rest : ndarray, shape (rows, q)
-        Their answers, and what re-tuning leaves of these.
-    term : ndarray of int, shape (q,)
-        Which choice, from 0, each column belongs to.
-    alone : ndarray, shape (groups,)
-        How much of the error's power each group explains by itself.
-    error : ndarray, shape (rows,)
-        What re-tuning leaves of the error.
-    triangle : ndarray, shape (q, q)
-    target : ndarray, shape (q,)
-        Factors of ``rest``, and the error along its orthonormal basis: of the first columns they are the first of each.
-    """
+    """A pursuit."""
 
     squares: list[float]
     coefficients: list[int]
-    chosen: list[int]
-    columns: FloatArray
+    chosen: list[int]  # groups, in order
+    columns: FloatArray  # their answers, and what re-tuning leaves of these
     rest: FloatArray
-    term: Indices
-    alone: FloatArray
-    error: FloatArray
+    term: Indices  # (q,): which choice, from 0, each column belongs to
+    alone: FloatArray  # (groups,): how much of the error's power each group explains by itself
+    error: FloatArray  # (rows,): what re-tuning leaves of the error
     triangle: FloatArray
-    target: FloatArray
+    target: FloatArray  # (q,): factors of ``rest``, and the error along its orthonormal basis
 
     def solved(self, terms: int, ridge: float) -> tuple[FloatArray, FloatArray]:
         """Return the coefficients of the first terms, and what they leave of the error, shape (rows,)."""

@@ -95,17 +95,7 @@ def elements(result: FitResult) -> tuple[Element, ...]:
 
 
 class Ground:
-    """What the free unknowns of a fit could explain, to first order; rows are the blocks in use of all recordings.
-
-    Attributes
-    ----------
-    raw, error : ndarray, shape (rows,)
-        The error, and what re-tuning would leave of it.
-    jacobian : ndarray, shape (rows, U)
-        Derivative of the output by every unknown.
-    basis : ndarray, shape (rows, F)
-        Orthonormal basis of what the free unknowns move.
-    """
+    """What the free unknowns of a fit could explain, to first order; rows are the blocks in use of all recordings."""
 
     def __init__(self, cut: Sequence[Line], jacobian: FloatArray, error: FloatArray, pinned: BoolArray) -> None:
         self.jacobian, self.raw, self.unknowns = jacobian, error, jacobian.shape[1]
@@ -119,7 +109,6 @@ class Ground:
         return left
 
     def split(self, rows: FloatArray) -> list[FloatArray]:
-        """Split rows into one array per recording."""
         return list(np.split(rows, self._sizes))
 
 

@@ -82,12 +82,10 @@ AXES: Mapping[Element, tuple[Axis, ...]] = {
 
 
 def signal_unit(dimension: str, kind: Kind) -> str:
-    """Return the unit of a signal of a dimension."""
     return f"{unit('speed', kind)}/s" if dimension == "speed/s" else unit(dimension, kind)
 
 
 def input_unit(place: Place, result: FitResult, kind: Kind) -> str:
-    """Return the unit of an input at a place."""
     if place is not Place.SENSOR:
         return unit("torque", kind)
     names = {"speed": "speed", "position": "angle", "force": "torque"}
@@ -102,18 +100,10 @@ FEWEST_PASSES = 3
 
 @dataclass(frozen=True, slots=True)
 class Binned:
-    """Data and a law over the bins that the signal passes often enough, and how much of the law they tell.
+    """Data and a law over the bins that the signal passes often enough, and how much of the law they tell."""
 
-    Attributes
-    ----------
-    arrays : tuple of ndarray, shape (K,) each
-        Signal, data, lower and upper end of the data's 95 % interval, and law.
-    explained : float
-        Share of the law's power that is a function of the signal.
-    """
-
-    arrays: tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]
-    explained: float
+    arrays: tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]  # (K,)
+    explained: float  # share of the law's power that is a function of the signal
 
 
 def binned_by_pass(
@@ -200,7 +190,6 @@ def picture(
 
 
 def _as_error(line: Line, difference: FloatArray) -> Line:
-    """Return a line whose error is a difference of simulations."""
     good = np.ones(difference.size, dtype=np.bool_)
     return replace(line, error=block_mean_of(difference, good, line.length)[0])
 

@@ -92,12 +92,7 @@ FEWEST_BLOCKS = 8
 
 
 def responses(before: FitResult, after: FitResult) -> dict[str, Response]:
-    """Return the response of each recording and of both models in it; recordings too short or masked have none.
-
-    Torque and output are differenced first: that changes no response, and a slow course of the speed does not leak. The
-    models' responses are estimated from their simulations in the same way, so that what the method distorts is alike.
-    A joint has none: its torque is the output.
-    """
+    """Return the response of each recording and of both models in it; recordings too short or masked have none."""
     found: dict[str, Response] = {}
     if before.problem.grid.structure is Structure.JOINT:
         return found
@@ -209,7 +204,6 @@ def intervals(result: FitResult, floor: float) -> dict[str, tuple[Interval, ...]
 
 
 def _merged(spans: Sequence[Interval]) -> list[Interval]:
-    """Join intervals that are closer than a window."""
     joined: list[Interval] = []
     for low, high in spans:
         if joined and low - joined[-1][1] < WINDOW_S:

@@ -4,14 +4,6 @@ A drive of two masses has three states: one rigid motion and one twist with its 
 it holds one more, which a zero nearly cancels or which stands for what the sampling did. Balanced truncation (B. C.
 Moore, IEEE Trans. Automatic Control 26, 1981) leaves out the states that are both hard to reach from the input and
 hard to see in the output. Its error is bounded at every frequency (D. F. Enns, 1984)::
-
-    |G(f) - G_r(f)|  <=  2 (sigma_(r+1) + ... + sigma_n)
-
-with sigma the Hankel singular values; the bound tells what the left-out order was worth.
-
-With the input held between samples, ``exp([[A_c, B_c], [0, 0]] T) = [[A, B], [0, 1]]`` (Astrom and Wittenmark,
-Computer-Controlled Systems, chapter 2); its matrix logarithm takes a sampled model back to continuous time, zeros and
-all. Signals that were decimated through a low-pass were not held: their zeros, unlike their poles, are off.
 """
 
 from __future__ import annotations
@@ -93,28 +85,15 @@ at 1, as those of fast recordings do, rounding may put one of them outside."""
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Reduced:
-    """A model of lower order and what it left out.
+    """A model of lower order and what it left out."""
 
-    Attributes
-    ----------
-    model : LinearModel
-        Of the order asked for, or of the original one where that is no higher.
-    covariance : ndarray, shape (n, n), or None
-        Of its theta; None if that of the original was not given.
-    hankel : ndarray
-        Hankel singular values of the original, largest first [output unit per input unit].
-    largest_error : float
-        Bound of the change of the frequency response at any frequency [output unit per input unit].
-    """
-
-    model: LinearModel
-    covariance: FloatArray | None
+    model: LinearModel  # of the order asked for, or of the original one where that is no higher
+    covariance: FloatArray | None  # of its theta
     hankel: FloatArray
     largest_error: float
 
 
 def third_order(model: LinearModel, covariance: FloatArray | None = None) -> Reduced:
-    """Return the third-order equivalent of a stable model."""
     return reduce_order(model, THIRD, covariance)
 
 

@@ -3,11 +3,6 @@
 The delta method: for a function g of parameters with covariance P, ``cov g = G P G^T``, G its derivative (L. Ljung,
 System Identification, 2nd ed., section 9.A), taken along the principal axes of P where it is taken by differences:
 where poles and zeros cancel, single coefficients may move far, but only together.
-
-A simple root z of ``c_0 z^n + ... + c_n`` moves with its coefficients by ``dz / dc_i = -z^(n-i) / p'(z)``; at a double
-root p' vanishes, and its standard deviation is infinite, which is what the data say. Frequency and damping follow
-through ``s = ln(z) / T``. A pole and a zero cancel if their difference d is no larger than its own uncertainty,
-``d^T cov(d)^-1 d`` within its chi-square quantile: both are estimated from the same data and move together.
 """
 
 from __future__ import annotations
@@ -40,18 +35,11 @@ STEP = 0.01
 
 @dataclass(frozen=True, slots=True)
 class Uncertain:
-    """A number and its standard deviation; infinite where the data say nothing of it.
-
-    Attributes
-    ----------
-    value, std : float
-    interval : tuple of float, optional
-        Interval of 95 %, where it is not that of a normal distribution.
-    """
+    """A number and its standard deviation; infinite where the data say nothing of it."""
 
     value: float
     std: float
-    interval: tuple[float, float] | None = None
+    interval: tuple[float, float] | None = None  # interval of 95 %, where it is not that of a normal distribution
 
     @property
     def ci95(self) -> tuple[float, float]:
@@ -79,7 +67,6 @@ def square_root(covariance: FloatArray) -> FloatArray:
 def propagate(
     function: Callable[[FloatArray], FloatArray], parameters: FloatArray, covariance: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return a function's value, shape (m,), and its covariance, shape (m, m)."""
     axes = square_root(covariance).T
     value = function(parameters)
     slopes = [(function(parameters + STEP * axis) - function(parameters - STEP * axis)) / (2.0 * STEP) for axis in axes]
@@ -131,19 +118,11 @@ FAR = 1e6
 
 @dataclass(frozen=True, slots=True)
 class Cancellation:
-    """A pole and a zero that the data can't tell apart.
+    """A pole and a zero that the data can't tell apart."""
 
-    Attributes
-    ----------
-    pole, zero : complex
-        In z; of a conjugate pair the one with positive imaginary part.
-    p_value : float
-        Probability of a distance at least this large if they were one.
-    """
-
-    pole: complex
+    pole: complex  # in z
     zero: complex
-    p_value: float
+    p_value: float  # probability of a distance at least this large if they were one
 
     @property
     def statement(self) -> str:
@@ -186,17 +165,10 @@ def _distance(poles: Roots, i: int, zeros: Roots, j: int, P: FloatArray, freedom
 
 @dataclass(frozen=True, slots=True, eq=False)
 class UncertainRoot:
-    """A pole or zero in z.
-
-    Attributes
-    ----------
-    value : complex
-    covariance : ndarray, shape (2, 2)
-        Of its real and imaginary part; the second row is 0 for a real root.
-    """
+    """A pole or zero in z."""
 
     value: complex
-    covariance: FloatArray
+    covariance: FloatArray  # of its real and imaginary part
 
     def ellipse(self, confidence: float = CONFIDENCE, points: int = 73) -> ComplexArray:
         """Return the outline of the confidence region, closed, shape (points,); a segment for a real root."""

@@ -1,14 +1,5 @@
 """Off-line fits of a whole recording: output error and Box-Jenkins, from record to model, covariance and free run.
 
-Output error: the prediction-error method on the free-run simulation (:mod:`problem` has the equations); consistent
-whatever the colour of the noise on y as long as torque does not follow speed; its covariance takes the colour into
-account. Box-Jenkins: ``y = B / A u + 1 / D w``, w white. The sum of w^2 over A, B and D together is least at the
-maximum-likelihood estimate (Box and Jenkins, Time Series Analysis, chapter 11; Ljung, System Identification, 2nd ed.,
-section 7.4). D is long, a second: road, grade and the driver's slow changes are the noise's, and no pole of the
-driveline has to follow them. The covariance is that of the joint estimate, so that what feedback correlates, plant and
-noise, widens the intervals. On 200 buses on a road, with a driver, the errors of frequency and damping were 0.24 and
-0.38 times those of the output-error fit (``python -m tests.benchmarks.identification``).
-
 Two figures of merit, never one without the other. *Free run*: the output simulated from the input alone, which is what
 a model is for. *One step*: the next output predicted with the last measured ones at hand; on slow signals it is near
 100 % for any model.
@@ -36,7 +27,6 @@ PERIOD_TOLERANCE = 0.02
 
 
 def require_identifiable(record: Record, orders: Orders) -> None:
-    """Refuse a recording that can't determine a model of these orders."""
     stamped_s = float(np.median(np.diff(record.time_s))) if record.time_s.shape[0] > 1 else record.sample_time_s
     if abs(stamped_s - record.sample_time_s) > PERIOD_TOLERANCE * record.sample_time_s:
         raise BadSetting(
@@ -56,45 +46,19 @@ class Method(Enum):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LinearFit:
-    """A fitted model and how well it does.
+    """A fitted model and how well it does."""
 
-    Attributes
-    ----------
-    method : Method
-        Which estimator.
-    model : LinearModel
-        Transfer function.
-    covariance : ndarray, shape (na+nb, na+nb)
-        Covariance of theta, the residual's colour taken into account.
-    state : ndarray, shape (n_states + 1,)
-        ``[c, h]``: numerator of the free response from sample ``first`` of the data, and that of the high-pass.
-    first : int
-        First good sample; the simulation starts there.
-    rms : float
-        RMS of the free-run simulation error [output unit].
-    fit_percent : float
-        ``100 (1 - |y - yhat| / |y - mean y|)`` in free run, the normalised RMS fit (not R squared).
-    one_step_fit_percent : float
-        The same for the prediction one step ahead.
-    noise : NoiseModel
-        Of the free-run residual; predicts one step ahead.
-    block : int
-        Samples whose mean residual is one sample to the noise model.
-    n_samples : int
-        Good samples used.
-    """
-
-    method: Method
-    model: LinearModel
-    covariance: FloatArray
-    state: FloatArray
-    first: int
-    rms: float
+    method: Method  # which estimator
+    model: LinearModel  # transfer function
+    covariance: FloatArray  # covariance of theta, the residual's colour taken into account
+    state: FloatArray  # (n_states + 1,): ``[c, h]``
+    first: int  # first good sample
+    rms: float  # RMS of the free-run simulation error [output unit]
     fit_percent: float
-    one_step_fit_percent: float
-    noise: NoiseModel
-    n_samples: int
-    block: int = 1
+    one_step_fit_percent: float  # the same for the prediction one step ahead
+    noise: NoiseModel  # of the free-run residual
+    n_samples: int  # good samples used
+    block: int = 1  # samples whose mean residual is one sample to the noise model
 
     def simulate(self, u: FloatArray) -> FloatArray:
         """Free-run simulation over the data's inputs, shape (N,); the time before ``first`` is 0."""
@@ -206,7 +170,6 @@ def summarised(
 
 
 def fit_output_error(record: Record, orders: Orders | None = None) -> LinearFit:
-    """Fit an output-error model to a recording's total torque and output."""
     problem, first = problem_of(record, orders)
     x = problem.solve(starts(problem))
     noise = fit_noise(problem.blocks.mean(problem.error(x)), problem.blocks.okay, reach(problem.period_s))
@@ -259,29 +222,16 @@ def _spread(problem: Problem, x: FloatArray) -> tuple[FloatArray, NoiseModel]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FreeRun:
-    """Free-run simulation next to the measurement.
+    """Free-run simulation next to the measurement."""
 
-    Attributes
-    ----------
-    name : str
-        The recording.
-    error : ndarray, shape (N,)
-        Measured less simulated output [output unit]; NaN where there is none.
-    rms : float
-        Of the good samples [output unit].
-    fit_percent, one_step_fit_percent : float
-        In free run, and one step ahead with the noise model given.
-    """
-
-    name: str
-    error: FloatArray
-    rms: float
-    fit_percent: float
+    name: str  # the recording
+    error: FloatArray  # (N,): measured less simulated output [output unit]; NaN where there is none
+    rms: float  # of the good samples [output unit]
+    fit_percent: float  # in free run, and one step ahead with the noise model given
     one_step_fit_percent: float
 
 
 def free_run(model: LinearModel, record: Record, noise: NoiseModel) -> FreeRun:
-    """Simulate a recording with a model."""
     period_s = record.sample_time_s
     if not np.isclose(period_s, model.sample_time_s, rtol=1e-3) or not model.is_stable:
         raise BadModel(

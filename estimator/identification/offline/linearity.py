@@ -1,11 +1,5 @@
 """Whether a linear model is enough: a score test on what makes a driveline's response nonlinear.
 
-With the linear model right, its innovation w(t) is independent of everything that was known at t - 1, so also of any
-nonlinear function of the torque in the shaft or of the speed. Piecewise linear functions of both, whose knots lie at
-quantiles, at zero torque (a gap) and at standstill (dry friction), drive the model as inputs of their own; w is
-regressed on their whitened responses next to its own gradient (T. S. Breusch and A. R. Pagan, Review of Economic
-Studies 47, 1980; an LM test in its F form, which holds in closed loop as well)::
-
     F = ((S_0 - S_1) / q) / (S_1 / (n - p - q))
 
 The step that the linear parameters take when the functions are let in is what the nonlinearity has done to them.
@@ -48,22 +42,12 @@ LAGS = (1, 2, 3)
 
 @dataclass(frozen=True, slots=True)
 class Linearity:
-    """The test's result.
+    """The test's result."""
 
-    Attributes
-    ----------
-    p_value : float
-        Probability of an F at least this large on a linear drive.
-    by_torque, by_speed : float
-        The same for functions of the shaft's torque alone, and of the speed alone.
-    effect : float
-        What the functions explain of the innovations beyond chance, RMS over RMS.
-    """
-
-    p_value: float
-    by_torque: float
+    p_value: float  # probability of an F at least this large on a linear drive
+    by_torque: float  # the same for functions of the shaft's torque alone, and of the speed alone
     by_speed: float
-    effect: float = 1.0
+    effect: float = 1.0  # what the functions explain of the innovations beyond chance, RMS over RMS
 
     @property
     def is_linear(self) -> bool:
@@ -114,7 +98,6 @@ def _knotted(signal: FloatArray, settled: float | None = None) -> FloatArray:
 def _responses(
     problem: Problem, x: FloatArray, model: LinearModel, inputs: FloatArray, high_pass_hz: float
 ) -> FloatArray:
-    """Return the whitened response to each function of a signal and lag, shape (n, functions * lags)."""
     chain = [Decimator(problem.sample_time_s, 1, high_pass_hz) for _ in inputs.T]
     passed = [one.run(f, f, np.ones(f.shape, dtype=np.bool_)).u for one, f in zip(chain, inputs.T, strict=True)]
     filtered = [lfilter([1.0], model.A, f) for f in passed]

@@ -5,13 +5,6 @@ Burg's method (J. P. Burg, 1967; S. M. Kay, Modern Spectral Estimation, chapter 
 at a time from the forward error f and the backward error g::
 
     k_m = - 2 sum f_(m-1)(t) g_(m-1)(t-1) / sum (f_(m-1)(t)^2 + g_(m-1)(t-1)^2)
-
-|k_m| < 1, so that D is always stable. The sums run over unbroken stretches alone, so that masked samples do no harm.
-
-The covariance of a fit whose residual e = w / D is coloured (L. Ljung, System Identification, 2nd ed., section 9.4)::
-
-    cov theta = R^-1 Q R^-1,      R = sum psi psi^T,      Q = sigma_w^2 sum psi_h psi_h^T
-    psi_h(t)  = sum_i h_i psi(t+i),   h the impulse response of 1 / D
 """
 
 from __future__ import annotations
@@ -34,18 +27,10 @@ SAMPLES_PER_COEFFICIENT = 10
 
 @dataclass(frozen=True, slots=True, eq=False)
 class NoiseModel:
-    """The autoregression of a residual.
+    """The autoregression of a residual."""
 
-    Attributes
-    ----------
-    D : ndarray, shape (p+1,)
-        Coefficients in q^-1, leading 1; ``[1]`` for white noise.
-    std : float
-        Standard deviation of w [output unit].
-    """
-
-    D: FloatArray
-    std: float
+    D: FloatArray  # (p+1,): coefficients in q^-1, leading 1; ``[1]`` for white noise
+    std: float  # standard deviation of w [output unit]
 
     @property
     def order(self) -> int:

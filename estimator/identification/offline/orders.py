@@ -4,10 +4,6 @@ Every candidate is a Box-Jenkins model with a noise model of its own, all of one
 criterion (G. Schwarz, Annals of Statistics 6, 1978) counts innovations, which are independent::
 
     BIC = N ln(mean of w^2) + (number of parameters) ln N
-
-A slow pole more can still fit what the load does slowly. Both signals therefore pass a high-pass at the lower end of
-the band in which a driveline resonates. Cross-validation is shown with it: the free-run fit on recordings that took no
-part.
 """
 
 from __future__ import annotations
@@ -38,24 +34,12 @@ pole would be taken to explain."""
 
 @dataclass(frozen=True, slots=True)
 class Candidate:
-    """One structure and how it did.
-
-    Attributes
-    ----------
-    orders : Orders
-    criterion : float
-        BIC less that of the best.
-    rms : float
-        Of the whitened simulation error [output unit].
-    unseen_fit_percent : float
-        Free-run fit over all recordings held out; NaN if there are none.
-    model : LinearModel
-    """
+    """One structure and how it did."""
 
     orders: Orders
-    criterion: float
-    rms: float
-    unseen_fit_percent: float
+    criterion: float  # BIC less that of the best
+    rms: float  # of the whitened simulation error [output unit]
+    unseen_fit_percent: float  # free-run fit over all recordings held out
     model: LinearModel
 
 
@@ -67,7 +51,6 @@ class OrderChoice:
 
     @property
     def chosen(self) -> Orders:
-        """Orders of the best candidate."""
         return self.candidates[0].orders
 
     @property
@@ -91,7 +74,6 @@ class OrderChoice:
 
 
 def select_orders(record: Record, among: Sequence[Orders] = DEFAULT, unseen: Sequence[Record] = ()) -> OrderChoice:
-    """Choose order and delay."""
     if not among:
         raise BadSetting("order selection: 0 candidates, expected one or more. Give the orders to choose from.")
     prepared, *others = (_prepared(one) for one in (record, *unseen))

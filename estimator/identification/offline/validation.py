@@ -1,20 +1,9 @@
 """Whether a model is right: free run first, then whether what it leaves has to do with the input.
 
-An output-error model is judged by its transfer function, so by the independence of residual and past input; whiteness
-of the residual is a matter of the noise model, and its autocorrelation is shown besides without a verdict (L. Ljung,
-System Identification, 2nd ed., section 16.6). Both signals are made white first, the residual by its own
-autoregression D and the input by one of its own (G. E. P. Box, G. M. Jenkins, Time Series Analysis, "prewhitening"),
-so that under independence each correlation is normal with variance 1 / N, whatever the colours, and those at m lags
-together::
-
     r(tau) = sum w(t) v(t - tau) / sqrt(sum w^2 sum v^2),      N sum r(tau)^2 ~ chi-square(m)
 
 From one sample of delay on (past input) they tell that B / A is wrong; below (the input answers the residual, at once
 or later) they tell of feedback.
-
-A driver, a cruise controller or an anti-jerk function that answers the speed carries noise from the output back into
-the input (ibid., section 13.4). Judge that at the recording's own period: decimated signals were low-passed, and their
-present output goes with a little of the input to come.
 """
 
 from __future__ import annotations
@@ -49,24 +38,12 @@ LEAST_DELAY = 1
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CorrelationTest:
-    """Correlations by lag with the bound that 95 % of them keep if there is none.
+    """Correlations by lag with the bound that 95 % of them keep if there is none."""
 
-    Attributes
-    ----------
-    lag : ndarray of int, shape (m,)
-        Samples.
-    correlation : ndarray, shape (m,)
-    bound : float
-        95 % of independent correlations are smaller in size.
-    p_value : float
-        Probability of correlations like these if there are none: of their sum of squares, which sees many small
-        ones, or of the largest, which sees a single one; the smaller, counted twice for the choice.
-    """
-
-    lag: IntArray
-    correlation: FloatArray
-    bound: float
-    p_value: float
+    lag: IntArray  # (m,): samples
+    correlation: FloatArray  # (m,)
+    bound: float  # 95 % of independent correlations are smaller in size
+    p_value: float  # probability of correlations like these if there are none
 
     @property
     def is_independent(self) -> bool:
@@ -78,27 +55,13 @@ class CorrelationTest:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Validation:
-    """What can be said for and against a fit.
+    """What can be said for and against a fit."""
 
-    Attributes
-    ----------
-    own : FreeRun
-        On the recording it was fitted to.
-    unseen : tuple of FreeRun
-        On others: cross-validation.
-    independence : CorrelationTest
-        Residual against past input; the judge of B / A.
-    feedback : CorrelationTest
-        Residual against input too late to have caused it.
-    autocorrelation : CorrelationTest
-        Of the free-run residual, not whitened; shown, no judge of B / A.
-    """
-
-    own: FreeRun
-    unseen: tuple[FreeRun, ...]
-    independence: CorrelationTest
-    feedback: CorrelationTest
-    autocorrelation: CorrelationTest
+    own: FreeRun  # on the recording it was fitted to
+    unseen: tuple[FreeRun, ...]  # on others
+    independence: CorrelationTest  # residual against past input
+    feedback: CorrelationTest  # residual against input too late to have caused it
+    autocorrelation: CorrelationTest  # of the free-run residual, not whitened
 
     @property
     def statement(self) -> str:
@@ -114,7 +77,6 @@ class Validation:
 
 
 def validate(fit: LinearFit, record: Record, unseen: Sequence[Record] = (), lags: int = LAGS) -> Validation:
-    """Validate a fit on its own recording and on others."""
     own = free_run(fit.model, record, fit.noise)
     tests = residual_tests(own.error, record, fit.block, min(fit.model.nk, LEAST_DELAY), lags)
     return Validation(own, tuple(free_run(fit.model, other, fit.noise) for other in unseen), *tests)
@@ -183,7 +145,6 @@ def correlation_test(e: FloatArray, x: FloatArray, okay: BoolArray, lags: IntArr
 
 
 def _product(e: FloatArray, x: FloatArray, lag: int) -> float:
-    """Return sum of e(t) x(t - lag)."""
     if lag >= 0:
         return float(e[lag:] @ x[: x.shape[0] - lag])
     return float(e[:lag] @ x[-lag:])
@@ -195,15 +156,7 @@ SIGNIFICANCE = 0.01
 
 @dataclass(frozen=True, slots=True)
 class Feedback:
-    """Whether there was feedback and what it means.
-
-    Attributes
-    ----------
-    detected : bool
-    p_value : float
-        Probability of a correlation with later input at least this large without feedback.
-    statement : str
-    """
+    """Whether there was feedback and what it means."""
 
     detected: bool
     p_value: float

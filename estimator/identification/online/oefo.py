@@ -4,33 +4,6 @@ Nevaranta, Montonen, Lindh, "Online Estimation of a Mechanical Driveline Paramet
 ECCE Europe, equations (1) to (7); I. D. Landau and G. Zito, Digital Control Systems (Springer, 2006),
 chapters 3 and 5. With t for the paper's k + 1 and the total delay nk (its d = 1 is nk = 1, see
 ``linear_model``)::
-
-    phi(t-1)^T = [-yhat(t-1) .. -yhat(t-na), u(t-nk) .. u(t-nk-nb+1)]                       (3)
-    Phi(t-1)   = phi(t-1) / L(q^-1)                                                          (7)
-    e0(t)      = y(t) - theta(t-1)^T phi(t-1)                     a priori error             (1)
-    e(t)       = e0(t) / (1 + Phi^T F(t-1) Phi)                   a posteriori error         (6)
-    theta(t)   = theta(t-1) + F(t-1) Phi e(t)                                                (4)
-    F(t)^-1    = lambda_1 F(t-1)^-1 + lambda_2 Phi Phi^T                                     (5)
-    yhat(t)    = theta(t)^T phi(t-1)                              fed back into phi
-
-One departure from the printed paper, on purpose: its (3) shows measured outputs -y in the regressor. That is
-the least-squares regressor; noise on y would bias it. An output-error algorithm (the paper's own name for it,
-and Landau and Zito's chapter 5) has the *predicted* outputs there, and that is what stands here.
-
-L is an estimate of A from an earlier batch output-error model (the paper), or follows the present A_hat
-(:attr:`Filtering.ADAPTED`, known as AFOLOE). Then the last A_hat that was stable keeps filtering while the
-present one is not.
-
-The filter may be left out for the first samples (``start_up_samples``; the printed algorithm is 0). With
-theta(0) = 0 and a large F(0) the first predictions are a few times too large, and 1 / L of a lightly damped
-pair makes that ten times more: F then shrinks on what was no information, and theta stays where it was
-thrown. In 24 simulated cruises the worst damping error fell from 10 % to 1.5 % by leaving the filter out for
-80 samples.
-
-Guards, since nothing may raise or run away in the loop: a masked output, or one that is no number or beyond
-1e30, leaves theta and F as they are while time advances with the prediction; an input of that kind is held,
-and its samples are masked; a prediction beyond 1000 times the largest output seen starts again from the
-measured one; without excitation F stops growing at tr F(0).
 """
 
 from __future__ import annotations
@@ -165,7 +138,6 @@ class Oefo(RegressionEstimator):
 
 
 def _of_length(L: FloatArray, length: int) -> FloatArray:
-    """Return L with zeros behind it: where A_hat will take its place, it has the length of A_hat from the start."""
     given = np.array(L, dtype=np.float64)
     if given.ndim != 1 or given.shape[0] > length:
         raise BadModel(

@@ -32,52 +32,24 @@ class Feed(Enum):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Setup:
-    """What estimators are made from; each takes what it needs.
+    """What estimators are made from; each takes what it needs."""
 
-    Attributes
-    ----------
-    orders : Orders
-        Structure of the transfer functions; of it the Kalman filter takes the delay.
-    sample_time_s : float
-        Period of the samples that will come [s].
-    adaptation : Adaptation
-        Adaptation-gain profile.
-    L : ndarray, optional
-        Observation filter's denominator, from a batch model. None: OEFO's follows its estimate, RIV has none.
-    start_up_samples : int
-        Good samples at the start without the filter.
-    two_mass : TwoMass, optional
-        Start values of the physical parameters.
-    noise : EkfNoise
-        For the Kalman filter.
-    """
-
-    orders: Orders = field(default_factory=Orders)
-    sample_time_s: float = 0.02
-    adaptation: Adaptation = field(default_factory=DecreasingThenConstantTrace)
-    L: FloatArray | None = None
-    start_up_samples: int = 0
-    two_mass: TwoMass | None = None
-    noise: EkfNoise = field(default_factory=EkfNoise)
+    orders: Orders = field(default_factory=Orders)  # structure of the transfer functions
+    sample_time_s: float = 0.02  # period of the samples that will come [s]
+    adaptation: Adaptation = field(default_factory=DecreasingThenConstantTrace)  # adaptation-gain profile
+    L: FloatArray | None = None  # observation filter's denominator, from a batch model
+    start_up_samples: int = 0  # good samples at the start without the filter
+    two_mass: TwoMass | None = None  # start values of the physical parameters
+    noise: EkfNoise = field(default_factory=EkfNoise)  # for the Kalman filter
 
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """An estimator that can be asked for by name.
+    """An estimator that can be asked for by name."""
 
-    Attributes
-    ----------
-    title : str
-        What it is, for a reader.
-    make : callable
-        Makes one, ready for samples.
-    feed : Feed
-        The samples it is made for.
-    """
-
-    title: str
-    make: Callable[[Setup], RecursiveEstimator]
-    feed: Feed = Feed.FILTERED
+    title: str  # what it is, for a reader
+    make: Callable[[Setup], RecursiveEstimator]  # makes one, ready for samples
+    feed: Feed = Feed.FILTERED  # the samples it is made for
 
     def __call__(self, setup: Setup) -> RecursiveEstimator:
         """Make one, ready for samples."""

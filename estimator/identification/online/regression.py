@@ -225,38 +225,7 @@ def tell(y_hat: float, e_prior: float, e_post: float, used: bool, stable: bool, 
 
 
 class RegressionEstimator(RecursiveEstimator):
-    """An estimator that corrects theta along F Phi; what differs is what stands in phi and Phi.
-
-    Parameters
-    ----------
-    name, block
-        As for every compiled estimator.
-    past : mapping
-        Shapes of the past values its step keeps, by name.
-    orders : Orders
-        Structure of the model.
-    adaptation : Adaptation, optional
-        Adaptation-gain profile; the paper's by default.
-    L : ndarray, shape (m,)
-        ``1, l_1 ..``: denominator of the observation filter.
-    adapts_filter : bool
-        Whether A_hat takes the place of L.
-    start_up_samples : int
-        Good samples at the start that the step treats apart.
-    theta : ndarray, shape (na+nb,), optional
-        Start values; zero by default. Choose a small initial gain with them.
-    extra_names : tuple of str
-        Parameters besides those of the transfer function, estimated along.
-
-    Raises
-    ------
-    BadSetting
-        If ``start_up_samples`` is negative.
-    BadModel
-        If L can't filter: see :func:`checked_filter`.
-    BadShape
-        If ``theta`` is not na + nb finite numbers.
-    """
+    """An estimator that corrects theta along F Phi; what differs is what stands in phi and Phi."""
 
     def __init__(
         self,

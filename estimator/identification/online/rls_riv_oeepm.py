@@ -6,51 +6,6 @@ In the notation of :mod:`estimator.identification.online.oefo`, its equations (1
 
 L. Ljung, System Identification, 2nd ed. (Prentice Hall, 1999), section 11.2; I. D. Landau and G. Zito, Digital
 Control Systems (Springer, 2006), section 3.2. In the notation of :mod:`estimator.identification.online.oefo`::
-
-    phi(t-1)^T = [-y(t-1) .. -y(t-na), u(t-nk) .. u(t-nk-nb+1)]        measured outputs
-    Phi(t-1)   = phi(t-1)                                              nothing is filtered
-
-with equations (1) and (4) to (6) of the paper. It minimises the sum of squares of A y - B u, and is right where that
-is white. White noise w on the *measured output* alone makes it A w, which correlates with phi: theta is then wrong
-however long the run, and the damping of a light resonance most of all. That bias is why the paper takes another.
-
-A missing output is missing from the next na regressors too: they are left out, exactly as rows of a least-squares
-problem. In time advances with the prediction.
-
-**Recursive instrumental variable with auxiliary model (RIV): least squares, with the noise taken out of its gain.**
-
-P. C. Young, Recursive Estimation and Time-Series Analysis, 2nd ed. (Springer, 2011), chapter 7; I. D. Landau and G.
-Zito, Digital Control Systems (Springer, 2006), section 5.5 (IVAM). An auxiliary model, the present estimate as long as
-it is stable and else the last that was, simulates the output from the torque alone::
-
-    x(t)       = theta_s^T [-x(t-1) .. -x(t-na), u(t-nk) .. u(t-nk-nb+1)]               auxiliary model
-    phi(t-1)   = [-y(t-1) .. -y(t-na), u(t-nk) .. u(t-nk-nb+1)] / L(q^-1)               measured outputs
-    Phi(t-1)   = [-x(t-1) .. -x(t-na), u(t-nk) .. u(t-nk-nb+1)] / L(q^-1)               instruments
-    e0(t)      = y(t) / L(q^-1) - theta(t-1)^T phi(t-1)
-
-with equations (4) to (6). The instruments carry no measurement noise, so that noise of any colour on the output does
-not bias the estimate. L = A makes A w / L white for white w: then it is Young's refined estimator (SRIV), and no
-unbiased one has less variance. L = 1 is the plain instrumental variable, whose variance at a light resonance is large.
-
-For the first ``start_up_samples``, and while A_hat is not stable, it is least squares, Phi = phi: what a model made of
-nothing simulates is no instrument, and (4) with a bad one moves away from the truth instead of towards it.
-In place of a missing output its simulated one stands in phi, which at the true parameters is right but for the noise.
-``y_hat`` is the auxiliary model's output; the errors are filtered by 1 / L.
-
-**Recursive output error with extended prediction model (OEEPM): the noise is modelled, so that no filter is needed.**
-
-I. D. Landau and G. Zito, Digital Control Systems (Springer, 2006), section 5.4 (output error with extended
-prediction model). The a-posteriori errors stand in the regressor next to the predicted outputs::
-
-    phi(t-1)^T = [-yhat(t-1) .. -yhat(t-na), u(t-nk) .. u(t-nk-nb+1), e(t-1) .. e(t-na)]
-    Phi(t-1)   = phi(t-1)
-    theta^T    = [a_1 .. a_na, b_1 .. b_nb, h_1 .. h_na],          h_i = c_i - a_i
-
-with equations (1) and (4) to (6), and e(t) = y(t) - theta(t)^T phi(t-1). It is the optimal predictor of
-A y = B u + C w, w white: with yhat = y - e the first terms give -A* y + B u + C* e. White noise on the output alone is
-C = A, that is h = 0. Convergence is certain without noise, and with it where 1/C - 1/2 is strictly positive real;
-with C = A lightly damped it is not, which is what OEFO's filter is for. ``theta`` of the interface is a and b alone;
-the h_i are :attr:`Trajectory.extra`'s business and :attr:`OeEpm.h`.
 """
 
 from __future__ import annotations
@@ -108,17 +63,7 @@ def rls_block(u: FloatArray, y: FloatArray, okay: BoolArray, memory: NDArray[np.
 
 
 class Rls(RegressionEstimator):
-    """The estimator with its state; ``y_hat`` predicts one step ahead, from measured outputs.
-
-    Parameters
-    ----------
-    orders : Orders
-        Structure of the model.
-    adaptation : Adaptation
-        Adaptation-gain profile; the paper's by default.
-    theta : ndarray, shape (na+nb,), optional
-        Start values; zero by default.
-    """
+    """The estimator with its state; ``y_hat`` predicts one step ahead, from measured outputs."""
 
     def __init__(
         self, orders: Orders | None = None, adaptation: Adaptation | None = None, theta: FloatArray | None = None
@@ -173,28 +118,7 @@ def riv_block(u: FloatArray, y: FloatArray, okay: BoolArray, memory: NDArray[np.
 
 
 class Riv(RegressionEstimator):
-    """The estimator with its state.
-
-    Parameters
-    ----------
-    L : ndarray, shape (m,)
-        ``1, l_1 ..``: denominator of the filter of all signals; ``[1.0]`` is none.
-    orders : Orders
-        Structure of the model.
-    adaptation : Adaptation
-        Adaptation-gain profile; the paper's by default.
-    start_up_samples : int
-        Good samples at the start that are learnt from by least squares.
-    theta : ndarray, shape (na+nb,), optional
-        Start values; zero by default.
-
-    Raises
-    ------
-    BadSetting
-        If ``start_up_samples`` is negative.
-    BadModel
-        If L does not start with 1, is not finite, or has a root on or outside the unit circle.
-    """
+    """The estimator with its state."""
 
     def __init__(
         self,
@@ -246,17 +170,7 @@ def oeepm_block(u: FloatArray, y: FloatArray, okay: BoolArray, memory: NDArray[n
 
 
 class OeEpm(RegressionEstimator):
-    """The estimator with its state; ``y_hat`` predicts from the torque and the errors so far.
-
-    Parameters
-    ----------
-    orders : Orders
-        Structure of the model.
-    adaptation : Adaptation
-        Adaptation-gain profile; the paper's by default.
-    theta : ndarray, shape (na+nb,), optional
-        Start values of a and b; zero by default.
-    """
+    """The estimator with its state; ``y_hat`` predicts from the torque and the errors so far."""
 
     def __init__(
         self, orders: Orders | None = None, adaptation: Adaptation | None = None, theta: FloatArray | None = None

@@ -4,17 +4,8 @@ Roots by simultaneous iteration (Weierstrass; E. Durand 1960, I. O. Kerner, Nume
 
     z_i  <-  z_i - A(z_i) / prod_{j != i} (z_i - z_j)
 
-It converges quadratically: from the poles of the sample before in two or three rounds. Two real poles that become a
-pair can't be found so, since real values stay real; then, and at the start, the rounds begin at points that lie on no
-axis of symmetry, and take about ten.
-
 A mode is the part rho / (1 - p q^-1) and its conjugate in the partial fractions of B / A. With the residue rho held,
 its output changes with the natural frequency f by::
-
-    psi(t) = dy/df = 2 Re [ rho dp/df q^-1 / (1 - p q^-1)^2 ] u(t),      dp/df = 2 pi T p (-zeta + j sqrt(1 - zeta^2))
-
-Not u but its steps u(t) - u(t-1) are passed, and whatever psi is held against is taken in steps as well: what driver
-and grade do far below the resonance then hardly enters.
 """
 
 from __future__ import annotations

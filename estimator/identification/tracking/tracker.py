@@ -35,17 +35,7 @@ class Tracked:
 
 
 class Tracker:
-    """The three with their state; memory does not grow.
-
-    Parameters
-    ----------
-    estimator : RecursiveEstimator
-        Of an output-error model; fresh.
-    follower : Follower
-        For its models.
-    watch : ChangeWatch
-        For its models, with blocks of the same length.
-    """
+    """The three with their state; memory does not grow."""
 
     def __init__(self, estimator: RecursiveEstimator, follower: Follower, watch: ChangeWatch) -> None:
         self._estimator, self._follower, self.watch = estimator, follower, watch
@@ -124,7 +114,6 @@ class Tracker:
 
 
 def _without_resonance(found: Followed) -> Followed:
-    """Return what was followed without the resonance: one that was found in noise."""
     nothing = np.full(found.frequency_hz.shape, np.nan)
     return Followed(nothing, nothing, nothing, nothing, nothing)
 

@@ -59,7 +59,6 @@ def quadratic_law(speed: float, drag: float, exponent: float, at: float) -> floa
 
 
 def quadratic_scales(model: Driveline, records: Sequence[Record]) -> tuple[float, ...]:
-    """Return a twentieth of the torque in use at the top speed, 1, and the top speed."""
     top = speed_scale(records)
     return (0.05 * torque_scale(records) / top**2, 1.0, top)
 
@@ -84,7 +83,6 @@ def other_power(size: str, scale: float, values: Mapping[str, float]) -> list[Re
 
 
 def quadratic_testable(model: Driveline, records: Sequence[Record]) -> Untestable | None:
-    """Need speeds that differ, or else it is the constant load."""
     if speeds_differ(records):
         return None
     return Untestable("the speed is the same all along: not separable from the constant load torque", "reversal")
@@ -273,7 +271,6 @@ def cold_part(time_s: float, cold: float, time_constant_s: float) -> float:
 def warming_described(
     model: Driveline, values: Mapping[str, float], line: Mapping[str, float]
 ) -> Mapping[str, tuple[Span, ...]]:
-    """Return the friction from warm to cold."""
     name = "b_L" if "b_L" in line else "b_M"
     return {name: ((line[name], line[name] + values["cold_nm_s"]),)}
 
@@ -313,7 +310,6 @@ def gears_law(torque: float, sign: float, driving: float, back: float) -> float:
 
 
 def gears_testable(model: Driveline, records: Sequence[Record]) -> Untestable | None:
-    """Need both signs of torque and of speed, or else it is a gain of the torque or a constant load."""
     if turns(model, records) and any(torque_reverses(record) for record in records):
         return None
     return Untestable("torque or speed never change sign: not separable from gain and constant load", "reversal")

@@ -55,7 +55,6 @@ GENERATOR_COUPLED = Effect(
 def payload_described(
     model: Driveline, values: Mapping[str, float], line: Mapping[str, float]
 ) -> Mapping[str, tuple[Span, ...]]:
-    """Return the load's inertia before and after."""
     name = load_inertia(model)
     before, after = line[name], line[name] + values["change_kg_m2"]
     return {name: ((before, before), (after, after))}

@@ -241,12 +241,7 @@ LIGHTEST = 0.005
 def coupling(
     vehicle: float, slip_per_nm: float, creep_speed: float, wheel_share: float, steepest: float
 ) -> tuple[float, float]:
-    """Return the torque per slide [Nm s/rad] at a vehicle speed, and the share of the inertia on the wheel's side.
-
-    A light wheel on a steep curve follows faster than an integration step can. There it is made heavier at the
-    vehicle's cost, by as much as the step needs: so near to rigid the split changes next to nothing. ``steepest`` is
-    the load's inertia times the fastest decay the step can follow [Nm s/rad].
-    """
+    """Return the torque per slide [Nm s/rad] at a vehicle speed, and the share of the inertia on the wheel's side."""
     slope = 1.0 / (slip_per_nm * (abs(vehicle) + creep_speed))
     needed = slope / steepest
     enough = wheel_share * (1.0 - wheel_share) >= needed

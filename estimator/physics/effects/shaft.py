@@ -184,7 +184,6 @@ def stiffness_retold(
 
 
 def stiffness_sentence(values: Mapping[str, float], motion: Motion) -> str:
-    """Say what was found, as the twist at which the stiffness has changed by a tenth."""
     if stage := values.get("stage_share", 0.0):
         side, at = ("stiffer", values["stage_rad"]) if stage > 0 else ("softer", values["stage_rad"])
         return f"the shaft has two stages: {abs(stage):.0%} {side} beyond a twist of {at:.3g} {unit('angle', motion)}"
@@ -224,7 +223,6 @@ STIFFNESS_NONLINEARITY = Effect(
 def stiffness_step_described(
     model: Driveline, values: Mapping[str, float], line: Mapping[str, float]
 ) -> Mapping[str, tuple[Span, ...]]:
-    """Return the stiffness before and after."""
     before, after = line["k"], line["k"] * (1.0 + values["change"])
     return {"k": ((before, before), (after, after))}
 

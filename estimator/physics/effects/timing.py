@@ -40,22 +40,12 @@ EQUAL_POLES = 1e-6
 
 
 class LowPass(NamedTuple):
-    """A low-pass over steps of one length: what is left, behind a step, of its output and of its rate times ``tau``.
+    """A low-pass over steps of one length: what is left, behind a step, of its output and of its rate times ``tau``."""
 
-    Attributes
-    ----------
-    time_constant, shape : float
-        ``tau`` [s] and ``s``.
-    turns : float
-        Length of a step in ``tau``.
-    output_of_output, output_of_rise, rise_of_output, rise_of_rise : float
-        What is left of a unit of each in each, without an input.
-    """
-
-    time_constant: float
+    time_constant: float  # ``tau`` [s] and ``s``
     shape: float
-    turns: float
-    output_of_output: float
+    turns: float  # length of a step in ``tau``
+    output_of_output: float  # what is left of a unit of each in each, without an input
     output_of_rise: float
     rise_of_output: float
     rise_of_rise: float
@@ -177,13 +167,7 @@ ACTUATOR_LAG = Effect(
 
 @compiled
 def delayed(torque: FloatArray, before: float, start: float, length: float) -> tuple[float, float]:
-    """Return a zero-order-held torque over ``[start, start + length]`` [samples], length at most 1, as a straight line.
-
-    Its mean and its rise from end to end [Nm]: the line with the mean and the first moment of the jump. A mean alone
-    would take from a torque at 10 Hz 1.6 % of its amplitude over a step of 10 ms, and an inertia would be that much
-    off. Until the first sample the torque is ``before`` [Nm], after the last it is held at that one: the end of the
-    last period may come out one rounding error late. Both are continuous in ``start``, which a fit needs.
-    """
+    """Return a zero-order-held torque over ``[start, start + length]``, at most a sample, as a straight line."""
     end = start + length
     last_row = torque.size - 1
     first = min(math.floor(start), last_row)
@@ -276,7 +260,6 @@ further off ends where another of its periods matches."""
 
 
 def drift_unresolved(model: Driveline, records: Sequence[Record], values: Mapping[str, float]) -> str:
-    """Object to clocks that part by less than a tenth of a sampling period over the longest recording."""
     least_s = 0.1 * min(record.sample_time_s for record in records)
     parted_s = abs(values["rate"]) * longest_s(records)
     if parted_s >= least_s:

@@ -302,7 +302,6 @@ def bias_starts(model: Driveline, records: Sequence[Record]) -> list[Start]:
 
 
 def bias_testable(model: Driveline, records: Sequence[Record]) -> Untestable | None:
-    """Need the load torque, or time to drift."""
     if is_load_known(model) or longest_s(records) >= LEAST_S:
         return None
     reason = f"every recording is shorter than {LEAST_S:g} s and the constant load torque is unknown"

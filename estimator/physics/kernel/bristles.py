@@ -4,11 +4,6 @@ A contact under friction is a spring until it breaks away; sliding, it follows t
 distance and not by a time::
 
     dT_f/dt = s (w - |w| T_f / g(w)),    s = (T_c + T_x) / x_b
-
-with the deflection ``x_b`` at breakaway (Dahl, AIAA J. 14(12), 1976; with g, Canudas de Wit, Olsson, Åström and
-Lischinsky, IEEE Trans. Automat. Contr. 40(3), 1995). At a constant speed it has an exact solution. It is taken for half
-a sub-step before the line moves under this torque, and for half a one behind (Strang's splitting, of second order). At
-the load ``g`` is constant, but a brake's is there for a while only: bristles hold no more than it is at the moment.
 """
 
 from __future__ import annotations
@@ -62,7 +57,6 @@ def at_motor(torque: float, x: State, now: Conditions, p: FloatArray, time_s: fl
 
 @inlined
 def at_load(line: Line, torque: float, x: State, now: Conditions, p: FloatArray, time_s: float) -> float:
-    """Return the same of the load's, or of its wheels'."""
     speed, inverse_inertia = x.load_speed, now.inverse_load
     if line.masses == 1:
         speed, inverse_inertia = x.speed, now.inverse_motor

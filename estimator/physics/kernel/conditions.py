@@ -22,28 +22,12 @@ from estimator.signals.record import FloatArray
 
 
 class Line(NamedTuple):
-    """What a line is made of.
+    """What a line is made of."""
 
-    Attributes
-    ----------
-    masses : int
-        1, 2 or 3.
-    elastic : bool
-        Whether the first shaft is a spring and a damper, and no law next to them.
-    sliding : bool
-        Whether there may be a slider inside that shaft.
-    extended : bool
-        Whether it has states beyond those of its masses and a slider: an extra mode, a tyre that slips, a shaft that
-        relaxes.
-    own : tuple
-        Empty, or the torque readings, a user's own laws as one function, and what they are given of the moment: time
-        [s] and torque reading [Nm].
-    """
-
-    masses: int
-    elastic: bool
-    sliding: bool
-    extended: bool
+    masses: int  # 1, 2 or 3
+    elastic: bool  # whether the first shaft is a spring and a damper, and no law next to them
+    sliding: bool  # whether there may be a slider inside that shaft
+    extended: bool  # whether it has states beyond those of its masses and a slider
     own: tuple[Any, ...]
 
 
@@ -123,7 +107,6 @@ def with_law(before: Total, law: Callable[..., float], values: Callable[..., Any
 
 
 def total(place: Place, given: int = 1) -> Total:
-    """Return the sum of all laws of a place, which are given one quantity or two."""
     if given == 1:
         summed: Total = assembled(lambda x, p: like(0.0, x))
     else:
@@ -136,7 +119,6 @@ def total(place: Place, given: int = 1) -> Total:
 
 
 def terms_of(place: Place) -> tuple[Term, ...]:
-    """Return the laws that entries declare for a place, each with the places of its parameters."""
     return tuple(
         (entry.acting.law, tuple(slot(entry.name, parameter.name) for parameter in entry.parameters))
         for entry in BUILT_IN.values()

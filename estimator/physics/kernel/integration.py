@@ -49,25 +49,13 @@ from estimator.signals.record import FloatArray, IntArray
 
 
 class Feed(NamedTuple):
-    """What is known of a torque's way before it begins.
+    """What is known of a torque's way before it begins."""
 
-    Attributes
-    ----------
-    shifted : bool
-        Whether it is delayed, or its clock another.
-    delay, begun : float
-        The delay, and the time at sample 0 [samples].
-    before_all : float
-        The torque before the first sample [Nm].
-    lag : LowPass
-        What it lags behind.
-    """
-
-    shifted: bool
-    delay: float
+    shifted: bool  # whether it is delayed, or its clock another
+    delay: float  # the delay, and the time at sample 0 [samples]
     begun: float
-    before_all: float
-    lag: LowPass
+    before_all: float  # the torque before the first sample [Nm]
+    lag: LowPass  # what it lags behind
 
 
 @inlined

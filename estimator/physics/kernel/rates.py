@@ -44,7 +44,6 @@ def _at_moment(line: Any, time_s: Any, k: Any) -> Any:
 
 
 def under_own(now: Conditions, line: Line, x: State, p: FloatArray) -> Conditions:
-    """Return the conditions with the torques of a line's own laws on the motor and against the load."""
     if len(line.own) == 0:
         return now
     if line.masses == 1:

@@ -24,40 +24,20 @@ RELAXING, LAGGED, LAG_RISE, FILTERED, FILTER_RISE, BRISTLES_MOTOR, BRISTLES_LOAD
 
 
 class State(NamedTuple):
-    """Mechanical state.
+    """Mechanical state."""
 
-    Attributes
-    ----------
-    angle, speed : float
-        Of the motor [rad, rad/s].
-    twist : float
-        Of the (first) shaft [rad].
-    load_speed : float
-        Of the load, or of the wheels where the tyre slips [rad/s].
-    loading : float
-        Of the shaft's slider, from -1 to 1.
-    vehicle_speed, traction : float
-        Of the vehicle behind the tyre [rad/s], and the torque of a tyre that has to roll to build it up [Nm].
-    branch_twist, branch_speed : float
-        Of the extra mode: of its spring, and of its inertia [rad, rad/s].
-    middle_twist, middle_speed : float
-        Twist of the second shaft [rad] and speed of the mass before it [rad/s].
-    relaxing : float
-        Torque of the branch in the first shaft that relaxes [Nm].
-    """
-
-    angle: float
+    angle: float  # of the motor [rad, rad/s]
     speed: float
-    twist: float
-    load_speed: float
-    loading: float
+    twist: float  # of the (first) shaft [rad]
+    load_speed: float  # of the load, or of the wheels where the tyre slips [rad/s]
+    loading: float  # of the shaft's slider, from -1 to 1
     vehicle_speed: float
-    branch_twist: float
+    branch_twist: float  # of the extra mode
     branch_speed: float
-    middle_twist: float
+    middle_twist: float  # twist of the second shaft [rad] and speed of the mass before it [rad/s]
     middle_speed: float
     traction: float
-    relaxing: float
+    relaxing: float  # torque of the branch in the first shaft that relaxes [Nm]
 
 
 @inlined
@@ -77,21 +57,9 @@ class Bristles(NamedTuple):
 
 
 class Tyre(NamedTuple):
-    """What the law of a tyre takes from its parameters; inverses, because a division takes as long as a law.
+    """What the law of a tyre takes from its parameters; inverses, because a division takes as long as a law."""
 
-    Attributes
-    ----------
-    tread : float
-        Torque per slip [Nm].
-    least_relaxation : float
-        Angle to roll for a torque to build up that the step can follow at standstill [rad].
-    winding : float
-        Damping by the carcass at standstill, as far as the step can follow it [Nm s/rad].
-    inverse_creep, inverse_grip, inverse_wheel, inverse_vehicle : float
-        Of the speed below which it creeps [rad/s], of the grip [Nm] and of the inertias before and behind it [kg m^2].
-    """
-
-    tread: float
+    tread: float  # torque per slip [Nm]
     least_relaxation: float
     winding: float
     inverse_creep: float
