@@ -16,27 +16,33 @@ from dataclasses import dataclass, replace
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from estimator.diagnosis.assemble import Z95
 from estimator.diagnosis.first_use import compile_kernels, is_first_use
-from estimator.diagnosis.hypotheses import Effects, Progress, line_values, silent
 from estimator.diagnosis.inference.answer import Found, answer
-from estimator.diagnosis.inference.calibration import ALIKE_WITHIN, LEAST_PROBABILITY, TEMPERED
+from estimator.diagnosis.inference.checks import ALIKE_WITHIN, GRADE, LEAST_PROBABILITY, TEMPERED
 from estimator.diagnosis.inference.disturbances import whitener_of
+from estimator.diagnosis.inference.hypotheses import (
+    Effects,
+    Hypothesis,
+    Progress,
+    covariance,
+    line_values,
+    of_first_outputs,
+    silent,
+)
 from estimator.diagnosis.inference.judge import Grounds, tempered_by
-from estimator.diagnosis.inference.likelihood import Hypothesis, covariance, of_first_outputs
-from estimator.diagnosis.inference.plausible import GRADE
 from estimator.diagnosis.inference.search import Search
-from estimator.diagnosis.intervals import Z95
 from estimator.diagnosis.preconditions import prepare
 from estimator.diagnosis.result import Diagnosis
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import FitResult, fit
-from estimator.physics.grid import grid_for
 from estimator.physics.jacobian import jacobian_at
+from estimator.physics.layout import grid_for
 from estimator.physics.model import DrivelineModel, EffectValue, parameter_unit
+from estimator.physics.parallel import Work
 from estimator.physics.problem import make_problem, parameters
 from estimator.physics.simulate import MASSES
 from estimator.physics.unknowns import Shared, own_unknowns
-from estimator.physics.work import Work
 from estimator.signals.record import FloatArray, Record
 
 MOST_OPEN = 4

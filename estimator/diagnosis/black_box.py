@@ -20,10 +20,9 @@ from estimator.physics.catalogue import BUILT_IN
 from estimator.physics.driveline import Case, Start
 from estimator.physics.effect import Effect, Element
 from estimator.physics.fit import FitResult, fit, make_problem
-from estimator.physics.grid import Grid, grid_for
 from estimator.physics.inputs import load_of
 from estimator.physics.kernel import state_vector
-from estimator.physics.layout import LOAD, NOMINAL, flat, slot
+from estimator.physics.layout import LOAD, NOMINAL, Grid, flat, grid_for, slot
 from estimator.physics.model import DrivelineModel, Parameter, Structure
 from estimator.physics.motion import measured_speed
 from estimator.physics.simulate import simulate, simulate_each

@@ -8,13 +8,13 @@ from collections.abc import Sequence
 from threadpoolctl import threadpool_limits
 
 from estimator.diagnosis.first_use import COMPILING, compile_kernels, compile_laws, is_first_use
-from estimator.diagnosis.hypotheses import Progress, silent
 from estimator.diagnosis.inference.answer import answer
+from estimator.diagnosis.inference.hypotheses import Progress, silent
 from estimator.diagnosis.preconditions import prepare
 from estimator.diagnosis.result import Diagnosis
 from estimator.physics.model import DrivelineModel
+from estimator.physics.parallel import Work
 from estimator.physics.simulate import MASSES
-from estimator.physics.work import Work
 from estimator.signals.record import Record
 
 BUDGET_S = math.inf

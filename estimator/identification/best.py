@@ -14,8 +14,8 @@ from enum import Enum
 import numpy as np
 
 from estimator.identification.linear_model import Orders
+from estimator.identification.modes.modes import Cancellation, UncertainMode, pole_zero_map, uncertain_modes
 from estimator.identification.modes.physical import RESPONDING
-from estimator.identification.modes.uncertainty import Cancellation, UncertainMode, pole_zero_map, uncertain_modes
 from estimator.identification.offline.fits import LinearFit, fit_of, solved
 from estimator.identification.offline.linearity import (
     Linearity,
@@ -24,9 +24,8 @@ from estimator.identification.offline.linearity import (
     modes_by_region,
     shaft_torque,
 )
-from estimator.identification.offline.orders import criterion
 from estimator.identification.offline.problem import Problem
-from estimator.identification.offline.validation import Feedback, Validation, judge_feedback, validate
+from estimator.identification.offline.validation import Feedback, Validation, criterion, judge_feedback, validate
 from estimator.signals.decimate import HIGH_PASS_HZ, block_of, first_part, high_passed
 from estimator.signals.record import FloatArray, Record
 

@@ -17,7 +17,7 @@ import numpy as np
 from estimator.errors import BadSetting, BadShape
 from estimator.identification.linear_model import LinearModel, Orders
 from estimator.identification.modes.modes import Mode
-from estimator.identification.online.oefo import Filtering, Oefo
+from estimator.identification.online.estimators import Filtering, Oefo
 from estimator.identification.online.recursive import Estimate, RecursiveEstimator, Status, Trajectory
 from estimator.identification.settings import SAMPLES_PER_PARAMETER, Settings
 from estimator.identification.tracking.alarm import Alarm, TrackingState

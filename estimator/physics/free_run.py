@@ -11,15 +11,13 @@ import numpy as np
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.driveline import Case, Start
 from estimator.physics.fit import FitResult, fit
-from estimator.physics.grid import Grid
-from estimator.physics.layout import LOAD, slot
+from estimator.physics.layout import LOAD, Grid, slot
 from estimator.physics.model import DrivelineModel
 from estimator.physics.own_scan import Projector, cells, scan, waves
 from estimator.physics.problem import Problem, case_of, make_problem, start_of, start_vector
 from estimator.physics.simulate import simulate_each
 from estimator.physics.unknowns import own_unknowns
-from estimator.signals.outputs import outputs_apart
-from estimator.signals.record import BoolArray, FloatArray, Record
+from estimator.signals.record import BoolArray, FloatArray, Record, outputs_apart
 
 Own = Mapping[tuple[str, str], float]
 """Effect and parameter to a recording's own value."""

@@ -14,7 +14,7 @@ from estimator.physics.catalogue import BUILT_IN
 from estimator.physics.driveline import Case, Start
 from estimator.physics.effect import Place
 from estimator.physics.effects.torque import EDGE
-from estimator.physics.kernel import bristles, sensing, slots, state_vector
+from estimator.physics.kernel import conditions, sensing, slots, state_vector
 from estimator.physics.kernel.conditions import branch_frequency, branch_inertia, is_bristled, is_within
 from estimator.physics.layout import LOAD, slot
 from estimator.signals.record import MOST_BYTES, FloatArray, IntArray, Record, once
@@ -243,6 +243,6 @@ def follow(x: FloatArray, torque_nm: float, angle_rad: float, p: FloatArray) -> 
     x[state_vector.FILTERED] = sensing.reading(speed, angle_rad, p) + p[slots.FILTERED_BEFORE]
     x[state_vector.FILTER_RISE] = -p[slots.FILTERED_BEFORE]
     if is_bristled(p):  # of friction that has slid for long
-        x[state_vector.BRISTLES_MOTOR] = bristles.slid(speed, bristles.sliding(speed, p))
+        x[state_vector.BRISTLES_MOTOR] = conditions.slid(speed, conditions.sliding(speed, p))
         loaded = carried if p[slots.J_L] > 0.0 else speed
-        x[state_vector.BRISTLES_LOAD] = bristles.slid(loaded, p[slots.COULOMB_LOAD])
+        x[state_vector.BRISTLES_LOAD] = conditions.slid(loaded, p[slots.COULOMB_LOAD])

@@ -12,13 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from estimator.physics.driveline import Case, Start
-from estimator.physics.grid import Grid, grid_for
-from estimator.physics.layout import LOAD, flat, slot
+from estimator.physics.layout import LOAD, Grid, flat, grid_for, slot
 from estimator.physics.model import DrivelineModel, Load
 from estimator.physics.simulate import simulate_outputs, simulate_records
 from estimator.physics.unknowns import LocalBasis, Shared, local_basis, own_unknowns, shared_load
-from estimator.signals.outputs import leads
-from estimator.signals.record import BoolArray, FloatArray, IntArray, Record, once
+from estimator.signals.record import BoolArray, FloatArray, IntArray, Record, leads, once
 
 BAD = 1e3
 """A simulation that runs away counts as this many times the largest output."""

@@ -14,8 +14,7 @@ from estimator.diagnosis.preconditions.channels import with_usable_channels
 from estimator.identification.offline.validation import CorrelationTest, residual_tests
 from estimator.physics.model import Motion
 from estimator.signals.decimate import block_of
-from estimator.signals.outputs import outputs_apart
-from estimator.signals.record import FloatArray, OutputKind, Record
+from estimator.signals.record import FloatArray, OutputKind, Record, outputs_apart
 from hil.config.model_file import ModelFile, read_model_for_recordings
 from hil.config.model_tables import Prepared
 from hil.errors import UsageError

@@ -4,8 +4,7 @@ import argparse
 import sys
 from collections.abc import Callable, Sequence
 
-from estimator.physics.grid import Grid
-from estimator.physics.layout import flat_values, named
+from estimator.physics.layout import Grid, flat_values, named
 from estimator.physics.model import Structure
 from estimator.physics.own_law import OwnLaw
 from estimator.physics.simulate import simulate

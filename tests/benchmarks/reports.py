@@ -14,9 +14,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from estimator.identification.identify import identify
+from estimator.identification.identify import identify, study
 from estimator.identification.settings import Settings
-from estimator.identification.study import study
 from hil.figures.local_model import LocalModel
 from hil.report.diagnosis_html import diagnosis_page
 from hil.report.identification_page import identification_page

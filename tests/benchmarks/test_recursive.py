@@ -3,7 +3,7 @@
 import numpy as np
 
 from estimator.identification.online.adaptation import DecreasingGain, DecreasingThenConstantTrace
-from estimator.identification.online.rls_riv_oeepm import Rls
+from estimator.identification.online.estimators import Rls
 from tests.benchmarks import recursive, recursive_c
 from tests.benchmarks.recursive_data import MODEL, data, regressors
 

@@ -11,10 +11,9 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from estimator.identification.identify import identify
+from estimator.identification.identify import Compared, identify
 from estimator.identification.linear_model import LinearModel
 from estimator.identification.online.recursive import Status
-from estimator.identification.study import Compared
 from estimator.signals.prbs import prbs_nm
 from hil.cli.main import run
 from hil.recording import read_record

@@ -12,13 +12,12 @@ from estimator.design import _on_paper as on_paper
 from estimator.design import _precision as precision
 from estimator.diagnosis.inference.descent import descended
 from estimator.diagnosis.inference.disturbances import whitener_of
+from estimator.diagnosis.inference.hypotheses import THOROUGH
 from estimator.diagnosis.inference.judge import grounds
-from estimator.diagnosis.inference.likelihood import THOROUGH
 from estimator.diagnosis.inference.search import Search
 from estimator.physics.driveline import Start
 from estimator.physics.fit import not_fitted
-from estimator.physics.grid import grid_for
-from estimator.physics.layout import flat
+from estimator.physics.layout import flat, grid_for
 from estimator.physics.problem import make_problem
 from estimator.physics.simulate import simulate
 from estimator.physics.unknowns import own_unknowns

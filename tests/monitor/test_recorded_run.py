@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from drivers.errors import DeviceTimeout
-from estimator.physics.twist import Shaft
+from estimator.physics.joint import Shaft
 from hil.config.rig_file import read_rig
 from hil.monitor import recorded_run
 from hil.monitor.messages import Notice, Over, Report

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.physics.twist import Shaft
+from estimator.physics.joint import Shaft
 from hil.monitor.messages import Began, Ended, Kind, Lost, Notice, Over, Ready, Samples, outcome
 from hil.monitor.snapshot import Activity
 from hil.monitor.state import WINDOWS_S, LiveState

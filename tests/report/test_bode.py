@@ -5,7 +5,7 @@ import pytest
 
 from estimator.identification.identify import identify
 from estimator.identification.linear_model import LinearModel
-from estimator.identification.modes.uncertainty import square_root
+from estimator.identification.modes.modes import square_root
 from hil.report import bode
 from tests.estimator.identification.driveline import cruise
 

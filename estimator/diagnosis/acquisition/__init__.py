@@ -1,6 +1,6 @@
 """Faults of the acquisition, recognised in the raw recordings and compensated, so that mechanics can be judged."""
 
-from estimator.diagnosis.acquisition.compensate import as_if_not_lost, as_read, compensate, recognise
+from estimator.diagnosis.acquisition.chain import as_if_not_lost, as_read, compensate, recognise
 from estimator.diagnosis.acquisition.finding import OUTPUT, Finding, Sized
 from estimator.diagnosis.acquisition.jitter import hidden_jitter, mean_shift
 

@@ -9,8 +9,16 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from scipy import optimize, stats
 
-from estimator.diagnosis.acquisition.finding import LEVEL, OUTPUT, SMALLEST_P, Finding, Sized, no_cells
-from estimator.diagnosis.acquisition.predictor import predict, slope_test
+from estimator.diagnosis.acquisition.finding import (
+    LEVEL,
+    OUTPUT,
+    SMALLEST_P,
+    Finding,
+    Sized,
+    no_cells,
+    predict,
+    slope_test,
+)
 from estimator.diagnosis.acquisition.quantised import decimal_place
 from estimator.signals.record import BoolArray, FloatArray, Record, uniform_period_s
 

@@ -21,10 +21,10 @@ from estimator.diagnosis.acquisition.finding import (
     flagged,
     mean_run,
     no_cells,
+    predict,
     runs,
     share_interval,
 )
-from estimator.diagnosis.acquisition.predictor import predict
 from estimator.diagnosis.acquisition.quantised import chance_repeats, lattice_step, repeats
 from estimator.signals.record import BoolArray, FloatArray, Record
 

@@ -9,9 +9,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from estimator.diagnosis.acquisition.chain import Chain, mechanical, read_through
 from estimator.diagnosis.assemble import augmented_model, load_torques, retuned_parameters
-from estimator.diagnosis.chain import Chain, mechanical, read_through
-from estimator.diagnosis.hypotheses import Progress, everything, open_hypotheses, silent
+from estimator.diagnosis.inference.checks import Test, tests, tests_in_words
 from estimator.diagnosis.inference.disturbances import reading_noise
 from estimator.diagnosis.inference.figures import (
     FreeRuns,
@@ -25,6 +25,16 @@ from estimator.diagnosis.inference.figures import (
     on_recordings,
     traces_of,
 )
+from estimator.diagnosis.inference.hypotheses import (
+    SAME,
+    Hypothesis,
+    Progress,
+    everything,
+    fitted,
+    of_first_outputs,
+    open_hypotheses,
+    silent,
+)
 from estimator.diagnosis.inference.judge import (
     Decision,
     Grounds,
@@ -35,14 +45,12 @@ from estimator.diagnosis.inference.judge import (
     spread,
     verdict_of,
 )
-from estimator.diagnosis.inference.likelihood import SAME, Hypothesis, fitted, of_first_outputs
-from estimator.diagnosis.inference.remainder import Test, tests, tests_in_words
 from estimator.diagnosis.inference.rivals import Law, best_law, rivals_of, searches_around
 from estimator.diagnosis.inference.search import Search
 from estimator.diagnosis.inference.wording import Context, law_in_words, statement
 from estimator.diagnosis.noise import noise_floor
 from estimator.diagnosis.preconditions import Prepared
-from estimator.diagnosis.preconditions.thinned import as_slow_as_needed
+from estimator.diagnosis.preconditions.prepare import as_slow_as_needed
 from estimator.diagnosis.result import (
     Diagnosis,
     Discrepancy,
@@ -64,10 +72,9 @@ from estimator.diagnosis.where import discrepancy, locate
 from estimator.physics.effect import Element, Untestable
 from estimator.physics.fit import not_fitted
 from estimator.physics.model import DrivelineModel
+from estimator.physics.parallel import TimeIsUp, Work, counted
 from estimator.physics.steps import from_their_moment
-from estimator.physics.work import TimeIsUp, Work, counted
-from estimator.signals.outputs import outputs_apart
-from estimator.signals.record import FloatArray
+from estimator.signals.record import FloatArray, outputs_apart
 
 
 @dataclass(frozen=True, slots=True)

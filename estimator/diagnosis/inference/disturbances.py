@@ -10,18 +10,17 @@ from functools import partial
 import numpy as np
 from scipy.linalg import expm
 
-from estimator.diagnosis.line.motion import LASTS, FormPlace, form_changes
+from estimator.diagnosis.line.blocks import LASTS, FormPlace, form_changes
 from estimator.diagnosis.line.whitening import Gains, Terms, fill_gains, innovate, terms_of
 from estimator.diagnosis.noise import noise_floor
 from estimator.physics.fit import FitResult
 from estimator.physics.layout import slot
 from estimator.physics.model import Structure
 from estimator.physics.motion import torque_scale
+from estimator.physics.parallel import check_time
 from estimator.physics.problem import Rows
-from estimator.physics.work import check_time
 from estimator.signals.correlation import stand_in_variance
-from estimator.signals.outputs import by_output
-from estimator.signals.record import BoolArray, FloatArray, Location, OutputKind, Record
+from estimator.signals.record import BoolArray, FloatArray, Location, OutputKind, Record, by_output
 
 
 @dataclass(frozen=True, slots=True)

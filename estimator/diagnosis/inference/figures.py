@@ -9,16 +9,29 @@ from functools import cached_property
 
 import numpy as np
 
-from estimator.diagnosis.assemble import acquired_effects, moments_in, parameters_of, profile_size, profiles_of, rms_of
-from estimator.diagnosis.chain import Chain
-from estimator.diagnosis.hypotheses import NOTHING, Effects, everything
-from estimator.diagnosis.inference.calibration import LEAST_SHARE
+from estimator.diagnosis.acquisition.chain import Chain
+from estimator.diagnosis.assemble import (
+    acquired_effects,
+    moments_in,
+    parameters_of,
+    profile_size,
+    profiles_of,
+    reported_covariance,
+    rms_of,
+)
+from estimator.diagnosis.inference.checks import GRADE, LEAST_SHARE
 from estimator.diagnosis.inference.descent import descended
 from estimator.diagnosis.inference.disturbances import reading_noise
+from estimator.diagnosis.inference.hypotheses import (
+    NOTHING,
+    THOROUGH,
+    Effects,
+    Hypothesis,
+    covariance,
+    everything,
+    refitted,
+)
 from estimator.diagnosis.inference.judge import Belief, Decision, free_rms
-from estimator.diagnosis.inference.likelihood import THOROUGH, Hypothesis, covariance, refitted
-from estimator.diagnosis.inference.plausible import GRADE
-from estimator.diagnosis.intervals import reported_covariance
 from estimator.diagnosis.result import Evidence, Fit, FoundEffect, OutputFit, Trace
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import FitResult, fit, not_fitted, warm_start
@@ -26,8 +39,7 @@ from estimator.physics.free_run import simulate_foreign
 from estimator.physics.model import DrivelineModel, unit
 from estimator.physics.problem import Problem, make_problem, parameters, start_vector
 from estimator.physics.unknowns import LocalBasis, Shared
-from estimator.signals.outputs import by_output
-from estimator.signals.record import BoolArray, FloatArray, OutputKind, Record
+from estimator.signals.record import BoolArray, FloatArray, OutputKind, Record, by_output
 
 BLOCK_S, EVERY_S = 0.6, 2.0
 """Blocks kept out for a profile: shorter than its knot spacing, so that its neighbours predict it."""

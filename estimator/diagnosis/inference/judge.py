@@ -10,20 +10,21 @@ from typing import NamedTuple
 
 import numpy as np
 
-from estimator.diagnosis.hypotheses import Effects
-from estimator.diagnosis.inference.calibration import (
+from estimator.diagnosis.assemble import Z95
+from estimator.diagnosis.inference.checks import (
     ALIKE_SHARE,
     ALIKE_WITHIN,
     CLEARLY_BELOW,
+    GRADE,
     LEAST_PROBABILITY,
     LEAST_SHARE,
     TEMPERED,
+    Test,
+    is_possible,
+    tests,
 )
-from estimator.diagnosis.inference.likelihood import Hypothesis, covariance
-from estimator.diagnosis.inference.plausible import GRADE, is_possible
-from estimator.diagnosis.inference.remainder import Test, tests
+from estimator.diagnosis.inference.hypotheses import Effects, Hypothesis, covariance
 from estimator.diagnosis.inference.search import Search
-from estimator.diagnosis.intervals import Z95
 from estimator.diagnosis.result import Fit, Verdict
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.problem import Problem

@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from estimator.diagnosis.inference.disturbances import Whitener
-from estimator.diagnosis.inference.likelihood import Hypothesis
+from estimator.diagnosis.inference.hypotheses import Hypothesis
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.driveline import Case
 from estimator.physics.effect import Effect

@@ -8,19 +8,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from estimator.diagnosis.hypotheses import NOTHING, Effects
-from estimator.diagnosis.inference.calibration import LEAST_SHARE
+from estimator.diagnosis.inference.checks import LEAST_SHARE, tests
 from estimator.diagnosis.inference.disturbances import MOST_FORM, estimated, reading_noise
-from estimator.diagnosis.inference.judge import Grounds, Score, free_rms
-from estimator.diagnosis.inference.likelihood import (
+from estimator.diagnosis.inference.hypotheses import (
+    NOTHING,
     ROUNDS,
+    Effects,
     Hypothesis,
     choices_of,
     covariance,
     fitted,
     of_first_outputs,
 )
-from estimator.diagnosis.inference.remainder import tests
+from estimator.diagnosis.inference.judge import Grounds, Score, free_rms
 from estimator.diagnosis.inference.search import Search
 from estimator.diagnosis.result import Stray
 from estimator.diagnosis.unnamed import ElementSearch, scene, searches_at

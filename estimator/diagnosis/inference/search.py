@@ -10,10 +10,16 @@ from threading import Lock
 
 import numpy as np
 
-from estimator.diagnosis.hypotheses import (
+from estimator.diagnosis.inference.checks import GRADE, is_plausible, loosened, may_be_loose
+from estimator.diagnosis.inference.descent import extended
+from estimator.diagnosis.inference.disturbances import Limits, limits_of
+from estimator.diagnosis.inference.hypotheses import (
     NOTHING,
     Effects,
+    Hypothesis,
     Progress,
+    compared,
+    fitted,
     forgetting,
     inheriting,
     kept,
@@ -23,22 +29,16 @@ from estimator.diagnosis.hypotheses import (
     silent,
     with_effect,
 )
-from estimator.diagnosis.inference.descent import extended
-from estimator.diagnosis.inference.disturbances import Limits, limits_of
-from estimator.diagnosis.inference.likelihood import Hypothesis, compared, fitted
 from estimator.diagnosis.inference.looks import Answers, Look, Remembering, promising, screen
-from estimator.diagnosis.inference.plausible import GRADE, is_plausible, loosened, may_be_loose
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult, not_fitted, warm_start
-from estimator.physics.grid import Grid, grid_for
-from estimator.physics.layout import slot
+from estimator.physics.layout import Grid, grid_for, slot
 from estimator.physics.model import DrivelineModel
-from estimator.physics.parallel import concurrently
+from estimator.physics.parallel import Work, concurrently
 from estimator.physics.problem import Problem, make_problem, start_of, start_vector
 from estimator.physics.simulate import simulate
 from estimator.physics.unknowns import Release, nominal_unknowns, own_unknowns, released
-from estimator.physics.work import Work
 from estimator.signals.record import BoolArray, Record
 
 BLIND = "speed_sign_blind"

@@ -18,8 +18,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from estimator.compiled import compiled
-from estimator.diagnosis.line.blocks import FORCES, Line, Place, places, size_at
-from estimator.diagnosis.line.motion import Motion
+from estimator.diagnosis.line.blocks import FORCES, Line, Motion, Place, places, size_at
 from estimator.diagnosis.line.tangent import LOAD, MOTOR
 from estimator.physics.fit import FitResult
 from estimator.physics.kernel import state_vector

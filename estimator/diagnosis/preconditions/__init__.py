@@ -7,8 +7,8 @@ from estimator.diagnosis.preconditions.prepare import (
     as_moved,
     prepare,
     require_plausible,
+    thin,
 )
-from estimator.diagnosis.preconditions.thinned import thin
 from estimator.diagnosis.preconditions.units import require_plausible_alone
 
 __all__ = [

@@ -11,8 +11,7 @@ from scipy.ndimage import uniform_filter1d
 from scipy.signal import detrend
 
 from estimator.physics.driveline import Start
-from estimator.physics.grid import Grid
-from estimator.physics.layout import flat
+from estimator.physics.layout import Grid, flat
 from estimator.physics.model import DrivelineModel, Structure, natural_frequencies_rad_s
 from estimator.physics.motion import measured_speed
 from estimator.physics.simulate import simulate

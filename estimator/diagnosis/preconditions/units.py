@@ -26,7 +26,7 @@ from estimator.diagnosis.preconditions.explanations import (
 )
 from estimator.diagnosis.preconditions.inertia import BODY_TELLS, Inertia, as_one_body, fitted_inertia
 from estimator.errors import BadModel, Cure, Implausible
-from estimator.physics.grid import Grid, grid_for
+from estimator.physics.layout import Grid, grid_for
 from estimator.physics.model import DrivelineModel, Motion, Parameter, Structure, parameter_unit
 from estimator.signals.record import FloatArray, OutputKind, Record
 

@@ -1,10 +1,10 @@
 """Laws without a name: at each element the best sparse sum of functions, the rival that every name must beat."""
 
-from estimator.diagnosis.unnamed.element_search import ElementSearch, without_law
 from estimator.diagnosis.unnamed.laws import LAGS
 from estimator.diagnosis.unnamed.scene import Filter, Scene, scene
 from estimator.diagnosis.unnamed.search import (
     ROUNDS,
+    ElementSearch,
     UnnamedLaw,
     best_of,
     best_unnamed,
@@ -12,6 +12,7 @@ from estimator.diagnosis.unnamed.search import (
     judged,
     searches_at,
     unnamed_laws,
+    without_law,
 )
 
 __all__ = [

@@ -14,8 +14,7 @@ from scipy.signal import lfilter
 
 from estimator.diagnosis.line import Motion
 from estimator.physics.effect import Element
-from estimator.signals.record import FloatArray
-from estimator.signals.slider import carried
+from estimator.signals.record import FloatArray, carried
 
 ROUNDED = 0.02
 """A sign function changes over this share of its argument's range."""

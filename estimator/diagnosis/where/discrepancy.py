@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import stats
 
-from estimator.diagnosis.intervals import Z95
+from estimator.diagnosis.assemble import Z95
 from estimator.diagnosis.line import (
     DRIVES,
     PLACES,

@@ -20,9 +20,8 @@ from scipy.stats import chi2
 
 from estimator.errors import BadModel, BadSetting
 from estimator.identification.linear_model import LinearModel, Orders
-from estimator.identification.modes.modes import resonance
+from estimator.identification.modes.modes import QUANTILE, Uncertain, resonance
 from estimator.identification.modes.reduced import THIRD, to_continuous
-from estimator.identification.modes.uncertainty import QUANTILE, Uncertain
 from estimator.signals.record import FloatArray
 
 UNITS = MappingProxyType(

@@ -15,7 +15,7 @@ from scipy.linalg import logm, schur
 
 from estimator.errors import BadModel, BadShape
 from estimator.identification.linear_model import ComplexArray, LinearModel
-from estimator.identification.modes.uncertainty import propagate, square_root
+from estimator.identification.modes.modes import propagate, square_root
 from estimator.signals.record import FloatArray
 
 

@@ -19,9 +19,8 @@ from scipy.sparse import csc_array, diags_array
 from scipy.sparse.linalg import splu
 from threadpoolctl import threadpool_limits
 
-from estimator.identification.linear_model import ComplexArray, LinearModel, Orders, free_response
+from estimator.identification.linear_model import ComplexArray, LinearModel, Orders, free_response, solve_least_squares
 from estimator.identification.offline.starts import delayed
-from estimator.identification.triangular import solve_least_squares
 from estimator.signals.decimate import HIGH_PASS_HZ, Blocks
 from estimator.signals.record import BoolArray, FloatArray
 

@@ -13,9 +13,8 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.signal import lfilter
 
-from estimator.identification.linear_model import LinearModel, Orders
+from estimator.identification.linear_model import LinearModel, Orders, solve_least_squares, triangular
 from estimator.identification.modes.reduced import numerator_of
-from estimator.identification.triangular import solve_least_squares, triangular
 from estimator.signals.record import BoolArray, FloatArray
 
 ITERATIONS = 20

@@ -16,9 +16,9 @@ from estimator.compiled import brief, compiled, inlined, ir_inlined
 from estimator.lanes import borrowed
 from estimator.physics.effects.timing import LowPass, delayed, lag_step, low_pass
 from estimator.physics.kernel import slots
-from estimator.physics.kernel.bristles import bent, rubbed
 from estimator.physics.kernel.conditions import (
     Line,
+    bent,
     branch_frequency,
     branch_inertia,
     conditions,
@@ -28,6 +28,7 @@ from estimator.physics.kernel.conditions import (
     is_extended,
     is_waving,
     is_within,
+    rubbed,
     with_torques,
 )
 from estimator.physics.kernel.linear import WORTHWHILE_SAMPLES, Answers, answers, has_dry_friction, is_linear, led_on

@@ -16,14 +16,15 @@ from estimator.lanes import LANES, as_lanes, borrowed
 from estimator.physics.catalogue import BUILT_IN
 from estimator.physics.effects.timing import LowPass, low_pass
 from estimator.physics.kernel import slots
-from estimator.physics.kernel.bristles import bent, rubbed
 from estimator.physics.kernel.conditions import (
     Line,
+    bent,
     conditions,
     is_bristled,
     is_changing,
     is_elastic,
     is_waving,
+    rubbed,
     with_torques,
 )
 from estimator.physics.kernel.integration import Masses, begun_feed, fed, for_its_make, integrate, is_late, with_mode

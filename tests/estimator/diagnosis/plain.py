@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from estimator.diagnosis.hypotheses import NOTHING, Effects, kept
+from estimator.diagnosis.inference.hypotheses import NOTHING, Effects, kept
 from estimator.diagnosis.inference.looks import Screen, promising
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import FitResult, best_fit, fit, make_problem
-from estimator.physics.grid import Grid
+from estimator.physics.layout import Grid
 from estimator.physics.model import DrivelineModel
 from estimator.physics.problem import Problem
 from estimator.physics.unknowns import Release, nominal_unknowns

@@ -9,20 +9,23 @@ import numpy as np
 import pytest
 
 from estimator.diagnosis.acquisition import Finding, Sized
+from estimator.diagnosis.acquisition.chain import Chain
 from estimator.diagnosis.assemble import (
+    Z95,
     acquired_effects,
     augmented_model,
+    interval,
+    interval_both_ways,
     load_torques,
     moments_in,
     parameters_of,
     profile_size,
     profiles_of,
+    reported_covariance,
     retuned_parameters,
 )
-from estimator.diagnosis.chain import Chain
 from estimator.diagnosis.diagnose import diagnose
-from estimator.diagnosis.hypotheses import NOTHING, everything
-from estimator.diagnosis.intervals import Z95, interval, interval_both_ways, reported_covariance
+from estimator.diagnosis.inference.hypotheses import NOTHING, everything
 from estimator.diagnosis.result import Evidence, FoundEffect
 from estimator.physics.catalogue import EFFECTS, effect_problems
 from estimator.physics.driveline import Start

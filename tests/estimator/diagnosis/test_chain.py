@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from estimator.diagnosis.acquisition.chain import Chain, mechanical, read_through, replay
 from estimator.diagnosis.assemble import rms_of
-from estimator.diagnosis.chain import Chain, mechanical, read_through, replay
-from estimator.diagnosis.hypotheses import NOTHING, everything
+from estimator.diagnosis.inference.hypotheses import NOTHING, everything
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.free_run import free_run
 from estimator.physics.layout import slot

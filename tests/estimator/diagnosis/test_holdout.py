@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from estimator.diagnosis.hypotheses import NOTHING, Effects, everything
 from estimator.diagnosis.inference.figures import BLOCK_S, EVERY_S, blocks, foreign_outputs
+from estimator.diagnosis.inference.hypotheses import NOTHING, Effects, everything
 from estimator.physics.driveline import Start
 from estimator.physics.effects.load import KNOT_SPACING_S
 from estimator.physics.fit import FitResult

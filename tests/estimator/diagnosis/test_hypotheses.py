@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from estimator.diagnosis.hypotheses import everything, open_hypotheses, with_effect
+from estimator.diagnosis.inference.hypotheses import everything, open_hypotheses, with_effect
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.driveline import Start
 from estimator.physics.effect import Element

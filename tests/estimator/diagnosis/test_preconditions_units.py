@@ -14,7 +14,7 @@ from estimator.diagnosis.preconditions.units import BEYOND, require_plausible_un
 from estimator.errors import Cure, Implausible
 from estimator.physics.driveline import Start
 from estimator.physics.effect import Element
-from estimator.physics.grid import grid_for
+from estimator.physics.layout import grid_for
 from estimator.physics.model import Motion
 from estimator.signals.record import FloatArray, OutputKind, Record
 from tests.estimator.diagnosis.planted import Moved, recordings, rubbing

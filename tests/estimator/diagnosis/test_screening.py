@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from estimator.diagnosis.hypotheses import NOTHING, everything
+from estimator.diagnosis.inference.hypotheses import NOTHING, everything
 from estimator.diagnosis.inference.looks import Look, Screen, promising
 from estimator.physics.driveline import Start
 from estimator.physics.effect import Element

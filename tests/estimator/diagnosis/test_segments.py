@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from estimator.diagnosis import diagnose
-from estimator.diagnosis.chain import replay
+from estimator.diagnosis.acquisition.chain import replay
 from estimator.diagnosis.noise import noise_floor
 from estimator.diagnosis.preconditions import prepare
 from estimator.diagnosis.result import Course, Discrepancy, Equivalent, Estimated, Profile, Response, Verdict

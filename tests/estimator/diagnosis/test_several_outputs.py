@@ -11,18 +11,16 @@ import pytest
 from estimator.diagnosis.diagnose import diagnose
 from estimator.diagnosis.noise import noise_floor
 from estimator.diagnosis.preconditions.channels import with_usable_channels
-from estimator.diagnosis.preconditions.thinned import as_slow_as_needed
+from estimator.diagnosis.preconditions.prepare import as_slow_as_needed
 from estimator.diagnosis.result import Verdict
 from estimator.errors import BadModel
 from estimator.physics.driveline import Start
 from estimator.physics.fit import fit
-from estimator.physics.grid import grid_for
-from estimator.physics.layout import flat_values
+from estimator.physics.layout import flat_values, grid_for
 from estimator.physics.problem import make_problem
 from estimator.physics.simulate import simulate
 from estimator.physics.unknowns import nominal_unknowns
-from estimator.signals.outputs import outputs_apart
-from estimator.signals.record import Channel, FloatArray, Location, OutputKind, Record, sliced
+from estimator.signals.record import Channel, FloatArray, Location, OutputKind, Record, outputs_apart, sliced
 from tests.estimator.diagnosis.one_effect import Bench, bench_with
 from tests.estimator.physics.bench import ONE_MASS, TWO_MASS, model
 

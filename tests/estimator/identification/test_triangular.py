@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from estimator.identification.triangular import ROWS, singular_values, solve_least_squares, triangular
+from estimator.identification.linear_model import ROWS, singular_values, solve_least_squares, triangular
 
 
 @pytest.mark.parametrize("shape", [(200, 7), (7, 7), (3, 7), (50, 1), (1, 1)])

@@ -9,8 +9,7 @@ from estimator.errors import BadModel
 from estimator.physics.driveline import Start
 from estimator.physics.fit import fit
 from estimator.physics.free_run import free_run
-from estimator.physics.grid import grid_for
-from estimator.physics.layout import flat
+from estimator.physics.layout import flat, grid_for
 from estimator.physics.problem import make_problem
 from estimator.physics.simulate import simulate
 from estimator.signals.record import Location, OutputKind

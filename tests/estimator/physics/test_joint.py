@@ -11,9 +11,8 @@ from estimator.errors import BadModel, BadShape
 from estimator.physics import joint
 from estimator.physics.driveline import Start
 from estimator.physics.fit import fit
-from estimator.physics.grid import grid_for
 from estimator.physics.kernel import state_vector
-from estimator.physics.layout import flat_values
+from estimator.physics.layout import flat_values, grid_for
 from estimator.physics.model import DrivelineModel, Parameter, Structure, natural_frequencies_rad_s, parameter_unit
 from estimator.physics.motion import motor_angle
 from estimator.physics.problem import make_problem

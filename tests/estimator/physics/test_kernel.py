@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from estimator.physics.driveline import Start
-from estimator.physics.grid import Grid, grid_for
 from estimator.physics.kernel import conditions, state_vector
 from estimator.physics.kernel.rates import met
-from estimator.physics.layout import flat
+from estimator.physics.layout import Grid, flat, grid_for
 from estimator.physics.model import DrivelineModel
 from estimator.physics.simulate import simulate
 from estimator.signals.record import FloatArray, Location, OutputKind

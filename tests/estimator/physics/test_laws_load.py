@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from estimator.physics.driveline import Start
-from estimator.physics.grid import Grid, grid_for
 from estimator.physics.kernel.state_vector import LOAD_SPEED
-from estimator.physics.layout import flat_values
+from estimator.physics.layout import Grid, flat_values, grid_for
 from estimator.physics.simulate import simulate
 from estimator.signals.record import FloatArray
 from tests.estimator.physics import reference

@@ -5,9 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.physics.grid import Grid
 from estimator.physics.kernel import sensing, state_vector
-from estimator.physics.layout import flat_values
+from estimator.physics.layout import Grid, flat_values
 from estimator.physics.simulate import simulate
 from estimator.signals.record import FloatArray, Location, OutputKind
 from tests.estimator.physics import reference

@@ -8,17 +8,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from estimator.diagnosis.hypotheses import open_hypotheses
+from estimator.diagnosis.inference.hypotheses import open_hypotheses
 from estimator.errors import BadModel
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.driveline import Start
 from estimator.physics.effect import Element
-from estimator.physics.grid import Grid, grid_for
-from estimator.physics.layout import SIZE, flat, flat_values, named, slot
+from estimator.physics.layout import SIZE, Grid, flat, flat_values, grid_for, named, slot
 from estimator.physics.model import EffectValue, Structure
 from estimator.physics.own_law import TRIAL, OwnLaw, OwnParameter
-from estimator.physics.simulate import simulate
-from estimator.physics.stepper import Stepper
+from estimator.physics.simulate import Stepper, simulate
 from estimator.signals.record import FloatArray
 from tests.estimator.physics import bench
 

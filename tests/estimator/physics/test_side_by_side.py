@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from estimator.physics.driveline import Case, Start
-from estimator.physics.grid import Grid
 from estimator.physics.kernel.side_by_side import go_side_by_side, kin_together, leading_kin
-from estimator.physics.layout import flat, slot
+from estimator.physics.layout import Grid, flat, slot
 from estimator.physics.model import DrivelineModel, EffectValue, Parameter, Structure
 from estimator.physics.simulate import simulate_each, simulate_records
 from estimator.signals.record import FloatArray

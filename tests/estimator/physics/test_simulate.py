@@ -7,15 +7,23 @@ import numpy as np
 import pytest
 
 from estimator.diagnosis.assemble import load_torques
-from estimator.diagnosis.hypotheses import open_hypotheses
-from estimator.diagnosis.preconditions.thinned import thin
+from estimator.diagnosis.inference.hypotheses import open_hypotheses
+from estimator.diagnosis.preconditions.prepare import thin
 from estimator.diagnosis.preconditions.units import require_plausible_units
 from estimator.errors import BadModel, BadShape, Implausible
 from estimator.physics.driveline import Case, Start
 from estimator.physics.fit import FitResult, fit, make_problem
 from estimator.physics.free_run import free_run
-from estimator.physics.grid import FASTEST_IN_NYQUIST, RADIANS_PER_STEP, SIGN_WIDTH, grid_for, substeps_for
-from estimator.physics.layout import flat, flat_values, slot
+from estimator.physics.layout import (
+    FASTEST_IN_NYQUIST,
+    RADIANS_PER_STEP,
+    SIGN_WIDTH,
+    flat,
+    flat_values,
+    grid_for,
+    slot,
+    substeps_for,
+)
 from estimator.physics.model import DrivelineModel, Load, Structure, natural_frequencies_rad_s
 from estimator.physics.problem import bounds
 from estimator.physics.simulate import output_state, simulate, simulate_each

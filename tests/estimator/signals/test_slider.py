@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from estimator.signals.slider import carried
+from estimator.signals.record import carried
 
 WIDTH = 2.0
 

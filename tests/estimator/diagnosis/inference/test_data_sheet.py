@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import pytest
 
 from estimator.diagnosis.diagnose import diagnose
-from estimator.diagnosis.hypotheses import everything, open_hypotheses
+from estimator.diagnosis.inference.hypotheses import everything, open_hypotheses
 from estimator.diagnosis.inference.rivals import FREELY, free_line
 from estimator.diagnosis.inference.search import Search
 from estimator.diagnosis.inference.wording import off_the_sheet

@@ -7,7 +7,8 @@ from typing import cast
 
 import pytest
 
-from estimator.diagnosis.inference import remainder
+from estimator.diagnosis.inference import checks
+from estimator.diagnosis.inference.hypotheses import Hypothesis
 from estimator.diagnosis.inference.judge import (
     Score,
     levels,
@@ -17,7 +18,6 @@ from estimator.diagnosis.inference.judge import (
     tempered_by,
     verdict_of,
 )
-from estimator.diagnosis.inference.likelihood import Hypothesis
 from estimator.diagnosis.result import Verdict
 
 
@@ -87,8 +87,8 @@ def test_a_set_without_an_effect_counts_against_it_even_with_values_that_are_no_
     assert probability_of({"brake"}, scores, 1.0) == 1.0
 
 
-def left_over(value: float, most: float, is_share: bool = True) -> remainder.Test:
-    return remainder.Test("", value, most, is_share)
+def left_over(value: float, most: float, is_share: bool = True) -> checks.Test:
+    return checks.Test("", value, most, is_share)
 
 
 def test_differences_of_scores_count_by_what_is_left_beyond_what_explained_worlds_leave() -> None:

@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from estimator.diagnosis.inference.checks import LOOSE, is_plausible, loosened, may_be_loose
 from estimator.diagnosis.inference.disturbances import Limits, Size, limits_for
-from estimator.diagnosis.inference.likelihood import Hypothesis
-from estimator.diagnosis.inference.plausible import LOOSE, is_plausible, loosened, may_be_loose
+from estimator.diagnosis.inference.hypotheses import Hypothesis
 from estimator.diagnosis.inference.search import GRADE
 from estimator.physics.fit import FitResult, not_fitted
 from estimator.physics.problem import make_problem, start_vector

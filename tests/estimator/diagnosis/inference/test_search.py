@@ -8,11 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.diagnosis.hypotheses import everything, open_hypotheses
+from estimator.diagnosis.inference.checks import tests as examined
 from estimator.diagnosis.inference.disturbances import Size
+from estimator.diagnosis.inference.hypotheses import compared, everything, fitted, open_hypotheses
 from estimator.diagnosis.inference.judge import Decision, decide, free_rms, grounds
-from estimator.diagnosis.inference.likelihood import compared, fitted
-from estimator.diagnosis.inference.remainder import tests as examined
 from estimator.diagnosis.inference.search import Search
 from estimator.physics.model import EffectValue
 from estimator.signals.record import Record

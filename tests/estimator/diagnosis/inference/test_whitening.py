@@ -25,12 +25,11 @@ from estimator.diagnosis.inference.disturbances import (
     whitener,
     whitener_of,
 )
-from estimator.diagnosis.line.motion import LASTS
+from estimator.diagnosis.line.blocks import LASTS
 from estimator.physics.driveline import Start
 from estimator.physics.fit import FitResult, fit, not_fitted
 from estimator.physics.problem import make_problem, start_vector
-from estimator.signals.outputs import outputs_apart
-from estimator.signals.record import BoolArray, Channel, FloatArray, Location, OutputKind
+from estimator.signals.record import BoolArray, Channel, FloatArray, Location, OutputKind, outputs_apart
 from tests.estimator.diagnosis.planted import drive_torque
 from tests.estimator.physics.bench import SAMPLE_TIME_S, TWO_MASS, linear_record, model
 

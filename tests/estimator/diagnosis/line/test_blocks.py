@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from estimator.diagnosis.line.blocks import lines, spread_stretches
-from estimator.diagnosis.line.motion import block_mean, block_mean_of
+from estimator.diagnosis.line.blocks import block_mean, block_mean_of, lines, spread_stretches
 from estimator.diagnosis.line.tangent import block_length
 from estimator.physics.driveline import Start
 from estimator.physics.fit import fit

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from estimator.diagnosis.line.motion import AROUND, FormPlace, change_around, form_changes, motion_of
+from estimator.diagnosis.line.blocks import AROUND, FormPlace, change_around, form_changes, motion_of
 from estimator.physics.driveline import Start
 from estimator.physics.fit import fit, not_fitted
 from estimator.physics.problem import make_problem, start_vector

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.diagnosis.line.motion import block_mean, simulated
+from estimator.diagnosis.line.blocks import block_mean, simulated
 from estimator.diagnosis.line.tangent import tangent
 from estimator.physics.driveline import Start
 from estimator.physics.fit import FitResult, fit

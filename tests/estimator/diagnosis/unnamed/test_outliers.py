@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from estimator.diagnosis.unnamed.element_search import outliers
+from estimator.diagnosis.unnamed.search import outliers
 
 
 def test_strays_are_distinguished_from_a_swing_and_from_noise() -> None:

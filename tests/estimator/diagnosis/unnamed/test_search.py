@@ -7,9 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.diagnosis.unnamed.element_search import ElementSearch
 from estimator.diagnosis.unnamed.scene import scene
-from estimator.diagnosis.unnamed.search import LEAST_ROUNDS, ROUNDS, best_unnamed, searches_at, unnamed_laws
+from estimator.diagnosis.unnamed.search import (
+    LEAST_ROUNDS,
+    ROUNDS,
+    ElementSearch,
+    best_unnamed,
+    searches_at,
+    unnamed_laws,
+)
 from estimator.physics.driveline import Start
 from estimator.physics.effect import Element
 from tests.estimator.diagnosis.planted import SIGMA, Law, nominal_fit, quiet, recordings

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.diagnosis.hypotheses import NOTHING, everything
+from estimator.diagnosis.inference.hypotheses import NOTHING, everything
 from estimator.diagnosis.unnamed import ROUNDS, scene, searches_at
 from estimator.diagnosis.where.discrepancy import discrepancy, effects_added, without_effect
 from estimator.physics.effect import Element

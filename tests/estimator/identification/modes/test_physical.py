@@ -5,6 +5,7 @@ import pytest
 
 from estimator.errors import BadModel, BadSetting
 from estimator.identification.linear_model import LinearModel, Orders
+from estimator.identification.modes.modes import Uncertain
 from estimator.identification.modes.physical import (
     NAMES,
     coefficients_of,
@@ -12,7 +13,6 @@ from estimator.identification.modes.physical import (
     two_mass_model,
     two_mass_start,
 )
-from estimator.identification.modes.uncertainty import Uncertain
 from estimator.identification.offline.fits import LinearFit
 from tests.estimator.identification import driveline
 

@@ -7,12 +7,12 @@ import pytest
 
 from estimator.errors import BadShape
 from estimator.identification.linear_model import LinearModel
-from estimator.identification.modes.modes import resonance
-from estimator.identification.modes.uncertainty import (
+from estimator.identification.modes.modes import (
     Uncertain,
     UncertainRoot,
     pole_zero_map,
     propagate,
+    resonance,
     uncertain_modes,
 )
 from estimator.signals.record import FloatArray

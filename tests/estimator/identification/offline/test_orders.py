@@ -3,7 +3,7 @@ import pytest
 
 from estimator.errors import BadSetting
 from estimator.identification.linear_model import Orders
-from estimator.identification.offline.orders import select_orders
+from estimator.identification.offline.validation import select_orders
 from estimator.signals.record import Record
 from tests.estimator.identification.closed_loop import controlled
 from tests.estimator.identification.driveline import cruise

@@ -4,9 +4,8 @@ import pytest
 from estimator.errors import BadModel
 from estimator.identification.linear_model import LinearModel, Orders
 from estimator.identification.modes.physical import two_mass_model
-from estimator.identification.offline.fits import LinearFit, fit_box_jenkins, free_run
+from estimator.identification.offline.fits import LinearFit, fit_box_jenkins, fit_noise, free_run
 from estimator.identification.offline.linearity import Linearity
-from estimator.identification.offline.noise_model import fit_noise
 from estimator.identification.offline.validation import correlation_test, judge_feedback, residual_tests, validate
 from estimator.signals.decimate import decimate
 from estimator.signals.record import FloatArray, Record

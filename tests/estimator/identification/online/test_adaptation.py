@@ -19,7 +19,7 @@ from estimator.identification.online.adaptation import (
     VariableForgetting,
     VariableForgettingThenConstantTrace,
 )
-from estimator.identification.online.oefo import Oefo
+from estimator.identification.online.estimators import Oefo
 from estimator.identification.online.recursive import Reason, Status
 from estimator.signals.record import FloatArray
 from tests.estimator.identification.online.cases import LINEAR, linear_data

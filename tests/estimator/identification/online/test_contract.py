@@ -10,8 +10,8 @@ import pytest
 from estimator.errors import BadModel, BadSetting, BadShape
 from estimator.identification.linear_model import LinearModel
 from estimator.identification.online.adaptation import ConstantForgetting
+from estimator.identification.online.estimators import ESTIMATORS, Setup
 from estimator.identification.online.recursive import Estimate, Reason, RecursiveEstimator, Status
-from estimator.identification.online.registry import ESTIMATORS, Setup
 from estimator.signals.record import FloatArray
 from tests.estimator.identification.online.cases import CASES, LINEAR, TWO_MASS, Case, two_mass_data
 
