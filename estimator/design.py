@@ -32,7 +32,7 @@ from estimator.diagnosis.inference.hypotheses import (
 )
 from estimator.diagnosis.inference.judge import Grounds, tempered_by
 from estimator.diagnosis.inference.search import Search
-from estimator.diagnosis.preconditions import prepare
+from estimator.diagnosis.preconditions.prepare import prepare
 from estimator.diagnosis.result import Diagnosis
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import FitResult, fit
@@ -165,10 +165,7 @@ def _are_twins(one: Hypothesis, other: Hypothesis) -> bool:
 
 
 def _holds(effects: Effects, others: Effects) -> bool:
-    """Tell whether a set is another one with more in it: what is added has not paid, and is no other explanation.
-
-    More is another effect, or a law that holds another's as a special case.
-    """
+    """Tell whether a set is another one with more in it: what is added has not paid, and is no other explanation."""
     special = effects.union(*(EFFECTS[name].contains for name in effects))
     return effects != others and others <= special
 
@@ -193,7 +190,6 @@ def as_model(candidate: Candidate, line: DrivelineModel) -> DrivelineModel:
 
 
 def _on_paper(candidate: Candidate, line: DrivelineModel, record: Record) -> FitResult:
-    """Simulate a recording with a hypothesis; only what is the recording's own is fitted."""
     fitted, effects = candidate.fit.plain, candidate.effects - {GRADE}
     shared = fitted.problem.shared
     own = tuple(_throughout(each, record) for each in own_unknowns({*line.effects, *effects}, record))
@@ -258,8 +254,7 @@ def _precision(hypothesis: Hypothesis) -> FloatArray:
 
 def _root(known: FloatArray) -> FloatArray:
     values, vectors = np.linalg.eigh(known)
-    root: FloatArray = np.sqrt(np.maximum(values, 0.0))[:, np.newaxis] * vectors.T
-    return root
+    return np.sqrt(np.maximum(values, 0.0))[:, np.newaxis] * vectors.T
 
 
 @dataclass(frozen=True, slots=True)

@@ -71,8 +71,7 @@ def _free(result: FitResult) -> BoolArray:
 
 
 def _bread(jacobian: FloatArray) -> FloatArray:
-    bread: FloatArray = np.asarray(np.linalg.pinv(jacobian.T @ jacobian, hermitian=True), dtype=np.float64)
-    return bread
+    return np.asarray(np.linalg.pinv(jacobian.T @ jacobian, hermitian=True), dtype=np.float64)
 
 
 def _meat(result: FitResult, jacobian: FloatArray) -> FloatArray:
@@ -86,22 +85,16 @@ def _meat(result: FitResult, jacobian: FloatArray) -> FloatArray:
         first += error.size
         total += _long_run(scores, lags)
     n = result.residual.size
-    meat: FloatArray = total * n / max(n - jacobian.shape[1], 1)
-    return meat
+    return total * n / max(n - jacobian.shape[1], 1)
 
 
 def _long_run(scores: FloatArray, lags: int) -> FloatArray:
-    """Sum the Bartlett-weighted cross products of the scores up to ``lags`` apart, by block differences.
-
-    Bartlett weights over L lags are what overlapping blocks of length L give: the covariance of sums over a window,
-    divided by its length. That costs one cumulative sum instead of L products.
-    """
+    """Sum the Bartlett-weighted cross products of the scores up to ``lags`` apart, by block differences."""
     window = max(lags, 1)
     padded = np.vstack([np.zeros((window, scores.shape[1])), scores, np.zeros((window - 1, scores.shape[1]))])
     sums = np.cumsum(padded, axis=0)
     blocks = sums[window:] - sums[:-window]
-    product: FloatArray = blocks.T @ blocks / window
-    return product
+    return blocks.T @ blocks / window
 
 
 def interval(result: FitResult, cov: FloatArray, index: int) -> tuple[float, float]:
@@ -157,7 +150,6 @@ def interval_both_ways(result: FitResult, cov: FloatArray, index: int) -> tuple[
 
 
 def _dimension_in_line(shared: Shared) -> str:
-    """Return the dimension of a parameter of the line or of an effect in it; none of what stands before the line."""
     if not shared.effect:
         return parameter_dimension(shared.name)
     entry = EFFECTS[shared.effect]

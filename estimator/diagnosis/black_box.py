@@ -1,9 +1,4 @@
-"""A plant that another program simulates: its torques pass through a torque path, its speed through a sensor.
-
-Both are those of the compiled simulation, without a line of their own. On a free inertia of 1 kg m^2 the change of
-speed over a period is the mean torque that reached the shaft in it. Turned round, an inertia that is driven by the
-change of a speed moves at that speed, and the sensor shows of it what it would of the plant's.
-"""
+"""A plant that another program simulates: its torques pass through a torque path, its speed through a sensor."""
 
 from __future__ import annotations
 
@@ -80,7 +75,6 @@ class _Known:
     output: FloatArray
 
     def is_near(self, case: Case, has_start: bool) -> bool:
-        """Tell whether a case differs from this one by a single effect, or one number of load or initial state."""
         if self.case.extra_load_nm is not case.extra_load_nm:
             return False
         changed = {_EFFECT_AT[i] for i in np.flatnonzero(self.case.p != case.p).tolist()}
@@ -117,8 +111,7 @@ class BlackBox:
         if known is None:
             return self._read(record, case)
         before, after = simulate_each(grid_for(self.line, [record]), record, [known.case, case])
-        changed: FloatArray = known.output + (after - before)
-        return changed
+        return known.output + (after - before)
 
     def _read(self, record: Record, case: Case) -> FloatArray:
         steps = FINER if (case.p[_WITHIN] != 0.0).any() else 1

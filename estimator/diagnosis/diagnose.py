@@ -10,7 +10,7 @@ from threadpoolctl import threadpool_limits
 from estimator.diagnosis.first_use import COMPILING, compile_kernels, compile_laws, is_first_use
 from estimator.diagnosis.inference.answer import answer
 from estimator.diagnosis.inference.hypotheses import Progress, silent
-from estimator.diagnosis.preconditions import prepare
+from estimator.diagnosis.preconditions.prepare import prepare
 from estimator.diagnosis.result import Diagnosis
 from estimator.physics.model import DrivelineModel
 from estimator.physics.parallel import Work

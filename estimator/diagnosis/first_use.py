@@ -1,11 +1,4 @@
-"""The first use on a machine: the simulation has yet to be compiled there, which takes a minute, once.
-
-It is compiled for one, two or three masses when a model of so many is first diagnosed.
-
-A compiler works on one core, so two processes share the kernels. What calls a kernel takes its code in from where it is
-kept on disk: first each process compiles a kernel that calls no other, then each a caller. What is quickly compiled
-fills the time of the one that would be done first.
-"""
+"""The first use on a machine: the simulation has yet to be compiled there, which takes a minute, once."""
 
 from __future__ import annotations
 
@@ -73,10 +66,7 @@ SIDE_BY_SIDE: tuple[tuple[tuple[Any, ...], tuple[Any, ...]], ...] = (
 
 
 def is_first_use(masses: int) -> bool:
-    """Tell whether no simulation of so many masses has been kept on disk yet for this version in this place.
-
-    The same version installed in another place keeps its own.
-    """
+    """Tell whether no simulation of so many masses has been kept on disk yet for this version in this place."""
     return IS_COMPILED and not _marker(masses).exists()
 
 

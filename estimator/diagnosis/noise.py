@@ -47,8 +47,7 @@ def _usable(record: Record) -> BoolArray:
     if record.okay.size <= PREDICTOR_ORDER:
         return np.zeros(0, dtype=np.bool_)
     seen = np.lib.stride_tricks.sliding_window_view(record.okay, PREDICTOR_ORDER + 1).mean(axis=1)
-    usable: BoolArray = record.okay[PREDICTOR_ORDER:] & (seen >= MOSTLY_GOOD)
-    return usable
+    return record.okay[PREDICTOR_ORDER:] & (seen >= MOSTLY_GOOD)
 
 
 def _one_step_errors(record: Record, usable: BoolArray) -> FloatArray:
@@ -60,16 +59,11 @@ def _one_step_errors(record: Record, usable: BoolArray) -> FloatArray:
     columns = [signal[n - lag : signal.size - lag] for signal in (y, u) for lag in lags]
     regressors = np.column_stack([*columns, np.ones(y.size - n)])
     a, b = regressors[usable], y[n:][usable]
-    errors: FloatArray = b - a @ np.linalg.lstsq(a, b, rcond=None)[0]
-    return errors
+    return b - a @ np.linalg.lstsq(a, b, rcond=None)[0]
 
 
 def unpredictable(errors: Sequence[FloatArray]) -> float:
-    """Return the RMS of what a set of simulation errors' own past does not predict.
-
-    A second, often sharper view of the floor: once a model explains most of what happens, what its error leaves to a
-    linear predictor of itself is the noise of the reading.
-    """
+    """Return the RMS of what a set of simulation errors' own past does not predict."""
     n = PREDICTOR_ORDER
     past = np.concatenate([np.lib.stride_tricks.sliding_window_view(error[:-1], n) for error in errors])
     now = np.concatenate([error[n:] for error in errors])

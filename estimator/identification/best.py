@@ -1,10 +1,4 @@
-"""The best estimate of a recording: a pole pair that the data need, its intervals, and whether to believe it.
-
-A Box-Jenkins model at the recording's own period, where the torque was held from one sample to the next. Its order is
-that of two masses, three, and is raised only where the residual still depends on past torque. The pair is given where
-the data pay for it (a model without is worse by the Bayesian criterion), where no zero cancels it, and where its
-frequency is known to better than a half.
-"""
+"""The best estimate of a recording: a pole pair that the data need, its intervals, and whether to believe it."""
 
 from __future__ import annotations
 
@@ -80,7 +74,6 @@ class BestEstimate:
 
     @property
     def too_slow(self) -> bool:
-        """Tell whether the recording has too few samples in a period of the resonance."""
         period_s = self.fit.model.sample_time_s
         return self.mode is not None and self.mode.frequency_hz.value * period_s > 1.0 / SAMPLES_PER_PERIOD
 

@@ -1,7 +1,5 @@
 """The on-line chain: samples of the bus in, the driveline's model and its resonance out, while driving.
 
-::
-
 One code for a sample and for a block: what a rig computed while driving comes out of its recording again, to the
 bit. Nothing in the loop raises on a value; the estimate's status says what is wrong with it.
 """

@@ -132,7 +132,6 @@ def identify(record: Record, settings: Settings | None = None) -> Identification
 
 
 def _samples_holding(data: Record, good: int | None) -> int:
-    """Return how many samples from the start hold that many good ones; all if there are fewer."""
     if good is None:
         return int(data.okay.shape[0])
     return int(np.searchsorted(np.cumsum(data.okay), good)) + 1

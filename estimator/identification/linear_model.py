@@ -1,10 +1,4 @@
-"""Tall least-squares problems, brought to triangular form by Householder reflections first.
-
-N samples by n parameters become n by n without loss: ``|A x - b|`` and the singular values stay what they are
-(G. H. Golub and C. F. Van Loan, Matrix Computations, chapter 5). Compiled here, and not left to the
-linear-algebra library, since that spreads such a small problem over threads: on a rig whose cores are busy it
-then waits 100 times longer than it computes.
-"""
+"""Tall least-squares problems, brought to triangular form by Householder reflections first."""
 
 from __future__ import annotations
 

@@ -144,7 +144,6 @@ def define(function: Any, kinds: tuple[type, ...], wanted: Any, result: Any, mak
 
 
 def called(builder: Any, name: str, *args: Any) -> Any:
-    """Return what one of LLVM's own functions makes of lanes."""
     kind = ir.FunctionType(NUMBERS, [NUMBERS] * len(args))
     return builder.call(defined_once(builder.module, kind, f"llvm.{name}.v{LANES}f64"), args)
 

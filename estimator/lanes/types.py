@@ -41,7 +41,6 @@ class LanesType(types.Type):
         super().__init__("Lanes")
 
     def can_convert_from(self, typingctx: Any, other: Any) -> Any:
-        """Take any number."""
         return Conversion.safe if isinstance(other, types.Number) else None
 
     def unify(self, typingctx: Any, other: Any) -> Any:

@@ -170,8 +170,7 @@ def natural_frequencies_rad_s(values: Mapping[str, float]) -> FloatArray:
         stiffness[i : i + 2, i : i + 2] += values[spring] * np.array([[1.0, -1.0], [-1.0, 1.0]])
     root = np.sqrt([values[name] for name, _ in chain])
     squares = np.linalg.eigvalsh(stiffness / np.outer(root, root))
-    frequencies: FloatArray = np.sqrt(np.maximum(squares[1:], 0.0))
-    return frequencies
+    return np.sqrt(np.maximum(squares[1:], 0.0))
 
 
 def load_inertia(model: Driveline) -> str:

@@ -1,9 +1,4 @@
-"""What an entry of the catalogue is: a law that can be released from its null, and what is known of it.
-
-A missing effect is a constraint of the superset model to release: at ``null`` its law does nothing. A law
-that acts at one of the places of ``estimator.physics.effect`` is taken into the one kernel from its entry; one that
-changes the line itself is written into the kernel. Everything else about it stands in its entry.
-"""
+"""What an entry of the catalogue is: a law that can be released from its null, and what is known of it."""
 
 from __future__ import annotations
 
@@ -223,10 +218,8 @@ class Effect:
 
     @property
     def shared_parameters(self) -> tuple[EffectParameter, ...]:
-        """Parameters that all recordings share, in order."""
         return tuple(parameter for parameter in self.parameters if not parameter.own)
 
     @property
     def own_parameters(self) -> tuple[EffectParameter, ...]:
-        """Parameters that every recording has of its own, in order."""
         return tuple(parameter for parameter in self.parameters if parameter.own)

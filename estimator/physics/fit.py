@@ -106,8 +106,7 @@ class FitResult:
         low, high = bounds(self.problem)
         fixed = low == high  # at infinity, too
         down, up = (np.subtract(self.x, bound, out=np.zeros_like(self.x), where=~fixed) for bound in (low, high))
-        ended: BoolArray = fixed | (down < 1e-6) | (-up < 1e-6)
-        return ended
+        return fixed | (down < 1e-6) | (-up < 1e-6)
 
     def value(self, effect: str, name: str) -> float:
         """Fitted value of a parameter (``effect`` empty for a nominal one)."""
@@ -134,7 +133,6 @@ def not_fitted(problem: Problem, x: FloatArray) -> FitResult:
 
 
 def _moments(problem: Problem) -> BoolArray:
-    """Return which unknowns are moments of events, shape (U,)."""
     parts = [np.zeros(len(problem.shared), dtype=bool)]
     for basis in problem.bases:
         own = np.zeros(basis.guess.size, dtype=bool)

@@ -202,8 +202,7 @@ class _Rows(Generic[Key]):
 
 def initial_state(start: Start, torque_nm: float, angle_rad: float, p: FloatArray) -> FloatArray:
     """Return the kernel's state at the start: what is not unknown follows from the rest as if it were steady."""
-    only: FloatArray = initial_states([start], np.array([torque_nm]), angle_rad, p[np.newaxis])[0]
-    return only
+    return initial_states([start], np.array([torque_nm]), angle_rad, p[np.newaxis])[0]
 
 
 def initial_states(starts: Sequence[Start], torque_nm: FloatArray, angle_rad: float, p: FloatArray) -> FloatArray:

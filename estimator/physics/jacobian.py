@@ -119,7 +119,6 @@ def _apart(moving: Sequence[IntArray]) -> list[_Moved]:
 
 
 def _together(problem: Problem, moving: Sequence[IntArray]) -> list[_Moved]:
-    """Return parts across drives that fill the lanes; the same unknown of all is next to it."""
     of = np.repeat(np.arange(len(moving)), [mine.size for mine in moving])
     columns = np.concatenate(moving)
     own = columns >= len(problem.shared)
@@ -155,7 +154,6 @@ class _Around:
 
     @property
     def is_one(self) -> bool:
-        """Whether the drives are simulated as if they were one."""
         problem = self._problem
         if len(self._drives) == 1 or not are_of_a_length(self._drives):
             return False

@@ -51,11 +51,7 @@ class Shaft:
         return cls(**{name: float(values[name]) for name in model.structure.parameter_names}, source=source)
 
     def with_resonance(self, mode: Mode) -> Shaft:
-        """Take k and c from a resonance, the inertias staying as they are.
-
-        With J = J_M J_L / (J_M + J_L): k = J w^2 and c = 2 J zeta w, w the natural frequency [rad/s]; exact for a
-        shaft between two free inertias, friction left out.
-        """
+        """Take k and c from a resonance, the inertias staying as they are."""
         inertia = self.J_M * self.J_L / (self.J_M + self.J_L)
         w = 2.0 * math.pi * mode.frequency_hz
         return replace(self, k=inertia * w * w, c=2.0 * inertia * mode.damping * w, source="resonance")
@@ -146,28 +142,7 @@ def simulate(
     preload_nm: float,
     output: int = TORQUE,
 ) -> FloatArray:
-    """Simulate the torque of a joint, or its motion, under the imposed motion of a recording.
-
-    Parameters
-    ----------
-    imposed : Imposed
-        That motion.
-    p : ndarray, shape (layout.SIZE,)
-        Parameters of the superset model.
-    load_torque_nm : ndarray, shape (N,)
-        Constant torque T_0, and what there is next to it [Nm].
-    twist_rad : float
-        Twist at the first sample [rad].
-    preload_nm : float
-        Constant torque behind a gap [Nm].
-    output : int
-        ``TORQUE``, or a state of the kernel; the far end is at rest.
-
-    Returns
-    -------
-    ndarray, shape (N,)
-        Torque [Nm], rad or rad/s.
-    """
+    """Simulate the torque of a joint, or its motion, under the imposed motion of a recording."""
     twist, rate = imposed.twist + twist_rad, imposed.rate
     motion: dict[int, FloatArray] = {
         state_vector.TWIST: twist,
@@ -178,16 +153,14 @@ def simulate(
         return motion[output] if output in motion else np.zeros(twist.shape)
     out: FloatArray = np.empty_like(twist)
     respond(record.since_start_s, record.sample_time_s, twist, rate, preload_nm, p, out)
-    taken: FloatArray = out - load_torque_nm
-    return taken
+    return out - load_torque_nm
 
 
 def _rate(record: Record) -> FloatArray:
     """Return the rate of the imposed motion at every sample; at the ends, that nearest to them."""
     slope = measured_speed(record)
     known = np.flatnonzero(np.isfinite(slope))
-    rate: FloatArray = np.interp(np.arange(slope.size), known, slope[known])
-    return rate
+    return np.interp(np.arange(slope.size), known, slope[known])
 
 
 @compiled

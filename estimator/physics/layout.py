@@ -129,10 +129,7 @@ def slot(effect: str, parameter: str) -> int:
 
 
 def flat(model: DrivelineModel) -> FloatArray:
-    """Return the kernel's parameter vector of a model: its values, every other effect at null.
-
-    Shape (SIZE,), and more where the model has laws of a user's own.
-    """
+    """Return the kernel's parameter vector of a model: its values, every other effect at null."""
     nominal = model.values() if isinstance(model.load, Load) else {**model.values(), LOAD: model.load}
     effects = {name: {k: v.value for k, v in e.items()} for name, e in model.effects.items()}
     return flat_values(nominal, effects, model.laws)

@@ -37,10 +37,7 @@ def least_inside(triangle: FloatArray, target: FloatArray, low: FloatArray, high
 
 
 def least_of_quadratic(curvature: FloatArray, gradient: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
-    """Return the least of ``x' curvature x / 2 + gradient' x`` with ``low <= x <= high``, shape (U,).
-
-    ``curvature``, shape (U, U), is positive definite; unknowns without bounds come first, as in ``least_inside``.
-    """
+    """Return the least of ``x' curvature x / 2 + gradient' x`` with ``low <= x <= high``, shape (U,)."""
     return least_inside(*_factored(curvature, gradient), low, high)
 
 
@@ -112,8 +109,7 @@ def _one_by_one(triangle: FloatArray, target: FloatArray, low: FloatArray, high:
 
 
 def _bounded(low: FloatArray, high: FloatArray) -> BoolArray:
-    bounded: BoolArray = np.isfinite(low) | np.isfinite(high)
-    return bounded
+    return np.isfinite(low) | np.isfinite(high)
 
 
 CONVERGED = 0.1
@@ -232,7 +228,6 @@ def _step(
     low: FloatArray,
     high: FloatArray,
 ) -> FloatArray:
-    """Return the damped Gauss-Newton step inside the bounds: the least of the damped quadratic there."""
     free = unbounded_first(low, high, low < high)
     diagonal = np.diag(curvature)
     damped = curvature + np.diag(damping * np.maximum(diagonal, 1e-12 * diagonal.max()))

@@ -56,19 +56,13 @@ def _typical_torque(record: Record) -> float:
 
 
 def _typical(signal: FloatArray) -> float:
-    """Return the 99th percentile of a signal's size.
-
-    Where it rests for all but a short pulse, its peak; where it rests throughout, 1: a scale must not be zero.
-    """
+    """Return the 99th percentile of a signal's size."""
     size = np.abs(signal)
     return float(np.nanpercentile(size, 99)) or float(np.nanmax(size)) or 1.0
 
 
 def reverses(record: Record) -> bool:
-    """Tell whether the speed clearly takes both signs in a recording.
-
-    Clearly: on each side it reaches a hundredth of its own range, for at least ten samples.
-    """
+    """Tell whether the speed clearly takes both signs in a recording."""
     speed = measured_speed(record)
     threshold = 0.01 * float(np.nanpercentile(np.abs(speed), 99))
     return bool(np.sum(speed > threshold) >= 10 and np.sum(speed < -threshold) >= 10)
@@ -151,7 +145,6 @@ MOST_TURNS = 100.0
 
 
 def range_of(records: Sequence[Record]) -> float:
-    """Return the range of the motor's angle, or of a travel, in the recording that has most of it."""
     return max(float(np.ptp(motor_angle(record))) for record in records)
 
 

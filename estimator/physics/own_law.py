@@ -309,7 +309,7 @@ class Forces(types.WrapperAddressProtocol):  # type: ignore[misc]  # numba has n
         def called(time_s, motor, load, twist, torque, p):  # type: ignore[no-untyped-def]
             return back(time_s, motor, load, twist, torque, p.ctypes)
 
-        return numba.njit(called)  # type: ignore[no-any-return]
+        return numba.njit(called)
 
 
 def _none(time_s, motor, load, twist, torque, p):  # type: ignore[no-untyped-def]

@@ -1,9 +1,4 @@
-"""What a recording has of its own of an effect, found by a scan: phases of an angle, moments of an event.
-
-Neither is convex: a fit that starts half a period or a few seconds off ends in the wrong place. Around the state
-without the effect the output answers to a small one in proportion, so that phases follow from the answers to a cosine
-and a sine, and moments from the answers to the effect in every cell of a grid over time.
-"""
+"""What a recording has of its own of an effect, found by a scan: phases of an angle, moments of an event."""
 
 from __future__ import annotations
 
@@ -39,15 +34,10 @@ class Projector:
         self.error = self.rest(result.residual)
 
     def rest(self, signals: FloatArray) -> FloatArray:
-        """Return what is left of stacked signals, shape (..., R)."""
-        left: FloatArray = signals - (signals @ self._free) @ self._free.T
-        return left
+        return signals - (signals @ self._free) @ self._free.T
 
     def products(self, answers: FloatArray, index: int) -> tuple[FloatArray, FloatArray]:
-        """Return the products of what is left of answers with each other, (K, K), and with ``error``, (K,).
-
-        The answers, shape (K, R_i), are one recording's own, its outputs in turn: they are 0 in all other rows.
-        """
+        """Return the products of what is left of answers with each other, (K, K), and with ``error``, (K,)."""
         rows = self._rows[index]
         seen = answers @ self._free[rows]
         return answers @ answers.T - seen @ seen.T, answers @ self.error[rows]
@@ -127,7 +117,6 @@ def small_waves(entry: Effect, p: FloatArray, sizes: Mapping[str, float]) -> lis
 
 
 def answers_to(entry: Effect, sizes: Mapping[str, float], outputs: FloatArray, still: FloatArray) -> list[Wave]:
-    """Return the answers to `small_waves` from their outputs, shape (K, R), and the one without them, shape (R,)."""
     return [
         Wave(phase, amplitude, (outputs[2 * i : 2 * i + 2] - still) / (SMALL * sizes[amplitude]))
         for i, (phase, amplitude) in enumerate(_acting(entry, sizes))

@@ -163,7 +163,6 @@ def concurrently(function: Callable[[Item], Result], items: Sequence[Item]) -> l
 
 
 def _wait_for(helpers: Sequence[Future[None]], cores: _Cores) -> None:
-    """Wait until helpers are done; whoever waits leaves its core to them."""
     if all(helper.done() for helper in helpers):
         return
     cores.idle.release()

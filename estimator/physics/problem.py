@@ -154,11 +154,7 @@ def simulated_each(
     index: int,
     alike_s: FloatArray | None = None,
 ) -> FloatArray:
-    """Return the samples that count of one recording for parameter vectors and its own unknowns, shape (K, R_i).
-
-    Its outputs stand in turn. ``alike_s``, shape (K,), says up to when each is as the first one
-    (``simulate.simulate_each``).
-    """
+    """Return the samples that count of one recording for parameter vectors and its own unknowns, shape (K, R_i)."""
     basis = problem.local[index]
     cases = [case_of(basis, p, local) for p, local in points]
     return simulated_cases(problem, cases, index, alike_s)
@@ -181,7 +177,6 @@ def case_of(basis: LocalBasis, p: FloatArray, local: FloatArray) -> Case:
 
 
 def _within_reason(out: FloatArray, record: Record) -> FloatArray:
-    """Return outputs (..., N) of a recording, far away where the simulation runs away."""
     worst = far_away(record)
     if -worst <= out.min() and out.max() <= worst:  # False where it is no number
         return out

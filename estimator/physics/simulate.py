@@ -95,8 +95,7 @@ def simulate(
     ndarray, shape (N,)
         In the unit of ``record.output``.
     """
-    only: FloatArray = simulate_each(grid, record, [Case(p, start, extra_load_nm)], output)[0]
-    return only
+    return simulate_each(grid, record, [Case(p, start, extra_load_nm)], output)[0]
 
 
 def simulate_each(
@@ -190,8 +189,7 @@ def _read(outputs: Sequence[Record], out: FloatArray, slopes: FloatArray) -> Flo
         found: FloatArray = 0.5 * slopes.sum(axis=-2, keepdims=True) / units
         found[..., 0, [0, -1]] = slopes[..., [1, 0], [0, -1]] / units
         return found
-    read: FloatArray = _sampled_off_time(out, slopes, outputs[0].offset_s) / units
-    return read
+    return _sampled_off_time(out, slopes, outputs[0].offset_s) / units
 
 
 def _samples_alike(record: Record, count: int, alike_s: FloatArray | None) -> IntArray:
@@ -214,8 +212,7 @@ def _sampled_off_time(out: FloatArray, slopes: FloatArray, offset_s: FloatArray 
     """Return outputs (..., C, N) as they were when the samples were taken, off their time stamps [s]."""
     if offset_s is None or slopes.shape[-1] == 0:
         return out
-    moved: FloatArray = out + np.where(offset_s < 0.0, slopes[..., :1, :], slopes[..., 1:, :]) * offset_s
-    return moved
+    return out + np.where(offset_s < 0.0, slopes[..., :1, :], slopes[..., 1:, :]) * offset_s
 
 
 def _joint_output(record: Record, imposed: joint.Imposed, case: Case, output: int) -> FloatArray:
@@ -239,8 +236,7 @@ def _misread(grid: Grid, record: Record, case: Case) -> FloatArray | float:
     if grid.structure is Structure.ONE_MASS:
         motion[1:] = motion[0], np.zeros(motion.shape[1])
     arguments = np.vstack([record.since_start_s, motion, record.total_torque_nm])
-    error: FloatArray = np.sum([law.law(arguments, law.values(case.p)) for law in laws], axis=0)
-    return error
+    return np.sum([law.law(arguments, law.values(case.p)) for law in laws], axis=0)
 
 
 TIMED = np.array([slot(e.name, e.parameters[0].name) for e in catalogue.BUILT_IN.values() if e.event or e.timed])

@@ -73,11 +73,7 @@ class Release:
 
 
 def effect_unknowns(name: str, model: DrivelineModel, records: Sequence[Record]) -> list[Release]:
-    """Return an effect's parameters as unknowns, once per start point; a profile has no shared ones.
-
-    What recordings have of their own starts at its null: phases and moments are found by a scan
-    (``estimator.diagnosis.inference.looks``).
-    """
+    """Return an effect's parameters as unknowns, once per start point; a profile has no shared ones."""
     name = model.own(name)
     entry = EFFECTS[name]
     if entry.profile:
@@ -169,7 +165,6 @@ class LocalBasis:
 
     @property
     def profile_rows(self) -> slice:
-        """Where the profile stands."""
         return slice(self.guess.size - self.profile.shape[0], self.guess.size)
 
     def start(self, x: FloatArray) -> Start:
@@ -213,8 +208,7 @@ class LocalBasis:
         """Return the load profile of scaled unknowns, shape (N,) [Nm]; None without one."""
         if self.profile.shape[0] == 0:
             return None
-        load: FloatArray = (x[self.profile_rows] * self.scale[self.profile_rows]) @ self.profile
-        return load
+        return (x[self.profile_rows] * self.scale[self.profile_rows]) @ self.profile
 
 
 def local_basis(

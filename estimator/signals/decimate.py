@@ -141,8 +141,7 @@ def low_pass_taps(factor: int) -> FloatArray:
     length = round(low_pass_length(factor))
     ideal = np.sinc(EDGE / factor * (np.arange(length) - (length - 1) / 2.0))
     windowed = ideal * np.hamming(length)  # as scipy.signal.firwin, which takes a second to import
-    taps: FloatArray = windowed / windowed.sum()
-    return taps
+    return windowed / windowed.sum()
 
 
 class Decimator:
@@ -186,7 +185,6 @@ class Decimator:
 
     @property
     def delay_samples(self) -> int:
-        """Delay of the kept samples, counted in kept samples."""
         return HALF_LENGTH if self._factor > 1 else 0
 
     def run(self, u: FloatArray, y: FloatArray, okay: BoolArray) -> Decimated:
@@ -214,7 +212,6 @@ class Decimator:
         return Decimated(out[0, :n].copy(), out[1, :n].copy(), out_okay[:n].copy())
 
     def state(self) -> dict[str, FloatArray | IntArray]:
-        """Return the state, copied."""
         return {"counters": self._counters.copy(), "level": self._level.copy(), "window": self._window.copy()}
 
     def restore(self, state: Mapping[str, Any]) -> None:
@@ -271,7 +268,6 @@ a longer recording is of a driveline that warms meanwhile. Each costs 6 kilobyte
 
 
 def first_part(record: Record) -> Record:
-    """Return the part of a recording that off-line models are fitted to: the first MOST blocks."""
     most = MOST * block_of(record.sample_time_s)
     return record if record.time_s.shape[0] <= most else sliced(record, slice(0, most))
 

@@ -79,8 +79,7 @@ def multisine_nm(period_samples: int, excited: IntArray, amplitude_nm: float) ->
         clipped = np.fft.rfft(np.clip(signal, -level, level))
         spectrum[excited] = np.exp(1j * np.angle(clipped[excited]))
         signal = np.fft.irfft(spectrum, period_samples)
-    found: FloatArray = chosen * (amplitude_nm / float(np.abs(chosen).max()))
-    return found
+    return chosen * (amplitude_nm / float(np.abs(chosen).max()))
 
 
 def crest_factor(signal: FloatArray) -> float:

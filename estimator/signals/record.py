@@ -206,8 +206,7 @@ class Record:
     def since_start_s(self) -> FloatArray:
         """Time since the recording began, shape (N,) [s]."""
         began = self.time_s[0] if self.began_s is None else self.began_s
-        since: FloatArray = self.time_s - began
-        return since
+        return self.time_s - began
 
     @property
     def known_load_nm(self) -> FloatArray | float:
@@ -218,8 +217,7 @@ class Record:
     @once
     def total_torque_nm(self) -> FloatArray:
         """Sum of the torque inputs, T_tot = T_M1 + T_M2 in the paper; shape (N,) [Nm]."""
-        total: FloatArray = self.torque_nm.sum(axis=1)
-        return total
+        return self.torque_nm.sum(axis=1)
 
 
 def sliced(record: Record, rows: slice, name: str | None = None) -> Record:

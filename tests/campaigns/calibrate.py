@@ -29,7 +29,7 @@ from estimator.diagnosis.inference.answer import searched as searched_for
 from estimator.diagnosis.inference.checks import LEAST_SHARE, TEST_LIMITS, THRESHOLDS_FILE, chance
 from estimator.diagnosis.inference.judge import Score, probability_of
 from estimator.diagnosis.inference.rivals import rivals_of
-from estimator.diagnosis.preconditions import prepare
+from estimator.diagnosis.preconditions.prepare import prepare
 from estimator.errors import EstimatorError
 from hil.proof.truth.specimen import NOTHING
 from tests.campaigns.forms import Role

@@ -86,8 +86,7 @@ def as_read(output: FloatArray, record: Record, effects: Mapping[str, Mapping[st
 def _repeating(output: FloatArray, record: Record) -> FloatArray:
     (stale,) = repeated([np.where(flagged(record), np.nan, record.output)]).rows
     renewed = np.maximum.accumulate(np.where(stale, 0, np.arange(output.size)))
-    shown: FloatArray = output[renewed]
-    return shown
+    return output[renewed]
 
 
 AMONG_READ = (stale_samples, speed_quantisation, stamped_jitter)
@@ -140,7 +139,6 @@ class Chain:
         return replace(self, records=steady, findings=(*self.findings, found), shifts=shifts)
 
     def effects(self) -> dict[str, dict[str, float]]:
-        """Return what was recognised as effects of a model: name to parameter values."""
         return {f.name: {name: sized.value for name, sized in f.parameters.items()} for f in self.findings}
 
     def errors(self, outputs: Sequence[FloatArray], within: Sequence[BoolArray] | None = None) -> list[FloatArray]:
@@ -163,7 +161,6 @@ def read_through(records: Sequence[Record]) -> Chain:
 
 
 def _read_rows(record: Record, findings: Iterable[Finding]) -> BoolArray:
-    """Return the good rows of which the output was not lost, shape (N,)."""
     rows = record.okay
     for finding in findings:
         if finding.name == "lost_samples":

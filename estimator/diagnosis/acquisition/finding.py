@@ -19,21 +19,17 @@ def channels(record: Record) -> FloatArray:
 
 
 def flagged(record: Record) -> BoolArray:
-    """Return the rows in which the output was not read, or no torque was (a flagged row); shape (N,)."""
-    missing: BoolArray = ~np.isfinite(record.output) | ~record.torque_trusted.any(axis=1)
-    return missing
+    return ~np.isfinite(record.output) | ~record.torque_trusted.any(axis=1)
 
 
 def any_of(cells: BoolArray) -> BoolArray:
     """Return the rows with at least one True, shape (N,)."""
-    rows: BoolArray = np.logical_or.reduce(cells, axis=1)
-    return rows
+    return np.logical_or.reduce(cells, axis=1)
 
 
 def all_of(cells: BoolArray) -> BoolArray:
     """Return the rows that are True throughout, shape (N,)."""
-    rows: BoolArray = np.logical_and.reduce(cells, axis=1)
-    return rows
+    return np.logical_and.reduce(cells, axis=1)
 
 
 def runs(rows: BoolArray) -> list[tuple[int, int]]:

@@ -33,11 +33,7 @@ SMALLEST_PERIODS = 1e-3
 
 
 def stamp_offsets_s(record: Record) -> FloatArray:
-    """Return how far each time stamp is from the uniform time base [s]; zeros where stamps are even, shape (N,).
-
-    Even means to within their own resolution and a clock's: the uniform time base is taken off, and what is left counts
-    if it is well above what rounding the stamps leaves.
-    """
+    """Return how far each time stamp is from the uniform time base [s]; zeros where stamps are even, shape (N,)."""
     since = record.time_s - uniform_period_s(record.time_s) * np.arange(record.time_s.size)
     offset: FloatArray = since - since.mean()
     rounding_s = decimal_place(record.time_s) / np.sqrt(12.0)
@@ -72,7 +68,6 @@ def stamped_jitter(records: Sequence[Record]) -> Finding | None:
 
 
 def _confirmed(record: Record, offset_s: FloatArray) -> tuple[float, float] | None:
-    """Return which share of the offsets the output confirms, and its standard error; None where it can't tell."""
     trusted = record.okay & np.isfinite(record.output)
     trusted[[0, -1]] = False
     trusted[1:-1] &= np.isfinite(record.output[2:]) & np.isfinite(record.output[:-2])
@@ -165,8 +160,7 @@ def hidden_jitter(
 
 def mean_shift(slopes: FloatArray, jitter_s: float) -> FloatArray:
     """Return what readings off their time by ``jitter_s`` (rms) are off in the mean: a kink is cut short."""
-    shift: FloatArray = np.sqrt(OF_A_KINK) * jitter_s * (slopes[1] - slopes[0])
-    return shift
+    return np.sqrt(OF_A_KINK) * jitter_s * (slopes[1] - slopes[0])
 
 
 def _outputs(records: Sequence[Record], okay: Sequence[BoolArray]) -> Mapping[str, BoolArray]:
@@ -291,7 +285,6 @@ def _crossing(excess: Callable[[float], float], inside: float, outside: float) -
 
 
 def _of_the_many(rest: _Rest, found: _Jitter) -> bool:
-    """Tell whether the typical row shows the jitter, by the median absolute error of the steep half of the rows."""
     steep = rest.steepness >= np.median(rest.steepness)
     mad_to_sigma = 1.0 / float(stats.norm.ppf(0.75))
     typical = (mad_to_sigma * np.median(np.abs(rest.error[steep]))) ** 2

@@ -262,8 +262,7 @@ def _regularity(values: FloatArray, step: float) -> float:
 
 
 def _smooth(values: FloatArray) -> FloatArray:
-    mean: FloatArray = np.convolve(values, np.full(SMOOTHING, 1.0 / SMOOTHING), mode="valid")
-    return mean
+    return np.convolve(values, np.full(SMOOTHING, 1.0 / SMOOTHING), mode="valid")
 
 
 LONGEST_ZERO = 20
@@ -347,7 +346,6 @@ def _zeros_of(series: Sequence[FloatArray]) -> tuple[list[BoolArray], float]:
 
 
 def _at_ends(values: FloatArray, near: float, found: Sequence[BoolArray]) -> BoolArray:
-    """Return the zeros a recording begins or ends with, where they are no more in a row than were lost elsewhere."""
     longest = max(end - begin for rows in found for begin, end in runs(rows))
     zeros = np.zeros(values.shape, dtype=np.bool_)
     for begin, end in runs(values == 0.0):
@@ -358,7 +356,6 @@ def _at_ends(values: FloatArray, near: float, found: Sequence[BoolArray]) -> Boo
 
 
 def _out_of_line(values: FloatArray, near: float) -> BoolArray:
-    """Return the zeros in short runs between values that are not near zero; shape (N,)."""
     found = np.zeros(values.shape, dtype=np.bool_)
     for begin, end in runs(values == 0.0):
         if begin > 0 and end < values.size and end - begin <= LONGEST_ZERO:
@@ -422,5 +419,4 @@ def _missing(record: Record) -> BoolArray:
     whole_row = all_of(lost) & ~record.okay
     lost = np.column_stack([~np.isfinite(record.output) | whole_row, lost])
     short = shorter_runs(any_of(lost), LONGEST_BURST)
-    missing: BoolArray = lost & short[:, np.newaxis]
-    return missing
+    return lost & short[:, np.newaxis]

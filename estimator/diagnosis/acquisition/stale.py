@@ -65,8 +65,7 @@ def _moving_share(moving: BoolArray, read: BoolArray) -> FloatArray:
     counts = [
         sliding_window_view(np.pad(rows, HALF_WINDOW), 2 * HALF_WINDOW + 1).sum(axis=1) for rows in (moving, read)
     ]
-    share: FloatArray = counts[0] / np.maximum(counts[1], 1)
-    return share
+    return counts[0] / np.maximum(counts[1], 1)
 
 
 CATCH_UP = 0.8
@@ -87,7 +86,6 @@ class Repeated:
 
     @property
     def count(self) -> int:
-        """Repeats in telling rows."""
         return sum(int(rows.sum()) for rows in self.rows)
 
     @property
@@ -169,7 +167,6 @@ def followed(torque: FloatArray, trusted: BoolArray, reference: FloatArray) -> t
 
 
 def _regressors(reference: FloatArray) -> FloatArray:
-    """Return the references of each row and of those before it, and one for an offset; shape (N, PERIODS + 1)."""
     before = [np.concatenate([np.full(lag, reference[0]), reference[: reference.size - lag]]) for lag in range(PERIODS)]
     return np.column_stack([*before, np.ones(reference.size)])
 
@@ -204,7 +201,6 @@ class Clock:
         return [row for row in range(first, last + 1) if row % self.period == self.phase]
 
     def explains(self, change_nm: float) -> bool:
-        """Tell whether a change is one step of the clock, or none."""
         size = abs(change_nm)
         return size <= CLEAR_STEP * self.usual_nm or abs(size - self.step_nm) <= SAME_STEP * self.step_nm
 
@@ -312,8 +308,7 @@ def _late(again: BoolArray, step: FloatArray, early: FloatArray, clear: BoolArra
 
 def _next_fresh(torque: FloatArray, stale: BoolArray) -> FloatArray:
     rows = np.where(stale, torque.size - 1, np.arange(torque.size))
-    following: FloatArray = torque[np.minimum.accumulate(rows[::-1])[::-1]]
-    return following
+    return torque[np.minimum.accumulate(rows[::-1])[::-1]]
 
 
 def _mended(record: Record, inputs: Sequence[int], stale: BoolArray) -> Record:

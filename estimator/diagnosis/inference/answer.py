@@ -49,8 +49,7 @@ from estimator.diagnosis.inference.rivals import Law, best_law, rivals_of, searc
 from estimator.diagnosis.inference.search import Search
 from estimator.diagnosis.inference.wording import Context, law_in_words, statement
 from estimator.diagnosis.noise import noise_floor
-from estimator.diagnosis.preconditions import Prepared
-from estimator.diagnosis.preconditions.prepare import as_slow_as_needed
+from estimator.diagnosis.preconditions.prepare import Prepared, as_slow_as_needed
 from estimator.diagnosis.result import (
     Diagnosis,
     Discrepancy,
@@ -67,8 +66,9 @@ from estimator.diagnosis.result import (
     UntestableEffect,
     Verdict,
 )
-from estimator.diagnosis.unnamed import ElementSearch
-from estimator.diagnosis.where import discrepancy, locate
+from estimator.diagnosis.unnamed.search import ElementSearch
+from estimator.diagnosis.where import locate
+from estimator.diagnosis.where.discrepancy import discrepancy
 from estimator.physics.effect import Element, Untestable
 from estimator.physics.fit import not_fitted
 from estimator.physics.model import DrivelineModel
@@ -288,7 +288,6 @@ def _does_not_fall(fit: Fit) -> str:
 
 
 def _abstained(seen: _Seen, runs: FreeRuns, reason: str) -> tuple[_Seen, FreeRuns]:
-    """Return what is left to say where what is believed does not carry over: nothing is named."""
     decision = seen.decision
     doubted = tuple(replace(each, objection=reason) for each in (*decision.named, *decision.traces))
     decision = replace(decision, named=(), traces=(), doubted=(*doubted, *decision.doubted))

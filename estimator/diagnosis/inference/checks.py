@@ -156,7 +156,6 @@ def _is_described(hypothesis: Hypothesis, model: DrivelineModel) -> bool:
 
 
 def _is_driven(plain: FitResult, records: Sequence[Record]) -> bool:
-    """Tell whether the torque path lets a real part of the torque through in every part of every recording."""
     for i, record in enumerate(records):
         through = shaft_torque(record.torque_nm, record.time_s - record.time_s[0], plain.p_of(i))
         for passed, read in zip(

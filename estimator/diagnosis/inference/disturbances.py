@@ -163,7 +163,6 @@ class Whitener:
         return found
 
     def minus_twice_log(self, innovations: FloatArray) -> float:
-        """Return minus twice the log-likelihood of stacked innovations, but for a constant."""
         return 2.0 * float(self.logs.sum()) + float(innovations @ innovations)
 
 
@@ -269,7 +268,6 @@ class Limits:
         return replace(self, high=high)
 
     def without_forms(self) -> Limits:
-        """Return limits that hold the error of laws' forms as usual: of a line without such a law."""
         low, high = self.low.copy(), self.high.copy()
         low[Size.FORM] = high[Size.FORM] = self.usual[Size.FORM]
         return replace(self, low=low, high=high)
@@ -280,10 +278,8 @@ class Limits:
 
 
 def reading_noise(sizes: FloatArray) -> FloatArray:
-    """Return the noise of each output's reading, white and coloured, shape (C,)."""
     each = np.exp(readings(sizes))
-    noise: FloatArray = np.hypot(each[:, Size.WHITE], each[:, Size.COLOURED])
-    return noise
+    return np.hypot(each[:, Size.WHITE], each[:, Size.COLOURED])
 
 
 def limits_of(records: Sequence[Record]) -> Limits:

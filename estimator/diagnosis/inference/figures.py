@@ -58,8 +58,7 @@ def blocks(record: Record) -> BoolArray:
     every_s, block_s = scale * EVERY_S, scale * BLOCK_S
     phase = np.mod(since_s, every_s)
     middle = 0.5 * (every_s - block_s)
-    inside: BoolArray = (phase >= middle) & (phase < middle + block_s)
-    return inside
+    return (phase >= middle) & (phase < middle + block_s)
 
 
 def foreign_outputs(
@@ -232,7 +231,6 @@ class FreeRuns:
 
     @cached_property
     def final(self) -> FitResult:
-        """What is believed: the recordings' first outputs."""
         return self.after.first_outputs()
 
     @cached_property
@@ -302,7 +300,6 @@ def acquired(runs: FreeRuns) -> tuple[FoundEffect, ...]:
 
 
 def figures_of(runs: FreeRuns, noise: float, findings: Sequence[FoundEffect]) -> Fit:
-    """Return the errors of free runs of the recordings as they were read, faults of the acquisition and all."""
     chain, line, retuned = runs.chain, runs.unseen.line, runs.retuned
     as_read = fit(replace(retuned.problem, records=chain.raw), retuned.x) if chain.findings else retuned
     return Fit(

@@ -219,8 +219,7 @@ def _squares(
     measured = np.concatenate([problem.records[i].output[problem.use[i]] for i in problem.drives[index]])
     outputs = simulated_each(problem, [(result.p, x) for x in tried], index)
     errors = filtered.part(index, (outputs - measured).T).T
-    left: FloatArray = (errors**2).sum(axis=1) - ((errors @ taken_up) ** 2).sum(axis=1)
-    return left
+    return (errors**2).sum(axis=1) - ((errors @ taken_up) ** 2).sum(axis=1)
 
 
 SAME = 1.0

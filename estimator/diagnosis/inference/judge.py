@@ -116,10 +116,7 @@ def shares(path: Sequence[Hypothesis]) -> dict[str, float]:
 
 
 def shares_with_grade(best: Hypothesis, visited: Mapping[Effects, Hypothesis], nothing: Hypothesis) -> dict[str, float]:
-    """Return the same of a set in which the load walks far, which follows whatever is slow.
-
-    What another effect has is by how much more is left without it; the rest goes with the grade.
-    """
+    """Return the same of a set in which the load walks far, which follows whatever is slow."""
     without = {name: visited[best.effects - {name}] for name in sorted(best.effects) if name != GRADE}
     found = {name: max(fall(each, best, nothing), 0.0) for name, each in without.items()}
     return found | {GRADE: max(1.0 - best.free_squares / nothing.free_squares - sum(found.values()), 0.0)}
@@ -153,11 +150,7 @@ def _alike(
 
 
 def probability_of(names: Collection[str], scores: Sequence[Score], tempered: float) -> float:
-    """Return the probability that one of some effects is there, over all sets that were fitted.
-
-    A set with values that are no case of its effects is evidence of something else: against the effects it does
-    without, and for none that it holds.
-    """
+    """Return the probability that one of some effects is there, over all sets that were fitted."""
     holds = [any(name in names for name in each.effects) for each in scores]
     counted = [(each.score, has) for each, has in zip(scores, holds, strict=True) if each.is_plausible or not has]
     values = np.array([score for score, _ in counted])
@@ -191,11 +184,7 @@ class Decision:
 
 
 def tempered_by(tests: Sequence[Test], samples: int, factor: float) -> float:
-    """Return by which differences of scores are divided: more where a test finds information that no law has used.
-
-    That is what it finds beyond what is left in worlds of which all is explained. Tests find the same information
-    again: the one that finds most of it says how much there is at least.
-    """
+    """Return by which differences of scores are divided: more where a test finds information that no law has used."""
     beyond = [test.value - test.most for test in tests if test.failed and test.is_share]
     return factor + samples * max(beyond, default=0.0)
 
@@ -268,7 +257,6 @@ def _as_simple_as_will_do(search: Search, best: Hypothesis) -> Hypothesis:
 
 
 def _with_sizes(search: Search, best: Hypothesis) -> Hypothesis:
-    """Return the best set without effects that it is as probable without, or whose interval holds their null."""
     for name in sorted(best.effects):
         without = search.without(best, name)
         if without.score <= best.score or holds_null(best, name):
@@ -318,6 +306,5 @@ def error_falls(fit: Fit) -> bool:
 
 
 def spread(problem: Problem) -> float:
-    """Return how far the output itself is spread, each recording around its mean."""
     parts = [record.output[use] for record, use in zip(problem.records, problem.use, strict=True)]
     return float(np.std(np.concatenate([part - part.mean() for part in parts])))

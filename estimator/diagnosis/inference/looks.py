@@ -167,7 +167,6 @@ class Screen:
         return [list(each) for each in zip(*found, strict=True)]
 
     def _along(self, steps: _Steps, step: float, moved: FloatArray) -> Look:
-        """Look along the change of the output that one size of an effect makes."""
         release, first, zero = steps.release, steps.first, steps.zero
         if not np.isfinite(moved).all():  # so far out that the line flies apart: this start promises nothing
             return Look(release, 0.0)
@@ -419,7 +418,6 @@ class Remembering(Screen):
 
 
 def _changed(base: FloatArray, p: FloatArray) -> bytes:
-    """Return what was changed of a parameter vector: places and values."""
     places = np.flatnonzero(p != base)
     return places.tobytes() + p[places].tobytes()
 

@@ -23,7 +23,8 @@ from estimator.diagnosis.inference.hypotheses import (
 from estimator.diagnosis.inference.judge import Grounds, Score, free_rms
 from estimator.diagnosis.inference.search import Search
 from estimator.diagnosis.result import Stray
-from estimator.diagnosis.unnamed import ElementSearch, scene, searches_at
+from estimator.diagnosis.unnamed.scene import scene
+from estimator.diagnosis.unnamed.search import ElementSearch, searches_at
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Element
 from estimator.physics.fit import not_fitted

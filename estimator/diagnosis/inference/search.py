@@ -361,7 +361,6 @@ class Search:
         return None if rough is None else self.finish(rough, current)
 
     def fit_look_alikes(self, best: Hypothesis) -> None:
-        """Fit to their end what came near in the place of an effect, so that each look-alike has its own values."""
         for effects, rough in sorted(self.rough.items(), key=lambda item: sorted(item[0])):
             exchanged = len(effects) == len(best.effects) and len(effects & best.effects) == len(effects) - 1
             if exchanged and effects not in self.visited:
@@ -370,7 +369,6 @@ class Search:
                     self.finish(rough, best)
 
     def _best_drop(self, current: Hypothesis) -> Hypothesis | None:
-        """Return a hypothesis without an effect that others made superfluous; None where there is none."""
         return self._better(concurrently(lambda name: self.without(current, name), sorted(current.effects)), current)
 
     def _best_exchange(self, current: Hypothesis) -> Hypothesis | None:
@@ -435,7 +433,6 @@ def precedes(one: str, other: str) -> bool:
 
 
 def are_alike(one: str, other: str) -> bool:
-    """Tell whether two effects are known to resemble each other, or act at one element."""
     a, b = EFFECTS[one], EFFECTS[other]
     kin = {*a.resembles, *a.equivalent}, {*b.resembles, *b.equivalent}
     return other in kin[0] or one in kin[1] or a.element is b.element

@@ -77,7 +77,6 @@ def _as_if(element: Element, name: str, coefficient: float) -> str:
 
 
 def _signals_of(name: str) -> list[str]:
-    """Return the signals that a formula, or a function of one, depends on; none of a phrase."""
     if is_phrase(name) and not name.startswith(FUNCTION):
         return []
     found = (match.group() for match in _SIGNAL.finditer(name.removeprefix(FUNCTION)))

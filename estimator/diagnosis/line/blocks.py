@@ -45,8 +45,7 @@ NO_FORCE: Force = (0.0, 0.0)
 
 def simulated(result: FitResult, index: int, force: Force = NO_FORCE, state: int | None = None) -> FloatArray:
     """Simulate a recording at a fit's unknowns under further torques: its output, or a state; shape (N,)."""
-    only: FloatArray = simulated_each(result, [result.x], index, force, state)[0]
-    return only
+    return simulated_each(result, [result.x], index, force, state)[0]
 
 
 def simulated_each(
@@ -93,8 +92,7 @@ def motion_in_blocks(record: Record, states: dict[str, FloatArray], length: int)
 def between(values: FloatArray) -> FloatArray:
     """Return a sampled signal half a sample later, where the torque held from a sample on has its middle."""
     later = np.append(values[1:], 2.0 * values[-1] - values[-2])
-    middle: FloatArray = 0.5 * (values + later)
-    return middle
+    return 0.5 * (values + later)
 
 
 AROUND = 2
@@ -138,14 +136,12 @@ def _at_motor(speed: FloatArray, p: FloatArray) -> FloatArray:
     size = p[slots.COULOMB] + np.zeros(speed.size)
     if p[slots.STRIBECK_SPEED] > 0.0:
         size += p[slots.STRIBECK_COULOMB] + p[slots.STRIBECK] * np.exp(-((speed / p[slots.STRIBECK_SPEED]) ** 2))
-    law_nm: FloatArray = size * np.sign(speed)
-    return law_nm
+    return size * np.sign(speed)
 
 
 def _at_load(speed: FloatArray, since_start_s: FloatArray, p: FloatArray) -> FloatArray:
     braked = (p[slots.BRAKE_FROM] <= since_start_s) & (since_start_s <= p[slots.BRAKE_TO])
-    law_nm: FloatArray = (p[slots.COULOMB_LOAD] + p[slots.BRAKE] * braked) * np.sign(speed)
-    return law_nm
+    return (p[slots.COULOMB_LOAD] + p[slots.BRAKE] * braked) * np.sign(speed)
 
 
 def _in_shaft(twist: FloatArray, p: FloatArray) -> FloatArray:
@@ -154,16 +150,14 @@ def _in_shaft(twist: FloatArray, p: FloatArray) -> FloatArray:
     missing = np.clip(twist, -half, half)
     beyond = np.abs(twist) - half - p[slots.STAGE_FROM]
     more = p[slots.STAGE] * np.sign(twist) * np.maximum(beyond, 0.0)
-    found: FloatArray = p[slots.K] * (more - missing)
-    return found
+    return p[slots.K] * (more - missing)
 
 
 def change_around(law_nm: FloatArray) -> FloatArray:
     """Return the range of a torque over the samples around each one, shape (N,)."""
     padded = np.pad(law_nm, AROUND, mode="edge")
     windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * AROUND + 1)
-    change: FloatArray = windows.max(axis=1) - windows.min(axis=1)
-    return change
+    return windows.max(axis=1) - windows.min(axis=1)
 
 
 def block_mean(values: FloatArray, length: int) -> FloatArray:
@@ -171,8 +165,7 @@ def block_mean(values: FloatArray, length: int) -> FloatArray:
     count = values.shape[0] // length
     if length == 1:
         return values[:count]
-    mean: FloatArray = values[: count * length].reshape(count, length, *values.shape[1:]).mean(axis=1)
-    return mean
+    return values[: count * length].reshape(count, length, *values.shape[1:]).mean(axis=1)
 
 
 def block_mean_of(values: FloatArray, use: BoolArray, length: int) -> tuple[FloatArray, FloatArray]:

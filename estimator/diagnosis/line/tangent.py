@@ -244,8 +244,7 @@ def run_block(setting: Setting, first: int, torques: Torques, p: FloatArray, sta
         setting.out,
         setting.slopes,
     )
-    mean: float = setting.out[0, first : torque.shape[0]].mean()
-    return mean
+    return setting.out[0, first : torque.shape[0]].mean()
 
 
 NUDGE = 1e-5

@@ -1,9 +1,4 @@
-"""The Kalman filter that turns a free-run error into its innovations, compiled: gains once, then any signals.
-
-Model: ``x[t+1] = F x[t] + w``, ``y[t] = H x[t] + v`` with ``cov w = Q`` and ``cov v = diag(r)``. What was not observed
-is predicted and not corrected, and the outputs of a sample correct the state one after the other (Durbin and Koopman,
-Time Series Analysis by State Space Methods, chapters 4 and 6.4). F and H are sparse.
-"""
+"""The Kalman filter that turns a free-run error into its innovations, compiled: gains once, then any signals."""
 
 from __future__ import annotations
 
@@ -28,7 +23,6 @@ class Terms(NamedTuple):
 
 
 def terms_of(matrix: FloatArray) -> Terms:
-    """Return the entries of a matrix that are not 0, row by row."""
     rows, columns = np.nonzero(matrix)
     return Terms(rows, columns, matrix[rows, columns])
 
@@ -93,7 +87,6 @@ def predict(f: Terms, q: FloatArray, p: FloatArray, half: FloatArray, before: Fl
 
 @inlined
 def is_as_before(observed: BoolArray, t: int) -> bool:
-    """Tell whether the same outputs were observed as a sample before."""
     same = True
     for i in range(observed.shape[1]):
         same = same and observed[t, i] == observed[t - 1, i]

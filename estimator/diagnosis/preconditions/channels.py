@@ -292,7 +292,6 @@ def _lag(mine: FloatArray, its: FloatArray, rows: IntArray, shifts: IntArray) ->
 
 
 def _goes_like(record: Record, channel: Channel) -> FloatArray:
-    """Return what a channel should go like, shape (N,), NaN where that is not known."""
     speed = measured_speed(record)
     if channel.kind is OutputKind.TORQUE or channel.location is Location.SHAFT:
         return record.total_torque_nm

@@ -1,10 +1,4 @@
-"""All that would explain a recording that does not fit its model, each with its odds: units, signs, columns, periods.
-
-The inertia that a recording fits is compared with the model's, as it was read and with what may be wrong about its
-columns undone: a sign, two that are swapped, a period. What is off by a factor then is compared with the factors of
-``ROWS``. The odds of each explanation are its prior, times how well the inertia fits with it, how much of the motion
-follows, and how usual the largest torque and speed then are.
-"""
+"""What would explain a recording that does not fit its model, with odds: units, signs, columns, periods."""
 
 from __future__ import annotations
 
@@ -252,7 +246,6 @@ def _fit_of(row: Row, needed: float, spread: float) -> float:
 
 
 def _bands_of(apart: float, is_model: bool) -> float:
-    """Return the density of what is apart between the bands."""
     if math.isnan(apart):
         return 1.0
     other = _normal(apart, BANDS_OTHER)
@@ -260,7 +253,6 @@ def _bands_of(apart: float, is_model: bool) -> float:
 
 
 def largest(record: Record) -> tuple[float, float]:
-    """Return the largest torque and output of a recording, but for a few rows."""
     torque, output = np.abs(record.torque_nm).max(axis=1), np.abs(record.output[record.okay])
     return float(np.quantile(torque, 0.999)), float(np.quantile(output, 0.999))
 
@@ -314,7 +306,6 @@ class Explanation:
         return replace(cure, output=-cure.output) if self.is_turned else cure
 
     def question(self, falls: str) -> str:
-        """Return what to ask, for people."""
         asked = [self.change.question] if self.change.question else []
         asked += [falls] if self.is_turned else []
         asked += [
@@ -374,7 +365,6 @@ def _sign(row: Row) -> float:
 
 
 def usual(chosen: Sequence[Row], read: float, torque_nm: float, output: float, record: Record) -> float:
-    """Return the density of the largest torque that was read, and of the speed that follows."""
     reads = next((row.reads for row in chosen if row.reads is not None), None)
     if reads is not None:
         density = float(reads[0] <= read <= reads[1]) / math.log(reads[1] / reads[0])

@@ -175,5 +175,4 @@ def _integrals(record: Record) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 
 def _rest(y: FloatArray, design: FloatArray) -> FloatArray:
-    rest: FloatArray = y - design @ np.linalg.lstsq(design, y, rcond=None)[0]
-    return rest
+    return y - design @ np.linalg.lstsq(design, y, rcond=None)[0]

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import detrend
 
-from estimator.diagnosis.acquisition import as_if_not_lost
+from estimator.diagnosis.acquisition.chain import as_if_not_lost
 from estimator.diagnosis.noise import noise_floor, share_of
 from estimator.diagnosis.preconditions.channels import unwrapped, with_usable_channels, without_clipped
 from estimator.diagnosis.preconditions.inertia import driven, model_warnings
@@ -156,20 +156,14 @@ PER_PERIOD = 12.0
 
 
 def thinned(records: Sequence[Record], model: DrivelineModel) -> list[Record]:
-    """Return recordings with as many samples as the model's fastest mode needs; those that have no more as they are.
-
-    A joint has no mode, and its recordings differ in what they need: stretches of them are used instead.
-    """
+    """Return recordings with as many samples as the model's fastest mode needs; those that have no more as they are."""
     if share_of(records) >= 1.0 or model.structure is Structure.JOINT:
         return list(records)
     return [thin(record, factor_for([record], model)) for record in records]
 
 
 def as_slow_as_needed(records: Sequence[Record], model: DrivelineModel) -> list[Record]:
-    """Return recordings with no more samples than the line can answer to: between them only the sensor is seen.
-
-    Of a short one enough are kept for a model and its noise.
-    """
+    """Return recordings with no more samples than the line can answer to: between them only the sensor is seen."""
     shortest = min(record.okay.size for record in records)
     factor = min(factor_for(records, model, LONGEST_OF_RIGID_S), max(shortest // FEWEST_KEPT, 1))
     return [thin(record, factor) for record in records]
@@ -216,7 +210,6 @@ def thin(record: Record, factor: int) -> Record:
 
 
 def _blocks(values: NDArray[Any], factor: int) -> NDArray[Any]:
-    """Return values by row, shape (N,) or (N, M), in blocks of so many rows; shape (N // factor, factor) or with M."""
     count = values.shape[0] // factor
     return values[: count * factor].reshape(count, factor, *values.shape[1:])
 
@@ -301,8 +294,7 @@ def _unexcited_mode(records: Sequence[Record], line: DrivelineModel, grid: Grid,
 
 def _good(record: Record, signal: FloatArray) -> FloatArray:
     """Return a signal's good samples without mean and trend."""
-    good: FloatArray = detrend(signal[record.okay])
-    return good
+    return detrend(signal[record.okay])
 
 
 def _rms(signals: Sequence[FloatArray]) -> float:

@@ -230,7 +230,6 @@ def require_plausible_alone(record: Record) -> None:
 
 
 def _of_the_torque_path(record: Record) -> Iterator[Change]:
-    """Yield a torque that stops at a limit, or is lost over time: either makes an inertia look too large."""
     for torque in _lessened(record):
         lessened = replace(record, torque_nm=torque)
         question = "does the torque stop at a limit, or is it lost over time"

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import find_peaks
 
-from estimator.diagnosis.line import DRIVES, FORCES, PLACES, Line, Motion, Place
+from estimator.diagnosis.line.blocks import DRIVES, FORCES, PLACES, Line, Motion, Place
 from estimator.diagnosis.unnamed.laws import CHANGING, FREE, LAWS, MODULATIONS, Law, hats, knots_of, one, top_of
 from estimator.diagnosis.unnamed.scene import Ground, Scene
 from estimator.physics.effect import Element
@@ -96,8 +96,7 @@ def _pieces(
 
 
 def _centred(signal: FloatArray) -> FloatArray:
-    centred: FloatArray = signal - signal.mean()
-    return centred
+    return signal - signal.mean()
 
 
 def _differences(signal: FloatArray) -> FloatArray:
@@ -156,7 +155,6 @@ def _fixed(element: Element) -> list[Form]:
 
 
 def _free(element: Element, motions: Sequence[Motion]) -> list[Form]:
-    """Return any function of a signal: piecewise linear between knots."""
     found = []
     for name, signal in FREE[element].items():
         knots = knots_of(np.concatenate([signal(m) for m in motions]))
@@ -190,12 +188,10 @@ def _input(index: int, motion: Motion) -> FloatArray:
 
 def _input_beyond(index: int, limit: float, motion: Motion) -> FloatArray:
     torque = _input(index, motion)
-    beyond: FloatArray = torque - np.clip(torque, -limit, limit)
-    return beyond
+    return torque - np.clip(torque, -limit, limit)
 
 
 def _periodic(view: Scene, element: Element, motions: Sequence[Motion]) -> list[Form]:
-    """Return waves over the motor's angle that the input at the element's place shows, each recording its phase."""
     found = []
     for of, modulation in MODULATIONS[element].items():
         inputs = view.explanations[PLACES[element]].inputs
@@ -266,8 +262,7 @@ def moments(motion: Motion, every_s: float, recordings: int) -> FloatArray:
     """Return the moments of one of so many recordings at which something may set in [s]."""
     length_s = float(motion.time_s[-1] - motion.time_s[0])
     every_s = max(every_s, recordings * length_s / MOST_MOMENTS)
-    found: FloatArray = motion.time_s[0] + every_s * np.arange(1, max(int(length_s / every_s), 2))
-    return found
+    return motion.time_s[0] + every_s * np.arange(1, max(int(length_s / every_s), 2))
 
 
 BATCH = 2**18
@@ -283,10 +278,8 @@ class Pool:
     answers: FloatArray
 
     def of(self, laws: Sequence[int]) -> FloatArray:
-        """Return the answers to some of the laws, in their order, shape (rows, q)."""
         rows = [np.flatnonzero(self.group == law) for law in laws]
-        found: FloatArray = self.answers[np.concatenate([np.zeros(0, dtype=int), *rows])].T
-        return found
+        return self.answers[np.concatenate([np.zeros(0, dtype=int), *rows])].T
 
 
 def candidates(view: Scene, element: Element, tried: Sequence[Form] | None = None) -> Pool:
@@ -363,7 +356,6 @@ class Path:
     target: FloatArray  # (q,): factors of ``rest``, and the error along its orthonormal basis
 
     def solved(self, terms: int, ridge: float) -> tuple[FloatArray, FloatArray]:
-        """Return the coefficients of the first terms, and what they leave of the error, shape (rows,)."""
         coefficients = self.weighed(terms, ridge)
         return coefficients, self.error - self.rest[:, : coefficients.size] @ coefficients
 
@@ -409,10 +401,7 @@ def pursue(pool: Pool, ground: Ground) -> Path:
 
 
 def factored(columns: FloatArray, target: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the triangular factor of columns, shape (q, q), and a target along their orthonormal basis, shape (q,).
-
-    The target is factored with them, as one column more: the basis itself, which takes as long again, is not needed.
-    """
+    """Return the triangular factor of columns, shape (q, q), and a target along their orthonormal basis, shape (q,)."""
     q = columns.shape[1]
     triangle = np.asarray(np.linalg.qr(np.column_stack([columns, target]), mode="r"))
     return triangle[:q, :q], np.ascontiguousarray(triangle[:q, q])

@@ -11,21 +11,20 @@ from typing import Protocol
 
 import numpy as np
 
-from estimator.diagnosis.line import (
+from estimator.diagnosis.line.blocks import (
     DRIVES,
     FORCES,
     NO_FORCE,
     PLACES,
-    Explanation,
     Force,
     Line,
     Motion,
     Place,
     block_mean_of,
-    explain_all,
     lines,
     simulated_each,
 )
+from estimator.diagnosis.line.equivalent import Explanation, explain_all
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult
 from estimator.physics.jacobian import jacobian_at
@@ -62,8 +61,7 @@ class Scene:
         line = self.cut[index]
         if self.filter is None:
             return columns[line.rows]
-        whitened: FloatArray = self.filter.part(index, columns[line.okay])[line.stretches[line.okay]]
-        return whitened
+        return self.filter.part(index, columns[line.okay])[line.stretches[line.okay]]
 
     @property
     def errors(self) -> list[FloatArray]:
@@ -104,9 +102,7 @@ class Ground:
         self.error = self.rest(error)
 
     def rest(self, signals: FloatArray) -> FloatArray:
-        """Return what is left of signals, shape (rows,) or (rows, q)."""
-        left: FloatArray = signals - self.basis @ (self.basis.T @ signals)
-        return left
+        return signals - self.basis @ (self.basis.T @ signals)
 
     def split(self, rows: FloatArray) -> list[FloatArray]:
         return list(np.split(rows, self._sizes))
@@ -141,8 +137,7 @@ class Extra:
 
     def outputs(self, result: FitResult, points: Sequence[FloatArray], index: int) -> FloatArray:
         """Simulate the output of one recording with the law at K vectors of unknowns, shape (K, N)."""
-        moved: FloatArray = simulated_each(result, points, index, self.forces[index]) + self.readings[index]
-        return moved
+        return simulated_each(result, points, index, self.forces[index]) + self.readings[index]
 
 
 def extra_of(view: Scene, element: Element, weights: Sequence[FloatArray]) -> Extra:

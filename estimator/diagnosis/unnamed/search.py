@@ -12,7 +12,7 @@ import numpy as np
 from scipy import stats
 from scipy.ndimage import maximum_filter1d, median_filter
 
-from estimator.diagnosis.line import PLACES, Place, block_mean_of, lines, simulated
+from estimator.diagnosis.line.blocks import PLACES, Place, block_mean_of, lines, simulated
 from estimator.diagnosis.noise import SMALLEST_P, Gain, noise_floor
 from estimator.diagnosis.unnamed.forms import (
     MOST_COEFFICIENTS,
@@ -155,8 +155,7 @@ def distance_from_neighbours(error: FloatArray) -> FloatArray:
 
 def near(off: BoolArray) -> BoolArray:
     """Tell which values stand next to one that is off, shape (B,): a filter answers to it for some samples."""
-    found: BoolArray = maximum_filter1d(off.astype(np.int8), NEIGHBOURS, mode="constant").astype(np.bool_)
-    return found
+    return maximum_filter1d(off.astype(np.int8), NEIGHBOURS, mode="constant").astype(np.bool_)
 
 
 KEPT = 40

@@ -9,33 +9,12 @@ import numpy as np
 from scipy import stats
 
 from estimator.diagnosis.assemble import Z95
-from estimator.diagnosis.line import (
-    DRIVES,
-    PLACES,
-    Explanation,
-    Input,
-    Line,
-    Motion,
-    Place,
-    block_mean_of,
-    explain,
-    lines,
-    size_at,
-    smooth,
-)
+from estimator.diagnosis.line.blocks import DRIVES, PLACES, Line, Motion, Place, block_mean_of, lines, size_at
+from estimator.diagnosis.line.equivalent import Explanation, Input, explain, smooth
 from estimator.diagnosis.noise import VERY_STRONG
 from estimator.diagnosis.result import Course, Discrepancy, Equivalent, LawPicture, RankedLaw
-from estimator.diagnosis.unnamed import (
-    ROUNDS,
-    ElementSearch,
-    Filter,
-    Scene,
-    UnnamedLaw,
-    judged,
-    scene,
-    searches_at,
-    without_law,
-)
+from estimator.diagnosis.unnamed.scene import Filter, Scene, scene
+from estimator.diagnosis.unnamed.search import ROUNDS, ElementSearch, UnnamedLaw, judged, searches_at, without_law
 from estimator.diagnosis.where.locate import error_spectrum, responses
 from estimator.physics import model
 from estimator.physics.catalogue import EFFECTS
@@ -58,8 +37,7 @@ class Axis:
 
 
 def _twist_torque(motion: Motion, result: FitResult) -> FloatArray:
-    torque: FloatArray = result.p[slot("", "k")] * motion.twist
-    return torque
+    return result.p[slot("", "k")] * motion.twist
 
 
 TORQUE = Axis("torque", "torque", lambda m, _: m.torque)
@@ -134,7 +112,6 @@ def binned_by_pass(
 
 
 def _edges(values: FloatArray, low: float, high: float) -> FloatArray:
-    """Return bin edges, half as bins of one width would have them and half as bins of one count would."""
     grid = np.linspace(low, high, 20 * BINS + 1)
     counted = np.searchsorted(np.sort(values), grid) / values.size
     share = 0.5 * (grid - low) / (high - low) + 0.5 * (counted - counted[0]) / (counted[-1] - counted[0])
@@ -273,7 +250,6 @@ def _picture_of_effect(
 
 
 def without_effect(result: FitResult, name: str) -> FitResult:
-    """Return a fit with one effect's shared parameters at their nulls and all else as it is, simulated."""
     nulls = {parameter.name: parameter.null for parameter in EFFECTS[name].shared_parameters}
     kept = [j for j, shared in enumerate(result.problem.shared) if shared.effect != name]
     p = result.problem.p.copy()

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 from scipy import signal, stats
 
-from estimator.diagnosis.line import Motion, motion_of
+from estimator.diagnosis.line.blocks import Motion, motion_of
 from estimator.diagnosis.result import BandTest, ErrorSpectrum, Interval, Region, Response
 from estimator.errors import NotExciting
 from estimator.identification.spectral import SpectralEstimate, spectral_estimate
@@ -92,7 +92,6 @@ FEWEST_BLOCKS = 8
 
 
 def responses(before: FitResult, after: FitResult) -> dict[str, Response]:
-    """Return the response of each recording and of both models in it; recordings too short or masked have none."""
     found: dict[str, Response] = {}
     if before.problem.grid.structure is Structure.JOINT:
         return found
@@ -162,8 +161,7 @@ LONGEST_SEGMENT = 512
 
 def _errors(result: FitResult, index: int) -> FloatArray:
     record = result.problem.records[index]
-    errors: FloatArray = np.where(record.okay, result.outputs[index] - record.output, 0.0)
-    return errors
+    return np.where(record.okay, result.outputs[index] - record.output, 0.0)
 
 
 def _window_power(result: FitResult, index: int) -> tuple[FloatArray, FloatArray]:
@@ -182,8 +180,7 @@ def excess(result: FitResult, index: int, floor: float) -> FloatArray:
     windows = max(power.size / max(float(count.max()), 1.0), 1.0)
     degrees, where = np.unique(np.maximum(count, 1.0), return_inverse=True)
     ratio = np.maximum(stats.chi2.isf(FALSE_ALARM / windows, degrees) / degrees, SMALLEST_RATIO)[where]
-    stands: FloatArray = np.where(power > ratio * floor**2, power - floor**2, 0.0)
-    return stands
+    return np.where(power > ratio * floor**2, power - floor**2, 0.0)
 
 
 def intervals(result: FitResult, floor: float) -> dict[str, tuple[Interval, ...]]:
@@ -231,7 +228,6 @@ def band_hz(mismatch: Sequence[FloatArray], sample_times_s: Sequence[float], noi
 
 
 def region(result: FitResult, element: Element, floor: float = 0.0) -> Region:
-    """Return the range of the element's own signal that holds the central part of the error's power above the floor."""
     values, weights = [], []
     for i in range(len(result.problem.records)):
         values.append(_signal(element, motion_of(result, i), result))
@@ -258,8 +254,7 @@ def _signal(element: Element, motion: Motion, result: FitResult) -> FloatArray:
     if element is Element.TORQUE_PATH:
         return motion.torque
     if element is Element.SHAFT:
-        stiffness: FloatArray = result.p[slot("", "k")] * motion.twist
-        return stiffness
+        return result.p[slot("", "k")] * motion.twist
     return motion.load_speed if element is Element.LOAD else motion.speed
 
 

@@ -1,9 +1,4 @@
-"""From poles to what an engineer means: natural frequency, damping, and which of them is the resonance.
-
-A pole z of a model sampled with period T belongs to the continuous-time pole ``s = ln(z) / T``; it is the
-matched one as long as the mode lies below the Nyquist frequency. Natural frequency ``|s| / 2 pi``, damping
-ratio ``-Re s / |s|``.
-"""
+"""From poles to what an engineer means: natural frequency, damping, and which of them is the resonance."""
 
 from __future__ import annotations
 
@@ -187,12 +182,10 @@ def _roots(coefficients: FloatArray, first: int, place: int, n_parameters: int) 
 
 
 def pole_roots(model: LinearModel) -> Roots:
-    """Return the poles of a model with their derivatives."""
     return _roots(model.A, 1, 0, model.orders.n_parameters)
 
 
 def zero_roots(model: LinearModel) -> Roots:
-    """Return the zeros of a model with their derivatives."""
     return _roots(np.array(model.b), 0, len(model.a), model.orders.n_parameters)
 
 

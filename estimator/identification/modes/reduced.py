@@ -4,6 +4,8 @@ A drive of two masses has three states: one rigid motion and one twist with its 
 it holds one more, which a zero nearly cancels or which stands for what the sampling did. Balanced truncation (B. C.
 Moore, IEEE Trans. Automatic Control 26, 1981) leaves out the states that are both hard to reach from the input and
 hard to see in the output. Its error is bounded at every frequency (D. F. Enns, 1984)::
+
+    |G(f) - G_r(f)|  <=  2 (sigma_(r+1) + ... + sigma_n),    sigma the Hankel singular values
 """
 
 from __future__ import annotations
@@ -116,11 +118,7 @@ def reduce_order(model: LinearModel, order: int, covariance: FloatArray | None =
 
 
 def _gramian(A: FloatArray, Q: FloatArray) -> FloatArray:
-    """Return the sum of ``A^k Q (A^T)^k`` over k, by doubling (R. A. Smith, SIAM J. Applied Mathematics 16, 1968).
-
-    A solver of the Lyapunov equation divides by what a pole lacks to 1; this only adds, however slow the pole, over a
-    horizon of samples.
-    """
+    """Return the sum of ``A^k Q (A^T)^k`` over k, by doubling (R. A. Smith, SIAM J. Applied Mathematics 16, 1968)."""
     total, power = Q, A
     for _ in range(MOST_DOUBLINGS):
         total, power = total + power @ total @ power.T, power @ power
@@ -142,11 +140,7 @@ def _as_model(theta: FloatArray, original: LinearModel, order: int) -> LinearMod
 def _triangular_form(
     A: FloatArray, B: FloatArray, C: FloatArray, D: float
 ) -> tuple[FloatArray, FloatArray, FloatArray, float]:
-    """Return the states in their Schur form: powers of A then keep its poles, which rounding else puts outside.
-
-    Where many poles crowd together at 1, as of a recording of one mass, one may lie there all the same; the motion is
-    then slowed by as much.
-    """
+    """Return the states in their Schur form: powers of A then keep its poles, which rounding else puts outside."""
     T, Z = schur(A)
     radius = float(np.abs(np.linalg.eigvals(T)).max(initial=0.0))
     return T * min(1.0, (1.0 - 1e-9) / max(radius, 0.5)), Z.T @ B, C @ Z, D

@@ -1,12 +1,4 @@
-"""Whether a linear model is enough: a score test on what makes a driveline's response nonlinear.
-
-    F = ((S_0 - S_1) / q) / (S_1 / (n - p - q))
-
-The step that the linear parameters take when the functions are let in is what the nonlinearity has done to them.
-
-Where the drive is not linear, its resonance is given by operating region: the whitened equations hold row by row, so
-that B / A can be fitted to the rows alone in which a signal lies in a region, D and everything before them as they are.
-"""
+"""Whether a linear model is enough: a score test on what makes a driveline's response nonlinear."""
 
 from __future__ import annotations
 

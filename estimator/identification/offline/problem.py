@@ -168,7 +168,6 @@ class UnreadTorque:
         return columns
 
     def added_to(self, u: FloatArray, values: FloatArray) -> FloatArray:
-        """Return the input with the unknowns that are inputs at their values, shape (N,)."""
         filled = u.copy()
         inputs = np.array(self.is_input, dtype=np.bool_)
         filled[np.array(self.at, dtype=np.int64)[inputs]] += values[inputs]
@@ -363,5 +362,4 @@ class Problem:
                 )
                 for start in starts
             ]
-        x: FloatArray = min(solutions, key=lambda solution: float(solution.cost)).x
-        return x
+        return min(solutions, key=lambda solution: float(solution.cost)).x

@@ -139,9 +139,6 @@ def _past(u: FloatArray, y: FloatArray) -> FloatArray:
 
 
 def _strongest(R: FloatArray, ahead: FloatArray, n: int) -> FloatArray:
-    """Return the map from the past to the n strongest principal components of predicted outputs, shape (2 PAST, n).
-
-    R is the past's triangle, ``ahead`` its map to the predictions; each component has a square sum of 1.
-    """
+    """Return the map from the past to the n strongest principal components of predicted outputs, shape (2 PAST, n)."""
     _, powers, axes = np.linalg.svd(R @ ahead, full_matrices=False)
     return np.asarray(ahead @ axes[:n].T / powers[:n], dtype=np.float64)

@@ -4,6 +4,10 @@ L. Ljung, Asymptotic Behavior of the Extended Kalman Filter as a Parameter Estim
 Automatic Control 24 (1979); B. D. O. Anderson and J. B. Moore, Optimal Filtering (Prentice Hall, 1979), chapter 8.
 State x = [w_M, w_L, s, T_0, ln J_M, ln J_L, ln k, ln c] with the equations of motion of
 the two masses below::
+
+    K(t)      = P(t) H^T / (H P(t) H^T + R),       H = [1 0 .. 0]
+    x(t|t)    = x(t) + K(t) (y(t) - w_M(t)),       P(t|t) = P(t) - K(t) H P(t)
+    x(t+1)    = f(x(t|t), u(t+1-nk)),              P(t+1) = Phi P(t|t) Phi^T + Q,      Phi = df/dx
 """
 
 from __future__ import annotations

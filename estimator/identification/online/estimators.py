@@ -4,6 +4,18 @@ Nevaranta, Montonen, Lindh, "Online Estimation of a Mechanical Driveline Paramet
 ECCE Europe, equations (1) to (7); I. D. Landau and G. Zito, Digital Control Systems (Springer, 2006),
 chapters 3 and 5. With t for the paper's k + 1 and the total delay nk (its d = 1 is nk = 1, see
 ``linear_model``)::
+
+    phi(t-1)^T = [-yhat(t-1) .. -yhat(t-na), u(t-nk) .. u(t-nk-nb+1)]                       (3)
+    Phi(t-1)   = phi(t-1) / L(q^-1)                                                          (7)
+    e0(t)      = y(t) - theta(t-1)^T phi(t-1)                     a priori error             (1)
+    e(t)       = e0(t) / (1 + Phi^T F(t-1) Phi)                   a posteriori error         (6)
+    theta(t)   = theta(t-1) + F(t-1) Phi e(t)                                                (4)
+    F(t)^-1    = lambda_1 F(t-1)^-1 + lambda_2 Phi Phi^T                                     (5)
+    yhat(t)    = theta(t)^T phi(t-1)                              fed back into phi
+
+One departure from the printed paper, on purpose: its (3) shows measured outputs -y in the regressor. That is
+the least-squares regressor; noise on y would bias it. An output-error algorithm (the paper's own name for it,
+and Landau and Zito's chapter 5) has the *predicted* outputs there, and that is what stands here.
 """
 
 from __future__ import annotations
@@ -190,11 +202,7 @@ class Rls(RegressionEstimator):
 
 
 def riv_past(of: Orders, n_L: int) -> Shapes:
-    """Return its past values.
-
-    Outputs of the auxiliary model and torques; those two and the measured outputs, filtered by the n_L coefficients of
-    1 / L; parameters of the auxiliary model.
-    """
+    """Return its past values."""
     outputs_f, inputs_f = (max(of.na, n_L - 1),), (max(of.nk + of.nb, n_L - 1),)
     filtered_rows = {"auxiliary_f": outputs_f, "outputs_f": outputs_f, "inputs_f": inputs_f}
     return {"outputs": (of.na,), "inputs": (of.nk + of.nb,), **filtered_rows, "auxiliary": (of.n_parameters,)}

@@ -1,10 +1,4 @@
-"""Recursive estimators: their one interface, and what an estimate says about itself.
-
-An estimator takes samples one by one (:meth:`RecursiveEstimator.update`, on the rig) or as a block
-(:meth:`RecursiveEstimator.run`, from a recording); both give the same bits. In the loop nothing raises: a
-sample that can't be used is masked, and an estimate that can't be trusted says so in its status, with the
-reason.
-"""
+"""Recursive estimators: their one interface, and what an estimate says about itself."""
 
 from __future__ import annotations
 
@@ -54,8 +48,7 @@ class Memory:
 
     def __getitem__(self, name: str) -> FloatArray:
         """Return a part: a view, to be read or written."""
-        part: FloatArray = self.record[name][0]
-        return part
+        return self.record[name][0]
 
     @property
     def settings(self) -> dict[str, FloatArray]:
@@ -79,7 +72,6 @@ def saved(estimator: str, memory: Memory) -> State:
 
 
 def restored(state: Mapping[str, Any], estimator: str, memory: Memory) -> None:
-    """Write a state into the memory of an estimator of the same kind and settings."""
     for name, expected in (("estimator", estimator), ("version", VERSION)):
         _require(str(np.asarray(_part(state, name))) == str(expected), name, state[name], repr(expected))
     for name, setting in memory.settings.items():

@@ -1,10 +1,4 @@
-"""Regression along an adaptation gain: what OEFO, RLS, RIV and OEEPM share, compiled and around it.
-
-Each corrects theta along F Phi; what differs is what stands in phi and Phi, and what is fed back. A step takes one
-sample and fills a row of results (:func:`estimator.identification.online.recursive.row_type`); the same step serves a
-block and the rig's single sample. All state lives in one record ``m`` with the parts of :func:`kept`, :func:`room` and
-each estimator's own.
-"""
+"""Regression along an adaptation gain: what OEFO, RLS, RIV and OEEPM share, compiled and around it."""
 
 from __future__ import annotations
 

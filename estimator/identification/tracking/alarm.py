@@ -1,11 +1,4 @@
-"""Alarms of a change of the resonance: record, state of the tracking, and the threshold for a rate of false ones.
-
-    P(both beyond h) = 2 / (2 pi) integral (1 + 2 h^2 / (nu (1 + sin theta)))^(-nu / 2) dtheta,  -pi/2 to asin(rho)
-
-That times the statistics per hour is the expected number of false alarms in an hour, an upper bound. Two beyond a lower
-threshold instead of one beyond a higher: the rate rests on the bulk of the distribution, and not on tails that nobody
-knows.
-"""
+"""Alarms of a change of the resonance: record, state of the tracking, and the threshold for a rate of false ones."""
 
 from __future__ import annotations
 

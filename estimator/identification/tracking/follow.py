@@ -4,6 +4,10 @@ For any recursive estimator of an output-error model. With theta* for the truth 
 the prediction error is, to first order, ``e0(t) = w(t) - psi(t-1)^T (theta(t-1) - theta*)``, psi the gradient of the
 prediction. Whatever its adaptation law, the estimator corrects by ``theta(t) - theta(t-1) = K(t) e0(t)``. So the
 covariance of its error is::
+
+    P(t) = (I - K psi^T) P(t-1) (I - K psi^T)^T + S K K^T
+
+and K is *seen*, not assumed: it is the correction made, divided by the error it was made for.
 """
 
 from __future__ import annotations
@@ -447,7 +451,6 @@ class Follower:
         return Followed(*(np.ascontiguousarray(column) for column in out.T))
 
     def state(self) -> dict[str, FloatArray]:
-        """Return the state, copied."""
         return {name: values.copy() for name, values in self._live.items()} | {"roots": self._roots.view(float).copy()}
 
     def restore(self, state: Mapping[str, Any]) -> None:

@@ -6,6 +6,8 @@ Roots by simultaneous iteration (Weierstrass; E. Durand 1960, I. O. Kerner, Nume
 
 A mode is the part rho / (1 - p q^-1) and its conjugate in the partial fractions of B / A. With the residue rho held,
 its output changes with the natural frequency f by::
+
+    psi(t) = dy/df = 2 Re [ rho dp/df q^-1 / (1 - p q^-1)^2 ] u(t),      dp/df = 2 pi T p (-zeta + j sqrt(1 - zeta^2))
 """
 
 from __future__ import annotations
@@ -180,7 +182,6 @@ N_THROUGH = 5
 
 @compiled
 def pass_torque(u: float, pole: complex, through: FloatArray) -> None:
-    """Pass the next torque through a mode's pole."""
     once = pole * complex(through[ONCE_RE], through[ONCE_IM]) + (u - through[LAST])
     twice = pole * complex(through[TWICE_RE], through[TWICE_IM]) + once
     through[ONCE_RE], through[ONCE_IM], through[TWICE_RE], through[TWICE_IM] = (
@@ -213,11 +214,7 @@ def of_steps(pole: complex) -> float:
 
 @compiled
 def output_density(psi: float, pole: complex, half_width_hz: float) -> float:
-    """Return a sample of the density at its peak of what the torque makes of the output [output unit squared].
-
-    Over the half width zeta f, psi is the mode's own output, with the band of a pole passed twice: a white torque of
-    variance 1 gives ``|rho|^2 / (1 - r)^2``, the peak, to first order in 1 - r.
-    """
+    """Return a sample of the density at its peak of what the torque makes of the output [output unit squared]."""
     r = np.sqrt(squared(pole))
     over = half_width_hz * psi
     return float(over * over * (1.0 + r) / (1.0 - r) / of_steps(pole))

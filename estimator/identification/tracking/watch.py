@@ -148,7 +148,6 @@ def take_reference(
     mode: FloatArray,
     through: FloatArray,
 ) -> None:
-    """Take the resonance of a model for reference; none where it has no damped one."""
     na = structure[NA]
     mode[:] = 0.0
     mode[ERROR] = np.nan
@@ -176,7 +175,6 @@ def reference_output(structure: IntArray, theta: FloatArray, past: FloatArray) -
 
 @compiled
 def take_error(error: float, y: float, mode: FloatArray, through: FloatArray, score: FloatArray) -> None:
-    """Take the error of a sample, NaN where it is not good, into the score of its block."""
     psi = sensitivity(complex(mode[WEIGHT_RE], mode[WEIGHT_IM]), through)
     step, y_step = error - mode[ERROR], y - mode[OUTPUT_THEN]
     mode[ERROR], mode[OUTPUT_THEN] = error, y
@@ -389,7 +387,6 @@ class ChangeWatch:
         return alarm
 
     def _by_score(self, deviation_hz: float, std_hz: float) -> Level:
-        """Return the resonance at a deviation from the reference's."""
         return Level.of(float(self._live["mode"][REFERENCE_HZ]) + deviation_hz, std_hz)
 
     @property
@@ -412,7 +409,6 @@ class ChangeWatch:
         )
 
     def state(self) -> dict[str, FloatArray]:
-        """Return the state, copied."""
         kept = {name: values.copy() for name, values in self._live.items()}
         return kept | {"memory": np.array(astuple(self._memory), dtype=np.float64)}
 

@@ -170,14 +170,12 @@ def speed_of(record: Record) -> FloatArray:
 
 
 def eddy_testable(model: Driveline, records: Sequence[Record]) -> Untestable | None:
-    """Need speeds far enough apart."""
     if any(float(np.ptp(speed_of(record))) >= LEAST_RANGE * speed_scale([record]) for record in records):
         return None
     return Untestable("the speed hardly varies: not separable from viscous friction and the constant load", "reversal")
 
 
 def eddy_implausible(model: Driveline, records: Sequence[Record], values: Mapping[str, float]) -> str:
-    """Object to a drag that does not level off in the speeds driven."""
     top = speed_scale(records)
     if values["peak_rad_s"] < STRAIGHT * top:
         return ""
@@ -222,7 +220,6 @@ def by_direction_law(speed: float, difference: float) -> float:
 
 
 def by_direction_testable(model: Driveline, records: Sequence[Record]) -> Untestable | None:
-    """Need motion in both directions, and at each place at different speeds."""
     both = [record for record in records if reverses(record)]
     if not both:
         return Untestable("the speed never changes sign: not separable from viscous friction", "reversal")
@@ -232,7 +229,6 @@ def by_direction_testable(model: Driveline, records: Sequence[Record]) -> Untest
 
 
 def by_direction_sentence(values: Mapping[str, float], motion: Motion) -> str:
-    """Say what was found."""
     size = f"{abs(values['difference_nm_s']):.3g} {unit('damping', motion)}"
     more, less = ("forward", "backward") if values["difference_nm_s"] > 0.0 else ("backward", "forward")
     return f"friction at the motor depends on the direction: {size} more {more} and as much less {less}"

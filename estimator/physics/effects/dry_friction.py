@@ -43,7 +43,6 @@ CREEP = EffectParameter(
 
 
 def motor_scales(model: Driveline, records: Sequence[Record]) -> tuple[float, ...]:
-    """Return a twentieth of the torque in use, presliding by which a motor swings at 20 Hz, and a usual creep."""
     friction = 0.05 * torque_scale(records)
     presliding = friction / (model.parameters["J_M"].value * (2.0 * math.pi * HELD_HZ) ** 2)
     return (friction, presliding, CREEPS_OVER * speed_scale(records))
@@ -70,7 +69,6 @@ def forms_near_rest(
 
 
 def motor_testable(model: Driveline, records: Sequence[Record]) -> Untestable | None:
-    """Need a speed that takes both signs, in one recording or in several that share their load; or a known load."""
     if turns(model, records):
         return None
     return Untestable("the speed never changes sign: not separable from the constant load torque", "reversal")
@@ -136,7 +134,6 @@ def bending(size: str, model: Driveline, records: Sequence[Record], values: Mapp
 
 
 def load_testable(model: Driveline, records: Sequence[Record]) -> Untestable | None:
-    """Need a recording in which the speed takes both signs."""
     return motor_testable(model, records)
 
 
@@ -195,12 +192,10 @@ def stribeck_retold(
 
 
 def stribeck_testable(model: Driveline, records: Sequence[Record]) -> Untestable | None:
-    """Need what Coulomb friction needs: both signs of the speed."""
     return motor_testable(model, records)
 
 
 def stribeck_sentence(values: Mapping[str, float], motion: Motion) -> str:
-    """Say what was found."""
     torque, speed = unit("torque", motion), unit("speed", motion)
     breakaway = values["coulomb_nm"] + values["excess_nm"]
     return (

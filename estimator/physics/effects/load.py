@@ -48,12 +48,10 @@ def grade_basis(time_s: FloatArray, at_s: FloatArray | None = None) -> FloatArra
     knots = np.concatenate([[first] * DEGREE, inner, [last] * DEGREE])
     at = time_s if at_s is None else at_s
     design = BSpline.design_matrix(np.clip(at, first, last), knots, DEGREE).toarray()
-    splines: FloatArray = np.ascontiguousarray(design.T[1:])
-    return splines
+    return np.ascontiguousarray(design.T[1:])
 
 
 def grade_testable(model: Driveline, records: Sequence[Record]) -> Untestable | None:
-    """Need a recording long enough for a profile."""
     if any(record.time_s[-1] - record.time_s[0] >= SHORTEST_S for record in records):
         return None
     return Untestable(
@@ -91,7 +89,6 @@ ROAD_GRADE = Effect(
 
 
 def imbalance_testable(model: Driveline, records: Sequence[Record]) -> Untestable | None:
-    """Need the gear ratio, and motion."""
     if model.gear_ratio is None:
         reason = "the model file has no [geometry] gear_ratio: the wheel's angle is unknown"
         return Untestable(reason, "reversal", needs="gear_ratio in the model file's [geometry]")
@@ -153,7 +150,6 @@ def gravity_starts(model: Driveline, records: Sequence[Record]) -> list[Start]:
 
 
 def gravity_implausible(model: Driveline, records: Sequence[Record], values: Mapping[str, float]) -> str:
-    """Refuse what changes, over the load's swing, by more than the torque does from end to end, however it hangs."""
     swing = min(range_of(records) / values["motor_turns_per_turn"], 2.0 * math.pi)
     most = max(float(np.abs(record.total_torque_nm).max()) for record in records)
     if values["moment_nm"] * (1.0 - math.cos(0.5 * swing)) <= 2.0 * most:
@@ -162,7 +158,6 @@ def gravity_implausible(model: Driveline, records: Sequence[Record], values: Map
 
 
 def gravity_sentence(values: Mapping[str, float], motion: Motion) -> str:
-    """Say what was found."""
     turns = values["motor_turns_per_turn"]
     geared = f", {turns:.3g} motor turns to one turn of the load" if turns != 1.0 else ""
     return f"gravity pulls at the load with up to {values['moment_nm']:.3g} {unit('torque', motion)}{geared}"
@@ -205,7 +200,6 @@ def ground_law(angle: float, stiffness: float) -> float:
 
 
 def ground_sentence(values: Mapping[str, float], motion: Motion) -> str:
-    """Say what was found."""
     size = f"{values['stiffness_nm_per_rad']:.3g} {unit('stiffness', motion)}"
     return f"a spring of {size} holds the load against the ground"
 
@@ -253,10 +247,7 @@ def coupling(
 
 @compiled
 def build_up(slide: float, roll: float, traction: float, tread: float, relaxation: float) -> float:
-    """Return how fast the traction builds up [Nm/s]: over the angle that the tyre has to roll.
-
-    ``tread`` is the torque per slip [Nm], ``relaxation`` what the integration step can follow at this roll [rad].
-    """
+    """Return how fast the traction builds up [Nm/s]: over the angle that the tyre has to roll."""
     return (slide * tread - roll * traction) / relaxation
 
 

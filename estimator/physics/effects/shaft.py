@@ -57,10 +57,7 @@ def gap_scales(model: Driveline, records: Sequence[Record]) -> tuple[float, ...]
 
 
 def gap_starts(model: Driveline, records: Sequence[Record]) -> list[Start]:
-    """Return a ladder of gap sizes: a gap that is too large or too small is a local optimum.
-
-    On a bench nothing can bounce, and the damping engages at once.
-    """
+    """Return a ladder of gap sizes: a gap that is too large or too small is a local optimum."""
     contact: float | Held = Held(0.0) if model.structure is Structure.JOINT else 1.0
     pull: float | Held = Held(0.0) if model.structure is Structure.JOINT else 0.5
     return [(size, contact, pull, Held(0.0)) for size in (0.1, 0.4, 1.2, 3.6)]
@@ -85,7 +82,6 @@ def gap_completed(values: Mapping[str, float]) -> Mapping[str, float]:
 
 
 def gap_testable(model: Driveline, records: Sequence[Record]) -> Untestable | None:
-    """Need torque of both signs, so that the gap is crossed."""
     if any(torque_reverses(record) for record in records):
         return None
     return Untestable("the shaft torque never changes sign: the gap stays closed on one side", "reversal")
@@ -138,11 +134,7 @@ BACKLASH = Effect(
 
 @compiled
 def stiffness_factor(twist: float, hardening: float, shape: float) -> float:
-    """Return the factor on the stiffness, ``(1 + |h| e^2 / m)^(+-m)`` with the sign of h.
-
-    To first order it is ``1 + h e^2`` whatever the shape m. A hardening shaft with m = 1 is the Duffing spring; a
-    softening one with m = 1/2 ends in a constant torque, and none ever pulls the wrong way.
-    """
+    """Return the factor on the stiffness, ``(1 + |h| e^2 / m)^(+-m)`` with the sign of h."""
     if every(hardening == 0.0):
         return 1.0
     size = 1.0 + abs(hardening) * twist * twist / shape
@@ -256,11 +248,7 @@ STIFFNESS_CHANGE = Effect(
 
 @compiled
 def loading_rate(loading: float, rate: float, sharpness: float, unloading: float, fastest: float) -> float:
-    """Return how fast the slider loads [1/s]: towards 1 against the motion, and no further.
-
-    ``rate`` is that of the twist, over the twist in which the slider yields [1/s]. One that yields within a step of the
-    integration is held to the ``fastest`` decay [1/s] the step can follow.
-    """
+    """Return how fast the slider loads [1/s]: towards 1 against the motion, and no further."""
     pace = min(abs(rate), fastest)
     yielded = power(min(abs(loading), 1.0), sharpness)
     yielded = choose(rate * loading < 0.0, -unloading * yielded, yielded)
@@ -274,10 +262,7 @@ def slider_scales(model: Driveline, records: Sequence[Record]) -> tuple[float, .
 
 
 def slider_starts(model: Driveline, records: Sequence[Record]) -> list[Start]:
-    """Return sliders that yield early and late, a part of them in the nominal stiffness.
-
-    That of a joint is a guess and free.
-    """
+    """Return sliders that yield early and late, a part of them in the nominal stiffness."""
     early, late = (Held(0.0), Held(0.0)) if model.structure is Structure.JOINT else (0.2, 0.5)
     return [(0.5, 0.5, 1.0, 0.7, early), (1.0, 4.0, 1.0, 0.7, late)]
 
@@ -311,10 +296,7 @@ SHAFT_HYSTERESIS = Effect(
 
 @compiled
 def relaxing_rate(torque: float, rate: float, stiffness: float, fastest: float, relaxation_s: float) -> float:
-    """Return how fast the branch's torque changes [Nm/s], at a rate of the twist [rad/s].
-
-    One that relaxes within a step of the integration is held to the ``fastest`` decay [1/s] the step can follow.
-    """
+    """Return how fast the branch's torque changes [Nm/s], at a rate of the twist [rad/s]."""
     return (stiffness * relaxation_s * rate - torque) * min(1.0 / relaxation_s, fastest)
 
 
@@ -370,7 +352,6 @@ def cardan_starts(model: Driveline, records: Sequence[Record]) -> list[Start]:
 
 
 def cardan_testable(model: Driveline, records: Sequence[Record]) -> Untestable | None:
-    """Need speeds at which twice per turn is near the resonance."""
     if not goes_round(records, 0.5):
         return Untestable("the motor makes less than half a turn: nothing recurs with its angle", "reversal")
     if any(speed_sweeps(record) for record in records):
@@ -379,7 +360,6 @@ def cardan_testable(model: Driveline, records: Sequence[Record]) -> Untestable |
 
 
 def cardan_sentence(values: Mapping[str, float], motion: Motion) -> str:
-    """Say what was found."""
     size = f"{values['amplitude_nm']:.3g} {unit('torque', motion)}"
     if values["angle_rad"]:
         size = f"the torque of an angle of {values['angle_rad']:.3g} {unit('angle', motion)}"

@@ -268,16 +268,12 @@ def drift_unresolved(model: Driveline, records: Sequence[Record], values: Mappin
 
 
 def drift_rescaled(values: Mapping[str, float]) -> Mapping[str, float]:
-    """Return what the line takes by the torque's clock: the fit keeps to the speed's, and either may be right.
-
-    Torques and speeds stay as they were read. In a time that is longer, accelerations are smaller and twists larger.
-    """
+    """Return what the line takes by the torque's clock: the fit keeps to the speed's, and either may be right."""
     longer = 1.0 + values["rate"]
     return {"inertia": longer, "stiffness": 1.0 / longer}
 
 
 def drift_sentence(values: Mapping[str, float], motion: Motion) -> str:
-    """Say what was found."""
     return f"the torque's clock runs {1e6 * values['rate']:+.0f} ppm off the speed's"
 
 

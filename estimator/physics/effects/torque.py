@@ -35,7 +35,6 @@ from estimator.signals.record import FloatArray, Record
 
 
 def gain_testable(model: Driveline, records: Sequence[Record]) -> Untestable | None:
-    """Need two inputs whose ratio changes, or else a wrong gain is a change of all other parameters."""
     if any(record.torque_nm.shape[1] < 2 for record in records):
         return Untestable("there is one torque input only: its gain is that of all other parameters", "cruise")
     if shares_differ(records):
@@ -57,7 +56,6 @@ def gain_rescaled(values: Mapping[str, float]) -> Mapping[str, float]:
 
 
 def gain_sentence(values: Mapping[str, float], motion: Motion) -> str:
-    """Say what was found, and the other way to tell it."""
     wrong, right = ("m1", "m2") if values["gain_m1"] != 1.0 else ("m2", "m1")
     gain = values[f"gain_{wrong}"]
     return (
@@ -104,17 +102,13 @@ def derating_scales(model: Driveline, records: Sequence[Record]) -> tuple[float,
 def derating_retold(
     model: Driveline, records: Sequence[Record], values: Mapping[str, float], line: Mapping[str, float]
 ) -> list[Retelling]:
-    """Return a loss by the torque's own heat, within the recording and beyond it.
-
-    The torque that the loss is reported for is a matter of scale, and held.
-    """
+    """Return a loss by the torque's own heat, within the recording and beyond it."""
     if values["heating_nm"] > 0.0:
         return []
     return [Retelling((values["depth"], share, Held(1.0)), {}) for share in (0.3, 2.0)]
 
 
 def derating_sentence(values: Mapping[str, float], motion: Motion) -> str:
-    """Say what was found."""
     by = "by up to"
     if values["heating_nm"] > 0.0:
         by = f"under a lasting torque of {values['heating_nm']:.3g} {unit('torque', motion)} by"
@@ -125,7 +119,6 @@ def derating_sentence(values: Mapping[str, float], motion: Motion) -> str:
 
 
 def derating_implausible(model: Driveline, records: Sequence[Record], values: Mapping[str, float]) -> str:
-    """Object to a loss that comes too soon for warmth."""
     least_s = QUICKEST * derating_scales(model, records)[1]
     if values["time_constant_s"] > least_s:
         return ""
@@ -178,7 +171,6 @@ def saturation_starts(model: Driveline, records: Sequence[Record]) -> list[Start
 
 
 def saturation_sentence(values: Mapping[str, float], motion: Motion) -> str:
-    """Say what was found."""
     torque = unit("torque", motion)
     found = [
         f"{limit:.3g} {torque} {of}"
@@ -233,7 +225,6 @@ def nonlinearity_scales(model: Driveline, records: Sequence[Record]) -> tuple[fl
 
 
 def nonlinearity_testable(model: Driveline, records: Sequence[Record]) -> Untestable | None:
-    """Need torques of very different sizes."""
     sizes = np.concatenate([np.abs(record.total_torque_nm) for record in records])
     low, high = np.percentile(sizes, [10, 95])
     if high - low > SPREAD * high and any(torque_reverses(record) for record in records):
@@ -242,7 +233,6 @@ def nonlinearity_testable(model: Driveline, records: Sequence[Record]) -> Untest
 
 
 def nonlinearity_sentence(values: Mapping[str, float], motion: Motion) -> str:
-    """Say what was found."""
     loss, tilt = values["curvature_per_nm"], values["asymmetry_per_nm"]
     torque = unit("torque", motion)
     if tilt == 0.0:
@@ -309,7 +299,6 @@ def bias_testable(model: Driveline, records: Sequence[Record]) -> Untestable | N
 
 
 def bias_sentence(values: Mapping[str, float], motion: Motion) -> str:
-    """Say what was found."""
     side = "above" if values["offset_nm"] > 0.0 else "below"
     offset = f"{abs(values['offset_nm']):.3g} {unit('torque', motion)} {side} its reading"
     if values["time_constant_s"] <= 0.0:
@@ -364,7 +353,6 @@ def ripple_starts(model: Driveline, records: Sequence[Record]) -> list[Start]:
 
 
 def ripple_testable(model: Driveline, records: Sequence[Record]) -> Untestable | None:
-    """Need the ripple to pass a frequency at which the line answers: a speed that changes much."""
     if not goes_round(records, 1.0 / ORDERS[-1]):
         return Untestable("the motor makes too little of a turn: nothing recurs with its angle", "reversal")
     if any(speed_sweeps(record) for record in records):
@@ -373,7 +361,6 @@ def ripple_testable(model: Driveline, records: Sequence[Record]) -> Untestable |
 
 
 def ripple_sentence(values: Mapping[str, float], motion: Motion) -> str:
-    """Say what was found."""
     torque = unit("torque", motion)
     size = f"{values['amplitude_nm']:.3g} {torque}" if values["amplitude_nm"] else f"{values['share']:.2%} of itself"
     return f"the torque ripples by {size} at {values['order']:.0f} times per motor turn"

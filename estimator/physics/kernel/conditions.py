@@ -352,8 +352,7 @@ def breakaway(p: FloatArray) -> float:
 def sliding(speed: float, p: FloatArray) -> float:
     """Return what they come to while it slides at a speed [Nm]."""
     ratio = speed / max(p[slots.STRIBECK_SPEED], LEAST)
-    torque: float = p[slots.COULOMB] + p[slots.STRIBECK_COULOMB] + p[slots.STRIBECK] * fading(ratio * ratio)
-    return torque
+    return p[slots.COULOMB] + p[slots.STRIBECK_COULOMB] + p[slots.STRIBECK] * fading(ratio * ratio)
 
 
 @inlined
@@ -371,10 +370,7 @@ def followed(torque: float, speed: float, limit: float, stiffness: float, time_s
 
 @inlined
 def at_motor(torque: float, x: State, now: Conditions, p: FloatArray, time_s: float) -> float:
-    """Return the torque of the motor's bristles after a time at the speed of a state [Nm].
-
-    Their stiffness is none that the step can't follow.
-    """
+    """Return the torque of the motor's bristles after a time at the speed of a state [Nm]."""
     stiff = breakaway(p) / max(p[slots.COULOMB_PRESLIDING], p[slots.STRIBECK_PRESLIDING])
     stiff = min(stiff, now.fastest * now.fastest / now.inverse_motor)
     return followed(torque, x.speed, sliding(x.speed, p), stiff, time_s)

@@ -1,10 +1,4 @@
-"""The one compiled driveline simulation.
-
-Chain of one sub-step: torque on the shaft -> delay -> lag -> motor -> shaft -> load -> sensor. Fixed-step Runge-Kutta
-of fourth order; the torque of a sub-step is a straight line with the exact mean and first moment of the delayed,
-lagged, zero-order-held input over it. What changes with time or angle, but not with the state, is set once per
-sub-step. A line that is linear takes the same steps as sums (``linear``).
-"""
+"""The one compiled driveline simulation."""
 
 from __future__ import annotations
 
@@ -67,10 +61,7 @@ def is_late(p: FloatArray) -> bool:
 
 @inlined
 def begun_feed(torque: FloatArray, begun: float, sample_time_s: float, p: FloatArray, h: float) -> Feed:
-    """Return what is known of the way of a torque, shape (N,), to sub-steps of ``h`` [s].
-
-    Its sample 0 is at ``begun`` [samples].
-    """
+    """Return what is known of the way of a torque, shape (N,), to sub-steps of ``h`` [s]."""
     shifted, before_all = p[slots.DELAY] != 0.0 or p[slots.DRIFT] != 0.0, torque[0] + p[slots.DELAYED_BEFORE]
     lag = low_pass(p[slots.LAG], p[slots.LAG_SHAPE], h)
     return Feed(shifted, p[slots.DELAY] / sample_time_s, begun, before_all, lag)

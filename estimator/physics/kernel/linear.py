@@ -1,9 +1,4 @@
-"""Of a linear line, where a stretch of time leads to: read off the Runge-Kutta steps once, then only added up.
-
-What leads a linear line on is a sum: of what its state leads to, entry by entry, and of what its torques do. Each of
-these is found by the sub-steps themselves, from one unit of it alone, so nothing is said twice and the result is that
-of the sub-steps to rounding. A period without a change inside takes one sum in place of all its sub-steps.
-"""
+"""Of a linear line, where a stretch of time leads to: read off the Runge-Kutta steps once, then only added up."""
 
 from __future__ import annotations
 

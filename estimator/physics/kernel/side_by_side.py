@@ -1,9 +1,4 @@
-"""Up to eight simulations side by side, as a Jacobian takes them: one instruction for all.
-
-The laws are those of one simulation (``rates``), compiled for numbers in lanes. What torque comes through a delay or a
-lag does not depend on the motion, and is worked out before. A line whose output is differentiated takes its simulations
-one by one, and so does a linear one: it adds up what it knows.
-"""
+"""Up to eight simulations side by side, as a Jacobian takes them: one instruction for all."""
 
 from __future__ import annotations
 

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.diagnosis.acquisition import Finding, Sized
 from estimator.diagnosis.acquisition.chain import Chain
+from estimator.diagnosis.acquisition.finding import Finding, Sized
 from estimator.diagnosis.assemble import (
     Z95,
     acquired_effects,

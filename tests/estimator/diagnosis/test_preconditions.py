@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from estimator.diagnosis import diagnose
-from estimator.diagnosis.preconditions import FEWEST_SAMPLES, prepare
+from estimator.diagnosis.preconditions.prepare import FEWEST_SAMPLES, prepare
 from estimator.diagnosis.result import Verdict
 from estimator.errors import BadModel, BadShape, NotExciting
 from estimator.physics.driveline import Start

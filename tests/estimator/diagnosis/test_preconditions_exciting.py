@@ -7,9 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.diagnosis.preconditions import prepare
 from estimator.diagnosis.preconditions.inertia import model_warnings
-from estimator.diagnosis.preconditions.prepare import require_excitation
+from estimator.diagnosis.preconditions.prepare import prepare, require_excitation
 from estimator.errors import NotExciting
 from estimator.physics.driveline import Start
 from estimator.signals.record import Record

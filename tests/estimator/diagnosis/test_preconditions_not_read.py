@@ -7,9 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.diagnosis.preconditions import prepare
 from estimator.diagnosis.preconditions.channels import period_of, unwrapped
-from estimator.diagnosis.preconditions.prepare import not_read, without_not_read
+from estimator.diagnosis.preconditions.prepare import not_read, prepare, without_not_read
 from estimator.physics.driveline import Start
 from estimator.signals.record import FloatArray, OutputKind, Record
 from tests.estimator.physics.bench import ONE_MASS, linear_record, model, random_steps

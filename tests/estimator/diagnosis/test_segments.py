@@ -11,7 +11,7 @@ import pytest
 from estimator.diagnosis import diagnose
 from estimator.diagnosis.acquisition.chain import replay
 from estimator.diagnosis.noise import noise_floor
-from estimator.diagnosis.preconditions import prepare
+from estimator.diagnosis.preconditions.prepare import prepare
 from estimator.diagnosis.result import Course, Discrepancy, Equivalent, Estimated, Profile, Response, Verdict
 from estimator.diagnosis.segments import FEWEST_SAMPLES, LONG_S, LONG_SAMPLES, cut, joined, segments, tiles
 from estimator.errors import NotExciting

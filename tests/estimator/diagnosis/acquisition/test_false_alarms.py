@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.diagnosis.acquisition import compensate, recognise
+from estimator.diagnosis.acquisition.chain import compensate, recognise
 from estimator.signals.record import OutputKind, Record
 from tests.estimator.diagnosis.acquisition.bench import KINDS, PERIOD_S, SAMPLES, TORQUE_STEP, drive, drives, healthy
 

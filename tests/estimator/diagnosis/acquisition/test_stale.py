@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from estimator.diagnosis.acquisition import OUTPUT, Finding, recognise
-from estimator.diagnosis.acquisition.finding import LEVEL
+from estimator.diagnosis.acquisition.chain import recognise
+from estimator.diagnosis.acquisition.finding import LEVEL, OUTPUT, Finding
 from estimator.diagnosis.acquisition.quantised import chance_repeats, lattice_step
 from estimator.diagnosis.acquisition.stale import LateTorque, pooled_p_value
 from estimator.signals.record import BoolArray, Record

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from estimator.diagnosis.inference.hypotheses import NOTHING, everything
-from estimator.diagnosis.unnamed import ROUNDS, scene, searches_at
+from estimator.diagnosis.unnamed.scene import scene
+from estimator.diagnosis.unnamed.search import ROUNDS, searches_at
 from estimator.diagnosis.where.discrepancy import discrepancy, effects_added, without_effect
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult
