@@ -135,7 +135,7 @@ def left_open(
 
 def _open(search: Search, ground: Grounds, untested: tuple[str, ...]) -> Open:
     best = ground.best
-    tempered = tempered_by(ground.tests, best.plain.residual.size, TEMPERED)
+    tempered = tempered_by(ground.tests, best.result.residual.size, TEMPERED)
     within = max(ALIKE_WITHIN, 2.0 * tempered * math.log(1.0 / (1.0 - LEAST_PROBABILITY)))
     near = {
         each.effects: search.visited[each.effects]
@@ -177,11 +177,11 @@ def name_of(effects: Effects) -> str:
 
 def as_model(candidate: Candidate, line: DrivelineModel) -> DrivelineModel:
     """Return a hypothesis as a model to drive on paper; its events last throughout, a road stays level."""
-    plain = candidate.fit.plain
-    values = line_values(plain)
+    result = candidate.fit.result
+    values = line_values(result)
     always = {"from_s": EffectValue(0.0), "to_s": EffectValue(1e9)}
     added = {
-        name: {key: EffectValue(value) for key, value in plain.values_of(name).items()}
+        name: {key: EffectValue(value) for key, value in result.values_of(name).items()}
         | (always if EFFECTS[name].event else {})
         for name in candidate.effects - {GRADE}
     }
@@ -190,7 +190,7 @@ def as_model(candidate: Candidate, line: DrivelineModel) -> DrivelineModel:
 
 
 def _on_paper(candidate: Candidate, line: DrivelineModel, record: Record) -> FitResult:
-    fitted, effects = candidate.fit.plain, candidate.effects - {GRADE}
+    fitted, effects = candidate.fit.result, candidate.effects - {GRADE}
     shared = fitted.problem.shared
     own = tuple(_throughout(each, record) for each in own_unknowns({*line.effects, *effects}, record))
     problem = make_problem(line, [record], shared, own=[own], grid=grid_for(line, [record]))
@@ -222,8 +222,8 @@ def distance(truth: Candidate, rival: Candidate, line: DrivelineModel, record: R
     float
         In minus twice a log-likelihood, at least 0.
     """
-    said = _on_paper(truth, line, record)
-    other = _on_paper(rival, line, replace(record, output=said.outputs[0]))
+    simulated = _on_paper(truth, line, record)
+    other = _on_paper(rival, line, replace(record, output=simulated.outputs[0]))
     whitened, derivative, held = _whitened(rival, other)
     rows = np.linalg.qr(np.vstack([derivative, held]), mode="reduced")[0]
     error = np.concatenate([whitened, np.zeros(held.shape[0])])
@@ -244,7 +244,7 @@ def _whitened(candidate: Candidate, on_paper: FitResult) -> tuple[FloatArray, Fl
 
 
 def _precision(hypothesis: Hypothesis) -> FloatArray:
-    count = len(hypothesis.plain.problem.shared)
+    count = len(hypothesis.result.problem.shared)
     spread = covariance(hypothesis)[:count, :count]
     free = np.diag(spread) > 0.0
     known = np.zeros((count, count))

@@ -121,8 +121,8 @@ class BlackBox:
             return output[::steps]
         rising = np.append(np.diff(output), 0.0) / fine.sample_time_s
         moved = replace(fine, torque_nm=rising[:, np.newaxis], load_nm=None)
-        begun = Case(_with(case.p, _SENSOR), Start(0.0, 0.0, float(output[0])))
-        found: FloatArray = simulate_each(_GRID, moved, [begun])[0]
+        initial = Case(_with(case.p, _SENSOR), Start(0.0, 0.0, float(output[0])))
+        found: FloatArray = simulate_each(_GRID, moved, [initial])[0]
         return found[::steps]
 
     def _output(self, record: Record, case: Case, load: FloatArray) -> FloatArray:

@@ -71,7 +71,7 @@ def diagnose(
     progress = _rising(progress)
     masses = len(MASSES.get(model.structure, ()))  # of a joint on a bench there is nothing to compile
     if masses and is_first_use(masses):
-        progress = _telling(progress)
+        progress = _with_compile_note(progress)
         progress("preparing", 0.0)
         compile_kernels(masses)
     if masses and model.laws:
@@ -96,6 +96,6 @@ def _rising(progress: Progress) -> Progress:
     return report
 
 
-def _telling(progress: Progress) -> Progress:
+def _with_compile_note(progress: Progress) -> Progress:
     """Say at every stage what most of its time goes to."""
     return lambda message, share: progress(f"{message} ({COMPILING})", share)

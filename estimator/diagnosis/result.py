@@ -118,7 +118,7 @@ class Remainder:
     def says(self) -> str:
         """What it does that noise does not, and the law it follows; the end of a sentence that begins with "it"."""
         law = self.law if self.element is not None else ""
-        return "; it ".join(said for said in (self.tests or self.law, law) if said)
+        return "; it ".join(text for text in (self.tests or self.law, law) if text)
 
 
 @dataclass(frozen=True, slots=True)
@@ -332,7 +332,7 @@ _AT: dict[str, Element] = {
 
 
 @dataclass(frozen=True, slots=True)
-class Stray:
+class OffNominal:
     """A nominal parameter that explains more outside of its tolerance."""
 
     name: str
@@ -371,7 +371,7 @@ class Diagnosis:
     traces: tuple[Trace, ...]
     warnings: tuple[str, ...] = ()
     discrepancy: Discrepancy | None = None
-    strays: tuple[Stray, ...] = ()
+    off_nominal: tuple[OffNominal, ...] = ()
     remainder: Remainder | None = None
     slight: tuple[Slight, ...] = ()
     effort: Effort = field(default_factory=Effort)

@@ -110,14 +110,14 @@ Start = tuple[float | Held | Within, ...]
 
 
 @dataclass(frozen=True, slots=True)
-class Retelling:
+class OtherForm:
     """Where a fit of a law that is written another way starts."""
 
     start: Start  # of the law's own parameters, in scales
     line: Mapping[str, float]  # of the line's own that change with it, by name, in their units
 
 
-Retold = Callable[[Driveline, Sequence[Record], Mapping[str, float], Mapping[str, float]], list[Retelling]]
+OtherForms = Callable[[Driveline, Sequence[Record], Mapping[str, float], Mapping[str, float]], list[OtherForm]]
 Span = tuple[float, float]
 Spans = Callable[[Driveline, Mapping[str, float], Mapping[str, float]], Mapping[str, tuple[Span, ...]]]
 Starts = Callable[[Driveline, Sequence[Record]], list[Start]]
@@ -184,13 +184,13 @@ class Effect:
     step: Step | None = None  # where the event is a step of a nominal parameter
     permanent: str = ""  # the effect that the event is where it acts all along, if that is one
     phases: Mapping[str, str] = field(default_factory=dict)
-    loosens: frozenset[str] = frozenset()  # nominal parameters that it moves beyond what they are trusted to
+    widens: frozenset[str] = frozenset()  # nominal parameters that it moves beyond what they are trusted to
     described: Spans = lambda _model, _values, _line: {}
     implausible: Objection = lambda _model, _records, _values: ""
     unresolved: Objection = lambda _model, _records, _values: ""
     rescaled: Callable[[Mapping[str, float]], Mapping[str, float]] = lambda _values: {}
     completed: Callable[[Mapping[str, float]], Mapping[str, float]] = lambda values: values
-    retold: Retold = lambda _model, _records, _values, _line: []
+    reparametrised: OtherForms = lambda _model, _records, _values, _line: []
     derived: Callable[[Mapping[str, float], Mapping[str, float]], Mapping[str, float]] = lambda _values, _nominal: {}
     linear: bool = False
     waving: bool = False

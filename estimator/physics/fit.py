@@ -190,21 +190,23 @@ CLOSE = 1.1
 Name = tuple[object, ...]
 
 
-def best_fit(problems: Sequence[Problem], warm: FitResult | None = None, iterations: int = ITERATIONS) -> FitResult:
+def best_fit(problems: Sequence[Problem], previous: FitResult | None = None, iterations: int = ITERATIONS) -> FitResult:
     """Fit from several starts and return the best; what a fit ``warm`` has in common starts where that one ended.
 
     Every start gets a few steps; those that are then close to the best continue.
     """
     if len(problems) == 1:
-        return _begun(problems[0], warm, iterations)
-    heat = begun(problems, warm, min(HEAT, iterations))
+        return _initial_fit(problems[0], previous, iterations)
+    heat = initial_fits(problems, previous, min(HEAT, iterations))
     finals = concurrently(partial(converge, iterations=iterations), [heat[i] for i in close(heat)])
     return min(finals, key=lambda result: result.squares)
 
 
-def begun(problems: Sequence[Problem], warm: FitResult | None = None, iterations: int = HEAT) -> list[FitResult]:
+def initial_fits(
+    problems: Sequence[Problem], previous: FitResult | None = None, iterations: int = HEAT
+) -> list[FitResult]:
     """Fit a few steps from each of several starts."""
-    return concurrently(partial(_begun, warm=warm, iterations=iterations), problems)
+    return concurrently(partial(_initial_fit, previous=previous, iterations=iterations), problems)
 
 
 def close(heat: Sequence[FitResult]) -> list[int]:
@@ -219,15 +221,15 @@ def converge(result: FitResult, iterations: int = ITERATIONS) -> FitResult:
     return result if result.converged or iterations <= HEAT else fit(result.problem, result.x, iterations)
 
 
-def _begun(problem: Problem, warm: FitResult | None, iterations: int) -> FitResult:
-    return fit(problem, None if warm is None else warm_start(problem, warm), iterations)
+def _initial_fit(problem: Problem, previous: FitResult | None, iterations: int) -> FitResult:
+    return fit(problem, None if previous is None else warm_start(problem, previous), iterations)
 
 
-def warm_start(problem: Problem, warm: FitResult) -> FloatArray:
+def warm_start(problem: Problem, previous: FitResult) -> FloatArray:
     """Return scaled unknowns, shape (U,): where a fit left them, and those that it lacks where a fit starts."""
     x = start_vector(problem)
-    columns, taken, ratio = in_common(problem, warm.problem)
-    x[columns] = warm.x[taken] / ratio
+    columns, taken, ratio = in_common(problem, previous.problem)
+    x[columns] = previous.x[taken] / ratio
     return x
 
 

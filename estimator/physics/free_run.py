@@ -17,7 +17,7 @@ from estimator.physics.own_scan import Projector, cells, scan, waves
 from estimator.physics.problem import Problem, case_of, make_problem, start_of, start_vector
 from estimator.physics.simulate import simulate_each
 from estimator.physics.unknowns import own_unknowns
-from estimator.signals.record import BoolArray, FloatArray, Record, outputs_apart
+from estimator.signals.record import BoolArray, FloatArray, Record, separated_outputs
 
 Own = Mapping[tuple[str, str], float]
 """Effect and parameter to a recording's own value."""
@@ -47,7 +47,7 @@ def free_run(model: DrivelineModel, record: Record, known: Own = NOTHING_KNOWN) 
     start = start_of(problem, result.x, 0)
     whole = replace(start, load_torque_nm=start.load_torque_nm + float(problem.p[slot("", LOAD)]))
     case = case_of(problem.local[0], problem.p, result.x)
-    views = outputs_apart([record], lambda _: 1.0)[1:]
+    views = separated_outputs([record], lambda _: 1.0)[1:]
     further = tuple(simulate_each(problem.grid, view, [case])[0] for view in views)
     return FreeRun(result.outputs[0], result.rms, whole, further)
 

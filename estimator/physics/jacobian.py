@@ -84,7 +84,7 @@ def jacobian_at(
     wanted = (low < high) if among is None else (low < high) & among
     moving = [np.flatnonzero(_moves(problem, wanted, drive[0])) for drive in problem.drives]
     around = _Around(problem, x, outputs, problem.drives)
-    parts = _together(problem, moving) if around.is_one else _apart(moving)
+    parts = _together(problem, moving) if around.is_one else _separately(moving)
     found = np.zeros((x.size, around.firsts[-1]))
     concurrently(lambda part: around.fill(part, found), parts)
     return found.T
@@ -108,7 +108,7 @@ def _moves(problem: Problem, free: BoolArray, index: int) -> BoolArray:
     return moves
 
 
-def _apart(moving: Sequence[IntArray]) -> list[_Moved]:
+def _separately(moving: Sequence[IntArray]) -> list[_Moved]:
     """Return parts of one drive each: two at least, none wider than the lanes."""
     return [
         _Moved(np.full(some.size, i), some)

@@ -166,7 +166,7 @@ def minimise(
         gradient, curvature = derivative.T @ errors, derivative.T @ derivative
         while True:
             square = float(errors @ errors)
-            step = _step(x, gradient, curvature, damping, low, high)
+            step = damped_step(x, gradient, curvature, damping, low, high)
             promise = float(-step @ (2.0 * gradient + curvature @ step))
             if _is_little(promise, square, errors):
                 if not fresh:
@@ -220,7 +220,7 @@ def _carried_on(
     return (derivative.T + np.outer(step, missed)).T, bent
 
 
-def _step(
+def damped_step(
     x: FloatArray,
     gradient: FloatArray,
     curvature: FloatArray,

@@ -270,7 +270,7 @@ def carried(values: FloatArray, width: float) -> FloatArray:
 Noise = Callable[[Sequence[Record]], float]
 
 
-def outputs_apart(records: Sequence[Record], noise_of: Noise) -> list[Record]:
+def separated_outputs(records: Sequence[Record], noise_of: Noise) -> list[Record]:
     """Return recordings with one output each."""
     alone = [replace(record, channels=()) for record in records]
     first = noise_of(alone) if any(record.channels for record in records) else 1.0

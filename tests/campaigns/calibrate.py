@@ -140,7 +140,7 @@ def searched(form: str, seed: int) -> Row | None:
             [Claim(each.name, sorted(each.names), each.share) for each in found.beliefs],
             [(sorted(each.effects), each.score, each.is_plausible) for each in (*found.scores, *rivals)],
             {test.key: test.value for test in found.tests if test.key},
-            found.best.plain.residual.size,
+            found.best.result.residual.size,
             round(time.process_time() - began, 2),
         )
     )

@@ -17,7 +17,7 @@ from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import FitResult, rates
 from estimator.physics.free_run import NOTHING_KNOWN, FreeRun, Own, free_run
 from estimator.physics.model import DrivelineModel
-from estimator.signals.record import BoolArray, FloatArray, Record, outputs_apart, uniform_period_s
+from estimator.signals.record import BoolArray, FloatArray, Record, separated_outputs, uniform_period_s
 
 UNREAD = frozenset({"stale_samples", "lost_samples"})
 """Findings whose readings are not what was measured in that row."""
@@ -117,9 +117,9 @@ class Chain:
     shifts: tuple[FloatArray, ...] = ()  # (N,)
 
     @property
-    def apart(self) -> list[Record]:
+    def separated(self) -> list[Record]:
         """The recordings for fits, each measured output by itself."""
-        return outputs_apart(self.records, noise_floor)
+        return separated_outputs(self.records, noise_floor)
 
     def with_jitter_in(self, result: FitResult) -> Chain:
         """Return the chain with the jitter that only the errors of a converged fit show, where they show any.

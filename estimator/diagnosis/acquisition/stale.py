@@ -43,21 +43,21 @@ NEAR_ZERO = 0.02
 """Zero is within this share of the channel's size."""
 
 
-def telling_rows(values: FloatArray, step: float) -> BoolArray:
+def informative_rows(values: FloatArray, step: float) -> BoolArray:
     """Return the rows of a channel in which a repeat would tell, shape (N,)."""
     change = np.abs(np.diff(values, prepend=np.nan))
     read, again = np.isfinite(change), repeats(values, step)
-    tells: BoolArray = read & (_moving_share(read & ~again, read) > 0.5)
-    moving = change[tells & ~again]
+    informative: BoolArray = read & (_moving_share(read & ~again, read) > 0.5)
+    moving = change[informative & ~again]
     if moving.size == 0 or float(np.quantile(moving, 0.25)) <= STEPS_PER_ROW * step:
-        return np.zeros_like(tells)
+        return np.zeros_like(informative)
     low, high = float(np.nanmin(values)), float(np.nanmax(values))
     for begin, end in runs(again):
         value = values[begin]
         at_rest = abs(value) <= NEAR_ZERO * max(abs(low), abs(high)) or value in (low, high)
         if end - begin >= REST_ROWS and at_rest:
-            tells[begin:end] = False
-    return tells
+            informative[begin:end] = False
+    return informative
 
 
 def _moving_share(moving: BoolArray, read: BoolArray) -> FloatArray:
@@ -110,15 +110,15 @@ def repeated(series: Sequence[FloatArray]) -> Repeated:
     total, expected, upper = 0, 0.0, 0.0
     for values in series:
         step = lattice_step(values)
-        tells = telling_rows(values, step)
-        again = repeats(values, step) & tells
+        informative = informative_rows(values, step)
+        again = repeats(values, step) & informative
         change = np.diff(values, prepend=np.nan)
-        chance = chance_repeats(change[tells], step)
+        chance = chance_repeats(change[informative], step)
         rows.append(again)
-        total, expected, upper = total + int(tells.sum()), expected + chance.expected, upper + chance.upper
+        total, expected, upper = total + int(informative.sum()), expected + chance.expected, upper + chance.upper
         follows = _follows(again)
         after.append(np.abs(change[follows & np.isfinite(change)]))
-        usual.append(np.abs(change[tells & ~again & ~follows]))
+        usual.append(np.abs(change[informative & ~again & ~follows]))
     return Repeated(tuple(rows), total, expected, upper, _ratio(np.concatenate(after), np.concatenate(usual)))
 
 

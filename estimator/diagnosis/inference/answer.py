@@ -58,10 +58,10 @@ from estimator.diagnosis.result import (
     FoundEffect,
     Interval,
     Mismatch,
+    OffNominal,
     RejectedEffect,
     Remainder,
     Slight,
-    Stray,
     UnnamedLaw,
     UntestableEffect,
     Verdict,
@@ -74,7 +74,7 @@ from estimator.physics.fit import not_fitted
 from estimator.physics.model import DrivelineModel
 from estimator.physics.parallel import TimeIsUp, Work, counted
 from estimator.physics.steps import from_their_moment
-from estimator.signals.record import FloatArray, outputs_apart
+from estimator.signals.record import FloatArray, separated_outputs
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,22 +100,22 @@ def searched(
 ) -> Found:
     """Search for what is missing; once more where the errors of what is found show jitter."""
 
-    def begun(of: Chain) -> Search:
+    def begin(of: Chain) -> Search:
         search = _search(of, line, work or Work(), most)
         search.progress = progress
         watch(search)
         return search
 
-    found = _found(chain, begun(chain))
+    found = _found(chain, begin(chain))
     if found.search.stopped:
         return found
-    free = on_recordings(found.grounds.best, line, chain.apart, is_whole=True)
+    free = on_recordings(found.grounds.best, line, chain.separated, is_whole=True)
     steady = chain.with_jitter_in(free.first_outputs())
-    return found if steady is chain else _found(steady, begun(steady))
+    return found if steady is chain else _found(steady, begin(steady))
 
 
 def _search(chain: Chain, line: DrivelineModel, work: Work, most: float) -> Search:
-    fitted_to = outputs_apart(as_slow_as_needed(chain.records, line), noise_floor)
+    fitted_to = separated_outputs(as_slow_as_needed(chain.records, line), noise_floor)
     names = open_hypotheses(line, chain.records)[0]
     return Search(line, fitted_to, everything(fitted_to), names, work=work, most=most)
 
@@ -158,13 +158,13 @@ def answer(
         try:
             found = searched(chain, line, work, LEVELS[level], watched, progress)
             keep(found)
-            said = _decided(found, line, ready, model, progress, level)
+            diagnosis = _decided(found, line, ready, model, progress, level)
         except TimeIsUp:
-            said = None
-    if said is None:
-        said = _undecided(search, chain, line, model, level, work)
+            diagnosis = None
+    if diagnosis is None:
+        diagnosis = _undecided(search, chain, line, model, level, work)
     progress("done", 1.0)
-    return replace(said, timing_s={"total": time.perf_counter() - began})
+    return replace(diagnosis, timing_s={"total": time.perf_counter() - began})
 
 
 def _decided(
@@ -188,7 +188,7 @@ class _Seen:
     searches: list[ElementSearch]
     alone: Law | None
     left: Law | None
-    strays: tuple[Stray, ...] = ()
+    off_nominal: tuple[OffNominal, ...] = ()
 
 
 def _seen(search: Search, ground: Grounds) -> _Seen:
@@ -204,8 +204,8 @@ def _seen(search: Search, ground: Grounds) -> _Seen:
     believed = _without_doubted(search, decision)
     alone, sheet, searches = rivals.alone, rivals.sheet, rivals.searches
     if not decision.named:
-        strays = sheet.strays if sheet is not None and sheet.leaves_noise else ()
-        return _Seen(decision, ground.nothing, failed or (), searches, alone, alone, strays)
+        off_nominal = sheet.off_nominal if sheet is not None and sheet.leaves_noise else ()
+        return _Seen(decision, ground.nothing, failed or (), searches, alone, alone, off_nominal)
     if believed is ground.best:
         return _Seen(decision, believed, failed, searches, alone, rivals.added if failed else None)
     failed, first = tuple(test for test in tests(believed) if test.failed), of_first_outputs(believed)
@@ -223,12 +223,12 @@ def _without_doubted(search: Search, decision: Decision) -> Hypothesis:
 
 def _steps_from_their_moment(search: Search, believed: Hypothesis) -> Hypothesis:
     """Return a hypothesis with steps of payload or stiffness that begin inside recordings, where it is as probable."""
-    turned = from_their_moment(believed.plain, search.model)
-    if turned is believed.plain:
+    turned = from_their_moment(believed.result, search.model)
+    if turned is believed.result:
         return believed
-    begun = not_fitted(turned.problem, turned.x)
+    initial = not_fitted(turned.problem, turned.x)
     names = len(search.names)
-    found = fitted(believed.effects, begun, believed.sizes, believed.limits, names, believed.minus_twice_log)
+    found = fitted(believed.effects, initial, believed.sizes, believed.limits, names, believed.minus_twice_log)
     return found if found.score <= believed.score + SAME else believed
 
 
@@ -249,13 +249,13 @@ def _said(seen: _Seen, runs: FreeRuns, search: Search, model: DrivelineModel, le
     traces = (*decision.traces,) if verdict is not Verdict.UNEXPLAINED else ()
     named = {each.name for each in effects} | {each.name for each in traces}
     named |= {name for each in effects for name in each.indistinguishable_from}
-    slight = tuple(Slight(each.name, each.share, decision.best.plain.values_of(each.name)) for each in traces)
+    slight = tuple(Slight(each.name, each.share, decision.best.result.values_of(each.name)) for each in traces)
     context = Context(
         remainder,
         [each.name for each in traces],
-        seen.strays,
+        seen.off_nominal,
         blind,
-        decision.nothing.plain.problem.grid.plant is None,
+        decision.nothing.result.problem.grid.plant is None,
     )
     return Diagnosis(
         verdict=verdict,
@@ -274,7 +274,7 @@ def _said(seen: _Seen, runs: FreeRuns, search: Search, model: DrivelineModel, le
         warnings=_warnings(search, level),
         discrepancy=_discrepancy(seen, line) if mismatch.detected and line.plant is None else None,
         remainder=remainder,
-        strays=seen.strays,
+        off_nominal=seen.off_nominal,
         slight=slight,
         effort=effort,
     )
@@ -294,7 +294,9 @@ def _abstained(seen: _Seen, runs: FreeRuns, reason: str) -> tuple[_Seen, FreeRun
     nothing = decision.nothing
     failed = tuple(test for test in tests(nothing) if test.failed)
     runs = replace(runs, believed=nothing, is_whole=False, after=runs.before, held_after=runs.held_before)
-    return _Seen(decision, nothing, failed or seen.failed, seen.searches, seen.alone, seen.alone, seen.strays), runs
+    return _Seen(
+        decision, nothing, failed or seen.failed, seen.searches, seen.alone, seen.alone, seen.off_nominal
+    ), runs
 
 
 def _undecided(
@@ -359,24 +361,26 @@ def noise_of(hypothesis: Hypothesis) -> float:
 
 def _errors(hypothesis: Hypothesis) -> list[FloatArray]:
     """Return the free-run error per recording, 0 where a sample is missing."""
-    plain = hypothesis.plain.first_outputs()
-    return [np.where(r.okay, r.output - out, 0.0) for r, out in zip(plain.problem.records, plain.outputs, strict=True)]
+    result = hypothesis.result.first_outputs()
+    return [
+        np.where(r.okay, r.output - out, 0.0) for r, out in zip(result.problem.records, result.outputs, strict=True)
+    ]
 
 
 def _band_hz(hypothesis: Hypothesis, noise: float) -> Interval | None:
     errors = _errors(hypothesis)
-    return locate.band_hz(errors, [hypothesis.plain.problem.records[0].sample_time_s] * len(errors), noise)
+    return locate.band_hz(errors, [hypothesis.result.problem.records[0].sample_time_s] * len(errors), noise)
 
 
 def _mismatch(seen: _Seen, verdict: Verdict, effects: Sequence[FoundEffect]) -> Mismatch:
     decision = seen.decision
     if verdict is Verdict.NO_MISMATCH:
         return Mismatch(False, None, {}, None, None, 1.0)
-    nothing, noise = decision.nothing.plain.first_outputs(), noise_of(decision.best)
+    nothing, noise = decision.nothing.result.first_outputs(), noise_of(decision.best)
     law = seen.alone if seen.left is None else seen.left
     element: Element | None = None if law is None else law.element
-    if effects or seen.strays:
-        element = (effects or seen.strays)[0].element
+    if effects or seen.off_nominal:
+        element = (effects or seen.off_nominal)[0].element
     gained = max(decision.nothing.score - decision.best.score, 0.0)
     return Mismatch(
         detected=True,
@@ -391,9 +395,9 @@ def _mismatch(seen: _Seen, verdict: Verdict, effects: Sequence[FoundEffect]) -> 
 def _discrepancy(seen: _Seen, line: DrivelineModel) -> Discrepancy:
     """Return the mismatch as the report draws it."""
     noise = noise_of(seen.decision.best)
-    nothing, believed = of_first_outputs(seen.decision.nothing), seen.believed.plain.first_outputs()
+    nothing, believed = of_first_outputs(seen.decision.nothing), seen.believed.result.first_outputs()
     return discrepancy(
-        nothing.plain, believed, noise, line.motion, rounds=1, begun=seen.searches, whitening=nothing.filter
+        nothing.result, believed, noise, line.motion, rounds=1, initial=seen.searches, whitening=nothing.filter
     )
 
 

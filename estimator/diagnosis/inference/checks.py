@@ -85,11 +85,11 @@ ROUNDING = 1e-6
 
 def is_possible(hypothesis: Hypothesis, records: Sequence[Record]) -> bool:
     """Tell whether a machine can be so: its input is on, it is not stuck, no load walks so far, events take place."""
-    values, plain = _values_of(hypothesis), hypothesis.plain
+    values, result = _values_of(hypothesis), hypothesis.result
     if GRADE in hypothesis.effects and _walk(hypothesis, records) > _most_torque(records):
         return False
-    edges = all(has_edge(name, plain) for name in values if EFFECTS[name].event)
-    return edges and _is_driven(plain, records) and not _is_stuck(values, records)
+    edges = all(has_edge(name, result) for name in values if EFFECTS[name].event)
+    return edges and _is_driven(result, records) and not _is_stuck(values, records)
 
 
 def is_plausible(hypothesis: Hypothesis, model: DrivelineModel, records: Sequence[Record]) -> bool:
@@ -101,26 +101,26 @@ def is_plausible(hypothesis: Hypothesis, model: DrivelineModel, records: Sequenc
 
 
 def _values_of(hypothesis: Hypothesis) -> dict[str, Mapping[str, float]]:
-    return {name: hypothesis.plain.values_of(name) for name in hypothesis.effects - {GRADE}}
+    return {name: hypothesis.result.values_of(name) for name in hypothesis.effects - {GRADE}}
 
 
-def loosened(hypothesis: Hypothesis, model: DrivelineModel) -> FitResult | None:
+def widened(hypothesis: Hypothesis, model: DrivelineModel) -> FitResult | None:
     """Return a fit whose nominal parameters may leave their tolerances where its effects change them; None as it is.
 
     Those that are at a bound. Whether a data sheet's value is one that the line had at some moment is then for
     `is_plausible` to say.
     """
-    plain = hypothesis.plain
+    result = hypothesis.result
     wide = _spans(hypothesis, model)
     shared = tuple(
         replace(each, low=each.low / LOOSE, high=each.high * LOOSE)
         if pinned and not each.effect and each.name in wide and _is_tight(each, model)
         else each
-        for each, pinned in zip(plain.problem.shared, plain.pinned, strict=False)
+        for each, pinned in zip(result.problem.shared, result.pinned, strict=False)
     )
-    if shared == plain.problem.shared:
+    if shared == result.problem.shared:
         return None
-    return replace(plain, problem=replace(plain.problem, shared=shared), converged=False)
+    return replace(result, problem=replace(result.problem, shared=shared), converged=False)
 
 
 def may_be_loose(shared: Shared, effects: Effects, model: DrivelineModel) -> bool:
@@ -136,17 +136,17 @@ def _is_tight(shared: Shared, model: DrivelineModel) -> bool:
 
 def _spans(hypothesis: Hypothesis, model: DrivelineModel) -> dict[str, list[Span]]:
     """Return where data sheets' values of nominal parameters may lie that the effects change, by name."""
-    plain, found = hypothesis.plain, dict[str, list[Span]]()
-    line = line_values(plain)
+    result, found = hypothesis.result, dict[str, list[Span]]()
+    line = line_values(result)
     for name in hypothesis.effects - {GRADE}:
-        for parameter, spans in EFFECTS[name].described(model, plain.values_of(name), line).items():
+        for parameter, spans in EFFECTS[name].described(model, result.values_of(name), line).items():
             found.setdefault(parameter, []).extend(spans)
     return found
 
 
 def _is_described(hypothesis: Hypothesis, model: DrivelineModel) -> bool:
     """Tell whether every nominal value is, within its tolerance, one that the line had at some moment."""
-    line = line_values(hypothesis.plain)
+    line = line_values(hypothesis.result)
     for name, spans in _spans(hypothesis, model).items():
         given = model.parameters[name]
         low, high = (given.value * (1.0 + sign * (given.tolerance + ROUNDING)) for sign in (-1.0, 1.0))
@@ -155,9 +155,9 @@ def _is_described(hypothesis: Hypothesis, model: DrivelineModel) -> bool:
     return True
 
 
-def _is_driven(plain: FitResult, records: Sequence[Record]) -> bool:
+def _is_driven(result: FitResult, records: Sequence[Record]) -> bool:
     for i, record in enumerate(records):
-        through = shaft_torque(record.torque_nm, record.time_s - record.time_s[0], plain.p_of(i))
+        through = shaft_torque(record.torque_nm, record.time_s - record.time_s[0], result.p_of(i))
         for passed, read in zip(
             np.array_split(through, PARTS), np.array_split(record.total_torque_nm, PARTS), strict=True
         ):
@@ -229,7 +229,7 @@ class Test:
 
 
 def tests(best: Hypothesis) -> tuple[Test, ...]:
-    problem = best.plain.problem
+    problem = best.result.problem
     errors = residuals(best, best.white.residual)
     whole = np.concatenate(errors)
     power = float(whole @ whole) / whole.size
@@ -270,7 +270,7 @@ def _is_at_bound(best: Hypothesis, size: Size) -> bool:
 
 def _dependent(best: Hypothesis, whole: FloatArray) -> float:
     """Return the share of the innovations' variance that is a function of torque, speed or angle, bias removed."""
-    problem = best.plain.problem
+    problem = best.result.problem
     torque, speed, angle = (
         np.concatenate([signal(record)[use] for record, use in zip(problem.records, problem.use, strict=True)])
         for signal in (_driven_by, lambda r: np.nan_to_num(measured_speed(r)), motor_angle)

@@ -353,12 +353,12 @@ def estimated(
     check_time()
     whitened = whitening_of(result)
     limits = limits if changes_of(result) else limits.without_forms()
-    begun = starts(sizes, limits) if is_anew else [sizes]
-    return min((estimate(whitened, error, each, limits, rounds) for each in begun), key=lambda each: each[1])
+    initial = starts(sizes, limits) if is_anew else [sizes]
+    return min((estimate(whitened, error, each, limits, rounds) for each in initial), key=lambda each: each[1])
 
 
 def estimate(
-    whitened: Callable[[FloatArray], Whitener], error: FloatArray, begun: FloatArray, limits: Limits, rounds: int
+    whitened: Callable[[FloatArray], Whitener], error: FloatArray, initial: FloatArray, limits: Limits, rounds: int
 ) -> tuple[FloatArray, float]:
     """Return the most probable noise model of an error and its minus twice log-posterior, by Fisher scoring."""
 
@@ -368,7 +368,7 @@ def estimate(
         value = 2.0 * float(logs.sum()) + float(innovations @ innovations) + minus_twice_log_prior(sizes, limits)
         return value, innovations, logs
 
-    sizes = np.clip(begun, limits.low, limits.high)
+    sizes = np.clip(initial, limits.low, limits.high)
     value, innovations, logs = at(sizes)
     damping = 1e-2
     for _ in range(rounds):

@@ -87,10 +87,10 @@ def on_recordings(
     use: Sequence[BoolArray] | None = None,
 ) -> FitResult:
     """Return the free run of a hypothesis on recordings it was fitted to, at their own rate."""
-    of = hypothesis.plain.problem
+    of = hypothesis.result.problem
     own = [basis.own for basis in of.local]
     problem = make_problem(line, records, of.shared, own=own, profile=GRADE in hypothesis.effects, use=use)
-    own_alone = _with_own(problem, warm_start(problem, hypothesis.plain))
+    own_alone = _with_own(problem, warm_start(problem, hypothesis.result))
     if is_whole:
         return own_alone
     rms = own_alone.rms
@@ -132,19 +132,19 @@ class Unseen:
         Where faults of the acquisition were recognised the readings judge: simulated ``as_read``, or as it is.
         """
         judging = self.chain if self.chain.records else seen
-        records: Sequence[Record] = judging.records if self.chain.records else hypothesis.plain.problem.records
+        records: Sequence[Record] = judging.records if self.chain.records else hypothesis.result.problem.records
         if judging.findings and not self.chain.records:
-            records = seen.apart
+            records = seen.separated
         between = [record.okay & ~blocks(record) for record in records]
         if self.chain.records:
             outputs = foreign_outputs(whole, self.line, records, between, hypothesis.effects)
         else:
-            plain = hypothesis.plain
+            result = hypothesis.result
             if is_whole:
-                of = plain.problem
+                of = result.problem
                 use = tuple(record.okay & ~blocks(record) for record in of.records)
-                plain = refitted(hypothesis, replace(of, use=use))
-            outputs = on_recordings(replace(hypothesis, plain=plain), self.line, records, is_whole, between).outputs
+                result = refitted(hypothesis, replace(of, use=use))
+            outputs = on_recordings(replace(hypothesis, result=result), self.line, records, is_whole, between).outputs
         firsts = [(out, record) for out, record in zip(outputs, records, strict=True) if record.lead is None]
         inside = [blocks(record) for _, record in firsts]
         if not judging.findings:
@@ -174,9 +174,9 @@ def _found(
     nulls = {parameter.name: parameter.null for parameter in entry.parameters}
     profiles = {}
     if belief.name == GRADE:
-        of = best.plain.problem
+        of = best.result.problem
         problem = make_problem(model, of.records, of.shared, own=[b.own for b in of.local], profile=True, use=of.use)
-        course = fit(problem, warm_start(problem, best.plain))
+        course = fit(problem, warm_start(problem, best.result))
         of_course = reported_covariance(course)
         profiles, parameters = profiles_of(course, of_course, model), profile_size(course, of_course, model)
     else:
@@ -249,12 +249,12 @@ def free_runs(nothing: Hypothesis, believed: Hypothesis, is_whole: bool, chain: 
 
     The re-tuned model leaves the least that it can: an error that it need not have is no mismatch.
     """
-    before = _least(on_recordings(nothing, unseen.line, chain.apart, is_whole=False), unseen.line)
+    before = _least(on_recordings(nothing, unseen.line, chain.separated, is_whole=False), unseen.line)
     held_before = unseen.rms(nothing, before, False, chain, is_as_read=False)
     if believed is nothing:
         held_after = unseen.rms(nothing, before, False, chain, is_as_read=True) if chain.findings else held_before
         return FreeRuns(chain, unseen, believed, is_whole, before, before, held_before, held_after)
-    after = on_recordings(believed, unseen.line, chain.apart, is_whole)
+    after = on_recordings(believed, unseen.line, chain.separated, is_whole)
     held_after = unseen.rms(believed, after, is_whole, chain, is_as_read=True)
     return FreeRuns(chain, unseen, believed, is_whole, before, after, held_before, held_after)
 
@@ -270,8 +270,8 @@ def _least(retuned: FitResult, line: DrivelineModel) -> FitResult:
     )
     if nominal.squares >= retuned.squares:
         return retuned
-    begun = not_fitted(problem, nominal.x)
-    return descended(begun, lambda errors: errors / begun.rms, THOROUGH).light()
+    initial = not_fitted(problem, nominal.x)
+    return descended(initial, lambda errors: errors / initial.rms, THOROUGH).light()
 
 
 def _held_at_start(unknown: Shared) -> Shared:
@@ -280,8 +280,8 @@ def _held_at_start(unknown: Shared) -> Shared:
 
 def first_figures(chain: Chain, line: DrivelineModel, nothing: Hypothesis | None) -> tuple[Fit, FitResult]:
     """Return the errors that are known where a search was ended at once: of the model as given, and re-tuned."""
-    nominal = not_fitted(problem := make_problem(line, chain.apart, ()), start_vector(problem)).first_outputs()
-    estimate = nominal if nothing is None else nothing.plain.first_outputs()
+    nominal = not_fitted(problem := make_problem(line, chain.separated, ()), start_vector(problem)).first_outputs()
+    estimate = nominal if nothing is None else nothing.result.first_outputs()
     noise = math.nan if nothing is None else float(reading_noise(nothing.sizes)[0])
     of = unit(DIMENSIONS[chain.raw[0].kind], line.motion)
     return Fit(of, nominal.rms, estimate.rms, estimate.rms, math.nan, math.nan, noise), estimate

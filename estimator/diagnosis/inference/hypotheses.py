@@ -77,23 +77,23 @@ def everything(records: Sequence[Record]) -> list[BoolArray]:
     return [np.asarray(record.okay) for record in records]
 
 
-def kept(warm: FitResult, effects: Collection[str]) -> Release:
+def kept(previous: FitResult, effects: Collection[str]) -> Release:
     """Return the unknowns of a fit that belong to the line itself or to some effects."""
     wanted = {"", *effects}
     return Release(
-        tuple(unknown for unknown in warm.problem.shared if unknown.effect in wanted),
-        tuple(tuple(unknown for unknown in basis.own if unknown.effect in wanted) for basis in warm.problem.local),
+        tuple(unknown for unknown in previous.problem.shared if unknown.effect in wanted),
+        tuple(tuple(unknown for unknown in basis.own if unknown.effect in wanted) for basis in previous.problem.local),
     )
 
 
-def inheriting(name: str, release: Release, warm: FitResult) -> Release:
+def inheriting(name: str, release: Release, previous: FitResult) -> Release:
     """Return a start of a general law that keeps what a fit of its special case has found out by another telling.
 
     Friction that was seen to bend before it slides does so with a Stribeck range, too: begun without, such a fit is far
     behind the special case and would be given up.
     """
     found = {
-        key: value for special in EFFECTS[name].contains for key, value in warm.values_of(special).items() if value
+        key: value for special in EFFECTS[name].contains for key, value in previous.values_of(special).items() if value
     }
     limits = {parameter.name: (parameter.low, parameter.high) for parameter in EFFECTS[name].parameters}
 
@@ -252,7 +252,7 @@ class Hypothesis:
     """A set of effects, fitted."""
 
     effects: Effects
-    plain: FitResult  # unknowns, simulations and errors
+    result: FitResult  # unknowns, simulations and errors
     sizes: FloatArray  # (S,): logarithms of the disturbances' sizes and times (`whitener.Size`)
     limits: Limits
     minus_twice_log: float  # minus twice the log-likelihood of the recordings, and of the disturbances' prior
@@ -266,12 +266,12 @@ class Hypothesis:
     @property
     def unknowns(self) -> int:
         """How many unknowns were fitted; moments of events only where these act."""
-        low, high = bounds(self.plain.problem)
-        return int(np.sum(low < high)) - _idle_moments(self.plain)
+        low, high = bounds(self.result.problem)
+        return int(np.sum(low < high)) - _idle_moments(self.result)
 
     @property
     def score(self) -> float:
-        n = self.plain.residual.size
+        n = self.result.residual.size
         freed = "road_grade" in self.effects
         return self.minus_twice_log + (self.unknowns + freed) * math.log(n) + 2.0 * self.choices
 
@@ -282,22 +282,22 @@ class Hypothesis:
         A load that may walk far leaves the noise of the reading: the rest is what it did.
         """
         if "road_grade" in self.effects:
-            return float(np.sum(samples_of(self.plain) * reading_noise(self.sizes) ** 2))
-        rms = self.plain.rms
-        return descended(self.plain, lambda errors: errors / rms, FREE).squares
+            return float(np.sum(samples_of(self.result) * reading_noise(self.sizes) ** 2))
+        rms = self.result.rms
+        return descended(self.result, lambda errors: errors / rms, FREE).squares
 
     @cached_property
     def filter(self) -> Whitener:
         """The filter that whitens errors under the hypothesis' own disturbances."""
-        return whitener_of(self.plain, self.sizes)
+        return whitener_of(self.result, self.sizes)
 
     @cached_property
     def white(self) -> FitResult:
         """The fit with its errors and their derivative as innovations: independent, of variance 1."""
-        plain = self.plain
-        known = plain.derivative if plain.converged else None
-        derivative = jacobian_at(plain.problem, plain.x, plain.outputs) if known is None else known
-        return replace(plain, residual=self.filter(plain.residual), derivative=self.filter(derivative))
+        result = self.result
+        known = result.derivative if result.converged else None
+        derivative = jacobian_at(result.problem, result.x, result.outputs) if known is None else known
+        return replace(result, residual=self.filter(result.residual), derivative=self.filter(derivative))
 
 
 def choices_of(effects: Effects, hypotheses: int) -> float:
@@ -308,7 +308,7 @@ def choices_of(effects: Effects, hypotheses: int) -> float:
 
 def fitted(
     effects: Effects,
-    begun: FitResult,
+    initial: FitResult,
     sizes: FloatArray,
     limits: Limits,
     hypotheses: int,
@@ -319,90 +319,90 @@ def fitted(
     ``rival`` is minus twice the log-likelihood of the hypothesis it will be compared with: the farther from it, the
     less the last digits matter. Without one it is fitted to its end.
     """
-    plain, choices, sizes = begun, choices_of(effects, hypotheses), np.clip(sizes, limits.low, limits.high)
+    result, choices, sizes = initial, choices_of(effects, hypotheses), np.clip(sizes, limits.low, limits.high)
     best: Hypothesis | None = None
     passes: list[float] = []
     while best is None or len(passes) < MOST_PASSES:
-        plain = descended(plain, whitener_of(plain, sizes), THOROUGH)
+        result = descended(result, whitener_of(result, sizes), THOROUGH)
         if len(passes) < WITH_MOMENTS:
-            plain = _with_moments(plain, sizes)
-        sizes, now = _disturbances(plain, sizes, limits, is_anew=not passes)
+            result = _with_moments(result, sizes)
+        sizes, now = _disturbances(result, sizes, limits, is_anew=not passes)
         enough = SAME if math.isnan(rival) else max(SAME, DIGITS * abs(now - rival))
         last = best is not None and now > best.minus_twice_log - enough
         if best is None or now < best.minus_twice_log:
-            best = Hypothesis(effects, plain, sizes, limits, now, choices)
+            best = Hypothesis(effects, result, sizes, limits, now, choices)
         if last:
             break
         passes.append(now)
-    return replace(best, plain=light(best.plain))
+    return replace(best, result=light(best.result))
 
 
-def compared(effects: Effects, begun: FitResult, parent: Hypothesis, limits: Limits, hypotheses: int) -> Hypothesis:
+def compared(effects: Effects, initial: FitResult, parent: Hypothesis, limits: Limits, hypotheses: int) -> Hypothesis:
     """Fit a hypothesis a few steps from another's disturbances, to be compared with others like it.
 
     Where it explains much more, other disturbances weigh what is left, and it is fitted a few steps under those, too.
     ``limits`` are those of its own disturbances: a load that may walk far is not every hypothesis'.
     """
     sizes, best = np.clip(parent.sizes, limits.low, limits.high), parent.minus_twice_log
-    plain, now = begun, math.inf
+    result, now = initial, math.inf
     for _ in range(MOST_ROUGH):
-        plain = descended(plain, whitener_of(plain, sizes), ROUGH)
-        sizes, now = _disturbances(plain, sizes, limits)
-        if now > best - MUCH * plain.residual.size:
+        result = descended(result, whitener_of(result, sizes), ROUGH)
+        sizes, now = _disturbances(result, sizes, limits)
+        if now > best - MUCH * result.residual.size:
             break
         best = now
-    return Hypothesis(effects, plain, sizes, limits, now, choices_of(effects, hypotheses))
+    return Hypothesis(effects, result, sizes, limits, now, choices_of(effects, hypotheses))
 
 
 def refitted(hypothesis: Hypothesis, problem: Problem) -> FitResult:
     """Return the fit of a hypothesis to other samples of the same recordings, its disturbances as they are."""
-    begun = not_fitted(problem, hypothesis.plain.x)
-    return descended(begun, whitener_of(begun, hypothesis.sizes), THOROUGH)
+    initial = not_fitted(problem, hypothesis.result.x)
+    return descended(initial, whitener_of(initial, hypothesis.sizes), THOROUGH)
 
 
 def _disturbances(
-    plain: FitResult, sizes: FloatArray, limits: Limits, is_anew: bool = False
+    result: FitResult, sizes: FloatArray, limits: Limits, is_anew: bool = False
 ) -> tuple[FloatArray, float]:
-    return estimated(plain, plain.residual, sizes, limits, ROUNDS, is_anew)
+    return estimated(result, result.residual, sizes, limits, ROUNDS, is_anew)
 
 
-def samples_of(plain: FitResult) -> FloatArray:
+def samples_of(result: FitResult) -> FloatArray:
     """Return how many samples count of each output, shape (C,)."""
-    use = plain.problem.use
-    return np.array([sum(int(each.sum()) for each in use[part]) for part in by_output(plain.problem.records)])
+    use = result.problem.use
+    return np.array([sum(int(each.sum()) for each in use[part]) for part in by_output(result.problem.records)])
 
 
 def of_first_outputs(hypothesis: Hypothesis) -> Hypothesis:
-    plain = hypothesis.plain.first_outputs()
-    if plain is hypothesis.plain:
+    result = hypothesis.result.first_outputs()
+    if result is hypothesis.result:
         return hypothesis
     sizes, limits = of_first(hypothesis.sizes), hypothesis.limits.of_first()
-    filtered = whitener_of(plain, sizes)
-    now = filtered.minus_twice_log(filtered(plain.residual)) + minus_twice_log_prior(sizes, limits)
-    return Hypothesis(hypothesis.effects, plain, sizes, limits, now, hypothesis.choices)
+    filtered = whitener_of(result, sizes)
+    now = filtered.minus_twice_log(filtered(result.residual)) + minus_twice_log_prior(sizes, limits)
+    return Hypothesis(hypothesis.effects, result, sizes, limits, now, hypothesis.choices)
 
 
-def _with_moments(plain: FitResult, sizes: FloatArray) -> FitResult:
+def _with_moments(result: FitResult, sizes: FloatArray) -> FitResult:
     """Return a fit with moments of events where the innovations are least, and fitted from there."""
-    if not _has_moments(plain.problem):
-        return plain
+    if not _has_moments(result.problem):
+        return result
     for _ in range(2):
-        found = moved(plain, whitener_of(plain, sizes))
+        found = moved(result, whitener_of(result, sizes))
         if found is None:
             break
-        plain = descended(extended(*found, plain), whitener_of(plain, sizes), THOROUGH)
-    return plain
+        result = descended(extended(*found, result), whitener_of(result, sizes), THOROUGH)
+    return result
 
 
 def _has_moments(problem: Problem) -> bool:
     return any(u.name in MOMENT_NAMES and u.low < u.high for basis in problem.bases for u in basis.own)
 
 
-def _idle_moments(plain: FitResult) -> int:
+def _idle_moments(result: FitResult) -> int:
     """Return how many moments are of events that do not take place in their recording."""
     count = 0
-    for i, basis in enumerate(plain.problem.bases):
-        values = plain.local_of(i)[basis.own_rows]
+    for i, basis in enumerate(result.problem.bases):
+        values = result.local_of(i)[basis.own_rows]
         own = {(u.effect, u.name): (u, float(v)) for u, v in zip(basis.own, values, strict=True)}
         for name in {u.effect for u in basis.own if EFFECTS[u.effect].event}:
             (begin, from_s), (end, to_s) = own[name, "from_s"], own[name, "to_s"]
@@ -410,7 +410,7 @@ def _idle_moments(plain: FitResult) -> int:
             if to_s <= from_s:
                 count += movable
             else:  # one that begins or ends with the recording has no moment there
-                first, last = (float(t) for t in plain.problem.records[i].since_start_s[[0, -1]])
+                first, last = (float(t) for t in result.problem.records[i].since_start_s[[0, -1]])
                 count += (begin.low < begin.high and from_s <= first) + (end.low < end.high and to_s >= last)
     return count
 
@@ -427,5 +427,5 @@ def covariance(hypothesis: Hypothesis) -> FloatArray:
 
 def residuals(hypothesis: Hypothesis, stacked: FloatArray) -> Sequence[FloatArray]:
     """Split stacked values into those of each recording."""
-    ends = np.cumsum([int(use.sum()) for use in hypothesis.plain.problem.use])[:-1]
+    ends = np.cumsum([int(use.sum()) for use in hypothesis.result.problem.use])[:-1]
     return np.split(stacked, ends)

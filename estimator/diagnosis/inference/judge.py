@@ -129,7 +129,7 @@ def _same_law(name: str) -> set[str]:
 
 def free_rms(hypothesis: Hypothesis) -> float:
     """Return the RMS of the free-run error, re-tuned to leave least of it."""
-    return math.sqrt(hypothesis.free_squares / hypothesis.plain.residual.size)
+    return math.sqrt(hypothesis.free_squares / hypothesis.result.residual.size)
 
 
 def _alike(
@@ -142,7 +142,7 @@ def _alike(
         if len(effects - others) == 1 and others <= effects
     }
     near = {name: best} | {other: each for other, each in exchanged.items() if each.score - best.score < within}
-    values = {other: each.plain.values_of(other) for other, each in near.items()}
+    values = {other: each.result.values_of(other) for other, each in near.items()}
     for other in list(near):
         for twin in EFFECTS[other].equivalent if best.outputs == 1 else ():
             values.setdefault(twin, values[other])  # the same linear system: the same parameters
@@ -211,7 +211,7 @@ def scores_of(search: Search) -> tuple[Score, ...]:
 def believed(search: Search, ground: Grounds, rivals: Sequence[Score] = ()) -> tuple[Belief, ...]:
     """Return what is believed of the best set, over all sets that were fitted and ``rivals`` beyond these."""
     best = ground.best
-    tempered = tempered_by(ground.tests, best.plain.residual.size, TEMPERED)
+    tempered = tempered_by(ground.tests, best.result.residual.size, TEMPERED)
     found = beliefs(
         best,
         search.visited,
@@ -273,18 +273,18 @@ def holds_null(hypothesis: Hypothesis, name: str) -> bool:
     entry = EFFECTS[name]
     if entry.profile:
         return False
-    first, plain = entry.parameters[0], hypothesis.plain
+    first, result = entry.parameters[0], hypothesis.result
     among = {p.name: p.null for p in entry.shared_parameters if p is first or (first.optional and p.optional)}
-    spread, pinned = np.sqrt(np.maximum(np.diag(covariance(hypothesis)), 0.0)), plain.pinned
+    spread, pinned = np.sqrt(np.maximum(np.diag(covariance(hypothesis)), 0.0)), result.pinned
     held = []
-    for i, each in enumerate(plain.problem.shared):
+    for i, each in enumerate(result.problem.shared):
         null = among.get(each.name) if each.effect == name and each.low < each.high else None
         if null is None or (first.optional and null not in (0.0, math.inf, first.null)):
             continue
         if math.isinf(null):
-            held.append(bool(pinned[i]) and plain.x[i] > 0.5 * each.high)
+            held.append(bool(pinned[i]) and result.x[i] > 0.5 * each.high)
         else:
-            held.append(abs(plain.x[i] - null / each.scale) <= Z95 * spread[i])
+            held.append(abs(result.x[i] - null / each.scale) <= Z95 * spread[i])
     return bool(held) and all(held)
 
 

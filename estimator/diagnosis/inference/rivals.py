@@ -22,7 +22,7 @@ from estimator.diagnosis.inference.hypotheses import (
 )
 from estimator.diagnosis.inference.judge import Grounds, Score, free_rms
 from estimator.diagnosis.inference.search import Search
-from estimator.diagnosis.result import Stray
+from estimator.diagnosis.result import OffNominal
 from estimator.diagnosis.unnamed.scene import scene
 from estimator.diagnosis.unnamed.search import ElementSearch, searches_at
 from estimator.physics.catalogue import EFFECTS
@@ -46,12 +46,12 @@ class FreeLine:
 
     score: float  # that of a hypothesis (``likelihood``)
     leaves_noise: bool  # whether what it leaves passes for noise
-    strays: tuple[Stray, ...]  # what clearly left its tolerance, the clearest first
+    off_nominal: tuple[OffNominal, ...]  # what clearly left its tolerance, the clearest first
 
 
 def free_line(search: Search) -> FreeLine | None:
     """Fit the nominal line beyond its tolerances; None where these hold nothing back."""
-    nothing = search.nothing().plain
+    nothing = search.nothing().result
     shared = nothing.problem.shared
     trusted = [not s.effect and np.isfinite(s.low) and s.low < s.high for s in shared]
     if not any(free and at_bound for free, at_bound in zip(trusted, nothing.pinned, strict=False)):
@@ -61,26 +61,26 @@ def free_line(search: Search) -> FreeLine | None:
     )
     problem = replace(nothing.problem, shared=freed)
     sizes, hypotheses = search.nothing().sizes, len(search.names)
-    begun = not_fitted(problem, nothing.x)
-    found = fitted(NOTHING, begun, sizes, search.limits, hypotheses, search.nothing().minus_twice_log)
-    strays = _strays(search, found)
-    if not strays:
+    initial = not_fitted(problem, nothing.x)
+    found = fitted(NOTHING, initial, sizes, search.limits, hypotheses, search.nothing().minus_twice_log)
+    off_nominal = _off_nominal(search, found)
+    if not off_nominal:
         return None
-    chosen = choices_of(frozenset(stray.name for stray in strays), hypotheses + sum(trusted))
-    return FreeLine(found.score + 2.0 * chosen, not any(test.failed for test in tests(found)), strays)
+    chosen = choices_of(frozenset(value.name for value in off_nominal), hypotheses + sum(trusted))
+    return FreeLine(found.score + 2.0 * chosen, not any(test.failed for test in tests(found)), off_nominal)
 
 
-def _strays(search: Search, found: Hypothesis) -> tuple[Stray, ...]:
+def _off_nominal(search: Search, found: Hypothesis) -> tuple[OffNominal, ...]:
     spread = np.sqrt(np.maximum(np.diag(covariance(found)), 0.0))
     clear = []
-    for i, trusted in enumerate(search.nothing().plain.problem.shared):
-        ratio = float(found.plain.x[i])
+    for i, trusted in enumerate(search.nothing().result.problem.shared):
+        ratio = float(found.result.x[i])
         by = max(trusted.low - ratio, ratio - trusted.high)
         if not trusted.effect and trusted.low < trusted.high and by > CLEARLY * spread[i]:
             sureness = by / max(float(spread[i]), np.finfo(float).tiny)
             given, unit = search.model.parameters[trusted.name], parameter_unit(trusted.name, search.model.motion)
-            clear.append((sureness, Stray(trusted.name, ratio, trusted.high - 1.0, given.value, unit)))
-    return tuple(stray for _, stray in sorted(clear, key=lambda each: -each[0]))
+            clear.append((sureness, OffNominal(trusted.name, ratio, trusted.high - 1.0, given.value, unit)))
+    return tuple(value for _, value in sorted(clear, key=lambda each: -each[0]))
 
 
 LOOKING_ROUNDS = 6
@@ -99,15 +99,15 @@ class Law:
 
 def searches_around(hypothesis: Hypothesis) -> list[ElementSearch]:
     """Look for the best law to add to a hypothesis at every element; none inside a plant simulated elsewhere."""
-    if hypothesis.plain.problem.grid.plant is not None:
+    if hypothesis.result.problem.grid.plant is not None:
         return []
     noise = float(reading_noise(hypothesis.sizes)[0])
-    return searches_at(scene(hypothesis.plain, noise, hypothesis.filter), LOOKING_ROUNDS)
+    return searches_at(scene(hypothesis.result, noise, hypothesis.filter), LOOKING_ROUNDS)
 
 
 def best_law(hypothesis: Hypothesis, searches: Sequence[ElementSearch]) -> Law | None:
     """Return the law with which the recordings are most probable; None where they are more probable without one."""
-    white = hypothesis.filter(hypothesis.plain.residual)
+    white = hypothesis.filter(hypothesis.result.residual)
     before = float(white @ white) / white.size
     laws = [_scored(hypothesis, search, before, math.log(len(searches))) for search in searches if search.law.terms]
     best = min(laws, key=lambda law: law.score, default=None)
@@ -120,7 +120,7 @@ def _scored(hypothesis: Hypothesis, search: ElementSearch, before: float, places
     With all disturbances in one proportion minus twice the log-likelihood falls by ``n log(Q / Q')``, Q the squared
     innovations; estimated anew it falls further.
     """
-    n = hypothesis.plain.residual.size
+    n = hypothesis.result.residual.size
     score = hypothesis.score - search.law.information(before, search.mean_square, n) + 2.0 * places
     is_simulated = any(weights.any() for weights in search.weights)
     if is_simulated:

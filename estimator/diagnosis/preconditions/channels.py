@@ -189,7 +189,7 @@ def with_usable_channels(records: Sequence[Record]) -> tuple[list[Record], list[
         usable: list[Channel] = []
         for channel in record.channels:
             channel, dead = _without_dead(record, channel)
-            warnings += [f"recording {record.name}: the output {channel.label} {said}" for said in dead]
+            warnings += [f"recording {record.name}: the output {channel.label} {notes}" for notes in dead]
             fault = _fault(record, channel, usable)
             if fault:
                 warnings.append(f"recording {record.name}: the output {channel.label} is not used: {fault}")
@@ -204,17 +204,17 @@ def _without_dead(record: Record, channel: Channel) -> tuple[Channel, list[str]]
     read = channel.output[channel.okay]
     if read.size == 0 or np.ptp(read) == 0.0:  # never read, or dead throughout: for `_fault` to say
         return channel, []
-    like, okay, said = _goes_like(record, channel), channel.okay.copy(), []
+    like, okay, notes = _goes_like(record, channel), channel.okay.copy(), []
     least = max(2, round(DEAD_S / record.sample_time_s))
     ends = np.flatnonzero(np.diff(channel.output) != 0.0) + 1
     for first, end in pairwise([0, *ends.tolist(), channel.output.size]):
         if end - first >= least and np.ptp(like[first:end]) > MOVED * np.nanstd(like):
             okay[first:end] = False
-            said.append(
+            notes.append(
                 f"stays at {channel.output[first]:g} from {record.time_s[first]:g} to {record.time_s[end - 1]:g} s, "
                 "while the motor moves: its sensor is dead there, and it is not used there."
             )
-    return replace(channel, okay=okay), said
+    return replace(channel, okay=okay), notes
 
 
 def _fault(record: Record, channel: Channel, others: Sequence[Channel]) -> str:

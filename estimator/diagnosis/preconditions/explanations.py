@@ -245,11 +245,11 @@ def _fit_of(row: Row, needed: float, spread: float) -> float:
     return (1.0 - PHYSICS_SHARE) * close + PHYSICS_SHARE * far
 
 
-def _bands_of(apart: float, is_model: bool) -> float:
-    if math.isnan(apart):
+def _bands_of(log_ratio: float, is_model: bool) -> float:
+    if math.isnan(log_ratio):
         return 1.0
-    other = _normal(apart, BANDS_OTHER)
-    return other if is_model else (1.0 - BANDS_PHYSICS) * _normal(apart, BANDS) + BANDS_PHYSICS * other
+    other = _normal(log_ratio, BANDS_OTHER)
+    return other if is_model else (1.0 - BANDS_PHYSICS) * _normal(log_ratio, BANDS) + BANDS_PHYSICS * other
 
 
 def largest(record: Record) -> tuple[float, float]:
@@ -339,7 +339,7 @@ def explanations(change: Change, found: Inertia, rows: Sequence[Row], spread: fl
         by_torque = math.prod(factor for row, factor in factors if row.part is Part.TORQUE)
         by_output = math.prod(factor for row, factor in factors if row.part is Part.OUTPUT)
         weight = common * fit * math.prod(row.prior for row in chosen)
-        weight *= _bands_of(found.apart, any(row.part is Part.MODEL for row in chosen))
+        weight *= _bands_of(found.log_ratio, any(row.part is Part.MODEL for row in chosen))
         weight *= usual(chosen, torque, torque * by_torque, output * by_output, record)
         return Explanation(change, tuple(factors), weight, torque * by_torque, output * by_output, is_turned)
 

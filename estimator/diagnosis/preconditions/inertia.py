@@ -103,7 +103,7 @@ class Inertia:
 
     ratio: float
     share: float
-    apart: float = math.nan
+    log_ratio: float = math.nan
 
 
 NOTHING = Inertia(math.nan, 0.0)
@@ -111,15 +111,15 @@ NOTHING = Inertia(math.nan, 0.0)
 
 def fitted_inertia(record: Record, line: DrivelineModel, grid: Grid | None) -> Inertia | None:
     first_hz = float(natural_frequencies_rad_s(line.values())[0]) / (2.0 * math.pi)
-    apart, found = math.nan, as_one_body(record, line, first_hz)
+    log_ratio, found = math.nan, as_one_body(record, line, first_hz)
     if grid is not None and 0.0 < ABOVE[0] * first_hz < 0.5 / record.sample_time_s:
         below, above = (by_band(record, line, grid, low * first_hz, high * first_hz) for low, high in (BELOW, ABOVE))
         if min(below.share, above.share) >= BANDS_TELL:
-            apart = math.log(abs(below.ratio / above.ratio))
-            if abs(apart) <= math.log(AGREE):
+            log_ratio = math.log(abs(below.ratio / above.ratio))
+            if abs(log_ratio) <= math.log(AGREE):
                 mean = math.copysign(math.sqrt(abs(below.ratio * above.ratio)), below.ratio)
-                return Inertia(mean, max(below.share, found.share), apart)  # comparable with that of one body alone
-    return replace(found, apart=apart) if found.share >= BODY_TELLS else None
+                return Inertia(mean, max(below.share, found.share), log_ratio)  # comparable with that of one body alone
+    return replace(found, log_ratio=log_ratio) if found.share >= BODY_TELLS else None
 
 
 def by_band(record: Record, line: DrivelineModel, grid: Grid, low_hz: float, high_hz: float) -> Inertia:

@@ -23,7 +23,7 @@ from estimator.errors import BadShape, Implausible, NotExciting
 from estimator.physics.layout import Grid, grid_for
 from estimator.physics.model import DrivelineModel, Structure, natural_frequencies_rad_s
 from estimator.physics.simulate import output_state
-from estimator.signals.record import BoolArray, FloatArray, OutputKind, Record, outputs_apart
+from estimator.signals.record import BoolArray, FloatArray, OutputKind, Record, separated_outputs
 
 FEWEST_KEPT = 20
 """Samples in a row that count: by chance two in three of the steps between them would have to be alike."""
@@ -351,8 +351,8 @@ def as_moved(records: Sequence[Record]) -> tuple[list[Record], list[str]]:
     warnings: list[str] = []
     mended = list(records)
     for mend in (unwrapped, without_clipped, without_not_read, with_usable_channels):
-        mended, said = mend(mended)
-        warnings += said
+        mended, notes = mend(mended)
+        warnings += notes
     return mended, warnings
 
 
@@ -380,7 +380,7 @@ def prepare(records: Sequence[Record], model: DrivelineModel, holdout: Sequence[
     require_together([*records, *holdout] if records else records)
     mended, warnings = as_moved([*records, *holdout])
     for record in mended:
-        for each in outputs_apart([record], lambda _: 1.0):
+        for each in separated_outputs([record], lambda _: 1.0):
             output_state(each, model.structure)
         require_signals(record)
     names = [record.name for record in records]

@@ -33,7 +33,7 @@ SLOWEST_WAVE = 3.0
 MOST_PEAKS = 3
 """Orders that are tried of the signal itself, and of its change, the strongest first."""
 
-APART = 10.0
+SEPARATION = 10.0
 """Orders that differ by less than this many waves in a recording are one: a wave that comes and goes is no line."""
 
 BINS_PER_WAVE = 4.0
@@ -66,7 +66,7 @@ def peaks(signals: Sequence[FloatArray], angles: Sequence[FloatArray]) -> FloatA
             over_angle = np.bincount(place, prepared, size)
             power += np.abs(np.fft.rfft(over_angle)) ** 2 / max(float(prepared @ prepared), np.finfo(float).tiny)
         found, _ = find_peaks(np.where(good, power, 0.0))
-        near = APART * 2.0 * np.pi / travel
+        near = SEPARATION * 2.0 * np.pi / travel
         fresh: list[int] = []
         for i in found[np.argsort(-power[found])].tolist():
             if len(fresh) < MOST_PEAKS and all(abs(orders[i] - orders[j]) > near for j in [*chosen, *fresh]):

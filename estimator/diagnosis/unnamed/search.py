@@ -177,17 +177,17 @@ def first(view: Scene, ground: Ground, element: Element) -> ElementSearch:
     return _from(view, element, ground)
 
 
-def first_along_motion(view: Scene, plain: Ground, element: Element) -> ElementSearch:
+def first_along_motion(view: Scene, reduced_ground: Ground, element: Element) -> ElementSearch:
     inputs = view.explanations[PLACES[element]].inputs
     cut = tuple(replace(line, motion=each.motion) for line, each in zip(view.cut, inputs, strict=True))
     along = replace(view, cut=cut)
-    jacobian = plain.jacobian.copy()
+    jacobian = reduced_ground.jacobian.copy()
     for j, unknown in enumerate(view.result.problem.shared):
         place = PARAMETER_LAWS.get(unknown.name) if not unknown.effect else None
         if place is not None:
             columns = [place[1](m)[:, np.newaxis] for m in along.motions(element)]
             jacobian[:, j] = unknown.scale * answers(along, place[0], [columns])[0]
-    ground = Ground(cut, jacobian, plain.raw, view.result.pinned)
+    ground = Ground(cut, jacobian, reduced_ground.raw, view.result.pinned)
     return _from(along, element, ground)
 
 
@@ -401,12 +401,12 @@ def judged(view: Scene, searches: Sequence[ElementSearch]) -> list[UnnamedLaw]:
     return [_law(state, n, before / best.ground.error.size) for state in searches]
 
 
-def searches_at(view: Scene, rounds: int = 1, begun: Sequence[ElementSearch] = ()) -> list[ElementSearch]:
+def searches_at(view: Scene, rounds: int = 1, initial: Sequence[ElementSearch] = ()) -> list[ElementSearch]:
     """Look for a law at every element, and again where it is among the best.
 
     ``begun`` is what earlier rounds have found in the same fit, where there were any.
     """
-    searches = list(begun) or each_of(view.result, partial(first, view, ground_of(view)), elements(view.result))
+    searches = list(initial) or each_of(view.result, partial(first, view, ground_of(view)), elements(view.result))
     behind = max(state.rounds for state in searches)
     if behind < 2 <= rounds:
         searches = each_of(view.result, partial(_tried, view), searches)
@@ -422,11 +422,11 @@ def searches_at(view: Scene, rounds: int = 1, begun: Sequence[ElementSearch] = (
     return [replace(state, rounds=max(rounds, behind)) for state in searches]
 
 
-def _tried(view: Scene, begun: ElementSearch) -> ElementSearch:
+def _tried(view: Scene, initial: ElementSearch) -> ElementSearch:
     """Look again from the fit alone, and along the motion of an unknown input; return what simulates better."""
-    starts = [begun]
-    if PLACES[begun.element] is not Place.SENSOR:
-        starts.append(first_along_motion(view, begun.ground, begun.element))
+    starts = [initial]
+    if PLACES[initial.element] is not Place.SENSOR:
+        starts.append(first_along_motion(view, initial.ground, initial.element))
     return min((again(start) for start in starts), key=lambda state: (state.stuck, state.mean_square))
 
 

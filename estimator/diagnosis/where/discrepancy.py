@@ -177,13 +177,13 @@ def discrepancy(
     floor: float,
     motion: model.Motion = model.Motion.ROTATION,
     rounds: int | None = None,
-    begun: Sequence[ElementSearch] = (),
+    initial: Sequence[ElementSearch] = (),
     whitening: Filter | None = None,
 ) -> Discrepancy:
     """Look at what a re-tuned model lacks, with the effects found or, without any, with laws without a name."""
     view = scene(retuned, floor, whitening)
     named = effects_added(retuned, final)
-    searches = searches_at(view, rounds or (1 if named else ROUNDS), begun)
+    searches = searches_at(view, rounds or (1 if named else ROUNDS), initial)
     laws = sorted(judged(view, searches), key=lambda law: -law.gain.delta_bic)
     best = laws[0] if laws and laws[0].gain.delta_bic > 0.0 else None
     if named:

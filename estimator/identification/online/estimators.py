@@ -40,6 +40,7 @@ from estimator.identification.online.regression import (
     START_UP,
     RegressionEstimator,
     corrected,
+    fill_row,
     filtered,
     is_stable,
     is_usable,
@@ -48,7 +49,6 @@ from estimator.identification.online.regression import (
     push,
     regressor,
     taken_input,
-    tell,
 )
 from estimator.signals.record import BoolArray, FloatArray
 
@@ -83,7 +83,7 @@ def oefo_step(u: float, y: float, okay: bool, m: Parts, row: Parts) -> None:
             m.L[1 + i] = m.theta[i]
     push(m.outputs, y_hat)
     push(m.outputs_f, filtered(y_hat, m.L, m.outputs_f))
-    tell(y_hat, e_prior, e_post, used, stable, m, row)
+    fill_row(y_hat, e_prior, e_post, used, stable, m, row)
 
 
 @compiled
@@ -181,7 +181,7 @@ def rls_step(u: float, y: float, okay: bool, m: Parts, row: Parts) -> None:
     y_hat = kept_in_bounds(y_hat, y, used, m.live)
     m.live[HELD_OUTPUTS] = max(m.live[HELD_OUTPUTS] - 1.0, 0.0) if measured else float(of[0])
     push(m.outputs, y if measured else y_hat)
-    tell(y_hat, e_prior, e_post, used, is_stable(m.theta, of[0], m.f), m, row)
+    fill_row(y_hat, e_prior, e_post, used, is_stable(m.theta, of[0], m.f), m, row)
 
 
 @compiled
@@ -232,7 +232,7 @@ def riv_step(u: float, y: float, okay: bool, m: Parts, row: Parts) -> None:
     if stable:
         for i in range(m.theta.shape[0]):
             m.auxiliary[i] = m.theta[i]
-    tell(simulated, e_prior, e_post, used, stable, m, row)
+    fill_row(simulated, e_prior, e_post, used, stable, m, row)
 
 
 @compiled
@@ -284,7 +284,7 @@ def oeepm_step(u: float, y: float, okay: bool, m: Parts, row: Parts) -> None:
     y_hat = kept_in_bounds(y_hat, y, used, m.live)
     push(m.outputs, y_hat)
     push(m.errors, y - y_hat if used else 0.0)
-    tell(y_hat, e_prior, e_post, used, is_stable(m.theta, of[0], m.f), m, row)
+    fill_row(y_hat, e_prior, e_post, used, is_stable(m.theta, of[0], m.f), m, row)
 
 
 @compiled

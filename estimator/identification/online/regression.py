@@ -204,7 +204,7 @@ def verdict(stable: bool, m: Parts, row: Parts) -> int:
 
 
 @inlined
-def tell(y_hat: float, e_prior: float, e_post: float, used: bool, stable: bool, m: Parts, row: Parts) -> None:
+def fill_row(y_hat: float, e_prior: float, e_post: float, used: bool, stable: bool, m: Parts, row: Parts) -> None:
     """Fill the row of results of a sample."""
     n = row.theta.shape[0]
     for i in range(n):
@@ -252,7 +252,7 @@ class RegressionEstimator(RecursiveEstimator):
         """Names of the parameters the samples so far do not determine."""
         if self._stands_still:
             return self._orders.names
-        start = INFORMATION_GAIN if self._judged_apart else self._memory["law"][INITIAL_GAIN]
+        start = INFORMATION_GAIN if self._judged_separately else self._memory["law"][INITIAL_GAIN]
         still = self._memory["diagonal"] >= LEARNT * start
         return tuple(name for name, is_open in zip(self._orders.names, still, strict=False) if is_open)
 
@@ -268,7 +268,7 @@ class RegressionEstimator(RecursiveEstimator):
         return self._memory["L"].copy()
 
     @property
-    def _judged_apart(self) -> bool:
+    def _judged_separately(self) -> bool:
         law = self._memory["law"]
         return bool(law[LAMBDA2] == 0.0 or law[HOLDS_AT_ONCE] == 1.0)
 

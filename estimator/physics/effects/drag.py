@@ -18,8 +18,8 @@ from estimator.physics.effect import (
     EffectParameter,
     Element,
     Held,
+    OtherForm,
     Place,
-    Retelling,
     Span,
     Start,
     Untestable,
@@ -68,18 +68,18 @@ def quadratic_starts(model: Driveline, records: Sequence[Record]) -> list[Start]
     return [(0.5, Held(SQUARE), Held(1.0))]
 
 
-def quadratic_retold(
+def quadratic_reparametrised(
     model: Driveline, records: Sequence[Record], values: Mapping[str, float], line: Mapping[str, float]
-) -> list[Retelling]:
+) -> list[OtherForm]:
     """Return the drag that was found with an exponent that is not 2."""
     return other_power("quadratic_nm_s2", quadratic_scales(model, records)[0], values)
 
 
-def other_power(size: str, scale: float, values: Mapping[str, float]) -> list[Retelling]:
+def other_power(size: str, scale: float, values: Mapping[str, float]) -> list[OtherForm]:
     """Return the same of a drag whose size is the parameter ``size``."""
     if values["exponent"] != SQUARE:
         return []
-    return [Retelling((values[size] / scale, SQUARE - 0.05, Held(1.0)), {})]
+    return [OtherForm((values[size] / scale, SQUARE - 0.05, Held(1.0)), {})]
 
 
 def quadratic_testable(model: Driveline, records: Sequence[Record]) -> Untestable | None:
@@ -106,7 +106,7 @@ QUADRATIC_FRICTION = Effect(
     scales=quadratic_scales,
     starts=quadratic_starts,
     testable=quadratic_testable,
-    retold=quadratic_retold,
+    reparametrised=quadratic_reparametrised,
     text="drag at the motor that grows with the square of its speed: {quadratic_nm_s2:.3g} {unit[quadratic_drag]}",
 )
 
@@ -114,9 +114,9 @@ QUADRATIC_FRICTION = Effect(
 # Drag of the air on the vehicle: it grows with the square of its speed.
 
 
-def air_retold(
+def air_reparametrised(
     model: Driveline, records: Sequence[Record], values: Mapping[str, float], line: Mapping[str, float]
-) -> list[Retelling]:
+) -> list[OtherForm]:
     """Return the drag that was found with an exponent that is not 2."""
     return other_power("drag_nm_s2", quadratic_scales(model, records)[0], values)
 
@@ -139,7 +139,7 @@ AERODYNAMIC_DRAG = Effect(
     scales=quadratic_scales,
     starts=quadratic_starts,
     testable=quadratic_testable,
-    retold=air_retold,
+    reparametrised=air_reparametrised,
     text="drag on the load that grows with the square of its speed: {drag_nm_s2:.3g} {unit[quadratic_drag]}",
 )
 

@@ -17,7 +17,7 @@ from estimator.physics.effect import (
     EffectParameter,
     Element,
     Held,
-    Retelling,
+    OtherForm,
     Span,
     Start,
     Step,
@@ -146,9 +146,9 @@ def mode_starts(model: Driveline, records: Sequence[Record]) -> list[Start]:
     return [*heavy, *light]
 
 
-def mode_retold(
+def mode_reparametrised(
     model: Driveline, records: Sequence[Record], values: Mapping[str, float], line: Mapping[str, float]
-) -> list[Retelling]:
+) -> list[OtherForm]:
     """Return an inertia before the shaft and one behind it that leave the line as compliant and as heavy as a branch.
 
     Its spring and the shaft's are as soft together, within what ``k`` is trusted to. Well below its resonance it moves
@@ -171,14 +171,14 @@ def mode_retold(
     none, motor, load = Held(0.0), line["J_M"] + values["inertia_kg_m2"], line["J_L"]
     shaped = none, Held(1.0), Within(share, SOFTEST, STIFFEST), Within(1.0, 0.02, MOST_DAMPING / usual)
 
-    def retelling(omega: float, at_motor: bool) -> Retelling:
+    def reparametrisation(omega: float, at_motor: bool) -> OtherForm:
         inertia = stiffness / ((1.0 - share) * omega**2)
         size = Within(min(max(inertia / tenth, 10.0 * LIGHTEST), MOST), 10.0 * LIGHTEST, MOST)
         of_motor, of_load = (share, 1.0 - share) if at_motor else (1.0 - share, share)
         lighter = {"J_M": motor - of_motor**2 * inertia, "J_L": load - of_load**2 * inertia}
-        return Retelling((*shaped, *((size, none) if at_motor else (none, size))), {"k": stiffness / share, **lighter})
+        return OtherForm((*shaped, *((size, none) if at_motor else (none, size))), {"k": stiffness / share, **lighter})
 
-    return [retelling(before, at_motor=True), retelling(behind, at_motor=False)]
+    return [reparametrisation(before, at_motor=True), reparametrisation(behind, at_motor=False)]
 
 
 def mode_described(
@@ -251,10 +251,10 @@ EXTRA_TORSIONAL_MODE = Effect(
     scales=mode_scales,
     starts=mode_starts,
     text=mode_sentence,
-    loosens=frozenset({"k", "c"}),  # a spring in the line softens it by s and lowers its damping by s^2
+    widens=frozenset({"k", "c"}),  # a spring in the line softens it by s and lowers its damping by s^2
     described=mode_described,
     implausible=mode_implausible,
-    retold=mode_retold,
+    reparametrised=mode_reparametrised,
     derived=mode_derived,
     linear=True,
 )

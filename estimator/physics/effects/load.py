@@ -319,7 +319,7 @@ TYRE_SLIP = Effect(
     ),
     structures=WITH_SHAFT,
     resembles=("extra_torsional_mode",),
-    loosens=frozenset({"k", "c"}),  # a carcass is a spring behind the shaft, and the tread damps its oscillation
+    widens=frozenset({"k", "c"}),  # a carcass is a spring behind the shaft, and the tread damps its oscillation
     scales=tyre_scales,
     starts=tyre_starts,
     implausible=tyre_implausible,

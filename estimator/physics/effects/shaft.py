@@ -16,7 +16,7 @@ from estimator.physics.effect import (
     EffectParameter,
     Element,
     Held,
-    Retelling,
+    OtherForm,
     Span,
     Start,
     Step,
@@ -63,13 +63,13 @@ def gap_starts(model: Driveline, records: Sequence[Record]) -> list[Start]:
     return [(size, contact, pull, Held(0.0)) for size in (0.1, 0.4, 1.2, 3.6)]
 
 
-def gap_retold(
+def gap_reparametrised(
     model: Driveline, records: Sequence[Record], values: Mapping[str, float], line: Mapping[str, float]
-) -> list[Retelling]:
+) -> list[OtherForm]:
     """Return the gap that was found with the damper across it, which its faces then do not share."""
     if values["across"] > 0.0:
         return []
-    return [Retelling((values["gap_rad"] / gap_scales(model, records)[0], Held(0.0), Held(0.0), Held(1.0)), {})]
+    return [OtherForm((values["gap_rad"] / gap_scales(model, records)[0], Held(0.0), Held(0.0), Held(1.0)), {})]
 
 
 CONTACT_PER_GAP = 0.05
@@ -122,7 +122,7 @@ BACKLASH = Effect(
     scales=gap_scales,
     starts=gap_starts,
     testable=gap_testable,
-    retold=gap_retold,
+    reparametrised=gap_reparametrised,
     text="the shaft has a backlash of {gap_rad:.3g} {unit[angle]} in total",
     completed=gap_completed,
     shows_start=frozenset({"twist", "preload"}),
@@ -165,14 +165,14 @@ def stiffness_starts(model: Driveline, records: Sequence[Record]) -> list[Start]
     return [(0.5, 1.0, *one), (-0.5, 0.5, *one)]
 
 
-def stiffness_retold(
+def stiffness_reparametrised(
     model: Driveline, records: Sequence[Record], values: Mapping[str, float], line: Mapping[str, float]
-) -> list[Retelling]:
+) -> list[OtherForm]:
     """Return a shaft of two stages that hardens or softens as the one that was found, from small and larger twists."""
     if values["stage_share"] != 0.0:
         return []
     share = math.copysign(0.3, values["hardening_per_rad2"])
-    return [Retelling((Held(0.0), Held(1.0), share, begins), {}) for begins in (0.2, 0.5)]
+    return [OtherForm((Held(0.0), Held(1.0), share, begins), {}) for begins in (0.2, 0.5)]
 
 
 def stiffness_sentence(values: Mapping[str, float], motion: Motion) -> str:
@@ -203,8 +203,8 @@ STIFFNESS_NONLINEARITY = Effect(
     scales=stiffness_scales,
     starts=stiffness_starts,
     text=stiffness_sentence,
-    retold=stiffness_retold,
-    loosens=frozenset({"k", "c"}),  # of an oscillation whose frequency goes with its size a linear line damps the beats
+    reparametrised=stiffness_reparametrised,
+    widens=frozenset({"k", "c"}),  # of an oscillation whose frequency goes with its size a linear line damps the beats
     shows_start=frozenset({"twist"}),
 )
 
@@ -325,7 +325,7 @@ VISCOELASTIC_SHAFT = Effect(
     example={"branch_share": 0.4, "relaxation_s": 0.02},
     structures=WITH_SHAFT,
     resembles=("extra_torsional_mode", "shaft_hysteresis", "stiffness_nonlinearity", "actuator_lag"),
-    loosens=frozenset({"k", "c"}),  # the branch stiffens the line and damps it
+    widens=frozenset({"k", "c"}),  # the branch stiffens the line and damps it
     scales=lambda model, _records: (0.1, 1.0 / float(natural_frequencies_rad_s(model.values())[0])),
     starts=lambda _model, _records: [(3.0, time) for time in (0.3, 1.0, 3.0)],
     described=relaxation_described,

@@ -15,8 +15,8 @@ from estimator.physics.effect import (
     EffectParameter,
     Element,
     Held,
+    OtherForm,
     Place,
-    Retelling,
     Start,
     Untestable,
 )
@@ -99,13 +99,13 @@ def derating_scales(model: Driveline, records: Sequence[Record]) -> tuple[float,
     return (1.0, longest_s(records), 0.5 * torque_scale(records))
 
 
-def derating_retold(
+def derating_reparametrised(
     model: Driveline, records: Sequence[Record], values: Mapping[str, float], line: Mapping[str, float]
-) -> list[Retelling]:
+) -> list[OtherForm]:
     """Return a loss by the torque's own heat, within the recording and beyond it."""
     if values["heating_nm"] > 0.0:
         return []
-    return [Retelling((values["depth"], share, Held(1.0)), {}) for share in (0.3, 2.0)]
+    return [OtherForm((values["depth"], share, Held(1.0)), {}) for share in (0.3, 2.0)]
 
 
 def derating_sentence(values: Mapping[str, float], motion: Motion) -> str:
@@ -142,7 +142,7 @@ TORQUE_DERATING = Effect(
     resembles=("inverter_gain_mismatch", "road_grade", "warming_friction"),
     scales=derating_scales,
     starts=lambda _model, _records: [(0.2, 0.3, Held(0.0)), (0.3, 2.0, Held(0.0))],
-    retold=derating_retold,
+    reparametrised=derating_reparametrised,
     text=derating_sentence,
     implausible=derating_implausible,
     linear=True,

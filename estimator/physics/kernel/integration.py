@@ -60,7 +60,7 @@ def is_late(p: FloatArray) -> bool:
 
 
 @inlined
-def begun_feed(torque: FloatArray, begun: float, sample_time_s: float, p: FloatArray, h: float) -> Feed:
+def feed_from(torque: FloatArray, begun: float, sample_time_s: float, p: FloatArray, h: float) -> Feed:
     """Return what is known of the way of a torque, shape (N,), to sub-steps of ``h`` [s]."""
     shifted, before_all = p[slots.DELAY] != 0.0 or p[slots.DRIFT] != 0.0, torque[0] + p[slots.DELAYED_BEFORE]
     lag = low_pass(p[slots.LAG], p[slots.LAG_SHAPE], h)
@@ -97,7 +97,7 @@ Masses = tuple[int, ...]
 
 
 @ir_inlined
-def for_its_make(masses: int, own: tuple[Any, ...], made: Made, p: FloatArray, given: tuple[Any, ...]) -> None:
+def call_specialised(masses: int, own: tuple[Any, ...], made: Made, p: FloatArray, given: tuple[Any, ...]) -> None:
     """Call what is compiled for the make of the line that has these parameters, of 1, 2 or 3 masses."""
     if masses == 1:
         _for_its_states(1, True, own, made, p, given)
@@ -204,7 +204,7 @@ def integrate_made(
     substeps = with_mode(substeps, sample_time_s, p)
     h = sample_time_s / substeps
     length = 1.0 / substeps
-    feed = begun_feed(torque, start_s / sample_time_s, sample_time_s, p, h)
+    feed = feed_from(torque, start_s / sample_time_s, sample_time_s, p, h)
     low = low_pass(p[slots.FILTER], p[slots.FILTER_SHAPE], h)
     waving, filtering = is_waving(p), p[slots.FILTER] > 0.0
     steep = slopes.shape[1] > 0
@@ -292,7 +292,7 @@ def integrate(
         borrowed(p),
     )
     given_back = (borrowed(state), borrowed(outputs), sensor, borrowed(out), borrowed(slopes))
-    for_its_make(len(masses), own, integrate_made, borrowed(p), (*given, *given_back))
+    call_specialised(len(masses), own, integrate_made, borrowed(p), (*given, *given_back))
 
 
 @brief

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from estimator.diagnosis.inference.hypotheses import NOTHING, everything
-from estimator.diagnosis.inference.looks import Screen, promising
+from estimator.diagnosis.inference.score_tests import Screen, promising
 from estimator.physics.driveline import Start
 from estimator.physics.layout import flat_values, grid_for
 from estimator.physics.model import DrivelineModel, natural_frequencies_rad_s
@@ -42,7 +42,7 @@ def test_the_rate_is_found_on_slow_and_fast_lines(periods: float, samples: int, 
     records = drifting(line, true, rate, samples)
     bench = Bench(line, records, everything(records))
     nominal = bench.fit(NOTHING)
-    looks = promising(Screen(nominal, line).looks("clock_drift"))
-    found = bench.fit(frozenset({"clock_drift"}), nominal, [look.release for look in looks])
+    looks = promising(Screen(nominal, line).starts("clock_drift"))
+    found = bench.fit(frozenset({"clock_drift"}), nominal, [each.release for each in looks])
     assert found.value("clock_drift", "rate") == pytest.approx(rate, rel=0.01)
     assert found.rms == pytest.approx(SIGMA, rel=0.05)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from estimator.diagnosis.inference.hypotheses import NOTHING, everything
-from estimator.diagnosis.inference.looks import Look, Screen, promising
+from estimator.diagnosis.inference.score_tests import Look, Screen, promising
 from estimator.physics.driveline import Start
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult
@@ -39,7 +39,7 @@ Looked = tuple[list[Look], FitResult, FitResult]
 def looked_at(line: DrivelineModel, records: Sequence[Record], name: str) -> Looked:
     bench = Bench(line, records, everything(records))
     retuned = bench.fit(NOTHING)
-    return Screen(retuned, line).looks(name), retuned, bench.fit(frozenset({name}), retuned)
+    return Screen(retuned, line).starts(name), retuned, bench.fit(frozenset({name}), retuned)
 
 
 def starts(unknowns: Sequence[Shared]) -> dict[str, float]:

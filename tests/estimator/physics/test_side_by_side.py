@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from estimator.physics.driveline import Case, Start
-from estimator.physics.kernel.side_by_side import go_side_by_side, kin_together, leading_kin
+from estimator.physics.kernel.side_by_side import compatible_together, go_side_by_side, leading_compatible
 from estimator.physics.layout import Grid, flat, slot
 from estimator.physics.model import DrivelineModel, EffectValue, Parameter, Structure
 from estimator.physics.simulate import simulate_each, simulate_records
@@ -141,9 +141,9 @@ def test_lines_that_are_fed_alike_next_to_others() -> None:
 
 def test_kin_follow_each_other() -> None:
     p = np.array([flat(line_with(TWO_MASS, effects)) for effects in (SLIDER, {}, SLIDER, QUADRATIC, {}, SLIDER)])
-    order = kin_together(p)
+    order = compatible_together(p)
     assert order.tolist() == [0, 2, 5, 1, 4, 3]
-    assert [leading_kin(p, order[i:]) for i in (0, 3, 5)] == [3, 2, 1]
+    assert [leading_compatible(p, order[i:]) for i in (0, 3, 5)] == [3, 2, 1]
 
 
 @pytest.mark.parametrize("place", ["between_kg_m2", "behind_kg_m2"])

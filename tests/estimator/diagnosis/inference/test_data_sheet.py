@@ -12,7 +12,7 @@ from estimator.diagnosis.inference.hypotheses import everything, open_hypotheses
 from estimator.diagnosis.inference.rivals import FREELY, free_line
 from estimator.diagnosis.inference.search import Search
 from estimator.diagnosis.inference.wording import off_the_sheet
-from estimator.diagnosis.result import Stray, Verdict
+from estimator.diagnosis.result import OffNominal, Verdict
 from estimator.physics.effect import Element
 from estimator.physics.model import DrivelineModel
 from tests.estimator.diagnosis.planted import quiet
@@ -37,9 +37,9 @@ def test_what_left_its_tolerance_is_given_with_its_size_and_place(name: str, fac
     search = searched({name: factor})
     line = free_line(search)
     assert line is not None
-    (stray,) = line.strays
-    assert (stray.name, stray.element, stray.tolerance) == (name, element, pytest.approx(0.1))
-    assert stray.ratio == pytest.approx(factor, rel=0.03)
+    (value,) = line.off_nominal
+    assert (value.name, value.element, value.tolerance) == (name, element, pytest.approx(0.1))
+    assert value.ratio == pytest.approx(factor, rel=0.03)
     assert line.leaves_noise
     assert line.score < search.nothing().score
 
@@ -51,18 +51,18 @@ def test_inside_its_tolerances_nothing_is_beyond() -> None:
 def test_no_value_is_sought_that_is_no_slip_of_a_data_sheet() -> None:
     line = free_line(searched({"k": 2.0 * FREELY}))
     assert line is not None
-    assert max(stray.ratio for stray in line.strays) <= FREELY
+    assert max(value.ratio for value in line.off_nominal) <= FREELY
     assert not line.leaves_noise
 
 
 def test_a_value_off_its_sheet_is_said_with_what_the_sheet_says() -> None:
-    said = off_the_sheet([Stray("k", 1.166, 0.04, 4000.0, "Nm/rad"), Stray("J_L", 0.9, 0.05)])
+    said = off_the_sheet([OffNominal("k", 1.166, 0.04, 4000.0, "Nm/rad"), OffNominal("J_L", 0.9, 0.05)])
     assert said == ("k is 4660 Nm/rad, the data sheet says 4000 ± 4 % and J_L 10 % below its nominal value (± 5 %)")
 
 
 def test_a_wrong_stiffness_is_no_missing_physics() -> None:
     found = diagnose(quiet(), off_by({"k": 1.3}, 0.05))
-    assert [stray.name for stray in found.strays] == ["k"]
+    assert [value.name for value in found.off_nominal] == ["k"]
     assert (found.verdict, found.effects) == (Verdict.UNEXPLAINED, ())
     assert found.mismatch.element is Element.SHAFT
     assert "No physics need be missing, but the data sheet is off" in found.statement

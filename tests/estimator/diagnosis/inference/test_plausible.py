@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.diagnosis.inference.checks import LOOSE, is_plausible, loosened, may_be_loose
+from estimator.diagnosis.inference.checks import LOOSE, is_plausible, may_be_loose, widened
 from estimator.diagnosis.inference.disturbances import Limits, Size, limits_for
 from estimator.diagnosis.inference.hypotheses import Hypothesis
 from estimator.diagnosis.inference.search import GRADE
@@ -60,17 +60,17 @@ def test_a_load_that_walks_beyond_all_torque_is_no_road() -> None:
 
 
 def at(hypothesis: Hypothesis, name: str, x: float) -> Hypothesis:
-    plain: FitResult = hypothesis.plain
+    plain: FitResult = hypothesis.result
     moved = plain.x.copy()
     moved[next(i for i, each in enumerate(plain.problem.shared) if (each.effect, each.name) == ("", name))] = x
-    return replace(hypothesis, plain=replace(plain, x=moved))
+    return replace(hypothesis, result=replace(plain, x=moved))
 
 
 def test_friction_that_warms_is_described_somewhere_between_cold_and_warm() -> None:
     cold_nm_s = BENCH.model.parameters["b_L"].value
     hypothesis = hypothesis_with({"warming_friction": {"cold_nm_s": cold_nm_s, "time_constant_s": 5.0}})
     at_bound = at(hypothesis, "b_L", 1.0 - BENCH.model.parameters["b_L"].tolerance)
-    loose = loosened(at_bound, BENCH.model)
+    loose = widened(at_bound, BENCH.model)
     assert loose is not None
     (low,) = [each.low for each in loose.problem.shared if each.name == "b_L"]
     assert low == pytest.approx((1.0 - BENCH.model.parameters["b_L"].tolerance) / LOOSE)
@@ -80,7 +80,7 @@ def test_friction_that_warms_is_described_somewhere_between_cold_and_warm() -> N
 
 def test_nothing_is_loose_that_no_effect_changes() -> None:
     lag = {"actuator_lag": {"time_constant_s": 0.01}}
-    assert loosened(at(hypothesis_with(lag), "b_L", 1.0 - BENCH.model.parameters["b_L"].tolerance), BENCH.model) is None
+    assert widened(at(hypothesis_with(lag), "b_L", 1.0 - BENCH.model.parameters["b_L"].tolerance), BENCH.model) is None
     k = next(each for each in nominal_unknowns(BENCH.model) if each.name == "k")
     assert may_be_loose(k, frozenset({"stiffness_change"}), BENCH.model)
     assert not may_be_loose(k, frozenset({"warming_friction", GRADE}), BENCH.model)

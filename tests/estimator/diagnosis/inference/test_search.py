@@ -35,7 +35,7 @@ def decided(name: str, values: Mapping[str, float]) -> Decision:
 def test_nothing_is_named_where_nothing_is_missing() -> None:
     decision = decided(*PLAIN)
     assert decision.named == decision.traces == decision.failed == ()
-    assert decision.best.plain.rms == pytest.approx(SIGMA, rel=0.05)
+    assert decision.best.result.rms == pytest.approx(SIGMA, rel=0.05)
 
 
 @pytest.mark.parametrize(
@@ -56,7 +56,7 @@ def test_a_planted_effect_is_named_and_explains_all(name: str, values: Mapping[s
     assert belief.score > 100.0
     if belief.name == name:
         for key, value in values.items():
-            assert decision.best.plain.value(name, key) == pytest.approx(value, rel=0.1)
+            assert decision.best.result.value(name, key) == pytest.approx(value, rel=0.1)
 
 
 def test_every_set_is_fitted_once_and_the_best_of_them_is_taken() -> None:
@@ -70,7 +70,7 @@ def test_every_set_is_fitted_once_and_the_best_of_them_is_taken() -> None:
 def test_the_price_of_an_unknown_is_that_of_schwarz() -> None:
     search = searched(bench_with(*PLAIN))
     nothing = search.nothing()
-    n = nothing.plain.residual.size
+    n = nothing.result.residual.size
     assert nothing.score == pytest.approx(nothing.minus_twice_log + nothing.unknowns * np.log(n))
     dearer = replace(nothing, effects=frozenset({"road_grade"}), choices=3.0)
     assert dearer.score == pytest.approx(nothing.score + np.log(n) + 6.0)
@@ -108,14 +108,14 @@ def test_an_effect_that_is_known_roughly_is_tuned_and_no_finding() -> None:
     search = searched(roughly)
     decision = decide(search, grounds(search))
     assert decision.named == decision.failed == ()
-    assert decision.best.plain.value("coulomb_friction_motor", "friction_nm") == pytest.approx(8.0, rel=0.02)
+    assert decision.best.result.value("coulomb_friction_motor", "friction_nm") == pytest.approx(8.0, rel=0.02)
 
 
 def test_an_effect_that_is_known_wrongly_and_held_is_a_mismatch() -> None:
     bench = bench_with("coulomb_friction_motor", {"friction_nm": 8.0})
     held = knowing(bench, "coulomb_friction_motor", "friction_nm", 5.0, 0.0)
     nothing = searched(held).nothing()
-    assert nothing.plain.rms > 1.5 * SIGMA
+    assert nothing.result.rms > 1.5 * SIGMA
 
 
 def test_a_search_that_is_over_tells_the_best_so_far() -> None:
@@ -142,7 +142,7 @@ def test_only_a_load_that_is_a_grade_may_walk_far() -> None:
     sizes[Size.WALK] = far.high[Size.WALK]
     graded = replace(nothing, effects=frozenset({"road_grade"}), sizes=sizes, limits=far)
     most = search.limits.high[Size.WALK]
-    rough = compared(nothing.effects, nothing.plain, graded, search.limits, len(search.names))
-    whole = fitted(nothing.effects, nothing.plain, graded.sizes, search.limits, len(search.names))
+    rough = compared(nothing.effects, nothing.result, graded, search.limits, len(search.names))
+    whole = fitted(nothing.effects, nothing.result, graded.sizes, search.limits, len(search.names))
     assert rough.sizes[Size.WALK] <= most
     assert whole.sizes[Size.WALK] <= most

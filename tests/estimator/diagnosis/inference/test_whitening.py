@@ -29,7 +29,7 @@ from estimator.diagnosis.line.blocks import LASTS
 from estimator.physics.driveline import Start
 from estimator.physics.fit import FitResult, fit, not_fitted
 from estimator.physics.problem import make_problem, start_vector
-from estimator.signals.record import BoolArray, Channel, FloatArray, Location, OutputKind, outputs_apart
+from estimator.signals.record import BoolArray, Channel, FloatArray, Location, OutputKind, separated_outputs
 from tests.estimator.diagnosis.planted import drive_torque
 from tests.estimator.physics.bench import SAMPLE_TIME_S, TWO_MASS, linear_record, model
 
@@ -129,7 +129,7 @@ def test_all_outputs_of_a_recording_are_whitened_together(missing: tuple[int, ..
     seen[list(missing)] = False
     shaft = Channel(OutputKind.TORQUE, Location.SHAFT, "shaft_nm", np.zeros(count), seen)
     at_load = Channel(OutputKind.POSITION, Location.LOAD, "load_rad", np.zeros(count), record.okay)
-    records = outputs_apart([replace(record, channels=(shaft, at_load))], lambda _: 1.0)
+    records = separated_outputs([replace(record, channels=(shaft, at_load))], lambda _: 1.0)
     result = not_fitted(problem := make_problem(model(TWO_MASS), records, ()), start_vector(problem))
     sizes = np.concatenate([SIZES, np.log([20.0, 7.0, 0.1, 0.01, 0.02, 0.03])])
     filtered = whitener_of(result, sizes)

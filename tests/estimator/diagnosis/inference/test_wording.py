@@ -10,7 +10,7 @@ import pytest
 
 from estimator.diagnosis.inference.judge import error_falls, verdict_of
 from estimator.diagnosis.inference.wording import Context, statement
-from estimator.diagnosis.result import Effort, Evidence, Fit, FoundEffect, Remainder, Stray, Verdict
+from estimator.diagnosis.result import Effort, Evidence, Fit, FoundEffect, OffNominal, Remainder, Verdict
 from estimator.physics.effect import Element
 
 ERRORS = (0.0499, 0.05, 35.5, 35.50001)
@@ -59,6 +59,6 @@ def says_what_its_numbers_say(
 def test_a_constant_off_its_sheet_is_said_as_such() -> None:
     fit = Fit("rad/s", 2.0, 1.0, 1.0, 1.0, 1.0, 0.05)
     said = statement(
-        Verdict.UNEXPLAINED, fit, (), Effort(), Context(strays=(Stray("J_L", 1.34, 0.2, 105.0, "kg m^2"),))
+        Verdict.UNEXPLAINED, fit, (), Effort(), Context(off_nominal=(OffNominal("J_L", 1.34, 0.2, 105.0, "kg m^2"),))
     )
     assert "J_L is 141 kg m^2, the data sheet says 105 ± 20 %" in said

@@ -102,4 +102,4 @@ def test_what_a_first_look_has_found_is_not_looked_for_again(rounds: int, monkey
     result = nominal_fit(recordings(Element.SHAFT, lambda m: np.tanh(m.twist / 1e-3), 5.0))
     plain, begun = discrepancy(result, result, SIGMA, rounds=rounds), searches_at(scene(result, SIGMA))
     monkeypatch.setattr("estimator.diagnosis.unnamed.search.first", None)
-    assert discrepancy(result, result, SIGMA, rounds=rounds, begun=begun).laws == plain.laws
+    assert discrepancy(result, result, SIGMA, rounds=rounds, initial=begun).laws == plain.laws
