@@ -48,11 +48,8 @@ from estimator.signals.record import FloatArray, Record
 MOST_OPEN = 4
 """Hypotheses that are compared, the most probable: each pair is fitted to every experiment on paper."""
 
-ITERATIONS = 8
-"""Steps of a fit of what is a recording's own, which is nearly linear."""
-
-MOST_LOG_ODDS = 700.0
-"""Largest logarithm of odds that is given: its exponential is still a number."""
+ITERATIONS = 8  # steps of a fit of what is a recording's own, which is nearly linear
+MOST_LOG_ODDS = 700.0  # largest logarithm of odds that is given: its exponential is still a number
 
 
 @dataclass(frozen=True, slots=True)
@@ -171,7 +168,6 @@ def _holds(effects: Effects, others: Effects) -> bool:
 
 
 def name_of(effects: Effects) -> str:
-    """Return a hypothesis' name."""
     return " + ".join(sorted(effects)) or "nothing"
 
 

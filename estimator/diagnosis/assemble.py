@@ -26,8 +26,7 @@ from estimator.physics.unknowns import LOAD_TORQUE, Shared
 from estimator.signals.correlation import correlation_length
 from estimator.signals.record import BoolArray, FloatArray
 
-Z95 = 1.959963984540054
-"""97.5 % point of the normal distribution."""
+Z95 = 1.959963984540054  # 97.5 % point of the normal distribution
 
 COHERENT_S = 1.0
 """How long an error that is no noise keeps its value: the pace at which a test changes what it excites."""
@@ -98,10 +97,7 @@ def _long_run(scores: FloatArray, lags: int) -> FloatArray:
 
 
 def interval(result: FitResult, cov: FloatArray, index: int) -> tuple[float, float]:
-    """Return the 95 % interval of a shared parameter in its unit, by its index among the unknowns.
-
-    It ends where the fit's bounds do: what the law allows, or the tolerance a nominal parameter is trusted to.
-    """
+    """Return the 95 % interval of a shared parameter in its unit, by its index among the unknowns."""
     shared = result.problem.shared[index]
     spread = Z95 * float(np.sqrt(max(cov[index, index], 0.0)))
     x = min(max(float(result.x[index]), shared.low), shared.high)  # a fit may end beyond a bound by its last digit
@@ -167,8 +163,7 @@ def _rescaled(result: FitResult, x: FloatArray, dimension: str) -> float:
     return factor
 
 
-PROFILE_POINTS_S = 1.0
-"""A profile is reported every second."""
+PROFILE_POINTS_S = 1.0  # a profile is reported every second
 
 
 def moments_in(name: str, result: FitResult) -> dict[str, tuple[Interval, ...]]:

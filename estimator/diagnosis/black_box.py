@@ -27,14 +27,9 @@ from estimator.signals.record import FloatArray, OutputKind, Record, once
 Simulated = Callable[[Record, FloatArray, FloatArray, Start], FloatArray]
 """Recording, torque of its inputs (N, M) [Nm], load torque (N,) [Nm], initial state to the true output (N,)."""
 
-FINER = 4
-"""Steps to a sample where a torque is late by parts of one, or the output filtered within one."""
-
-MOST_KEPT = 4
-"""Outputs of the plant that are kept: a sensor's unknowns do not move it."""
-
-MOST_AROUND = 32
-"""Outputs of each recording that changes are added to."""
+FINER = 4  # steps to a sample where a torque is late by parts of one, or the output filtered within one
+MOST_KEPT = 4  # outputs of the plant that are kept: a sensor's unknowns do not move it
+MOST_AROUND = 32  # outputs of each recording that changes are added to
 
 _FREE = DrivelineModel(Structure.ONE_MASS, {"J_M": Parameter(1.0, 0.0), "b_M": Parameter(0.0, 0.0)})
 _GRID = Grid(Structure.ONE_MASS, 1, 0.0)
@@ -95,10 +90,7 @@ class BlackBox:
     _alone: threading.Lock = field(default_factory=threading.Lock)
 
     def simulated(self, record: Record, cases: Sequence[Case]) -> FloatArray:
-        """Simulate the recorded output of a recording, as its sensor shows it, under each case; shape (K, N).
-
-        One case is simulated by the plant; of several, what they change.
-        """
+        """Simulate the recorded output of a recording, as its sensor shows it, under each case; shape (K, N)."""
         around = self._around.setdefault(record, deque(maxlen=MOST_AROUND))
         if len(cases) == 1:
             output = self._read(record, cases[0])
@@ -180,23 +172,15 @@ def _finer(record: Record) -> Record:
     )
 
 
-WIDE = 30.0
-"""Factor, either way, within which values are looked for."""
-
-SHARES = (0.05, 0.3)
-"""Share of the motor in the whole inertia, where a fit starts."""
-
-FREQUENCIES = 5
-"""Natural frequencies at which one starts, up to `HIGHEST_HZ` or a quarter of the sampling rate."""
+WIDE = 30.0  # factor, either way, within which values are looked for
+SHARES = (0.05, 0.3)  # share of the motor in the whole inertia, where a fit starts
+FREQUENCIES = 5  # natural frequencies at which one starts, up to `HIGHEST_HZ` or a quarter of the sampling rate
 
 LOWEST_HZ, HIGHEST_HZ = 1.0, 60.0
 DAMPING = 0.05
 
-BETTER = 0.7
-"""Share of a rigid line's error that one with a shaft leaves at most to be taken."""
-
-ITERATIONS = 12
-"""Of the fit from each start; the best goes to its end."""
+BETTER = 0.7  # share of a rigid line's error that one with a shaft leaves at most to be taken
+ITERATIONS = 12  # of the fit from each start; the best goes to its end
 
 
 def equivalent_line(records: Sequence[Record]) -> DrivelineModel:

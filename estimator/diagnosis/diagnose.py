@@ -21,8 +21,7 @@ BUDGET_S = math.inf
 """Time after which a diagnosis is ended undecided [s]: none, so that the answer depends on no machine."""
 
 
-TO_SEARCH = 0.92
-"""Share of a limit of time after which no simulation is begun: the rest is for saying so."""
+TO_SEARCH = 0.92  # share of a limit of time after which no simulation is begun: the rest is for saying so
 
 
 def diagnose(

@@ -76,10 +76,7 @@ def _marker(masses: int) -> Path:
 
 
 def compile_kernels(masses: int) -> None:
-    """Compile the largest kernels in two processes and keep them on disk; what fails there is compiled when called.
-
-    Not in this one: a compiler that is interrupted ends in an error of its own.
-    """
+    """Compile the largest kernels in two processes and keep them on disk; what fails there is compiled when called."""
     for some, others in SIDE_BY_SIDE if sys.executable else ():
         with _compiling(masses, some), _compiling(masses, others):
             pass
@@ -88,7 +85,6 @@ def compile_kernels(masses: int) -> None:
 
 
 def compile_laws(model: DrivelineModel, sample_time_s: float) -> None:
-    """Compile the simulation with a model's own laws, where it has any: before a diagnosis counts its time."""
     p = flat(model)
     for law in model.laws:
         for parameter in law.law.parameters:

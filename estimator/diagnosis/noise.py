@@ -17,8 +17,7 @@ from estimator.signals.record import BoolArray, FloatArray, Record
 PREDICTOR_ORDER = 20
 """Past samples a one-step predictor sees: 0.2 s at 10 ms, more than a period of a driveline's first mode."""
 
-MOSTLY_GOOD = 0.75
-"""Share of good samples that a predictor's past must hold; the missing ones are interpolated."""
+MOSTLY_GOOD = 0.75  # share of good samples that a predictor's past must hold; the missing ones are interpolated
 
 FEWEST_PREDICTED = 2 * (2 * PREDICTOR_ORDER + 1)
 """Samples that a predictor is fitted to at least: two per coefficient."""
@@ -71,8 +70,7 @@ def unpredictable(errors: Sequence[FloatArray]) -> float:
     return float(np.sqrt(left @ left / max(left.size - n, 1)))
 
 
-VERY_STRONG = 10.0
-"""A difference in BIC above this is very strong evidence (Kass and Raftery, JASA 90, 1995)."""
+VERY_STRONG = 10.0  # a difference in BIC above this is very strong evidence (Kass and Raftery, JASA 90, 1995)
 
 SMALLEST_P = 1e-300
 

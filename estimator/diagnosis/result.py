@@ -265,12 +265,7 @@ class ErrorSpectrum:
 
 @dataclass(frozen=True, slots=True)
 class Response:
-    """Response from torque to output in one recording, without a model and of the models; shapes (M,).
-
-    ``std`` is the standard deviation of the size of what was measured, ``coherence`` the share of the output's power
-    that the torque explains; ``p_before`` and ``p_after`` are the probabilities that it differs so much from the
-    re-tuned and from the augmented model by chance.
-    """
+    """Response from torque to output in one recording, without a model and of the models; shapes (M,)."""
 
     frequency_hz: FloatArray
     measured: ComplexArray

@@ -24,8 +24,7 @@ from estimator.diagnosis.result import (
 )
 from estimator.signals.record import FloatArray, Record, sliced
 
-LONG_S = 1.0
-"""A gap that is longer ends a segment."""
+LONG_S = 1.0  # a gap that is longer ends a segment
 
 LONG_SAMPLES = 10
 """It must also hold more samples than this: where sampling is slow, a few lost ones are no gap."""
@@ -36,8 +35,7 @@ SHORTEST_S = 2.0
 FEWEST_SAMPLES = 50
 """Good samples of a segment at least: more than twice what a predictor of its own error looks back on."""
 
-FEWEST_FOR_START = 10
-"""Good samples from which initial state and load are read off for a simulation alone."""
+FEWEST_FOR_START = 10  # good samples from which initial state and load are read off for a simulation alone
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,10 +69,7 @@ def segments(record: Record) -> list[slice]:
 
 
 def tiles(record: Record) -> list[Record]:
-    """Return the segments of a recording, each up to where the next begins: all rows, for a simulation of each.
-
-    One of fewer than ``FEWEST_FOR_START`` good samples goes with the one before it.
-    """
+    """Return the segments of a recording, each up to where the next begins: all rows, for a simulation of each."""
     parts = segments(record)
     starts = [part.start for part in parts[1:] if int(record.okay[part].sum()) >= FEWEST_FOR_START]
     if not starts:

@@ -23,8 +23,7 @@ from estimator.identification.offline.validation import Feedback, Validation, cr
 from estimator.signals.decimate import HIGH_PASS_HZ, block_of, first_part, high_passed
 from estimator.signals.record import FloatArray, Record
 
-RIGID = Orders(1, 1, 1)
-"""One mass: the model that a pole pair has to be better than."""
+RIGID = Orders(1, 1, 1)  # one mass: the model that a pole pair has to be better than
 
 RICHER = (Orders(4, 4, 1), Orders(5, 5, 1))
 """Tried where two masses miss a part of the response: a lag or a further delay, a third mass."""
@@ -38,8 +37,7 @@ LOWEST_HZ, HIGHEST_HZ = 2.0, 50.0
 SAMPLES_PER_PERIOD = 4.0
 """Fewer samples in one period of the resonance leave its damping to the low-pass of the sampling."""
 
-MOST_UNCERTAIN = 0.5
-"""Largest half width of the frequency's 95 % interval, in parts of it."""
+MOST_UNCERTAIN = 0.5  # largest half width of the frequency's 95 % interval, in parts of it
 
 
 ONE_MASS_DOES = "one mass explains the recording as well: the data do not need a pole pair"

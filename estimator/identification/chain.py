@@ -94,8 +94,7 @@ class OnlineTrajectory:
         return (self[k] for k in range(len(self)))
 
 
-VERSION = 3
-"""Of a saved state; goes up when a part changes its meaning."""
+VERSION = 3  # of a saved state; goes up when a part changes its meaning
 
 EstimatorFactory = Callable[[Settings, FloatArray | None], RecursiveEstimator]
 """Makes a recursive estimator from the settings and L (None: there is no batch model yet)."""

@@ -12,8 +12,7 @@ from estimator.errors import BadModel, BadShape
 from estimator.signals.record import BoolArray, FloatArray
 from estimator.signals.settings import Requirement, is_positive, require
 
-ROWS = 65536
-"""Rows that are reduced at a time: half a megabyte each column."""
+ROWS = 65536  # rows that are reduced at a time: half a megabyte each column
 
 
 @compiled
@@ -45,11 +44,7 @@ def _reduce(work: FloatArray) -> None:
 
 
 def triangular(*columns: FloatArray, rows: BoolArray | None = None) -> FloatArray:
-    """Return R, upper triangular, with ``R^T R = A^T A``, A the columns side by side.
-
-    Rows are taken a part at a time, each below the R of those before (Golub and Van Loan, section 5.2): nothing as long
-    as A is copied.
-    """
+    """Return R, upper triangular, with ``R^T R = A^T A``, A the columns side by side."""
     R, n_samples = np.zeros((0, sum(np.atleast_2d(column.T).shape[0] for column in columns))), columns[0].shape[0]
     for first in range(0, n_samples, ROWS):
         some = slice(first, first + ROWS)

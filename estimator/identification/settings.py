@@ -19,8 +19,7 @@ from estimator.signals.decimate import HIGH_PASS_HZ, decimate, first_part, high_
 from estimator.signals.record import BoolArray, FloatArray, Record
 from estimator.signals.settings import Requirement, is_positive, require
 
-SAMPLES_PER_PARAMETER = 10
-"""Good samples asked for per parameter; fewer fit the noise as well as the system."""
+SAMPLES_PER_PARAMETER = 10  # good samples asked for per parameter; fewer fit the noise as well as the system
 
 RELATIVE_RANK = 1e-6
 """Singular value, against the largest, below which delayed copies count as dependent.

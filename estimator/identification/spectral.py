@@ -41,11 +41,7 @@ def from_spectra(
     s_yy: FloatArray,
     n_averages: float,
 ) -> SpectralEstimate:
-    """Return the estimate of averaged spectra.
-
-    Random error of the magnitude (J. S. Bendat and A. G. Piersol, Random Data, chapter "Statistical errors in advanced
-    estimates"), for n_d independent averages; the same number, in radians, is that of the phase::
-    """
+    """Return the estimate of averaged spectra."""
     tiny = np.finfo(np.float64).tiny
     response = s_yu / np.maximum(s_uu, tiny)
     coherence = np.minimum(np.abs(s_yu) ** 2 / np.maximum(s_uu * s_yy, tiny), 1.0)

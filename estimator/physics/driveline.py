@@ -123,10 +123,7 @@ class Parameter:
 
 @dataclass(frozen=True, slots=True)
 class EffectValue:
-    """One parameter of an effect: its value and, where it was estimated, its 95 % interval.
-
-    ``tolerance`` is the share of the value within which re-tuning it is no missing physics; 0 holds it.
-    """
+    """One parameter of an effect: its value and, where it was estimated, its 95 % interval."""
 
     value: float
     ci95: tuple[float, float] | None = None
@@ -174,7 +171,6 @@ def natural_frequencies_rad_s(values: Mapping[str, float]) -> FloatArray:
 
 
 def load_inertia(model: Driveline) -> str:
-    """Return the name of the inertia that the load's mass is part of."""
     return "J_M" if model.structure is Structure.ONE_MASS else "J_L"
 
 

@@ -50,11 +50,8 @@ EVERY_LINE = frozenset({Structure.ONE_MASS, Structure.TWO_MASS, Structure.THREE_
 
 EVERY_STRUCTURE = frozenset(Structure)
 
-WITH_SHAFT = frozenset({Structure.TWO_MASS, Structure.THREE_MASS})
-"""Structures with a shaft between inertias."""
-
-WITH_SPRING = WITH_SHAFT | {Structure.JOINT}
-"""Structures with a shaft, between inertias or alone on a bench."""
+WITH_SHAFT = frozenset({Structure.TWO_MASS, Structure.THREE_MASS})  # structures with a shaft between inertias
+WITH_SPRING = WITH_SHAFT | {Structure.JOINT}  # structures with a shaft, between inertias or alone on a bench
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,10 +92,7 @@ class Within:
 
 @dataclass(frozen=True, slots=True)
 class Untestable:
-    """Why a set of recordings can't tell whether an effect is there, and which test would.
-
-    ``needs`` is what must be given next to any test; without it no recording can tell.
-    """
+    """Why a set of recordings can't tell whether an effect is there, and which test would."""
 
     reason: str
     suggested_test: str

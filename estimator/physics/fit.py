@@ -25,8 +25,7 @@ from estimator.physics.problem import (
 from estimator.physics.problem import make_problem as make_problem  # where users have always found it
 from estimator.signals.record import BoolArray, FloatArray, IntArray
 
-ITERATIONS = 50
-"""Jacobians at most; a fit that needs more is not converged."""
+ITERATIONS = 50  # jacobians at most; a fit that needs more is not converged
 
 MOMENT_NAMES = frozenset(moment.name for moment in MOMENTS)
 """Names of an event's own unknowns: the error over them has a kink at every sample's edge."""
@@ -181,20 +180,14 @@ def fit(problem: Problem, x0: FloatArray | None = None, iterations: int = ITERAT
     return FitResult(problem, solution.x, outputs(solution.x), solution.residual, solution.jacobian, solution.converged)
 
 
-HEAT = 3
-"""Jacobians that each of several starts gets before only the best ones continue."""
-
-CLOSE = 1.1
-"""Squared error, over the best start's, up to which a start continues."""
+HEAT = 3  # jacobians that each of several starts gets before only the best ones continue
+CLOSE = 1.1  # squared error, over the best start's, up to which a start continues
 
 Name = tuple[object, ...]
 
 
 def best_fit(problems: Sequence[Problem], previous: FitResult | None = None, iterations: int = ITERATIONS) -> FitResult:
-    """Fit from several starts and return the best; what a fit ``warm`` has in common starts where that one ended.
-
-    Every start gets a few steps; those that are then close to the best continue.
-    """
+    """Fit from several starts and return the best; what a fit ``warm`` has in common starts where that one ended."""
     if len(problems) == 1:
         return _initial_fit(problems[0], previous, iterations)
     heat = initial_fits(problems, previous, min(HEAT, iterations))

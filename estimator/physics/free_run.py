@@ -36,11 +36,7 @@ class FreeRun:
 
 
 def free_run(model: DrivelineModel, record: Record, known: Own = NOTHING_KNOWN) -> FreeRun:
-    """Simulate one recording with a model from its measured torques.
-
-    Besides load torque and initial state, what the model's effects leave to every recording is estimated from it:
-    phases of angles, moments of events, the load profile of a road.
-    """
+    """Simulate one recording with a model from its measured torques."""
     profile = any(EFFECTS[name].profile for name in model.effects)
     problem = make_problem(model, [record], (), profile=profile)
     result = settle(problem, known)
@@ -53,11 +49,7 @@ def free_run(model: DrivelineModel, record: Record, known: Own = NOTHING_KNOWN) 
 
 
 def settle(problem: Problem, known: Own = NOTHING_KNOWN) -> FitResult:
-    """Estimate what is its own in a problem of one recording without shared unknowns.
-
-    With a gap in the line the recording may begin on either flank or between them, and the error has an optimum near
-    each: every one is tried. Phases and moments start where a scan finds them.
-    """
+    """Estimate what is its own in a problem of one recording without shared unknowns."""
     start = _with_own(problem, known) if problem.local[0].own else start_vector(problem)
     twist, gap_rad = problem.local[0].twist_index, float(problem.p[slot("backlash", "gap_rad")])
     starts = [start]

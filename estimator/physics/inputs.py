@@ -57,11 +57,7 @@ def limited(torque: FloatArray, limit: float, sharpness: float) -> FloatArray:
 
 
 def warmth(torque: FloatArray, since_start_s: FloatArray, period_s: float, p: FloatArray, begun: float) -> FloatArray:
-    """Return how warm the windings are when each row begins and behind the last, 1 with the full loss; shape (N + 1,).
-
-    By time alone, or, where they are heated, by the torque's own losses: ``tau dh/dt + h = (T / T_n)^2``, held over
-    each period; ``begun`` is the first row's then.
-    """
+    """Return how warm the windings are when each row begins and after the last, 1 at the full loss; (N + 1,)."""
     if p[_HEATED] <= 0.0:
         rows_and_end = np.append(since_start_s, since_start_s[-1] + period_s)
         return np.asarray(-np.expm1(-rows_and_end / p[_DERATING_TIME]))
@@ -109,8 +105,7 @@ class _Kept:
         self.torques: tuple[tuple[bytes, FloatArray], ...] = ()
 
 
-MOST_KEPT = 2
-"""Torques that are kept: that of a fit, and one with something moved."""
+MOST_KEPT = 2  # torques that are kept: that of a fit, and one with something moved
 
 
 @once

@@ -50,15 +50,13 @@ def fill_differences(
             found[columns[k], firsts[i] : row] = 0.0
 
 
-STEP = 1e-5
-"""Finite-difference step in scaled unknowns: the simulation is smooth to about 1e-10 of its size."""
+STEP = 1e-5  # finite-difference step in scaled unknowns: the simulation is smooth to about 1e-10 of its size
 
 ROUNDING = 1e-13
 """Change of the output, over its size, that is none: simulations side by side round otherwise than one by itself, and
 an unknown that does nothing, such as the phase of an amplitude that is 0, has a column of zeros."""
 
-ROOM = 2**20
-"""Values of simulations that are made at a time, where they are more than fill the lanes."""
+ROOM = 2**20  # values of simulations that are made at a time, where they are more than fill the lanes
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,8 +18,7 @@ from estimator.physics.model import DrivelineModel, Motion, Structure
 from estimator.physics.motion import measured_speed
 from estimator.signals.record import FloatArray, Record
 
-TWIST = 2
-"""Place of phi in the state [w_M, w_L, phi, T_L]."""
+TWIST = 2  # place of phi in the state [w_M, w_L, phi, T_L]
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +50,6 @@ class Shaft:
         return cls(**{name: float(values[name]) for name in model.structure.parameter_names}, source=source)
 
     def with_resonance(self, mode: Mode) -> Shaft:
-        """Take k and c from a resonance, the inertias staying as they are."""
         inertia = self.J_M * self.J_L / (self.J_M + self.J_L)
         w = 2.0 * math.pi * mode.frequency_hz
         return replace(self, k=inertia * w * w, c=2.0 * inertia * mode.damping * w, source="resonance")
@@ -107,8 +105,7 @@ def _discrete(shaft: Shaft, period_s: float) -> tuple[FloatArray, FloatArray]:
     return np.asarray(moved[:4, :4], dtype=np.float64), np.asarray(moved[:4, 4], dtype=np.float64)
 
 
-TORQUE = -1
-"""The output that a joint has next to the kernel's states: the torque it carries."""
+TORQUE = -1  # the output that a joint has next to the kernel's states: the torque it carries
 
 PART_OF_TORQUE, MOST_SECANTS = 1e-12, 100
 """How near the balance inside an open gap is found, as part of the torques at its ends, and by how many secants."""
@@ -142,7 +139,6 @@ def simulate(
     preload_nm: float,
     output: int = TORQUE,
 ) -> FloatArray:
-    """Simulate the torque of a joint, or its motion, under the imposed motion of a recording."""
     twist, rate = imposed.twist + twist_rad, imposed.rate
     motion: dict[int, FloatArray] = {
         state_vector.TWIST: twist,

@@ -62,7 +62,6 @@ class Grid:
 
 
 def substeps_for(values: Mapping[str, float], period_s: float) -> int:
-    """Return the integration steps per period that the line's natural frequency, or its fastest decay, needs."""
     if "J_M" not in values:
         return 1
     motor = (values["b_M"] + values.get("c", 0.0)) / values["J_M"]
@@ -119,8 +118,7 @@ kernel reads it (``inputs``)."""
 
 _SLOTS["", LOAD] = len(_SLOTS)
 
-SIZE = len(_SLOTS)
-"""Length of the flat vector, without a user's own laws."""
+SIZE = len(_SLOTS)  # length of the flat vector, without a user's own laws
 
 
 def slot(effect: str, parameter: str) -> int:

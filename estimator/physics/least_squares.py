@@ -12,11 +12,8 @@ from estimator.compiled import compiled
 from estimator.signals.correlation import effective_samples
 from estimator.signals.record import BoolArray, FloatArray, IntArray
 
-TINY = 1e-12
-"""Room that a bound always leaves: an interval of no length is none."""
-
-EXCHANGES = 10
-"""Exchanges after which pivoting is taken to go round in circles."""
+TINY = 1e-12  # room that a bound always leaves: an interval of no length is none
+EXCHANGES = 10  # exchanges after which pivoting is taken to go round in circles
 
 
 def unbounded_first(low: FloatArray, high: FloatArray, among: BoolArray) -> IntArray:
@@ -135,12 +132,7 @@ LEAST_DAMPING, MOST_DAMPING = 1e-10, 1e9
 
 @dataclass(frozen=True, slots=True)
 class Solution:
-    """Where a fit ended: unknowns (U,), errors (R,), Jacobian there, or one last small step before (R, U).
-
-    No Jacobian where the iterations were used up: whoever continues finds it, and few do.
-    ``stuck`` where a step was refused and shorter ones promised nothing any more, or were refused as well: the error
-    has a kink there, or ``x`` is its least to the last digits.
-    """
+    """Where a fit ended: unknowns (U,), errors (R,), Jacobian there, or one last small step before (R, U)."""
 
     x: FloatArray
     residual: FloatArray
@@ -210,10 +202,7 @@ def _gained(errors: FloatArray, tried: FloatArray) -> float:
 def _carried_on(
     derivative: FloatArray, curvature: FloatArray, change: FloatArray, step: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the derivative nearest to the old one that tells the change of the errors over a step, and its curvature.
-
-    The derivative changes by what has rank one, the curvature by a little more: much less work than a product anew.
-    """
+    """Return the nearest derivative that has the change of the errors over a step (Broyden), and its curvature."""
     missed = (change - derivative @ step) / (step @ step)
     across = np.outer(derivative.T @ missed, step)
     bent: FloatArray = curvature + across + across.T + (missed @ missed) * np.outer(step, step)

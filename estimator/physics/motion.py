@@ -56,7 +56,6 @@ def _typical_torque(record: Record) -> float:
 
 
 def _typical(signal: FloatArray) -> float:
-    """Return the 99th percentile of a signal's size."""
     size = np.abs(signal)
     return float(np.nanpercentile(size, 99)) or float(np.nanmax(size)) or 1.0
 
@@ -69,10 +68,7 @@ def reverses(record: Record) -> bool:
 
 
 def turns(model: Driveline, records: Sequence[Record]) -> bool:
-    """Tell whether the speed's sign can be distinguished from a constant load torque.
-
-    In a recording with both signs; in several of one sign each, where they share the load; in any, where it is known.
-    """
+    """Tell whether the speed's sign can be distinguished from a constant load torque."""
     if not isinstance(model.load, Load) or any(reverses(record) for record in records):
         return True
     signs = {bool(np.nanmean(measured_speed(record)) > 0.0) for record in records}
@@ -87,7 +83,6 @@ def torque_reverses(record: Record) -> bool:
 
 
 def largest_torque(records: Sequence[Record]) -> float:
-    """Return the largest typical torque of one input: the 99th percentile of its size."""
     return max(_typical(column) for record in records for column in record.torque_nm.T)
 
 
@@ -123,11 +118,7 @@ def speed_sweeps(record: Record) -> bool:
 
 @once
 def motor_angle(record: Record) -> FloatArray:
-    """Return the motor angle by the record's own output, from 0 at its start; shape (N,) [rad].
-
-    Laws that are periodic in the angle take their phase from it. A simulated angle would drift off by whole radians
-    while a fit is still on its way.
-    """
+    """Return the motor angle by the record's own output, from 0 at its start; shape (N,) [rad]."""
     if record.lead is not None:
         return motor_angle(record.lead)
     good = np.flatnonzero(record.okay)
@@ -163,11 +154,7 @@ PLACES, FEWEST_PASSES = 50, 4.0
 
 
 def speed_by_place(record: Record) -> float:
-    """Return the share of the speed's variance that goes with where the motor is: 1 where a motion only repeats.
-
-    What depends on the speed is not separable from what depends on the angle then. 0 for a motion that continues and
-    on.
-    """
+    """Return the share of the speed's variance that goes with where the motor is: 1 where a motion only repeats."""
     angle, speed = motor_angle(record), np.abs(measured_speed(record))
     seen = np.isfinite(speed)
     angle, speed = angle[seen], speed[seen]

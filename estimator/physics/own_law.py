@@ -1,9 +1,4 @@
-"""A user's own law: a Python function that takes part in a diagnosis like an entry of the catalogue.
-
-It is given what happens in the line and returns a torque, or an error of the reading. The compiled simulation calls the
-laws of a model as one function, by its address (`Forces`): a law that numba can compile acts as one of the catalogue
-does, at each stage of each integration step; one that it can't is called back in Python.
-"""
+"""A user's own law: a Python function that takes part in a diagnosis like an entry of the catalogue."""
 
 from __future__ import annotations
 
@@ -148,7 +143,6 @@ class OwnLaw:
 
     @property
     def taken(self) -> list[str]:
-        """The parameters in the order in which the function takes them behind its arguments."""
         return list(inspect.signature(self.function).parameters)[len(ARGUMENTS) :]
 
     def at(
@@ -222,7 +216,6 @@ class LawName(str):
     compiled: dict[tuple[LawName, ...], Forces]
 
     def is_active(self, p: FloatArray) -> bool:
-        """Tell whether a parameter vector switches the law on."""
         first = self.law.parameters[0]
         return bool(p[self.places[first.name]] != first.null)
 
@@ -335,7 +328,6 @@ def _with_value(law: Function, place: int) -> Any:
 
 
 def _with(before: Function, law: Function, on_motor: float, on_load: float) -> Any:
-    """Return torques with those of one more law."""
 
     def torques(time_s, motor, load, twist, torque, p):  # type: ignore[no-untyped-def]
         first, second = before(time_s, motor, load, twist, torque, p)

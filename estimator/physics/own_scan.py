@@ -62,10 +62,7 @@ class Projector:
 
 
 class Simulate(Protocol):
-    """K parameter vectors to the simulated samples that count, shape (K, R).
-
-    ``alike_s``, shape (K,), tells up to when each is as the first one (``simulate.simulate_each``).
-    """
+    """K parameter vectors to the simulated samples that count, shape (K, R)."""
 
     def __call__(self, parameters: Sequence[FloatArray], alike_s: FloatArray | None = None) -> FloatArray:
         """Return the simulated samples."""
@@ -75,8 +72,7 @@ MOST_CELLS = 40
 SHORTEST_CELL_S = 0.5
 """Grid of the moments of an event: half a second, or a fortieth of a longer recording; a fit moves them from there."""
 
-SMALL = 0.1
-"""Answers are taken at this share of an effect's size, where they are in proportion to it."""
+SMALL = 0.1  # answers are taken at this share of an effect's size, where they are in proportion to it
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,10 +142,7 @@ def cells(entry: Effect, p: FloatArray, own: tuple[Shared, ...], sizes: Mapping[
 
 @dataclass(frozen=True, slots=True)
 class Stretch:
-    """The best interval for an event in one recording: rows of the grid, and what an event of a size takes away there.
-
-    ``taken`` is the fall of the squared error; 0 with an empty interval where no interval takes anything away.
-    """
+    """The best interval for an event in one recording: rows of the grid, and what an event takes away there."""
 
     first: int
     last: int
@@ -181,10 +174,7 @@ def scan(answers: FloatArray, error: FloatArray, lasting: bool = False) -> Scan:
 
 
 def scanned(gram: FloatArray, match: FloatArray, lasting: bool = False) -> Scan:
-    """Prepare the same search from the products of the answers with each other, (M, M), and with the error, (M,).
-
-    An event that is ``lasting`` ends with its recording; expressed the other way round, it begins with it.
-    """
+    """Prepare the same search from the products of the answers with each other, (M, M), and with the error, (M,)."""
     along = match[None, :] - match[:, None]
     power = np.maximum(np.diag(gram)[:, None] - 2.0 * gram + np.diag(gram)[None, :], 0.0)
     if lasting:

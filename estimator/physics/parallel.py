@@ -59,7 +59,6 @@ def counted(work: Work) -> Iterator[Work]:
 
 
 def count_samples(samples: int) -> None:
-    """Count samples that are to be simulated, where somebody counts."""
     work = _work.get()
     if work is not None:
         work.add(samples)
@@ -78,11 +77,8 @@ def check_time() -> None:
         work.check()
 
 
-PARTS = 4
-"""Parts into which sums and lanes are cut where the cut shows in the last bits."""
-
-THREADS_PER_CORE = 4
-"""Threads that may exist: one works per core, the others wait for what they shared out."""
+PARTS = 4  # parts into which sums and lanes are cut where the cut shows in the last bits
+THREADS_PER_CORE = 4  # threads that may exist: one works per core, the others wait for what they shared out
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")

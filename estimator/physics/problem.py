@@ -18,8 +18,7 @@ from estimator.physics.simulate import simulate_outputs, simulate_records
 from estimator.physics.unknowns import LocalBasis, Shared, local_basis, own_unknowns, shared_load
 from estimator.signals.record import BoolArray, FloatArray, IntArray, Record, leads, once
 
-BAD = 1e3
-"""A simulation that runs away counts as this many times the largest output."""
+BAD = 1e3  # a simulation that runs away counts as this many times the largest output
 
 
 Rows = slice | IntArray

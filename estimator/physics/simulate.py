@@ -45,12 +45,10 @@ _OUTPUT_STATE = {
 }
 """What the kernel gives of each output; of an acceleration the speed, whose slope it is."""
 
-_SENSED = (state_vector.SPEED, state_vector.LOAD_SPEED)
-"""What the effects of a speed sensor act on."""
+_SENSED = (state_vector.SPEED, state_vector.LOAD_SPEED)  # what the effects of a speed sensor act on
 
 
 def output_state(record: Record, structure: Structure) -> int:
-    """Return the index of the state a recording measures."""
     if (record.imposed is not None) != (structure is Structure.JOINT):
         got = "an imposed motion" if record.imposed is not None else f"{record.kind.value} as the output"
         raise BadModel(
@@ -329,8 +327,7 @@ def simulate_together(grid: Grid, drives: Sequence[Outputs], of: Sequence[int], 
     return out
 
 
-SIGN_WIDTH_RAD_S = 0.02
-"""Dry friction of a simulated rig changes sign within this speed; its noise is larger."""
+SIGN_WIDTH_RAD_S = 0.02  # dry friction of a simulated rig changes sign within this speed; its noise is larger
 
 FINER = 2
 """A rig is stepped once and not thousands of times as in a fit: finer steps let friction stick closer to standstill."""

@@ -18,8 +18,7 @@ from estimator.physics.model import DrivelineModel
 from estimator.physics.unknowns import LocalBasis
 from estimator.signals.record import FloatArray, Record
 
-EDGE_S = 0.5
-"""An event's moment nearer to a recording's end is none: any start-up error looks like one."""
+EDGE_S = 0.5  # an event's moment nearer to a recording's end is none: any start-up error looks like one
 
 SAME = 1.001
 """Squared error expressed the other way round, over the one before, up to which it is the same explanation."""

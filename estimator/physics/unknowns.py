@@ -42,10 +42,7 @@ class Shared:
 
 
 def nominal_unknowns(model: DrivelineModel) -> tuple[Shared, ...]:
-    """Return the nominal parameters as unknowns within their tolerances; one trusted exactly is not free.
-
-    So are the parameters of effects that the model has, where it says how far they are trusted.
-    """
+    """Return the nominal parameters as unknowns within their tolerances; one trusted exactly is not free."""
     line = (
         Shared("", name, p.value, 1.0 - p.tolerance, 1.0 + p.tolerance, 1.0)
         for name, p in model.parameters.items()
@@ -101,7 +98,6 @@ def released(
 
 
 def own_unknowns(names: Iterable[str], record: Record) -> tuple[Shared, ...]:
-    """Return the own parameters that a set of effects has in a recording, at their nulls."""
     return tuple(unknown for name in sorted(names) for unknown in _own_unknowns(EFFECTS[name], record))
 
 
@@ -259,7 +255,6 @@ def _not_settable(model: DrivelineModel, has_angle: bool, count: int) -> tuple[i
 
 
 def shared_load(model: DrivelineModel, records: Sequence[Record]) -> Shared:
-    """Return the constant load torque that all recordings share as an unknown."""
     scale = 0.1 * torque_scale(records)
     guesses = (
         0.0 if record.imposed is not None else _mean_load(model, record, measured_speed(record)) for record in records

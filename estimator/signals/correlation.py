@@ -29,11 +29,7 @@ def effective_samples(errors: Sequence[FloatArray]) -> float:
 
 @once
 def stand_in_variance(record: Record) -> FloatArray:
-    """Return the variance of the sum of all torques where one was not read, shape (N,) [Nm²]; 0 where all were.
-
-    A straight line was drawn over each gap, or the torque of its one end held. How far such a line is from the torque
-    in the middle of a gap as long is seen in the rest of the recording.
-    """
+    """Return the variance of the sum of all torques where one was not read, shape (N,) [Nm²]; 0 where all were."""
     variance = np.zeros(record.time_s.size)
     if record.torque_okay is None:
         return variance

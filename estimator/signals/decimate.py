@@ -113,11 +113,8 @@ models' spare pole, with nothing to hold it, drifts across z = -1: seen in half 
 HIGH_PASS_HZ = 0.3
 """Corner of the high-pass: below, a road grade and the driver move the speed more than the torque does."""
 
-MOST_FACTOR = 10_000
-"""A low-pass of 160,001 taps; the models' 20 ms of samples every 2 µs."""
-
-EDGE = 1.0
-"""Edge of the low-pass (half amplitude) in parts of the new Nyquist frequency."""
+MOST_FACTOR = 10_000  # a low-pass of 160,001 taps; the models' 20 ms of samples every 2 µs
+EDGE = 1.0  # edge of the low-pass (half amplitude) in parts of the new Nyquist frequency
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,7 +132,6 @@ def low_pass_length(factor: float) -> float:
 
 
 def low_pass_taps(factor: int) -> FloatArray:
-    """Return the taps of the anti-aliasing filter, shape (16 * factor + 1,), sum 1; one tap for factor 1."""
     if factor == 1:
         return np.ones(1)
     length = round(low_pass_length(factor))

@@ -24,17 +24,13 @@ class Lines(Enum):
     ODD_RANDOM = "odd_random"
 
 
-GROUP = 4
-"""Odd lines in a group of which one, drawn at random, is left out to detect odd distortion."""
-
-FEWEST_LINES = 2
-"""With fewer it is a sine."""
+GROUP = 4  # odd lines in a group of which one, drawn at random, is left out to detect odd distortion
+FEWEST_LINES = 2  # with fewer it is a sine
 
 ROUNDS = 400
 """Rounds of clipping at most (Van der Ouderaa, Schoukens and Renneboog, IEEE Trans. Instrum. Meas. 37, 1988)."""
 
-CLIP = 0.95
-"""Share of the peak at which a round clips, at first; it rises to 1."""
+CLIP = 0.95  # share of the peak at which a round clips, at first; it rises to 1
 
 
 def excited_lines(

@@ -221,7 +221,6 @@ class Record:
 
 
 def sliced(record: Record, rows: slice, name: str | None = None) -> Record:
-    """Return a part of a recording as a recording of its own; laws over time count from where the whole began."""
     parts: dict[str, Any] = {
         field.name: values[rows]
         for field in fields(record)
@@ -232,11 +231,8 @@ def sliced(record: Record, rows: slice, name: str | None = None) -> Record:
     return replace(record, name=record.name if name is None else name, began_s=began_s, channels=channels, **parts)
 
 
-DIGITS = 9
-"""Digits a period is rounded to at most, so that 0.01 s is 0.01 s in every recording of a rig."""
-
-ALLOWED = 3.0
-"""The roundest period within so many standard errors is taken ..."""
+DIGITS = 9  # digits a period is rounded to at most, so that 0.01 s is 0.01 s in every recording of a rig
+ALLOWED = 3.0  # the roundest period within so many standard errors is taken
 
 MOST = 0.005
 """... but not beyond this share of the period: a few wild stamps determine nothing."""
@@ -271,7 +267,6 @@ Noise = Callable[[Sequence[Record]], float]
 
 
 def separated_outputs(records: Sequence[Record], noise_of: Noise) -> list[Record]:
-    """Return recordings with one output each."""
     alone = [replace(record, channels=()) for record in records]
     first = noise_of(alone) if any(record.channels for record in records) else 1.0
     further: list[Record] = []
@@ -299,7 +294,6 @@ def leads(records: Sequence[Record]) -> tuple[int, ...]:
 
 
 def by_output(records: Sequence[Record]) -> list[slice]:
-    """Return where the recordings of each output stand in a sequence: of the first one, and of each further one."""
     names = [record.label for record in records]
     firsts = [i for i, name in enumerate(names) if i == 0 or name != names[i - 1]]
     return [slice(first, end) for first, end in pairwise([*firsts, len(names)])]

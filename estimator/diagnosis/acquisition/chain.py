@@ -69,11 +69,7 @@ def _on_time(record: Record) -> Record:
 
 
 def as_read(output: FloatArray, record: Record, effects: Mapping[str, Mapping[str, float]]) -> FloatArray:
-    """Return a simulated output as this recording would show it.
-
-    Lost samples and jitter leave it as it is: what was lost is not shown, and an instant that nothing tells can't be
-    reproduced (one that stamps tell is in ``record.offset_s``).
-    """
+    """Return a simulated output as this recording would show it."""
     read = output
     if "speed_quantisation" in effects:
         step = effects["speed_quantisation"]["step_rad_s"]
@@ -142,10 +138,7 @@ class Chain:
         return {f.name: {name: sized.value for name, sized in f.parameters.items()} for f in self.findings}
 
     def errors(self, outputs: Sequence[FloatArray], within: Sequence[BoolArray] | None = None) -> list[FloatArray]:
-        """Return simulated, as this chain would have read it, less recorded; the good rows of each raw recording.
-
-        Readings that were lost without a flag are no good rows: nothing was read there. Only rows ``within`` count.
-        """
+        """Return simulated, as this chain would have read it, less recorded; the good rows of each raw recording."""
         read = [as_read(output, record, self.effects()) for output, record in zip(outputs, self.raw, strict=True)]
         shifted = [each + shift for each, shift in zip(read, self.shifts, strict=True)] if self.shifts else read
         rows = [_read_rows(record, self.findings) for record in self.raw]
@@ -169,16 +162,11 @@ def _read_rows(record: Record, findings: Iterable[Finding]) -> BoolArray:
 
 
 def mechanical(model: DrivelineModel) -> DrivelineModel:
-    """Return a model without the effects that are recognised in recordings and not fitted."""
     return replace(model, effects={name: v for name, v in model.effects.items() if not EFFECTS[name].recognised})
 
 
 def replay(model: DrivelineModel, record: Record, known: Own = NOTHING_KNOWN) -> FreeRun:
-    """Simulate one recording with a model, as the acquisition that the model describes would have read it.
-
-    After a long gap the simulation begins anew, with an initial state and a load of its own; ``start`` is that of the
-    segment with the most good samples. ``known`` is as in ``free_run``.
-    """
+    """Simulate one recording with a model, as the acquisition that the model describes would have read it."""
     parts = tiles(record)
     runs = [_replay(model, part, known) for part in parts]
     most = max(range(len(parts)), key=lambda i: int(parts[i].okay.sum()))

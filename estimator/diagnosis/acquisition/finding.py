@@ -33,7 +33,6 @@ def all_of(cells: BoolArray) -> BoolArray:
 
 
 def runs(rows: BoolArray) -> list[tuple[int, int]]:
-    """Return where each run of True begins and the row after its end."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], rows, [False]])))
     return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
 
@@ -48,10 +47,7 @@ def shorter_runs(rows: BoolArray, longest: int) -> BoolArray:
 
 
 def share_interval(count: float, total: float, mean_run: float = 1.0) -> tuple[float, float]:
-    """Return the exact 95 % interval of a share (Clopper and Pearson, Biometrika 26, 1934).
-
-    What comes in runs counts as one piece of evidence a run.
-    """
+    """Return the exact 95 % interval of a share (Clopper and Pearson, Biometrika 26, 1934)."""
     events, trials = count / mean_run, total / mean_run
     low = 0.0 if events <= 0 else float(stats.beta.ppf(0.025, events, trials - events + 1.0))
     high = 1.0 if events >= trials else float(stats.beta.ppf(0.975, events + 1.0, trials - events))
@@ -64,8 +60,7 @@ def mean_run(masks: list[BoolArray]) -> float:
     return float(lengths @ lengths / lengths.sum()) if lengths.size else 1.0
 
 
-OUTPUT = 0
-"""Column of the measured output in ``Finding.cells``; torque input i is column ``1 + i``."""
+OUTPUT = 0  # column of the measured output in ``Finding.cells``; torque input i is column ``1 + i``
 
 
 class Sized(NamedTuple):
@@ -109,16 +104,14 @@ SMALLEST_SHARE = 0.002
 its variance grows by the like. At one in two hundred and thirty the search for laws without a name still sees them (a
 sealed case, seed 701), and what it sees should have its name."""
 
-SMALLEST_P = 1e-300
-"""Stands for any smaller probability, so that logarithms stay finite."""
+SMALLEST_P = 1e-300  # stands for any smaller probability, so that logarithms stay finite
 
 
 ORDER = 12
 """Past samples of output and torque that are seen. A line of two masses needs 2, one of three 4; the rest is there to
 average the noise of the reading."""
 
-ROWS_PER_REGRESSOR = 5
-"""A recording with fewer usable rows than this per coefficient is not judged."""
+ROWS_PER_REGRESSOR = 5  # a recording with fewer usable rows than this per coefficient is not judged
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,14 +22,9 @@ from estimator.diagnosis.acquisition.finding import (
 from estimator.diagnosis.acquisition.quantised import decimal_place
 from estimator.signals.record import BoolArray, FloatArray, Record, uniform_period_s
 
-AGREEMENT = 0.5
-"""Share of the stamps' offsets that the output must confirm: half way between none and all."""
-
-ABOVE_ROUNDING = 2.0
-"""Offsets of this many times what rounding the stamps leaves are more than rounding."""
-
-SMALLEST_PERIODS = 1e-3
-"""Jitter below this share of the period is not looked into."""
+AGREEMENT = 0.5  # share of the stamps' offsets that the output must confirm: half way between none and all
+ABOVE_ROUNDING = 2.0  # offsets of this many times what rounding the stamps leaves are more than rounding
+SMALLEST_PERIODS = 1e-3  # jitter below this share of the period is not looked into
 
 
 def stamp_offsets_s(record: Record) -> FloatArray:
@@ -86,8 +81,7 @@ def _pooled(found: Sequence[tuple[float, float]]) -> tuple[float, float]:
     return mean, float(1.0 / np.sqrt(weights.sum()))
 
 
-PAST = 8
-"""Past errors that may explain an error: most of a period of a driveline's first mode at 10 ms."""
+PAST = 8  # past errors that may explain an error: most of a period of a driveline's first mode at 10 ms
 
 AROUND = 3
 """Slopes before and after that may explain it: a delay, a lag or a wrong inertia show as a mix of them."""
@@ -97,11 +91,8 @@ BLOCK = 250
 angle that drifts off the true one moves what depends on it as a delay does that comes and goes. Its size is estimated
 from all rows: so many coefficients follow a part of the jitter too."""
 
-LEAST_GAIN = 0.05
-"""Share of the error's variance that jitter must account for, on average: less changes no fit."""
-
-OF_A_KINK = 0.17
-"""``(E|tau| / 2 sigma_t)^2``: 1 / 2 pi for Gaussian offsets, 3 / 16 for uniform ones."""
+LEAST_GAIN = 0.05  # share of the error's variance that jitter must account for, on average: less changes no fit
+OF_A_KINK = 0.17  # ``(E|tau| / 2 sigma_t)^2``: 1 / 2 pi for Gaussian offsets, 3 / 16 for uniform ones
 
 MOST_OF_IT = 0.5
 """Share of the error's variance beyond the noise that must be jitter: where other things leave more, the model has not
@@ -117,11 +108,7 @@ NEIGHBOURS = 0.5
 
 @dataclass(frozen=True, slots=True)
 class _Rest:
-    """What is left of the errors of all recordings, with slopes, and the same of the row after; shape (n,).
-
-    ``lengths`` holds how many of the rows each recording has, ``steepness`` the slope that the spread of a row's errors
-    follows, ``slope`` the mean of those before and after it.
-    """
+    """What is left of the errors of all recordings, with slopes, and the same of the row after; shape (n,)."""
 
     lengths: tuple[int, ...]
     error: FloatArray

@@ -35,18 +35,12 @@ one so fine that gaps are a matter of chance it is too large, which errs to the 
 CORE_QUANTILE = 0.05
 """Differences that count as near zero: the smallest twentieth of them. A density varies little over that."""
 
-DECIMALS = 9
-"""Values with more decimals than this are taken as not rounded."""
-
-ROUND_OFF = 1e-9
-"""Values closer than this share of the largest are the same number, scaled in another way."""
+DECIMALS = 9  # values with more decimals than this are taken as not rounded
+ROUND_OFF = 1e-9  # values closer than this share of the largest are the same number, scaled in another way
 
 
 def lattice_step(values: FloatArray) -> float:
-    """Return the step of the lattice that values lie on [unit of the values]; tiny where they lie on none.
-
-    0 for fewer than three different values.
-    """
+    """Return the step of the lattice that values lie on [unit of the values]; tiny where they lie on none."""
     levels = np.unique(values[np.isfinite(values)])
     if levels.size < 3:
         return 0.0
@@ -72,8 +66,7 @@ class ChanceRepeats:
     upper: float
 
 
-MODEL_ERROR = 0.1
-"""Relative error of extrapolating the density to zero, in addition to its sampling error."""
+MODEL_ERROR = 0.1  # relative error of extrapolating the density to zero, in addition to its sampling error
 
 
 def chance_repeats(differences: FloatArray, step: float) -> ChanceRepeats:
@@ -122,11 +115,8 @@ NOISE_PER_STEP = 1.0
 """A lattice matters from a step of this many standard deviations of the one-step error: below that its rounding adds
 under 1/12, 4 % of the error's size."""
 
-BINS_PER_STEP = 8
-"""Fineness of the histogram whose spectrum is searched: it takes 3 % off the finest step's R."""
-
-PADDING = 4
-"""Points of the spectrum per resolution cell, so that no peak falls between two."""
+BINS_PER_STEP = 8  # fineness of the histogram whose spectrum is searched: it takes 3 % off the finest step's R
+PADDING = 4  # points of the spectrum per resolution cell, so that no peak falls between two
 
 LEVELS = 6
 """A lattice must be visited on this many levels within the spread of a recording; fewer are lumps, no lattice."""
@@ -140,12 +130,10 @@ REGULAR = 0.2
 SMOOTHING = 25
 """Samples of a moving mean that wipes out a lattice, and leaves the lumps of a drive that keeps to a few speeds."""
 
-ABOVE_LUMPS = 3.0
-"""R of the readings must be this many times that of their moving mean."""
+ABOVE_LUMPS = 3.0  # R of the readings must be this many times that of their moving mean
 
 
-MOST_BINS = 2**22
-"""Bins of a spectrum of levels: a finer noise in a wider range shows no lattice that matters."""
+MOST_BINS = 2**22  # bins of a spectrum of levels: a finer noise in a wider range shows no lattice that matters
 
 
 def speed_quantisation(records: Sequence[Record]) -> Finding | None:
@@ -265,14 +253,9 @@ def _smooth(values: FloatArray) -> FloatArray:
     return np.convolve(values, np.full(SMOOTHING, 1.0 / SMOOTHING), mode="valid")
 
 
-LONGEST_ZERO = 20
-"""More zeros than this in a row are a signal at zero."""
-
-NEAR_STEPS = 5
-"""A value near zero is within so many lattice steps of it ..."""
-
-COMMON_LEVELS = 5
-"""So many of the commonest other values are looked at, whether they come as zero does."""
+LONGEST_ZERO = 20  # more zeros than this in a row are a signal at zero
+NEAR_STEPS = 5  # a value near zero is within so many lattice steps of it
+COMMON_LEVELS = 5  # so many of the commonest other values are looked at, whether they come as zero does
 
 AS_EXACTLY = 0.5
 """Of what is near another level for short as large a share must be that level exactly, times this, as for zero."""
@@ -300,11 +283,7 @@ def lost_zeros(records: Sequence[Record]) -> tuple[list[BoolArray], float]:
 
 
 def _with_their_frames(read: Sequence[FloatArray], lost: Sequence[BoolArray]) -> list[BoolArray]:
-    """Return what is lost with the zeros that another channel shows at the same time.
-
-    A row, or a frame with several readings, is lost as a whole. Of a torque that rests at zero, and around it, single
-    zeros tell nothing; that it is zero whenever the speed is lost does.
-    """
+    """Return what is lost with the zeros that another channel shows at the same time."""
     whole = [cells.copy() for cells in lost]
     for column in range(max(cells.shape[1] for cells in lost)):
         having = [k for k, cells in enumerate(lost) if cells.shape[1] > column]
@@ -384,8 +363,7 @@ def _visits(series: Sequence[FloatArray], near: float) -> int:
     return sum(int(shorter_runs(np.abs(values) <= near, LONGEST_ZERO).sum()) for values in series)
 
 
-LONGEST_BURST = 50
-"""More missing rows than this in a row are a gap."""
+LONGEST_BURST = 50  # more missing rows than this in a row are a gap
 
 
 def lost_samples(records: Sequence[Record]) -> Finding | None:

@@ -39,8 +39,7 @@ The quarter is taken, not the half, because a torque that jumps every few sample
 REST_ROWS = 8
 """A run of repeats this long, at zero or at the end of the channel's range, is standstill or saturation."""
 
-NEAR_ZERO = 0.02
-"""Zero is within this share of the channel's size."""
+NEAR_ZERO = 0.02  # zero is within this share of the channel's size
 
 
 def informative_rows(values: FloatArray, step: float) -> BoolArray:
@@ -135,11 +134,8 @@ def _ratio(after: FloatArray, usual: FloatArray) -> float:
     return float(np.median(after) / np.median(usual)) if after.size and usual.size else 0.0
 
 
-PERIODS = 3
-"""The torque of a row is predicted from its own reference and from those before it, so many in all."""
-
-FEWEST_ROWS = 100
-"""Fewer rows that were read do not show how a drive follows."""
+PERIODS = 3  # the torque of a row is predicted from its own reference and from those before it, so many in all
+FEWEST_ROWS = 100  # fewer rows that were read do not show how a drive follows
 
 MOST_LEFT = 0.25
 """Share of the torque's changes, as a power, that a reference may leave; one that leaves more does not tell."""
@@ -171,17 +167,10 @@ def _regressors(reference: FloatArray) -> FloatArray:
     return np.column_stack([*before, np.ones(reference.size)])
 
 
-LONGEST_HOLD = 20
-"""Longest clock looked for, in samples."""
-
-ON_TICK = 0.95
-"""Share of the steps that must fall on the ticks; the rest may be steps of the base torque."""
-
-FEWEST_STEPS = 20
-"""Fewer steps do not show a clock."""
-
-CLEAR_STEP = 8.0
-"""A step is a change this many times the usual one within a hold."""
+LONGEST_HOLD = 20  # longest clock looked for, in samples
+ON_TICK = 0.95  # share of the steps that must fall on the ticks; the rest may be steps of the base torque
+FEWEST_STEPS = 20  # fewer steps do not show a clock
+CLEAR_STEP = 8.0  # a step is a change this many times the usual one within a hold
 
 SAME_STEP = 0.2
 """A change is the clock's step if it differs from it by at most this share: the base torque may drift meanwhile."""
@@ -223,7 +212,6 @@ def clock_of(torque: FloatArray, trusted: BoolArray) -> Clock | None:
 
 
 def fill(torque: FloatArray, trusted: BoolArray, reference: FloatArray | None = None) -> tuple[FloatArray, BoolArray]:
-    """Return a torque with what is not trusted replaced, and where the replacement is as good as a reading."""
     filled, known = _by_clock(torque, trusted)
     if reference is None or trusted.all():
         return filled, known
@@ -253,8 +241,7 @@ CLEAR = (2.0, 3.0, 4.0)
 """A step tells whether it was answered where the answer is this many times the predictor's error. Torques found stale
 are mended and the predictor fitted again, for wrong torques blur it; each pass asks for more, the last one counts."""
 
-ANSWERED = 0.5
-"""Share of the answer that must have come early: half way between none and all of it."""
+ANSWERED = 0.5  # share of the answer that must have come early: half way between none and all of it
 
 
 @dataclass(frozen=True, slots=True)

@@ -68,8 +68,7 @@ CLEARLY_BELOW = 0.5
 """RMS of the augmented model's error, over the spread of the signal, up to which anything is explained."""
 
 
-GRADE = "road_grade"
-"""The effect that is no law: a load that walks further than any load does by itself."""
+GRADE = "road_grade"  # the effect that is no law: a load that walks further than any load does by itself
 
 LEAST_THROUGH, PARTS = 0.2, 4
 """Share of the torque's RMS that must get through the torque path in each of so many parts of a recording: less
@@ -79,8 +78,7 @@ LOOSE = 3.0
 """Factor by which a nominal parameter that an effect changes may be beyond its tolerance: a line that is split in two
 equal springs has each twice as stiff as the whole."""
 
-ROUNDING = 1e-6
-"""Share of a value by which a fit may end beyond a bound."""
+ROUNDING = 1e-6  # share of a value by which a fit may end beyond a bound
 
 
 def is_possible(hypothesis: Hypothesis, records: Sequence[Record]) -> bool:
@@ -105,11 +103,7 @@ def _values_of(hypothesis: Hypothesis) -> dict[str, Mapping[str, float]]:
 
 
 def widened(hypothesis: Hypothesis, model: DrivelineModel) -> FitResult | None:
-    """Return a fit whose nominal parameters may leave their tolerances where its effects change them; None as it is.
-
-    Those that are at a bound. Whether a data sheet's value is one that the line had at some moment is then for
-    `is_plausible` to say.
-    """
+    """Return a fit whose nominal parameters may leave their tolerances where its effects change them; None as it is."""
     result = hypothesis.result
     wide = _spans(hypothesis, model)
     shared = tuple(
@@ -187,23 +181,18 @@ def _is_stuck(values: Mapping[str, Mapping[str, float]], records: Sequence[Recor
     )
 
 
-BINS = 12
-"""Bins of torque and of speed, of equal count."""
+BINS = 12  # bins of torque and of speed, of equal count
 
 COLUMNS = {"most_predictable": PREDICTOR_ORDER, "most_dependent": 2 * BINS + 3}
 """How many signals a share of the innovations is sought in: past samples; bins, waves in the angle, and a mean."""
 
 FEWEST = 50
 
-CHANCE = 4.0
-"""Standard deviations of what noise shows by chance that a share may be beyond its limit."""
-
-FEWEST_PERIODS = 5
-"""Times that a wave repeats in a recording to be a line: what is slower is drift."""
+CHANCE = 4.0  # standard deviations of what noise shows by chance that a share may be beyond its limit
+FEWEST_PERIODS = 5  # times that a wave repeats in a recording to be a line: what is slower is drift
 
 CHANGE_S = 1.0
-EDGE = 0.02
-"""Distance from the bound of a disturbance's logarithm within which it has reached it."""
+EDGE = 0.02  # distance from the bound of a disturbance's logarithm within which it has reached it
 
 DISTURBANCES = {
     Size.TORQUE: "is more than the noise of a torque reading",

@@ -15,11 +15,8 @@ from estimator.signals.record import FloatArray
 
 Weigh = Callable[[FloatArray], FloatArray]
 
-LITTLE = 0.2
-"""Fall of the squared innovations, of variance 1, that changes no conclusion."""
-
-KEPT = 0.5
-"""Share of a step's promise that it must keep for the derivative to be carried on."""
+LITTLE = 0.2  # fall of the squared innovations, of variance 1, that changes no conclusion
+KEPT = 0.5  # share of a step's promise that it must keep for the derivative to be carried on
 
 NEAR = 10.0
 """Fall of the squared innovations over a step behind which a derivative that was found anew still holds."""
@@ -28,8 +25,7 @@ FIRST_DAMPING = 1e-3
 EASE, STIFFEN = 0.2, 5.0
 LEAST_DAMPING, MOST_DAMPING = 1e-10, 1e8
 
-MUCH_BYTES = 2**25
-"""Room of a derivative that is rather found again than kept with a fit that is over."""
+MUCH_BYTES = 2**25  # room of a derivative that is rather found again than kept with a fit that is over
 
 
 @dataclass(frozen=True, slots=True)

@@ -116,8 +116,7 @@ class Size(IntEnum):
     FORM = 7
 
 
-READING = 3
-"""How many sizes are of an output's reading."""
+READING = 3  # how many sizes are of an output's reading
 
 
 def of_first(sizes: FloatArray) -> FloatArray:
@@ -321,11 +320,8 @@ def limits_for(records: Sequence[Record], white: float) -> Limits:
     return Limits(np.clip(usual, low, high), low, high)
 
 
-STEP = 1e-4
-"""Change of a logarithm by which derivatives are found."""
-
-ENOUGH = 0.5
-"""Fall of minus twice the log-posterior below which sizes are estimated."""
+STEP = 1e-4  # change of a logarithm by which derivatives are found
+ENOUGH = 0.5  # fall of minus twice the log-posterior below which sizes are estimated
 
 
 def minus_twice_log_prior(sizes: FloatArray, limits: Limits) -> float:
@@ -346,10 +342,7 @@ def starts(sizes: FloatArray, limits: Limits) -> list[FloatArray]:
 def estimated(
     result: FitResult, error: FloatArray, sizes: FloatArray, limits: Limits, rounds: int, is_anew: bool = False
 ) -> tuple[FloatArray, float]:
-    """Return the most probable noise model of a fit's error and its minus twice log-posterior.
-
-    ``is_anew`` where it is begun from elsewhere, too (``starts``).
-    """
+    """Return the most probable noise model of a fit's error and its minus twice log-posterior."""
     check_time()
     whitened = whitening_of(result)
     limits = limits if changes_of(result) else limits.without_forms()

@@ -44,15 +44,11 @@ from estimator.signals.record import BoolArray, FloatArray, OutputKind, Record, 
 BLOCK_S, EVERY_S = 0.6, 2.0
 """Blocks kept out for a profile: shorter than its knot spacing, so that its neighbours predict it."""
 
-FEWEST_BLOCKS = 3
-"""Blocks of a recording at least: it may be shorter than one of these."""
+FEWEST_BLOCKS = 3  # blocks of a recording at least: it may be shorter than one of these
 
 
 def blocks(record: Record) -> BoolArray:
-    """Return which samples are kept out: blocks all along, none at the very ends; shape (N,).
-
-    A recording too short for as many has shorter ones, closer together.
-    """
+    """Return which samples are kept out: blocks all along, none at the very ends; shape (N,)."""
     since_s = record.time_s - record.time_s[0]
     scale = min(1.0, float(since_s[-1]) / (FEWEST_BLOCKS * EVERY_S))
     every_s, block_s = scale * EVERY_S, scale * BLOCK_S
@@ -75,8 +71,7 @@ def foreign_outputs(
     )
 
 
-ITERATIONS = 8
-"""Steps of a least-squares fit of what is a recording's own, which is nearly linear."""
+ITERATIONS = 8  # steps of a least-squares fit of what is a recording's own, which is nearly linear
 
 
 def on_recordings(
@@ -163,7 +158,6 @@ SMALLEST_P = 1e-300
 def found_effects(
     decision: Decision, estimate: FitResult, cov: FloatArray, model: DrivelineModel
 ) -> tuple[FoundEffect, ...]:
-    """Return the named effects, the weightiest first, with the values and covariance of a fit."""
     return tuple(_found(belief, decision, estimate, cov, model) for belief in decision.named)
 
 
@@ -334,7 +328,6 @@ def _rms(fit: FitResult, part: slice) -> float:
 
 
 def effects_of(runs: FreeRuns, decision: Decision) -> tuple[FoundEffect, ...]:
-    """Return the effects that are named, the weightiest first."""
     known = replace(decision, best=runs.believed)
     found = found_effects(known, runs.estimate, runs.covariance, runs.unseen.line) if decision.named else ()
     held = {"holdout_rms_before": runs.held_before, "holdout_rms_after": runs.held_after}

@@ -87,11 +87,7 @@ def kept(previous: FitResult, effects: Collection[str]) -> Release:
 
 
 def inheriting(name: str, release: Release, previous: FitResult) -> Release:
-    """Return a start of a general law that keeps what a fit of its special case has found out by another telling.
-
-    Friction that was seen to bend before it slides does so with a Stribeck range, too: begun without, such a fit is far
-    behind the special case and would be given up.
-    """
+    """Return a start of a general law that keeps what a fit of its special case has found out by another telling."""
     found = {
         key: value for special in EFFECTS[name].contains for key, value in previous.values_of(special).items() if value
     }
@@ -133,8 +129,7 @@ OFFSETS_S = np.array([0.01, 0.02, 0.04, 0.08, 0.15, 0.3, 0.6, 1.2, 2.4])
 OFFSETS_S = np.concatenate([-OFFSETS_S[::-1], OFFSETS_S])
 """Where else the likelihood is looked at, around the moment a fit ended at; and at the recording's own ends."""
 
-WORTH_MOVING = 2.0
-"""Fall of the squared innovations that moments elsewhere must bring."""
+WORTH_MOVING = 2.0  # fall of the squared innovations that moments elsewhere must bring
 
 MOVES = 4
 
@@ -225,8 +220,7 @@ def _squares(
 SAME = 1.0
 """Fall of minus twice the log-likelihood below which another pass over unknowns and disturbances is not made."""
 
-DIGITS = 0.02
-"""The same over the difference from a rival that the fit is for."""
+DIGITS = 0.02  # the same over the difference from a rival that the fit is for
 
 MOST_PASSES = 6
 
@@ -240,11 +234,8 @@ MOST_ROUGH, MUCH = 3, 0.05
 """Such comparisons under disturbances of their own at most, and the fall of minus twice the log-likelihood per sample
 for the next."""
 
-ROUNDS = 2
-"""Steps of Fisher scoring in a pass."""
-
-WITH_MOMENTS = 1
-"""Passes in which moments of events are looked for elsewhere."""
+ROUNDS = 2  # steps of Fisher scoring in a pass
+WITH_MOMENTS = 1  # passes in which moments of events are looked for elsewhere
 
 
 @dataclass(frozen=True)
@@ -277,10 +268,7 @@ class Hypothesis:
 
     @cached_property
     def free_squares(self) -> float:
-        """The squared free-run error, unknowns as they leave least of it.
-
-        A load that may walk far leaves the noise of the reading: the rest is what it did.
-        """
+        """The squared free-run error, unknowns as they leave least of it."""
         if "road_grade" in self.effects:
             return float(np.sum(samples_of(self.result) * reading_noise(self.sizes) ** 2))
         rms = self.result.rms
@@ -338,11 +326,7 @@ def fitted(
 
 
 def compared(effects: Effects, initial: FitResult, parent: Hypothesis, limits: Limits, hypotheses: int) -> Hypothesis:
-    """Fit a hypothesis a few steps from another's disturbances, to be compared with others like it.
-
-    Where it explains much more, other disturbances weigh what is left, and it is fitted a few steps under those, too.
-    ``limits`` are those of its own disturbances: a load that may walk far is not every hypothesis'.
-    """
+    """Fit a hypothesis a few steps from another's disturbances, to be compared with others like it."""
     sizes, best = np.clip(parent.sizes, limits.low, limits.high), parent.minus_twice_log
     result, now = initial, math.inf
     for _ in range(MOST_ROUGH):
@@ -426,6 +410,5 @@ def covariance(hypothesis: Hypothesis) -> FloatArray:
 
 
 def residuals(hypothesis: Hypothesis, stacked: FloatArray) -> Sequence[FloatArray]:
-    """Split stacked values into those of each recording."""
     ends = np.cumsum([int(use.sum()) for use in hypothesis.result.problem.use])[:-1]
     return np.split(stacked, ends)

@@ -190,7 +190,6 @@ def tempered_by(tests: Sequence[Test], samples: int, factor: float) -> float:
 
 
 def grounds(search: Search) -> Grounds:
-    """Search, and return what there is to decide on."""
     nothing = search.nothing()
     best = _with_sizes(search, _as_simple_as_will_do(search, search.run()))
     for name in best.effects:
@@ -289,10 +288,7 @@ def holds_null(hypothesis: Hypothesis, name: str) -> bool:
 
 
 def verdict_of(of_spread: float, is_named: bool, is_more_than_noise: bool, falls: bool = True) -> Verdict:
-    """Return the verdict on a set that leaves an error of so much of the signal's spread (CONTRACT).
-
-    ``falls`` tells whether the error falls, on the recordings and on data not used for the fit.
-    """
+    """Return the verdict on a set that leaves an error of so much of the signal's spread (CONTRACT)."""
     if is_named and (of_spread > CLEARLY_BELOW or not falls):
         return Verdict.UNEXPLAINED
     if is_named:

@@ -36,8 +36,7 @@ FREELY = 3.0
 """Factor, either way, within which a nominal parameter is looked for: beyond it a value is no slip of a data sheet, and
 the integration's steps, chosen for the nominal line, would not follow."""
 
-CLEARLY = 3.0
-"""Standard errors by which a value must lie beyond what it is trusted to."""
+CLEARLY = 3.0  # standard errors by which a value must lie beyond what it is trusted to
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,8 +82,7 @@ def _off_nominal(search: Search, found: Hypothesis) -> tuple[OffNominal, ...]:
     return tuple(value for _, value in sorted(clear, key=lambda each: -each[0]))
 
 
-LOOKING_ROUNDS = 6
-"""Rounds of the search for a law without a name, at most."""
+LOOKING_ROUNDS = 6  # rounds of the search for a law without a name, at most
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,11 +113,7 @@ def best_law(hypothesis: Hypothesis, searches: Sequence[ElementSearch]) -> Law |
 
 
 def _scored(hypothesis: Hypothesis, search: ElementSearch, before: float, places: float) -> Law:
-    """Return a law with its score: that of its innovations, or with disturbances estimated anew where it is simulated.
-
-    With all disturbances in one proportion minus twice the log-likelihood falls by ``n log(Q / Q')``, Q the squared
-    innovations; estimated anew it falls further.
-    """
+    """Return a law with its score: that of its innovations, or with disturbances estimated anew."""
     n = hypothesis.result.residual.size
     score = hypothesis.score - search.law.information(before, search.mean_square, n) + 2.0 * places
     is_simulated = any(weights.any() for weights in search.weights)
@@ -191,10 +185,7 @@ def rival_laws(ground: Grounds, alone: Law | None, added: Law | None) -> tuple[S
 
 
 def _at_its_place(ground: Grounds, law: Law, gained: float) -> Effects:
-    """Return the names of which a law is another form: those at its place, where they gain nearly all that it gains.
-
-    What a form leaves is at most `MOST_FORM` of the law in torque, and so the square of that in squared error.
-    """
+    """Return the names of which a law is another form: those at its place, where they gain nearly all that it gains."""
     names = frozenset(name for name in ground.best.effects if EFFECTS[name].element is law.element)
     score = {each.effects: each.score for each in ground.scores}.get(names, math.inf)
     is_form = ground.nothing.score - score >= (1.0 - MOST_FORM**2) * gained

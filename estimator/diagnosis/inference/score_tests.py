@@ -42,14 +42,9 @@ ROOM_SAMPLES = 2**21
 STEP_SHARES = (1.0, 0.1)
 """Shares of a start's size that are looked along: what is not smooth shows in full, what moves far in small."""
 
-STARTS = 2
-"""Start points of an effect that are fitted, the most promising of its list."""
-
-SHAPES = 2
-"""Further ones, of other shapes than these."""
-
-PROMISING = 0.5
-"""Share of the best start's promise below which another start of the same effect is not tried."""
+STARTS = 2  # start points of an effect that are fitted, the most promising of its list
+SHAPES = 2  # further ones, of other shapes than these
+PROMISING = 0.5  # share of the best start's promise below which another start of the same effect is not tried
 
 ROUNDS = 3
 """Rounds in which the size of an event and its intervals in all recordings find each other from there."""
@@ -75,11 +70,7 @@ class ScoredStart:
 
 
 def promising(starts: Sequence[ScoredStart]) -> list[ScoredStart]:
-    """Return the starts worth a fit: the best, and others where they promise nearly as much.
-
-    These are the second best, and the best of other shapes, since a law has an optimum near each, and of every other
-    variant: a look at one is no look at another.
-    """
+    """Return the starts worth a fit: the best, and others where they promise nearly as much."""
     near = [scored for scored in starts if scored.promise >= PROMISING * starts[0].promise or scored is starts[0]]
     best = {(scored.variant, scored.shape): scored for scored in reversed(near)}
     distinct = [scored for scored in near[STARTS:] if best[scored.variant, scored.shape] is scored]
@@ -343,8 +334,7 @@ def _between(own: tuple[Shared, ...], entry: Effect, grid: Cells, stretch: Stret
 SAME_MOTION = 0.02
 """RMS by which two motions may differ, over what the output moves, for effects to move the output alike in both."""
 
-ROOM_BYTES = 2**27
-"""Room that answers may take."""
+ROOM_BYTES = 2**27  # room that answers may take
 
 
 @dataclass

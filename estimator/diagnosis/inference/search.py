@@ -42,26 +42,19 @@ from estimator.physics.unknowns import Release, nominal_unknowns, own_unknowns, 
 from estimator.signals.record import BoolArray, Record
 
 BLIND = "speed_sign_blind"
-MOST_FITS = 6
-"""Effects that are fitted on top of a hypothesis, the most promising of a first look."""
-
-WORTH_FITTING = 0.1
-"""Share of the best promise below which an effect is not fitted."""
+MOST_FITS = 6  # effects that are fitted on top of a hypothesis, the most promising of a first look
+WORTH_FITTING = 0.1  # share of the best promise below which an effect is not fitted
 
 FEWEST_FITS = 2
 """Effects that are fitted however little a first look promises: a gap shows only near its own width."""
 
-SAME_PROMISE = 0.5
-"""Share of what an effect promises that a look-alike must promise in its place."""
+SAME_PROMISE = 0.5  # share of what an effect promises that a look-alike must promise in its place
 
 NEARLY = 0.3
 """Share of what an effect explains by which another's first few steps may be behind for it to be fitted to its end."""
 
-FINISHED = 2
-"""Best of these that are fitted to their end."""
-
-STARTS = 5
-"""Effects from each of which a search begins, the most promising."""
+FINISHED = 2  # best of these that are fitted to their end
+STARTS = 5  # effects from each of which a search begins, the most promising
 
 MOST_EFFECTS = 8
 
@@ -99,11 +92,7 @@ class Search:
         return self._limits
 
     def run(self) -> Hypothesis:
-        """Return the best set of effects found, begun from each of the most promising effects.
-
-        One effect that imitates another may be the better one as long as it is alone, and what remains of it in the way
-        of the true one.
-        """
+        """Return the best set of effects found, begun from each of the most promising effects."""
         self.path = self._climbed([self.nothing()])
         firsts = sorted((each for effects, each in self.visited.items() if len(effects) == 1), key=lambda h: h.score)
         for first in firsts[:STARTS]:

@@ -19,11 +19,8 @@ PLACE_NAMES: Mapping[Element, str] = {
     Element.ACQUISITION: "in the acquisition",
 }
 
-MOST_TERMS = 3
-"""At most so many terms of a law are said."""
-
-ARTICLES = ("a ", "the ")
-"""With one of these a term begins that is a phrase; all others are formulas."""
+MOST_TERMS = 3  # at most so many terms of a law are said
+ARTICLES = ("a ", "the ")  # with one of these a term begins that is a phrase; all others are formulas
 
 FUNCTION = "a function of "
 
@@ -92,11 +89,8 @@ def times(ratio: float) -> str:
     return f"{float(f'{ratio:.3g}'):.0f}" if ratio >= 100.0 else f"{ratio:.3g}"
 
 
-SURE = 0.999
-"""Probability from which a sentence gives no more digits."""
-
-MOST_NAMES = 4
-"""Untried effects that a headline lists."""
+SURE = 0.999  # probability from which a sentence gives no more digits
+MOST_NAMES = 4  # untried effects that a headline lists
 
 
 @dataclass(frozen=True, slots=True)

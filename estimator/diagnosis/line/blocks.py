@@ -95,11 +95,8 @@ def between(values: FloatArray) -> FloatArray:
     return 0.5 * (values + later)
 
 
-AROUND = 2
-"""Samples before and behind a moment between which a law's change counts."""
-
-LASTS = 3.0
-"""Samples over which such an error is correlated: about as long as a change counts."""
+AROUND = 2  # samples before and behind a moment between which a law's change counts
+LASTS = 3.0  # samples over which such an error is correlated: about as long as a change counts
 
 
 class FormPlace(IntEnum):
@@ -217,8 +214,7 @@ def size_at(result: FitResult, place: Place) -> float:
 MOST_ROWS = 20_000
 """Blocks that laws are fitted to, all recordings together: over three minutes at 10 ms. They bound memory."""
 
-STRETCH = 3000
-"""Blocks of a stretch of a long recording."""
+STRETCH = 3000  # blocks of a stretch of a long recording
 
 
 @dataclass(frozen=True, slots=True)
@@ -261,10 +257,7 @@ class Line:
 
 
 def lines(result: FitResult, forces: Sequence[Force] | None = None, length: int | None = None) -> tuple[Line, ...]:
-    """Return the recordings of a fit in blocks, under further torques where there are any.
-
-    ``length`` is the samples per block, by default as few as the fit's own line needs.
-    """
+    """Return the recordings of a fit in blocks, under further torques where there are any."""
     length = length or block_length(result)
     count = len(result.problem.records)
     every = [NO_FORCE] * count if forces is None else forces

@@ -188,8 +188,7 @@ WIDE = 10.0
 FORGETS_S = 1.0
 """A shaft torque that stays is invisible: it only holds another twist. Its walk returns to zero in about this time."""
 
-SEARCH_TOLERANCE = 0.15
-"""Of the rate's decimal logarithm: the likelihood is flat around its top."""
+SEARCH_TOLERANCE = 0.15  # of the rate's decimal logarithm: the likelihood is flat around its top
 
 
 @dataclass(frozen=True, slots=True)

@@ -31,8 +31,7 @@ from estimator.physics.problem import start_of
 from estimator.physics.simulate import MASSES, output_state
 from estimator.signals.record import FloatArray, OutputKind, Record
 
-MOTOR, LOAD = 0, 1
-"""Columns of the inputs: torque on the motor shaft, and torque against the load."""
+MOTOR, LOAD = 0, 1  # columns of the inputs: torque on the motor shaft, and torque against the load
 
 
 @dataclass(frozen=True, slots=True)
@@ -247,8 +246,7 @@ def run_block(setting: Setting, first: int, torques: Torques, p: FloatArray, sta
     return setting.out[0, first : torque.shape[0]].mean()
 
 
-NUDGE = 1e-5
-"""Size of a difference step, as a share of the speed or torque in use."""
+NUDGE = 1e-5  # size of a difference step, as a share of the speed or torque in use
 
 LONGEST_BLOCK_S = 0.01
 BLOCKS_PER_PERIOD = 12.0

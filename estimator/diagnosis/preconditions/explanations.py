@@ -47,8 +47,7 @@ class Row:
 _SPEED, _POSITION = (OutputKind.SPEED,), (OutputKind.POSITION,)
 _LINE = (Motion.TRANSLATION,)
 
-GEARS = (3.0, 16.0)
-"""Ratios of the gears behind traction motors."""
+GEARS = (3.0, 16.0)  # ratios of the gears behind traction motors
 
 RIGHT = Row("", Part.MODEL, 1.0, 1.0, 1.0, motions=TURNS_AND_LINES)
 """Nothing is wrong with the recording: the model lacks physics."""
@@ -117,11 +116,7 @@ def rows_for(line: DrivelineModel) -> list[Row]:
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """What may be wrong with columns beyond a factor, undone; ``prior`` as in `Row`.
-
-    ``factors`` is how many factors may be wrong besides; ``physics`` whether it is an entry of the catalogue, which is
-    not to be refused but to be found.
-    """
+    """What may be wrong with columns beyond a factor, undone; ``prior`` as in `Row`."""
 
     record: Record
     prior: float = 1.0
@@ -134,14 +129,12 @@ class Change:
 SLOWEST_S, FASTEST_S = 0.5, 1e-5
 """A driveline sampled slower, or faster, is more likely recorded in another unit of time."""
 
-SHORTEST_S = 1.0
-"""No recording of a driveline is shorter."""
+SHORTEST_S = 1.0  # no recording of a driveline is shorter
 
 PERIODS = (1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 4e-3, 5e-3, 1e-2, 2e-2, 5e-2, 1e-1)
 """Usual periods [s], for times that are counted in rows."""
 
-UNLIKELY = 0.02
-"""Prior of a period that no driveline is sampled with, and of each that rows may have."""
+UNLIKELY = 0.02  # prior of a period that no driveline is sampled with, and of each that rows may have
 
 
 def changes_of(record: Record) -> Iterator[Change]:
@@ -214,11 +207,8 @@ PHYSICS, PHYSICS_SHARE = math.log(2.0), 0.08
 BANDS, BANDS_PHYSICS, BANDS_OTHER = 0.35, 0.1, 1.2
 """Spread of the two bands' ratio by one factor, the share of the cases that spread as another model's do, and that."""
 
-REST = 4.0
-"""Power of the unexplained motion in the likelihood: as of eight independent stretches."""
-
-LEAST_REST = 0.02
-"""Share of the motion that the shortest model error leaves unexplained."""
+REST = 4.0  # power of the unexplained motion in the likelihood: as of eight independent stretches
+LEAST_REST = 0.02  # share of the motion that the shortest model error leaves unexplained
 
 USUAL_TORQUE_NM, USUAL_SPEED_RAD_S = (200.0, math.log(8.0)), (80.0, math.log(5.0))
 """Median, and spread of the logarithm, of the largest torque and speed in a recording of a drive."""

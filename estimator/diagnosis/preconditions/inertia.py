@@ -72,20 +72,11 @@ BELOW, ABOVE = (0.1, 0.6), (1.6, math.inf)
 BLOCK_HZ, FEWEST_BINS = 1.0, 8
 """Frequencies compared at a time: few enough for a delay of some samples not to matter."""
 
-BANDS_TELL = 0.5
-"""Share of the output in either band that must follow from the torque."""
-
-AGREE = 2.5
-"""Factor between the ratios of the two bands up to which they are of one cause."""
-
-STRETCH_S = 1.0
-"""Over which the change of speed is looked at."""
-
-FEWEST_STEPS = 10
-"""Samples of a stretch at least."""
-
-FEWEST_STRETCHES = 10
-"""Stretches that a recording must hold to say anything: the regression has three unknowns."""
+BANDS_TELL = 0.5  # share of the output in either band that must follow from the torque
+AGREE = 2.5  # factor between the ratios of the two bands up to which they are of one cause
+STRETCH_S = 1.0  # over which the change of speed is looked at
+FEWEST_STEPS = 10  # samples of a stretch at least
+FEWEST_STRETCHES = 10  # stretches that a recording must hold to say anything: the regression has three unknowns
 
 BODY_TELLS = 0.9
 """Share of the speed's changes that the torque must account for. Where a road or a brake moves the line and a control
@@ -94,12 +85,7 @@ sets the torque it is below 0.6, in tip-ins and reversals above."""
 
 @dataclass(frozen=True, slots=True)
 class Inertia:
-    """The inertia that a recording fits over the nominal one, negative where the speed falls with the torque.
-
-    ``share`` is the share of the motion that follows from the torque. ``apart`` is the logarithm of the ratio below the
-    first mode over that above it: 0 for a factor between units, which moves both alike, and not for a load that is
-    heavier, or a mode that is elsewhere; NaN where both are not seen.
-    """
+    """The inertia that a recording fits over the nominal one, negative where the speed falls with the torque."""
 
     ratio: float
     share: float

@@ -32,15 +32,13 @@ ROUNDING = 2.0
 """How far three samples of a straight line may be off one, in the file's least steps: each is rounded by half of one,
 and the middle one counts twice."""
 
-SMOOTH = 1e-9
-"""The same as a share of the signal's range, where a file has all digits."""
+SMOOTH = 1e-9  # the same as a share of the signal's range, where a file has all digits
 
 BENT = 50.0
 """How far three samples usually are off a straight line, in what rounding makes of one: below, it can't be decided. The
 line itself must go further than that: a motion that settles without noise is straight in the end."""
 
-SELDOM = 0.05
-"""Share of equal neighbours elsewhere up to which twenty in a row are no chance: 1e-26."""
+SELDOM = 0.05  # share of equal neighbours elsewhere up to which twenty in a row are no chance: 1e-26
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,8 +149,7 @@ FEWEST_KEPT = 200
 """Samples of the shortest recording that are kept in any case: fewer do not carry a model with a dozen unknowns."""
 
 TURN = 2.0 * np.pi
-PER_PERIOD = 12.0
-"""Samples kept per period of the line's fastest mode, at least; and one in `LONGEST_S`."""
+PER_PERIOD = 12.0  # samples kept per period of the line's fastest mode, at least; and one in `LONGEST_S`
 
 
 def thinned(records: Sequence[Record], model: DrivelineModel) -> list[Record]:
@@ -214,8 +211,7 @@ def _blocks(values: NDArray[Any], factor: int) -> NDArray[Any]:
     return values[: count * factor].reshape(count, factor, *values.shape[1:])
 
 
-FEWEST_SAMPLES = 200
-"""Fewer good samples than this do not carry a model with a dozen unknowns and its hold-out."""
+FEWEST_SAMPLES = 200  # fewer good samples than this do not carry a model with a dozen unknowns and its hold-out
 
 NEAR_MODE = 0.7
 """From this share of the first natural frequency on a line answers otherwise than one body: by ``1 / (1 - 0.7^2)``,
@@ -301,8 +297,7 @@ def _rms(signals: Sequence[FloatArray]) -> float:
     return math.sqrt(sum(float(signal @ signal) for signal in signals) / sum(signal.size for signal in signals))
 
 
-SAME_PERIOD = 1e-3
-"""Relative difference of sampling periods that rounding of time stamps makes."""
+SAME_PERIOD = 1e-3  # relative difference of sampling periods that rounding of time stamps makes
 
 
 def require_together(records: Sequence[Record]) -> None:
@@ -347,7 +342,6 @@ class Prepared:
 
 
 def as_moved(records: Sequence[Record]) -> tuple[list[Record], list[str]]:
-    """Return recordings without what no sensor has read, and what there is to say of it."""
     warnings: list[str] = []
     mended = list(records)
     for mend in (unwrapped, without_clipped, without_not_read, with_usable_channels):

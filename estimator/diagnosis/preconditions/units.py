@@ -37,11 +37,8 @@ smallest factor between units (3.6) is more."""
 FAR_AHEAD, OVER_THE_NEXT = 0.5, 4.0
 """Odds of an explanation from which on the line that cures it is given, and how much larger than those of the next."""
 
-DOUBTFUL = 0.3
-"""Odds that nothing is wrong below which a recording whose inertia is plausible is doubted."""
-
-FEWEST_ODDS, MOST_NAMED = 0.01, 7
-"""Odds from which on an explanation is named, and how many are."""
+DOUBTFUL = 0.3  # odds that nothing is wrong below which a recording whose inertia is plausible is doubted
+FEWEST_ODDS, MOST_NAMED = 0.01, 7  # odds from which on an explanation is named, and how many are
 
 MOST_LOAD = 10.0
 """Factor by which a load machine's torque may exceed all torque of the motor: more would turn the motor over."""
@@ -57,10 +54,7 @@ UNKNOWN_FIT = 1.0 / 6.0
 
 
 def require_plausible_units(records: Sequence[Record], model: DrivelineModel) -> list[Implausible]:
-    """Refuse recordings whose torque, output or time is off by a factor, in sign, or another column's.
-
-    Returns what is doubtful: recordings that could be of a model that lacks physics, and are likelier in another unit.
-    """
+    """Refuse recordings whose torque, output or time is off by a factor, in sign, or another column's."""
     for record in records:
         _require_plausible_load(record)
     refusal, doubts = _judged(records, replace(model, effects={}))
@@ -199,8 +193,7 @@ def _require_plausible_load(record: Record) -> None:
 FASTEST_RAD_S = 2500.0
 """Speed of a traction motor that is not reached: 24,000 rpm. A speed in rpm is."""
 
-ALONE = 0.75
-"""Odds from which on a recording is refused by itself."""
+ALONE = 0.75  # odds from which on a recording is refused by itself
 
 _BODY = DrivelineModel(Structure.ONE_MASS, {"J_M": Parameter(1.0, 0.0), "b_M": Parameter(0.0, 0.0)})
 

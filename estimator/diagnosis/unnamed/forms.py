@@ -24,25 +24,17 @@ from estimator.physics.parallel import PARTS, concurrently
 from estimator.signals.correlation import effective_samples
 from estimator.signals.record import FloatArray, IntArray
 
-HIGHEST_ORDER = 24.0
-"""Periods per motor turn: faster ones pass unseen through any driveline."""
-
-SLOWEST_WAVE = 3.0
-"""Waves that fit into a recording at least."""
-
-MOST_PEAKS = 3
-"""Orders that are tried of the signal itself, and of its change, the strongest first."""
+HIGHEST_ORDER = 24.0  # periods per motor turn: faster ones pass unseen through any driveline
+SLOWEST_WAVE = 3.0  # waves that fit into a recording at least
+MOST_PEAKS = 3  # orders that are tried of the signal itself, and of its change, the strongest first
 
 SEPARATION = 10.0
 """Orders that differ by less than this many waves in a recording are one: a wave that comes and goes is no line."""
 
 BINS_PER_WAVE = 4.0
 
-LONGEST_TRAVEL = 30_000.0
-"""Angle of one spectrum [rad], some 5000 turns: its grid has a million places."""
-
-FEWEST_SAMPLES = 1024
-"""Samples in such a piece; with fewer its waves are not seen."""
+LONGEST_TRAVEL = 30_000.0  # angle of one spectrum [rad], some 5000 turns: its grid has a million places
+FEWEST_SAMPLES = 1024  # samples in such a piece; with fewer its waves are not seen
 
 
 def peaks(signals: Sequence[FloatArray], angles: Sequence[FloatArray]) -> FloatArray:
@@ -104,20 +96,11 @@ def _differences(signal: FloatArray) -> FloatArray:
     return np.diff(signal, prepend=signal[0])
 
 
-STEP_EVERY_S = 0.5
-"""Grid of the moments at which a load torque may step."""
-
-CHANGE_EVERY_S = 1.0
-"""Grid of the moments at which an inertia, a stiffness or a drag may change."""
-
-MOST_MOMENTS = 180
-"""Moments in all recordings together; longer ones have a coarser grid."""
-
-USUAL_ORDERS = (1.0, 2.0)
-"""Waves per motor turn that are tried in any case: imbalance, and joints at an angle."""
-
-COURSE_KNOTS = 11
-"""Of a slow course of the load over one recording."""
+STEP_EVERY_S = 0.5  # grid of the moments at which a load torque may step
+CHANGE_EVERY_S = 1.0  # grid of the moments at which an inertia, a stiffness or a drag may change
+MOST_MOMENTS = 180  # moments in all recordings together; longer ones have a coarser grid
+USUAL_ORDERS = (1.0, 2.0)  # waves per motor turn that are tried in any case: imbalance, and joints at an angle
+COURSE_KNOTS = 11  # of a slow course of the load over one recording
 
 Columns = FloatArray
 """One or several functions of time of one recording, shape (B, q)."""
@@ -323,19 +306,13 @@ def _answers_of(line: Line, element: Element, functions: FloatArray) -> FloatArr
     return line.tangent.answers(sign * motor, sign * load, functions)
 
 
-MOST_TERMS = 9
-"""Three load steps per recording in a set of three, or as many terms of another kind."""
+MOST_TERMS = 9  # three load steps per recording in a set of three, or as many terms of another kind
 
 MOST_COEFFICIENTS = 45
 
-ALIKE = 1e-6
-"""A candidate that re-tuning reproduces to this share of its power can't be distinguished from it."""
-
-CHUNK = 2048
-"""Rows that are worked on at a time."""
-
-TOO_ALIKE = 1e-8
-"""Share of a column's power below which it is a combination of others."""
+ALIKE = 1e-6  # a candidate that re-tuning reproduces to this share of its power can't be distinguished from it
+CHUNK = 2048  # rows that are worked on at a time
+TOO_ALIKE = 1e-8  # share of a column's power below which it is a combination of others
 
 Indices = NDArray[np.intp]
 
@@ -401,7 +378,6 @@ def pursue(pool: Pool, ground: Ground) -> Path:
 
 
 def factored(columns: FloatArray, target: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the triangular factor of columns, shape (q, q), and a target along their orthonormal basis, shape (q,)."""
     q = columns.shape[1]
     triangle = np.asarray(np.linalg.qr(np.column_stack([columns, target]), mode="r"))
     return triangle[:q, :q], np.ascontiguousarray(triangle[:q, q])

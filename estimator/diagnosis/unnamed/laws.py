@@ -16,8 +16,7 @@ from estimator.diagnosis.line.blocks import Motion
 from estimator.physics.effect import Element
 from estimator.signals.record import FloatArray, carried
 
-ROUNDED = 0.02
-"""A sign function changes over this share of its argument's range."""
+ROUNDED = 0.02  # a sign function changes over this share of its argument's range
 
 KNOTS = 9
 """Of a free function of one signal: between its first and 99th percentile, the same share of samples between two."""
@@ -41,7 +40,6 @@ def inside(values: FloatArray, share: float) -> FloatArray:
 
 
 def beyond(values: FloatArray, share: float) -> FloatArray:
-    """Return what a signal is beyond a share of its range."""
     return values - inside(values, share)
 
 

@@ -81,7 +81,6 @@ def scene(result: FitResult, floor: float, whitening: Filter | None = None) -> S
 
 
 def elements(result: FitResult) -> tuple[Element, ...]:
-    """Return the elements at which laws are tried on a fit."""
     if result.problem.grid.structure is Structure.JOINT:
         return (Element.SHAFT,)
     found = [Element.TORQUE_PATH, Element.MOTOR]
@@ -109,11 +108,7 @@ class Ground:
 
 
 def ground_of(view: Scene) -> Ground:
-    """Return what re-tuning a fit further could explain of its error.
-
-    The derivative is found anew: that of a fit is of the place before its last step. That is near enough for all but
-    this. Of a drifting position re-tuning explains nearly all that a law does, and the rest is in the fifth digit.
-    """
+    """Return what re-tuning a fit further could explain of its error."""
     result = view.result
     jacobian = jacobian_at(result.problem, result.x, result.outputs)
     row, parts = 0, []

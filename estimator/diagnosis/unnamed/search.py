@@ -35,8 +35,7 @@ from estimator.physics.problem import bounds, own_part, residual_at
 from estimator.signals.correlation import effective_samples
 from estimator.signals.record import BoolArray, FloatArray
 
-RIDGE = 1e-5
-"""Keeps columns that are combinations of others small; a share of a column's norm."""
+RIDGE = 1e-5  # keeps columns that are combinations of others small; a share of a column's norm
 
 MOST_FORCE = 0.8
 """Largest RMS of a law, in RMS of the torque (or reading) in use: a law that takes more than the line carries is no
@@ -127,11 +126,8 @@ def rms(parts: Sequence[FloatArray]) -> float:
     return float(np.sqrt(np.mean(np.concatenate(list(parts)) ** 2)))
 
 
-NEIGHBOURS = 7
-"""A reading is held against the median of so many around it: a swing of the line lasts longer."""
-
-FALSE_ALARM = 0.01
-"""Probability that normal noise makes one outlier in all recordings."""
+NEIGHBOURS = 7  # a reading is held against the median of so many around it: a swing of the line lasts longer
+FALSE_ALARM = 0.01  # probability that normal noise makes one outlier in all recordings
 
 WITHIN = 0.9
 """Share of the values from which their spread is estimated: few are their neighbours' median, none an outlier."""
@@ -158,8 +154,7 @@ def near(off: BoolArray) -> BoolArray:
     return maximum_filter1d(off.astype(np.int8), NEIGHBOURS, mode="constant").astype(np.bool_)
 
 
-KEPT = 40
-"""Forms that by themselves explain most, which further rounds choose from."""
+KEPT = 40  # forms that by themselves explain most, which further rounds choose from
 
 PARAMETER_LAWS: Mapping[str, tuple[Element, Law]] = {
     "J_M": (Element.MOTOR, lambda m: np.gradient(m.speed, m.time_s)),
@@ -226,8 +221,7 @@ def _without_outliers(state: ElementSearch) -> ElementSearch:
     return replace(state, law=law, mean_square=after / rows, errors=aside, stuck=True)
 
 
-STEPS = (1.0, 0.5, 0.2, 0.05)
-"""Shares of a step that are tried until the error falls."""
+STEPS = (1.0, 0.5, 0.2, 0.05)  # shares of a step that are tried until the error falls
 
 
 def again(state: ElementSearch) -> ElementSearch:
@@ -342,8 +336,7 @@ def _solution(state: ElementSearch, terms: int) -> tuple[FloatArray, FloatArray]
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
-ROUNDS = 20
-"""Rounds that locate, at most: the first promises, the others try what it promised."""
+ROUNDS = 20  # rounds that locate, at most: the first promises, the others try what it promised
 
 LEAST_ROUNDS = 5
 WORTH_A_ROUND = 0.005
@@ -360,10 +353,7 @@ IN_REACH = 3.0
 
 @dataclass(frozen=True, slots=True)
 class UnnamedLaw:
-    """The best law at one element: its terms and coefficients, what it gains, and the RMS it would leave.
-
-    A term with several coefficients, a free function or waves, is given by the RMS of what it does.
-    """
+    """The best law at one element: its terms and coefficients, what it gains, and the RMS it would leave."""
 
     element: Element
     terms: tuple[tuple[str, float], ...]

@@ -72,8 +72,7 @@ def input_unit(place: Place, result: FitResult, kind: Kind) -> str:
 
 BINS = 24
 
-FEWEST_PASSES = 3
-"""A bin that the signal passes less often says nothing of its own scatter."""
+FEWEST_PASSES = 3  # a bin that the signal passes less often says nothing of its own scatter
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,8 +131,7 @@ def _passes(bins: FloatArray, signals: Sequence[FloatArray]) -> tuple[FloatArray
     return bins[start], np.stack([*sums, length], axis=1)
 
 
-FUNCTION = 0.5
-"""Share of a law's power that must be a function of one signal to be drawn over it."""
+FUNCTION = 0.5  # share of a law's power that must be a function of one signal to be drawn over it
 
 
 def picture(

@@ -20,19 +20,12 @@ from estimator.physics.model import Structure
 from estimator.signals.decimate import block_of
 from estimator.signals.record import FloatArray, Record
 
-SEGMENT = 256
-"""Samples of a segment: 2.56 s at 10 ms, long enough to resolve a driveline's first mode."""
-
-FEWEST_PER_BAND = 3
-"""Frequencies in a band at least."""
+SEGMENT = 256  # samples of a segment: 2.56 s at 10 ms, long enough to resolve a driveline's first mode
+FEWEST_PER_BAND = 3  # frequencies in a band at least
 
 
 def error_spectrum(before: FitResult, after: FitResult, floor: float) -> ErrorSpectrum:
-    """Return the density of the error of two fits of the same recordings, and where the first stands above the floor.
-
-    Welch's average over all recordings of at least a segment, Hann window; each band of an octave is tested against
-    white noise of the floor's size, corrected for the number of bands.
-    """
+    """Return the density of the error of two fits, and where the first stands above the floor."""
     records = before.problem.records
     length = min(SEGMENT, *(record.okay.size for record in records))
     frequency, first, averages = _density(records, before.outputs, length)
@@ -84,11 +77,8 @@ def _octaves(frequency: FloatArray) -> FloatArray:
     return np.array([*edges, float(frequency[0])][::-1]) if edges[-1] > frequency[0] else np.array(edges[::-1])
 
 
-COHERENT = 0.5
-"""Share of the output's power that the torque must explain before a response is compared there."""
-
-FEWEST_BLOCKS = 8
-"""Blocks of samples that a segment holds at least (``spectral_estimate``)."""
+COHERENT = 0.5  # share of the output's power that the torque must explain before a response is compared there
+FEWEST_BLOCKS = 8  # blocks of samples that a segment holds at least (``spectral_estimate``)
 
 
 def responses(before: FitResult, after: FitResult) -> dict[str, Response]:
@@ -143,20 +133,14 @@ def _p_value(measured: SpectralEstimate, model: SpectralEstimate) -> float:
     return float(stats.chi2.sf(float(apart @ apart), degrees))
 
 
-WINDOW_S = 0.5
-"""Errors are averaged over this time before they are called a mismatch."""
-
-FALSE_ALARM = 0.01
-"""Probability that noise alone is called a mismatch anywhere in a recording."""
+WINDOW_S = 0.5  # errors are averaged over this time before they are called a mismatch
+FALSE_ALARM = 0.01  # probability that noise alone is called a mismatch anywhere in a recording
 
 SMALLEST_RATIO = 1.2
 """Mean square, in floors, that a window must reach at least: the floor itself is known to about a tenth."""
 
-CENTRAL = 0.8
-"""Share of the mismatch's power that band and region hold."""
-
-LONGEST_SEGMENT = 512
-"""Samples of a segment of Welch's average."""
+CENTRAL = 0.8  # share of the mismatch's power that band and region hold
+LONGEST_SEGMENT = 512  # samples of a segment of Welch's average
 
 
 def _errors(result: FitResult, index: int) -> FloatArray:

@@ -107,17 +107,13 @@ def two_mass_resonance(J_M: float, J_L: float, k: float, c: float, b_M: float, b
     return Mode(abs(s) / (2.0 * np.pi), -s.real / abs(s))
 
 
-CONFIDENCE = 0.95
-"""Of every interval and ellipse that does not say otherwise."""
+CONFIDENCE = 0.95  # of every interval and ellipse that does not say otherwise
 
 QUANTILE = float(norm.ppf(0.5 + CONFIDENCE / 2.0))
 """Half width of such an interval in standard deviations: 1.96."""
 
-SHORT = 0.5
-"""Reach of an interval to either side, against the value, up to which a number is known."""
-
-STEP = 0.01
-"""Of the difference quotient, in standard deviations."""
+SHORT = 0.5  # reach of an interval to either side, against the value, up to which a number is known
+STEP = 0.01  # of the difference quotient, in standard deviations
 
 
 @dataclass(frozen=True, slots=True)

@@ -34,11 +34,8 @@ NAMES = tuple(UNITS)
 SUMS = MappingProxyType({"J_M + J_L": (0, 1), "c + b_M": (3, 4), "b_M + b_L": (4, 5)})
 """Often determined where the single ones are not."""
 
-POSITIVE = 3
-"""The first parameters are above 0 and estimated by their logarithms; the others may be 0."""
-
-RESPONDING = Orders(THIRD, THIRD, 1)
-"""Structure of a sampled two-mass drive: one sample of delay."""
+POSITIVE = 3  # the first parameters are above 0 and estimated by their logarithms; the others may be 0
+RESPONDING = Orders(THIRD, THIRD, 1)  # structure of a sampled two-mass drive: one sample of delay
 
 IMPLAUSIBLE = float(chi2.isf(1e-3, 2 * THIRD))
 """Deviance from which on no line that can be responds like this: one in 1000, all six coefficients free."""

@@ -214,11 +214,7 @@ def problem_of(record: Record, orders: Orders | None) -> tuple[Problem, int]:
 
 
 def starts(problem: Problem) -> Iterator[FloatArray]:
-    """Yield an x for each start; always at least one.
-
-    They are found from block means, which the driveline fills with its motion whatever the recording's period is, and
-    taken back to it by their poles.
-    """
+    """Yield an x for each start; always at least one."""
     k, orders = problem.block, problem.orders
     period_s = k * problem.sample_time_s
     u, y, okay = problem.blocks.mean(problem.u), problem.blocks.mean(problem.y), problem.blocks.okay

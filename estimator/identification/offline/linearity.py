@@ -25,11 +25,8 @@ LEAST_EFFECT = 0.1
 """Part of the innovations from which on a nonlinearity matters: what 30 s at 10 ms just show. Of a million samples the
 test alone would call every drive nonlinear."""
 
-QUANTILES = (0.1, 0.35, 0.65, 0.9)
-"""Knots of the piecewise linear functions, of the signal's own distribution."""
-
-LAGS = (1, 2, 3)
-"""Numerators of the responses, in samples of the noise model: as many as a two-mass drive has."""
+QUANTILES = (0.1, 0.35, 0.65, 0.9)  # knots of the piecewise linear functions, of the signal's own distribution
+LAGS = (1, 2, 3)  # numerators of the responses, in samples of the noise model: as many as a two-mass drive has
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,8 +109,7 @@ def _tested(J: FloatArray, w: FloatArray, columns: FloatArray) -> tuple[float, f
     return float(fisher.sf(gained / q / variance, q, free)), float(np.sqrt(max(gained - q * variance, 0.0) / total))
 
 
-REGIONS = 3
-"""Of equal numbers of samples: below, about and above the middle."""
+REGIONS = 3  # of equal numbers of samples: below, about and above the middle
 
 MOST_EVALUATIONS = 30
 
@@ -130,7 +126,6 @@ class RegionalMode:
 def modes_by_region(
     problem: Problem, x: FloatArray, signal: FloatArray, band_hz: tuple[float, float]
 ) -> tuple[RegionalMode, ...]:
-    """Fit B / A once for each region of a signal."""
     value = problem.blocks.mean(signal)[problem.noise_order :]
     edges = np.quantile(value, np.linspace(0.0, 1.0, REGIONS + 1))
     found = []

@@ -74,8 +74,7 @@ MOST_UNREAD = 200
 DEPENDENT = 1e-9
 """Singular value, against the largest, below which an unknown of the torque changes nothing by itself."""
 
-RIDGE = 1e-12
-"""Keeps an output that no whitened error depends on from making the normal equations singular."""
+RIDGE = 1e-12  # keeps an output that no whitened error depends on from making the normal equations singular
 
 
 class _Outputs:

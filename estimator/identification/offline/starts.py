@@ -18,8 +18,7 @@ from estimator.identification.modes.reduced import numerator_of
 from estimator.signals.record import BoolArray, FloatArray
 
 ITERATIONS = 20
-HIGH_ORDER = 16
-"""Order of the averaging ARX model: four times the paper's order."""
+HIGH_ORDER = 16  # order of the averaging ARX model: four times the paper's order
 
 LARGEST_RADIUS = 0.999
 """Radius to which a pole on or outside the unit circle is brought; its time constant is then 1000 samples."""
@@ -99,11 +98,8 @@ def candidates(
         yield steiglitz_mcbride(u, smooth, everywhere, orders, begin)
 
 
-PAST = 40
-"""Samples of the past: longer than the impulse response of the predictor, which the noise ends."""
-
-FUTURE = 15
-"""Predicted outputs that the state is found from: several times the order."""
+PAST = 40  # samples of the past: longer than the impulse response of the predictor, which the noise ends
+FUTURE = 15  # predicted outputs that the state is found from: several times the order
 
 
 def subspace(u: FloatArray, y: FloatArray, okay: BoolArray, orders: Orders, sample_time_s: float) -> LinearModel | None:

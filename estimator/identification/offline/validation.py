@@ -112,8 +112,7 @@ def criterion(fit: LinearFit) -> float:
     return n * float(np.log(power)) + fit.model.orders.n_parameters * float(np.log(n))
 
 
-LAGS = 25
-"""Lags looked at to either side: half a second at 20 ms, the decay time of a drive's resonance."""
+LAGS = 25  # lags looked at to either side: half a second at 20 ms, the decay time of a drive's resonance
 
 
 JUMP = 1.2
@@ -123,8 +122,7 @@ LEAST_CORRELATED = 0.05
 """Root of the sum of squared correlations, beyond what chance makes of it, below which a model misses nothing that
 matters: in a recording of a million samples the smallest departure is significant."""
 
-LEAST_DELAY = 1
-"""Samples before which held torque can't act on a sampled speed."""
+LEAST_DELAY = 1  # samples before which held torque can't act on a sampled speed
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -195,11 +193,7 @@ def residual_tests(
 
 
 def between_jumps(u: FloatArray) -> FloatArray:
-    """Return the steps of an input without its jumps, shape (N,).
-
-    Next to a PRBS of 100 Nm a driver's answer of 1 Nm to the noise of the speed is not seen; between its jumps it is.
-    Any function of the input is independent of the residual where the loop is open, so that the test keeps its level.
-    """
+    """Return the steps of an input without its jumps, shape (N,)."""
     step = np.diff(u, prepend=u[:1])
     size = np.abs(step - np.median(step))
     ordered, first, end = np.sort(size), size.shape[0] // 4, size.shape[0] - size.shape[0] // 50
@@ -241,8 +235,7 @@ def _product(e: FloatArray, x: FloatArray, lag: int) -> float:
     return float(e[:lag] @ x[-lag:])
 
 
-SIGNIFICANCE = 0.01
-"""False alarms of the detection, on recordings in open loop."""
+SIGNIFICANCE = 0.01  # false alarms of the detection, on recordings in open loop
 
 
 @dataclass(frozen=True, slots=True)

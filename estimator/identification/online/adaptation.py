@@ -107,12 +107,7 @@ class VariableForgetting:
 
 @dataclass(frozen=True, slots=True)
 class DecreasingThenConstantTrace:
-    """Decreasing gain until tr F has fallen to ``trace``, which is then held: fast start, then tracking.
-
-    The paper's profile. While the trace is held, lambda_1(t) and lambda_2(t) follow from it and from their
-    constant ratio alpha. The paper gives "lambda_1 = 0.993" next to "tr F(0) = 0.01"; since lambda_1(t) itself
-    is fixed by the trace, its number is taken as the ratio (lambda_1 for lambda_2 = 1).
-    """
+    """Decreasing gain until tr F has fallen to ``trace``, which is then held: fast start, then tracking."""
 
     lambda1: float = 0.993
     trace: float = 0.01
@@ -293,11 +288,7 @@ def informs_by_itself(law: FloatArray) -> bool:
 
 @inlined
 def adapt(Phi: FloatArray, m: Parts) -> float:
-    """Update whatever the profile has; g = F Phi and Phi^T F Phi are of the F before.
-
-    ``m.diagonal`` then tells what the samples determine: it is that of F, or, where F does not fall with them, that of
-    the decreasing gain ``known_U``, ``known_D`` that runs alongside it for this alone.
-    """
+    """Update whatever the profile has; g = F Phi and Phi^T F Phi are of the F before."""
     by_itself = informs_by_itself(m.law)
     if not by_itself:
         absorb(Phi, 1.0, m.known_U, m.known_D, m.g, m.f)

@@ -165,7 +165,6 @@ def _of_length(L: FloatArray, length: int) -> FloatArray:
 
 
 def rls_past(of: Orders) -> Shapes:
-    """Return its past values: measured outputs, torques."""
     return {"outputs": (of.na,), "inputs": (of.nk + of.nb,)}
 
 
@@ -202,7 +201,6 @@ class Rls(RegressionEstimator):
 
 
 def riv_past(of: Orders, n_L: int) -> Shapes:
-    """Return its past values."""
     outputs_f, inputs_f = (max(of.na, n_L - 1),), (max(of.nk + of.nb, n_L - 1),)
     filtered_rows = {"auxiliary_f": outputs_f, "outputs_f": outputs_f, "inputs_f": inputs_f}
     return {"outputs": (of.na,), "inputs": (of.nk + of.nb,), **filtered_rows, "auxiliary": (of.n_parameters,)}
@@ -267,7 +265,6 @@ class Riv(RegressionEstimator):
 
 
 def oeepm_past(of: Orders) -> Shapes:
-    """Return its past values: predicted outputs, torques, a-posteriori errors."""
     return {"outputs": (of.na,), "inputs": (of.nk + of.nb,), "errors": (of.na,)}
 
 

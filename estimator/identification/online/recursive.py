@@ -60,8 +60,7 @@ class Memory:
         return {name: self[name].copy() for name in self._kept}
 
 
-VERSION = 2
-"""Goes up when a part changes its meaning; states of another version are refused."""
+VERSION = 2  # goes up when a part changes its meaning; states of another version are refused
 
 State = dict[str, Any]
 

@@ -205,7 +205,6 @@ def verdict(stable: bool, m: Parts, row: Parts) -> int:
 
 @inlined
 def fill_row(y_hat: float, e_prior: float, e_post: float, used: bool, stable: bool, m: Parts, row: Parts) -> None:
-    """Fill the row of results of a sample."""
     n = row.theta.shape[0]
     for i in range(n):
         row.theta[i] = m.theta[i]
@@ -274,7 +273,6 @@ class RegressionEstimator(RecursiveEstimator):
 
 
 def checked_filter(name: str, L: FloatArray) -> FloatArray:
-    """Return a copy of L."""
     own = np.array(L, dtype=np.float64)
     if own.ndim != 1 or own.shape[0] == 0 or not np.isfinite(own).all() or own[0] != 1.0:
         raise BadModel(f"{name}: L is {L}, expected finite coefficients 1, l_1, l_2 .. of a polynomial in q^-1.")

@@ -13,8 +13,7 @@ import numpy as np
 from estimator.errors import BadSetting
 from estimator.signals.record import FloatArray
 
-NORMAL_95 = 1.959963984540054
-"""Standard deviations that hold 95 % of a normal distribution, either way."""
+NORMAL_95 = 1.959963984540054  # standard deviations that hold 95 % of a normal distribution, either way
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,14 +124,9 @@ class TrackingState(IntEnum):
         return self.word.replace("_", " ")
 
 
-HIGHEST = 40.0
-"""No threshold is sought above."""
-
-NODES = 200
-"""Of the Gauss-Legendre quadrature: twelve digits for thresholds from 0.1 up."""
-
-HALVINGS = 40
-"""Of the interval that holds the threshold: to below 1e-10 of `HIGHEST`."""
+HIGHEST = 40.0  # no threshold is sought above
+NODES = 200  # of the Gauss-Legendre quadrature: twelve digits for thresholds from 0.1 up
+HALVINGS = 40  # of the interval that holds the threshold: to below 1e-10 of `HIGHEST`
 
 
 @cache

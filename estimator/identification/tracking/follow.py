@@ -365,8 +365,7 @@ TRUSTED = 26
 """Excited blocks in a row after which an estimate that had to begin anew counts as settled: as many as the watch takes
 to know what is usual."""
 
-FEWEST = 240
-"""Samples of a usable estimate before a standard deviation is given."""
+FEWEST = 240  # samples of a usable estimate before a standard deviation is given
 
 
 @dataclass(frozen=True, slots=True, eq=False)

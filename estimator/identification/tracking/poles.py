@@ -18,14 +18,9 @@ from estimator.compiled import compiled, inlined
 from estimator.identification.linear_model import ComplexArray
 from estimator.signals.record import FloatArray
 
-ROUNDS = 60
-"""Rounds allowed from the fixed points; only poles that (nearly) coincide take so many."""
-
-WARM_ROUNDS = 6
-"""Rounds allowed from the poles of the sample before."""
-
-CONVERGED = 1e-13
-"""Change of a pole by which it is taken as found; poles of interest have a magnitude near 1."""
+ROUNDS = 60  # rounds allowed from the fixed points; only poles that (nearly) coincide take so many
+WARM_ROUNDS = 6  # rounds allowed from the poles of the sample before
+CONVERGED = 1e-13  # change of a pole by which it is taken as found; poles of interest have a magnitude near 1
 
 COINCIDING = 1e-5
 """Change after all the rounds up to which poles that coincide are taken as found: rounding leaves a double one 1e-8."""

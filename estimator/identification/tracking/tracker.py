@@ -17,10 +17,7 @@ from estimator.signals.record import BoolArray, FloatArray, IntArray
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Tracked:
-    """What came of samples: the estimates, the resonance in them, what the tracking was doing, and the alarms.
-
-    ``state`` has shape (n,), values of :class:`TrackingState`; ``alarm_at`` tells at which sample each alarm came.
-    """
+    """What came of samples: the estimates, the resonance in them, what the tracking was doing, and the alarms."""
 
     estimates: Trajectory
     found: Followed

@@ -70,10 +70,7 @@ class Baseline:
 
 
 def spread_of(number: FloatArray, deviation_hz: FloatArray, information: FloatArray) -> Spread:
-    """Return how blocks scatter about a straight line over their numbers, each array of shape (n,), n of 3 or more.
-
-    A line, since a resonance that drifts while it is learnt would be taken for one that scatters.
-    """
+    """Return how blocks scatter about a straight line over their numbers, each array of shape (n,), n of 3 or more."""
     mean = (information @ number) / information.sum()
     level = (information @ deviation_hz) / information.sum()
     slope = (information @ ((number - mean) * (deviation_hz - level))) / (information @ (number - mean) ** 2)
@@ -163,7 +160,6 @@ def take_reference(
 
 @compiled
 def reference_output(structure: IntArray, theta: FloatArray, past: FloatArray) -> float:
-    """Return the next output of the reference model, from its own outputs and the inputs."""
     na = structure[NA]
     value = 0.0
     for i in range(na):

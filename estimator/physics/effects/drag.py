@@ -164,7 +164,6 @@ def eddy_law(speed: float, peak: float, peak_speed: float) -> float:
 
 
 def speed_of(record: Record) -> FloatArray:
-    """Return the speeds that were measured."""
     speed = measured_speed(record)
     return speed[np.isfinite(speed)]
 

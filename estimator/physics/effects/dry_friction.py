@@ -58,10 +58,7 @@ def motor_reparametrised(
 def forms_near_rest(
     size: str, scale: Sequence[float], values: Mapping[str, float], presliding: Sequence[float]
 ) -> list[OtherForm]:
-    """Return a dry friction that was found sharp in its forms near rest, bent by each ``presliding``, or creeping.
-
-    The sizes before the two shapes keep what was found.
-    """
+    """Return a dry friction that was found sharp in its forms near rest, bent by each ``presliding``, or creeping."""
     if values["presliding_rad"] > 0.0 or values["creep_rad_s"] > 0.0:
         return []
     found = values[size] / scale[0]
@@ -101,8 +98,7 @@ COULOMB_FRICTION_MOTOR = Effect(
 # Dry friction on the load side: a constant torque against the motion.
 
 
-STICKING = 0.02
-"""Presliding of a contact that sticks, in the scale of one that deflects."""
+STICKING = 0.02  # presliding of a contact that sticks, in the scale of one that deflects
 
 LOAD_PRESLIDING = EffectParameter(
     "presliding_rad",

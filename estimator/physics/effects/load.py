@@ -29,11 +29,8 @@ from estimator.signals.record import FloatArray, Record
 # Road grade: a load torque that wanders slowly over a recording, as the road goes up and down.
 
 
-KNOT_SPACING_S = 2.0
-"""A road's grade keeps its value over tens of metres: 2 s at a bus's 10 m/s are 20 m."""
-
-DEGREE = 3
-"""Cubic: a road is laid out without kinks, so a profile with an edge is something else."""
+KNOT_SPACING_S = 2.0  # a road's grade keeps its value over tens of metres: 2 s at a bus's 10 m/s are 20 m
+DEGREE = 3  # cubic: a road is laid out without kinks, so a profile with an edge is something else
 
 SHORTEST_S = 4 * KNOT_SPACING_S
 """A profile needs a few knots; a shorter recording can't tell it from the constant load."""
@@ -227,8 +224,7 @@ GROUNDED_SPRING = Effect(
 # The tyre slips: the wheel's inertia is coupled to the vehicle's by creep and no longer rigidly.
 
 
-LIGHTEST = 0.005
-"""Least share of the load's inertia that a wheel has."""
+LIGHTEST = 0.005  # least share of the load's inertia that a wheel has
 
 
 @compiled

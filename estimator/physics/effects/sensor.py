@@ -83,11 +83,8 @@ RESOLVER_ERROR = Effect(
 # The sensor reads the magnitude of the speed.
 
 
-STANDSTILL = 0.05
-"""Share of its top speed below which a recording comes to standstill between two samples."""
-
-LEAST_SHARE = 0.5
-"""Share of the magnitude from which a sensor's own motion has no sign left."""
+STANDSTILL = 0.05  # share of its top speed below which a recording comes to standstill between two samples
+LEAST_SHARE = 0.5  # share of the magnitude from which a sensor's own motion has no sign left
 
 
 def blind_testable(model: Driveline, records: Sequence[Record]) -> Untestable | None:

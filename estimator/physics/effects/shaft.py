@@ -143,10 +143,7 @@ def stiffness_factor(twist: float, hardening: float, shape: float) -> float:
 
 @compiled
 def loaded_twist(twist: float, hardening: float, shape: float, stage: float, stage_from: float) -> float:
-    """Return the twist at which a linear shaft carries the same torque [rad].
-
-    From ``stage_from`` on, either way, a second spring is loaded next to the first: a coupling of two stages.
-    """
+    """Return the twist at which a linear shaft carries the same torque [rad]."""
     same = twist * stiffness_factor(twist, hardening, shape)
     if every(stage == 0.0):
         return same
@@ -262,7 +259,6 @@ def slider_scales(model: Driveline, records: Sequence[Record]) -> tuple[float, .
 
 
 def slider_starts(model: Driveline, records: Sequence[Record]) -> list[Start]:
-    """Return sliders that yield early and late, a part of them in the nominal stiffness."""
     early, late = (Held(0.0), Held(0.0)) if model.structure is Structure.JOINT else (0.2, 0.5)
     return [(0.5, 0.5, 1.0, 0.7, early), (1.0, 4.0, 1.0, 0.7, late)]
 

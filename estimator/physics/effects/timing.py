@@ -35,8 +35,7 @@ SLOWEST_S = 0.1
 """Longest time constant [s] of a current loop or of a sensor's filter, or delay of a bus: a drive is of no use with
 one. What a fit finds beyond it stands for something else that is slow."""
 
-EQUAL_POLES = 1e-6
-"""Half the distance of two poles, times the step, below which they are one."""
+EQUAL_POLES = 1e-6  # half the distance of two poles, times the step, below which they are one
 
 
 class LowPass(NamedTuple):
@@ -104,19 +103,14 @@ def quick_enough(key: str) -> Callable[[Driveline, Sequence[Record], Mapping[str
 # The torque in the air gap follows its reading with a lag.
 
 
-FASTEST_S = 1e-9
-"""Below this a lag is none; it keeps the exponential's argument finite."""
+FASTEST_S = 1e-9  # below this a lag is none; it keeps the exponential's argument finite
 
 
 @compiled
 def lag_step(
     torque: float, rise: float, lagged: float, lag_rise: float, lag: LowPass
 ) -> tuple[float, float, float, float]:
-    """Return the lagged torque over a step of constant input as a straight line, and its value and rise at the end.
-
-    The line has the mean and the first moment of the decay, exactly: mean and rise from end to end [Nm]. Without a lag
-    the input's own rise is passed on; behind one it counts no more. The rise at the end is the rate times ``tau``.
-    """
+    """Return the lagged torque over a step of constant input as a straight line, and its value and rise at the end."""
     if lag.time_constant < FASTEST_S:
         return torque, rise, torque, 0.0
     turns, shape, value = lag.turns, lag.shape, lagged - torque

@@ -152,8 +152,7 @@ TORQUE_DERATING = Effect(
 # The true torque stops at a limit that its reading passes.
 
 
-EDGE = 100.0
-"""Sharpness from which on a knee is an edge."""
+EDGE = 100.0  # sharpness from which on a knee is an edge
 
 
 def saturation_scales(model: Driveline, records: Sequence[Record]) -> tuple[float, ...]:
@@ -209,8 +208,7 @@ TORQUE_SATURATION = Effect(
 # The true torque grows less than its reading: the machine's iron saturates, for both signs alike or not.
 
 
-SPREAD = 0.3
-"""Share of the largest torque by which its size must differ: about one size any law is a gain."""
+SPREAD = 0.3  # share of the largest torque by which its size must differ: about one size any law is a gain
 
 
 def nonlinearity_law(torque: FloatArray, _since_start_s: FloatArray, curvature: float, asymmetry: float) -> FloatArray:
@@ -269,8 +267,7 @@ TORQUE_NONLINEARITY = Effect(
 # The reading of the torque is off by an offset, from the start on or as it drifts away.
 
 
-LEAST_S = 8.0
-"""A drift shows in recordings of this length: in less it is the noise of the reading."""
+LEAST_S = 8.0  # a drift shows in recordings of this length: in less it is the noise of the reading
 
 
 def bias_law(torque: FloatArray, since_start_s: FloatArray, offset: float, time_constant_s: float) -> FloatArray:
@@ -286,7 +283,6 @@ def is_load_known(model: Driveline) -> bool:
 
 
 def bias_starts(model: Driveline, records: Sequence[Record]) -> list[Start]:
-    """Return drifts that end within the recording and beyond it, and an offset where the load is known."""
     drifting: list[Start] = [(0.5, 0.3), (1.0, 2.0)]
     return [(0.5, Held(0.0)), *drifting] if is_load_known(model) else drifting
 

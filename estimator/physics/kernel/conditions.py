@@ -168,7 +168,6 @@ def is_waving(p: FloatArray) -> bool:
 
 @inlined
 def is_changing(begin_s: float, end_s: float, p: FloatArray) -> bool:
-    """Tell whether an event begins or ends between two times."""
     for i in range(EVENTS.shape[0]):
         if some(p[EVENTS[i, 0]] != 0.0) and is_edge(begin_s, end_s, p[EVENTS[i, 1]], p[EVENTS[i, 2]]):
             return True
@@ -391,7 +390,6 @@ def at_load(line: Line, torque: float, x: State, now: Conditions, p: FloatArray,
 
 @inlined
 def bent(line: Line, held: Bristles, x: State, now: Conditions, p: FloatArray, time_s: float) -> Bristles:
-    """Return what the bristles hold after a time at the speeds of a state."""
     motor, load = held.motor, held.load
     if is_bristled_at_motor(p):
         motor = at_motor(motor, x, now, p, time_s)
@@ -402,7 +400,6 @@ def bent(line: Line, held: Bristles, x: State, now: Conditions, p: FloatArray, t
 
 @inlined
 def rubbed(now: Conditions, held: Bristles, p: FloatArray) -> Conditions:
-    """Return the conditions with what bristles hold in place of the other laws of dry friction where they are."""
     torque, dry_motor, dry_load, rubbing = now.torque, now.dry_motor, now.dry_load, now.rubbing
     if is_bristled_at_motor(p):
         torque, dry_motor = torque - held.motor, like(0.0, dry_motor)

@@ -78,10 +78,7 @@ def fed(
     lag_rise: float,
     p: FloatArray,
 ) -> tuple[float, float, float, float]:
-    """Return mean and rise of the torque on the shaft [Nm] over a sub-step, and the lag's state at its end.
-
-    The sub-step begins a ``part`` of a sample behind sample k and is ``length`` samples long.
-    """
+    """Return mean and rise of the torque on the shaft [Nm] over a sub-step, and the lag's state at its end."""
     place = k + part
     supplied, rise = torque[k], 0.0
     if feed.shifted:

@@ -16,8 +16,7 @@ from estimator.physics.laws import BEYOND, dry_friction
 from estimator.physics.layout import slot
 from estimator.signals.record import FloatArray
 
-WORTHWHILE_SAMPLES = 50
-"""Samples from which on reading the answers takes less time than they save."""
+WORTHWHILE_SAMPLES = 50  # samples from which on reading the answers takes less time than they save
 
 _OTHERS = [(entry.name, each) for entry in BUILT_IN.values() if not entry.linear for each in entry.parameters]
 BENDING = np.array([slot(effect, parameter.name) for effect, parameter in _OTHERS])
@@ -83,7 +82,6 @@ def is_beyond(begun: float, ended: float, limit: float) -> bool:
 
 @inlined
 def unit(entry: int) -> State:
-    """Return the state of a line at rest but for one unit of an entry."""
     return State(
         1.0 if entry == 0 else 0.0,
         1.0 if entry == 1 else 0.0,

@@ -317,8 +317,7 @@ def runge_kutta(line: Line, now: Conditions, torque: float, rise: float, x: Stat
     return moved(line, x, fourth, h / 6.0)
 
 
-PARTS = 8
-"""Steps that are taken in place of one."""
+PARTS = 8  # steps that are taken in place of one
 
 DEPTHS, FAST = 4.0, 0.25
 """Depths of contact, ``e_c``, beyond the edge of a gap in which its damping sets in, where a step covers this share of

@@ -50,7 +50,6 @@ FEEDING = np.array([slots.DELAY, slots.DELAYED_BEFORE, slots.DRIFT, slots.LAG, s
 
 @compiled
 def go_side_by_side(masses: Masses, p: FloatArray, rows: IntArray) -> bool:
-    """Tell whether some of the lines, a row of parameters each, are simulated side by side."""
     first = p[rows[0]]
     if rows.size == 1 or not IS_COMPILED:
         return False

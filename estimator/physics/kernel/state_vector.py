@@ -7,11 +7,8 @@ from typing import NamedTuple
 from estimator.compiled import inlined
 from estimator.signals.record import FloatArray
 
-ANGLE, SPEED, TWIST, LOAD_SPEED = 0, 1, 2, 3
-"""Mechanical states that can be an output; see ``State``."""
-
-LOAD_ANGLE, SHAFT_TORQUE = 20, 21
-"""Outputs that follow from several states."""
+ANGLE, SPEED, TWIST, LOAD_SPEED = 0, 1, 2, 3  # mechanical states that can be an output; see ``State``
+LOAD_ANGLE, SHAFT_TORQUE = 20, 21  # outputs that follow from several states
 
 VEHICLE_SPEED, BRANCH_TWIST, BRANCH_SPEED, MIDDLE_TWIST, MIDDLE_SPEED, TRACTION = 5, 6, 7, 8, 9, 10
 """Further ones."""
@@ -42,7 +39,6 @@ class State(NamedTuple):
 
 @inlined
 def unpacked(state: FloatArray) -> State:
-    """Return the mechanical part of the state array."""
     return State(
         state[0], state[1], state[2], state[3], state[4], state[5],
         state[6], state[7], state[8], state[9], state[10], state[11],
