@@ -25,7 +25,7 @@ from estimator.physics.model import DrivelineModel, Structure, natural_frequenci
 from estimator.physics.simulate import output_state
 from estimator.signals.record import BoolArray, FloatArray, OutputKind, Record, separated_outputs
 
-FEWEST_KEPT = 20
+FEWEST_IN_A_ROW = 20
 """Samples in a row that count: by chance two in three of the steps between them would have to be alike."""
 
 ROUNDING = 2.0
@@ -65,7 +65,7 @@ def not_read(channel: str, values: FloatArray, seen: BoolArray, may_rest: bool) 
     drawn, held = np.zeros_like(seen), np.zeros_like(seen)
     for first, behind in _runs(whole & (bend <= rounding)):
         rows = slice(first, behind + 2)  # a triple has two rows more
-        if behind + 2 - first < FEWEST_KEPT:
+        if behind + 2 - first < FEWEST_IN_A_ROW:
             continue
         moved = float(np.ptp(values[rows]))
         drawn[rows] |= moved >= usual
