@@ -72,7 +72,7 @@ def unpredictable(errors: Sequence[FloatArray]) -> float:
 
 VERY_STRONG = 10.0  # a difference in BIC above this is very strong evidence (Kass and Raftery, JASA 90, 1995)
 
-SMALLEST_P = 1e-300
+SMALLEST_P = 1e-300  # stands for any smaller probability, so that logarithms stay finite
 
 
 @dataclass(frozen=True, slots=True)

@@ -26,7 +26,7 @@ from threadpoolctl import threadpool_limits
 from estimator.diagnosis.acquisition.chain import mechanical, read_through
 from estimator.diagnosis.inference.answer import LEVELS
 from estimator.diagnosis.inference.answer import searched as searched_for
-from estimator.diagnosis.inference.checks import LEAST_SHARE, TEST_LIMITS, THRESHOLDS_FILE, chance
+from estimator.diagnosis.inference.checks import COLUMNS, LEAST_SHARE, TEST_LIMITS, THRESHOLDS_FILE, chance
 from estimator.diagnosis.inference.judge import Score, probability_of
 from estimator.diagnosis.inference.rivals import rivals_of
 from estimator.diagnosis.preconditions.prepare import prepare
@@ -97,8 +97,7 @@ class World:
 
     def probability(self, claim: Claim, thresholds: Thresholds) -> float:
         """Return the probability of an effect under some thresholds."""
-        shares = (key for key, limit in TEST_LIMITS.items() if limit.is_share)
-        lost = max(0.0, *(self.beyond_chance(key) - thresholds.limits[key] for key in shares))
+        lost = max(0.0, *(self.beyond_chance(key) - thresholds.limits[key] for key in COLUMNS))
         scores = [Score(frozenset(effects), score, plausible) for effects, score, plausible in self.scores]
         return probability_of(claim.names, scores, thresholds.divisor + self.samples * lost)
 

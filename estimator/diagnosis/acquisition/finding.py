@@ -104,8 +104,6 @@ SMALLEST_SHARE = 0.002
 its variance grows by the like. At one in two hundred and thirty the search for laws without a name still sees them (a
 sealed case, seed 701), and what it sees should have its name."""
 
-SMALLEST_P = 1e-300  # stands for any smaller probability, so that logarithms stay finite
-
 
 ORDER = 12
 """Past samples of output and torque that are seen. A line of two masses needs 2, one of three 4; the rest is there to

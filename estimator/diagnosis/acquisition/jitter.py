@@ -12,7 +12,6 @@ from scipy import optimize, stats
 from estimator.diagnosis.acquisition.finding import (
     LEVEL,
     OUTPUT,
-    SMALLEST_P,
     Finding,
     Sized,
     no_cells,
@@ -20,6 +19,7 @@ from estimator.diagnosis.acquisition.finding import (
     slope_test,
 )
 from estimator.diagnosis.acquisition.quantised import decimal_place
+from estimator.diagnosis.noise import SMALLEST_P
 from estimator.signals.record import BoolArray, FloatArray, Record, uniform_period_s
 
 AGREEMENT = 0.5  # share of the stamps' offsets that the output must confirm: half way between none and all

@@ -12,7 +12,6 @@ from scipy import stats
 from estimator.diagnosis.acquisition.finding import (
     LEVEL,
     OUTPUT,
-    SMALLEST_P,
     SMALLEST_SHARE,
     Finding,
     Sized,
@@ -26,6 +25,7 @@ from estimator.diagnosis.acquisition.finding import (
     share_interval,
     shorter_runs,
 )
+from estimator.diagnosis.noise import SMALLEST_P
 from estimator.signals.record import BoolArray, FloatArray, OutputKind, Record
 
 STEP_QUANTILE = 0.02

@@ -12,7 +12,6 @@ from scipy import stats
 from estimator.diagnosis.acquisition.finding import (
     LEVEL,
     OUTPUT,
-    SMALLEST_P,
     SMALLEST_SHARE,
     Finding,
     Sized,
@@ -26,6 +25,7 @@ from estimator.diagnosis.acquisition.finding import (
     share_interval,
 )
 from estimator.diagnosis.acquisition.quantised import chance_repeats, lattice_step, repeats
+from estimator.diagnosis.noise import SMALLEST_P
 from estimator.signals.record import BoolArray, FloatArray, Record
 
 HALF_WINDOW = 25

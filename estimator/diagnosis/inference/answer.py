@@ -48,7 +48,7 @@ from estimator.diagnosis.inference.judge import (
 from estimator.diagnosis.inference.rivals import Law, best_law, rivals_of, searches_around
 from estimator.diagnosis.inference.search import Search
 from estimator.diagnosis.inference.wording import Context, law_in_words, statement
-from estimator.diagnosis.noise import noise_floor
+from estimator.diagnosis.noise import SMALLEST_P, noise_floor
 from estimator.diagnosis.preconditions.prepare import Prepared, as_slow_as_needed
 from estimator.diagnosis.result import (
     Diagnosis,
@@ -86,32 +86,28 @@ class Found:
     grounds: Grounds
 
 
-def ignore(_search: Search) -> None:
-    """Do nothing with a search that begins."""
-
-
 def searched(
     chain: Chain,
     line: DrivelineModel,
     work: Work | None = None,
     most: float = math.inf,
-    watch: Callable[[Search], None] = ignore,
+    watch: Callable[[Search], None] = lambda _search: None,
     progress: Progress = silent,
 ) -> Found:
     """Search for what is missing; once more where the errors of what is found show jitter."""
 
-    def begin(of: Chain) -> Search:
+    def found_in(of: Chain) -> Found:
         search = _search(of, line, work or Work(), most)
         search.progress = progress
         watch(search)
-        return search
+        return Found(of, search, grounds(search))
 
-    found = _found(chain, begin(chain))
+    found = found_in(chain)
     if found.search.stopped:
         return found
     free = on_recordings(found.grounds.best, line, chain.separated, is_whole=True)
     steady = chain.with_jitter_in(free.first_outputs())
-    return found if steady is chain else _found(steady, begin(steady))
+    return found if steady is chain else found_in(steady)
 
 
 def _search(chain: Chain, line: DrivelineModel, work: Work, most: float) -> Search:
@@ -120,18 +116,8 @@ def _search(chain: Chain, line: DrivelineModel, work: Work, most: float) -> Sear
     return Search(line, fitted_to, everything(fitted_to), names, work=work, most=most)
 
 
-def _found(chain: Chain, search: Search) -> Found:
-    return Found(chain, search, grounds(search))
-
-
-SMALLEST_P = 1e-300
-
 LEVELS: Mapping[str, int] = {"quick": 4_000, "normal": 40_000, "thorough": 400_000}
 """Free runs of all recordings after which a search makes no further step: a choice of how long people wait."""
-
-
-def keep_nothing(_found: Found) -> None:
-    """Take no note of what a search found."""
 
 
 def answer(
@@ -140,7 +126,7 @@ def answer(
     progress: Progress,
     level: str,
     work: Work,
-    keep: Callable[[Found], None] = keep_nothing,
+    keep: Callable[[Found], None] = lambda _found: None,
 ) -> Diagnosis:
     """Return the diagnosis of recordings that are fit for one; undecided where the limit of time ends it.
 

@@ -35,19 +35,8 @@ LEAST_PROBABILITY: float = THRESHOLDS["least_probability"]
 """Probability from which an effect is named."""
 
 
-@dataclass(frozen=True, slots=True)
-class Limit:
-    """The most that a test may find in noise; ``is_share`` where it finds a share of the innovations' variance."""
-
-    most: float
-    is_share: bool = False
-
-
-TEST_LIMITS = {
-    "most_predictable": Limit(THRESHOLDS["most_predictable"], is_share=True),
-    "most_dependent": Limit(THRESHOLDS["most_dependent"], is_share=True),
-    "most_line": Limit(THRESHOLDS["most_line"]),
-    "most_change": Limit(THRESHOLDS["most_change"]),
+TEST_LIMITS: dict[str, float] = {
+    key: THRESHOLDS[key] for key in ("most_predictable", "most_dependent", "most_line", "most_change")
 }
 """What their own past may predict of the innovations, and what torque, speed and angle may, beyond chance; the power
 of a line in their spectrum over their mean power; their mean square in a second, in standard deviations from that of
@@ -231,7 +220,7 @@ def tests(best: Hypothesis) -> tuple[Test, ...]:
     bounded = (Test(name, float(_is_at_bound(best, size)), 0.5) for size, name in _bounded(best))
     return (
         *(
-            Test(name, value, TEST_LIMITS[key].most + chance(key, whole.size), TEST_LIMITS[key].is_share, key)
+            Test(name, value, TEST_LIMITS[key] + chance(key, whole.size), key in COLUMNS, key)
             for key, name, value in limited
         ),
         *bounded,

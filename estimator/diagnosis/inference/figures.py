@@ -32,6 +32,7 @@ from estimator.diagnosis.inference.hypotheses import (
     refitted,
 )
 from estimator.diagnosis.inference.judge import Belief, Decision, free_rms
+from estimator.diagnosis.noise import SMALLEST_P
 from estimator.diagnosis.result import Evidence, Fit, FoundEffect, OutputFit, Trace
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import FitResult, fit, not_fitted, warm_start
@@ -150,9 +151,6 @@ class Unseen:
             pairs = zip(firsts, judging.raw, inside, strict=True)
             errors = [(out - raw.output)[raw.okay & held] for (out, _), raw, held in pairs]
         return float(np.sqrt(np.mean(np.concatenate(errors) ** 2)))
-
-
-SMALLEST_P = 1e-300
 
 
 def found_effects(

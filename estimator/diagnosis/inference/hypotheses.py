@@ -314,7 +314,7 @@ def fitted(
         result = descended(result, whitener_of(result, sizes), THOROUGH)
         if len(passes) < WITH_MOMENTS:
             result = _with_moments(result, sizes)
-        sizes, now = _disturbances(result, sizes, limits, is_anew=not passes)
+        sizes, now = estimated(result, result.residual, sizes, limits, ROUNDS, is_anew=not passes)
         enough = SAME if math.isnan(rival) else max(SAME, DIGITS * abs(now - rival))
         last = best is not None and now > best.minus_twice_log - enough
         if best is None or now < best.minus_twice_log:
@@ -331,7 +331,7 @@ def compared(effects: Effects, initial: FitResult, parent: Hypothesis, limits: L
     result, now = initial, math.inf
     for _ in range(MOST_ROUGH):
         result = descended(result, whitener_of(result, sizes), ROUGH)
-        sizes, now = _disturbances(result, sizes, limits)
+        sizes, now = estimated(result, result.residual, sizes, limits, ROUNDS)
         if now > best - MUCH * result.residual.size:
             break
         best = now
@@ -342,12 +342,6 @@ def refitted(hypothesis: Hypothesis, problem: Problem) -> FitResult:
     """Return the fit of a hypothesis to other samples of the same recordings, its disturbances as they are."""
     initial = not_fitted(problem, hypothesis.result.x)
     return descended(initial, whitener_of(initial, hypothesis.sizes), THOROUGH)
-
-
-def _disturbances(
-    result: FitResult, sizes: FloatArray, limits: Limits, is_anew: bool = False
-) -> tuple[FloatArray, float]:
-    return estimated(result, result.residual, sizes, limits, ROUNDS, is_anew)
 
 
 def samples_of(result: FitResult) -> FloatArray:

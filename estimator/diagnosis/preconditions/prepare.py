@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy.signal import detrend
 
 from estimator.diagnosis.acquisition.chain import as_if_not_lost
+from estimator.diagnosis.acquisition.finding import runs
 from estimator.diagnosis.noise import noise_floor, share_of
 from estimator.diagnosis.preconditions.channels import unwrapped, with_usable_channels, without_clipped
 from estimator.diagnosis.preconditions.inertia import driven, model_warnings
@@ -63,7 +64,7 @@ def not_read(channel: str, values: FloatArray, seen: BoolArray, may_rest: bool) 
     if usual < BENT * rounding:
         return []
     drawn, held = np.zeros_like(seen), np.zeros_like(seen)
-    for first, behind in _runs(whole & (bend <= rounding)):
+    for first, behind in runs(whole & (bend <= rounding)):
         rows = slice(first, behind + 2)  # a triple has two rows more
         if behind + 2 - first < FEWEST_IN_A_ROW:
             continue
@@ -73,11 +74,6 @@ def not_read(channel: str, values: FloatArray, seen: BoolArray, may_rest: bool) 
     if may_rest or float(np.mean(steps[~(held[1:] & held[:-1])] == 0.0)) > SELDOM:
         held[:] = False
     return [NotRead(channel, rows, rows is held) for rows in (drawn, held) if rows.any()]
-
-
-def _runs(rows: BoolArray) -> list[tuple[int, int]]:
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], rows.astype(np.int8), [0]])))
-    return [(int(first), int(last)) for first, last in edges.reshape(-1, 2)]
 
 
 def without_not_read(records: Sequence[Record]) -> tuple[list[Record], list[str]]:

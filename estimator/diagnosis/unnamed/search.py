@@ -13,7 +13,7 @@ from scipy import stats
 from scipy.ndimage import maximum_filter1d, median_filter
 
 from estimator.diagnosis.line.blocks import PLACES, Place, block_mean_of, lines, simulated
-from estimator.diagnosis.noise import SMALLEST_P, Gain, noise_floor
+from estimator.diagnosis.noise import SMALLEST_P, Gain
 from estimator.diagnosis.unnamed.forms import (
     MOST_COEFFICIENTS,
     Form,
@@ -25,7 +25,7 @@ from estimator.diagnosis.unnamed.forms import (
     pursue,
 )
 from estimator.diagnosis.unnamed.laws import Law
-from estimator.diagnosis.unnamed.scene import Extra, Ground, Scene, elements, extra_of, ground_of, scene
+from estimator.diagnosis.unnamed.scene import Extra, Ground, Scene, elements, extra_of, ground_of
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult
 from estimator.physics.jacobian import STEP
@@ -359,23 +359,6 @@ class UnnamedLaw:
     terms: tuple[tuple[str, float], ...]
     gain: Gain
     rms: float
-
-
-def best_unnamed(result: FitResult, rounds: int = 1) -> UnnamedLaw | None:
-    """Return the law without a name that gains most over a fit; None where no candidate gains anything."""
-    return best_of(unnamed_laws(result, rounds))
-
-
-def best_of(laws: Sequence[UnnamedLaw]) -> UnnamedLaw | None:
-    """Return the law that gains most, of those that gain anything."""
-    found = [law for law in laws if law.gain.delta_bic > 0]
-    return max(found, key=lambda law: law.gain.delta_bic, default=None)
-
-
-def unnamed_laws(result: FitResult, rounds: int = 1) -> list[UnnamedLaw]:
-    """Return the best law of each element that has candidates."""
-    view = scene(result, noise_floor(result.problem.records))
-    return judged(view, searches_at(view, rounds))
 
 
 def each_of(result: FitResult, search: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:

@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 from scipy import signal, stats
 
+from estimator.diagnosis.acquisition.finding import runs
 from estimator.diagnosis.line.blocks import Motion, motion_of
 from estimator.diagnosis.result import BandTest, ErrorSpectrum, Interval, Region, Response
 from estimator.errors import NotExciting
@@ -175,8 +176,7 @@ def intervals(result: FitResult, floor: float) -> dict[str, tuple[Interval, ...]
     found = {}
     for i, record in enumerate(result.problem.records):
         above = excess(result, i, floor) > 0.0
-        edges = np.flatnonzero(np.diff(np.concatenate([[0], above.astype(int), [0]])))
-        spans = [(float(record.time_s[a]), float(record.time_s[b - 1])) for a, b in edges.reshape(-1, 2)]
+        spans = [(float(record.time_s[a]), float(record.time_s[b - 1])) for a, b in runs(above)]
         shortest = 0.5 * min(WINDOW_S, float(record.time_s[-1] - record.time_s[0]))
         kept = [span for span in _merged(spans) if span[1] - span[0] >= shortest]
         if kept:

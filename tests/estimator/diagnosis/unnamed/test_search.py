@@ -7,17 +7,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from estimator.diagnosis.noise import noise_floor
 from estimator.diagnosis.unnamed.scene import scene
 from estimator.diagnosis.unnamed.search import (
     LEAST_ROUNDS,
     ROUNDS,
     ElementSearch,
-    best_unnamed,
+    UnnamedLaw,
+    judged,
     searches_at,
-    unnamed_laws,
 )
 from estimator.physics.driveline import Start
 from estimator.physics.effect import Element
+from estimator.physics.fit import FitResult
 from tests.estimator.diagnosis.planted import SIGMA, Law, nominal_fit, quiet, recordings
 from tests.estimator.physics.bench import TWO_MASS, linear_record
 
@@ -38,6 +40,17 @@ PLANTED: list[tuple[Element, str, Law, float]] = [
     (Element.SPEED_SENSOR, "dw/dt", lambda m: np.gradient(m.speed, m.time_s), -1.5e-3),
     (Element.SPEED_SENSOR, "|w|", lambda m: np.abs(m.speed), 0.03),
 ]
+
+
+def unnamed_laws(result: FitResult, rounds: int = 1) -> list[UnnamedLaw]:
+    view = scene(result, noise_floor(result.problem.records))
+    return judged(view, searches_at(view, rounds))
+
+
+def best_unnamed(result: FitResult) -> UnnamedLaw | None:
+    """Return the law without a name that gains most over a fit; None where no candidate gains anything."""
+    found = [law for law in unnamed_laws(result) if law.gain.delta_bic > 0]
+    return max(found, key=lambda law: law.gain.delta_bic, default=None)
 
 
 @pytest.mark.parametrize(
