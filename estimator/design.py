@@ -1,11 +1,4 @@
-"""The next experiment, judged before it is driven: how well it distinguishes hypotheses, what it makes known.
-
-An experiment on paper is a recording that one hypothesis would give. Another hypothesis is fitted to it: its unknowns,
-held by what earlier recordings say of them, move to where the innovations are least, and what these still are is the
-expected difference of scores (T-optimality: Atkinson and Fedorov, Biometrika 62, 1975; Box and Hill, Technometrics 9,
-1967). Around a fit the information about its unknowns is that of its whitened derivative (D-optimality; Goodwin and
-Payne, Dynamic System Identification, 1977).
-"""
+"""The next experiment, judged before it is driven: how well it distinguishes hypotheses, what it makes known."""
 
 from __future__ import annotations
 
@@ -54,24 +47,12 @@ MOST_LOG_ODDS = 700.0  # largest logarithm of odds that is given: its exponentia
 
 @dataclass(frozen=True, slots=True)
 class Candidate:
-    """A hypothesis that recordings leave open.
+    """A hypothesis that recordings leave open."""
 
-    Attributes
-    ----------
-    name : str
-        Its effects joined by " + "; "nothing" for the nominal model re-tuned.
-    probability : float
-        Among the hypotheses that are open, as the judge counts odds.
-    fit : Hypothesis
-        Of the recordings' first outputs.
-    precision : ndarray, shape (S, S)
-        What recordings say of its shared unknowns: the inverse of their covariance, 0 where held.
-    """
-
-    name: str
-    probability: float
-    fit: Hypothesis
-    precision: FloatArray
+    name: str  # its effects joined by " + "; "nothing" for the nominal model re-tuned
+    probability: float  # among the hypotheses that are open, as the judge counts odds
+    fit: Hypothesis  # of the recordings' first outputs
+    precision: FloatArray  # (S, S): What recordings say of its shared unknowns
 
     @property
     def effects(self) -> Effects:
@@ -81,26 +62,13 @@ class Candidate:
 
 @dataclass(frozen=True, slots=True)
 class Open:
-    """What recordings leave open.
-
-    Attributes
-    ----------
-    line : DrivelineModel
-    candidates : tuple of Candidate
-        The most probable first; a single one where nothing is open.
-    twins : mapping of str to tuple of str
-        Effects of the candidates, and those that are the same linear system by this output, in every experiment.
-    tempered : float
-        By which differences of scores are divided (``judge``).
-    untested : tuple of str
-        Effects that these recordings can neither show nor exclude, and others could.
-    """
+    """What recordings leave open."""
 
     line: DrivelineModel
-    candidates: tuple[Candidate, ...]
+    candidates: tuple[Candidate, ...]  # the most probable first
     twins: Mapping[str, tuple[str, ...]]
-    tempered: float
-    untested: tuple[str, ...]
+    tempered: float  # by which differences of scores are divided (``judge``)
+    untested: tuple[str, ...]  # effects that these recordings can neither show nor exclude, and others could
 
     @property
     def is_decided(self) -> bool:
@@ -111,13 +79,7 @@ class Open:
 def left_open(
     records: Sequence[Record], model: DrivelineModel, effort: str = "normal", progress: Progress = silent
 ) -> tuple[Open, Diagnosis]:
-    """Diagnose, and return the hypotheses that recordings do not decide between, with the diagnosis.
-
-    Raises
-    ------
-    NotExciting, BadShape, Implausible
-        As ``diagnose``.
-    """
+    """Diagnose, and return the hypotheses that recordings do not decide between, with the diagnosis."""
     masses = len(MASSES.get(model.structure, ()))
     if masses and is_first_use(masses):
         progress("preparing", 0.0)
@@ -206,18 +168,7 @@ def _throughout(unknown: Shared, record: Record) -> Shared:
 
 
 def distance(truth: Candidate, rival: Candidate, line: DrivelineModel, record: Record) -> float:
-    """Return by how much the rival's score is expected to rise over the truth's if an experiment is driven.
-
-    Parameters
-    ----------
-    record : Record
-        The experiment on paper: its torques, and about what its output will be.
-
-    Returns
-    -------
-    float
-        In minus twice a log-likelihood, at least 0.
-    """
+    """Return by how much the rival's score is expected to rise over the truth's if an experiment is driven."""
     simulated = _on_paper(truth, line, record)
     other = _on_paper(rival, line, replace(record, output=simulated.outputs[0]))
     whitened, derivative, held = _whitened(rival, other)
@@ -255,17 +206,9 @@ def _root(known: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True, slots=True)
 class Expected:
-    """What an experiment is expected to decide.
+    """What an experiment is expected to decide."""
 
-    Attributes
-    ----------
-    gained : ndarray, shape (K, K)
-        Natural logarithm of the factor by which the odds of hypothesis i over j rise if i is true.
-    right : float
-        Probability that the true hypothesis is expected to have after it, over what is open.
-    """
-
-    gained: FloatArray
+    gained: FloatArray  # (K, K)
     right: float
 
     @property
