@@ -153,16 +153,8 @@ class Unseen:
         return float(np.sqrt(np.mean(np.concatenate(errors) ** 2)))
 
 
-def found_effects(
-    decision: Decision, estimate: FitResult, cov: FloatArray, model: DrivelineModel
-) -> tuple[FoundEffect, ...]:
-    return tuple(_found(belief, decision, estimate, cov, model) for belief in decision.named)
-
-
-def _found(
-    belief: Belief, decision: Decision, estimate: FitResult, cov: FloatArray, model: DrivelineModel
-) -> FoundEffect:
-    entry, best = EFFECTS[belief.name], decision.best
+def _found(belief: Belief, decision: Decision, runs: FreeRuns) -> FoundEffect:
+    entry, best, model = EFFECTS[belief.name], runs.believed, runs.unseen.line
     nulls = {parameter.name: parameter.null for parameter in entry.parameters}
     profiles = {}
     if belief.name == GRADE:
@@ -172,13 +164,13 @@ def _found(
         of_course = reported_covariance(course)
         profiles, parameters = profiles_of(course, of_course, model), profile_size(course, of_course, model)
     else:
-        parameters = parameters_of(belief.name, estimate, cov, model)
+        parameters = parameters_of(belief.name, runs.estimate, runs.covariance, model)
     return FoundEffect(
         name=entry.name,
         element=entry.element,
         statement=entry.sentence(nulls | {name: p.value for name, p in parameters.items()}, model.motion),
         parameters=parameters,
-        time_s=moments_in(belief.name, estimate) if entry.event else {},
+        time_s=moments_in(belief.name, runs.estimate) if entry.event else {},
         indistinguishable_from=tuple(belief.alike),
         alternatives=belief.alike,
         evidence=Evidence(
@@ -326,19 +318,14 @@ def _rms(fit: FitResult, part: slice) -> float:
 
 
 def effects_of(runs: FreeRuns, decision: Decision) -> tuple[FoundEffect, ...]:
-    known = replace(decision, best=runs.believed)
-    found = found_effects(known, runs.estimate, runs.covariance, runs.unseen.line) if decision.named else ()
+    """Return the effects that are named, the weightiest first."""
     held = {"holdout_rms_before": runs.held_before, "holdout_rms_after": runs.held_after}
+    found = (_found(belief, decision, runs) for belief in decision.named)
     return tuple(replace(each, evidence=replace(each.evidence, **held)) for each in found)
 
 
 def traces_of(runs: FreeRuns, decision: Decision) -> tuple[FoundEffect, ...]:
-    traces = tuple(each for each in decision.traces if each.name in runs.believed.effects)
-    if not traces:
-        return ()
-    return found_effects(
-        replace(decision, best=runs.believed, named=traces), runs.estimate, runs.covariance, runs.unseen.line
-    )
+    return tuple(_found(each, decision, runs) for each in decision.traces if each.name in runs.believed.effects)
 
 
 def courses_of(runs: FreeRuns) -> tuple[Trace, ...]:

@@ -56,36 +56,6 @@ class Belief:
         return self.objection or f"in the most probable set, but its own probability is {self.probability:.2f} only"
 
 
-def beliefs(
-    best: Hypothesis,
-    visited: Mapping[Effects, Hypothesis],
-    scores: Sequence[Score],
-    share: Mapping[str, float],
-    tempered: float,
-    alike_within: float,
-    alike_share: float,
-) -> tuple[Belief, ...]:
-    """Return what is believed of each effect of the best set, the weightiest first."""
-    found = []
-    plausible = {each.effects: visited[each.effects] for each in scores if each.is_plausible}
-    for name in sorted(best.effects):
-        without = visited[best.effects - {name}]
-        within = max(alike_within, alike_share * (without.score - best.score))
-        alike = _alike(name, best, plausible, within)
-        names = frozenset({name, *alike, *_same_law(name)})
-        found.append(
-            Belief(
-                name,
-                names,
-                probability_of(names, scores, tempered),
-                min(max(share[name], 0.0), 1.0),
-                without.score - best.score,
-                alike,
-            )
-        )
-    return tuple(sorted(found, key=lambda belief: -belief.share))
-
-
 def fall(one: Hypothesis, other: Hypothesis, nothing: Hypothesis) -> float:
     """Return by how much less another set leaves than one, as a share of the re-tuned model's squared error."""
     return (one.free_squares - other.free_squares) / nothing.free_squares
@@ -208,18 +178,22 @@ def scores_of(search: Search) -> tuple[Score, ...]:
 
 
 def believed(search: Search, ground: Grounds, rivals: Sequence[Score] = ()) -> tuple[Belief, ...]:
-    """Return what is believed of the best set, over all sets that were fitted and ``rivals`` beyond these."""
-    best = ground.best
+    """Return what is believed of each effect of the best set, the weightiest first.
+
+    Over all sets that were fitted and ``rivals`` beyond these.
+    """
+    best, scores = ground.best, (*ground.scores, *rivals)
     tempered = tempered_by(ground.tests, best.result.residual.size, TEMPERED)
-    found = beliefs(
-        best,
-        search.visited,
-        (*ground.scores, *rivals),
-        ground.shares,
-        tempered,
-        max(ALIKE_WITHIN, 2.0 * tempered * math.log(1.0 / (1.0 - LEAST_PROBABILITY))),
-        ALIKE_SHARE,
-    )
+    as_good = max(ALIKE_WITHIN, 2.0 * tempered * math.log(1.0 / (1.0 - LEAST_PROBABILITY)))
+    plausible = {each.effects: search.visited[each.effects] for each in scores if each.is_plausible}
+    found = []
+    for name in sorted(best.effects):
+        gained = search.visited[best.effects - {name}].score - best.score
+        alike = _alike(name, best, plausible, max(as_good, ALIKE_SHARE * gained))
+        names = frozenset({name, *alike, *_same_law(name)})
+        share = min(max(ground.shares[name], 0.0), 1.0)
+        found.append(Belief(name, names, probability_of(names, scores, tempered), share, gained, alike))
+    found.sort(key=lambda belief: -belief.share)
     return tuple(each for each in found if search.is_resolved(best, each.name))
 
 

@@ -412,8 +412,3 @@ class Remembering(Screen):
 def _changed(nominal: FloatArray, p: FloatArray) -> bytes:
     places = np.flatnonzero(p != nominal)
     return places.tobytes() + p[places].tobytes()
-
-
-def screen(hypothesis: Hypothesis, model: DrivelineModel, answers: Answers) -> Remembering:
-    """Return a first look at effects around a hypothesis; promises are falls of the squared innovations."""
-    return Remembering(hypothesis, model, answers)

@@ -29,7 +29,7 @@ from estimator.diagnosis.inference.hypotheses import (
     silent,
     with_effect,
 )
-from estimator.diagnosis.inference.score_tests import Answers, Remembering, ScoredStart, promising, screen
+from estimator.diagnosis.inference.score_tests import Answers, Remembering, ScoredStart, promising
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult, not_fitted, warm_start
@@ -218,7 +218,7 @@ class Search:
         return min(better, key=lambda each: each.score, default=None)
 
     def _score(self, reduced: Hypothesis, name: str) -> list[ScoredStart]:
-        view = screen(reduced, self.model, self.answers)
+        view = Remembering(reduced, self.model, self.answers)
         starts = promising(view.starts(name))
         self._learn(reduced, view)
         return starts
@@ -233,7 +233,7 @@ class Search:
 
         With a ``rival`` those are worth it that promise nearly as much.
         """
-        view = screen(current, self.model, self.answers)
+        view = Remembering(current, self.model, self.answers)
         contained = {special for have in current.effects for special in EFFECTS[have].contains}
         tried = [name for name in names if name != GRADE and name not in contained]
         starts = dict(zip(tried, concurrently(view.starts, tried), strict=True))

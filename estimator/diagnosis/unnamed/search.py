@@ -13,7 +13,8 @@ from scipy import stats
 from scipy.ndimage import maximum_filter1d, median_filter
 
 from estimator.diagnosis.line.blocks import PLACES, Place, block_mean_of, lines, simulated
-from estimator.diagnosis.noise import SMALLEST_P, Gain
+from estimator.diagnosis.noise import SMALLEST_P
+from estimator.diagnosis.result import RankedLaw
 from estimator.diagnosis.unnamed.forms import (
     MOST_COEFFICIENTS,
     Form,
@@ -351,22 +352,12 @@ IN_REACH = 3.0
 """Elements whose law leaves more than this many times the RMS of the best are not looked at again."""
 
 
-@dataclass(frozen=True, slots=True)
-class UnnamedLaw:
-    """The best law at one element: its terms and coefficients, what it gains, and the RMS it would leave."""
-
-    element: Element
-    terms: tuple[tuple[str, float], ...]
-    gain: Gain
-    rms: float
-
-
 def each_of(result: FitResult, search: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
     """Search for laws in what a fit leaves in several ways: on all cores, or in turn where each takes much room."""
     return (concurrently if result.residual.size <= MOST_AT_ONCE else in_turn)(search, items)
 
 
-def judged(view: Scene, searches: Sequence[ElementSearch]) -> list[UnnamedLaw]:
+def judged(view: Scene, searches: Sequence[ElementSearch]) -> list[RankedLaw]:
     """Return what each state has found, weighed with one number of independent samples."""
     best = min(searches, key=lambda state: state.mean_square)
     n = max(effective_samples(best.errors), best.ground.unknowns + MOST_COEFFICIENTS + 2.0)
@@ -403,13 +394,13 @@ def _tried(view: Scene, initial: ElementSearch) -> ElementSearch:
     return min((again(start) for start in starts), key=lambda state: (state.stuck, state.mean_square))
 
 
-def _law(state: ElementSearch, n: float, before: float) -> UnnamedLaw:
+def _law(state: ElementSearch, n: float, before: float) -> RankedLaw:
     q = state.law.coefficients
     if q == 0:
-        return UnnamedLaw(state.element, (), Gain(0.0, 1.0, n), math.sqrt(before))
+        return RankedLaw(state.element, (), math.sqrt(before), 0.0, 1.0)
     gained = state.law.information(before, state.mean_square, n)
     rest = max(n - state.ground.unknowns - q, 1.0)
     f_value = max(before / state.mean_square - 1.0, 0.0) * rest / q
     log_p = float(stats.f.logsf(f_value, q, rest)) + state.law.choices
     p_value = max(math.exp(min(log_p, 0.0)), SMALLEST_P)
-    return UnnamedLaw(state.element, state.law.terms, Gain(gained, p_value, n), math.sqrt(state.mean_square))
+    return RankedLaw(state.element, state.law.terms, math.sqrt(state.mean_square), gained, p_value)

@@ -14,7 +14,7 @@ from estimator.diagnosis.line.equivalent import Explanation, Input, explain, smo
 from estimator.diagnosis.noise import VERY_STRONG
 from estimator.diagnosis.result import Course, Discrepancy, Equivalent, LawPicture, RankedLaw
 from estimator.diagnosis.unnamed.scene import Filter, Scene, scene
-from estimator.diagnosis.unnamed.search import ROUNDS, ElementSearch, UnnamedLaw, judged, searches_at, without_law
+from estimator.diagnosis.unnamed.search import ROUNDS, ElementSearch, judged, searches_at, without_law
 from estimator.diagnosis.where.locate import error_spectrum, responses
 from estimator.physics import model
 from estimator.physics.catalogue import EFFECTS
@@ -182,19 +182,15 @@ def discrepancy(
     view = scene(retuned, floor, whitening)
     named = effects_added(retuned, final)
     searches = searches_at(view, rounds or (1 if named else ROUNDS), initial)
-    laws = sorted(judged(view, searches), key=lambda law: -law.gain.delta_bic)
-    best = laws[0] if laws and laws[0].gain.delta_bic > 0.0 else None
+    laws = sorted(judged(view, searches), key=lambda law: -law.delta_bic)
+    best = laws[0] if laws and laws[0].delta_bic > 0.0 else None
     if named:
         pictures = _pictures_of_effects(named, final, floor, motion)
     else:
         pictures = _picture_of_law(best, searches, floor, motion)
     return Discrepancy(
         element=None if best is None else best.element,
-        laws=tuple(
-            RankedLaw(law.element, law.terms, law.rms, law.gain.delta_bic, law.gain.p_value)
-            for law in laws
-            if law.terms
-        ),
+        laws=tuple(law for law in laws if law.terms),
         equivalents=_equivalents(view, motion),
         spectrum=error_spectrum(retuned, final, floor),
         responses=responses(retuned, final),
@@ -262,7 +258,7 @@ def without_effect(result: FitResult, name: str) -> FitResult:
 
 
 def _picture_of_law(
-    best: UnnamedLaw | None, searches: Sequence[ElementSearch], floor: float, motion: model.Motion
+    best: RankedLaw | None, searches: Sequence[ElementSearch], floor: float, motion: model.Motion
 ) -> tuple[LawPicture, ...]:
     if best is None:
         return ()
