@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, fields, is_dataclass, replace
 from itertools import pairwise
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -14,14 +14,11 @@ from estimator.diagnosis.noise import share_of, stretches
 from estimator.diagnosis.result import (
     Course,
     Diagnosis,
-    Discrepancy,
     Estimated,
-    FoundEffect,
-    Interval,
     Profile,
-    Response,
     Trace,
 )
+from estimator.physics.model import DrivelineModel
 from estimator.signals.record import FloatArray, Record, sliced
 
 LONG_S = 1.0  # a gap that is longer ends a segment
@@ -129,41 +126,53 @@ def _stretches_warning(record: Record, long: Sequence[slice], used: Sequence[sli
     )
 
 
-Value = TypeVar("Value")
 Over = TypeVar("Over", Course, Profile)
-Terms = tuple[tuple[str, float], ...]
 
 
 def joined(diagnosis: Diagnosis, cut: Cut) -> Diagnosis:
     """Return a diagnosis of segments under the names of the recordings they are of."""
     if not cut.rows:
         return diagnosis
-    unnamed = diagnosis.unnamed
-    return replace(
-        diagnosis,
-        statement=_text(diagnosis.statement, cut),
-        mismatch=replace(diagnosis.mismatch, time_s=_intervals(diagnosis.mismatch.time_s, cut)),
-        effects=tuple(_effect(effect, cut) for effect in diagnosis.effects),
-        rejected=tuple(replace(rival, reason=_text(rival.reason, cut)) for rival in diagnosis.rejected),
-        untestable=tuple(replace(entry, reason=_text(entry.reason, cut)) for entry in diagnosis.untestable),
-        unnamed=None if unnamed is None else replace(unnamed, terms=_terms(unnamed.terms, cut)),
-        load_torque=_by_recording(diagnosis.load_torque, cut, lambda parts: _mean(parts, cut)),
-        traces=_traces(diagnosis.traces, cut),
-        warnings=tuple(_text(warning, cut) for warning in diagnosis.warnings),
-        discrepancy=None if diagnosis.discrepancy is None else _discrepancy(diagnosis.discrepancy, cut),
-    )
+    found: Diagnosis = _renamed(replace(diagnosis, traces=()), cut)
+    by_name = {trace.name: trace for trace in diagnosis.traces}
+    return replace(found, traces=tuple(_by_recording(by_name, cut).values()))
 
 
-def _by_recording(
-    values: Mapping[str, Value], cut: Cut, join: Callable[[Mapping[str, Value]], Value]
-) -> dict[str, Value]:
+def _renamed(value: Any, cut: Cut) -> Any:
+    """Return a part of a diagnosis with recordings where it has segments: in texts, and in what is given for each."""
+    if isinstance(value, str):
+        return _text(value, cut)
+    if isinstance(value, tuple):
+        return tuple(_renamed(each, cut) for each in value)
+    if isinstance(value, Mapping) and value and value.keys() <= cut.origin.keys():
+        return _by_recording(value, cut)
+    if is_dataclass(value) and not isinstance(value, DrivelineModel | type):
+        return replace(value, **{each.name: _renamed(getattr(value, each.name), cut) for each in fields(value)})
+    return value
+
+
+def _by_recording(values: Mapping[str, Any], cut: Cut) -> dict[str, Any]:
     """Join the values of the segments of each recording, in the order of the recordings."""
     found = {}
     for record in cut.whole:
         parts = {name: value for name, value in values.items() if cut.origin[name] == record.name}
         if parts:
-            found[record.name] = join(parts)
+            found[record.name] = _together(parts, cut)
     return found
+
+
+def _together(parts: Mapping[str, Any], cut: Cut) -> Any:
+    first = next(iter(parts.values()))
+    if isinstance(first, tuple):
+        return tuple(each for values in parts.values() for each in values)
+    if isinstance(first, Estimated):
+        return _mean(parts, cut)
+    if isinstance(first, Course | Profile):
+        return _with_breaks(list(parts.values()))
+    if isinstance(first, Trace):
+        return _whole(parts, cut)
+    good = {record.name: int(record.okay.sum()) for record in cut.records}
+    return parts[max(parts, key=good.__getitem__)]
 
 
 def _text(text: str, cut: Cut) -> str:
@@ -171,26 +180,6 @@ def _text(text: str, cut: Cut) -> str:
         return text
     names = sorted(cut.rows, key=len, reverse=True)  # run#12 before run#1
     return re.sub("|".join(map(re.escape, names)), lambda match: cut.origin[match.group()], text)
-
-
-def _terms(terms: Terms, cut: Cut) -> Terms:
-    return tuple((_text(name, cut), value) for name, value in terms)
-
-
-def _intervals(time_s: Mapping[str, tuple[Interval, ...]], cut: Cut) -> dict[str, tuple[Interval, ...]]:
-    def one_after_the_other(parts: Mapping[str, tuple[Interval, ...]]) -> tuple[Interval, ...]:
-        return tuple(interval for intervals in parts.values() for interval in intervals)
-
-    return _by_recording(time_s, cut, one_after_the_other)
-
-
-def _effect(effect: FoundEffect, cut: Cut) -> FoundEffect:
-    return replace(
-        effect,
-        statement=_text(effect.statement, cut),
-        time_s=_intervals(effect.time_s, cut),
-        profiles=_by_recording(effect.profiles, cut, lambda parts: _with_breaks(list(parts.values()))),
-    )
 
 
 def _mean(parts: Mapping[str, Estimated], cut: Cut) -> Estimated:
@@ -225,11 +214,6 @@ def _with_breaks(parts: Sequence[Over]) -> Over:
     )
 
 
-def _traces(traces: Sequence[Trace], cut: Cut) -> tuple[Trace, ...]:
-    by_name = {trace.name: trace for trace in traces}
-    return tuple(_by_recording(by_name, cut, lambda parts: _whole(parts, cut)).values())
-
-
 def _whole(parts: Mapping[str, Trace], cut: Cut) -> Trace:
     """Return the trace of a recording from those of its segments."""
     first = next(iter(parts))
@@ -252,22 +236,4 @@ def _whole(parts: Mapping[str, Trace], cut: Cut) -> Trace:
         nominal=nominal,
         retuned=retuned,
         augmented=augmented,
-    )
-
-
-def _discrepancy(seen: Discrepancy, cut: Cut) -> Discrepancy:
-    good = {record.name: int(record.okay.sum()) for record in cut.records}
-
-    def longest(parts: Mapping[str, Response]) -> Response:
-        return parts[max(parts, key=good.__getitem__)]
-
-    return replace(
-        seen,
-        laws=tuple(replace(law, terms=_terms(law.terms, cut)) for law in seen.laws),
-        equivalents=tuple(
-            replace(each, courses=_by_recording(each.courses, cut, lambda parts: _with_breaks(list(parts.values()))))
-            for each in seen.equivalents
-        ),
-        responses=_by_recording(seen.responses, cut, longest),
-        pictures=tuple(replace(picture, name=_text(picture.name, cut)) for picture in seen.pictures),
     )
