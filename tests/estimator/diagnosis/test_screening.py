@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from estimator.diagnosis.inference.hypotheses import NOTHING, everything
-from estimator.diagnosis.inference.score_tests import Look, Screen, promising
+from estimator.diagnosis.inference.score_tests import ScoredStart, Screen, promising
 from estimator.physics.driveline import Start
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult
@@ -32,7 +32,7 @@ from tests.estimator.physics.bench import (
 
 SAMPLES = 1200
 
-Looked = tuple[list[Look], FitResult, FitResult]
+Looked = tuple[list[ScoredStart], FitResult, FitResult]
 """Looks around the re-tuned nominal fit, that fit, and the one with the effect."""
 
 
@@ -202,10 +202,10 @@ class TestPromising:
     """Starts of one law: with two parameters free, or with one of them held."""
 
     @staticmethod
-    def look(promise: float, held: bool = False) -> Look:
+    def look(promise: float, held: bool = False) -> ScoredStart:
         free = Shared("tyre_slip", "slip_per_nm", 1.0, 0.0, 1.0, 0.5)
         other = Shared("tyre_slip", "wheel_share", 1.0, *((0.1, 0.1) if held else (0.0, 1.0)), 0.1)
-        return Look(Release((free, other), ((),)), promise)
+        return ScoredStart(Release((free, other), ((),)), promise)
 
     def test_the_best_and_a_second_that_promises_nearly_as_much(self) -> None:
         looks = [self.look(promise) for promise in (10.0, 9.0, 8.0)]
