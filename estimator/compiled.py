@@ -56,36 +56,20 @@ def compiled(function: Function) -> Function:
 
 
 def inlined(function: Function) -> Function:
-    """Compile a function into whatever calls it: what is constant there is worked out once, and no call is left.
-
-    Of an array that is handed over, references are still counted, two atomic operations per array and call. A loop
-    hands over what owns nothing: borrowed arrays (``estimator.lanes.columns``), or parts of a record
-    (``estimator.identification.online.recursive``).
-    """
+    """Compile a function into whatever calls it: what is constant there is worked out once, and no call is left."""
     return cast(Function, numba.njit(cache=True, nogil=True, error_model="numpy", forceinline=True)(function))
 
 
 def ir_inlined(function: Function) -> Function:
-    """Compile a function as a part of each compiled one that calls it, and never by itself.
-
-    What calls a kernel takes the kernel's whole code in and works on it anew. Where several small functions stand in
-    between, each would; so they are inlined before anything is compiled.
-    """
+    """Compile a function as a part of each compiled one that calls it, and never by itself."""
     return cast(Function, numba.njit(nogil=True, error_model="numpy", inline="always")(function))
 
 
 def assembled(function: Function) -> Function:
-    """Compile a function that was put together from others into whatever calls it; it has no file that a cache knows.
-
-    What calls it is cached with it.
-    """
+    """Compile a function put together from others into whatever calls it, and cached with that: it has no file."""
     return cast(Function, numba.njit(nogil=True, error_model="numpy", forceinline=True)(function))
 
 
 def brief(function: Function) -> Function:
-    """Compile a function that is over in microseconds and is called all the time: it keeps the interpreter lock.
-
-    Whoever gives the lock away so often and takes it back at once keeps other threads from ever getting it: they are
-    woken, find it taken, and begin to wait anew (CPython's ``take_gil``). A heartbeat came 0.4 s late by that.
-    """
+    """Compile a function that is over in microseconds and is called all the time: it keeps the interpreter lock."""
     return cast(Function, numba.njit(cache=True, error_model="numpy")(function))

@@ -1,11 +1,4 @@
-"""The next experiment, judged before it is driven: how well it distinguishes hypotheses, what it makes known.
-
-An experiment on paper is a recording that one hypothesis would give. Another hypothesis is fitted to it: its unknowns,
-held by what earlier recordings say of them, move to where the innovations are least, and what these still are is the
-expected difference of scores (T-optimality: Atkinson and Fedorov, Biometrika 62, 1975; Box and Hill, Technometrics 9,
-1967). Around a fit the information about its unknowns is that of its whitened derivative (D-optimality; Goodwin and
-Payne, Dynamic System Identification, 1977).
-"""
+"""The next experiment, judged before it is driven: how well it distinguishes hypotheses, what it makes known."""
 
 from __future__ import annotations
 
@@ -16,59 +9,50 @@ from dataclasses import dataclass, replace
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from estimator.diagnosis.assemble import Z95
 from estimator.diagnosis.first_use import compile_kernels, is_first_use
-from estimator.diagnosis.hypotheses import Effects, Progress, line_values, silent
 from estimator.diagnosis.inference.answer import Found, answer
-from estimator.diagnosis.inference.calibration import ALIKE_WITHIN, LEAST_PROBABILITY, TEMPERED
+from estimator.diagnosis.inference.checks import ALIKE_WITHIN, GRADE, LEAST_PROBABILITY, TEMPERED
 from estimator.diagnosis.inference.disturbances import whitener_of
+from estimator.diagnosis.inference.hypotheses import (
+    Effects,
+    Hypothesis,
+    Progress,
+    covariance,
+    line_values,
+    of_first_outputs,
+    silent,
+)
 from estimator.diagnosis.inference.judge import Grounds, tempered_by
-from estimator.diagnosis.inference.likelihood import Hypothesis, covariance, of_first_outputs
-from estimator.diagnosis.inference.plausible import GRADE
 from estimator.diagnosis.inference.search import Search
-from estimator.diagnosis.intervals import Z95
-from estimator.diagnosis.preconditions import prepare
+from estimator.diagnosis.preconditions.prepare import prepare
 from estimator.diagnosis.result import Diagnosis
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import FitResult, fit
-from estimator.physics.grid import grid_for
 from estimator.physics.jacobian import jacobian_at
+from estimator.physics.layout import grid_for
 from estimator.physics.model import DrivelineModel, EffectValue, parameter_unit
+from estimator.physics.parallel import Work
 from estimator.physics.problem import make_problem, parameters
 from estimator.physics.simulate import MASSES
 from estimator.physics.unknowns import Shared, own_unknowns
-from estimator.physics.work import Work
 from estimator.signals.record import FloatArray, Record
 
 MOST_OPEN = 4
 """Hypotheses that are compared, the most probable: each pair is fitted to every experiment on paper."""
 
-ITERATIONS = 8
-"""Steps of a fit of what is a recording's own, which is nearly linear."""
-
-MOST_LOG_ODDS = 700.0
-"""Largest logarithm of odds that is given: its exponential is still a number."""
+ITERATIONS = 8  # steps of a fit of what is a recording's own, which is nearly linear
+MOST_LOG_ODDS = 700.0  # largest logarithm of odds that is given: its exponential is still a number
 
 
 @dataclass(frozen=True, slots=True)
 class Candidate:
-    """A hypothesis that recordings leave open.
+    """A hypothesis that recordings leave open."""
 
-    Attributes
-    ----------
-    name : str
-        Its effects joined by " + "; "nothing" for the nominal model re-tuned.
-    probability : float
-        Among the hypotheses that are open, as the judge counts odds.
-    fit : Hypothesis
-        Of the recordings' first outputs.
-    precision : ndarray, shape (S, S)
-        What recordings say of its shared unknowns: the inverse of their covariance, 0 where held.
-    """
-
-    name: str
-    probability: float
-    fit: Hypothesis
-    precision: FloatArray
+    name: str  # its effects joined by " + "; "nothing" for the nominal model re-tuned
+    probability: float  # among the hypotheses that are open, as the judge counts odds
+    fit: Hypothesis  # of the recordings' first outputs
+    precision: FloatArray  # (S, S): What recordings say of its shared unknowns
 
     @property
     def effects(self) -> Effects:
@@ -78,26 +62,13 @@ class Candidate:
 
 @dataclass(frozen=True, slots=True)
 class Open:
-    """What recordings leave open.
-
-    Attributes
-    ----------
-    line : DrivelineModel
-    candidates : tuple of Candidate
-        The most probable first; a single one where nothing is open.
-    twins : mapping of str to tuple of str
-        Effects of the candidates, and those that are the same linear system by this output, in every experiment.
-    tempered : float
-        By which differences of scores are divided (``judge``).
-    untested : tuple of str
-        Effects that these recordings can neither show nor exclude, and others could.
-    """
+    """What recordings leave open."""
 
     line: DrivelineModel
-    candidates: tuple[Candidate, ...]
+    candidates: tuple[Candidate, ...]  # the most probable first
     twins: Mapping[str, tuple[str, ...]]
-    tempered: float
-    untested: tuple[str, ...]
+    tempered: float  # by which differences of scores are divided (``judge``)
+    untested: tuple[str, ...]  # effects that these recordings can neither show nor exclude, and others could
 
     @property
     def is_decided(self) -> bool:
@@ -108,13 +79,7 @@ class Open:
 def left_open(
     records: Sequence[Record], model: DrivelineModel, effort: str = "normal", progress: Progress = silent
 ) -> tuple[Open, Diagnosis]:
-    """Diagnose, and return the hypotheses that recordings do not decide between, with the diagnosis.
-
-    Raises
-    ------
-    NotExciting, BadShape, Implausible
-        As ``diagnose``.
-    """
+    """Diagnose, and return the hypotheses that recordings do not decide between, with the diagnosis."""
     masses = len(MASSES.get(model.structure, ()))
     if masses and is_first_use(masses):
         progress("preparing", 0.0)
@@ -129,7 +94,7 @@ def left_open(
 
 def _open(search: Search, ground: Grounds, untested: tuple[str, ...]) -> Open:
     best = ground.best
-    tempered = tempered_by(ground.tests, best.plain.residual.size, TEMPERED)
+    tempered = tempered_by(ground.tests, best.result.residual.size, TEMPERED)
     within = max(ALIKE_WITHIN, 2.0 * tempered * math.log(1.0 / (1.0 - LEAST_PROBABILITY)))
     near = {
         each.effects: search.visited[each.effects]
@@ -159,26 +124,22 @@ def _are_twins(one: Hypothesis, other: Hypothesis) -> bool:
 
 
 def _holds(effects: Effects, others: Effects) -> bool:
-    """Tell whether a set is another one with more in it: what is added has not paid, and is no other explanation.
-
-    More is another effect, or a law that holds another's as a special case.
-    """
+    """Tell whether a set is another one with more in it: what is added has not paid, and is no other explanation."""
     special = effects.union(*(EFFECTS[name].contains for name in effects))
     return effects != others and others <= special
 
 
 def name_of(effects: Effects) -> str:
-    """Return a hypothesis' name."""
     return " + ".join(sorted(effects)) or "nothing"
 
 
 def as_model(candidate: Candidate, line: DrivelineModel) -> DrivelineModel:
     """Return a hypothesis as a model to drive on paper; its events last throughout, a road stays level."""
-    plain = candidate.fit.plain
-    values = line_values(plain)
+    result = candidate.fit.result
+    values = line_values(result)
     always = {"from_s": EffectValue(0.0), "to_s": EffectValue(1e9)}
     added = {
-        name: {key: EffectValue(value) for key, value in plain.values_of(name).items()}
+        name: {key: EffectValue(value) for key, value in result.values_of(name).items()}
         | (always if EFFECTS[name].event else {})
         for name in candidate.effects - {GRADE}
     }
@@ -187,8 +148,7 @@ def as_model(candidate: Candidate, line: DrivelineModel) -> DrivelineModel:
 
 
 def _on_paper(candidate: Candidate, line: DrivelineModel, record: Record) -> FitResult:
-    """Simulate a recording with a hypothesis; only what is the recording's own is fitted."""
-    fitted, effects = candidate.fit.plain, candidate.effects - {GRADE}
+    fitted, effects = candidate.fit.result, candidate.effects - {GRADE}
     shared = fitted.problem.shared
     own = tuple(_throughout(each, record) for each in own_unknowns({*line.effects, *effects}, record))
     problem = make_problem(line, [record], shared, own=[own], grid=grid_for(line, [record]))
@@ -208,20 +168,9 @@ def _throughout(unknown: Shared, record: Record) -> Shared:
 
 
 def distance(truth: Candidate, rival: Candidate, line: DrivelineModel, record: Record) -> float:
-    """Return by how much the rival's score is expected to rise over the truth's if an experiment is driven.
-
-    Parameters
-    ----------
-    record : Record
-        The experiment on paper: its torques, and about what its output will be.
-
-    Returns
-    -------
-    float
-        In minus twice a log-likelihood, at least 0.
-    """
-    said = _on_paper(truth, line, record)
-    other = _on_paper(rival, line, replace(record, output=said.outputs[0]))
+    """Return by how much the rival's score is expected to rise over the truth's if an experiment is driven."""
+    simulated = _on_paper(truth, line, record)
+    other = _on_paper(rival, line, replace(record, output=simulated.outputs[0]))
     whitened, derivative, held = _whitened(rival, other)
     rows = np.linalg.qr(np.vstack([derivative, held]), mode="reduced")[0]
     error = np.concatenate([whitened, np.zeros(held.shape[0])])
@@ -242,7 +191,7 @@ def _whitened(candidate: Candidate, on_paper: FitResult) -> tuple[FloatArray, Fl
 
 
 def _precision(hypothesis: Hypothesis) -> FloatArray:
-    count = len(hypothesis.plain.problem.shared)
+    count = len(hypothesis.result.problem.shared)
     spread = covariance(hypothesis)[:count, :count]
     free = np.diag(spread) > 0.0
     known = np.zeros((count, count))
@@ -252,23 +201,14 @@ def _precision(hypothesis: Hypothesis) -> FloatArray:
 
 def _root(known: FloatArray) -> FloatArray:
     values, vectors = np.linalg.eigh(known)
-    root: FloatArray = np.sqrt(np.maximum(values, 0.0))[:, np.newaxis] * vectors.T
-    return root
+    return np.sqrt(np.maximum(values, 0.0))[:, np.newaxis] * vectors.T
 
 
 @dataclass(frozen=True, slots=True)
 class Expected:
-    """What an experiment is expected to decide.
+    """What an experiment is expected to decide."""
 
-    Attributes
-    ----------
-    gained : ndarray, shape (K, K)
-        Natural logarithm of the factor by which the odds of hypothesis i over j rise if i is true.
-    right : float
-        Probability that the true hypothesis is expected to have after it, over what is open.
-    """
-
-    gained: FloatArray
+    gained: FloatArray  # (K, K)
     right: float
 
     @property

@@ -14,8 +14,7 @@ import time
 from contextlib import suppress
 from pathlib import Path
 
-UNUSED_S = 30 * 86_400.0
-"""A version that was not started for a month compiles anew: a minute or two."""
+UNUSED_S = 30 * 86_400.0  # a version that was not started for a month compiles anew: a minute or two
 
 IN_USE = ".in_use"
 

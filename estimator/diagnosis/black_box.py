@@ -1,15 +1,4 @@
-"""A plant that another program simulates: its torques pass through a torque path, its speed through a sensor.
-
-Both are those of the compiled simulation, without a line of their own. On a free inertia of 1 kg m^2 the change of
-speed over a period is the mean torque that reached the shaft in it. Turned round, an inertia that is driven by the
-change of a speed moves at that speed, and the sensor shows of it what it would of the plant's.
-
-The plant's own simulation takes long. What a changed parameter changes is simulated on a line that answers much as the
-plant does, and added to the plant's output without the change (space mapping: Bandler and others, IEEE Trans. MTT
-42(12), 1994). So derivatives and first looks are those of that line; every output that is compared with a recording is
-the plant's. By that line are also judged how a disturbance of the torque shows in the output, the time scale on which
-that moves, and in which unit the torque is; it takes no part in what is simulated.
-"""
+"""A plant that another program simulates: its torques pass through a torque path, its speed through a sensor."""
 
 from __future__ import annotations
 
@@ -26,10 +15,9 @@ from estimator.physics.catalogue import BUILT_IN
 from estimator.physics.driveline import Case, Start
 from estimator.physics.effect import Effect, Element
 from estimator.physics.fit import FitResult, fit, make_problem
-from estimator.physics.grid import Grid, grid_for
 from estimator.physics.inputs import load_of
 from estimator.physics.kernel import state_vector
-from estimator.physics.layout import LOAD, NOMINAL, flat, slot
+from estimator.physics.layout import LOAD, NOMINAL, Grid, flat, grid_for, slot
 from estimator.physics.model import DrivelineModel, Parameter, Structure
 from estimator.physics.motion import measured_speed
 from estimator.physics.simulate import simulate, simulate_each
@@ -39,14 +27,9 @@ from estimator.signals.record import FloatArray, OutputKind, Record, once
 Simulated = Callable[[Record, FloatArray, FloatArray, Start], FloatArray]
 """Recording, torque of its inputs (N, M) [Nm], load torque (N,) [Nm], initial state to the true output (N,)."""
 
-FINER = 4
-"""Steps to a sample where a torque is late by parts of one, or the output filtered within one."""
-
-MOST_KEPT = 4
-"""Outputs of the plant that are kept: a sensor's unknowns do not move it."""
-
-MOST_AROUND = 32
-"""Outputs of each recording that changes are added to."""
+FINER = 4  # steps to a sample where a torque is late by parts of one, or the output filtered within one
+MOST_KEPT = 4  # outputs of the plant that are kept: a sensor's unknowns do not move it
+MOST_AROUND = 32  # outputs of each recording that changes are added to
 
 _FREE = DrivelineModel(Structure.ONE_MASS, {"J_M": Parameter(1.0, 0.0), "b_M": Parameter(0.0, 0.0)})
 _GRID = Grid(Structure.ONE_MASS, 1, 0.0)
@@ -87,7 +70,6 @@ class _Known:
     output: FloatArray
 
     def is_near(self, case: Case, has_start: bool) -> bool:
-        """Tell whether a case differs from this one by a single effect, or one number of load or initial state."""
         if self.case.extra_load_nm is not case.extra_load_nm:
             return False
         changed = {_EFFECT_AT[i] for i in np.flatnonzero(self.case.p != case.p).tolist()}
@@ -97,33 +79,18 @@ class _Known:
 
 @dataclass
 class BlackBox:
-    """A plant simulated by another program, with the catalogue's effects at its inputs and its output.
+    """A plant simulated by another program, with the catalogue's effects at its inputs and its output."""
 
-    Attributes
-    ----------
-    run : callable
-        The plant alone.
-    starts : collection of str
-        What of the initial state it can be given: names of attributes of ``Start``.
-    line : DrivelineModel
-        A line that answers much as it does.
-    has_start : bool
-        Whether the initial state of that line means the same.
-    """
-
-    run: Simulated
-    starts: Collection[str]
-    line: DrivelineModel
-    has_start: bool
+    run: Simulated  # the plant alone
+    starts: Collection[str]  # what of the initial state it can be given
+    line: DrivelineModel  # a line that answers much as it does
+    has_start: bool  # whether the initial state of that line means the same
     _known: dict[bytes, FloatArray] = field(default_factory=dict)
     _around: WeakKeyDictionary[Record, deque[_Known]] = field(default_factory=WeakKeyDictionary)
     _alone: threading.Lock = field(default_factory=threading.Lock)
 
     def simulated(self, record: Record, cases: Sequence[Case]) -> FloatArray:
-        """Simulate the recorded output of a recording, as its sensor shows it, under each case; shape (K, N).
-
-        One case is simulated by the plant; of several, what they change.
-        """
+        """Simulate the recorded output of a recording, as its sensor shows it, under each case; shape (K, N)."""
         around = self._around.setdefault(record, deque(maxlen=MOST_AROUND))
         if len(cases) == 1:
             output = self._read(record, cases[0])
@@ -136,11 +103,9 @@ class BlackBox:
         if known is None:
             return self._read(record, case)
         before, after = simulate_each(grid_for(self.line, [record]), record, [known.case, case])
-        changed: FloatArray = known.output + (after - before)
-        return changed
+        return known.output + (after - before)
 
     def _read(self, record: Record, case: Case) -> FloatArray:
-        """Return what the sensor shows of the plant's output, shape (N,)."""
         steps = FINER if (case.p[_WITHIN] != 0.0).any() else 1
         fine = _finer(record) if steps > 1 else record
         output = self._output(fine, case, np.repeat(load_of(case, record), steps))
@@ -148,8 +113,8 @@ class BlackBox:
             return output[::steps]
         rising = np.append(np.diff(output), 0.0) / fine.sample_time_s
         moved = replace(fine, torque_nm=rising[:, np.newaxis], load_nm=None)
-        begun = Case(_with(case.p, _SENSOR), Start(0.0, 0.0, float(output[0])))
-        found: FloatArray = simulate_each(_GRID, moved, [begun])[0]
+        initial = Case(_with(case.p, _SENSOR), Start(0.0, 0.0, float(output[0])))
+        found: FloatArray = simulate_each(_GRID, moved, [initial])[0]
         return found[::steps]
 
     def _output(self, record: Record, case: Case, load: FloatArray) -> FloatArray:
@@ -207,23 +172,15 @@ def _finer(record: Record) -> Record:
     )
 
 
-WIDE = 30.0
-"""Factor, either way, within which values are looked for."""
-
-SHARES = (0.05, 0.3)
-"""Share of the motor in the whole inertia, where a fit starts."""
-
-FREQUENCIES = 5
-"""Natural frequencies at which one starts, up to `HIGHEST_HZ` or a quarter of the sampling rate."""
+WIDE = 30.0  # factor, either way, within which values are looked for
+SHARES = (0.05, 0.3)  # share of the motor in the whole inertia, where a fit starts
+FREQUENCIES = 5  # natural frequencies at which one starts, up to `HIGHEST_HZ` or a quarter of the sampling rate
 
 LOWEST_HZ, HIGHEST_HZ = 1.0, 60.0
 DAMPING = 0.05
 
-BETTER = 0.7
-"""Share of a rigid line's error that one with a shaft leaves at most to be taken."""
-
-ITERATIONS = 12
-"""Of the fit from each start; the best goes to its end."""
+BETTER = 0.7  # share of a rigid line's error that one with a shaft leaves at most to be taken
+ITERATIONS = 12  # of the fit from each start; the best goes to its end
 
 
 def equivalent_line(records: Sequence[Record]) -> DrivelineModel:

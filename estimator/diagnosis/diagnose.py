@@ -8,21 +8,20 @@ from collections.abc import Sequence
 from threadpoolctl import threadpool_limits
 
 from estimator.diagnosis.first_use import COMPILING, compile_kernels, compile_laws, is_first_use
-from estimator.diagnosis.hypotheses import Progress, silent
 from estimator.diagnosis.inference.answer import answer
-from estimator.diagnosis.preconditions import prepare
+from estimator.diagnosis.inference.hypotheses import Progress, silent
+from estimator.diagnosis.preconditions.prepare import prepare
 from estimator.diagnosis.result import Diagnosis
 from estimator.physics.model import DrivelineModel
+from estimator.physics.parallel import Work
 from estimator.physics.simulate import MASSES
-from estimator.physics.work import Work
 from estimator.signals.record import Record
 
 BUDGET_S = math.inf
 """Time after which a diagnosis is ended undecided [s]: none, so that the answer depends on no machine."""
 
 
-TO_SEARCH = 0.92
-"""Share of a limit of time after which no simulation is begun: the rest is for saying so."""
+TO_SEARCH = 0.92  # share of a limit of time after which no simulation is begun: the rest is for saying so
 
 
 def diagnose(
@@ -71,7 +70,7 @@ def diagnose(
     progress = _rising(progress)
     masses = len(MASSES.get(model.structure, ()))  # of a joint on a bench there is nothing to compile
     if masses and is_first_use(masses):
-        progress = _telling(progress)
+        progress = _with_compile_note(progress)
         progress("preparing", 0.0)
         compile_kernels(masses)
     if masses and model.laws:
@@ -96,6 +95,6 @@ def _rising(progress: Progress) -> Progress:
     return report
 
 
-def _telling(progress: Progress) -> Progress:
+def _with_compile_note(progress: Progress) -> Progress:
     """Say at every stage what most of its time goes to."""
     return lambda message, share: progress(f"{message} ({COMPILING})", share)

@@ -1,11 +1,4 @@
-"""The first use on a machine: the simulation has yet to be compiled there, which takes a minute, once.
-
-It is compiled for one, two or three masses when a model of so many is first diagnosed.
-
-A compiler works on one core, so two processes share the kernels. What calls a kernel takes its code in from where it is
-kept on disk: first each process compiles a kernel that calls no other, then each a caller. What is quickly compiled
-fills the time of the one that would be done first.
-"""
+"""The first use on a machine: the simulation has yet to be compiled there, which takes a minute, once."""
 
 from __future__ import annotations
 
@@ -25,10 +18,9 @@ from estimator.compiled import IS_COMPILED
 from estimator.diagnosis.line.equivalent import Chain, Filtered, run_filter, run_smoother
 from estimator.diagnosis.line.tangent import Nudges, Setting, linearise
 from estimator.physics.driveline import Start
-from estimator.physics.grid import Grid
 from estimator.physics.kernel.integration import integrate
 from estimator.physics.kernel.side_by_side import integrate_each, integrate_side_by_side
-from estimator.physics.layout import flat
+from estimator.physics.layout import Grid, flat
 from estimator.physics.least_squares import least
 from estimator.physics.model import DrivelineModel
 from estimator.physics.simulate import simulate
@@ -74,10 +66,7 @@ SIDE_BY_SIDE: tuple[tuple[tuple[Any, ...], tuple[Any, ...]], ...] = (
 
 
 def is_first_use(masses: int) -> bool:
-    """Tell whether no simulation of so many masses has been kept on disk yet for this version in this place.
-
-    The same version installed in another place keeps its own.
-    """
+    """Tell whether no simulation of so many masses has been kept on disk yet for this version in this place."""
     return IS_COMPILED and not _marker(masses).exists()
 
 
@@ -87,10 +76,7 @@ def _marker(masses: int) -> Path:
 
 
 def compile_kernels(masses: int) -> None:
-    """Compile the largest kernels in two processes and keep them on disk; what fails there is compiled when called.
-
-    Not in this one: a compiler that is interrupted ends in an error of its own.
-    """
+    """Compile the largest kernels in two processes and keep them on disk; what fails there is compiled when called."""
     for some, others in SIDE_BY_SIDE if sys.executable else ():
         with _compiling(masses, some), _compiling(masses, others):
             pass
@@ -99,7 +85,6 @@ def compile_kernels(masses: int) -> None:
 
 
 def compile_laws(model: DrivelineModel, sample_time_s: float) -> None:
-    """Compile the simulation with a model's own laws, where it has any: before a diagnosis counts its time."""
     p = flat(model)
     for law in model.laws:
         for parameter in law.law.parameters:

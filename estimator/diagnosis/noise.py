@@ -17,20 +17,14 @@ from estimator.signals.record import BoolArray, FloatArray, Record
 PREDICTOR_ORDER = 20
 """Past samples a one-step predictor sees: 0.2 s at 10 ms, more than a period of a driveline's first mode."""
 
-MOSTLY_GOOD = 0.75
-"""Share of good samples that a predictor's past must hold; the missing ones are interpolated."""
+MOSTLY_GOOD = 0.75  # share of good samples that a predictor's past must hold; the missing ones are interpolated
 
 FEWEST_PREDICTED = 2 * (2 * PREDICTOR_ORDER + 1)
 """Samples that a predictor is fitted to at least: two per coefficient."""
 
 
 def noise_floor(records: Sequence[Record]) -> float:
-    """Estimate the noise of the reading, from the data alone.
-
-    The floor is the RMS error of a linear one-step predictor that sees the last outputs and torques. A predictor
-    follows whatever moves slowly, missing physics included, so what it leaves is the noise of the sensor [unit of
-    the output]. Recordings, or segments, too short for a predictor of their own are left to the others.
-    """
+    """Estimate the noise of the reading, from the data alone."""
     squares, count = 0.0, 0
     pairs = [(record, _usable(record)) for record in records]
     long = [(record, usable) for record, usable in pairs if usable.sum() >= FEWEST_PREDICTED]
@@ -52,8 +46,7 @@ def _usable(record: Record) -> BoolArray:
     if record.okay.size <= PREDICTOR_ORDER:
         return np.zeros(0, dtype=np.bool_)
     seen = np.lib.stride_tricks.sliding_window_view(record.okay, PREDICTOR_ORDER + 1).mean(axis=1)
-    usable: BoolArray = record.okay[PREDICTOR_ORDER:] & (seen >= MOSTLY_GOOD)
-    return usable
+    return record.okay[PREDICTOR_ORDER:] & (seen >= MOSTLY_GOOD)
 
 
 def _one_step_errors(record: Record, usable: BoolArray) -> FloatArray:
@@ -65,16 +58,11 @@ def _one_step_errors(record: Record, usable: BoolArray) -> FloatArray:
     columns = [signal[n - lag : signal.size - lag] for signal in (y, u) for lag in lags]
     regressors = np.column_stack([*columns, np.ones(y.size - n)])
     a, b = regressors[usable], y[n:][usable]
-    errors: FloatArray = b - a @ np.linalg.lstsq(a, b, rcond=None)[0]
-    return errors
+    return b - a @ np.linalg.lstsq(a, b, rcond=None)[0]
 
 
 def unpredictable(errors: Sequence[FloatArray]) -> float:
-    """Return the RMS of what a set of simulation errors' own past does not predict.
-
-    A second, often sharper view of the floor: once a model explains most of what happens, what its error leaves to a
-    linear predictor of itself is the noise of the reading.
-    """
+    """Return the RMS of what a set of simulation errors' own past does not predict."""
     n = PREDICTOR_ORDER
     past = np.concatenate([np.lib.stride_tricks.sliding_window_view(error[:-1], n) for error in errors])
     now = np.concatenate([error[n:] for error in errors])
@@ -82,33 +70,21 @@ def unpredictable(errors: Sequence[FloatArray]) -> float:
     return float(np.sqrt(left @ left / max(left.size - n, 1)))
 
 
-VERY_STRONG = 10.0
-"""A difference in BIC above this is very strong evidence (Kass and Raftery, JASA 90, 1995)."""
+VERY_STRONG = 10.0  # a difference in BIC above this is very strong evidence (Kass and Raftery, JASA 90, 1995)
 
-SMALLEST_P = 1e-300
+SMALLEST_P = 1e-300  # stands for any smaller probability, so that logarithms stay finite
 
 
 @dataclass(frozen=True, slots=True)
 class Gain:
-    """What a larger model gains over a smaller one.
+    """What a larger model gains over a smaller one."""
 
-    Attributes
-    ----------
-    delta_bic : float
-        Information gained, residual correlation taken into account; positive speaks for the larger model.
-    p_value : float
-        Probability of so large a gain if the smaller model were true, for one hypothesis.
-    n_effective : float
-        Independent samples the larger model's residual is worth.
-    """
-
-    delta_bic: float
+    delta_bic: float  # information gained, residual correlation taken into account
     p_value: float
-    n_effective: float
+    n_effective: float  # independent samples the larger model's residual is worth
 
 
 def residuals_by_record(result: FitResult) -> list[FloatArray]:
-    """Split a fit's stacked residual into one array per recording."""
     sizes = np.cumsum([int(use.sum()) for use in result.problem.use])[:-1]
     return list(np.split(result.residual, sizes))
 

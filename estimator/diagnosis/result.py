@@ -118,7 +118,7 @@ class Remainder:
     def says(self) -> str:
         """What it does that noise does not, and the law it follows; the end of a sentence that begins with "it"."""
         law = self.law if self.element is not None else ""
-        return "; it ".join(said for said in (self.tests or self.law, law) if said)
+        return "; it ".join(text for text in (self.tests or self.law, law) if text)
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,28 +141,13 @@ class RejectedEffect:
 
 @dataclass(frozen=True, slots=True)
 class Effort:
-    """What the search cost, in work that is the same on every machine, and what it did not get to.
+    """What the search cost, in work that is the same on every machine, and what it did not get to."""
 
-    Attributes
-    ----------
-    level : str
-        ``quick``, ``normal`` or ``thorough``.
-    simulations : int
-        Free runs of all recordings.
-    finished : bool
-        False where a limit of time ended it.
-    untried : tuple of str
-        Effects that were promising, or not looked at, and not fitted.
-    candidates : int
-        Effects that these recordings can show.
-    limit_s : float
-    """
-
-    level: str = "normal"
-    simulations: int = 0
-    finished: bool = True
-    untried: tuple[str, ...] = ()
-    candidates: int = 0
+    level: str = "normal"  # ``quick``, ``normal`` or ``thorough``
+    simulations: int = 0  # free runs of all recordings
+    finished: bool = True  # false where a limit of time ended it
+    untried: tuple[str, ...] = ()  # effects that were promising, or not looked at, and not fitted
+    candidates: int = 0  # effects that these recordings can show
     limit_s: float = math.inf
 
 
@@ -183,20 +168,11 @@ class UntestableEffect:
 
 @dataclass(frozen=True, slots=True)
 class UnnamedLaw:
-    """A law without a name for a mismatch that no entry explains.
-
-    Attributes
-    ----------
-    terms : tuple of (str, float)
-        Functions of what happens in the line, each with its coefficient: a torque [Nm] at motor, shaft, load or in the
-        torque path, an error of the reading [unit of the output] at the sensor.
-    rms_before, rms_after : float
-        Free-run error without it, and what it would leave to first order.
-    """
+    """A law without a name for a mismatch that no entry explains."""
 
     element: Element
-    terms: tuple[tuple[str, float], ...]
-    rms_before: float
+    terms: tuple[tuple[str, float], ...]  # functions of what happens in the line, each with its coefficient
+    rms_before: float  # free-run error without it, and what it would leave to first order
     rms_after: float
 
 
@@ -257,26 +233,12 @@ class Course:
 
 @dataclass(frozen=True, slots=True)
 class Equivalent:
-    """The input at one place that by itself would explain the re-tuned model's error.
-
-    Attributes
-    ----------
-    place : str
-        ``motor`` (torque that drives it), ``shaft`` (torque it carries beyond its law), ``load`` (torque against it) or
-        ``sensor`` (error of the reading).
-    unit : str
-    courses : mapping of str to Course
-        Per recording.
-    log_likelihood : float
-        Of the error, if a random walk acts at this place: the higher, the simpler an input explains it.
-    plausible : bool
-        Whether no other place is more likely by a factor that matters (``VERY_STRONG`` in BIC).
-    """
+    """The input at one place that by itself would explain the re-tuned model's error."""
 
     place: str
     unit: str
-    courses: Mapping[str, Course]
-    log_likelihood: float
+    courses: Mapping[str, Course]  # per recording
+    log_likelihood: float  # of the error, if a random walk acts at this place
     plausible: bool
 
 
@@ -303,12 +265,7 @@ class ErrorSpectrum:
 
 @dataclass(frozen=True, slots=True)
 class Response:
-    """Response from torque to output in one recording, without a model and of the models; shapes (M,).
-
-    ``std`` is the standard deviation of the size of what was measured, ``coherence`` the share of the output's power
-    that the torque explains; ``p_before`` and ``p_after`` are the probabilities that it differs so much from the
-    re-tuned and from the augmented model by chance.
-    """
+    """Response from torque to output in one recording, without a model and of the models; shapes (M,)."""
 
     frequency_hz: FloatArray
     measured: ComplexArray
@@ -322,35 +279,19 @@ class Response:
 
 @dataclass(frozen=True, slots=True)
 class LawPicture:
-    """A law over the signal it depends on, with the data: both are averages over bins; arrays of shape (K,).
+    """A law over the signal it depends on, with the data: both are averages over bins; arrays of shape (K,)."""
 
-    Attributes
-    ----------
-    name : str
-        The effect, or the law without a name.
-    signal, signal_unit, unit : str
-        What it is drawn over, and the unit of torque or reading.
-    x : ndarray
-        Mean of the signal in each bin.
-    data, low, high : ndarray
-        What the recordings ask for where the law acts, found without knowing it, and its 95 % interval.
-    law : ndarray
-        The law, seen in the same way.
-    explained : float
-        Share of the law's power over time that is a function of this signal.
-    """
-
-    name: str
+    name: str  # the effect, or the law without a name
     element: Element
-    signal: str
+    signal: str  # what it is drawn over, and the unit of torque or reading
     signal_unit: str
     unit: str
-    x: FloatArray
+    x: FloatArray  # mean of the signal in each bin
     data: FloatArray
     low: FloatArray
     high: FloatArray
-    law: FloatArray
-    explained: float
+    law: FloatArray  # the law, seen in the same way
+    explained: float  # share of the law's power over time that is a function of this signal
 
 
 @dataclass(frozen=True, slots=True)
@@ -366,18 +307,10 @@ class RankedLaw:
 
 @dataclass(frozen=True, slots=True)
 class Discrepancy:
-    """What the re-tuned model lacks: as an input at every place, over time, frequency and operating region.
+    """What the re-tuned model lacks: as an input at every place, over time, frequency and operating region."""
 
-    Attributes
-    ----------
-    element : Element or None
-        Where the best law without a name acts; None where no law gains anything.
-    laws : tuple of RankedLaw
-        Best law of each element, strongest first.
-    """
-
-    element: Element | None
-    laws: tuple[RankedLaw, ...]
+    element: Element | None  # where the best law without a name acts
+    laws: tuple[RankedLaw, ...]  # best law of each element, strongest first
     equivalents: tuple[Equivalent, ...]
     spectrum: ErrorSpectrum
     responses: Mapping[str, Response]
@@ -394,23 +327,12 @@ _AT: dict[str, Element] = {
 
 
 @dataclass(frozen=True, slots=True)
-class Stray:
-    """A nominal parameter that explains more outside of its tolerance.
-
-    Attributes
-    ----------
-    name : str
-    ratio : float
-        Its value there over the nominal one.
-    tolerance : float
-        Share of the nominal value that it is trusted to.
-    nominal : float or None
-    unit : str
-    """
+class OffNominal:
+    """A nominal parameter that explains more outside of its tolerance."""
 
     name: str
-    ratio: float
-    tolerance: float
+    ratio: float  # its value there over the nominal one
+    tolerance: float  # share of the nominal value that it is trusted to
     nominal: float | None = None
     unit: str = ""
 
@@ -444,7 +366,7 @@ class Diagnosis:
     traces: tuple[Trace, ...]
     warnings: tuple[str, ...] = ()
     discrepancy: Discrepancy | None = None
-    strays: tuple[Stray, ...] = ()
+    off_nominal: tuple[OffNominal, ...] = ()
     remainder: Remainder | None = None
     slight: tuple[Slight, ...] = ()
     effort: Effort = field(default_factory=Effort)

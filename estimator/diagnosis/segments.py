@@ -1,22 +1,12 @@
-"""Recordings with long gaps, cut into segments for the fit, and the diagnosis of segments put together again.
-
-Over a short gap the simulation continues with the torque it has. Over a long one it would diverge: the torque there was
-not read, or the model does not hold there (a mask: another brake, a gear change). So each segment is a recording of its
-own, with its own initial state and, as every recording, its own constant load torque: a road is not as steep behind a
-gap as before it. Time continues (``Record.began_s``), for laws over time.
-
-Users know their recordings by name, and get everything by it: intervals and courses of all its segments, one after the
-other; simulations over its whole time, NaN where no segment is; as constant load torque the mean of its segments',
-each counting by its good samples; and the response of the segment with the most of them.
-"""
+"""Recordings with long gaps, cut into segments for the fit, and the diagnosis of segments put together again."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, fields, is_dataclass, replace
 from itertools import pairwise
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -24,18 +14,14 @@ from estimator.diagnosis.noise import share_of, stretches
 from estimator.diagnosis.result import (
     Course,
     Diagnosis,
-    Discrepancy,
     Estimated,
-    FoundEffect,
-    Interval,
     Profile,
-    Response,
     Trace,
 )
+from estimator.physics.model import DrivelineModel
 from estimator.signals.record import FloatArray, Record, sliced
 
-LONG_S = 1.0
-"""A gap that is longer ends a segment."""
+LONG_S = 1.0  # a gap that is longer ends a segment
 
 LONG_SAMPLES = 10
 """It must also hold more samples than this: where sampling is slow, a few lost ones are no gap."""
@@ -46,33 +32,18 @@ SHORTEST_S = 2.0
 FEWEST_SAMPLES = 50
 """Good samples of a segment at least: more than twice what a predictor of its own error looks back on."""
 
-FEWEST_FOR_START = 10
-"""Good samples from which initial state and load are read off for a simulation alone."""
+FEWEST_FOR_START = 10  # good samples from which initial state and load are read off for a simulation alone
 
 
 @dataclass(frozen=True, slots=True)
 class Cut:
-    """Recordings, cut.
+    """Recordings, cut."""
 
-    Attributes
-    ----------
-    whole : tuple of Record
-        As they were given.
-    records : tuple of Record
-        What is left of them for a fit; a recording without long gaps as it is.
-    rows : mapping of str to slice
-        Of each segment, by its name: its rows in its recording. Recordings that are not cut are not in it.
-    origin : mapping of str to str
-        Name of every record to the name of its recording.
-    warnings : tuple of str
-        What was left out.
-    """
-
-    whole: tuple[Record, ...]
-    records: tuple[Record, ...]
-    rows: Mapping[str, slice]
-    origin: Mapping[str, str]
-    warnings: tuple[str, ...] = ()
+    whole: tuple[Record, ...]  # as they were given
+    records: tuple[Record, ...]  # what is left of them for a fit
+    rows: Mapping[str, slice]  # of each segment, by its name
+    origin: Mapping[str, str]  # name of every record to the name of its recording
+    warnings: tuple[str, ...] = ()  # what was left out
 
     def of(self, names: Iterable[str]) -> tuple[Record, ...]:
         """Return what is left of the recordings of these names."""
@@ -95,10 +66,7 @@ def segments(record: Record) -> list[slice]:
 
 
 def tiles(record: Record) -> list[Record]:
-    """Return the segments of a recording, each up to where the next begins: all rows, for a simulation of each.
-
-    One of fewer than ``FEWEST_FOR_START`` good samples goes with the one before it.
-    """
+    """Return the segments of a recording, each up to where the next begins: all rows, for a simulation of each."""
     parts = segments(record)
     starts = [part.start for part in parts[1:] if int(record.okay[part].sum()) >= FEWEST_FOR_START]
     if not starts:
@@ -158,69 +126,60 @@ def _stretches_warning(record: Record, long: Sequence[slice], used: Sequence[sli
     )
 
 
-Value = TypeVar("Value")
 Over = TypeVar("Over", Course, Profile)
-Terms = tuple[tuple[str, float], ...]
 
 
 def joined(diagnosis: Diagnosis, cut: Cut) -> Diagnosis:
     """Return a diagnosis of segments under the names of the recordings they are of."""
     if not cut.rows:
         return diagnosis
-    unnamed = diagnosis.unnamed
-    return replace(
-        diagnosis,
-        statement=_text(diagnosis.statement, cut),
-        mismatch=replace(diagnosis.mismatch, time_s=_intervals(diagnosis.mismatch.time_s, cut)),
-        effects=tuple(_effect(effect, cut) for effect in diagnosis.effects),
-        rejected=tuple(replace(rival, reason=_text(rival.reason, cut)) for rival in diagnosis.rejected),
-        untestable=tuple(replace(entry, reason=_text(entry.reason, cut)) for entry in diagnosis.untestable),
-        unnamed=None if unnamed is None else replace(unnamed, terms=_terms(unnamed.terms, cut)),
-        load_torque=_by_recording(diagnosis.load_torque, cut, lambda parts: _mean(parts, cut)),
-        traces=_traces(diagnosis.traces, cut),
-        warnings=tuple(_text(warning, cut) for warning in diagnosis.warnings),
-        discrepancy=None if diagnosis.discrepancy is None else _discrepancy(diagnosis.discrepancy, cut),
-    )
+    found: Diagnosis = _renamed(replace(diagnosis, traces=()), cut)
+    by_name = {trace.name: trace for trace in diagnosis.traces}
+    return replace(found, traces=tuple(_by_recording(by_name, cut).values()))
 
 
-def _by_recording(
-    values: Mapping[str, Value], cut: Cut, join: Callable[[Mapping[str, Value]], Value]
-) -> dict[str, Value]:
+def _renamed(value: Any, cut: Cut) -> Any:
+    """Return a part of a diagnosis with recordings where it has segments: in texts, and in what is given for each."""
+    if isinstance(value, str):
+        return _text(value, cut)
+    if isinstance(value, tuple):
+        return tuple(_renamed(each, cut) for each in value)
+    if isinstance(value, Mapping) and value and value.keys() <= cut.origin.keys():
+        return _by_recording(value, cut)
+    if is_dataclass(value) and not isinstance(value, DrivelineModel | type):
+        return replace(value, **{each.name: _renamed(getattr(value, each.name), cut) for each in fields(value)})
+    return value
+
+
+def _by_recording(values: Mapping[str, Any], cut: Cut) -> dict[str, Any]:
     """Join the values of the segments of each recording, in the order of the recordings."""
     found = {}
     for record in cut.whole:
         parts = {name: value for name, value in values.items() if cut.origin[name] == record.name}
         if parts:
-            found[record.name] = join(parts)
+            found[record.name] = _together(parts, cut)
     return found
 
 
+def _together(parts: Mapping[str, Any], cut: Cut) -> Any:
+    first = next(iter(parts.values()))
+    if isinstance(first, tuple):
+        return tuple(each for values in parts.values() for each in values)
+    if isinstance(first, Estimated):
+        return _mean(parts, cut)
+    if isinstance(first, Course | Profile):
+        return _with_breaks(list(parts.values()))
+    if isinstance(first, Trace):
+        return _whole(parts, cut)
+    good = {record.name: int(record.okay.sum()) for record in cut.records}
+    return parts[max(parts, key=good.__getitem__)]
+
+
 def _text(text: str, cut: Cut) -> str:
-    """Name recordings where a text names segments."""
     if not cut.rows:
         return text
     names = sorted(cut.rows, key=len, reverse=True)  # run#12 before run#1
     return re.sub("|".join(map(re.escape, names)), lambda match: cut.origin[match.group()], text)
-
-
-def _terms(terms: Terms, cut: Cut) -> Terms:
-    return tuple((_text(name, cut), value) for name, value in terms)
-
-
-def _intervals(time_s: Mapping[str, tuple[Interval, ...]], cut: Cut) -> dict[str, tuple[Interval, ...]]:
-    def one_after_the_other(parts: Mapping[str, tuple[Interval, ...]]) -> tuple[Interval, ...]:
-        return tuple(interval for intervals in parts.values() for interval in intervals)
-
-    return _by_recording(time_s, cut, one_after_the_other)
-
-
-def _effect(effect: FoundEffect, cut: Cut) -> FoundEffect:
-    return replace(
-        effect,
-        statement=_text(effect.statement, cut),
-        time_s=_intervals(effect.time_s, cut),
-        profiles=_by_recording(effect.profiles, cut, lambda parts: _with_breaks(list(parts.values()))),
-    )
 
 
 def _mean(parts: Mapping[str, Estimated], cut: Cut) -> Estimated:
@@ -255,11 +214,6 @@ def _with_breaks(parts: Sequence[Over]) -> Over:
     )
 
 
-def _traces(traces: Sequence[Trace], cut: Cut) -> tuple[Trace, ...]:
-    by_name = {trace.name: trace for trace in traces}
-    return tuple(_by_recording(by_name, cut, lambda parts: _whole(parts, cut)).values())
-
-
 def _whole(parts: Mapping[str, Trace], cut: Cut) -> Trace:
     """Return the trace of a recording from those of its segments."""
     first = next(iter(parts))
@@ -282,22 +236,4 @@ def _whole(parts: Mapping[str, Trace], cut: Cut) -> Trace:
         nominal=nominal,
         retuned=retuned,
         augmented=augmented,
-    )
-
-
-def _discrepancy(seen: Discrepancy, cut: Cut) -> Discrepancy:
-    good = {record.name: int(record.okay.sum()) for record in cut.records}
-
-    def longest(parts: Mapping[str, Response]) -> Response:
-        return parts[max(parts, key=good.__getitem__)]
-
-    return replace(
-        seen,
-        laws=tuple(replace(law, terms=_terms(law.terms, cut)) for law in seen.laws),
-        equivalents=tuple(
-            replace(each, courses=_by_recording(each.courses, cut, lambda parts: _with_breaks(list(parts.values()))))
-            for each in seen.equivalents
-        ),
-        responses=_by_recording(seen.responses, cut, longest),
-        pictures=tuple(replace(picture, name=_text(picture.name, cut)) for picture in seen.pictures),
     )

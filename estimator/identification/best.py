@@ -1,10 +1,4 @@
-"""The best estimate of a recording: a pole pair that the data need, its intervals, and whether to believe it.
-
-A Box-Jenkins model at the recording's own period, where the torque was held from one sample to the next. Its order is
-that of two masses, three, and is raised only where the residual still depends on past torque. The pair is given where
-the data pay for it (a model without is worse by the Bayesian criterion), where no zero cancels it, and where its
-frequency is known to better than a half.
-"""
+"""The best estimate of a recording: a pole pair that the data need, its intervals, and whether to believe it."""
 
 from __future__ import annotations
 
@@ -14,8 +8,8 @@ from enum import Enum
 import numpy as np
 
 from estimator.identification.linear_model import LinearModel, Orders
+from estimator.identification.modes.modes import Cancellation, UncertainMode, pole_zero_map, uncertain_modes
 from estimator.identification.modes.physical import RESPONDING
-from estimator.identification.modes.uncertainty import Cancellation, UncertainMode, pole_zero_map, uncertain_modes
 from estimator.identification.offline.fits import LinearFit, fit_of, solved
 from estimator.identification.offline.linearity import (
     Linearity,
@@ -24,14 +18,12 @@ from estimator.identification.offline.linearity import (
     modes_by_region,
     shaft_torque,
 )
-from estimator.identification.offline.orders import criterion
 from estimator.identification.offline.problem import Problem
-from estimator.identification.offline.validation import Feedback, Validation, judge_feedback, validate
+from estimator.identification.offline.validation import Feedback, Validation, criterion, judge_feedback, validate
 from estimator.signals.decimate import HIGH_PASS_HZ, block_of, first_part, high_passed
 from estimator.signals.record import FloatArray, Record
 
-RIGID = Orders(1, 1, 1)
-"""One mass: the model that a pole pair has to be better than."""
+RIGID = Orders(1, 1, 1)  # one mass: the model that a pole pair has to be better than
 
 RICHER = (Orders(4, 4, 1), Orders(5, 5, 1))
 """Tried where two masses miss a part of the response: a lag or a further delay, a third mass."""
@@ -45,8 +37,7 @@ LOWEST_HZ, HIGHEST_HZ = 2.0, 50.0
 SAMPLES_PER_PERIOD = 4.0
 """Fewer samples in one period of the resonance leave its damping to the low-pass of the sampling."""
 
-MOST_UNCERTAIN = 0.5
-"""Largest half width of the frequency's 95 % interval, in parts of it."""
+MOST_UNCERTAIN = 0.5  # largest half width of the frequency's 95 % interval, in parts of it
 
 
 ONE_MASS_DOES = "one mass explains the recording as well: the data do not need a pole pair"
@@ -66,50 +57,23 @@ class Verdict(Enum):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BestEstimate:
-    """The headline of one recording.
+    """The headline of one recording."""
 
-    Attributes
-    ----------
-    fit : LinearFit
-        The Box-Jenkins model it is taken from.
-    two_mass : LinearFit
-        The one of third order, which physical parameters are taken from.
-    problem : Problem
-    x : ndarray
-        Its problem and minimum.
-    mode : UncertainMode or None
-        The pole pair, None where the data carry none.
-    reason : str
-        Why there is none.
-    band_hz : tuple of float
-        Where it was looked for [Hz].
-    validation : Validation
-        Of the fit on its recording.
-    feedback : Feedback
-        Whether the torque followed the speed.
-    linearity : Linearity
-        Whether a linear model is enough.
-    regions : tuple of RegionalMode
-        The resonance by region of the shaft's torque [Nm]; empty where the drive is linear.
-    verdict : Verdict
-    """
-
-    fit: LinearFit
-    two_mass: LinearFit
+    fit: LinearFit  # the Box-Jenkins model it is taken from
+    two_mass: LinearFit  # the one of third order, which physical parameters are taken from
     problem: Problem
-    x: FloatArray
-    mode: UncertainMode | None
-    reason: str
-    band_hz: tuple[float, float]
-    validation: Validation
-    feedback: Feedback
-    linearity: Linearity
-    regions: tuple[RegionalMode, ...]
+    x: FloatArray  # its minimum
+    mode: UncertainMode | None  # the pole pair, None where the data carry none
+    reason: str  # why there is none
+    band_hz: tuple[float, float]  # where it was looked for [Hz]
+    validation: Validation  # of the fit on its recording
+    feedback: Feedback  # whether the torque followed the speed
+    linearity: Linearity  # whether a linear model is enough
+    regions: tuple[RegionalMode, ...]  # the resonance by region of the shaft's torque [Nm]; empty where linear
     verdict: Verdict
 
     @property
     def too_slow(self) -> bool:
-        """Tell whether the recording has too few samples in a period of the resonance."""
         period_s = self.fit.model.sample_time_s
         return self.mode is not None and self.mode.frequency_hz.value * period_s > 1.0 / SAMPLES_PER_PERIOD
 
@@ -126,7 +90,6 @@ class _Rung:
 
 
 def best_estimate(record: Record, high_pass_hz: float = HIGH_PASS_HZ) -> BestEstimate:
-    """Return the best estimate of a recording."""
     record = first_part(record)
     data = high_passed(record, high_pass_hz)
     rungs = [_rung(data, RESPONDING)]

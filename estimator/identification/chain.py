@@ -1,13 +1,5 @@
 """The on-line chain: samples of the bus in, the driveline's model and its resonance out, while driving.
 
-::
-
-    torque, output  ->  high-pass, low-pass, every M-th sample   (estimator.signals.decimate)
-                    ->  recursive estimator                      (Oefo, or any other)
-                    ->  poles, resonance, damping, how sure      (tracking.follow)
-                    ->  does the torque excite it?               (tracking.excitation)
-                    ->  has the resonance changed?               (tracking.watch)
-
 One code for a sample and for a block: what a rig computed while driving comes out of its recording again, to the
 bit. Nothing in the loop raises on a value; the estimate's status says what is wrong with it.
 """
@@ -23,7 +15,7 @@ import numpy as np
 from estimator.errors import BadSetting, BadShape
 from estimator.identification.linear_model import LinearModel, Orders
 from estimator.identification.modes.modes import Mode
-from estimator.identification.online.oefo import Filtering, Oefo
+from estimator.identification.online.estimators import Filtering, Oefo
 from estimator.identification.online.recursive import Estimate, RecursiveEstimator, Status, Trajectory
 from estimator.identification.settings import SAMPLES_PER_PARAMETER, Settings
 from estimator.identification.tracking.alarm import Alarm, TrackingState
@@ -39,34 +31,16 @@ NOT_EXCITED = "at the resonance the torque moves the output less than the noise 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OnlineEstimate:
-    """State of the on-line chain after one kept sample.
-
-    Attributes
-    ----------
-    time_s : float
-        Moment of the recording the sample stands for, the low-pass's delay taken out [s].
-    estimate : Estimate
-        Of the recursive estimator, with its status.
-    model : LinearModel
-        Its parameters as a model.
-    resonance : Mode or None
-        Dominant lightly damped mode; None where there is none, or the estimate is not to be used.
-    frequency_std_hz, damping_std : float
-        Standard deviations of its natural frequency [Hz] and damping ratio; NaN where not known.
-    state : TrackingState
-        What the tracking is doing.
-    alarm : Alarm or None
-        A change that was found at this sample.
-    """
+    """State of the on-line chain after one kept sample."""
 
     time_s: float
-    estimate: Estimate
-    model: LinearModel
-    resonance: Mode | None
-    frequency_std_hz: float
+    estimate: Estimate  # of the recursive estimator, with its status
+    model: LinearModel  # its parameters as a model
+    resonance: Mode | None  # dominant lightly damped mode
+    frequency_std_hz: float  # standard deviations of its natural frequency [Hz] and damping ratio
     damping_std: float
-    state: TrackingState
-    alarm: Alarm | None = None
+    state: TrackingState  # what the tracking is doing
+    alarm: Alarm | None = None  # A change that was found at this sample
 
     @property
     def status(self) -> Status:
@@ -81,39 +55,19 @@ class OnlineEstimate:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OnlineTrajectory:
-    """The same of every kept sample of a block.
+    """The same of every kept sample of a block."""
 
-    Attributes
-    ----------
-    time_s : ndarray, shape (n,)
-        Moments [s].
-    estimates : Trajectory
-        Of the recursive estimator, length n.
-    frequency_hz, damping, height : ndarray, shape (n,)
-        The resonance; NaN where there is none.
-    frequency_std_hz, damping_std : ndarray, shape (n,)
-        Standard deviations; NaN where not known.
-    state : ndarray of int, shape (n,)
-        Values of :class:`TrackingState`.
-    alarms : tuple of Alarm
-        Changes found in the block, in order of time.
-    alarm_at : tuple of int
-        At which kept sample of the block each was found.
-    orders, sample_time_s
-        Structure and sampling period of the models [s].
-    """
-
-    time_s: FloatArray
-    estimates: Trajectory
-    frequency_hz: FloatArray
-    damping: FloatArray
-    height: FloatArray
-    frequency_std_hz: FloatArray
-    damping_std: FloatArray
-    state: IntArray
-    alarms: tuple[Alarm, ...]
-    alarm_at: tuple[int, ...]
-    orders: Orders
+    time_s: FloatArray  # (n,): moments [s]
+    estimates: Trajectory  # of the recursive estimator, length n
+    frequency_hz: FloatArray  # (n,): the resonance
+    damping: FloatArray  # (n,): the resonance
+    height: FloatArray  # (n,): the resonance
+    frequency_std_hz: FloatArray  # (n,): standard deviations
+    damping_std: FloatArray  # (n,): standard deviations
+    state: IntArray  # (n,): values of :class:`TrackingState`
+    alarms: tuple[Alarm, ...]  # changes found in the block, in order of time
+    alarm_at: tuple[int, ...]  # at which kept sample of the block each was found
+    orders: Orders  # structure and sampling period of the models [s]
     sample_time_s: float
 
     def __len__(self) -> int:
@@ -140,8 +94,7 @@ class OnlineTrajectory:
         return (self[k] for k in range(len(self)))
 
 
-VERSION = 3
-"""Of a saved state; goes up when a part changes its meaning."""
+VERSION = 3  # of a saved state; goes up when a part changes its meaning
 
 EstimatorFactory = Callable[[Settings, FloatArray | None], RecursiveEstimator]
 """Makes a recursive estimator from the settings and L (None: there is no batch model yet)."""

@@ -26,8 +26,8 @@ from threadpoolctl import threadpool_limits
 from estimator.errors import BadModel
 from estimator.identification.best import BestEstimate, Verdict, known_pair
 from estimator.identification.linear_model import LinearModel
+from estimator.identification.modes.modes import UncertainMode
 from estimator.identification.modes.physical import PhysicalEstimate, physical_parameters
-from estimator.identification.modes.uncertainty import UncertainMode
 from estimator.identification.offline.problem import SETTLED, Problem
 from estimator.signals.record import FloatArray
 

@@ -12,16 +12,14 @@ from enum import Enum
 import numpy as np
 
 from estimator.errors import BadSetting, NotExciting
-from estimator.identification.linear_model import Orders
+from estimator.identification.linear_model import Orders, singular_values
 from estimator.identification.online.adaptation import Adaptation, DecreasingThenConstantTrace
-from estimator.identification.online.oefo import Oefo
-from estimator.identification.triangular import singular_values
+from estimator.identification.online.estimators import Oefo
 from estimator.signals.decimate import HIGH_PASS_HZ, decimate, first_part, high_passed
 from estimator.signals.record import BoolArray, FloatArray, Record
 from estimator.signals.settings import Requirement, is_positive, require
 
-SAMPLES_PER_PARAMETER = 10
-"""Good samples asked for per parameter; fewer fit the noise as well as the system."""
+SAMPLES_PER_PARAMETER = 10  # good samples asked for per parameter; fewer fit the noise as well as the system
 
 RELATIVE_RANK = 1e-6
 """Singular value, against the largest, below which delayed copies count as dependent.

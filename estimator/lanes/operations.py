@@ -119,8 +119,7 @@ def _like(value: Any, other: Any) -> Any:
 Make = Callable[..., Any]
 """From an instruction builder and the arguments' values to the result's."""
 
-FUSED = ("contract",)
-"""A product and the sum it goes into may be one instruction, rounded once."""
+FUSED = ("contract",)  # a product and the sum it goes into may be one instruction, rounded once
 
 NUMBER = (LanesType, types.Number)
 ANSWER = (MaskType, types.Boolean)
@@ -144,7 +143,6 @@ def define(function: Any, kinds: tuple[type, ...], wanted: Any, result: Any, mak
 
 
 def called(builder: Any, name: str, *args: Any) -> Any:
-    """Return what one of LLVM's own functions makes of lanes."""
     kind = ir.FunctionType(NUMBERS, [NUMBERS] * len(args))
     return builder.call(defined_once(builder.module, kind, f"llvm.{name}.v{LANES}f64"), args)
 
@@ -194,13 +192,11 @@ define(operator.and_, ANSWER, mask, mask, lambda builder, x, y: builder.and_(x, 
 define(operator.or_, ANSWER, mask, mask, lambda builder, x, y: builder.or_(x, y))
 
 
-LARGEST = 708.0
-"""Beyond this the exponential leaves the range of a number; it stays at its end."""
+LARGEST = 708.0  # beyond this the exponential leaves the range of a number; it stays at its end
 
 LOG2_E = 1.4426950408889634
 LN_2, LN_2_HIGH, LN_2_LOW = 0.6931471805599453, 6.93147180369123816490e-01, 1.90821492927058770002e-10
-WHOLE = 6755399441055744.0
-"""Added to a number, ``1.5 * 2**52`` leaves its whole part in the last bits."""
+WHOLE = 6755399441055744.0  # added to a number, ``1.5 * 2**52`` leaves its whole part in the last bits
 
 TWO_BY_PI = 0.6366197723675814
 QUARTER_HIGH, QUARTER_MIDDLE = 1.57079632673412561417e00, 6.07710050630396597660e-11

@@ -25,8 +25,7 @@ register_jitable: Any = extending.register_jitable
 register_model: Any = extending.register_model
 
 
-LANES = 8
-"""Numbers in lanes: one register of the widest instructions there are today, two or four of others."""
+LANES = 8  # numbers in lanes: one register of the widest instructions there are today, two or four of others
 
 NUMBERS = ir.VectorType(ir.DoubleType(), LANES)
 BITS = ir.VectorType(ir.IntType(64), LANES)
@@ -41,7 +40,6 @@ class LanesType(types.Type):
         super().__init__("Lanes")
 
     def can_convert_from(self, typingctx: Any, other: Any) -> Any:
-        """Take any number."""
         return Conversion.safe if isinstance(other, types.Number) else None
 
     def unify(self, typingctx: Any, other: Any) -> Any:

@@ -57,7 +57,6 @@ _ENTRIES = (
 
 
 def _mutual(entries: Sequence[Effect]) -> dict[str, Effect]:
-    """Return the entries by name; what one resembles, or is equivalent to, resembles it or is equivalent to it."""
 
     def of(entry: Effect, names: Callable[[Effect], tuple[str, ...]]) -> tuple[str, ...]:
         return tuple(dict.fromkeys([*names(entry), *(each.name for each in entries if entry.name in names(each))]))

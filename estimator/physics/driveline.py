@@ -5,13 +5,6 @@ Equations of motion, reflected to the motor shaft (translation: read kg, N, m, N
     two_mass   J_M dw_M/dt = T - b_M w_M - T_S          one_mass   J_M dw_M/dt = T - b_M w_M - T_0
                J_L dw_L/dt = T_S - b_L w_L - T_0
                T_S = k (phi_M - phi_L) + c (w_M - w_L)
-
-    three_mass a mass J_2 between shaft and load, and a second shaft k_2, c_2 from it to the load
-
-    joint      T = k phi + c dphi/dt - T_0: the twist phi is imposed, the torque T is measured
-
-``T_0`` is the constant load torque; it and the initial state are unknown in every recording, unless the model says that
-recordings share it, or what it is.
 """
 
 from __future__ import annotations
@@ -130,10 +123,7 @@ class Parameter:
 
 @dataclass(frozen=True, slots=True)
 class EffectValue:
-    """One parameter of an effect: its value and, where it was estimated, its 95 % interval.
-
-    ``tolerance`` is the share of the value within which re-tuning it is no missing physics; 0 holds it.
-    """
+    """One parameter of an effect: its value and, where it was estimated, its 95 % interval."""
 
     value: float
     ci95: tuple[float, float] | None = None
@@ -177,12 +167,10 @@ def natural_frequencies_rad_s(values: Mapping[str, float]) -> FloatArray:
         stiffness[i : i + 2, i : i + 2] += values[spring] * np.array([[1.0, -1.0], [-1.0, 1.0]])
     root = np.sqrt([values[name] for name, _ in chain])
     squares = np.linalg.eigvalsh(stiffness / np.outer(root, root))
-    frequencies: FloatArray = np.sqrt(np.maximum(squares[1:], 0.0))
-    return frequencies
+    return np.sqrt(np.maximum(squares[1:], 0.0))
 
 
 def load_inertia(model: Driveline) -> str:
-    """Return the name of the inertia that the load's mass is part of."""
     return "J_M" if model.structure is Structure.ONE_MASS else "J_L"
 
 
@@ -205,16 +193,8 @@ class Start:
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """One simulation of a recording.
+    """One simulation of a recording."""
 
-    Attributes
-    ----------
-    p : ndarray, shape (layout.SIZE,)
-        Parameters of the superset model, the recording's own among them.
-    extra_load_nm : ndarray, shape (N,), optional
-        Load torque over time, next to the constant one.
-    """
-
-    p: FloatArray
+    p: FloatArray  # (layout.SIZE,): parameters of the superset model, the recording's own among them
     start: Start
-    extra_load_nm: FloatArray | None = None
+    extra_load_nm: FloatArray | None = None  # (N,): load torque over time, next to the constant one

@@ -25,8 +25,7 @@ from estimator.physics.problem import (
 from estimator.physics.problem import make_problem as make_problem  # where users have always found it
 from estimator.signals.record import BoolArray, FloatArray, IntArray
 
-ITERATIONS = 50
-"""Jacobians at most; a fit that needs more is not converged."""
+ITERATIONS = 50  # jacobians at most; a fit that needs more is not converged
 
 MOMENT_NAMES = frozenset(moment.name for moment in MOMENTS)
 """Names of an event's own unknowns: the error over them has a kink at every sample's edge."""
@@ -106,15 +105,13 @@ class FitResult:
         low, high = bounds(self.problem)
         fixed = low == high  # at infinity, too
         down, up = (np.subtract(self.x, bound, out=np.zeros_like(self.x), where=~fixed) for bound in (low, high))
-        ended: BoolArray = fixed | (down < 1e-6) | (-up < 1e-6)
-        return ended
+        return fixed | (down < 1e-6) | (-up < 1e-6)
 
     def value(self, effect: str, name: str) -> float:
         """Fitted value of a parameter (``effect`` empty for a nominal one)."""
         return float(self.p[next(s.slot for s in self.problem.shared if (s.effect, s.name) == (effect, name))])
 
     def values_of(self, effect: str) -> dict[str, float]:
-        """Return the values of an effect's parameters that all recordings share."""
         return {
             s.name: float(x) * s.scale for s, x in zip(self.problem.shared, self.x, strict=False) if s.effect == effect
         }
@@ -135,7 +132,6 @@ def not_fitted(problem: Problem, x: FloatArray) -> FitResult:
 
 
 def _moments(problem: Problem) -> BoolArray:
-    """Return which unknowns are moments of events, shape (U,)."""
     parts = [np.zeros(len(problem.shared), dtype=bool)]
     for basis in problem.bases:
         own = np.zeros(basis.guess.size, dtype=bool)
@@ -184,30 +180,26 @@ def fit(problem: Problem, x0: FloatArray | None = None, iterations: int = ITERAT
     return FitResult(problem, solution.x, outputs(solution.x), solution.residual, solution.jacobian, solution.converged)
 
 
-HEAT = 3
-"""Jacobians that each of several starts gets before only the best ones continue."""
-
-CLOSE = 1.1
-"""Squared error, over the best start's, up to which a start continues."""
+HEAT = 3  # jacobians that each of several starts gets before only the best ones continue
+CLOSE = 1.1  # squared error, over the best start's, up to which a start continues
 
 Name = tuple[object, ...]
 
 
-def best_fit(problems: Sequence[Problem], warm: FitResult | None = None, iterations: int = ITERATIONS) -> FitResult:
-    """Fit from several starts and return the best; what a fit ``warm`` has in common starts where that one ended.
-
-    Every start gets a few steps; those that are then close to the best continue.
-    """
+def best_fit(problems: Sequence[Problem], previous: FitResult | None = None, iterations: int = ITERATIONS) -> FitResult:
+    """Fit from several starts and return the best; what a fit ``warm`` has in common starts where that one ended."""
     if len(problems) == 1:
-        return _begun(problems[0], warm, iterations)
-    heat = begun(problems, warm, min(HEAT, iterations))
+        return _initial_fit(problems[0], previous, iterations)
+    heat = initial_fits(problems, previous, min(HEAT, iterations))
     finals = concurrently(partial(converge, iterations=iterations), [heat[i] for i in close(heat)])
     return min(finals, key=lambda result: result.squares)
 
 
-def begun(problems: Sequence[Problem], warm: FitResult | None = None, iterations: int = HEAT) -> list[FitResult]:
+def initial_fits(
+    problems: Sequence[Problem], previous: FitResult | None = None, iterations: int = HEAT
+) -> list[FitResult]:
     """Fit a few steps from each of several starts."""
-    return concurrently(partial(_begun, warm=warm, iterations=iterations), problems)
+    return concurrently(partial(_initial_fit, previous=previous, iterations=iterations), problems)
 
 
 def close(heat: Sequence[FitResult]) -> list[int]:
@@ -222,15 +214,15 @@ def converge(result: FitResult, iterations: int = ITERATIONS) -> FitResult:
     return result if result.converged or iterations <= HEAT else fit(result.problem, result.x, iterations)
 
 
-def _begun(problem: Problem, warm: FitResult | None, iterations: int) -> FitResult:
-    return fit(problem, None if warm is None else warm_start(problem, warm), iterations)
+def _initial_fit(problem: Problem, previous: FitResult | None, iterations: int) -> FitResult:
+    return fit(problem, None if previous is None else warm_start(problem, previous), iterations)
 
 
-def warm_start(problem: Problem, warm: FitResult) -> FloatArray:
+def warm_start(problem: Problem, previous: FitResult) -> FloatArray:
     """Return scaled unknowns, shape (U,): where a fit left them, and those that it lacks where a fit starts."""
     x = start_vector(problem)
-    columns, taken, ratio = in_common(problem, warm.problem)
-    x[columns] = warm.x[taken] / ratio
+    columns, taken, ratio = in_common(problem, previous.problem)
+    x[columns] = previous.x[taken] / ratio
     return x
 
 
@@ -257,12 +249,6 @@ def _scales(problem: Problem) -> FloatArray:
 
 
 def rates(result: FitResult) -> list[FloatArray]:
-    """Return the rates of the simulated outputs before and after each sample, shape (2, N) for each recording.
-
-    A torque that steps at a sample makes two of them; what was before the first one is unknown, and taken for what
-    follows. A joint follows an imposed motion, which is known at the samples alone: its rates are those of straight
-    lines to the neighbours.
-    """
     if result.problem.grid.structure is Structure.JOINT:
         pairs = zip(result.outputs, result.problem.records, strict=True)
         return [_secants(output, record.sample_time_s) for output, record in pairs]

@@ -11,15 +11,13 @@ import numpy as np
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.driveline import Case, Start
 from estimator.physics.fit import FitResult, fit
-from estimator.physics.grid import Grid
-from estimator.physics.layout import LOAD, slot
+from estimator.physics.layout import LOAD, Grid, slot
 from estimator.physics.model import DrivelineModel
 from estimator.physics.own_scan import Projector, cells, scan, waves
 from estimator.physics.problem import Problem, case_of, make_problem, start_of, start_vector
 from estimator.physics.simulate import simulate_each
 from estimator.physics.unknowns import own_unknowns
-from estimator.signals.outputs import outputs_apart
-from estimator.signals.record import BoolArray, FloatArray, Record
+from estimator.signals.record import BoolArray, FloatArray, Record, separated_outputs
 
 Own = Mapping[tuple[str, str], float]
 """Effect and parameter to a recording's own value."""
@@ -29,49 +27,29 @@ NOTHING_KNOWN: Own = MappingProxyType({})
 
 @dataclass(frozen=True, slots=True)
 class FreeRun:
-    """A free-run simulation of one recording.
+    """A free-run simulation of one recording."""
 
-    Attributes
-    ----------
-    output : ndarray, shape (N,)
-        Simulated output, in the unit of the recording's.
-    rms : float
-        RMS of its error over the good samples.
-    start : Start
-        Load torque and initial state that were estimated.
-    further : tuple of ndarray, shape (N,)
-        Simulated further outputs, in the order of the recording's channels, each in its own unit.
-    """
-
-    output: FloatArray
-    rms: float
-    start: Start
-    further: tuple[FloatArray, ...] = ()
+    output: FloatArray  # (N,): simulated output, in the unit of the recording's
+    rms: float  # RMS of its error over the good samples
+    start: Start  # load torque and initial state that were estimated
+    further: tuple[FloatArray, ...] = ()  # (N,)
 
 
 def free_run(model: DrivelineModel, record: Record, known: Own = NOTHING_KNOWN) -> FreeRun:
-    """Simulate one recording with a model from its measured torques.
-
-    Besides load torque and initial state, what the model's effects leave to every recording is estimated from it:
-    phases of angles, moments of events, the load profile of a road.
-    """
+    """Simulate one recording with a model from its measured torques."""
     profile = any(EFFECTS[name].profile for name in model.effects)
     problem = make_problem(model, [record], (), profile=profile)
     result = settle(problem, known)
     start = start_of(problem, result.x, 0)
     whole = replace(start, load_torque_nm=start.load_torque_nm + float(problem.p[slot("", LOAD)]))
     case = case_of(problem.local[0], problem.p, result.x)
-    views = outputs_apart([record], lambda _: 1.0)[1:]
+    views = separated_outputs([record], lambda _: 1.0)[1:]
     further = tuple(simulate_each(problem.grid, view, [case])[0] for view in views)
     return FreeRun(result.outputs[0], result.rms, whole, further)
 
 
 def settle(problem: Problem, known: Own = NOTHING_KNOWN) -> FitResult:
-    """Estimate what is its own in a problem of one recording without shared unknowns.
-
-    With a gap in the line the recording may begin on either flank or between them, and the error has an optimum near
-    each: every one is tried. Phases and moments start where a scan finds them.
-    """
+    """Estimate what is its own in a problem of one recording without shared unknowns."""
     start = _with_own(problem, known) if problem.local[0].own else start_vector(problem)
     twist, gap_rad = problem.local[0].twist_index, float(problem.p[slot("backlash", "gap_rad")])
     starts = [start]

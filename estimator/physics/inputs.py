@@ -14,7 +14,7 @@ from estimator.physics.catalogue import BUILT_IN
 from estimator.physics.driveline import Case, Start
 from estimator.physics.effect import Place
 from estimator.physics.effects.torque import EDGE
-from estimator.physics.kernel import bristles, sensing, slots, state_vector
+from estimator.physics.kernel import conditions, sensing, slots, state_vector
 from estimator.physics.kernel.conditions import branch_frequency, branch_inertia, is_bristled, is_within
 from estimator.physics.layout import LOAD, slot
 from estimator.signals.record import MOST_BYTES, FloatArray, IntArray, Record, once
@@ -57,11 +57,7 @@ def limited(torque: FloatArray, limit: float, sharpness: float) -> FloatArray:
 
 
 def warmth(torque: FloatArray, since_start_s: FloatArray, period_s: float, p: FloatArray, begun: float) -> FloatArray:
-    """Return how warm the windings are when each row begins and behind the last, 1 with the full loss; shape (N + 1,).
-
-    By time alone, or, where they are heated, by the torque's own losses: ``tau dh/dt + h = (T / T_n)^2``, held over
-    each period; ``begun`` is the first row's then.
-    """
+    """Return how warm the windings are when each row begins and after the last, 1 at the full loss; (N + 1,)."""
     if p[_HEATED] <= 0.0:
         rows_and_end = np.append(since_start_s, since_start_s[-1] + period_s)
         return np.asarray(-np.expm1(-rows_and_end / p[_DERATING_TIME]))
@@ -109,8 +105,7 @@ class _Kept:
         self.torques: tuple[tuple[bytes, FloatArray], ...] = ()
 
 
-MOST_KEPT = 2
-"""Torques that are kept: that of a fit, and one with something moved."""
+MOST_KEPT = 2  # torques that are kept: that of a fit, and one with something moved
 
 
 @once
@@ -140,26 +135,14 @@ Key = TypeVar("Key", bound=Hashable)
 
 
 class Inputs(NamedTuple):
-    """What drives a line in each of K simulations.
+    """What drives a line in each of K simulations."""
 
-    Attributes
-    ----------
-    torque, load : ndarray, shape (T, N) and (L, N)
-        Torque on its shaft and load torque, each that any of them has [Nm].
-    fed_by, loaded_by : ndarray of int, shape (K,)
-        Which of these each has: most have the same.
-    p : ndarray, shape (K, layout.SIZE)
-        Parameters.
-    state : ndarray, shape (K, STATES)
-        The kernel's start state, which a simulation overwrites.
-    """
-
-    torque: FloatArray
-    load: FloatArray
-    fed_by: IntArray
-    loaded_by: IntArray
-    p: FloatArray
-    state: FloatArray
+    torque: FloatArray  # (T, N): torque on its shaft and load torque, each that any of them has [Nm]
+    load: FloatArray  # (T, N): torque on its shaft and load torque, each that any of them has [Nm]
+    fed_by: IntArray  # (K,): which of these each has
+    loaded_by: IntArray  # (K,): which of these each has
+    p: FloatArray  # (K, layout.SIZE): parameters
+    state: FloatArray  # (K, STATES): the kernel's start state, which a simulation overwrites
 
 
 def inputs_of(records: Sequence[Record], of: Sequence[int], cases: Sequence[Case]) -> Inputs:
@@ -214,8 +197,7 @@ class _Rows(Generic[Key]):
 
 def initial_state(start: Start, torque_nm: float, angle_rad: float, p: FloatArray) -> FloatArray:
     """Return the kernel's state at the start: what is not unknown follows from the rest as if it were steady."""
-    only: FloatArray = initial_states([start], np.array([torque_nm]), angle_rad, p[np.newaxis])[0]
-    return only
+    return initial_states([start], np.array([torque_nm]), angle_rad, p[np.newaxis])[0]
 
 
 def initial_states(starts: Sequence[Start], torque_nm: FloatArray, angle_rad: float, p: FloatArray) -> FloatArray:
@@ -255,6 +237,6 @@ def follow(x: FloatArray, torque_nm: float, angle_rad: float, p: FloatArray) -> 
     x[state_vector.FILTERED] = sensing.reading(speed, angle_rad, p) + p[slots.FILTERED_BEFORE]
     x[state_vector.FILTER_RISE] = -p[slots.FILTERED_BEFORE]
     if is_bristled(p):  # of friction that has slid for long
-        x[state_vector.BRISTLES_MOTOR] = bristles.slid(speed, bristles.sliding(speed, p))
+        x[state_vector.BRISTLES_MOTOR] = conditions.slid(speed, conditions.sliding(speed, p))
         loaded = carried if p[slots.J_L] > 0.0 else speed
-        x[state_vector.BRISTLES_LOAD] = bristles.slid(loaded, p[slots.COULOMB_LOAD])
+        x[state_vector.BRISTLES_LOAD] = conditions.slid(loaded, p[slots.COULOMB_LOAD])

@@ -50,15 +50,13 @@ def fill_differences(
             found[columns[k], firsts[i] : row] = 0.0
 
 
-STEP = 1e-5
-"""Finite-difference step in scaled unknowns: the simulation is smooth to about 1e-10 of its size."""
+STEP = 1e-5  # finite-difference step in scaled unknowns: the simulation is smooth to about 1e-10 of its size
 
 ROUNDING = 1e-13
 """Change of the output, over its size, that is none: simulations side by side round otherwise than one by itself, and
 an unknown that does nothing, such as the phase of an amplitude that is 0, has a column of zeros."""
 
-ROOM = 2**20
-"""Values of simulations that are made at a time, where they are more than fill the lanes."""
+ROOM = 2**20  # values of simulations that are made at a time, where they are more than fill the lanes
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +82,7 @@ def jacobian_at(
     wanted = (low < high) if among is None else (low < high) & among
     moving = [np.flatnonzero(_moves(problem, wanted, drive[0])) for drive in problem.drives]
     around = _Around(problem, x, outputs, problem.drives)
-    parts = _together(problem, moving) if around.is_one else _apart(moving)
+    parts = _together(problem, moving) if around.is_one else _separately(moving)
     found = np.zeros((x.size, around.firsts[-1]))
     concurrently(lambda part: around.fill(part, found), parts)
     return found.T
@@ -108,7 +106,7 @@ def _moves(problem: Problem, free: BoolArray, index: int) -> BoolArray:
     return moves
 
 
-def _apart(moving: Sequence[IntArray]) -> list[_Moved]:
+def _separately(moving: Sequence[IntArray]) -> list[_Moved]:
     """Return parts of one drive each: two at least, none wider than the lanes."""
     return [
         _Moved(np.full(some.size, i), some)
@@ -119,7 +117,6 @@ def _apart(moving: Sequence[IntArray]) -> list[_Moved]:
 
 
 def _together(problem: Problem, moving: Sequence[IntArray]) -> list[_Moved]:
-    """Return parts across drives that fill the lanes; the same unknown of all is next to it."""
     of = np.repeat(np.arange(len(moving)), [mine.size for mine in moving])
     columns = np.concatenate(moving)
     own = columns >= len(problem.shared)
@@ -155,7 +152,6 @@ class _Around:
 
     @property
     def is_one(self) -> bool:
-        """Whether the drives are simulated as if they were one."""
         problem = self._problem
         if len(self._drives) == 1 or not are_of_a_length(self._drives):
             return False

@@ -1,37 +1,111 @@
-"""A shaft element on a bench: its twist is imposed, the torque it carries is measured; there is no inertia.
-
-Equation (translation: read N, m, N s/m)::
-
-    T = (k - m T_h / y) e f(e) + T_h z + c de/dt - T_0 - preload
-
-``e`` is the twist; ``f`` belongs to ``stiffness_nonlinearity``, ``T_h z``, y and m to ``shaft_hysteresis``. The
-constant torque ``T_0`` and the twist at the start are unknown in every recording.
-
-``backlash`` is a gap in series with all of them: of the twist they get ``e``, and the gap takes the rest, at most half
-of itself to either side. Faces only push: they touch on one side where the torque is positive, on the other where it is
-negative; in between there is none, and no damping. Where the slider has moved, the gap has moved with it.
-
-So a constant torque is one of two with a gap. ``T_0`` stays where the gap is open: the zero of the load cell. A preload
-behind the gap, unknown in every recording, too, does not: of a slider that yields at another torque one way than the
-other. Without a gap they are the same.
-"""
+"""The shaft by itself: a joint on a bench whose motion is imposed, and the twist of a shaft from measured speed."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
+from scipy.linalg import expm, solve_discrete_are
 
 from estimator.compiled import compiled
+from estimator.identification.modes.modes import Mode
 from estimator.physics.effects.shaft import damping_share, loaded_twist, loading_rate
 from estimator.physics.kernel import slots, state_vector
 from estimator.physics.laws import beyond_gap, share_inside
+from estimator.physics.model import DrivelineModel, Motion, Structure
 from estimator.physics.motion import measured_speed
 from estimator.signals.record import FloatArray, Record
 
-TORQUE = -1
-"""The output that a joint has next to the kernel's states: the torque it carries."""
+TWIST = 2  # place of phi in the state [w_M, w_L, phi, T_L]
+
+
+@dataclass(frozen=True, slots=True)
+class Uncertainty:
+    """How far signals and model are trusted; the first two are the bus's own figures (docs/formats.md)."""
+
+    speed_rad_s: float = 0.05  # standard deviation of the speed reading [rad/s]
+    torque_nm: float = 1.0  # standard deviation of the torque over one period, beyond its reading [Nm]
+    load_nm_per_sqrt_s: float = 50.0  # how fast the load torque walks
+
+
+@dataclass(frozen=True, slots=True)
+class Shaft:
+    """The numbers of a two-mass model, at the motor shaft: kg m^2, Nm/rad, Nm s/rad; and where they are from."""
+
+    J_M: float
+    J_L: float
+    k: float
+    c: float
+    b_M: float
+    b_L: float
+    source: str
+
+    @classmethod
+    def of_model(cls, model: DrivelineModel, source: str) -> Shaft | None:
+        if model.structure is not Structure.TWO_MASS or model.motion is not Motion.ROTATION:
+            return None
+        values = model.values()
+        return cls(**{name: float(values[name]) for name in model.structure.parameter_names}, source=source)
+
+    def with_resonance(self, mode: Mode) -> Shaft:
+        inertia = self.J_M * self.J_L / (self.J_M + self.J_L)
+        w = 2.0 * math.pi * mode.frequency_hz
+        return replace(self, k=inertia * w * w, c=2.0 * inertia * mode.damping * w, source="resonance")
+
+
+class TwistFilter:
+    """The filter with its state."""
+
+    def __init__(self, shaft: Shaft, period_s: float, uncertainty: Uncertainty | None = None) -> None:
+        self._period_s = period_s
+        self._uncertainty = uncertainty or Uncertainty()
+        self._x: FloatArray = np.zeros(4)
+        self._begun = False
+        self._torque_nm = 0.0
+        self.use(shaft)
+
+    def use(self, shaft: Shaft) -> None:
+        """Continue with other numbers, from the present state."""
+        self.shaft = shaft
+        self._F, self._g = _discrete(shaft, self._period_s)
+        u = self._uncertainty
+        Q = np.outer(self._g, self._g) * u.torque_nm**2
+        Q[3, 3] += u.load_nm_per_sqrt_s**2 * self._period_s
+        h = np.array([[1.0, 0.0, 0.0, 0.0]])
+        P = solve_discrete_are(self._F.T, h.T, Q, np.array([[u.speed_rad_s**2]]))
+        gain = P[:, 0] / (P[0, 0] + u.speed_rad_s**2)
+        self._gain: FloatArray = np.asarray(gain, dtype=np.float64)
+        self.twist_std_rad = math.sqrt(max(0.0, float(P[TWIST, TWIST] - gain[TWIST] * P[0, TWIST])))
+
+    def step(self, torque_nm: float, speed_rad_s: float, okay: bool) -> float:
+        """Take one sample."""
+        if okay:
+            if not self._begun:
+                self._begun = True
+                self._x[:2] = speed_rad_s
+            self._x = self._x + self._gain * (speed_rad_s - self._x[0])
+            self._torque_nm = torque_nm
+        twist_rad = float(self._x[TWIST]) if self._begun else math.nan
+        if self._begun:
+            self._x = self._F @ self._x + self._g * self._torque_nm
+        return twist_rad
+
+
+def _discrete(shaft: Shaft, period_s: float) -> tuple[FloatArray, FloatArray]:
+    """Return F, shape (4, 4), and g, shape (4,), for a torque held over one period."""
+    s = shaft
+    A = np.zeros((5, 5))
+    A[0, :3] = -(s.b_M + s.c) / s.J_M, s.c / s.J_M, -s.k / s.J_M
+    A[1, :4] = s.c / s.J_L, -(s.b_L + s.c) / s.J_L, s.k / s.J_L, -1.0 / s.J_L
+    A[2, :2] = 1.0, -1.0
+    A[0, 4] = 1.0 / s.J_M
+    moved = expm(A * period_s)
+    return np.asarray(moved[:4, :4], dtype=np.float64), np.asarray(moved[:4, 4], dtype=np.float64)
+
+
+TORQUE = -1  # the output that a joint has next to the kernel's states: the torque it carries
 
 PART_OF_TORQUE, MOST_SECANTS = 1e-12, 100
 """How near the balance inside an open gap is found, as part of the torques at its ends, and by how many secants."""
@@ -51,7 +125,6 @@ class Imposed(NamedTuple):
 
 
 def imposed_in(record: Record) -> Imposed:
-    """Return the imposed motion of a recording, which is the same in every simulation of it."""
     if record.imposed is None:
         raise ValueError(f"recording {record.name}: a joint is simulated from an imposed motion, got none")
     return Imposed(record.imposed - record.imposed[0], _rate(record))
@@ -66,28 +139,6 @@ def simulate(
     preload_nm: float,
     output: int = TORQUE,
 ) -> FloatArray:
-    """Simulate the torque of a joint, or its motion, under the imposed motion of a recording.
-
-    Parameters
-    ----------
-    imposed : Imposed
-        That motion.
-    p : ndarray, shape (layout.SIZE,)
-        Parameters of the superset model.
-    load_torque_nm : ndarray, shape (N,)
-        Constant torque T_0, and what there is next to it [Nm].
-    twist_rad : float
-        Twist at the first sample [rad].
-    preload_nm : float
-        Constant torque behind a gap [Nm].
-    output : int
-        ``TORQUE``, or a state of the kernel; the far end is at rest.
-
-    Returns
-    -------
-    ndarray, shape (N,)
-        Torque [Nm], rad or rad/s.
-    """
     twist, rate = imposed.twist + twist_rad, imposed.rate
     motion: dict[int, FloatArray] = {
         state_vector.TWIST: twist,
@@ -98,16 +149,14 @@ def simulate(
         return motion[output] if output in motion else np.zeros(twist.shape)
     out: FloatArray = np.empty_like(twist)
     respond(record.since_start_s, record.sample_time_s, twist, rate, preload_nm, p, out)
-    taken: FloatArray = out - load_torque_nm
-    return taken
+    return out - load_torque_nm
 
 
 def _rate(record: Record) -> FloatArray:
     """Return the rate of the imposed motion at every sample; at the ends, that nearest to them."""
     slope = measured_speed(record)
     known = np.flatnonzero(np.isfinite(slope))
-    rate: FloatArray = np.interp(np.arange(slope.size), known, slope[known])
-    return rate
+    return np.interp(np.arange(slope.size), known, slope[known])
 
 
 @compiled

@@ -10,14 +10,9 @@ from estimator.lanes import choose, every
 BEYOND = 20.0
 """From here on the hyperbolic tangent is 1 to the last bit; most speeds are beyond, and need no tangent."""
 
-NOTHING_LEFT = 40.0
-"""From here on the exponential of the negative is lost next to 1."""
-
-LEAST = 1e-300
-"""A size that is next to nothing and has a logarithm."""
-
-BENT = 0.625
-"""Up to here the hyperbolic tangent is a rational function of its argument to the last bit."""
+NOTHING_LEFT = 40.0  # from here on the exponential of the negative is lost next to 1
+LEAST = 1e-300  # a size that is next to nothing and has a logarithm
+BENT = 0.625  # up to here the hyperbolic tangent is a rational function of its argument to the last bit
 
 
 @compiled
@@ -82,10 +77,7 @@ def share_inside(start: float, length: float, low: float, high: float) -> float:
 
 @compiled
 def inertia_while(inertia: float, extra: float, share: float) -> float:
-    """Return the inertia that answers to a torque as one with ``extra`` on it for a ``share`` of the time does.
-
-    Accelerations add up over time, not inertias: it is the harmonic mean. Without a share it is ``inertia``, exactly.
-    """
+    """Return the inertia that answers to a torque as one with ``extra`` on it for a ``share`` of the time does."""
     if every(share == 0.0):
         return inertia
     whole = inertia + extra

@@ -1,13 +1,4 @@
-"""Bounded nonlinear least squares for long residuals and few unknowns: a projected Levenberg-Marquardt method.
-
-``scipy.optimize.least_squares`` decomposes the whole Jacobian at every step; with ten thousand errors and twenty
-unknowns that costs more than the simulations that made it. Here the step comes from the normal equations, with
-Marquardt's scaling (SIAM J. Appl. Math. 11, 1963), and is the least of the damped quadratic inside the bounds
-(``estimator.physics.least_squares``). Near the end, where steps keep what they promise, the Jacobian is carried on by
-Broyden's update (Math. Comp. 19, 1965; with Marquardt's method: Madsen, Nielsen and Tingleff, Methods for Non-Linear
-Least Squares Problems, DTU 2004, 3.5): it costs a simulation per unknown, a step one. A fit ends a last small step from
-a Jacobian found anew.
-"""
+"""Bounded nonlinear least squares for long residuals and few unknowns: a projected Levenberg-Marquardt method."""
 
 from __future__ import annotations
 
@@ -21,11 +12,8 @@ from estimator.compiled import compiled
 from estimator.signals.correlation import effective_samples
 from estimator.signals.record import BoolArray, FloatArray, IntArray
 
-TINY = 1e-12
-"""Room that a bound always leaves: an interval of no length is none."""
-
-EXCHANGES = 10
-"""Exchanges after which pivoting is taken to go round in circles."""
+TINY = 1e-12  # room that a bound always leaves: an interval of no length is none
+EXCHANGES = 10  # exchanges after which pivoting is taken to go round in circles
 
 
 def unbounded_first(low: FloatArray, high: FloatArray, among: BoolArray) -> IntArray:
@@ -46,10 +34,7 @@ def least_inside(triangle: FloatArray, target: FloatArray, low: FloatArray, high
 
 
 def least_of_quadratic(curvature: FloatArray, gradient: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
-    """Return the least of ``x' curvature x / 2 + gradient' x`` with ``low <= x <= high``, shape (U,).
-
-    ``curvature``, shape (U, U), is positive definite; unknowns without bounds come first, as in ``least_inside``.
-    """
+    """Return the least of ``x' curvature x / 2 + gradient' x`` with ``low <= x <= high``, shape (U,)."""
     return least_inside(*_factored(curvature, gradient), low, high)
 
 
@@ -121,8 +106,7 @@ def _one_by_one(triangle: FloatArray, target: FloatArray, low: FloatArray, high:
 
 
 def _bounded(low: FloatArray, high: FloatArray) -> BoolArray:
-    bounded: BoolArray = np.isfinite(low) | np.isfinite(high)
-    return bounded
+    return np.isfinite(low) | np.isfinite(high)
 
 
 CONVERGED = 0.1
@@ -148,12 +132,7 @@ LEAST_DAMPING, MOST_DAMPING = 1e-10, 1e9
 
 @dataclass(frozen=True, slots=True)
 class Solution:
-    """Where a fit ended: unknowns (U,), errors (R,), Jacobian there, or one last small step before (R, U).
-
-    No Jacobian where the iterations were used up: whoever continues finds it, and few do.
-    ``stuck`` where a step was refused and shorter ones promised nothing any more, or were refused as well: the error
-    has a kink there, or ``x`` is its least to the last digits.
-    """
+    """Where a fit ended: unknowns (U,), errors (R,), Jacobian there, or one last small step before (R, U)."""
 
     x: FloatArray
     residual: FloatArray
@@ -179,7 +158,7 @@ def minimise(
         gradient, curvature = derivative.T @ errors, derivative.T @ derivative
         while True:
             square = float(errors @ errors)
-            step = _step(x, gradient, curvature, damping, low, high)
+            step = damped_step(x, gradient, curvature, damping, low, high)
             promise = float(-step @ (2.0 * gradient + curvature @ step))
             if _is_little(promise, square, errors):
                 if not fresh:
@@ -223,17 +202,14 @@ def _gained(errors: FloatArray, tried: FloatArray) -> float:
 def _carried_on(
     derivative: FloatArray, curvature: FloatArray, change: FloatArray, step: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the derivative nearest to the old one that tells the change of the errors over a step, and its curvature.
-
-    The derivative changes by what has rank one, the curvature by a little more: much less work than a product anew.
-    """
+    """Return the nearest derivative that has the change of the errors over a step (Broyden), and its curvature."""
     missed = (change - derivative @ step) / (step @ step)
     across = np.outer(derivative.T @ missed, step)
     bent: FloatArray = curvature + across + across.T + (missed @ missed) * np.outer(step, step)
     return (derivative.T + np.outer(step, missed)).T, bent
 
 
-def _step(
+def damped_step(
     x: FloatArray,
     gradient: FloatArray,
     curvature: FloatArray,
@@ -241,7 +217,6 @@ def _step(
     low: FloatArray,
     high: FloatArray,
 ) -> FloatArray:
-    """Return the damped Gauss-Newton step inside the bounds: the least of the damped quadratic there."""
     free = unbounded_first(low, high, low < high)
     diagonal = np.diag(curvature)
     damped = curvature + np.diag(damping * np.maximum(diagonal, 1e-12 * diagonal.max()))

@@ -56,29 +56,19 @@ def _typical_torque(record: Record) -> float:
 
 
 def _typical(signal: FloatArray) -> float:
-    """Return the 99th percentile of a signal's size.
-
-    Where it rests for all but a short pulse, its peak; where it rests throughout, 1: a scale must not be zero.
-    """
     size = np.abs(signal)
     return float(np.nanpercentile(size, 99)) or float(np.nanmax(size)) or 1.0
 
 
 def reverses(record: Record) -> bool:
-    """Tell whether the speed clearly takes both signs in a recording.
-
-    Clearly: on each side it reaches a hundredth of its own range, for at least ten samples.
-    """
+    """Tell whether the speed clearly takes both signs in a recording."""
     speed = measured_speed(record)
     threshold = 0.01 * float(np.nanpercentile(np.abs(speed), 99))
     return bool(np.sum(speed > threshold) >= 10 and np.sum(speed < -threshold) >= 10)
 
 
 def turns(model: Driveline, records: Sequence[Record]) -> bool:
-    """Tell whether the speed's sign can be distinguished from a constant load torque.
-
-    In a recording with both signs; in several of one sign each, where they share the load; in any, where it is known.
-    """
+    """Tell whether the speed's sign can be distinguished from a constant load torque."""
     if not isinstance(model.load, Load) or any(reverses(record) for record in records):
         return True
     signs = {bool(np.nanmean(measured_speed(record)) > 0.0) for record in records}
@@ -93,7 +83,6 @@ def torque_reverses(record: Record) -> bool:
 
 
 def largest_torque(records: Sequence[Record]) -> float:
-    """Return the largest typical torque of one input: the 99th percentile of its size."""
     return max(_typical(column) for record in records for column in record.torque_nm.T)
 
 
@@ -129,11 +118,7 @@ def speed_sweeps(record: Record) -> bool:
 
 @once
 def motor_angle(record: Record) -> FloatArray:
-    """Return the motor angle by the record's own output, from 0 at its start; shape (N,) [rad].
-
-    Laws that are periodic in the angle take their phase from it. A simulated angle would drift off by whole radians
-    while a fit is still on its way.
-    """
+    """Return the motor angle by the record's own output, from 0 at its start; shape (N,) [rad]."""
     if record.lead is not None:
         return motor_angle(record.lead)
     good = np.flatnonzero(record.okay)
@@ -151,7 +136,6 @@ MOST_TURNS = 100.0
 
 
 def range_of(records: Sequence[Record]) -> float:
-    """Return the range of the motor's angle, or of a travel, in the recording that has most of it."""
     return max(float(np.ptp(motor_angle(record))) for record in records)
 
 
@@ -170,11 +154,7 @@ PLACES, FEWEST_PASSES = 50, 4.0
 
 
 def speed_by_place(record: Record) -> float:
-    """Return the share of the speed's variance that goes with where the motor is: 1 where a motion only repeats.
-
-    What depends on the speed is not separable from what depends on the angle then. 0 for a motion that continues and
-    on.
-    """
+    """Return the share of the speed's variance that goes with where the motor is: 1 where a motion only repeats."""
     angle, speed = motor_angle(record), np.abs(measured_speed(record))
     seen = np.isfinite(speed)
     angle, speed = angle[seen], speed[seen]

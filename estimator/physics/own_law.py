@@ -1,9 +1,4 @@
-"""A user's own law: a Python function that takes part in a diagnosis like an entry of the catalogue.
-
-It is given what happens in the line and returns a torque, or an error of the reading. The compiled simulation calls the
-laws of a model as one function, by its address (`Forces`): a law that numba can compile acts as one of the catalogue
-does, at each stage of each integration step; one that it can't is called back in Python.
-"""
+"""A user's own law: a Python function that takes part in a diagnosis like an entry of the catalogue."""
 
 from __future__ import annotations
 
@@ -60,35 +55,13 @@ class OwnParameter:
 
 @dataclass(frozen=True, slots=True)
 class OwnLaw:
-    """A law by its function.
+    """A law by its function."""
 
-    Attributes
-    ----------
-    name : str
-        Of its own: not one of the catalogue's.
-    function : callable
-        ``function(time_s, motor_speed, load_speed, twist, torque, **parameters)``, of numbers or of arrays of one
-        shape: time since the recording began [s], speeds [rad/s], twist [rad] and torque reading [Nm] to a torque [Nm]
-        or, at the sensor, an error of the reading. At the null of its first parameter it returns 0.
-    element : Element
-        Motor or load: the torque acts against positive motion. Shaft: it is carried next to spring and damper. Speed
-        sensor: it is added to the reading.
-    parameters : tuple of OwnParameter
-        The first one decides: its interval must exclude its null for the law to be believed.
-    label : str
-        How it was named, for messages.
-
-    Raises
-    ------
-    BadModel
-        With every fault of the definition, one per line; or where the function can't be used.
-    """
-
-    name: str
+    name: str  # of its own
     function: Callable[..., object]
-    element: Element
-    parameters: tuple[OwnParameter, ...]
-    label: str = ""
+    element: Element  # motor or load
+    parameters: tuple[OwnParameter, ...]  # the first one decides
+    label: str = ""  # how it was named, for messages
     takes_arrays: bool = field(init=False, default=False)
     compiled: Callable[..., float] | None = field(init=False, default=None)
 
@@ -161,7 +134,6 @@ class OwnLaw:
         return found
 
     def _same_of_arrays(self, values: Mapping[str, float]) -> bool:
-        """Tell whether the function returns the same of arrays as of their numbers one by one."""
         try:
             with np.errstate(all="ignore"):
                 together = np.asarray(self.function(*TRIAL, **values), dtype=float)
@@ -171,7 +143,6 @@ class OwnLaw:
 
     @property
     def taken(self) -> list[str]:
-        """The parameters in the order in which the function takes them behind its arguments."""
         return list(inspect.signature(self.function).parameters)[len(ARGUMENTS) :]
 
     def at(
@@ -185,7 +156,6 @@ class OwnLaw:
         return float(self(np.array([[time_s], [motor], [load], [twist], [torque]]), values)[0])
 
     def _compiled(self, values: Mapping[str, float]) -> Callable[..., float] | None:
-        """Return the function compiled; None where it can't be, raises by itself, or returns something else then."""
         try:
             if any(each.opname == "RAISE_VARARGS" for each in dis.get_instructions(self.function)):
                 return None
@@ -238,26 +208,14 @@ def title_of(element: Element) -> str:
 
 
 class LawName(str):
-    """The name of a law of one model; as a text it is like any other.
-
-    Attributes
-    ----------
-    law : OwnLaw
-    entry : Effect
-        The law as an entry of the catalogue.
-    places : mapping of str to int
-        Where each of its parameters stands in the parameter vector of its model, behind those of the catalogue.
-    compiled : dict of tuple of LawName to Forces
-        It and laws after it of the same model as one function, where that was asked for.
-    """
+    """The name of a law of one model; as a text it is like any other."""
 
     law: OwnLaw
-    entry: Effect
+    entry: Effect  # the law as an entry of the catalogue
     places: Mapping[str, int]
     compiled: dict[tuple[LawName, ...], Forces]
 
     def is_active(self, p: FloatArray) -> bool:
-        """Tell whether a parameter vector switches the law on."""
         first = self.law.parameters[0]
         return bool(p[self.places[first.name]] != first.null)
 
@@ -344,7 +302,7 @@ class Forces(types.WrapperAddressProtocol):  # type: ignore[misc]  # numba has n
         def called(time_s, motor, load, twist, torque, p):  # type: ignore[no-untyped-def]
             return back(time_s, motor, load, twist, torque, p.ctypes)
 
-        return numba.njit(called)  # type: ignore[no-any-return]
+        return numba.njit(called)
 
 
 def _none(time_s, motor, load, twist, torque, p):  # type: ignore[no-untyped-def]
@@ -370,7 +328,6 @@ def _with_value(law: Function, place: int) -> Any:
 
 
 def _with(before: Function, law: Function, on_motor: float, on_load: float) -> Any:
-    """Return torques with those of one more law."""
 
     def torques(time_s, motor, load, twist, torque, p):  # type: ignore[no-untyped-def]
         first, second = before(time_s, motor, load, twist, torque, p)

@@ -1,9 +1,4 @@
-"""What a recording has of its own of an effect, found by a scan: phases of an angle, moments of an event.
-
-Neither is convex: a fit that starts half a period or a few seconds off ends in the wrong place. Around the state
-without the effect the output answers to a small one in proportion, so that phases follow from the answers to a cosine
-and a sine, and moments from the answers to the effect in every cell of a grid over time.
-"""
+"""What a recording has of its own of an effect, found by a scan: phases of an angle, moments of an event."""
 
 from __future__ import annotations
 
@@ -25,13 +20,7 @@ from estimator.signals.record import FloatArray
 
 
 class Projector:
-    """Takes out of stacked signals what the unknowns of a fit could explain, to first order.
-
-    Attributes
-    ----------
-    error : ndarray, shape (R,)
-        What is left of the fit's own error once the unknowns that are not at a bound have moved freely.
-    """
+    """Takes out of stacked signals what the unknowns of a fit could explain, to first order."""
 
     def __init__(self, result: FitResult) -> None:
         low, high = bounds(result.problem)
@@ -45,15 +34,10 @@ class Projector:
         self.error = self.rest(result.residual)
 
     def rest(self, signals: FloatArray) -> FloatArray:
-        """Return what is left of stacked signals, shape (..., R)."""
-        left: FloatArray = signals - (signals @ self._free) @ self._free.T
-        return left
+        return signals - (signals @ self._free) @ self._free.T
 
     def products(self, answers: FloatArray, index: int) -> tuple[FloatArray, FloatArray]:
-        """Return the products of what is left of answers with each other, (K, K), and with ``error``, (K,).
-
-        The answers, shape (K, R_i), are one recording's own, its outputs in turn: they are 0 in all other rows.
-        """
+        """Return the products of what is left of answers with each other, (K, K), and with ``error``, (K,)."""
         rows = self._rows[index]
         seen = answers @ self._free[rows]
         return answers @ answers.T - seen @ seen.T, answers @ self.error[rows]
@@ -78,10 +62,7 @@ class Projector:
 
 
 class Simulate(Protocol):
-    """K parameter vectors to the simulated samples that count, shape (K, R).
-
-    ``alike_s``, shape (K,), tells up to when each is as the first one (``simulate.simulate_each``).
-    """
+    """K parameter vectors to the simulated samples that count, shape (K, R)."""
 
     def __call__(self, parameters: Sequence[FloatArray], alike_s: FloatArray | None = None) -> FloatArray:
         """Return the simulated samples."""
@@ -91,8 +72,7 @@ MOST_CELLS = 40
 SHORTEST_CELL_S = 0.5
 """Grid of the moments of an event: half a second, or a fortieth of a longer recording; a fit moves them from there."""
 
-SMALL = 0.1
-"""Answers are taken at this share of an effect's size, where they are in proportion to it."""
+SMALL = 0.1  # answers are taken at this share of an effect's size, where they are in proportion to it
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,18 +86,10 @@ class Wave:
 
 @dataclass(frozen=True, slots=True)
 class Cells:
-    """Answers to an event of unit size from the first moment of a grid to each of its moments.
+    """Answers to an event of unit size from the first moment of a grid to each of its moments."""
 
-    Attributes
-    ----------
-    moments_s : ndarray, shape (M,)
-        Time since the recording began [s].
-    answers : ndarray, shape (M, R)
-        The first row is 0: no event.
-    """
-
-    moments_s: FloatArray
-    answers: FloatArray
+    moments_s: FloatArray  # (M,): time since the recording began [s]
+    answers: FloatArray  # (M, R): the first row is 0: no event
 
 
 def waves(entry: Effect, p: FloatArray, sizes: Mapping[str, float], run: Simulate, still: FloatArray) -> list[Wave]:
@@ -141,7 +113,6 @@ def small_waves(entry: Effect, p: FloatArray, sizes: Mapping[str, float]) -> lis
 
 
 def answers_to(entry: Effect, sizes: Mapping[str, float], outputs: FloatArray, still: FloatArray) -> list[Wave]:
-    """Return the answers to `small_waves` from their outputs, shape (K, R), and the one without them, shape (R,)."""
     return [
         Wave(phase, amplitude, (outputs[2 * i : 2 * i + 2] - still) / (SMALL * sizes[amplitude]))
         for i, (phase, amplitude) in enumerate(_acting(entry, sizes))
@@ -171,10 +142,7 @@ def cells(entry: Effect, p: FloatArray, own: tuple[Shared, ...], sizes: Mapping[
 
 @dataclass(frozen=True, slots=True)
 class Stretch:
-    """The best interval for an event in one recording: rows of the grid, and what an event of a size takes away there.
-
-    ``taken`` is the fall of the squared error; 0 with an empty interval where no interval takes anything away.
-    """
+    """The best interval for an event in one recording: rows of the grid, and what an event takes away there."""
 
     first: int
     last: int
@@ -185,18 +153,10 @@ class Stretch:
 
 @dataclass(frozen=True, slots=True)
 class Scan:
-    """What a grid of answers and an error have to say to each other, for every interval of the grid at once.
+    """What a grid of answers and an error have to say to each other, for every interval of the grid at once."""
 
-    Attributes
-    ----------
-    along : ndarray, shape (M, M)
-        Product of the error with the answer from row a to row b.
-    power : ndarray, shape (M, M)
-        Squared norm of that answer.
-    """
-
-    along: FloatArray
-    power: FloatArray
+    along: FloatArray  # (M, M): product of the error with the answer from row a to row b
+    power: FloatArray  # (M, M): squared norm of that answer
 
     def best(self, size: float) -> Stretch:
         """Return the interval in which an event of a size takes most away."""
@@ -214,10 +174,7 @@ def scan(answers: FloatArray, error: FloatArray, lasting: bool = False) -> Scan:
 
 
 def scanned(gram: FloatArray, match: FloatArray, lasting: bool = False) -> Scan:
-    """Prepare the same search from the products of the answers with each other, (M, M), and with the error, (M,).
-
-    An event that is ``lasting`` ends with its recording; expressed the other way round, it begins with it.
-    """
+    """Prepare the same search from the products of the answers with each other, (M, M), and with the error, (M,)."""
     along = match[None, :] - match[:, None]
     power = np.maximum(np.diag(gram)[:, None] - 2.0 * gram + np.diag(gram)[None, :], 0.0)
     if lasting:

@@ -1,26 +1,84 @@
-"""Work on all cores: the compiled kernel holds no interpreter lock, so threads are enough.
-
-Whoever calls works itself and lets idle cores help. Calls inside such a call do the same: when one long piece of work
-is left, what is inside it is shared out. How work is cut never depends on how many cores there are, and so no result
-does, to the last bit.
-"""
+"""Simulations side by side on all cores, counted as work and held to a limit of time."""
 
 from __future__ import annotations
 
+import math
 import os
 import threading
+import time
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextvars import copy_context
+from contextlib import contextmanager
+from contextvars import ContextVar, copy_context
 from itertools import takewhile
 from typing import TypeVar
 
-PARTS = 4
-"""Parts into which sums and lanes are cut where the cut shows in the last bits."""
 
-THREADS_PER_CORE = 4
-"""Threads that may exist: one works per core, the others wait for what they shared out."""
+class TimeIsUp(Exception):
+    """The limit of time of a computation has passed."""
+
+
+class Work:
+    """Samples that were simulated, and the moment at which no further ones are."""
+
+    def __init__(self, limit_s: float = math.inf, share: float = 1.0) -> None:
+        self.samples = 0
+        self.limit_s = limit_s
+        self._end = time.perf_counter() + share * limit_s
+        self._lock = threading.Lock()
+
+    def add(self, samples: int) -> None:
+        """Count samples that are to be simulated."""
+        self.check()
+        with self._lock:
+            self.samples += samples
+
+    def check(self) -> None:
+        """Raise ``TimeIsUp`` where the limit has passed."""
+        if self.left_s < 0.0:
+            raise TimeIsUp
+
+    @property
+    def left_s(self) -> float:
+        """Time until the limit [s]; negative where it has passed."""
+        return self._end - time.perf_counter()
+
+
+_work: ContextVar[Work | None] = ContextVar("work", default=None)
+
+
+@contextmanager
+def counted(work: Work) -> Iterator[Work]:
+    """Count what is simulated in this context, and in what it shares out to other cores."""
+    token = _work.set(work)
+    try:
+        yield work
+    finally:
+        _work.reset(token)
+
+
+def count_samples(samples: int) -> None:
+    work = _work.get()
+    if work is not None:
+        work.add(samples)
+
+
+def time_left_s() -> float:
+    """Return the time until the limit [s], for what is done outside this process; infinity without one."""
+    work = _work.get()
+    return math.inf if work is None else work.left_s
+
+
+def check_time() -> None:
+    """Raise ``TimeIsUp`` where a limit of time has passed: for work that is no simulation."""
+    work = _work.get()
+    if work is not None:
+        work.check()
+
+
+PARTS = 4  # parts into which sums and lanes are cut where the cut shows in the last bits
+THREADS_PER_CORE = 4  # threads that may exist: one works per core, the others wait for what they shared out
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -101,7 +159,6 @@ def concurrently(function: Callable[[Item], Result], items: Sequence[Item]) -> l
 
 
 def _wait_for(helpers: Sequence[Future[None]], cores: _Cores) -> None:
-    """Wait until helpers are done; whoever waits leaves its core to them."""
     if all(helper.done() for helper in helpers):
         return
     cores.idle.release()

@@ -12,16 +12,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from estimator.physics.driveline import Case, Start
-from estimator.physics.grid import Grid, grid_for
-from estimator.physics.layout import LOAD, flat, slot
+from estimator.physics.layout import LOAD, Grid, flat, grid_for, slot
 from estimator.physics.model import DrivelineModel, Load
 from estimator.physics.simulate import simulate_outputs, simulate_records
 from estimator.physics.unknowns import LocalBasis, Shared, local_basis, own_unknowns, shared_load
-from estimator.signals.outputs import leads
-from estimator.signals.record import BoolArray, FloatArray, IntArray, Record, once
+from estimator.signals.record import BoolArray, FloatArray, IntArray, Record, leads, once
 
-BAD = 1e3
-"""A simulation that runs away counts as this many times the largest output."""
+BAD = 1e3  # a simulation that runs away counts as this many times the largest output
 
 
 Rows = slice | IntArray
@@ -30,28 +27,15 @@ Rows = slice | IntArray
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """What is fitted to what.
-
-    Attributes
-    ----------
-    p : ndarray, shape (layout.SIZE,)
-        Parameter vector; unknowns overwrite their slots.
-    local : tuple of LocalBasis
-        What each recording has of its own; a further output has that of the recording it is of.
-    use : tuple of ndarray of bool
-        Per recording, which samples count.
-    leads : tuple of int
-        Which recording's own unknowns each recording has; those that have their own come first. By default as
-        ``Record.lead`` says.
-    """
+    """What is fitted to what."""
 
     grid: Grid
     records: tuple[Record, ...]
-    p: FloatArray
+    p: FloatArray  # (layout.SIZE,): parameter vector
     shared: tuple[Shared, ...]
-    local: tuple[LocalBasis, ...]
-    use: tuple[BoolArray, ...]
-    leads: tuple[int, ...] = ()
+    local: tuple[LocalBasis, ...]  # what each recording has of its own
+    use: tuple[BoolArray, ...]  # per recording, which samples count
+    leads: tuple[int, ...] = ()  # which recording's own unknowns each recording has
 
     def __post_init__(self) -> None:
         if not self.leads:
@@ -169,11 +153,7 @@ def simulated_each(
     index: int,
     alike_s: FloatArray | None = None,
 ) -> FloatArray:
-    """Return the samples that count of one recording for parameter vectors and its own unknowns, shape (K, R_i).
-
-    Its outputs stand in turn. ``alike_s``, shape (K,), says up to when each is as the first one
-    (``simulate.simulate_each``).
-    """
+    """Return the samples that count of one recording for parameter vectors and its own unknowns, shape (K, R_i)."""
     basis = problem.local[index]
     cases = [case_of(basis, p, local) for p, local in points]
     return simulated_cases(problem, cases, index, alike_s)
@@ -182,7 +162,6 @@ def simulated_each(
 def simulated_cases(
     problem: Problem, cases: Sequence[Case], index: int, alike_s: FloatArray | None = None
 ) -> FloatArray:
-    """Return the same for cases of a recording."""
     drive = problem.drives[index]
     records = [problem.records[i] for i in drive]
     outputs = simulate_outputs(problem.grid, records, cases, alike_s)
@@ -197,7 +176,6 @@ def case_of(basis: LocalBasis, p: FloatArray, local: FloatArray) -> Case:
 
 
 def _within_reason(out: FloatArray, record: Record) -> FloatArray:
-    """Return outputs (..., N) of a recording, far away where the simulation runs away."""
     worst = far_away(record)
     if -worst <= out.min() and out.max() <= worst:  # False where it is no number
         return out

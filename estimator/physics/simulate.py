@@ -14,17 +14,16 @@ from estimator.lanes import LANES
 from estimator.physics import catalogue, joint
 from estimator.physics.driveline import Case, Start
 from estimator.physics.effect import Element
-from estimator.physics.grid import Grid
-from estimator.physics.inputs import inputs_of, load_of
-from estimator.physics.kernel import side_by_side, state_vector
+from estimator.physics.effects.timing import TRANSPORT_DELAY
+from estimator.physics.inputs import initial_state, inputs_of, load_of, shaft_torque_from
+from estimator.physics.kernel import integration, sensing, side_by_side, state_vector
 from estimator.physics.kernel import side_by_side as many
 from estimator.physics.kernel.integration import Masses
-from estimator.physics.layout import slot
-from estimator.physics.model import Structure
+from estimator.physics.layout import Grid, flat, slot, substeps_for
+from estimator.physics.model import DrivelineModel, Structure
 from estimator.physics.motion import motor_angle
 from estimator.physics.own_law import FORCES
-from estimator.physics.parallel import PARTS, concurrently
-from estimator.physics.work import count_samples
+from estimator.physics.parallel import PARTS, concurrently, count_samples
 from estimator.signals.record import FloatArray, IntArray, Location, OutputKind, Record
 
 MASSES: dict[Structure, Masses] = {
@@ -46,12 +45,10 @@ _OUTPUT_STATE = {
 }
 """What the kernel gives of each output; of an acceleration the speed, whose slope it is."""
 
-_SENSED = (state_vector.SPEED, state_vector.LOAD_SPEED)
-"""What the effects of a speed sensor act on."""
+_SENSED = (state_vector.SPEED, state_vector.LOAD_SPEED)  # what the effects of a speed sensor act on
 
 
 def output_state(record: Record, structure: Structure) -> int:
-    """Return the index of the state a recording measures."""
     if (record.imposed is not None) != (structure is Structure.JOINT):
         got = "an imposed motion" if record.imposed is not None else f"{record.kind.value} as the output"
         raise BadModel(
@@ -96,8 +93,7 @@ def simulate(
     ndarray, shape (N,)
         In the unit of ``record.output``.
     """
-    only: FloatArray = simulate_each(grid, record, [Case(p, start, extra_load_nm)], output)[0]
-    return only
+    return simulate_each(grid, record, [Case(p, start, extra_load_nm)], output)[0]
 
 
 def simulate_each(
@@ -191,8 +187,7 @@ def _read(outputs: Sequence[Record], out: FloatArray, slopes: FloatArray) -> Flo
         found: FloatArray = 0.5 * slopes.sum(axis=-2, keepdims=True) / units
         found[..., 0, [0, -1]] = slopes[..., [1, 0], [0, -1]] / units
         return found
-    read: FloatArray = _sampled_off_time(out, slopes, outputs[0].offset_s) / units
-    return read
+    return _sampled_off_time(out, slopes, outputs[0].offset_s) / units
 
 
 def _samples_alike(record: Record, count: int, alike_s: FloatArray | None) -> IntArray:
@@ -215,8 +210,7 @@ def _sampled_off_time(out: FloatArray, slopes: FloatArray, offset_s: FloatArray 
     """Return outputs (..., C, N) as they were when the samples were taken, off their time stamps [s]."""
     if offset_s is None or slopes.shape[-1] == 0:
         return out
-    moved: FloatArray = out + np.where(offset_s < 0.0, slopes[..., :1, :], slopes[..., 1:, :]) * offset_s
-    return moved
+    return out + np.where(offset_s < 0.0, slopes[..., :1, :], slopes[..., 1:, :]) * offset_s
 
 
 def _joint_output(record: Record, imposed: joint.Imposed, case: Case, output: int) -> FloatArray:
@@ -240,8 +234,7 @@ def _misread(grid: Grid, record: Record, case: Case) -> FloatArray | float:
     if grid.structure is Structure.ONE_MASS:
         motion[1:] = motion[0], np.zeros(motion.shape[1])
     arguments = np.vstack([record.since_start_s, motion, record.total_torque_nm])
-    error: FloatArray = np.sum([law.law(arguments, law.values(case.p)) for law in laws], axis=0)
-    return error
+    return np.sum([law.law(arguments, law.values(case.p)) for law in laws], axis=0)
 
 
 TIMED = np.array([slot(e.name, e.parameters[0].name) for e in catalogue.BUILT_IN.values() if e.event or e.timed])
@@ -332,3 +325,82 @@ def simulate_together(grid: Grid, drives: Sequence[Outputs], of: Sequence[int], 
     )
     out /= np.array([[each.unit for each in drives[i]] for i in of])[:, :, np.newaxis]
     return out
+
+
+SIGN_WIDTH_RAD_S = 0.02  # dry friction of a simulated rig changes sign within this speed; its noise is larger
+
+FINER = 2
+"""A rig is stepped once and not thousands of times as in a fit: finer steps let friction stick closer to standstill."""
+
+
+class Stepper:
+    """Advances a driveline by one period of constant torque at a time."""
+
+    def __init__(
+        self, model: DrivelineModel, period_s: float, load_torque_nm: float = 0.0, speed_rad_s: float = 0.0
+    ) -> None:
+        self._masses = MASSES[model.structure]
+        self._p = flat(model)
+        if laws := [law for law in model.laws if law.is_active(self._p)]:
+            raise BadModel(
+                f"effects.{laws[0]}: expected effects of the catalogue, got a law of your own, which a simulated "
+                "rig can't have. Take it out of the model file."
+            )
+        self._period_s = period_s
+        self._substeps = FINER * substeps_for(model.values(), period_s)
+        history = int(np.ceil(self._p[slot(TRANSPORT_DELAY.name, "delay_s")] / period_s)) + 2
+        self._steps = 0
+        self._warmth = 0.0
+        self._torque = np.zeros(history)
+        self._load = np.full(history, load_torque_nm)
+        self._angle = np.zeros(history)
+        self._outputs, self._out = np.array([state_vector.SPEED]), np.zeros((1, history))
+        self._slopes = np.zeros((2, 0))
+        start = Start(load_torque_nm, 0.0, speed_rad_s, load_speed_rad_s=speed_rad_s, middle_speed_rad_s=speed_rad_s)
+        self._state = initial_state(start, 0.0, 0.0, self._p)
+
+    @property
+    def speed_rad_s(self) -> float:
+        """Motor speed now, as the sensor shows it [rad/s]."""
+        state = self._state
+        read = sensing.reading(state[state_vector.SPEED], self._read_angle(), self._p)
+        return float(sensing.shown(read, state[state_vector.FILTERED], self._p))
+
+    @property
+    def angle_rad(self) -> float:
+        """Motor angle now [rad]."""
+        return float(self._state[state_vector.ANGLE])
+
+    def step(self, *torque_nm: float) -> None:
+        """Let the torque of each input [Nm] act for one period."""
+        now = np.array([self._steps * self._period_s])
+        self._torque[:-1] = self._torque[1:]
+        on_shaft, self._warmth = shaft_torque_from(np.array([torque_nm]), now, self._period_s, self._p, self._warmth)
+        self._torque[-1] = on_shaft[0]
+        self._angle[-1] = self._read_angle()
+        self._angle[-2] = self._angle[-1] - self._state[state_vector.SPEED] * self._period_s  # it goes straight on
+        last = self._torque.size - 1
+        integration.integrate_period(
+            self._masses,
+            (),
+            self._period_s,
+            self._substeps,
+            SIGN_WIDTH_RAD_S,
+            last,
+            last + 1,
+            (self._steps - last) * self._period_s,
+            self._torque,
+            self._load,
+            self._angle,
+            self._p,
+            self._state,
+            self._outputs,
+            False,
+            self._out,
+            self._slopes,
+        )
+        self._steps += 1
+
+    def _read_angle(self) -> float:
+        """Return the motor angle that the resolver gives now [rad]: laws that are periodic in it know no other."""
+        return float(sensing.read_angle(self._state[state_vector.ANGLE], self._p))

@@ -18,8 +18,7 @@ from estimator.physics.model import DrivelineModel
 from estimator.physics.unknowns import LocalBasis
 from estimator.signals.record import FloatArray, Record
 
-EDGE_S = 0.5
-"""An event's moment nearer to a recording's end is none: any start-up error looks like one."""
+EDGE_S = 0.5  # an event's moment nearer to a recording's end is none: any start-up error looks like one
 
 SAME = 1.001
 """Squared error expressed the other way round, over the one before, up to which it is the same explanation."""
@@ -46,7 +45,6 @@ def moments_of(result: FitResult, name: str) -> list[Moments]:
 
 
 def inside(record: Record, moment_s: float) -> bool:
-    """Tell whether a moment is inside a recording, away from its ends."""
     first, last = (float(end) for end in record.since_start_s[[0, -1]])
     return first + EDGE_S <= moment_s <= last - EDGE_S
 

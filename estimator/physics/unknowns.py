@@ -42,10 +42,7 @@ class Shared:
 
 
 def nominal_unknowns(model: DrivelineModel) -> tuple[Shared, ...]:
-    """Return the nominal parameters as unknowns within their tolerances; one trusted exactly is not free.
-
-    So are the parameters of effects that the model has, where it says how far they are trusted.
-    """
+    """Return the nominal parameters as unknowns within their tolerances; one trusted exactly is not free."""
     line = (
         Shared("", name, p.value, 1.0 - p.tolerance, 1.0 + p.tolerance, 1.0)
         for name, p in model.parameters.items()
@@ -73,11 +70,7 @@ class Release:
 
 
 def effect_unknowns(name: str, model: DrivelineModel, records: Sequence[Record]) -> list[Release]:
-    """Return an effect's parameters as unknowns, once per start point; a profile has no shared ones.
-
-    What recordings have of their own starts at its null: phases and moments are found by a scan
-    (``estimator.diagnosis.inference.looks``).
-    """
+    """Return an effect's parameters as unknowns, once per start point; a profile has no shared ones."""
     name = model.own(name)
     entry = EFFECTS[name]
     if entry.profile:
@@ -105,7 +98,6 @@ def released(
 
 
 def own_unknowns(names: Iterable[str], record: Record) -> tuple[Shared, ...]:
-    """Return the own parameters that a set of effects has in a recording, at their nulls."""
     return tuple(unknown for name in sorted(names) for unknown in _own_unknowns(EFFECTS[name], record))
 
 
@@ -118,7 +110,6 @@ def _unknown(effect: str, parameter: EffectParameter, scale: float, x: float | H
 
 
 def _own_unknowns(entry: Effect, record: Record) -> tuple[Shared, ...]:
-    """Return a recording's own parameters of an effect: moments within the recording, other ones as they are."""
     since = record.since_start_s
     first, last = float(since[0]), float(since[-1]) + record.sample_time_s
     return tuple(
@@ -135,29 +126,15 @@ LOAD_TORQUE, TWIST, PRELOAD = 0, 1, 2
 
 @dataclass(frozen=True, slots=True)
 class LocalBasis:
-    """The unknowns of one recording: load torque, initial state, own parameters of effects, a load profile.
-
-    Attributes
-    ----------
-    scale : ndarray, shape (L,)
-        Size of each unknown, in its unit.
-    guess : ndarray, shape (L,)
-        Where a fit starts, in units of ``scale``.
-    own : tuple of Shared
-        Own parameters of effects, O of them; they stand behind the load torque and the initial state.
-    profile : ndarray, shape (K, N)
-        Basis of the load profile, whose K unknowns stand last; K = 0 without one.
-    held : tuple of int
-        Unknowns that stay where a fit starts: others say as much.
-    """
+    """The unknowns of one recording: load torque, initial state, own parameters of effects, a load profile."""
 
     structure: Structure
     has_angle: bool
-    scale: FloatArray
-    guess: FloatArray
-    own: tuple[Shared, ...]
-    profile: FloatArray
-    held: tuple[int, ...] = ()
+    scale: FloatArray  # (L,): size of each unknown, in its unit
+    guess: FloatArray  # (L,): where a fit starts, in units of ``scale``
+    own: tuple[Shared, ...]  # own parameters of effects, O of them
+    profile: FloatArray  # (K, N): basis of the load profile, whose K unknowns stand last
+    held: tuple[int, ...] = ()  # unknowns that stay where a fit starts
 
     @property
     def low(self) -> FloatArray:
@@ -184,7 +161,6 @@ class LocalBasis:
 
     @property
     def profile_rows(self) -> slice:
-        """Where the profile stands."""
         return slice(self.guess.size - self.profile.shape[0], self.guess.size)
 
     def start(self, x: FloatArray) -> Start:
@@ -228,8 +204,7 @@ class LocalBasis:
         """Return the load profile of scaled unknowns, shape (N,) [Nm]; None without one."""
         if self.profile.shape[0] == 0:
             return None
-        load: FloatArray = (x[self.profile_rows] * self.scale[self.profile_rows]) @ self.profile
-        return load
+        return (x[self.profile_rows] * self.scale[self.profile_rows]) @ self.profile
 
 
 def local_basis(
@@ -280,7 +255,6 @@ def _not_settable(model: DrivelineModel, has_angle: bool, count: int) -> tuple[i
 
 
 def shared_load(model: DrivelineModel, records: Sequence[Record]) -> Shared:
-    """Return the constant load torque that all recordings share as an unknown."""
     scale = 0.1 * torque_scale(records)
     guesses = (
         0.0 if record.imposed is not None else _mean_load(model, record, measured_speed(record)) for record in records

@@ -10,14 +10,7 @@ from estimator.signals.record import BoolArray, FloatArray, Record, once
 
 
 def correlation_length(errors: Sequence[FloatArray]) -> float:
-    """Return how many samples of an error count as one: ``1 + 2 sum rho_k^2``.
-
-    This is the factor by which the correlation of a Gaussian series inflates the variance of its mean square, and
-    mean squares are what models are compared by (Bayley and Hammersley, J. R. Stat. Soc. Suppl. 8, 1946).
-    Correlations are summed to a quarter of the series, less what white noise would add. A correlated error's estimated
-    correlations scatter more than that (Bartlett's formula), so the length l errs upward, by up to 0.44 (l - 1): with
-    it the F test keeps its level on short series too, without it there are up to twice as many false alarms.
-    """
+    """Return how many samples of an error count as one: ``1 + 2 sum rho_k^2``."""
     length = max(error.size for error in errors)
     size = 1 << int(np.ceil(np.log2(2 * length)))
     power = sum(np.abs(np.fft.rfft(error - error.mean(), size)) ** 2 for error in errors)
@@ -36,11 +29,7 @@ def effective_samples(errors: Sequence[FloatArray]) -> float:
 
 @once
 def stand_in_variance(record: Record) -> FloatArray:
-    """Return the variance of the sum of all torques where one was not read, shape (N,) [Nm²]; 0 where all were.
-
-    A straight line was drawn over each gap, or the torque of its one end held. How far such a line is from the torque
-    in the middle of a gap as long is seen in the rest of the recording.
-    """
+    """Return the variance of the sum of all torques where one was not read, shape (N,) [Nm²]; 0 where all were."""
     variance = np.zeros(record.time_s.size)
     if record.torque_okay is None:
         return variance

@@ -2,18 +2,7 @@
 
 The model between u and y survives any linear filter that both pass through. Two are used, in this order:
 
-1. First-order high-pass: each signal minus its exponentially weighted mean, ``m += (1 - p)(x - m)`` with the
-   pole ``p = exp(-2 pi f_c T)``. It takes away what a road grade or the driver does slowly, which a model of
-   the driveline can't explain. Trials gave 0.3 Hz; see DESIGN "Identification".
-2. Linear-phase low-pass (FIR, Hamming window) ahead of keeping every M-th sample. It delays by a whole number
-   of the *kept* samples, which :func:`decimate` takes out of the time base.
-
 The same causal loop serves the rig on line, sample by sample, and a recording as a block, with equal bits.
-
-Masks: a sample that is not okay, or no number up to 1e30, is replaced by the last good one and spoils every output
-whose low-pass window holds it. It also enters the running mean; while more than half of that mean is such
-held values, outputs stay spoilt. The first outputs, whose window reaches back before the recording, are
-spoilt too.
 """
 
 from __future__ import annotations
@@ -124,11 +113,8 @@ models' spare pole, with nothing to hold it, drifts across z = -1: seen in half 
 HIGH_PASS_HZ = 0.3
 """Corner of the high-pass: below, a road grade and the driver move the speed more than the torque does."""
 
-MOST_FACTOR = 10_000
-"""A low-pass of 160,001 taps; the models' 20 ms of samples every 2 µs."""
-
-EDGE = 1.0
-"""Edge of the low-pass (half amplitude) in parts of the new Nyquist frequency."""
+MOST_FACTOR = 10_000  # a low-pass of 160,001 taps; the models' 20 ms of samples every 2 µs
+EDGE = 1.0  # edge of the low-pass (half amplitude) in parts of the new Nyquist frequency
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,33 +132,16 @@ def low_pass_length(factor: float) -> float:
 
 
 def low_pass_taps(factor: int) -> FloatArray:
-    """Return the taps of the anti-aliasing filter, shape (16 * factor + 1,), sum 1; one tap for factor 1."""
     if factor == 1:
         return np.ones(1)
     length = round(low_pass_length(factor))
     ideal = np.sinc(EDGE / factor * (np.arange(length) - (length - 1) / 2.0))
     windowed = ideal * np.hamming(length)  # as scipy.signal.firwin, which takes a second to import
-    taps: FloatArray = windowed / windowed.sum()
-    return taps
+    return windowed / windowed.sum()
 
 
 class Decimator:
-    """The chain with its state, for samples as they come.
-
-    Parameters
-    ----------
-    sample_time_s : float
-        Sampling period of the samples that will come [s].
-    factor : int
-        One in ``factor`` samples is kept.
-    high_pass_hz : float
-        Corner of the high-pass [Hz].
-
-    Raises
-    ------
-    BadSetting
-        If the factor is below 1 or above `MOST_FACTOR`, or the corner is not between 0 and the new Nyquist frequency.
-    """
+    """The chain with its state, for samples as they come."""
 
     __slots__ = ("_counters", "_factor", "_level", "_share", "_taps", "_window", "sample_time_s")
 
@@ -212,7 +181,6 @@ class Decimator:
 
     @property
     def delay_samples(self) -> int:
-        """Delay of the kept samples, counted in kept samples."""
         return HALF_LENGTH if self._factor > 1 else 0
 
     def run(self, u: FloatArray, y: FloatArray, okay: BoolArray) -> Decimated:
@@ -240,7 +208,6 @@ class Decimator:
         return Decimated(out[0, :n].copy(), out[1, :n].copy(), out_okay[:n].copy())
 
     def state(self) -> dict[str, FloatArray | IntArray]:
-        """Return the state, copied."""
         return {"counters": self._counters.copy(), "level": self._level.copy(), "window": self._window.copy()}
 
     def restore(self, state: Mapping[str, Any]) -> None:
@@ -297,7 +264,6 @@ a longer recording is of a driveline that warms meanwhile. Each costs 6 kilobyte
 
 
 def first_part(record: Record) -> Record:
-    """Return the part of a recording that off-line models are fitted to: the first MOST blocks."""
     most = MOST * block_of(record.sample_time_s)
     return record if record.time_s.shape[0] <= most else sliced(record, slice(0, most))
 
@@ -308,15 +274,7 @@ def block_of(sample_time_s: float) -> int:
 
 
 class Blocks:
-    """Means over whole blocks, of the measured samples of each; what is left over at the end is not used.
-
-    Parameters
-    ----------
-    okay : ndarray of bool, shape (N,)
-        Which samples were measured.
-    size : int
-        Samples of a block.
-    """
+    """Means over whole blocks, of the measured samples of each; what is left over at the end is not used."""
 
     def __init__(self, okay: BoolArray, size: int) -> None:
         self._size, self._n = size, okay.shape[0] // size
@@ -325,7 +283,6 @@ class Blocks:
         """Blocks of which half or more was measured, shape (n,)."""
 
     def mean(self, x: FloatArray) -> FloatArray:
-        """Return the means of x, shape (N,) or (N, m): shape (n,) or (n, m), 0 where a block is not okay."""
         good = self._good.reshape(self._n, self._size, *(1,) * (x.ndim - 1))
         parts = x[: self._n * self._size].reshape(self._n, self._size, *x.shape[1:])
         count = np.maximum(good.sum(axis=1), 1)

@@ -24,17 +24,13 @@ class Lines(Enum):
     ODD_RANDOM = "odd_random"
 
 
-GROUP = 4
-"""Odd lines in a group of which one, drawn at random, is left out to detect odd distortion."""
-
-FEWEST_LINES = 2
-"""With fewer it is a sine."""
+GROUP = 4  # odd lines in a group of which one, drawn at random, is left out to detect odd distortion
+FEWEST_LINES = 2  # with fewer it is a sine
 
 ROUNDS = 400
 """Rounds of clipping at most (Van der Ouderaa, Schoukens and Renneboog, IEEE Trans. Instrum. Meas. 37, 1988)."""
 
-CLIP = 0.95
-"""Share of the peak at which a round clips, at first; it rises to 1."""
+CLIP = 0.95  # share of the peak at which a round clips, at first; it rises to 1
 
 
 def excited_lines(
@@ -58,26 +54,7 @@ def excited_lines(
 
 
 def multisine_nm(period_samples: int, excited: IntArray, amplitude_nm: float) -> FloatArray:
-    """Return one period with equal power at every line and phases that make its peak small.
-
-    Parameters
-    ----------
-    period_samples : int
-        Length of a period.
-    excited : ndarray, shape (F,)
-        Lines that carry power (``excited_lines``).
-    amplitude_nm : float
-        Largest magnitude [Nm].
-
-    Returns
-    -------
-    ndarray, shape (period_samples,)
-
-    Raises
-    ------
-    BadSetting
-        If there are fewer than two lines, or the amplitude is no positive number.
-    """
+    """Return one period with equal power at every line and phases that make its peak small."""
     require(
         "multi-sine",
         (
@@ -98,8 +75,7 @@ def multisine_nm(period_samples: int, excited: IntArray, amplitude_nm: float) ->
         clipped = np.fft.rfft(np.clip(signal, -level, level))
         spectrum[excited] = np.exp(1j * np.angle(clipped[excited]))
         signal = np.fft.irfft(spectrum, period_samples)
-    found: FloatArray = chosen * (amplitude_nm / float(np.abs(chosen).max()))
-    return found
+    return chosen * (amplitude_nm / float(np.abs(chosen).max()))
 
 
 def crest_factor(signal: FloatArray) -> float:

@@ -2,14 +2,6 @@
 
 The paper superposes the sequence of a ten-cell register on the torque reference. A register of n cells with
 the feedback of a primitive polynomial runs through all 2^n - 1 non-zero states, so that one period has
-
-- 2^(n-1) levels of one sign and 2^(n-1) - 1 of the other (balance),
-- a two-valued autocorrelation: amplitude^2 at lag 0 and -amplitude^2 / (2^n - 1) at every other,
-- a longest run of n equal levels.
-
-Register: cell 1 is the least significant bit of the state and takes the feedback, cell n is the output.
-Feedback is the exclusive or of the tapped cells. The clock divider holds each level for that many cycles; it
-lowers the band and multiplies the period and the longest run.
 """
 
 from __future__ import annotations
@@ -56,24 +48,7 @@ def shift(state: int, cells: int) -> int:
 
 
 class Prbs:
-    """The sequence, one level per cycle.
-
-    Parameters
-    ----------
-    amplitude_nm : float
-        The level is plus or minus this torque [Nm].
-    cells : int
-        Length of the shift register, 2 to 16; the paper has 10.
-    clock_divider : int
-        Cycles each level is held.
-    seed : int
-        First state of the register, 1 to 2^cells - 1; it only shifts the sequence in time.
-
-    Raises
-    ------
-    BadSetting
-        If a parameter is outside these ranges. A register at zero would stay there for ever.
-    """
+    """The sequence, one level per cycle."""
 
     __slots__ = ("_cells", "_clock_divider", "_held", "_level_nm", "_state")
 

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from enum import Enum
 from functools import wraps
+from itertools import pairwise
 from typing import Any, TypeVar
 from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
 
+from estimator.compiled import compiled
 from estimator.errors import BadShape
 
 Object = TypeVar("Object")
@@ -67,25 +69,13 @@ class Location(Enum):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Channel:
-    """A further measured output of a recording.
+    """A further measured output of a recording."""
 
-    Attributes
-    ----------
-    kind, location
-        What it is, and where it is measured.
-    label : str
-        The column it was read from; names it in results.
-    output : ndarray, shape (N,)
-        Its readings [rad/s, rad, Nm, rad/s^2; translation m/s, m, N, m/s^2].
-    okay : ndarray of bool, shape (N,)
-        False where a reading must not be used.
-    """
-
-    kind: OutputKind
+    kind: OutputKind  # what it is, and where it is measured
     location: Location
-    label: str
-    output: FloatArray
-    okay: BoolArray
+    label: str  # the column it was read from
+    output: FloatArray  # (N,): its readings [rad/s, rad, Nm, rad/s^2; translation m/s, m, N, m/s^2]
+    okay: BoolArray  # (N,): false where a reading must not be used
 
 
 @dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
@@ -209,7 +199,6 @@ class Record:
 
     @property
     def read(self) -> BoolArray | None:
-        """Where every torque was read and is to be trusted, shape (N,); None where all of them were."""
         return None if self.torque_okay is None else np.asarray(self.torque_trusted.all(axis=1), dtype=np.bool_)
 
     @property
@@ -217,8 +206,7 @@ class Record:
     def since_start_s(self) -> FloatArray:
         """Time since the recording began, shape (N,) [s]."""
         began = self.time_s[0] if self.began_s is None else self.began_s
-        since: FloatArray = self.time_s - began
-        return since
+        return self.time_s - began
 
     @property
     def known_load_nm(self) -> FloatArray | float:
@@ -229,12 +217,10 @@ class Record:
     @once
     def total_torque_nm(self) -> FloatArray:
         """Sum of the torque inputs, T_tot = T_M1 + T_M2 in the paper; shape (N,) [Nm]."""
-        total: FloatArray = self.torque_nm.sum(axis=1)
-        return total
+        return self.torque_nm.sum(axis=1)
 
 
 def sliced(record: Record, rows: slice, name: str | None = None) -> Record:
-    """Return a part of a recording as a recording of its own; laws over time count from where the whole began."""
     parts: dict[str, Any] = {
         field.name: values[rows]
         for field in fields(record)
@@ -245,11 +231,8 @@ def sliced(record: Record, rows: slice, name: str | None = None) -> Record:
     return replace(record, name=record.name if name is None else name, began_s=began_s, channels=channels, **parts)
 
 
-DIGITS = 9
-"""Digits a period is rounded to at most, so that 0.01 s is 0.01 s in every recording of a rig."""
-
-ALLOWED = 3.0
-"""The roundest period within so many standard errors is taken ..."""
+DIGITS = 9  # digits a period is rounded to at most, so that 0.01 s is 0.01 s in every recording of a rig
+ALLOWED = 3.0  # the roundest period within so many standard errors is taken
 
 MOST = 0.005
 """... but not beyond this share of the period: a few wild stamps determine nothing."""
@@ -269,3 +252,62 @@ def uniform_period_s(time_s: FloatArray) -> float:
         if abs(rounded - slope) <= allowed:
             return rounded
     return float(f"{slope:.{DIGITS}g}")
+
+
+@compiled
+def carried(values: FloatArray, width: float) -> FloatArray:
+    """Return the deflection of a slider that is moved by a signal, from rest, and yields at a width."""
+    found = np.zeros(values.size)
+    for k in range(1, values.size):
+        found[k] = min(max(found[k - 1] + values[k] - values[k - 1], -width), width)
+    return found
+
+
+Noise = Callable[[Sequence[Record]], float]
+
+
+def separated_outputs(records: Sequence[Record], noise_of: Noise) -> list[Record]:
+    alone = [replace(record, channels=()) for record in records]
+    first = noise_of(alone) if any(record.channels for record in records) else 1.0
+    further: list[Record] = []
+    for label in labels(records):
+        parts = [
+            _alone(record, channel, lead)
+            for record, lead in zip(records, alone, strict=True)
+            for channel in record.channels
+            if channel.label == label
+        ]
+        unit = noise_of(parts) / first
+        further += [replace(part, output=part.output / unit, unit=unit) for part in parts]
+    return [*alone, *further]
+
+
+def labels(records: Sequence[Record]) -> list[str]:
+    """Return the names of the further outputs that any of some recordings has."""
+    return list(dict.fromkeys(channel.label for record in records for channel in record.channels))
+
+
+def leads(records: Sequence[Record]) -> tuple[int, ...]:
+    """Return where in a sequence the recording stands that each is, or is a further output of."""
+    place = {id(record): i for i, record in enumerate(records)}
+    return tuple(place.get(id(record.lead), i) for i, record in enumerate(records))
+
+
+def by_output(records: Sequence[Record]) -> list[slice]:
+    names = [record.label for record in records]
+    firsts = [i for i, name in enumerate(names) if i == 0 or name != names[i - 1]]
+    return [slice(first, end) for first, end in pairwise([*firsts, len(names)])]
+
+
+def _alone(record: Record, channel: Channel, lead: Record) -> Record:
+    return replace(
+        record,
+        name=f"{record.name}:{channel.label}",
+        output=np.where(channel.okay, channel.output, 0.0),
+        okay=channel.okay & record.okay,
+        kind=channel.kind,
+        location=channel.location,
+        channels=(),
+        lead=lead,
+        label=channel.label,
+    )

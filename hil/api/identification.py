@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from estimator.identification.modes.uncertainty import Uncertain
+from estimator.identification.identify import Study
+from estimator.identification.modes.modes import Uncertain
 from estimator.identification.settings import Settings
-from estimator.identification.study import Study
 from hil.api.diagnosis import Recordings, records_of, sources_of
 from hil.api.models import Model, as_file
 from hil.api.record import Record

@@ -14,9 +14,9 @@ from hil.cli.options import Dbc, TrustLaws, tell
 from hil.cli.printing import say
 
 if TYPE_CHECKING:
-    from estimator.identification.offline.orders import OrderChoice
+    from estimator.identification.identify import Compared, Study
+    from estimator.identification.offline.validation import OrderChoice
     from estimator.identification.settings import Settings
-    from estimator.identification.study import Compared, Study
     from estimator.physics.model import DrivelineModel
     from estimator.signals.record import Record
     from hil.provenance import Provenance
@@ -58,8 +58,8 @@ def identify(
     Writes DIR/identification.json with theta, A, B, poles, zeros, intervals, tests and the spectral estimate of each
     recording, and DIR/report.html.
     """
+    from estimator.identification.identify import compare
     from estimator.identification.settings import Settings
-    from estimator.identification.study import compare
     from hil.provenance import provenance
     from hil.recording.recordings import require_even_cycles
     from hil.report.identification_input import chosen_estimators, chosen_orders, start_values

@@ -97,8 +97,10 @@ def _unknowns(model: DrivelineModel) -> tuple[Shared, ...]:
 
 
 def _summary(model: DrivelineModel, result: FitResult) -> PhysicalFit:
-    from estimator.diagnosis.assemble import load_torques  # a second, and the bus comes first
-    from estimator.diagnosis.intervals import reported_covariance
+    from estimator.diagnosis.assemble import (
+        load_torques,  # a second, and the bus comes first
+        reported_covariance,
+    )
 
     covariance = reported_covariance(result)
     values = {

@@ -13,7 +13,7 @@ import numpy as np
 
 from drivers.torque_guard import Evidence, TorqueGuard
 from estimator.physics.model import DrivelineModel, Parameter, Structure
-from estimator.physics.stepper import Stepper
+from estimator.physics.simulate import Stepper
 from estimator.signals.record import FloatArray
 from hil.commission.order import Order, RigSource
 from hil.commission.state import RunRecord

@@ -13,7 +13,7 @@ from estimator.errors import BadModel, BadSetting
 from estimator.identification.chain import OnlineChain, oefo
 from estimator.identification.online.adaptation import PROFILES as KINDS
 from estimator.identification.online.adaptation import Adaptation
-from estimator.identification.online.oefo import Oefo
+from estimator.identification.online.estimators import Oefo
 from estimator.identification.settings import SAMPLES_PER_PARAMETER, Settings
 from estimator.identification.tracking.watch import WatchSettings
 from estimator.signals.decimate import Decimator, low_pass_length

@@ -10,7 +10,7 @@ import numpy as np
 from drivers.errors import DriverError
 from estimator.identification.chain import decimation_factor
 from estimator.identification.online.regression import checked_filter
-from estimator.physics.twist import Shaft
+from estimator.physics.joint import Shaft
 from hil.config.model_file import read_model
 from hil.config.rig_file import Rig
 from hil.errors import HilError, RecordingError, UsageError

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from estimator.physics.twist import Shaft, TwistFilter
+from estimator.physics.joint import Shaft, TwistFilter
 from hil.monitor.live_estimation import LiveEstimation
 from hil.monitor.messages import (
     Began,

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from estimator.diagnosis.black_box import BlackBox, equivalent_line
-from estimator.diagnosis.preconditions import thin
+from estimator.diagnosis.preconditions.prepare import thin
 from estimator.physics.driveline import Start
 from estimator.physics.model import DrivelineModel, Load
 from estimator.signals.record import FloatArray, OutputKind, Record

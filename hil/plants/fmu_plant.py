@@ -20,7 +20,7 @@ from estimator.diagnosis.segments import tiles
 from estimator.physics.driveline import Start
 from estimator.physics.free_run import FreeRun
 from estimator.physics.model import Motion
-from estimator.physics.work import TimeIsUp, check_time, time_left_s
+from estimator.physics.parallel import TimeIsUp, check_time, time_left_s
 from estimator.signals.record import FloatArray, OutputKind, Record
 from hil.errors import UsageError
 from hil.plants.fmu_process import HUNG, MEMORY_BYTES, STEP_S

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from estimator.diagnosis.chain import replay
+from estimator.diagnosis.acquisition.chain import replay
 from estimator.physics.free_run import NOTHING_KNOWN, FreeRun, Own
 from estimator.physics.model import DrivelineModel, Motion
 from estimator.signals.record import Record

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from estimator.diagnosis.preconditions import as_moved, thin
+from estimator.diagnosis.preconditions.prepare import as_moved, thin
 from estimator.diagnosis.result import Diagnosis
 from estimator.physics.catalogue import EFFECTS
 from estimator.signals.record import Record

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from estimator.physics.work import TimeIsUp, Work, counted
+from estimator.physics.parallel import TimeIsUp, Work, counted
 from estimator.signals.record import Record
 from hil.config.model_file import ModelFile, read_model_for_recordings, read_signals
 from hil.errors import UsageError

@@ -11,8 +11,10 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from estimator.diagnosis.acquisition import as_if_not_lost
-from estimator.diagnosis.preconditions import are_whole_numbers, require_plausible, require_plausible_alone
+from estimator.diagnosis.acquisition.chain import as_if_not_lost
+from estimator.diagnosis.preconditions.explanations import are_whole_numbers
+from estimator.diagnosis.preconditions.prepare import require_plausible
+from estimator.diagnosis.preconditions.units import require_plausible_alone
 from estimator.errors import Cure, EstimatorError, Implausible
 from estimator.physics.model import DrivelineModel
 from estimator.signals.record import OutputKind, Record

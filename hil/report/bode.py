@@ -13,7 +13,7 @@ import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
 from estimator.identification.linear_model import ComplexArray, LinearModel
-from estimator.identification.modes.uncertainty import QUANTILE, propagate
+from estimator.identification.modes.modes import QUANTILE, propagate
 from estimator.identification.offline.fits import LinearFit
 from estimator.signals.record import FloatArray, IntArray
 from hil.figures.local_model import LocalModel, decibels, degrees

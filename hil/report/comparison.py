@@ -14,8 +14,7 @@ from estimator.diagnosis.preconditions.channels import with_usable_channels
 from estimator.identification.offline.validation import CorrelationTest, residual_tests
 from estimator.physics.model import Motion
 from estimator.signals.decimate import block_of
-from estimator.signals.outputs import outputs_apart
-from estimator.signals.record import FloatArray, OutputKind, Record
+from estimator.signals.record import FloatArray, OutputKind, Record, separated_outputs
 from hil.config.model_file import ModelFile, read_model_for_recordings
 from hil.config.model_tables import Prepared
 from hil.errors import UsageError
@@ -84,7 +83,7 @@ class Comparison:
 def compare_record(plant: Plant, record: Record) -> Comparison:
     """Simulate a recording and measure the error of each output; one that a plant does not simulate is left out."""
     run = plant.run(record)
-    views = outputs_apart([record], lambda _: 1.0)[1:]
+    views = separated_outputs([record], lambda _: 1.0)[1:]
     load = run.start.load_torque_nm
     pairs = zip(views, run.further, strict=True) if run.further else ()
     further = tuple(_compared(plant, view, _from_its_zero(view, found), load) for view, found in pairs)

@@ -66,8 +66,8 @@ def diagnosis_json(diagnosis: Diagnosis) -> Json:
         "warnings": list(diagnosis.warnings),
         "discrepancy": None if diagnosis.discrepancy is None else _discrepancy(diagnosis.discrepancy),
         "strays": [
-            {"parameter": stray.name, "ratio": json_number(stray.ratio), "tolerance": json_number(stray.tolerance)}
-            for stray in diagnosis.strays
+            {"parameter": value.name, "ratio": json_number(value.ratio), "tolerance": json_number(value.tolerance)}
+            for value in diagnosis.off_nominal
         ],
         "remainder": None if diagnosis.remainder is None else _remainder(diagnosis.remainder),
         "traces": [_slight(each) for each in diagnosis.slight],

@@ -11,7 +11,7 @@ from plotly.subplots import make_subplots
 
 from estimator.identification.chain import OnlineTrajectory
 from estimator.identification.linear_model import ComplexArray
-from estimator.identification.modes.uncertainty import QUANTILE
+from estimator.identification.modes.modes import QUANTILE
 from estimator.identification.offline.validation import CorrelationTest, Validation
 from estimator.signals.record import FloatArray, IntArray
 from hil.figures.local_model import LocalModel

@@ -6,12 +6,11 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-from estimator.identification.identify import identify
+from estimator.identification.identify import Compared, Study, identify, study
 from estimator.identification.joint import Together, joint_estimate
 from estimator.identification.modes.modes import Mode
-from estimator.identification.offline.orders import OrderChoice
+from estimator.identification.offline.validation import OrderChoice
 from estimator.identification.settings import Settings
-from estimator.identification.study import Compared, Study, study
 from estimator.physics.model import DrivelineModel
 from estimator.signals.record import Record
 from hil.figures.local_model import LocalModel

@@ -13,10 +13,10 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from estimator.errors import BadSetting
 from estimator.identification.linear_model import Orders
-from estimator.identification.offline.orders import OrderChoice, select_orders
+from estimator.identification.offline.validation import OrderChoice, select_orders
 from estimator.identification.online.adaptation import Adaptation
 from estimator.identification.online.ekf import TwoMass
-from estimator.identification.online.registry import ESTIMATORS, Entry
+from estimator.identification.online.estimators import ESTIMATORS, Entry
 from estimator.identification.settings import Settings
 from estimator.physics.model import DrivelineModel, Structure
 from estimator.signals.decimate import decimate

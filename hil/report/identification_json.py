@@ -8,18 +8,15 @@ from typing import Any, Final
 
 import numpy as np
 
-from estimator.identification.identify import Identification
+from estimator.identification.identify import Compared, Identification, Study
 from estimator.identification.joint import Together
 from estimator.identification.linear_model import ComplexArray, LinearModel
-from estimator.identification.modes.modes import Mode
+from estimator.identification.modes.modes import Mode, Uncertain
 from estimator.identification.modes.physical import PhysicalEstimate
-from estimator.identification.modes.uncertainty import Uncertain
 from estimator.identification.offline.fits import FreeRun
-from estimator.identification.offline.orders import OrderChoice
-from estimator.identification.offline.validation import CorrelationTest
+from estimator.identification.offline.validation import CorrelationTest, OrderChoice
 from estimator.identification.settings import Settings
 from estimator.identification.spectral import SpectralEstimate
-from estimator.identification.study import Compared, Study
 from hil.provenance import Provenance
 from hil.report.identification_wording import best_statement, joint_statement, verdict
 from hil.report.numbers import json_number

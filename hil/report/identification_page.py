@@ -14,13 +14,11 @@ from rich.box import SIMPLE_HEAD
 from rich.console import RenderableType
 from rich.table import Table
 
+from estimator.identification.identify import Compared, Study
 from estimator.identification.joint import Together
-from estimator.identification.modes.modes import Mode
-from estimator.identification.modes.uncertainty import UncertainRoot
-from estimator.identification.offline.orders import OrderChoice
-from estimator.identification.offline.validation import CorrelationTest
+from estimator.identification.modes.modes import Mode, UncertainRoot
+from estimator.identification.offline.validation import CorrelationTest, OrderChoice
 from estimator.identification.online.recursive import Status
-from estimator.identification.study import Compared, Study
 from estimator.signals.record import FloatArray
 from hil.figures.local_model import LocalModel
 from hil.figures.palette import BLACK, BLUE, GREEN, VERMILION, series_colour

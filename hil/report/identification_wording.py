@@ -8,11 +8,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from estimator.identification.best import SEEN, Verdict
+from estimator.identification.identify import Study
 from estimator.identification.joint import Together
-from estimator.identification.modes.uncertainty import Uncertain
+from estimator.identification.modes.modes import Uncertain
 from estimator.identification.offline.validation import Validation
 from estimator.identification.online.recursive import Status
-from estimator.identification.study import Study
 from hil.figures.local_model import LocalModel
 from hil.report.numbers import listed, shown
 

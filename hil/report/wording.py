@@ -99,8 +99,10 @@ def headline(diagnosis: Diagnosis) -> str:
         return f"Missing in the model: {listed(found)}; what is left is more than noise"
     if diagnosis.verdict is Verdict.NO_MISMATCH:
         return "Nothing is missing: the nominal model, re-tuned, explains the recordings"
-    if diagnosis.strays:
-        return f"No physics need be missing, but the data sheet is off: {listed([s.name for s in diagnosis.strays])}"
+    if diagnosis.off_nominal:
+        return (
+            f"No physics need be missing, but the data sheet is off: {listed([v.name for v in diagnosis.off_nominal])}"
+        )
     return "Something is missing, and no effect of the catalogue explains it"
 
 

@@ -11,8 +11,7 @@ from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Effect, EffectParameter, Element
 from estimator.physics.kernel import integration
 from estimator.physics.model import DrivelineModel, EffectValue, Motion, Parameter, Structure
-from estimator.physics.simulate import MASSES, output_state
-from estimator.physics.stepper import SIGN_WIDTH_RAD_S, Stepper
+from estimator.physics.simulate import MASSES, SIGN_WIDTH_RAD_S, Stepper, output_state
 from estimator.signals.record import FloatArray, Location, OutputKind, Record
 from hil.config.model_file import read_model
 from hil.config.rig_file import Rig, SimulationTable

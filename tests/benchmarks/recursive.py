@@ -26,10 +26,8 @@ import numpy as np
 
 from estimator.identification.online.adaptation import DecreasingGain, DecreasingThenConstantTrace
 from estimator.identification.online.ekf import TwoMass
-from estimator.identification.online.oefo import Oefo
+from estimator.identification.online.estimators import ESTIMATORS, Oefo, Rls, Setup
 from estimator.identification.online.recursive import RecursiveEstimator, Trajectory
-from estimator.identification.online.registry import ESTIMATORS, Setup
-from estimator.identification.online.rls_riv_oeepm import Rls
 from estimator.identification.settings import Settings
 from estimator.signals.record import FloatArray, Record
 from hil.rig.live import Pace, play_record, tracking_settings

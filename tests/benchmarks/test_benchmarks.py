@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from estimator.identification.online.adaptation import DecreasingGain, DecreasingThenConstantTrace
-from estimator.identification.online.rls_riv_oeepm import Rls
+from estimator.identification.online.estimators import Rls
 from estimator.physics.fit import fit
 from estimator.physics.problem import Problem
 from hil.rig.pacing import FreePacer, period_ns

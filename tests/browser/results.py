@@ -6,10 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from estimator.identification.identify import identify
-from estimator.identification.online.registry import ESTIMATORS
+from estimator.identification.identify import Compared, Study, compare, identify, study
+from estimator.identification.online.estimators import ESTIMATORS
 from estimator.identification.settings import Settings
-from estimator.identification.study import Compared, Study, compare, study
 from estimator.physics.model import Motion
 from estimator.signals.record import Record
 from hil.figures.local_model import LocalModel, Reference, TwoMassLine, row_of

@@ -23,14 +23,13 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 from threadpoolctl import threadpool_limits
 
-from estimator.diagnosis.chain import mechanical, read_through
+from estimator.diagnosis.acquisition.chain import mechanical, read_through
 from estimator.diagnosis.inference.answer import LEVELS
 from estimator.diagnosis.inference.answer import searched as searched_for
-from estimator.diagnosis.inference.calibration import LEAST_SHARE, TEST_LIMITS, THRESHOLDS_FILE
+from estimator.diagnosis.inference.checks import COLUMNS, LEAST_SHARE, TEST_LIMITS, THRESHOLDS_FILE, chance
 from estimator.diagnosis.inference.judge import Score, probability_of
-from estimator.diagnosis.inference.remainder import chance
 from estimator.diagnosis.inference.rivals import rivals_of
-from estimator.diagnosis.preconditions import prepare
+from estimator.diagnosis.preconditions.prepare import prepare
 from estimator.errors import EstimatorError
 from hil.proof.truth.specimen import NOTHING
 from tests.campaigns.forms import Role
@@ -98,8 +97,7 @@ class World:
 
     def probability(self, claim: Claim, thresholds: Thresholds) -> float:
         """Return the probability of an effect under some thresholds."""
-        shares = (key for key, limit in TEST_LIMITS.items() if limit.is_share)
-        lost = max(0.0, *(self.beyond_chance(key) - thresholds.limits[key] for key in shares))
+        lost = max(0.0, *(self.beyond_chance(key) - thresholds.limits[key] for key in COLUMNS))
         scores = [Score(frozenset(effects), score, plausible) for effects, score, plausible in self.scores]
         return probability_of(claim.names, scores, thresholds.divisor + self.samples * lost)
 
@@ -141,7 +139,7 @@ def searched(form: str, seed: int) -> Row | None:
             [Claim(each.name, sorted(each.names), each.share) for each in found.beliefs],
             [(sorted(each.effects), each.score, each.is_plausible) for each in (*found.scores, *rivals)],
             {test.key: test.value for test in found.tests if test.key},
-            found.best.plain.residual.size,
+            found.best.result.residual.size,
             round(time.process_time() - began, 2),
         )
     )

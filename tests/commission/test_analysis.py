@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from estimator.identification.offline.fits import fit_output_error
-from estimator.physics.stepper import Stepper
+from estimator.physics.simulate import Stepper
 from estimator.signals.decimate import decimate
 from estimator.signals.prbs import prbs_nm
 from estimator.signals.record import Record

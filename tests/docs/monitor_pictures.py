@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from estimator.physics.twist import Shaft
+from estimator.physics.joint import Shaft
 from hil.config.rig_file import Rig, read_rig
 from hil.monitor.app import MonitorApp
 from hil.monitor.host import HealthWatch, plc_health

@@ -13,8 +13,7 @@ from estimator.physics.catalogue import EFFECTS
 from estimator.physics.driveline import Start
 from estimator.physics.effect import Place
 from estimator.physics.free_run import free_run
-from estimator.physics.grid import Grid, grid_for
-from estimator.physics.layout import flat_values
+from estimator.physics.layout import Grid, flat_values, grid_for
 from estimator.physics.simulate import simulate
 from estimator.signals.record import FloatArray, Record
 from tests.docs.bus import BUS, DRIVES, LINE, LOAD_NM, PERIOD_S, TIME_S, Drive, Values

@@ -9,7 +9,7 @@ from pydantic import BaseModel
 
 from drivers.inverter.drive_settings import OPTION_CODES
 from drivers.plc.register_map import USED
-from estimator.diagnosis.inference import calibration, plausible
+from estimator.diagnosis.inference import checks
 from estimator.diagnosis.inference import figures as holdout
 from estimator.diagnosis.inference.search import STARTS
 from estimator.diagnosis.where import locate
@@ -84,10 +84,10 @@ def test_the_thresholds_of_a_verdict_are_those_of_the_code() -> None:
         f"blocks of {holdout.BLOCK_S:g} s every {holdout.EVERY_S:g} s",
         f"over {locate.WINDOW_S:g} s",
         f"central {locate.CENTRAL:.0%}".replace("%", " %"),
-        f"whose share is below {calibration.LEAST_SHARE:g}",
+        f"whose share is below {checks.LEAST_SHARE:g}",
     ):
         assert said in page
-    assert plausible.LEAST_THROUGH == 0.2
+    assert checks.LEAST_THROUGH == 0.2
     assert "lets through less than a fifth" in page
     assert "the five most promising effects" in page
     assert STARTS == 5

@@ -12,13 +12,12 @@ from estimator.design import _on_paper as on_paper
 from estimator.design import _precision as precision
 from estimator.diagnosis.inference.descent import descended
 from estimator.diagnosis.inference.disturbances import whitener_of
+from estimator.diagnosis.inference.hypotheses import THOROUGH
 from estimator.diagnosis.inference.judge import grounds
-from estimator.diagnosis.inference.likelihood import THOROUGH
 from estimator.diagnosis.inference.search import Search
 from estimator.physics.driveline import Start
 from estimator.physics.fit import not_fitted
-from estimator.physics.grid import grid_for
-from estimator.physics.layout import flat
+from estimator.physics.layout import flat, grid_for
 from estimator.physics.problem import make_problem
 from estimator.physics.simulate import simulate
 from estimator.physics.unknowns import own_unknowns
@@ -65,14 +64,14 @@ def test_what_an_experiment_promises_is_what_a_fit_to_it_finds(known: Open) -> N
     truth, rival = known.candidates
     paper = driven(known, 60.0)
     said = replace(paper, output=on_paper(truth, known.line, paper).outputs[0])
-    before = rival.fit.plain.problem
+    before = rival.fit.result.problem
     records = [*before.records, said]
     own = [own_unknowns(rival.effects, each) for each in records]
     joint = make_problem(known.line, records, before.shared, own=own)
-    begun = not_fitted(joint, np.concatenate([rival.fit.plain.x, joint.local[-1].guess]))
+    begun = not_fitted(joint, np.concatenate([rival.fit.result.x, joint.local[-1].guess]))
     fitted = descended(begun, whitener_of(begun, rival.fit.sizes), THOROUGH)
     squares = [
-        float(np.sum(whitener_of(each, rival.fit.sizes)(each.residual) ** 2)) for each in (fitted, rival.fit.plain)
+        float(np.sum(whitener_of(each, rival.fit.sizes)(each.residual) ** 2)) for each in (fitted, rival.fit.result)
     ]
     promised = distance(truth, rival, known.line, paper)
     assert promised > 10.0

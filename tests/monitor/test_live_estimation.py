@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from estimator.identification.tracking.alarm import TrackingState
-from estimator.physics.twist import Shaft
+from estimator.physics.joint import Shaft
 from hil.monitor.live_estimation import LiveEstimation
 from hil.rig.live import LiveEstimate, OnlineSetup, tracking_chain, tracking_settings
 from hil.sample import Sample, SampleFlag

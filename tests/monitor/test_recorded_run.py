@@ -10,7 +10,7 @@ from typing import Protocol, cast
 import pytest
 
 from drivers.errors import DeviceTimeout
-from estimator.physics.twist import Shaft
+from estimator.physics.joint import Shaft
 from hil.config.rig_file import read_rig
 from hil.monitor import recorded_run
 from hil.monitor.messages import Notice, Over, Report

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from estimator.physics.twist import Shaft
+from estimator.physics.joint import Shaft
 from hil.monitor.messages import Began, Kind, Lost, Notice, Over, Ready, Samples
 from hil.monitor.snapshot import NO_VALUE, STANDS_STILL_S, Activity, Quality, QualityWatch
 from hil.monitor.state import LiveState

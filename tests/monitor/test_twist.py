@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from estimator.identification.modes.modes import two_mass_resonance
-from estimator.physics.twist import Shaft, TwistFilter, Uncertainty
+from estimator.physics.joint import Shaft, TwistFilter, Uncertainty
 from tests.monitor.two_mass import PERIOD_S, driven
 
 SHAFT = Shaft(J_M=1.6, J_L=100.0, k=4200.0, c=9.0, b_M=0.35, b_L=0.9, source="test")

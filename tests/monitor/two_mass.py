@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from estimator.physics.twist import Shaft
+from estimator.physics.joint import Shaft
 from estimator.signals.prbs import Prbs
 from tests.estimator.identification.driveline import Line
 

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from estimator.physics.driveline import Start
-from estimator.physics.grid import grid_for
-from estimator.physics.layout import flat_values
+from estimator.physics.layout import flat_values, grid_for
 from estimator.physics.model import DrivelineModel, Parameter, Structure
 from estimator.physics.simulate import simulate
 from estimator.signals.record import Record

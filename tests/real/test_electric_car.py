@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from estimator.diagnosis.preconditions import prepare
+from estimator.diagnosis.preconditions.prepare import prepare
 from hil.cli.main import run
 from hil.config.model_file import read_model
 from hil.recording import read_records

@@ -6,7 +6,7 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from estimator.diagnosis.result import Diagnosis, Mismatch, Stray, Trace, UnnamedLaw, Verdict
+from estimator.diagnosis.result import Diagnosis, Mismatch, OffNominal, Trace, UnnamedLaw, Verdict
 from estimator.physics.effect import Element
 from hil.report.diagnosis_html import MOST_DRAWN, diagnosis_page, interval_bar
 from hil.report.page import IntervalBar
@@ -106,8 +106,8 @@ def test_the_same_diagnosis_makes_the_same_page(diagnosis: Diagnosis) -> None:
 
 def test_a_nominal_value_that_is_off_is_the_headline(diagnosis: Diagnosis) -> None:
     """It is no missing physics, and no name is needed for it."""
-    strays = (Stray("J_L", 1.11, 0.04), Stray("k", 1.07, 0.04))
-    off = replace(diagnosis, verdict=Verdict.UNEXPLAINED, effects=(), strays=strays)
+    off_nominal = (OffNominal("J_L", 1.11, 0.04), OffNominal("k", 1.07, 0.04))
+    off = replace(diagnosis, verdict=Verdict.UNEXPLAINED, effects=(), off_nominal=off_nominal)
     text = read(diagnosis_page(off)).text
     assert "No physics need be missing, but the data sheet is off: J_L and k" in text
     assert "Something is missing" not in text

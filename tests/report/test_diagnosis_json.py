@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from estimator.diagnosis.result import Diagnosis, Mismatch, Stray, UnnamedLaw, Verdict
+from estimator.diagnosis.result import Diagnosis, Mismatch, OffNominal, UnnamedLaw, Verdict
 from estimator.physics.effect import Element
 from hil.report.diagnosis_json import diagnosis_json, diagnosis_text
 from hil.report.numbers import json_number
@@ -130,5 +130,5 @@ def test_a_law_without_a_name_is_written(diagnosis):
 
 def test_nominal_values_that_are_off_are_given_as_a_ratio(diagnosis: Diagnosis) -> None:
     assert diagnosis_json(diagnosis)["strays"] == []
-    off = replace(diagnosis, strays=(Stray("J_L", 1.11, 0.04),))
+    off = replace(diagnosis, off_nominal=(OffNominal("J_L", 1.11, 0.04),))
     assert diagnosis_json(off)["strays"] == [{"parameter": "J_L", "ratio": 1.11, "tolerance": 0.04}]

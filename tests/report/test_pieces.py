@@ -12,7 +12,7 @@ from rich.console import Console, RenderableType
 from estimator.diagnosis.result import Diagnosis
 from estimator.identification.identify import identify
 from estimator.identification.linear_model import LinearModel
-from estimator.identification.modes.uncertainty import square_root
+from estimator.identification.modes.modes import square_root
 from estimator.physics.model import Motion
 from estimator.signals.record import OutputKind
 from hil.errors import UsageError

@@ -19,25 +19,20 @@ def channels(record: Record) -> FloatArray:
 
 
 def flagged(record: Record) -> BoolArray:
-    """Return the rows in which the output was not read, or no torque was (a flagged row); shape (N,)."""
-    missing: BoolArray = ~np.isfinite(record.output) | ~record.torque_trusted.any(axis=1)
-    return missing
+    return ~np.isfinite(record.output) | ~record.torque_trusted.any(axis=1)
 
 
 def any_of(cells: BoolArray) -> BoolArray:
     """Return the rows with at least one True, shape (N,)."""
-    rows: BoolArray = np.logical_or.reduce(cells, axis=1)
-    return rows
+    return np.logical_or.reduce(cells, axis=1)
 
 
 def all_of(cells: BoolArray) -> BoolArray:
     """Return the rows that are True throughout, shape (N,)."""
-    rows: BoolArray = np.logical_and.reduce(cells, axis=1)
-    return rows
+    return np.logical_and.reduce(cells, axis=1)
 
 
 def runs(rows: BoolArray) -> list[tuple[int, int]]:
-    """Return where each run of True begins and the row after its end."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], rows, [False]])))
     return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
 
@@ -52,10 +47,7 @@ def shorter_runs(rows: BoolArray, longest: int) -> BoolArray:
 
 
 def share_interval(count: float, total: float, mean_run: float = 1.0) -> tuple[float, float]:
-    """Return the exact 95 % interval of a share (Clopper and Pearson, Biometrika 26, 1934).
-
-    What comes in runs counts as one piece of evidence a run.
-    """
+    """Return the exact 95 % interval of a share (Clopper and Pearson, Biometrika 26, 1934)."""
     events, trials = count / mean_run, total / mean_run
     low = 0.0 if events <= 0 else float(stats.beta.ppf(0.025, events, trials - events + 1.0))
     high = 1.0 if events >= trials else float(stats.beta.ppf(0.975, events + 1.0, trials - events))
@@ -68,8 +60,7 @@ def mean_run(masks: list[BoolArray]) -> float:
     return float(lengths @ lengths / lengths.sum()) if lengths.size else 1.0
 
 
-OUTPUT = 0
-"""Column of the measured output in ``Finding.cells``; torque input i is column ``1 + i``."""
+OUTPUT = 0  # column of the measured output in ``Finding.cells``; torque input i is column ``1 + i``
 
 
 class Sized(NamedTuple):
@@ -82,27 +73,13 @@ class Sized(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One effect of the acquisition or of the sensor's resolution.
+    """One effect of the acquisition or of the sensor's resolution."""
 
-    Attributes
-    ----------
-    name : str
-        As in the catalogue.
-    parameters : mapping of str to Sized
-        As in the catalogue.
-    cells : mapping of recording's name to ndarray of bool, shape (N, 1 + M)
-        The readings it touches: the output, then each torque input.
-    p_value : float
-        Probability of as much by chance in recordings without the effect.
-    statement : str
-        One sentence for an engineer.
-    """
-
-    name: str
+    name: str  # as in the catalogue
     parameters: Mapping[str, Sized]
-    cells: Mapping[str, BoolArray]
-    p_value: float
-    statement: str
+    cells: Mapping[str, BoolArray]  # (N, 1 + M): the readings it touches
+    p_value: float  # probability of as much by chance in recordings without the effect
+    statement: str  # one sentence for an engineer
 
     def touched(self, record: Record) -> BoolArray:
         """Return the readings of a recording that are touched, shape (N, 1 + M); none where it has not been seen."""
@@ -110,7 +87,6 @@ class Finding:
         return no_cells(record) if cells is None else cells
 
     def rows(self, record: Record) -> BoolArray:
-        """Return the rows of a recording with at least one touched reading, shape (N,)."""
         return any_of(self.touched(record))
 
 
@@ -128,5 +104,66 @@ SMALLEST_SHARE = 0.002
 its variance grows by the like. At one in two hundred and thirty the search for laws without a name still sees them (a
 sealed case, seed 701), and what it sees should have its name."""
 
-SMALLEST_P = 1e-300
-"""Stands for any smaller probability, so that logarithms stay finite."""
+
+ORDER = 12
+"""Past samples of output and torque that are seen. A line of two masses needs 2, one of three 4; the rest is there to
+average the noise of the reading."""
+
+ROWS_PER_REGRESSOR = 5  # a recording with fewer usable rows than this per coefficient is not judged
+
+
+@dataclass(frozen=True, slots=True)
+class Prediction:
+    """A predictor's errors on one recording."""
+
+    rows: np.ndarray[tuple[int], np.dtype[np.intp]]  # (n,): rows that were predicted
+    error: FloatArray  # (n,): reading less prediction, in those rows [unit of the output]
+    regressors: int  # number of coefficients
+    gain: float
+
+    @property
+    def typical(self) -> float:
+        """Typical error, as the standard deviation of a Gaussian with the same median; blind to a few wild rows."""
+        return 1.4826 * float(np.median(np.abs(self.error)))
+
+    @property
+    def sigma(self) -> float:
+        """RMS error, degrees of freedom taken into account."""
+        return float(np.sqrt(self.error @ self.error / (self.error.size - self.regressors)))
+
+
+def predict(record: Record, trusted: BoolArray) -> Prediction | None:
+    """Fit the predictor to a recording.
+
+    The torque of the row itself is among the regressors. By the convention of every recording it acts later, so its
+    coefficient is zero; where the torque is recorded a row late it takes up what would pass for staleness.
+    """
+    good = np.flatnonzero(trusted)
+    n = trusted.size
+    if good.size < ROWS_PER_REGRESSOR * 2 * ORDER:
+        return None
+    y = np.interp(np.arange(n), good, record.output[good] - record.output[good].mean())
+    u = record.total_torque_nm
+    lags = range(1, ORDER + 1)
+    past = [signal[ORDER - lag : n - lag] for signal in (y, u) for lag in lags]
+    regressors = np.column_stack([*past, u[ORDER:], np.ones(n - ORDER)])
+    usable = trusted[ORDER:] & trusted[ORDER - 1 : -1]
+    if usable.sum() < ROWS_PER_REGRESSOR * regressors.shape[1]:
+        return None
+    seen, measured = regressors[usable], y[ORDER:][usable]
+    coefficients = np.linalg.lstsq(seen, measured, rcond=None)[0]
+    error = measured - seen @ coefficients
+    return Prediction(ORDER + np.flatnonzero(usable), error, seen.shape[1], float(coefficients[ORDER]))
+
+
+def slope_test(signal: FloatArray, error: FloatArray) -> tuple[float, float]:
+    """Return the coefficient of a signal in an error and its standard error, robust to unequal variances.
+
+    White's estimator (Econometrica 48, 1980). The standard error is infinite where the signal is nothing.
+    """
+    power = float(signal @ signal)
+    if power <= 0.0:
+        return 0.0, float("inf")
+    slope = float(signal @ error) / power
+    left = error - slope * signal
+    return slope, float(np.sqrt(np.sum((signal * left) ** 2))) / power

@@ -9,27 +9,26 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from scipy import optimize, stats
 
-from estimator.diagnosis.acquisition.finding import LEVEL, OUTPUT, SMALLEST_P, Finding, Sized, no_cells
-from estimator.diagnosis.acquisition.predictor import predict, slope_test
+from estimator.diagnosis.acquisition.finding import (
+    LEVEL,
+    OUTPUT,
+    Finding,
+    Sized,
+    no_cells,
+    predict,
+    slope_test,
+)
 from estimator.diagnosis.acquisition.quantised import decimal_place
+from estimator.diagnosis.noise import SMALLEST_P
 from estimator.signals.record import BoolArray, FloatArray, Record, uniform_period_s
 
-AGREEMENT = 0.5
-"""Share of the stamps' offsets that the output must confirm: half way between none and all."""
-
-ABOVE_ROUNDING = 2.0
-"""Offsets of this many times what rounding the stamps leaves are more than rounding."""
-
-SMALLEST_PERIODS = 1e-3
-"""Jitter below this share of the period is not looked into."""
+AGREEMENT = 0.5  # share of the stamps' offsets that the output must confirm: half way between none and all
+ABOVE_ROUNDING = 2.0  # offsets of this many times what rounding the stamps leaves are more than rounding
+SMALLEST_PERIODS = 1e-3  # jitter below this share of the period is not looked into
 
 
 def stamp_offsets_s(record: Record) -> FloatArray:
-    """Return how far each time stamp is from the uniform time base [s]; zeros where stamps are even, shape (N,).
-
-    Even means to within their own resolution and a clock's: the uniform time base is taken off, and what is left counts
-    if it is well above what rounding the stamps leaves.
-    """
+    """Return how far each time stamp is from the uniform time base [s]; zeros where stamps are even, shape (N,)."""
     since = record.time_s - uniform_period_s(record.time_s) * np.arange(record.time_s.size)
     offset: FloatArray = since - since.mean()
     rounding_s = decimal_place(record.time_s) / np.sqrt(12.0)
@@ -64,7 +63,6 @@ def stamped_jitter(records: Sequence[Record]) -> Finding | None:
 
 
 def _confirmed(record: Record, offset_s: FloatArray) -> tuple[float, float] | None:
-    """Return which share of the offsets the output confirms, and its standard error; None where it can't tell."""
     trusted = record.okay & np.isfinite(record.output)
     trusted[[0, -1]] = False
     trusted[1:-1] &= np.isfinite(record.output[2:]) & np.isfinite(record.output[:-2])
@@ -83,8 +81,7 @@ def _pooled(found: Sequence[tuple[float, float]]) -> tuple[float, float]:
     return mean, float(1.0 / np.sqrt(weights.sum()))
 
 
-PAST = 8
-"""Past errors that may explain an error: most of a period of a driveline's first mode at 10 ms."""
+PAST = 8  # past errors that may explain an error: most of a period of a driveline's first mode at 10 ms
 
 AROUND = 3
 """Slopes before and after that may explain it: a delay, a lag or a wrong inertia show as a mix of them."""
@@ -94,11 +91,8 @@ BLOCK = 250
 angle that drifts off the true one moves what depends on it as a delay does that comes and goes. Its size is estimated
 from all rows: so many coefficients follow a part of the jitter too."""
 
-LEAST_GAIN = 0.05
-"""Share of the error's variance that jitter must account for, on average: less changes no fit."""
-
-OF_A_KINK = 0.17
-"""``(E|tau| / 2 sigma_t)^2``: 1 / 2 pi for Gaussian offsets, 3 / 16 for uniform ones."""
+LEAST_GAIN = 0.05  # share of the error's variance that jitter must account for, on average: less changes no fit
+OF_A_KINK = 0.17  # ``(E|tau| / 2 sigma_t)^2``: 1 / 2 pi for Gaussian offsets, 3 / 16 for uniform ones
 
 MOST_OF_IT = 0.5
 """Share of the error's variance beyond the noise that must be jitter: where other things leave more, the model has not
@@ -114,11 +108,7 @@ NEIGHBOURS = 0.5
 
 @dataclass(frozen=True, slots=True)
 class _Rest:
-    """What is left of the errors of all recordings, with slopes, and the same of the row after; shape (n,).
-
-    ``lengths`` holds how many of the rows each recording has, ``steepness`` the slope that the spread of a row's errors
-    follows, ``slope`` the mean of those before and after it.
-    """
+    """What is left of the errors of all recordings, with slopes, and the same of the row after; shape (n,)."""
 
     lengths: tuple[int, ...]
     error: FloatArray
@@ -157,8 +147,7 @@ def hidden_jitter(
 
 def mean_shift(slopes: FloatArray, jitter_s: float) -> FloatArray:
     """Return what readings off their time by ``jitter_s`` (rms) are off in the mean: a kink is cut short."""
-    shift: FloatArray = np.sqrt(OF_A_KINK) * jitter_s * (slopes[1] - slopes[0])
-    return shift
+    return np.sqrt(OF_A_KINK) * jitter_s * (slopes[1] - slopes[0])
 
 
 def _outputs(records: Sequence[Record], okay: Sequence[BoolArray]) -> Mapping[str, BoolArray]:
@@ -283,7 +272,6 @@ def _crossing(excess: Callable[[float], float], inside: float, outside: float) -
 
 
 def _of_the_many(rest: _Rest, found: _Jitter) -> bool:
-    """Tell whether the typical row shows the jitter, by the median absolute error of the steep half of the rows."""
     steep = rest.steepness >= np.median(rest.steepness)
     mad_to_sigma = 1.0 / float(stats.norm.ppf(0.75))
     typical = (mad_to_sigma * np.median(np.abs(rest.error[steep]))) ** 2

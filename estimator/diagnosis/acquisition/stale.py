@@ -12,7 +12,6 @@ from scipy import stats
 from estimator.diagnosis.acquisition.finding import (
     LEVEL,
     OUTPUT,
-    SMALLEST_P,
     SMALLEST_SHARE,
     Finding,
     Sized,
@@ -21,11 +20,12 @@ from estimator.diagnosis.acquisition.finding import (
     flagged,
     mean_run,
     no_cells,
+    predict,
     runs,
     share_interval,
 )
-from estimator.diagnosis.acquisition.predictor import predict
 from estimator.diagnosis.acquisition.quantised import chance_repeats, lattice_step, repeats
+from estimator.diagnosis.noise import SMALLEST_P
 from estimator.signals.record import BoolArray, FloatArray, Record
 
 HALF_WINDOW = 25
@@ -39,25 +39,24 @@ The quarter is taken, not the half, because a torque that jumps every few sample
 REST_ROWS = 8
 """A run of repeats this long, at zero or at the end of the channel's range, is standstill or saturation."""
 
-NEAR_ZERO = 0.02
-"""Zero is within this share of the channel's size."""
+NEAR_ZERO = 0.02  # zero is within this share of the channel's size
 
 
-def telling_rows(values: FloatArray, step: float) -> BoolArray:
+def informative_rows(values: FloatArray, step: float) -> BoolArray:
     """Return the rows of a channel in which a repeat would tell, shape (N,)."""
     change = np.abs(np.diff(values, prepend=np.nan))
     read, again = np.isfinite(change), repeats(values, step)
-    tells: BoolArray = read & (_moving_share(read & ~again, read) > 0.5)
-    moving = change[tells & ~again]
+    informative: BoolArray = read & (_moving_share(read & ~again, read) > 0.5)
+    moving = change[informative & ~again]
     if moving.size == 0 or float(np.quantile(moving, 0.25)) <= STEPS_PER_ROW * step:
-        return np.zeros_like(tells)
+        return np.zeros_like(informative)
     low, high = float(np.nanmin(values)), float(np.nanmax(values))
     for begin, end in runs(again):
         value = values[begin]
         at_rest = abs(value) <= NEAR_ZERO * max(abs(low), abs(high)) or value in (low, high)
         if end - begin >= REST_ROWS and at_rest:
-            tells[begin:end] = False
-    return tells
+            informative[begin:end] = False
+    return informative
 
 
 def _moving_share(moving: BoolArray, read: BoolArray) -> FloatArray:
@@ -65,8 +64,7 @@ def _moving_share(moving: BoolArray, read: BoolArray) -> FloatArray:
     counts = [
         sliding_window_view(np.pad(rows, HALF_WINDOW), 2 * HALF_WINDOW + 1).sum(axis=1) for rows in (moving, read)
     ]
-    share: FloatArray = counts[0] / np.maximum(counts[1], 1)
-    return share
+    return counts[0] / np.maximum(counts[1], 1)
 
 
 CATCH_UP = 0.8
@@ -77,29 +75,16 @@ on a lattice a small fraction."""
 
 @dataclass(frozen=True, slots=True)
 class Repeated:
-    """What one channel's repeats say.
+    """What one channel's repeats say."""
 
-    Attributes
-    ----------
-    rows : tuple of ndarray of bool, shape (N,)
-        Per recording, rows that repeat where a repeat tells.
-    total : int
-        Rows in which a repeat would tell.
-    expected, upper : float
-        Repeats by chance among these: best estimate, and the most it may be.
-    catch_up : float
-        Median change after a repeat, over the usual one; 0 without repeats.
-    """
-
-    rows: tuple[BoolArray, ...]
-    total: int
-    expected: float
+    rows: tuple[BoolArray, ...]  # (N,): per recording, rows that repeat where a repeat tells
+    total: int  # rows in which a repeat would tell
+    expected: float  # repeats by chance among these
     upper: float
-    catch_up: float
+    catch_up: float  # median change after a repeat, over the usual one
 
     @property
     def count(self) -> int:
-        """Repeats in telling rows."""
         return sum(int(rows.sum()) for rows in self.rows)
 
     @property
@@ -124,15 +109,15 @@ def repeated(series: Sequence[FloatArray]) -> Repeated:
     total, expected, upper = 0, 0.0, 0.0
     for values in series:
         step = lattice_step(values)
-        tells = telling_rows(values, step)
-        again = repeats(values, step) & tells
+        informative = informative_rows(values, step)
+        again = repeats(values, step) & informative
         change = np.diff(values, prepend=np.nan)
-        chance = chance_repeats(change[tells], step)
+        chance = chance_repeats(change[informative], step)
         rows.append(again)
-        total, expected, upper = total + int(tells.sum()), expected + chance.expected, upper + chance.upper
+        total, expected, upper = total + int(informative.sum()), expected + chance.expected, upper + chance.upper
         follows = _follows(again)
         after.append(np.abs(change[follows & np.isfinite(change)]))
-        usual.append(np.abs(change[tells & ~again & ~follows]))
+        usual.append(np.abs(change[informative & ~again & ~follows]))
     return Repeated(tuple(rows), total, expected, upper, _ratio(np.concatenate(after), np.concatenate(usual)))
 
 
@@ -149,11 +134,8 @@ def _ratio(after: FloatArray, usual: FloatArray) -> float:
     return float(np.median(after) / np.median(usual)) if after.size and usual.size else 0.0
 
 
-PERIODS = 3
-"""The torque of a row is predicted from its own reference and from those before it, so many in all."""
-
-FEWEST_ROWS = 100
-"""Fewer rows that were read do not show how a drive follows."""
+PERIODS = 3  # the torque of a row is predicted from its own reference and from those before it, so many in all
+FEWEST_ROWS = 100  # fewer rows that were read do not show how a drive follows
 
 MOST_LEFT = 0.25
 """Share of the torque's changes, as a power, that a reference may leave; one that leaves more does not tell."""
@@ -163,7 +145,6 @@ AS_GOOD = 0.003
 
 
 def followed(torque: FloatArray, trusted: BoolArray, reference: FloatArray) -> tuple[FloatArray, BoolArray, bool]:
-    """Return a torque as its reference tells it."""
     regressors = _regressors(np.where(~trusted & (reference == 0.0), np.nan, reference))  # lost with the torque
     predicted = all_of(np.isfinite(regressors))
     read = predicted & trusted
@@ -182,22 +163,14 @@ def followed(torque: FloatArray, trusted: BoolArray, reference: FloatArray) -> t
 
 
 def _regressors(reference: FloatArray) -> FloatArray:
-    """Return the references of each row and of those before it, and one for an offset; shape (N, PERIODS + 1)."""
     before = [np.concatenate([np.full(lag, reference[0]), reference[: reference.size - lag]]) for lag in range(PERIODS)]
     return np.column_stack([*before, np.ones(reference.size)])
 
 
-LONGEST_HOLD = 20
-"""Longest clock looked for, in samples."""
-
-ON_TICK = 0.95
-"""Share of the steps that must fall on the ticks; the rest may be steps of the base torque."""
-
-FEWEST_STEPS = 20
-"""Fewer steps do not show a clock."""
-
-CLEAR_STEP = 8.0
-"""A step is a change this many times the usual one within a hold."""
+LONGEST_HOLD = 20  # longest clock looked for, in samples
+ON_TICK = 0.95  # share of the steps that must fall on the ticks; the rest may be steps of the base torque
+FEWEST_STEPS = 20  # fewer steps do not show a clock
+CLEAR_STEP = 8.0  # a step is a change this many times the usual one within a hold
 
 SAME_STEP = 0.2
 """A change is the clock's step if it differs from it by at most this share: the base torque may drift meanwhile."""
@@ -217,7 +190,6 @@ class Clock:
         return [row for row in range(first, last + 1) if row % self.period == self.phase]
 
     def explains(self, change_nm: float) -> bool:
-        """Tell whether a change is one step of the clock, or none."""
         size = abs(change_nm)
         return size <= CLEAR_STEP * self.usual_nm or abs(size - self.step_nm) <= SAME_STEP * self.step_nm
 
@@ -240,7 +212,6 @@ def clock_of(torque: FloatArray, trusted: BoolArray) -> Clock | None:
 
 
 def fill(torque: FloatArray, trusted: BoolArray, reference: FloatArray | None = None) -> tuple[FloatArray, BoolArray]:
-    """Return a torque with what is not trusted replaced, and where the replacement is as good as a reading."""
     filled, known = _by_clock(torque, trusted)
     if reference is None or trusted.all():
         return filled, known
@@ -270,28 +241,17 @@ CLEAR = (2.0, 3.0, 4.0)
 """A step tells whether it was answered where the answer is this many times the predictor's error. Torques found stale
 are mended and the predictor fitted again, for wrong torques blur it; each pass asks for more, the last one counts."""
 
-ANSWERED = 0.5
-"""Share of the answer that must have come early: half way between none and all of it."""
+ANSWERED = 0.5  # share of the answer that must have come early: half way between none and all of it
 
 
 @dataclass(frozen=True, slots=True)
 class LateTorque:
-    """What one recording says of some torque inputs together.
+    """What one recording says of some torque inputs together."""
 
-    Attributes
-    ----------
-    rows : ndarray of bool, shape (N,)
-        Rows whose torques repeat while the output answers the next one.
-    early, repeats : int
-        Clear steps that were answered early, of those before which the torque repeats.
-    early_others, others : int
-        The same of those before which it does not.
-    """
-
-    rows: BoolArray
-    early: int
+    rows: BoolArray  # (N,): rows whose torques repeat while the output answers the next one
+    early: int  # clear steps that were answered early, of those before which the torque repeats
     repeats: int
-    early_others: int
+    early_others: int  # the same of those before which it does not
     others: int
 
 
@@ -334,10 +294,8 @@ def _late(again: BoolArray, step: FloatArray, early: FloatArray, clear: BoolArra
 
 
 def _next_fresh(torque: FloatArray, stale: BoolArray) -> FloatArray:
-    """Return in each row the torque of the next row that is not stale, shape (N,)."""
     rows = np.where(stale, torque.size - 1, np.arange(torque.size))
-    following: FloatArray = torque[np.minimum.accumulate(rows[::-1])[::-1]]
-    return following
+    return torque[np.minimum.accumulate(rows[::-1])[::-1]]
 
 
 def _mended(record: Record, inputs: Sequence[int], stale: BoolArray) -> Record:

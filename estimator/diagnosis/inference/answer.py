@@ -9,9 +9,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from estimator.diagnosis.acquisition.chain import Chain, mechanical, read_through
 from estimator.diagnosis.assemble import augmented_model, load_torques, retuned_parameters
-from estimator.diagnosis.chain import Chain, mechanical, read_through
-from estimator.diagnosis.hypotheses import Progress, everything, open_hypotheses, silent
+from estimator.diagnosis.inference.checks import Test, tests, tests_in_words
 from estimator.diagnosis.inference.disturbances import reading_noise
 from estimator.diagnosis.inference.figures import (
     FreeRuns,
@@ -25,6 +25,16 @@ from estimator.diagnosis.inference.figures import (
     on_recordings,
     traces_of,
 )
+from estimator.diagnosis.inference.hypotheses import (
+    SAME,
+    Hypothesis,
+    Progress,
+    everything,
+    fitted,
+    of_first_outputs,
+    open_hypotheses,
+    silent,
+)
 from estimator.diagnosis.inference.judge import (
     Decision,
     Grounds,
@@ -35,14 +45,11 @@ from estimator.diagnosis.inference.judge import (
     spread,
     verdict_of,
 )
-from estimator.diagnosis.inference.likelihood import SAME, Hypothesis, fitted, of_first_outputs
-from estimator.diagnosis.inference.remainder import Test, tests, tests_in_words
 from estimator.diagnosis.inference.rivals import Law, best_law, rivals_of, searches_around
 from estimator.diagnosis.inference.search import Search
 from estimator.diagnosis.inference.wording import Context, law_in_words, statement
-from estimator.diagnosis.noise import noise_floor
-from estimator.diagnosis.preconditions import Prepared
-from estimator.diagnosis.preconditions.thinned import as_slow_as_needed
+from estimator.diagnosis.noise import SMALLEST_P, noise_floor
+from estimator.diagnosis.preconditions.prepare import Prepared, as_slow_as_needed
 from estimator.diagnosis.result import (
     Diagnosis,
     Discrepancy,
@@ -51,23 +58,23 @@ from estimator.diagnosis.result import (
     FoundEffect,
     Interval,
     Mismatch,
+    OffNominal,
     RejectedEffect,
     Remainder,
     Slight,
-    Stray,
     UnnamedLaw,
     UntestableEffect,
     Verdict,
 )
-from estimator.diagnosis.unnamed import ElementSearch
-from estimator.diagnosis.where import discrepancy, locate
+from estimator.diagnosis.unnamed.search import ElementSearch
+from estimator.diagnosis.where import locate
+from estimator.diagnosis.where.discrepancy import discrepancy
 from estimator.physics.effect import Element, Untestable
 from estimator.physics.fit import not_fitted
 from estimator.physics.model import DrivelineModel
+from estimator.physics.parallel import TimeIsUp, Work, counted
 from estimator.physics.steps import from_their_moment
-from estimator.physics.work import TimeIsUp, Work, counted
-from estimator.signals.outputs import outputs_apart
-from estimator.signals.record import FloatArray
+from estimator.signals.record import FloatArray, separated_outputs
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,52 +86,38 @@ class Found:
     grounds: Grounds
 
 
-def ignore(_search: Search) -> None:
-    """Do nothing with a search that begins."""
-
-
 def searched(
     chain: Chain,
     line: DrivelineModel,
     work: Work | None = None,
     most: float = math.inf,
-    watch: Callable[[Search], None] = ignore,
+    watch: Callable[[Search], None] = lambda _search: None,
     progress: Progress = silent,
 ) -> Found:
     """Search for what is missing; once more where the errors of what is found show jitter."""
 
-    def begun(of: Chain) -> Search:
+    def found_in(of: Chain) -> Found:
         search = _search(of, line, work or Work(), most)
         search.progress = progress
         watch(search)
-        return search
+        return Found(of, search, grounds(search))
 
-    found = _found(chain, begun(chain))
+    found = found_in(chain)
     if found.search.stopped:
         return found
-    free = on_recordings(found.grounds.best, line, chain.apart, is_whole=True)
+    free = on_recordings(found.grounds.best, line, chain.separated, is_whole=True)
     steady = chain.with_jitter_in(free.first_outputs())
-    return found if steady is chain else _found(steady, begun(steady))
+    return found if steady is chain else found_in(steady)
 
 
 def _search(chain: Chain, line: DrivelineModel, work: Work, most: float) -> Search:
-    fitted_to = outputs_apart(as_slow_as_needed(chain.records, line), noise_floor)
+    fitted_to = separated_outputs(as_slow_as_needed(chain.records, line), noise_floor)
     names = open_hypotheses(line, chain.records)[0]
     return Search(line, fitted_to, everything(fitted_to), names, work=work, most=most)
 
 
-def _found(chain: Chain, search: Search) -> Found:
-    return Found(chain, search, grounds(search))
-
-
-SMALLEST_P = 1e-300
-
 LEVELS: Mapping[str, int] = {"quick": 4_000, "normal": 40_000, "thorough": 400_000}
 """Free runs of all recordings after which a search makes no further step: a choice of how long people wait."""
-
-
-def keep_nothing(_found: Found) -> None:
-    """Take no note of what a search found."""
 
 
 def answer(
@@ -133,7 +126,7 @@ def answer(
     progress: Progress,
     level: str,
     work: Work,
-    keep: Callable[[Found], None] = keep_nothing,
+    keep: Callable[[Found], None] = lambda _found: None,
 ) -> Diagnosis:
     """Return the diagnosis of recordings that are fit for one; undecided where the limit of time ends it.
 
@@ -151,13 +144,13 @@ def answer(
         try:
             found = searched(chain, line, work, LEVELS[level], watched, progress)
             keep(found)
-            said = _decided(found, line, ready, model, progress, level)
+            diagnosis = _decided(found, line, ready, model, progress, level)
         except TimeIsUp:
-            said = None
-    if said is None:
-        said = _undecided(search, chain, line, model, level, work)
+            diagnosis = None
+    if diagnosis is None:
+        diagnosis = _undecided(search, chain, line, model, level, work)
     progress("done", 1.0)
-    return replace(said, timing_s={"total": time.perf_counter() - began})
+    return replace(diagnosis, timing_s={"total": time.perf_counter() - began})
 
 
 def _decided(
@@ -181,7 +174,7 @@ class _Seen:
     searches: list[ElementSearch]
     alone: Law | None
     left: Law | None
-    strays: tuple[Stray, ...] = ()
+    off_nominal: tuple[OffNominal, ...] = ()
 
 
 def _seen(search: Search, ground: Grounds) -> _Seen:
@@ -197,8 +190,8 @@ def _seen(search: Search, ground: Grounds) -> _Seen:
     believed = _without_doubted(search, decision)
     alone, sheet, searches = rivals.alone, rivals.sheet, rivals.searches
     if not decision.named:
-        strays = sheet.strays if sheet is not None and sheet.leaves_noise else ()
-        return _Seen(decision, ground.nothing, failed or (), searches, alone, alone, strays)
+        off_nominal = sheet.off_nominal if sheet is not None and sheet.leaves_noise else ()
+        return _Seen(decision, ground.nothing, failed or (), searches, alone, alone, off_nominal)
     if believed is ground.best:
         return _Seen(decision, believed, failed, searches, alone, rivals.added if failed else None)
     failed, first = tuple(test for test in tests(believed) if test.failed), of_first_outputs(believed)
@@ -216,12 +209,12 @@ def _without_doubted(search: Search, decision: Decision) -> Hypothesis:
 
 def _steps_from_their_moment(search: Search, believed: Hypothesis) -> Hypothesis:
     """Return a hypothesis with steps of payload or stiffness that begin inside recordings, where it is as probable."""
-    turned = from_their_moment(believed.plain, search.model)
-    if turned is believed.plain:
+    turned = from_their_moment(believed.result, search.model)
+    if turned is believed.result:
         return believed
-    begun = not_fitted(turned.problem, turned.x)
+    initial = not_fitted(turned.problem, turned.x)
     names = len(search.names)
-    found = fitted(believed.effects, begun, believed.sizes, believed.limits, names, believed.minus_twice_log)
+    found = fitted(believed.effects, initial, believed.sizes, believed.limits, names, believed.minus_twice_log)
     return found if found.score <= believed.score + SAME else believed
 
 
@@ -242,13 +235,13 @@ def _said(seen: _Seen, runs: FreeRuns, search: Search, model: DrivelineModel, le
     traces = (*decision.traces,) if verdict is not Verdict.UNEXPLAINED else ()
     named = {each.name for each in effects} | {each.name for each in traces}
     named |= {name for each in effects for name in each.indistinguishable_from}
-    slight = tuple(Slight(each.name, each.share, decision.best.plain.values_of(each.name)) for each in traces)
+    slight = tuple(Slight(each.name, each.share, decision.best.result.values_of(each.name)) for each in traces)
     context = Context(
         remainder,
         [each.name for each in traces],
-        seen.strays,
+        seen.off_nominal,
         blind,
-        decision.nothing.plain.problem.grid.plant is None,
+        decision.nothing.result.problem.grid.plant is None,
     )
     return Diagnosis(
         verdict=verdict,
@@ -267,7 +260,7 @@ def _said(seen: _Seen, runs: FreeRuns, search: Search, model: DrivelineModel, le
         warnings=_warnings(search, level),
         discrepancy=_discrepancy(seen, line) if mismatch.detected and line.plant is None else None,
         remainder=remainder,
-        strays=seen.strays,
+        off_nominal=seen.off_nominal,
         slight=slight,
         effort=effort,
     )
@@ -281,14 +274,15 @@ def _does_not_fall(fit: Fit) -> str:
 
 
 def _abstained(seen: _Seen, runs: FreeRuns, reason: str) -> tuple[_Seen, FreeRuns]:
-    """Return what is left to say where what is believed does not carry over: nothing is named."""
     decision = seen.decision
     doubted = tuple(replace(each, objection=reason) for each in (*decision.named, *decision.traces))
     decision = replace(decision, named=(), traces=(), doubted=(*doubted, *decision.doubted))
     nothing = decision.nothing
     failed = tuple(test for test in tests(nothing) if test.failed)
     runs = replace(runs, believed=nothing, is_whole=False, after=runs.before, held_after=runs.held_before)
-    return _Seen(decision, nothing, failed or seen.failed, seen.searches, seen.alone, seen.alone, seen.strays), runs
+    return _Seen(
+        decision, nothing, failed or seen.failed, seen.searches, seen.alone, seen.alone, seen.off_nominal
+    ), runs
 
 
 def _undecided(
@@ -353,24 +347,26 @@ def noise_of(hypothesis: Hypothesis) -> float:
 
 def _errors(hypothesis: Hypothesis) -> list[FloatArray]:
     """Return the free-run error per recording, 0 where a sample is missing."""
-    plain = hypothesis.plain.first_outputs()
-    return [np.where(r.okay, r.output - out, 0.0) for r, out in zip(plain.problem.records, plain.outputs, strict=True)]
+    result = hypothesis.result.first_outputs()
+    return [
+        np.where(r.okay, r.output - out, 0.0) for r, out in zip(result.problem.records, result.outputs, strict=True)
+    ]
 
 
 def _band_hz(hypothesis: Hypothesis, noise: float) -> Interval | None:
     errors = _errors(hypothesis)
-    return locate.band_hz(errors, [hypothesis.plain.problem.records[0].sample_time_s] * len(errors), noise)
+    return locate.band_hz(errors, [hypothesis.result.problem.records[0].sample_time_s] * len(errors), noise)
 
 
 def _mismatch(seen: _Seen, verdict: Verdict, effects: Sequence[FoundEffect]) -> Mismatch:
     decision = seen.decision
     if verdict is Verdict.NO_MISMATCH:
         return Mismatch(False, None, {}, None, None, 1.0)
-    nothing, noise = decision.nothing.plain.first_outputs(), noise_of(decision.best)
+    nothing, noise = decision.nothing.result.first_outputs(), noise_of(decision.best)
     law = seen.alone if seen.left is None else seen.left
     element: Element | None = None if law is None else law.element
-    if effects or seen.strays:
-        element = (effects or seen.strays)[0].element
+    if effects or seen.off_nominal:
+        element = (effects or seen.off_nominal)[0].element
     gained = max(decision.nothing.score - decision.best.score, 0.0)
     return Mismatch(
         detected=True,
@@ -385,9 +381,9 @@ def _mismatch(seen: _Seen, verdict: Verdict, effects: Sequence[FoundEffect]) -> 
 def _discrepancy(seen: _Seen, line: DrivelineModel) -> Discrepancy:
     """Return the mismatch as the report draws it."""
     noise = noise_of(seen.decision.best)
-    nothing, believed = of_first_outputs(seen.decision.nothing), seen.believed.plain.first_outputs()
+    nothing, believed = of_first_outputs(seen.decision.nothing), seen.believed.result.first_outputs()
     return discrepancy(
-        nothing.plain, believed, noise, line.motion, rounds=1, begun=seen.searches, whitening=nothing.filter
+        nothing.result, believed, noise, line.motion, rounds=1, initial=seen.searches, whitening=nothing.filter
     )
 
 
@@ -433,7 +429,6 @@ def _compared(worse: float) -> str:
 
 
 def _remainder(seen: _Seen) -> Remainder | None:
-    """Return what is left beyond noise and drift; None where nothing is."""
     believed, law = seen.believed, seen.left
     if not seen.failed:
         return None

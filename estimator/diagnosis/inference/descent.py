@@ -1,11 +1,4 @@
-"""Gauss-Newton descent of the squared innovations, with derivatives that are carried from fit to fit.
-
-A derivative by differences costs a simulation per unknown, a step one. So a fit begins with the derivative of the fit
-it extends, of which only the new unknowns' columns are found, and follows it by Broyden's update (Math. Comp. 19,
-1965; with Marquardt's damping: Madsen, Nielsen and Tingleff, Methods for Non-Linear Least Squares Problems, DTU 2004,
-3.5). It is found anew where a step does not keep what it promised, and before a fit counts as ended. Derivatives are
-those of the plain errors: they hold under any weighting.
-"""
+"""Gauss-Newton descent of the squared innovations, with derivatives that are carried from fit to fit."""
 
 from __future__ import annotations
 
@@ -16,17 +9,14 @@ import numpy as np
 
 from estimator.physics.fit import FitResult, in_common
 from estimator.physics.jacobian import jacobian_at
-from estimator.physics.least_squares import least_of_quadratic, unbounded_first
+from estimator.physics.least_squares import damped_step
 from estimator.physics.problem import Problem, bounds, outputs_at, residual_at
 from estimator.signals.record import FloatArray
 
 Weigh = Callable[[FloatArray], FloatArray]
 
-LITTLE = 0.2
-"""Fall of the squared innovations, of variance 1, that changes no conclusion."""
-
-KEPT = 0.5
-"""Share of a step's promise that it must keep for the derivative to be carried on."""
+LITTLE = 0.2  # fall of the squared innovations, of variance 1, that changes no conclusion
+KEPT = 0.5  # share of a step's promise that it must keep for the derivative to be carried on
 
 NEAR = 10.0
 """Fall of the squared innovations over a step behind which a derivative that was found anew still holds."""
@@ -35,8 +25,7 @@ FIRST_DAMPING = 1e-3
 EASE, STIFFEN = 0.2, 5.0
 LEAST_DAMPING, MOST_DAMPING = 1e-10, 1e8
 
-MUCH_BYTES = 2**25
-"""Room of a derivative that is rather found again than kept with a fit that is over."""
+MUCH_BYTES = 2**25  # room of a derivative that is rather found again than kept with a fit that is over
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +36,7 @@ class Effort:
     steps: int
 
 
-def extended(problem: Problem, x: FloatArray, warm: FitResult, anew: str = "") -> FitResult:
+def extended(problem: Problem, x: FloatArray, previous: FitResult, anew: str = "") -> FitResult:
     """Return the free run of a problem at ``x`` with the derivative of a fit with which it has unknowns in common.
 
     The columns of the others are found, and those of the parameters of an effect that is begun ``anew``.
@@ -55,18 +44,18 @@ def extended(problem: Problem, x: FloatArray, warm: FitResult, anew: str = "") -
     low, high = bounds(problem)
     x = np.clip(x, low, high)
     outputs = outputs_at(problem, x)
-    begun = FitResult(problem, x, outputs, residual_at(problem, outputs), None, False)
-    if warm.derivative is None or warm.derivative.shape[0] != begun.residual.size:
-        return begun
-    columns, taken, ratio = in_common(problem, warm.problem)
-    known = warm.derivative[:, taken].any(axis=0)  # what was held there, and is free here, is not known
+    initial = FitResult(problem, x, outputs, residual_at(problem, outputs), None, False)
+    if previous.derivative is None or previous.derivative.shape[0] != initial.residual.size:
+        return initial
+    columns, taken, ratio = in_common(problem, previous.problem)
+    known = previous.derivative[:, taken].any(axis=0)  # what was held there, and is free here, is not known
     known &= ~np.isin(columns, [i for i, shared in enumerate(problem.shared) if anew and shared.effect == anew])
     columns, taken, ratio = columns[known], taken[known], ratio[known]
     new = low < high
     new[columns] = False
-    derivative = jacobian_at(problem, x, outputs, new) if new.any() else np.zeros((begun.residual.size, x.size))
-    derivative[:, columns] = warm.derivative[:, taken] * (ratio * (low < high)[columns])
-    return replace(begun, derivative=derivative)
+    derivative = jacobian_at(problem, x, outputs, new) if new.any() else np.zeros((initial.residual.size, x.size))
+    derivative[:, columns] = previous.derivative[:, taken] * (ratio * (low < high)[columns])
+    return replace(initial, derivative=derivative)
 
 
 def light(fit: FitResult) -> FitResult:
@@ -74,9 +63,9 @@ def light(fit: FitResult) -> FitResult:
     return fit if fit.derivative is None or fit.derivative.nbytes <= MUCH_BYTES else fit.light()
 
 
-def descended(begun: FitResult, weigh: Weigh, effort: Effort) -> FitResult:
+def descended(initial: FitResult, weigh: Weigh, effort: Effort) -> FitResult:
     """Return the unknowns at which the squared innovations under fixed disturbances are least."""
-    descent = _Descent(begun, weigh, effort.derivatives)
+    descent = _Descent(initial, weigh, effort.derivatives)
     for _ in range(effort.steps):
         if not descent.step():
             break
@@ -86,13 +75,13 @@ def descended(begun: FitResult, weigh: Weigh, effort: Effort) -> FitResult:
 class _Descent:
     """One descent: where it is, its derivative, how it is damped, and what it may still spend."""
 
-    def __init__(self, begun: FitResult, weigh: Weigh, derivatives: int) -> None:
-        self._problem, self._weigh, self._left = begun.problem, weigh, derivatives
-        self._low, self._high = bounds(begun.problem)
-        self._x = np.clip(begun.x, self._low, self._high)
-        self._outputs, self._errors, self._derivative = begun.outputs, begun.residual, begun.derivative
+    def __init__(self, initial: FitResult, weigh: Weigh, derivatives: int) -> None:
+        self._problem, self._weigh, self._left = initial.problem, weigh, derivatives
+        self._low, self._high = bounds(initial.problem)
+        self._x = np.clip(initial.x, self._low, self._high)
+        self._outputs, self._errors, self._derivative = initial.outputs, initial.residual, initial.derivative
         self._innovations = weigh(self._errors)
-        self._fresh = begun.converged and begun.derivative is not None
+        self._fresh = initial.converged and initial.derivative is not None
         self._damping, self._converged = FIRST_DAMPING, False
 
     @property
@@ -107,7 +96,7 @@ class _Descent:
         white = self._weigh(derivative)
         gradient, curvature = white.T @ self._innovations, white.T @ white
         while True:
-            moved = self._moved(gradient, curvature)
+            moved = damped_step(self._x, gradient, curvature, self._damping, self._low, self._high)
             promise = float(-moved @ (2.0 * gradient + curvature @ moved))
             if promise < LITTLE:
                 self._converged = self._fresh
@@ -149,15 +138,3 @@ class _Descent:
             self._derivative = self._derivative + np.outer(missed, moved)
             self._x, self._outputs, self._errors, self._innovations = x, outputs, errors, innovations
         return gained
-
-    def _moved(self, gradient: FloatArray, curvature: FloatArray) -> FloatArray:
-        """Return the damped Gauss-Newton step inside the bounds."""
-        free = unbounded_first(self._low, self._high, self._low < self._high)
-        diagonal = np.diag(curvature)
-        damped = curvature + np.diag(self._damping * np.maximum(diagonal, 1e-12 * diagonal.max()))
-        down, up = self._low[free] - self._x[free], self._high[free] - self._x[free]
-        step = np.zeros_like(self._x)
-        step[free] = least_of_quadratic(
-            damped[np.ix_(free, free)], gradient[free], np.minimum(down, 0.0), np.maximum(up, 0.0)
-        )
-        return step

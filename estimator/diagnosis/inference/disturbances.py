@@ -10,41 +10,29 @@ from functools import partial
 import numpy as np
 from scipy.linalg import expm
 
-from estimator.diagnosis.line.motion import LASTS, FormPlace, form_changes
+from estimator.diagnosis.line.blocks import LASTS, FormPlace, form_changes
 from estimator.diagnosis.line.whitening import Gains, Terms, fill_gains, innovate, terms_of
 from estimator.diagnosis.noise import noise_floor
 from estimator.physics.fit import FitResult
 from estimator.physics.layout import slot
 from estimator.physics.model import Structure
 from estimator.physics.motion import torque_scale
+from estimator.physics.parallel import check_time
 from estimator.physics.problem import Rows
-from estimator.physics.work import check_time
 from estimator.signals.correlation import stand_in_variance
-from estimator.signals.outputs import by_output
-from estimator.signals.record import BoolArray, FloatArray, Location, OutputKind, Record
+from estimator.signals.record import BoolArray, FloatArray, Location, OutputKind, Record, by_output
 
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """The linear line as disturbances see it, sampled.
-
-    Attributes
-    ----------
-    f : ndarray, shape (n, n)
-    torque, load, shaft : ndarray, shape (n,)
-        How a torque held for a sample, at the motor, against the load and more in the first shaft, moves the state.
-    h : ndarray, shape (C, n)
-        How each output shows the state.
-    direct : float
-        How the load shows in the output at once: 1 for a joint, whose torque is read.
-    """
+    """The linear line as disturbances see it, sampled."""
 
     f: FloatArray
-    torque: FloatArray
-    load: FloatArray
-    h: FloatArray
-    direct: float = 0.0
-    shaft: FloatArray = field(default_factory=lambda: np.zeros(0))
+    torque: FloatArray  # (n,)
+    load: FloatArray  # (n,)
+    h: FloatArray  # (C, n): how each output shows the state
+    direct: float = 0.0  # how the load shows in the output at once
+    shaft: FloatArray = field(default_factory=lambda: np.zeros(0))  # (n,)
 
 
 def line_of(result: FitResult) -> Line:
@@ -128,8 +116,7 @@ class Size(IntEnum):
     FORM = 7
 
 
-READING = 3
-"""How many sizes are of an output's reading."""
+READING = 3  # how many sizes are of an output's reading
 
 
 def of_first(sizes: FloatArray) -> FloatArray:
@@ -144,23 +131,12 @@ def readings(sizes: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True, slots=True)
 class Whitener:
-    """Kalman filters for recordings: a linear map of their errors to innovations of variance 1.
-
-    Attributes
-    ----------
-    f, h : Terms
-        Of the transition, shape (m, m), and of how the outputs show the state, shape (C, m).
-    gains : tuple of Gains
-        Of each recording.
-    use : tuple of ndarray of bool, shape (N_i, C)
-    rows : tuple of Rows
-        Where the samples of each recording that count stand among all, its outputs in turn.
-    """
+    """Kalman filters for recordings: a linear map of their errors to innovations of variance 1."""
 
     f: Terms
     h: Terms
-    gains: tuple[Gains, ...]
-    use: tuple[BoolArray, ...]
+    gains: tuple[Gains, ...]  # of each recording
+    use: tuple[BoolArray, ...]  # (N_i, C)
     rows: tuple[Rows, ...]
 
     def __call__(self, stacked: FloatArray) -> FloatArray:
@@ -186,7 +162,6 @@ class Whitener:
         return found
 
     def minus_twice_log(self, innovations: FloatArray) -> float:
-        """Return minus twice the log-likelihood of stacked innovations, but for a constant."""
         return 2.0 * float(self.logs.sum()) + float(innovations @ innovations)
 
 
@@ -292,7 +267,6 @@ class Limits:
         return replace(self, high=high)
 
     def without_forms(self) -> Limits:
-        """Return limits that hold the error of laws' forms as usual: of a line without such a law."""
         low, high = self.low.copy(), self.high.copy()
         low[Size.FORM] = high[Size.FORM] = self.usual[Size.FORM]
         return replace(self, low=low, high=high)
@@ -303,10 +277,8 @@ class Limits:
 
 
 def reading_noise(sizes: FloatArray) -> FloatArray:
-    """Return the noise of each output's reading, white and coloured, shape (C,)."""
     each = np.exp(readings(sizes))
-    noise: FloatArray = np.hypot(each[:, Size.WHITE], each[:, Size.COLOURED])
-    return noise
+    return np.hypot(each[:, Size.WHITE], each[:, Size.COLOURED])
 
 
 def limits_of(records: Sequence[Record]) -> Limits:
@@ -348,11 +320,8 @@ def limits_for(records: Sequence[Record], white: float) -> Limits:
     return Limits(np.clip(usual, low, high), low, high)
 
 
-STEP = 1e-4
-"""Change of a logarithm by which derivatives are found."""
-
-ENOUGH = 0.5
-"""Fall of minus twice the log-posterior below which sizes are estimated."""
+STEP = 1e-4  # change of a logarithm by which derivatives are found
+ENOUGH = 0.5  # fall of minus twice the log-posterior below which sizes are estimated
 
 
 def minus_twice_log_prior(sizes: FloatArray, limits: Limits) -> float:
@@ -373,19 +342,16 @@ def starts(sizes: FloatArray, limits: Limits) -> list[FloatArray]:
 def estimated(
     result: FitResult, error: FloatArray, sizes: FloatArray, limits: Limits, rounds: int, is_anew: bool = False
 ) -> tuple[FloatArray, float]:
-    """Return the most probable noise model of a fit's error and its minus twice log-posterior.
-
-    ``is_anew`` where it is begun from elsewhere, too (``starts``).
-    """
+    """Return the most probable noise model of a fit's error and its minus twice log-posterior."""
     check_time()
     whitened = whitening_of(result)
     limits = limits if changes_of(result) else limits.without_forms()
-    begun = starts(sizes, limits) if is_anew else [sizes]
-    return min((estimate(whitened, error, each, limits, rounds) for each in begun), key=lambda each: each[1])
+    initial = starts(sizes, limits) if is_anew else [sizes]
+    return min((estimate(whitened, error, each, limits, rounds) for each in initial), key=lambda each: each[1])
 
 
 def estimate(
-    whitened: Callable[[FloatArray], Whitener], error: FloatArray, begun: FloatArray, limits: Limits, rounds: int
+    whitened: Callable[[FloatArray], Whitener], error: FloatArray, initial: FloatArray, limits: Limits, rounds: int
 ) -> tuple[FloatArray, float]:
     """Return the most probable noise model of an error and its minus twice log-posterior, by Fisher scoring."""
 
@@ -395,7 +361,7 @@ def estimate(
         value = 2.0 * float(logs.sum()) + float(innovations @ innovations) + minus_twice_log_prior(sizes, limits)
         return value, innovations, logs
 
-    sizes = np.clip(begun, limits.low, limits.high)
+    sizes = np.clip(initial, limits.low, limits.high)
     value, innovations, logs = at(sizes)
     damping = 1e-2
     for _ in range(rounds):

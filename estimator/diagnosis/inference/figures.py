@@ -9,16 +9,30 @@ from functools import cached_property
 
 import numpy as np
 
-from estimator.diagnosis.assemble import acquired_effects, moments_in, parameters_of, profile_size, profiles_of, rms_of
-from estimator.diagnosis.chain import Chain
-from estimator.diagnosis.hypotheses import NOTHING, Effects, everything
-from estimator.diagnosis.inference.calibration import LEAST_SHARE
+from estimator.diagnosis.acquisition.chain import Chain
+from estimator.diagnosis.assemble import (
+    acquired_effects,
+    moments_in,
+    parameters_of,
+    profile_size,
+    profiles_of,
+    reported_covariance,
+    rms_of,
+)
+from estimator.diagnosis.inference.checks import GRADE, LEAST_SHARE
 from estimator.diagnosis.inference.descent import descended
 from estimator.diagnosis.inference.disturbances import reading_noise
+from estimator.diagnosis.inference.hypotheses import (
+    NOTHING,
+    THOROUGH,
+    Effects,
+    Hypothesis,
+    covariance,
+    everything,
+    refitted,
+)
 from estimator.diagnosis.inference.judge import Belief, Decision, free_rms
-from estimator.diagnosis.inference.likelihood import THOROUGH, Hypothesis, covariance, refitted
-from estimator.diagnosis.inference.plausible import GRADE
-from estimator.diagnosis.intervals import reported_covariance
+from estimator.diagnosis.noise import SMALLEST_P
 from estimator.diagnosis.result import Evidence, Fit, FoundEffect, OutputFit, Trace
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import FitResult, fit, not_fitted, warm_start
@@ -26,28 +40,22 @@ from estimator.physics.free_run import simulate_foreign
 from estimator.physics.model import DrivelineModel, unit
 from estimator.physics.problem import Problem, make_problem, parameters, start_vector
 from estimator.physics.unknowns import LocalBasis, Shared
-from estimator.signals.outputs import by_output
-from estimator.signals.record import BoolArray, FloatArray, OutputKind, Record
+from estimator.signals.record import BoolArray, FloatArray, OutputKind, Record, by_output
 
 BLOCK_S, EVERY_S = 0.6, 2.0
 """Blocks kept out for a profile: shorter than its knot spacing, so that its neighbours predict it."""
 
-FEWEST_BLOCKS = 3
-"""Blocks of a recording at least: it may be shorter than one of these."""
+FEWEST_BLOCKS = 3  # blocks of a recording at least: it may be shorter than one of these
 
 
 def blocks(record: Record) -> BoolArray:
-    """Return which samples are kept out: blocks all along, none at the very ends; shape (N,).
-
-    A recording too short for as many has shorter ones, closer together.
-    """
+    """Return which samples are kept out: blocks all along, none at the very ends; shape (N,)."""
     since_s = record.time_s - record.time_s[0]
     scale = min(1.0, float(since_s[-1]) / (FEWEST_BLOCKS * EVERY_S))
     every_s, block_s = scale * EVERY_S, scale * BLOCK_S
     phase = np.mod(since_s, every_s)
     middle = 0.5 * (every_s - block_s)
-    inside: BoolArray = (phase >= middle) & (phase < middle + block_s)
-    return inside
+    return (phase >= middle) & (phase < middle + block_s)
 
 
 def foreign_outputs(
@@ -64,8 +72,7 @@ def foreign_outputs(
     )
 
 
-ITERATIONS = 8
-"""Steps of a least-squares fit of what is a recording's own, which is nearly linear."""
+ITERATIONS = 8  # steps of a least-squares fit of what is a recording's own, which is nearly linear
 
 
 def on_recordings(
@@ -76,10 +83,10 @@ def on_recordings(
     use: Sequence[BoolArray] | None = None,
 ) -> FitResult:
     """Return the free run of a hypothesis on recordings it was fitted to, at their own rate."""
-    of = hypothesis.plain.problem
+    of = hypothesis.result.problem
     own = [basis.own for basis in of.local]
     problem = make_problem(line, records, of.shared, own=own, profile=GRADE in hypothesis.effects, use=use)
-    own_alone = _with_own(problem, warm_start(problem, hypothesis.plain))
+    own_alone = _with_own(problem, warm_start(problem, hypothesis.result))
     if is_whole:
         return own_alone
     rms = own_alone.rms
@@ -108,17 +115,10 @@ def _held(basis: LocalBasis, x: FloatArray) -> LocalBasis:
 
 @dataclass(frozen=True, slots=True)
 class Unseen:
-    """The samples that judge: those of recordings kept out of the fit, else blocks of the recordings themselves.
-
-    Attributes
-    ----------
-    line : DrivelineModel
-    chain : Chain
-        Of recordings kept out of every fit; empty where there are none.
-    """
+    """The samples that judge: those of recordings kept out of the fit, else blocks of the recordings themselves."""
 
     line: DrivelineModel
-    chain: Chain
+    chain: Chain  # of recordings kept out of every fit
 
     def rms(self, hypothesis: Hypothesis, whole: FitResult, is_whole: bool, seen: Chain, is_as_read: bool) -> float:
         """Return the RMS of a hypothesis' free-run error in blocks of 0.6 s every 2 s [unit of the output].
@@ -128,19 +128,19 @@ class Unseen:
         Where faults of the acquisition were recognised the readings judge: simulated ``as_read``, or as it is.
         """
         judging = self.chain if self.chain.records else seen
-        records: Sequence[Record] = judging.records if self.chain.records else hypothesis.plain.problem.records
+        records: Sequence[Record] = judging.records if self.chain.records else hypothesis.result.problem.records
         if judging.findings and not self.chain.records:
-            records = seen.apart
+            records = seen.separated
         between = [record.okay & ~blocks(record) for record in records]
         if self.chain.records:
             outputs = foreign_outputs(whole, self.line, records, between, hypothesis.effects)
         else:
-            plain = hypothesis.plain
+            result = hypothesis.result
             if is_whole:
-                of = plain.problem
+                of = result.problem
                 use = tuple(record.okay & ~blocks(record) for record in of.records)
-                plain = refitted(hypothesis, replace(of, use=use))
-            outputs = on_recordings(replace(hypothesis, plain=plain), self.line, records, is_whole, between).outputs
+                result = refitted(hypothesis, replace(of, use=use))
+            outputs = on_recordings(replace(hypothesis, result=result), self.line, records, is_whole, between).outputs
         firsts = [(out, record) for out, record in zip(outputs, records, strict=True) if record.lead is None]
         inside = [blocks(record) for _, record in firsts]
         if not judging.findings:
@@ -153,36 +153,24 @@ class Unseen:
         return float(np.sqrt(np.mean(np.concatenate(errors) ** 2)))
 
 
-SMALLEST_P = 1e-300
-
-
-def found_effects(
-    decision: Decision, estimate: FitResult, cov: FloatArray, model: DrivelineModel
-) -> tuple[FoundEffect, ...]:
-    """Return the named effects, the weightiest first, with the values and covariance of a fit."""
-    return tuple(_found(belief, decision, estimate, cov, model) for belief in decision.named)
-
-
-def _found(
-    belief: Belief, decision: Decision, estimate: FitResult, cov: FloatArray, model: DrivelineModel
-) -> FoundEffect:
-    entry, best = EFFECTS[belief.name], decision.best
+def _found(belief: Belief, decision: Decision, runs: FreeRuns) -> FoundEffect:
+    entry, best, model = EFFECTS[belief.name], runs.believed, runs.unseen.line
     nulls = {parameter.name: parameter.null for parameter in entry.parameters}
     profiles = {}
     if belief.name == GRADE:
-        of = best.plain.problem
+        of = best.result.problem
         problem = make_problem(model, of.records, of.shared, own=[b.own for b in of.local], profile=True, use=of.use)
-        course = fit(problem, warm_start(problem, best.plain))
+        course = fit(problem, warm_start(problem, best.result))
         of_course = reported_covariance(course)
         profiles, parameters = profiles_of(course, of_course, model), profile_size(course, of_course, model)
     else:
-        parameters = parameters_of(belief.name, estimate, cov, model)
+        parameters = parameters_of(belief.name, runs.estimate, runs.covariance, model)
     return FoundEffect(
         name=entry.name,
         element=entry.element,
         statement=entry.sentence(nulls | {name: p.value for name, p in parameters.items()}, model.motion),
         parameters=parameters,
-        time_s=moments_in(belief.name, estimate) if entry.event else {},
+        time_s=moments_in(belief.name, runs.estimate) if entry.event else {},
         indistinguishable_from=tuple(belief.alike),
         alternatives=belief.alike,
         evidence=Evidence(
@@ -209,25 +197,15 @@ DIMENSIONS = {
 
 @dataclass(frozen=True)
 class FreeRuns:
-    """Free runs before and after, on the recordings at their own rate.
-
-    Attributes
-    ----------
-    is_whole : bool
-        Whether what is believed leaves nothing but its disturbances.
-    before, after : FitResult
-        The nominal model, re-tuned; with the effects that are believed: every measured output.
-    held_before, held_after : float
-        RMS of their errors on samples that no fit has seen [unit of the output].
-    """
+    """Free runs before and after, on the recordings at their own rate."""
 
     chain: Chain
     unseen: Unseen
     believed: Hypothesis
-    is_whole: bool
-    before: FitResult
+    is_whole: bool  # whether what is believed leaves nothing but its disturbances
+    before: FitResult  # the nominal model, re-tuned
     after: FitResult
-    held_before: float
+    held_before: float  # RMS of their errors on samples that no fit has seen [unit of the output]
     held_after: float
 
     @cached_property
@@ -237,7 +215,6 @@ class FreeRuns:
 
     @cached_property
     def final(self) -> FitResult:
-        """What is believed: the recordings' first outputs."""
         return self.after.first_outputs()
 
     @cached_property
@@ -256,12 +233,12 @@ def free_runs(nothing: Hypothesis, believed: Hypothesis, is_whole: bool, chain: 
 
     The re-tuned model leaves the least that it can: an error that it need not have is no mismatch.
     """
-    before = _least(on_recordings(nothing, unseen.line, chain.apart, is_whole=False), unseen.line)
+    before = _least(on_recordings(nothing, unseen.line, chain.separated, is_whole=False), unseen.line)
     held_before = unseen.rms(nothing, before, False, chain, is_as_read=False)
     if believed is nothing:
         held_after = unseen.rms(nothing, before, False, chain, is_as_read=True) if chain.findings else held_before
         return FreeRuns(chain, unseen, believed, is_whole, before, before, held_before, held_after)
-    after = on_recordings(believed, unseen.line, chain.apart, is_whole)
+    after = on_recordings(believed, unseen.line, chain.separated, is_whole)
     held_after = unseen.rms(believed, after, is_whole, chain, is_as_read=True)
     return FreeRuns(chain, unseen, believed, is_whole, before, after, held_before, held_after)
 
@@ -277,8 +254,8 @@ def _least(retuned: FitResult, line: DrivelineModel) -> FitResult:
     )
     if nominal.squares >= retuned.squares:
         return retuned
-    begun = not_fitted(problem, nominal.x)
-    return descended(begun, lambda errors: errors / begun.rms, THOROUGH).light()
+    initial = not_fitted(problem, nominal.x)
+    return descended(initial, lambda errors: errors / initial.rms, THOROUGH).light()
 
 
 def _held_at_start(unknown: Shared) -> Shared:
@@ -287,8 +264,8 @@ def _held_at_start(unknown: Shared) -> Shared:
 
 def first_figures(chain: Chain, line: DrivelineModel, nothing: Hypothesis | None) -> tuple[Fit, FitResult]:
     """Return the errors that are known where a search was ended at once: of the model as given, and re-tuned."""
-    nominal = not_fitted(problem := make_problem(line, chain.apart, ()), start_vector(problem)).first_outputs()
-    estimate = nominal if nothing is None else nothing.plain.first_outputs()
+    nominal = not_fitted(problem := make_problem(line, chain.separated, ()), start_vector(problem)).first_outputs()
+    estimate = nominal if nothing is None else nothing.result.first_outputs()
     noise = math.nan if nothing is None else float(reading_noise(nothing.sizes)[0])
     of = unit(DIMENSIONS[chain.raw[0].kind], line.motion)
     return Fit(of, nominal.rms, estimate.rms, estimate.rms, math.nan, math.nan, noise), estimate
@@ -307,7 +284,6 @@ def acquired(runs: FreeRuns) -> tuple[FoundEffect, ...]:
 
 
 def figures_of(runs: FreeRuns, noise: float, findings: Sequence[FoundEffect]) -> Fit:
-    """Return the errors of free runs of the recordings as they were read, faults of the acquisition and all."""
     chain, line, retuned = runs.chain, runs.unseen.line, runs.retuned
     as_read = fit(replace(retuned.problem, records=chain.raw), retuned.x) if chain.findings else retuned
     return Fit(
@@ -343,20 +319,13 @@ def _rms(fit: FitResult, part: slice) -> float:
 
 def effects_of(runs: FreeRuns, decision: Decision) -> tuple[FoundEffect, ...]:
     """Return the effects that are named, the weightiest first."""
-    known = replace(decision, best=runs.believed)
-    found = found_effects(known, runs.estimate, runs.covariance, runs.unseen.line) if decision.named else ()
     held = {"holdout_rms_before": runs.held_before, "holdout_rms_after": runs.held_after}
+    found = (_found(belief, decision, runs) for belief in decision.named)
     return tuple(replace(each, evidence=replace(each.evidence, **held)) for each in found)
 
 
 def traces_of(runs: FreeRuns, decision: Decision) -> tuple[FoundEffect, ...]:
-    """Return the traces that what is believed holds."""
-    traces = tuple(each for each in decision.traces if each.name in runs.believed.effects)
-    if not traces:
-        return ()
-    return found_effects(
-        replace(decision, best=runs.believed, named=traces), runs.estimate, runs.covariance, runs.unseen.line
-    )
+    return tuple(_found(each, decision, runs) for each in decision.traces if each.name in runs.believed.effects)
 
 
 def courses_of(runs: FreeRuns) -> tuple[Trace, ...]:

@@ -1,11 +1,4 @@
-"""The judge: from the sets of effects that were fitted to what is believed, and nothing after that.
-
-Every explanation is a hypothesis with a score: sets of names, a law without a name, such a law added to the names, and
-nominal values off their data sheet. A score is minus twice a log-probability, prior included, if the model were the
-world. Worlds are written in other forms than the model, and what they leave takes part in every difference of scores:
-these are divided by what is calibrated (``calibration``) and by what the best set leaves that is no noise
-(``remainder``).
-"""
+"""The judge: from the sets of effects that were fitted to what is believed, and nothing after that."""
 
 from __future__ import annotations
 
@@ -17,20 +10,21 @@ from typing import NamedTuple
 
 import numpy as np
 
-from estimator.diagnosis.hypotheses import Effects
-from estimator.diagnosis.inference.calibration import (
+from estimator.diagnosis.assemble import Z95
+from estimator.diagnosis.inference.checks import (
     ALIKE_SHARE,
     ALIKE_WITHIN,
     CLEARLY_BELOW,
+    GRADE,
     LEAST_PROBABILITY,
     LEAST_SHARE,
     TEMPERED,
+    Test,
+    is_possible,
+    tests,
 )
-from estimator.diagnosis.inference.likelihood import Hypothesis, covariance
-from estimator.diagnosis.inference.plausible import GRADE, is_possible
-from estimator.diagnosis.inference.remainder import Test, tests
+from estimator.diagnosis.inference.hypotheses import Effects, Hypothesis, covariance
 from estimator.diagnosis.inference.search import Search
-from estimator.diagnosis.intervals import Z95
 from estimator.diagnosis.result import Fit, Verdict
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.problem import Problem
@@ -46,64 +40,20 @@ class Score(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Belief:
-    """What is believed of one effect of the best set.
-
-    Attributes
-    ----------
-    names : frozenset of str
-        The effect, those it can't be distinguished from, and those that hold it or are one of it.
-    probability : float
-        Of this effect or one of those it can't be distinguished from.
-    share : float
-        Share of the re-tuned model's squared free-run error that goes with it.
-    score : float
-        By which the score rises without it.
-    alike : mapping of str to mapping of str to float
-        Effects that explain as much in its place, with their values there.
-    """
+    """What is believed of one effect of the best set."""
 
     name: str
     names: frozenset[str]
-    probability: float
-    share: float
-    score: float
-    alike: Mapping[str, Mapping[str, float]]
+    probability: float  # of this effect or one of those it can't be distinguished from
+    share: float  # share of the re-tuned model's squared free-run error that goes with it
+    score: float  # by which the score rises without it
+    alike: Mapping[str, Mapping[str, float]]  # effects that explain as much in its place, with their values there
     objection: str = ""
 
     @property
     def reason(self) -> str:
         """Why it is not named."""
         return self.objection or f"in the most probable set, but its own probability is {self.probability:.2f} only"
-
-
-def beliefs(
-    best: Hypothesis,
-    visited: Mapping[Effects, Hypothesis],
-    scores: Sequence[Score],
-    share: Mapping[str, float],
-    tempered: float,
-    alike_within: float,
-    alike_share: float,
-) -> tuple[Belief, ...]:
-    """Return what is believed of each effect of the best set, the weightiest first."""
-    found = []
-    plausible = {each.effects: visited[each.effects] for each in scores if each.is_plausible}
-    for name in sorted(best.effects):
-        without = visited[best.effects - {name}]
-        within = max(alike_within, alike_share * (without.score - best.score))
-        alike = _alike(name, best, plausible, within)
-        names = frozenset({name, *alike, *_same_law(name)})
-        found.append(
-            Belief(
-                name,
-                names,
-                probability_of(names, scores, tempered),
-                min(max(share[name], 0.0), 1.0),
-                without.score - best.score,
-                alike,
-            )
-        )
-    return tuple(sorted(found, key=lambda belief: -belief.share))
 
 
 def fall(one: Hypothesis, other: Hypothesis, nothing: Hypothesis) -> float:
@@ -121,12 +71,7 @@ def levels(path: Sequence[Hypothesis]) -> list[float]:
 
 
 def shares(path: Sequence[Hypothesis]) -> dict[str, float]:
-    """Return the share of the re-tuned model's squared free-run error that goes with each effect of the last set.
-
-    Along the way from the nominal model to the best set, each effect has what is left less from where it was added. One
-    that takes another's place has its share, too; what a step without a new effect changes all have in proportion.
-    Together they are what the last set explains.
-    """
+    """Return the share of the re-tuned model's squared free-run error that goes with each effect of the last set."""
     found: dict[str, float] = {}
     left = levels(path)
     for (one, before), (other, after) in pairwise(zip(path, left, strict=True)):
@@ -141,10 +86,7 @@ def shares(path: Sequence[Hypothesis]) -> dict[str, float]:
 
 
 def shares_with_grade(best: Hypothesis, visited: Mapping[Effects, Hypothesis], nothing: Hypothesis) -> dict[str, float]:
-    """Return the same of a set in which the load walks far, which follows whatever is slow.
-
-    What another effect has is by how much more is left without it; the rest goes with the grade.
-    """
+    """Return the same of a set in which the load walks far, which follows whatever is slow."""
     without = {name: visited[best.effects - {name}] for name in sorted(best.effects) if name != GRADE}
     found = {name: max(fall(each, best, nothing), 0.0) for name, each in without.items()}
     return found | {GRADE: max(1.0 - best.free_squares / nothing.free_squares - sum(found.values()), 0.0)}
@@ -157,7 +99,7 @@ def _same_law(name: str) -> set[str]:
 
 def free_rms(hypothesis: Hypothesis) -> float:
     """Return the RMS of the free-run error, re-tuned to leave least of it."""
-    return math.sqrt(hypothesis.free_squares / hypothesis.plain.residual.size)
+    return math.sqrt(hypothesis.free_squares / hypothesis.result.residual.size)
 
 
 def _alike(
@@ -170,7 +112,7 @@ def _alike(
         if len(effects - others) == 1 and others <= effects
     }
     near = {name: best} | {other: each for other, each in exchanged.items() if each.score - best.score < within}
-    values = {other: each.plain.values_of(other) for other, each in near.items()}
+    values = {other: each.result.values_of(other) for other, each in near.items()}
     for other in list(near):
         for twin in EFFECTS[other].equivalent if best.outputs == 1 else ():
             values.setdefault(twin, values[other])  # the same linear system: the same parameters
@@ -178,11 +120,7 @@ def _alike(
 
 
 def probability_of(names: Collection[str], scores: Sequence[Score], tempered: float) -> float:
-    """Return the probability that one of some effects is there, over all sets that were fitted.
-
-    A set with values that are no case of its effects is evidence of something else: against the effects it does
-    without, and for none that it holds.
-    """
+    """Return the probability that one of some effects is there, over all sets that were fitted."""
     holds = [any(name in names for name in each.effects) for each in scores]
     counted = [(each.score, has) for each, has in zip(scores, holds, strict=True) if each.is_plausible or not has]
     values = np.array([score for score, _ in counted])
@@ -193,63 +131,35 @@ def probability_of(names: Collection[str], scores: Sequence[Score], tempered: fl
 
 @dataclass(frozen=True, slots=True)
 class Grounds:
-    """What a decision rests on, before any threshold is applied.
+    """What a decision rests on, before any threshold is applied."""
 
-    Attributes
-    ----------
-    best, nothing : Hypothesis
-        The best set of effects, and the re-tuned model.
-    shares : mapping of str to float
-        Of each effect of the best set (``shares``).
-    tests : tuple of Test
-    scores : tuple of Score
-        Of all sets that were fitted to their end and that a machine can be.
-    beliefs : tuple of Belief
-        Of every effect of the best set that is large enough to be distinguished from another way of sampling.
-    """
-
-    best: Hypothesis
+    best: Hypothesis  # the best set of effects, and the re-tuned model
     nothing: Hypothesis
-    shares: Mapping[str, float]
+    shares: Mapping[str, float]  # of each effect of the best set (``shares``)
     tests: tuple[Test, ...]
-    scores: tuple[Score, ...]
+    scores: tuple[Score, ...]  # of all sets that were fitted to their end and that a machine can be
     beliefs: tuple[Belief, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
 class Decision:
-    """What is believed.
-
-    Attributes
-    ----------
-    named, traces : tuple of Belief
-        Effects that are established, the weightiest first; those among them that hardly move the error.
-    doubted : tuple of Belief
-        Effects of the best set that are not established.
-    failed : tuple of Test
-        What the best set leaves that noise has not.
-    """
+    """What is believed."""
 
     best: Hypothesis
     nothing: Hypothesis
-    named: tuple[Belief, ...]
+    named: tuple[Belief, ...]  # effects that are established, the weightiest first
     traces: tuple[Belief, ...]
-    doubted: tuple[Belief, ...]
-    failed: tuple[Test, ...]
+    doubted: tuple[Belief, ...]  # effects of the best set that are not established
+    failed: tuple[Test, ...]  # what the best set leaves that noise has not
 
 
 def tempered_by(tests: Sequence[Test], samples: int, factor: float) -> float:
-    """Return by which differences of scores are divided: more where a test finds information that no law has used.
-
-    That is what it finds beyond what is left in worlds of which all is explained. Tests find the same information
-    again: the one that finds most of it says how much there is at least.
-    """
+    """Return by which differences of scores are divided: more where a test finds information that no law has used."""
     beyond = [test.value - test.most for test in tests if test.failed and test.is_share]
     return factor + samples * max(beyond, default=0.0)
 
 
 def grounds(search: Search) -> Grounds:
-    """Search, and return what there is to decide on."""
     nothing = search.nothing()
     best = _with_sizes(search, _as_simple_as_will_do(search, search.run()))
     for name in best.effects:
@@ -268,18 +178,22 @@ def scores_of(search: Search) -> tuple[Score, ...]:
 
 
 def believed(search: Search, ground: Grounds, rivals: Sequence[Score] = ()) -> tuple[Belief, ...]:
-    """Return what is believed of the best set, over all sets that were fitted and ``rivals`` beyond these."""
-    best = ground.best
-    tempered = tempered_by(ground.tests, best.plain.residual.size, TEMPERED)
-    found = beliefs(
-        best,
-        search.visited,
-        (*ground.scores, *rivals),
-        ground.shares,
-        tempered,
-        max(ALIKE_WITHIN, 2.0 * tempered * math.log(1.0 / (1.0 - LEAST_PROBABILITY))),
-        ALIKE_SHARE,
-    )
+    """Return what is believed of each effect of the best set, the weightiest first.
+
+    Over all sets that were fitted and ``rivals`` beyond these.
+    """
+    best, scores = ground.best, (*ground.scores, *rivals)
+    tempered = tempered_by(ground.tests, best.result.residual.size, TEMPERED)
+    as_good = max(ALIKE_WITHIN, 2.0 * tempered * math.log(1.0 / (1.0 - LEAST_PROBABILITY)))
+    plausible = {each.effects: search.visited[each.effects] for each in scores if each.is_plausible}
+    found = []
+    for name in sorted(best.effects):
+        gained = search.visited[best.effects - {name}].score - best.score
+        alike = _alike(name, best, plausible, max(as_good, ALIKE_SHARE * gained))
+        names = frozenset({name, *alike, *_same_law(name)})
+        share = min(max(ground.shares[name], 0.0), 1.0)
+        found.append(Belief(name, names, probability_of(names, scores, tempered), share, gained, alike))
+    found.sort(key=lambda belief: -belief.share)
     return tuple(each for each in found if search.is_resolved(best, each.name))
 
 
@@ -316,7 +230,6 @@ def _as_simple_as_will_do(search: Search, best: Hypothesis) -> Hypothesis:
 
 
 def _with_sizes(search: Search, best: Hypothesis) -> Hypothesis:
-    """Return the best set without effects that it is as probable without, or whose interval holds their null."""
     for name in sorted(best.effects):
         without = search.without(best, name)
         if without.score <= best.score or holds_null(best, name):
@@ -333,26 +246,23 @@ def holds_null(hypothesis: Hypothesis, name: str) -> bool:
     entry = EFFECTS[name]
     if entry.profile:
         return False
-    first, plain = entry.parameters[0], hypothesis.plain
+    first, result = entry.parameters[0], hypothesis.result
     among = {p.name: p.null for p in entry.shared_parameters if p is first or (first.optional and p.optional)}
-    spread, pinned = np.sqrt(np.maximum(np.diag(covariance(hypothesis)), 0.0)), plain.pinned
+    spread, pinned = np.sqrt(np.maximum(np.diag(covariance(hypothesis)), 0.0)), result.pinned
     held = []
-    for i, each in enumerate(plain.problem.shared):
+    for i, each in enumerate(result.problem.shared):
         null = among.get(each.name) if each.effect == name and each.low < each.high else None
         if null is None or (first.optional and null not in (0.0, math.inf, first.null)):
             continue
         if math.isinf(null):
-            held.append(bool(pinned[i]) and plain.x[i] > 0.5 * each.high)
+            held.append(bool(pinned[i]) and result.x[i] > 0.5 * each.high)
         else:
-            held.append(abs(plain.x[i] - null / each.scale) <= Z95 * spread[i])
+            held.append(abs(result.x[i] - null / each.scale) <= Z95 * spread[i])
     return bool(held) and all(held)
 
 
 def verdict_of(of_spread: float, is_named: bool, is_more_than_noise: bool, falls: bool = True) -> Verdict:
-    """Return the verdict on a set that leaves an error of so much of the signal's spread (CONTRACT).
-
-    ``falls`` tells whether the error falls, on the recordings and on data not used for the fit.
-    """
+    """Return the verdict on a set that leaves an error of so much of the signal's spread (CONTRACT)."""
     if is_named and (of_spread > CLEARLY_BELOW or not falls):
         return Verdict.UNEXPLAINED
     if is_named:
@@ -366,6 +276,5 @@ def error_falls(fit: Fit) -> bool:
 
 
 def spread(problem: Problem) -> float:
-    """Return how far the output itself is spread, each recording around its mean."""
     parts = [record.output[use] for record, use in zip(problem.records, problem.use, strict=True)]
     return float(np.std(np.concatenate([part - part.mean() for part in parts])))

@@ -8,22 +8,23 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from estimator.diagnosis.hypotheses import NOTHING, Effects
-from estimator.diagnosis.inference.calibration import LEAST_SHARE
+from estimator.diagnosis.inference.checks import LEAST_SHARE, tests
 from estimator.diagnosis.inference.disturbances import MOST_FORM, estimated, reading_noise
-from estimator.diagnosis.inference.judge import Grounds, Score, free_rms
-from estimator.diagnosis.inference.likelihood import (
+from estimator.diagnosis.inference.hypotheses import (
+    NOTHING,
     ROUNDS,
+    Effects,
     Hypothesis,
     choices_of,
     covariance,
     fitted,
     of_first_outputs,
 )
-from estimator.diagnosis.inference.remainder import tests
+from estimator.diagnosis.inference.judge import Grounds, Score, free_rms
 from estimator.diagnosis.inference.search import Search
-from estimator.diagnosis.result import Stray
-from estimator.diagnosis.unnamed import ElementSearch, scene, searches_at
+from estimator.diagnosis.result import OffNominal
+from estimator.diagnosis.unnamed.scene import scene
+from estimator.diagnosis.unnamed.search import ElementSearch, searches_at
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Element
 from estimator.physics.fit import not_fitted
@@ -35,32 +36,21 @@ FREELY = 3.0
 """Factor, either way, within which a nominal parameter is looked for: beyond it a value is no slip of a data sheet, and
 the integration's steps, chosen for the nominal line, would not follow."""
 
-CLEARLY = 3.0
-"""Standard errors by which a value must lie beyond what it is trusted to."""
+CLEARLY = 3.0  # standard errors by which a value must lie beyond what it is trusted to
 
 
 @dataclass(frozen=True, slots=True)
 class FreeLine:
-    """The nominal line with its values free.
+    """The nominal line with its values free."""
 
-    Attributes
-    ----------
-    score : float
-        That of a hypothesis (``likelihood``): a value that is wrong is chosen among all values and effects.
-    leaves_noise : bool
-        Whether what it leaves passes for noise: then no physics need be missing.
-    strays : tuple of Stray
-        What clearly left its tolerance, the clearest first; at least one.
-    """
-
-    score: float
-    leaves_noise: bool
-    strays: tuple[Stray, ...]
+    score: float  # that of a hypothesis (``likelihood``)
+    leaves_noise: bool  # whether what it leaves passes for noise
+    off_nominal: tuple[OffNominal, ...]  # what clearly left its tolerance, the clearest first
 
 
 def free_line(search: Search) -> FreeLine | None:
     """Fit the nominal line beyond its tolerances; None where these hold nothing back."""
-    nothing = search.nothing().plain
+    nothing = search.nothing().result
     shared = nothing.problem.shared
     trusted = [not s.effect and np.isfinite(s.low) and s.low < s.high for s in shared]
     if not any(free and at_bound for free, at_bound in zip(trusted, nothing.pinned, strict=False)):
@@ -70,64 +60,52 @@ def free_line(search: Search) -> FreeLine | None:
     )
     problem = replace(nothing.problem, shared=freed)
     sizes, hypotheses = search.nothing().sizes, len(search.names)
-    begun = not_fitted(problem, nothing.x)
-    found = fitted(NOTHING, begun, sizes, search.limits, hypotheses, search.nothing().minus_twice_log)
-    strays = _strays(search, found)
-    if not strays:
+    initial = not_fitted(problem, nothing.x)
+    found = fitted(NOTHING, initial, sizes, search.limits, hypotheses, search.nothing().minus_twice_log)
+    off_nominal = _off_nominal(search, found)
+    if not off_nominal:
         return None
-    chosen = choices_of(frozenset(stray.name for stray in strays), hypotheses + sum(trusted))
-    return FreeLine(found.score + 2.0 * chosen, not any(test.failed for test in tests(found)), strays)
+    chosen = choices_of(frozenset(value.name for value in off_nominal), hypotheses + sum(trusted))
+    return FreeLine(found.score + 2.0 * chosen, not any(test.failed for test in tests(found)), off_nominal)
 
 
-def _strays(search: Search, found: Hypothesis) -> tuple[Stray, ...]:
+def _off_nominal(search: Search, found: Hypothesis) -> tuple[OffNominal, ...]:
     spread = np.sqrt(np.maximum(np.diag(covariance(found)), 0.0))
     clear = []
-    for i, trusted in enumerate(search.nothing().plain.problem.shared):
-        ratio = float(found.plain.x[i])
+    for i, trusted in enumerate(search.nothing().result.problem.shared):
+        ratio = float(found.result.x[i])
         by = max(trusted.low - ratio, ratio - trusted.high)
         if not trusted.effect and trusted.low < trusted.high and by > CLEARLY * spread[i]:
             sureness = by / max(float(spread[i]), np.finfo(float).tiny)
             given, unit = search.model.parameters[trusted.name], parameter_unit(trusted.name, search.model.motion)
-            clear.append((sureness, Stray(trusted.name, ratio, trusted.high - 1.0, given.value, unit)))
-    return tuple(stray for _, stray in sorted(clear, key=lambda each: -each[0]))
+            clear.append((sureness, OffNominal(trusted.name, ratio, trusted.high - 1.0, given.value, unit)))
+    return tuple(value for _, value in sorted(clear, key=lambda each: -each[0]))
 
 
-LOOKING_ROUNDS = 6
-"""Rounds of the search for a law without a name, at most."""
+LOOKING_ROUNDS = 6  # rounds of the search for a law without a name, at most
 
 
 @dataclass(frozen=True, slots=True)
 class Law:
-    """The law without a name that makes the recordings most probable together with a set of effects.
-
-    Attributes
-    ----------
-    element : Element
-    terms : tuple of (str, float)
-        Functions of what happens in the line, each with its coefficient.
-    score : float
-        That of the hypothesis with the law (``likelihood``).
-    rms : float
-        RMS of the free-run error with it [unit of the output].
-    """
+    """The law without a name that makes the recordings most probable together with a set of effects."""
 
     element: Element
-    terms: tuple[tuple[str, float], ...]
-    score: float
-    rms: float
+    terms: tuple[tuple[str, float], ...]  # functions of what happens in the line, each with its coefficient
+    score: float  # that of the hypothesis with the law (``likelihood``)
+    rms: float  # RMS of the free-run error with it [unit of the output]
 
 
 def searches_around(hypothesis: Hypothesis) -> list[ElementSearch]:
     """Look for the best law to add to a hypothesis at every element; none inside a plant simulated elsewhere."""
-    if hypothesis.plain.problem.grid.plant is not None:
+    if hypothesis.result.problem.grid.plant is not None:
         return []
     noise = float(reading_noise(hypothesis.sizes)[0])
-    return searches_at(scene(hypothesis.plain, noise, hypothesis.filter), LOOKING_ROUNDS)
+    return searches_at(scene(hypothesis.result, noise, hypothesis.filter), LOOKING_ROUNDS)
 
 
 def best_law(hypothesis: Hypothesis, searches: Sequence[ElementSearch]) -> Law | None:
     """Return the law with which the recordings are most probable; None where they are more probable without one."""
-    white = hypothesis.filter(hypothesis.plain.residual)
+    white = hypothesis.filter(hypothesis.result.residual)
     before = float(white @ white) / white.size
     laws = [_scored(hypothesis, search, before, math.log(len(searches))) for search in searches if search.law.terms]
     best = min(laws, key=lambda law: law.score, default=None)
@@ -135,12 +113,8 @@ def best_law(hypothesis: Hypothesis, searches: Sequence[ElementSearch]) -> Law |
 
 
 def _scored(hypothesis: Hypothesis, search: ElementSearch, before: float, places: float) -> Law:
-    """Return a law with its score: that of its innovations, or with disturbances estimated anew where it is simulated.
-
-    With all disturbances in one proportion minus twice the log-likelihood falls by ``n log(Q / Q')``, Q the squared
-    innovations; estimated anew it falls further.
-    """
-    n = hypothesis.plain.residual.size
+    """Return a law with its score: that of its innovations, or with disturbances estimated anew."""
+    n = hypothesis.result.residual.size
     score = hypothesis.score - search.law.information(before, search.mean_square, n) + 2.0 * places
     is_simulated = any(weights.any() for weights in search.weights)
     if is_simulated:
@@ -178,24 +152,13 @@ def _rms(search: ElementSearch) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Rivals:
-    """What the names of the best set are weighed against.
+    """What the names of the best set are weighed against."""
 
-    Attributes
-    ----------
-    alone, added : Law or None
-        The best law without a name: instead of all effects, and on top of the best set of these.
-    sheet : FreeLine or None
-    searches : list of ElementSearch
-        For the law alone, element by element.
-    scores : tuple of Score
-        Those of all these.
-    """
-
-    alone: Law | None
+    alone: Law | None  # the best law without a name
     added: Law | None
     sheet: FreeLine | None
-    searches: list[ElementSearch]
-    scores: tuple[Score, ...]
+    searches: list[ElementSearch]  # for the law alone, element by element
+    scores: tuple[Score, ...]  # those of all these
 
 
 def rivals_of(search: Search, ground: Grounds) -> Rivals:
@@ -210,13 +173,7 @@ def rivals_of(search: Search, ground: Grounds) -> Rivals:
 
 
 def rival_laws(ground: Grounds, alone: Law | None, added: Law | None) -> tuple[Score, ...]:
-    """Return laws without a name as hypotheses: one instead of all effects, and one added to the best set of these.
-
-    Where the law alone is more probable than names and a law for what they leave, the names imitate it, unless it is
-    another form of theirs (`_at_its_place`). Laws are sought in the first output alone: what they gain over the same
-    set without them counts there. One that leaves the free-run error as it was is a trace, and no other explanation of
-    what the names explain.
-    """
+    """Return laws without a name as hypotheses: one instead of all effects, and one added to the best set of these."""
     best, first = of_first_outputs(ground.best), of_first_outputs(ground.nothing)
     offset = ground.best.score - best.score
     found = []
@@ -228,10 +185,7 @@ def rival_laws(ground: Grounds, alone: Law | None, added: Law | None) -> tuple[S
 
 
 def _at_its_place(ground: Grounds, law: Law, gained: float) -> Effects:
-    """Return the names of which a law is another form: those at its place, where they gain nearly all that it gains.
-
-    What a form leaves is at most `MOST_FORM` of the law in torque, and so the square of that in squared error.
-    """
+    """Return the names of which a law is another form: those at its place, where they gain nearly all that it gains."""
     names = frozenset(name for name in ground.best.effects if EFFECTS[name].element is law.element)
     score = {each.effects: each.score for each in ground.scores}.get(names, math.inf)
     is_form = ground.nothing.score - score >= (1.0 - MOST_FORM**2) * gained

@@ -10,10 +10,16 @@ from threading import Lock
 
 import numpy as np
 
-from estimator.diagnosis.hypotheses import (
+from estimator.diagnosis.inference.checks import GRADE, is_plausible, may_be_loose, widened
+from estimator.diagnosis.inference.descent import extended
+from estimator.diagnosis.inference.disturbances import Limits, limits_of
+from estimator.diagnosis.inference.hypotheses import (
     NOTHING,
     Effects,
+    Hypothesis,
     Progress,
+    compared,
+    fitted,
     forgetting,
     inheriting,
     kept,
@@ -23,81 +29,52 @@ from estimator.diagnosis.hypotheses import (
     silent,
     with_effect,
 )
-from estimator.diagnosis.inference.descent import extended
-from estimator.diagnosis.inference.disturbances import Limits, limits_of
-from estimator.diagnosis.inference.likelihood import Hypothesis, compared, fitted
-from estimator.diagnosis.inference.looks import Answers, Look, Remembering, promising, screen
-from estimator.diagnosis.inference.plausible import GRADE, is_plausible, loosened, may_be_loose
+from estimator.diagnosis.inference.score_tests import Answers, Remembering, ScoredStart, promising
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult, not_fitted, warm_start
-from estimator.physics.grid import Grid, grid_for
-from estimator.physics.layout import slot
+from estimator.physics.layout import Grid, grid_for, slot
 from estimator.physics.model import DrivelineModel
-from estimator.physics.parallel import concurrently
+from estimator.physics.parallel import Work, concurrently
 from estimator.physics.problem import Problem, make_problem, start_of, start_vector
 from estimator.physics.simulate import simulate
 from estimator.physics.unknowns import Release, nominal_unknowns, own_unknowns, released
-from estimator.physics.work import Work
 from estimator.signals.record import BoolArray, Record
 
 BLIND = "speed_sign_blind"
-MOST_FITS = 6
-"""Effects that are fitted on top of a hypothesis, the most promising of a first look."""
-
-WORTH_FITTING = 0.1
-"""Share of the best promise below which an effect is not fitted."""
+MOST_FITS = 6  # effects that are fitted on top of a hypothesis, the most promising of a first look
+WORTH_FITTING = 0.1  # share of the best promise below which an effect is not fitted
 
 FEWEST_FITS = 2
 """Effects that are fitted however little a first look promises: a gap shows only near its own width."""
 
-SAME_PROMISE = 0.5
-"""Share of what an effect promises that a look-alike must promise in its place."""
+SAME_PROMISE = 0.5  # share of what an effect promises that a look-alike must promise in its place
 
 NEARLY = 0.3
 """Share of what an effect explains by which another's first few steps may be behind for it to be fitted to its end."""
 
-FINISHED = 2
-"""Best of these that are fitted to their end."""
-
-STARTS = 5
-"""Effects from each of which a search begins, the most promising."""
+FINISHED = 2  # best of these that are fitted to their end
+STARTS = 5  # effects from each of which a search begins, the most promising
 
 MOST_EFFECTS = 8
 
 
 @dataclass
 class Search:
-    """Hypotheses on a model and recordings; each set of effects is fitted once.
-
-    Attributes
-    ----------
-    visited : dict of set of effects to Hypothesis
-        Those that were fitted to their end.
-    path : list of Hypothesis
-        Each better than the one before, from the nominal model to the best.
-    rivals : dict of str to float
-        Best score of a set with each effect that was fitted at all, to values that are a case of it.
-    implausible : dict of str to float
-        The same of others.
-    foreseen : dict of str to float
-        The least score that a score test promises for each effect on top of the set that was looked at last.
-    work : Work
-        What was simulated so far; no further change is tried after ``most`` free runs of all recordings: ``stopped``.
-    """
+    """Hypotheses on a model and recordings; each set of effects is fitted once."""
 
     model: DrivelineModel
     records: Sequence[Record]
     use: Sequence[BoolArray]
     names: Sequence[str]
     grid: Grid | None = None
-    visited: dict[Effects, Hypothesis] = field(default_factory=dict)
+    visited: dict[Effects, Hypothesis] = field(default_factory=dict)  # those that were fitted to their end
     rough: dict[Effects, Hypothesis] = field(default_factory=dict)
     path: list[Hypothesis] = field(default_factory=list)
     rivals: dict[str, float] = field(default_factory=dict)
-    implausible: dict[str, float] = field(default_factory=dict)
+    implausible: dict[str, float] = field(default_factory=dict)  # the same of others
     foreseen: dict[str, float] = field(default_factory=dict)
-    work: Work = field(default_factory=Work)
+    work: Work = field(default_factory=Work)  # what was simulated so far
     most: float = math.inf
     progress: Progress = silent
     stopped: bool = False
@@ -115,11 +92,7 @@ class Search:
         return self._limits
 
     def run(self) -> Hypothesis:
-        """Return the best set of effects found, begun from each of the most promising effects.
-
-        One effect that imitates another may be the better one as long as it is alone, and what remains of it in the way
-        of the true one.
-        """
+        """Return the best set of effects found, begun from each of the most promising effects."""
         self.path = self._climbed([self.nothing()])
         firsts = sorted((each for effects, each in self.visited.items() if len(effects) == 1), key=lambda h: h.score)
         for first in firsts[:STARTS]:
@@ -159,19 +132,18 @@ class Search:
         return round(self.work.samples / sum(r.time_s.size for r in self.records if r.lead is None))
 
     def nothing(self) -> Hypothesis:
-        """Fit the nominal model."""
         if NOTHING not in self.visited:
             own = tuple(own_unknowns(self.model.effects, record) for record in self.records)
             problem = self._problem(NOTHING, Release(nominal_unknowns(self.model), own))
-            begun = not_fitted(problem, start_vector(problem))
-            self._keep(fitted(NOTHING, begun, self.limits.usual, self.limits, len(self.names)))
+            initial = not_fitted(problem, start_vector(problem))
+            self._keep(fitted(NOTHING, initial, self.limits.usual, self.limits, len(self.names)))
         return self.visited[NOTHING]
 
     def _best_addition(self, current: Hypothesis) -> Hypothesis | None:
-        looks, view = self._looks(current, [name for name in self._open(current) if name not in current.effects])
+        starts, view = self._scores(current, [name for name in self._open(current) if name not in current.effects])
         self._learn(current, view)
-        rough = concurrently(lambda name: self._added(current, name, looks[name]), list(looks))
-        found = [each for each in rough if each is not None] + self._begun_anew(current)
+        rough = concurrently(lambda name: self._added(current, name, starts[name]), list(starts))
+        found = [each for each in rough if each is not None] + self._from_other_starts(current)
         found.sort(key=lambda each: each.score)
         most = FINISHED if current.effects else STARTS
         near = [each for each in found[:most] if self._may_be_best(each, found[0], current)]
@@ -186,7 +158,7 @@ class Search:
         is_event = any(EFFECTS[name].event for name in each.effects - current.effects)
         return each.score <= best.score + NEARLY * _gain(best, current) or (is_event and not current.effects)
 
-    def _begun_anew(self, current: Hypothesis) -> list[Hypothesis]:
+    def _from_other_starts(self, current: Hypothesis) -> list[Hypothesis]:
         """Fit a hypothesis' effects from other starts a few steps, once for each set of other effects.
 
         Laws are written other ways, events looked for in other stretches of the recordings.
@@ -201,33 +173,35 @@ class Search:
 
     def _rewritten(self, current: Hypothesis, name: str) -> list[Hypothesis]:
         """Fit a law written other ways."""
-        fits, plain = [], current.plain
-        for other in EFFECTS[name].retold(self.model, self.records, plain.values_of(name), line_values(plain)):
-            begun = placed(forgetting(plain, name), other.line)
+        fits, result = [], current.result
+        for other in EFFECTS[name].reparametrised(
+            self.model, self.records, result.values_of(name), line_values(result)
+        ):
+            initial = placed(forgetting(result, name), other.line)
             (release,) = released(name, self.model, self.records, [other.start])
             alone = replace(release, own=((),) * len(self.records))
-            problem = self._extended(begun, current.effects, alone)
-            started = extended(problem, warm_start(problem, begun), plain, anew=name)
+            problem = self._extended(initial, current.effects, alone)
+            started = extended(problem, warm_start(problem, initial), result, anew=name)
             fits.append(self._compared(current.effects, started, current))
         return fits
 
     def _elsewhere(self, current: Hypothesis, name: str) -> Hypothesis | None:
         """Fit an event where a look at the same hypothesis without it, the rest as it is, sees it."""
-        plain, effects = current.plain, current.effects - {name}
-        problem = self._problem(effects, kept(plain, (effects - {GRADE}) | set(self.model.effects)))
-        without = extended(problem, warm_start(problem, forgetting(plain, name)), plain)
-        base = replace(current, effects=effects, plain=replace(without, converged=without.derivative is not None))
-        return self._added(base, name, self._look(base, name), current)
+        result, effects = current.result, current.effects - {name}
+        problem = self._problem(effects, kept(result, (effects - {GRADE}) | set(self.model.effects)))
+        without = extended(problem, warm_start(problem, forgetting(result, name)), result)
+        reduced = replace(current, effects=effects, result=replace(without, converged=without.derivative is not None))
+        return self._added(reduced, name, self._score(reduced, name), current)
 
     def _open(self, current: Hypothesis) -> Sequence[str]:
         """Return the testable effects; behind a sensor blind for the sign, reversals are those of the motion."""
         if BLIND not in current.effects and BLIND not in self.model.effects:
             return self.names
-        plain = current.plain
-        p = np.array([plain.p_of(i) for i in range(len(self.records))])
+        result = current.result
+        p = np.array([result.p_of(i) for i in range(len(self.records))])
         p[:, slot(BLIND, "share")] = 0.0
         seeing = [
-            replace(record, output=simulate(plain.problem.grid, record, mine, start_of(plain.problem, plain.x, i)))
+            replace(record, output=simulate(result.problem.grid, record, mine, start_of(result.problem, result.x, i)))
             for i, (record, mine) in enumerate(zip(self.records, p, strict=True))
         ]
         testable = open_hypotheses(self.model, seeing)[0]
@@ -243,44 +217,44 @@ class Search:
         better = [each for each in found if each.score < current.score and self.is_plausible(each)]
         return min(better, key=lambda each: each.score, default=None)
 
-    def _look(self, base: Hypothesis, name: str) -> list[Look]:
-        view = screen(base, self.model, self.answers)
-        looks = promising(view.looks(name))
-        self._learn(base, view)
-        return looks
+    def _score(self, reduced: Hypothesis, name: str) -> list[ScoredStart]:
+        view = Remembering(reduced, self.model, self.answers)
+        starts = promising(view.starts(name))
+        self._learn(reduced, view)
+        return starts
 
     def _learn(self, around: Hypothesis, view: Remembering) -> None:
-        self.answers.learn(around.plain, view.found)
+        self.answers.learn(around.result, view.found)
 
-    def _looks(
+    def _scores(
         self, current: Hypothesis, names: Sequence[str], rival: str = ""
-    ) -> tuple[dict[str, list[Look]], Remembering]:
+    ) -> tuple[dict[str, list[ScoredStart]], Remembering]:
         """Return the starts of the effects that are worth a fit, the most promising effect first.
 
         With a ``rival`` those are worth it that promise nearly as much.
         """
-        view = screen(current, self.model, self.answers)
+        view = Remembering(current, self.model, self.answers)
         contained = {special for have in current.effects for special in EFFECTS[have].contains}
         tried = [name for name in names if name != GRADE and name not in contained]
-        looks = dict(zip(tried, concurrently(view.looks, tried), strict=True))
-        price = float(np.log(current.plain.residual.size))
+        starts = dict(zip(tried, concurrently(view.starts, tried), strict=True))
+        price = float(np.log(current.result.residual.size))
         if not rival:
-            self.foreseen.update({name: current.score - looks[name][0].promise + price for name in tried})
-        order = sorted(tried, key=lambda name: -looks[name][0].promise)
-        least = max(WORTH_FITTING * looks[order[0]][0].promise, np.log(current.plain.residual.size)) if order else 0.0
+            self.foreseen.update({name: current.score - starts[name][0].promise + price for name in tried})
+        order = sorted(tried, key=lambda name: -starts[name][0].promise)
+        least = max(WORTH_FITTING * starts[order[0]][0].promise, np.log(current.result.residual.size)) if order else 0.0
         if rival and rival != GRADE:
-            least = max(least, SAME_PROMISE * view.looks(rival)[0].promise)
-        loose = [name for name in order if EFFECTS[name].loosens]
+            least = max(least, SAME_PROMISE * view.starts(rival)[0].promise)
+        loose = [name for name in order if EFFECTS[name].widens]
         some = 0 if rival else FEWEST_FITS
-        worth = [name for i, name in enumerate(order) if looks[name][0].promise >= least or i < some]
+        worth = [name for i, name in enumerate(order) if starts[name][0].promise >= least or i < some]
         equals = {name: EFFECTS[name].equivalent if current.outputs == 1 else () for name in worth}
         twins = {twin for name in worth for twin in equals[name] if precedes(name, twin)}
         worth = [name for name in worth if name not in twins][:MOST_FITS]
         chosen = dict.fromkeys([*worth, *(loose if not current.effects and not rival else [])])
-        return {name: promising(looks[name]) for name in chosen}, view
+        return {name: promising(starts[name]) for name in chosen}, view
 
     def _added(
-        self, current: Hypothesis, name: str, looks: Sequence[Look], instead: Hypothesis | None = None
+        self, current: Hypothesis, name: str, starts: Sequence[ScoredStart], instead: Hypothesis | None = None
     ) -> Hypothesis | None:
         """Fit an effect on top of a hypothesis a few steps, from each of its starts; None where no value is one.
 
@@ -292,16 +266,16 @@ class Search:
         if effects in self.visited and not is_again:
             return self.visited[effects]
         rival = instead or current
-        warm = current.plain if is_again else rival.plain
+        previous = current.result if is_again else rival.result
         for gone in rival.effects - effects - {GRADE}:
-            warm = forgetting(warm, gone)
+            previous = forgetting(previous, gone)
         fits = []
-        for look in looks:
-            problem = self._extended(warm, effects, inheriting(name, look.release, warm))
-            begun = extended(problem, warm_start(problem, warm), current.plain if is_again else rival.plain)
-            fits.append(self._compared(effects, begun, rival))
+        for scored in starts:
+            problem = self._extended(previous, effects, inheriting(name, scored.release, previous))
+            initial = extended(problem, warm_start(problem, previous), current.result if is_again else rival.result)
+            fits.append(self._compared(effects, initial, rival))
         best = min([each for each in fits if self.is_plausible(each)] or fits, key=lambda each: each.score)
-        loose = loosened(best, self.model)
+        loose = widened(best, self.model)
         if loose is not None:
             best = self._more_plausible(best, self._compared(effects, loose, rival))
         is_plausible = self.is_plausible(best)
@@ -312,8 +286,8 @@ class Search:
                 self.rough[effects] = best
         return best if is_plausible else None
 
-    def _compared(self, effects: Effects, begun: FitResult, rival: Hypothesis) -> Hypothesis:
-        return compared(effects, begun, rival, self._limits_of(effects), len(self.names))
+    def _compared(self, effects: Effects, initial: FitResult, rival: Hypothesis) -> Hypothesis:
+        return compared(effects, initial, rival, self._limits_of(effects), len(self.names))
 
     def _limits_of(self, effects: Effects) -> Limits:
         return self.limits.freed() if GRADE in effects else self.limits
@@ -326,8 +300,8 @@ class Search:
         """Take a fit as far as a comparison with a rival needs; kept where it is the best of its set so far."""
         known = self.visited.get(rough.effects)
         if known is None or rough.score < known.score:
-            whole = self._fitted(rough, rough.plain, rival)
-            loose = loosened(whole, self.model)
+            whole = self._fitted(rough, rough.result, rival)
+            loose = widened(whole, self.model)
             if loose is not None:
                 whole = self._more_plausible(whole, self._fitted(whole, loose, rival))
             whole = whole if self.is_plausible(whole) else rough
@@ -335,8 +309,8 @@ class Search:
                 self._keep(whole)
         return self.visited[rough.effects]
 
-    def _fitted(self, of: Hypothesis, begun: FitResult, rival: Hypothesis) -> Hypothesis:
-        return fitted(of.effects, begun, of.sizes, of.limits, len(self.names), rival.minus_twice_log)
+    def _fitted(self, of: Hypothesis, initial: FitResult, rival: Hypothesis) -> Hypothesis:
+        return fitted(of.effects, initial, of.sizes, of.limits, len(self.names), rival.minus_twice_log)
 
     def _more_plausible(self, one: Hypothesis, other: Hypothesis) -> Hypothesis:
         """Return the better of two fits of a set, where both are plausible; else the one that is."""
@@ -348,7 +322,7 @@ class Search:
 
     def is_resolved(self, hypothesis: Hypothesis, name: str) -> bool:
         """Tell whether an effect is large enough to be distinguished from another way of sampling."""
-        values = hypothesis.plain.values_of(name)
+        values = hypothesis.result.values_of(name)
         return name == GRADE or not EFFECTS[name].unresolved(self.model, self.records, values)
 
     def without(self, current: Hypothesis, name: str) -> Hypothesis:
@@ -360,25 +334,24 @@ class Search:
         known = self.visited.get(effects)
         if known is None or place not in self._lessened:
             self._lessened.add(place)
-            plain = current.plain
+            result = current.result
             if name != GRADE:
-                release = kept(plain, (effects - {GRADE}) | set(self.model.effects))
+                release = kept(result, (effects - {GRADE}) | set(self.model.effects))
                 problem = self._problem(effects, release)
-                plain = extended(problem, warm_start(problem, forgetting(plain, name)), plain)
+                result = extended(problem, warm_start(problem, forgetting(result, name)), result)
             limits = self._limits_of(effects)
-            found = fitted(effects, plain, current.sizes, limits, len(self.names), current.minus_twice_log)
+            found = fitted(effects, result, current.sizes, limits, len(self.names), current.minus_twice_log)
             if known is None or found.score < known.score:
                 self._keep(found)
         return self.visited[effects]
 
     def exchanged(self, current: Hypothesis, name: str, other: str) -> Hypothesis | None:
         """Fit another effect in the place of one; None where no value is one."""
-        base = self.without(current, name)
-        rough = self._added(base, other, self._look(base, other), current)
+        reduced = self.without(current, name)
+        rough = self._added(reduced, other, self._score(reduced, other), current)
         return None if rough is None else self.finish(rough, current)
 
     def fit_look_alikes(self, best: Hypothesis) -> None:
-        """Fit to their end what came near in the place of an effect, so that each look-alike has its own values."""
         for effects, rough in sorted(self.rough.items(), key=lambda item: sorted(item[0])):
             exchanged = len(effects) == len(best.effects) and len(effects & best.effects) == len(effects) - 1
             if exchanged and effects not in self.visited:
@@ -387,14 +360,12 @@ class Search:
                     self.finish(rough, best)
 
     def _best_drop(self, current: Hypothesis) -> Hypothesis | None:
-        """Return a hypothesis without an effect that others made superfluous; None where there is none."""
         return self._better(concurrently(lambda name: self.without(current, name), sorted(current.effects)), current)
 
     def _best_exchange(self, current: Hypothesis) -> Hypothesis | None:
-        """Return the best hypothesis with a look-alike in the place of one effect; None where none is better."""
         nearest = concurrently(lambda name: self._nearest(current, name), sorted(current.effects))
-        for _, base, view in nearest:
-            self._learn(base, view)
+        for _, reduced, view in nearest:
+            self._learn(reduced, view)
         return self._better([each for each, _, _ in nearest if each is not None], current)
 
     def _nearest(self, current: Hypothesis, name: str) -> tuple[Hypothesis | None, Hypothesis, Remembering]:
@@ -402,19 +373,19 @@ class Search:
 
         A load that walks far has no law for a first look to judge it by: it is fitted to its end.
         """
-        base = self.without(current, name)
+        reduced = self.without(current, name)
         alike = [other for other in self.names if other not in current.effects and are_alike(name, other)]
-        looks, view = self._looks(base, alike, name)
-        rough = [self._added(base, other, looks[other], current) for other in looks]
-        near = current.score + NEARLY * _gain(current, base)
+        starts, view = self._scores(reduced, alike, name)
+        rough = [self._added(reduced, other, starts[other], current) for other in starts]
+        near = current.score + NEARLY * _gain(current, reduced)
         found = [each for each in rough if each is not None and each.score < near]
         best = [self.finish(min(found, key=lambda each: each.score), current)] if found else []
         if GRADE in alike:
-            best.append(self._with_grade(base))
-        return min(best, key=lambda each: each.score, default=None), base, view
+            best.append(self._with_grade(reduced))
+        return min(best, key=lambda each: each.score, default=None), reduced, view
 
-    def _extended(self, warm: FitResult, effects: Effects, release: Release) -> Problem:
-        common = kept(warm, (effects - {GRADE}) | set(self.model.effects))
+    def _extended(self, previous: FitResult, effects: Effects, release: Release) -> Problem:
+        common = kept(previous, (effects - {GRADE}) | set(self.model.effects))
         own = tuple((*old, *mine) for old, mine in zip(common.own, release.own, strict=True))
         return self._problem(effects, Release((*common.shared, *release.shared), own))
 
@@ -453,7 +424,6 @@ def precedes(one: str, other: str) -> bool:
 
 
 def are_alike(one: str, other: str) -> bool:
-    """Tell whether two effects are known to resemble each other, or act at one element."""
     a, b = EFFECTS[one], EFFECTS[other]
-    kin = {*a.resembles, *a.equivalent}, {*b.resembles, *b.equivalent}
-    return other in kin[0] or one in kin[1] or a.element is b.element
+    alike_to = {*a.resembles, *a.equivalent}, {*b.resembles, *b.equivalent}
+    return other in alike_to[0] or one in alike_to[1] or a.element is b.element

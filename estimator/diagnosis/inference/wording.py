@@ -7,7 +7,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from estimator.diagnosis.result import Effort, Fit, FoundEffect, Remainder, Stray, UntestableEffect, Verdict
+from estimator.diagnosis.result import Effort, Fit, FoundEffect, OffNominal, Remainder, UntestableEffect, Verdict
 from estimator.physics.effect import Element
 
 PLACE_NAMES: Mapping[Element, str] = {
@@ -19,11 +19,8 @@ PLACE_NAMES: Mapping[Element, str] = {
     Element.ACQUISITION: "in the acquisition",
 }
 
-MOST_TERMS = 3
-"""At most so many terms of a law are said."""
-
-ARTICLES = ("a ", "the ")
-"""With one of these a term begins that is a phrase; all others are formulas."""
+MOST_TERMS = 3  # at most so many terms of a law are said
+ARTICLES = ("a ", "the ")  # with one of these a term begins that is a phrase; all others are formulas
 
 FUNCTION = "a function of "
 
@@ -58,9 +55,9 @@ def law_in_words(element: Element, terms: Sequence[tuple[str, float]]) -> str:
         return alike
     signals = list(dict.fromkeys(word for name, _ in terms[:MOST_TERMS] for word in _signals_of(name)))
     others = [name for name, _ in terms[:MOST_TERMS] if not _signals_of(name)]
-    said = [f"depends on {_listed(signals)}"] if signals else []
-    said += [f"looks like {_listed(others)}"] if others else []
-    return f"{' and '.join(said)}, {PLACE_NAMES[element]}"
+    parts = [f"depends on {_listed(signals)}"] if signals else []
+    parts += [f"looks like {_listed(others)}"] if others else []
+    return f"{' and '.join(parts)}, {PLACE_NAMES[element]}"
 
 
 def _as_if(element: Element, name: str, coefficient: float) -> str:
@@ -77,7 +74,6 @@ def _as_if(element: Element, name: str, coefficient: float) -> str:
 
 
 def _signals_of(name: str) -> list[str]:
-    """Return the signals that a formula, or a function of one, depends on; none of a phrase."""
     if is_phrase(name) and not name.startswith(FUNCTION):
         return []
     found = (match.group() for match in _SIGNAL.finditer(name.removeprefix(FUNCTION)))
@@ -93,28 +89,19 @@ def times(ratio: float) -> str:
     return f"{float(f'{ratio:.3g}'):.0f}" if ratio >= 100.0 else f"{ratio:.3g}"
 
 
-SURE = 0.999
-"""Probability from which a sentence gives no more digits."""
-
-MOST_NAMES = 4
-"""Untried effects that a headline lists."""
+SURE = 0.999  # probability from which a sentence gives no more digits
+MOST_NAMES = 4  # untried effects that a headline lists
 
 
 @dataclass(frozen=True, slots=True)
 class Context:
-    """What a statement adds to the verdict.
-
-    Attributes
-    ----------
-    can_be_retuned : bool
-        False for a plant whose parameters are not fitted.
-    """
+    """What a statement adds to the verdict."""
 
     remainder: Remainder | None = None
     traces: Sequence[str] = ()
-    strays: Sequence[Stray] = ()
+    off_nominal: Sequence[OffNominal] = ()
     untestable: Sequence[UntestableEffect] = ()
-    can_be_retuned: bool = True
+    can_be_retuned: bool = True  # false for a plant whose parameters are not fitted
 
 
 def statement(
@@ -123,7 +110,7 @@ def statement(
     """Return one paragraph: verdict, figures, and what to do next."""
     parts = [] if effort.finished else [_not_decided(effort)]
     parts.append(_headline(verdict, fit, effects, effort, context))
-    if context.remainder is not None and not context.strays:
+    if context.remainder is not None and not context.off_nominal:
         parts.append(_left(verdict, context.remainder))
     if context.traces:
         parts.append(f"Seen, but too small to matter: {', '.join(context.traces)}.")
@@ -156,8 +143,8 @@ def _headline(verdict: Verdict, fit: Fit, effects: Sequence[FoundEffect], effort
             f"Nothing is missing: {model} leaves nothing but the noise and slow drift of the readings ({_noise(fit)})."
         )
     found = "; ".join(effect.statement for effect in effects)
-    if context.strays and verdict is Verdict.UNEXPLAINED:
-        return _wrong_values(left, context.strays)
+    if context.off_nominal and verdict is Verdict.UNEXPLAINED:
+        return _wrong_values(left, context.off_nominal)
     if verdict is Verdict.UNEXPLAINED:
         also = f" Found in the acquisition, and not the cause: {found}." if effects else ""
         return f"Something is missing in the model, and no effect of the catalogue explains it: {left}.{also}"
@@ -166,11 +153,10 @@ def _headline(verdict: Verdict, fit: Fit, effects: Sequence[FoundEffect], effort
 
 
 def _fall(fit: Fit) -> str:
-    """Say what becomes of the error, on the recordings and on samples not used for the fit."""
-    said = f"the free-run error {_change(fit.retuned, fit.augmented)} {fit.unit}"
+    text = f"the free-run error {_change(fit.retuned, fit.augmented)} {fit.unit}"
     if math.isfinite(fit.holdout_retuned) and math.isfinite(fit.holdout_augmented):
-        said += f", on samples not used for the fit it {_change(fit.holdout_retuned, fit.holdout_augmented)} {fit.unit}"
-    return said
+        text += f", on samples not used for the fit it {_change(fit.holdout_retuned, fit.holdout_augmented)} {fit.unit}"
+    return text
 
 
 def _change(before: float, after: float) -> str:
@@ -205,28 +191,27 @@ def _sure(effects: Sequence[FoundEffect]) -> str:
     return f" (probability {least:.3f})" if least < SURE else f" (probability above {SURE})"
 
 
-def _wrong_values(left: str, strays: Sequence[Stray]) -> str:
+def _wrong_values(left: str, off_nominal: Sequence[OffNominal]) -> str:
     return (
-        f"No physics need be missing, but the data sheet is off: {off_the_sheet(strays)}. With that the nominal model "
-        f"explains the recordings down to the noise; {left}. Check the data sheet, or widen the tolerance where it is "
-        "a guess, and diagnose again."
+        f"No physics need be missing, but the data sheet is off: {off_the_sheet(off_nominal)}. With that the nominal "
+        f"model explains the recordings down to the noise; {left}. Check the data sheet, or widen the tolerance where "
+        "it is a guess, and diagnose again."
     )
 
 
-def off_the_sheet(strays: Sequence[Stray]) -> str:
-    """Say which values are what, and what the data sheet says."""
-    said = []
-    for stray in strays:
-        trusted = f"{100.0 * stray.tolerance:.2g} %"
-        if stray.nominal is None:
-            side = "above" if stray.ratio > 1.0 else "below"
-            said.append(f"{stray.name} {100.0 * abs(stray.ratio - 1.0):.2g} % {side} its nominal value (± {trusted})")
+def off_the_sheet(off_nominal: Sequence[OffNominal]) -> str:
+    parts = []
+    for each in off_nominal:
+        trusted = f"{100.0 * each.tolerance:.2g} %"
+        if each.nominal is None:
+            side = "above" if each.ratio > 1.0 else "below"
+            parts.append(f"{each.name} {100.0 * abs(each.ratio - 1.0):.2g} % {side} its nominal value (± {trusted})")
         else:
-            value, unit = stray.ratio * stray.nominal, f" {stray.unit}" if stray.unit else ""
-            said.append(
-                f"{stray.name} is {_round(value)}{unit}, the data sheet says {_round(stray.nominal)} ± {trusted}"
+            value, unit = each.ratio * each.nominal, f" {each.unit}" if each.unit else ""
+            parts.append(
+                f"{each.name} is {_round(value)}{unit}, the data sheet says {_round(each.nominal)} ± {trusted}"
             )
-    return " and ".join(said)
+    return " and ".join(parts)
 
 
 def _left(verdict: Verdict, remainder: Remainder) -> str:

@@ -1,21 +1,175 @@
-"""Recordings of a fit cut into blocks of samples: the rows on which its error is explained."""
+"""A fit cut into blocks of samples: the motion of its line, and the error in each."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from enum import Enum
+from dataclasses import dataclass, replace
+from enum import Enum, IntEnum
 
 import numpy as np
 
-from estimator.diagnosis.line.motion import NO_FORCE, Force, Motion, between, block_mean_of, motion_in_blocks, states_of
-from estimator.diagnosis.line.tangent import Tangent, block_length, tangent
+from estimator.diagnosis.line.tangent import LOAD, MOTOR, Tangent, block_length, tangent
+from estimator.physics.driveline import Case
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult
+from estimator.physics.kernel import slots, state_vector
 from estimator.physics.model import Structure
-from estimator.physics.motion import speed_scale, torque_scale
+from estimator.physics.motion import motor_angle, speed_scale, torque_scale
 from estimator.physics.parallel import concurrently
+from estimator.physics.problem import Problem, local_part, parameters
+from estimator.physics.simulate import simulate_each
 from estimator.signals.record import BoolArray, FloatArray, Record
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """What happens in one recording, for laws to be functions of; arrays of shape (B,), one value per block.
+
+    ``angle`` is by the recording's own output; ``inputs`` has shape (B, M).
+    """
+
+    time_s: FloatArray
+    torque: FloatArray
+    inputs: FloatArray
+    angle: FloatArray
+    speed: FloatArray
+    twist: FloatArray
+    load_speed: FloatArray
+
+
+Force = tuple[FloatArray | float, FloatArray | float]
+"""Torque on the motor and torque against the load, in addition to the model's, shape (N,) each [Nm]."""
+
+NO_FORCE: Force = (0.0, 0.0)
+
+
+def simulated(result: FitResult, index: int, force: Force = NO_FORCE, state: int | None = None) -> FloatArray:
+    """Simulate a recording at a fit's unknowns under further torques: its output, or a state; shape (N,)."""
+    return simulated_each(result, [result.x], index, force, state)[0]
+
+
+def simulated_each(
+    result: FitResult, points: Sequence[FloatArray], index: int, force: Force = NO_FORCE, state: int | None = None
+) -> FloatArray:
+    """Simulate a recording at K vectors of a fit's unknowns under further torques, shape (K, N); see ``simulated``."""
+    problem = result.problem
+    torque = problem.records[index].torque_nm.copy()
+    torque[:, 0] += force[MOTOR]
+    record = replace(problem.records[index], torque_nm=torque)
+    cases = [_case(problem, x, index, force[LOAD] + np.zeros(torque.shape[0])) for x in points]
+    return simulate_each(problem.grid, record, cases, state)
+
+
+def _case(problem: Problem, x: FloatArray, index: int, load_nm: FloatArray) -> Case:
+    basis, local = problem.local[index], local_part(problem, x, index)
+    profile = basis.extra_load(local)
+    loaded = load_nm if profile is None else load_nm + profile
+    return Case(basis.parameters(parameters(problem, x), local), basis.start(local), loaded)
+
+
+def motion_of(result: FitResult, index: int) -> Motion:
+    return motion_in_blocks(result.problem.records[index], states_of(result, index), 1)
+
+
+def states_of(result: FitResult, index: int, force: Force = NO_FORCE) -> dict[str, FloatArray]:
+    wanted = (state_vector.SPEED, state_vector.TWIST, state_vector.LOAD_SPEED)
+    speed, twist, load_speed = (simulated(result, index, force, state) for state in wanted)
+    if result.problem.grid.structure is Structure.ONE_MASS:
+        load_speed = speed
+    angle = motor_angle(result.problem.records[index])
+    return {"angle": angle, "speed": speed, "twist": twist, "load_speed": load_speed}
+
+
+def motion_in_blocks(record: Record, states: dict[str, FloatArray], length: int) -> Motion:
+    return Motion(
+        block_mean(record.time_s, length),
+        block_mean(record.total_torque_nm, length),
+        block_mean(record.torque_nm, length),
+        **{name: block_mean(values, length) for name, values in states.items()},
+    )
+
+
+def between(values: FloatArray) -> FloatArray:
+    """Return a sampled signal half a sample later, where the torque held from a sample on has its middle."""
+    later = np.append(values[1:], 2.0 * values[-1] - values[-2])
+    return 0.5 * (values + later)
+
+
+AROUND = 2  # samples before and behind a moment between which a law's change counts
+LASTS = 3.0  # samples over which such an error is correlated: about as long as a change counts
+
+
+class FormPlace(IntEnum):
+    """Where a law whose form is in error acts: on the motor, against the load, in the shaft."""
+
+    MOTOR = 0
+    LOAD = 1
+    SHAFT = 2
+
+
+_MOTOR = (slots.COULOMB, slots.STRIBECK, slots.STRIBECK_COULOMB)
+_LOAD = (slots.COULOMB_LOAD, slots.BRAKE)
+_SHAFT = (slots.GAP, slots.STAGE)
+
+
+def form_changes(result: FitResult, index: int) -> FloatArray:
+    """Return by how much the laws at each place change around each sample of a recording [Nm], shape (3, N)."""
+    p, record = result.p_of(index), result.problem.records[index]
+    found = np.zeros((len(FormPlace), record.time_s.size))
+    structure = result.problem.grid.structure
+    if structure is Structure.JOINT or result.problem.grid.plant is not None:
+        return found
+    if p[list(_MOTOR)].any():
+        found[FormPlace.MOTOR] = change_around(_at_motor(simulated(result, index, state=state_vector.SPEED), p))
+    if p[list(_LOAD)].any():
+        state = state_vector.SPEED if structure is Structure.ONE_MASS else state_vector.LOAD_SPEED
+        found[FormPlace.LOAD] = change_around(_at_load(simulated(result, index, state=state), record.since_start_s, p))
+    if p[list(_SHAFT)].any():
+        found[FormPlace.SHAFT] = change_around(_in_shaft(simulated(result, index, state=state_vector.TWIST), p))
+    return np.where(np.isfinite(found), found, 0.0)
+
+
+def _at_motor(speed: FloatArray, p: FloatArray) -> FloatArray:
+    size = p[slots.COULOMB] + np.zeros(speed.size)
+    if p[slots.STRIBECK_SPEED] > 0.0:
+        size += p[slots.STRIBECK_COULOMB] + p[slots.STRIBECK] * np.exp(-((speed / p[slots.STRIBECK_SPEED]) ** 2))
+    return size * np.sign(speed)
+
+
+def _at_load(speed: FloatArray, since_start_s: FloatArray, p: FloatArray) -> FloatArray:
+    braked = (p[slots.BRAKE_FROM] <= since_start_s) & (since_start_s <= p[slots.BRAKE_TO])
+    return (p[slots.COULOMB_LOAD] + p[slots.BRAKE] * braked) * np.sign(speed)
+
+
+def _in_shaft(twist: FloatArray, p: FloatArray) -> FloatArray:
+    """Return what the shaft carries less than its spring would: up to half a gap's worth, and a stage's more."""
+    half = 0.5 * p[slots.GAP]
+    missing = np.clip(twist, -half, half)
+    beyond = np.abs(twist) - half - p[slots.STAGE_FROM]
+    more = p[slots.STAGE] * np.sign(twist) * np.maximum(beyond, 0.0)
+    return p[slots.K] * (more - missing)
+
+
+def change_around(law_nm: FloatArray) -> FloatArray:
+    """Return the range of a torque over the samples around each one, shape (N,)."""
+    padded = np.pad(law_nm, AROUND, mode="edge")
+    windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * AROUND + 1)
+    return windows.max(axis=1) - windows.min(axis=1)
+
+
+def block_mean(values: FloatArray, length: int) -> FloatArray:
+    """Average a signal of shape (N, ...) over blocks, shape (N // length, ...)."""
+    count = values.shape[0] // length
+    if length == 1:
+        return values[:count]
+    return values[: count * length].reshape(count, length, *values.shape[1:]).mean(axis=1)
+
+
+def block_mean_of(values: FloatArray, use: BoolArray, length: int) -> tuple[FloatArray, FloatArray]:
+    """Average the samples in use over blocks: the means, 0 where there are none, and how many there are; (B,)."""
+    weight = block_mean(use.astype(float), length) * length
+    total = block_mean(np.where(use, values, 0.0), length) * length
+    return total / np.maximum(weight, 1.0), weight
 
 
 class Place(Enum):
@@ -45,7 +199,6 @@ DRIVES = {Element.TORQUE_PATH: 1.0, Element.MOTOR: -1.0, Element.SHAFT: 1.0, Ele
 
 
 def places(result: FitResult) -> tuple[Place, ...]:
-    """Return the places that a fit's structure has."""
     if result.problem.grid.structure is Structure.JOINT:
         return (Place.SHAFT,)
     if result.problem.grid.structure is Structure.ONE_MASS:
@@ -54,7 +207,6 @@ def places(result: FitResult) -> tuple[Place, ...]:
 
 
 def size_at(result: FitResult, place: Place) -> float:
-    """Return the size in use of what acts at a place: torque, or speed at the sensor."""
     records = result.problem.records
     return speed_scale(records) if place is Place.SENSOR else torque_scale(records)
 
@@ -62,40 +214,21 @@ def size_at(result: FitResult, place: Place) -> float:
 MOST_ROWS = 20_000
 """Blocks that laws are fitted to, all recordings together: over three minutes at 10 ms. They bound memory."""
 
-STRETCH = 3000
-"""Blocks of a stretch of a long recording."""
+STRETCH = 3000  # blocks of a stretch of a long recording
 
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """One recording of a fit, in blocks.
-
-    Attributes
-    ----------
-    record : Record
-    length : int
-        Samples per block.
-    tangent : Tangent
-    error : ndarray, shape (B,)
-        Measured less simulated output, averaged over the block's good samples; 0 where there are none.
-    weight : ndarray, shape (B,)
-        How many samples of the block count.
-    motion : Motion
-        As the fit has it, in the middle of each block.
-    reading : Motion
-        The same at the moments at which the output was read.
-    stretches : ndarray of bool, shape (B,)
-        Where laws are fitted: everywhere, or in stretches spread over a long recording.
-    """
+    """One recording of a fit, in blocks."""
 
     record: Record
-    length: int
+    length: int  # samples per block
     tangent: Tangent
-    error: FloatArray
-    weight: FloatArray
-    motion: Motion
-    reading: Motion
-    stretches: BoolArray
+    error: FloatArray  # (B,): measured less simulated output, averaged over the block's good samples
+    weight: FloatArray  # (B,): how many samples of the block count
+    motion: Motion  # as the fit has it, in the middle of each block
+    reading: Motion  # the same at the moments at which the output was read
+    stretches: BoolArray  # (B,): where laws are fitted
 
     @property
     def okay(self) -> BoolArray:
@@ -124,10 +257,7 @@ class Line:
 
 
 def lines(result: FitResult, forces: Sequence[Force] | None = None, length: int | None = None) -> tuple[Line, ...]:
-    """Return the recordings of a fit in blocks, under further torques where there are any.
-
-    ``length`` is the samples per block, by default as few as the fit's own line needs.
-    """
+    """Return the recordings of a fit in blocks, under further torques where there are any."""
     length = length or block_length(result)
     count = len(result.problem.records)
     every = [NO_FORCE] * count if forces is None else forces
@@ -152,7 +282,6 @@ def _line(result: FitResult, index: int, length: int, force: Force) -> Line:
 
 
 def spread_stretches(blocks: int, most: int) -> BoolArray:
-    """Return which blocks of a recording are used: all, or evenly spread stretches of at most so many; (blocks,)."""
     used = np.ones(blocks, dtype=np.bool_)
     if blocks <= most:
         return used

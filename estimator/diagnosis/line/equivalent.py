@@ -1,10 +1,4 @@
-"""The torque at one place of the line, or the error of the reading, that by itself would explain a fit's error.
-
-What the simulation lacks is taken for an unknown input of the linearised line: a random walk, estimated with its
-standard error by a fixed-interval Kalman smoother (Durbin and Koopman, Time Series Analysis by State Space Methods,
-chapter 4). How fast the walk may go is found by the marginal likelihood of the error, and that likelihood tells how
-plausible the place is: at the right one a simple input explains the error, elsewhere it takes a wild one.
-"""
+"""The torque at one place of the line, or the error of the reading, that by itself would explain a fit's error."""
 
 from __future__ import annotations
 
@@ -18,8 +12,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from estimator.compiled import compiled
-from estimator.diagnosis.line.blocks import FORCES, Line, Place, places, size_at
-from estimator.diagnosis.line.motion import Motion
+from estimator.diagnosis.line.blocks import FORCES, Line, Motion, Place, places, size_at
 from estimator.diagnosis.line.tangent import LOAD, MOTOR
 from estimator.physics.fit import FitResult
 from estimator.physics.kernel import state_vector
@@ -27,28 +20,14 @@ from estimator.signals.record import FloatArray
 
 
 class Chain(NamedTuple):
-    """The line as the input sees it, over B blocks, or 1 that stands for all.
+    """The line as the input sees it, over B blocks, or 1 that stands for all."""
 
-    Attributes
-    ----------
-    phi : ndarray, shape (B, n, n)
-        How the state moves on.
-    drive : ndarray, shape (B, n)
-        How the input acts on it.
-    c, direct : ndarray, shapes (B, n) and (B,)
-        How state and input show in the output.
-    memory : float
-        Share of the input that is there in the next block.
-    walk : float
-        Variance of its change from block to block.
-    """
-
-    phi: FloatArray
-    drive: FloatArray
-    c: FloatArray
-    direct: FloatArray
-    memory: float
-    walk: float
+    phi: FloatArray  # (B, n, n): how the state moves on
+    drive: FloatArray  # (B, n): how the input acts on it
+    c: FloatArray  # (B, n): how state and input show in the output
+    direct: FloatArray  # (B, n): how state and input show in the output
+    memory: float  # share of the input that is there in the next block
+    walk: float  # variance of its change from block to block
 
 
 class Filtered(NamedTuple):
@@ -209,44 +188,26 @@ WIDE = 10.0
 FORGETS_S = 1.0
 """A shaft torque that stays is invisible: it only holds another twist. Its walk returns to zero in about this time."""
 
-SEARCH_TOLERANCE = 0.15
-"""Of the rate's decimal logarithm: the likelihood is flat around its top."""
+SEARCH_TOLERANCE = 0.15  # of the rate's decimal logarithm: the likelihood is flat around its top
 
 
 @dataclass(frozen=True, slots=True)
 class Input:
-    """The input at one place of one recording; arrays of shape (B,), one value per block.
+    """The input at one place of one recording; arrays of shape (B,), one value per block."""
 
-    Attributes
-    ----------
-    value, std : ndarray
-        Estimate and its standard error: torque that drives the motor, torque the shaft carries beyond its law, torque
-        against the load [Nm], or error of the reading [unit of the output].
-    motion : Motion
-        What then happens in the line, in the middle of each block.
-    """
-
-    value: FloatArray
+    value: FloatArray  # estimate and its standard error
     std: FloatArray
-    motion: Motion
+    motion: Motion  # what then happens in the line, in the middle of each block
 
 
 @dataclass(frozen=True, slots=True)
 class Explanation:
-    """The inputs at one place, one per recording.
-
-    Attributes
-    ----------
-    rate : float
-        Standard deviation of the walk's change in one second [unit of the input].
-    log_likelihood : float
-        Of the error, at the best rate.
-    """
+    """The inputs at one place, one per recording."""
 
     place: Place
     inputs: tuple[Input, ...]
-    rate: float
-    log_likelihood: float
+    rate: float  # standard deviation of the walk's change in one second [unit of the input]
+    log_likelihood: float  # of the error, at the best rate
 
 
 def explain(result: FitResult, cut: Sequence[Line], place: Place, floor: float) -> Explanation:

@@ -31,32 +31,19 @@ from estimator.physics.problem import start_of
 from estimator.physics.simulate import MASSES, output_state
 from estimator.signals.record import FloatArray, OutputKind, Record
 
-MOTOR, LOAD = 0, 1
-"""Columns of the inputs: torque on the motor shaft, and torque against the load."""
+MOTOR, LOAD = 0, 1  # columns of the inputs: torque on the motor shaft, and torque against the load
 
 
 @dataclass(frozen=True, slots=True)
 class Tangent:
-    """A linearised line of n states over B blocks; the first dimension is 1 where one block stands for all.
+    """A linearised line of n states over B blocks; the first dimension is 1 where one block stands for all."""
 
-    Attributes
-    ----------
-    phi : ndarray, shape (B, n, n)
-    gamma : ndarray, shape (B, n, 2)
-    c : ndarray, shape (B, n)
-    d : ndarray, shape (B, 2)
-    states : tuple of int
-        Which entries of the kernel's state the n are.
-    scale : ndarray, shape (n,)
-        Size of each state in use, in its unit.
-    """
-
-    phi: FloatArray
-    gamma: FloatArray
-    c: FloatArray
-    d: FloatArray
-    states: tuple[int, ...]
-    scale: FloatArray
+    phi: FloatArray  # (B, n, n)
+    gamma: FloatArray  # (B, n, 2)
+    c: FloatArray  # (B, n)
+    d: FloatArray  # (B, 2)
+    states: tuple[int, ...]  # which entries of the kernel's state the n are
+    scale: FloatArray  # (n,): size of each state in use, in its unit
 
     def part(self, rows: slice) -> Tangent:
         """Return the tangent of some of the blocks."""
@@ -151,21 +138,11 @@ class Setting(NamedTuple):
 
 
 class Nudges(NamedTuple):
-    """What is moved, and by how much.
+    """What is moved, and by how much."""
 
-    Attributes
-    ----------
-    states : ndarray of int, shape (n,)
-        Entries of the kernel's state.
-    steps : ndarray, shape (n,)
-        By how much each, in its unit.
-    step_nm : float
-        By how much the torques [Nm].
-    """
-
-    states: NDArray[np.int_]
-    steps: FloatArray
-    step_nm: float
+    states: NDArray[np.int_]  # (n,): entries of the kernel's state
+    steps: FloatArray  # (n,): by how much each, in its unit
+    step_nm: float  # by how much the torques [Nm]
 
 
 Torques = tuple[FloatArray, FloatArray]
@@ -266,12 +243,10 @@ def run_block(setting: Setting, first: int, torques: Torques, p: FloatArray, sta
         setting.out,
         setting.slopes,
     )
-    mean: float = setting.out[0, first : torque.shape[0]].mean()
-    return mean
+    return setting.out[0, first : torque.shape[0]].mean()
 
 
-NUDGE = 1e-5
-"""Size of a difference step, as a share of the speed or torque in use."""
+NUDGE = 1e-5  # size of a difference step, as a share of the speed or torque in use
 
 LONGEST_BLOCK_S = 0.01
 BLOCKS_PER_PERIOD = 12.0
@@ -335,7 +310,6 @@ def _setting(result: FitResult, record: Record, angle: FloatArray) -> Setting:
 
 
 def _load(result: FitResult, index: int, constant_nm: float) -> FloatArray:
-    """Return the load torque of one recording at a fit, shape (N,)."""
     record = result.problem.records[index]
     load = np.full(record.time_s.size, constant_nm) + record.known_load_nm
     extra = result.problem.local[index].extra_load(result.local_of(index))

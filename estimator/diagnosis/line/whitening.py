@@ -1,9 +1,4 @@
-"""The Kalman filter that turns a free-run error into its innovations, compiled: gains once, then any signals.
-
-Model: ``x[t+1] = F x[t] + w``, ``y[t] = H x[t] + v`` with ``cov w = Q`` and ``cov v = diag(r)``. What was not observed
-is predicted and not corrected, and the outputs of a sample correct the state one after the other (Durbin and Koopman,
-Time Series Analysis by State Space Methods, chapters 4 and 6.4). F and H are sparse.
-"""
+"""The Kalman filter that turns a free-run error into its innovations, compiled: gains once, then any signals."""
 
 from __future__ import annotations
 
@@ -28,27 +23,16 @@ class Terms(NamedTuple):
 
 
 def terms_of(matrix: FloatArray) -> Terms:
-    """Return the entries of a matrix that are not 0, row by row."""
     rows, columns = np.nonzero(matrix)
     return Terms(rows, columns, matrix[rows, columns])
 
 
 class Gains(NamedTuple):
-    """What the filter of a recording does with N samples of C outputs.
+    """What the filter of a recording does with N samples of C outputs."""
 
-    Attributes
-    ----------
-    predictor : ndarray, shape (N, C, m)
-        How the innovation of each output moves the next state's prediction.
-    cross : ndarray, shape (N, C, C)
-        How it moves the predictions of the outputs after it.
-    spread : ndarray, shape (N, C)
-        Standard deviation of each innovation; infinite where it was not observed.
-    """
-
-    predictor: FloatArray
-    cross: FloatArray
-    spread: FloatArray
+    predictor: FloatArray  # (N, C, m): how the innovation of each output moves the next state's prediction
+    cross: FloatArray  # (N, C, C): how it moves the predictions of the outputs after it
+    spread: FloatArray  # (N, C): standard deviation of each innovation
 
 
 @inlined
@@ -103,7 +87,6 @@ def predict(f: Terms, q: FloatArray, p: FloatArray, half: FloatArray, before: Fl
 
 @inlined
 def is_as_before(observed: BoolArray, t: int) -> bool:
-    """Tell whether the same outputs were observed as a sample before."""
     same = True
     for i in range(observed.shape[1]):
         same = same and observed[t, i] == observed[t - 1, i]
@@ -112,7 +95,6 @@ def is_as_before(observed: BoolArray, t: int) -> bool:
 
 @inlined
 def add_input(at_input: FloatArray, n: int, variance: float, p: FloatArray) -> None:
-    """Add to a covariance what input n of this variance does to it."""
     for i in range(p.shape[0]):
         for k in range(p.shape[0]):
             p[i, k] += variance * at_input[n, i] * at_input[n, k]
@@ -130,7 +112,6 @@ def fill_gains(
     unread: FloatArray,
     gains: Gains,
 ) -> None:
-    """Fill the gains of a recording."""
     count, m = h.shape
     room = (np.empty((m, m)), np.empty((count, m)), np.empty((count, m)), np.zeros(m), np.empty(count))
     fill_gains_in(f, h, q, r, prior.copy(), observed, at_input, unread, gains, room)

@@ -12,15 +12,11 @@ import numpy as np
 from estimator.physics.motion import measured_speed
 from estimator.signals.record import BoolArray, Channel, FloatArray, IntArray, Location, OutputKind, Record
 
-HALF = 0.5
-"""Share of the range of a reading that a jump must exceed."""
-
-FAR = 4.0
-"""How far a jump must be, in the largest other steps."""
+HALF = 0.5  # share of the range of a reading that a jump must exceed
+FAR = 4.0  # how far a jump must be, in the largest other steps
 
 TURN = 2.0 * math.pi
-NEAR_A_TURN = 0.01
-"""Share within which a jump is one of a whole turn."""
+NEAR_A_TURN = 0.01  # share within which a jump is one of a whole turn
 
 
 def period_of(values: FloatArray, seen: BoolArray) -> float | None:
@@ -42,7 +38,6 @@ def period_of(values: FloatArray, seen: BoolArray) -> float | None:
 
 
 def _motion(steps: FloatArray, jumps: BoolArray, at: int) -> float:
-    """Return the step that the motion itself makes at a jump: the mean of those around it."""
     around = [i for i in (at - 1, at + 1) if 0 <= i < steps.size and not jumps[i]]
     return float(np.mean(steps[around])) if around else 0.0
 
@@ -66,14 +61,9 @@ def unwrapped(records: Sequence[Record]) -> tuple[list[Record], list[str]]:
     return mended, warnings
 
 
-FEWEST_SAMPLES = 10
-"""Rows at the limit that count."""
-
-FEWEST_LEVELS = 10
-"""A channel of fewer values is switched."""
-
-SMALLEST_SHARE = 0.005
-"""Share of the rows that must stand at the limit: fewer change no fit."""
+FEWEST_SAMPLES = 10  # rows at the limit that count
+FEWEST_LEVELS = 10  # a channel of fewer values is switched
+SMALLEST_SHARE = 0.005  # share of the rows that must stand at the limit: fewer change no fit
 
 OFTEN = 10.0
 """How often the limit must come over any other value: four times what a smooth peak read in steps can have."""
@@ -92,7 +82,6 @@ class Clipped:
 
 
 def clipped(channel: str, values: FloatArray, seen: BoolArray) -> list[Clipped]:
-    """Return the limits at which a channel is cut off, of its largest and its smallest value."""
     levels, counts = np.unique(values[seen], return_counts=True)
     if levels.size < FEWEST_LEVELS:
         return []
@@ -148,36 +137,23 @@ def _torques(record: Record) -> list[str]:
     ]
 
 
-FEWEST_GOOD = 0.5
-"""Share of the recording's good rows that a channel must have read."""
-
-ALIKE = 0.5
-"""Correlation with what a channel should go like from which it goes like that, or the other way."""
+FEWEST_GOOD = 0.5  # share of the recording's good rows that a channel must have read
+ALIKE = 0.5  # correlation with what a channel should go like from which it goes like that, or the other way
 
 MOST_RATIO = 2.0
 """Factor by which a speed may be larger or smaller than the motor's: the shaft's twist is no part of its spread."""
 
-CHANCE = 3.0
-"""Standard deviations of the correlation of two signals that have nothing to do with each other."""
-
-SAME = 1e-9
-"""Difference over the spread up to which two channels are one signal."""
+CHANCE = 3.0  # standard deviations of the correlation of two signals that have nothing to do with each other
+SAME = 1e-9  # difference over the spread up to which two channels are one signal
 
 SMOOTH_S = 0.2
 """Width of the mean over which channels are compared: below a driveline's first mode both ends move as one."""
 
 
-LAG_STEP_S, LAGS = 0.01, 30
-"""Steps in which a channel's lag is sought [s], and how many of them either way."""
-
-BLOCKS = 8
-"""Parts of a recording in which a channel's lag is estimated, each by itself."""
-
-DEAD_S = 0.5
-"""Time for which a reading that does not change at all is dead, where it should [s]."""
-
-MOVED = 0.5
-"""Range, over its spread, of what a channel should go like, from which a reading should change."""
+LAG_STEP_S, LAGS = 0.01, 30  # steps in which a channel's lag is sought [s], and how many of them either way
+BLOCKS = 8  # parts of a recording in which a channel's lag is estimated, each by itself
+DEAD_S = 0.5  # time for which a reading that does not change at all is dead, where it should [s]
+MOVED = 0.5  # range, over its spread, of what a channel should go like, from which a reading should change
 
 CLEARLY = 6.0
 """Standard errors by which a lag must change over a recording: 1 in 1000 by chance, with as many degrees of freedom."""
@@ -190,7 +166,7 @@ def with_usable_channels(records: Sequence[Record]) -> tuple[list[Record], list[
         usable: list[Channel] = []
         for channel in record.channels:
             channel, dead = _without_dead(record, channel)
-            warnings += [f"recording {record.name}: the output {channel.label} {said}" for said in dead]
+            warnings += [f"recording {record.name}: the output {channel.label} {notes}" for notes in dead]
             fault = _fault(record, channel, usable)
             if fault:
                 warnings.append(f"recording {record.name}: the output {channel.label} is not used: {fault}")
@@ -205,17 +181,17 @@ def _without_dead(record: Record, channel: Channel) -> tuple[Channel, list[str]]
     read = channel.output[channel.okay]
     if read.size == 0 or np.ptp(read) == 0.0:  # never read, or dead throughout: for `_fault` to say
         return channel, []
-    like, okay, said = _goes_like(record, channel), channel.okay.copy(), []
+    like, okay, notes = _goes_like(record, channel), channel.okay.copy(), []
     least = max(2, round(DEAD_S / record.sample_time_s))
     ends = np.flatnonzero(np.diff(channel.output) != 0.0) + 1
     for first, end in pairwise([0, *ends.tolist(), channel.output.size]):
         if end - first >= least and np.ptp(like[first:end]) > MOVED * np.nanstd(like):
             okay[first:end] = False
-            said.append(
+            notes.append(
                 f"stays at {channel.output[first]:g} from {record.time_s[first]:g} to {record.time_s[end - 1]:g} s, "
                 "while the motor moves: its sensor is dead there, and it is not used there."
             )
-    return replace(channel, okay=okay), said
+    return replace(channel, okay=okay), notes
 
 
 def _fault(record: Record, channel: Channel, others: Sequence[Channel]) -> str:
@@ -293,7 +269,6 @@ def _lag(mine: FloatArray, its: FloatArray, rows: IntArray, shifts: IntArray) ->
 
 
 def _goes_like(record: Record, channel: Channel) -> FloatArray:
-    """Return what a channel should go like, shape (N,), NaN where that is not known."""
     speed = measured_speed(record)
     if channel.kind is OutputKind.TORQUE or channel.location is Location.SHAFT:
         return record.total_torque_nm

@@ -1,10 +1,4 @@
-"""All that would explain a recording that does not fit its model, each with its odds: units, signs, columns, periods.
-
-The inertia that a recording fits is compared with the model's, as it was read and with what may be wrong about its
-columns undone: a sign, two that are swapped, a period. What is off by a factor then is compared with the factors of
-``ROWS``. The odds of each explanation are its prior, times how well the inertia fits with it, how much of the motion
-follows, and how usual the largest torque and speed then are.
-"""
+"""What would explain a recording that does not fit its model, with odds: units, signs, columns, periods."""
 
 from __future__ import annotations
 
@@ -37,41 +31,23 @@ TURNS_AND_LINES = (Motion.ROTATION, Motion.TRANSLATION)
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One mistake that is a factor.
+    """One mistake that is a factor."""
 
-    Attributes
-    ----------
-    question : str
-        What to ask; ``{0}`` is the factor, ``{1}`` its inverse, ``{2}`` and ``{3}`` the rated value behind per cent and
-        per mille.
-    low, high : float
-        What the column is to be multiplied by is between them, evenly in its logarithm.
-    prior : float
-        How often it is made, over how often a recording is right and the model lacks physics.
-    kinds, motions
-        The outputs and motions it can be made with.
-    reads : (float, float) or None
-        Between them is the largest torque as it is read, where the mistake says that; else any usual torque.
-    whole : bool
-        Whether the torques then are whole numbers.
-    """
-
-    question: str
+    question: str  # what to ask
     part: Part
-    low: float
+    low: float  # what the column is to be multiplied by is between them, evenly in its logarithm
     high: float
     prior: float
     kinds: tuple[OutputKind, ...] = (OutputKind.SPEED, OutputKind.POSITION, OutputKind.ACCELERATION)
-    motions: tuple[Motion, ...] = (Motion.ROTATION,)
+    motions: tuple[Motion, ...] = (Motion.ROTATION,)  # the outputs and motions it can be made with
     reads: tuple[float, float] | None = None
-    whole: bool = False
+    whole: bool = False  # whether the torques then are whole numbers
 
 
 _SPEED, _POSITION = (OutputKind.SPEED,), (OutputKind.POSITION,)
 _LINE = (Motion.TRANSLATION,)
 
-GEARS = (3.0, 16.0)
-"""Ratios of the gears behind traction motors."""
+GEARS = (3.0, 16.0)  # ratios of the gears behind traction motors
 
 RIGHT = Row("", Part.MODEL, 1.0, 1.0, 1.0, motions=TURNS_AND_LINES)
 """Nothing is wrong with the recording: the model lacks physics."""
@@ -140,11 +116,7 @@ def rows_for(line: DrivelineModel) -> list[Row]:
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """What may be wrong with columns beyond a factor, undone; ``prior`` as in `Row`.
-
-    ``factors`` is how many factors may be wrong besides; ``physics`` whether it is an entry of the catalogue, which is
-    not to be refused but to be found.
-    """
+    """What may be wrong with columns beyond a factor, undone; ``prior`` as in `Row`."""
 
     record: Record
     prior: float = 1.0
@@ -157,14 +129,12 @@ class Change:
 SLOWEST_S, FASTEST_S = 0.5, 1e-5
 """A driveline sampled slower, or faster, is more likely recorded in another unit of time."""
 
-SHORTEST_S = 1.0
-"""No recording of a driveline is shorter."""
+SHORTEST_S = 1.0  # no recording of a driveline is shorter
 
 PERIODS = (1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 4e-3, 5e-3, 1e-2, 2e-2, 5e-2, 1e-1)
 """Usual periods [s], for times that are counted in rows."""
 
-UNLIKELY = 0.02
-"""Prior of a period that no driveline is sampled with, and of each that rows may have."""
+UNLIKELY = 0.02  # prior of a period that no driveline is sampled with, and of each that rows may have
 
 
 DAY_S = 86_400.0
@@ -243,11 +213,8 @@ PHYSICS, PHYSICS_SHARE = math.log(2.0), 0.08
 BANDS, BANDS_PHYSICS, BANDS_OTHER = 0.35, 0.1, 1.2
 """Spread of the two bands' ratio by one factor, the share of the cases that spread as another model's do, and that."""
 
-REST = 4.0
-"""Power of the unexplained motion in the likelihood: as of eight independent stretches."""
-
-LEAST_REST = 0.02
-"""Share of the motion that the shortest model error leaves unexplained."""
+REST = 4.0  # power of the unexplained motion in the likelihood: as of eight independent stretches
+LEAST_REST = 0.02  # share of the motion that the shortest model error leaves unexplained
 
 USUAL_TORQUE_NM, USUAL_SPEED_RAD_S = (200.0, math.log(8.0)), (80.0, math.log(5.0))
 """Median, and spread of the logarithm, of the largest torque and speed in a recording of a drive."""
@@ -274,16 +241,14 @@ def _fit_of(row: Row, needed: float, spread: float) -> float:
     return (1.0 - PHYSICS_SHARE) * close + PHYSICS_SHARE * far
 
 
-def _bands_of(apart: float, is_model: bool) -> float:
-    """Return the density of what is apart between the bands."""
-    if math.isnan(apart):
+def _bands_of(log_ratio: float, is_model: bool) -> float:
+    if math.isnan(log_ratio):
         return 1.0
-    other = _normal(apart, BANDS_OTHER)
-    return other if is_model else (1.0 - BANDS_PHYSICS) * _normal(apart, BANDS) + BANDS_PHYSICS * other
+    other = _normal(log_ratio, BANDS_OTHER)
+    return other if is_model else (1.0 - BANDS_PHYSICS) * _normal(log_ratio, BANDS) + BANDS_PHYSICS * other
 
 
 def largest(record: Record) -> tuple[float, float]:
-    """Return the largest torque and output of a recording, but for a few rows."""
     torque, output = np.abs(record.torque_nm).max(axis=1), np.abs(record.output[record.okay])
     return float(np.quantile(torque, 0.999)), float(np.quantile(output, 0.999))
 
@@ -337,7 +302,6 @@ class Explanation:
         return replace(cure, output=-cure.output) if self.is_turned else cure
 
     def question(self, falls: str) -> str:
-        """Return what to ask, for people."""
         asked = [self.change.question] if self.change.question else []
         asked += [falls] if self.is_turned else []
         asked += [
@@ -371,7 +335,7 @@ def explanations(change: Change, found: Inertia, rows: Sequence[Row], spread: fl
         by_torque = math.prod(factor for row, factor in factors if row.part is Part.TORQUE)
         by_output = math.prod(factor for row, factor in factors if row.part is Part.OUTPUT)
         weight = common * fit * math.prod(row.prior for row in chosen)
-        weight *= _bands_of(found.apart, any(row.part is Part.MODEL for row in chosen))
+        weight *= _bands_of(found.log_ratio, any(row.part is Part.MODEL for row in chosen))
         weight *= usual(chosen, torque, torque * by_torque, output * by_output, record)
         return Explanation(change, tuple(factors), weight, torque * by_torque, output * by_output, is_turned)
 
@@ -397,7 +361,6 @@ def _sign(row: Row) -> float:
 
 
 def usual(chosen: Sequence[Row], read: float, torque_nm: float, output: float, record: Record) -> float:
-    """Return the density of the largest torque that was read, and of the speed that follows."""
     reads = next((row.reads for row in chosen if row.reads is not None), None)
     if reads is not None:
         density = float(reads[0] <= read <= reads[1]) / math.log(reads[1] / reads[0])

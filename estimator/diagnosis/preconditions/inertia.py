@@ -11,8 +11,7 @@ from scipy.ndimage import uniform_filter1d
 from scipy.signal import detrend
 
 from estimator.physics.driveline import Start
-from estimator.physics.grid import Grid
-from estimator.physics.layout import flat
+from estimator.physics.layout import Grid, flat
 from estimator.physics.model import DrivelineModel, Structure, natural_frequencies_rad_s
 from estimator.physics.motion import measured_speed
 from estimator.physics.simulate import simulate
@@ -73,20 +72,11 @@ BELOW, ABOVE = (0.1, 0.6), (1.6, math.inf)
 BLOCK_HZ, FEWEST_BINS = 1.0, 8
 """Frequencies compared at a time: few enough for a delay of some samples not to matter."""
 
-BANDS_TELL = 0.5
-"""Share of the output in either band that must follow from the torque."""
-
-AGREE = 2.5
-"""Factor between the ratios of the two bands up to which they are of one cause."""
-
-STRETCH_S = 1.0
-"""Over which the change of speed is looked at."""
-
-FEWEST_STEPS = 10
-"""Samples of a stretch at least."""
-
-FEWEST_STRETCHES = 10
-"""Stretches that a recording must hold to say anything: the regression has three unknowns."""
+BANDS_TELL = 0.5  # share of the output in either band that must follow from the torque
+AGREE = 2.5  # factor between the ratios of the two bands up to which they are of one cause
+STRETCH_S = 1.0  # over which the change of speed is looked at
+FEWEST_STEPS = 10  # samples of a stretch at least
+FEWEST_STRETCHES = 10  # stretches that a recording must hold to say anything: the regression has three unknowns
 
 BODY_TELLS = 0.9
 """Share of the speed's changes that the torque must account for. Where a road or a brake moves the line and a control
@@ -95,33 +85,27 @@ sets the torque it is below 0.6, in tip-ins and reversals above."""
 
 @dataclass(frozen=True, slots=True)
 class Inertia:
-    """The inertia that a recording fits over the nominal one, negative where the speed falls with the torque.
-
-    ``share`` is the share of the motion that follows from the torque. ``apart`` is the logarithm of the ratio below the
-    first mode over that above it: 0 for a factor between units, which moves both alike, and not for a load that is
-    heavier, or a mode that is elsewhere; NaN where both are not seen.
-    """
+    """The inertia that a recording fits over the nominal one, negative where the speed falls with the torque."""
 
     ratio: float
     share: float
-    apart: float = math.nan
+    log_ratio: float = math.nan
 
 
 NOTHING = Inertia(math.nan, 0.0)
 
 
 def fitted_inertia(record: Record, line: DrivelineModel, grid: Grid | None) -> Inertia | None:
-    """Return the inertia that a recording fits; None where it does not tell."""
     first_hz = float(natural_frequencies_rad_s(line.values())[0]) / (2.0 * math.pi)
-    apart, found = math.nan, as_one_body(record, line, first_hz)
+    log_ratio, found = math.nan, as_one_body(record, line, first_hz)
     if grid is not None and 0.0 < ABOVE[0] * first_hz < 0.5 / record.sample_time_s:
         below, above = (by_band(record, line, grid, low * first_hz, high * first_hz) for low, high in (BELOW, ABOVE))
         if min(below.share, above.share) >= BANDS_TELL:
-            apart = math.log(abs(below.ratio / above.ratio))
-            if abs(apart) <= math.log(AGREE):
+            log_ratio = math.log(abs(below.ratio / above.ratio))
+            if abs(log_ratio) <= math.log(AGREE):
                 mean = math.copysign(math.sqrt(abs(below.ratio * above.ratio)), below.ratio)
-                return Inertia(mean, max(below.share, found.share), apart)  # comparable with that of one body alone
-    return replace(found, apart=apart) if found.share >= BODY_TELLS else None
+                return Inertia(mean, max(below.share, found.share), log_ratio)  # comparable with that of one body alone
+    return replace(found, log_ratio=log_ratio) if found.share >= BODY_TELLS else None
 
 
 def by_band(record: Record, line: DrivelineModel, grid: Grid, low_hz: float, high_hz: float) -> Inertia:
@@ -168,7 +152,6 @@ def as_one_body(record: Record, line: DrivelineModel, first_hz: float) -> Inerti
 
 
 def _integrals(record: Record) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return speed, impulse of the torque, and angle; each of shape (N,)."""
     speed = measured_speed(record)
     good = np.flatnonzero(np.isfinite(speed))
     speed = np.interp(np.arange(speed.size), good, speed[good])
@@ -178,5 +161,4 @@ def _integrals(record: Record) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 
 def _rest(y: FloatArray, design: FloatArray) -> FloatArray:
-    rest: FloatArray = y - design @ np.linalg.lstsq(design, y, rcond=None)[0]
-    return rest
+    return y - design @ np.linalg.lstsq(design, y, rcond=None)[0]

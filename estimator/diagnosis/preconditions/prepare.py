@@ -1,31 +1,213 @@
-"""Preparation of recordings for a diagnosis: whether they belong together, excite anything, and what is left out."""
+"""From recordings as given to recordings that can be diagnosed: refused, masked or thinned."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from math import sqrt
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.signal import detrend
 
-from estimator.diagnosis.acquisition import as_if_not_lost
-from estimator.diagnosis.noise import noise_floor
+from estimator.diagnosis.acquisition.chain import as_if_not_lost
+from estimator.diagnosis.acquisition.finding import runs
+from estimator.diagnosis.noise import noise_floor, share_of
 from estimator.diagnosis.preconditions.channels import unwrapped, with_usable_channels, without_clipped
 from estimator.diagnosis.preconditions.inertia import driven, model_warnings
-from estimator.diagnosis.preconditions.thinned import thinned, with_room, without_not_read
 from estimator.diagnosis.preconditions.units import require_plausible_units
 from estimator.diagnosis.result import Diagnosis
 from estimator.diagnosis.segments import Cut, cut, joined
 from estimator.errors import BadShape, Implausible, NotExciting
-from estimator.physics.grid import Grid, grid_for
-from estimator.physics.model import DrivelineModel, natural_frequencies_rad_s
+from estimator.physics.layout import Grid, grid_for
+from estimator.physics.model import DrivelineModel, Structure, natural_frequencies_rad_s
 from estimator.physics.simulate import output_state
-from estimator.signals.outputs import outputs_apart
-from estimator.signals.record import FloatArray, Record
+from estimator.signals.record import BoolArray, FloatArray, OutputKind, Record, separated_outputs
 
-FEWEST_SAMPLES = 200
-"""Fewer good samples than this do not carry a model with a dozen unknowns and its hold-out."""
+FEWEST_IN_A_ROW = 20
+"""Samples in a row that count: by chance two in three of the steps between them would have to be alike."""
+
+ROUNDING = 2.0
+"""How far three samples of a straight line may be off one, in the file's least steps: each is rounded by half of one,
+and the middle one counts twice."""
+
+SMOOTH = 1e-9  # the same as a share of the signal's range, where a file has all digits
+
+BENT = 50.0
+"""How far three samples usually are off a straight line, in what rounding makes of one: below, it can't be decided. The
+line itself must go further than that: a motion that settles without noise is straight in the end."""
+
+SELDOM = 0.05  # share of equal neighbours elsewhere up to which twenty in a row are no chance: 1e-26
+
+
+@dataclass(frozen=True, slots=True)
+class NotRead:
+    """Rows of a channel that no sensor has read, shape (N,), and what is there instead."""
+
+    channel: str
+    rows: BoolArray
+    held: bool
+
+
+def not_read(channel: str, values: FloatArray, seen: BoolArray, may_rest: bool) -> list[NotRead]:
+    """Return the rows in which a channel is interpolated, and those in which it is held at one value."""
+    whole = seen[:-2] & seen[1:-1] & seen[2:]
+    steps = np.abs(np.diff(values))
+    if not whole.any() or not (steps > 0.0).any():
+        return []
+    rounding = max(ROUNDING * float(steps[steps > 0.0].min()), SMOOTH * float(np.ptp(values[seen])))
+    bend = np.abs(np.diff(values, 2))
+    bent = bend[whole & (bend > rounding)]
+    usual = float(np.median(bent)) if bent.size else 0.0
+    if usual < BENT * rounding:
+        return []
+    drawn, held = np.zeros_like(seen), np.zeros_like(seen)
+    for first, behind in runs(whole & (bend <= rounding)):
+        rows = slice(first, behind + 2)  # a triple has two rows more
+        if behind + 2 - first < FEWEST_IN_A_ROW:
+            continue
+        moved = float(np.ptp(values[rows]))
+        drawn[rows] |= moved >= usual
+        held[rows] |= moved == 0.0 and values[first] != 0.0
+    if may_rest or float(np.mean(steps[~(held[1:] & held[:-1])] == 0.0)) > SELDOM:
+        held[:] = False
+    return [NotRead(channel, rows, rows is held) for rows in (drawn, held) if rows.any()]
+
+
+def without_not_read(records: Sequence[Record]) -> tuple[list[Record], list[str]]:
+    """Mask the rows in which the output was not read; say so.
+
+    A torque that lies on straight lines may be one that was commanded: ramps, and levels.
+    """
+    mended, warnings = [], []
+    for record in records:
+        okay = record.okay.copy()
+        seen = record.okay & np.isfinite(record.output)
+        for found in not_read(record.kind.value, record.output, seen, record.kind is not OutputKind.SPEED):
+            okay &= ~found.rows
+            what = "stands still to the last digit" if found.held else "lies on straight lines to the last digit"
+            why = "its reading had stopped" if found.held else "it was interpolated, not read"
+            warnings.append(
+                f"recording {record.name}: the {found.channel} {what} in {found.rows.mean():.1%} of the rows: {why} "
+                "there; these rows are not used. Give the raw recording, with its gaps."
+            )
+        mended.append(record if np.array_equal(okay, record.okay) else replace(record, okay=okay))
+    return mended, warnings
+
+
+MOST = 500_000
+"""Samples of all recordings, counted once for each recording: 12 of 3000 samples. A fit takes some 1.4 kB for each."""
+
+SEED = 1
+
+
+def with_room(segments: Cut, training: Iterable[str]) -> tuple[Cut, list[str]]:
+    """Leave out pieces of the recordings that are fitted, as many as a fit can't hold; say which are used."""
+    pieces = segments.of(training)
+    used = list(pieces)
+    while (size := _size(used)) > MOST and len(used) > 1:
+        used = _some(pieces, min(int(len(used) * sqrt(MOST / size)), len(used) - 1))
+    if len(used) == len(pieces):
+        return segments, []
+    left_out = {piece.name for piece in pieces} - {piece.name for piece in used}
+    kept = tuple(record for record in segments.records if record.name not in left_out)
+    return replace(segments, records=kept), [_warning(used, pieces)]
+
+
+def _size(pieces: Sequence[Record]) -> int:
+    return len(pieces) * sum(int(piece.output.shape[0]) for piece in pieces)
+
+
+def _some(pieces: Sequence[Record], count: int) -> list[Record]:
+    """Return one of each of so many equal parts of the list, at least one in all."""
+    edges = np.linspace(0, len(pieces), max(count, 1) + 1).astype(int)
+    return [pieces[i] for i in np.random.default_rng(SEED).integers(edges[:-1], edges[1:])]
+
+
+def _warning(used: Sequence[Record], pieces: Sequence[Record]) -> str:
+    return (
+        f"{len(used)} of {len(pieces)} recordings are used (each piece between long gaps, or stretch of a long one, "
+        f"counts as one), drawn from the whole list: {', '.join(piece.name for piece in used)}. Each has unknowns of "
+        "its own, so more would take gigabytes. Give those that matter, and the others by --holdout."
+    )
+
+
+LONGEST_S = 0.01
+LONGEST_OF_RIGID_S = 0.02
+"""The same where a likelihood of the samples is formed: on a millisecond's grid only an encoder's steps are seen."""
+
+BAND_POWER = 0.99
+"""Share of the power of what a joint takes that lies within its band: a joint has no mode, its motion is imposed."""
+
+FEWEST_KEPT = 200
+"""Samples of the shortest recording that are kept in any case: fewer do not carry a model with a dozen unknowns."""
+
+TURN = 2.0 * np.pi
+PER_PERIOD = 12.0  # samples kept per period of the line's fastest mode, at least; and one in `LONGEST_S`
+
+
+def thinned(records: Sequence[Record], model: DrivelineModel) -> list[Record]:
+    """Return recordings with as many samples as the model's fastest mode needs; those that have no more as they are."""
+    if share_of(records) >= 1.0 or model.structure is Structure.JOINT:
+        return list(records)
+    return [thin(record, factor_for([record], model)) for record in records]
+
+
+def as_slow_as_needed(records: Sequence[Record], model: DrivelineModel) -> list[Record]:
+    """Return recordings with no more samples than the line can answer to: between them only the sensor is seen."""
+    shortest = min(record.okay.size for record in records)
+    factor = min(factor_for(records, model, LONGEST_OF_RIGID_S), max(shortest // FEWEST_KEPT, 1))
+    return [thin(record, factor) for record in records]
+
+
+def factor_for(records: Sequence[Record], model: DrivelineModel, longest_s: float = LONGEST_S) -> int:
+    """Return one in how many samples is enough for recordings of one sampling period."""
+    joint = model.structure is Structure.JOINT
+    fastest_hz = max(map(_band_hz, records)) if joint else float(natural_frequencies_rad_s(model.values())[-1]) / TURN
+    if fastest_hz > 0.0:
+        longest_s = min(longest_s, 1.0 / (PER_PERIOD * fastest_hz))
+    return max(1, int(longest_s / records[0].sample_time_s * (1.0 + 1e-9)))
+
+
+def _band_hz(record: Record) -> float:
+    """Return the frequency below which nearly all the power of an output is [Hz]."""
+    output = np.where(record.okay, record.output, np.mean(record.output[record.okay]))
+    power = np.cumsum(np.abs(np.fft.rfft(output - output.mean())) ** 2)
+    index = int(np.searchsorted(power, BAND_POWER * power[-1]))
+    return float(np.fft.rfftfreq(output.size, record.sample_time_s)[index])
+
+
+def thin(record: Record, factor: int) -> Record:
+    """Return a recording with one in ``factor`` of its samples."""
+    if factor == 1:
+        return record
+    count = record.okay.size // factor
+    kept = slice(0, count * factor, factor)
+    trusted = np.asarray(_blocks(record.torque_trusted, factor).all(axis=1))
+    return replace(
+        record,
+        sample_time_s=factor * record.sample_time_s,
+        time_s=record.time_s[kept],
+        torque_nm=_blocks(record.torque_nm, factor).mean(axis=1),
+        output=record.output[kept],
+        okay=record.okay[kept],
+        torque_okay=None if record.torque_okay is None else trusted,
+        offset_s=None if record.offset_s is None else record.offset_s[kept],
+        imposed=None if record.imposed is None else record.imposed[kept],
+        reference_nm=None if record.reference_nm is None else _blocks(record.reference_nm, factor).mean(axis=1),
+        load_nm=None if record.load_nm is None else _blocks(record.load_nm, factor).mean(axis=1),
+        channels=tuple(replace(each, output=each.output[kept], okay=each.okay[kept]) for each in record.channels),
+    )
+
+
+def _blocks(values: NDArray[Any], factor: int) -> NDArray[Any]:
+    count = values.shape[0] // factor
+    return values[: count * factor].reshape(count, factor, *values.shape[1:])
+
+
+FEWEST_SAMPLES = 200  # fewer good samples than this do not carry a model with a dozen unknowns and its hold-out
 
 NEAR_MODE = 0.7
 """From this share of the first natural frequency on a line answers otherwise than one body: by ``1 / (1 - 0.7^2)``,
@@ -104,16 +286,14 @@ def _unexcited_mode(records: Sequence[Record], line: DrivelineModel, grid: Grid,
 
 def _good(record: Record, signal: FloatArray) -> FloatArray:
     """Return a signal's good samples without mean and trend."""
-    good: FloatArray = detrend(signal[record.okay])
-    return good
+    return detrend(signal[record.okay])
 
 
 def _rms(signals: Sequence[FloatArray]) -> float:
     return math.sqrt(sum(float(signal @ signal) for signal in signals) / sum(signal.size for signal in signals))
 
 
-SAME_PERIOD = 1e-3
-"""Relative difference of sampling periods that rounding of time stamps makes."""
+SAME_PERIOD = 1e-3  # relative difference of sampling periods that rounding of time stamps makes
 
 
 def require_together(records: Sequence[Record]) -> None:
@@ -158,12 +338,11 @@ class Prepared:
 
 
 def as_moved(records: Sequence[Record]) -> tuple[list[Record], list[str]]:
-    """Return recordings without what no sensor has read, and what there is to say of it."""
     warnings: list[str] = []
     mended = list(records)
     for mend in (unwrapped, without_clipped, without_not_read, with_usable_channels):
-        mended, said = mend(mended)
-        warnings += said
+        mended, notes = mend(mended)
+        warnings += notes
     return mended, warnings
 
 
@@ -191,7 +370,7 @@ def prepare(records: Sequence[Record], model: DrivelineModel, holdout: Sequence[
     require_together([*records, *holdout] if records else records)
     mended, warnings = as_moved([*records, *holdout])
     for record in mended:
-        for each in outputs_apart([record], lambda _: 1.0):
+        for each in separated_outputs([record], lambda _: 1.0):
             output_state(each, model.structure)
         require_signals(record)
     names = [record.name for record in records]

@@ -29,7 +29,7 @@ from estimator.diagnosis.preconditions.explanations import (
 )
 from estimator.diagnosis.preconditions.inertia import BODY_TELLS, Inertia, as_one_body, fitted_inertia
 from estimator.errors import BadModel, Cure, Implausible
-from estimator.physics.grid import Grid, grid_for
+from estimator.physics.layout import Grid, grid_for
 from estimator.physics.model import DrivelineModel, Motion, Parameter, Structure, parameter_unit
 from estimator.signals.record import FloatArray, OutputKind, Record
 
@@ -40,11 +40,8 @@ smallest factor between units (3.6) is more."""
 FAR_AHEAD, OVER_THE_NEXT = 0.5, 4.0
 """Odds of an explanation from which on the line that cures it is given, and how much larger than those of the next."""
 
-DOUBTFUL = 0.3
-"""Odds that nothing is wrong below which a recording whose inertia is plausible is doubted."""
-
-FEWEST_ODDS, MOST_NAMED = 0.01, 7
-"""Odds from which on an explanation is named, and how many are."""
+DOUBTFUL = 0.3  # odds that nothing is wrong below which a recording whose inertia is plausible is doubted
+FEWEST_ODDS, MOST_NAMED = 0.01, 7  # odds from which on an explanation is named, and how many are
 
 MOST_LOAD = 10.0
 """Factor by which a load machine's torque may exceed all torque of the motor: more would turn the motor over."""
@@ -60,10 +57,7 @@ UNKNOWN_FIT = 1.0 / 6.0
 
 
 def require_plausible_units(records: Sequence[Record], model: DrivelineModel) -> list[Implausible]:
-    """Refuse recordings whose torque, output or time is off by a factor, in sign, or another column's.
-
-    Returns what is doubtful: recordings that could be of a model that lacks physics, and are likelier in another unit.
-    """
+    """Refuse recordings whose torque, output or time is off by a factor, in sign, or another column's."""
     for record in records:
         _require_plausible_load(record)
     refusal, doubts = _judged(records, replace(model, effects={}))
@@ -151,7 +145,6 @@ def _text(
 
 
 def _follows(explanation: Explanation, record: Record, line: DrivelineModel) -> str:
-    """Return what an explanation makes of the largest torque and output that were read."""
     torque, unit = ("torque", "Nm") if line.motion is Motion.ROTATION else ("force", "N")
     read_nm, read = largest(record)
     follows = f", {torque}s up to {explanation.torque_nm:.3g} {unit} then" if explanation.torque_nm != read_nm else ""
@@ -161,7 +154,6 @@ def _follows(explanation: Explanation, record: Record, line: DrivelineModel) -> 
 
 
 def _cured(record: Record, cure: Cure) -> Record:
-    """Return a recording with a cure applied."""
     if cure.swapped is not None or cure.kind is not None:
         same = (
             change
@@ -204,8 +196,7 @@ def _require_plausible_load(record: Record) -> None:
 FASTEST_RAD_S = 2500.0
 """Speed of a traction motor that is not reached: 24,000 rpm. A speed in rpm is."""
 
-ALONE = 0.75
-"""Odds from which on a recording is refused by itself."""
+ALONE = 0.75  # odds from which on a recording is refused by itself
 
 SLOWEST_LOGGED_S = 5.0
 """Vehicles are logged once a second by telemetry; slower than this, a time in milliseconds is more likely."""
@@ -253,7 +244,6 @@ def _require_plausible_period(record: Record) -> None:
 
 
 def _of_the_torque_path(record: Record) -> Iterator[Change]:
-    """Yield a torque that stops at a limit, or is lost over time: either makes an inertia look too large."""
     for torque in _lessened(record):
         lessened = replace(record, torque_nm=torque)
         question = "does the torque stop at a limit, or is it lost over time"

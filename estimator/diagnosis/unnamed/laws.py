@@ -12,13 +12,11 @@ from functools import partial
 import numpy as np
 from scipy.signal import lfilter
 
-from estimator.diagnosis.line import Motion
+from estimator.diagnosis.line.blocks import Motion
 from estimator.physics.effect import Element
-from estimator.signals.record import FloatArray
-from estimator.signals.slider import carried
+from estimator.signals.record import FloatArray, carried
 
-ROUNDED = 0.02
-"""A sign function changes over this share of its argument's range."""
+ROUNDED = 0.02  # a sign function changes over this share of its argument's range
 
 KNOTS = 9
 """Of a free function of one signal: between its first and 99th percentile, the same share of samples between two."""
@@ -32,40 +30,31 @@ def top_of(values: FloatArray) -> float:
 def sign(values: FloatArray) -> FloatArray:
     """Return a signal's sign, rounded about zero."""
     width = ROUNDED * top_of(values)
-    rounded: FloatArray = np.tanh(values / width)
-    return rounded
+    return np.tanh(values / width)
 
 
 def inside(values: FloatArray, share: float) -> FloatArray:
     """Return a signal held at a share of its range."""
     limit = share * top_of(values)
-    held: FloatArray = np.clip(values, -limit, limit)
-    return held
+    return np.clip(values, -limit, limit)
 
 
 def beyond(values: FloatArray, share: float) -> FloatArray:
-    """Return what a signal is beyond a share of its range."""
-    excess: FloatArray = values - inside(values, share)
-    return excess
+    return values - inside(values, share)
 
 
 def slide(values: FloatArray, share: float) -> FloatArray:
     """Return what a slider carries that yields after a share of a signal's range (Prandtl)."""
-    load: FloatArray = carried(values, share * top_of(values))
-    return load
+    return carried(values, share * top_of(values))
 
 
 def peaked(speed: FloatArray, share: float) -> FloatArray:
-    """Return a drag that is greatest at a share of the top speed, as of eddy currents."""
     there = speed / (share * top_of(speed))
-    drag: FloatArray = there / (1.0 + there**2)
-    return drag
+    return there / (1.0 + there**2)
 
 
 def fading(speed: FloatArray, share: float) -> FloatArray:
-    """Return a friction that fades away over a share of the top speed (Stribeck)."""
-    friction: FloatArray = sign(speed) * np.exp(-np.abs(speed) / (share * top_of(speed)))
-    return friction
+    return sign(speed) * np.exp(-np.abs(speed) / (share * top_of(speed)))
 
 
 def behind(values: FloatArray, motion: Motion, time_constant_s: float) -> FloatArray:
@@ -73,26 +62,22 @@ def behind(values: FloatArray, motion: Motion, time_constant_s: float) -> FloatA
     period_s = float(motion.time_s[1] - motion.time_s[0])
     keep = np.exp(-period_s / time_constant_s)
     lagged = lfilter([1.0 - keep], [1.0, -keep], values - values[0]) + values[0]
-    late: FloatArray = lagged - values
-    return late
+    return lagged - values
 
 
 def rate(values: FloatArray, motion: Motion) -> FloatArray:
     """Return a signal's change per second."""
-    slope: FloatArray = np.gradient(values, motion.time_s)
-    return slope
+    return np.gradient(values, motion.time_s)
 
 
 def since_start(motion: Motion) -> FloatArray:
     """Return the time since the first block [s]."""
-    since: FloatArray = motion.time_s - motion.time_s[0]
-    return since
+    return motion.time_s - motion.time_s[0]
 
 
 def decaying(values: FloatArray, motion: Motion, time_s: float) -> FloatArray:
     """Return a signal whose part decays over a time, as oil warms up."""
-    part: FloatArray = values * np.exp(-since_start(motion) / time_s)
-    return part
+    return values * np.exp(-since_start(motion) / time_s)
 
 
 def rising(values: FloatArray, motion: Motion, time_s: float) -> FloatArray:
@@ -101,9 +86,7 @@ def rising(values: FloatArray, motion: Motion, time_s: float) -> FloatArray:
 
 
 def at_low_speed(values: FloatArray, motion: Motion, share: float) -> FloatArray:
-    """Return a signal that fades with the speed, over a share of its top."""
-    faded: FloatArray = values / (1.0 + (motion.speed / (share * top_of(motion.speed))) ** 2)
-    return faded
+    return values / (1.0 + (motion.speed / (share * top_of(motion.speed))) ** 2)
 
 
 def knots_of(values: FloatArray) -> FloatArray:
@@ -138,17 +121,14 @@ def _twist(m: Motion) -> FloatArray:
 
 
 def _twist_rate(m: Motion) -> FloatArray:
-    apart: FloatArray = m.speed - m.load_speed
-    return apart
+    return m.speed - m.load_speed
 
 
 def _of(function: Callable[[FloatArray, float], FloatArray], signal: Law, size: float) -> Law:
-    """Return a function with one size of a signal."""
     return lambda m: function(signal(m), size)
 
 
 def _with(function: Callable[[FloatArray, Motion, float], FloatArray], signal: Law, time_s: float) -> Law:
-    """Return a function with one time of a signal and of its course."""
     return lambda m: function(signal(m), m, time_s)
 
 

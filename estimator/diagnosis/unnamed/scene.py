@@ -11,21 +11,20 @@ from typing import Protocol
 
 import numpy as np
 
-from estimator.diagnosis.line import (
+from estimator.diagnosis.line.blocks import (
     DRIVES,
     FORCES,
     NO_FORCE,
     PLACES,
-    Explanation,
     Force,
     Line,
     Motion,
     Place,
     block_mean_of,
-    explain_all,
     lines,
     simulated_each,
 )
+from estimator.diagnosis.line.equivalent import Explanation, explain_all
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult
 from estimator.physics.jacobian import jacobian_at
@@ -62,8 +61,7 @@ class Scene:
         line = self.cut[index]
         if self.filter is None:
             return columns[line.rows]
-        whitened: FloatArray = self.filter.part(index, columns[line.okay])[line.stretches[line.okay]]
-        return whitened
+        return self.filter.part(index, columns[line.okay])[line.stretches[line.okay]]
 
     @property
     def errors(self) -> list[FloatArray]:
@@ -83,7 +81,6 @@ def scene(result: FitResult, floor: float, whitening: Filter | None = None) -> S
 
 
 def elements(result: FitResult) -> tuple[Element, ...]:
-    """Return the elements at which laws are tried on a fit."""
     if result.problem.grid.structure is Structure.JOINT:
         return (Element.SHAFT,)
     found = [Element.TORQUE_PATH, Element.MOTOR]
@@ -95,17 +92,7 @@ def elements(result: FitResult) -> tuple[Element, ...]:
 
 
 class Ground:
-    """What the free unknowns of a fit could explain, to first order; rows are the blocks in use of all recordings.
-
-    Attributes
-    ----------
-    raw, error : ndarray, shape (rows,)
-        The error, and what re-tuning would leave of it.
-    jacobian : ndarray, shape (rows, U)
-        Derivative of the output by every unknown.
-    basis : ndarray, shape (rows, F)
-        Orthonormal basis of what the free unknowns move.
-    """
+    """What the free unknowns of a fit could explain, to first order; rows are the blocks in use of all recordings."""
 
     def __init__(self, cut: Sequence[Line], jacobian: FloatArray, error: FloatArray, pinned: BoolArray) -> None:
         self.jacobian, self.raw, self.unknowns = jacobian, error, jacobian.shape[1]
@@ -114,21 +101,14 @@ class Ground:
         self.error = self.rest(error)
 
     def rest(self, signals: FloatArray) -> FloatArray:
-        """Return what is left of signals, shape (rows,) or (rows, q)."""
-        left: FloatArray = signals - self.basis @ (self.basis.T @ signals)
-        return left
+        return signals - self.basis @ (self.basis.T @ signals)
 
     def split(self, rows: FloatArray) -> list[FloatArray]:
-        """Split rows into one array per recording."""
         return list(np.split(rows, self._sizes))
 
 
 def ground_of(view: Scene) -> Ground:
-    """Return what re-tuning a fit further could explain of its error.
-
-    The derivative is found anew: that of a fit is of the place before its last step. That is near enough for all but
-    this. Of a drifting position re-tuning explains nearly all that a law does, and the rest is in the fifth digit.
-    """
+    """Return what re-tuning a fit further could explain of its error."""
     result = view.result
     jacobian = jacobian_at(result.problem, result.x, result.outputs)
     row, parts = 0, []
@@ -152,8 +132,7 @@ class Extra:
 
     def outputs(self, result: FitResult, points: Sequence[FloatArray], index: int) -> FloatArray:
         """Simulate the output of one recording with the law at K vectors of unknowns, shape (K, N)."""
-        moved: FloatArray = simulated_each(result, points, index, self.forces[index]) + self.readings[index]
-        return moved
+        return simulated_each(result, points, index, self.forces[index]) + self.readings[index]
 
 
 def extra_of(view: Scene, element: Element, weights: Sequence[FloatArray]) -> Extra:

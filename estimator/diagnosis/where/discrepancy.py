@@ -8,34 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import stats
 
-from estimator.diagnosis.intervals import Z95
-from estimator.diagnosis.line import (
-    DRIVES,
-    PLACES,
-    Explanation,
-    Input,
-    Line,
-    Motion,
-    Place,
-    block_mean_of,
-    explain,
-    lines,
-    size_at,
-    smooth,
-)
+from estimator.diagnosis.assemble import Z95
+from estimator.diagnosis.line.blocks import DRIVES, PLACES, Line, Motion, Place, block_mean_of, lines, size_at
+from estimator.diagnosis.line.equivalent import Explanation, Input, explain, smooth
 from estimator.diagnosis.noise import VERY_STRONG
 from estimator.diagnosis.result import Course, Discrepancy, Equivalent, LawPicture, RankedLaw
-from estimator.diagnosis.unnamed import (
-    ROUNDS,
-    ElementSearch,
-    Filter,
-    Scene,
-    UnnamedLaw,
-    judged,
-    scene,
-    searches_at,
-    without_law,
-)
+from estimator.diagnosis.unnamed.scene import Filter, Scene, scene
+from estimator.diagnosis.unnamed.search import ROUNDS, ElementSearch, judged, searches_at, without_law
 from estimator.diagnosis.where.locate import error_spectrum, responses
 from estimator.physics import model
 from estimator.physics.catalogue import EFFECTS
@@ -58,8 +37,7 @@ class Axis:
 
 
 def _twist_torque(motion: Motion, result: FitResult) -> FloatArray:
-    torque: FloatArray = result.p[slot("", "k")] * motion.twist
-    return torque
+    return result.p[slot("", "k")] * motion.twist
 
 
 TORQUE = Axis("torque", "torque", lambda m, _: m.torque)
@@ -82,12 +60,10 @@ AXES: Mapping[Element, tuple[Axis, ...]] = {
 
 
 def signal_unit(dimension: str, kind: Kind) -> str:
-    """Return the unit of a signal of a dimension."""
     return f"{unit('speed', kind)}/s" if dimension == "speed/s" else unit(dimension, kind)
 
 
 def input_unit(place: Place, result: FitResult, kind: Kind) -> str:
-    """Return the unit of an input at a place."""
     if place is not Place.SENSOR:
         return unit("torque", kind)
     names = {"speed": "speed", "position": "angle", "force": "torque"}
@@ -96,24 +72,15 @@ def input_unit(place: Place, result: FitResult, kind: Kind) -> str:
 
 BINS = 24
 
-FEWEST_PASSES = 3
-"""A bin that the signal passes less often says nothing of its own scatter."""
+FEWEST_PASSES = 3  # a bin that the signal passes less often says nothing of its own scatter
 
 
 @dataclass(frozen=True, slots=True)
 class Binned:
-    """Data and a law over the bins that the signal passes often enough, and how much of the law they tell.
+    """Data and a law over the bins that the signal passes often enough, and how much of the law they tell."""
 
-    Attributes
-    ----------
-    arrays : tuple of ndarray, shape (K,) each
-        Signal, data, lower and upper end of the data's 95 % interval, and law.
-    explained : float
-        Share of the law's power that is a function of the signal.
-    """
-
-    arrays: tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]
-    explained: float
+    arrays: tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]  # (K,)
+    explained: float  # share of the law's power that is a function of the signal
 
 
 def binned_by_pass(
@@ -144,7 +111,6 @@ def binned_by_pass(
 
 
 def _edges(values: FloatArray, low: float, high: float) -> FloatArray:
-    """Return bin edges, half as bins of one width would have them and half as bins of one count would."""
     grid = np.linspace(low, high, 20 * BINS + 1)
     counted = np.searchsorted(np.sort(values), grid) / values.size
     share = 0.5 * (grid - low) / (high - low) + 0.5 * (counted - counted[0]) / (counted[-1] - counted[0])
@@ -165,8 +131,7 @@ def _passes(bins: FloatArray, signals: Sequence[FloatArray]) -> tuple[FloatArray
     return bins[start], np.stack([*sums, length], axis=1)
 
 
-FUNCTION = 0.5
-"""Share of a law's power that must be a function of one signal to be drawn over it."""
+FUNCTION = 0.5  # share of a law's power that must be a function of one signal to be drawn over it
 
 
 def picture(
@@ -200,7 +165,6 @@ def picture(
 
 
 def _as_error(line: Line, difference: FloatArray) -> Line:
-    """Return a line whose error is a difference of simulations."""
     good = np.ones(difference.size, dtype=np.bool_)
     return replace(line, error=block_mean_of(difference, good, line.length)[0])
 
@@ -211,26 +175,22 @@ def discrepancy(
     floor: float,
     motion: model.Motion = model.Motion.ROTATION,
     rounds: int | None = None,
-    begun: Sequence[ElementSearch] = (),
+    initial: Sequence[ElementSearch] = (),
     whitening: Filter | None = None,
 ) -> Discrepancy:
     """Look at what a re-tuned model lacks, with the effects found or, without any, with laws without a name."""
     view = scene(retuned, floor, whitening)
     named = effects_added(retuned, final)
-    searches = searches_at(view, rounds or (1 if named else ROUNDS), begun)
-    laws = sorted(judged(view, searches), key=lambda law: -law.gain.delta_bic)
-    best = laws[0] if laws and laws[0].gain.delta_bic > 0.0 else None
+    searches = searches_at(view, rounds or (1 if named else ROUNDS), initial)
+    laws = sorted(judged(view, searches), key=lambda law: -law.delta_bic)
+    best = laws[0] if laws and laws[0].delta_bic > 0.0 else None
     if named:
         pictures = _pictures_of_effects(named, final, floor, motion)
     else:
         pictures = _picture_of_law(best, searches, floor, motion)
     return Discrepancy(
         element=None if best is None else best.element,
-        laws=tuple(
-            RankedLaw(law.element, law.terms, law.rms, law.gain.delta_bic, law.gain.p_value)
-            for law in laws
-            if law.terms
-        ),
+        laws=tuple(law for law in laws if law.terms),
         equivalents=_equivalents(view, motion),
         spectrum=error_spectrum(retuned, final, floor),
         responses=responses(retuned, final),
@@ -284,7 +244,6 @@ def _picture_of_effect(
 
 
 def without_effect(result: FitResult, name: str) -> FitResult:
-    """Return a fit with one effect's shared parameters at their nulls and all else as it is, simulated."""
     nulls = {parameter.name: parameter.null for parameter in EFFECTS[name].shared_parameters}
     kept = [j for j, shared in enumerate(result.problem.shared) if shared.effect != name]
     p = result.problem.p.copy()
@@ -299,7 +258,7 @@ def without_effect(result: FitResult, name: str) -> FitResult:
 
 
 def _picture_of_law(
-    best: UnnamedLaw | None, searches: Sequence[ElementSearch], floor: float, motion: model.Motion
+    best: RankedLaw | None, searches: Sequence[ElementSearch], floor: float, motion: model.Motion
 ) -> tuple[LawPicture, ...]:
     if best is None:
         return ()

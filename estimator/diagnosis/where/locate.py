@@ -9,7 +9,8 @@ from itertools import pairwise
 import numpy as np
 from scipy import signal, stats
 
-from estimator.diagnosis.line import Motion, motion_of
+from estimator.diagnosis.acquisition.finding import runs
+from estimator.diagnosis.line.blocks import Motion, motion_of
 from estimator.diagnosis.result import BandTest, ErrorSpectrum, Interval, Region, Response
 from estimator.errors import NotExciting
 from estimator.identification.spectral import SpectralEstimate, spectral_estimate
@@ -19,19 +20,12 @@ from estimator.physics.layout import slot
 from estimator.physics.model import Structure
 from estimator.signals.record import FloatArray, Record
 
-SEGMENT = 256
-"""Samples of a segment: 2.56 s at 10 ms, long enough to resolve a driveline's first mode."""
-
-FEWEST_PER_BAND = 3
-"""Frequencies in a band at least."""
+SEGMENT = 256  # samples of a segment: 2.56 s at 10 ms, long enough to resolve a driveline's first mode
+FEWEST_PER_BAND = 3  # frequencies in a band at least
 
 
 def error_spectrum(before: FitResult, after: FitResult, floor: float) -> ErrorSpectrum:
-    """Return the density of the error of two fits of the same recordings, and where the first stands above the floor.
-
-    Welch's average over all recordings of at least a segment, Hann window; each band of an octave is tested against
-    white noise of the floor's size, corrected for the number of bands.
-    """
+    """Return the density of the error of two fits, and where the first stands above the floor."""
     records = before.problem.records
     length = min(SEGMENT, *(record.okay.size for record in records))
     frequency, first, averages = _density(records, before.outputs, length)
@@ -83,17 +77,10 @@ def _octaves(frequency: FloatArray) -> FloatArray:
     return np.array([*edges, float(frequency[0])][::-1]) if edges[-1] > frequency[0] else np.array(edges[::-1])
 
 
-COHERENT = 0.5
-"""Share of the output's power that the torque must explain before a response is compared there."""
+COHERENT = 0.5  # share of the output's power that the torque must explain before a response is compared there
 
 
 def responses(before: FitResult, after: FitResult) -> dict[str, Response]:
-    """Return the response of each recording and of both models in it; recordings too short or masked have none.
-
-    Torque and output are differenced first: that changes no response, and a slow course of the speed does not leak. The
-    models' responses are estimated from their simulations in the same way, so that what the method distorts is alike.
-    A joint has none: its torque is the output.
-    """
     found: dict[str, Response] = {}
     if before.problem.grid.structure is Structure.JOINT:
         return found
@@ -144,26 +131,19 @@ def _p_value(measured: SpectralEstimate, model: SpectralEstimate) -> float:
     return float(stats.chi2.sf(float(apart @ apart), degrees))
 
 
-WINDOW_S = 0.5
-"""Errors are averaged over this time before they are called a mismatch."""
-
-FALSE_ALARM = 0.01
-"""Probability that noise alone is called a mismatch anywhere in a recording."""
+WINDOW_S = 0.5  # errors are averaged over this time before they are called a mismatch
+FALSE_ALARM = 0.01  # probability that noise alone is called a mismatch anywhere in a recording
 
 SMALLEST_RATIO = 1.2
 """Mean square, in floors, that a window must reach at least: the floor itself is known to about a tenth."""
 
-CENTRAL = 0.8
-"""Share of the mismatch's power that band and region hold."""
-
-LONGEST_SEGMENT = 512
-"""Samples of a segment of Welch's average."""
+CENTRAL = 0.8  # share of the mismatch's power that band and region hold
+LONGEST_SEGMENT = 512  # samples of a segment of Welch's average
 
 
 def _errors(result: FitResult, index: int) -> FloatArray:
     record = result.problem.records[index]
-    errors: FloatArray = np.where(record.okay, result.outputs[index] - record.output, 0.0)
-    return errors
+    return np.where(record.okay, result.outputs[index] - record.output, 0.0)
 
 
 def _window_power(result: FitResult, index: int) -> tuple[FloatArray, FloatArray]:
@@ -182,8 +162,7 @@ def excess(result: FitResult, index: int, floor: float) -> FloatArray:
     windows = max(power.size / max(float(count.max()), 1.0), 1.0)
     degrees, where = np.unique(np.maximum(count, 1.0), return_inverse=True)
     ratio = np.maximum(stats.chi2.isf(FALSE_ALARM / windows, degrees) / degrees, SMALLEST_RATIO)[where]
-    stands: FloatArray = np.where(power > ratio * floor**2, power - floor**2, 0.0)
-    return stands
+    return np.where(power > ratio * floor**2, power - floor**2, 0.0)
 
 
 def intervals(result: FitResult, floor: float) -> dict[str, tuple[Interval, ...]]:
@@ -194,8 +173,7 @@ def intervals(result: FitResult, floor: float) -> dict[str, tuple[Interval, ...]
     found = {}
     for i, record in enumerate(result.problem.records):
         above = excess(result, i, floor) > 0.0
-        edges = np.flatnonzero(np.diff(np.concatenate([[0], above.astype(int), [0]])))
-        spans = [(float(record.time_s[a]), float(record.time_s[b - 1])) for a, b in edges.reshape(-1, 2)]
+        spans = [(float(record.time_s[a]), float(record.time_s[b - 1])) for a, b in runs(above)]
         shortest = 0.5 * min(WINDOW_S, float(record.time_s[-1] - record.time_s[0]))
         kept = [span for span in _merged(spans) if span[1] - span[0] >= shortest]
         if kept:
@@ -204,7 +182,6 @@ def intervals(result: FitResult, floor: float) -> dict[str, tuple[Interval, ...]
 
 
 def _merged(spans: Sequence[Interval]) -> list[Interval]:
-    """Join intervals that are closer than a window."""
     joined: list[Interval] = []
     for low, high in spans:
         if joined and low - joined[-1][1] < WINDOW_S:
@@ -232,7 +209,6 @@ def band_hz(mismatch: Sequence[FloatArray], sample_times_s: Sequence[float], noi
 
 
 def region(result: FitResult, element: Element, floor: float = 0.0) -> Region:
-    """Return the range of the element's own signal that holds the central part of the error's power above the floor."""
     values, weights = [], []
     for i in range(len(result.problem.records)):
         values.append(_signal(element, motion_of(result, i), result))
@@ -259,8 +235,7 @@ def _signal(element: Element, motion: Motion, result: FitResult) -> FloatArray:
     if element is Element.TORQUE_PATH:
         return motion.torque
     if element is Element.SHAFT:
-        stiffness: FloatArray = result.p[slot("", "k")] * motion.twist
-        return stiffness
+        return result.p[slot("", "k")] * motion.twist
     return motion.load_speed if element is Element.LOAD else motion.speed
 
 

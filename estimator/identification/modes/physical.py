@@ -5,22 +5,6 @@ Torque at the motor in, motor speed out, is of third order with six coefficients
     w_M     1          J_L s^2 + (c + b_L) s + k
     --- =  ---  ----------------------------------------------------------------------------------------------------
     T_M     1   J_M J_L s^3 + (J_M (c+b_L) + J_L (c+b_M)) s^2 + ((J_M+J_L) k + c (b_M+b_L) + b_M b_L) s + k (b_M+b_L)
-
-They are estimated from the linear model in place of the data (indirect prediction-error method: T. Soderstrom, P.
-Stoica and B. Friedlander, Automatica 27, 1991): with theta(x) the coefficients of the drive x, sampled with held
-input, and P the covariance of the estimate theta_hat, minimise the deviance::
-
-    D(x) = (theta(x) - theta_hat)^T P^-1 (theta(x) - theta_hat)  +  sum of ((x_i - known_i) / std_i)^2
-
-over what a line can be: inertias and stiffness above 0, damping and frictions 0 or more (it is then passive). The
-second sum holds what is known beforehand. Intervals are profile likelihood (Meeker and Escobar, The American
-Statistician 49, 1995): the values v of a parameter for which the least D with x_i = v is within the chi-square quantile
-of the minimum.
-They end at 0 where the data allow it, and reach as far up as the data do: no normal distribution is supposed.
-
-A parameter is determined where its interval is short against the value, and not where it leaves out 0 alone. Near
-constant speed friction is distinguished from the load torque by the lowest frequencies alone, and a motor friction b_M
-damps the resonance almost as c does: each is then left open, and the sum c + b_M is sharp all the same.
 """
 
 from __future__ import annotations
@@ -36,9 +20,8 @@ from scipy.stats import chi2
 
 from estimator.errors import BadModel, BadSetting
 from estimator.identification.linear_model import LinearModel, Orders
-from estimator.identification.modes.modes import resonance
+from estimator.identification.modes.modes import QUANTILE, Uncertain, resonance
 from estimator.identification.modes.reduced import THIRD, to_continuous
-from estimator.identification.modes.uncertainty import QUANTILE, Uncertain
 from estimator.signals.record import FloatArray
 
 UNITS = MappingProxyType(
@@ -51,11 +34,8 @@ NAMES = tuple(UNITS)
 SUMS = MappingProxyType({"J_M + J_L": (0, 1), "c + b_M": (3, 4), "b_M + b_L": (4, 5)})
 """Often determined where the single ones are not."""
 
-POSITIVE = 3
-"""The first parameters are above 0 and estimated by their logarithms; the others may be 0."""
-
-RESPONDING = Orders(THIRD, THIRD, 1)
-"""Structure of a sampled two-mass drive: one sample of delay."""
+POSITIVE = 3  # the first parameters are above 0 and estimated by their logarithms; the others may be 0
+RESPONDING = Orders(THIRD, THIRD, 1)  # structure of a sampled two-mass drive: one sample of delay
 
 IMPLAUSIBLE = float(chi2.isf(1e-3, 2 * THIRD))
 """Deviance from which on no line that can be responds like this: one in 1000, all six coefficients free."""
@@ -80,21 +60,12 @@ CURES = MappingProxyType(
 
 @dataclass(frozen=True, slots=True)
 class PhysicalParameter:
-    """One parameter with its unit and uncertainty.
-
-    Attributes
-    ----------
-    name, unit : str
-    estimate : Uncertain
-        Value, standard deviation and 95 % interval.
-    statement : str
-        What the data say of it, and what would tell where they don't.
-    """
+    """One parameter with its unit and uncertainty."""
 
     name: str
     unit: str
-    estimate: Uncertain
-    statement: str
+    estimate: Uncertain  # value, standard deviation and 95 % interval
+    statement: str  # what the data say of it, and what would tell where they don't
 
     @property
     def is_determined(self) -> bool:
@@ -104,22 +75,11 @@ class PhysicalParameter:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PhysicalEstimate:
-    """The two-mass drive that a linear model is the response of.
+    """The two-mass drive that a linear model is the response of."""
 
-    Attributes
-    ----------
-    parameters : Mapping[str, PhysicalParameter]
-        ``J_M, J_L, k, c, b_M, b_L``.
-    sums : Mapping[str, PhysicalParameter]
-        ``J_M + J_L``, ``c + b_M``, ``b_M + b_L``: often determined where the single ones are not.
-    misfit : float
-        The least deviance: chi-square of the coefficients against the drive's and of what was known; 0 without the
-        latter where the estimate is a line that can be.
-    """
-
-    parameters: Mapping[str, PhysicalParameter]
-    sums: Mapping[str, PhysicalParameter]
-    misfit: float
+    parameters: Mapping[str, PhysicalParameter]  # ``J_M, J_L, k, c, b_M, b_L``
+    sums: Mapping[str, PhysicalParameter]  # ``J_M + J_L``, ``c + b_M``, ``b_M + b_L``
+    misfit: float  # the least deviance
 
     @property
     def undetermined(self) -> tuple[str, ...]:
@@ -203,11 +163,9 @@ class _Likelihood:
     most: FloatArray
 
     def parameters(self, z: FloatArray) -> FloatArray:
-        """Return the parameters of one z or of several, in its shape."""
         return np.concatenate([np.exp(z[..., :POSITIVE]), self.unit * z[..., POSITIVE:]], axis=-1)
 
     def residual(self, z: FloatArray) -> FloatArray:
-        """Return the whitened differences, shape (m, 6 + known), of z of shape (m, 6)."""
         x = self.parameters(z)
         off = (coefficients_of(x, self.model.sample_time_s) - self.model.theta) @ self.whitening.T
         prior = [(x[:, i] - one.value) / one.std for i, one in self.known.items()]

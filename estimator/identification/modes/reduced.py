@@ -5,13 +5,7 @@ it holds one more, which a zero nearly cancels or which stands for what the samp
 Moore, IEEE Trans. Automatic Control 26, 1981) leaves out the states that are both hard to reach from the input and
 hard to see in the output. Its error is bounded at every frequency (D. F. Enns, 1984)::
 
-    |G(f) - G_r(f)|  <=  2 (sigma_(r+1) + ... + sigma_n)
-
-with sigma the Hankel singular values; the bound tells what the left-out order was worth.
-
-With the input held between samples, ``exp([[A_c, B_c], [0, 0]] T) = [[A, B], [0, 1]]`` (Astrom and Wittenmark,
-Computer-Controlled Systems, chapter 2); its matrix logarithm takes a sampled model back to continuous time, zeros and
-all. Signals that were decimated through a low-pass were not held: their zeros, unlike their poles, are off.
+    |G(f) - G_r(f)|  <=  2 (sigma_(r+1) + ... + sigma_n),    sigma the Hankel singular values
 """
 
 from __future__ import annotations
@@ -23,7 +17,7 @@ from scipy.linalg import logm, schur
 
 from estimator.errors import BadModel, BadShape
 from estimator.identification.linear_model import ComplexArray, LinearModel
-from estimator.identification.modes.uncertainty import propagate, square_root
+from estimator.identification.modes.modes import propagate, square_root
 from estimator.signals.record import FloatArray
 
 
@@ -93,28 +87,15 @@ at 1, as those of fast recordings do, rounding may put one of them outside."""
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Reduced:
-    """A model of lower order and what it left out.
+    """A model of lower order and what it left out."""
 
-    Attributes
-    ----------
-    model : LinearModel
-        Of the order asked for, or of the original one where that is no higher.
-    covariance : ndarray, shape (n, n), or None
-        Of its theta; None if that of the original was not given.
-    hankel : ndarray
-        Hankel singular values of the original, largest first [output unit per input unit].
-    largest_error : float
-        Bound of the change of the frequency response at any frequency [output unit per input unit].
-    """
-
-    model: LinearModel
-    covariance: FloatArray | None
+    model: LinearModel  # of the order asked for, or of the original one where that is no higher
+    covariance: FloatArray | None  # of its theta
     hankel: FloatArray
     largest_error: float
 
 
 def third_order(model: LinearModel, covariance: FloatArray | None = None) -> Reduced:
-    """Return the third-order equivalent of a stable model."""
     return reduce_order(model, THIRD, covariance)
 
 
@@ -137,11 +118,7 @@ def reduce_order(model: LinearModel, order: int, covariance: FloatArray | None =
 
 
 def _gramian(A: FloatArray, Q: FloatArray) -> FloatArray:
-    """Return the sum of ``A^k Q (A^T)^k`` over k, by doubling (R. A. Smith, SIAM J. Applied Mathematics 16, 1968).
-
-    A solver of the Lyapunov equation divides by what a pole lacks to 1; this only adds, however slow the pole, over a
-    horizon of samples.
-    """
+    """Return the sum of ``A^k Q (A^T)^k`` over k, by doubling (R. A. Smith, SIAM J. Applied Mathematics 16, 1968)."""
     total, power = Q, A
     for _ in range(MOST_DOUBLINGS):
         total, power = total + power @ total @ power.T, power @ power
@@ -163,11 +140,7 @@ def _as_model(theta: FloatArray, original: LinearModel, order: int) -> LinearMod
 def _triangular_form(
     A: FloatArray, B: FloatArray, C: FloatArray, D: float
 ) -> tuple[FloatArray, FloatArray, FloatArray, float]:
-    """Return the states in their Schur form: powers of A then keep its poles, which rounding else puts outside.
-
-    Where many poles crowd together at 1, as of a recording of one mass, one may lie there all the same; the motion is
-    then slowed by as much.
-    """
+    """Return the states in their Schur form: powers of A then keep its poles, which rounding else puts outside."""
     T, Z = schur(A)
     radius = float(np.abs(np.linalg.eigvals(T)).max(initial=0.0))
     return T * min(1.0, (1.0 - 1e-9) / max(radius, 0.5)), Z.T @ B, C @ Z, D

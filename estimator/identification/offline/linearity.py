@@ -1,18 +1,4 @@
-"""Whether a linear model is enough: a score test on what makes a driveline's response nonlinear.
-
-With the linear model right, its innovation w(t) is independent of everything that was known at t - 1, so also of any
-nonlinear function of the torque in the shaft or of the speed. Piecewise linear functions of both, whose knots lie at
-quantiles, at zero torque (a gap) and at standstill (dry friction), drive the model as inputs of their own; w is
-regressed on their whitened responses next to its own gradient (T. S. Breusch and A. R. Pagan, Review of Economic
-Studies 47, 1980; an LM test in its F form, which holds in closed loop as well)::
-
-    F = ((S_0 - S_1) / q) / (S_1 / (n - p - q))
-
-The step that the linear parameters take when the functions are let in is what the nonlinearity has done to them.
-
-Where the drive is not linear, its resonance is given by operating region: the whitened equations hold row by row, so
-that B / A can be fitted to the rows alone in which a signal lies in a region, D and everything before them as they are.
-"""
+"""Whether a linear model is enough: a score test on what makes a driveline's response nonlinear."""
 
 from __future__ import annotations
 
@@ -39,31 +25,18 @@ LEAST_EFFECT = 0.1
 """Part of the innovations from which on a nonlinearity matters: what 30 s at 10 ms just show. Of a million samples the
 test alone would call every drive nonlinear."""
 
-QUANTILES = (0.1, 0.35, 0.65, 0.9)
-"""Knots of the piecewise linear functions, of the signal's own distribution."""
-
-LAGS = (1, 2, 3)
-"""Numerators of the responses, in samples of the noise model: as many as a two-mass drive has."""
+QUANTILES = (0.1, 0.35, 0.65, 0.9)  # knots of the piecewise linear functions, of the signal's own distribution
+LAGS = (1, 2, 3)  # numerators of the responses, in samples of the noise model: as many as a two-mass drive has
 
 
 @dataclass(frozen=True, slots=True)
 class Linearity:
-    """The test's result.
+    """The test's result."""
 
-    Attributes
-    ----------
-    p_value : float
-        Probability of an F at least this large on a linear drive.
-    by_torque, by_speed : float
-        The same for functions of the shaft's torque alone, and of the speed alone.
-    effect : float
-        What the functions explain of the innovations beyond chance, RMS over RMS.
-    """
-
-    p_value: float
-    by_torque: float
+    p_value: float  # probability of an F at least this large on a linear drive
+    by_torque: float  # the same for functions of the shaft's torque alone, and of the speed alone
     by_speed: float
-    effect: float = 1.0
+    effect: float = 1.0  # what the functions explain of the innovations beyond chance, RMS over RMS
 
     @property
     def is_linear(self) -> bool:
@@ -114,7 +87,6 @@ def _knotted(signal: FloatArray, settled: float | None = None) -> FloatArray:
 def _responses(
     problem: Problem, x: FloatArray, model: LinearModel, inputs: FloatArray, high_pass_hz: float
 ) -> FloatArray:
-    """Return the whitened response to each function of a signal and lag, shape (n, functions * lags)."""
     chain = [Decimator(problem.sample_time_s, 1, high_pass_hz) for _ in inputs.T]
     passed = [one.run(f, f, np.ones(f.shape, dtype=np.bool_)).u for one, f in zip(chain, inputs.T, strict=True)]
     filtered = [lfilter([1.0], model.A, f) for f in passed]
@@ -137,8 +109,7 @@ def _tested(J: FloatArray, w: FloatArray, columns: FloatArray) -> tuple[float, f
     return float(fisher.sf(gained / q / variance, q, free)), float(np.sqrt(max(gained - q * variance, 0.0) / total))
 
 
-REGIONS = 3
-"""Of equal numbers of samples: below, about and above the middle."""
+REGIONS = 3  # of equal numbers of samples: below, about and above the middle
 
 MOST_EVALUATIONS = 30
 
@@ -155,7 +126,6 @@ class RegionalMode:
 def modes_by_region(
     problem: Problem, x: FloatArray, signal: FloatArray, band_hz: tuple[float, float]
 ) -> tuple[RegionalMode, ...]:
-    """Fit B / A once for each region of a signal."""
     value = problem.blocks.mean(signal)[problem.noise_order :]
     edges = np.quantile(value, np.linspace(0.0, 1.0, REGIONS + 1))
     found = []

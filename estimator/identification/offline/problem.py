@@ -4,28 +4,6 @@
 
     y(t) = B(q^-1) / A(q^-1) u(t) + C(q^-1) / A(q^-1) delta(t) + h rho^t + e(t),     D(q^-1) e(t) = w(t)
     minimise the sum of w(t)^2 over A, B, C, h and D
-
-C is the free response to what was before the first sample, h that of the high-pass both signals have passed, whose
-pole is rho: a constant load that the driveline did not know at rest becomes this transient. D = 1 makes it the
-output-error problem; with D free, w white is maximum likelihood. The gradient comes by filtering (L. Ljung, System
-Identification, 2nd ed., chapter 10)::
-
-    d yhat / d a_i = -q^-i yhat / A
-    d yhat / d b_j = q^-(nk+j-1) u / A
-    d yhat / d c_j = q^-(j-1) delta / A
-    d w    / d d_i = q^-i e
-
-A is a product of second-order sections, and one of first order where its order is odd. The stability triangle of
-``1 + a_1 q^-1 + a_2 q^-2`` is ``|a_2| < 1, |a_1| < 1 + a_2`` (E. I. Jury, 1964), so that all of it and nothing else is
-reached by ``a_2 = tanh x_2, a_1 = (1 + a_2) tanh x_1``: Levenberg and Marquardt's steps need no bounds.
-
-What was not measured or not read is unknown rather than left out: an unmeasured output is one unknown that enters the
-next p whitened errors through D; a torque that was not read drives the model as an input of its own. Whitened errors
-and gradients are projected onto what is orthogonal to the responses to all of these (variable projection: G. H. Golub
-and V. Pereyra, SIAM J. Numerical Analysis 10, 1973), which is the same as estimating them along.
-
-Samples that come faster than a driveline answers are simulated as they come, and their error is averaged over blocks
-before D: an average of both sides of an equation holds exactly, and D stays short.
 """
 
 from __future__ import annotations
@@ -41,9 +19,8 @@ from scipy.sparse import csc_array, diags_array
 from scipy.sparse.linalg import splu
 from threadpoolctl import threadpool_limits
 
-from estimator.identification.linear_model import ComplexArray, LinearModel, Orders, free_response
+from estimator.identification.linear_model import ComplexArray, LinearModel, Orders, free_response, solve_least_squares
 from estimator.identification.offline.starts import delayed
-from estimator.identification.triangular import solve_least_squares
 from estimator.signals.decimate import HIGH_PASS_HZ, Blocks
 from estimator.signals.record import BoolArray, FloatArray
 
@@ -97,8 +74,7 @@ MOST_UNREAD = 200
 DEPENDENT = 1e-9
 """Singular value, against the largest, below which an unknown of the torque changes nothing by itself."""
 
-RIDGE = 1e-12
-"""Keeps an output that no whitened error depends on from making the normal equations singular."""
+RIDGE = 1e-12  # keeps an output that no whitened error depends on from making the normal equations singular
 
 
 class _Outputs:
@@ -118,15 +94,7 @@ class _Outputs:
 
 
 class Elimination:
-    """The projection onto what no missing sample explains, and the values of what is missing.
-
-    Parameters
-    ----------
-    outputs : csc_array, shape (n, m), or None
-        Response of the whitened errors to each output that was not measured.
-    inputs : ndarray, shape (n, k), or None
-        Response to each unknown of torque that was not read.
-    """
+    """The projection onto what no missing sample explains, and the values of what is missing."""
 
     def __init__(self, outputs: csc_array | None, inputs: FloatArray | None) -> None:
         self._outputs = None if outputs is None else _Outputs(outputs)
@@ -157,15 +125,7 @@ class Elimination:
 
 
 class OutputResponses:
-    """Where unmeasured outputs enter the whitened errors; only the values change with D.
-
-    Parameters
-    ----------
-    okay : ndarray of bool, shape (n,)
-        Which outputs were measured.
-    order : int
-        Of D; the first whitened error is that of sample ``order``.
-    """
+    """Where unmeasured outputs enter the whitened errors; only the values change with D."""
 
     def __init__(self, okay: BoolArray, order: int) -> None:
         missing = np.flatnonzero(~okay)
@@ -182,15 +142,7 @@ class OutputResponses:
 
 
 class UnreadTorque:
-    """The unknowns of torque that was not read: one a sample; of a gap longer than the state, the state at its end.
-
-    Parameters
-    ----------
-    read : ndarray of bool, shape (N,), or None
-        Where the torque was read; None for everywhere.
-    n_states : int
-        Past values that fix the free response.
-    """
+    """The unknowns of torque that was not read: one a sample; of a gap longer than the state, the state at its end."""
 
     def __init__(self, read: BoolArray | None, n_states: int) -> None:
         self.at: list[int] = []
@@ -215,7 +167,6 @@ class UnreadTorque:
         return columns
 
     def added_to(self, u: FloatArray, values: FloatArray) -> FloatArray:
-        """Return the input with the unknowns that are inputs at their values, shape (N,)."""
         filled = u.copy()
         inputs = np.array(self.is_input, dtype=np.bool_)
         filled[np.array(self.at, dtype=np.int64)[inputs]] += values[inputs]
@@ -260,32 +211,16 @@ class _Point:
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """The least-squares problem in ``x = [A's parameters, b, c, h, d]``; u, y, okay and read of shape (N,).
+    """The least-squares problem in ``x = [A's parameters, b, c, h, d]``; u, y, okay and read of shape (N,)."""
 
-    Attributes
-    ----------
-    u, y, okay
-        Input, output, and whether the output was measured.
-    orders : Orders
-        Of B / A.
-    sample_time_s : float
-        Sampling period [s].
-    read : ndarray of bool, optional
-        Whether the input was read; everywhere by default.
-    noise_order : int
-        Of D; 0 for an output-error fit.
-    block : int
-        Samples whose mean error is one sample to D.
-    """
-
-    u: FloatArray
+    u: FloatArray  # input, output, and whether the output was measured
     y: FloatArray
     okay: BoolArray
-    orders: Orders
-    sample_time_s: float
-    read: BoolArray | None = None
-    noise_order: int = 0
-    block: int = 1
+    orders: Orders  # of B / A
+    sample_time_s: float  # sampling period [s]
+    read: BoolArray | None = None  # whether the input was read
+    noise_order: int = 0  # of D; 0 for an output-error fit
+    block: int = 1  # samples whose mean error is one sample to D
     _last: list[_Point] = field(default_factory=list, init=False, repr=False)
 
     @property
@@ -426,5 +361,4 @@ class Problem:
                 )
                 for start in starts
             ]
-        x: FloatArray = min(solutions, key=lambda solution: float(solution.cost)).x
-        return x
+        return min(solutions, key=lambda solution: float(solution.cost)).x

@@ -4,10 +4,6 @@ Least squares on the equation error (ARX) needs no start but is biased by noise 
 L. E. McBride (IEEE Trans. Automatic Control 10, 1965) filters u and y by the last 1 / A_hat and repeats it; it is
 started from the ARX model itself, and from the simulated output of an ARX model of high order, in which the noise is
 averaged out.
-
-Predictor-based subspace identification has no minimum to miss and no bias by coloured noise or feedback: a long
-autoregression with input predicts y from the past; its coefficients, shifted, give the next outputs as a linear map of
-the past, whose n strongest directions are the state (A. Chiuso, Automatica 43, 2007). A, B, C follow by least squares.
 """
 
 from __future__ import annotations
@@ -17,14 +13,12 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.signal import lfilter
 
-from estimator.identification.linear_model import LinearModel, Orders
+from estimator.identification.linear_model import LinearModel, Orders, solve_least_squares, triangular
 from estimator.identification.modes.reduced import numerator_of
-from estimator.identification.triangular import solve_least_squares, triangular
 from estimator.signals.record import BoolArray, FloatArray
 
 ITERATIONS = 20
-HIGH_ORDER = 16
-"""Order of the averaging ARX model: four times the paper's order."""
+HIGH_ORDER = 16  # order of the averaging ARX model: four times the paper's order
 
 LARGEST_RADIUS = 0.999
 """Radius to which a pole on or outside the unit circle is brought; its time constant is then 1000 samples."""
@@ -104,11 +98,8 @@ def candidates(
         yield steiglitz_mcbride(u, smooth, everywhere, orders, begin)
 
 
-PAST = 40
-"""Samples of the past: longer than the impulse response of the predictor, which the noise ends."""
-
-FUTURE = 15
-"""Predicted outputs that the state is found from: several times the order."""
+PAST = 40  # samples of the past: longer than the impulse response of the predictor, which the noise ends
+FUTURE = 15  # predicted outputs that the state is found from: several times the order
 
 
 def subspace(u: FloatArray, y: FloatArray, okay: BoolArray, orders: Orders, sample_time_s: float) -> LinearModel | None:
@@ -144,9 +135,6 @@ def _past(u: FloatArray, y: FloatArray) -> FloatArray:
 
 
 def _strongest(R: FloatArray, ahead: FloatArray, n: int) -> FloatArray:
-    """Return the map from the past to the n strongest principal components of predicted outputs, shape (2 PAST, n).
-
-    R is the past's triangle, ``ahead`` its map to the predictions; each component has a square sum of 1.
-    """
+    """Return the map from the past to the n strongest principal components of predicted outputs, shape (2 PAST, n)."""
     _, powers, axes = np.linalg.svd(R @ ahead, full_matrices=False)
     return np.asarray(ahead @ axes[:n].T / powers[:n], dtype=np.float64)

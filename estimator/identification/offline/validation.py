@@ -1,20 +1,9 @@
-"""Whether a model is right: free run first, then whether what it leaves has to do with the input.
+"""Order and delay: how many coefficients the data pay for.
 
-An output-error model is judged by its transfer function, so by the independence of residual and past input; whiteness
-of the residual is a matter of the noise model, and its autocorrelation is shown besides without a verdict (L. Ljung,
-System Identification, 2nd ed., section 16.6). Both signals are made white first, the residual by its own
-autoregression D and the input by one of its own (G. E. P. Box, G. M. Jenkins, Time Series Analysis, "prewhitening"),
-so that under independence each correlation is normal with variance 1 / N, whatever the colours, and those at m lags
-together::
+Every candidate is a Box-Jenkins model with a noise model of its own, all of one order, so the Bayesian information
+criterion (G. Schwarz, Annals of Statistics 6, 1978) counts innovations, which are independent::
 
-    r(tau) = sum w(t) v(t - tau) / sqrt(sum w^2 sum v^2),      N sum r(tau)^2 ~ chi-square(m)
-
-From one sample of delay on (past input) they tell that B / A is wrong; below (the input answers the residual, at once
-or later) they tell of feedback.
-
-A driver, a cruise controller or an anti-jerk function that answers the speed carries noise from the output back into
-the input (ibid., section 13.4). Judge that at the recording's own period: decimated signals were low-passed, and their
-present output goes with a little of the input to come.
+    BIC = N ln(mean of w^2) + (number of parameters) ln N
 """
 
 from __future__ import annotations
@@ -26,14 +15,104 @@ import numpy as np
 from scipy.stats import chi2
 from threadpoolctl import threadpool_limits
 
-from estimator.identification.modes.uncertainty import CONFIDENCE, QUANTILE
-from estimator.identification.offline.fits import FreeRun, LinearFit, free_run
-from estimator.identification.offline.noise_model import fit_noise, reach
-from estimator.signals.decimate import Blocks
+from estimator.errors import BadSetting
+from estimator.identification.linear_model import LinearModel, Orders
+from estimator.identification.modes.modes import CONFIDENCE, QUANTILE
+from estimator.identification.offline.fits import FreeRun, LinearFit, fit_box_jenkins, fit_noise, free_run, reach
+from estimator.signals.decimate import Blocks, decimate
 from estimator.signals.record import BoolArray, FloatArray, IntArray, Record
 
-LAGS = 25
-"""Lags looked at to either side: half a second at 20 ms, the decay time of a drive's resonance."""
+DEFAULT = tuple(Orders(n, n, nk) for nk in (1, 2, 3) for n in (2, 3, 4, 5))
+"""Second to fifth order, a delay of one to three samples."""
+
+
+LOWEST_HZ = 2.0
+"""Corner of the high-pass before orders are compared [Hz]; a drive's resonance is looked for from there on."""
+
+
+SETTLING = 5.0
+"""Time constants of the high-pass that are left out: a constant acceleration leaves a transient there, which a further
+pole would be taken to explain."""
+
+
+@dataclass(frozen=True, slots=True)
+class Candidate:
+    """One structure and how it did."""
+
+    orders: Orders
+    criterion: float  # BIC less that of the best
+    rms: float  # of the whitened simulation error [output unit]
+    unseen_fit_percent: float  # free-run fit over all recordings held out
+    model: LinearModel
+
+
+@dataclass(frozen=True, slots=True)
+class OrderChoice:
+    """Every candidate, the best by the criterion first."""
+
+    candidates: tuple[Candidate, ...]
+
+    @property
+    def chosen(self) -> Orders:
+        return self.candidates[0].orders
+
+    @property
+    def statement(self) -> str:
+        """The choice, how clear it is, and what unseen recordings say of it."""
+        best, *rest = self.candidates
+        text = f"na = {best.orders.na}, nb = {best.orders.nb}, nk = {best.orders.nk}"
+        text += f", by a BIC {rest[0].criterion:.1f} below the next." if rest else "."
+        if np.isnan(best.unseen_fit_percent):
+            return text
+        winner = max(self.candidates, key=lambda candidate: candidate.unseen_fit_percent)
+        agree = (
+            "which is best there too"
+            if winner is best
+            else (
+                f"best there is na = {winner.orders.na}, nb = {winner.orders.nb}, nk = {winner.orders.nk} with "
+                f"{winner.unseen_fit_percent:.1f} %"
+            )
+        )
+        return f"{text} Free-run fit on unseen recordings {best.unseen_fit_percent:.1f} %, {agree}."
+
+
+def select_orders(record: Record, among: Sequence[Orders] = DEFAULT, unseen: Sequence[Record] = ()) -> OrderChoice:
+    if not among:
+        raise BadSetting("order selection: 0 candidates, expected one or more. Give the orders to choose from.")
+    prepared, *others = (_prepared(one) for one in (record, *unseen))
+    found = [_candidate(prepared, orders, others) for orders in among]
+    least = min(candidate.criterion for candidate in found)
+    ranked = sorted(found, key=lambda candidate: candidate.criterion)
+    return OrderChoice(tuple(replace(candidate, criterion=candidate.criterion - least) for candidate in ranked))
+
+
+def _prepared(record: Record) -> Record:
+    """Return a recording without its slow part and without the high-pass's own settling."""
+    passed = decimate(record, 1, LOWEST_HZ)
+    settled = np.arange(passed.okay.shape[0]) * passed.sample_time_s >= SETTLING / (2.0 * np.pi * LOWEST_HZ)
+    return replace(passed, okay=passed.okay & settled)
+
+
+def _candidate(record: Record, orders: Orders, unseen: Sequence[Record]) -> Candidate:
+    fit = fit_box_jenkins(record, orders)
+    runs = [free_run(fit.model, other, fit.noise).fit_percent for other in unseen]
+    return Candidate(
+        orders=orders,
+        criterion=criterion(fit),
+        rms=fit.noise.std,
+        unseen_fit_percent=float(np.mean(runs)) if runs else float("nan"),
+        model=fit.model,
+    )
+
+
+def criterion(fit: LinearFit) -> float:
+    """Return the BIC of a Box-Jenkins fit; to be compared on one recording and with one order of D."""
+    n = fit.n_samples / fit.block
+    power = max(fit.noise.std**2, np.finfo(np.float64).tiny)
+    return n * float(np.log(power)) + fit.model.orders.n_parameters * float(np.log(n))
+
+
+LAGS = 25  # lags looked at to either side: half a second at 20 ms, the decay time of a drive's resonance
 
 
 JUMP = 1.2
@@ -43,30 +122,17 @@ LEAST_CORRELATED = 0.05
 """Root of the sum of squared correlations, beyond what chance makes of it, below which a model misses nothing that
 matters: in a recording of a million samples the smallest departure is significant."""
 
-LEAST_DELAY = 1
-"""Samples before which held torque can't act on a sampled speed."""
+LEAST_DELAY = 1  # samples before which held torque can't act on a sampled speed
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CorrelationTest:
-    """Correlations by lag with the bound that 95 % of them keep if there is none.
+    """Correlations by lag with the bound that 95 % of them keep if there is none."""
 
-    Attributes
-    ----------
-    lag : ndarray of int, shape (m,)
-        Samples.
-    correlation : ndarray, shape (m,)
-    bound : float
-        95 % of independent correlations are smaller in size.
-    p_value : float
-        Probability of correlations like these if there are none: of their sum of squares, which sees many small
-        ones, or of the largest, which sees a single one; the smaller, counted twice for the choice.
-    """
-
-    lag: IntArray
-    correlation: FloatArray
-    bound: float
-    p_value: float
+    lag: IntArray  # (m,): samples
+    correlation: FloatArray  # (m,)
+    bound: float  # 95 % of independent correlations are smaller in size
+    p_value: float  # probability of correlations like these if there are none
 
     @property
     def is_independent(self) -> bool:
@@ -78,27 +144,13 @@ class CorrelationTest:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Validation:
-    """What can be said for and against a fit.
+    """What can be said for and against a fit."""
 
-    Attributes
-    ----------
-    own : FreeRun
-        On the recording it was fitted to.
-    unseen : tuple of FreeRun
-        On others: cross-validation.
-    independence : CorrelationTest
-        Residual against past input; the judge of B / A.
-    feedback : CorrelationTest
-        Residual against input too late to have caused it.
-    autocorrelation : CorrelationTest
-        Of the free-run residual, not whitened; shown, no judge of B / A.
-    """
-
-    own: FreeRun
-    unseen: tuple[FreeRun, ...]
-    independence: CorrelationTest
-    feedback: CorrelationTest
-    autocorrelation: CorrelationTest
+    own: FreeRun  # on the recording it was fitted to
+    unseen: tuple[FreeRun, ...]  # on others
+    independence: CorrelationTest  # residual against past input
+    feedback: CorrelationTest  # residual against input too late to have caused it
+    autocorrelation: CorrelationTest  # of the free-run residual, not whitened
 
     @property
     def statement(self) -> str:
@@ -114,7 +166,6 @@ class Validation:
 
 
 def validate(fit: LinearFit, record: Record, unseen: Sequence[Record] = (), lags: int = LAGS) -> Validation:
-    """Validate a fit on its own recording and on others."""
     own = free_run(fit.model, record, fit.noise)
     tests = residual_tests(own.error, record, fit.block, min(fit.model.nk, LEAST_DELAY), lags)
     return Validation(own, tuple(free_run(fit.model, other, fit.noise) for other in unseen), *tests)
@@ -142,11 +193,7 @@ def residual_tests(
 
 
 def between_jumps(u: FloatArray) -> FloatArray:
-    """Return the steps of an input without its jumps, shape (N,).
-
-    Next to a PRBS of 100 Nm a driver's answer of 1 Nm to the noise of the speed is not seen; between its jumps it is.
-    Any function of the input is independent of the residual where the loop is open, so that the test keeps its level.
-    """
+    """Return the steps of an input without its jumps, shape (N,)."""
     step = np.diff(u, prepend=u[:1])
     size = np.abs(step - np.median(step))
     ordered, first, end = np.sort(size), size.shape[0] // 4, size.shape[0] - size.shape[0] // 50
@@ -183,27 +230,17 @@ def correlation_test(e: FloatArray, x: FloatArray, okay: BoolArray, lags: IntArr
 
 
 def _product(e: FloatArray, x: FloatArray, lag: int) -> float:
-    """Return sum of e(t) x(t - lag)."""
     if lag >= 0:
         return float(e[lag:] @ x[: x.shape[0] - lag])
     return float(e[:lag] @ x[-lag:])
 
 
-SIGNIFICANCE = 0.01
-"""False alarms of the detection, on recordings in open loop."""
+SIGNIFICANCE = 0.01  # false alarms of the detection, on recordings in open loop
 
 
 @dataclass(frozen=True, slots=True)
 class Feedback:
-    """Whether there was feedback and what it means.
-
-    Attributes
-    ----------
-    detected : bool
-    p_value : float
-        Probability of a correlation with later input at least this large without feedback.
-    statement : str
-    """
+    """Whether there was feedback and what it means."""
 
     detected: bool
     p_value: float

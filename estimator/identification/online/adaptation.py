@@ -4,17 +4,8 @@ Every profile is a choice of lambda_1(t) and lambda_2(t) in the paper's equation
 
     F(t+1)^-1 = lambda_1(t) F(t)^-1 + lambda_2(t) Phi(t) Phi(t)^T,      0 < lambda_1 <= 1,  0 <= lambda_2 < 2
 
-All of I. D. Landau and G. Zito, Digital Control Systems (Springer, 2006), chapter 3, under the names they have
-there. A profile is a small object of its own; what an estimator's compiled loop needs of it is :class:`GainLaw`,
-the same for all of them.
-
 The initial gain F(0) = GI times the unit matrix is a choice that each profile has: 1000 where nothing is known of
 theta, at most 1 where an estimate is given as theta(0) (ibid.).
-
-F is kept as U D U^T (U unit upper triangular, D diagonal) and updated after G. J. Bierman, Factorization Methods for
-Discrete Sequential Estimation (Academic Press, 1977), chapter V: it can then not lose symmetry or turn indefinite by
-rounding, however long the run. Row j of the array ``U`` is *column* j of U, with its unit diagonal and the zeros below
-it: the inner loops run over whole rows of fixed length, which a compiler turns into vector instructions.
 """
 
 from __future__ import annotations
@@ -32,33 +23,15 @@ from estimator.signals.settings import Requirement, is_positive, require
 
 @dataclass(frozen=True, slots=True)
 class GainLaw:
-    """What the loop carries out.
+    """What the loop carries out."""
 
-    Attributes
-    ----------
-    initial_gain : float
-        F(0) is this times the unit matrix.
-    lambda1 : float
-        lambda_1(0).
-    lambda0 : float
-        ``lambda_1(t) = lambda0 lambda_1(t-1) + 1 - lambda0``; 1 keeps lambda_1 as it is.
-    trace : float
-        From the moment tr F has fallen to this value it is held there; 0 never holds it.
-    alpha : float
-        lambda_1(t) / lambda_2(t) while the trace is held.
-    lambda2 : float
-        lambda_2 before a trace is held: 1, or 0, which leaves F as it is.
-    holds_at_once : bool
-        tr F is held at its initial value from the first sample; ``trace`` is then not used.
-    """
-
-    initial_gain: float
-    lambda1: float = 1.0
-    lambda0: float = 1.0
-    trace: float = 0.0
-    alpha: float = 1.0
-    lambda2: float = 1.0
-    holds_at_once: bool = False
+    initial_gain: float  # F(0) is this times the unit matrix
+    lambda1: float = 1.0  # lambda_1(0)
+    lambda0: float = 1.0  # ``lambda_1(t) = lambda0 lambda_1(t-1) + 1 - lambda0``
+    trace: float = 0.0  # from the moment tr F has fallen to this value it is held there
+    alpha: float = 1.0  # lambda_1(t) / lambda_2(t) while the trace is held
+    lambda2: float = 1.0  # lambda_2 before a trace is held
+    holds_at_once: bool = False  # tr F is held at its initial value from the first sample
 
     def __post_init__(self) -> None:
         factor = "a factor above 0 and at most 1"
@@ -134,12 +107,7 @@ class VariableForgetting:
 
 @dataclass(frozen=True, slots=True)
 class DecreasingThenConstantTrace:
-    """Decreasing gain until tr F has fallen to ``trace``, which is then held: fast start, then tracking.
-
-    The paper's profile. While the trace is held, lambda_1(t) and lambda_2(t) follow from it and from their
-    constant ratio alpha. The paper gives "lambda_1 = 0.993" next to "tr F(0) = 0.01"; since lambda_1(t) itself
-    is fixed by the trace, its number is taken as the ratio (lambda_1 for lambda_2 = 1).
-    """
+    """Decreasing gain until tr F has fallen to ``trace``, which is then held: fast start, then tracking."""
 
     lambda1: float = 0.993
     trace: float = 0.01
@@ -224,7 +192,6 @@ def dot(a: FloatArray, b: FloatArray) -> float:
 
 @inlined
 def project(Phi: FloatArray, U: FloatArray, f: FloatArray) -> None:
-    """Set f = U^T Phi."""
     for j in range(Phi.shape[0]):
         total = Phi[j]
         for i in range(j):
@@ -234,7 +201,6 @@ def project(Phi: FloatArray, U: FloatArray, f: FloatArray) -> None:
 
 @inlined
 def gain(Phi: FloatArray, U: FloatArray, D: FloatArray, g: FloatArray, f: FloatArray) -> float:
-    """Set g = F Phi and return Phi^T F Phi."""
     n = Phi.shape[0]
     project(Phi, U, f)
     s = 0.0
@@ -322,11 +288,7 @@ def informs_by_itself(law: FloatArray) -> bool:
 
 @inlined
 def adapt(Phi: FloatArray, m: Parts) -> float:
-    """Update whatever the profile has; g = F Phi and Phi^T F Phi are of the F before.
-
-    ``m.diagonal`` then tells what the samples determine: it is that of F, or, where F does not fall with them, that of
-    the decreasing gain ``known_U``, ``known_D`` that runs alongside it for this alone.
-    """
+    """Update whatever the profile has; g = F Phi and Phi^T F Phi are of the F before."""
     by_itself = informs_by_itself(m.law)
     if not by_itself:
         absorb(Phi, 1.0, m.known_U, m.known_D, m.g, m.f)

@@ -8,19 +8,6 @@ the two masses below::
     K(t)      = P(t) H^T / (H P(t) H^T + R),       H = [1 0 .. 0]
     x(t|t)    = x(t) + K(t) (y(t) - w_M(t)),       P(t|t) = P(t) - K(t) H P(t)
     x(t+1)    = f(x(t|t), u(t+1-nk)),              P(t+1) = Phi P(t|t) Phi^T + Q,      Phi = df/dx
-
-Logarithms, so that no inertia, stiffness or damping can turn negative. T_0 is a load torque that wanders: a hill, the
-driver, and near a constant speed the viscous frictions, which are therefore given and not estimated. P is kept as
-U D U^T: G. J. Bierman, Factorization Methods for Discrete Sequential Estimation (Academic Press, 1977), chapters V
-(correction) and VI (prediction, Thornton's).
-
-It wants the torque as it was held and the speed as it was read: raw samples at the rig's own period. A low-pass and a
-longer period between the samples let the torque move in between, which the transfer functions of the other estimators
-absorb and physical parameters can't.
-
-Guards: as everywhere a masked sample, or one that is no number, leaves the estimate alone while time advances. An
-output 100 standard deviations from the prediction is not used; twenty in a row, and the motion starts anew from them.
-A parameter stays within a factor of 100 of its start value.
 """
 
 from __future__ import annotations
@@ -62,28 +49,13 @@ ESTIMATED = ("J_M", "J_L", "k", "c")
 
 @dataclass(frozen=True, slots=True)
 class TwoMass:
-    """Parameters reflected to the motor shaft.
+    """Parameters reflected to the motor shaft."""
 
-    Attributes
-    ----------
-    J_M, J_L : float
-        Inertia of motor and load [kg m^2].
-    k, c : float
-        Stiffness [Nm/rad] and damping [Nm s/rad] of the shaft.
-    b_M, b_L : float
-        Viscous friction at motor and load [Nm s/rad].
-
-    Raises
-    ------
-    BadSetting
-        If an inertia, the stiffness or the damping is not above 0, or a friction is below.
-    """
-
-    J_M: float
+    J_M: float  # inertia of motor and load [kg m^2]
     J_L: float
-    k: float
+    k: float  # stiffness [Nm/rad] and damping [Nm s/rad] of the shaft
     c: float
-    b_M: float = 0.0
+    b_M: float = 0.0  # viscous friction at motor and load [Nm s/rad]
     b_L: float = 0.0
 
     def __post_init__(self) -> None:
@@ -102,34 +74,14 @@ class EkfNoise:
     Twice, since what wrong start values do to the linearisation counts as noise too. With the sensors' own 0.05 rad/s
     and 1 Nm, and starts 30 to 70 % off, one or two of twelve simulated cruises of 30 s ended with a load inertia twice
     to a hundred times too large, and believed it.
-
-    Attributes
-    ----------
-    output_rad_s : float
-        Noise of a speed reading [rad/s].
-    torque_nm : float
-        What of the motor's torque in a sample the reading does not tell [Nm]: resolution, ripple.
-    load_nm_per_sqrt_s : float
-        How far the load torque wanders in a second [Nm].
-    log_per_sqrt_s : float
-        How far a parameter wanders in a second, relative to itself.
-    start_log : float
-        How far a start value may be off, relative to itself: 0.7 is a factor of two.
-    start_speed_rad_s, start_twist_rad, start_load_nm : float
-        The same of the motion: speed difference [rad/s], twist [rad], load torque [Nm].
-
-    Raises
-    ------
-    BadSetting
-        If one is not above 0.
     """
 
-    output_rad_s: float = 0.1
+    output_rad_s: float = 0.1  # noise of a speed reading [rad/s]
     torque_nm: float = 10.0
-    load_nm_per_sqrt_s: float = 10.0
-    log_per_sqrt_s: float = 1e-4
-    start_log: float = 0.7
-    start_speed_rad_s: float = 1.0
+    load_nm_per_sqrt_s: float = 10.0  # how far the load torque wanders in a second [Nm]
+    log_per_sqrt_s: float = 1e-4  # how far a parameter wanders in a second, relative to itself
+    start_log: float = 0.7  # how far a start value may be off, relative to itself
+    start_speed_rad_s: float = 1.0  # the same of the motion
     start_twist_rad: float = 0.2
     start_load_nm: float = 1000.0
 
@@ -441,24 +393,7 @@ def block(u: FloatArray, y: FloatArray, okay: BoolArray, memory: NDArray[np.void
 
 
 class Ekf(RecursiveEstimator):
-    """The filter with its state; ``y_hat`` is the filtered motor speed.
-
-    Parameters
-    ----------
-    start : TwoMass
-        Start values of J_M, J_L, k, c; the frictions are kept.
-    sample_time_s : float
-        Sampling period [s].
-    nk : int
-        Total delay between torque and speed, at least the one sample of a held torque.
-    noise : EkfNoise, optional
-        What is noise, and how far the start values are trusted.
-
-    Raises
-    ------
-    BadSetting
-        If the sampling period is not above 0 or the delay is below 1.
-    """
+    """The filter with its state; ``y_hat`` is the filtered motor speed."""
 
     def __init__(self, start: TwoMass, sample_time_s: float, nk: int = 1, noise: EkfNoise | None = None) -> None:
         require(

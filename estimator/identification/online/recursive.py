@@ -1,15 +1,4 @@
-"""Recursive estimators: their one interface, and what an estimate says about itself.
-
-An estimator takes samples one by one (:meth:`RecursiveEstimator.update`, on the rig) or as a block
-(:meth:`RecursiveEstimator.run`, from a recording); both give the same bits. In the loop nothing raises: a
-sample that can't be used is masked, and an estimate that can't be trusted says so in its status, with the
-reason.
-
-An estimator is a compiled loop and its memory, a record cut into named parts of fixed shapes: its type *is* its layout,
-so a loop compiled for it knows every shape and place, unrolls what is eight long and looks up no bound. What it
-remembers is saved as plain arrays (``numpy.savez(path, **state)``, or their lists in JSON) and taken up again to the
-bit.
-"""
+"""Recursive estimators: their one interface, and what an estimate says about itself."""
 
 from __future__ import annotations
 
@@ -48,17 +37,7 @@ NONE, TOO_FEW_SAMPLES, NOT_EXCITED, UNSTABLE, CONSTANT_OUTPUT = range(5)
 
 
 class Memory:
-    """A record of numbers and its parts.
-
-    Parameters
-    ----------
-    kept : mapping
-        Shape of each part that the next sample needs, by name.
-    settings : mapping
-        Numbers that no sample changes, by name: what is kept is worth nothing without them.
-    room : mapping, optional
-        Shape of each part that no sample leaves anything in for the next.
-    """
+    """A record of numbers and its parts."""
 
     def __init__(self, kept: Shapes, settings: Mapping[str, FloatArray], room: Shapes | None = None) -> None:
         shapes = {**kept, **{name: numbers.shape for name, numbers in settings.items()}, **(room or {})}
@@ -69,12 +48,10 @@ class Memory:
 
     def __getitem__(self, name: str) -> FloatArray:
         """Return a part: a view, to be read or written."""
-        part: FloatArray = self.record[name][0]
-        return part
+        return self.record[name][0]
 
     @property
     def settings(self) -> dict[str, FloatArray]:
-        """Copies of the settings, by name."""
         return {name: self[name].copy() for name in self._settings}
 
     @property
@@ -83,8 +60,7 @@ class Memory:
         return {name: self[name].copy() for name in self._kept}
 
 
-VERSION = 2
-"""Goes up when a part changes its meaning; states of another version are refused."""
+VERSION = 2  # goes up when a part changes its meaning; states of another version are refused
 
 State = dict[str, Any]
 
@@ -95,7 +71,6 @@ def saved(estimator: str, memory: Memory) -> State:
 
 
 def restored(state: Mapping[str, Any], estimator: str, memory: Memory) -> None:
-    """Write a state into the memory of an estimator of the same kind and settings."""
     for name, expected in (("estimator", estimator), ("version", VERSION)):
         _require(str(np.asarray(_part(state, name))) == str(expected), name, state[name], repr(expected))
     for name, setting in memory.settings.items():
@@ -219,29 +194,16 @@ class Estimate:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Trajectory:
-    """Every estimate of a block.
+    """Every estimate of a block."""
 
-    Attributes
-    ----------
-    theta : ndarray, shape (N, na+nb)
-    y_hat, e_prior, e_post : ndarray, shape (N,)
-    used : ndarray of bool, shape (N,)
-    reason : ndarray of int, shape (N,)
-        Values of :class:`Reason`.
-    extra : ndarray, shape (N, m)
-        What the estimator holds besides theta (noise model, masses and stiffness); m is often 0.
-    extra_names : tuple of str
-        Names of its columns.
-    """
-
-    theta: FloatArray
-    y_hat: FloatArray
-    e_prior: FloatArray
-    e_post: FloatArray
-    used: BoolArray
-    reason: ReasonArray
-    extra: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
-    extra_names: tuple[str, ...] = ()
+    theta: FloatArray  # (N, na+nb)
+    y_hat: FloatArray  # (N,)
+    e_prior: FloatArray  # (N,)
+    e_post: FloatArray  # (N,)
+    used: BoolArray  # (N,)
+    reason: ReasonArray  # (N,): values of :class:`Reason`
+    extra: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))  # (N, m)
+    extra_names: tuple[str, ...] = ()  # names of its columns
 
     def __len__(self) -> int:
         return int(self.theta.shape[0])

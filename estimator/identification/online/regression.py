@@ -1,10 +1,4 @@
-"""Regression along an adaptation gain: what OEFO, RLS, RIV and OEEPM share, compiled and around it.
-
-Each corrects theta along F Phi; what differs is what stands in phi and Phi, and what is fed back. A step takes one
-sample and fills a row of results (:func:`estimator.identification.online.recursive.row_type`); the same step serves a
-block and the rig's single sample. All state lives in one record ``m`` with the parts of :func:`kept`, :func:`room` and
-each estimator's own.
-"""
+"""Regression along an adaptation gain: what OEFO, RLS, RIV and OEEPM share, compiled and around it."""
 
 from __future__ import annotations
 
@@ -210,8 +204,7 @@ def verdict(stable: bool, m: Parts, row: Parts) -> int:
 
 
 @inlined
-def tell(y_hat: float, e_prior: float, e_post: float, used: bool, stable: bool, m: Parts, row: Parts) -> None:
-    """Fill the row of results of a sample."""
+def fill_row(y_hat: float, e_prior: float, e_post: float, used: bool, stable: bool, m: Parts, row: Parts) -> None:
     n = row.theta.shape[0]
     for i in range(n):
         row.theta[i] = m.theta[i]
@@ -225,38 +218,7 @@ def tell(y_hat: float, e_prior: float, e_post: float, used: bool, stable: bool, 
 
 
 class RegressionEstimator(RecursiveEstimator):
-    """An estimator that corrects theta along F Phi; what differs is what stands in phi and Phi.
-
-    Parameters
-    ----------
-    name, block
-        As for every compiled estimator.
-    past : mapping
-        Shapes of the past values its step keeps, by name.
-    orders : Orders
-        Structure of the model.
-    adaptation : Adaptation, optional
-        Adaptation-gain profile; the paper's by default.
-    L : ndarray, shape (m,)
-        ``1, l_1 ..``: denominator of the observation filter.
-    adapts_filter : bool
-        Whether A_hat takes the place of L.
-    start_up_samples : int
-        Good samples at the start that the step treats apart.
-    theta : ndarray, shape (na+nb,), optional
-        Start values; zero by default. Choose a small initial gain with them.
-    extra_names : tuple of str
-        Parameters besides those of the transfer function, estimated along.
-
-    Raises
-    ------
-    BadSetting
-        If ``start_up_samples`` is negative.
-    BadModel
-        If L can't filter: see :func:`checked_filter`.
-    BadShape
-        If ``theta`` is not na + nb finite numbers.
-    """
+    """An estimator that corrects theta along F Phi; what differs is what stands in phi and Phi."""
 
     def __init__(
         self,
@@ -289,7 +251,7 @@ class RegressionEstimator(RecursiveEstimator):
         """Names of the parameters the samples so far do not determine."""
         if self._stands_still:
             return self._orders.names
-        start = INFORMATION_GAIN if self._judged_apart else self._memory["law"][INITIAL_GAIN]
+        start = INFORMATION_GAIN if self._judged_separately else self._memory["law"][INITIAL_GAIN]
         still = self._memory["diagonal"] >= LEARNT * start
         return tuple(name for name, is_open in zip(self._orders.names, still, strict=False) if is_open)
 
@@ -305,13 +267,12 @@ class RegressionEstimator(RecursiveEstimator):
         return self._memory["L"].copy()
 
     @property
-    def _judged_apart(self) -> bool:
+    def _judged_separately(self) -> bool:
         law = self._memory["law"]
         return bool(law[LAMBDA2] == 0.0 or law[HOLDS_AT_ONCE] == 1.0)
 
 
 def checked_filter(name: str, L: FloatArray) -> FloatArray:
-    """Return a copy of L."""
     own = np.array(L, dtype=np.float64)
     if own.ndim != 1 or own.shape[0] == 0 or not np.isfinite(own).all() or own[0] != 1.0:
         raise BadModel(f"{name}: L is {L}, expected finite coefficients 1, l_1, l_2 .. of a polynomial in q^-1.")

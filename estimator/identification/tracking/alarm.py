@@ -1,18 +1,4 @@
-"""Alarms of a change of the resonance: record, state of the tracking, and the threshold for a rate of false ones.
-
-The rule: two statistics in a row beyond a threshold h, on the same side. Each is standardised with the mean m and the
-standard deviation s of statistics before, ``tau = (x - m) / (s sqrt(1 + 1/n))``: m of n of them, s with nu degrees of
-freedom. Where nothing changes, and the statistics are independent and normal, two tau have a bivariate t distribution
-with nu degrees of freedom, correlated by ``rho = 1 / (n + 1)`` through m. By Plackett's identity for its derivative
-with respect to the correlation (Biometrika 41, 1954; A. Genz, Statistics and Computing 14, 2004), from -1, where both
-can't be beyond h, up to rho::
-
-    P(both beyond h) = 2 / (2 pi) integral (1 + 2 h^2 / (nu (1 + sin theta)))^(-nu / 2) dtheta,  -pi/2 to asin(rho)
-
-That times the statistics per hour is the expected number of false alarms in an hour, an upper bound. Two beyond a lower
-threshold instead of one beyond a higher: the rate rests on the bulk of the distribution, and not on tails that nobody
-knows.
-"""
+"""Alarms of a change of the resonance: record, state of the tracking, and the threshold for a rate of false ones."""
 
 from __future__ import annotations
 
@@ -27,8 +13,7 @@ import numpy as np
 from estimator.errors import BadSetting
 from estimator.signals.record import FloatArray
 
-NORMAL_95 = 1.959963984540054
-"""Standard deviations that hold 95 % of a normal distribution, either way."""
+NORMAL_95 = 1.959963984540054  # standard deviations that hold 95 % of a normal distribution, either way
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,36 +51,17 @@ class Level:
 
 @dataclass(frozen=True, slots=True)
 class Alarm:
-    """One change that was found.
-
-    Attributes
-    ----------
-    time_s : float
-        The moment of the recording at which it was found [s]; the chain's delay comes on top.
-    changed_between_s : tuple of float
-        The change lies between these two moments [s].
-    quantity : str
-        What changed, its unit at the end: ``resonance_hz``.
-    before, after : Level
-        Value before and since.
-    settled : bool
-        False while the estimate is on its way: ``after`` is then what the samples since the change say by themselves,
-        too little for a large one. The same alarm comes once more when it has settled.
-    statistic, threshold : float
-        The evidence, and what it had to exceed.
-    false_alarms_per_hour : float
-        What the threshold was made for: so many alarms an hour where nothing changes.
-    """
+    """One change that was found."""
 
     time_s: float
-    changed_between_s: tuple[float, float]
-    quantity: str
-    before: Level
+    changed_between_s: tuple[float, float]  # the change lies between these two moments [s]
+    quantity: str  # what changed, its unit at the end
+    before: Level  # value before and since
     after: Level
-    settled: bool
-    statistic: float
+    settled: bool  # false while the estimate is on its way
+    statistic: float  # the evidence, and what it had to exceed
     threshold: float
-    false_alarms_per_hour: float
+    false_alarms_per_hour: float  # what the threshold was made for
 
     @property
     def statement(self) -> str:
@@ -158,19 +124,13 @@ class TrackingState(IntEnum):
         return self.word.replace("_", " ")
 
 
-HIGHEST = 40.0
-"""No threshold is sought above."""
-
-NODES = 200
-"""Of the Gauss-Legendre quadrature: twelve digits for thresholds from 0.1 up."""
-
-HALVINGS = 40
-"""Of the interval that holds the threshold: to below 1e-10 of `HIGHEST`."""
+HIGHEST = 40.0  # no threshold is sought above
+NODES = 200  # of the Gauss-Legendre quadrature: twelve digits for thresholds from 0.1 up
+HALVINGS = 40  # of the interval that holds the threshold: to below 1e-10 of `HIGHEST`
 
 
 @cache
 def _quadrature() -> tuple[FloatArray, FloatArray]:
-    """Return nodes and weights on the interval from 0 to 1."""
     nodes, weights = np.polynomial.legendre.leggauss(NODES)
     return (nodes + 1.0) / 2, weights / 2
 
@@ -186,7 +146,6 @@ def false_pairs(threshold: float, n: int, freedom: int) -> float:
 
 @cache
 def threshold_for(false_alarms_per_hour: float, statistics_per_hour: float, n: int, freedom: int) -> float:
-    """Return the threshold that has at most so many false alarms an hour."""
     wanted = false_alarms_per_hour / statistics_per_hour
     if not 0.0 < wanted < false_pairs(0.0, n, freedom):
         raise BadSetting(

@@ -7,35 +7,7 @@ covariance of its error is::
 
     P(t) = (I - K psi^T) P(t-1) (I - K psi^T)^T + S K K^T
 
-and K is *seen*, not assumed: it is the correction made, divided by the error it was made for. Forgetting, a held
-trace, masks and a frozen estimate are in it without being known here. From P follows, by the gradient of the poles
-(:mod:`poles`), the standard deviation of frequency and damping.
-
-**The noise S.** The residual is coloured (road, aliasing, what the model lacks), and what counts is its density where
-psi has its own: at the resonance. Hence S is the residual's density there, found by passing it twice through the
-resonance's own pole, which weighs it as psi^2 does, and relating the mean square to what a white residual would give
-(L. Ljung, System Identification, 2nd ed. 1999, (9.54): the covariance of the estimate with the noise spectrum under
-the integral). The mean runs over the last :data:`MEMORY` samples.
-
-**The gradient psi** is phi / A. Only the resonance's own pair of A is taken as a filter, the rest as the number it
-amounts to at the resonance: what a spare pole does, close to the unit circle or to a zero, says nothing about the
-resonance, and made P wander.
-
-What it does not hold: the lag of an estimate that forgets behind a driveline that changes, and errors of first order
-in theta right after the start. Before :data:`FEWEST` samples of a usable estimate no standard deviation is given: at
-150 samples the first-order theory was too sure by a factor of 2.5, at 300 it was right within a quarter
-(``python -m tests.benchmarks.tracking``). Where the residual is a deterministic error of the model, repeated with
-every period of the PRBS, the deviations are too large by up to two: they take it for noise.
-
-**Excitation.** At the end of every block, what the torque makes of the output at the resonance is held against the
-density S of the residual there. *Excited* is a block in which it is the larger; to become so, and to stay so with a
-torque that has become much weaker, it takes :data:`OPENS` times as much: a torque that is nothing but the noise of its
-reading makes an output that is not there, and a single look at a narrow band of noise exceeds ln(1000) times its mean
-once in 1000. *Lacking*: the torque's steps have less than 1 / :data:`OPENS` of the power they had while excited (the
-PRBS is off); the estimator is held, for it would learn noise, and forget. *Drowned*, which two blocks in a row have to
-say: the noise is above what the model makes of the torque; what has been learnt is begun anew. An estimate that is held
-keeps its covariance, but the samples within :data:`MEMORY` say less and less: by what is left of their information the
-variances are divided, up to those of a value that may be anywhere in the band in which the resonance is looked for.
+and K is *seen*, not assumed: it is the correction made, divided by the error it was made for.
 """
 
 from __future__ import annotations
@@ -120,7 +92,6 @@ def keep_mode(frequency_hz: float, damping: float, pole: complex, rho: complex, 
 def take_torque(
     u: float, okay: bool, density: float, sample_time_s: float, mode: FloatArray, through: FloatArray, block: FloatArray
 ) -> None:
-    """Take a sample into the block's densities of torque and output at the resonance."""
     pole = complex(mode[POLE_RE], mode[POLE_IM])
     block[SAMPLES] += 1.0
     if okay and mode[MODE_HZ] > 0.0:
@@ -135,7 +106,6 @@ def take_torque(
 
 @compiled
 def judge(memory: float, opens: float, closes: float, block: FloatArray, lasting: FloatArray) -> int:
-    """Return the verdict on a block."""
     ratio, torque = block[OUTPUT] / block[GOOD], block[TORQUE] / block[GOOD]
     take_mean(torque, block[SAMPLES] / memory, WITHIN, lasting)
     was_excited, was_weak = lasting[VERDICT] == EXCITED, lasting[WEAK] == 1.0
@@ -245,7 +215,6 @@ def fill_gradient(structure: IntArray, gain: float, outputs: FloatArray, inputs:
 
 @compiled
 def spread(P: FloatArray, psi: FloatArray, K: FloatArray, density: float, v: FloatArray) -> None:
-    """P <- (I - K psi^T) P (I - K psi^T)^T + density K K^T; v is room, shape (n,)."""
     n = psi.shape[0]
     c = density
     reach = 0.0
@@ -356,7 +325,6 @@ def follow_block(
     roots: ComplexArray,
     out: FloatArray,
 ) -> None:
-    """Follow the estimates of a block."""
     na, n = structure[NA], theta.shape[1]
     step, frequency, damping, mode = work[3, :n], work[4, :na], work[5, :na], work[6, :3]
     band = numbers[LOWEST_HZ : LARGEST_DAMPING + 1]
@@ -397,8 +365,7 @@ TRUSTED = 26
 """Excited blocks in a row after which an estimate that had to begin anew counts as settled: as many as the watch takes
 to know what is usual."""
 
-FEWEST = 240
-"""Samples of a usable estimate before a standard deviation is given."""
+FEWEST = 240  # samples of a usable estimate before a standard deviation is given
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -413,19 +380,7 @@ class Followed:
 
 
 class Follower:
-    """The recursion with its state; memory does not grow.
-
-    Parameters
-    ----------
-    orders : Orders
-        Structure of the models that will come; na of 2 or more.
-    sample_time_s : float
-        Their sampling period [s].
-    band_hz : tuple of float
-        Where the resonance is looked for [Hz].
-    block : int
-        Samples of a block, at the end of which the excitation is judged.
-    """
+    """The recursion with its state; memory does not grow."""
 
     def __init__(self, orders: Orders, sample_time_s: float, band_hz: tuple[float, float], block: int) -> None:
         n = orders.n_parameters
@@ -449,7 +404,6 @@ class Follower:
 
     @property
     def excitation(self) -> Excitation:
-        """Verdict on the last whole block."""
         return Excitation(int(self._live["lasting"][VERDICT]))
 
     @property
@@ -496,7 +450,6 @@ class Follower:
         return Followed(*(np.ascontiguousarray(column) for column in out.T))
 
     def state(self) -> dict[str, FloatArray]:
-        """Return the state, copied."""
         return {name: values.copy() for name, values in self._live.items()} | {"roots": self._roots.view(float).copy()}
 
     def restore(self, state: Mapping[str, Any]) -> None:

@@ -4,17 +4,10 @@ Roots by simultaneous iteration (Weierstrass; E. Durand 1960, I. O. Kerner, Nume
 
     z_i  <-  z_i - A(z_i) / prod_{j != i} (z_i - z_j)
 
-It converges quadratically: from the poles of the sample before in two or three rounds. Two real poles that become a
-pair can't be found so, since real values stay real; then, and at the start, the rounds begin at points that lie on no
-axis of symmetry, and take about ten.
-
 A mode is the part rho / (1 - p q^-1) and its conjugate in the partial fractions of B / A. With the residue rho held,
 its output changes with the natural frequency f by::
 
     psi(t) = dy/df = 2 Re [ rho dp/df q^-1 / (1 - p q^-1)^2 ] u(t),      dp/df = 2 pi T p (-zeta + j sqrt(1 - zeta^2))
-
-Not u but its steps u(t) - u(t-1) are passed, and whatever psi is held against is taken in steps as well: what driver
-and grade do far below the resonance then hardly enters.
 """
 
 from __future__ import annotations
@@ -25,14 +18,9 @@ from estimator.compiled import compiled, inlined
 from estimator.identification.linear_model import ComplexArray
 from estimator.signals.record import FloatArray
 
-ROUNDS = 60
-"""Rounds allowed from the fixed points; only poles that (nearly) coincide take so many."""
-
-WARM_ROUNDS = 6
-"""Rounds allowed from the poles of the sample before."""
-
-CONVERGED = 1e-13
-"""Change of a pole by which it is taken as found; poles of interest have a magnitude near 1."""
+ROUNDS = 60  # rounds allowed from the fixed points; only poles that (nearly) coincide take so many
+WARM_ROUNDS = 6  # rounds allowed from the poles of the sample before
+CONVERGED = 1e-13  # change of a pole by which it is taken as found; poles of interest have a magnitude near 1
 
 COINCIDING = 1e-5
 """Change after all the rounds up to which poles that coincide are taken as found: rounding leaves a double one 1e-8."""
@@ -189,7 +177,6 @@ N_THROUGH = 5
 
 @compiled
 def pass_torque(u: float, pole: complex, through: FloatArray) -> None:
-    """Pass the next torque through a mode's pole."""
     once = pole * complex(through[ONCE_RE], through[ONCE_IM]) + (u - through[LAST])
     twice = pole * complex(through[TWICE_RE], through[TWICE_IM]) + once
     through[ONCE_RE], through[ONCE_IM], through[TWICE_RE], through[TWICE_IM] = (
@@ -222,11 +209,7 @@ def of_steps(pole: complex) -> float:
 
 @compiled
 def output_density(psi: float, pole: complex, half_width_hz: float) -> float:
-    """Return a sample of the density at its peak of what the torque makes of the output [output unit squared].
-
-    Over the half width zeta f, psi is the mode's own output, with the band of a pole passed twice: a white torque of
-    variance 1 gives ``|rho|^2 / (1 - r)^2``, the peak, to first order in 1 - r.
-    """
+    """Return a sample of the density at its peak of what the torque makes of the output [output unit squared]."""
     r = np.sqrt(squared(pole))
     over = half_width_hz * psi
     return float(over * over * (1.0 + r) / (1.0 - r) / of_steps(pole))

@@ -1,9 +1,4 @@
-"""A recursive estimator, followed and watched, block by block of samples.
-
-What a block says of the excitation decides what becomes of the next: it is learnt from, the estimator is held, or it
-begins anew (:mod:`follow`). Blocks begin with the first sample that comes, so that samples one by one, or all at
-once, are cut alike.
-"""
+"""A recursive estimator, followed and watched, block by block of samples."""
 
 from __future__ import annotations
 
@@ -22,10 +17,7 @@ from estimator.signals.record import BoolArray, FloatArray, IntArray
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Tracked:
-    """What came of samples: the estimates, the resonance in them, what the tracking was doing, and the alarms.
-
-    ``state`` has shape (n,), values of :class:`TrackingState`; ``alarm_at`` tells at which sample each alarm came.
-    """
+    """What came of samples: the estimates, the resonance in them, what the tracking was doing, and the alarms."""
 
     estimates: Trajectory
     found: Followed
@@ -35,17 +27,7 @@ class Tracked:
 
 
 class Tracker:
-    """The three with their state; memory does not grow.
-
-    Parameters
-    ----------
-    estimator : RecursiveEstimator
-        Of an output-error model; fresh.
-    follower : Follower
-        For its models.
-    watch : ChangeWatch
-        For its models, with blocks of the same length.
-    """
+    """The three with their state; memory does not grow."""
 
     def __init__(self, estimator: RecursiveEstimator, follower: Follower, watch: ChangeWatch) -> None:
         self._estimator, self._follower, self.watch = estimator, follower, watch
@@ -124,7 +106,6 @@ class Tracker:
 
 
 def _without_resonance(found: Followed) -> Followed:
-    """Return what was followed without the resonance: one that was found in noise."""
     nothing = np.full(found.frequency_hz.shape, np.nan)
     return Followed(nothing, nothing, nothing, nothing, nothing)
 

@@ -5,24 +5,6 @@ by delta, its error is to first order ``e = w + psi delta``, with psi the sensit
 (:mod:`poles`; e and psi are both taken in steps). Every second the samples come to one deviation::
 
     d = sum psi e / sum psi^2
-
-the score of that change over its information (the local approach: M. Basseville, I. V. Nikiforov, Detection of Abrupt
-Changes, Prentice Hall 1993, chapter 8). A tracked parameter would tell the same later: the estimate takes seconds to
-move, the score has it in the first block.
-
-A change smaller than :attr:`WatchSettings.smallest_change` counts as none: so much is taken off d first.
-
-No noise model is believed: level and spread of d are those of :attr:`WatchSettings.reference_blocks` blocks seen
-before, a period of the PRBS and more, so that what the model lacks, which the PRBS repeats, is part of them. With the
-information p = sum psi^2 of a block, x = d sqrt(p) has one spread s for every p as long as noise is what spreads it;
-what the model lacks spreads d instead. Which of the two it was is not known: the variance of d is the larger of both,
-``s^2 max(1/p, 1/p_usual)``. The threshold follows from the rate of false alarms (:mod:`alarm`).
-
-A block that is not excited is left out: the reference runs on, and with the excitation the watch is there again.
-
-After an alarm the estimate is left to settle, tells the value after, and becomes the next reference. The spread is
-known by then; a few blocks give the new level. So a drift that continues is alarmed again, each time it has moved by
-more than the smallest change.
 """
 
 from __future__ import annotations
@@ -57,18 +39,10 @@ from estimator.signals.settings import Requirement, is_positive, require
 
 @dataclass(frozen=True, slots=True)
 class Spread:
-    """How blocks scatter.
+    """How blocks scatter."""
 
-    Attributes
-    ----------
-    of_x : float
-        Standard deviation s of d sqrt(p).
-    usual : float
-        Mean information of the blocks it is known from.
-    """
-
-    of_x: float
-    usual: float
+    of_x: float  # standard deviation s of d sqrt(p)
+    usual: float  # mean information of the blocks it is known from
 
     def variance(self, information: float) -> float:
         """Return the variance of the deviation that a block of so much information gives [Hz^2]."""
@@ -77,18 +51,10 @@ class Spread:
 
 @dataclass(frozen=True, slots=True)
 class Baseline:
-    """Mean deviation of some blocks, weighted by their information.
+    """Mean deviation of some blocks, weighted by their information."""
 
-    Attributes
-    ----------
-    level_hz : float
-        Their mean [Hz].
-    information : float
-        Of all of them.
-    """
-
-    level_hz: float
-    information: float
+    level_hz: float  # their mean [Hz]
+    information: float  # of all of them
 
     @classmethod
     def of(cls, deviation_hz: FloatArray, information: FloatArray) -> Baseline:
@@ -104,10 +70,7 @@ class Baseline:
 
 
 def spread_of(number: FloatArray, deviation_hz: FloatArray, information: FloatArray) -> Spread:
-    """Return how blocks scatter about a straight line over their numbers, each array of shape (n,), n of 3 or more.
-
-    A line, since a resonance that drifts while it is learnt would be taken for one that scatters.
-    """
+    """Return how blocks scatter about a straight line over their numbers, each array of shape (n,), n of 3 or more."""
     mean = (information @ number) / information.sum()
     level = (information @ deviation_hz) / information.sum()
     slope = (information @ ((number - mean) * (deviation_hz - level))) / (information @ (number - mean) ** 2)
@@ -120,34 +83,15 @@ HOUR_S = 3600.0
 
 @dataclass(frozen=True, slots=True)
 class WatchSettings:
-    """How a change is watched for.
-
-    Attributes
-    ----------
-    false_alarms_per_hour : float
-        So many an hour, at most, where the resonance does not move by more than ``smallest_change``.
-    smallest_change : float
-        A change up to this share of the resonance counts as none: 1 % is 2 % of the stiffness, and more than a
-        heavily laden bus makes of it.
-    block_s : float
-        Length of a block [s]: several times the memory of the mode, so that blocks are nearly independent.
-    reference_blocks : int
-        Blocks that level and spread are learnt from: with one second each, a PRBS period of 1023 levels of 20 ms.
-    baseline_blocks : int
-        Blocks that the level is learnt from after an alarm: as few as make the threshold little higher.
-    settling_s : float
-        How long the estimate is left to itself after an alarm [s]: four memories of a forgetting of 0.995 at 20 ms.
-    fewest_share : float
-        A block with a smaller share of usable samples is left out.
-    """
+    """How a change is watched for."""
 
     false_alarms_per_hour: float = 0.1
-    smallest_change: float = 0.01
+    smallest_change: float = 0.01  # A change up to this share of the resonance counts as none
     block_s: float = 1.0
-    reference_blocks: int = 21
-    baseline_blocks: int = 7
+    reference_blocks: int = 21  # blocks that level and spread are learnt from
+    baseline_blocks: int = 7  # blocks that the level is learnt from after an alarm
     settling_s: float = 16.0
-    fewest_share: float = 0.8
+    fewest_share: float = 0.8  # A block with a smaller share of usable samples is left out
 
     def __post_init__(self) -> None:
         share, blocks, smallest = self.fewest_share, self.reference_blocks, self.smallest_change
@@ -201,7 +145,6 @@ def take_reference(
     mode: FloatArray,
     through: FloatArray,
 ) -> None:
-    """Take the resonance of a model for reference; none where it has no damped one."""
     na = structure[NA]
     mode[:] = 0.0
     mode[ERROR] = np.nan
@@ -217,7 +160,6 @@ def take_reference(
 
 @compiled
 def reference_output(structure: IntArray, theta: FloatArray, past: FloatArray) -> float:
-    """Return the next output of the reference model, from its own outputs and the inputs."""
     na = structure[NA]
     value = 0.0
     for i in range(na):
@@ -229,7 +171,6 @@ def reference_output(structure: IntArray, theta: FloatArray, past: FloatArray) -
 
 @compiled
 def take_error(error: float, y: float, mode: FloatArray, through: FloatArray, score: FloatArray) -> None:
-    """Take the error of a sample, NaN where it is not good, into the score of its block."""
     psi = sensitivity(complex(mode[WEIGHT_RE], mode[WEIGHT_IM]), through)
     step, y_step = error - mode[ERROR], y - mode[OUTPUT_THEN]
     mode[ERROR], mode[OUTPUT_THEN] = error, y
@@ -295,24 +236,7 @@ class _Memory:
 
 
 class ChangeWatch:
-    """The watch with its state; memory does not grow.
-
-    Parameters
-    ----------
-    orders : Orders
-        Structure of the models that will come.
-    sample_time_s : float
-        Their sampling period [s].
-    band_hz : tuple of float
-        Where the resonance is looked for [Hz].
-    settings : WatchSettings
-        How to watch.
-
-    Raises
-    ------
-    BadSetting
-        If the rate of false alarms can't be kept by any threshold.
-    """
+    """The watch with its state; memory does not grow."""
 
     def __init__(
         self, orders: Orders, sample_time_s: float, band_hz: tuple[float, float], settings: WatchSettings
@@ -363,7 +287,6 @@ class ChangeWatch:
     def end_block(
         self, time_s: float, theta: FloatArray, frequency: Level | None, damping: float, excited: bool
     ) -> Alarm | None:
-        """End the present block."""
         score = self._live["score"].tolist()
         self._live["score"][:] = 0.0
         self.statistic = np.nan
@@ -460,7 +383,6 @@ class ChangeWatch:
         return alarm
 
     def _by_score(self, deviation_hz: float, std_hz: float) -> Level:
-        """Return the resonance at a deviation from the reference's."""
         return Level.of(float(self._live["mode"][REFERENCE_HZ]) + deviation_hz, std_hz)
 
     @property
@@ -483,7 +405,6 @@ class ChangeWatch:
         )
 
     def state(self) -> dict[str, FloatArray]:
-        """Return the state, copied."""
         kept = {name: values.copy() for name, values in self._live.items()}
         return kept | {"memory": np.array(astuple(self._memory), dtype=np.float64)}
 

@@ -18,8 +18,8 @@ from estimator.physics.effect import (
     EffectParameter,
     Element,
     Held,
+    OtherForm,
     Place,
-    Retelling,
     Span,
     Start,
     Untestable,
@@ -59,7 +59,6 @@ def quadratic_law(speed: float, drag: float, exponent: float, at: float) -> floa
 
 
 def quadratic_scales(model: Driveline, records: Sequence[Record]) -> tuple[float, ...]:
-    """Return a twentieth of the torque in use at the top speed, 1, and the top speed."""
     top = speed_scale(records)
     return (0.05 * torque_scale(records) / top**2, 1.0, top)
 
@@ -69,22 +68,21 @@ def quadratic_starts(model: Driveline, records: Sequence[Record]) -> list[Start]
     return [(0.5, Held(SQUARE), Held(1.0))]
 
 
-def quadratic_retold(
+def quadratic_reparametrised(
     model: Driveline, records: Sequence[Record], values: Mapping[str, float], line: Mapping[str, float]
-) -> list[Retelling]:
+) -> list[OtherForm]:
     """Return the drag that was found with an exponent that is not 2."""
     return other_power("quadratic_nm_s2", quadratic_scales(model, records)[0], values)
 
 
-def other_power(size: str, scale: float, values: Mapping[str, float]) -> list[Retelling]:
+def other_power(size: str, scale: float, values: Mapping[str, float]) -> list[OtherForm]:
     """Return the same of a drag whose size is the parameter ``size``."""
     if values["exponent"] != SQUARE:
         return []
-    return [Retelling((values[size] / scale, SQUARE - 0.05, Held(1.0)), {})]
+    return [OtherForm((values[size] / scale, SQUARE - 0.05, Held(1.0)), {})]
 
 
 def quadratic_testable(model: Driveline, records: Sequence[Record]) -> Untestable | None:
-    """Need speeds that differ, or else it is the constant load."""
     if speeds_differ(records):
         return None
     return Untestable("the speed is the same all along: not separable from the constant load torque", "reversal")
@@ -108,7 +106,7 @@ QUADRATIC_FRICTION = Effect(
     scales=quadratic_scales,
     starts=quadratic_starts,
     testable=quadratic_testable,
-    retold=quadratic_retold,
+    reparametrised=quadratic_reparametrised,
     text="drag at the motor that grows with the square of its speed: {quadratic_nm_s2:.3g} {unit[quadratic_drag]}",
 )
 
@@ -116,9 +114,9 @@ QUADRATIC_FRICTION = Effect(
 # Drag of the air on the vehicle: it grows with the square of its speed.
 
 
-def air_retold(
+def air_reparametrised(
     model: Driveline, records: Sequence[Record], values: Mapping[str, float], line: Mapping[str, float]
-) -> list[Retelling]:
+) -> list[OtherForm]:
     """Return the drag that was found with an exponent that is not 2."""
     return other_power("drag_nm_s2", quadratic_scales(model, records)[0], values)
 
@@ -141,7 +139,7 @@ AERODYNAMIC_DRAG = Effect(
     scales=quadratic_scales,
     starts=quadratic_starts,
     testable=quadratic_testable,
-    retold=air_retold,
+    reparametrised=air_reparametrised,
     text="drag on the load that grows with the square of its speed: {drag_nm_s2:.3g} {unit[quadratic_drag]}",
 )
 
@@ -166,20 +164,17 @@ def eddy_law(speed: float, peak: float, peak_speed: float) -> float:
 
 
 def speed_of(record: Record) -> FloatArray:
-    """Return the speeds that were measured."""
     speed = measured_speed(record)
     return speed[np.isfinite(speed)]
 
 
 def eddy_testable(model: Driveline, records: Sequence[Record]) -> Untestable | None:
-    """Need speeds far enough apart."""
     if any(float(np.ptp(speed_of(record))) >= LEAST_RANGE * speed_scale([record]) for record in records):
         return None
     return Untestable("the speed hardly varies: not separable from viscous friction and the constant load", "reversal")
 
 
 def eddy_implausible(model: Driveline, records: Sequence[Record], values: Mapping[str, float]) -> str:
-    """Object to a drag that does not level off in the speeds driven."""
     top = speed_scale(records)
     if values["peak_rad_s"] < STRAIGHT * top:
         return ""
@@ -224,7 +219,6 @@ def by_direction_law(speed: float, difference: float) -> float:
 
 
 def by_direction_testable(model: Driveline, records: Sequence[Record]) -> Untestable | None:
-    """Need motion in both directions, and at each place at different speeds."""
     both = [record for record in records if reverses(record)]
     if not both:
         return Untestable("the speed never changes sign: not separable from viscous friction", "reversal")
@@ -234,7 +228,6 @@ def by_direction_testable(model: Driveline, records: Sequence[Record]) -> Untest
 
 
 def by_direction_sentence(values: Mapping[str, float], motion: Motion) -> str:
-    """Say what was found."""
     size = f"{abs(values['difference_nm_s']):.3g} {unit('damping', motion)}"
     more, less = ("forward", "backward") if values["difference_nm_s"] > 0.0 else ("backward", "forward")
     return f"friction at the motor depends on the direction: {size} more {more} and as much less {less}"
@@ -273,7 +266,6 @@ def cold_part(time_s: float, cold: float, time_constant_s: float) -> float:
 def warming_described(
     model: Driveline, values: Mapping[str, float], line: Mapping[str, float]
 ) -> Mapping[str, tuple[Span, ...]]:
-    """Return the friction from warm to cold."""
     name = "b_L" if "b_L" in line else "b_M"
     return {name: ((line[name], line[name] + values["cold_nm_s"]),)}
 
@@ -313,7 +305,6 @@ def gears_law(torque: float, sign: float, driving: float, back: float) -> float:
 
 
 def gears_testable(model: Driveline, records: Sequence[Record]) -> Untestable | None:
-    """Need both signs of torque and of speed, or else it is a gain of the torque or a constant load."""
     if turns(model, records) and any(torque_reverses(record) for record in records):
         return None
     return Untestable("torque or speed never change sign: not separable from gain and constant load", "reversal")

@@ -16,7 +16,7 @@ from estimator.physics.effect import (
     EffectParameter,
     Element,
     Held,
-    Retelling,
+    OtherForm,
     Untestable,
 )
 from estimator.physics.laws import fading, smooth_sign
@@ -43,34 +43,29 @@ CREEP = EffectParameter(
 
 
 def motor_scales(model: Driveline, records: Sequence[Record]) -> tuple[float, ...]:
-    """Return a twentieth of the torque in use, presliding by which a motor swings at 20 Hz, and a usual creep."""
     friction = 0.05 * torque_scale(records)
     presliding = friction / (model.parameters["J_M"].value * (2.0 * math.pi * HELD_HZ) ** 2)
     return (friction, presliding, CREEPS_OVER * speed_scale(records))
 
 
-def motor_retold(
+def motor_reparametrised(
     model: Driveline, records: Sequence[Record], values: Mapping[str, float], line: Mapping[str, float]
-) -> list[Retelling]:
+) -> list[OtherForm]:
     """Return the friction that was found, bending before it slides, or creeping near rest."""
     return forms_near_rest("friction_nm", motor_scales(model, records), values, (1.0,))
 
 
 def forms_near_rest(
     size: str, scale: Sequence[float], values: Mapping[str, float], presliding: Sequence[float]
-) -> list[Retelling]:
-    """Return a dry friction that was found sharp in its forms near rest, bent by each ``presliding``, or creeping.
-
-    The sizes before the two shapes keep what was found.
-    """
+) -> list[OtherForm]:
+    """Return a dry friction that was found sharp in its forms near rest, bent by each ``presliding``, or creeping."""
     if values["presliding_rad"] > 0.0 or values["creep_rad_s"] > 0.0:
         return []
     found = values[size] / scale[0]
-    return [Retelling((found, bent, Held(0.0)), {}) for bent in presliding] + [Retelling((found, Held(0.0), 1.0), {})]
+    return [OtherForm((found, bent, Held(0.0)), {}) for bent in presliding] + [OtherForm((found, Held(0.0), 1.0), {})]
 
 
 def motor_testable(model: Driveline, records: Sequence[Record]) -> Untestable | None:
-    """Need a speed that takes both signs, in one recording or in several that share their load; or a known load."""
     if turns(model, records):
         return None
     return Untestable("the speed never changes sign: not separable from the constant load torque", "reversal")
@@ -94,7 +89,7 @@ COULOMB_FRICTION_MOTOR = Effect(
     scales=motor_scales,
     starts=lambda _model, _records: [(0.5, Held(0.0), Held(0.0))],
     testable=motor_testable,
-    retold=motor_retold,
+    reparametrised=motor_reparametrised,
     text="dry friction of {friction_nm:.3g} {unit[torque]} acts at the motor against the motion",
     linear=True,
 )
@@ -103,8 +98,7 @@ COULOMB_FRICTION_MOTOR = Effect(
 # Dry friction on the load side: a constant torque against the motion.
 
 
-STICKING = 0.02
-"""Presliding of a contact that sticks, in the scale of one that deflects."""
+STICKING = 0.02  # presliding of a contact that sticks, in the scale of one that deflects
 
 LOAD_PRESLIDING = EffectParameter(
     "presliding_rad",
@@ -123,20 +117,19 @@ def load_scales(model: Driveline, records: Sequence[Record]) -> tuple[float, ...
     return motor_scales(model, records)
 
 
-def load_retold(
+def load_reparametrised(
     model: Driveline, records: Sequence[Record], values: Mapping[str, float], line: Mapping[str, float]
-) -> list[Retelling]:
+) -> list[OtherForm]:
     """Return the friction that was found, bending before it slides, or sticking: less than a heavy load shows."""
     return bending("friction_nm", model, records, values)
 
 
-def bending(size: str, model: Driveline, records: Sequence[Record], values: Mapping[str, float]) -> list[Retelling]:
+def bending(size: str, model: Driveline, records: Sequence[Record], values: Mapping[str, float]) -> list[OtherForm]:
     """Return the same of dry friction at the load whose torque is the parameter ``size``."""
     return forms_near_rest(size, load_scales(model, records), values, (1.0, STICKING))
 
 
 def load_testable(model: Driveline, records: Sequence[Record]) -> Untestable | None:
-    """Need a recording in which the speed takes both signs."""
     return motor_testable(model, records)
 
 
@@ -158,7 +151,7 @@ COULOMB_FRICTION_LOAD = Effect(
     scales=load_scales,
     starts=lambda _model, _records: [(0.5, Held(0.0), Held(0.0))],
     testable=load_testable,
-    retold=load_retold,
+    reparametrised=load_reparametrised,
     text="dry friction of {friction_nm:.3g} {unit[torque]} on the load side",
     linear=True,
 )
@@ -183,24 +176,22 @@ def stribeck_scales(model: Driveline, records: Sequence[Record]) -> tuple[float,
     return (torque, torque, 0.05 * speed_scale(records), presliding, creep)
 
 
-def stribeck_retold(
+def stribeck_reparametrised(
     model: Driveline, records: Sequence[Record], values: Mapping[str, float], line: Mapping[str, float]
-) -> list[Retelling]:
+) -> list[OtherForm]:
     """Return the friction that was found, bending before it slides, or creeping near rest."""
     if values["presliding_rad"] > 0.0 or values["creep_rad_s"] > 0.0:
         return []
     found = (values[name] for name in ("excess_nm", "coulomb_nm", "stribeck_rad_s"))
     start = tuple(value / scale for value, scale in zip(found, stribeck_scales(model, records)[:3], strict=True))
-    return [Retelling((*start, 1.0, Held(0.0)), {}), Retelling((*start, Held(0.0), 1.0), {})]
+    return [OtherForm((*start, 1.0, Held(0.0)), {}), OtherForm((*start, Held(0.0), 1.0), {})]
 
 
 def stribeck_testable(model: Driveline, records: Sequence[Record]) -> Untestable | None:
-    """Need what Coulomb friction needs: both signs of the speed."""
     return motor_testable(model, records)
 
 
 def stribeck_sentence(values: Mapping[str, float], motion: Motion) -> str:
-    """Say what was found."""
     torque, speed = unit("torque", motion), unit("speed", motion)
     breakaway = values["coulomb_nm"] + values["excess_nm"]
     return (
@@ -231,7 +222,7 @@ STRIBECK_FRICTION = Effect(
     scales=stribeck_scales,
     starts=lambda _model, _records: [(0.5, 0.3, width, Held(0.0), Held(0.0)) for width in (0.6, 1.5, 3.0)],
     testable=stribeck_testable,
-    retold=stribeck_retold,
+    reparametrised=stribeck_reparametrised,
     text=stribeck_sentence,
     linear=True,
 )
@@ -240,9 +231,9 @@ STRIBECK_FRICTION = Effect(
 # A brake that drags for a while.
 
 
-def brake_retold(
+def brake_reparametrised(
     model: Driveline, records: Sequence[Record], values: Mapping[str, float], line: Mapping[str, float]
-) -> list[Retelling]:
+) -> list[OtherForm]:
     """Return the brake that was found, bending before it slides, sticking or creeping, where a recording shows that."""
     if not any(reverses(record) for record in records):
         return []
@@ -270,7 +261,7 @@ BRAKE_DRAG = Effect(
     permanent="coulomb_friction_load",
     scales=lambda model, records: load_scales(model, records),
     starts=lambda _model, _records: [(0.5, Held(0.0), Held(0.0))],
-    retold=brake_retold,
+    reparametrised=brake_reparametrised,
     text="a brake drags with {brake_nm:.3g} {unit[torque]} during a part of the recording",
     linear=True,
 )

@@ -17,7 +17,7 @@ from estimator.physics.effect import (
     EffectParameter,
     Element,
     Held,
-    Retelling,
+    OtherForm,
     Span,
     Start,
     Step,
@@ -55,7 +55,6 @@ GENERATOR_COUPLED = Effect(
 def payload_described(
     model: Driveline, values: Mapping[str, float], line: Mapping[str, float]
 ) -> Mapping[str, tuple[Span, ...]]:
-    """Return the load's inertia before and after."""
     name = load_inertia(model)
     before, after = line[name], line[name] + values["change_kg_m2"]
     return {name: ((before, before), (after, after))}
@@ -87,19 +86,15 @@ INERTIA_CHANGE = Effect(
 # One more inertia on a spring: a second resonance that the model does not have.
 
 
-MOST_DAMPING = 0.15
-"""Steel shafts and their rubber couplings stay below this damping ratio of their own."""
-
-LEAST_AMPLIFIED = 2.0
-"""By which a resonance amplifies at least, ``1 / (2 zeta)``, whatever damps it."""
+MOST_DAMPING = 0.15  # steel shafts and their rubber couplings stay below this damping ratio of their own
+LEAST_AMPLIFIED = 2.0  # by which a resonance amplifies at least, ``1 / (2 zeta)``, whatever damps it
 
 
 LIGHTEST, STIFFEST = 0.03, 0.95
 """Inertia within the line, over the motor's, and share of the twist on the shaft behind it, beyond which it
 would take too many steps to follow them."""
 
-MOST = 50.0
-"""Most inertia, in tenths of the motor's."""
+MOST = 50.0  # most inertia, in tenths of the motor's
 
 SOFTEST = 0.4
 """Share of the twist on the shaft below which the shaft would be the stiffer of both springs by far."""
@@ -109,8 +104,7 @@ NEAR_HALF_RATE = 0.4
 """Frequency over the sampling rate up to which an inertia within the line is looked for: from farther above a
 fit may end at its image on the other side of half the rate."""
 
-ABOVE = 5.0
-"""Frequency over the line's own near which it is looked for where the samples are fast."""
+ABOVE = 5.0  # frequency over the line's own near which it is looked for where the samples are fast
 
 
 @compiled
@@ -140,20 +134,16 @@ def mode_scales(model: Driveline, records: Sequence[Record]) -> tuple[float, ...
 
 
 def mode_starts(model: Driveline, records: Sequence[Record]) -> list[Start]:
-    """Return heavy modes far above the first resonance, and light ones below, around and above it, as close as narrow.
-
-    The heavy ones come first: where only what their spring does to the line shows, nothing else distinguishes them. An
-    inertia within the line is looked for from where such a branch has been fitted (``retold``).
-    """
+    """Return heavy modes far above the first resonance, and light ones below, around and above it."""
     none = Held(0.0)
     heavy = [(1.5, ratio, 0.95, 1.0, none, none) for ratio in (3.0, 4.0, 5.0, 6.0)]
     light = [(0.2, float(ratio), 1.0, 1.0, none, none) for ratio in np.geomspace(0.3, 5.0, 24)]
     return [*heavy, *light]
 
 
-def mode_retold(
+def mode_reparametrised(
     model: Driveline, records: Sequence[Record], values: Mapping[str, float], line: Mapping[str, float]
-) -> list[Retelling]:
+) -> list[OtherForm]:
     """Return an inertia before the shaft and one behind it that leave the line as compliant and as heavy as a branch.
 
     Its spring and the shaft's are as soft together, within what ``k`` is trusted to. Well below its resonance it moves
@@ -176,14 +166,14 @@ def mode_retold(
     none, motor, load = Held(0.0), line["J_M"] + values["inertia_kg_m2"], line["J_L"]
     shaped = none, Held(1.0), Within(share, SOFTEST, STIFFEST), Within(1.0, 0.02, MOST_DAMPING / usual)
 
-    def retelling(omega: float, at_motor: bool) -> Retelling:
+    def reparametrisation(omega: float, at_motor: bool) -> OtherForm:
         inertia = stiffness / ((1.0 - share) * omega**2)
         size = Within(min(max(inertia / tenth, 10.0 * LIGHTEST), MOST), 10.0 * LIGHTEST, MOST)
         of_motor, of_load = (share, 1.0 - share) if at_motor else (1.0 - share, share)
         lighter = {"J_M": motor - of_motor**2 * inertia, "J_L": load - of_load**2 * inertia}
-        return Retelling((*shaped, *((size, none) if at_motor else (none, size))), {"k": stiffness / share, **lighter})
+        return OtherForm((*shaped, *((size, none) if at_motor else (none, size))), {"k": stiffness / share, **lighter})
 
-    return [retelling(before, at_motor=True), retelling(behind, at_motor=False)]
+    return [reparametrisation(before, at_motor=True), reparametrisation(behind, at_motor=False)]
 
 
 def mode_described(
@@ -197,7 +187,6 @@ def mode_described(
 
 
 def mode_sentence(values: Mapping[str, float], motion: Motion) -> str:
-    """Say what was found."""
     place = f"{mode_within(values) or values['inertia_kg_m2']:.3g} {unit('inertia', motion)} on a spring"
     if values.get("between_kg_m2"):
         place += " between motor and shaft"
@@ -257,10 +246,10 @@ EXTRA_TORSIONAL_MODE = Effect(
     scales=mode_scales,
     starts=mode_starts,
     text=mode_sentence,
-    loosens=frozenset({"k", "c"}),  # a spring in the line softens it by s and lowers its damping by s^2
+    widens=frozenset({"k", "c"}),  # a spring in the line softens it by s and lowers its damping by s^2
     described=mode_described,
     implausible=mode_implausible,
-    retold=mode_retold,
+    reparametrised=mode_reparametrised,
     derived=mode_derived,
     linear=True,
 )

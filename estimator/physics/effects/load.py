@@ -29,11 +29,8 @@ from estimator.signals.record import FloatArray, Record
 # Road grade: a load torque that wanders slowly over a recording, as the road goes up and down.
 
 
-KNOT_SPACING_S = 2.0
-"""A road's grade keeps its value over tens of metres: 2 s at a bus's 10 m/s are 20 m."""
-
-DEGREE = 3
-"""Cubic: a road is laid out without kinks, so a profile with an edge is something else."""
+KNOT_SPACING_S = 2.0  # a road's grade keeps its value over tens of metres: 2 s at a bus's 10 m/s are 20 m
+DEGREE = 3  # cubic: a road is laid out without kinks, so a profile with an edge is something else
 
 SHORTEST_S = 4 * KNOT_SPACING_S
 """A profile needs a few knots; a shorter recording can't tell it from the constant load."""
@@ -48,12 +45,10 @@ def grade_basis(time_s: FloatArray, at_s: FloatArray | None = None) -> FloatArra
     knots = np.concatenate([[first] * DEGREE, inner, [last] * DEGREE])
     at = time_s if at_s is None else at_s
     design = BSpline.design_matrix(np.clip(at, first, last), knots, DEGREE).toarray()
-    splines: FloatArray = np.ascontiguousarray(design.T[1:])
-    return splines
+    return np.ascontiguousarray(design.T[1:])
 
 
 def grade_testable(model: Driveline, records: Sequence[Record]) -> Untestable | None:
-    """Need a recording long enough for a profile."""
     if any(record.time_s[-1] - record.time_s[0] >= SHORTEST_S for record in records):
         return None
     return Untestable(
@@ -91,7 +86,6 @@ ROAD_GRADE = Effect(
 
 
 def imbalance_testable(model: Driveline, records: Sequence[Record]) -> Untestable | None:
-    """Need the gear ratio, and motion."""
     if model.gear_ratio is None:
         reason = "the model file has no [geometry] gear_ratio: the wheel's angle is unknown"
         return Untestable(reason, "reversal", needs="gear_ratio in the model file's [geometry]")
@@ -153,7 +147,6 @@ def gravity_starts(model: Driveline, records: Sequence[Record]) -> list[Start]:
 
 
 def gravity_implausible(model: Driveline, records: Sequence[Record], values: Mapping[str, float]) -> str:
-    """Refuse what changes, over the load's swing, by more than the torque does from end to end, however it hangs."""
     swing = min(range_of(records) / values["motor_turns_per_turn"], 2.0 * math.pi)
     most = max(float(np.abs(record.total_torque_nm).max()) for record in records)
     if values["moment_nm"] * (1.0 - math.cos(0.5 * swing)) <= 2.0 * most:
@@ -162,7 +155,6 @@ def gravity_implausible(model: Driveline, records: Sequence[Record], values: Map
 
 
 def gravity_sentence(values: Mapping[str, float], motion: Motion) -> str:
-    """Say what was found."""
     turns = values["motor_turns_per_turn"]
     geared = f", {turns:.3g} motor turns to one turn of the load" if turns != 1.0 else ""
     return f"gravity pulls at the load with up to {values['moment_nm']:.3g} {unit('torque', motion)}{geared}"
@@ -205,7 +197,6 @@ def ground_law(angle: float, stiffness: float) -> float:
 
 
 def ground_sentence(values: Mapping[str, float], motion: Motion) -> str:
-    """Say what was found."""
     size = f"{values['stiffness_nm_per_rad']:.3g} {unit('stiffness', motion)}"
     return f"a spring of {size} holds the load against the ground"
 
@@ -233,20 +224,14 @@ GROUNDED_SPRING = Effect(
 # The tyre slips: the wheel's inertia is coupled to the vehicle's by creep and no longer rigidly.
 
 
-LIGHTEST = 0.005
-"""Least share of the load's inertia that a wheel has."""
+LIGHTEST = 0.005  # least share of the load's inertia that a wheel has
 
 
 @compiled
 def coupling(
     vehicle: float, slip_per_nm: float, creep_speed: float, wheel_share: float, steepest: float
 ) -> tuple[float, float]:
-    """Return the torque per slide [Nm s/rad] at a vehicle speed, and the share of the inertia on the wheel's side.
-
-    A light wheel on a steep curve follows faster than an integration step can. There it is made heavier at the
-    vehicle's cost, by as much as the step needs: so near to rigid the split changes next to nothing. ``steepest`` is
-    the load's inertia times the fastest decay the step can follow [Nm s/rad].
-    """
+    """Return the torque per slide [Nm s/rad] at a vehicle speed, and the share of the inertia on the wheel's side."""
     slope = 1.0 / (slip_per_nm * (abs(vehicle) + creep_speed))
     needed = slope / steepest
     enough = wheel_share * (1.0 - wheel_share) >= needed
@@ -258,10 +243,7 @@ def coupling(
 
 @compiled
 def build_up(slide: float, roll: float, traction: float, tread: float, relaxation: float) -> float:
-    """Return how fast the traction builds up [Nm/s]: over the angle that the tyre has to roll.
-
-    ``tread`` is the torque per slip [Nm], ``relaxation`` what the integration step can follow at this roll [rad].
-    """
+    """Return how fast the traction builds up [Nm/s]: over the angle that the tyre has to roll."""
     return (slide * tread - roll * traction) / relaxation
 
 
@@ -333,7 +315,7 @@ TYRE_SLIP = Effect(
     ),
     structures=WITH_SHAFT,
     resembles=("extra_torsional_mode",),
-    loosens=frozenset({"k", "c"}),  # a carcass is a spring behind the shaft, and the tread damps its oscillation
+    widens=frozenset({"k", "c"}),  # a carcass is a spring behind the shaft, and the tread damps its oscillation
     scales=tyre_scales,
     starts=tyre_starts,
     implausible=tyre_implausible,

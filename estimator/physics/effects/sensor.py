@@ -50,7 +50,6 @@ def true_angle(read: float, once: float, once_phase: float, twice: float, twice_
 
 
 def resolver_sentence(values: Mapping[str, float], motion: Motion) -> str:
-    """Say what was found."""
     return (
         f"the resolver's angle is off by {1e3 * values['once_rad']:.3g} mrad once and "
         f"{1e3 * values['twice_rad']:.3g} mrad twice per turn"
@@ -84,22 +83,17 @@ RESOLVER_ERROR = Effect(
 # The sensor reads the magnitude of the speed.
 
 
-STANDSTILL = 0.05
-"""Share of its top speed below which a recording comes to standstill between two samples."""
-
-LEAST_SHARE = 0.5
-"""Share of the magnitude from which a sensor's own motion has no sign left."""
+STANDSTILL = 0.05  # share of its top speed below which a recording comes to standstill between two samples
+LEAST_SHARE = 0.5  # share of the magnitude from which a sensor's own motion has no sign left
 
 
 def blind_testable(model: Driveline, records: Sequence[Record]) -> Untestable | None:
-    """Need a recording that comes to standstill: beyond it the sign may change, whatever the sensor reads."""
     if any(float(np.nanmin(np.abs(measured_speed(record)))) < STANDSTILL * speed_scale([record]) for record in records):
         return None
     return Untestable("the speed stays clear of standstill: it has no other sign that could be lost", "reversal")
 
 
 def blind_implausible(model: Driveline, records: Sequence[Record], values: Mapping[str, float]) -> str:
-    """Object to a sensor that tells the sign of most of the speed: what differs with the sign is something else."""
     if values["share"] >= LEAST_SHARE:
         return ""
     return f"a sensor that reads {values['share']:.2g} of the speed without its sign is not blind for it"
@@ -153,7 +147,6 @@ SPEED_QUANTISATION = Effect(
 
 
 def stale_sentence(values: Mapping[str, float], motion: Motion) -> str:
-    """Say what was found."""
     return f"{100.0 * values['share']:.3g}% of the samples are stale: they repeat the value before without a flag"
 
 
@@ -178,7 +171,6 @@ STALE_SAMPLES = Effect(
 
 
 def lost_sentence(values: Mapping[str, float], motion: Motion) -> str:
-    """Say what was found."""
     return f"{100.0 * values['share']:.3g}% of the samples were lost: missing, flagged or recorded as zero"
 
 

@@ -16,7 +16,7 @@ from estimator.physics.effect import (
     EffectParameter,
     Element,
     Held,
-    Retelling,
+    OtherForm,
     Span,
     Start,
     Step,
@@ -57,22 +57,19 @@ def gap_scales(model: Driveline, records: Sequence[Record]) -> tuple[float, ...]
 
 
 def gap_starts(model: Driveline, records: Sequence[Record]) -> list[Start]:
-    """Return a ladder of gap sizes: a gap that is too large or too small is a local optimum.
-
-    On a bench nothing can bounce, and the damping engages at once.
-    """
+    """Return a ladder of gap sizes: a gap that is too large or too small is a local optimum."""
     contact: float | Held = Held(0.0) if model.structure is Structure.JOINT else 1.0
     pull: float | Held = Held(0.0) if model.structure is Structure.JOINT else 0.5
     return [(size, contact, pull, Held(0.0)) for size in (0.1, 0.4, 1.2, 3.6)]
 
 
-def gap_retold(
+def gap_reparametrised(
     model: Driveline, records: Sequence[Record], values: Mapping[str, float], line: Mapping[str, float]
-) -> list[Retelling]:
+) -> list[OtherForm]:
     """Return the gap that was found with the damper across it, which its faces then do not share."""
     if values["across"] > 0.0:
         return []
-    return [Retelling((values["gap_rad"] / gap_scales(model, records)[0], Held(0.0), Held(0.0), Held(1.0)), {})]
+    return [OtherForm((values["gap_rad"] / gap_scales(model, records)[0], Held(0.0), Held(0.0), Held(1.0)), {})]
 
 
 CONTACT_PER_GAP = 0.05
@@ -85,7 +82,6 @@ def gap_completed(values: Mapping[str, float]) -> Mapping[str, float]:
 
 
 def gap_testable(model: Driveline, records: Sequence[Record]) -> Untestable | None:
-    """Need torque of both signs, so that the gap is crossed."""
     if any(torque_reverses(record) for record in records):
         return None
     return Untestable("the shaft torque never changes sign: the gap stays closed on one side", "reversal")
@@ -126,7 +122,7 @@ BACKLASH = Effect(
     scales=gap_scales,
     starts=gap_starts,
     testable=gap_testable,
-    retold=gap_retold,
+    reparametrised=gap_reparametrised,
     text="the shaft has a backlash of {gap_rad:.3g} {unit[angle]} in total",
     completed=gap_completed,
     shows_start=frozenset({"twist", "preload"}),
@@ -138,11 +134,7 @@ BACKLASH = Effect(
 
 @compiled
 def stiffness_factor(twist: float, hardening: float, shape: float) -> float:
-    """Return the factor on the stiffness, ``(1 + |h| e^2 / m)^(+-m)`` with the sign of h.
-
-    To first order it is ``1 + h e^2`` whatever the shape m. A hardening shaft with m = 1 is the Duffing spring; a
-    softening one with m = 1/2 ends in a constant torque, and none ever pulls the wrong way.
-    """
+    """Return the factor on the stiffness, ``(1 + |h| e^2 / m)^(+-m)`` with the sign of h."""
     if every(hardening == 0.0):
         return 1.0
     size = 1.0 + abs(hardening) * twist * twist / shape
@@ -151,10 +143,7 @@ def stiffness_factor(twist: float, hardening: float, shape: float) -> float:
 
 @compiled
 def loaded_twist(twist: float, hardening: float, shape: float, stage: float, stage_from: float) -> float:
-    """Return the twist at which a linear shaft carries the same torque [rad].
-
-    From ``stage_from`` on, either way, a second spring is loaded next to the first: a coupling of two stages.
-    """
+    """Return the twist at which a linear shaft carries the same torque [rad]."""
     same = twist * stiffness_factor(twist, hardening, shape)
     if every(stage == 0.0):
         return same
@@ -173,18 +162,17 @@ def stiffness_starts(model: Driveline, records: Sequence[Record]) -> list[Start]
     return [(0.5, 1.0, *one), (-0.5, 0.5, *one)]
 
 
-def stiffness_retold(
+def stiffness_reparametrised(
     model: Driveline, records: Sequence[Record], values: Mapping[str, float], line: Mapping[str, float]
-) -> list[Retelling]:
+) -> list[OtherForm]:
     """Return a shaft of two stages that hardens or softens as the one that was found, from small and larger twists."""
     if values["stage_share"] != 0.0:
         return []
     share = math.copysign(0.3, values["hardening_per_rad2"])
-    return [Retelling((Held(0.0), Held(1.0), share, begins), {}) for begins in (0.2, 0.5)]
+    return [OtherForm((Held(0.0), Held(1.0), share, begins), {}) for begins in (0.2, 0.5)]
 
 
 def stiffness_sentence(values: Mapping[str, float], motion: Motion) -> str:
-    """Say what was found, as the twist at which the stiffness has changed by a tenth."""
     if stage := values.get("stage_share", 0.0):
         side, at = ("stiffer", values["stage_rad"]) if stage > 0 else ("softer", values["stage_rad"])
         return f"the shaft has two stages: {abs(stage):.0%} {side} beyond a twist of {at:.3g} {unit('angle', motion)}"
@@ -212,8 +200,8 @@ STIFFNESS_NONLINEARITY = Effect(
     scales=stiffness_scales,
     starts=stiffness_starts,
     text=stiffness_sentence,
-    retold=stiffness_retold,
-    loosens=frozenset({"k", "c"}),  # of an oscillation whose frequency goes with its size a linear line damps the beats
+    reparametrised=stiffness_reparametrised,
+    widens=frozenset({"k", "c"}),  # of an oscillation whose frequency goes with its size a linear line damps the beats
     shows_start=frozenset({"twist"}),
 )
 
@@ -224,7 +212,6 @@ STIFFNESS_NONLINEARITY = Effect(
 def stiffness_step_described(
     model: Driveline, values: Mapping[str, float], line: Mapping[str, float]
 ) -> Mapping[str, tuple[Span, ...]]:
-    """Return the stiffness before and after."""
     before, after = line["k"], line["k"] * (1.0 + values["change"])
     return {"k": ((before, before), (after, after))}
 
@@ -258,11 +245,7 @@ STIFFNESS_CHANGE = Effect(
 
 @compiled
 def loading_rate(loading: float, rate: float, sharpness: float, unloading: float, fastest: float) -> float:
-    """Return how fast the slider loads [1/s]: towards 1 against the motion, and no further.
-
-    ``rate`` is that of the twist, over the twist in which the slider yields [1/s]. One that yields within a step of the
-    integration is held to the ``fastest`` decay [1/s] the step can follow.
-    """
+    """Return how fast the slider loads [1/s]: towards 1 against the motion, and no further."""
     pace = min(abs(rate), fastest)
     yielded = power(min(abs(loading), 1.0), sharpness)
     yielded = choose(rate * loading < 0.0, -unloading * yielded, yielded)
@@ -276,10 +259,6 @@ def slider_scales(model: Driveline, records: Sequence[Record]) -> tuple[float, .
 
 
 def slider_starts(model: Driveline, records: Sequence[Record]) -> list[Start]:
-    """Return sliders that yield early and late, a part of them in the nominal stiffness.
-
-    That of a joint is a guess and free.
-    """
     early, late = (Held(0.0), Held(0.0)) if model.structure is Structure.JOINT else (0.2, 0.5)
     return [(0.5, 0.5, 1.0, 0.7, early), (1.0, 4.0, 1.0, 0.7, late)]
 
@@ -313,10 +292,7 @@ SHAFT_HYSTERESIS = Effect(
 
 @compiled
 def relaxing_rate(torque: float, rate: float, stiffness: float, fastest: float, relaxation_s: float) -> float:
-    """Return how fast the branch's torque changes [Nm/s], at a rate of the twist [rad/s].
-
-    One that relaxes within a step of the integration is held to the ``fastest`` decay [1/s] the step can follow.
-    """
+    """Return how fast the branch's torque changes [Nm/s], at a rate of the twist [rad/s]."""
     return (stiffness * relaxation_s * rate - torque) * min(1.0 / relaxation_s, fastest)
 
 
@@ -345,7 +321,7 @@ VISCOELASTIC_SHAFT = Effect(
     example={"branch_share": 0.4, "relaxation_s": 0.02},
     structures=WITH_SHAFT,
     resembles=("extra_torsional_mode", "shaft_hysteresis", "stiffness_nonlinearity", "actuator_lag"),
-    loosens=frozenset({"k", "c"}),  # the branch stiffens the line and damps it
+    widens=frozenset({"k", "c"}),  # the branch stiffens the line and damps it
     scales=lambda model, _records: (0.1, 1.0 / float(natural_frequencies_rad_s(model.values())[0])),
     starts=lambda _model, _records: [(3.0, time) for time in (0.3, 1.0, 3.0)],
     described=relaxation_described,
@@ -372,7 +348,6 @@ def cardan_starts(model: Driveline, records: Sequence[Record]) -> list[Start]:
 
 
 def cardan_testable(model: Driveline, records: Sequence[Record]) -> Untestable | None:
-    """Need speeds at which twice per turn is near the resonance."""
     if not goes_round(records, 0.5):
         return Untestable("the motor makes less than half a turn: nothing recurs with its angle", "reversal")
     if any(speed_sweeps(record) for record in records):
@@ -381,7 +356,6 @@ def cardan_testable(model: Driveline, records: Sequence[Record]) -> Untestable |
 
 
 def cardan_sentence(values: Mapping[str, float], motion: Motion) -> str:
-    """Say what was found."""
     size = f"{values['amplitude_nm']:.3g} {unit('torque', motion)}"
     if values["angle_rad"]:
         size = f"the torque of an angle of {values['angle_rad']:.3g} {unit('angle', motion)}"

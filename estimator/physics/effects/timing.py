@@ -35,27 +35,16 @@ SLOWEST_S = 0.1
 """Longest time constant [s] of a current loop or of a sensor's filter, or delay of a bus: a drive is of no use with
 one. What a fit finds beyond it stands for something else that is slow."""
 
-EQUAL_POLES = 1e-6
-"""Half the distance of two poles, times the step, below which they are one."""
+EQUAL_POLES = 1e-6  # half the distance of two poles, times the step, below which they are one
 
 
 class LowPass(NamedTuple):
-    """A low-pass over steps of one length: what is left, behind a step, of its output and of its rate times ``tau``.
+    """A low-pass over steps of one length: what is left, behind a step, of its output and of its rate times ``tau``."""
 
-    Attributes
-    ----------
-    time_constant, shape : float
-        ``tau`` [s] and ``s``.
-    turns : float
-        Length of a step in ``tau``.
-    output_of_output, output_of_rise, rise_of_output, rise_of_rise : float
-        What is left of a unit of each in each, without an input.
-    """
-
-    time_constant: float
+    time_constant: float  # ``tau`` [s] and ``s``
     shape: float
-    turns: float
-    output_of_output: float
+    turns: float  # length of a step in ``tau``
+    output_of_output: float  # what is left of a unit of each in each, without an input
     output_of_rise: float
     rise_of_output: float
     rise_of_rise: float
@@ -114,19 +103,14 @@ def quick_enough(key: str) -> Callable[[Driveline, Sequence[Record], Mapping[str
 # The torque in the air gap follows its reading with a lag.
 
 
-FASTEST_S = 1e-9
-"""Below this a lag is none; it keeps the exponential's argument finite."""
+FASTEST_S = 1e-9  # below this a lag is none; it keeps the exponential's argument finite
 
 
 @compiled
 def lag_step(
     torque: float, rise: float, lagged: float, lag_rise: float, lag: LowPass
 ) -> tuple[float, float, float, float]:
-    """Return the lagged torque over a step of constant input as a straight line, and its value and rise at the end.
-
-    The line has the mean and the first moment of the decay, exactly: mean and rise from end to end [Nm]. Without a lag
-    the input's own rise is passed on; behind one it counts no more. The rise at the end is the rate times ``tau``.
-    """
+    """Return the lagged torque over a step of constant input as a straight line, and its value and rise at the end."""
     if lag.time_constant < FASTEST_S:
         return torque, rise, torque, 0.0
     turns, shape, value = lag.turns, lag.shape, lagged - torque
@@ -177,13 +161,7 @@ ACTUATOR_LAG = Effect(
 
 @compiled
 def delayed(torque: FloatArray, before: float, start: float, length: float) -> tuple[float, float]:
-    """Return a zero-order-held torque over ``[start, start + length]`` [samples], length at most 1, as a straight line.
-
-    Its mean and its rise from end to end [Nm]: the line with the mean and the first moment of the jump. A mean alone
-    would take from a torque at 10 Hz 1.6 % of its amplitude over a step of 10 ms, and an inertia would be that much
-    off. Until the first sample the torque is ``before`` [Nm], after the last it is held at that one: the end of the
-    last period may come out one rounding error late. Both are continuous in ``start``, which a fit needs.
-    """
+    """Return a zero-order-held torque over ``[start, start + length]``, at most a sample, as a straight line."""
     end = start + length
     last_row = torque.size - 1
     first = min(math.floor(start), last_row)
@@ -276,7 +254,6 @@ further off ends where another of its periods matches."""
 
 
 def drift_unresolved(model: Driveline, records: Sequence[Record], values: Mapping[str, float]) -> str:
-    """Object to clocks that part by less than a tenth of a sampling period over the longest recording."""
     least_s = 0.1 * min(record.sample_time_s for record in records)
     parted_s = abs(values["rate"]) * longest_s(records)
     if parted_s >= least_s:
@@ -285,16 +262,12 @@ def drift_unresolved(model: Driveline, records: Sequence[Record], values: Mappin
 
 
 def drift_rescaled(values: Mapping[str, float]) -> Mapping[str, float]:
-    """Return what the line takes by the torque's clock: the fit keeps to the speed's, and either may be right.
-
-    Torques and speeds stay as they were read. In a time that is longer, accelerations are smaller and twists larger.
-    """
+    """Return what the line takes by the torque's clock: the fit keeps to the speed's, and either may be right."""
     longer = 1.0 + values["rate"]
     return {"inertia": longer, "stiffness": 1.0 / longer}
 
 
 def drift_sentence(values: Mapping[str, float], motion: Motion) -> str:
-    """Say what was found."""
     return f"the torque's clock runs {1e6 * values['rate']:+.0f} ppm off the speed's"
 
 

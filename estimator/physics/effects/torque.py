@@ -15,8 +15,8 @@ from estimator.physics.effect import (
     EffectParameter,
     Element,
     Held,
+    OtherForm,
     Place,
-    Retelling,
     Start,
     Untestable,
 )
@@ -35,7 +35,6 @@ from estimator.signals.record import FloatArray, Record
 
 
 def gain_testable(model: Driveline, records: Sequence[Record]) -> Untestable | None:
-    """Need two inputs whose ratio changes, or else a wrong gain is a change of all other parameters."""
     if any(record.torque_nm.shape[1] < 2 for record in records):
         return Untestable("there is one torque input only: its gain is that of all other parameters", "cruise")
     if shares_differ(records):
@@ -57,7 +56,6 @@ def gain_rescaled(values: Mapping[str, float]) -> Mapping[str, float]:
 
 
 def gain_sentence(values: Mapping[str, float], motion: Motion) -> str:
-    """Say what was found, and the other way to tell it."""
     wrong, right = ("m1", "m2") if values["gain_m1"] != 1.0 else ("m2", "m1")
     gain = values[f"gain_{wrong}"]
     return (
@@ -101,20 +99,16 @@ def derating_scales(model: Driveline, records: Sequence[Record]) -> tuple[float,
     return (1.0, longest_s(records), 0.5 * torque_scale(records))
 
 
-def derating_retold(
+def derating_reparametrised(
     model: Driveline, records: Sequence[Record], values: Mapping[str, float], line: Mapping[str, float]
-) -> list[Retelling]:
-    """Return a loss by the torque's own heat, within the recording and beyond it.
-
-    The torque that the loss is reported for is a matter of scale, and held.
-    """
+) -> list[OtherForm]:
+    """Return a loss by the torque's own heat, within the recording and beyond it."""
     if values["heating_nm"] > 0.0:
         return []
-    return [Retelling((values["depth"], share, Held(1.0)), {}) for share in (0.3, 2.0)]
+    return [OtherForm((values["depth"], share, Held(1.0)), {}) for share in (0.3, 2.0)]
 
 
 def derating_sentence(values: Mapping[str, float], motion: Motion) -> str:
-    """Say what was found."""
     by = "by up to"
     if values["heating_nm"] > 0.0:
         by = f"under a lasting torque of {values['heating_nm']:.3g} {unit('torque', motion)} by"
@@ -125,7 +119,6 @@ def derating_sentence(values: Mapping[str, float], motion: Motion) -> str:
 
 
 def derating_implausible(model: Driveline, records: Sequence[Record], values: Mapping[str, float]) -> str:
-    """Object to a loss that comes too soon for warmth."""
     least_s = QUICKEST * derating_scales(model, records)[1]
     if values["time_constant_s"] > least_s:
         return ""
@@ -149,7 +142,7 @@ TORQUE_DERATING = Effect(
     resembles=("inverter_gain_mismatch", "road_grade", "warming_friction"),
     scales=derating_scales,
     starts=lambda _model, _records: [(0.2, 0.3, Held(0.0)), (0.3, 2.0, Held(0.0))],
-    retold=derating_retold,
+    reparametrised=derating_reparametrised,
     text=derating_sentence,
     implausible=derating_implausible,
     linear=True,
@@ -159,8 +152,7 @@ TORQUE_DERATING = Effect(
 # The true torque stops at a limit that its reading passes.
 
 
-EDGE = 100.0
-"""Sharpness from which on a knee is an edge."""
+EDGE = 100.0  # sharpness from which on a knee is an edge
 
 
 def saturation_scales(model: Driveline, records: Sequence[Record]) -> tuple[float, ...]:
@@ -178,7 +170,6 @@ def saturation_starts(model: Driveline, records: Sequence[Record]) -> list[Start
 
 
 def saturation_sentence(values: Mapping[str, float], motion: Motion) -> str:
-    """Say what was found."""
     torque = unit("torque", motion)
     found = [
         f"{limit:.3g} {torque} {of}"
@@ -217,8 +208,7 @@ TORQUE_SATURATION = Effect(
 # The true torque grows less than its reading: the machine's iron saturates, for both signs alike or not.
 
 
-SPREAD = 0.3
-"""Share of the largest torque by which its size must differ: about one size any law is a gain."""
+SPREAD = 0.3  # share of the largest torque by which its size must differ: about one size any law is a gain
 
 
 def nonlinearity_law(torque: FloatArray, _since_start_s: FloatArray, curvature: float, asymmetry: float) -> FloatArray:
@@ -233,7 +223,6 @@ def nonlinearity_scales(model: Driveline, records: Sequence[Record]) -> tuple[fl
 
 
 def nonlinearity_testable(model: Driveline, records: Sequence[Record]) -> Untestable | None:
-    """Need torques of very different sizes."""
     sizes = np.concatenate([np.abs(record.total_torque_nm) for record in records])
     low, high = np.percentile(sizes, [10, 95])
     if high - low > SPREAD * high and any(torque_reverses(record) for record in records):
@@ -242,7 +231,6 @@ def nonlinearity_testable(model: Driveline, records: Sequence[Record]) -> Untest
 
 
 def nonlinearity_sentence(values: Mapping[str, float], motion: Motion) -> str:
-    """Say what was found."""
     loss, tilt = values["curvature_per_nm"], values["asymmetry_per_nm"]
     torque = unit("torque", motion)
     if tilt == 0.0:
@@ -279,8 +267,7 @@ TORQUE_NONLINEARITY = Effect(
 # The reading of the torque is off by an offset, from the start on or as it drifts away.
 
 
-LEAST_S = 8.0
-"""A drift shows in recordings of this length: in less it is the noise of the reading."""
+LEAST_S = 8.0  # a drift shows in recordings of this length: in less it is the noise of the reading
 
 
 def bias_law(torque: FloatArray, since_start_s: FloatArray, offset: float, time_constant_s: float) -> FloatArray:
@@ -296,13 +283,11 @@ def is_load_known(model: Driveline) -> bool:
 
 
 def bias_starts(model: Driveline, records: Sequence[Record]) -> list[Start]:
-    """Return drifts that end within the recording and beyond it, and an offset where the load is known."""
     drifting: list[Start] = [(0.5, 0.3), (1.0, 2.0)]
     return [(0.5, Held(0.0)), *drifting] if is_load_known(model) else drifting
 
 
 def bias_testable(model: Driveline, records: Sequence[Record]) -> Untestable | None:
-    """Need the load torque, or time to drift."""
     if is_load_known(model) or longest_s(records) >= LEAST_S:
         return None
     reason = f"every recording is shorter than {LEAST_S:g} s and the constant load torque is unknown"
@@ -310,7 +295,6 @@ def bias_testable(model: Driveline, records: Sequence[Record]) -> Untestable | N
 
 
 def bias_sentence(values: Mapping[str, float], motion: Motion) -> str:
-    """Say what was found."""
     side = "above" if values["offset_nm"] > 0.0 else "below"
     offset = f"{abs(values['offset_nm']):.3g} {unit('torque', motion)} {side} its reading"
     if values["time_constant_s"] <= 0.0:
@@ -365,7 +349,6 @@ def ripple_starts(model: Driveline, records: Sequence[Record]) -> list[Start]:
 
 
 def ripple_testable(model: Driveline, records: Sequence[Record]) -> Untestable | None:
-    """Need the ripple to pass a frequency at which the line answers: a speed that changes much."""
     if not goes_round(records, 1.0 / ORDERS[-1]):
         return Untestable("the motor makes too little of a turn: nothing recurs with its angle", "reversal")
     if any(speed_sweeps(record) for record in records):
@@ -374,7 +357,6 @@ def ripple_testable(model: Driveline, records: Sequence[Record]) -> Untestable |
 
 
 def ripple_sentence(values: Mapping[str, float], motion: Motion) -> str:
-    """Say what was found."""
     torque = unit("torque", motion)
     size = f"{values['amplitude_nm']:.3g} {torque}" if values["amplitude_nm"] else f"{values['share']:.2%} of itself"
     return f"the torque ripples by {size} at {values['order']:.0f} times per motor turn"

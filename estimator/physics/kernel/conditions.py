@@ -15,35 +15,19 @@ from estimator.physics.effect import Place
 from estimator.physics.effects.drag import cold_part
 from estimator.physics.effects.inertia import frequency_within
 from estimator.physics.kernel import slots
-from estimator.physics.kernel.state_vector import Conditions, Tyre
-from estimator.physics.laws import inertia_while, overtoned_wave, share_inside, wave
+from estimator.physics.kernel.state_vector import Bristles, Conditions, State, Tyre
+from estimator.physics.laws import LEAST, fading, inertia_while, overtoned_wave, share_inside, wave
 from estimator.physics.layout import slot
 from estimator.signals.record import FloatArray
 
 
 class Line(NamedTuple):
-    """What a line is made of.
+    """What a line is made of."""
 
-    Attributes
-    ----------
-    masses : int
-        1, 2 or 3.
-    elastic : bool
-        Whether the first shaft is a spring and a damper, and no law next to them.
-    sliding : bool
-        Whether there may be a slider inside that shaft.
-    extended : bool
-        Whether it has states beyond those of its masses and a slider: an extra mode, a tyre that slips, a shaft that
-        relaxes.
-    own : tuple
-        Empty, or the torque readings, a user's own laws as one function, and what they are given of the moment: time
-        [s] and torque reading [Nm].
-    """
-
-    masses: int
-    elastic: bool
-    sliding: bool
-    extended: bool
+    masses: int  # 1, 2 or 3
+    elastic: bool  # whether the first shaft is a spring and a damper, and no law next to them
+    sliding: bool  # whether there may be a slider inside that shaft
+    extended: bool  # whether it has states beyond those of its masses and a slider
     own: tuple[Any, ...]
 
 
@@ -123,7 +107,6 @@ def with_law(before: Total, law: Callable[..., float], values: Callable[..., Any
 
 
 def total(place: Place, given: int = 1) -> Total:
-    """Return the sum of all laws of a place, which are given one quantity or two."""
     if given == 1:
         summed: Total = assembled(lambda x, p: like(0.0, x))
     else:
@@ -136,7 +119,6 @@ def total(place: Place, given: int = 1) -> Total:
 
 
 def terms_of(place: Place) -> tuple[Term, ...]:
-    """Return the laws that entries declare for a place, each with the places of its parameters."""
     return tuple(
         (entry.acting.law, tuple(slot(entry.name, parameter.name) for parameter in entry.parameters))
         for entry in BUILT_IN.values()
@@ -186,7 +168,6 @@ def is_waving(p: FloatArray) -> bool:
 
 @inlined
 def is_changing(begin_s: float, end_s: float, p: FloatArray) -> bool:
-    """Tell whether an event begins or ends between two times."""
     for i in range(EVENTS.shape[0]):
         if some(p[EVENTS[i, 0]] != 0.0) and is_edge(begin_s, end_s, p[EVENTS[i, 1]], p[EVENTS[i, 2]]):
             return True
@@ -358,3 +339,70 @@ def with_torques(now: Conditions, torque: float, load: float) -> Conditions:
 def with_torque(now: Conditions, torque: float) -> Conditions:
     """Return the conditions with a torque [Nm] next to the ripple."""
     return with_torques(now, now.torque + torque * now.torque_factor, now.load)
+
+
+@inlined
+def breakaway(p: FloatArray) -> float:
+    """Return the dry friction of all laws at the motor, next to standstill [Nm]."""
+    return float(p[slots.COULOMB] + p[slots.STRIBECK_COULOMB] + p[slots.STRIBECK])
+
+
+@inlined
+def sliding(speed: float, p: FloatArray) -> float:
+    """Return what they come to while it slides at a speed [Nm]."""
+    ratio = speed / max(p[slots.STRIBECK_SPEED], LEAST)
+    return p[slots.COULOMB] + p[slots.STRIBECK_COULOMB] + p[slots.STRIBECK] * fading(ratio * ratio)
+
+
+@inlined
+def slid(speed: float, limit: float) -> float:
+    """Return the torque against a motion that has continued for long under a friction [Nm]."""
+    return choose(speed > 0.0, limit, choose(speed < 0.0, -limit, 0.0))
+
+
+@inlined
+def followed(torque: float, speed: float, limit: float, stiffness: float, time_s: float) -> float:
+    """Return the torque of bristles of a stiffness [Nm/rad] after a time at constant speed [Nm]."""
+    left = fading(abs(speed) * stiffness * time_s / max(limit, LEAST))
+    return slid(speed, limit) * (1.0 - left) + torque * left
+
+
+@inlined
+def at_motor(torque: float, x: State, now: Conditions, p: FloatArray, time_s: float) -> float:
+    """Return the torque of the motor's bristles after a time at the speed of a state [Nm]."""
+    stiff = breakaway(p) / max(p[slots.COULOMB_PRESLIDING], p[slots.STRIBECK_PRESLIDING])
+    stiff = min(stiff, now.fastest * now.fastest / now.inverse_motor)
+    return followed(torque, x.speed, sliding(x.speed, p), stiff, time_s)
+
+
+@inlined
+def at_load(line: Line, torque: float, x: State, now: Conditions, p: FloatArray, time_s: float) -> float:
+    speed, inverse_inertia = x.load_speed, now.inverse_load
+    if line.masses == 1:
+        speed, inverse_inertia = x.speed, now.inverse_motor
+    elif line.extended and some(p[slots.SLIP] > 0.0):
+        inverse_inertia = now.tyre.inverse_wheel
+    limit = now.dry_load
+    stiff = limit / max(p[slots.COULOMB_LOAD_PRESLIDING], p[slots.BRAKE_PRESLIDING])
+    stiff = min(stiff, now.fastest * now.fastest / inverse_inertia)
+    return followed(min(max(torque, -limit), limit), speed, limit, stiff, time_s)
+
+
+@inlined
+def bent(line: Line, held: Bristles, x: State, now: Conditions, p: FloatArray, time_s: float) -> Bristles:
+    motor, load = held.motor, held.load
+    if is_bristled_at_motor(p):
+        motor = at_motor(motor, x, now, p, time_s)
+    if is_bristled_at_load(p):
+        load = at_load(line, load, x, now, p, time_s)
+    return Bristles(motor, load)
+
+
+@inlined
+def rubbed(now: Conditions, held: Bristles, p: FloatArray) -> Conditions:
+    torque, dry_motor, dry_load, rubbing = now.torque, now.dry_motor, now.dry_load, now.rubbing
+    if is_bristled_at_motor(p):
+        torque, dry_motor = torque - held.motor, like(0.0, dry_motor)
+    if is_bristled_at_load(p):
+        rubbing, dry_load = held.load, like(0.0, dry_load)
+    return with_friction(now, torque, now.load, dry_motor, dry_load, rubbing)

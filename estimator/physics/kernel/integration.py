@@ -1,10 +1,4 @@
-"""The one compiled driveline simulation.
-
-Chain of one sub-step: torque on the shaft -> delay -> lag -> motor -> shaft -> load -> sensor. Fixed-step Runge-Kutta
-of fourth order; the torque of a sub-step is a straight line with the exact mean and first moment of the delayed,
-lagged, zero-order-held input over it. What changes with time or angle, but not with the state, is set once per
-sub-step. A line that is linear takes the same steps as sums (``linear``).
-"""
+"""The one compiled driveline simulation."""
 
 from __future__ import annotations
 
@@ -16,9 +10,9 @@ from estimator.compiled import brief, compiled, inlined, ir_inlined
 from estimator.lanes import borrowed
 from estimator.physics.effects.timing import LowPass, delayed, lag_step, low_pass
 from estimator.physics.kernel import slots
-from estimator.physics.kernel.bristles import bent, rubbed
 from estimator.physics.kernel.conditions import (
     Line,
+    bent,
     branch_frequency,
     branch_inertia,
     conditions,
@@ -28,6 +22,7 @@ from estimator.physics.kernel.conditions import (
     is_extended,
     is_waving,
     is_within,
+    rubbed,
     with_torques,
 )
 from estimator.physics.kernel.linear import WORTHWHILE_SAMPLES, Answers, answers, has_dry_friction, is_linear, led_on
@@ -49,25 +44,13 @@ from estimator.signals.record import FloatArray, IntArray
 
 
 class Feed(NamedTuple):
-    """What is known of a torque's way before it begins.
+    """What is known of a torque's way before it begins."""
 
-    Attributes
-    ----------
-    shifted : bool
-        Whether it is delayed, or its clock another.
-    delay, begun : float
-        The delay, and the time at sample 0 [samples].
-    before_all : float
-        The torque before the first sample [Nm].
-    lag : LowPass
-        What it lags behind.
-    """
-
-    shifted: bool
-    delay: float
+    shifted: bool  # whether it is delayed, or its clock another
+    delay: float  # the delay, and the time at sample 0 [samples]
     begun: float
-    before_all: float
-    lag: LowPass
+    before_all: float  # the torque before the first sample [Nm]
+    lag: LowPass  # what it lags behind
 
 
 @inlined
@@ -77,11 +60,8 @@ def is_late(p: FloatArray) -> bool:
 
 
 @inlined
-def begun_feed(torque: FloatArray, begun: float, sample_time_s: float, p: FloatArray, h: float) -> Feed:
-    """Return what is known of the way of a torque, shape (N,), to sub-steps of ``h`` [s].
-
-    Its sample 0 is at ``begun`` [samples].
-    """
+def feed_from(torque: FloatArray, begun: float, sample_time_s: float, p: FloatArray, h: float) -> Feed:
+    """Return what is known of the way of a torque, shape (N,), to sub-steps of ``h`` [s]."""
     shifted, before_all = p[slots.DELAY] != 0.0 or p[slots.DRIFT] != 0.0, torque[0] + p[slots.DELAYED_BEFORE]
     lag = low_pass(p[slots.LAG], p[slots.LAG_SHAPE], h)
     return Feed(shifted, p[slots.DELAY] / sample_time_s, begun, before_all, lag)
@@ -98,10 +78,7 @@ def fed(
     lag_rise: float,
     p: FloatArray,
 ) -> tuple[float, float, float, float]:
-    """Return mean and rise of the torque on the shaft [Nm] over a sub-step, and the lag's state at its end.
-
-    The sub-step begins a ``part`` of a sample behind sample k and is ``length`` samples long.
-    """
+    """Return mean and rise of the torque on the shaft [Nm] over a sub-step, and the lag's state at its end."""
     place = k + part
     supplied, rise = torque[k], 0.0
     if feed.shifted:
@@ -117,7 +94,7 @@ Masses = tuple[int, ...]
 
 
 @ir_inlined
-def for_its_make(masses: int, own: tuple[Any, ...], made: Made, p: FloatArray, given: tuple[Any, ...]) -> None:
+def call_specialised(masses: int, own: tuple[Any, ...], made: Made, p: FloatArray, given: tuple[Any, ...]) -> None:
     """Call what is compiled for the make of the line that has these parameters, of 1, 2 or 3 masses."""
     if masses == 1:
         _for_its_states(1, True, own, made, p, given)
@@ -224,7 +201,7 @@ def integrate_made(
     substeps = with_mode(substeps, sample_time_s, p)
     h = sample_time_s / substeps
     length = 1.0 / substeps
-    feed = begun_feed(torque, start_s / sample_time_s, sample_time_s, p, h)
+    feed = feed_from(torque, start_s / sample_time_s, sample_time_s, p, h)
     low = low_pass(p[slots.FILTER], p[slots.FILTER_SHAPE], h)
     waving, filtering = is_waving(p), p[slots.FILTER] > 0.0
     steep = slopes.shape[1] > 0
@@ -312,7 +289,7 @@ def integrate(
         borrowed(p),
     )
     given_back = (borrowed(state), borrowed(outputs), sensor, borrowed(out), borrowed(slopes))
-    for_its_make(len(masses), own, integrate_made, borrowed(p), (*given, *given_back))
+    call_specialised(len(masses), own, integrate_made, borrowed(p), (*given, *given_back))
 
 
 @brief

@@ -1,12 +1,4 @@
-"""Of a linear line, where a stretch of time leads to: read off the Runge-Kutta steps once, then only added up.
-
-What leads a linear line on is a sum: of what its state leads to, entry by entry, and of what its torques do. Each of
-these is found by the sub-steps themselves, from one unit of it alone, so nothing is said twice and the result is that
-of the sub-steps to rounding. A period without a change inside takes one sum in place of all its sub-steps.
-
-Dry friction is a constant torque while the speed is well away from its change of sign: the line is linear there, too,
-which is looked at sub-step by sub-step.
-"""
+"""Of a linear line, where a stretch of time leads to: read off the Runge-Kutta steps once, then only added up."""
 
 from __future__ import annotations
 
@@ -24,8 +16,7 @@ from estimator.physics.laws import BEYOND, dry_friction
 from estimator.physics.layout import slot
 from estimator.signals.record import FloatArray
 
-WORTHWHILE_SAMPLES = 50
-"""Samples from which on reading the answers takes less time than they save."""
+WORTHWHILE_SAMPLES = 50  # samples from which on reading the answers takes less time than they save
 
 _OTHERS = [(entry.name, each) for entry in BUILT_IN.values() if not entry.linear for each in entry.parameters]
 BENDING = np.array([slot(effect, parameter.name) for effect, parameter in _OTHERS])
@@ -37,18 +28,9 @@ REST = State(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 class Answers(NamedTuple):
-    """The state to which a unit of each entry of the state, and of each torque, leads a line at rest.
+    """The state to which a unit of each entry of the state, and of each torque, leads a line at rest."""
 
-    Attributes
-    ----------
-    angle, speed, twist, load_speed, branch_twist, branch_speed, middle_twist, middle_speed, relaxing : State
-        To one unit of the entry of that name [unit of the state / unit of the entry].
-    torque, rise, load : State
-        To a torque on the shaft of this mean, of this rise from end to end, and to a load torque [unit of the state /
-        Nm].
-    """
-
-    angle: State
+    angle: State  # to one unit of the entry of that name [unit of the state / unit of the entry]
     speed: State
     twist: State
     load_speed: State
@@ -79,7 +61,6 @@ def is_linear(line: Line, p: FloatArray) -> bool:
 
 @inlined
 def has_dry_friction(p: FloatArray) -> bool:
-    """Tell whether there is dry friction at the motor or at the load, be it for a while only."""
     return bool(is_bristled(p) or p[slots.COULOMB] != 0.0 or p[slots.COULOMB_LOAD] != 0.0 or p[slots.BRAKE] != 0.0)
 
 
@@ -101,7 +82,6 @@ def is_beyond(begun: float, ended: float, limit: float) -> bool:
 
 @inlined
 def unit(entry: int) -> State:
-    """Return the state of a line at rest but for one unit of an entry."""
     return State(
         1.0 if entry == 0 else 0.0,
         1.0 if entry == 1 else 0.0,

@@ -44,7 +44,6 @@ def _at_moment(line: Any, time_s: Any, k: Any) -> Any:
 
 
 def under_own(now: Conditions, line: Line, x: State, p: FloatArray) -> Conditions:
-    """Return the conditions with the torques of a line's own laws on the motor and against the load."""
     if len(line.own) == 0:
         return now
     if line.masses == 1:
@@ -318,8 +317,7 @@ def runge_kutta(line: Line, now: Conditions, torque: float, rise: float, x: Stat
     return moved(line, x, fourth, h / 6.0)
 
 
-PARTS = 8
-"""Steps that are taken in place of one."""
+PARTS = 8  # steps that are taken in place of one
 
 DEPTHS, FAST = 4.0, 0.25
 """Depths of contact, ``e_c``, beyond the edge of a gap in which its damping sets in, where a step covers this share of

@@ -71,10 +71,7 @@ def smoothed(
     p: FloatArray,
     h: float,
 ) -> tuple[float, float]:
-    """Return the filtered reading and its rise [rad/s] after a step of ``h`` [s] between two states and read angles.
-
-    The filter's input is a straight line whose mean is what the output has been in the mean.
-    """
+    """Return the filtered reading and its rise [rad/s] after a step of ``h`` [s] between two states and read angles."""
     begin, end = entry(before, output, p), entry(after, output, p)
     bow = travelled(after, output, p) / h - travelled(before, output, p) / h - 0.5 * (begin + end)
     read, ends = reading(begin + bow, angle_before, p), reading(end + bow, angle_after, p)

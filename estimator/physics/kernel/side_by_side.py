@@ -1,9 +1,4 @@
-"""Up to eight simulations side by side, as a Jacobian takes them: one instruction for all.
-
-The laws are those of one simulation (``rates``), compiled for numbers in lanes. What torque comes through a delay or a
-lag does not depend on the motion, and is worked out before. A line whose output is differentiated takes its simulations
-one by one, and so does a linear one: it adds up what it knows.
-"""
+"""Up to eight simulations side by side, as a Jacobian takes them: one instruction for all."""
 
 from __future__ import annotations
 
@@ -16,17 +11,18 @@ from estimator.lanes import LANES, as_lanes, borrowed
 from estimator.physics.catalogue import BUILT_IN
 from estimator.physics.effects.timing import LowPass, low_pass
 from estimator.physics.kernel import slots
-from estimator.physics.kernel.bristles import bent, rubbed
 from estimator.physics.kernel.conditions import (
     Line,
+    bent,
     conditions,
     is_bristled,
     is_changing,
     is_elastic,
     is_waving,
+    rubbed,
     with_torques,
 )
-from estimator.physics.kernel.integration import Masses, begun_feed, fed, for_its_make, integrate, is_late, with_mode
+from estimator.physics.kernel.integration import Masses, call_specialised, fed, feed_from, integrate, is_late, with_mode
 from estimator.physics.kernel.linear import is_linear
 from estimator.physics.kernel.rates import read_out, stepped
 from estimator.physics.kernel.sensing import reading, shown, smoothed
@@ -54,39 +50,38 @@ FEEDING = np.array([slots.DELAY, slots.DELAYED_BEFORE, slots.DRIFT, slots.LAG, s
 
 @compiled
 def go_side_by_side(masses: Masses, p: FloatArray, rows: IntArray) -> bool:
-    """Tell whether some of the lines, a row of parameters each, are simulated side by side."""
     first = p[rows[0]]
     if rows.size == 1 or not IS_COMPILED:
         return False
     if is_linear(Line(len(masses), len(masses) == 1 or is_elastic(first), False, False, ()), first):
         return False
-    return leading_kin(p, rows) == rows.size
+    return leading_compatible(p, rows) == rows.size
 
 
 @inlined
-def leading_kin(p: FloatArray, rows: IntArray) -> int:
+def leading_compatible(p: FloatArray, rows: IntArray) -> int:
     """Return how many of the lines, a row of parameters each, are kin of the first before one is not."""
     count = 1
-    while count < rows.size and are_kin(p[rows[0]], p[rows[count]]):
+    while count < rows.size and are_compatible(p[rows[0]], p[rows[count]]):
         count += 1
     return count
 
 
 @inlined
-def kin_together(p: FloatArray) -> IntArray:
+def compatible_together(p: FloatArray) -> IntArray:
     """Return the rows of some lines in an order that has those that are kin follow each other."""
     order, placed = np.empty(p.shape[0], dtype=np.int64), np.zeros(p.shape[0], dtype=np.bool_)
     count = 0
     for first in range(p.shape[0]):
         for row in range(first, p.shape[0]):
-            if not placed[row] and are_kin(p[first], p[row]):
+            if not placed[row] and are_compatible(p[first], p[row]):
                 order[count], placed[row] = row, True
                 count += 1
     return order
 
 
 @inlined
-def are_kin(p: FloatArray, other: FloatArray) -> bool:
+def are_compatible(p: FloatArray, other: FloatArray) -> bool:
     """Tell whether two lines are alike but for the size of their parameters."""
     for i in MAKING:
         if (p[i] == 0.0) != (other[i] == 0.0):
@@ -130,7 +125,7 @@ def supplied_lanes(
             mean[:, lane], rise[:, lane] = mean[:, 0], rise[:, 0]
             continue
         given = torque[fed_by[row]]
-        feed = begun_feed(given, start_s / sample_time_s, sample_time_s, p[row], h)
+        feed = feed_from(given, start_s / sample_time_s, sample_time_s, p[row], h)
         lagged, lag_rise = state[row, LAGGED], state[row, LAG_RISE]
         for k in range(first, samples):
             for j in range(substeps):
@@ -253,7 +248,7 @@ def integrate_side_by_side(
     given = (sample_time_s, substeps, sign_width, first, start_s, mean, rise, loads, angle)
     filtering = sensor and p[rows[0], slots.FILTER] > 0.0
     them = (in_lanes(p, rows), in_lanes(state, rows), low_passes(rows, p, sample_time_s / substeps))
-    for_its_make(len(masses), (), advance, p[rows[0]], (*given, p[rows[0]], *them, outputs, filtering, values))
+    call_specialised(len(masses), (), advance, p[rows[0]], (*given, p[rows[0]], *them, outputs, filtering, values))
     for lane in range(rows.size):
         own = p[rows[lane]]
         for k in range(first, torque.shape[1]):
@@ -293,11 +288,11 @@ def integrate_each(
     """
     given = (sample_time_s, substeps, sign_width)
     apart = not np.any(alike[1:])
-    order = kin_together(p) if apart else 1 + np.argsort(alike[1:])
+    order = compatible_together(p) if apart else 1 + np.argsort(alike[1:])
     samples, reached, i = torque.shape[1], 0, 0
     while i < order.size:
         rows = order[i : i + LANES]
-        rows = rows[: leading_kin(p, rows)]
+        rows = rows[: leading_compatible(p, rows)]
         together = len(own) == 0 and slopes.shape[2] == 0 and go_side_by_side(masses, p, rows)
         if not together:
             rows = rows[:1]

@@ -7,11 +7,8 @@ from typing import NamedTuple
 from estimator.compiled import inlined
 from estimator.signals.record import FloatArray
 
-ANGLE, SPEED, TWIST, LOAD_SPEED = 0, 1, 2, 3
-"""Mechanical states that can be an output; see ``State``."""
-
-LOAD_ANGLE, SHAFT_TORQUE = 20, 21
-"""Outputs that follow from several states."""
+ANGLE, SPEED, TWIST, LOAD_SPEED = 0, 1, 2, 3  # mechanical states that can be an output; see ``State``
+LOAD_ANGLE, SHAFT_TORQUE = 20, 21  # outputs that follow from several states
 
 VEHICLE_SPEED, BRANCH_TWIST, BRANCH_SPEED, MIDDLE_TWIST, MIDDLE_SPEED, TRACTION = 5, 6, 7, 8, 9, 10
 """Further ones."""
@@ -24,45 +21,24 @@ RELAXING, LAGGED, LAG_RISE, FILTERED, FILTER_RISE, BRISTLES_MOTOR, BRISTLES_LOAD
 
 
 class State(NamedTuple):
-    """Mechanical state.
+    """Mechanical state."""
 
-    Attributes
-    ----------
-    angle, speed : float
-        Of the motor [rad, rad/s].
-    twist : float
-        Of the (first) shaft [rad].
-    load_speed : float
-        Of the load, or of the wheels where the tyre slips [rad/s].
-    loading : float
-        Of the shaft's slider, from -1 to 1.
-    vehicle_speed, traction : float
-        Of the vehicle behind the tyre [rad/s], and the torque of a tyre that has to roll to build it up [Nm].
-    branch_twist, branch_speed : float
-        Of the extra mode: of its spring, and of its inertia [rad, rad/s].
-    middle_twist, middle_speed : float
-        Twist of the second shaft [rad] and speed of the mass before it [rad/s].
-    relaxing : float
-        Torque of the branch in the first shaft that relaxes [Nm].
-    """
-
-    angle: float
+    angle: float  # of the motor [rad, rad/s]
     speed: float
-    twist: float
-    load_speed: float
-    loading: float
+    twist: float  # of the (first) shaft [rad]
+    load_speed: float  # of the load, or of the wheels where the tyre slips [rad/s]
+    loading: float  # of the shaft's slider, from -1 to 1
     vehicle_speed: float
-    branch_twist: float
+    branch_twist: float  # of the extra mode
     branch_speed: float
-    middle_twist: float
+    middle_twist: float  # twist of the second shaft [rad] and speed of the mass before it [rad/s]
     middle_speed: float
     traction: float
-    relaxing: float
+    relaxing: float  # torque of the branch in the first shaft that relaxes [Nm]
 
 
 @inlined
 def unpacked(state: FloatArray) -> State:
-    """Return the mechanical part of the state array."""
     return State(
         state[0], state[1], state[2], state[3], state[4], state[5],
         state[6], state[7], state[8], state[9], state[10], state[11],
@@ -77,21 +53,9 @@ class Bristles(NamedTuple):
 
 
 class Tyre(NamedTuple):
-    """What the law of a tyre takes from its parameters; inverses, because a division takes as long as a law.
+    """What the law of a tyre takes from its parameters; inverses, because a division takes as long as a law."""
 
-    Attributes
-    ----------
-    tread : float
-        Torque per slip [Nm].
-    least_relaxation : float
-        Angle to roll for a torque to build up that the step can follow at standstill [rad].
-    winding : float
-        Damping by the carcass at standstill, as far as the step can follow it [Nm s/rad].
-    inverse_creep, inverse_grip, inverse_wheel, inverse_vehicle : float
-        Of the speed below which it creeps [rad/s], of the grip [Nm] and of the inertias before and behind it [kg m^2].
-    """
-
-    tread: float
+    tread: float  # torque per slip [Nm]
     least_relaxation: float
     winding: float
     inverse_creep: float

@@ -6,21 +6,19 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
-from estimator.diagnosis.chain import mechanical
+from estimator.diagnosis.acquisition.chain import mechanical
 from estimator.diagnosis.segments import tiles
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.driveline import Case
 from estimator.physics.effect import Element
 from estimator.physics.free_run import settle
-from estimator.physics.grid import Grid, substeps_for
 from estimator.physics.inputs import load_of
 from estimator.physics.kernel import state_vector
 from estimator.physics.kernel.integration import with_mode
-from estimator.physics.layout import LOAD, SIZE, flat, slot
+from estimator.physics.layout import LOAD, SIZE, Grid, flat, slot, substeps_for
 from estimator.physics.model import DrivelineModel, Motion, Structure, parameter_unit, unit
 from estimator.physics.problem import case_of, local_part, make_problem
-from estimator.physics.simulate import MASSES
-from estimator.physics.stepper import SIGN_WIDTH_RAD_S
+from estimator.physics.simulate import MASSES, SIGN_WIDTH_RAD_S
 from estimator.signals.record import FloatArray, Location, Record
 from hil.errors import UsageError
 

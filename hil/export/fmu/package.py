@@ -17,7 +17,7 @@ from pathlib import Path
 
 from estimator.physics import inputs
 from estimator.physics.effects.timing import FASTEST_S, lag_step, low_pass
-from estimator.physics.kernel import bristles, conditions, rates, sensing, slots, state_vector
+from estimator.physics.kernel import conditions, rates, sensing, slots, state_vector
 from estimator.physics.layout import SIZE, slot
 from hil.config.model_file import read_model, read_model_for_recordings
 from hil.errors import ModelFileError, UsageError
@@ -43,7 +43,7 @@ from hil.report.outputs import publish
 
 USED = (
     conditions.conditions, conditions.with_torque, conditions.is_elastic, conditions.is_extended,
-    conditions.is_bristled, bristles.bent, bristles.rubbed, rates.stepped, rates.rates, rates.shaft_torques,
+    conditions.is_bristled, conditions.bent, conditions.rubbed, rates.stepped, rates.rates, rates.shaft_torques,
     sensing.entry, sensing.reading, sensing.read_angle, sensing.smoothed, sensing.shown, low_pass, lag_step,
     inputs.follow,
 )  # fmt: skip

@@ -17,9 +17,8 @@ from estimator.errors import BadModel, EstimatorError
 from estimator.identification.best import best_estimate
 from estimator.identification.chain import OnlineChain
 from estimator.identification.identify import identify
-from estimator.identification.modes.modes import Mode
+from estimator.identification.modes.modes import Mode, Uncertain, UncertainMode
 from estimator.identification.modes.physical import physical_parameters
-from estimator.identification.modes.uncertainty import Uncertain, UncertainMode
 from estimator.identification.offline.fits import LinearFit
 from estimator.identification.settings import Settings
 from estimator.signals.record import Record

@@ -18,9 +18,8 @@ from estimator.errors import BadModel
 from estimator.identification.best import best_estimate
 from estimator.identification.identify import VALUES_PER_WIDTH, identify
 from estimator.identification.linear_model import LinearModel, Orders
-from estimator.identification.modes.modes import Mode, two_mass_resonance
+from estimator.identification.modes.modes import Mode, Uncertain, two_mass_resonance
 from estimator.identification.modes.physical import physical_parameters
-from estimator.identification.modes.uncertainty import Uncertain
 from estimator.identification.offline.fits import fit_box_jenkins
 from estimator.identification.spectral import SpectralEstimate, spectral_estimate
 from estimator.signals.decimate import decimate

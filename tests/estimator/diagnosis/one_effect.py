@@ -7,10 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from estimator.diagnosis.hypotheses import everything
+from estimator.diagnosis.inference.hypotheses import everything
 from estimator.physics.driveline import Start
-from estimator.physics.grid import grid_for
-from estimator.physics.layout import flat_values
+from estimator.physics.layout import flat_values, grid_for
 from estimator.physics.model import DrivelineModel
 from estimator.physics.simulate import simulate
 from estimator.signals.record import BoolArray, FloatArray, Record

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from estimator.diagnosis.hypotheses import NOTHING, Effects, kept
-from estimator.diagnosis.inference.looks import Screen, promising
+from estimator.diagnosis.inference.hypotheses import NOTHING, Effects, kept
+from estimator.diagnosis.inference.score_tests import Screen, promising
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import FitResult, best_fit, fit, make_problem
-from estimator.physics.grid import Grid
+from estimator.physics.layout import Grid
 from estimator.physics.model import DrivelineModel
 from estimator.physics.problem import Problem
 from estimator.physics.unknowns import Release, nominal_unknowns
@@ -34,7 +34,7 @@ class Bench:
         (new,) = effects - had
         if EFFECTS[new].profile:
             return best_fit([self._problem(effects, kept(warm, effects), True)], warm)
-        looked = releases or [look.release for look in promising(Screen(warm, self.model).looks(new))]
+        looked = releases or [each.release for each in promising(Screen(warm, self.model).starts(new))]
         return best_fit([self._problem(effects, _joined(kept(warm, effects), each)) for each in looked], warm)
 
     def _problem(self, effects: Effects, release: Release, profile: bool = False) -> Problem:

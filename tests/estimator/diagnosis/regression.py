@@ -8,8 +8,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from estimator.physics.fit import FitResult
-from estimator.physics.grid import Grid
-from estimator.physics.layout import NOMINAL, SIZE
+from estimator.physics.layout import NOMINAL, SIZE, Grid
 from estimator.physics.model import Structure
 from estimator.physics.problem import Problem
 from estimator.physics.unknowns import LocalBasis, Shared

@@ -7,19 +7,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.diagnosis.acquisition import Finding, Sized
+from estimator.diagnosis.acquisition.chain import Chain
+from estimator.diagnosis.acquisition.finding import Finding, Sized
 from estimator.diagnosis.assemble import (
     acquired_effects,
     augmented_model,
     moments_in,
     parameters_of,
     profiles_of,
+    reported_covariance,
     retuned_parameters,
 )
-from estimator.diagnosis.chain import Chain
 from estimator.diagnosis.diagnose import diagnose
-from estimator.diagnosis.hypotheses import NOTHING, everything
-from estimator.diagnosis.intervals import reported_covariance
+from estimator.diagnosis.inference.hypotheses import NOTHING, everything
 from estimator.diagnosis.result import Evidence, FoundEffect
 from estimator.physics.catalogue import EFFECTS, effect_problems
 from estimator.physics.driveline import Start

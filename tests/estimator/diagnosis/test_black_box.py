@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 
 from estimator.diagnosis.black_box import BlackBox, equivalent_line
-from estimator.diagnosis.hypotheses import open_hypotheses
+from estimator.diagnosis.inference.hypotheses import open_hypotheses
 from estimator.physics.driveline import Case, Start
 from estimator.physics.free_run import free_run
-from estimator.physics.grid import grid_for
-from estimator.physics.layout import flat, slot
+from estimator.physics.layout import flat, grid_for, slot
 from estimator.physics.model import DrivelineModel, Parameter, Structure
 from estimator.physics.simulate import simulate, simulate_each
 from estimator.signals.record import FloatArray, Record

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.diagnosis.chain import mechanical, read_through, replay
-from estimator.diagnosis.hypotheses import NOTHING, everything
+from estimator.diagnosis.acquisition.chain import mechanical, read_through, replay
+from estimator.diagnosis.inference.hypotheses import NOTHING, everything
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.layout import slot
 from estimator.physics.model import DrivelineModel, EffectValue, Parameter, Structure

@@ -8,12 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.diagnosis.hypotheses import NOTHING, everything
-from estimator.diagnosis.inference.looks import Screen, promising
+from estimator.diagnosis.inference.hypotheses import NOTHING, everything
+from estimator.diagnosis.inference.score_tests import Screen, promising
 from estimator.diagnosis.preconditions.channels import with_usable_channels
 from estimator.physics.driveline import Start
-from estimator.physics.grid import grid_for
-from estimator.physics.layout import flat_values
+from estimator.physics.layout import flat_values, grid_for
 from estimator.physics.model import DrivelineModel, natural_frequencies_rad_s
 from estimator.physics.simulate import simulate
 from estimator.signals.record import Channel, FloatArray, Location, OutputKind, Record

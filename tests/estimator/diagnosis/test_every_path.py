@@ -18,8 +18,7 @@ import pytest
 
 from estimator.diagnosis.diagnose import diagnose
 from estimator.physics.driveline import Start
-from estimator.physics.grid import grid_for
-from estimator.physics.layout import flat_values
+from estimator.physics.layout import flat_values, grid_for
 from estimator.physics.model import Structure
 from estimator.physics.simulate import simulate
 from estimator.signals.record import FloatArray, Location, OutputKind

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from estimator.diagnosis.hypotheses import open_hypotheses, with_effect
+from estimator.diagnosis.inference.hypotheses import open_hypotheses, with_effect
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.driveline import Start
 from tests.estimator.physics.bench import ONE_MASS, TWO_MASS, linear_record, model, random_steps

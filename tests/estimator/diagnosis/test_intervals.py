@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from estimator.diagnosis.intervals import (
+from estimator.diagnosis.assemble import (
     Z95,
     covariance,
     interval,

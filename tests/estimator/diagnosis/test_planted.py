@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from estimator.diagnosis import Diagnosis, Verdict, diagnose
-from estimator.diagnosis.chain import replay
+from estimator.diagnosis.acquisition.chain import replay
 from estimator.diagnosis.result import FoundEffect
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.model import DrivelineModel, Parameter, Structure

@@ -9,8 +9,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from estimator.diagnosis.hypotheses import NOTHING, everything
-from estimator.diagnosis.inference.looks import Look, Screen, promising
+from estimator.diagnosis.inference.hypotheses import NOTHING, everything
+from estimator.diagnosis.inference.score_tests import ScoredStart, Screen, promising
 from estimator.physics.driveline import Start
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult
@@ -32,14 +32,14 @@ from tests.estimator.physics.bench import (
 
 SAMPLES = 1200
 
-Looked = tuple[list[Look], FitResult, FitResult]
+Looked = tuple[list[ScoredStart], FitResult, FitResult]
 """Looks around the re-tuned nominal fit, that fit, and the one with the effect."""
 
 
 def looked_at(line: DrivelineModel, records: Sequence[Record], name: str) -> Looked:
     bench = Bench(line, records, everything(records))
     retuned = bench.fit(NOTHING)
-    return Screen(retuned, line).looks(name), retuned, bench.fit(frozenset({name}), retuned)
+    return Screen(retuned, line).starts(name), retuned, bench.fit(frozenset({name}), retuned)
 
 
 def starts(unknowns: Sequence[Shared]) -> dict[str, float]:
@@ -156,10 +156,10 @@ class TestPromising:
     """Starts of one law: with two parameters free, or with one of them held."""
 
     @staticmethod
-    def look(promise: float, held: bool = False) -> Look:
+    def look(promise: float, held: bool = False) -> ScoredStart:
         free = Shared("tyre_slip", "slip_per_nm", 1.0, 0.0, 1.0, 0.5)
         other = Shared("tyre_slip", "wheel_share", 1.0, *((0.1, 0.1) if held else (0.0, 1.0)), 0.1)
-        return Look(Release((free, other), ((),)), promise)
+        return ScoredStart(Release((free, other), ((),)), promise)
 
     def test_the_best_and_a_second_that_promises_nearly_as_much(self) -> None:
         looks = [self.look(promise) for promise in (10.0, 9.0, 8.0)]

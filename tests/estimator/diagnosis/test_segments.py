@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from estimator.diagnosis import diagnose
-from estimator.diagnosis.chain import replay
-from estimator.diagnosis.hypotheses import NOTHING, Effects, everything
+from estimator.diagnosis.acquisition.chain import replay
 from estimator.diagnosis.inference.figures import BLOCK_S, EVERY_S, blocks, foreign_outputs
+from estimator.diagnosis.inference.hypotheses import NOTHING, Effects, everything
 from estimator.diagnosis.noise import LONGEST_S, MOST_SAMPLES, noise_floor, share_of, stretches
 from estimator.diagnosis.result import Course, Discrepancy, Equivalent, Estimated, Profile, Response, Verdict
 from estimator.diagnosis.segments import FEWEST_SAMPLES, LONG_S, cut, joined, segments

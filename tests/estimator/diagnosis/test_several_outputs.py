@@ -11,17 +11,15 @@ import pytest
 from estimator.diagnosis.diagnose import diagnose
 from estimator.diagnosis.noise import noise_floor
 from estimator.diagnosis.preconditions.channels import with_usable_channels
-from estimator.diagnosis.preconditions.thinned import as_slow_as_needed
+from estimator.diagnosis.preconditions.prepare import as_slow_as_needed
 from estimator.diagnosis.result import Verdict
 from estimator.physics.driveline import Start
 from estimator.physics.fit import fit
-from estimator.physics.grid import grid_for
-from estimator.physics.layout import flat_values
+from estimator.physics.layout import flat_values, grid_for
 from estimator.physics.problem import make_problem
 from estimator.physics.simulate import simulate
 from estimator.physics.unknowns import nominal_unknowns
-from estimator.signals.outputs import outputs_apart
-from estimator.signals.record import Channel, FloatArray, Location, OutputKind, Record, sliced
+from estimator.signals.record import Channel, FloatArray, Location, OutputKind, Record, separated_outputs, sliced
 from tests.estimator.diagnosis.one_effect import Bench, bench_with
 from tests.estimator.physics.bench import TWO_MASS
 
@@ -116,7 +114,7 @@ def test_a_filter_of_one_sensor_is_no_lag_of_the_torque_once_another_sensor_has_
 
 def test_outputs_of_one_recording_share_its_start_and_load() -> None:
     bench = with_output(LOAD_SPEED, *DRY)
-    apart = outputs_apart(bench.records, noise_floor)
+    apart = separated_outputs(bench.records, noise_floor)
     assert [each.lead for each in apart] == [None, None, apart[0], apart[1]]
     shared = nominal_unknowns(bench.model)
     alone, both = (make_problem(bench.model, records, shared) for records in (apart[:2], apart))

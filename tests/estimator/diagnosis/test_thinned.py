@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.diagnosis.hypotheses import NOTHING, everything
+from estimator.diagnosis.inference.hypotheses import NOTHING, everything
 from estimator.diagnosis.noise import MOST_SAMPLES
-from estimator.diagnosis.preconditions.thinned import (
+from estimator.diagnosis.preconditions.prepare import (
     LONGEST_OF_RIGID_S,
     LONGEST_S,
     as_slow_as_needed,
@@ -17,8 +17,7 @@ from estimator.diagnosis.preconditions.thinned import (
     thinned,
 )
 from estimator.physics.driveline import Start
-from estimator.physics.grid import grid_for
-from estimator.physics.layout import flat
+from estimator.physics.layout import flat, grid_for
 from estimator.physics.model import DrivelineModel, Parameter, Structure
 from estimator.physics.simulate import simulate
 from estimator.signals.record import OutputKind

@@ -7,8 +7,7 @@ from scipy.linalg import expm
 from scipy.signal import max_len_seq
 
 from estimator.identification.linear_model import LinearModel
-from estimator.identification.modes.modes import LIGHTLY_DAMPED
-from estimator.identification.modes.uncertainty import UncertainMode, uncertain_modes
+from estimator.identification.modes.modes import LIGHTLY_DAMPED, UncertainMode, uncertain_modes
 from estimator.signals.record import FloatArray, Record
 
 J_M, J_L, K, C, B_M, B_L = 1.6, 100.0, 4200.0, 9.0, 0.35, 0.9

@@ -7,8 +7,8 @@ import pytest
 
 from estimator.identification.best import BestEstimate, Verdict, best_estimate
 from estimator.identification.linear_model import Orders
+from estimator.identification.modes.modes import Uncertain
 from estimator.identification.modes.physical import NAMES, two_mass_model
-from estimator.identification.modes.uncertainty import Uncertain
 from estimator.identification.offline.fits import LinearFit, fit_box_jenkins, fit_output_error, problem_of
 from estimator.signals.decimate import high_passed
 from estimator.signals.prbs import prbs_nm

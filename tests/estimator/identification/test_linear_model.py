@@ -2,9 +2,15 @@ import numpy as np
 import pytest
 
 from estimator.errors import BadSetting, NotExciting
-from estimator.identification.linear_model import LinearModel, Orders
+from estimator.identification.linear_model import (
+    ROWS,
+    LinearModel,
+    Orders,
+    singular_values,
+    solve_least_squares,
+    triangular,
+)
 from estimator.identification.settings import excitation_order, require_excitation
-from estimator.identification.triangular import ROWS, singular_values, solve_least_squares, triangular
 from estimator.signals.prbs import prbs_nm
 from estimator.signals.record import FloatArray
 

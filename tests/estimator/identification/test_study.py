@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 from estimator.errors import BadModel
-from estimator.identification.identify import identify
+from estimator.identification.identify import compare, identify, study
 from estimator.identification.online.ekf import TwoMass
-from estimator.identification.online.registry import ESTIMATORS
+from estimator.identification.online.estimators import ESTIMATORS
 from estimator.identification.settings import Settings
-from estimator.identification.study import compare, study
 from estimator.signals.record import Record
 from tests.estimator.identification.driveline import B_L, B_M, J_L, J_M, C, K, cruise, true_resonance
 

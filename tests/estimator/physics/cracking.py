@@ -6,8 +6,7 @@ import numpy as np
 
 from estimator.physics.driveline import Start
 from estimator.physics.fit import FitResult, fit
-from estimator.physics.grid import grid_for
-from estimator.physics.layout import flat, slot
+from estimator.physics.layout import flat, grid_for, slot
 from estimator.physics.model import DrivelineModel
 from estimator.physics.problem import make_problem
 from estimator.physics.simulate import simulate

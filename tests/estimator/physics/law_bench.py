@@ -5,8 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from estimator.physics.driveline import Start
-from estimator.physics.grid import Grid
-from estimator.physics.layout import flat_values
+from estimator.physics.layout import Grid, flat_values
 from estimator.physics.simulate import simulate
 from estimator.signals.record import FloatArray, Record
 from tests.estimator.physics import reference

@@ -7,14 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.diagnosis.hypotheses import open_hypotheses
+from estimator.diagnosis.inference.hypotheses import open_hypotheses
 from estimator.physics import inputs as torque_path
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.driveline import Start
 from estimator.physics.effect import Effect, Element, Held
-from estimator.physics.grid import grid_for
 from estimator.physics.kernel import slots
-from estimator.physics.layout import flat, flat_values, slot
+from estimator.physics.layout import flat, flat_values, grid_for, slot
 from estimator.physics.simulate import simulate
 from estimator.signals.record import FloatArray, OutputKind, Record
 from tests.estimator.physics.bench import TWO_MASS, assert_same_to_rounding, linear_record, model, random_steps, record

@@ -8,8 +8,8 @@ import pytest
 from estimator.lanes import LANES
 from estimator.physics import simulate as simulate_module
 from estimator.physics import simulate as together_module
-from estimator.physics.grid import Grid
 from estimator.physics.jacobian import fill_differences, jacobian_at
+from estimator.physics.layout import Grid
 from estimator.physics.model import DrivelineModel
 from estimator.physics.problem import Problem, make_problem, outputs_at, own_part, start_vector
 from estimator.physics.unknowns import Shared, nominal_unknowns, own_unknowns

@@ -8,8 +8,7 @@ from scipy.integrate import solve_ivp
 
 from estimator.physics.driveline import Start
 from estimator.physics.fit import fit
-from estimator.physics.grid import grid_for
-from estimator.physics.layout import flat_values
+from estimator.physics.layout import flat_values, grid_for
 from estimator.physics.model import DrivelineModel, Parameter, Structure
 from estimator.physics.problem import make_problem
 from estimator.physics.simulate import simulate

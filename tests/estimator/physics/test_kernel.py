@@ -7,11 +7,10 @@ import numpy as np
 import pytest
 
 from estimator.physics.driveline import Start
-from estimator.physics.grid import Grid, grid_for
 from estimator.physics.kernel import state_vector
 from estimator.physics.kernel.rates import met
 from estimator.physics.laws import BEYOND, hyperbolic_tangent, power
-from estimator.physics.layout import flat
+from estimator.physics.layout import Grid, flat, grid_for
 from estimator.physics.simulate import simulate
 from estimator.signals.record import FloatArray, Location, OutputKind
 from tests.estimator.physics.bench import (

@@ -5,8 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from estimator.physics.grid import Grid
-from estimator.physics.layout import flat_values
+from estimator.physics.layout import Grid, flat_values
 from estimator.physics.simulate import simulate
 from estimator.signals.record import FloatArray, OutputKind
 from tests.estimator.physics import reference

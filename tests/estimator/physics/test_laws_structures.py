@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from estimator.physics.driveline import Start
-from estimator.physics.grid import Grid
 from estimator.physics.kernel import state_vector
-from estimator.physics.layout import flat_values
+from estimator.physics.layout import Grid, flat_values
 from estimator.physics.model import Structure
 from estimator.physics.simulate import simulate
 from estimator.signals.record import FloatArray

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from estimator.physics.driveline import Start
-from estimator.physics.grid import Grid
 from estimator.physics.kernel import linear, state_vector
 from estimator.physics.kernel.conditions import Line
-from estimator.physics.layout import flat, slot
+from estimator.physics.layout import Grid, flat, slot
 from estimator.physics.model import DrivelineModel, EffectValue, Parameter, Structure
 from estimator.physics.simulate import simulate
 from estimator.signals.record import FloatArray

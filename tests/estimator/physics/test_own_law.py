@@ -8,12 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from estimator.diagnosis.hypotheses import open_hypotheses
+from estimator.diagnosis.inference.hypotheses import open_hypotheses
 from estimator.errors import BadModel
 from estimator.physics.driveline import Start
 from estimator.physics.effect import Element
-from estimator.physics.grid import Grid, grid_for
-from estimator.physics.layout import flat, flat_values, named
+from estimator.physics.layout import Grid, flat, flat_values, grid_for, named
 from estimator.physics.model import EffectValue, Structure
 from estimator.physics.own_law import TRIAL, OwnLaw, OwnParameter
 from estimator.physics.simulate import simulate

@@ -12,8 +12,7 @@ import pytest
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.driveline import Start
 from estimator.physics.fit import FitResult, fit
-from estimator.physics.grid import Grid, grid_for
-from estimator.physics.layout import flat_values
+from estimator.physics.layout import Grid, flat_values, grid_for
 from estimator.physics.model import Parameter
 from estimator.physics.problem import make_problem, start_vector
 from estimator.physics.simulate import simulate

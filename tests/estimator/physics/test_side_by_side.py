@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from estimator.physics.driveline import Case, Start
-from estimator.physics.grid import Grid
-from estimator.physics.layout import flat, slot
+from estimator.physics.layout import Grid, flat, slot
 from estimator.physics.model import DrivelineModel, EffectValue, Parameter, Structure
 from estimator.physics.simulate import simulate_each
 from estimator.signals.record import FloatArray

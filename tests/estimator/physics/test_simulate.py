@@ -7,13 +7,12 @@ import numpy as np
 import pytest
 
 from estimator.diagnosis.assemble import load_torques
-from estimator.diagnosis.hypotheses import open_hypotheses
+from estimator.diagnosis.inference.hypotheses import open_hypotheses
 from estimator.errors import BadModel
 from estimator.physics.driveline import Case, Start
 from estimator.physics.fit import FitResult, fit, make_problem
 from estimator.physics.free_run import free_run
-from estimator.physics.grid import grid_for, substeps_for
-from estimator.physics.layout import flat, flat_values, slot
+from estimator.physics.layout import flat, flat_values, grid_for, slot, substeps_for
 from estimator.physics.model import DrivelineModel, Load, Structure, natural_frequencies_rad_s
 from estimator.physics.problem import bounds
 from estimator.physics.simulate import output_state, simulate, simulate_each

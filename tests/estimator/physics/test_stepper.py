@@ -7,12 +7,10 @@ import pytest
 
 from estimator.physics.catalogue import EFFECTS as CATALOGUE
 from estimator.physics.driveline import Start
-from estimator.physics.grid import grid_for
 from estimator.physics.kernel import state_vector
-from estimator.physics.layout import flat
+from estimator.physics.layout import flat, grid_for
 from estimator.physics.model import DrivelineModel, Parameter, Structure
-from estimator.physics.simulate import simulate
-from estimator.physics.stepper import FINER, SIGN_WIDTH_RAD_S, Stepper
+from estimator.physics.simulate import FINER, SIGN_WIDTH_RAD_S, Stepper, simulate
 from estimator.signals.record import FloatArray, OutputKind, Record
 from tests.estimator.physics.bench import ONE_MASS, SAMPLE_TIME_S, THREE_MASS, TWO_MASS, model, random_steps, record
 

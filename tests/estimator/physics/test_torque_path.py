@@ -7,8 +7,7 @@ from scipy.linalg import expm
 from estimator.physics.driveline import Start
 from estimator.physics.effects import timing
 from estimator.physics.effects.timing import lag_step, low_pass
-from estimator.physics.grid import Grid
-from estimator.physics.layout import flat
+from estimator.physics.layout import Grid, flat
 from estimator.physics.simulate import simulate
 from estimator.signals.record import FloatArray
 from tests.chosen import campaign

@@ -10,8 +10,7 @@ from estimator.physics.effect import Held, Within
 from estimator.physics.effects.torque import ORDERS
 from estimator.physics.fit import fit
 from estimator.physics.free_run import free_run
-from estimator.physics.grid import grid_for
-from estimator.physics.layout import flat, slot
+from estimator.physics.layout import flat, grid_for, slot
 from estimator.physics.problem import make_problem
 from estimator.physics.simulate import simulate
 from estimator.physics.unknowns import effect_unknowns, local_basis, nominal_unknowns, released

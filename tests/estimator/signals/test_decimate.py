@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.diagnosis.preconditions.thinned import MOST, with_room
+from estimator.diagnosis.preconditions.prepare import MOST, with_room
 from estimator.diagnosis.segments import cut
 from estimator.diagnosis.unnamed.forms import LONGEST_TRAVEL, peaks
 from estimator.errors import BadSetting

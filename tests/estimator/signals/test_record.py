@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from estimator.errors import BadShape
-from estimator.signals.record import Record, once, uniform_period_s
-from estimator.signals.slider import carried
+from estimator.signals.record import Record, carried, once, uniform_period_s
 
 
 def record(**changed: Any) -> Record:

@@ -16,8 +16,7 @@ from fmpy.validation import validate_fmu
 
 from estimator.physics.catalogue import BUILT_IN
 from estimator.physics.driveline import Case, Start
-from estimator.physics.grid import Grid
-from estimator.physics.layout import flat_values
+from estimator.physics.layout import Grid, flat_values
 from estimator.physics.model import DrivelineModel, EffectValue, Parameter, Structure
 from estimator.physics.simulate import motor_angle, simulate
 from estimator.signals.record import FloatArray, Record

@@ -8,10 +8,9 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from estimator.diagnosis.acquisition import compensate, hidden_jitter, recognise
-from estimator.diagnosis.acquisition.jitter import stamped_jitter
-from estimator.diagnosis.acquisition.lost import lost_samples
-from estimator.diagnosis.acquisition.quantised import speed_quantisation
+from estimator.diagnosis.acquisition.chain import compensate, recognise
+from estimator.diagnosis.acquisition.jitter import hidden_jitter, stamped_jitter
+from estimator.diagnosis.acquisition.quantised import lost_samples, speed_quantisation
 from estimator.diagnosis.acquisition.stale import stale_samples
 from estimator.signals.record import FloatArray, Record
 from tests.chosen import one_in

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.diagnosis.acquisition import recognise
+from estimator.diagnosis.acquisition.chain import recognise
 from estimator.signals.record import OutputKind, Record
 from tests.chosen import one_in
 from tests.estimator.diagnosis.acquisition.bench import KINDS, PERIOD_S, SAMPLES, drive, drives, healthy

@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.diagnosis.acquisition import OUTPUT, compensate, hidden_jitter, recognise
-from estimator.diagnosis.acquisition.finding import Finding
+from estimator.diagnosis.acquisition.chain import compensate, recognise
+from estimator.diagnosis.acquisition.finding import OUTPUT, Finding
+from estimator.diagnosis.acquisition.jitter import hidden_jitter
 from estimator.signals.record import FloatArray, Record
 from tests.estimator.diagnosis.acquisition.bench import (
     KINDS,

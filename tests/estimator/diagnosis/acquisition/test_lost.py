@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.diagnosis.acquisition import Finding, recognise
+from estimator.diagnosis.acquisition.chain import recognise
+from estimator.diagnosis.acquisition.finding import Finding
 from estimator.signals.record import BoolArray, Record
 from tests.estimator.diagnosis.acquisition.bench import SAMPLES, healthy, random_rows
 

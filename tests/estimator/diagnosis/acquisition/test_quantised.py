@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.diagnosis.acquisition import recognise
+from estimator.diagnosis.acquisition.chain import recognise
 from estimator.signals.record import FloatArray
 from tests.estimator.diagnosis.acquisition.bench import KINDS, NOISE, PERIOD_S, drives, healthy
 

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.diagnosis.acquisition import OUTPUT, Finding, recognise
+from estimator.diagnosis.acquisition.chain import recognise
+from estimator.diagnosis.acquisition.finding import OUTPUT, Finding
 from estimator.diagnosis.acquisition.quantised import chance_repeats, lattice_step
 from estimator.signals.record import BoolArray, Record
 from tests.estimator.diagnosis.acquisition.bench import healthy, random_rows, stale

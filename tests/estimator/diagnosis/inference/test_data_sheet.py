@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import pytest
 
 from estimator.diagnosis.diagnose import diagnose
-from estimator.diagnosis.hypotheses import everything, open_hypotheses
+from estimator.diagnosis.inference.hypotheses import everything, open_hypotheses
 from estimator.diagnosis.inference.rivals import free_line
 from estimator.diagnosis.inference.search import Search
 from estimator.diagnosis.result import Verdict
@@ -36,9 +36,9 @@ def test_what_left_its_tolerance_is_given_with_its_size_and_place(name: str, fac
     search = searched({name: factor})
     line = free_line(search)
     assert line is not None
-    (stray,) = line.strays
-    assert (stray.name, stray.element, stray.tolerance) == (name, element, pytest.approx(0.1))
-    assert stray.ratio == pytest.approx(factor, rel=0.03)
+    (value,) = line.off_nominal
+    assert (value.name, value.element, value.tolerance) == (name, element, pytest.approx(0.1))
+    assert value.ratio == pytest.approx(factor, rel=0.03)
     assert line.leaves_noise
     assert line.score < search.nothing().score
 
@@ -50,7 +50,7 @@ def test_inside_its_tolerances_nothing_is_beyond() -> None:
 @pytest.mark.campaign
 def test_a_wrong_stiffness_is_no_missing_physics() -> None:
     found = diagnose(quiet(), off_by({"k": 1.3}, 0.05))
-    assert [stray.name for stray in found.strays] == ["k"]
+    assert [value.name for value in found.off_nominal] == ["k"]
     assert (found.verdict, found.effects) == (Verdict.UNEXPLAINED, ())
     assert found.mismatch.element is Element.SHAFT
     assert "No physics need be missing, but the data sheet is off" in found.statement

@@ -11,8 +11,10 @@ from typing import cast
 
 import pytest
 
-from estimator.diagnosis.inference import remainder
+from estimator.diagnosis.inference import checks
+from estimator.diagnosis.inference.checks import LOOSE, is_plausible, widened
 from estimator.diagnosis.inference.disturbances import Limits, limits_for
+from estimator.diagnosis.inference.hypotheses import Hypothesis
 from estimator.diagnosis.inference.judge import (
     Score,
     error_falls,
@@ -22,8 +24,6 @@ from estimator.diagnosis.inference.judge import (
     tempered_by,
     verdict_of,
 )
-from estimator.diagnosis.inference.likelihood import Hypothesis
-from estimator.diagnosis.inference.plausible import LOOSE, is_plausible, loosened
 from estimator.diagnosis.inference.wording import Context, statement
 from estimator.diagnosis.result import Effort, Evidence, Fit, FoundEffect, Remainder, Verdict
 from estimator.physics.effect import Element
@@ -80,8 +80,8 @@ def test_a_set_without_an_effect_counts_against_it_even_with_values_that_are_no_
     assert probability_of({"brake"}, scores, 1.0) == 1.0
 
 
-def left_over(value: float, most: float, is_share: bool = True) -> remainder.Test:
-    return remainder.Test("", value, most, is_share)
+def left_over(value: float, most: float, is_share: bool = True) -> checks.Test:
+    return checks.Test("", value, most, is_share)
 
 
 def test_differences_of_scores_count_by_what_is_left_beyond_what_explained_worlds_leave() -> None:
@@ -145,17 +145,17 @@ def test_values_that_are_no_case_of_an_effect(name: str, values: Mapping[str, fl
 
 
 def at(hypothesis: Hypothesis, name: str, x: float) -> Hypothesis:
-    plain: FitResult = hypothesis.plain
+    plain: FitResult = hypothesis.result
     moved = plain.x.copy()
     moved[next(i for i, each in enumerate(plain.problem.shared) if (each.effect, each.name) == ("", name))] = x
-    return replace(hypothesis, plain=replace(plain, x=moved))
+    return replace(hypothesis, result=replace(plain, x=moved))
 
 
 def test_friction_that_warms_is_described_somewhere_between_cold_and_warm() -> None:
     cold_nm_s = BENCH.model.parameters["b_L"].value
     hypothesis = hypothesis_with({"warming_friction": {"cold_nm_s": cold_nm_s, "time_constant_s": 5.0}})
     at_bound = at(hypothesis, "b_L", 1.0 - BENCH.model.parameters["b_L"].tolerance)
-    loose = loosened(at_bound, BENCH.model)
+    loose = widened(at_bound, BENCH.model)
     assert loose is not None
     (low,) = [each.low for each in loose.problem.shared if each.name == "b_L"]
     assert low == pytest.approx((1.0 - BENCH.model.parameters["b_L"].tolerance) / LOOSE)

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.diagnosis.hypotheses import everything, open_hypotheses
+from estimator.diagnosis.inference.hypotheses import everything, open_hypotheses
 from estimator.diagnosis.inference.judge import Decision, decide, grounds
 from estimator.diagnosis.inference.search import Search
 from estimator.physics.model import EffectValue
@@ -33,7 +33,7 @@ def decided(name: str, values: Mapping[str, float]) -> Decision:
 def test_nothing_is_named_where_nothing_is_missing() -> None:
     decision = decided(*PLAIN)
     assert decision.named == decision.traces == decision.failed == ()
-    assert decision.best.plain.rms == pytest.approx(SIGMA, rel=0.05)
+    assert decision.best.result.rms == pytest.approx(SIGMA, rel=0.05)
 
 
 @pytest.mark.parametrize(
@@ -54,7 +54,7 @@ def test_a_planted_effect_is_named_and_explains_all(name: str, values: Mapping[s
     assert belief.score > 100.0
     if belief.name == name:
         for key, value in values.items():
-            assert decision.best.plain.value(name, key) == pytest.approx(value, rel=0.1)
+            assert decision.best.result.value(name, key) == pytest.approx(value, rel=0.1)
 
 
 def test_every_set_is_fitted_once_and_the_best_of_them_is_taken() -> None:
@@ -91,11 +91,11 @@ def test_an_effect_that_is_known_roughly_is_tuned_and_no_finding() -> None:
     search = searched(roughly)
     decision = decide(search, grounds(search))
     assert decision.named == decision.failed == ()
-    assert decision.best.plain.value("coulomb_friction_motor", "friction_nm") == pytest.approx(8.0, rel=0.02)
+    assert decision.best.result.value("coulomb_friction_motor", "friction_nm") == pytest.approx(8.0, rel=0.02)
 
 
 def test_an_effect_that_is_known_wrongly_and_held_is_a_mismatch() -> None:
     bench = bench_with("coulomb_friction_motor", {"friction_nm": 8.0})
     held = knowing(bench, "coulomb_friction_motor", "friction_nm", 5.0, 0.0)
     nothing = searched(held).nothing()
-    assert nothing.plain.rms > 1.5 * SIGMA
+    assert nothing.result.rms > 1.5 * SIGMA

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from estimator.diagnosis.hypotheses import everything, open_hypotheses
+from estimator.diagnosis.inference.hypotheses import everything, open_hypotheses
 from estimator.diagnosis.inference.judge import Grounds, decide, grounds
 from estimator.diagnosis.inference.rivals import Law, best_law, rival_laws, searches_around
 from estimator.diagnosis.inference.search import Search
@@ -33,16 +33,16 @@ def test_a_planted_law_is_scored_by_the_likelihood_it_gains() -> None:
     assert found.terms[0] == ("w_M |w_M|", pytest.approx(0.1, rel=0.1))
     assert found.rms == pytest.approx(SIGMA, rel=0.1)
     noise = searched(quiet()).nothing()
-    least = math.log(planted.plain.residual.size)
+    least = math.log(planted.result.residual.size)
     assert noise.score + least < found.score < planted.score
 
 
 def test_laws_are_weighed_by_the_innovations() -> None:
     """What a filter makes of a signal is what it makes of the signal's samples in use."""
     nothing = searched(quiet()).nothing()
-    view = scene(nothing.plain, SIGMA, nothing.filter)
+    view = scene(nothing.result, SIGMA, nothing.filter)
     errors = np.concatenate(view.errors)
-    assert errors == pytest.approx(-nothing.filter(nothing.plain.residual))
+    assert errors == pytest.approx(-nothing.filter(nothing.result.residual))
     assert float(np.mean(errors**2)) == pytest.approx(1.0, abs=0.1)
 
 

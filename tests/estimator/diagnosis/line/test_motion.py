@@ -7,8 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.diagnosis.line.blocks import lines, spread_stretches
-from estimator.diagnosis.line.motion import FormPlace, block_mean, form_changes, motion_of, simulated
+from estimator.diagnosis.line.blocks import (
+    FormPlace,
+    block_mean,
+    form_changes,
+    lines,
+    motion_of,
+    simulated,
+    spread_stretches,
+)
 from estimator.diagnosis.line.tangent import block_length, tangent
 from estimator.physics.driveline import Start
 from estimator.physics.fit import FitResult, fit, not_fitted

@@ -7,8 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from estimator.diagnosis.unnamed.forms import STEP_EVERY_S
-from estimator.diagnosis.unnamed.pursuit import candidates
+from estimator.diagnosis.unnamed.forms import STEP_EVERY_S, candidates
 from estimator.diagnosis.unnamed.scene import Scene, elements, scene
 from estimator.physics.driveline import Start
 from estimator.physics.effect import Element

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from estimator.diagnosis.unnamed.pursuit import Pool, candidates, pursue
+from estimator.diagnosis.unnamed.forms import Pool, candidates, pursue
 from estimator.diagnosis.unnamed.scene import Ground, ground_of, scene
 from estimator.physics.effect import Element
 from estimator.signals.record import FloatArray
@@ -60,7 +60,7 @@ def test_what_is_left_is_computed_and_not_promised(monkeypatch: pytest.MonkeyPat
     ground = ground_of(scene(nominal_fit(quiet((1,))), SIGMA))
     pool = pool_of([rng.standard_normal((ground.error.size, 1))])
     whole = float(ground.error @ ground.error)
-    monkeypatch.setattr("estimator.diagnosis.unnamed.pursuit._gains", lambda *_: (np.array([whole]), np.array([1.0])))
+    monkeypatch.setattr("estimator.diagnosis.unnamed.scene._gains", lambda *_: (np.array([whole]), np.array([1.0])))
     path = pursue(pool, ground)
     assert path.chosen == []
     assert path.squares == [pytest.approx(whole)]

@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.diagnosis.hypotheses import NOTHING, everything
-from estimator.diagnosis.unnamed import ROUNDS, scene, searches_at
+from estimator.diagnosis.inference.hypotheses import NOTHING, everything
+from estimator.diagnosis.unnamed import scene
+from estimator.diagnosis.unnamed.search import ROUNDS, searches_at
 from estimator.diagnosis.where.discrepancy import discrepancy, effects_added, without_effect
 from estimator.diagnosis.where.locate import error_spectrum, responses
 from estimator.physics.driveline import Start
@@ -92,7 +93,7 @@ def test_what_a_first_look_has_found_is_not_looked_for_again(rounds: int, monkey
     result = nominal_fit(recordings(Element.SHAFT, lambda m: np.tanh(m.twist / 1e-3), 5.0))
     plain, begun = discrepancy(result, result, SIGMA, rounds=rounds), searches_at(scene(result, SIGMA))
     monkeypatch.setattr("estimator.diagnosis.unnamed.search.first", None)
-    assert discrepancy(result, result, SIGMA, rounds=rounds, begun=begun).laws == plain.laws
+    assert discrepancy(result, result, SIGMA, rounds=rounds, initial=begun).laws == plain.laws
 
 
 START = Start(5.0, 0.0, 2.0, 0.0, 2.0)

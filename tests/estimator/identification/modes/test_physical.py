@@ -5,13 +5,13 @@ import pytest
 
 from estimator.errors import BadModel, BadSetting
 from estimator.identification.linear_model import LinearModel, Orders
+from estimator.identification.modes.modes import Uncertain
 from estimator.identification.modes.physical import (
     NAMES,
     coefficients_of,
     physical_parameters,
     two_mass_model,
 )
-from estimator.identification.modes.uncertainty import Uncertain
 from estimator.identification.offline.fits import LinearFit
 from tests.estimator.identification import driveline
 

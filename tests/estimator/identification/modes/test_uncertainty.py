@@ -5,12 +5,7 @@ import pytest
 
 from estimator.errors import BadShape
 from estimator.identification.linear_model import LinearModel
-from estimator.identification.modes.modes import resonance
-from estimator.identification.modes.uncertainty import (
-    pole_zero_map,
-    propagate,
-    uncertain_modes,
-)
+from estimator.identification.modes.modes import pole_zero_map, propagate, resonance, uncertain_modes
 from estimator.signals.record import FloatArray
 
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter, welch
 
-from estimator.identification.offline.noise_model import fit_noise, sandwich
+from estimator.identification.offline.fits import fit_noise, sandwich
 
 D = np.array([1.0, -1.5, 0.7])
 N = 20_000

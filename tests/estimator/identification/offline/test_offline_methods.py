@@ -8,7 +8,7 @@ import pytest
 
 from estimator.errors import BadSetting, NotExciting
 from estimator.identification.linear_model import Orders
-from estimator.identification.modes.uncertainty import UncertainMode
+from estimator.identification.modes.modes import UncertainMode
 from estimator.identification.offline.fits import LinearFit, Method, fit_box_jenkins, fit_output_error
 from estimator.signals.decimate import MOST, block_of, decimate, first_part, high_passed
 from estimator.signals.record import Record

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from estimator.identification.linear_model import Orders
-from estimator.identification.offline.orders import select_orders
+from estimator.identification.offline.validation import select_orders
 from tests.estimator.identification.closed_loop import controlled
 from tests.estimator.identification.driveline import cruise
 

@@ -3,9 +3,8 @@ import pytest
 
 from estimator.identification.linear_model import Orders
 from estimator.identification.modes.physical import two_mass_model
-from estimator.identification.offline.fits import LinearFit, fit_box_jenkins, free_run
+from estimator.identification.offline.fits import LinearFit, fit_box_jenkins, fit_noise, free_run
 from estimator.identification.offline.linearity import Linearity
-from estimator.identification.offline.noise_model import fit_noise
 from estimator.identification.offline.validation import correlation_test, judge_feedback, residual_tests, validate
 from estimator.signals.record import FloatArray, Record
 from tests.estimator.identification import driveline

@@ -10,8 +10,8 @@ from scipy.signal import ss2tf
 from estimator.identification.linear_model import LinearModel
 from estimator.identification.online.adaptation import Adaptation, DecreasingGain
 from estimator.identification.online.ekf import TwoMass
+from estimator.identification.online.estimators import ESTIMATORS, Setup
 from estimator.identification.online.recursive import RecursiveEstimator
-from estimator.identification.online.registry import ESTIMATORS, Setup
 from estimator.signals.prbs import prbs_nm
 from estimator.signals.record import BoolArray, FloatArray
 

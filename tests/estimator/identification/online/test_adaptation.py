@@ -18,7 +18,7 @@ from estimator.identification.online.adaptation import (
     GainLaw,
     VariableForgetting,
 )
-from estimator.identification.online.oefo import Oefo
+from estimator.identification.online.estimators import Oefo
 from estimator.identification.online.recursive import Reason, Status
 from estimator.signals.record import FloatArray
 from tests.estimator.identification.online.cases import LINEAR, linear_data

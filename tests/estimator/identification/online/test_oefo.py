@@ -8,7 +8,7 @@ from estimator.compiled import brief
 from estimator.errors import BadModel
 from estimator.identification.linear_model import LinearModel, Orders
 from estimator.identification.online.adaptation import ConstantForgetting, DecreasingGain
-from estimator.identification.online.oefo import Oefo
+from estimator.identification.online.estimators import Oefo
 from estimator.identification.online.recursive import Reason, Status
 from estimator.identification.online.regression import is_stable
 from estimator.signals.prbs import prbs_nm

@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from estimator.diagnosis.inference.disturbances import Whitener
-from estimator.diagnosis.inference.likelihood import Hypothesis
+from estimator.diagnosis.inference.hypotheses import Hypothesis
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.driveline import Case
 from estimator.physics.effect import Effect
@@ -42,21 +42,16 @@ ROOM_SAMPLES = 2**21
 STEP_SHARES = (1.0, 0.1)
 """Shares of a start's size that are looked along: what is not smooth shows in full, what moves far in small."""
 
-STARTS = 2
-"""Start points of an effect that are fitted, the most promising of its list."""
-
-SHAPES = 2
-"""Further ones, of other shapes than these."""
-
-PROMISING = 0.5
-"""Share of the best start's promise below which another start of the same effect is not tried."""
+STARTS = 2  # start points of an effect that are fitted, the most promising of its list
+SHAPES = 2  # further ones, of other shapes than these
+PROMISING = 0.5  # share of the best start's promise below which another start of the same effect is not tried
 
 ROUNDS = 3
 """Rounds in which the size of an event and its intervals in all recordings find each other from there."""
 
 
 @dataclass(frozen=True, slots=True)
-class Look:
+class ScoredStart:
     """A start of an effect's fit, and the fall of the squared error it promises to first order."""
 
     release: Release
@@ -74,18 +69,14 @@ class Look:
         return tuple(free[1:])
 
 
-def promising(looks: Sequence[Look]) -> list[Look]:
-    """Return the starts worth a fit: the best, and others where they promise nearly as much.
-
-    These are the second best, and the best of other shapes, since a law has an optimum near each, and of every other
-    variant: a look at one is no look at another.
-    """
-    near = [look for look in looks if look.promise >= PROMISING * looks[0].promise or look is looks[0]]
-    best = {(look.variant, look.shape): look for look in reversed(near)}
-    apart = [look for look in near[STARTS:] if best[look.variant, look.shape] is look]
-    first = [*near[:STARTS], *apart[:SHAPES]]
-    seen = {look.variant for look in first}
-    others = {look.variant: look for look in reversed(near) if look.variant not in seen}
+def promising(starts: Sequence[ScoredStart]) -> list[ScoredStart]:
+    """Return the starts worth a fit: the best, and others where they promise nearly as much."""
+    near = [scored for scored in starts if scored.promise >= PROMISING * starts[0].promise or scored is starts[0]]
+    best = {(scored.variant, scored.shape): scored for scored in reversed(near)}
+    distinct = [scored for scored in near[STARTS:] if best[scored.variant, scored.shape] is scored]
+    first = [*near[:STARTS], *distinct[:SHAPES]]
+    seen = {scored.variant for scored in first}
+    others = {scored.variant: scored for scored in reversed(near) if scored.variant not in seen}
     return [*first, *others.values()]
 
 
@@ -119,7 +110,7 @@ class Screen:
         self._projector = projector or Projector(result)
         self._rows = result.problem.rows
 
-    def looks(self, name: str, kept: str = "") -> list[Look]:
+    def starts(self, name: str, kept: str = "") -> list[ScoredStart]:
         """Return a look at each start of an effect, the most promising first.
 
         ``kept`` is a parameter that keeps the value of the fit that is looked around, in every start.
@@ -129,9 +120,9 @@ class Screen:
         if kept:
             releases = [self._keeping(kept, release) for release in releases]
         if entry.profile:
-            return [Look(release, np.inf) for release in releases]
+            return [ScoredStart(release, np.inf) for release in releases]
         looker = self._periodic if entry.phases else self._events if entry.event else self._plain
-        return sorted(looker(entry, releases), key=lambda look: -look.promise)
+        return sorted(looker(entry, releases), key=lambda scored: -scored.promise)
 
     def _keeping(self, kept: str, release: Release) -> Release:
         p = self._result.p
@@ -140,15 +131,15 @@ class Screen:
             shared=tuple(replace(u, start=p[u.slot] / u.scale) if u.name == kept else u for u in release.shared),
         )
 
-    def _plain(self, entry: Effect, releases: Sequence[Release]) -> list[Look]:
+    def _plain(self, entry: Effect, releases: Sequence[Release]) -> list[ScoredStart]:
         found = []
         for some in self._at_a_time(releases, len(STEP_SHARES)):
             tried = [_Steps.of(entry, release) for release in some]
             outputs = self._each([steps.filled for steps in tried])
             for steps, mine in zip(tried, outputs, strict=True):
                 moved = self._stacked([output - self._output(i) for i, output in enumerate(mine)])
-                looks = [self._along(steps, step, change) for step, change in zip(steps.sizes, moved, strict=True)]
-                found.append(max(looks, key=lambda look: look.promise))
+                starts = [self._along(steps, step, change) for step, change in zip(steps.sizes, moved, strict=True)]
+                found.append(max(starts, key=lambda scored: scored.promise))
         return found
 
     def _at_a_time(self, releases: Sequence[Release], simulations: int) -> Iterator[Sequence[Release]]:
@@ -166,19 +157,20 @@ class Screen:
             found.append(np.split(self._runner(i)([p for each in lists for p in each]), ends[:-1]))
         return [list(each) for each in zip(*found, strict=True)]
 
-    def _along(self, steps: _Steps, step: float, moved: FloatArray) -> Look:
-        """Look along the change of the output that one size of an effect makes."""
+    def _along(self, steps: _Steps, step: float, moved: FloatArray) -> ScoredStart:
         release, first, zero = steps.release, steps.first, steps.zero
         if not np.isfinite(moved).all():  # so far out that the line flies apart: this start promises nothing
-            return Look(release, 0.0)
+            return ScoredStart(release, 0.0)
         ends = sorted((limit - zero) / step for limit in (first.low, first.high))
         most = LARGEST_SCALING * abs((first.start - zero) / step)
         reached, promise = self._projector.promise(moved, max(ends[0], -most), min(ends[1], most))
         least = SMALLEST_SCALING * abs((first.start - zero) / step)
         size = float(np.copysign(max(abs(reached), least), reached))
-        return Look(_with_start(release, first, float(np.clip(zero + size * step, first.low, first.high))), promise)
+        return ScoredStart(
+            _with_start(release, first, float(np.clip(zero + size * step, first.low, first.high))), promise
+        )
 
-    def _periodic(self, entry: Effect, releases: Sequence[Release]) -> list[Look]:
+    def _periodic(self, entry: Effect, releases: Sequence[Release]) -> list[ScoredStart]:
         found = []
         for some in self._at_a_time(releases, 2 * len(entry.phases)):
             outputs = self._each([partial(_waved, entry, release) for release in some])
@@ -188,9 +180,9 @@ class Screen:
                 found.append(self._in_phase(release, answers))
         return found
 
-    def _in_phase(self, release: Release, found: list[list[Wave]]) -> Look:
+    def _in_phase(self, release: Release, found: list[list[Wave]]) -> ScoredStart:
         if not all(np.isfinite(wave.answers @ wave.answers.T).all() for mine in found for wave in mine):
-            return Look(release, 0.0)  # so far out that the line flies apart
+            return ScoredStart(release, 0.0)  # so far out that the line flies apart
         amplitudes, phases, promise = self._regress(found)
         shared = tuple(
             replace(u, start=float(np.clip(amplitudes[u.name] / u.scale, u.low, u.high))) if u.name in amplitudes else u
@@ -200,7 +192,7 @@ class Screen:
             tuple(replace(u, start=mine.get(u.name, u.start)) for u in unknowns)
             for unknowns, mine in zip(release.own, phases, strict=False)
         )
-        return Look(_with_own(Release(shared, release.own), own), promise)
+        return ScoredStart(_with_own(Release(shared, release.own), own), promise)
 
     def _regress(self, found: list[list[Wave]]) -> tuple[dict[str, float], list[dict[str, float]], float]:
         """Return the amplitudes all recordings share, the phases of each, and the promise."""
@@ -227,10 +219,10 @@ class Screen:
                 change[self._rows[i]] += amplitudes[wave.amplitude] * turned
         return amplitudes, phases, self._projector.promise(change, 0.0, 1.0)[1]
 
-    def _events(self, entry: Effect, releases: Sequence[Release]) -> list[Look]:
+    def _events(self, entry: Effect, releases: Sequence[Release]) -> list[ScoredStart]:
         return [self._event(entry, release) for release in releases]
 
-    def _event(self, entry: Effect, release: Release) -> Look:
+    def _event(self, entry: Effect, release: Release) -> ScoredStart:
         sizes = _sizes(release)
         size = release.shared[0]
         grids = [
@@ -245,7 +237,7 @@ class Screen:
             stretches = [each.best(best) for each in scans]
             power = sum(stretch.power for stretch in stretches)
             if power == 0.0:
-                return Look(release, 0.0)
+                return ScoredStart(release, 0.0)
             best = float(
                 np.clip(-sum(s.match for s in stretches) / power, size.low * size.scale, size.high * size.scale)
             )
@@ -260,7 +252,7 @@ class Screen:
                 for grid, stretch in zip(grids, stretches, strict=True)
             ]
         )
-        return Look(found, self._projector.promise(best * change, 0.0, LARGEST_SCALING)[1])
+        return ScoredStart(found, self._projector.promise(best * change, 0.0, LARGEST_SCALING)[1])
 
     @staticmethod
     def _may_be(size: Shared, value: float) -> bool:
@@ -342,8 +334,7 @@ def _between(own: tuple[Shared, ...], entry: Effect, grid: Cells, stretch: Stret
 SAME_MOTION = 0.02
 """RMS by which two motions may differ, over what the output moves, for effects to move the output alike in both."""
 
-ROOM_BYTES = 2**27
-"""Room that answers may take."""
+ROOM_BYTES = 2**27  # room that answers may take
 
 
 @dataclass
@@ -353,7 +344,6 @@ class Answers:
     around: list[tuple[FitResult, list[dict[bytes, FloatArray]]]] = field(default_factory=list)
 
     def near(self, fit: FitResult) -> list[dict[bytes, FloatArray]]:
-        """Return what is known of each recording around a motion like that of a fit."""
         for other, known in self.around:
             if _difference(fit, other) < SAME_MOTION:
                 return known
@@ -401,15 +391,15 @@ class Remembering(Screen):
 
     def __init__(self, hypothesis: Hypothesis, model: DrivelineModel, answers: Answers) -> None:
         super().__init__(hypothesis.white, model, _Weighted(hypothesis))
-        self._known = answers.near(hypothesis.plain)
+        self._known = answers.near(hypothesis.result)
         self.found: list[dict[bytes, FloatArray]] = [{} for _ in self._known]
 
     def _runner(self, index: int) -> Simulate:
         simulate, known, found_here = super()._runner(index), self._known[index], self.found[index]
-        base, still = self._result.p_of(index), self._output(index)
+        nominal, still = self._result.p_of(index), self._output(index)
 
         def run(parameters: Sequence[FloatArray], alike_s: FloatArray | None = None) -> FloatArray:
-            keys = [_changed(base, p) for p in parameters]
+            keys = [_changed(nominal, p) for p in parameters]
             if all(key in known for key in keys):
                 return np.array([still + known[key] for key in keys])
             found = simulate(parameters, alike_s)
@@ -419,15 +409,6 @@ class Remembering(Screen):
         return run
 
 
-def _changed(base: FloatArray, p: FloatArray) -> bytes:
-    """Return what was changed of a parameter vector: places and values."""
-    places = np.flatnonzero(p != base)
+def _changed(nominal: FloatArray, p: FloatArray) -> bytes:
+    places = np.flatnonzero(p != nominal)
     return places.tobytes() + p[places].tobytes()
-
-
-def screen(hypothesis: Hypothesis, model: DrivelineModel, answers: Answers) -> Remembering:
-    """Return a first look at effects around a hypothesis; promises are falls of the squared innovations."""
-    return Remembering(hypothesis, model, answers)
-
-
-__all__ = ["Answers", "Look", "screen"]

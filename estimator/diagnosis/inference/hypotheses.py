@@ -1,15 +1,15 @@
-"""The fit of one hypothesis under the weighting of its own disturbances, and its score."""
+"""Hypotheses: sets of effects added to the nominal model, where their fits begin, and their likelihood."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
-from estimator.diagnosis.hypotheses import Effects
+from estimator.diagnosis.black_box import acts_around
 from estimator.diagnosis.inference.descent import Effort, descended, extended, light
 from estimator.diagnosis.inference.disturbances import (
     Limits,
@@ -22,19 +22,114 @@ from estimator.diagnosis.inference.disturbances import (
     whitener_of,
 )
 from estimator.physics.catalogue import EFFECTS
+from estimator.physics.effect import Untestable
 from estimator.physics.fit import MOMENT_NAMES, FitResult, not_fitted
 from estimator.physics.jacobian import changes, jacobian_at
+from estimator.physics.layout import slot
+from estimator.physics.model import DrivelineModel, Motion
+from estimator.physics.motion import turns_on
 from estimator.physics.problem import Problem, bounds, own_part, simulated_each
-from estimator.physics.unknowns import LocalBasis
-from estimator.signals.outputs import by_output
-from estimator.signals.record import FloatArray, Record
+from estimator.physics.unknowns import LocalBasis, Release, Shared
+from estimator.signals.record import BoolArray, FloatArray, Record, by_output
+
+Effects = frozenset[str]
+NOTHING: Effects = frozenset()
+
+
+Progress = Callable[[str, float], None]
+"""Called with what is being done and the share of the work behind it; raise from it to cancel."""
+
+
+def silent(_message: str, _share: float) -> None:
+    """Report nothing."""
+
+
+def with_effect(effects: Effects, name: str) -> Effects:
+    """Add an effect to a set; it replaces the special cases of itself."""
+    return (effects - set(EFFECTS[name].contains)) | {name}
+
+
+def open_hypotheses(model: DrivelineModel, records: Sequence[Record]) -> tuple[tuple[str, ...], dict[str, Untestable]]:
+    """Sort the catalogue into effects that the recordings can tell and those they can't, with the reason.
+
+    Effects that make no sense in the model's structure or for such a motion, that act inside a plant simulated
+    elsewhere, or that the model already has, are in neither.
+    """
+    testable, untestable = [], {}
+    for name in (*EFFECTS, *model.laws):
+        entry = EFFECTS[name]
+        fits = model.structure in entry.structures and all(record.kind in entry.kinds for record in records)
+        turns = model.motion is Motion.ROTATION or not entry.phases
+        swings = not (entry.swinging and turns_on(records))
+        reached = model.plant is None or acts_around(entry)
+        if not (fits and turns and swings and reached) or name in model.effects or entry.recognised:
+            continue
+        obstacle = entry.testable(model, records)
+        if obstacle is None:
+            testable.append(name)
+        else:
+            untestable[name] = obstacle
+    return tuple(testable), untestable
+
+
+def everything(records: Sequence[Record]) -> list[BoolArray]:
+    """Return masks that use every good sample."""
+    return [np.asarray(record.okay) for record in records]
+
+
+def kept(previous: FitResult, effects: Collection[str]) -> Release:
+    """Return the unknowns of a fit that belong to the line itself or to some effects."""
+    wanted = {"", *effects}
+    return Release(
+        tuple(unknown for unknown in previous.problem.shared if unknown.effect in wanted),
+        tuple(tuple(unknown for unknown in basis.own if unknown.effect in wanted) for basis in previous.problem.local),
+    )
+
+
+def inheriting(name: str, release: Release, previous: FitResult) -> Release:
+    """Return a start of a general law that keeps what a fit of its special case has found out by another telling."""
+    found = {
+        key: value for special in EFFECTS[name].contains for key, value in previous.values_of(special).items() if value
+    }
+    limits = {parameter.name: (parameter.low, parameter.high) for parameter in EFFECTS[name].parameters}
+
+    def inherited(unknown: Shared) -> Shared:
+        if unknown.low < unknown.high or unknown.name not in found:
+            return unknown
+        low, high = limits[unknown.name]
+        return replace(unknown, low=low, high=high, start=min(max(found[unknown.name] / unknown.scale, low), high))
+
+    return replace(release, shared=tuple(inherited(unknown) for unknown in release.shared))
+
+
+def forgetting(result: FitResult, name: str) -> FitResult:
+    """Return a fit as if the parameters of an effect that all recordings share had not been released in it."""
+    keep = [shared.effect != name for shared in result.problem.shared]
+    shared = tuple(each for each, kept in zip(result.problem.shared, keep, strict=True) if kept)
+    left = [*keep, *[True] * (result.x.size - len(keep))]
+    problem = replace(result.problem, shared=shared)
+    return replace(result, problem=problem, x=result.x[left], derivative=None)  # which was found with the effect
+
+
+def line_values(result: FitResult) -> dict[str, float]:
+    """Return the values of the line's own parameters in a fit, those that it may not change among them."""
+    return {name: float(result.p[slot("", name)]) for name in result.problem.grid.structure.parameter_names}
+
+
+def placed(result: FitResult, line: Mapping[str, float]) -> FitResult:
+    """Return a fit with some of the line's own parameters elsewhere, within what they are trusted to."""
+    x = result.x.copy()
+    for i, shared in enumerate(result.problem.shared):
+        if not shared.effect and shared.name in line:
+            x[i] = min(max(line[shared.name] / shared.scale, shared.low), shared.high)
+    return replace(result, x=x)
+
 
 OFFSETS_S = np.array([0.01, 0.02, 0.04, 0.08, 0.15, 0.3, 0.6, 1.2, 2.4])
 OFFSETS_S = np.concatenate([-OFFSETS_S[::-1], OFFSETS_S])
 """Where else the likelihood is looked at, around the moment a fit ended at; and at the recording's own ends."""
 
-WORTH_MOVING = 2.0
-"""Fall of the squared innovations that moments elsewhere must bring."""
+WORTH_MOVING = 2.0  # fall of the squared innovations that moments elsewhere must bring
 
 MOVES = 4
 
@@ -119,15 +214,13 @@ def _squares(
     measured = np.concatenate([problem.records[i].output[problem.use[i]] for i in problem.drives[index]])
     outputs = simulated_each(problem, [(result.p, x) for x in tried], index)
     errors = filtered.part(index, (outputs - measured).T).T
-    left: FloatArray = (errors**2).sum(axis=1) - ((errors @ taken_up) ** 2).sum(axis=1)
-    return left
+    return (errors**2).sum(axis=1) - ((errors @ taken_up) ** 2).sum(axis=1)
 
 
 SAME = 1.0
 """Fall of minus twice the log-likelihood below which another pass over unknowns and disturbances is not made."""
 
-DIGITS = 0.02
-"""The same over the difference from a rival that the fit is for."""
+DIGITS = 0.02  # the same over the difference from a rival that the fit is for
 
 MOST_PASSES = 6
 
@@ -141,37 +234,20 @@ MOST_ROUGH, MUCH = 3, 0.05
 """Such comparisons under disturbances of their own at most, and the fall of minus twice the log-likelihood per sample
 for the next."""
 
-ROUNDS = 2
-"""Steps of Fisher scoring in a pass."""
-
-WITH_MOMENTS = 1
-"""Passes in which moments of events are looked for elsewhere."""
+ROUNDS = 2  # steps of Fisher scoring in a pass
+WITH_MOMENTS = 1  # passes in which moments of events are looked for elsewhere
 
 
 @dataclass(frozen=True)
 class Hypothesis:
-    """A set of effects, fitted.
-
-    Attributes
-    ----------
-    effects : frozenset of str
-    plain : FitResult
-        Unknowns, simulations and errors; no derivative.
-    sizes : ndarray, shape (S,)
-        Logarithms of the disturbances' sizes and times (`whitener.Size`).
-    limits : Limits
-    minus_twice_log : float
-        Minus twice the log-likelihood of the recordings, and of the disturbances' prior.
-    choices : float
-        Logarithm of the number of sets of effects of this size it was chosen among.
-    """
+    """A set of effects, fitted."""
 
     effects: Effects
-    plain: FitResult
-    sizes: FloatArray
+    result: FitResult  # unknowns, simulations and errors
+    sizes: FloatArray  # (S,): logarithms of the disturbances' sizes and times (`whitener.Size`)
     limits: Limits
-    minus_twice_log: float
-    choices: float
+    minus_twice_log: float  # minus twice the log-likelihood of the recordings, and of the disturbances' prior
+    choices: float  # logarithm of the number of sets of effects of this size it was chosen among
 
     @property
     def outputs(self) -> int:
@@ -181,39 +257,35 @@ class Hypothesis:
     @property
     def unknowns(self) -> int:
         """How many unknowns were fitted; moments of events only where these act."""
-        low, high = bounds(self.plain.problem)
-        return int(np.sum(low < high)) - _idle_moments(self.plain)
+        low, high = bounds(self.result.problem)
+        return int(np.sum(low < high)) - _idle_moments(self.result)
 
     @property
     def score(self) -> float:
-        """Minus twice the log-likelihood with the price of the unknowns and of the choice (Schwarz, 1978)."""
-        n = self.plain.residual.size
+        n = self.result.residual.size
         freed = "road_grade" in self.effects
         return self.minus_twice_log + (self.unknowns + freed) * math.log(n) + 2.0 * self.choices
 
     @cached_property
     def free_squares(self) -> float:
-        """The squared free-run error, unknowns as they leave least of it.
-
-        A load that may walk far leaves the noise of the reading: the rest is what it did.
-        """
+        """The squared free-run error, unknowns as they leave least of it."""
         if "road_grade" in self.effects:
-            return float(np.sum(samples_of(self.plain) * reading_noise(self.sizes) ** 2))
-        rms = self.plain.rms
-        return descended(self.plain, lambda errors: errors / rms, FREE).squares
+            return float(np.sum(samples_of(self.result) * reading_noise(self.sizes) ** 2))
+        rms = self.result.rms
+        return descended(self.result, lambda errors: errors / rms, FREE).squares
 
     @cached_property
     def filter(self) -> Whitener:
         """The filter that whitens errors under the hypothesis' own disturbances."""
-        return whitener_of(self.plain, self.sizes)
+        return whitener_of(self.result, self.sizes)
 
     @cached_property
     def white(self) -> FitResult:
         """The fit with its errors and their derivative as innovations: independent, of variance 1."""
-        plain = self.plain
-        known = plain.derivative if plain.converged else None
-        derivative = jacobian_at(plain.problem, plain.x, plain.outputs) if known is None else known
-        return replace(plain, residual=self.filter(plain.residual), derivative=self.filter(derivative))
+        result = self.result
+        known = result.derivative if result.converged else None
+        derivative = jacobian_at(result.problem, result.x, result.outputs) if known is None else known
+        return replace(result, residual=self.filter(result.residual), derivative=self.filter(derivative))
 
 
 def choices_of(effects: Effects, hypotheses: int) -> float:
@@ -224,7 +296,7 @@ def choices_of(effects: Effects, hypotheses: int) -> float:
 
 def fitted(
     effects: Effects,
-    begun: FitResult,
+    initial: FitResult,
     sizes: FloatArray,
     limits: Limits,
     hypotheses: int,
@@ -235,91 +307,80 @@ def fitted(
     ``rival`` is minus twice the log-likelihood of the hypothesis it will be compared with: the farther from it, the
     less the last digits matter. Without one it is fitted to its end.
     """
-    plain, choices, sizes = begun, choices_of(effects, hypotheses), np.clip(sizes, limits.low, limits.high)
+    result, choices, sizes = initial, choices_of(effects, hypotheses), np.clip(sizes, limits.low, limits.high)
     best: Hypothesis | None = None
     passes: list[float] = []
     while best is None or len(passes) < MOST_PASSES:
-        plain = descended(plain, whitener_of(plain, sizes), THOROUGH)
+        result = descended(result, whitener_of(result, sizes), THOROUGH)
         if len(passes) < WITH_MOMENTS:
-            plain = _with_moments(plain, sizes)
-        sizes, now = _disturbances(plain, sizes, limits, is_anew=not passes)
+            result = _with_moments(result, sizes)
+        sizes, now = estimated(result, result.residual, sizes, limits, ROUNDS, is_anew=not passes)
         enough = SAME if math.isnan(rival) else max(SAME, DIGITS * abs(now - rival))
         last = best is not None and now > best.minus_twice_log - enough
         if best is None or now < best.minus_twice_log:
-            best = Hypothesis(effects, plain, sizes, limits, now, choices)
+            best = Hypothesis(effects, result, sizes, limits, now, choices)
         if last:
             break
         passes.append(now)
-    return replace(best, plain=light(best.plain))
+    return replace(best, result=light(best.result))
 
 
-def compared(effects: Effects, begun: FitResult, parent: Hypothesis, limits: Limits, hypotheses: int) -> Hypothesis:
-    """Fit a hypothesis a few steps from another's disturbances, to be compared with others like it.
-
-    Where it explains much more, other disturbances weigh what is left, and it is fitted a few steps under those, too.
-    ``limits`` are those of its own disturbances: a load that may walk far is not every hypothesis'.
-    """
+def compared(effects: Effects, initial: FitResult, parent: Hypothesis, limits: Limits, hypotheses: int) -> Hypothesis:
+    """Fit a hypothesis a few steps from another's disturbances, to be compared with others like it."""
     sizes, best = np.clip(parent.sizes, limits.low, limits.high), parent.minus_twice_log
-    plain, now = begun, math.inf
+    result, now = initial, math.inf
     for _ in range(MOST_ROUGH):
-        plain = descended(plain, whitener_of(plain, sizes), ROUGH)
-        sizes, now = _disturbances(plain, sizes, limits)
-        if now > best - MUCH * plain.residual.size:
+        result = descended(result, whitener_of(result, sizes), ROUGH)
+        sizes, now = estimated(result, result.residual, sizes, limits, ROUNDS)
+        if now > best - MUCH * result.residual.size:
             break
         best = now
-    return Hypothesis(effects, plain, sizes, limits, now, choices_of(effects, hypotheses))
+    return Hypothesis(effects, result, sizes, limits, now, choices_of(effects, hypotheses))
 
 
 def refitted(hypothesis: Hypothesis, problem: Problem) -> FitResult:
     """Return the fit of a hypothesis to other samples of the same recordings, its disturbances as they are."""
-    begun = not_fitted(problem, hypothesis.plain.x)
-    return descended(begun, whitener_of(begun, hypothesis.sizes), THOROUGH)
+    initial = not_fitted(problem, hypothesis.result.x)
+    return descended(initial, whitener_of(initial, hypothesis.sizes), THOROUGH)
 
 
-def _disturbances(
-    plain: FitResult, sizes: FloatArray, limits: Limits, is_anew: bool = False
-) -> tuple[FloatArray, float]:
-    return estimated(plain, plain.residual, sizes, limits, ROUNDS, is_anew)
-
-
-def samples_of(plain: FitResult) -> FloatArray:
+def samples_of(result: FitResult) -> FloatArray:
     """Return how many samples count of each output, shape (C,)."""
-    use = plain.problem.use
-    return np.array([sum(int(each.sum()) for each in use[part]) for part in by_output(plain.problem.records)])
+    use = result.problem.use
+    return np.array([sum(int(each.sum()) for each in use[part]) for part in by_output(result.problem.records)])
 
 
 def of_first_outputs(hypothesis: Hypothesis) -> Hypothesis:
-    """Return what a hypothesis says of the recordings' first outputs alone."""
-    plain = hypothesis.plain.first_outputs()
-    if plain is hypothesis.plain:
+    result = hypothesis.result.first_outputs()
+    if result is hypothesis.result:
         return hypothesis
     sizes, limits = of_first(hypothesis.sizes), hypothesis.limits.of_first()
-    filtered = whitener_of(plain, sizes)
-    now = filtered.minus_twice_log(filtered(plain.residual)) + minus_twice_log_prior(sizes, limits)
-    return Hypothesis(hypothesis.effects, plain, sizes, limits, now, hypothesis.choices)
+    filtered = whitener_of(result, sizes)
+    now = filtered.minus_twice_log(filtered(result.residual)) + minus_twice_log_prior(sizes, limits)
+    return Hypothesis(hypothesis.effects, result, sizes, limits, now, hypothesis.choices)
 
 
-def _with_moments(plain: FitResult, sizes: FloatArray) -> FitResult:
+def _with_moments(result: FitResult, sizes: FloatArray) -> FitResult:
     """Return a fit with moments of events where the innovations are least, and fitted from there."""
-    if not _has_moments(plain.problem):
-        return plain
+    if not _has_moments(result.problem):
+        return result
     for _ in range(2):
-        found = moved(plain, whitener_of(plain, sizes))
+        found = moved(result, whitener_of(result, sizes))
         if found is None:
             break
-        plain = descended(extended(*found, plain), whitener_of(plain, sizes), THOROUGH)
-    return plain
+        result = descended(extended(*found, result), whitener_of(result, sizes), THOROUGH)
+    return result
 
 
 def _has_moments(problem: Problem) -> bool:
     return any(u.name in MOMENT_NAMES and u.low < u.high for basis in problem.bases for u in basis.own)
 
 
-def _idle_moments(plain: FitResult) -> int:
+def _idle_moments(result: FitResult) -> int:
     """Return how many moments are of events that do not take place in their recording."""
     count = 0
-    for i, basis in enumerate(plain.problem.bases):
-        values = plain.local_of(i)[basis.own_rows]
+    for i, basis in enumerate(result.problem.bases):
+        values = result.local_of(i)[basis.own_rows]
         own = {(u.effect, u.name): (u, float(v)) for u, v in zip(basis.own, values, strict=True)}
         for name in {u.effect for u in basis.own if EFFECTS[u.effect].event}:
             (begin, from_s), (end, to_s) = own[name, "from_s"], own[name, "to_s"]
@@ -327,7 +388,7 @@ def _idle_moments(plain: FitResult) -> int:
             if to_s <= from_s:
                 count += movable
             else:  # one that begins or ends with the recording has no moment there
-                first, last = (float(t) for t in plain.problem.records[i].since_start_s[[0, -1]])
+                first, last = (float(t) for t in result.problem.records[i].since_start_s[[0, -1]])
                 count += (begin.low < begin.high and from_s <= first) + (end.low < end.high and to_s >= last)
     return count
 
@@ -343,6 +404,5 @@ def covariance(hypothesis: Hypothesis) -> FloatArray:
 
 
 def residuals(hypothesis: Hypothesis, stacked: FloatArray) -> Sequence[FloatArray]:
-    """Split stacked values into those of each recording."""
-    ends = np.cumsum([int(use.sum()) for use in hypothesis.plain.problem.use])[:-1]
+    ends = np.cumsum([int(use.sum()) for use in hypothesis.result.problem.use])[:-1]
     return np.split(stacked, ends)

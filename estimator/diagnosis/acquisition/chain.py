@@ -1,0 +1,191 @@
+"""The acquisition chain of a set of recordings: as they were read, and with its faults compensated."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from estimator.diagnosis.acquisition.finding import OUTPUT, Finding, flagged, no_cells
+from estimator.diagnosis.acquisition.jitter import hidden_jitter, mean_shift, stamp_offsets_s, stamped_jitter
+from estimator.diagnosis.acquisition.quantised import lost_samples, speed_quantisation
+from estimator.diagnosis.acquisition.stale import fill, repeated, stale_samples
+from estimator.diagnosis.noise import noise_floor
+from estimator.diagnosis.segments import tiles
+from estimator.physics.catalogue import EFFECTS
+from estimator.physics.fit import FitResult, rates
+from estimator.physics.free_run import NOTHING_KNOWN, FreeRun, Own, free_run
+from estimator.physics.model import DrivelineModel
+from estimator.signals.record import BoolArray, FloatArray, Record, separated_outputs, uniform_period_s
+
+UNREAD = frozenset({"stale_samples", "lost_samples"})
+"""Findings whose readings are not what was measured in that row."""
+
+
+def compensate(records: Sequence[Record], findings: Sequence[Finding]) -> tuple[Record, ...]:
+    """Return the records as they would be without what was found."""
+    return tuple(_compensated(record, findings) for record in records)
+
+
+def _compensated(record: Record, findings: Sequence[Finding]) -> Record:
+    unread = no_cells(record)
+    for finding in findings:
+        if finding.name in UNREAD:
+            unread |= finding.touched(record)
+    if unread.any():
+        record = _without(record, unread)
+    if any(finding.name == "sample_jitter" and finding.rows(record).any() for finding in findings):
+        record = _on_time(record)
+    return record
+
+
+def blanked(record: Record, finding: Finding | None) -> Record:
+    """Return a record in which the readings a finding touches were not read, for what is looked for next."""
+    if finding is None:
+        return record
+    cells = finding.touched(record)
+    blank = _without(record, cells)
+    output = np.where(cells[:, OUTPUT], np.nan, record.output)
+    return replace(blank, output=output, torque_okay=record.torque_trusted & ~cells[:, 1:])
+
+
+def _without(record: Record, unread: np.ndarray[tuple[int, int], np.dtype[np.bool_]]) -> Record:
+    trusted = record.torque_trusted & ~unread[:, 1:]
+    filled = [fill(record.torque_nm[:, i], trusted[:, i], record.reference_nm) for i in range(trusted.shape[1])]
+    known = np.column_stack([known for _, known in filled])
+    return replace(
+        record,
+        torque_nm=np.column_stack([torque for torque, _ in filled]),
+        okay=record.okay & ~unread[:, OUTPUT],
+        torque_okay=None if known.all() else known,
+    )
+
+
+def _on_time(record: Record) -> Record:
+    offset_s = stamp_offsets_s(record)
+    period_s = uniform_period_s(record.time_s)
+    return replace(record, sample_time_s=period_s, time_s=record.time_s - offset_s, offset_s=offset_s)
+
+
+def as_read(output: FloatArray, record: Record, effects: Mapping[str, Mapping[str, float]]) -> FloatArray:
+    """Return a simulated output as this recording would show it."""
+    read = output
+    if "speed_quantisation" in effects:
+        step = effects["speed_quantisation"]["step_rad_s"]
+        read = np.round(read / step) * step
+    if "stale_samples" in effects:
+        read = _repeating(read, record)
+    return read
+
+
+def _repeating(output: FloatArray, record: Record) -> FloatArray:
+    (stale,) = repeated([np.where(flagged(record), np.nan, record.output)]).rows
+    renewed = np.maximum.accumulate(np.where(stale, 0, np.arange(output.size)))
+    return output[renewed]
+
+
+AMONG_READ = (stale_samples, speed_quantisation, stamped_jitter)
+"""What is looked for among the readings that were not lost."""
+
+
+def recognise(records: Sequence[Record]) -> tuple[Finding, ...]:
+    """Return what is recognised in a set of recordings of one acquisition chain; none in healthy ones."""
+    lost = lost_samples(records)
+    read = [blanked(record, lost) for record in records]
+    found = (lost, *(look(read) for look in AMONG_READ))
+    return tuple(finding for finding in found if finding is not None)
+
+
+def as_if_not_lost(records: Sequence[Record]) -> tuple[Record, ...]:
+    """Return records without the readings that were lost: zeros without a flag are neither noise nor motion."""
+    lost = lost_samples(records)
+    return tuple(records) if lost is None else compensate(records, [lost])
+
+
+@dataclass(frozen=True, slots=True)
+class Chain:
+    """Recordings and what is recognised of the chain that made them."""
+
+    raw: tuple[Record, ...]  # as read
+    records: tuple[Record, ...]  # with the faults compensated, and without what jitter adds in the mean, for fits
+    findings: tuple[Finding, ...]  # what was recognised
+    shifts: tuple[FloatArray, ...] = ()  # (N,)
+
+    @property
+    def separated(self) -> list[Record]:
+        """The recordings for fits, each measured output by itself."""
+        return separated_outputs(self.records, noise_floor)
+
+    def with_jitter_in(self, result: FitResult) -> Chain:
+        """Return the chain with the jitter that only the errors of a converged fit show, where they show any.
+
+        What cannot be known is by how much each reading is off. What they are off in the mean is taken off them.
+        """
+        if any(finding.name == "sample_jitter" for finding in self.findings):
+            return self
+        errors = [record.output - output for output, record in zip(result.outputs, self.records, strict=True)]
+        slopes = rates(result)
+        found = hidden_jitter(self.records, errors, slopes, [record.okay for record in self.records])
+        if found is None:
+            return self
+        jitter_s = found.parameters["jitter_s"].value
+        shifts = tuple(mean_shift(steep, jitter_s) for steep in slopes)
+        steady = tuple(replace(r, output=r.output - shift) for r, shift in zip(self.records, shifts, strict=True))
+        return replace(self, records=steady, findings=(*self.findings, found), shifts=shifts)
+
+    def effects(self) -> dict[str, dict[str, float]]:
+        return {f.name: {name: sized.value for name, sized in f.parameters.items()} for f in self.findings}
+
+    def errors(self, outputs: Sequence[FloatArray], within: Sequence[BoolArray] | None = None) -> list[FloatArray]:
+        """Return simulated, as this chain would have read it, less recorded; the good rows of each raw recording."""
+        read = [as_read(output, record, self.effects()) for output, record in zip(outputs, self.raw, strict=True)]
+        shifted = [each + shift for each, shift in zip(read, self.shifts, strict=True)] if self.shifts else read
+        rows = [_read_rows(record, self.findings) for record in self.raw]
+        if within is not None:
+            rows = [read & inside for read, inside in zip(rows, within, strict=True)]
+        return [(each - record.output)[good] for each, record, good in zip(shifted, self.raw, rows, strict=True)]
+
+
+def read_through(records: Sequence[Record]) -> Chain:
+    """Recognise the faults of a set of recordings and compensate them."""
+    findings = recognise(records) if records else ()
+    return Chain(tuple(records), compensate(records, findings), findings)
+
+
+def _read_rows(record: Record, findings: Iterable[Finding]) -> BoolArray:
+    rows = record.okay
+    for finding in findings:
+        if finding.name == "lost_samples":
+            rows = rows & ~finding.touched(record)[:, OUTPUT]
+    return rows
+
+
+def mechanical(model: DrivelineModel) -> DrivelineModel:
+    return replace(model, effects={name: v for name, v in model.effects.items() if not EFFECTS[name].recognised})
+
+
+def replay(model: DrivelineModel, record: Record, known: Own = NOTHING_KNOWN) -> FreeRun:
+    """Simulate one recording with a model, as the acquisition that the model describes would have read it."""
+    parts = tiles(record)
+    runs = [_replay(model, part, known) for part in parts]
+    most = max(range(len(parts)), key=lambda i: int(parts[i].okay.sum()))
+    output = np.concatenate([run.output for run, _ in runs])
+    read = np.concatenate([rows for _, rows in runs])
+    error = (output - record.output)[read]
+    further = tuple(np.concatenate(each) for each in zip(*(run.further for run, _ in runs), strict=True))
+    return FreeRun(output, float(np.sqrt(np.mean(error**2))), runs[most][0].start, further)
+
+
+def _replay(model: DrivelineModel, record: Record, known: Own) -> tuple[FreeRun, BoolArray]:
+    """Simulate one recording without long gaps; also returns the rows that were read, shape (N,)."""
+    acquired: Mapping[str, Mapping[str, float]] = {
+        name: {key: value.value for key, value in values.items()}
+        for name, values in model.effects.items()
+        if EFFECTS[name].recognised
+    }
+    if not acquired:
+        return free_run(model, record, known), record.okay
+    found = tuple(finding for finding in recognise([record]) if finding.name in acquired)
+    run = free_run(mechanical(model), compensate([record], found)[0], known)
+    return replace(run, output=as_read(run.output, record, acquired)), _read_rows(record, found)
