@@ -42,15 +42,12 @@ class Formula:
         What stands next to the node id.
     of_node_id
         Whether the node id is added.
-    node_id_first
-        Whether it stands in front, where CiA 306 wants it.
     hexadecimal
         Whether the constant is written so: then it may be the bit pattern of a negative number.
     """
 
     constant: int
     of_node_id: bool = False
-    node_id_first: bool = False
     hexadecimal: bool = False
 
     def value(self, node_id: int) -> int:
@@ -69,7 +66,6 @@ def read_formula(text: str) -> Formula | None:
     return Formula(
         constant=sum(constants),
         of_node_id=node_ids == 1,
-        node_id_first=terms[0] == _NODE_ID,
         hexadecimal=any(term.startswith("0X") for term in terms),
     )
 

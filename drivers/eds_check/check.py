@@ -11,12 +11,11 @@ from drivers.datasheet.file import DataSheet, read_commissioning
 from drivers.datasheet.objects import EdsObject, objects_of_use, read_objects
 from drivers.datasheet.text import ADVICE, EdsFinding, EdsText, EdsUnreadable, Severity, read_eds_text
 from drivers.eds_check.context import SAMPLE_NODE_ID, EdsContext, at_file
-from drivers.eds_check.entries import check_entries, check_values
+from drivers.eds_check.entries import check_entries, check_sections
 from drivers.eds_check.needs import ALWAYS_USED, RigLine, check_modes, check_needs, rig_lines
 from drivers.eds_check.pdos import check_carriers, check_pdos
-from drivers.eds_check.sections import check_lists, check_sections
 
-RULES = (check_sections, check_lists, check_entries, check_values, check_pdos, check_needs, check_modes, check_carriers)
+RULES = (check_sections, check_entries, check_pdos, check_needs, check_modes, check_carriers)
 
 
 @dataclass(frozen=True, slots=True)

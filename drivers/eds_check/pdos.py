@@ -19,26 +19,13 @@ from drivers.eds_check.context import EdsContext, at_file, at_key, at_section, h
 
 _AS_MAPPED = "The maker's own mapping counts."
 
-_DIRECTIONS = ((RPDO, "NrOfRXPDO"), (TPDO, "NrOfTXPDO"))
-"""Each direction, and the key of DeviceInfo that counts its PDOs."""
-
 
 def check_pdos(context: EdsContext) -> Iterator[EdsFinding]:
     """Check every PDO there is."""
-    for direction, count_key in _DIRECTIONS:
-        yield from _count(context, direction, count_key)
+    for direction in (RPDO, TPDO):
         for n in PDO_NUMBERS:
             yield from _pair(context, direction, direction.communication + n, direction.mapping + n)
     yield from _same_cob_ids(context)
-
-
-def _count(context: EdsContext, direction: Direction, count_key: str) -> Iterator[EdsFinding]:
-    section = context.text.section("DeviceInfo")
-    there = sum(direction.communication + n in context.objects for n in PDO_NUMBERS)
-    written = None if section is None else read_number(section.get(count_key) or "")
-    if section is not None and written is not None and written != there:
-        expected = f"{there}, the {direction.name}s described"
-        yield at_key(Severity.WARNING, section, count_key, expected, "", "Correct the count.")
 
 
 def _pair(context: EdsContext, direction: Direction, communication: int, mapping: int) -> Iterator[EdsFinding]:
@@ -137,7 +124,7 @@ def _dummy(
 def _same_cob_ids(context: EdsContext) -> Iterator[EdsFinding]:
     seen: dict[int, EdsEntry] = {}
     given = {carrier.layout.communication_index: carrier.layout.cob_id for carrier in context.plan.carriers}
-    for direction, _ in _DIRECTIONS:
+    for direction in (RPDO, TPDO):
         for n in PDO_NUMBERS:
             entry = context.entry(direction.communication + n, 1)
             value = None if entry is None else entry.value(context.node_id)

@@ -72,7 +72,7 @@ SHIPPED = str(data_file("inverter.eds"))
 def faulty(tmp_path: Path) -> Path:
     path = tmp_path / "faulty.eds"
     text = Path(SHIPPED).read_text().replace("DefaultValue=0xFDB44700", "DefaultValue=fast")
-    path.write_text(text.replace("LSS_Supported=0\n", ""))
+    path.write_text(text.replace("Granularity=8", "Granularity=0"))
     return path
 
 
@@ -92,11 +92,11 @@ def test_json(faulty: Path, capsys: pytest.CaptureFixture[str]) -> None:
     first = document["files"][1]["findings"][0]
     assert first == {
         "severity": "warning",
-        "line": 14,
-        "place": "[DeviceInfo] LSS_Supported",
-        "expected": "this key (CiA 306)",
-        "found": "none",
-        "advice": "Add it.",
+        "line": 31,
+        "place": "[DeviceInfo] Granularity",
+        "expected": "8, so that objects can be mapped byte by byte",
+        "found": "no mapping, '0'",
+        "advice": "If the drive's mapping is fixed, configuring it will be refused; ask its maker.",
     }
 
 

@@ -174,10 +174,10 @@ def test_every_number_is_read_back_from_all_three_ways_to_write_it(number: int) 
 @pytest.mark.parametrize(
     ("text", "formula"),
     [
-        ("$NODEID+0x180", Formula(0x180, of_node_id=True, node_id_first=True, hexadecimal=True)),
-        ("$NODEID + 384", Formula(384, of_node_id=True, node_id_first=True)),
+        ("$NODEID+0x180", Formula(0x180, of_node_id=True, hexadecimal=True)),
+        ("$NODEID + 384", Formula(384, of_node_id=True)),
         ("0x180+$NodeId", Formula(0x180, of_node_id=True, hexadecimal=True)),
-        ("$NODEID", Formula(0, of_node_id=True, node_id_first=True)),
+        ("$NODEID", Formula(0, of_node_id=True)),
         ("0x80000000+$NODEID+0x180", Formula(0x80000180, of_node_id=True, hexadecimal=True)),
         ("12", Formula(12)),
         ("$NODEID+$NODEID", None),
