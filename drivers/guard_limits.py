@@ -13,30 +13,13 @@ NS_PER_S: Final = 1_000_000_000
 
 @dataclass(frozen=True, slots=True)
 class ErrorLimits:
-    """How far the torque a drive reports may be from the one it was commanded; see `drivers.inverter.supervision`.
+    """How far the torque a drive reports may be from the one it was commanded; see `drivers.inverter.supervision`."""
 
-    Attributes
-    ----------
-    m1_nm, m2_nm : float
-        Of each inverter [Nm].
-    sum_nm : float
-        Of both together, sign counted [Nm].
-    time_s : float
-        So long in all a torque may be further off [s].
-    response_s : float
-        Time in which a drive follows a change of its command [s].
-
-    Raises
-    ------
-    ConfigMismatch
-        If one is not a finite number above zero; names all that are not.
-    """
-
-    m1_nm: float
-    m2_nm: float
-    sum_nm: float
-    time_s: float
-    response_s: float
+    m1_nm: float  # of each inverter [Nm]
+    m2_nm: float  # of each inverter [Nm]
+    sum_nm: float  # of both together, sign counted [Nm]
+    time_s: float  # so long in all a torque may be further off [s]
+    response_s: float  # time in which a drive follows a change of its command [s]
 
     def __post_init__(self) -> None:
         _require_limits("torque error", {field.name: getattr(self, field.name) for field in fields(self)})

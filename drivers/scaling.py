@@ -94,15 +94,9 @@ def _nearest_count(exact: float, low: int, high: int) -> int | None:
 
 @dataclass(frozen=True, slots=True)
 class TorqueScale:
-    """Per mille of rated torque (CiA 402 objects 0x6071, 0x6077, 0x60B2) to Nm and back.
+    """Per mille of rated torque (CiA 402 objects 0x6071, 0x6077, 0x60B2) to Nm and back."""
 
-    Attributes
-    ----------
-    rated_torque_nm
-        Motor rated torque, object 0x6076, in Nm.
-    """
-
-    rated_torque_nm: float
+    rated_torque_nm: float  # motor rated torque, object 0x6076, in Nm
 
     def to_nm(self, raw: int) -> float:
         """Torque [Nm] of a count."""
@@ -128,15 +122,9 @@ _PREFIX_LIMIT = 9  # 10^-9 to 10^9
 
 @dataclass(frozen=True, slots=True)
 class VelocityScale:
-    """Counts of velocity actual value, 0x606C, to rad/s and back.
+    """Counts of velocity actual value, 0x606C, to rad/s and back."""
 
-    Attributes
-    ----------
-    rad_s_per_count
-        Speed of one count [rad/s].
-    """
-
-    rad_s_per_count: float
+    rad_s_per_count: float  # speed of one count [rad/s]
 
     @classmethod
     def from_object(cls, si_unit_velocity: int, where: str) -> VelocityScale:

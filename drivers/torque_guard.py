@@ -67,21 +67,11 @@ _SEAL: Final = _Seal()
 
 @dataclass(frozen=True, slots=True)
 class Evidence:
-    """What a request is built on.
+    """What a request is built on."""
 
-    Attributes
-    ----------
-    feedback_age_ns
-        Age of the oldest feedback behind it [ns].
-    permissive_age_ns
-        Age of the PLC's permission [ns].
-    speed_rad_s
-        Motor speed, of all readings the one furthest from standstill [rad/s].
-    """
-
-    feedback_age_ns: int
-    permissive_age_ns: int
-    speed_rad_s: float
+    feedback_age_ns: int  # age of the oldest feedback behind it [ns]
+    permissive_age_ns: int  # age of the PLC's permission [ns]
+    speed_rad_s: float  # motor speed, of all readings the one furthest from standstill [rad/s]
 
 
 @dataclass(frozen=True, slots=True)

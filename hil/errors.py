@@ -32,15 +32,7 @@ class UsageError(InputError):
 
 
 class FileProblem(InputError):
-    """One or more faults in a file, each with its place.
-
-    Parameters
-    ----------
-    path
-        The file at fault.
-    problems
-        One line each: ``place: expected ..., got ...``.
-    """
+    """One or more faults in a file, each with its place."""
 
     def __init__(self, path: Path | str, *problems: str) -> None:
         self.path = Path(path)

@@ -51,19 +51,11 @@ class Source:
 
 @dataclass(frozen=True, slots=True)
 class Provenance:
-    """What a result was made from.
-
-    Attributes
-    ----------
-    command : str
-        The command line; "" where a program of the user's called.
-    date : str
-        ISO 8601, UTC.
-    """
+    """What a result was made from."""
 
     version: str
-    date: str
-    command: str
+    date: str  # ISO 8601, UTC
+    command: str  # the command line
     models: tuple[Source, ...]
     recordings: tuple[Source, ...]
 

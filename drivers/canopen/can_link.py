@@ -98,13 +98,7 @@ class _Network(canopen.Network):
 
 
 class CanLink:
-    """A bus in use, with its receive thread.
-
-    Parameters
-    ----------
-    bus
-        An open ``python-can`` bus; it belongs to the link from now on and is shut down with it.
-    """
+    """A bus in use, with its receive thread."""
 
     def __init__(self, bus: can.BusABC) -> None:
         self._bus = bus

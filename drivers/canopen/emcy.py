@@ -241,21 +241,11 @@ _FRAME = struct.Struct("<HB5s")
 
 @dataclass(frozen=True, slots=True)
 class Emergency:
-    """One EMCY message.
+    """One EMCY message."""
 
-    Attributes
-    ----------
-    code
-        Error code, as in object 0x603F.
-    register
-        Error register, object 0x1001.
-    vendor_data
-        Five bytes of the manufacturer.
-    """
-
-    code: int
-    register: int
-    vendor_data: bytes
+    code: int  # error code, as in object 0x603F
+    register: int  # error register, object 0x1001
+    vendor_data: bytes  # five bytes of the manufacturer
 
     @property
     def is_reset(self) -> bool:

@@ -51,17 +51,7 @@ def nmt_frame(command: NmtCommand, node_id: int) -> bytes:
 
 
 class HeartbeatMonitor:
-    """Watches one node's heartbeat. Time is passed in; nothing here reads a clock.
-
-    Parameters
-    ----------
-    where
-        Device, for messages.
-    timeout_ns
-        Longest time without a heartbeat [ns].
-    started_ns
-        When watching began: a node that never comes is lost ``timeout_ns`` after that [ns].
-    """
+    """Watches one node's heartbeat. Time is passed in; nothing here reads a clock."""
 
     def __init__(self, where: str, timeout_ns: int, started_ns: int) -> None:
         self._where = where
@@ -88,19 +78,7 @@ class HeartbeatMonitor:
 
 
 class HeartbeatProducer:
-    """Sends this node's heartbeat from a thread of its own until stopped.
-
-    Parameters
-    ----------
-    send
-        ``send(cob_id, data)`` of the bus.
-    node_id
-        Whose heartbeat it is.
-    period_s
-        Time between two [s].
-    state
-        Read at each heartbeat.
-    """
+    """Sends this node's heartbeat from a thread of its own until stopped."""
 
     def __init__(
         self,

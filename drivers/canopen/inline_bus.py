@@ -80,15 +80,7 @@ class _Inbox(queue.Queue[can.Message]):
 
 
 class InlineBus(VirtualBus):
-    """One participant of a virtual channel, whose receiver is called in the sender's thread.
-
-    Parameters
-    ----------
-    channel
-        Name of python-can's virtual channel.
-    options
-        As `can.interfaces.virtual.VirtualBus` takes them.
-    """
+    """One participant of a virtual channel, whose receiver is called in the sender's thread."""
 
     def __init__(self, channel: str, **options: Any) -> None:
         super().__init__(channel, **options)

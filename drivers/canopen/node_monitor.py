@@ -20,15 +20,7 @@ _NMT_STATES = {state.value: state for state in NmtState}
 
 
 class NodeMonitor:
-    """Takes heartbeats and EMCY frames in the receive thread, judges them in the caller's.
-
-    Parameters
-    ----------
-    where
-        Device, for messages.
-    heartbeat_timeout_ns
-        Longest time without a heartbeat [ns].
-    """
+    """Takes heartbeats and EMCY frames in the receive thread, judges them in the caller's."""
 
     def __init__(self, where: str, heartbeat_timeout_ns: int) -> None:
         self._where = where

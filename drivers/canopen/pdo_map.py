@@ -69,34 +69,16 @@ class MappedObject:
 
 @dataclass(frozen=True, slots=True)
 class PdoLayout:
-    """A PDO as its objects describe it.
+    """A PDO as its objects describe it."""
 
-    Attributes
-    ----------
-    communication_index, mapping_index
-        Where its parameters are, for example 0x1800 and 0x1A00.
-    cob_id
-        CAN identifier: its lower 11 bits, all of it unless ``extended``.
-    valid
-        False if bit 31 of the COB-ID entry switches the PDO off.
-    transmission_type
-        1 to 240: at every n-th SYNC; 254, 255: event-driven.
-    objects
-        Mapped objects in the order of the frame.
-    extended
-        Whether the identifier has 29 bits: no frame of this PDO is sent or heard here.
-    no_rtr
-        Whether bit 30 forbids remote frames. None are sent, so that layouts which differ in it alone are the same.
-    """
-
-    communication_index: int
-    mapping_index: int
-    cob_id: int
-    valid: bool
-    transmission_type: int
-    objects: tuple[MappedObject, ...]
-    extended: bool = False
-    no_rtr: bool = field(default=False, compare=False)
+    communication_index: int  # where its parameters are, for example 0x1800 and 0x1A00
+    mapping_index: int  # where its parameters are, for example 0x1800 and 0x1A00
+    cob_id: int  # CAN identifier
+    valid: bool  # false if bit 31 of the COB-ID entry switches the PDO off
+    transmission_type: int  # 1 to 240: at every n-th SYNC; 254, 255: event-driven
+    objects: tuple[MappedObject, ...]  # mapped objects in the order of the frame
+    extended: bool = False  # whether the identifier has 29 bits
+    no_rtr: bool = field(default=False, compare=False)  # whether bit 30 forbids remote frames
 
     def __str__(self) -> str:
         mapped = ", ".join(map(str, self.objects)) or "nothing"
@@ -145,28 +127,7 @@ def configuration_writes(layout: PdoLayout, present: int) -> tuple[tuple[int, in
 
 
 class PdoCodec:
-    """Packs and unpacks the frames of one PDO.
-
-    Parameters
-    ----------
-    layout
-        The PDO.
-    types
-        Data type of each mapped object by ``(index, subindex)``, from the EDS.
-    where
-        Device or file, for messages.
-
-    Attributes
-    ----------
-    indices
-        Index of each mapped object, in the order of the frame.
-
-    Raises
-    ------
-    ConfigMismatch
-        If the identifier has 29 bits, a mapped object is unknown or has another length than its type, or the frame
-        is over 8 bytes.
-    """
+    """Packs and unpacks the frames of one PDO."""
 
     def __init__(self, layout: PdoLayout, types: Mapping[tuple[int, int], IntegerType], where: str) -> None:
         self.layout = layout

@@ -134,19 +134,7 @@ def _handshake(
 
 
 class BoundedRemoteBus(RemoteBus):  # type: ignore[misc]  # the library has no types
-    """``can_remote.RemoteBus`` that never waits for ever.
-
-    Parameters
-    ----------
-    url
-        ``ws://host:port/TOKEN/`` or, with TLS, ``wss://host:port/TOKEN/``; without a token that of this user's own
-        server.
-
-    Raises
-    ------
-    OSError, HTTPException, can.CanError
-        If there is no such server.
-    """
+    """``can_remote.RemoteBus`` that never waits for ever."""
 
     def __init__(self, url: str) -> None:
         websocket = _BoundedWebSocket(url, _SUBPROTOCOLS, ssl_context=DEFAULT_SSL_CONTEXT)

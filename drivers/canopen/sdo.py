@@ -181,19 +181,7 @@ class ObjectTypes(Protocol):
 
 
 class SdoChannel:
-    """Reads (uploads) and writes (downloads) one node's objects.
-
-    Parameters
-    ----------
-    node
-        The node, already on its network.
-    eds
-        Gives each object its data type.
-    where
-        Device, for messages.
-    timeout_s
-        How long to wait for each answer [s].
-    """
+    """Reads (uploads) and writes (downloads) one node's objects."""
 
     def __init__(self, node: SdoNode, eds: ObjectTypes, where: str, timeout_s: float) -> None:
         self._client = node.sdo

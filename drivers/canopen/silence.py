@@ -13,15 +13,6 @@ class Silence:
 
     Overdue at one look is not enough: a program that was held up, or suspended, finds every heartbeat overdue and
     those that came meanwhile unread. A heartbeat has ended where it is still overdue after ``grace_ns`` of being awake.
-
-    Parameters
-    ----------
-    timeout_ns
-        Longest time between two heartbeats [ns].
-    grace_ns
-        What is left for reading what came while the listener stood still [ns].
-    longest_look_ns
-        Of the time between two looks so much counts as awake at most [ns]; None for all of it.
     """
 
     __slots__ = ("_awake_ns", "_grace_ns", "_last_ns", "_longest_look_ns", "_looked_ns", "_timeout_ns")

@@ -14,18 +14,7 @@ Subscribe = Callable[[int, Callable[[bytes, int], None]], None]
 
 
 class Strangers:
-    """Looks out for frames that only this program sends, while it drives.
-
-    Parameters
-    ----------
-    subscribe
-        ``subscribe(cob_id, callback)`` of the bus.
-
-    Attributes
-    ----------
-    heard
-        The first such frame at all, before the watch, too: the reason where a device is not as it was set.
-    """
+    """Looks out for frames that only this program sends, while it drives."""
 
     def __init__(self, subscribe: Subscribe) -> None:
         self._subscribe = subscribe

@@ -69,28 +69,14 @@ def is_reserved(cob_id: int) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class Direction:
-    """One of the two directions of PDOs.
+    """One of the two directions of PDOs."""
 
-    Attributes
-    ----------
-    name
-        RPDO or TPDO.
-    communication, mapping
-        Indices of the parameters of the first.
-    access
-        Access types of what one may carry.
-    first_cob_id
-        Identifier of the first for node 0; the three after it follow at distances of 0x100.
-    types
-        Transmission types that this program can use.
-    """
-
-    name: str
-    communication: int
-    mapping: int
-    access: tuple[str, ...]
+    name: str  # RPDO or TPDO
+    communication: int  # indices of the parameters of the first
+    mapping: int  # indices of the parameters of the first
+    access: tuple[str, ...]  # access types of what one may carry
     first_cob_id: int
-    types: range
+    types: range  # transmission types that this program can use
 
     def predefined(self, number: int) -> int:
         """Give the identifier that the pre-defined connection set has for node 0 and one of the first four PDOs."""
@@ -108,24 +94,12 @@ EVENT_DRIVEN: Final = (254, 255)
 
 @dataclass(frozen=True, slots=True)
 class Carrier:
-    """One PDO in use.
+    """One PDO in use."""
 
-    Attributes
-    ----------
-    layout
-        What it has in a run.
-    described
-        What the data sheet says it has before; None where it does not say.
-    mapped_here
-        Whether this program maps it, for the data sheet's own mapping is another.
-    fixed
-        Entries ``(index, subindex)`` of its parameters that can't be written.
-    """
-
-    layout: PdoLayout
-    described: PdoLayout | None
-    mapped_here: bool
-    fixed: frozenset[tuple[int, int]]
+    layout: PdoLayout  # what it has in a run
+    described: PdoLayout | None  # what the data sheet says it has before
+    mapped_here: bool  # whether this program maps it, for the data sheet's own mapping is another
+    fixed: frozenset[tuple[int, int]]  # entries ``(index, subindex)`` of its parameters that can't be written
 
     def carries(self, index: int, subindex: int = 0) -> bool:
         """Whether an object is mapped."""

@@ -16,25 +16,13 @@ from drivers.scaling import IntegerType
 
 @dataclass(frozen=True, slots=True)
 class Shortcoming:
-    """Why one object does not take part.
+    """Why one object does not take part."""
 
-    Attributes
-    ----------
-    part
-        The object, as the table wants it.
-    entry
-        The object, as the data sheet has it; None if it has no such.
-    key
-        Key of the data sheet that says so; empty without the object.
-    expected, found
-        Both in words.
-    """
-
-    part: Part
-    entry: EdsEntry | None
-    key: str
-    expected: str
-    found: str
+    part: Part  # the object, as the table wants it
+    entry: EdsEntry | None  # the object, as the data sheet has it
+    key: str  # key of the data sheet that says so
+    expected: str  # both in words
+    found: str  # both in words
 
     def __str__(self) -> str:
         name = f"0x{self.part.index:04X}:{self.part.subindex:02X}"
@@ -43,21 +31,11 @@ class Shortcoming:
 
 @dataclass(frozen=True, slots=True)
 class Ability:
-    """What a drive has of one function.
+    """What a drive has of one function."""
 
-    Attributes
-    ----------
-    capability
-        Its row of the table.
-    parts
-        The objects that give it; empty if the drive does not have it.
-    shortcomings
-        Why the ways before, or all of them, are none.
-    """
-
-    capability: Capability
-    parts: tuple[Part, ...]
-    shortcomings: tuple[Shortcoming, ...] = ()
+    capability: Capability  # its row of the table
+    parts: tuple[Part, ...]  # the objects that give it
+    shortcomings: tuple[Shortcoming, ...] = ()  # why the ways before, or all of them, are none
 
     @property
     def given(self) -> bool:
@@ -119,28 +97,14 @@ FEEDBACK = (Function.STATUSWORD, Function.TORQUE_ACTUAL, Function.SPEED_ACTUAL)
 
 @dataclass(frozen=True, slots=True)
 class DrivePlan:
-    """How one drive is used.
+    """How one drive is used."""
 
-    Attributes
-    ----------
-    sheet
-        Its data sheet.
-    abilities
-        What it has of each function.
-    command, feedback
-        The search for RPDOs and for TPDOs.
-    channels
-        Further objects that are to be recorded.
-    further
-        The search for the TPDOs that carry those which the feedback's do not carry.
-    """
-
-    sheet: DataSheet
-    abilities: Abilities
-    command: CarrierSearch
-    feedback: CarrierSearch
-    channels: tuple[ObjectId, ...]
-    further: CarrierSearch
+    sheet: DataSheet  # its data sheet
+    abilities: Abilities  # what it has of each function
+    command: CarrierSearch  # the search for RPDOs and for TPDOs
+    feedback: CarrierSearch  # the search for RPDOs and for TPDOs
+    channels: tuple[ObjectId, ...]  # further objects that are to be recorded
+    further: CarrierSearch  # the search for the TPDOs that carry those which the feedback's do not carry
 
     def has(self, function: Function) -> bool:
         """Whether the drive has a function."""

@@ -57,20 +57,10 @@ _RAD_S: Final = MappingProxyType(
 
 @dataclass(frozen=True, slots=True)
 class SpeedUnit:
-    """Unit of 0x606C as somebody states it.
+    """Unit of 0x606C as somebody states it."""
 
-    Attributes
-    ----------
-    unit
-        Its name.
-    counts_per_unit
-        Counts of one unit: 10 where a count is a tenth of it, 65536 for a number with 16 binary places.
-    increments_per_turn
-        Increments of one turn of the motor, four for each line of an encoder; None unless the unit is of increments.
-    """
-
-    unit: SpeedUnitName
-    counts_per_unit: float = 1.0
+    unit: SpeedUnitName  # its name
+    counts_per_unit: float = 1.0  # counts of one unit
     increments_per_turn: float | None = None
 
     @property

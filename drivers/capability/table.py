@@ -68,59 +68,27 @@ class Without(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """One value of the object dictionary that takes part in giving a function.
+    """One value of the object dictionary that takes part in giving a function."""
 
-    Attributes
-    ----------
-    index, subindex
-        The object.
-    kinds
-        Data types it may have: one of another type says something else, or by another scale.
-    written
-        Whether it is written; else it is read.
-    read_back
-        Whether what is written is read back.
-    carried
-        Whether a PDO has to carry it: an RPDO what is written, a TPDO what is read.
-    held
-        Values it may hold for good where it can't be written; None for none.
-    """
-
-    index: int
-    subindex: int
-    kinds: tuple[IntegerType, ...]
-    written: bool = False
-    read_back: bool = False
-    carried: bool = False
-    held: range | None = None
+    index: int  # the object
+    subindex: int  # the object
+    kinds: tuple[IntegerType, ...]  # data types it may have
+    written: bool = False  # whether it is written
+    read_back: bool = False  # whether what is written is read back
+    carried: bool = False  # whether a PDO has to carry it
+    held: range | None = None  # values it may hold for good where it can't be written
 
 
 @dataclass(frozen=True, slots=True)
 class Capability:
-    """One row of the table.
+    """One row of the table."""
 
-    Attributes
-    ----------
-    function
-        What is wanted.
-    ways
-        Objects that give it, in order of preference; a way has one part or more.
-    without
-        What becomes of a drive that has none of them.
-    instead
-        What is done then, in words.
-    cost
-        What that costs, in words.
-    key
-        Key of the rig file that says it or by which it is accepted; empty without one.
-    """
-
-    function: Function
-    ways: tuple[tuple[Part, ...], ...]
-    without: Without
-    instead: str
-    cost: str = ""
-    key: str = ""
+    function: Function  # what is wanted
+    ways: tuple[tuple[Part, ...], ...]  # objects that give it, in order of preference
+    without: Without  # what becomes of a drive that has none of them
+    instead: str  # what is done then, in words
+    cost: str = ""  # what that costs, in words
+    key: str = ""  # key of the rig file that says it or by which it is accepted
 
 
 _I8, _I16, _I32 = IntegerType.INTEGER8, IntegerType.INTEGER16, IntegerType.INTEGER32

@@ -31,43 +31,21 @@ BIT_RATES_KBIT_S: Final = range(10, 1001)
 
 @dataclass(frozen=True, slots=True)
 class Commissioning:
-    """What a DCF says of the node it was written for (CiA 306, ``[DeviceComissioning]``).
+    """What a DCF says of the node it was written for (CiA 306, ``[DeviceComissioning]``)."""
 
-    Attributes
-    ----------
-    node_id
-        Its node id; None if it says none from 1 to 127.
-    bit_rate_kbit_s
-        Bit rate of its bus [kbit/s]; None if it says none from 10 to 1000.
-    node_name
-        Its name there; empty without one.
-    """
-
-    node_id: int | None = None
-    bit_rate_kbit_s: int | None = None
-    node_name: str = ""
+    node_id: int | None = None  # its node id
+    bit_rate_kbit_s: int | None = None  # bit rate of its bus [kbit/s]; None if it says none from 10 to 1000
+    node_name: str = ""  # its name there
 
 
 @dataclass(frozen=True, slots=True)
 class DataSheet:
-    """One file, for one node.
+    """One file, for one node."""
 
-    Attributes
-    ----------
-    path
-        The file.
-    objects
-        Its objects.
-    node_id
-        What ``$NODEID`` stands for.
-    commissioning
-        Of a DCF; None of an EDS.
-    """
-
-    path: Path
-    objects: Mapping[int, EdsObject]
-    node_id: int
-    commissioning: Commissioning | None = None
+    path: Path  # the file
+    objects: Mapping[int, EdsObject]  # its objects
+    node_id: int  # what ``$NODEID`` stands for
+    commissioning: Commissioning | None = None  # of a DCF; None of an EDS
 
     @property
     def kind(self) -> str:
@@ -197,29 +175,7 @@ _MANDATORY_SECTION = "DeviceInfo"
 
 
 class EdsFile:
-    """One EDS, with ``$NODEID`` replaced by the node's id.
-
-    Parameters
-    ----------
-    path
-        The file; None for the EDS that is shipped.
-    node_id
-        Node id, 1 to 127.
-
-    Attributes
-    ----------
-    path, node_id
-        As given.
-    sheet
-        Its objects, to be asked for.
-    dictionary
-        Its objects, as the ``canopen`` library keeps them.
-
-    Raises
-    ------
-    ConfigMismatch
-        If the file is not there, is no EDS, or has two values for one key.
-    """
+    """One EDS, with ``$NODEID`` replaced by the node's id."""
 
     def __init__(self, path: Path | None, node_id: int) -> None:
         self.path = path or data_file("inverter.eds")

@@ -54,37 +54,17 @@ _WITH_VALUES = (ObjectType.VAR, ObjectType.DOMAIN, ObjectType.ARRAY, ObjectType.
 
 @dataclass(frozen=True, slots=True)
 class EdsEntry:
-    """One value of the object dictionary.
+    """One value of the object dictionary."""
 
-    Attributes
-    ----------
-    index, subindex
-        Where it is.
-    section
-        The section that describes it; that of the whole object if it was written compactly.
-    name
-        ParameterName, or the section's name without one.
-    kind
-        Data type; None if it is missing or unknown.
-    access
-        One of `ACCESS_TYPES`; None if it is missing or another.
-    mappable
-        Whether a PDO may carry it.
-    default_text
-        DefaultValue as written; None if missing or blank.
-    parameter_text
-        ParameterValue as written in a DCF; None if missing or blank, and in an EDS.
-    """
-
-    index: int
-    subindex: int
-    section: EdsSection
-    name: str
-    kind: DataType | None
-    access: str | None
-    mappable: bool
-    default_text: str | None
-    parameter_text: str | None = None
+    index: int  # where it is
+    subindex: int  # where it is
+    section: EdsSection  # the section that describes it
+    name: str  # parameterName, or the section's name without one
+    kind: DataType | None  # data type
+    access: str | None  # one of `ACCESS_TYPES`
+    mappable: bool  # whether a PDO may carry it
+    default_text: str | None  # defaultValue as written
+    parameter_text: str | None = None  # parameterValue as written in a DCF; None if missing or blank, and in an EDS
 
     @property
     def value_text(self) -> str | None:

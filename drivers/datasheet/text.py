@@ -31,28 +31,14 @@ class Severity(Enum):
 
 @dataclass(frozen=True, slots=True)
 class EdsFinding:
-    """One remark.
+    """One remark."""
 
-    Attributes
-    ----------
-    severity
-        How bad it is.
-    line
-        Line of the file, from 1; None if it concerns the file as a whole.
-    place
-        Section, and key if it concerns one: ``[60A9] DefaultValue``.
-    expected, found
-        Both in words.
-    advice
-        What to do, as a sentence.
-    """
-
-    severity: Severity
-    line: int | None
-    place: str
-    expected: str
-    found: str
-    advice: str
+    severity: Severity  # how bad it is
+    line: int | None  # line of the file, from 1; None if it concerns the file as a whole
+    place: str  # section, and key if it concerns one
+    expected: str  # both in words
+    found: str  # both in words
+    advice: str  # what to do, as a sentence
 
     def __str__(self) -> str:
         return f"{self.place}: expected {self.expected}, found {self.found}. {self.advice}"
@@ -79,17 +65,7 @@ _INLINE_COMMENT = re.compile(r"\s;")
 
 
 class EdsUnreadable(ConfigMismatch):
-    """A file whose text can't be read at all.
-
-    Parameters
-    ----------
-    path
-        The file.
-    found
-        What came instead of an EDS.
-    advice
-        What to do, as a sentence.
-    """
+    """A file whose text can't be read at all."""
 
     def __init__(self, path: Path, found: str, advice: str = ADVICE) -> None:
         self.found = found

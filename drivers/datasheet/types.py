@@ -34,21 +34,11 @@ def octal_matters(text: str) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class Formula:
-    """A number, or a sum of one and the node id.
+    """A number, or a sum of one and the node id."""
 
-    Attributes
-    ----------
-    constant
-        What stands next to the node id.
-    of_node_id
-        Whether the node id is added.
-    hexadecimal
-        Whether the constant is written so: then it may be the bit pattern of a negative number.
-    """
-
-    constant: int
-    of_node_id: bool = False
-    hexadecimal: bool = False
+    constant: int  # what stands next to the node id
+    of_node_id: bool = False  # whether the node id is added
+    hexadecimal: bool = False  # whether the constant is written so
 
     def value(self, node_id: int) -> int:
         """Put the node id in."""
@@ -72,24 +62,12 @@ def read_formula(text: str) -> Formula | None:
 
 @dataclass(frozen=True, slots=True)
 class DataType:
-    """One data type.
+    """One data type."""
 
-    Attributes
-    ----------
-    code
-        Index of the type in the object dictionary.
-    name
-        As CiA 301 calls it.
-    bits
-        Width; None where it varies (texts, domains).
-    signed
-        Whether an integer may be negative.
-    """
-
-    code: int
-    name: str
-    bits: int | None = None
-    signed: bool = False
+    code: int  # index of the type in the object dictionary
+    name: str  # as CiA 301 calls it
+    bits: int | None = None  # width
+    signed: bool = False  # whether an integer may be negative
 
     @property
     def is_integer(self) -> bool:

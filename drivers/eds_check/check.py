@@ -20,24 +20,12 @@ RULES = (check_sections, check_entries, check_pdos, check_needs, check_modes, ch
 
 @dataclass(frozen=True, slots=True)
 class EdsReport:
-    """What a check came to.
+    """What a check came to."""
 
-    Attributes
-    ----------
-    path
-        The file.
-    findings
-        In the order of the file's lines; what has no line comes first.
-    plan
-        What a drive with it has, and how it is used; None for a file that can't be read.
-    lines
-        What the rig file has to say of it.
-    """
-
-    path: Path
-    findings: tuple[EdsFinding, ...]
-    plan: DrivePlan | None = None
-    lines: tuple[RigLine, ...] = ()
+    path: Path  # the file
+    findings: tuple[EdsFinding, ...]  # in the order of the file's lines
+    plan: DrivePlan | None = None  # what a drive with it has, and how it is used
+    lines: tuple[RigLine, ...] = ()  # what the rig file has to say of it
 
     @property
     def usable(self) -> bool:

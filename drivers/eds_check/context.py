@@ -15,22 +15,12 @@ SAMPLE_NODE_ID = 127
 
 @dataclass(frozen=True, slots=True)
 class EdsContext:
-    """One file under check.
+    """One file under check."""
 
-    Attributes
-    ----------
-    text, objects
-        What it says.
-    plan
-        How a drive with it is used.
-    used
-        Objects this program reads or writes; what is wrong with another one is a warning at most.
-    """
-
-    text: EdsText
-    objects: Mapping[int, EdsObject]
-    plan: DrivePlan
-    used: frozenset[int]
+    text: EdsText  # what it says
+    objects: Mapping[int, EdsObject]  # what it says
+    plan: DrivePlan  # how a drive with it is used
+    used: frozenset[int]  # objects this program reads or writes
 
     @property
     def node_id(self) -> int:

@@ -185,18 +185,10 @@ USUAL_HEARTBEAT_MS = 100
 
 @dataclass(frozen=True, slots=True)
 class RigLine:
-    """One line under ``[inverters.m1]`` or ``[inverters.m2]``.
+    """One line under ``[inverters.m1]`` or ``[inverters.m2]``."""
 
-    Attributes
-    ----------
-    text
-        The line.
-    reason
-        Why it has to be there.
-    """
-
-    text: str
-    reason: str
+    text: str  # the line
+    reason: str  # why it has to be there
 
     @property
     def key(self) -> str:

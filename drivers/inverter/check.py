@@ -36,25 +36,13 @@ SERIAL_NUMBER: Final = (0x1018, 4)
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """One disagreement between a device and what is expected of it.
+    """One disagreement between a device and what is expected of it."""
 
-    Attributes
-    ----------
-    where
-        Device.
-    what
-        Object and its name.
-    expected, found
-        Both values in words.
-    source
-        Where the expectation comes from: rig file or EDS.
-    """
-
-    where: str
-    what: str
-    expected: str
-    found: str
-    source: str
+    where: str  # device
+    what: str  # object and its name
+    expected: str  # both values in words
+    found: str  # both values in words
+    source: str  # where the expectation comes from
 
     def __str__(self) -> str:
         return f"{self.where}: {self.what} is {self.found}, expected {self.expected} ({self.source})"

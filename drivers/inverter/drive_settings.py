@@ -44,31 +44,15 @@ RIG_FILE: Final = "rig file"
 
 @dataclass(frozen=True, slots=True)
 class DriveSetting:
-    """One object that is written when a drive is configured, and read back.
+    """One object that is written when a drive is configured, and read back."""
 
-    Attributes
-    ----------
-    index, subindex
-        The object.
-    name
-        Its name in CiA 301 or CiA 402.
-    value
-        What it is given.
-    source
-        Who asks for it: rig file, DCF, or this program.
-    watches_host
-        Whether the drive watches the host by it; such a setting is made anew at every run.
-    at_most
-        Whether a drive that has less keeps that: a limit is taken down, never up.
-    """
-
-    index: int
-    subindex: int
-    name: str
-    value: int
-    source: str
-    watches_host: bool = False
-    at_most: bool = False
+    index: int  # the object
+    subindex: int  # the object
+    name: str  # its name in CiA 301 or CiA 402
+    value: int  # what it is given
+    source: str  # who asks for it
+    watches_host: bool = False  # whether the drive watches the host by it
+    at_most: bool = False  # whether a drive that has less keeps that
 
     def is_met_by(self, value: int) -> bool:
         """Whether a drive that has this value needs no other."""

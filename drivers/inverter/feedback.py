@@ -32,35 +32,15 @@ class Received(NamedTuple):
 
 
 class InverterFeedback(NamedTuple):
-    """What an inverter reported in its TPDOs.
+    """What an inverter reported in its TPDOs."""
 
-    Attributes
-    ----------
-    torque_nm
-        Torque actual value, 0x6077 [Nm].
-    speed_rad_s
-        Velocity actual value, 0x606C [rad/s].
-    state
-        Power state from the statusword, 0x6041.
-    t_ns
-        Arrival on the host's monotonic clock, of the TPDO that came first where there are several [ns].
-    sequence
-        Counts what was received from this inverter, from 1.
-    torque_raw, speed_raw
-        The counts on the bus, so that a wrong scale can be corrected later.
-    limited
-        Statusword bit 11: a limit of the drive's own acts, and the torque is not what was asked for.
-    follows
-        Statusword bit 12, which says in cyclic synchronous torque mode that the target torque is followed.
-    """
-
-    torque_nm: float
-    speed_rad_s: float
-    state: PowerState
+    torque_nm: float  # torque actual value, 0x6077 [Nm]
+    speed_rad_s: float  # velocity actual value, 0x606C [rad/s]
+    state: PowerState  # power state from the statusword, 0x6041
     t_ns: int
-    sequence: int
-    torque_raw: int
-    speed_raw: int
+    sequence: int  # counts what was received from this inverter, from 1
+    torque_raw: int  # the counts on the bus, so that a wrong scale can be corrected later
+    speed_raw: int  # the counts on the bus, so that a wrong scale can be corrected later
     limited: bool = False
     follows: bool = True
 
@@ -110,20 +90,7 @@ class _TpdoReceiver:
 
 
 class FeedbackReceiver(_TpdoReceiver):
-    """Hands the latest feedback of one inverter to the caller's thread.
-
-    Parameters
-    ----------
-    codecs
-        The TPDOs' layouts; together they must carry 0x6041, 0x6077 and 0x606C.
-    torque, velocity
-        Scales of 0x6077 and 0x606C.
-
-    Raises
-    ------
-    ConfigMismatch
-        If one of the objects is in none of them.
-    """
+    """Hands the latest feedback of one inverter to the caller's thread."""
 
     def __init__(self, codecs: Sequence[PdoCodec], torque: TorqueScale, velocity: VelocityScale) -> None:
         super().__init__(codecs)
@@ -190,20 +157,7 @@ class FeedbackReceiver(_TpdoReceiver):
 
 
 class ChannelReceiver(_TpdoReceiver):
-    """Hands the counts of further objects to the caller's thread.
-
-    Parameters
-    ----------
-    codecs
-        Unpackers of the TPDOs that carry them.
-    objects
-        What is to be read of them.
-
-    Raises
-    ------
-    ConfigMismatch
-        If one of the objects is in none of them.
-    """
+    """Hands the counts of further objects to the caller's thread."""
 
     def __init__(self, codecs: Sequence[PdoCodec], objects: Sequence[ObjectId]) -> None:
         super().__init__(codecs)

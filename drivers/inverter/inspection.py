@@ -33,20 +33,12 @@ MOST_PARAMETERS: Final = 0x1400, 0x1C00
 
 @dataclass(frozen=True, slots=True)
 class CommissionedValue:
-    """One value that is not the same everywhere.
+    """One value that is not the same everywhere."""
 
-    Attributes
-    ----------
-    what
-        Object and its name in the DCF, or what of ``[DeviceComissioning]`` it is.
-    dcf, device, rig_file
-        Its value in each, in words; empty where it has none.
-    """
-
-    what: str
-    dcf: str
-    device: str
-    rig_file: str
+    what: str  # object and its name in the DCF, or what of ``[DeviceComissioning]`` it is
+    dcf: str  # its value in each, in words
+    device: str  # its value in each, in words
+    rig_file: str  # its value in each, in words
 
     def __str__(self) -> str:
         parts = (("DCF", self.dcf), ("device", self.device), ("rig file", self.rig_file))
@@ -105,21 +97,7 @@ def _found(sdo: SdoChannel, index: int, subindex: int) -> str:
 
 
 class InspectedInverter:
-    """One inverter on a link, compared with the rig file, its EDS and its DCF.
-
-    Parameters
-    ----------
-    link
-        The bus it is on.
-    settings
-        What the rig file says of it.
-
-    Raises
-    ------
-    ConfigMismatch
-        If the EDS can't be read, has no PDOs that carry the torque command and its feedback or can be made to, or would
-        have the drive keep its torque without a host, and nobody has accepted that.
-    """
+    """One inverter on a link, compared with the rig file, its EDS and its DCF."""
 
     def __init__(self, link: CanLink, settings: InverterSettings) -> None:
         self.settings = settings

@@ -39,30 +39,7 @@ def codecs(eds: EdsFile, carriers: Iterable[Carrier], where: str) -> tuple[PdoCo
 
 
 class InverterPdos:
-    """Frames of one inverter, down and up.
-
-    Parameters
-    ----------
-    settings
-        The inverter as the rig file has it.
-
-    Attributes
-    ----------
-    eds
-        Its data sheet.
-    plan
-        What it has, and how it is used.
-    velocity
-        Scale of 0x606C.
-    rpdos
-        Identifiers of the RPDOs that carry the command.
-
-    Raises
-    ------
-    ConfigMismatch
-        If the EDS can't be read, the drive lacks what it can't do without, no TPDO can carry a further object to be
-        recorded, or nobody says its unit of speed.
-    """
+    """Frames of one inverter, down and up."""
 
     def __init__(self, settings: InverterSettings) -> None:
         where = settings.where

@@ -32,19 +32,7 @@ _NO_TORQUE_PERMILLE = 10
 
 
 class PowerControl:
-    """Walks one drive through the CiA 402 state machine.
-
-    Parameters
-    ----------
-    sdo
-        The drive's objects.
-    settings
-        Mode, time-outs and name.
-    torque_objects
-        What is to be zero for no torque to be asked for, by index.
-    last_error
-        Gives the error code of the drive's last EMCY, or None; for a drive without 0x603F.
-    """
+    """Walks one drive through the CiA 402 state machine."""
 
     def __init__(
         self,

@@ -19,18 +19,10 @@ PLACEHOLDERS: Final = ("NAME", "REASON")
 
 @dataclass(frozen=True, slots=True)
 class Acceptance:
-    """Who accepted what a drive lacks, and why.
+    """Who accepted what a drive lacks, and why."""
 
-    Attributes
-    ----------
-    by
-        A person's name.
-    why
-        What stops the torque instead, or why it does not have to.
-    """
-
-    by: str
-    why: str
+    by: str  # A person's name
+    why: str  # what stops the torque instead, or why it does not have to
 
     @property
     def is_by_a_person(self) -> bool:
@@ -55,82 +47,32 @@ def _is_filled_in(text: str) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class InverterSettings:
-    """One inverter as the rig file has it.
+    """One inverter as the rig file has it."""
 
-    Attributes
-    ----------
-    name
-        Name in messages, such as ``m1``.
-    node_id
-        CANopen node id, 1 to 127.
-    rated_torque_nm
-        Motor rated torque; object 0x6076 must agree [Nm].
-    torque_limit_nm
-        Greatest torque that will be commanded; object 0x6072 must allow it [Nm].
-    mode
-        Mode of operation to run in.
-    eds_path
-        The drive's EDS; None for the one that is shipped.
-    vendor_id, product_code
-        Identity expected in object 0x1018; None for the EDS's.
-    serial_number
-        Of the drive behind this node id, 0x1018:04; None where it is not compared.
-    heartbeat_ms
-        Heartbeat period of the drive [ms].
-    host_node_id
-        Node id of the host's own heartbeat, 1 to 127.
-    host_timeout_ms
-        Without the host's heartbeat for so long the drive takes the host for dead [ms].
-    follow_bit
-        Whether the drive says in bit 12 of its statusword that it follows the target torque (mode 10 only).
-    rpdo_deadline_ms
-        Without an RPDO for so long the drive takes the host for dead [ms].
-    option_codes
-        Option codes by object, 0x6007 and 0x605A to 0x605E, where not the EDS's.
-    torque_slope_nm_per_s
-        Torque slope of profile torque mode, object 0x6087; None for the drive's own [Nm/s].
-    speed_unit
-        Unit of 0x606C; None for the drive's own.
-    rated_torque_unit_nm
-        What one count of 0x6076 is; CiA 402 has a thousandth [Nm].
-    accepted
-        What the drive lacks and somebody has accepted, by name.
-    channels
-        Further objects to be recorded in each cycle.
-    sdo_timeout_s
-        Longest wait for an SDO answer [s].
-    mode_timeout_s
-        Longest wait for the mode of operation to be shown in 0x6061 [s].
-    state_timeout_s
-        Longest wait for a change of power state or NMT state [s].
-    speed_limit_rad_s
-        Fastest speed at which there may be a torque; infinite where nothing limits it [rad/s].
-    """
-
-    name: str
-    node_id: int
-    rated_torque_nm: float
-    torque_limit_nm: float
-    mode: TorqueMode = TorqueMode.CYCLIC_SYNCHRONOUS_TORQUE
-    eds_path: Path | None = None
-    vendor_id: int | None = None
-    product_code: int | None = None
-    serial_number: int | None = None
-    heartbeat_ms: int = 100
-    host_node_id: int = HOST_NODE_ID
-    host_timeout_ms: int = 150
+    name: str  # name in messages, such as ``m1``
+    node_id: int  # CANopen node id, 1 to 127
+    rated_torque_nm: float  # motor rated torque
+    torque_limit_nm: float  # greatest torque that will be commanded
+    mode: TorqueMode = TorqueMode.CYCLIC_SYNCHRONOUS_TORQUE  # mode of operation to run in
+    eds_path: Path | None = None  # the drive's EDS; None for the one that is shipped
+    vendor_id: int | None = None  # identity expected in object 0x1018; None for the EDS's
+    product_code: int | None = None  # identity expected in object 0x1018; None for the EDS's
+    serial_number: int | None = None  # of the drive behind this node id, 0x1018:04; None where it is not compared
+    heartbeat_ms: int = 100  # heartbeat period of the drive [ms]
+    host_node_id: int = HOST_NODE_ID  # node id of the host's own heartbeat, 1 to 127
+    host_timeout_ms: int = 150  # without the host's heartbeat for so long the drive takes the host for dead [ms]
     follow_bit: bool = True
-    rpdo_deadline_ms: int = 150
+    rpdo_deadline_ms: int = 150  # without an RPDO for so long the drive takes the host for dead [ms]
     option_codes: Mapping[int, int] = field(default_factory=dict)
     torque_slope_nm_per_s: float | None = None
-    speed_unit: SpeedUnit | None = None
-    rated_torque_unit_nm: float = 1e-3
+    speed_unit: SpeedUnit | None = None  # unit of 0x606C; None for the drive's own
+    rated_torque_unit_nm: float = 1e-3  # what one count of 0x6076 is
     accepted: Mapping[str, Acceptance] = field(default_factory=dict)
-    channels: tuple[ObjectId, ...] = ()
-    sdo_timeout_s: float = 0.5
-    mode_timeout_s: float = 2.0
-    state_timeout_s: float = 2.0
-    speed_limit_rad_s: float = math.inf
+    channels: tuple[ObjectId, ...] = ()  # further objects to be recorded in each cycle
+    sdo_timeout_s: float = 0.5  # longest wait for an SDO answer [s]
+    mode_timeout_s: float = 2.0  # longest wait for the mode of operation to be shown in 0x6061 [s]
+    state_timeout_s: float = 2.0  # longest wait for a change of power state or NMT state [s]
+    speed_limit_rad_s: float = math.inf  # fastest speed at which there may be a torque
 
     @property
     def heartbeat_timeout_ms(self) -> int:

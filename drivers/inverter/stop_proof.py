@@ -64,27 +64,13 @@ NEEDED: Final = ("heartbeat_consumer", "rpdo_deadline", "abort_connection")
 
 @dataclass(frozen=True, slots=True)
 class Protection:
-    """One thing that takes the torque away without the host.
+    """One thing that takes the torque away without the host."""
 
-    Attributes
-    ----------
-    name
-        Its name in the rig file.
-    against
-        What it notices, or does.
-    by
-        Object and setting by which it is there; empty if it is missing.
-    accepted
-        Who accepted that it is missing; None if nobody.
-    proof
-        What a stop proof has seen of it; empty before one.
-    """
-
-    name: str
-    against: str
-    by: str = ""
-    accepted: Acceptance | None = None
-    proof: str = ""
+    name: str  # its name in the rig file
+    against: str  # what it notices, or does
+    by: str = ""  # object and setting by which it is there
+    accepted: Acceptance | None = None  # who accepted that it is missing
+    proof: str = ""  # what a stop proof has seen of it
 
     @property
     def in_order(self) -> bool:
@@ -190,26 +176,7 @@ CONNECTION_LOST = (0x8100, 0x8200)
 
 
 class StopProof:
-    """The host of one drive, playing dead.
-
-    Parameters
-    ----------
-    link
-        The bus.
-    settings
-        Times and name of the drive.
-    power, monitor
-        Its power state, and what it says of itself.
-    configure
-        Configures it, as for a run.
-    send_ready
-        Sends its RPDO with the command that keeps READY TO SWITCH ON, and no torque.
-
-    Attributes
-    ----------
-    seen
-        What was seen of each protection, by its name in the rig file.
-    """
+    """The host of one drive, playing dead."""
 
     def __init__(
         self,

@@ -395,15 +395,7 @@ class _Drive:
 
 
 class Supervision:
-    """Judges every cycle of one run by `RULES`.
-
-    Parameters
-    ----------
-    limits
-        Sizes and times of the rules.
-    m1, m2
-        Settings of both inverters.
-    """
+    """Judges every cycle of one run by `RULES`."""
 
     def __init__(self, limits: SupervisionLimits, m1: InverterSettings, m2: InverterSettings) -> None:
         guard = limits.guard

@@ -38,13 +38,7 @@ class AnswerIds:
 
 
 class MbapFramer(FramerSocket):
-    """A framer that keeps the identifiers of the answers that came.
-
-    Parameters
-    ----------
-    decoder
-        Makes PDUs of bytes.
-    """
+    """A framer that keeps the identifiers of the answers that came."""
 
     def __init__(self, decoder: DecodePDU) -> None:
         super().__init__(decoder)
@@ -70,29 +64,7 @@ HANDSHAKE_S: Final = 5.0
 
 
 class Dial:
-    """One connection, made once.
-
-    Parameters
-    ----------
-    host, port
-        Address of the server.
-    timeout_s
-        Time for each answer, and for connecting; with TLS that has at least `HANDSHAKE_S` [s].
-    security
-        How it is secured; None for plain Modbus TCP.
-    place
-        What to call it in messages.
-
-    Attributes
-    ----------
-    answered : bool
-        Whether anything has been answered over this connection, for its user to set.
-
-    Raises
-    ------
-    ConfigMismatch
-        If the files of ``security`` can't be used.
-    """
+    """One connection, made once."""
 
     def __init__(self, host: str, port: int, timeout_s: float, security: ClientSecurity | None, place: str) -> None:
         self._host = host

@@ -78,19 +78,7 @@ class _Decoder(DecodePDU):
 
 
 class ModbusLink:
-    """One connection to one Modbus TCP server, for one device id; it carries one request at a time.
-
-    Parameters
-    ----------
-    host, port
-        Address of the server.
-    device_id
-        Modbus unit to talk to.
-    timeout_s
-        Time for connecting and for each answer [s].
-    security
-        How the connection is secured; None for plain Modbus TCP.
-    """
+    """One connection to one Modbus TCP server, for one device id; it carries one request at a time."""
 
     __slots__ = ("_device_id", "_dial", "_host", "_port", "_security", "_timeout_s", "_turn")
 

@@ -59,18 +59,9 @@ _REASON_TEXT: Final[Mapping[str, str]] = MappingProxyType(
 
 @dataclass(frozen=True, slots=True)
 class Credentials:
-    """What one side shows and what it trusts: paths of PEM files.
+    """What one side shows and what it trusts: paths of PEM files."""
 
-    Attributes
-    ----------
-    ca : Path
-        Certificate of the authority that must have signed the other side's certificate.
-    certificate, key : Path
-        This side's own certificate, with the authorities between it and the root, and its private key, not
-        encrypted.
-    """
-
-    ca: Path
+    ca: Path  # certificate of the authority that must have signed the other side's certificate
     certificate: Path
     key: Path
 

@@ -36,25 +36,13 @@ LEAST_TORQUE_NM: Final = 1e-6
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """One register as it was read.
+    """One register as it was read."""
 
-    Attributes
-    ----------
-    name, register
-        Which it is.
-    value
-        What it holds, in the register's own unit; None where it could not be read, or means nothing.
-    problem
-        Why the value can't be believed; None where it can.
-    expected
-        What it should be, where there is a problem.
-    """
-
-    name: str
-    register: Register
-    value: Value | None
-    problem: str | None = None
-    expected: str = ""
+    name: str  # which it is
+    register: Register  # which it is
+    value: Value | None  # what it holds, in the register's own unit
+    problem: str | None = None  # why the value can't be believed
+    expected: str = ""  # what it should be, where there is a problem
 
     @property
     def shown(self) -> str:
@@ -121,15 +109,7 @@ def _advice(name: str, register: Register, words: Sequence[int]) -> str:
 
 
 class NamedRegisters:
-    """Registers of one PLC; one request for each run of adjacent ones.
-
-    Parameters
-    ----------
-    link
-        The connection.
-    register_map
-        What its registers mean.
-    """
+    """Registers of one PLC; one request for each run of adjacent ones."""
 
     __slots__ = ("_link", "_map")
 
@@ -196,19 +176,7 @@ NS_PER_S: Final = 1_000_000_000
 
 
 class HostWatchdog:
-    """Counts beats.
-
-    Parameters
-    ----------
-    registers : NamedRegisters
-        With ``host_count`` and ``host_count_seen``.
-    place : str
-        Of the PLC, for messages.
-    timeout_s : float
-        Time the PLC may leave a beat unseen [s].
-    clock_ns : callable
-        Monotonic clock [ns].
-    """
+    """Counts beats."""
 
     __slots__ = ("_clock_ns", "_count", "_place", "_registers", "_seen_ns", "_timeout_s")
 

@@ -27,24 +27,11 @@ PASSING: Final = (BusDown, DeviceTimeout)
 
 @dataclass(frozen=True, slots=True)
 class Backoff:
-    """Pauses between attempts.
-
-    Attributes
-    ----------
-    first_s, longest_s : float
-        Pause after the first failure, doubled after each further one up to the longest [s].
-    attempts : int
-        Attempts in all, the first one counted.
-
-    Raises
-    ------
-    ConfigMismatch
-        If there is no attempt, or a pause is not above zero or the longest shorter than the first.
-    """
+    """Pauses between attempts."""
 
     first_s: float = 0.2
     longest_s: float = 5.0
-    attempts: int = 6
+    attempts: int = 6  # attempts in all, the first one counted
 
     def __post_init__(self) -> None:
         if self.attempts < 1 or not 0.0 < self.first_s <= self.longest_s:
@@ -58,17 +45,7 @@ class Backoff:
 
 
 class PlcReader:
-    """Reads the PLC's status whenever it can be read; an asynchronous context manager.
-
-    Parameters
-    ----------
-    plc : Plc
-        The client; the reader connects it, and disconnects it at the end.
-    backoff : Backoff
-        How long to try for one status.
-    sleep : callable
-        Waits so many seconds.
-    """
+    """Reads the PLC's status whenever it can be read; an asynchronous context manager."""
 
     __slots__ = ("_backoff", "_connected", "_plc", "_sleep")
 

@@ -52,15 +52,7 @@ MOST_BITS: Final = 2000
 
 
 class RegisterMapError(ConfigMismatch):
-    """A map file is wrong: whoever wrote it is at fault.
-
-    Attributes
-    ----------
-    path : Path
-        The file.
-    problems : tuple of str
-        One line each: ``key | expected ... | got ...``.
-    """
+    """A map file is wrong: whoever wrote it is at fault."""
 
     def __init__(self, path: Path, *problems: str) -> None:
         self.path = path
@@ -69,25 +61,13 @@ class RegisterMapError(ConfigMismatch):
 
 
 class RegisterMap(MapTable):
-    """A whole map file. The key ``schema`` is `schema_id` here: pydantic has a use of its own for that name.
-
-    Attributes
-    ----------
-    name : str
-        What PLC it is for; appears in messages.
-    device_id : int
-        Modbus unit the PLC answers as.
-    identity : dict
-        What the registers of these names must hold.
-    registers : dict
-        The entries by name.
-    """
+    """A whole map file. The key ``schema`` is `schema_id` here: pydantic has a use of its own for that name."""
 
     schema_id: Annotated[Literal["hil.register_map/1"], Field(alias="schema")]
-    name: Annotated[str, Field(min_length=1)]
-    device_id: Annotated[int, Field(ge=0, le=255)]
-    identity: dict[str, int]
-    registers: dict[str, Register]
+    name: Annotated[str, Field(min_length=1)]  # what PLC it is for
+    device_id: Annotated[int, Field(ge=0, le=255)]  # modbus unit the PLC answers as
+    identity: dict[str, int]  # what the registers of these names must hold
+    registers: dict[str, Register]  # the entries by name
 
     def __getitem__(self, name: str) -> Register:
         """Return an entry by name."""

@@ -30,27 +30,13 @@ class PrbsSource(Enum):
 
 @dataclass(frozen=True, slots=True)
 class PrbsSettings:
-    """The PLC's pseudo-random binary torque: a ten-cell shift register.
+    """The PLC's pseudo-random binary torque: a ten-cell shift register."""
 
-    Attributes
-    ----------
-    enabled : bool
-        Whether the PLC's generator runs.
-    amplitude_nm : float
-        The level is plus or minus this torque, both inverters together [Nm].
-    clock_divider : int
-        PLC cycles each level is held.
-    seed : int
-        First state of the register, 1 to 1023.
-    source : PrbsSource
-        Who makes the PRBS.
-    """
-
-    enabled: bool
-    amplitude_nm: float
-    clock_divider: int
-    seed: int
-    source: PrbsSource
+    enabled: bool  # whether the PLC's generator runs
+    amplitude_nm: float  # the level is plus or minus this torque, both inverters together [Nm]
+    clock_divider: int  # PLC cycles each level is held
+    seed: int  # first state of the register, 1 to 1023
+    source: PrbsSource  # who makes the PRBS
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,33 +49,17 @@ class PlcWatchdog:
 
 @dataclass(frozen=True, slots=True)
 class PlcStatus:
-    """Everything the PLC reports.
+    """Everything the PLC reports."""
 
-    Attributes
-    ----------
-    drive_mode, clutch, permissive
-        What the driveline is like, and whether torque is permitted.
-    speed_limit_rad_s, torque_limit_nm : float
-        Largest motor speed, and largest torque of one inverter [rad/s, Nm].
-    watchdog : PlcWatchdog
-        Life signs both ways.
-    prbs : PrbsSettings
-        The settings its own generator holds.
-    prbs_torque_nm : float
-        What its own generator puts out at the moment of reading, both inverters together [Nm].
-    t_ns : int
-        When the first of the requests for it left, on the host's monotonic clock: no value is older.
-    """
-
-    drive_mode: DriveMode
-    clutch: ClutchState
-    permissive: bool
-    speed_limit_rad_s: float
-    torque_limit_nm: float
-    watchdog: PlcWatchdog
-    prbs: PrbsSettings
+    drive_mode: DriveMode  # what the driveline is like, and whether torque is permitted
+    clutch: ClutchState  # what the driveline is like, and whether torque is permitted
+    permissive: bool  # what the driveline is like, and whether torque is permitted
+    speed_limit_rad_s: float  # largest motor speed, and largest torque of one inverter [rad/s, Nm]
+    torque_limit_nm: float  # largest motor speed, and largest torque of one inverter [rad/s, Nm]
+    watchdog: PlcWatchdog  # life signs both ways
+    prbs: PrbsSettings  # the settings its own generator holds
     prbs_torque_nm: float
-    t_ns: int
+    t_ns: int  # when the first of the requests for it left, on the host's monotonic clock
 
     def age_ns(self, now_ns: int) -> int:
         """How old the oldest value may be at ``now_ns`` of the same clock [ns]."""

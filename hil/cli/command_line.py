@@ -56,24 +56,12 @@ SPEAKERS = frozenset(
 
 @dataclass(frozen=True, slots=True)
 class Call:
-    """What is to be done.
-
-    Attributes
-    ----------
-    command : str
-        One of the commands, or ``--help``, ``--version``, or empty where nothing was asked for.
-    arguments : tuple of str
-        The command's own.
-    quiet : bool
-        Only errors, and what ``--json`` prints.
-    log_level : str or None
-        As given; None where it was not.
-    """
+    """What is to be done."""
 
     command: str
-    arguments: tuple[str, ...] = ()
-    quiet: bool = False
-    log_level: str | None = None
+    arguments: tuple[str, ...] = ()  # the command's own
+    quiet: bool = False  # only errors, and what ``--json`` prints
+    log_level: str | None = None  # as given
 
     @classmethod
     def parse(cls, line: Sequence[str], commands: Collection[str]) -> Call:

@@ -217,13 +217,7 @@ SHOW_EVERY_S = 0.1
 
 
 class RunProgress:
-    """The bar of one run, from `__enter__` to `__exit__`.
-
-    Parameters
-    ----------
-    plan
-        What is run; the bar counts its measured part.
-    """
+    """The bar of one run, from `__enter__` to `__exit__`."""
 
     def __init__(self, plan: Plan) -> None:
         console = new_console(stderr=True)

@@ -38,29 +38,16 @@ class ChannelTable(Table):
     """One channel; its values are in SI units, reflected to the motor shaft.
 
     The key ``register`` is `register_name` here: pydantic has a use of its own for that name.
-
-    Attributes
-    ----------
-    column
-        Its column in a recording; ends in the unit, such as ``speed_load_rad_s``.
-    kind, at
-        What it is, and where it is measured.
-    inverter, object, subindex
-        The object of an inverter that a TPDO carries.
-    register_name
-        The name of a register in the PLC's map, whose type, scale and unit hold.
-    scale
-        Of an object: what one count is, in SI units. Of a register: a factor beyond the map's, such as a gear ratio.
     """
 
-    column: Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$")]
-    kind: Annotated[OutputKind, Field(strict=False)]
-    at: Annotated[Location, Field(strict=False)]
-    inverter: Literal["m1", "m2"] | None = None
+    column: Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$")]  # its column in a recording
+    kind: Annotated[OutputKind, Field(strict=False)]  # what it is, and where it is measured
+    at: Annotated[Location, Field(strict=False)]  # what it is, and where it is measured
+    inverter: Literal["m1", "m2"] | None = None  # the object of an inverter that a TPDO carries
     object: Annotated[int, Field(ge=0x1000, le=0xFFFF)] | None = None
-    subindex: Annotated[int, Field(ge=0, le=255)] = 0
+    subindex: Annotated[int, Field(ge=0, le=255)] = 0  # the object of an inverter that a TPDO carries
     register_name: Annotated[Text | None, Field(alias="register")] = None
-    scale: float | None = None
+    scale: float | None = None  # of an object
 
     @property
     def unit(self) -> str:

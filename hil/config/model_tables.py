@@ -58,37 +58,19 @@ class _Load(_Strict):
 
 
 class PreparedRecording(_Strict):
-    """A recording that was used.
-
-    Attributes
-    ----------
-    sha256 : str
-        Of its file; empty where it was not read from one.
-    samples_used : int
-        How many of its samples counted.
-    events : dict
-        From when to when each event was found in it, since it began [s].
-    """
+    """A recording that was used."""
 
     name: str
-    sha256: str
-    samples_used: int
+    sha256: str  # of its file
+    samples_used: int  # how many of its samples counted
     events: dict[str, Annotated[list[float], Field(min_length=2, max_length=2)]] = {}
 
 
 class Prepared(_Strict):
-    """What ``hil diagnose`` did to recordings before it fitted: ``hil simulate`` and ``hil compare`` do it again.
-
-    Attributes
-    ----------
-    fixed : bool
-        Whether wrapped positions are put together, and what was cut off, held or interpolated does not count.
-    one_in : int
-        To one in how many samples recordings are thinned.
-    """
+    """What ``hil diagnose`` did to recordings before it fitted: ``hil simulate`` and ``hil compare`` do it again."""
 
     mended: bool = True
-    one_in: int = Field(default=1, ge=1)
+    one_in: int = Field(default=1, ge=1)  # to one in how many samples recordings are thinned
     recordings: list[PreparedRecording] = []
 
 

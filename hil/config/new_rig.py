@@ -44,27 +44,13 @@ class NotAnAnswer(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Question:
-    """One question.
+    """One question."""
 
-    Attributes
-    ----------
-    name : str
-        Key among the answers, and the option's name.
-    asks : str
-        What is asked, unit included.
-    read : callable
-        Turns text into the value, given the answers before it; raises `NotAnAnswer`.
-    simulated : str
-        Answer for the simulated rig of ``hil sim``.
-    vehicle : str
-        Default on a vehicle; empty where there is none and a person has to know.
-    """
-
-    name: str
-    asks: str
-    read: Callable[[str, Answers], Value]
-    simulated: str
-    vehicle: str = ""
+    name: str  # key among the answers, and the option's name
+    asks: str  # what is asked, unit included
+    read: Callable[[str, Answers], Value]  # turns text into the value, given the answers before it
+    simulated: str  # answer for the simulated rig of ``hil sim``
+    vehicle: str = ""  # default on a vehicle
 
     @property
     def option(self) -> str:
@@ -218,21 +204,11 @@ SIMULATED_ACCEPTANCE = '{ by = "hil rig new --simulated", why = "simulated drive
 
 @dataclass(frozen=True, slots=True)
 class NewDrive:
-    """Both inverters of a new rig file, by their data sheet.
+    """Both inverters of a new rig file, by their data sheet."""
 
-    Attributes
-    ----------
-    defaults
-        Answers to the questions, by name.
-    lines
-        Lines for ``[inverters.m1]`` and ``[inverters.m2]``, comments included.
-    report
-        What the check of the file said.
-    """
-
-    defaults: Mapping[str, str]
-    lines: tuple[str, ...]
-    report: EdsReport
+    defaults: Mapping[str, str]  # answers to the questions, by name
+    lines: tuple[str, ...]  # lines for ``[inverters.m1]`` and ``[inverters.m2]``, comments included
+    report: EdsReport  # what the check of the file said
 
 
 def new_drive(eds: Path, rig_file: Path, simulated: bool) -> NewDrive:

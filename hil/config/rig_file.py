@@ -241,21 +241,7 @@ def read_rig(path: Path | str) -> Rig:
 
 
 def with_experiment_of(path: Path, experiment: str) -> tuple[Rig, str | None, str]:
-    """Read a rig file for one of its experiments, or with the one that a file of its own has.
-
-    Returns
-    -------
-    rig : Rig
-    text : str or None
-        Of the rig file with the experiment of the other file in it; None where there is no other file.
-    name : str
-        Of the experiment.
-
-    Raises
-    ------
-    RigFileError
-        As `read_rig`, and where the other file has not one experiment, or one of a name that the rig has otherwise.
-    """
+    """Read a rig file for one of its experiments, or with the one that a file of its own has."""
     file = Path(experiment)
     rig = read_rig(path)
     if experiment in rig.experiments or file.suffix.lower() != ".toml":

@@ -70,35 +70,16 @@ class Planned:
 
 @dataclass(frozen=True, slots=True)
 class Design:
-    """The experiment that was chosen, and what it is expected to bring.
-
-    Attributes
-    ----------
-    aim : Aim
-    key : str
-        Name of its table in a rig file.
-    decides : Expected or None
-        Where it is to decide between hypotheses.
-    widths : tuple of Width
-        Of the most probable hypothesis' values, now and after it.
-    shows : tuple of str
-        Effects that no recording so far could show, and this experiment does.
-    others : tuple of (str, float)
-        What else was driven on paper, and what it was judged by: the probability of the true hypothesis afterwards;
-        where one is left, how many effects it shows; for parameters, by what factor intervals that are wide become
-        shorter, in the mean.
-    refused : mapping of str to str
-        What may not be driven, and why.
-    """
+    """The experiment that was chosen, and what it is expected to bring."""
 
     aim: Aim
-    key: str
+    key: str  # name of its table in a rig file
     planned: Planned
-    decides: Expected | None
-    widths: tuple[Width, ...]
-    shows: tuple[str, ...]
-    others: tuple[tuple[str, float], ...]
-    refused: dict[str, str]
+    decides: Expected | None  # where it is to decide between hypotheses
+    widths: tuple[Width, ...]  # of the most probable hypothesis' values, now and after it
+    shows: tuple[str, ...]  # effects that no recording so far could show, and this experiment does
+    others: tuple[tuple[str, float], ...]  # what else was driven on paper, and what it was judged by
+    refused: dict[str, str]  # what may not be driven, and why
 
     @property
     def factor(self) -> float:
@@ -114,13 +95,7 @@ class Design:
 
 
 def designed(source: RigSource, known: Open, aim: Aim, progress: Progress) -> Design:
-    """Choose the next experiment for a rig.
-
-    Raises
-    ------
-    UsageError
-        Where the rig may drive nothing.
-    """
+    """Choose the next experiment for a rig."""
     rig = source.rig()
     limits = Limits.of(rig)
     model = as_model(known.candidates[0], known.line)

@@ -114,15 +114,7 @@ def load_state(folder: Path, source: RigSource, model: Path) -> State:
 
 @dataclass(slots=True)
 class Solving:
-    """One call: from where the last one ended to a verdict, or to what keeps it from there.
-
-    Attributes
-    ----------
-    given : sequence of Path
-        Recordings of the rig from before.
-    most_vehicle_s : float
-        Time that the vehicle may be needed for in all [s].
-    """
+    """One call: from where the last one ended to a verdict, or to what keeps it from there."""
 
     folder: Path
     source: RigSource
@@ -131,9 +123,9 @@ class Solving:
     runner: Runner
     talk: Talk
     state: State
-    given: Sequence[Path]
+    given: Sequence[Path]  # recordings of the rig from before
     effort: str
-    most_vehicle_s: float
+    most_vehicle_s: float  # time that the vehicle may be needed for in all [s]
     say: Callable[[str], None]
     progress: Callable[[str, float], None]
 

@@ -259,19 +259,7 @@ class NotTranslatable(ValueError):
 
 
 class Expressions:
-    """Translates expressions in the scope of one function.
-
-    Parameters
-    ----------
-    unit : Translation
-        Where the functions and structures that they use are asked for.
-    scope : dict
-        The function's globals.
-    names : dict of str to type
-        Local variables.
-    where : str
-        The function's file and name, for messages.
-    """
+    """Translates expressions in the scope of one function."""
 
     def __init__(self, unit: Translation, scope: dict[str, Any], names: dict[str, Type], where: str) -> None:
         self._unit, self._scope, self.names, self._where = unit, scope, names, where

@@ -54,31 +54,12 @@ PLC_WORD = 32767
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlcEstimator:
-    """The estimator that is exported: what `OnlineChain` is on the host, from the same three settings.
+    """The estimator that is exported: what `OnlineChain` is on the host, from the same three settings."""
 
-    Attributes
-    ----------
-    settings : Settings
-        Orders, periods, high-pass and adaptation profile.
-    cycle_s : float
-        Period of the PLC task that calls the estimator [s]; the models' period is a whole multiple of it.
-    L : ndarray or None
-        Denominator ``1, l_1 ..`` of the observation filter; None: it follows each stable A.
-    origin : str
-        Where the settings come from, for the head of the text.
-
-    Raises
-    ------
-    BadSetting
-        If ``cycle_s`` does not divide the models' period, or an index would not fit a PLC's INT.
-    BadModel
-        If L is no stable polynomial.
-    """
-
-    settings: Settings = field(default_factory=Settings)
+    settings: Settings = field(default_factory=Settings)  # orders, periods, high-pass and adaptation profile
     cycle_s: float = 0.01
-    L: FloatArray | None = None
-    origin: str = "the defaults"
+    L: FloatArray | None = None  # denominator ``1, l_1 ..`` of the observation filter
+    origin: str = "the defaults"  # where the settings come from, for the head of the text
 
     def __post_init__(self) -> None:
         for array, size, cure in self._arrays():

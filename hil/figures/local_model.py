@@ -21,24 +21,14 @@ STATES, INPUTS = 3, 2
 
 @dataclass(frozen=True, slots=True)
 class TwoMassLine:
-    """A two-mass driveline without anything nonlinear.
+    """A two-mass driveline without anything nonlinear."""
 
-    Attributes
-    ----------
-    inertia_motor_kg_m2, inertia_load_kg_m2
-        J_M and J_L [kg m^2].
-    stiffness_nm_per_rad, damping_nm_s_per_rad
-        k and c of the shaft.
-    friction_motor_nm_s_per_rad, friction_load_nm_s_per_rad
-        Viscous friction b_M and b_L.
-    """
-
-    inertia_motor_kg_m2: float
-    inertia_load_kg_m2: float
-    stiffness_nm_per_rad: float
-    damping_nm_s_per_rad: float
-    friction_motor_nm_s_per_rad: float
-    friction_load_nm_s_per_rad: float
+    inertia_motor_kg_m2: float  # J_M and J_L [kg m^2]
+    inertia_load_kg_m2: float  # J_M and J_L [kg m^2]
+    stiffness_nm_per_rad: float  # k and c of the shaft
+    damping_nm_s_per_rad: float  # k and c of the shaft
+    friction_motor_nm_s_per_rad: float  # viscous friction b_M and b_L
+    friction_load_nm_s_per_rad: float  # viscous friction b_M and b_L
 
     @classmethod
     def of(cls, values: Mapping[str, float]) -> TwoMassLine:
@@ -124,21 +114,11 @@ class Reference:
 
 @dataclass(frozen=True, slots=True)
 class LocalModel:
-    """One experiment, as the paper calls what comes of it.
+    """One experiment, as the paper calls what comes of it."""
 
-    Attributes
-    ----------
-    record
-        As it was recorded, at 10 ms in the paper.
-    found
-        On-line, off-line and spectral estimate of it.
-    reference
-        What to draw next to them.
-    """
-
-    record: Record
-    found: Identification
-    reference: Reference | None = None
+    record: Record  # as it was recorded, at 10 ms in the paper
+    found: Identification  # on-line, off-line and spectral estimate of it
+    reference: Reference | None = None  # what to draw next to them
 
     @classmethod
     def with_expected(cls, record: Record, found: Identification, expected: DrivelineModel | None) -> LocalModel:
@@ -220,41 +200,21 @@ AGREEMENT_DB = 3.0
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One experiment; NaN where there is no such value.
+    """One experiment; NaN where there is no such value."""
 
-    Attributes
-    ----------
-    name
-        The recording.
-    online_hz, offline_hz, reference_hz
-        Natural frequency of the resonance [Hz].
-    online_damping, offline_damping, reference_damping
-        Its damping ratio.
-    offline_db, spectral_db, reference_db
-        Largest difference of the on-line frequency response from the off-line model's, the spectral estimate and the
-        reference, in the band around the resonance where the coherence is above 0.9 [dB].
-    agrees_hz
-        Unbroken band around the resonance in which on-line model and spectral estimate agree within 3 dB [Hz]; None
-        where one of them is missing.
-    fit_percent
-        Of the off-line model in free run.
-    status
-        Of the on-line estimate.
-    """
-
-    name: str
-    online_hz: float
-    offline_hz: float
-    reference_hz: float
-    online_damping: float
-    offline_damping: float
-    reference_damping: float
+    name: str  # the recording
+    online_hz: float  # natural frequency of the resonance [Hz]
+    offline_hz: float  # natural frequency of the resonance [Hz]
+    reference_hz: float  # natural frequency of the resonance [Hz]
+    online_damping: float  # its damping ratio
+    offline_damping: float  # its damping ratio
+    reference_damping: float  # its damping ratio
     offline_db: float
     spectral_db: float
     agrees_hz: tuple[float, float] | None
     reference_db: float
-    fit_percent: float
-    status: str
+    fit_percent: float  # of the off-line model in free run
+    status: str  # of the on-line estimate
 
     def error(self, what: str, how: str) -> float:
         """Return the relative error of ``what`` (hz, damping) as found ``how`` (online, offline) to the reference."""

@@ -42,37 +42,17 @@ PRBS_STATES = 1023
 
 @dataclass(frozen=True, slots=True)
 class Conditions:
-    """One experiment's conditions.
+    """One experiment's conditions."""
 
-    Attributes
-    ----------
-    speed_rad_s
-        Motor speed that the driver holds [rad/s].
-    payload_kg
-        Mass on board on top of the empty bus's [kg]; negative where the rig's model already carries some.
-    slope_rms
-        How hilly the road is: RMS of rise over run.
-    wind_m_s, gust_m_s
-        Mean head wind and standard deviation of its gusts [m/s].
-    roughness_nm
-        RMS of what the road surface adds to the load torque, at the motor shaft [Nm].
-    pedal_nm
-        Standard deviation of the driver's corrections by the pedal [Nm].
-    prbs_seed
-        First state of the shift register.
-    seed
-        Of road, wind, driver and reading noise.
-    """
-
-    speed_rad_s: float
+    speed_rad_s: float  # motor speed that the driver holds [rad/s]
     payload_kg: float
-    slope_rms: float
-    wind_m_s: float
-    gust_m_s: float
-    roughness_nm: float
-    pedal_nm: float
-    prbs_seed: int
-    seed: int
+    slope_rms: float  # how hilly the road is
+    wind_m_s: float  # mean head wind and standard deviation of its gusts [m/s]
+    gust_m_s: float  # mean head wind and standard deviation of its gusts [m/s]
+    roughness_nm: float  # RMS of what the road surface adds to the load torque, at the motor shaft [Nm]
+    pedal_nm: float  # standard deviation of the driver's corrections by the pedal [Nm]
+    prbs_seed: int  # first state of the shift register
+    seed: int  # of road, wind, driver and reading noise
 
 
 def draw_conditions(seed: int, count: int) -> tuple[Conditions, ...]:
@@ -102,19 +82,7 @@ SHORTEST_S, LONGEST_S = 1.5, 6.0
 
 
 class PedalCruise:
-    """The law of one measured part; see `hil.rig.experiments.base.MeasureLaw`.
-
-    Parameters
-    ----------
-    cruise
-        What holds the speed.
-    pedal_nm
-        Standard deviation of the corrections [Nm].
-    period_s
-        Time between two cycles [s].
-    rng
-        What they are drawn from.
-    """
+    """The law of one measured part; see `hil.rig.experiments.base.MeasureLaw`."""
 
     __slots__ = ("_cruise", "_foot", "_next_s", "_pedal_nm", "_rng", "_wanted_nm")
 
@@ -176,15 +144,7 @@ class Bus:
 
 
 class RoadLoad:
-    """The load torque along one drive, asked for once per period.
-
-    Parameters
-    ----------
-    bus
-        Loaded as it is.
-    conditions
-        Of the drive.
-    """
+    """The load torque along one drive, asked for once per period."""
 
     __slots__ = ("_bus", "_conditions", "_gust_m_s", "_phases", "_rng", "_surface_nm")
 
@@ -220,21 +180,7 @@ class RoadLoad:
 
 
 class RoadPlant:
-    """A two-mass driveline under the load torque of a road.
-
-    Parameters
-    ----------
-    line
-        The driveline, with the payload's part of J_L.
-    load
-        Of the road.
-    metres_per_rad
-        Metres driven per radian of the motor.
-    speed_rad_s
-        Speed it rolls at in the beginning, at the motor shaft [rad/s].
-    period_s
-        Time of one step [s].
-    """
+    """A two-mass driveline under the load torque of a road."""
 
     __slots__ = ("_a", "_b", "_distance_m", "_load", "_metres_per_rad", "_period_s", "_x")
 
@@ -278,21 +224,11 @@ ANY_PORT = Address("127.0.0.1", 0)
 
 @dataclass(frozen=True, slots=True)
 class Driven:
-    """One experiment that was driven.
+    """One experiment that was driven."""
 
-    Attributes
-    ----------
-    path
-        The recording.
-    conditions
-        It was driven under.
-    line
-        The driveline as it truly was.
-    """
-
-    path: Path
-    conditions: Conditions
-    line: TwoMassLine
+    path: Path  # the recording
+    conditions: Conditions  # it was driven under
+    line: TwoMassLine  # the driveline as it truly was
 
 
 def drive(

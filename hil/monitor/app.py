@@ -43,23 +43,7 @@ LAST_WORDS_S = 5.0
 
 
 class MonitorApp(App[None]):
-    """The view.
-
-    Parameters
-    ----------
-    source
-        What is watched.
-    state
-        What is known of it.
-    choices
-        Experiments that can be started.
-    out
-        Folder of their recordings, for the dialog.
-    page
-        The first page, one of `PAGES`.
-    picture
-        A file to draw the screen into, and after how many seconds; the view ends after it.
-    """
+    """The view."""
 
     CSS = CSS
     ENABLE_COMMAND_PALETTE = False

@@ -68,17 +68,7 @@ Tell = Callable[[Notice], None]
 
 
 class NodeWatch:
-    """Life signs of one node, taken where frames are received; what is wrong with a frame is the driver's to say.
-
-    Parameters
-    ----------
-    link
-        The bus.
-    inverter
-        Whose life signs they are.
-    tell
-        Called with every EMCY.
-    """
+    """Life signs of one node, taken where frames are received; what is wrong with a frame is the driver's to say."""
 
     def __init__(self, link: CanLink, inverter: Inverter, tell: Tell) -> None:
         self._inverter = inverter
@@ -177,28 +167,14 @@ TRY_AGAIN_S = 1.0
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """What the rig's process is for.
+    """What the rig's process is for."""
 
-    Attributes
-    ----------
-    rig_path, rig
-        The rig file, and what it says with the addresses of the command line.
-    out
-        Folder of the recordings.
-    simulate
-        Whether the rig is simulated, in this very process.
-    trust_laws
-        Whether the code of its model's own laws may run.
-    setup
-        What estimates the runs.
-    """
-
-    rig_path: Path
-    rig: Rig
-    out: Path
-    simulate: bool = False
-    trust_laws: bool = False
-    setup: OnlineSetup = USUAL
+    rig_path: Path  # the rig file, and what it says with the addresses of the command line
+    rig: Rig  # the rig file, and what it says with the addresses of the command line
+    out: Path  # folder of the recordings
+    simulate: bool = False  # whether the rig is simulated, in this very process
+    trust_laws: bool = False  # whether the code of its model's own laws may run
+    setup: OnlineSetup = USUAL  # what estimates the runs
 
 
 class SessionStop(StopRequest):

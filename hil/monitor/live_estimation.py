@@ -53,17 +53,7 @@ NS_PER_S = 1_000_000_000
 
 
 class LiveEstimation:
-    """Estimates a run while it lasts, and keeps what was before.
-
-    Parameters
-    ----------
-    period_s
-        Time between two samples [s].
-    is_ready
-        Whether the chain may be used already; samples wait until then.
-    setup
-        What estimates.
-    """
+    """Estimates a run while it lasts, and keeps what was before."""
 
     def __init__(
         self, period_s: float, is_ready: Callable[[], bool] = lambda: True, setup: OnlineSetup = USUAL
@@ -235,15 +225,7 @@ NICE = 10
 
 
 class WarmUp:
-    """Makes the on-line chain ready, from a thread that begins at once and ends with the program.
-
-    Parameters
-    ----------
-    period_s
-        Time between two samples [s].
-    setup
-        What estimates; each structure of model has its own machine code.
-    """
+    """Makes the on-line chain ready, from a thread that begins at once and ends with the program."""
 
     def __init__(self, period_s: float, setup: OnlineSetup = USUAL) -> None:
         self._of = (period_s, setup)

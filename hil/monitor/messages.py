@@ -27,37 +27,17 @@ class Samples:
 
 @dataclass(frozen=True, slots=True)
 class NodeHealth:
-    """One inverter, as the bus shows it.
+    """One inverter, as the bus shows it."""
 
-    Attributes
-    ----------
-    node_id
-        CANopen node.
-    power
-        State of its power stage in the words of CiA 402; None before the first TPDO.
-    nmt
-        NMT state of its last heartbeat; None where there was none.
-    heartbeat_age_s, heartbeat_limit_s
-        Time since that heartbeat, and the longest that is right [s]; the age is None where there was none.
-    tpdo_age_s
-        Time since its last TPDO [s]; None where there was none.
-    emergency
-        The active EMCY in words, or None.
-    n_emergencies
-        EMCY frames since the monitor began, resets not counted.
-    trouble
-        Why it could not be configured, or None.
-    """
-
-    node_id: int
-    power: str | None
-    nmt: str | None
+    node_id: int  # CANopen node
+    power: str | None  # state of its power stage in the words of CiA 402; None before the first TPDO
+    nmt: str | None  # NMT state of its last heartbeat
     heartbeat_age_s: float | None
     heartbeat_limit_s: float
-    tpdo_age_s: float | None
-    emergency: str | None
-    n_emergencies: int
-    trouble: str | None
+    tpdo_age_s: float | None  # time since its last TPDO [s]; None where there was none
+    emergency: str | None  # the active EMCY in words, or None
+    n_emergencies: int  # EMCY frames since the monitor began, resets not counted
+    trouble: str | None  # why it could not be configured, or None
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,34 +107,16 @@ class Began:
 
 @dataclass(frozen=True, slots=True)
 class Over:
-    """An experiment is over, the drives are disarmed.
+    """An experiment is over, the drives are disarmed."""
 
-    Attributes
-    ----------
-    experiment
-        Its name.
-    recording
-        Where its samples are; None where there are none.
-    samples, flagged
-        How many, and how many of them are not good.
-    stopped
-        Whether someone asked for its end.
-    reason
-        What ended it before its time; None where it ran to its end or was stopped.
-    run_id
-        Its number in the run store; None where it is not in there.
-    alarms
-        Changes of the driveline that the on-line estimate found.
-    """
-
-    experiment: str
-    recording: str | None
-    samples: int
-    flagged: int
-    stopped: bool
-    reason: str | None
-    run_id: int | None = None
-    alarms: int = 0
+    experiment: str  # its name
+    recording: str | None  # where its samples are
+    samples: int  # how many, and how many of them are not good
+    flagged: int  # how many, and how many of them are not good
+    stopped: bool  # whether someone asked for its end
+    reason: str | None  # what ended it before its time
+    run_id: int | None = None  # its number in the run store
+    alarms: int = 0  # changes of the driveline that the on-line estimate found
 
 
 @dataclass(frozen=True, slots=True)

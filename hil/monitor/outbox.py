@@ -20,15 +20,7 @@ KEPT_SAMPLES = 20_000
 
 
 class Outbox:
-    """Reports on their way, from `__enter__` to `__exit__`; a view that is gone is no error of the rig's.
-
-    Parameters
-    ----------
-    connection
-        To the view; only this sends by it.
-    kept_samples
-        How many samples wait at most.
-    """
+    """Reports on their way, from `__enter__` to `__exit__`; a view that is gone is no error of the rig's."""
 
     def __init__(self, connection: Connection, kept_samples: int = KEPT_SAMPLES) -> None:
         self._connection = connection

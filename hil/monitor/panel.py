@@ -38,15 +38,7 @@ def drawn(draw: Draw, snapshot: Snapshot, width: int, height: int) -> list[str]:
 
 
 class Panel(Widget):
-    """Draws the latest snapshot; nothing until there is one.
-
-    Parameters
-    ----------
-    draw
-        What gives its lines.
-    name
-        Its name and its CSS class.
-    """
+    """Draws the latest snapshot; nothing until there is one."""
 
     def __init__(self, draw: Draw, name: str) -> None:
         super().__init__(name=name, classes=f"panel {name}")

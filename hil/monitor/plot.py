@@ -18,13 +18,7 @@ _BITS = np.array([[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]])
 
 
 class Canvas:
-    """Dots, switched on by column and row from the upper left.
-
-    Parameters
-    ----------
-    columns, rows
-        Character cells.
-    """
+    """Dots, switched on by column and row from the upper left."""
 
     def __init__(self, columns: int, rows: int) -> None:
         self.width, self.height = 2 * max(columns, 0), 4 * max(rows, 0)

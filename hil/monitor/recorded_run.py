@@ -40,21 +40,7 @@ STOPPED = "stopped by the operator"
 
 
 class RecordedRun:
-    """One run.
-
-    Parameters
-    ----------
-    rig_path, rig
-        The rig file, and the rig at the addresses that are used.
-    out
-        Folder of the recording; made where it is not there.
-    name
-        Which experiment.
-    outbox
-        Called with every sample and of beginning and end.
-    setup
-        What estimates.
-    """
+    """One run."""
 
     def __init__(
         self, rig_path: Path, rig: Rig, out: Path, name: str, outbox: Outbox, setup: OnlineSetup = USUAL

@@ -17,25 +17,13 @@ ROOM_FOR_PARTS = 60
 
 @dataclass(frozen=True, slots=True)
 class Trace:
-    """One signal as it is drawn.
+    """One signal as it is drawn."""
 
-    Attributes
-    ----------
-    name, unit
-        For the title.
-    values
-        Shape (N,).
-    least
-        Smallest span of its axis [unit].
-    now
-        Its present value, in words.
-    """
-
-    name: str
-    unit: str
-    values: FloatArray
-    least: float
-    now: str
+    name: str  # for the title
+    unit: str  # for the title
+    values: FloatArray  # shape (N,)
+    least: float  # smallest span of its axis [unit]
+    now: str  # its present value, in words
 
 
 def torque(snapshot: Snapshot, width: int, height: int) -> list[str]:

@@ -37,26 +37,13 @@ _WORDS = {
 
 @dataclass(frozen=True, slots=True)
 class Quality:
-    """The samples of the last seconds.
+    """The samples of the last seconds."""
 
-    Attributes
-    ----------
-    samples, good
-        How many, since the first good one of this stretch (listening, or one run); before it there is no counting:
-        a drive that has never answered is judged by its own life signs.
-    against
-        What is against those that are not good, what is remarked on others, and how often; the most frequent first.
-    standing_s
-        Time since the last good sample [s]; 0 while the latest is good.
-    why
-        What is against the latest one, in words; empty while it is good.
-    """
-
-    samples: int = 0
-    good: int = 0
+    samples: int = 0  # how many, since the first good one of this stretch (listening, or one run)
+    good: int = 0  # how many, since the first good one of this stretch (listening, or one run)
     against: tuple[tuple[str, int], ...] = ()
-    standing_s: float = 0.0
-    why: str = ""
+    standing_s: float = 0.0  # time since the last good sample [s]; 0 while the latest is good
+    why: str = ""  # what is against the latest one, in words
 
     @property
     def reasons(self) -> str:
@@ -88,13 +75,7 @@ def words(bits: int) -> str:
 
 
 class QualityWatch:
-    """Counts over the last `WINDOW_S`.
-
-    Parameters
-    ----------
-    period_s
-        Time between two samples [s].
-    """
+    """Counts over the last `WINDOW_S`."""
 
     def __init__(self, period_s: float) -> None:
         self._ring = Ring(max(1, math.ceil(WINDOW_S / period_s)), 2)
@@ -157,31 +138,17 @@ class Activity(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Headline:
-    """What is happening.
+    """What is happening."""
 
-    Attributes
-    ----------
-    rig
-        Its name, or that of the recording that is played.
-    activity
-        What is happening.
-    experiment, phase, phase_s, duration_s, recording
-        Of the run under way; empty, NaN while there is none. ``duration_s`` is that of the measured part.
-    message
-        The last thing the operator has to know; it stays until another comes.
-    silent_s
-        Time since the source last said anything [s]: so old is what is shown.
-    """
-
-    rig: str
-    activity: Activity
-    experiment: str
-    phase: str
-    phase_s: float
-    duration_s: float
-    recording: str
-    message: str
-    silent_s: float = 0.0
+    rig: str  # its name, or that of the recording that is played
+    activity: Activity  # what is happening
+    experiment: str  # of the run under way
+    phase: str  # of the run under way
+    phase_s: float  # of the run under way
+    duration_s: float  # of the run under way
+    recording: str  # of the run under way
+    message: str  # the last thing the operator has to know
+    silent_s: float = 0.0  # time since the source last said anything [s]: so old is what is shown
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -195,38 +162,20 @@ class Channel:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Signals:
-    """The last seconds.
+    """The last seconds."""
 
-    Attributes
-    ----------
-    time_s
-        Shape (N,), 0 for the latest sample and negative before it [s].
-    torque_nm, reference_nm, prbs_nm, speed_rad_s, twist_rad
-        Shape (N,); NaN where there is no value.
-    torque_m1_nm, torque_m2_nm
-        The latest of each inverter [Nm].
-    window_s
-        What the plots reach back [s].
-    twist_of
-        Where the numbers behind the twist are from, or why there is none.
-    twist_std_rad
-        Its standard deviation by the filter's own reckoning [rad]; NaN while there is none.
-    channels
-        The further ones of the rig file, in its order.
-    """
-
-    time_s: FloatArray
-    torque_nm: FloatArray
-    reference_nm: FloatArray
-    prbs_nm: FloatArray
-    speed_rad_s: FloatArray
-    twist_rad: FloatArray
-    torque_m1_nm: float
-    torque_m2_nm: float
-    window_s: float
-    twist_of: str
+    time_s: FloatArray  # shape (N,), 0 for the latest sample and negative before it [s]
+    torque_nm: FloatArray  # shape (N,)
+    reference_nm: FloatArray  # shape (N,)
+    prbs_nm: FloatArray  # shape (N,)
+    speed_rad_s: FloatArray  # shape (N,)
+    twist_rad: FloatArray  # shape (N,)
+    torque_m1_nm: float  # the latest of each inverter [Nm]
+    torque_m2_nm: float  # the latest of each inverter [Nm]
+    window_s: float  # what the plots reach back [s]
+    twist_of: str  # where the numbers behind the twist are from, or why there is none
     twist_std_rad: float
-    channels: tuple[Channel, ...] = ()
+    channels: tuple[Channel, ...] = ()  # the further ones of the rig file, in its order
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -242,48 +191,24 @@ class History:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Model:
-    """The on-line model.
+    """The on-line model."""
 
-    Attributes
-    ----------
-    frequency_hz, gain
-        Shape (n,): its frequency response, magnitude [rad/s per Nm].
-    poles, zeros
-        In z.
-    trail
-        Poles of models before, oldest first, shape (m,).
-    sample_time_s
-        Its period [s].
-    measured_hz, measured_gain
-        Shape (m,): the response of the last samples without a model, where it is known; empty before there are enough.
-    """
-
-    frequency_hz: FloatArray
-    gain: FloatArray
-    poles: ComplexArray
-    zeros: ComplexArray
-    trail: ComplexArray
-    sample_time_s: float
-    measured_hz: FloatArray = field(default_factory=lambda: np.empty(0))
-    measured_gain: FloatArray = field(default_factory=lambda: np.empty(0))
+    frequency_hz: FloatArray  # shape (n,)
+    gain: FloatArray  # shape (n,)
+    poles: ComplexArray  # in z
+    zeros: ComplexArray  # in z
+    trail: ComplexArray  # poles of models before, oldest first, shape (m,)
+    sample_time_s: float  # its period [s]
+    measured_hz: FloatArray = field(default_factory=lambda: np.empty(0))  # shape (m,)
+    measured_gain: FloatArray = field(default_factory=lambda: np.empty(0))  # shape (m,)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Estimation:
-    """What the on-line chain says; None and NaN where it says nothing yet.
+    """What the on-line chain says; None and NaN where it says nothing yet."""
 
-    Attributes
-    ----------
-    status
-        The estimator's own word, and why.
-    live
-        Whether samples come in: else the figures are of the last run.
-    state
-        What the tracking is doing; None before the first estimate.
-    """
-
-    status: str
-    live: bool
+    status: str  # the estimator's own word, and why
+    live: bool  # whether samples come in
     resonance_hz: float
     resonance_std_hz: float
     damping: float
@@ -291,7 +216,7 @@ class Estimation:
     history: History
     model: Model | None
     alarms: tuple[Alarm, ...]
-    state: TrackingState | None = None
+    state: TrackingState | None = None  # what the tracking is doing
 
 
 @dataclass(frozen=True, slots=True, eq=False)

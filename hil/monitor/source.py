@@ -67,11 +67,6 @@ class RigSource:
     """A rig in a process of its own, from `__enter__` to `__exit__`.
 
     The rig's process is never killed from here: it is what takes the torque away.
-
-    Parameters
-    ----------
-    job
-        What the process is for.
     """
 
     can_drive = True
@@ -142,21 +137,7 @@ OPTIONAL = (columns.REFERENCE, "prbs_nm", columns.FLAGS)
 
 
 class ReplaySource:
-    """Plays samples; `poll` gives those that are due.
-
-    Parameters
-    ----------
-    name
-        Of the recording, for the screen.
-    samples
-        In order of time; ``time_s`` says when each is due.
-    speed
-        Multiple of the pace at which they were recorded.
-    measured
-        Whether a sample is of the measured part, and so for the estimate.
-    clock_ns
-        Monotonic clock [ns].
-    """
+    """Plays samples; `poll` gives those that are due."""
 
     can_drive = False
 

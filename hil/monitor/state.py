@@ -50,25 +50,7 @@ NS_PER_S = 1_000_000_000
 
 
 class LiveState:
-    """Takes reports, gives snapshots.
-
-    Parameters
-    ----------
-    rig
-        Name for the screen.
-    period_s
-        Time between two samples [s].
-    shaft
-        Two-mass model for the twist; None for no twist.
-    can_drive
-        Whether there is a rig that takes orders.
-    is_ready
-        Whether the estimator may be used already.
-    setup
-        What estimates.
-    channel_units
-        Column and unit of each further channel of its samples.
-    """
+    """Takes reports, gives snapshots."""
 
     def __init__(
         self,

@@ -56,22 +56,7 @@ def is_fmu(path: Path) -> bool:
 
 
 class FmuPlant:
-    """The model in an FMU.
-
-    Parameters
-    ----------
-    path : Path
-        The FMU.
-    mapped : sequence of str
-        What ``--map`` gives (``names``).
-    trusted : bool
-        Whether its code may run.
-
-    Raises
-    ------
-    UsageError
-        If it is not trusted, no FMU, or does not have the variables; or without FMPy.
-    """
+    """The model in an FMU."""
 
     motion = Motion.ROTATION
 

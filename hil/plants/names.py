@@ -13,23 +13,11 @@ KEYS = ("torque", "output", "load", "start")
 
 @dataclass(frozen=True, slots=True)
 class Names:
-    """Names of an FMU's variables.
+    """Names of an FMU's variables."""
 
-    Attributes
-    ----------
-    torque : tuple of str
-        Inputs, in the order of the recording's torques; a single one takes their sum.
-    output : str
-        What is held against the measured output.
-    load : str
-        Input or parameter that takes a constant load torque, to be estimated; "" for none.
-    start : tuple of str
-        Parameters of the initial state, to be estimated.
-    """
-
-    torque: tuple[str, ...] = ("T_M1", "T_M2")
-    output: str = "speed_measured"
-    load: str = "T_load"
+    torque: tuple[str, ...] = ("T_M1", "T_M2")  # inputs, in the order of the recording's torques
+    output: str = "speed_measured"  # what is held against the measured output
+    load: str = "T_load"  # input or parameter that takes a constant load torque, to be estimated
     start: tuple[str, ...] = ("start.speed", "start.twist", "start.load_speed")
 
 

@@ -31,13 +31,7 @@ class Plant(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class ModelPlant:
-    """The model of a model file.
-
-    Attributes
-    ----------
-    events : mapping
-        By the name of a recording, what is known of the moments of its events.
-    """
+    """The model of a model file."""
 
     name: str
     model: DrivelineModel

@@ -20,23 +20,13 @@ from hil.recording.signals import Tell
 
 @dataclass(frozen=True, slots=True)
 class Asked:
-    """What was given on the command line.
-
-    Attributes
-    ----------
-    signals : Path or None
-        File with the ``[signals]`` that recordings are read by; a model file has its own.
-    mapped : sequence of str
-        Variables of an FMU (``names``).
-    budget_s : float or None
-        Time that an FMU's first simulations may take, too [s].
-    """
+    """What was given on the command line."""
 
     model: Path
-    signals: Path | None
-    mapped: Sequence[str]
+    signals: Path | None  # file with the ``[signals]`` that recordings are read by
+    mapped: Sequence[str]  # variables of an FMU (``names``)
     trust: Trust
-    budget_s: float | None = None
+    budget_s: float | None = None  # time that an FMU's first simulations may take, too [s]
 
 
 def questioned(

@@ -83,21 +83,12 @@ def _comparison(what: str, true: float, entry: Json) -> Comparison:
 
 @dataclass(frozen=True, slots=True)
 class Judgement:
-    """What became of one verdict.
-
-    Attributes
-    ----------
-    outcome : Outcome
-    hidden, named : tuple of str
-        Effects that were there, and that were named.
-    sizes : tuple of Comparison
-        The hidden sizes that can be compared, then the nominal model's parameters.
-    """
+    """What became of one verdict."""
 
     outcome: Outcome
-    hidden: tuple[str, ...]
-    named: tuple[str, ...]
-    sizes: tuple[Comparison, ...]
+    hidden: tuple[str, ...]  # effects that were there, and that were named
+    named: tuple[str, ...]  # effects that were there, and that were named
+    sizes: tuple[Comparison, ...]  # the hidden sizes that can be compared, then the nominal model's parameters
 
 
 def judge(diagnosis: Json, truth: Json) -> Judgement:

@@ -63,23 +63,12 @@ records it. Left out are those that no recording of torque and speed tells from 
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """One row of a campaign.
+    """One row of a campaign."""
 
-    Attributes
-    ----------
-    name : str
-        ``none``, ``off``, an effect, or a pair.
-    group : Group
-    effect : str
-        What is hidden, as the truth simulator calls it.
-    nominal_error : float
-        Share by which the nominal values are off at most.
-    """
-
-    name: str
+    name: str  # ``none``, ``off``, an effect, or a pair
     group: Group
-    effect: str
-    nominal_error: float = NOMINAL_ERROR
+    effect: str  # what is hidden, as the truth simulator calls it
+    nominal_error: float = NOMINAL_ERROR  # share by which the nominal values are off at most
 
 
 def _singles(catalogued: bool) -> list[str]:

@@ -44,25 +44,15 @@ Json = dict[str, Any]
 
 @dataclass(frozen=True, slots=True)
 class Agreement:
-    """One known value besides what was found.
-
-    Attributes
-    ----------
-    found, ci95
-        None where the verdict does not have it.
-    inside
-        Whether the 95 % interval holds the known value; None where there is no interval.
-    within
-        Whether it agrees as closely as the truth file asks, and ``asked`` what that is.
-    """
+    """One known value besides what was found."""
 
     what: str
     unit: str
     truth: float
-    found: float | None
-    ci95: tuple[float, float] | None
-    inside: bool | None
-    within: bool
+    found: float | None  # none where the verdict does not have it
+    ci95: tuple[float, float] | None  # none where the verdict does not have it
+    inside: bool | None  # whether the 95 % interval holds the known value
+    within: bool  # whether it agrees as closely as the truth file asks, and ``asked`` what that is
     asked: str
 
 

@@ -80,22 +80,14 @@ class RunEntry(Table):
 
 
 class CaseFile(Table):
-    """Everything about a case but the truth.
-
-    Attributes
-    ----------
-    concealed
-        Names of the catalogue that the verdict should hold; none where nothing is missing.
-    shown, withheld
-        Channels the tool gets, and those that would tell what is concealed. Only what is shown is written.
-    """
+    """Everything about a case but the truth."""
 
     schema_: Literal["hil.real-case/1"] = Field(alias="schema")
     title: Text
-    concealed: list[Text]
+    concealed: list[Text]  # names of the catalogue that the verdict should hold
     conceals: Text
     shown: Annotated[list[Text], Field(min_length=1)]
-    withheld: list[Text]
+    withheld: list[Text]  # channels the tool gets, and those that would tell what is concealed
     format: FormatHints = FormatHints()
     recordings: Annotated[dict[Name, RecordingEntry], Field(min_length=1)]
     runs: Annotated[list[RunEntry], Field(min_length=1)]
@@ -122,21 +114,13 @@ class CaseFile(Table):
 
 
 class KnownValue(Table):
-    """A quantity that somebody else has measured or identified.
-
-    Attributes
-    ----------
-    found
-        Where ``diagnosis.json`` has it: ``parameters.J_M``, ``effects.backlash.gap_rad``, ``load_torque``.
-    within
-        Relative difference up to which the two agree.
-    """
+    """A quantity that somebody else has measured or identified."""
 
     what: Text
     found: Annotated[str, Field(pattern=r"^(parameters\.\w+|effects\.\w+\.\w+|load_torque)$")]
     value: float
     unit: Text
-    within: Positive
+    within: Positive  # relative difference up to which the two agree
 
 
 class TruthFile(Table):

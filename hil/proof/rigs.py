@@ -41,27 +41,13 @@ LIMIT_S = 600.0
 
 @dataclass(frozen=True, slots=True)
 class Concealed:
-    """One rig.
+    """One rig."""
 
-    Attributes
-    ----------
-    where : str
-        In words, for the scoreboard.
-    effect : str
-        In the driveline, its sensor or its torque path: an effect of the truth simulator.
-    faults : tuple of str
-        In the devices, as ``hil sim --fault`` takes them.
-    truth : mapping
-        What the faults are to a diagnosis; it replaces entries of the truth.
-    refused : str
-        Word that must stand in the reason for which the tool refuses to drive; empty where it should drive.
-    """
-
-    where: str
-    effect: str = "none"
-    faults: tuple[str, ...] = ()
-    truth: Mapping[str, Any] = field(default_factory=dict)
-    refused: str = ""
+    where: str  # in words, for the scoreboard
+    effect: str = "none"  # in the driveline, its sensor or its torque path
+    faults: tuple[str, ...] = ()  # in the devices, as ``hil sim --fault`` takes them
+    truth: Mapping[str, Any] = field(default_factory=dict)  # what the faults are to a diagnosis
+    refused: str = ""  # word that must stand in the reason for which the tool refuses to drive
 
 
 STALE_SHARE: Final = 0.1
@@ -101,17 +87,11 @@ _END_S = 5.0
 
 @dataclass(frozen=True, slots=True)
 class SealedProcess:
-    """A sealed rig that is up.
+    """A sealed rig that is up."""
 
-    Attributes
-    ----------
-    bus, modbus, commitment : str
-        As in its ready line.
-    """
-
-    bus: str
-    modbus: str
-    commitment: str
+    bus: str  # as in its ready line
+    modbus: str  # as in its ready line
+    commitment: str  # as in its ready line
     _pipes: _Pipes
 
     def open(self) -> object:

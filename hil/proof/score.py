@@ -33,24 +33,12 @@ RECORDING_S = 30.0
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """What the command made of a case.
+    """What the command made of a case."""
 
-    Attributes
-    ----------
-    diagnosis : mapping or None
-        Content of ``diagnosis.json``; None where there is none.
-    fresh_over_floor : sequence of float
-        Free-run RMS error of the augmented model on each fresh recording, over the noise of the speed reading.
-    diagnose_s : float
-        Time taken [s], start of the process included.
-    fault : str or None
-        Why a command did not do its job.
-    """
-
-    diagnosis: Json | None
+    diagnosis: Json | None  # content of ``diagnosis.json``
     fresh_over_floor: Sequence[float] = ()
-    diagnose_s: float = 0.0
-    fault: str | None = None
+    diagnose_s: float = 0.0  # time taken [s], start of the process included
+    fault: str | None = None  # why a command did not do its job
 
 
 def score(kind: Kind, seed: int, truth: Json, answer: Answer) -> dict[str, Any]:

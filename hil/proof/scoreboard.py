@@ -47,24 +47,12 @@ AGREEMENTS = ("besides what is known", "found", "known", "95 % interval", "asked
 
 @dataclass(frozen=True, slots=True)
 class Board:
-    """Everything the scoreboard shows.
+    """Everything the scoreboard shows."""
 
-    Attributes
-    ----------
-    sealed
-        Rows of `hil.proof.answers.judge_set`.
-    wire
-        Rows of `hil.proof.rigs.run_wire`.
-    real
-        Cases of ``real.json`` (`hil.proof.real`).
-    made
-        Model files and recordings of the sealed cases.
-    """
-
-    sealed: Sequence[Row]
-    wire: Sequence[Row] = ()
-    real: Sequence[Mapping[str, Any]] = ()
-    made: Provenance | None = None
+    sealed: Sequence[Row]  # rows of `hil.proof.answers.judge_set`
+    wire: Sequence[Row] = ()  # rows of `hil.proof.rigs.run_wire`
+    real: Sequence[Mapping[str, Any]] = ()  # cases of ``real.json`` (`hil.proof.real`)
+    made: Provenance | None = None  # model files and recordings of the sealed cases
 
 
 def scoreboard_files(board: Board) -> dict[str, Callable[[Path], object]]:

@@ -58,18 +58,10 @@ def _digests(nonce: str, truth: Truth) -> dict[str, str]:
 
 @dataclass(frozen=True, slots=True)
 class Seal:
-    """A truth and the nonce that hides it.
+    """A truth and the nonce that hides it."""
 
-    Attributes
-    ----------
-    nonce : str
-        Random, 64 hexadecimal digits; secret until the seal is opened.
-    truth : mapping
-        What is sealed; JSON types only.
-    """
-
-    nonce: str
-    truth: Truth
+    nonce: str  # random, 64 hexadecimal digits
+    truth: Truth  # what is sealed
 
     @property
     def commitment(self) -> str:

@@ -15,35 +15,17 @@ from hil.recording.table import Column, is_column
 
 
 class FormatHints(BaseModel):
-    """How a text recording is written; what is left out is recognised.
-
-    Attributes
-    ----------
-    delimiter : str
-        One character between cells; empty to recognise it, a blank for any number of blanks.
-    decimal : str
-        Decimal mark; empty to recognise it.
-    encoding : str
-        Name of the text encoding, as Python knows it; a byte order mark is recognised in any case.
-    header_line : int, optional
-        Line of the column names, from 1; 0 where there is none: the columns are called 1, 2, 3 and so on.
-    units_line : int, optional
-        Line of the units, from 1; 0 where there is none.
-    skip_lines : int
-        Lines at the beginning that are not looked at.
-    comment : str
-        What a line that is no row begins with; empty to recognise it, where the header line is not set.
-    """
+    """How a text recording is written; what is left out is recognised."""
 
     model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
 
-    delimiter: str = Field(default="", max_length=1)
-    decimal: Literal["", ".", ","] = ""
-    encoding: str = "utf-8"
-    header_line: int | None = Field(default=None, ge=0)
-    units_line: int | None = Field(default=None, ge=0)
-    skip_lines: int = Field(default=0, ge=0)
-    comment: str = Field(default="", max_length=8)
+    delimiter: str = Field(default="", max_length=1)  # one character between cells
+    decimal: Literal["", ".", ","] = ""  # decimal mark
+    encoding: str = "utf-8"  # name of the text encoding, as Python knows it
+    header_line: int | None = Field(default=None, ge=0)  # line of the column names, from 1; 0 where there is none
+    units_line: int | None = Field(default=None, ge=0)  # line of the units, from 1; 0 where there is none
+    skip_lines: int = Field(default=0, ge=0)  # lines at the beginning that are not looked at
+    comment: str = Field(default="", max_length=8)  # what a line that is no row begins with
 
     @field_validator("delimiter")
     @classmethod

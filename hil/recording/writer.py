@@ -87,15 +87,7 @@ class Unbuffered(Protocol):
 
 
 class WritingThread:
-    """Writes lines in their order, all that wait at once, from its making to `finish`.
-
-    Parameters
-    ----------
-    file
-        Where to; its maker closes it, unless `finish` gives up. Nothing is written after an OSError.
-    capacity
-        Lines that may wait, those that are being written included.
-    """
+    """Writes lines in their order, all that wait at once, from its making to `finish`."""
 
     def __init__(self, file: Unbuffered, capacity: int) -> None:
         self._file = file

@@ -33,41 +33,20 @@ SCHEMA = "hil.compare/1"
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """One output of a recording, its simulation by one model, and how far they differ.
+    """One output of a recording, its simulation by one model, and how far they differ."""
 
-    Attributes
-    ----------
-    model : str
-        Name of the model.
-    record : Record
-        The recording; of a further output with that alone (``Record.label``).
-    simulated : ndarray, shape (N,)
-        In ``unit``.
-    rms, largest : float
-        Of the error over the samples that count.
-    load_torque : float
-        Constant load torque that was estimated [Nm; translation N]; NaN where the model has none.
-    fit_percent : float
-        100 (1 - norm of the error / norm of the output without its mean), the NRMSE fit: 100 is perfect, 0 is
-        no better than a constant. NaN for an output that does not move.
-    past_input, itself : CorrelationTest
-        Of the error with the past torque, which a complete model leaves none of, and with its own past.
-    further : tuple of Comparison
-        Those of the recording's further outputs that the model simulates.
-    """
-
-    model: str
+    model: str  # name of the model
     motion: Motion
-    record: Record
-    simulated: FloatArray
+    record: Record  # the recording
+    simulated: FloatArray  # (N,): In ``unit``
     unit: str
-    rms: float
-    largest: float
-    load_torque: float
-    fit_percent: float
+    rms: float  # of the error over the samples that count
+    largest: float  # of the error over the samples that count
+    load_torque: float  # constant load torque that was estimated [Nm
+    fit_percent: float  # 100 (1 - norm of the error / norm of the output without its mean), the NRMSE fit
     past_input: CorrelationTest
     itself: CorrelationTest
-    further: tuple[Comparison, ...] = ()
+    further: tuple[Comparison, ...] = ()  # those of the recording's further outputs that the model simulates
 
     @property
     def outputs(self) -> tuple[Comparison, ...]:

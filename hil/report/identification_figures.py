@@ -37,31 +37,15 @@ MARGIN = 1.25
 
 @dataclass(frozen=True, slots=True)
 class PoleSet:
-    """Poles and zeros of one model.
+    """Poles and zeros of one model."""
 
-    Attributes
-    ----------
-    name
-        In the legend.
-    poles, zeros
-        In z.
-    colour
-        As ``#rrggbb``.
-    regions
-        Outlines of 95 % confidence regions, each of shape (K, 2).
-    reference
-        True for one that was not identified but is known: drawn larger and under the others.
-    hidden
-        Waits in the legend.
-    """
-
-    name: str
-    poles: ComplexArray
-    zeros: ComplexArray
-    colour: str
-    regions: tuple[FloatArray, ...] = ()
-    reference: bool = False
-    hidden: bool = False
+    name: str  # in the legend
+    poles: ComplexArray  # in z
+    zeros: ComplexArray  # in z
+    colour: str  # as ``#rrggbb``
+    regions: tuple[FloatArray, ...] = ()  # outlines of 95 % confidence regions, each of shape (K, 2)
+    reference: bool = False  # true for one that was not identified but is known
+    hidden: bool = False  # waits in the legend
 
 
 def pole_figure(name: str, sets: Sequence[PoleSet], sample_time_s: float) -> Figure:

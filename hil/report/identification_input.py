@@ -119,21 +119,11 @@ def read_identification(path: Path) -> IdentificationFile:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Identified:
-    """A recording that was identified, as an estimator needs it.
+    """A recording that was identified, as an estimator needs it."""
 
-    Attributes
-    ----------
-    name : str
-        Of the recording.
-    settings : Settings
-        Orders, delay, period and high-pass it was identified with.
-    L : ndarray, shape (m,)
-        Observation filter's denominator.
-    """
-
-    name: str
-    settings: Settings
-    L: FloatArray
+    name: str  # of the recording
+    settings: Settings  # orders, delay, period and high-pass it was identified with
+    L: FloatArray  # (m,): Observation filter's denominator
 
 
 def identified(path: Path, run: str | None, adaptation: Adaptation, option: str = "--run") -> Identified:

@@ -15,21 +15,7 @@ from hil.rig.stop import StopRequest
 
 
 class ArmedDrives:
-    """Context manager: arm both drives, disarm both.
-
-    Parameters
-    ----------
-    devices
-        The opened rig, its inverters configured.
-    stop
-        Looked at before each drive is armed.
-
-    Raises
-    ------
-    RunAborted
-        On exit, if a drive could not be confirmed disarmed; in place of the error that ended the block,
-        which it names.
-    """
+    """Context manager: arm both drives, disarm both."""
 
     __slots__ = ("_devices", "_stop")
 

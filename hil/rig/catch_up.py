@@ -9,13 +9,7 @@ from __future__ import annotations
 
 
 class CatchUp:
-    """Base torque of both inverters together, cycle by cycle.
-
-    Parameters
-    ----------
-    most_nm
-        Largest change within one cycle [Nm].
-    """
+    """Base torque of both inverters together, cycle by cycle."""
 
     __slots__ = ("_behind", "_cycle", "_held_nm", "_most_nm")
 

@@ -20,19 +20,7 @@ from hil.rig.plc_loop import PlcLoop
 
 
 class Channels:
-    """What is read in addition to torque and speed.
-
-    Parameters
-    ----------
-    tables
-        The channels of the rig file, in the order of the recording.
-    register_map
-        The PLC's.
-    inverters
-        By their names; each reads the objects of its channels in the order of the rig file.
-    loop, plc
-        Where the PLC's client runs, and the client.
-    """
+    """What is read in addition to torque and speed."""
 
     __slots__ = ("_factors", "_from_plc", "_inverters", "_loop", "_plc", "_poll", "_registers", "_sources")
 

@@ -49,64 +49,28 @@ class Verdict(Enum):
 
 @dataclass(frozen=True, slots=True)
 class ChannelReading:
-    """What a channel reads.
+    """What a channel reads."""
 
-    Attributes
-    ----------
-    channel
-        As the rig file has it.
-    value
-        In SI units; None where its register could not be read.
-    """
-
-    channel: ChannelTable
-    value: float | None
+    channel: ChannelTable  # as the rig file has it
+    value: float | None  # in SI units
 
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One device.
+    """One device."""
 
-    Attributes
-    ----------
-    device
-        Its name in the rig file.
-    address
-        Where it was looked for.
-    verdict
-        What came of it.
-    differences
-        What does not agree; empty unless it differs.
-    notes
-        Why it failed, or what would keep it from a run at present.
-    remarks
-        What a run will set by itself, and what the drive keeps of its own.
-    commissioned
-        Where DCF, device and rig file are not of one mind.
-    protections
-        What stands between a dead host and torque.
-    registers
-        What the registers of a PLC hold.
-    channels
-        What the further channels of the rig file read at this device.
-    max_speed_rad_s
-        The largest speed that a drive gives for itself [rad/s], where it does.
-    questions
-        What only someone who knows the vehicle can confirm.
-    """
-
-    device: str
-    address: str
-    verdict: Verdict
-    differences: tuple[Difference, ...] = ()
-    notes: tuple[str, ...] = ()
-    remarks: tuple[str, ...] = ()
-    commissioned: tuple[CommissionedValue, ...] = ()
-    protections: tuple[Protection, ...] = ()
-    registers: tuple[Reading, ...] = ()
-    channels: tuple[ChannelReading, ...] = ()
-    max_speed_rad_s: float | None = None
-    questions: tuple[str, ...] = ()
+    device: str  # its name in the rig file
+    address: str  # where it was looked for
+    verdict: Verdict  # what came of it
+    differences: tuple[Difference, ...] = ()  # what does not agree
+    notes: tuple[str, ...] = ()  # why it failed, or what would keep it from a run at present
+    remarks: tuple[str, ...] = ()  # what a run will set by itself, and what the drive keeps of its own
+    commissioned: tuple[CommissionedValue, ...] = ()  # where DCF, device and rig file are not of one mind
+    protections: tuple[Protection, ...] = ()  # what stands between a dead host and torque
+    registers: tuple[Reading, ...] = ()  # what the registers of a PLC hold
+    channels: tuple[ChannelReading, ...] = ()  # what the further channels of the rig file read at this device
+    max_speed_rad_s: float | None = None  # the largest speed that a drive gives for itself [rad/s], where it does
+    questions: tuple[str, ...] = ()  # what only someone who knows the vehicle can confirm
 
 
 def check_rig(rig: Rig, prove_stop: bool = False) -> tuple[Finding, ...]:

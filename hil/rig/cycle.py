@@ -49,27 +49,7 @@ _DOUBTS = {
 
 
 class Cycle:
-    """Everything that happens between two SYNC.
-
-    Parameters
-    ----------
-    link
-        The bus both inverters are on.
-    m1, m2
-        The inverters, configured. The resolver is read through m1.
-    guard
-        What every request has to pass.
-    period_ns
-        Time between two cycles [ns].
-    answer_timeout_s
-        How long the inverters may take to answer a SYNC [s].
-    timing
-        Takes note of when cycles begin and answers come; a new one by default.
-    channels
-        What else is read; nothing by default.
-    inertia_kg_m2
-        Vehicle and driveline at the motor shaft, as well as it is known; None if it is not [kg m²].
-    """
+    """Everything that happens between two SYNC."""
 
     __slots__ = ("_answer_timeout_ns", "_channels", "_guard", "_link", "_m1", "_m2", "_supervision", "timing")
 

@@ -50,64 +50,28 @@ beginning of the next cycle has to wait for what it takes of time; an error it r
 
 @dataclass(slots=True)
 class RunSummary:
-    """What a run came to.
+    """What a run came to."""
 
-    Attributes
-    ----------
-    cycles
-        Cycles driven, all phases.
-    recorded
-        Samples recorded.
-    flagged
-        Recorded samples that are not good.
-    most_late_ns
-        Latest beginning of a cycle [ns].
-    timing
-        When cycles began and answers came.
-    """
-
-    timing: RunTiming
-    cycles: int = 0
-    recorded: int = 0
-    flagged: int = 0
-    most_late_ns: int = 0
+    timing: RunTiming  # when cycles began and answers came
+    cycles: int = 0  # cycles driven, all phases
+    recorded: int = 0  # samples recorded
+    flagged: int = 0  # recorded samples that are not good
+    most_late_ns: int = 0  # latest beginning of a cycle [ns]
 
 
 @dataclass(slots=True)
 class Drive:
-    """One experiment, cycle by cycle.
+    """One experiment, cycle by cycle."""
 
-    Attributes
-    ----------
-    plan
-        What to do; used up by the run.
-    cycle
-        One exchange with both inverters.
-    watch
-        The PLC's permission.
-    prbs
-        The PLC's own generator, switched with the phases.
-    pacer
-        When each cycle begins.
-    recorder
-        Where samples go.
-    stop
-        Ends the run at the next cycle when requested.
-    progress
-        Called with every cycle.
-    observers
-        Given every sample.
-    """
-
-    plan: Plan
-    cycle: Cycle
-    watch: PlcWatch
-    prbs: PlcPrbs
-    pacer: Pacer
-    recorder: Recorder
-    stop: StopRequest
-    progress: Progress
-    observers: Sequence[Observer] = ()
+    plan: Plan  # what to do
+    cycle: Cycle  # one exchange with both inverters
+    watch: PlcWatch  # the PLC's permission
+    prbs: PlcPrbs  # the PLC's own generator, switched with the phases
+    pacer: Pacer  # when each cycle begins
+    recorder: Recorder  # where samples go
+    stop: StopRequest  # ends the run at the next cycle when requested
+    progress: Progress  # called with every cycle
+    observers: Sequence[Observer] = ()  # given every sample
     _summary: RunSummary = field(init=False)
     _catch_up: CatchUp = field(init=False)
     _phase: Phase = Phase.APPROACH

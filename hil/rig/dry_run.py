@@ -42,31 +42,15 @@ class Range:
 
 @dataclass(slots=True)
 class Prediction:
-    """What to expect of a run.
+    """What to expect of a run."""
 
-    Attributes
-    ----------
-    vehicle
-        The model the prediction is made with.
-    period_s
-        Time between two cycles [s].
-    cycles, measured
-        Cycles of the whole run and of its recorded part.
-    torque_nm
-        Range of the base torque of both inverters [Nm].
-    torque_m1_nm, torque_m2_nm
-        Range of each inverter's torque, PRBS included [Nm].
-    speed_rad_s, speed_measured_rad_s
-        Range of the speed over the whole run and over its recorded part [rad/s].
-    """
-
-    vehicle: RigidVehicle
-    period_s: float
-    cycles: int = 0
-    measured: int = 0
-    torque_nm: Range = field(default_factory=Range)
-    torque_m1_nm: Range = field(default_factory=Range)
-    torque_m2_nm: Range = field(default_factory=Range)
+    vehicle: RigidVehicle  # the model the prediction is made with
+    period_s: float  # time between two cycles [s]
+    cycles: int = 0  # cycles of the whole run and of its recorded part
+    measured: int = 0  # cycles of the whole run and of its recorded part
+    torque_nm: Range = field(default_factory=Range)  # range of the base torque of both inverters [Nm]
+    torque_m1_nm: Range = field(default_factory=Range)  # range of each inverter's torque, PRBS included [Nm]
+    torque_m2_nm: Range = field(default_factory=Range)  # range of each inverter's torque, PRBS included [Nm]
     speed_rad_s: Range = field(default_factory=Range)
     speed_measured_rad_s: Range = field(default_factory=Range)
 

@@ -77,25 +77,7 @@ def guarded_prbs(limits: GuardLimits, split: Split, amplitude_nm: float) -> tupl
 
 
 class PlcPrbs:
-    """The generator in one run; a context manager that leaves it off.
-
-    Parameters
-    ----------
-    loop
-        Where the PLC's client runs.
-    plc
-        The client, connected.
-    order
-        What to run in the measured part; None where the host makes the PRBS.
-    patience_s
-        How long a cycle may wait for the PLC [s]; 0 on a wall clock.
-
-    Raises
-    ------
-    RunAborted
-        On exit, if the generator was ordered and can't be confirmed off, or somebody else has set it and it was its
-        torque that ended the block; in place of the error that ended the block, which it names.
-    """
+    """The generator in one run; a context manager that leaves it off."""
 
     def __init__(self, loop: PlcLoop, plc: Plc, order: PlcPrbsOrder | None, patience_s: float) -> None:
         self._loop = loop

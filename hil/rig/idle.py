@@ -65,13 +65,6 @@ class PlcPoll:
     """Asks for the PLC's status ten times a second while nothing depends on it, and connects again after a loss.
 
     The status itself is the client's `Plc.latest`; ``trouble`` says what keeps the next from coming.
-
-    Parameters
-    ----------
-    loop
-        Where the PLC's client runs.
-    plc
-        The client, connected.
     """
 
     def __init__(self, loop: PlcLoop, plc: Plc) -> None:
@@ -113,17 +106,7 @@ class PlcPoll:
 
 
 class Listening:
-    """The rig at rest, cycle by cycle.
-
-    Parameters
-    ----------
-    devices
-        The rig, opened.
-    pacer
-        When each cycle begins.
-    timing
-        Takes note of when cycles begin and answers come.
-    """
+    """The rig at rest, cycle by cycle."""
 
     def __init__(self, devices: Devices, pacer: Pacer, timing: RunTiming) -> None:
         self._link = devices.link

@@ -72,13 +72,7 @@ class _Held:
 
 
 class LiveEstimate:
-    """Estimates from the samples of the measured part; an `Observer`.
-
-    Parameters
-    ----------
-    chain
-        The on-line chain, for the samples' period.
-    """
+    """Estimates from the samples of the measured part; an `Observer`."""
 
     def __init__(self, chain: OnlineChain) -> None:
         self.course = Course(chain)
@@ -115,19 +109,11 @@ OnCourse = Callable[[Course, float], None]
 
 @dataclass(frozen=True, slots=True)
 class Pace:
-    """How fast to play.
+    """How fast to play."""
 
-    Attributes
-    ----------
-    speed
-        Multiple of real time; None: as fast as it goes.
-    clock, sleep
-        The wall clock [s], and how to wait.
-    """
-
-    speed: float | None = None
-    clock: Callable[[], float] = time.monotonic
-    sleep: Callable[[float], None] = time.sleep
+    speed: float | None = None  # multiple of real time
+    clock: Callable[[], float] = time.monotonic  # the wall clock [s], and how to wait
+    sleep: Callable[[float], None] = time.sleep  # the wall clock [s], and how to wait
 
     def block_samples(self, sample_time_s: float) -> int:
         """Return how many samples to take at once."""

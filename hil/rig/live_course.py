@@ -34,13 +34,7 @@ def course_path(recording: Path) -> Path:
 
 
 class Course:
-    """What a chain said, sample by sample.
-
-    Parameters
-    ----------
-    chain
-        The chain; its settings stand in the file.
-    """
+    """What a chain said, sample by sample."""
 
     def __init__(self, chain: OnlineChain) -> None:
         self.samples = 0

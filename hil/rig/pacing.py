@@ -92,20 +92,7 @@ def device_patience_s(pacer: Pacer) -> float:
 
 
 class RealTimePacer:
-    """An absolute schedule on the monotonic clock: a late cycle does not delay those after it.
-
-    Parameters
-    ----------
-    period_ns
-        Time between two cycles [ns].
-
-    Notes
-    -----
-    When a cycle is late by more than half a period (a busy machine, a debugger), the cycles it ran into are
-    left out of the schedule and not caught up, so that two SYNC are never closer than half a period. The
-    numbers of the cycles left out are missing from the ticks; the cycle's caller records them as flagged
-    samples.
-    """
+    """An absolute schedule on the monotonic clock: a late cycle does not delay those after it."""
 
     __slots__ = ("_due_ns", "_next_cycle", "_period_ns")
 
@@ -145,16 +132,7 @@ class RealTimePacer:
 
 
 class FreePacer:
-    """No waiting: simulated time, one period per cycle, however long the answers take.
-
-    Parameters
-    ----------
-    period_ns
-        Time between two cycles [ns].
-    answer_timeout_s
-        Patience with a device [s of the wall clock]. Simulated time stands still meanwhile, so that it only
-        decides how soon a dead device is noticed, not what a run looks like.
-    """
+    """No waiting: simulated time, one period per cycle, however long the answers take."""
 
     __slots__ = ("_answer_timeout_s", "_cycle", "_period_ns")
 

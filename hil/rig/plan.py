@@ -34,30 +34,15 @@ class NoPrbs:
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """What a run is made of. Experiment and PRBS have a state: a plan is for one run.
+    """What a run is made of. Experiment and PRBS have a state: a plan is for one run."""
 
-    Attributes
-    ----------
-    name, period_s, experiment
-        Which experiment, and the time between two cycles [s].
-    prbs
-        The PRBS as the host makes it; where the PLC does, one of the same amplitude to predict with; none where the
-        experiment has none.
-    plc_prbs
-        What the PLC's own generator is sent; None where the host makes the PRBS.
-    split
-        Shares of the two inverters.
-    needs
-        What the run needs of the vehicle.
-    """
-
-    name: str
-    period_s: float
-    experiment: Experiment
-    prbs: Levels
-    plc_prbs: PlcPrbsOrder | None
-    split: Split
-    needs: Needs
+    name: str  # which experiment, and the time between two cycles [s]
+    period_s: float  # which experiment, and the time between two cycles [s]
+    experiment: Experiment  # which experiment, and the time between two cycles [s]
+    prbs: Levels  # the PRBS as the host makes it
+    plc_prbs: PlcPrbsOrder | None  # what the PLC's own generator is sent
+    split: Split  # shares of the two inverters
+    needs: Needs  # what the run needs of the vehicle
 
     def prbs_nm(self, phase: Phase) -> float:
         """Next level of the PRBS the host sends [Nm]; it runs in the measured part only, and is zero outside it."""

@@ -58,15 +58,7 @@ async def _cancel_rest() -> None:
 
 
 class HostBeat:
-    """Beats from `__enter__` until `hand_over`, or the end of the block.
-
-    Parameters
-    ----------
-    loop
-        Where the PLC's client runs.
-    plc
-        The client, connected.
-    """
+    """Beats from `__enter__` until `hand_over`, or the end of the block."""
 
     __slots__ = ("_beating", "_loop", "_on", "_plc")
 

@@ -73,21 +73,7 @@ SILENT_AFTER_NS = NS_PER_S
 
 
 class PlcWatch:
-    """The PLC's life signs and its permission to drive, looked at in every cycle.
-
-    Parameters
-    ----------
-    loop
-        Where the PLC's client runs.
-    plc
-        The client, connected.
-    before
-        What the PLC reported when the run was prepared; it was fit for `needs`.
-    needs
-        What the run needs of the vehicle.
-    patience_s
-        How long a cycle may wait for a poll [s]; 0 on a wall clock.
-    """
+    """The PLC's life signs and its permission to drive, looked at in every cycle."""
 
     def __init__(self, loop: PlcLoop, plc: Plc, before: PlcStatus, needs: Needs, patience_s: float) -> None:
         self._loop = loop
@@ -169,25 +155,13 @@ RPM: Final = 2.0 * math.pi / 60.0
 
 @dataclass(frozen=True, slots=True)
 class PlcLimit:
-    """One limit that the PLC reports.
+    """One limit that the PLC reports."""
 
-    Attributes
-    ----------
-    what
-        Its name.
-    question
-        It and what it is to be compared with, in words.
-    found, most
-        It, and the largest that is believed, with their unit; ``most`` is None where the drives say nothing of it.
-    believed
-        Whether it is within that.
-    """
-
-    what: str
-    question: str
-    found: str
-    most: str | None
-    believed: bool
+    what: str  # its name
+    question: str  # it and what it is to be compared with, in words
+    found: str  # it, and the largest that is believed, with their unit
+    most: str | None  # it, and the largest that is believed, with their unit
+    believed: bool  # whether it is within that
 
 
 def max_speed_rad_s(inverter: Inverter) -> float | None:

@@ -79,32 +79,16 @@ QUANTILES = (("p50", 0.5), ("p99", 0.99), ("p99.9", 0.999))
 
 @dataclass(slots=True)
 class RunTiming:
-    """The timing record of one run.
+    """The timing record of one run."""
 
-    Attributes
-    ----------
-    period_ns
-        What the period should be [ns].
-    period, lateness, reply_age
-        Histograms of the times above [ns].
-    cycles
-        Cycles that took place.
-    missed
-        Cycles that did not: this machine was too late for them.
-    late
-        Cycles that began later than half a period.
-    unanswered
-        Answers that did not come in time, of either inverter.
-    """
-
-    period_ns: int
-    period: Histogram = field(default_factory=Histogram)
-    lateness: Histogram = field(default_factory=Histogram)
-    reply_age: Histogram = field(default_factory=Histogram)
-    cycles: int = 0
-    missed: int = 0
-    late: int = 0
-    unanswered: int = 0
+    period_ns: int  # what the period should be [ns]
+    period: Histogram = field(default_factory=Histogram)  # histograms of the times above [ns]
+    lateness: Histogram = field(default_factory=Histogram)  # histograms of the times above [ns]
+    reply_age: Histogram = field(default_factory=Histogram)  # histograms of the times above [ns]
+    cycles: int = 0  # cycles that took place
+    missed: int = 0  # cycles that did not
+    late: int = 0  # cycles that began later than half a period
+    unanswered: int = 0  # answers that did not come in time, of either inverter
     _last_cycle: int | None = None
     _last_sync_ns: int | None = None
 

@@ -45,18 +45,7 @@ NS_PER_S = 1_000_000_000
 
 
 class BusTrace:
-    """A trace file, from `__enter__` to `__exit__`.
-
-    Parameters
-    ----------
-    path
-        A new file; its suffix, one of `SUFFIXES`, chooses the format.
-
-    Raises
-    ------
-    RecordingError
-        On entry, if the name can't be used; on exit, if the disk did not take the frames.
-    """
+    """A trace file, from `__enter__` to `__exit__`."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -142,13 +131,7 @@ HEADER_BYTES: Final = blf.OBJ_HEADER_BASE_STRUCT.size
 
 
 class BoundedBlfReader(can.BLFReader):
-    """Gives the frames of a BLF.
-
-    Raises
-    ------
-    BLFParseError
-        While reading, where a length in the file can't be one, or it unpacks to more than a log of its size does.
-    """
+    """Gives the frames of a BLF."""
 
     def __init__(self, file: BinaryIO, **kwargs: Any) -> None:
         file.seek(0, 2)

@@ -32,47 +32,21 @@ OWN_KEYS = frozenset({RIG_TEXT, RIG_CHECKSUM, EXPERIMENT, STARTED, VERSION, *CHE
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunEntry:
-    """One run as it is entered.
+    """One run as it is entered."""
 
-    Attributes
-    ----------
-    recording : Path
-        The recording, inside the store's folder.
-    data_sha256 : str
-        Checksum of its cells (`hil.recording.checksum`); empty where it carries none.
-    experiment : str
-        Name of the experiment.
-    started_utc : str
-        ISO 8601 with offset; empty where it is not known.
-    duration_s : float
-        Time from the first row to the last, and one period more [s].
-    samples, flagged : int
-        Rows, and how many of them are flagged.
-    software_version : str
-        Of the program that recorded.
-    rig_name, rig_text : str
-        Name and whole text of the rig file; empty where the recording does not carry it.
-    eds_sha256 : mapping of inverter to str
-        SHA-256 of each EDS the scales were from.
-    outcome : str
-        `COMPLETE`, or what ended the run.
-    settings : mapping of str to str
-        What else the recording says of itself: pace, timing, grants of the system.
-    """
-
-    recording: Path
-    data_sha256: str = ""
-    experiment: str = ""
-    started_utc: str = ""
+    recording: Path  # the recording, inside the store's folder
+    data_sha256: str = ""  # checksum of its cells (`hil.recording.checksum`)
+    experiment: str = ""  # name of the experiment
+    started_utc: str = ""  # ISO 8601 with offset
     duration_s: Annotated[float, Field(allow_inf_nan=False)] = 0.0
-    samples: NonNegativeInt = 0
-    flagged: NonNegativeInt = 0
-    software_version: str = ""
-    rig_name: str = ""
-    rig_text: str = ""
-    eds_sha256: Mapping[str, str] = field(default_factory=dict)
-    outcome: str = COMPLETE
-    settings: Mapping[str, str] = field(default_factory=dict)
+    samples: NonNegativeInt = 0  # rows, and how many of them are flagged
+    flagged: NonNegativeInt = 0  # rows, and how many of them are flagged
+    software_version: str = ""  # of the program that recorded
+    rig_name: str = ""  # name and whole text of the rig file
+    rig_text: str = ""  # name and whole text of the rig file
+    eds_sha256: Mapping[str, str] = field(default_factory=dict)  # SHA-256 of each EDS the scales were from
+    outcome: str = COMPLETE  # `COMPLETE`, or what ended the run
+    settings: Mapping[str, str] = field(default_factory=dict)  # what else the recording says of itself
 
     @property
     def rig_sha256(self) -> str:
@@ -90,30 +64,14 @@ class Note:
 
 @dataclass(frozen=True, slots=True)
 class Attachment:
-    """Something that came of a run: a model, a diagnosis, an identification, an alarm.
+    """Something that came of a run: a model, a diagnosis, an identification, an alarm."""
 
-    Attributes
-    ----------
-    kind : str
-        Such as ``diagnosis``.
-    added_utc : str
-        ISO 8601 with offset.
-    path : Path or None
-        The file it was attached from; None for a document that never was a file.
-    document : str
-        Its content, text, as it was when it was attached; empty for a file that is not text or too long.
-    verdict : str
-        Of a diagnosis.
-    alarms : int
-        Changes of the driveline that an on-line estimate found.
-    """
-
-    kind: str
-    added_utc: str
-    path: Path | None = None
-    document: str = ""
-    verdict: str = ""
-    alarms: NonNegativeInt = 0
+    kind: str  # such as ``diagnosis``
+    added_utc: str  # ISO 8601 with offset
+    path: Path | None = None  # the file it was attached from
+    document: str = ""  # its content, text, as it was when it was attached
+    verdict: str = ""  # of a diagnosis
+    alarms: NonNegativeInt = 0  # changes of the driveline that an on-line estimate found
 
     def as_json(self) -> Any:
         """Return the content of a JSON document; None for one that is none."""
@@ -125,21 +83,11 @@ class Attachment:
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """One run as the list has it: the entry, and what was said and made of it since, oldest first.
+    """One run as the list has it: the entry, and what was said and made of it since, oldest first."""
 
-    Attributes
-    ----------
-    run_id : int
-        Its number; never given twice.
-    entry : RunEntry
-        What was entered.
-    notes, attachments : tuple
-        In a list of runs (`RunStore.find`) the attachments come without their documents.
-    """
-
-    run_id: int
-    entry: RunEntry
-    notes: tuple[Note, ...] = ()
+    run_id: int  # its number
+    entry: RunEntry  # what was entered
+    notes: tuple[Note, ...] = ()  # in a list of runs (`RunStore.find`) the attachments come without their documents
     attachments: tuple[Attachment, ...] = ()
 
     def latest(self, kind: str) -> Attachment | None:

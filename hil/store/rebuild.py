@@ -57,36 +57,16 @@ def attach_to_runs(recordings: Iterable[Path], results: Mapping[str, Path]) -> l
 
 @dataclass(slots=True)
 class Rebuilt:
-    """What became of the list of a folder.
+    """What became of the list of a folder."""
 
-    Attributes
-    ----------
-    before : int
-        Runs that were in it.
-    found : int
-        Recordings that were entered now.
-    moved : int
-        Runs whose recording was found under another name, or that were damaged in the list and read again.
-    copies : int
-        Recordings with the data of a run whose own is still there, such as conversions; they are no runs.
-    attached : int
-        Results (diagnosis.json, identification.json) that were attached now.
-    unreadable : list of str
-        What is wrong with recordings, or with files of the list, that could not be read.
-    lost_notes : list of str
-        Notes to runs of which nothing else is left.
-    removed : list of Path
-        Unfinished files of processes that were killed.
-    """
-
-    before: int = 0
-    found: int = 0
+    before: int = 0  # runs that were in it
+    found: int = 0  # recordings that were entered now
     moved: int = 0
-    copies: int = 0
-    attached: int = 0
+    copies: int = 0  # recordings with the data of a run whose own is still there, such as conversions
+    attached: int = 0  # results (diagnosis.json, identification.json) that were attached now
     unreadable: list[str] = field(default_factory=list)
-    lost_notes: list[str] = field(default_factory=list)
-    removed: list[Path] = field(default_factory=list)
+    lost_notes: list[str] = field(default_factory=list)  # notes to runs of which nothing else is left
+    removed: list[Path] = field(default_factory=list)  # unfinished files of processes that were killed
 
 
 def rebuild(folder: Path) -> Rebuilt:

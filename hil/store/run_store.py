@@ -57,29 +57,13 @@ def store_of(folder: Path | str) -> Path:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunFilter:
-    """All that is given must hold; nothing given: every run.
+    """All that is given must hold; nothing given: every run."""
 
-    Attributes
-    ----------
-    experiment : str
-        Name of the experiment.
-    since, until : str
-        Start of the run: ISO 8601 date or time in UTC, `since` included, `until` included to its last digit
-        (``2026-11-21`` is the whole day).
-    rig : str
-        Name of the rig, or the beginning of its rig file's SHA-256.
-    verdict : str
-        Of the last diagnosis.
-    text : str
-        Somewhere in experiment, recording's name, outcome, version, rig file, notes or attached documents, capitals
-        or not.
-    """
-
-    experiment: str = ""
-    since: str = ""
-    until: str = ""
-    rig: str = ""
-    verdict: str = ""
+    experiment: str = ""  # name of the experiment
+    since: str = ""  # start of the run
+    until: str = ""  # start of the run
+    rig: str = ""  # name of the rig, or the beginning of its rig file's SHA-256
+    verdict: str = ""  # of the last diagnosis
     text: str = ""
 
     def takes(self, run: Run) -> bool:
@@ -112,18 +96,7 @@ class _Files:
 
 
 class RunStore:
-    """The runs of one folder; a context manager. What a call has written is kept when it returns, whole.
-
-    Parameters
-    ----------
-    folder : Path or str
-        Where the recordings are; ``hil_runs`` is made there where it is not.
-
-    Raises
-    ------
-    StoreError
-        On entry and from every call: if the folder can't be read or written.
-    """
+    """The runs of one folder; a context manager. What a call has written is kept when it returns, whole."""
 
     def __init__(self, folder: Path | str) -> None:
         self.folder = Path(folder)

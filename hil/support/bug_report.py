@@ -43,21 +43,11 @@ class Part:
 
 @dataclass(frozen=True, slots=True)
 class BugReport:
-    """The report, and what was taken out of it.
+    """The report, and what was taken out of it."""
 
-    Attributes
-    ----------
-    parts : tuple of Part
-        Its files.
-    taken_out : mapping of str to int
-        How often each kind of private thing was taken out.
-    missing : tuple of str
-        What could not be put in, and why.
-    """
-
-    parts: tuple[Part, ...]
-    taken_out: Mapping[str, int]
-    missing: tuple[str, ...]
+    parts: tuple[Part, ...]  # its files
+    taken_out: Mapping[str, int]  # how often each kind of private thing was taken out
+    missing: tuple[str, ...]  # what could not be put in, and why
 
     def zipped(self) -> bytes:
         """Return it as one ZIP."""

@@ -83,21 +83,11 @@ COMMON_NAMES: Final = frozenset({"root", "user", "users", "home", "admin", "loca
 
 @dataclass(slots=True)
 class Redaction:
-    """Takes out, and counts what it took out.
-
-    Attributes
-    ----------
-    places
-        Folder whose paths are kept, and what stands for it; the innermost first.
-    names
-        Names to take out, and what stands for each.
-    counts
-        How often each kind was taken out.
-    """
+    """Takes out, and counts what it took out."""
 
     places: Mapping[str, str] = field(default_factory=lambda: dict(_places()))
     names: Mapping[str, str] = field(default_factory=lambda: dict(_names()))
-    counts: Counter[str] = field(default_factory=Counter)
+    counts: Counter[str] = field(default_factory=Counter)  # how often each kind was taken out
 
     def text(self, text: str) -> str:
         """Return a text without what is private."""

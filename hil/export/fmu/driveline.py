@@ -28,39 +28,21 @@ OF_THE_RECORDER = ("stale_samples", "lost_samples", "sample_jitter", "clock_drif
 
 @dataclass(frozen=True, slots=True)
 class Driveline:
-    """A line to be written as C.
-
-    Attributes
-    ----------
-    p : ndarray, shape (layout.SIZE,)
-        Parameters of the superset model.
-    effects : tuple of str
-        Those that the line has, by name.
-    load : float
-        Load torque at the beginning [Nm].
-    start : mapping of str to float
-        State at the beginning, by the name of its place (``variables.NAMED``).
-    step_s, sign_width : float
-        Longest integration step [s], and speed within which dry friction changes sign.
-    angle_is_read : bool
-        Whether laws over the angle take it from an input.
-    left_out : tuple of str
-        Sentences about what is not in it.
-    """
+    """A line to be written as C."""
 
     name: str
     structure: Structure
     motion: Motion
-    p: FloatArray
-    effects: tuple[str, ...]
+    p: FloatArray  # (layout.SIZE,): Parameters of the superset model
+    effects: tuple[str, ...]  # those that the line has, by name
     sensor_at: str
     period_s: float
-    step_s: float
-    sign_width: float
-    load: float
-    start: Mapping[str, float]
-    angle_is_read: bool
-    left_out: tuple[str, ...]
+    step_s: float  # longest integration step [s], and speed within which dry friction changes sign
+    sign_width: float  # longest integration step [s], and speed within which dry friction changes sign
+    load: float  # load torque at the beginning [Nm]
+    start: Mapping[str, float]  # state at the beginning, by the name of its place (``variables.NAMED``)
+    angle_is_read: bool  # whether laws over the angle take it from an input
+    left_out: tuple[str, ...]  # sentences about what is not in it
 
     @property
     def masses(self) -> int:
@@ -162,24 +144,12 @@ VALUES = PARAMETER + SIZE
 
 @dataclass(frozen=True, slots=True)
 class Variable:
-    """A variable of modelDescription.xml.
-
-    Attributes
-    ----------
-    name, unit, description : str
-    reference : int
-        Place in the C array.
-    causality, variability, initial : str
-        As FMI has them; ``initial`` is empty where the standard's own applies.
-    start : float or bool, optional
-    derivative_of : int
-        Reference of the state whose derivative it is; -1 for none.
-    """
+    """A variable of modelDescription.xml."""
 
     name: str
-    reference: int
-    causality: str
-    variability: str
+    reference: int  # place in the C array
+    causality: str  # as FMI has them
+    variability: str  # as FMI has them
     unit: str
     description: str
     start: float | bool | None = None

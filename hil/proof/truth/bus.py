@@ -22,33 +22,17 @@ NOMINAL_TOLERANCE = 0.2
 
 @dataclass(frozen=True, slots=True)
 class Bus:
-    """The true driveline of one bus, reflected to the motor shaft, without anything hidden.
+    """The true driveline of one bus, reflected to the motor shaft, without anything hidden."""
 
-    Attributes
-    ----------
-    J_M, J_L : float
-        Inertia of motor and load [kg m^2].
-    k, c : float
-        Shaft stiffness [Nm/rad] and damping [Nm s/rad].
-    b_M, b_L : float
-        Viscous friction [Nm s/rad].
-    load_torque_nm : float
-        Rolling resistance: constant torque against the load.
-    gear_ratio : float
-        Motor turns per wheel turn.
-    wheel_radius_m : float
-        Rolling radius.
-    """
-
-    J_M: float
-    J_L: float
-    k: float
-    c: float
-    b_M: float
-    b_L: float
-    load_torque_nm: float
-    gear_ratio: float
-    wheel_radius_m: float
+    J_M: float  # inertia of motor and load [kg m^2]
+    J_L: float  # inertia of motor and load [kg m^2]
+    k: float  # shaft stiffness [Nm/rad] and damping [Nm s/rad]
+    c: float  # shaft stiffness [Nm/rad] and damping [Nm s/rad]
+    b_M: float  # viscous friction [Nm s/rad]
+    b_L: float  # viscous friction [Nm s/rad]
+    load_torque_nm: float  # rolling resistance
+    gear_ratio: float  # motor turns per wheel turn
+    wheel_radius_m: float  # rolling radius
 
     @property
     def metres_per_rad(self) -> float:
@@ -113,21 +97,11 @@ class Test(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """What the driver does in one test.
+    """What the driver does in one test."""
 
-    Attributes
-    ----------
-    speed_rad_s : float
-        Motor speed the bus rolls at when the recording begins, on level road.
-    torque_nm : ndarray, shape (N,)
-        Torque of both inverters on top of what holds that speed.
-    share_m1 : float
-        Part of the torque that inverter m1 gives.
-    """
-
-    speed_rad_s: float
-    torque_nm: FloatArray
-    share_m1: float
+    speed_rad_s: float  # motor speed the bus rolls at when the recording begins, on level road
+    torque_nm: FloatArray  # (N,): Torque of both inverters on top of what holds that speed
+    share_m1: float  # part of the torque that inverter m1 gives
 
 
 def _prbs(rng: np.random.Generator, amplitude_nm: float) -> FloatArray:

@@ -64,13 +64,7 @@ class Piece:
 
 
 class DelayLine:
-    """Hold every torque back by a fixed time.
-
-    Parameters
-    ----------
-    delay_s
-        Time a torque spends in the line [s]; any fraction of a sample.
-    """
+    """Hold every torque back by a fixed time."""
 
     def __init__(self, delay_s: float) -> None:
         self._waiting: deque[Piece] = deque([Piece(0.0, delay_s)] if delay_s > 0.0 else [])
@@ -109,15 +103,7 @@ def observed(p: Physics, states: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 class TruthDriveline:
-    """A driveline with all it hides; has the shape of ``hil.simulator.plant.Plant``.
-
-    Parameters
-    ----------
-    physics
-        The driveline.
-    speed_rad_s
-        Speed it is rolling at when it starts, shaft unloaded.
-    """
+    """A driveline with all it hides; has the shape of ``hil.simulator.plant.Plant``."""
 
     def __init__(self, physics: Physics, speed_rad_s: float = 0.0) -> None:
         self._physics = physics

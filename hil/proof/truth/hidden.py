@@ -56,41 +56,17 @@ class Place(Enum):
 
 @dataclass(frozen=True, slots=True)
 class HiddenEffect:
-    """One effect that can be concealed in a bus.
+    """One effect that can be concealed in a bus."""
 
-    Attributes
-    ----------
-    name : str
-        As in the contract's catalogue, or a name of its own outside it.
-    draw : callable
-        Generator and bus to sizes; they hold for all recordings of the bus.
-    apply : callable
-        Physics, sizes and the generator of one recording (start on the road, time of an event) to the physics
-        with the effect.
-    corrupt : callable
-        Acquisition and sizes to the acquisition with the effect.
-    when : callable, optional
-        Physics with an event to when it begins and ends [s]; None for what is always there.
-    fitted : mapping of str to str or callable
-        Parameter of the law that is fitted to the size that it should equal, or to how it follows from the sizes. What
-        is missing has no counterpart: the truth's formulation is another one.
-    unscaled : tuple of str
-        Sizes that stay as they are where the effect is made smaller: they say of what kind it is, not how much.
-    place : Place
-        The element it belongs to.
-    catalogued : bool
-        False for what no entry of the contract's catalogue describes: a tool can only abstain.
-    """
-
-    name: str
-    draw: Draw
+    name: str  # as in the contract's catalogue, or a name of its own outside it
+    draw: Draw  # generator and bus to sizes
     apply: Apply = same_physics
-    corrupt: Corrupt = same_recording
+    corrupt: Corrupt = same_recording  # acquisition and sizes to the acquisition with the effect
     when: When | None = None
     fitted: Mapping[str, str | Convert] = field(default_factory=dict)
-    unscaled: tuple[str, ...] = ()
-    place: Place = Place.NOWHERE
-    catalogued: bool = True
+    unscaled: tuple[str, ...] = ()  # sizes that stay as they are where the effect is made smaller
+    place: Place = Place.NOWHERE  # the element it belongs to
+    catalogued: bool = True  # false for what no entry of the contract's catalogue describes
 
     def happens_in(self, test: int, sizes: Sizes) -> bool:
         """Say whether the effect takes place in one of the three tests, counted from 0."""

@@ -73,25 +73,12 @@ def stream(seed: int, purpose: Stream, *key: int) -> np.random.Generator:
 
 @dataclass(frozen=True, slots=True)
 class Specimen:
-    """One bus and what it hides.
+    """One bus and what it hides."""
 
-    Attributes
-    ----------
-    effect : str
-        Name, or names joined by ``+``.
-    seed : int
-        What everything was drawn from.
-    bus : Bus
-        The true driveline.
-    nominal : mapping
-        The six values of the nominal model.
-    sizes : mapping of effect name to its drawn sizes
-    """
-
-    effect: str
-    seed: int
-    bus: Bus
-    nominal: Mapping[str, float]
+    effect: str  # name, or names joined by ``+``
+    seed: int  # what everything was drawn from
+    bus: Bus  # the true driveline
+    nominal: Mapping[str, float]  # the six values of the nominal model
     sizes: Mapping[str, Sizes]
 
     @property

@@ -14,21 +14,7 @@ crossover, and the loop's low-pass (at five times the crossover, see `speed_hold
 
 
 class Cruise:
-    """Hold the speed so slowly that the loop does not shape the response to the PRBS.
-
-    Parameters
-    ----------
-    speed_rad_s
-        Speed to hold [rad/s].
-    duration_s
-        Length of the measured part [s].
-    inertia_kg_m2
-        Total inertia at the motor shaft [kg m²]; it tunes the loop.
-    torque_limit_nm
-        Largest torque [Nm].
-    period_s
-        Time between two cycles [s].
-    """
+    """Hold the speed so slowly that the loop does not shape the response to the PRBS."""
 
     __slots__ = ("_duration_s", "_hold", "_start_speed_rad_s")
 

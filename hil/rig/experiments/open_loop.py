@@ -33,19 +33,7 @@ class Course(Protocol):
 
 
 class OpenLoop:
-    """A course of torque from standstill; measured from the first cycle, released at its end.
-
-    Parameters
-    ----------
-    course
-        The torque of both inverters together.
-    slew_nm_per_s
-        The torque changes no faster than this [Nm/s].
-    most_speed_rad_s
-        The run ends where the speed, averaged, exceeds this magnitude [rad/s].
-    period_s
-        Time between two cycles [s].
-    """
+    """A course of torque from standstill; measured from the first cycle, released at its end."""
 
     __slots__ = ("_course", "_most_rad_s", "_phase", "_share", "_speed_rad_s", "_step_nm", "_torque_nm")
 

@@ -10,17 +10,7 @@ WAVE_STEPS = 4
 
 
 class Pulses:
-    """Waves of +1, -1, -1, +1 steps of torque: speed and place return to where they were after each.
-
-    Parameters
-    ----------
-    step_nm
-        Height of a step [Nm].
-    step_s
-        Length of one [s].
-    duration_s
-        Length of the whole; as many whole waves as fit between the leads [s].
-    """
+    """Waves of +1, -1, -1, +1 steps of torque: speed and place return to where they were after each."""
 
     __slots__ = ("_duration_s", "_step_nm", "_step_s", "waves")
 
@@ -44,13 +34,7 @@ class Pulses:
 
 
 class Rest:
-    """No torque.
-
-    Parameters
-    ----------
-    duration_s
-        Length [s].
-    """
+    """No torque."""
 
     __slots__ = ("_duration_s",)
 

@@ -13,17 +13,6 @@ class Reversal:
 
     Turning at a speed rather than at a time keeps the vehicle near its place on a grade, and makes the
     speed cross zero in every half period whatever the inertia is.
-
-    Parameters
-    ----------
-    turning_speed_rad_s
-        The torque changes sign where the speed, low-passed, has reached this magnitude [rad/s].
-    swing_nm
-        Magnitude of the torque [Nm].
-    duration_s
-        Length of the measured part [s].
-    period_s
-        Time between two cycles [s].
     """
 
     __slots__ = ("_direction", "_duration_s", "_hold_nm", "_speed", "_swing_nm", "_turning_speed_rad_s")

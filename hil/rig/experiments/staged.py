@@ -22,15 +22,7 @@ from hil.rig.experiments.base import BaseTorque, MeasureLaw, Phase
 
 
 class LowPass:
-    """Low-pass one signal; it starts at the first value it is given.
-
-    Parameters
-    ----------
-    time_constant_s
-        Time constant [s].
-    period_s
-        Time between two values [s].
-    """
+    """Low-pass one signal; it starts at the first value it is given."""
 
     __slots__ = ("_share", "value")
 
@@ -64,19 +56,7 @@ class HoldTuning:
 
 
 class SpeedHold:
-    """Hold a speed by torque, one call per cycle.
-
-    Parameters
-    ----------
-    target_rad_s
-        Speed to hold [rad/s].
-    tuning
-        How fast.
-    limit_nm
-        The torque never exceeds this magnitude [Nm].
-    period_s
-        Time between two calls [s].
-    """
+    """Hold a speed by torque, one call per cycle."""
 
     __slots__ = ("_integral_nm", "_limit_nm", "_period_s", "_speed", "_target_rad_s", "_tuning")
 
@@ -130,21 +110,7 @@ TOLERANCE_LEAST_RAD_S = 0.5
 
 
 class Approach:
-    """Speed control up to a start speed.
-
-    Parameters
-    ----------
-    speed_rad_s
-        The start speed [rad/s].
-    inertia_kg_m2
-        Total inertia at the motor shaft [kg m²], as well as it is known; it tunes the loop.
-    torque_limit_nm
-        Largest torque [Nm].
-    period_s
-        Time between two cycles [s].
-    timeout_s
-        Time in which the vehicle must be there [s].
-    """
+    """Speed control up to a start speed."""
 
     __slots__ = (
         "_errors_rad_s",
@@ -210,19 +176,7 @@ class TorqueBounds:
 
 
 class StagedExperiment:
-    """One law, led up to and let out of safely.
-
-    Parameters
-    ----------
-    law
-        What to do in the measured part.
-    approach
-        How to get to its start speed.
-    bounds
-        Never left, in any phase.
-    period_s
-        Time between two cycles [s].
-    """
+    """One law, led up to and let out of safely."""
 
     __slots__ = ("_approach", "_bounds", "_law", "_measure_from_s", "_period_s", "_phase", "_torque_nm")
 

@@ -7,17 +7,6 @@ class Tip:
     """Steps of torque about what holds the speed: up for one step, down for the next.
 
     A step larger than the holding torque takes the driveline through zero torque, where backlash lies.
-
-    Parameters
-    ----------
-    speed_rad_s
-        Speed at the beginning [rad/s]; the mean speed stays near it.
-    step_nm
-        Height of a step above and below the holding torque [Nm].
-    step_s
-        Length of one step [s].
-    duration_s
-        Length of the measured part [s].
     """
 
     __slots__ = ("_duration_s", "_hold_nm", "_start_speed_rad_s", "_step_nm", "_step_s")
