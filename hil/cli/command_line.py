@@ -42,6 +42,7 @@ COMMANDS: dict[str, str] = {
     "completion": "Print the completion script of a shell.",
     "bugreport": "Pack what a supporter needs, without secrets.",
     "export": "Write the on-line estimator for a PLC, or the driveline as an FMU.",
+    "fleet": "Diagnose or identify many recordings on Dask; a page of the fleet.",
 }
 
 QUIET = "--quiet"

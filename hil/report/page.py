@@ -1,7 +1,7 @@
 """A page's content as data, and the one self-contained HTML file that a template makes of it.
 
 Pages are lists of blocks (headings, paragraphs, tables, figures); nobody but the templates writes markup. Jinja2
-escapes every text in them, links keep to `is_allowed`, and the page's policy lets no script run but its own two, by
+escapes every text in them, links keep to `is_allowed`, and the page's policy lets no script run but its own, by
 their hashes. The same blocks are shown on a terminal by `hil.report.terminal`.
 """
 
@@ -10,8 +10,9 @@ from __future__ import annotations
 import base64
 import gzip
 import hashlib
+import json
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
@@ -187,6 +188,45 @@ class Figure:
 
 
 @dataclass(frozen=True, slots=True)
+class Register:
+    """A table of many rows that `register.js` filters, sorts and shows; cells are texts, numbers or None.
+
+    Attributes
+    ----------
+    link : tuple
+        Column whose texts lead to files, the word shown, and what comes before and after the text; -1 for none.
+    choose : bool
+        Whether the first cell of a row chooses whose courses are shown.
+    """
+
+    name: str
+    headings: tuple[str, ...]
+    rows: Sequence[Sequence[Any]]
+    link: tuple[int, str, str, str] = (-1, "", "", "")
+    choose: bool = False
+
+    @property
+    def packed(self) -> str:
+        """The rows as gzip in base64."""
+        link = dict(zip(("column", "text", "before", "after"), self.link, strict=True))
+        content = {"headings": self.headings, "rows": self.rows, "link": link, "choose": self.choose}
+        return _packed(json.dumps(content, allow_nan=False, separators=(",", ":")).encode())
+
+
+@dataclass(frozen=True, slots=True)
+class Courses:
+    """The courses of each name's values, as `register.js` draws them for the one that is chosen."""
+
+    hint: str
+    of: Mapping[str, Sequence[Mapping[str, Any]]]
+
+    @property
+    def packed(self) -> str:
+        """The courses as gzip in base64."""
+        return _packed(json.dumps(self.of, allow_nan=False, separators=(",", ":")).encode())
+
+
+@dataclass(frozen=True, slots=True)
 class Cut:
     """The stretch in view of a figure, as the lines of ``[signals]`` that cut it; `page.js` writes them."""
 
@@ -282,10 +322,10 @@ def _kept(blocks: Iterable[Any]) -> tuple[Any, ...]:
 def page(title: str, blocks: Iterable[Any], footer: str) -> str:
     """Return the HTML of a page; a script that draws is brought along where a figure is."""
     kept = _kept(blocks)
-    has_figures = any(_figures(kept))
+    has_figures, has_registers = any(_of_kind(Figure, kept)), any(_of_kind(Register, kept))
     sections = [block for block in kept if isinstance(block, Section)]
-    behaviour = Markup(_text("page.js"))
-    scripts = [str(behaviour), *([_plotly()] if has_figures else [])]
+    behaviour, register = Markup(_text("page.js")), Markup(_text("register.js") if has_registers else "")
+    scripts = [str(behaviour), str(register), *([_plotly()] if has_figures else [])]
     return (
         _environment()
         .get_template("page.html")
@@ -296,6 +336,7 @@ def page(title: str, blocks: Iterable[Any], footer: str) -> str:
             footer=footer,
             style=Markup(_text("page.css")),
             behaviour=behaviour,
+            register=register,
             plotly=_packed(_plotly().encode()) if has_figures else "",
             hashes=" ".join(f"'sha256-{_hash(script)}'" for script in scripts),
         )
@@ -307,12 +348,12 @@ def fragment(*blocks: Any) -> str:
     return _environment().get_template("fragment.html").render(blocks=_kept(blocks))
 
 
-def _figures(blocks: Iterable[Any]) -> Iterable[Figure]:
+def _of_kind(kind: type, blocks: Iterable[Any]) -> Iterable[Any]:
     for block in blocks:
-        if isinstance(block, Figure):
+        if isinstance(block, kind):
             yield block
         elif isinstance(block, Section | Header | Details):
-            yield from _figures(block.blocks)
+            yield from _of_kind(kind, block.blocks)
 
 
 def is_allowed(href: str) -> bool:

@@ -38,6 +38,7 @@ READ_MORE = {
     "completion": "support",
     "bugreport": "support",
     "export": "plc-export",
+    "fleet": "fleet",
 }
 """The page that tells the rest of a command."""
 

@@ -1,0 +1,215 @@
+"""``hil fleet``: the same diagnosis and identification over many recordings, on Dask."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from enum import Enum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from hil.cli.diagnose import Effort
+from hil.cli.options import tell
+from hil.cli.printing import new_console, say
+
+if TYPE_CHECKING:
+    from hil.fleet.run import Done, Engine, Progress
+    from hil.fleet.tasks import Job
+
+app = typer.Typer(add_completion=False, no_args_is_help=True)
+
+
+class By(Enum):
+    """What is explained together."""
+
+    RECORDING = "recording"
+    VEHICLE = "vehicle"
+
+
+Sources = Annotated[
+    list[str],
+    typer.Argument(metavar="SOURCES...", help="Recordings: files, folders, globs, or URLs of fsspec (s3://…)."),
+]
+Out = Annotated[Path, typer.Option("--out", metavar="DATASET", help="Folder of the results; continued there.")]
+Scheduler = Annotated[
+    str | None,
+    typer.Option(metavar="URL", help="Dask scheduler, tcp://… or tls://…; without it this machine's cores."),
+]
+Workers = Annotated[
+    int | None, typer.Option("--jobs", min=1, metavar="N", help="Workers on this machine; all cores, or HIL_JOBS.")
+]
+Memory = Annotated[str, typer.Option(metavar="SIZE", help="Of each worker on this machine, as in 2GiB.")]
+Retries = Annotated[int, typer.Option(min=0, metavar="N", help="How often Dask tries again what a worker died of.")]
+Limit = Annotated[float, typer.Option("--budget-s", min=1.0, metavar="S", help="Time that one result may take \\[s].")]
+Pattern = Annotated[
+    str | None,
+    typer.Option(metavar="REGEX", help="Takes vehicle, rig and started from a path: (?P<vehicle>bus_[0-9]+)/."),
+]
+AsJson = Annotated[bool, typer.Option("--json", help="Print the counts as JSON.")]
+
+
+@app.command(epilog="Example: hil fleet diagnose drives/ --model bus.toml --out results")
+def diagnose(
+    sources: Sources,
+    model: Annotated[Path, typer.Option("--model", metavar="MODEL", help="Model file, nominal or augmented.")],
+    out: Out,
+    by: Annotated[
+        By, typer.Option(help="Each recording alone, or all of a vehicle together: its parameters shared.")
+    ] = By.RECORDING,
+    prior: Annotated[
+        Path | None,
+        typer.Option(metavar="DATASET", help="Results of this fleet: what is usual there replaces the nominal values."),
+    ] = None,
+    effort: Annotated[Effort, typer.Option("--effort", help="Work each search may cost.")] = Effort.NORMAL,
+    pattern: Pattern = None,
+    scheduler: Scheduler = None,
+    jobs: Workers = None,
+    memory: Memory = "auto",
+    retries: Retries = 2,
+    budget_s: Limit = 3600.0,
+    as_json: AsJson = False,
+) -> None:
+    """Diagnose every recording, or every vehicle's together.
+
+    What is in DATASET is not computed again. A recording that can't be read, and one whose worker dies, are listed with
+    the reason, and the rest goes on.
+    """
+    _require_dask()
+    from dataclasses import replace
+
+    from hil.config.model_file import read_model_for_recordings
+    from hil.fleet.dataset import require_dataset
+    from hil.fleet.page import usual_parameters
+    from hil.fleet.pooling import with_prior
+    from hil.fleet.tasks import DIAGNOSE, Job
+    from hil.provenance import Source
+
+    file = read_model_for_recordings(model, False)
+    named: tuple[str, ...] = ()
+    if prior is not None:
+        require_dataset(prior)
+        prior_model, named = with_prior(file.model, usual_parameters(prior))
+        file = replace(file, model=prior_model)
+        tell(f"from the fleet: {', '.join(named) or 'nothing, it has too few vehicles'}")
+    job = Job(DIAGNOSE, file, model.name, Source.of(model).sha256, named, effort.value, budget_s)
+    _carry_out(sources, out, job, by is By.VEHICLE, pattern, _engine(scheduler, jobs, memory, retries), as_json)
+
+
+@app.command(epilog="Example: hil fleet identify 's3://drives/2026-11/*.parquet' --out results")
+def identify(
+    sources: Sources,
+    out: Out,
+    model: Annotated[
+        Path | None, typer.Option("--model", metavar="MODEL", help="Model file: how to read foreign recordings.")
+    ] = None,
+    pattern: Pattern = None,
+    scheduler: Scheduler = None,
+    jobs: Workers = None,
+    memory: Memory = "auto",
+    retries: Retries = 2,
+    budget_s: Limit = 3600.0,
+    as_json: AsJson = False,
+) -> None:
+    """Identify the driveline from every recording: resonance, damping, physical parameters."""
+    _require_dask()
+    from hil.config.model_file import read_model_for_recordings
+    from hil.fleet.tasks import IDENTIFY, Job
+    from hil.provenance import Source
+
+    if model is None:
+        job = Job(IDENTIFY, None, budget_s=budget_s)
+    else:
+        file = read_model_for_recordings(model, False)
+        job = Job(IDENTIFY, file, model.name, Source.of(model).sha256, budget_s=budget_s)
+    _carry_out(sources, out, job, False, pattern, _engine(scheduler, jobs, memory, retries), as_json)
+
+
+@app.command(epilog="Example: hil fleet report results")
+def report(
+    dataset: Annotated[Path, typer.Argument(metavar="DATASET", help="Folder that diagnose or identify wrote.")],
+) -> None:
+    """Write DATASET/fleet.html: which vehicles have what since when, trends, each vehicle against its own fleet."""
+    from hil.files import write_whole
+    from hil.fleet.dataset import require_dataset
+    from hil.fleet.page import FILE_NAME, fleet_page
+    from hil.provenance import provenance
+
+    require_dataset(dataset)
+    write_whole(dataset / FILE_NAME, fleet_page(dataset, provenance()))
+    say(f"report: {dataset / FILE_NAME}")
+
+
+def _require_dask() -> None:
+    from importlib.util import find_spec
+
+    from hil.errors import UsageError
+
+    if find_spec("distributed") is None:
+        raise UsageError("hil fleet: expected Dask distributed, got none: pip install 'hil-driveline[fleet]'")
+
+
+def _engine(scheduler: str | None, jobs: int | None, memory: str, retries: int) -> Engine:
+    from estimator.physics.parallel import workers
+    from hil.fleet.run import Engine
+
+    return Engine(scheduler, jobs or workers(), memory, retries)
+
+
+def _carry_out(
+    sources: list[str], out: Path, job: Job, by_vehicle: bool, pattern: str | None, engine: Engine, as_json: bool
+) -> None:
+    import json
+    from dataclasses import asdict
+
+    from hil.errors import UsageError
+    from hil.fleet.dataset import Writer
+    from hil.fleet.run import carry_out, client_of, survey
+    from hil.fleet.sources import find, pattern_of
+    from hil.report.outputs import require_folder
+
+    require_folder(out)
+    found, complaints = find(sources, pattern_of(pattern))
+    for line in complaints:
+        tell(line)
+    if not found:
+        raise UsageError("expected recordings, got none: " + "; ".join(complaints))
+    with client_of(engine) as client, _progress_bar() as progress:
+        tell(f"dashboard: {client.dashboard_link}")
+        fleet = survey(client, found, engine.retries, progress)
+        for line in fleet.remarks():
+            tell(line)
+        done = carry_out(client, fleet, job, Writer(out, job.command), engine, by_vehicle, progress)
+    if as_json:
+        say(json.dumps({**asdict(done), "duplicates": len(fleet.duplicates), "sources": complaints}))
+    else:
+        _say_done(out, done)
+
+
+def _say_done(out: Path, done: Done) -> None:
+    from hil.fleet.dataset import FAILURES, read
+
+    for row in read(out, "failures").to_pylist():
+        say(f"not done: {row['url']}: {row['error']}", err=True)
+    failed = f", {done.failed} failed: {out / FAILURES}" if done.failed else ""
+    say(f"{done.computed} computed, {done.known} known before{failed}    results: {out}")
+
+
+@contextmanager
+def _progress_bar() -> Iterator[Progress]:
+    """Show what is done and the time left on standard error, where that is a terminal."""
+    from rich.progress import BarColumn, MofNCompleteColumn, TaskID, TextColumn, TimeRemainingColumn
+    from rich.progress import Progress as Bar
+
+    console = new_console(stderr=True)
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Bar(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+        tasks: dict[str, TaskID] = {}
+
+        def show(stage: str, done: int, total: int) -> None:
+            if stage not in tasks:
+                tasks[stage] = bar.add_task(stage, total=total)
+            bar.update(tasks[stage], completed=done, total=total)
+
+        yield show

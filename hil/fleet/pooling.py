@@ -1,0 +1,187 @@
+"""What is usual in a fleet, who is not, and since when: a hierarchical model, estimated by empirical Bayes.
+
+Of one parameter, recording r of vehicle v gives y with standard deviation s::
+
+    y_vr ~ N(theta_v, omega^2 + s_vr^2)      omega: what differs from drive to drive: payload, temperature, road
+    theta_v ~ N(mu, tau^2)                   tau: what differs from vehicle to vehicle
+
+omega is common to the fleet and known from all vehicles together; mu, tau and omega maximise the marginal likelihood
+(G. Casella, An introduction to empirical Bayes data analysis, The American Statistician 39, 1985). Of the vehicle,
+theta_v then has the mean of its own recordings, weighted, drawn towards mu by the prior's share. A few vehicles with a
+fault would widen tau until they are usual themselves: vehicles beyond `APART` are left out and the rest is estimated
+again, until none is added.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import minimize
+from scipy.stats import norm
+
+from estimator.physics.model import DrivelineModel
+from estimator.signals.record import FloatArray
+
+FALSE_RATE = 0.002
+"""Share of the vehicles that are usual, and named all the same, two-sided; likewise of the changes."""
+
+APART = 3.5
+"""Standard deviations from which a vehicle has no part in what is usual: 0.05 % of those that are."""
+
+FEWEST_VEHICLES = 8
+"""With fewer, their spread is hardly known: twice too large or too small."""
+
+LARGEST_TOLERANCE = 0.95
+QUANTILE = float(norm.ppf(0.975))
+
+
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """The values of one parameter in the recordings of a vehicle, in the order of time, shape (n,) each."""
+
+    value: FloatArray
+    std: FloatArray
+    key: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Usual:
+    """What is usual: mean, spread over vehicles, and spread over the drives of one vehicle."""
+
+    mean: float
+    between: float
+    within: float
+    n_vehicles: int
+
+
+@dataclass(frozen=True, slots=True)
+class Pooled:
+    """What is known of a vehicle's parameter from all its recordings and from the fleet.
+
+    Attributes
+    ----------
+    value, std : float
+        With the prior.
+    own, own_std : float
+        Without it: of the vehicle's recordings alone.
+    from_fleet : float
+        Share of the value that came from the prior.
+    away : float
+        How far its own value is from what is usual, in standard deviations of a usual vehicle's.
+    """
+
+    value: float
+    std: float
+    own: float
+    own_std: float
+    from_fleet: float
+    away: float
+
+    @property
+    def is_apart(self) -> bool:
+        """Whether the vehicle is not as the others, at `FALSE_RATE`."""
+        return abs(self.away) > threshold(1)
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """A step in a vehicle's recordings: which is the first of the new level, both levels, and how many deviations."""
+
+    first: int
+    before: float
+    after: float
+    away: float
+
+
+def threshold(comparisons: int) -> float:
+    """Return the standard deviations beyond which one of so many comparisons is by chance at `FALSE_RATE`."""
+    return float(norm.isf(FALSE_RATE / 2.0 / comparisons))
+
+
+def _own(seen: Seen, within: float) -> tuple[float, float]:
+    """Return the mean of a vehicle's recordings and its variance."""
+    weight = 1.0 / (within**2 + seen.std**2)
+    return float(weight @ seen.value / weight.sum()), float(1.0 / weight.sum())
+
+
+def _deviance(x: FloatArray, vehicles: Sequence[Seen]) -> float:
+    """Return -2 log of the marginal likelihood at ``log tau, log omega``, with mu where it is largest."""
+    between, within = np.exp(x)
+    own = np.array([_own(each, within) for each in vehicles])
+    total = own[:, 1] + between**2
+    mean = (own[:, 0] / total).sum() / (1.0 / total).sum()
+    deviance = float(np.sum(np.log(total) + (own[:, 0] - mean) ** 2 / total))
+    for each, (level, variance) in zip(vehicles, own, strict=True):
+        spread = within**2 + each.std**2
+        deviance += float(np.sum(np.log(spread) + (each.value - level) ** 2 / spread) - math.log(variance))
+    return deviance
+
+
+def usual(vehicles: Sequence[Seen]) -> Usual:
+    """Estimate what is usual from vehicles, without those that are apart."""
+    kept = list(vehicles)
+    while True:
+        found = _usual(kept)
+        left = [each for each in kept if abs(pooled(each, found).away) <= APART]
+        if len(left) == len(kept) or len(left) < max(2, len(vehicles) // 2):
+            return found
+        kept = left
+
+
+def _usual(vehicles: Sequence[Seen]) -> Usual:
+    levels = np.array([_own(each, 0.0)[0] if np.all(each.std > 0) else each.value.mean() for each in vehicles])
+    scale = 1.4826 * float(np.median(np.abs(levels - np.median(levels)))) or 1e-6 * abs(float(levels[0])) or 1e-9
+    bounds = [(math.log(1e-3 * scale), math.log(1e3 * scale))] * 2
+    found = minimize(_deviance, np.log([scale, scale]), (vehicles,), method="Nelder-Mead", bounds=bounds)
+    between, within = (float(each) for each in np.exp(found.x))
+    own = np.array([_own(each, within) for each in vehicles])
+    weight = 1.0 / (own[:, 1] + between**2)
+    return Usual(float(weight @ own[:, 0] / weight.sum()), between, within, len(vehicles))
+
+
+def pooled(seen: Seen, known: Usual) -> Pooled:
+    """Return what is known of a vehicle, given what is usual."""
+    own, variance = _own(seen, known.within)
+    share = variance / (variance + known.between**2)
+    spread = math.sqrt(variance + known.between**2)
+    return Pooled(
+        value=share * known.mean + (1.0 - share) * own,
+        std=math.sqrt(variance * (1.0 - share)),
+        own=own,
+        own_std=math.sqrt(variance),
+        from_fleet=share,
+        away=(own - known.mean) / spread,
+    )
+
+
+def change(seen: Seen, within: float) -> Change | None:
+    """Return the largest step in a vehicle's recordings, where it is more than chance.
+
+    The likelihood ratio of two levels against one over every moment (M. Basseville and I. V. Nikiforov, Detection of
+    Abrupt Changes, 1993, section 2.6), with the levels' own spread; the moments are the comparisons that are paid for.
+    """
+    weight = 1.0 / (within**2 + seen.std**2)
+    n = seen.value.size
+    best: Change | None = None
+    for first in range(1, n):
+        before, after = (
+            float(weight[part] @ seen.value[part] / weight[part].sum()) for part in (slice(first), slice(first, n))
+        )
+        spread = math.sqrt(1.0 / weight[:first].sum() + 1.0 / weight[first:].sum())
+        if best is None or abs(after - before) / spread > abs(best.away):
+            best = Change(first, before, after, (after - before) / spread)
+    return best if best is not None and abs(best.away) > threshold(n - 1) else None
+
+
+def with_prior(model: DrivelineModel, known: Mapping[str, Usual]) -> tuple[DrivelineModel, tuple[str, ...]]:
+    """Return a model whose parameters are what is usual, trusted to 95 % of the fleet's vehicles and drives."""
+    priors = {}
+    for name, each in known.items():
+        if name in model.parameters and each.n_vehicles >= FEWEST_VEHICLES and each.mean > 0.0:
+            reach = QUANTILE * math.hypot(each.between, each.within) / each.mean
+            tolerance = min(reach, LARGEST_TOLERANCE)
+            priors[name] = replace(model.parameters[name], value=each.mean, tolerance=tolerance)
+    return replace(model, parameters={**model.parameters, **priors}), tuple(priors)

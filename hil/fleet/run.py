@@ -1,0 +1,237 @@
+"""Hands the work of a fleet to Dask: a cluster of this machine's cores, or one that runs elsewhere.
+
+Scheduling, restarting workers and trying again are Dask's own. What is in flight is bounded, so that scheduler and
+client hold as much for 100 recordings as for 10,000.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from itertools import groupby, islice
+from typing import Any, TypeVar
+
+import dask
+from distributed import Client, Future, KilledWorker, LocalCluster, as_completed
+from distributed.comm.core import CommClosedError
+
+from hil.errors import UsageError
+from hil.fleet.dataset import Writer
+from hil.fleet.sources import Found
+from hil.fleet.tasks import Job, Outcome, analyse, describe, row_of
+
+IN_FLIGHT = 4
+"""Tasks for each core that the scheduler knows of: enough that none waits, and few to hold."""
+
+COMPARED = ("hil-driveline", "dask", "distributed", "cloudpickle", "numpy", "scipy", "numba")
+"""Packages that client, scheduler and workers must have alike: to understand one another, and to find the same."""
+
+OF_WORKERS = frozenset({"hil-driveline", "numpy", "scipy", "numba"})
+"""Of them those that a scheduler needs not, which computes nothing."""
+
+HANDSHAKE_S = 10.0
+
+Item = TypeVar("Item")
+
+Tell = Callable[[str], None]
+
+Progress = Callable[[str, int, int], None]
+"""Called with the stage, how much of it is done, and how much there is."""
+
+
+@dataclass(frozen=True, slots=True)
+class Engine:
+    """Where the work is done.
+
+    Attributes
+    ----------
+    scheduler : str or None
+        Address of a cluster that runs; None for one of this machine's cores.
+    workers : int
+        Of a cluster of our own; each has one thread.
+    memory : str
+        Of each worker, as Dask writes it; "auto" divides what there is.
+    retries : int
+        How often Dask tries again what a worker died of, or failed at.
+    """
+
+    scheduler: str | None = None
+    workers: int = 1
+    memory: str = "auto"
+    retries: int = 2
+
+
+@contextmanager
+def client_of(engine: Engine) -> Iterator[Client]:
+    """Connect to a cluster, and refuse it where its versions are others."""
+    if engine.scheduler is not None:
+        try:
+            client = Client(engine.scheduler, timeout=HANDSHAKE_S)
+        except (OSError, ValueError, TypeError) as error:
+            raise UsageError(
+                f"--scheduler {engine.scheduler}: expected a Dask scheduler that answers, got: {error}. Start it "
+                "(dask scheduler), or leave the option out to work on this machine."
+            ) from error
+        with client:
+            _require_alike(client)
+            yield client
+        return
+    settings = {"distributed.scheduler.allowed-failures": engine.retries, "distributed.worker.daemon": False}
+    with (
+        dask.config.set(settings),
+        LocalCluster(
+            n_workers=engine.workers, threads_per_worker=1, memory_limit=engine.memory, host="127.0.0.1",
+            dashboard_address="127.0.0.1:0", silence_logs=logging.CRITICAL,
+        ) as cluster,
+        Client(cluster) as client,
+    ):  # fmt: skip
+        yield client
+
+
+def _require_alike(client: Client) -> None:
+    """Refuse a cluster without workers, or of other versions."""
+    versions: Any = client.get_versions(packages=list(COMPARED))
+    if not versions["workers"]:
+        raise UsageError("--scheduler: expected a cluster with workers, got none. Start some: dask worker ADDRESS")
+    own = versions["client"]["packages"]
+    sides = [(f"worker {address}", each["packages"], frozenset[str]()) for address, each in versions["workers"].items()]
+    sides.append(("the scheduler", versions["scheduler"]["packages"], OF_WORKERS))
+    differing = [
+        f"{package} {own[package]} here, {there.get(package)} at {side}"
+        for side, there, left_out in sides
+        for package in ("python", *COMPARED)
+        if package not in left_out and there.get(package) != own[package]
+    ]
+    if differing:
+        raise UsageError(f"--scheduler: expected the versions of this machine, got {'; '.join(differing)}. Align them.")
+
+
+def hand_out(
+    client: Client, items: Iterable[Item], submit: Callable[[Item], Future[Any]]
+) -> Iterator[tuple[Item, Any, str]]:
+    """Yield each item with its result as it comes, or with what became of it."""
+    waiting = iter(items)
+    running = {}
+    done = as_completed(loop=client.loop)
+    cores = sum(client.nthreads().values()) or 1
+
+    def begin(some: Iterable[Item]) -> None:
+        for item in some:
+            future = submit(item)
+            running[future.key] = item
+            done.add(future)
+
+    begin(islice(waiting, IN_FLIGHT * cores))
+    for future in done:
+        item = running.pop(future.key)
+        if future.status == "cancelled" or isinstance(error := future.exception(), CommClosedError):
+            raise UsageError(
+                "expected the scheduler to stay, got none: the connection is lost. What was done is kept: call again."
+            )
+        if isinstance(error, KilledWorker):
+            yield (
+                item,
+                None,
+                f"its worker died {error.allowed_failures + 1} times: out of memory, out of time, or killed",
+            )
+        elif error is not None:
+            yield item, None, f"{type(error).__name__}: {error}"
+        else:
+            yield item, future.result(), ""
+        future.release()
+        begin(islice(waiting, 1))
+
+
+@dataclass(slots=True)
+class Fleet:
+    """The recordings of a fleet, described, and what is wrong with the others."""
+
+    recordings: list[Found] = field(default_factory=list)
+    failed: list[tuple[Found, str]] = field(default_factory=list)
+    duplicates: list[tuple[Found, Found]] = field(default_factory=list)
+
+    def pieces(self, by_vehicle: bool) -> list[tuple[Found, ...]]:
+        """Return what is computed together, in an order of its own: every recording, or a vehicle's on one rig."""
+        ordered = sorted(self.recordings, key=lambda each: (each.vehicle, each.rig, each.started, each.url))
+        if not by_vehicle:
+            return [(each,) for each in ordered]
+        return [tuple(group) for _, group in groupby(ordered, key=lambda each: (each.vehicle, each.rig))]
+
+    def remarks(self) -> list[str]:
+        """Return what the reader has to know: recordings that count once, vehicles of more than one rig."""
+        lines = [f"{one.url}: the same content as {other.url}, counted once" for one, other in self.duplicates]
+        rigs: dict[str, set[str]] = {}
+        for each in self.recordings:
+            rigs.setdefault(each.vehicle, set()).add(each.rig)
+        lines += [
+            f"vehicle {vehicle}: recordings of {len(names)} rigs ({', '.join(sorted(names))}), kept apart"
+            for vehicle, names in sorted(rigs.items())
+            if len(names) > 1
+        ]
+        return lines
+
+
+def survey(client: Client, found: Sequence[Found], retries: int, progress: Progress) -> Fleet:
+    """Take the checksum and the metadata of every recording."""
+    fleet, described = Fleet(), {}
+
+    def submit(each: Found) -> Future[Any]:
+        return client.submit(describe, each, pure=False, retries=retries)
+
+    for number, (each, result, error) in enumerate(hand_out(client, found, submit), start=1):
+        if isinstance(result, Found):
+            described[each.url] = result
+        else:
+            fleet.failed.append((each, error or result))
+        progress("reading", number, len(found))
+    first: dict[str, Found] = {}
+    for each in found:  # in their order, whichever worker was faster
+        if (one := described.get(each.url)) is None:
+            continue
+        if one.sha256 in first:
+            fleet.duplicates.append((one, first[one.sha256]))
+        else:
+            first[one.sha256] = one
+    fleet.recordings = list(first.values())
+    return fleet
+
+
+@dataclass(slots=True)
+class Done:
+    """How many pieces of work were computed, were there before, and failed."""
+
+    computed: int = 0
+    known: int = 0
+    failed: int = 0
+
+
+def carry_out(
+    client: Client, fleet: Fleet, job: Job, writer: Writer, engine: Engine, by_vehicle: bool, progress: Progress
+) -> Done:
+    """Compute what is not in the dataset yet, and keep it as it comes; what fails costs itself alone."""
+    known, pieces = writer.known(), fleet.pieces(by_vehicle)
+    todo = [piece for piece in pieces if job.key(piece) not in known]
+    done = Done(known=len(pieces) - len(todo))
+
+    def fail(piece: Sequence[Found], error: str) -> None:
+        done.failed += 1
+        writer.fail({**row_of(piece, job), "error": error})
+
+    def submit(piece: tuple[Found, ...]) -> Future[Any]:
+        return client.submit(analyse, piece, job, pure=False, retries=engine.retries)
+
+    try:
+        for each, error in fleet.failed:
+            fail((each,), error)
+        for piece, result, error in hand_out(client, todo, submit):
+            if isinstance(result, Outcome) and not result.error:
+                writer.add(result.rows, result.verdict)
+                done.computed += 1
+            else:
+                fail(piece, error or result.error)
+            progress(job.command, done.computed + done.failed - len(fleet.failed), len(todo))
+    finally:
+        writer.finish()
+    return done
