@@ -4,12 +4,12 @@ Of one parameter, recording r of vehicle v gives y with standard deviation s::
 
     y_vr ~ N(theta_v, omega^2 + s_vr^2)      omega: what differs from drive to drive: payload, temperature, road
     theta_v ~ N(mu, tau^2)                   tau: what differs from vehicle to vehicle
+              N(mu, (WIDER tau)^2)           of the few, a share of FEW, that are not as the others
 
-omega is common to the fleet and known from all vehicles together; mu, tau and omega maximise the marginal likelihood
-(G. Casella, An introduction to empirical Bayes data analysis, The American Statistician 39, 1985). Of the vehicle,
-theta_v then has the mean of its own recordings, weighted, drawn towards mu by the prior's share. A few vehicles with a
-fault would widen tau until they are usual themselves: vehicles beyond `APART` are left out and the rest is estimated
-again, until none is added.
+mu, tau and omega are common to the fleet and maximise the marginal likelihood (G. Casella, An introduction to empirical
+Bayes data analysis, The American Statistician 39, 1985). The wide part keeps vehicles with a fault from widening tau
+until they are usual themselves (two groups: B. Efron, Statistical Science 23, 2008). Of the vehicle, theta_v then has
+the mean of its own recordings, weighted, drawn towards mu by the prior's share.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ from estimator.signals.record import FloatArray
 FALSE_RATE = 0.002
 """Share of the vehicles that are usual, and named all the same, two-sided; likewise of the changes."""
 
-APART = 3.5
-"""Standard deviations from which a vehicle has no part in what is usual: 0.05 % of those that are."""
+FEW, WIDER = 0.05, 8.0
+"""Share of the vehicles that may be as they like, and how much wider their spread is."""
 
 FEWEST_VEHICLES = 8
 """With fewer, their spread is hardly known: twice too large or too small."""
@@ -108,12 +108,13 @@ def _own(seen: Seen, within: float) -> tuple[float, float]:
 
 
 def _deviance(x: FloatArray, vehicles: Sequence[Seen]) -> float:
-    """Return -2 log of the marginal likelihood at ``log tau, log omega``, with mu where it is largest."""
-    between, within = np.exp(x)
+    """Return -2 log of the marginal likelihood at ``mu, log tau, log omega``."""
+    mean, between, within = x[0], math.exp(x[1]), math.exp(x[2])
     own = np.array([_own(each, within) for each in vehicles])
-    total = own[:, 1] + between**2
-    mean = (own[:, 0] / total).sum() / (1.0 / total).sum()
-    deviance = float(np.sum(np.log(total) + (own[:, 0] - mean) ** 2 / total))
+    usual_one = norm.pdf(own[:, 0], mean, np.sqrt(own[:, 1] + between**2))
+    other = norm.pdf(own[:, 0], mean, np.sqrt(own[:, 1] + (WIDER * between) ** 2))
+    likelihood = np.maximum((1.0 - FEW) * usual_one + FEW * other, np.finfo(np.float64).tiny)
+    deviance = -2.0 * float(np.log(likelihood).sum())
     for each, (level, variance) in zip(vehicles, own, strict=True):
         spread = within**2 + each.std**2
         deviance += float(np.sum(np.log(spread) + (each.value - level) ** 2 / spread) - math.log(variance))
@@ -121,25 +122,17 @@ def _deviance(x: FloatArray, vehicles: Sequence[Seen]) -> float:
 
 
 def usual(vehicles: Sequence[Seen]) -> Usual:
-    """Estimate what is usual from vehicles, without those that are apart."""
-    kept = list(vehicles)
-    while True:
-        found = _usual(kept)
-        left = [each for each in kept if abs(pooled(each, found).away) <= APART]
-        if len(left) == len(kept) or len(left) < max(2, len(vehicles) // 2):
-            return found
-        kept = left
-
-
-def _usual(vehicles: Sequence[Seen]) -> Usual:
-    levels = np.array([_own(each, 0.0)[0] if np.all(each.std > 0) else each.value.mean() for each in vehicles])
-    scale = 1.4826 * float(np.median(np.abs(levels - np.median(levels)))) or 1e-6 * abs(float(levels[0])) or 1e-9
-    bounds = [(math.log(1e-3 * scale), math.log(1e3 * scale))] * 2
-    found = minimize(_deviance, np.log([scale, scale]), (vehicles,), method="Nelder-Mead", bounds=bounds)
-    between, within = (float(each) for each in np.exp(found.x))
-    own = np.array([_own(each, within) for each in vehicles])
-    weight = 1.0 / (own[:, 1] + between**2)
-    return Usual(float(weight @ own[:, 0] / weight.sum()), between, within, len(vehicles))
+    """Estimate what is usual."""
+    levels = np.array([each.value.mean() for each in vehicles])
+    middle = float(np.median(levels))
+    scale = 1.4826 * float(np.median(np.abs(levels - middle))) or 1e-6 * abs(middle) or 1e-9
+    low, high = math.log(1e-3 * scale), math.log(1e3 * scale)
+    bounds = [(middle - 10.0 * scale, middle + 10.0 * scale), (low, high), (low, high)]
+    start = np.array([middle, math.log(scale), math.log(scale)])
+    simplex = start + np.vstack([np.zeros(3), np.diag([0.5 * scale, 0.7, 0.7])])
+    options = {"initial_simplex": simplex, "xatol": 1e-3 * min(scale, 1.0), "fatol": 1e-3}
+    found = minimize(_deviance, start, (vehicles,), method="Nelder-Mead", bounds=bounds, options=options).x
+    return Usual(float(found[0]), math.exp(found[1]), math.exp(found[2]), len(vehicles))
 
 
 def pooled(seen: Seen, known: Usual) -> Pooled:

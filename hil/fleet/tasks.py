@@ -12,6 +12,8 @@ from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from threadpoolctl import threadpool_limits
+
 from estimator.diagnosis.diagnose import diagnose
 from estimator.diagnosis.result import Diagnosis
 from estimator.errors import EstimatorError
@@ -94,7 +96,11 @@ def analyse(recordings: Sequence[Found], job: Job) -> Outcome:
     work_on(1)
     begun = time.monotonic()
     try:
-        with _ended_after(PATIENCE * job.budget_s), side_by_side(recordings) as paths:
+        with (
+            _ended_after(PATIENCE * job.budget_s),
+            side_by_side(recordings) as paths,
+            threadpool_limits(1, user_api="blas"),  # how many threads add up shows in the last bits
+        ):
             signals = None if job.file is None else job.file.signals
             records = read_records(paths, signals, job.file is not None and job.file.on_bench)
             if job.command == IDENTIFY:

@@ -14,7 +14,7 @@ from tests.chosen import campaign
 
 SCIPY = ("scipy.interpolate", "scipy.linalg", "scipy.optimize", "scipy.signal", "scipy.special", "scipy.stats")
 OF_FILES = ("asammdf", "h5py", "matplotlib", "pandas", "plotly", "pyarrow")
-SLOW = (*SCIPY, *OF_FILES, "textual")
+SLOW = (*SCIPY, *OF_FILES, "textual", "dask", "distributed", "fsspec")
 RIG = str(Path(__file__).parents[2] / "examples" / "rig.toml")
 NOBODY = "ws://127.0.0.1:1/"
 

@@ -46,6 +46,7 @@ def _rows(vehicle: int, drive: int, hz: float, has_gap: bool, gap_rad: float) ->
         "model": "bus.toml",
         "model_sha256": "0",
         "from_fleet": "",
+        "seconds": 1.0 + drive,
         "version": "0",
     }
     parameters: list[Row] = []
