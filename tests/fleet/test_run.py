@@ -135,9 +135,9 @@ def workers_of(address: str) -> int:
 
 
 def children(process: int) -> list[int]:
-    """Return the workers of a client: its children that have the most memory."""
+    """Return the workers of a client."""
     found = subprocess.run(
-        ["ps", "-o", "pid=,args=", "--ppid", str(process)], capture_output=True, text=True, check=False
+        ["ps", "-ww", "-o", "pid=,args=", "--ppid", str(process)], capture_output=True, text=True, check=False
     )
     return [int(line.split()[0]) for line in found.stdout.splitlines() if "spawn_main" in line]
 
