@@ -41,6 +41,7 @@ campaign: $(READY)
 	$(BIN)/python -m tests.campaigns.fuzz
 	$(BIN)/python -m tests.campaigns.day
 	$(BIN)/python -m pytest tests/browser/test_foreign_text.py tests/plants tests/rig/test_sole_host.py
+	$(BIN)/python -m tests.campaigns.fleet --out out/fleet
 
 # Speed as ratios to scipy, a bare C loop, raw python-can; growth with the length, memory: docs/benchmarks.md.
 bench: $(READY)
@@ -48,6 +49,7 @@ bench: $(READY)
 	$(BIN)/python -m tests.benchmarks.diagnosis
 	$(BIN)/python -m tests.benchmarks.fieldbus
 	$(BIN)/python -m tests.benchmarks.recursive
+	$(BIN)/python -m tests.benchmarks.fleet
 
 # The manual as pages: out/docs/index.html.
 docs: $(READY)

@@ -74,7 +74,7 @@ def diagnose(
     """Diagnose every recording, or every vehicle's together.
 
     What is in DATASET is not computed again. A recording that can't be read, and one whose worker dies, are listed with
-    the reason, and the rest goes on.
+    the reason, and the rest continues.
     """
     _require_dask()
     from dataclasses import replace

@@ -17,6 +17,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy.optimize import minimize
@@ -130,7 +131,7 @@ def usual(vehicles: Sequence[Seen]) -> Usual:
     bounds = [(middle - 10.0 * scale, middle + 10.0 * scale), (low, high), (low, high)]
     start = np.array([middle, math.log(scale), math.log(scale)])
     simplex = start + np.vstack([np.zeros(3), np.diag([0.5 * scale, 0.7, 0.7])])
-    options = {"initial_simplex": simplex, "xatol": 1e-3 * min(scale, 1.0), "fatol": 1e-3}
+    options: Any = {"initial_simplex": simplex, "xatol": 1e-3 * min(scale, 1.0), "fatol": 1e-3}
     found = minimize(_deviance, start, (vehicles,), method="Nelder-Mead", bounds=bounds, options=options).x
     return Usual(float(found[0]), math.exp(found[1]), math.exp(found[2]), len(vehicles))
 

@@ -7,6 +7,7 @@ what a worker's time is not spent in tasks while there is work. Growth is that o
 
 import argparse
 import os
+import sys
 import tempfile
 import time
 from pathlib import Path
@@ -81,18 +82,18 @@ def main() -> None:
         with client_of(Engine(workers=1)) as client:
             surveyed(client, folder, 10)
             rows = [surveyed(client, folder, count) for count in (100, 10_000)]
-        print(table(("recordings", "each", "client and scheduler", "worker"), rows))
+        sys.stdout.write(table(("recordings", "each", "client and scheduler", "worker"), rows))
         (folder / "drives").mkdir()
         write_drives(folder / "drives", options.drives, options.seconds)
         times = {workers: identified(folder / "drives", workers) for workers in (1, 2)}
     per_drive = {w: spent / (options.drives - w) for w, (spent, _) in times.items()}
-    print(f"load of the machine: {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores")
+    lines = [f"load of the machine: {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores"]
     for workers, (spent, in_tasks) in times.items():
         share = 1.0 - in_tasks / (workers * spent)
-        print(
-            f"{workers} workers: {per_drive[workers]:.2f} s a drive of {options.seconds:g} s, {share:.1%} not in tasks"
-        )
-    print(f"two workers: {per_drive[1] / per_drive[2]:.2f} times one")
+        each = f"{per_drive[workers]:.2f} s a drive of {options.seconds:g} s"
+        lines.append(f"{workers} workers: {each}, {share:.1%} not in tasks")
+    lines.append(f"two workers: {per_drive[1] / per_drive[2]:.2f} times one")
+    sys.stdout.write("\n".join(lines) + "\n")
 
 
 if __name__ == "__main__":

@@ -109,7 +109,7 @@ def judged(rows: list[Row], drives: range) -> tuple[Usual, dict[int, Pooled]]:
     return known, {vehicle: pooled(each, known) for vehicle, each in seen.items()}
 
 
-def told(what: str, known: Usual, found: dict[int, Pooled]) -> str:
+def line_for(what: str, known: Usual, found: dict[int, Pooled]) -> str:
     """Return the line of one way to judge."""
     hits = sum(each.is_apart for vehicle, each in found.items() if is_faulty(vehicle))
     false = sum(each.is_apart for vehicle, each in found.items() if not is_faulty(vehicle))
@@ -130,8 +130,8 @@ def main() -> None:
     rows = identify_all(options.out / "drives.jsonl", drives, options.jobs)
     print(f"{len(rows)} drives, {sum(row['hz'] is None for row in rows)} without a resonance")
     for number in DRIVES:
-        print(told(f"drive {number} alone", *judged(rows, range(number, number + 1))))
-    print(told(f"{len(DRIVES)} drives together", *judged(rows, DRIVES)))
+        print(line_for(f"drive {number} alone", *judged(rows, range(number, number + 1))))
+    print(line_for(f"{len(DRIVES)} drives together", *judged(rows, DRIVES)))
 
 
 if __name__ == "__main__":

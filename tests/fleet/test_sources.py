@@ -35,7 +35,7 @@ def test_a_folder_a_glob_and_a_file_name_recordings_once(drives: Path) -> None:
     assert (found[2].vehicle, found[2].rig) == ("7", "a")
 
 
-def test_an_empty_folder_and_one_that_is_not_there_are_named_and_the_rest_goes_on(drives: Path) -> None:
+def test_an_empty_folder_and_one_that_is_not_there_are_named_and_the_rest_continues(drives: Path) -> None:
     (drives / "empty").mkdir()
     found, complaints = find([str(drives / "empty"), str(drives / "nowhere"), str(drives / "bus_1")], None)
     assert len(found) == 1
