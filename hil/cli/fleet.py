@@ -21,6 +21,11 @@ if TYPE_CHECKING:
 app = typer.Typer(add_completion=False, no_args_is_help=True)
 
 
+@app.callback(epilog="Example: hil fleet diagnose drives/ --model bus.toml --out results")
+def fleet() -> None:
+    """Diagnose or identify many recordings, on this machine's cores or a Dask cluster."""
+
+
 class By(Enum):
     """What is explained together."""
 
