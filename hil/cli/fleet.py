@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -11,11 +9,11 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from hil.cli.diagnose import Effort
-from hil.cli.options import tell
-from hil.cli.printing import new_console, say
+from hil.cli.options import Scheduler, require_dask, tell
+from hil.cli.printing import progress_bar, say
 
 if TYPE_CHECKING:
-    from hil.fleet.run import Done, Engine, Progress
+    from hil.fleet.run import Done, Engine
     from hil.fleet.tasks import Job
 
 app = typer.Typer(add_completion=False, no_args_is_help=True)
@@ -38,10 +36,6 @@ Sources = Annotated[
     typer.Argument(metavar="SOURCES...", help="Recordings: files, folders, globs, or URLs of fsspec (s3://…)."),
 ]
 Out = Annotated[Path, typer.Option("--out", metavar="DATASET", help="Folder of the results; continued there.")]
-Scheduler = Annotated[
-    str | None,
-    typer.Option(metavar="URL", help="Dask scheduler, tcp://… or tls://…; without it this machine's cores."),
-]
 Workers = Annotated[
     int | None, typer.Option("--jobs", min=1, metavar="N", help="Workers on this machine; all cores, or HIL_JOBS.")
 ]
@@ -81,7 +75,7 @@ def diagnose(
     What is in DATASET is not computed again. A recording that can't be read, and one whose worker dies, are listed with
     the reason, and the rest continues.
     """
-    _require_dask()
+    require_dask()
     from dataclasses import replace
 
     from hil.config.model_file import read_model_for_recordings
@@ -118,7 +112,7 @@ def identify(
     as_json: AsJson = False,
 ) -> None:
     """Identify the driveline from every recording: resonance, damping, physical parameters."""
-    _require_dask()
+    require_dask()
     from hil.config.model_file import read_model_for_recordings
     from hil.fleet.tasks import IDENTIFY, Job
     from hil.provenance import Source
@@ -146,15 +140,6 @@ def report(
     say(f"report: {dataset / FILE_NAME}")
 
 
-def _require_dask() -> None:
-    from importlib.util import find_spec
-
-    from hil.errors import UsageError
-
-    if find_spec("distributed") is None:
-        raise UsageError("hil fleet: expected Dask distributed, got none: pip install 'hil-driveline[fleet]'")
-
-
 def _engine(scheduler: str | None, jobs: int | None, memory: str, retries: int) -> Engine:
     from estimator.physics.parallel import workers
     from hil.fleet.run import Engine
@@ -180,7 +165,7 @@ def _carry_out(
         tell(line)
     if not found:
         raise UsageError("expected recordings, got none: " + "; ".join(complaints))
-    with client_of(engine) as client, _progress_bar() as progress:
+    with client_of(engine) as client, progress_bar() as progress:
         tell(f"dashboard: {client.dashboard_link}")
         fleet = survey(client, found, engine.retries, progress)
         for line in fleet.remarks():
@@ -199,22 +184,3 @@ def _say_done(out: Path, done: Done) -> None:
         say(f"not done: {row['url']}: {row['error']}", err=True)
     failed = f", {done.failed} failed: {out / FAILURES}" if done.failed else ""
     say(f"{done.computed} computed, {done.known} known before{failed}    results: {out}")
-
-
-@contextmanager
-def _progress_bar() -> Iterator[Progress]:
-    """Show what is done and the time left on standard error, where that is a terminal."""
-    from rich.progress import BarColumn, MofNCompleteColumn, TaskID, TextColumn, TimeRemainingColumn
-    from rich.progress import Progress as Bar
-
-    console = new_console(stderr=True)
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Bar(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
-        tasks: dict[str, TaskID] = {}
-
-        def show(stage: str, done: int, total: int) -> None:
-            if stage not in tasks:
-                tasks[stage] = bar.add_task(stage, total=total)
-            bar.update(tasks[stage], completed=done, total=total)
-
-        yield show

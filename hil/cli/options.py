@@ -91,6 +91,20 @@ Jobs = Annotated[
 ]
 
 
+Scheduler = Annotated[
+    str | None,
+    typer.Option(metavar="URL", help="Dask scheduler, tcp://… or tls://…; without it this machine's cores."),
+]
+
+
+def require_dask() -> None:
+    """Refuse where the extra is not installed: imported by the commands alone that work on a cluster."""
+    from importlib.util import find_spec
+
+    if find_spec("distributed") is None:
+        raise UsageError("expected Dask distributed, got none: pip install 'hil-driveline[fleet]'")
+
+
 FilterOf = Annotated[
     Path | None,
     typer.Option(

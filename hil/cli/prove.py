@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import secrets
 from collections.abc import Iterator
+from concurrent.futures import Executor
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-from hil.cli.printing import new_console, say
-
-if TYPE_CHECKING:
-    from hil.proof.work import Progress
+from hil.cli.options import Scheduler, require_dask
+from hil.cli.printing import progress_bar, say
 
 SEEDS = 2**31
 RIG_SEED = 11
@@ -84,7 +83,7 @@ def make(
         _require_outside(key_file, folder)
         require_folder(key_file.parent)
     chosen = secrets.randbelow(SEEDS) if seed is None else seed
-    with _progress() as progress:
+    with progress_bar() as progress:
         make_set(folder, cases, chosen, parse_key(key), jobs, progress)
     if key_file is None:
         say(f"key: {key}")
@@ -96,12 +95,12 @@ def make(
 
 
 @app.command(epilog="Example: hil prove run proof")
-def run(folder: Folder, jobs: Jobs = 2) -> None:
+def run(folder: Folder, jobs: Jobs = 2, scheduler: Scheduler = None) -> None:
     """Let the public command answer every case; it sees only DIR/cases, one case at a time."""
     from hil.proof.answers import answer
 
-    with _progress() as progress:
-        digest = answer(folder, jobs, progress)
+    with _pool(scheduler) as pool, progress_bar() as progress:
+        digest = answer(folder.absolute(), jobs, progress, pool=pool)
     say(f"verdicts: {folder}/verdicts   digest: {digest}")
 
 
@@ -126,7 +125,7 @@ def open_(
     from hil.report.outputs import publish
 
     secret = parse_key(_key_text(key, key_file))
-    with _progress() as progress:
+    with progress_bar() as progress:
         rows = judge_set(folder, secret, jobs, progress, verdicts)
     shown = folder / CASES
     made = provenance(sorted(shown.rglob("*.toml")), sorted(shown.rglob("*.csv")))
@@ -149,7 +148,7 @@ def wire(
     from hil.proof.rigs import WIRED, run_wire
     from hil.proof.scoreboard import WIRE
 
-    with _progress() as progress:
+    with progress_bar() as progress:
         rows = run_wire(folder / WIRE, seed, only or list(WIRED), progress)
     for row in rows:
         found = ", ".join(row.get("named", ())) or row.get("verdict", row["said"])
@@ -163,15 +162,29 @@ def real(
     folder: Folder,
     only: Annotated[list[str] | None, typer.Option(metavar="NAME", help="Only this one; may be repeated.")] = None,
     jobs: Jobs = 1,
+    scheduler: Scheduler = None,
 ) -> None:
     """Conceal what is known of real recordings, diagnose, compare; writes DIR/real/real.json."""
     from hil.proof.real import run_real
     from hil.proof.scoreboard import REAL
 
-    with _progress() as progress:
-        results = run_real(data, folder / REAL, only or (), jobs, progress)
+    with _pool(scheduler) as pool, progress_bar() as progress:
+        results = run_real(data.absolute(), folder.absolute() / REAL, only or (), jobs, progress, pool=pool)
     for result in results:
         say(f"{result['name']}: {'as it should be' if result['named_right'] else 'not as it should be'}")
+
+
+@contextmanager
+def _pool(scheduler: str | None) -> Iterator[Executor | None]:
+    """Give the cores of a Dask cluster, which sees the same folders; None for this machine's."""
+    if scheduler is None:
+        yield None
+        return
+    require_dask()
+    from hil.fleet.run import Engine, client_of
+
+    with client_of(Engine(scheduler)) as client:
+        yield client.get_executor(pure=False)  # type: ignore[no-untyped-call]
 
 
 def _key_text(key: str | None, key_file: Path | None) -> str:
@@ -201,21 +214,3 @@ def _require_outside(key_file: Path, folder: Path) -> None:
         )
     if key_file.exists():
         raise UsageError(f"{key_file}: expected a file that is not there yet: it may be the key of another set.")
-
-
-@contextmanager
-def _progress() -> Iterator[Progress]:
-    """Show what is done on standard error, with the time taken and left."""
-    from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
-    from rich.progress import Progress as Bar
-
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        TimeRemainingColumn(),
-    )
-    with Bar(*columns, console=new_console(stderr=True), transient=True) as bar:
-        task = bar.add_task("", total=None)
-        yield lambda what, done, total: bar.update(task, description=what, completed=done, total=total)

@@ -33,64 +33,26 @@ Row = dict[str, Any]
 VERDICTS = "verdicts"
 FAILURES = "failures.parquet"
 
-TEXT, NUMBER, COUNT = pa.string(), pa.float64(), pa.int64()
 
-_OF = {"key": TEXT, "vehicle": TEXT, "rig": TEXT, "started": TEXT, "name": TEXT}
+def _columns(texts: str, numbers: str = "", counts: str = "") -> pa.Schema:
+    kinds = ((f"key vehicle rig started name {texts}", pa.string()), (numbers, pa.float64()), (counts, pa.int64()))
+    return pa.schema([(name, kind) for names, kind in kinds for name in names.split()])
+
 
 TABLES: Mapping[str, pa.Schema] = {
-    name: pa.schema({**_OF, **columns}.items())
-    for name, columns in {
-        "recordings": {
-            "url": TEXT,
-            "sha256": TEXT,
-            "n_recordings": COUNT,
-            "n_samples": COUNT,
-            "duration_s": NUMBER,
-            "verdict": TEXT,
-            "statement": TEXT,
-            "element": TEXT,
-            "effects": TEXT,
-            "fit_unit": TEXT,
-            "fit_nominal": NUMBER,
-            "fit_retuned": NUMBER,
-            "fit_augmented": NUMBER,
-            "noise_floor": NUMBER,
-            "frequency_hz": NUMBER,
-            "damping": NUMBER,
-            "effort": TEXT,
-            "simulations": COUNT,
-            "seconds": NUMBER,
-            "model": TEXT,
-            "model_sha256": TEXT,
-            "from_fleet": TEXT,
-            "version": TEXT,
-        },
-        "effects": {
-            "effect": TEXT,
-            "form": TEXT,
-            "element": TEXT,
-            "probability": NUMBER,
-            "share": NUMBER,
-            "delta_bic": NUMBER,
-            "p_value": NUMBER,
-            "indistinguishable_from": TEXT,
-        },
-        "parameters": {
-            "effect": TEXT,
-            "parameter": TEXT,
-            "value": NUMBER,
-            "low": NUMBER,
-            "high": NUMBER,
-            "nominal": NUMBER,
-            "unit": TEXT,
-        },
-    }.items()
+    "recordings": _columns(
+        "url sha256 verdict statement element effects fit_unit effort model model_sha256 from_fleet version",
+        "duration_s fit_nominal fit_retuned fit_augmented noise_floor frequency_hz damping seconds",
+        "n_recordings n_samples simulations",
+    ),
+    "effects": _columns("effect form element indistinguishable_from", "probability share delta_bic p_value"),
+    "parameters": _columns("effect parameter unit", "value low high nominal"),
 }
 """Columns of each table; ``command`` is the folder. ``effect`` is empty for a parameter of the line itself."""
 
-_FAILURE = pa.schema({**_OF, "url": TEXT, "command": TEXT, "error": TEXT, "version": TEXT}.items())
+_FAILURE = _columns("url command error version")
 
-MOST_ROWS, LONGEST_S = 256, 10.0
+MOST_ROWS, LONGEST_S = 256, 60.0
 """Results, and time, after which a part is written: what a killed run has to compute again."""
 
 
@@ -177,7 +139,7 @@ def _age(path: Path) -> tuple[int, str]:
 
 def read(folder: Path, table: str, columns: Sequence[str] | None = None) -> pa.Table:
     """Read a table of a dataset, ``failures`` among them, oldest parts first; empty where there is nothing yet."""
-    schema = _FAILURE if table == "failures" else TABLES[table].append(pa.field("command", TEXT))
+    schema = _FAILURE if table == "failures" else TABLES[table].append(pa.field("command", pa.string()))
     place = folder / (FAILURES if table == "failures" else table)
     files = list(place.rglob("part-*.parquet")) if place.is_dir() else [place] * place.is_file()
     if not files:
@@ -185,7 +147,7 @@ def read(folder: Path, table: str, columns: Sequence[str] | None = None) -> pa.T
     try:
         source = pa.dataset.dataset(
             [str(path) for path in sorted(files, key=_age)], schema=schema, format="parquet",
-            partitioning=pa.dataset.partitioning(pa.schema([("command", TEXT)]), flavor="hive"),
+            partitioning=pa.dataset.partitioning(pa.schema([("command", pa.string())]), flavor="hive"),
         )  # fmt: skip
         return source.to_table(columns=None if columns is None else list(columns))
     except (pa.ArrowException, OSError) as error:

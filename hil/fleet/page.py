@@ -238,15 +238,11 @@ def _effects(effects: Sequence[Row], rows: Mapping[str, Row]) -> html.Register:
         for each in sorted(effects, key=lambda each: order[each["key"]])
     ]
     headings = ("vehicle", "effect", "element", "recorded", "probability", "share", "or else", "verdict")
-    return html.Register("effects", headings, lines, _to_verdict(7))
+    return html.Register("effects", headings, lines, VERDICTS)
 
 
 def _cell(row: Row, name: str) -> Any:
     return _day(row[name]) if name == "started" else row[name]
-
-
-def _to_verdict(column: int) -> tuple[int, str, str, str]:
-    return (column, "open", f"{VERDICTS}/", ".json")
 
 
 def _recordings(rows: Mapping[str, Row], effects: Sequence[Row]) -> html.Register:
@@ -256,7 +252,7 @@ def _recordings(rows: Mapping[str, Row], effects: Sequence[Row]) -> html.Registe
         "vehicle", "recording", "recorded", "by", "verdict", "effects", "resonance [Hz]", "damping", "statement",
         "verdict's file",
     )  # fmt: skip
-    return html.Register("recordings", headings, lines, _to_verdict(9))
+    return html.Register("recordings", headings, lines, VERDICTS)
 
 
 def _failures(failures: Sequence[Row]) -> html.Register:

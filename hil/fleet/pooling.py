@@ -20,6 +20,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 from scipy.optimize import minimize
 from scipy.stats import norm
 
@@ -38,6 +39,8 @@ FEWEST_VEHICLES = 8
 LARGEST_TOLERANCE = 0.95
 QUANTILE = float(norm.ppf(0.975))
 
+IntArray = npt.NDArray[np.int64]
+
 
 @dataclass(frozen=True, slots=True)
 class Seen:
@@ -45,7 +48,6 @@ class Seen:
 
     value: FloatArray
     std: FloatArray
-    key: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,26 +62,12 @@ class Usual:
 
 @dataclass(frozen=True, slots=True)
 class Pooled:
-    """What is known of a vehicle's parameter from all its recordings and from the fleet.
-
-    Attributes
-    ----------
-    value, std : float
-        With the prior.
-    own, own_std : float
-        Without it: of the vehicle's recordings alone.
-    from_fleet : float
-        Share of the value that came from the prior.
-    away : float
-        How far its own value is from what is usual, in standard deviations of a usual vehicle's.
-    """
+    """What is known of a vehicle's parameter from all its recordings and from the fleet."""
 
     value: float
     std: float
-    own: float
-    own_std: float
-    from_fleet: float
-    away: float
+    from_fleet: float  # share of the value that came from the prior
+    away: float  # from what is usual to its own recordings alone, in standard deviations of a usual vehicle's
 
     @property
     def is_apart(self) -> bool:
@@ -108,18 +96,18 @@ def _own(seen: Seen, within: float) -> tuple[float, float]:
     return float(weight @ seen.value / weight.sum()), float(1.0 / weight.sum())
 
 
-def _deviance(x: FloatArray, vehicles: Sequence[Seen]) -> float:
-    """Return -2 log of the marginal likelihood at ``mu, log tau, log omega``."""
+def _deviance(x: FloatArray, value: FloatArray, std: FloatArray, sizes: IntArray) -> float:
+    """Return -2 log of the marginal likelihood at ``mu, log tau, log omega``; ``sizes`` cuts values into vehicles."""
     mean, between, within = x[0], math.exp(x[1]), math.exp(x[2])
-    own = np.array([_own(each, within) for each in vehicles])
-    usual_one = norm.pdf(own[:, 0], mean, np.sqrt(own[:, 1] + between**2))
-    other = norm.pdf(own[:, 0], mean, np.sqrt(own[:, 1] + (WIDER * between) ** 2))
-    likelihood = np.maximum((1.0 - FEW) * usual_one + FEW * other, np.finfo(np.float64).tiny)
-    deviance = -2.0 * float(np.log(likelihood).sum())
-    for each, (level, variance) in zip(vehicles, own, strict=True):
-        spread = within**2 + each.std**2
-        deviance += float(np.sum(np.log(spread) + (each.value - level) ** 2 / spread) - math.log(variance))
-    return deviance
+    weight, first = 1.0 / (within**2 + std**2), np.cumsum(sizes) - sizes
+    total = np.add.reduceat(weight, first)
+    level = np.add.reduceat(weight * value, first) / total
+    usual_one, other = (
+        math.log(share) + norm.logpdf(level, mean, np.sqrt(1.0 / total + spread**2))
+        for share, spread in ((1.0 - FEW, between), (FEW, WIDER * between))
+    )
+    own = weight * (value - np.repeat(level, sizes)) ** 2 - np.log(weight)
+    return float(own.sum() + np.sum(np.log(total) - 2.0 * np.logaddexp(usual_one, other)))
 
 
 def usual(vehicles: Sequence[Seen]) -> Usual:
@@ -132,7 +120,9 @@ def usual(vehicles: Sequence[Seen]) -> Usual:
     start = np.array([middle, math.log(scale), math.log(scale)])
     simplex = start + np.vstack([np.zeros(3), np.diag([0.5 * scale, 0.7, 0.7])])
     options: Any = {"initial_simplex": simplex, "xatol": 1e-3 * min(scale, 1.0), "fatol": 1e-3}
-    found = minimize(_deviance, start, (vehicles,), method="Nelder-Mead", bounds=bounds, options=options).x
+    of_all = (np.concatenate([each.value for each in vehicles]), np.concatenate([each.std for each in vehicles]))
+    sizes = np.array([each.value.size for each in vehicles])
+    found = minimize(_deviance, start, (*of_all, sizes), method="Nelder-Mead", bounds=bounds, options=options).x
     return Usual(float(found[0]), math.exp(found[1]), math.exp(found[2]), len(vehicles))
 
 
@@ -140,14 +130,11 @@ def pooled(seen: Seen, known: Usual) -> Pooled:
     """Return what is known of a vehicle, given what is usual."""
     own, variance = _own(seen, known.within)
     share = variance / (variance + known.between**2)
-    spread = math.sqrt(variance + known.between**2)
     return Pooled(
         value=share * known.mean + (1.0 - share) * own,
         std=math.sqrt(variance * (1.0 - share)),
-        own=own,
-        own_std=math.sqrt(variance),
         from_fleet=share,
-        away=(own - known.mean) / spread,
+        away=(own - known.mean) / math.sqrt(variance + known.between**2),
     )
 
 

@@ -25,17 +25,15 @@ from hil.fleet.tasks import Job, Outcome, analyse, describe, row_of
 IN_FLIGHT = 4
 """Tasks for each core that the scheduler knows of: enough that none waits, and few to hold."""
 
-COMPARED = ("hil-driveline", "dask", "distributed", "cloudpickle", "numpy", "scipy", "numba")
-"""Packages that client, scheduler and workers must have alike: to understand one another, and to find the same."""
+OF_DASK: tuple[str, ...] = ("python", "dask", "distributed", "cloudpickle")
+"""What client, scheduler and workers must have alike to understand one another."""
 
-OF_WORKERS = frozenset({"hil-driveline", "numpy", "scipy", "numba"})
-"""Of them those that a scheduler needs not, which computes nothing."""
+OF_RESULTS: tuple[str, ...] = ("hil-driveline", "numpy", "scipy", "numba")
+"""And what client and workers must to find the same."""
 
 HANDSHAKE_S = 10.0
 
 Item = TypeVar("Item")
-
-Tell = Callable[[str], None]
 
 Progress = Callable[[str, int, int], None]
 """Called with the stage, how much of it is done, and how much there is."""
@@ -43,24 +41,12 @@ Progress = Callable[[str, int, int], None]
 
 @dataclass(frozen=True, slots=True)
 class Engine:
-    """Where the work is done.
-
-    Attributes
-    ----------
-    scheduler : str or None
-        Address of a cluster that runs; None for one of this machine's cores.
-    workers : int
-        Of a cluster of our own; each has one thread.
-    memory : str
-        Of each worker, as Dask writes it; "auto" divides what there is.
-    retries : int
-        How often Dask tries again what a worker died of, or failed at.
-    """
+    """Where the work is done: on a cluster that runs, or on workers of this machine, each with one thread."""
 
     scheduler: str | None = None
     workers: int = 1
-    memory: str = "auto"
-    retries: int = 2
+    memory: str = "auto"  # of each worker, as Dask writes it; "auto" divides what there is
+    retries: int = 2  # how often Dask tries again what a worker died of, or failed at
 
 
 @contextmanager
@@ -92,17 +78,17 @@ def client_of(engine: Engine) -> Iterator[Client]:
 
 def _require_alike(client: Client) -> None:
     """Refuse a cluster without workers, or of other versions."""
-    versions: Any = client.get_versions(packages=list(COMPARED))
+    versions: Any = client.get_versions(packages=[*OF_DASK[1:], *OF_RESULTS])
     if not versions["workers"]:
         raise UsageError("--scheduler: expected a cluster with workers, got none. Start some: dask worker ADDRESS")
     own = versions["client"]["packages"]
-    sides = [(f"worker {address}", each["packages"], frozenset[str]()) for address, each in versions["workers"].items()]
-    sides.append(("the scheduler", versions["scheduler"]["packages"], OF_WORKERS))
+    sides = [("the scheduler", versions["scheduler"], OF_DASK)]
+    sides += [(f"worker {address}", each, OF_DASK + OF_RESULTS) for address, each in versions["workers"].items()]
     differing = [
-        f"{package} {own[package]} here, {there.get(package)} at {side}"
-        for side, there, left_out in sides
-        for package in ("python", *COMPARED)
-        if package not in left_out and there.get(package) != own[package]
+        f"{package} {own[package]} here, {there['packages'].get(package)} at {side}"
+        for side, there, packages in sides
+        for package in packages
+        if there["packages"].get(package) != own[package]
     ]
     if differing:
         raise UsageError(f"--scheduler: expected the versions of this machine, got {'; '.join(differing)}. Align them.")
@@ -131,11 +117,8 @@ def hand_out(
                 "expected the scheduler to stay, got none: the connection is lost. What was done is kept: call again."
             )
         if isinstance(error, KilledWorker):
-            yield (
-                item,
-                None,
-                f"its worker died {error.allowed_failures + 1} times: out of memory, out of time, or killed",
-            )
+            times = error.allowed_failures + 1
+            yield item, None, f"its worker died {times} times: out of memory, out of time, or killed"
         elif error is not None:
             yield item, None, f"{type(error).__name__}: {error}"
         else:

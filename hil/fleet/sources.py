@@ -32,23 +32,13 @@ _FOLDER = re.compile(r"(?:^|/)(vehicle|rig)=([^/]+)(?=/)")
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """A recording of the fleet.
-
-    Attributes
-    ----------
-    url : str
-        A path, or an address of fsspec.
-    vehicle, rig, started : str
-        Empty where nothing says it; ``started`` in ISO 8601.
-    sha256 : str
-        Of its content, and of the sidecar that belongs to it; empty until `described`.
-    """
+    """A recording of the fleet, by its path or its address of fsspec; the rest is empty where nothing says it."""
 
     url: str
     vehicle: str = ""
     rig: str = ""
-    started: str = ""
-    sha256: str = ""
+    started: str = ""  # ISO 8601
+    sha256: str = ""  # of its content, and of the sidecar that belongs to it
 
     @property
     def name(self) -> str:

@@ -7,19 +7,16 @@ import json
 import os
 import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
-from typing import Any
 
 from threadpoolctl import threadpool_limits
 
 from estimator.diagnosis.diagnose import diagnose
-from estimator.diagnosis.result import Diagnosis
 from estimator.errors import EstimatorError
 from estimator.identification.modes.modes import two_mass_resonance
 from estimator.identification.settings import Settings
-from estimator.identification.study import Study
 from estimator.physics.model import Structure
 from estimator.physics.parallel import work_on
 from estimator.signals.record import Record
@@ -32,7 +29,6 @@ from hil.recording import read_records
 from hil.report.diagnosis_json import diagnosis_json
 from hil.report.identification_files import identify_all
 from hil.report.identification_json import identification_text
-from hil.report.numbers import json_number
 from hil.version import __version__
 
 DIAGNOSE, IDENTIFY = "diagnose", "identify"
@@ -43,23 +39,13 @@ PATIENCE = 3.0
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """What is done to every recording.
-
-    Attributes
-    ----------
-    file : ModelFile or None
-        None where recordings are identified as they are.
-    from_fleet : tuple of str
-        Parameters of the model that the fleet's prior has set.
-    budget_s : float
-        Time that one of them may take [s].
-    """
+    """What is done to every recording; ``file`` is None where they are identified as they are."""
 
     command: str
     file: ModelFile | None
     model: str = ""
     model_sha256: str = ""
-    from_fleet: tuple[str, ...] = ()
+    from_fleet: tuple[str, ...] = ()  # parameters of the model that the fleet's prior has set
     effort: str = "normal"
     budget_s: float = 3600.0
     version: str = __version__
@@ -103,22 +89,22 @@ def analyse(recordings: Sequence[Found], job: Job) -> Outcome:
         ):
             signals = None if job.file is None else job.file.signals
             records = read_records(paths, signals, job.file is not None and job.file.on_bench)
-            if job.command == IDENTIFY:
+            if job.command == IDENTIFY or job.file is None:
                 made = _identified(records)
             else:
                 with with_the_line_to_write(paths, signals):
-                    made = _diagnosed(records, job)
+                    made = _diagnosed(records, job.file, job)
     except (HilError, EstimatorError) as error:
         return Outcome({}, "", " ".join((str(error), *getattr(error, "__notes__", ()))))
-    head, rows, verdict = made
-    of = row_of(recordings, job)
-    timed = {"seconds": time.monotonic() - begun, "n_recordings": len(records), **head}
-    sizes = {
+    head, effects, parameters, verdict = made
+    head |= {
+        "n_recordings": len(records),
         "n_samples": sum(int(each.okay.sum()) for each in records),
         "duration_s": sum(float(each.time_s[-1] - each.time_s[0]) for each in records),
+        "seconds": time.monotonic() - begun,
     }
-    tables = {name: [{**of, **row} for row in rows.get(name, ())] for name in ("effects", "parameters")}
-    return Outcome({"recordings": [{**of, **sizes, **timed}], **tables}, verdict)
+    of, tables = row_of(recordings, job), {"recordings": [head], "effects": effects, "parameters": parameters}
+    return Outcome({name: [of | row for row in rows] for name, rows in tables.items()}, verdict)
 
 
 def row_of(recordings: Sequence[Found], job: Job) -> Row:
@@ -151,100 +137,65 @@ def _ended_after(limit_s: float) -> Iterator[None]:
         timer.cancel()
 
 
-Made = tuple[Row, dict[str, list[Row]], str]
-
-
-def _diagnosed(records: Sequence[Record], job: Job) -> Made:
-    file = job.file
-    if file is None:
-        raise TypeError("a diagnosis is of a model")
-    found = diagnose(records, file.model, (), budget_s=job.budget_s, effort=job.effort)
-    if not found.effort.finished:
-        raise HilError(f"expected a diagnosis within {job.budget_s:g} s (--budget-s), got none. Give it more time.")
-    content = diagnosis_json(found) | {"timing_s": {}}  # the same on every machine, to the last bit
-    text = json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
-    parameters = [*_of_line(found), *_of_effects(found)]
-    return _verdict_row(found), {"effects": _effect_rows(found), "parameters": parameters}, text
-
-
-def _verdict_row(found: Diagnosis) -> Row:
-    fit, element = found.fit, found.mismatch.element
-    line = {name: each.value for name, each in found.parameters.items()}
-    is_two_mass = found.augmented.structure is Structure.TWO_MASS
-    mode = two_mass_resonance(**line) if is_two_mass and len(line) == len(TWO_MASS) else None
-    return {
-        "verdict": found.verdict.value,
-        "statement": found.statement,
-        "element": "" if element is None else element.value,
-        "effects": " ".join(each.name for each in found.effects),
-        "fit_unit": fit.unit,
-        "fit_nominal": json_number(fit.nominal),
-        "fit_retuned": json_number(fit.retuned),
-        "fit_augmented": json_number(fit.augmented),
-        "noise_floor": json_number(fit.noise_floor),
-        "effort": found.effort.level,
-        "simulations": found.effort.simulations,
-        **({} if mode is None else {"frequency_hz": mode.frequency_hz, "damping": mode.damping}),
-    }
-
+Made = tuple[Row, list[Row], list[Row], str]
+"""Columns of the recording, rows of its effects and of parameters, and the verdict."""
 
 TWO_MASS = ("J_M", "J_L", "k", "c", "b_M", "b_L")
 
 
-def _effect_rows(found: Diagnosis) -> list[Row]:
-    return [
-        {
-            "effect": each.name,
-            "form": each.form,
-            "element": each.element.value,
-            "probability": json_number(each.probability),
-            "share": json_number(each.share),
-            "delta_bic": json_number(each.evidence.delta_bic),
-            "p_value": json_number(each.evidence.p_value),
-            "indistinguishable_from": " ".join(each.indistinguishable_from),
-        }
-        for each in found.effects
+def _diagnosed(records: Sequence[Record], file: ModelFile, job: Job) -> Made:
+    found = diagnose(records, file.model, (), budget_s=job.budget_s, effort=job.effort)
+    if not found.effort.finished:
+        raise HilError(f"expected a diagnosis within {job.budget_s:g} s (--budget-s), got none. Give it more time.")
+    content = diagnosis_json(found) | {"timing_s": {}}  # the same on every machine, to the last bit
+    fit, effects, line = content["fit"], content["effects"], content["parameters"]
+    head = {name: content[name] for name in ("verdict", "statement")} | {
+        "element": content["mismatch"]["element"] or "",
+        "effects": " ".join(each["name"] for each in effects),
+        **{f"fit_{name}": fit[name] for name in ("unit", "nominal", "retuned", "augmented")},
+        "noise_floor": fit["noise_floor"],
+        "effort": found.effort.level,
+        "simulations": found.effort.simulations,
+    }
+    if found.augmented.structure is Structure.TWO_MASS and set(line) == set(TWO_MASS):
+        mode = two_mass_resonance(**{name: found.parameters[name].value for name in TWO_MASS})
+        head |= {} if mode is None else {"frequency_hz": mode.frequency_hz, "damping": mode.damping}
+    parameters = [
+        *_parameters("", line),
+        *(row for each in effects for row in _parameters(each["name"], each["parameters"])),
     ]
+    text = json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+    return head, [_effect(each) for each in effects], parameters, text
 
 
-def _of_line(found: Diagnosis) -> Iterator[Row]:
-    for name, each in found.parameters.items():
-        yield _parameter("", name, each.value, each.ci95, each.unit) | {"nominal": json_number(each.nominal)}
+def _effect(each: Row) -> Row:
+    return {
+        "effect": each["name"],
+        "form": each.get("form", ""),
+        "indistinguishable_from": " ".join(each["indistinguishable_from"]),
+        **{name: each[name] for name in ("element", "probability", "share")},
+        **{name: each["evidence"][name] for name in ("delta_bic", "p_value")},
+    }
 
 
-def _of_effects(found: Diagnosis) -> Iterator[Row]:
-    for effect in found.effects:
-        for name, each in effect.parameters.items():
-            yield _parameter(effect.name, name, each.value, each.ci95, each.unit)
-
-
-def _parameter(effect: str, name: str, value: float, ci95: tuple[float, float], unit: str) -> Row:
-    low, high = (json_number(end) for end in ci95)
-    return {"effect": effect, "parameter": name, "value": json_number(value), "low": low, "high": high, "unit": unit}
+def _parameters(effect: str, parameters: Mapping[str, Row]) -> Iterator[Row]:
+    """Yield a row for each parameter as the JSON files have it."""
+    for name, each in parameters.items():
+        low, high = each["ci95"] or (None, None)
+        known = {column: each.get(column) for column in ("value", "nominal", "unit")}
+        yield {"effect": effect, "parameter": name, "low": low, "high": high, **known}
 
 
 def _identified(records: Sequence[Record]) -> Made:
     settings = Settings()
     studies = identify_all(records, settings)
     text = identification_text([each.found for each in studies], settings, None, studies)
-    best = json.loads(text)["recordings"][0]["best"]
-    rows = list(_of_study(studies[0]))
-    head = {
-        "verdict": best["verdict"],
-        "statement": best["statement"],
-        "frequency_hz": best["frequency_hz"],
-        "damping": best["damping"],
+    (found,) = json.loads(text)["recordings"]
+    best = found["best"]
+    line = {
+        "frequency_hz": {"value": best["frequency_hz"], "ci95": best["frequency_ci95_hz"], "unit": "Hz"},
+        "damping": {"value": best["damping"], "ci95": best["damping_ci95"], "unit": ""},
+        **{name: each for name, each in found["physical"]["parameters"].items() if each["determined"]},
     }
-    return head, {"parameters": rows}, text
-
-
-def _of_study(study: Study) -> Iterator[Row]:
-    mode: Any = study.best.mode
-    if mode is not None:
-        for name, unit in (("frequency_hz", "Hz"), ("damping", "")):
-            each = getattr(mode, name)
-            yield _parameter("", name, each.value, each.ci95, unit)
-    if study.physical is not None:
-        for name, known in study.physical.parameters.items():
-            if known.is_determined:
-                yield _parameter("", name, known.estimate.value, known.estimate.ci95, known.unit)
+    head = {name: best[name] for name in ("verdict", "statement", "frequency_hz", "damping")}
+    return head, [], list(_parameters("", line)), text

@@ -8,6 +8,7 @@ import tempfile
 import time
 import zlib
 from collections.abc import Mapping
+from concurrent.futures import Executor
 from pathlib import Path
 from typing import Any
 
@@ -44,7 +45,7 @@ LARGEST_TRUTH_BYTES = 1 << 28
 """What is unpacked of a sealed truth at most; with its fresh recordings one has a few million bytes."""
 
 
-def answer(folder: Path, jobs: int, progress: Progress, limit_s: float = LIMIT_S) -> str:
+def answer(folder: Path, jobs: int, progress: Progress, limit_s: float = LIMIT_S, pool: Executor | None = None) -> str:
     """Answer every case of a set that has no answer yet; return one digest of all answers."""
     cases = read_commitments(folder)
     answered = work_on(
@@ -52,6 +53,7 @@ def answer(folder: Path, jobs: int, progress: Progress, limit_s: float = LIMIT_S
         lambda name: _answer_one(folder, name, cases[name], limit_s),
         progress,
         jobs=jobs,
+        pool=pool,
         known=_answered(folder, cases),
         keep=lambda done: write_list(folder / VERDICTS_LIST, done),
         said="answered",

@@ -12,6 +12,7 @@ import shutil
 import tempfile
 import time
 from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -63,6 +64,7 @@ def run_real(
     jobs: int = 1,
     progress: Progress = silent,
     room: Path = ROOM,
+    pool: Executor | None = None,
 ) -> list[Json]:
     """Run real recordings through the public command and judge what it says."""
     folders = case_folders(list(names), room)
@@ -85,6 +87,7 @@ def run_real(
         lambda place: _ask(folders[runs[place][0]], cases[runs[place][0]], runs[place][1], data, out / place),
         progress,
         jobs=jobs,
+        pool=pool,
         known=_known(out, folders),
         keep=judged,
         said="diagnosed",

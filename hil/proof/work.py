@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor, as_completed
+from concurrent.futures import Executor, ThreadPoolExecutor, as_completed
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -27,21 +27,23 @@ def work_on(
     progress: Progress = silent,
     *,
     jobs: int = 1,
+    pool: Executor | None = None,
     known: Mapping[str, Result] | None = None,
     keep: Callable[[dict[str, Result]], object] = lambda done: None,
     said: str = "done",
 ) -> dict[str, Result]:
     """Return the result of each name, in the order given; the first error ends what has not begun."""
     done = {name: known[name] for name in names if name in known} if known else {}
-    pool = ThreadPoolExecutor(jobs)
-    try:
-        running = {pool.submit(work, name): name for name in names if name not in done}
-        for finished in as_completed(running):
-            done[running[finished]] = finished.result()
-            keep(done)
-            progress(f"{running[finished]} {said}", len(done), len(names))
-    finally:
-        pool.shutdown(cancel_futures=True)
+    with pool or ThreadPoolExecutor(jobs) as workers:
+        running = {workers.submit(work, name): name for name in names if name not in done}
+        try:
+            for finished in as_completed(running):
+                done[running[finished]] = finished.result()
+                keep(done)
+                progress(f"{running[finished]} {said}", len(done), len(names))
+        finally:
+            for future in running:
+                future.cancel()
     return {name: done[name] for name in names}
 
 

@@ -189,27 +189,18 @@ class Figure:
 
 @dataclass(frozen=True, slots=True)
 class Register:
-    """A table of many rows that `register.js` filters, sorts and shows; cells are texts, numbers or None.
-
-    Attributes
-    ----------
-    link : tuple
-        Column whose texts lead to files, the word shown, and what comes before and after the text; -1 for none.
-    choose : bool
-        Whether the first cell of a row chooses whose courses are shown.
-    """
+    """A table of many rows that `register.js` filters, sorts and shows; cells are texts, numbers or None."""
 
     name: str
     headings: tuple[str, ...]
     rows: Sequence[Sequence[Any]]
-    link: tuple[int, str, str, str] = (-1, "", "", "")
-    choose: bool = False
+    folder: str = ""  # of the JSON files that the texts of the last column lead to, if they do
+    choose: bool = False  # whether the first cell of a row chooses whose courses are shown
 
     @property
     def packed(self) -> str:
         """The rows as gzip in base64."""
-        link = dict(zip(("column", "text", "before", "after"), self.link, strict=True))
-        content = {"headings": self.headings, "rows": self.rows, "link": link, "choose": self.choose}
+        content = {"headings": self.headings, "rows": self.rows, "folder": self.folder, "choose": self.choose}
         return _packed(json.dumps(content, allow_nan=False, separators=(",", ":")).encode())
 
 

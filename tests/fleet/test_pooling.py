@@ -55,7 +55,7 @@ def test_the_prior_is_what_is_missing_in_the_own_recordings() -> None:
     assert one.from_fleet == pytest.approx(variance / (variance + BETWEEN**2))
     assert one.value == pytest.approx(MEAN + 1.0 - one.from_fleet)
     assert many.from_fleet < 0.05
-    assert many.std < one.std < one.own_std
+    assert many.std < one.std < np.sqrt(variance)
 
 
 def test_a_step_is_dated_and_none_is_seen_where_there_is_none() -> None:

@@ -14,10 +14,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from hil.cli.prove import _pool
 from hil.errors import UsageError
 from hil.fleet.dataset import TABLES, read
-from hil.fleet.run import COMPARED, _require_alike
+from hil.fleet.run import OF_DASK, OF_RESULTS, _require_alike
 from hil.fleet.tasks import IDENTIFY, Job, analyse
+from hil.proof.work import work_on
 from tests.benchmarks.buses import draw_bus, drive
 
 BUSES, DRIVES, SECONDS = 2, 2, 4.0
@@ -85,6 +87,46 @@ def by_two(drives: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
+MODEL = """
+schema = "hil.model/1"
+structure = "two_mass"
+[parameters]
+J_M = { value = 1.7, tolerance = 0.4 }
+J_L = { value = 100, tolerance = 0.4 }
+k = { value = 4500, tolerance = 0.9 }
+c = { value = 10, tolerance = 0.9 }
+b_M = { value = 0.3, tolerance = 0.9 }
+b_L = { value = 0.9, tolerance = 0.9 }
+"""
+
+
+def test_a_fleet_is_diagnosed_as_each_recording_alone_is_and_what_is_damaged_costs_itself(
+    drives: Path, tmp_path: Path
+) -> None:
+    model, out, alone = tmp_path / "bus.toml", tmp_path / "results", tmp_path / "alone"
+    model.write_text(MODEL)
+    given = ["--model", model, "--effort", "quick", "--out"]
+    counted = counts("diagnose", drives / "bus_0", drives / "bus_1" / "cut.csv", *given, out, "--jobs", 2)
+    assert (counted["computed"], counted["failed"], counted["duplicates"]) == (DRIVES, 1, 1)
+    assert [Path(row["url"]).name for row in read(out, "failures").to_pylist()] == ["cut.csv"]
+    command = [sys.executable, "-m", "hil", "diagnose", drives / "bus_0" / "run_1.csv", *given, alone]
+    one_core = os.environ | {"HIL_JOBS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    subprocess.run([*map(str, command)], env=one_core, stdout=subprocess.DEVNULL, timeout=LONGEST_S, check=True)
+    (row,) = (each for each in read(out, "recordings").to_pylist() if each["name"] == "run_1.csv")
+    found, expected = (
+        {k: v for k, v in json.loads(path.read_text()).items() if k not in ("timing_s", "made")}
+        for path in (out / "verdicts" / f"{row['key']}.json", alone / "diagnosis.json")
+    )
+    assert found == expected
+    assert (row["verdict"], row["vehicle"], row["effort"]) == (expected["verdict"], "bus_0", "quick")
+    values = {
+        each["parameter"]: each["value"] for each in read(out, "parameters").to_pylist() if each["key"] == row["key"]
+    }
+    assert values == {name: each["value"] for name, each in expected["parameters"].items()}
+    subprocess.run(hil("report", out), stdout=subprocess.DEVNULL, timeout=LONGEST_S, check=True)
+    assert "1 vehicles: 0 with an effect" in (out / "fleet.html").read_text()
+
+
 def test_what_is_damaged_is_listed_with_its_reason(by_two: Path) -> None:
     errors = {Path(row["url"]).name: row["error"] for row in read(by_two, "failures").to_pylist()}
     assert set(errors) == {"cut.csv", "text.csv"}
@@ -125,6 +167,10 @@ def test_a_cluster_elsewhere_with_one_worker_finds_the_same_to_the_last_bit(
     with cluster(tmp_path) as address:
         wait_for(lambda: workers_of(address))
         counted = counts("identify", drives, "--out", tmp_path / "results", "--scheduler", address)
+        with _pool(address) as pool:  # the proof's campaigns
+            assert work_on(["a", "b"], str.upper, pool=pool, known={"a": "known"}) == {"a": "known", "b": "B"}
+        with _pool(address) as pool, pytest.raises(TypeError, match="unsupported operand"):
+            work_on(["a"], sum, pool=pool)
     assert counted["computed"] == BUSES * DRIVES
     assert content(tmp_path / "results") == content(by_two)
 
@@ -151,6 +197,7 @@ def test_a_worker_and_then_the_client_are_killed_and_the_next_run_completes_it(
         os.kill(children(client.pid)[-1], signal.SIGKILL)
         seen = len(list((out / "verdicts").iterdir()))
         wait_for(lambda: len(list((out / "verdicts").iterdir())) > seen or client.poll() is not None)
+        assert client.poll() is None  # in the middle
         client.kill()
     wait_for(lambda: not children(client.pid))
     counted = counts("identify", drives, "--out", out, "--jobs", 2)
@@ -225,7 +272,7 @@ class Cluster:
 
 
 def versions(**others: str) -> dict[str, str]:
-    return {"python": "3.11", **dict.fromkeys(COMPARED, "1"), **others}
+    return {**dict.fromkeys((*OF_DASK, *OF_RESULTS), "1"), **others}
 
 
 @pytest.mark.parametrize(

@@ -25,7 +25,7 @@
   const compared = (a, b) => (a === null) - (b === null) || (a < b ? -1 : Number(a > b));
 
   async function register(box) {
-    const { headings, rows, link, choose } = await unpacked(box.dataset.register);
+    const { headings, rows, folder, choose } = await unpacked(box.dataset.register);
     const texts = rows.map((row) => row.map(shown).join(" ").toLowerCase());
     const field = box.querySelector("input");
     const count = box.querySelector("output");
@@ -36,16 +36,15 @@
     let order = rows.map((_, i) => i);
     let sorted = { column: -1, down: false };
     let first = -1;
+    const leads = (column) => folder && column === headings.length - 1;
 
     function cell(row, column, place) {
       const text = shown(rows[row][column]);
       if (column === 0 && choose) {
         made("button", place, text).addEventListener("click", () => courses(text));
-      } else if (column === link.column) {
-        const [kind, reference] = text ? ["a", link.before + text + link.after] : ["span", ""];
-        const element = made(kind, place, text ? link.text : "");
-        if (reference) element.href = reference;
-      } else place.textContent = text;
+      } else if (leads(column)) {
+        if (text) made("a", place, "open").href = `${folder}/${text}.json`;
+      } else place.textContent = place.title = text;
     }
 
     function draw() {
@@ -57,9 +56,7 @@
       for (const row of order.slice(begin, end)) {
         const line = made("tr", body);
         headings.forEach((_, column) => {
-          const place = made("td", line, "", typeof rows[row][column] === "number" ? "number" : "");
-          place.title = column === link.column ? "" : shown(rows[row][column]);
-          cell(row, column, place);
+          cell(row, column, made("td", line, "", typeof rows[row][column] === "number" ? "number" : ""));
         });
       }
       before.style.height = `${begin * ROW_PX}px`;
