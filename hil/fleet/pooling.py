@@ -20,12 +20,11 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from scipy.optimize import minimize
 from scipy.stats import norm
 
 from estimator.physics.model import DrivelineModel
-from estimator.signals.record import FloatArray
+from estimator.signals.record import FloatArray, IntArray
 
 FALSE_RATE = 0.002
 """Share of the vehicles that are usual, and named all the same, two-sided; likewise of the changes."""
@@ -38,8 +37,6 @@ FEWEST_VEHICLES = 8
 
 LARGEST_TOLERANCE = 0.95
 QUANTILE = float(norm.ppf(0.975))
-
-IntArray = npt.NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True)
