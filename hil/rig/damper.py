@@ -31,9 +31,6 @@ DEVIATIONS = 3.0
 BIAS = 0.02
 """The recursive estimate may be off by so much of the frequency, besides its own deviation."""
 
-FASTEST_RAD_S = 1e30
-"""What is beyond is no speed; also NaN is not below it."""
-
 
 @dataclass(slots=True)
 class Damping:
@@ -55,7 +52,7 @@ class Damping:
         """Return the torque of a cycle [Nm]; zero while it is off, or without a good speed of the cycle before."""
         last = self._last
         fresh = last is not None and last.counts and last.cycle == cycle - 1
-        if last is None or self.off or not fresh or not abs(last.speed_rad_s) < FASTEST_RAD_S:
+        if last is None or self.off or not fresh or not abs(last.speed_rad_s) < 1e30:  # nor of NaN
             self._states = None
             return 0.0
         return self._filtered(last.speed_rad_s)
@@ -81,17 +78,12 @@ class Damping:
             self.off = f"at {sample.time_s:.2f} s: {reason}"
 
     def _reason(self) -> str:
-        low, high = self.file.region_hz
-        latest = self.live.latest
-        mode = None if latest is None or latest.status is not Status.ESTIMATED else latest.resonance
-        if latest is not None and mode is not None:
-            std_hz = latest.frequency_std_hz
-            spread_hz = BIAS * mode.frequency_hz + (DEVIATIONS * std_hz if math.isfinite(std_hz) else 0.0)
-            if not low - spread_hz <= mode.frequency_hz <= high + spread_hz:
-                return (
-                    f"the resonance is at {mode.frequency_hz:.2f} Hz, the damper was designed for {low:.2f} to "
-                    f"{high:.2f} Hz"
-                )
+        (low, high), latest = self.file.region_hz, self.live.latest
+        if latest is not None and latest.status is Status.ESTIMATED and latest.resonance is not None:
+            hz, std_hz = latest.resonance.frequency_hz, latest.frequency_std_hz
+            spread_hz = BIAS * hz + (DEVIATIONS * std_hz if math.isfinite(std_hz) else 0.0)
+            if not low - spread_hz <= hz <= high + spread_hz:
+                return f"the resonance is at {hz:.2f} Hz, the damper was designed for {low:.2f} to {high:.2f} Hz"
         if self._at_limit > most_at_limit(self.file):
             return f"its torque stood at the limit of {self.rig.limit_nm:.0f} Nm for a period of the resonance"
         return ""
@@ -115,16 +107,13 @@ class Damping:
 
     def document(self) -> dict[str, Any]:
         """Return what came of it, as JSON."""
-        mode, expected = self.measured(), self.file.nominal[1]
+        found, expected = self.measured(), self.file.nominal[1]
+        modes = {} if found is None else {"frequency_hz": found.frequency_hz, "damping": found.damping}
         return {
             "off": self.off or None,
             "expected": {"frequency_hz": expected.frequency_hz, "damping": expected.damping},
-            "measured": None
-            if mode is None
-            else {
-                name: {"value": one.value, "ci95": [float(end) for end in one.ci95]}
-                for name, one in (("frequency_hz", mode.frequency_hz), ("damping", mode.damping))
-            },
+            "measured": {name: {"value": one.value, "ci95": list(map(float, one.ci95))} for name, one in modes.items()}
+            or None,
         }
 
 

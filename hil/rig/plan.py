@@ -97,18 +97,15 @@ def _require_fit(rig: Rig, table: AnyExperiment, split: Split, damper: Damping) 
             "--damper: expected an experiment with the host's PRBS (prbs.source = 'host'), which measures the closed "
             "loop and supervises it, got one without. Choose another experiment."
         )
-    asked_nm = rig.excitation_nm(table) + damper.rig.limit_nm
-    largest_nm = max(split.prbs_m1, 1.0 - split.prbs_m1) * asked_nm
-    if largest_nm > rig.guard.prbs_limit_nm:
-        raise UsageError(
-            f"--damper: PRBS and damper may come to {largest_nm:.1f} Nm at one inverter, expected at most the guard's "
-            f"prbs_limit_nm of {rig.guard.prbs_limit_nm:g} Nm. Lower prbs_amplitude_nm, or design with less --share."
-        )
-    for rest_nm, of in torque_rests(rig, table.share_m1, asked_nm):
-        if table.torque_nm > rest_nm:
+    both_nm = rig.excitation_nm(table) + damper.rig.limit_nm
+    most_nm = rig.guard.prbs_limit_nm / max(split.prbs_m1, 1.0 - split.prbs_m1)
+    rests = torque_rests(rig, table.share_m1, both_nm)
+    of_torque = (("the base torque", table.torque_nm, rest_nm, f"{of} next to both") for rest_nm, of in rests)
+    for what, asked_nm, rest_nm, of in (("PRBS and damper", both_nm, most_nm, "guard.prbs_limit_nm"), *of_torque):
+        if asked_nm > rest_nm:
             raise UsageError(
-                f"--damper: torque_nm of the experiment is {table.torque_nm:g} Nm, expected at most {rest_nm:g} Nm, "
-                f"what {of} leaves besides PRBS and damper. Lower it, or design with less --share."
+                f"--damper: {what} may come to {asked_nm:g} Nm, expected at most {rest_nm:g} Nm, which {of} leaves. "
+                "Lower torque_nm or prbs_amplitude_nm of the experiment, or design with less --share."
             )
 
 
