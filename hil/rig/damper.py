@@ -17,7 +17,7 @@ import numpy as np
 
 from estimator.errors import EstimatorError
 from estimator.identification.linear_model import Orders
-from estimator.identification.modes.uncertainty import UncertainMode, uncertain_modes
+from estimator.identification.modes.modes import UncertainMode, uncertain_modes
 from estimator.identification.offline.fits import fit_output_error
 from estimator.identification.online.recursive import Status
 from estimator.identification.settings import Settings
