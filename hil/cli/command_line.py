@@ -33,6 +33,7 @@ COMMANDS: dict[str, str] = {
     "paper": "The paper's figures from eight experiments on the simulated rig, or from recordings.",
     "diagnose": "Locate the mismatch and name the missing physics.",
     "design": "The next experiment that would decide what is left open.",
+    "design damper": "A feedback from speed to torque that damps the resonance.",
     "solve": "Diagnose, design, drive, diagnose again, until it is decided.",
     "simulate": "Free-run simulation from the measured torques.",
     "compare": "Simulation against recording, in figures and plots.",
@@ -44,6 +45,12 @@ COMMANDS: dict[str, str] = {
     "export": "Write the on-line estimator for a PLC, or the driveline as an FMU.",
     "fleet": "Diagnose or identify many recordings on Dask; a page of the fleet.",
 }
+
+
+def module_of(command: str) -> str:
+    """Return the module that holds a command."""
+    return f"hil.cli.{command.replace(' ', '_')}"
+
 
 QUIET = "--quiet"
 LOG_LEVEL = "--log-level"
@@ -73,6 +80,8 @@ class Call:
         first = HELP if own[0] == SHORT_HELP else own[0]
         if first not in commands and first not in (HELP, "--version"):
             raise UsageError(_unknown(first, commands))
+        if (both := " ".join(own[:2])) in commands and len(own) > 1:
+            return cls(both, tuple(own[2:]), quiet, level)
         return cls(first, tuple(own[1:]), quiet, level)
 
     @property

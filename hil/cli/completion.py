@@ -17,7 +17,7 @@ import typer
 from typer.completion import get_completion_script  # type: ignore[attr-defined]
 from typer.core import TyperCommand, TyperGroup
 
-from hil.cli.command_line import COMMANDS
+from hil.cli.command_line import COMMANDS, module_of
 from hil.cli.printing import say
 from hil.support.command_log import Level
 
@@ -46,7 +46,7 @@ class Commands(TyperGroup):
 
     def list_commands(self, ctx: Any) -> list[str]:
         """Return their names."""
-        return list(COMMANDS)
+        return [name for name in COMMANDS if " " not in name]
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         """Return what is shown of a command in a list."""
@@ -57,7 +57,9 @@ class Commands(TyperGroup):
         name, *rest = args
         if name not in self.list_commands(ctx):
             return None, None, []
-        command = typer.main.get_command(importlib.import_module(f"hil.cli.{name}").app)
+        if rest and f"{name} {rest[0]}" in COMMANDS:
+            name, rest = f"{name} {rest[0]}", rest[1:]
+        command = typer.main.get_command(importlib.import_module(module_of(name)).app)
         command.params += [option for option in self.params if option.name in ("quiet", "log_level")]
         return name, command, rest
 

@@ -118,6 +118,22 @@ def _write(out: Path, text: str, estimator: PlcEstimator) -> None:
     say(f"{out}: {estimator.origin}; na {orders.na}, nb {orders.nb}, nk {orders.nk}; call FB_HilEstimator")
 
 
+@app.command(epilog="Example: hil export damper damper/damper.toml --out damper.st")
+def damper(
+    design: Annotated[Path, typer.Argument(metavar="DAMPER", help="damper.toml of hil design damper.")],
+    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="Structured Text, .st, or C, .c; replaced.")],
+) -> None:
+    """Write active damping for a PLC or a drive: the torque of hil run --damper, to the bit."""
+    from hil.config.damper_file import drivable
+    from hil.export.damper import damper_text
+    from hil.report.outputs import publish
+
+    file, rig = drivable(design)
+    text = damper_text(file, rig, out.suffix.lower())
+    publish(out.parent, {out.name: lambda path: path.write_text(text, encoding="ascii")})
+    say(f"{out}: for {rig.name}; call it every {file.period_s:g} s, with the frequency of FB_HilEstimator")
+
+
 @app.command(epilog="Example: hil export fmu out/augmented.toml --recording run_1.csv --out bus.fmu")
 def fmu(
     model: Annotated[Path, typer.Argument(metavar="MODEL", help="Model file, nominal or augmented.")],

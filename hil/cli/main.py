@@ -13,7 +13,7 @@ import sys
 from collections.abc import Sequence
 from enum import IntEnum
 
-from hil.cli.command_line import COMMANDS, Call, overview, silence
+from hil.cli.command_line import COMMANDS, Call, module_of, overview, silence
 from hil.errors import HilError, InputError
 from hil.printable import shown
 from hil.rig.stop import interrupt_on_signals
@@ -84,7 +84,7 @@ def _called(call: Call) -> int:
     from hil.cli.printing import flow
 
     use_cores_of_environment()
-    app = importlib.import_module(f"hil.cli.{call.command}").app
+    app = importlib.import_module(module_of(call.command)).app
     flow(app)
     name = f"hil {call.command}"
     result = app(list(call.arguments), prog_name=name, standalone_mode=False, help_option_names=HELP_OPTIONS)

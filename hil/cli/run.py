@@ -47,6 +47,9 @@ def run(
     estimate: Annotated[
         bool, typer.Option(help="Estimate while driving; its course goes next to the recording: .online.json.")
     ] = True,
+    damper: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Active damping in the measured part, of hil design damper.")
+    ] = None,
     filter_of: FilterOf = None,
     filter_run: FilterRun = None,
     trust_laws: TrustLaws = False,
@@ -62,6 +65,8 @@ def run(
 
     named, rig_text, experiment = with_experiment_of(rig, experiment)
     rig_file = with_addresses(named, bus, modbus, take_over)
+    if dry_run and damper is not None:
+        raise UsageError("hil run: expected --damper or --dry-run, which predicts without it; got both.")
     if dry_run:
         from hil.cli.run_job import predict
 
@@ -69,12 +74,15 @@ def run(
         return
     if out is None:
         raise UsageError("hil run: expected --out REC, a recording to write, or --dry-run; got neither.")
-    from hil.cli.run_job import Job, live_estimate, print_result, record
+    from hil.cli.run_job import Job, damping, live_estimate, print_result, record
     from hil.rig.metadata import run_metadata
 
     metadata = {**run_metadata(rig, experiment, rig_text), "pace": pace.value}
     live = live_estimate(rig_file, out, filter_of, filter_run) if estimate else None
-    job = Job(rig_file, experiment, out, trace, pacer_for(rig_file, pace), metadata, live)
+    closed = None if damper is None else damping(damper, live)
+    if damper is not None:
+        metadata["damper"] = damper.name
+    job = Job(rig_file, experiment, out, trace, pacer_for(rig_file, pace), metadata, live, closed)
     with scheduling(pace) as grants:
         summary = record(job, grants)
     print_result(job, summary, grants, as_json)

@@ -35,6 +35,7 @@ from hil.store.entry import COMPLETE, ONLINE, statements
 
 if TYPE_CHECKING:
     from estimator.identification.chain import OnlineEstimate
+    from hil.rig.damper import Damping
     from hil.rig.live import LiveEstimate
 
 
@@ -64,6 +65,18 @@ def keep_course(live: LiveEstimate, path: Path) -> None:
         say(f"{path} is missing: {error}", err=True)
 
 
+def damping(path: Path, live: LiveEstimate | None) -> Damping:
+    """Make the damper of a file, supervised by the estimate of the run."""
+    if live is None:
+        raise UsageError(
+            "--damper: expected the on-line estimate, which supervises it, got --no-estimate. Leave it out."
+        )
+    from hil.config.damper_file import drivable
+    from hil.rig.damper import Damping
+
+    return Damping(*drivable(path), live)
+
+
 @dataclass(frozen=True, slots=True)
 class Job:
     """One run as it was asked for."""
@@ -75,11 +88,12 @@ class Job:
     pacer: Pacer
     metadata: dict[str, str]
     live: LiveEstimate | None
+    damper: Damping | None = None
 
 
 def record(job: Job, grants: RealTimeGrants) -> RunSummary:
     """Drive the experiment and record it; what was measured is kept and entered on every way out."""
-    plan = plan_run(job.rig, job.experiment)
+    plan = plan_run(job.rig, job.experiment, job.damper)
     stop, timing = StopRequest(), RunTiming(job.pacer.period_ns)
     recorder = RecordingWriter(
         job.out,
@@ -87,7 +101,7 @@ def record(job: Job, grants: RealTimeGrants) -> RunSummary:
         disk_patience_s(job.pacer),
         job.rig.channel_units,
     )
-    observers = () if job.live is None else (job.live,)
+    observers = [each for each in (job.live, job.damper) if each is not None]
     ended_by = COMPLETE
     try:
         with (
@@ -185,6 +199,11 @@ def print_result(job: Job, summary: RunSummary, grants: RealTimeGrants, as_json:
     )
     for line in timing_lines(summary.timing):
         say(f"  {line}")
+    if job.damper is not None:
+        from hil.rig.damper import damping_lines
+
+        for line in damping_lines(job.damper.document()):
+            say(line)
     if grants is not NOT_ASKED:
         say(f"  {grants.statement}")
     if job.trace is not None:
@@ -209,6 +228,7 @@ def _document(job: Job, summary: RunSummary, grants: RealTimeGrants) -> dict[str
         "timing": summary.timing.as_json(),
         "real_time": grants.as_json(),
         "online": None if job.live is None else job.live.course.summary(),
+        "damper": None if job.damper is None else job.damper.document(),
     }
 
 

@@ -372,7 +372,7 @@ def _prbs_faults(rig: Rig) -> Iterator[Fault]:
 
 def _room_faults(rig: Rig) -> Iterator[Fault]:
     """See that a PRBS the PLC adds by itself leaves the guard something to guard."""
-    for rest_nm, of in _torque_rests(rig, EVEN_SHARE):
+    for rest_nm, of in torque_rests(rig, EVEN_SHARE):
         if rest_nm <= 0.0:
             expected = f"less than {of} allows, since source is 'plc'"
             yield Fault("prbs.amplitude_nm", expected, rig.prbs.amplitude_nm)
@@ -383,7 +383,7 @@ def _experiment_faults(rig: Rig) -> Iterator[Fault]:
         key = f"experiments.{name}"
         yield from _excitation_faults(rig, key, experiment)
         amplitude_nm = max(rig.prbs.amplitude_nm, rig.excitation_nm(experiment))
-        for rest_nm, of in _torque_rests(rig, experiment.share_m1, amplitude_nm):
+        for rest_nm, of in torque_rests(rig, experiment.share_m1, amplitude_nm):
             if experiment.torque_nm > rest_nm:
                 expected = f"at most {rest_nm:g}, what {of} leaves besides the PRBS"
                 yield Fault(f"{key}.torque_nm", expected, experiment.torque_nm)
@@ -417,7 +417,7 @@ def _excitation_faults(rig: Rig, key: str, experiment: AnyExperiment) -> Iterato
         yield Fault(where, expected, rig.excitation_nm(experiment))
 
 
-def _torque_rests(rig: Rig, share_m1: float, amplitude_nm: float | None = None) -> Iterator[tuple[float, str]]:
+def torque_rests(rig: Rig, share_m1: float, amplitude_nm: float | None = None) -> Iterator[tuple[float, str]]:
     """Largest base torque of both inverters that each limit leaves besides the PRBS [Nm], and its key.
 
     ``share_m1`` is the part of the base torque that inverter m1 gives, 0 to 1; ``amplitude_nm`` that of the PRBS, or of

@@ -114,7 +114,7 @@ class IdentificationFile(_Part):
 
 def read_identification(path: Path) -> IdentificationFile:
     """Read one file."""
-    return validate(IdentificationFile, _json(path), path, FileProblem)
+    return validate(IdentificationFile, json_object(path), path, FileProblem)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -157,7 +157,8 @@ def _chosen(path: Path, entries: Sequence[_Recording], run: str | None, option: 
     raise UsageError(f"{option} {run}: expected a recording of {path}: {names}")
 
 
-def _json(path: Path) -> dict[str, Any]:
+def json_object(path: Path) -> dict[str, Any]:
+    """Read a file of the program's own."""
     try:
         found = read_json(path)
     except OSError as cause:
@@ -185,21 +186,25 @@ class PhysicalValue:
 def physical_values(path: Path, run: str | None = None) -> dict[str, PhysicalValue]:
     """Return the physical parameters of ``identification.json``: of one recording, or the surest of all."""
     read_identification(path)  # says what is wrong with it
-    entries = [each for each in _json(path)["recordings"] if run in (None, each["name"])]
+    entries = [each for each in json_object(path)["recordings"] if run in (None, each["name"])]
     if not entries:
         raise UsageError(f"{path}: expected a recording {run!r} in it, got a file without. See --run.")
     best: dict[str, PhysicalValue] = {}
     for entry in entries:
         for name, one in ((entry.get("physical") or {}).get("parameters") or {}).items():
-            found = _physical_value(one, str(entry["name"]))
+            found = physical_value(one, str(entry["name"]))
             if found is not None and (name not in best or found.half_width < best[name].half_width):
                 best[name] = found
     return best
 
 
-def _physical_value(one: Any, recording: str) -> PhysicalValue | None:
+def physical_value(one: Any, recording: str) -> PhysicalValue | None:
     """Return a value that is determined; None for any other."""
     match one:
-        case {"determined": True, "value": int() | float() as value, "ci95": [int() | float() as low, high]}:
+        case {
+            "determined": True,
+            "value": int() | float() as value,
+            "ci95": [int() | float() as low, int() | float() as high],
+        }:
             return PhysicalValue(float(value), 0.5 * float(high - low), recording)
     return None

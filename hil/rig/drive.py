@@ -112,11 +112,15 @@ class Drive:
             self._phase, self._phase_from = base.phase, tick.cycle
         time_s = self._seconds(tick.cycle - self._phase_from)
         base_nm = self._catch_up.torque_nm(tick.cycle, base.torque_nm)
-        request = self.plan.split.request(base_nm, self.plan.prbs_nm(base.phase))
+        prbs_nm = self.plan.prbs_nm(base.phase)
+        damping_nm = self.plan.damping_nm(base.phase, tick.cycle)
+        request = self.plan.split.request(base_nm, prbs_nm + damping_nm)
         self.prbs.follow(tick, base.phase, self.watch.status)
         sample = self.cycle.step(tick, request, time_s, flags, self.watch.status.age_ns(tick.now_ns))
         if self.plan.plc_prbs is not None:
             sample = replace(sample, prbs_nm=self.prbs.known_nm(self.watch.news))
+        elif self.plan.damper is not None:
+            sample = replace(sample, prbs_nm=prbs_nm)
         if base.phase is Phase.MEASURE:
             self._record(sample)
         else:

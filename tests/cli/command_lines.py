@@ -8,12 +8,12 @@ from typing import Any
 
 import typer
 
-from hil.cli.command_line import COMMANDS
+from hil.cli.command_line import COMMANDS, module_of
 
 
 def command(name: str) -> Any:
     """Return the command (or group) of a name."""
-    return typer.main.get_command(importlib.import_module(f"hil.cli.{name}").app)
+    return typer.main.get_command(importlib.import_module(module_of(name)).app)
 
 
 def every_command() -> Iterator[tuple[str, Any]]:
@@ -30,6 +30,8 @@ def parse(line: str) -> None:
     words = shlex.split(line, comments=True)
     _, name, *arguments = words[: words.index(">")] if ">" in words else words
     assert name in COMMANDS, f"no such command: {line}"
+    if f"{name} {next(iter(arguments), None)}" in COMMANDS:
+        name, arguments = f"{name} {arguments[0]}", arguments[1:]
     own = command(name)
     inner = getattr(own, "commands", {})
     if inner and arguments and not arguments[0].startswith("-"):

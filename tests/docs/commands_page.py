@@ -31,6 +31,7 @@ READ_MORE = {
     "paper": "paper",
     "diagnose": "diagnosis",
     "design": "design",
+    "design damper": "damping",
     "solve": "design",
     "effects": "catalogue",
     "rig": "support",
@@ -72,7 +73,7 @@ def _map() -> Iterator[str]:
     yield from ("| command | does |", "| --- | --- |")
     for name, line in COMMANDS.items():
         more = f" ([more]({READ_MORE[name]}.md))" if name in READ_MORE else ""
-        yield f"| [`hil {name}`](#hil-{name}) | {_cell(line)}{more} |"
+        yield f"| [`hil {name}`](#hil-{name.replace(' ', '-')}) | {_cell(line)}{more} |"
     yield ""
 
 

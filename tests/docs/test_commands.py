@@ -32,6 +32,8 @@ def test_a_mentioned_command_and_its_options_exist(line: str) -> None:
         assert name in {"--help", "--version", "--quiet", "--log-level"}
         return
     assert name in COMMANDS
+    if f"{name} {next(iter(words), None)}" in COMMANDS:
+        name, words = f"{name} {words[0]}", words[1:]
     assert {word for word in words if word.startswith("--")} <= options(name)
     inner = getattr(command(name), "commands", {})
     assert not (inner and words) or words[0] in inner or words[0].startswith("-"), f"no such command: {line}"

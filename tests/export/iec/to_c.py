@@ -19,7 +19,7 @@ HEAD = """#include <math.h>
 #define SQRT(x) sqrt{f}(x)
 #define LN(x) log{f}(x)
 #define ATAN(x) atan{f}(x)
-static int at(int i, int low, int high) {{ if (i < low || i > high) abort(); return i - low; }}
+static inline int at(int i, int low, int high) {{ if (i < low || i > high) abort(); return i - low; }}
 #define AT(i, low, high) at(i, low, high)
 """
 

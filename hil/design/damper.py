@@ -1,0 +1,233 @@
+"""What the design of a damper is given, and what it says: lines that are possible, dead time, limits, pictures."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.special import chdtri
+
+from estimator.damper import MOST_SENSITIVE, PARAMETERS, Damper, Demand, Loop, Region, Timing, points
+from estimator.physics.catalogue import EFFECTS
+from estimator.physics.effect import Element
+from estimator.physics.model import DrivelineModel, Motion, Structure
+from estimator.signals.prbs import prbs_nm
+from estimator.signals.record import FloatArray
+from hil.commission.responses import reading_lag
+from hil.config.damper_file import SCHEMA, DamperFile, DesignedFor
+from hil.config.model_file import read_model
+from hil.config.rig_file import read_rig
+from hil.errors import FileProblem, ModelFileError, UsageError
+from hil.figures.drawn import WIDTH_IN, drawing, require_matplotlib
+from hil.figures.local_model import decibels, degrees
+from hil.figures.palette import BLACK, PALE, VERMILION
+from hil.recording.formats import read_table
+from hil.report.diagnosis_json import SCHEMA as DIAGNOSIS
+from hil.report.identification_input import PhysicalValue, json_object, physical_value, physical_values
+
+USUAL_PERIOD_S = 0.01
+Z95 = 1.96
+
+LINEAR = ("actuator_lag", "transport_delay", "torque_bias", "torque_ripple", "speed_quantisation")
+"""Effects between torque and speed that the design takes into account, or that leave the loop as it is."""
+
+BETWEEN = (Element.TORQUE_PATH, Element.SHAFT, Element.SPEED_SENSOR)
+
+
+@dataclass(frozen=True, slots=True)
+class Order:
+    """What is asked, at the rig's period; without a rig there is no limit of the torque."""
+
+    period_s: float
+    demand: Demand
+    rig: DesignedFor | None = None
+
+
+def asked(path: Path | None, target: float, share: float) -> Order:
+    """Return what is asked of a damper: no more torque than the share, nor than the guard leaves."""
+    if path is None:
+        return Order(USUAL_PERIOD_S, Demand(target, math.inf, np.empty(0)))
+    rig = read_rig(path)
+    limits, prbs = rig.torque_limits, rig.prbs
+    room_nm = limits.prbs_limit_nm / max(prbs.part_m1, 1.0 - prbs.part_m1) - prbs.amplitude_nm
+    if room_nm <= 0.0:
+        raise UsageError(
+            f"{path}: the PRBS takes all of guard.prbs_limit_nm, expected room for the damper. Lower prbs.amplitude_nm."
+        )
+    limit_nm = min(share * (limits.torque_limit_m1_nm + limits.torque_limit_m2_nm), room_nm)
+    one_turn = (2**prbs.cells - 1) * prbs.clock_divider
+    excitation = prbs_nm(one_turn, prbs.amplitude_nm, prbs.cells, prbs.clock_divider, prbs.seed)
+    return Order(rig.period_s, Demand(target, limit_nm, excitation), DesignedFor.of(rig, limit_nm))
+
+
+def region_of(path: Path, estimate: Path | None) -> tuple[Region, DrivelineModel]:
+    """Return the lines that a model file and an estimate leave possible."""
+    model = read_model(path).model
+    if model.structure is not Structure.TWO_MASS or model.motion is not Motion.ROTATION:
+        got = f"{model.motion.value}, {model.structure.value}"
+        raise ModelFileError(path, f"structure | expected a rotating two_mass line | got {got}")
+    for name in model.effects:
+        if name not in LINEAR and EFFECTS[name].element in BETWEEN:
+            raise ModelFileError(path, f"effects.{name} | expected a line that is linear from torque to speed | got it")
+    value = {name: parameter.value for name, parameter in model.parameters.items()}
+    half = {name: abs(p.value) * p.tolerance for name, p in model.parameters.items()}
+    if estimate is not None:
+        known = _known(estimate)
+        widened = math.sqrt(chdtri(len(known), 0.05)) / Z95  # the box around the joint 95 % ellipsoid
+        value |= {name: one.value for name, one in known.items()}
+        half |= {name: widened * one.half_width for name, one in known.items()}
+    least, most = ({n: value[n] + sign * half[n] for n in PARAMETERS} for sign in (-1.0, 1.0))
+    for name in PARAMETERS[:3]:
+        if least[name] <= 0.0:
+            raise UsageError(f"{estimate or path}: {name} is known too little, its region reaches {least[name]:.3g}.")
+    return Region({n: value[n] for n in PARAMETERS}, {n: max(x, 0.0) for n, x in least.items()}, most), model
+
+
+def _known(path: Path) -> dict[str, PhysicalValue]:
+    """Read what a diagnosis or an identification determined, with its 95 % intervals."""
+    content = json_object(path)
+    if content.get("schema") == DIAGNOSIS:
+        entries = (content.get("parameters") or {}).items()
+        read = {name: physical_value({"determined": True, **one}, "") for name, one in entries}
+        found = {name: value for name, value in read.items() if name in PARAMETERS and value is not None}
+    else:
+        found = physical_values(path)
+    if not found:
+        raise FileProblem(path, f"parameters | expected intervals of some of {', '.join(PARAMETERS)} | got none")
+    return found
+
+
+def timing_of(model: DrivelineModel, period_s: float, recording: Path | None, tell: Callable[[str], None]) -> Timing:
+    """Return when a torque acts: one period for the bus, what a recording shows, and the model's own delay and lag.
+
+    The speed of one SYNC makes the torque that the next one puts into effect.
+    """
+    effects = {name: {key: one.value for key, one in values.items()} for name, values in model.effects.items()}
+    late_s = effects.get("transport_delay", {}).get("delay_s", 0.0)
+    lag_s = effects.get("actuator_lag", {}).get("time_constant_s", 0.0)
+    cycles = 0 if recording is None else _cycles_late(recording, period_s)
+    said = "taken for one period: give --recording" if recording is None else f"{recording}: {cycles} cycles more"
+    tell(f"dead time of bus and inverters: {said}")
+    return Timing(period_s, (1 + cycles) * period_s + late_s, lag_s)
+
+
+def _cycles_late(path: Path, period_s: float) -> int:
+    """Return by how many cycles the torque of a recording follows its reference."""
+    columns = read_table(path).columns
+    names = ("time_s", "torque_ref_nm", "torque_m1_nm", "torque_m2_nm")
+    if missing := [name for name in names if name not in columns]:
+        raise UsageError(f"{path}: expected {', '.join(missing)}, to measure the dead time by, got none")
+    time_s, reference, m1, m2 = (np.nan_to_num(columns[name]) for name in names)
+    step_s = float(np.median(np.diff(time_s))) if time_s.size > 1 else math.nan
+    if not abs(step_s - period_s) < 0.01 * period_s or np.ptp(reference) == 0.0:
+        raise UsageError(
+            f"{path}: expected a torque that changes, a row every {period_s:g} s, to measure the dead time by, got a "
+            f"row every {step_s:g} s and a change of {np.ptp(reference):g} Nm. Give a run of this rig with its PRBS."
+        )
+    return reading_lag(m1 + m2, reference)
+
+
+def file_of(found: Damper, order: Order, model: str) -> DamperFile:
+    """Return the design as its file."""
+    return DamperFile.model_validate(
+        {
+            "schema": SCHEMA,
+            "model": model,
+            "period_s": found.timing.period_s,
+            "dead_time_s": found.timing.dead_time_s,
+            "lag_s": found.timing.lag_s,
+            "region_hz": list(found.region_hz),
+            "least_damping": found.least_damping,
+            "sensitivity": found.sensitivity,
+            "torque_nm": found.torque_nm,
+            "line": found.line,
+            "filter": {"b": found.filter.b.tolist(), "a": found.filter.a.tolist()},
+            "rig": order.rig,
+        }
+    )
+
+
+def design_document(file: DamperFile, found: Damper) -> dict[str, Any]:
+    """Return the design as JSON: its file, and resonance and damping before and after."""
+    before, after = ({"frequency_hz": mode.frequency_hz, "damping": mode.damping} for mode in file.nominal[:2])
+    content = file.model_dump(by_alias=True) | {"schema": "hil.design_damper/1", "lines": found.n_lines}
+    return content | {"before": before, "after": after}
+
+
+def design_lines(file: DamperFile, found: Damper) -> Iterator[str]:
+    """Say what was designed."""
+    (before, after, _), (low, high) = file.nominal, file.region_hz
+    yield (
+        f"resonance {before.frequency_hz:.2f} Hz, damping {before.damping:.3f}; with the damper "
+        f"{after.frequency_hz:.2f} Hz, {after.damping:.3f}"
+    )
+    yield (
+        f"  over {found.n_lines} lines, resonance {low:.2f} to {high:.2f} Hz: damping at least "
+        f"{file.least_damping:.3f}, sensitivity at most {file.sensitivity:.2f}"
+    )
+    yield f"  filter of order 2, period {file.period_s:g} s, dead time {file.dead_time_s * 1e3:.1f} ms"
+    if file.rig is None:
+        yield "  no rig, so no torque limit: it can be looked at, and not driven"
+    else:
+        yield f"  torque under the rig's PRBS up to {file.torque_nm:.0f} Nm, limited to {file.rig.limit_nm:.0f} Nm"
+
+
+SHOWN_S = 1.0
+
+
+def draw(found: Damper, region: Region, path: Path) -> None:
+    """Draw Bode, Nyquist, step and disturbance of the nominal line before and after, and of the corners after."""
+    require_matplotlib()
+    loop, z = Loop(list(region.corners()), found.timing), points(found.timing.period_s, 600)
+    f = np.angle(z) / (2.0 * np.pi * found.timing.period_s)
+    G, K = loop.response(z), found.filter.response(z)
+    L, after = K * G, G / (1.0 + K * G)
+    corner, own = {"color": PALE, "linewidth": 0.5}, {"color": VERMILION}
+    with drawing():
+        from matplotlib.figure import Figure
+
+        figure = Figure(figsize=(WIDTH_IN, 6.6))
+        (bode, nyquist), (phase, sensitivity), (step, pulse) = figure.subplots(3, 2)
+        for panel, of, label in ((bode, decibels, "torque to speed [dB]"), (phase, degrees, "phase [deg]")):
+            for line in after[1:]:
+                panel.semilogx(f, of(line), **corner)
+            panel.semilogx(f, of(G[0]), "--", color=BLACK, label="before")
+            panel.semilogx(f, of(after[0]), label="after", **own)
+            panel.set(xlabel="frequency [Hz]", ylabel=label)
+        bode.legend()
+        nyquist.plot(L[1:].real.T, L[1:].imag.T, **corner)
+        nyquist.plot(L[0].real, L[0].imag, **own)
+        circle = -1.0 + np.exp(1j * np.linspace(0.0, 2.0 * np.pi, 100)) / MOST_SENSITIVE
+        nyquist.plot(circle.real, circle.imag, ":", color=BLACK)
+        nyquist.plot(-1.0, 0.0, "+", color=BLACK)
+        nyquist.set_aspect("equal", "datalim")
+        nyquist.set(xlabel="Re K G", ylabel="Im K G", title=f"Nyquist; dotted: |S| = {MOST_SENSITIVE:g}")
+        sensitivity.semilogx(f, 1.0 / np.abs(1.0 + L[1:]).T, **corner)
+        sensitivity.semilogx(f, 1.0 / np.abs(1.0 + L[0]), **own)
+        sensitivity.axhline(MOST_SENSITIVE, color=BLACK, linestyle=":")
+        sensitivity.set(xlabel="frequency [Hz]", ylabel="sensitivity |S|")
+        for panel, lasts_s, title in (
+            (step, SHOWN_S, "step of 100 Nm"),
+            (pulse, 0.05, "disturbance, 100 Nm for 50 ms"),
+        ):
+            panel.plot(*_answer(loop, None, lasts_s), "--", color=BLACK)
+            panel.plot(*_answer(loop, found, lasts_s), **own)
+            panel.set(xlabel="time [s]", ylabel="speed [rad/s]", title=title)
+        figure.savefig(path, dpi=150)
+
+
+def _answer(loop: Loop, found: Damper | None, lasts_s: float) -> tuple[FloatArray, FloatArray]:
+    """Return time and the nominal line's speed under 100 Nm."""
+    A = loop.A[0] if found is None else loop.closed(found.filter)[0]
+    time_s = np.arange(round(SHOWN_S / loop.period_s), dtype=np.float64) * loop.period_s
+    x, speed = np.zeros(A.shape[0]), np.zeros_like(time_s)
+    for k, t in enumerate(time_s.tolist()):
+        speed[k] = x[0]
+        x = A @ x
+        if t < lasts_s:
+            x[: loop.B.shape[1]] += 100.0 * loop.B[0]
+    return time_s, speed
