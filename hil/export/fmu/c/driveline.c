@@ -179,12 +179,12 @@ int driveline_step(Driveline *d, double length_s) {
         Several_dddd fed = timing_lag_step(mean, rise, rest[LAGGED], rest[LAG_RISE], lag);
         rest[LAGGED] = fed.item2, rest[LAG_RISE] = fed.item3;
         if (conditions_is_bristled(p)) {
-            held = bristles_bent(made, held, x, now, p, 0.5 * h);
-            felt = bristles_rubbed(now, held, p);
+            held = conditions_bent(made, held, x, now, p, 0.5 * h);
+            felt = conditions_rubbed(now, held, p);
         }
         State before = x;
         x = rates_stepped(made, felt, fed.item0, fed.item1, x, p, h);
-        if (conditions_is_bristled(p)) held = bristles_bent(made, held, x, now, p, 0.5 * h);
+        if (conditions_is_bristled(p)) held = conditions_bent(made, held, x, now, p, 0.5 * h);
         if (p.at[FILTER] > 0.0) {
             double turned = angle + turn * j / steps, turns = angle + turn * (j + 1) / steps;
             Several_dd read = sensing_smoothed(before, x, OUTPUT, turned, turns, rest[FILTERED], rest[FILTER_RISE],
@@ -213,7 +213,7 @@ void driveline_update(Driveline *d) {
     Conditions now =
         conditions_conditions(MASSES, time_s - 0.5 * h, h, angle, v[T_LOAD], v[SIGN_WIDTH], p), felt = now;
     Bristles held = {rest[BRISTLES_MOTOR], rest[BRISTLES_LOAD]};
-    if (conditions_is_bristled(p)) felt = bristles_rubbed(now, held, p);
+    if (conditions_is_bristled(p)) felt = conditions_rubbed(now, held, p);
     State moving = rates_rates(made, conditions_with_torque(felt, drive), x, p);
     v[SPEED_MEASURED] = sensing_shown(sensing_reading(sensing_entry(x, OUTPUT, p), angle, p), rest[FILTERED], p);
     v[SPEED_MOTOR] = x.speed;
