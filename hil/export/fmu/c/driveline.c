@@ -158,7 +158,7 @@ int driveline_remember(Driveline *d) {
     return delay_s == 0.0 || remember(&d->history, time_s, on_shaft(d), time_s - 2.0 * delay_s);
 }
 
-int driveline_step(Driveline *d, double length_s) {
+static int step_line(Driveline *d, double length_s) {
     Array p = parameters(d);
     Line made = line(d);
     int steps = (int)fmax(1.0, ceil(length_s / d->value[STEP_S] - 1e-6));
@@ -200,6 +200,25 @@ int driveline_step(Driveline *d, double length_s) {
     warm_up(d, length_s);
     return 1;
 }
+
+/* Around another FMU's shaft: what is here moves as that will, and passes on the torque that reaches it. What is passed
+   on acts a step later; so begin with the speed of then, and with what else drives the shaft as it changed so far. The
+   first speeds may come from before the importer connected the two. */
+static int step_around(Driveline *d, double length_s) {
+    double *v = d->value, inertia = v[PARAMETER + INERTIA], load = v[T_LOAD];
+    double other = v[STEPS_DONE] < 3.0 ? 0.0 : inertia * (v[SPEED_SEEN] - v[SEEN_BEFORE]) / length_s - v[ACTED];
+    double change = v[STEPS_DONE] < 4.0 ? 0.0 : other - v[OTHER_BEFORE], then = other + 2.0 * change;
+    double begins = v[SPEED_SEEN] + (other + change + v[TORQUE_PASSED]) * length_s / inertia;
+    v[STEPS_DONE] += 1.0, v[SEEN_BEFORE] = v[SPEED_SEEN], v[OTHER_BEFORE] = other, v[ACTED] = v[TORQUE_PASSED];
+    v[STATE + SPEED] = begins, v[T_LOAD] = load - then;
+    int is_well = step_line(d, length_s);
+    v[T_LOAD] = load;
+    v[TORQUE_PASSED] = inertia * (v[STATE + SPEED] - begins) / length_s - then;
+    v[LOAD_PASSED] = -v[TORQUE_PASSED];
+    return is_well;
+}
+
+int driveline_step(Driveline *d, double length_s) { return AROUND ? step_around(d, length_s) : step_line(d, length_s); }
 
 /* Outputs of the present state. */
 void driveline_update(Driveline *d) {
