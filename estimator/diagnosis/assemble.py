@@ -281,10 +281,8 @@ def profile_size(result: FitResult, cov: FloatArray, model: DrivelineModel) -> d
 def retuned_parameters(result: FitResult, model: DrivelineModel, whole: bool) -> dict[str, Retuned]:
     """Return every nominal parameter before and after; one trusted exactly stays what it was.
 
-    Of a plant simulated elsewhere there are none.
+    Of a plant simulated elsewhere there are those that it can be given.
     """
-    if model.plant is not None:
-        return {}
     cov = reported_covariance(result)
     fitted = {
         shared.name: (
@@ -296,6 +294,8 @@ def retuned_parameters(result: FitResult, model: DrivelineModel, whole: bool) ->
     }
     parameters = {}
     for name, parameter in model.parameters.items():
+        if model.plant is not None and name not in fitted:
+            continue
         value, ci95 = fitted.get(name, (parameter.value, (parameter.value, parameter.value)))
         parameters[name] = Retuned(parameter.value, value, ci95, parameter_unit(name, model.motion))
     return parameters

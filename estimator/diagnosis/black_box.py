@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
 import threading
 from collections import deque
@@ -11,6 +12,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from estimator.diagnosis.flange import FREE, slots_of, with_only
 from estimator.physics.catalogue import BUILT_IN
 from estimator.physics.driveline import Case, Start
 from estimator.physics.effect import Effect, Element
@@ -19,24 +21,38 @@ from estimator.physics.inputs import load_of
 from estimator.physics.kernel import state_vector
 from estimator.physics.layout import LOAD, NOMINAL, Grid, flat, grid_for, slot
 from estimator.physics.model import DrivelineModel, Parameter, Structure
-from estimator.physics.motion import measured_speed
+from estimator.physics.motion import measured_speed, motor_angle
 from estimator.physics.simulate import simulate, simulate_each
 from estimator.physics.unknowns import Shared
 from estimator.signals.record import FloatArray, OutputKind, Record, once
 
-Simulated = Callable[[Record, FloatArray, FloatArray, Start], FloatArray]
-"""Recording, torque of its inputs (N, M) [Nm], load torque (N,) [Nm], initial state to the true output (N,)."""
+
+@dataclass(frozen=True, slots=True)
+class Around:
+    """What a plant is simulated with."""
+
+    torque_nm: FloatArray  # (N, M): of its inputs
+    load_nm: FloatArray  # (N,)
+    start: Start
+    tuned: Mapping[str, float]  # factor on those of its parameters that act as the line's of these names
+    laws: FloatArray | None  # (layout.SIZE,): parameters of laws at its shafts (``flange``), where there are any
+    sign_width: float  # speed within which their dry friction changes sign [rad/s]
+
+
+Simulated = Callable[[Record, Around], FloatArray]
+"""Recording, and what it is simulated with, to the true output (N,)."""
 
 FINER = 4  # steps to a sample where a torque is late by parts of one, or the output filtered within one
-MOST_KEPT = 4  # outputs of the plant that are kept: a sensor's unknowns do not move it
-MOST_AROUND = 32  # outputs of each recording that changes are added to
+FEWEST_KEPT, MOST_KEPT = 4, 512  # outputs that are kept, and of each recording that changes are added to
+KEPT_BYTES = 64 << 20  # memory that those of long recordings may take
 
-_FREE = DrivelineModel(Structure.ONE_MASS, {"J_M": Parameter(1.0, 0.0), "b_M": Parameter(0.0, 0.0)})
 _GRID = Grid(Structure.ONE_MASS, 1, 0.0)
 
 
-def acts_around(entry: Effect) -> bool:
-    """Tell whether an effect acts at the inputs or outputs of a plant, whatever is inside it."""
+def acts_around(entry: Effect, plant: object) -> bool:
+    """Tell whether an effect acts at the inputs, shafts or outputs of a plant, whatever is inside it."""
+    if isinstance(plant, BlackBox) and entry.name in plant.laws:
+        return True
     return entry.profile or entry.element in (Element.TORQUE_PATH, Element.SPEED_SENSOR, Element.ACQUISITION)
 
 
@@ -85,13 +101,15 @@ class BlackBox:
     starts: Collection[str]  # what of the initial state it can be given
     line: DrivelineModel  # a line that answers much as it does
     has_start: bool  # whether the initial state of that line means the same
+    tuned: Collection[str] = ()  # parameters of that line that parameters of the plant act as
+    laws: Collection[str] = ()  # effects whose torque can be put at its shafts
     _known: dict[bytes, FloatArray] = field(default_factory=dict)
     _around: WeakKeyDictionary[Record, deque[_Known]] = field(default_factory=WeakKeyDictionary)
     _alone: threading.Lock = field(default_factory=threading.Lock)
 
     def simulated(self, record: Record, cases: Sequence[Case]) -> FloatArray:
         """Simulate the recorded output of a recording, as its sensor shows it, under each case; shape (K, N)."""
-        around = self._around.setdefault(record, deque(maxlen=MOST_AROUND))
+        around = self._around.setdefault(record, deque(maxlen=_most_kept(record)))
         if len(cases) == 1:
             output = self._read(record, cases[0])
             around.append(_Known(cases[0], output))
@@ -113,7 +131,7 @@ class BlackBox:
             return output[::steps]
         rising = np.append(np.diff(output), 0.0) / fine.sample_time_s
         moved = replace(fine, torque_nm=rising[:, np.newaxis], load_nm=None)
-        initial = Case(_with(case.p, _SENSOR), Start(0.0, 0.0, float(output[0])))
+        initial = Case(with_only(case.p, _SENSOR), Start(0.0, 0.0, float(output[0])))
         found: FloatArray = simulate_each(_GRID, moved, [initial])[0]
         return found[::steps]
 
@@ -121,20 +139,24 @@ class BlackBox:
         """Return the plant's own output, shape (N,), of the case's torques and load, shape (N,) [Nm]."""
         torque = _applied(record, case.p)
         settable = [float(getattr(case.start, name)) for name in self.starts]
-        key = np.concatenate([[record.sample_time_s], torque.ravel(), load, settable]).tobytes()
+        nominal = self.line.values()
+        tuned = {name: float(case.p[slot("", name)]) / nominal[name] for name in self.tuned}
+        width = grid_for(self.line, [record]).sign_width
+        laws = with_only(case.p, slots_of(self.laws))
+        acting = laws if (laws != flat(FREE)).any() else None
+        settings = [record.sample_time_s, record.since_start_s[0], *settable, *tuned.values()]
+        at_shafts = [] if acting is None else [acting, motor_angle(record)]
+        key = hashlib.sha256(np.concatenate([settings, torque.ravel(), load, *at_shafts]).tobytes()).digest()
         with self._alone:  # most FMUs allow one simulation at a time
             if key not in self._known:
-                while len(self._known) >= MOST_KEPT:
+                while len(self._known) >= _most_kept(record):
                     self._known.pop(next(iter(self._known)))
-                self._known[key] = self.run(record, torque, load, case.start)
+                self._known[key] = self.run(record, Around(torque, load, case.start, tuned, acting, width))
             return self._known[key]
 
 
-def _with(p: FloatArray, places: Sequence[int]) -> FloatArray:
-    """Return the parameters of a free inertia with those at some places."""
-    free = flat(_FREE)
-    free[places] = p[places]
-    return free
+def _most_kept(record: Record) -> int:
+    return min(MOST_KEPT, max(FEWEST_KEPT, KEPT_BYTES // record.output.nbytes))
 
 
 def _applied(record: Record, p: FloatArray) -> FloatArray:
@@ -142,8 +164,8 @@ def _applied(record: Record, p: FloatArray) -> FloatArray:
 
     The inputs act on one shaft: what becomes of their sum on its way is added to the first.
     """
-    path = _with(p, _INPUT)
-    if (path == flat(_FREE)).all():
+    path = with_only(p, _INPUT)
+    if (path == flat(FREE)).all():
         return record.torque_nm
     speed = simulate(_GRID, replace(record, load_nm=None), path, Start(0.0, 0.0, 0.0), output=state_vector.SPEED)
     mean = np.diff(speed) / record.sample_time_s

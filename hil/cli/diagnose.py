@@ -13,7 +13,7 @@ from typer.core import TyperCommand
 
 from hil.cli.command_line import is_silent
 from hil.cli.importing import without_collecting
-from hil.cli.options import Dbc, Jobs, Mapped, TrustFmu, TrustLaws, tell
+from hil.cli.options import Dbc, Jobs, Mapped, Signals, TrustFmu, TrustLaws, Tuned, tell
 
 HOLDOUT = "--holdout"
 
@@ -78,13 +78,9 @@ def diagnose(
         Effort, typer.Option("--effort", help="Work the search may cost, the same on every machine.")
     ] = Effort.NORMAL,
     dbc: Dbc = None,
-    signals: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE", help=r"File with the \[signals] to read recordings by, where the model is an FMU."
-        ),
-    ] = None,
+    signals: Signals = None,
     mapped: Mapped = None,
+    tuned: Tuned = None,
     trust_fmu: TrustFmu = False,
     trust_laws: TrustLaws = False,
     jobs: Jobs = None,
@@ -92,13 +88,15 @@ def diagnose(
 ) -> None:
     """Say where simulation and recordings differ, and which physics the model lacks.
 
-    Writes DIR/diagnosis.json, DIR/augmented.toml and DIR/report.html. Of an FMU, what acts at its inputs and outputs is
-    sought, and no augmented.toml written.
+    Writes DIR/diagnosis.json, DIR/augmented.toml and DIR/report.html. In the place of an FMU a line is diagnosed that
+    answers as it does; where there is none, what acts at its inputs, shafts and output is sought, and no augmented.toml
+    written. DIR/augmented.ssp is the FMU with the effects around it, where none is inside.
     """
     with without_collecting():
         from rich.console import Console
 
         from estimator.diagnosis.diagnose import diagnose as diagnose_records
+        from hil.errors import UsageError
         from hil.plants.plant import Trust
         from hil.plants.questioned import Asked, questioned
         from hil.plants.scales import with_the_line_to_write
@@ -106,21 +104,33 @@ def diagnose(
         from hil.report.diagnosis_files import publish_diagnosis
         from hil.report.diagnosis_html import diagnosis_summary
         from hil.report.diagnosis_json import diagnosis_text
+        from hil.report.fmu_terms import in_its_terms
         from hil.report.outputs import require_folder
         from hil.store import attach_to_runs
         from hil.store.entry import DIAGNOSIS, MODEL
 
     require_folder(out)
     every = [*recordings, *(holdout or ())]
-    asked = Asked(model, signals, mapped or (), Trust(trust_laws, trust_fmu), budget_s)
-    file, records = questioned(asked, every, dbc, tell)
+    asked = Asked(model, signals, mapped or (), Trust(trust_laws, trust_fmu), tuned or (), budget_s)
+    found = questioned(asked, every, dbc, tell)
+    file, records = found.file, found.records
     training, kept_back = records[: len(recordings)], records[len(recordings) :]
     with with_the_line_to_write(every, file.signals, dbc), progress_bar() as progress:
         diagnosis = diagnose_records(training, file.model, kept_back, progress, budget_s, effort.value)
+    more = {}
+    if found.fmu is not None:
+        from hil.export.fmu.ssp import augmented_ssp
+
+        diagnosis = in_its_terms(diagnosis, found.fmu, records[0].location)
+        try:
+            if (write := augmented_ssp(diagnosis, found.fmu, model, records[0])) is not None:
+                more["augmented.ssp"] = write
+        except UsageError as error:  # no C compiler
+            tell(f"augmented.ssp is not written: {error}")
     made = provenance([model], every)
     text = diagnosis_text(diagnosis, made)
     try:
-        publish_diagnosis(out, diagnosis, file, records, every, made)
+        publish_diagnosis(out, diagnosis, file, records, every, made, more)
     finally:  # the verdict is printed even if the disk is full
         if as_json:
             typer.echo(text, nl=False)

@@ -19,7 +19,7 @@ app = typer.Typer(add_completion=False)
 
 @app.command(epilog="Example: hil look drive.mf4. A logged bus: hil look canedge.mf4 --dbc vehicle.dbc")
 def look(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="A recording of any format.")],
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="A recording of any format, or an FMU.")],
     dbc: Dbc = None,
     model: Annotated[
         Path | None,
@@ -31,12 +31,19 @@ def look(
     ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
-    """Show what is in a recording: channels, units, rates, gaps, what each could be, and the table that reads it."""
+    """Show what is in a recording: channels, units, rates, gaps, what each could be, and the table that reads it.
+
+    Of an FMU, its variables and the options --map that name them; nothing of it runs.
+    """
     import json
 
+    from hil.plants.fmu_plant import is_fmu
     from hil.printable import printable
     from hil.recording.look import look as look_into
 
+    if is_fmu(file):
+        _look_into_fmu(file, as_json)
+        return
     found = look_into(file, dbc)
     if plot:
         _plot(found, model, dbc)
@@ -56,6 +63,34 @@ def look(
         _tell_scales(file, model, dbc)
     elif found.roles.torques and found.roles.output is not None:
         _tell_scales_alone(found, dbc)
+
+
+def _look_into_fmu(file: Path, as_json: bool) -> None:
+    """Print an FMU's variables, and what of them is meant by ``--map`` most probably."""
+    import json
+
+    from rich.table import Table
+
+    from hil.cli.printing import new_console
+    from hil.plants.fmu_look import look_into
+
+    found = look_into(file)
+    if as_json:
+        document = {"schema": "hil.look/1", "input": str(file), "variables": found.variables}
+        say(json.dumps({**document, "map": found.mapped, "doubtful": found.doubtful}))
+        return
+    table = Table(box=None, pad_edge=False)
+    headings = ("name", "causality", "variability", "type", "unit")
+    for heading in headings:
+        table.add_column(heading, overflow="fold")
+    for each in found.variables:
+        table.add_row(*(_plain(str(each[heading])) for heading in headings))
+    new_console().print(table)
+    say("")
+    say(found.options or "No variable looks like a torque or a speed: name them by --map torque=... --map output=...")
+    for key, others in found.doubtful.items():
+        if others:
+            say(f"{key} could as well be {', '.join(others)}")
 
 
 def _plot(found: Look, model: Path | None, dbc: Path | None) -> None:

@@ -43,7 +43,24 @@ Mapped = Annotated[
     typer.Option(
         "--map",
         metavar="KEY=NAME,...",
-        help="Variables of an FMU: torque=T1,T2 (one: their sum), output=w, load=T_L and start=w0,... (estimated).",
+        help="Variables of an FMU: torque=T1,T2 (one: their sum), output=w, load_speed=w_L, load=T_L and start=w0,... "
+        "(estimated).",
+    ),
+]
+
+Signals = Annotated[
+    Path | None,
+    typer.Option(
+        "--signals", metavar="FILE", help=r"File with the \[signals] to read recordings by, where the model is an FMU."
+    ),
+]
+
+Tuned = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--tune",
+        metavar="NAME=20%",
+        help="Parameter of an FMU, and to what its value is trusted, for re-tuning; or a TOML file of such lines.",
     ),
 ]
 

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from hil.cli.options import Dbc, TrustLaws, tell
+from hil.cli.options import Dbc, Mapped, Signals, TrustFmu, TrustLaws, tell
 from hil.cli.printing import say
 
 app = typer.Typer(add_completion=False)
@@ -16,10 +16,13 @@ app = typer.Typer(add_completion=False)
 
 @app.command(epilog="Example: hil simulate --model bus.toml --input run_1.csv --out run_1_simulated.csv")
 def simulate(
-    model: Annotated[Path, typer.Option(metavar="MODEL", help="Model file, nominal or augmented.")],
+    model: Annotated[Path, typer.Option(metavar="MODEL", help="Model file, nominal or augmented, or an FMU.")],
     recording: Annotated[Path, typer.Option("--input", metavar="REC", help="Recording with the torques.")],
     out: Annotated[Path, typer.Option(metavar="CSV", help="Simulated output, one row per sample of REC.")],
     dbc: Dbc = None,
+    signals: Signals = None,
+    mapped: Mapped = None,
+    trust_fmu: TrustFmu = False,
     trust_laws: TrustLaws = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
@@ -29,12 +32,11 @@ def simulate(
     such effects, also phases of angles, moments of events and the profile of the road.
     """
     from estimator.physics.model import unit
-    from hil.config.model_file import read_model_for_recordings
     from hil.errors import UsageError
-    from hil.plants import ModelPlant
-    from hil.plants.prepared import known_events, prepare_again
+    from hil.plants.plant import Trust
+    from hil.plants.questioned import Asked, simulated_by
     from hil.provenance import provenance
-    from hil.recording import Table, csv_format, read_record
+    from hil.recording import Table, csv_format
     from hil.report.numbers import json_number, shown
     from hil.report.outputs import publish, require_folder
     from hil.report.wording import output_unit, simulated_column
@@ -44,15 +46,14 @@ def simulate(
     if out.exists() and recording.exists() and out.samefile(recording):
         raise UsageError(f"--out {out}: expected another file than the recording itself. Choose another name.")
     require_folder(out.parent)
-    file = read_model_for_recordings(model, trust_laws)
-    record = read_record(recording, file.signals, file.on_bench, dbc, tell)
-    (record,) = prepare_again([record], file.prepared, tell, keep_rows=True)
-    run = ModelPlant(model.name, file.model, known_events(file.prepared, [recording])).run(record)
-    column = simulated_column(record.kind, file.model.motion)
+    asked = Asked(model, signals, mapped or (), Trust(trust_laws, trust_fmu))
+    plant, record = simulated_by(asked, recording, dbc, tell)
+    run = plant.run(record)
+    column = simulated_column(record.kind, plant.motion)
     further = {f"{each.label}_sim": found for each, found in zip(record.channels, run.further, strict=True)}
     table = Table(out, {"time_s": record.time_s, column: run.output, **further})
     publish(out.parent, {out.name: lambda path: csv_format.write(table, path)})
-    error_unit, load_unit = output_unit(record.kind, file.model.motion), unit("torque", file.model.motion)
+    error_unit, load_unit = output_unit(record.kind, plant.motion), unit("torque", plant.motion)
     if as_json:
         document = {
             "schema": "hil.simulate/1",

@@ -1,19 +1,30 @@
-"""The model in an FMU as ``hil diagnose`` takes it: a plant of which nothing is known but what it answers."""
+"""The model in an FMU as ``hil diagnose`` takes it: a line that answers as it does, or a plant taken as it is.
+
+Where a line of one or two inertias answers as the FMU to within what is recorded, that line is diagnosed, with the
+whole catalogue. Elsewhere every output that is compared is the FMU's, and only what acts around it is tried.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from estimator.diagnosis.black_box import BlackBox, equivalent_line
+from estimator.diagnosis.acquisition.chain import replay
+from estimator.diagnosis.black_box import Around, BlackBox, equivalent_line
+from estimator.diagnosis.flange import AT_LOAD, AT_MOTOR, FREE, slots_of, with_only
+from estimator.diagnosis.noise import noise_floor
 from estimator.diagnosis.preconditions.prepare import thin
-from estimator.physics.driveline import Start
-from estimator.physics.model import DrivelineModel, Load
-from estimator.signals.record import FloatArray, OutputKind, Record
+from estimator.physics.layout import flat
+from estimator.physics.model import DrivelineModel, Load, Structure
+from estimator.physics.motion import motor_angle
+from estimator.signals.record import FloatArray, Location, OutputKind, Record
+from hil.errors import UsageError
 from hil.plants.fmu_plant import FmuPlant
+from hil.plants.fmu_tune import Tuned, acting_as
 from hil.plants.names import OF_A_POSITION, Names
+from hil.recording.sandbox import Document
 
 STARTS = ("speed_rad_s", "twist_rad", "load_speed_rad_s")
 """What of an initial state the names of ``--map start=`` stand for, in this order; of a position the angle first."""
@@ -21,28 +32,120 @@ STARTS = ("speed_rad_s", "twist_rad", "load_speed_rad_s")
 FAST_ENOUGH_S = 1.0 / 240.0
 """Sampling period at which the line that answers as the plant does is fitted, at least."""
 
+ALIKE = 0.1
+"""Share of the noise of the readings within which a line answers as the FMU: a hundredth of its square."""
 
-def fmu_line(fmu: FmuPlant, records: Sequence[Record]) -> DrivelineModel:
-    """Return the model that is questioned, of recordings of one kind of output."""
-    kind = records[0].kind
-    named = fmu.named(kind)
+NOTHING = 1e-3
+"""Share of the output's range that half a step may change where a law is put at a shaft."""
+
+MOST_PARTS = 16
+
+
+@dataclass(frozen=True, slots=True)
+class FmuLine:
+    """What is diagnosed in the place of an FMU."""
+
+    fmu: FmuPlant
+    model: DrivelineModel  # the line, or the plant with the line that is nearest
+    named: Names  # which variables of the FMU are what
+    error: float  # RMS by which the line is off from the FMU, in the unit of the output
+    noise: float  # of the readings, in the unit of the output
+    tuned: Mapping[str, Tuned]  # by the parameter of the line, the one of the FMU that acts as it
+
+    @property
+    def is_alike(self) -> bool:
+        """Tell whether the line answers as the FMU to within what is recorded."""
+        return self.error <= ALIKE * self.noise
+
+
+def fmu_line(fmu: FmuPlant, records: Sequence[Record], tolerances: Mapping[str, float]) -> FmuLine:
+    """Return what is diagnosed of an FMU, of recordings of one kind of output."""
+    named = fmu.named(records[0].kind)
+    known = {name: fmu.parameter(name) for name in tolerances}
+    answered = [_answered(record, fmu.run(record).output) for record in records]
+    line = equivalent_line([_thinned(record) for record in answered])
+    errors = [replay(line, record).output - record.output for record in answered]
+    error = float(np.sqrt(np.mean(np.concatenate(errors) ** 2)))
+    tuned: dict[str, Tuned] = {}
+    for name, tolerance in tolerances.items():
+        value, unit = known[name]
+        moved = {name: value * (1.0 + 0.5 * tolerance)}
+        changed = [_thinned(_answered(record, fmu.changed(record, moved))) for record in records]
+        place, exponent = acting_as(name, line, changed, error, 1.0 + 0.5 * tolerance)
+        if place in tuned:
+            raise UsageError(f"--tune {name}: it acts as {tuned[place].name} does, {place} of a line. Take one of them")
+        tuned[place] = Tuned(name, value, unit, exponent, tolerance)
+    parameters = {
+        name: replace(each, tolerance=tuned[name].of_line) if name in tuned else each
+        for name, each in line.parameters.items()
+    }
+    found = FmuLine(fmu, replace(line, parameters=parameters), named, error, noise_floor(records), tuned)
+    return found if found.is_alike else replace(found, model=_around(records[0], found))
+
+
+def _flanges(fmu: FmuPlant, record: Record, named: Names, line: DrivelineModel) -> list[Document]:
+    """Return the shafts at which laws can be put, each with the output that is its speed (``Flanges``)."""
+    if not fmu.takes_laws(named) or record.kind is not OutputKind.SPEED:
+        return []
+    inertias, at_motor = line.values(), record.location is Location.MOTOR
+    load_speed = named.load_speed or ("" if at_motor else named.output)
+    has_load = line.structure is Structure.TWO_MASS and load_speed and fmu.is_input(named.load)
+    laws = AT_MOTOR if line.structure is Structure.TWO_MASS else (*AT_MOTOR, *AT_LOAD)
+    motor = {"speed": named.output, "input": named.torque, "sign": -1.0, "laws": laws, "inertia": inertias["J_M"]}
+    load = {"speed": load_speed, "input": [named.load], "sign": 1.0, "laws": AT_LOAD, "inertia": inertias.get("J_L")}
+    return [*([motor] if at_motor else []), *([load] if has_load else [])]
+
+
+def _around(record: Record, found: FmuLine) -> DrivelineModel:
+    """Return a model whose every simulation is the FMU's."""
+    fmu, named, line, kind = found.fmu, found.named, found.model, record.kind
+    flanges, parts = _flanges(fmu, record, named, line), dict[bytes, int]()
     states = ("angle_rad", *STARTS) if kind is OutputKind.POSITION else STARTS
     starts = dict(zip(named.start, states, strict=False))
 
-    def run(record: Record, torque_nm: FloatArray, load_nm: FloatArray, start: Start) -> FloatArray:
-        values: dict[str, FloatArray | float] = {name: getattr(start, state) for name, state in starts.items()}
+    def run(record: Record, around: Around) -> FloatArray:
+        values: dict[str, FloatArray | float] = {name: getattr(around.start, state) for name, state in starts.items()}
+        values |= {each.name: each.value_of(around.tuned[name]) for name, each in found.tuned.items()}
         if named.load:
-            values[named.load] = load_nm if fmu.is_input(named.load) else float(load_nm[0])
-        return fmu.simulated(record, named, torque_nm, values)
+            values[named.load] = around.load_nm if fmu.is_input(named.load) else float(around.load_nm[0])
+        if around.laws is None:
+            return fmu.simulated(record, named, around.torque_nm, values)
+        acting = [each for each in flanges if (with_only(around.laws, slots_of(each["laws"])) != flat(FREE)).any()]
+        settings = {"flanges": acting, "sign_width": around.sign_width, "start_s": float(record.since_start_s[0])}
+        given = (settings, {"p": around.laws, "angle": motor_angle(record)})
 
-    line = equivalent_line([_answered(fmu, record) for record in records])
+        def in_parts(count: int) -> FloatArray:
+            return fmu.simulated(record, named, around.torque_nm, values, given, count)
+
+        which = np.append(around.laws, record.sample_time_s).astype(bool).tobytes()
+        if which in parts:
+            return in_parts(parts[which])
+        parts[which], output = _fine_enough(in_parts)
+        return output
+
     is_alike = {*named.start} <= {*Names().start, *OF_A_POSITION.start}
-    plant = BlackBox(run, tuple(starts.values()), line, is_alike)
+    plant = BlackBox(
+        run, tuple(starts.values()), line, is_alike, tuple(found.tuned), [n for each in flanges for n in each["laws"]]
+    )
     return replace(line, plant=plant, load=Load.OWN if named.load else 0.0)
 
 
-def _answered(fmu: FmuPlant, record: Record) -> Record:
+def _fine_enough(in_parts: Callable[[int], FloatArray]) -> tuple[int, FloatArray]:
+    """Return in how many parts a period is simulated so that twice as many change nothing, and the output."""
+    parts, output = 1, in_parts(1)
+    while parts < MOST_PARTS:
+        finer = in_parts(2 * parts)
+        change = float(np.abs(finer - output).max())
+        if change <= NOTHING * float(np.ptp(finer)):
+            break
+        parts, output = 2 * parts, finer
+    return parts, output
+
+
+def _answered(record: Record, output: FloatArray) -> Record:
     """Return a recording with the FMU's output in the place of the measured one."""
-    alone = replace(record, channels=(), okay=np.ones_like(record.okay))
-    answered = replace(alone, output=fmu.run(record).output)
-    return thin(answered, max(1, int(FAST_ENOUGH_S / record.sample_time_s)))
+    return replace(record, channels=(), okay=np.ones_like(record.okay), output=output)
+
+
+def _thinned(record: Record) -> Record:
+    return thin(record, max(1, int(FAST_ENOUGH_S / record.sample_time_s)))

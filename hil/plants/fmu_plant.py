@@ -13,6 +13,7 @@ import weakref
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 
@@ -23,8 +24,8 @@ from estimator.physics.model import Motion
 from estimator.physics.parallel import TimeIsUp, check_time, time_left_s
 from estimator.signals.record import FloatArray, OutputKind, Record
 from hil.errors import UsageError
-from hil.plants.fmu_process import HUNG, MEMORY_BYTES, STEP_S
-from hil.plants.names import Names, names
+from hil.plants.fmu_process import HUNG, MEMORY_BYTES, STEP_S, number
+from hil.plants.names import Names, names, some
 from hil.printable import printable
 from hil.recording.sandbox import Document, Gone, Sandbox
 from hil.recording.table import Column
@@ -45,6 +46,8 @@ AFTERWARDS_S = 10.0
 """Time for a simulation once that of the whole command has been used up: what was found so far is still said [s]."""
 
 CURE = "Simulate it in the program that made it, and export it for Linux, 64 bit."
+
+NO_CHANGE: Mapping[str, float] = MappingProxyType({})
 
 SHARE_OF_RANGE = 0.1
 """Scale of a load or an initial state, over the range of the torque or the output."""
@@ -76,8 +79,11 @@ class FmuPlant:
         self._kind: str = described["kind"]
         self._mapped, self._known = tuple(mapped), tuple(variables)
         names(mapped, variables)
-        given = {name: each for name, each in variables.items() if each["causality"] == "input"}
-        self._inputs = {name: _number(each["start"]) for name, each in given.items() if each["type"] in NUMBERS}
+        self.simulations = 0
+        self._variables, self._settled = variables, dict[tuple[str, float], FloatArray]()
+        self._inputs = [
+            name for name, each in variables.items() if each["causality"] == "input" and each["type"] in NUMBERS
+        ]
 
     def _open(self) -> Document:
         """Start the FMU's process, and return what it says of itself."""
@@ -137,9 +143,18 @@ class FmuPlant:
             output = self._simulated(record, named, unknown, x)
             if np.abs(step).max() < SMALL * SMALL:
                 break
+        self._settled[record.name, float(record.time_s[0])] = x
         error = (output - record.output)[record.okay]
         load = float(x[0] * unknown.scale[0]) if named.load else float("nan")
         return FreeRun(output, float(np.sqrt(np.mean(error**2))), Start(load, 0.0, float("nan")))
+
+    def changed(self, record: Record, values: Mapping[str, float]) -> FloatArray:
+        """Simulate a recording that was `run` with some parameters changed, its load and initial state kept."""
+        named, parts = self.named(record.kind), []
+        for part in tiles(record):
+            x = self._settled[record.name, float(part.time_s[0])]
+            parts.append(self._simulated(part, named, _Unknown.of(named, part), x, values))
+        return np.concatenate(parts)
 
     def named(self, kind: OutputKind) -> Names:
         """Return which of its variables are what, for a kind of output."""
@@ -153,12 +168,32 @@ class FmuPlant:
             raise UsageError(f"--map output={found.output}: expected an output of the FMU, got an input")
         return found
 
+    def takes_laws(self, named: Names) -> bool:
+        """Tell whether torques can be put at its inputs step by step: in co-simulation, at scalars."""
+        used = (*named.torque, named.output, named.load, named.load_speed)
+        return self._kind == "CoSimulation" and not any(name.endswith("]") for name in used)
+
     def is_input(self, name: str) -> bool:
         """Tell whether a variable is an input, which may change over time."""
         return name in self._inputs
 
-    def _simulated(self, record: Record, named: Names, unknown: _Unknown, x: FloatArray) -> FloatArray:
-        values: dict[str, FloatArray | float] = dict(zip(unknown.names, (x * unknown.scale).tolist(), strict=True))
+    def parameter(self, name: str) -> tuple[float, str]:
+        """Return the start and the unit of a parameter that can be set."""
+        found = self._variables.get(name)
+        settable = [
+            n for n, each in self._variables.items() if each["causality"] == "parameter" and each["type"] in NUMBERS
+        ]
+        if found is None or name not in settable:
+            raise UsageError(f"--tune {name}: expected a real parameter of the FMU. It has: {some(settable)}")
+        if (value := number(found["start"])) == 0.0:
+            raise UsageError(f"--tune {name}: expected a start other than 0, of which a share can be taken")
+        return value, str(found["unit"])
+
+    def _simulated(
+        self, record: Record, named: Names, unknown: _Unknown, x: FloatArray, changed: Mapping[str, float] = NO_CHANGE
+    ) -> FloatArray:
+        values: dict[str, FloatArray | float] = {**changed}
+        values |= dict(zip(unknown.names, (x * unknown.scale).tolist(), strict=True))
         if record.load_nm is not None:
             if named.load not in self._inputs:
                 raise UsageError(
@@ -169,9 +204,16 @@ class FmuPlant:
         return self.simulated(record, named, record.torque_nm, values)
 
     def simulated(
-        self, record: Record, named: Names, torque_nm: FloatArray, values: Mapping[str, FloatArray | float]
+        self,
+        record: Record,
+        named: Names,
+        torque_nm: FloatArray,
+        values: Mapping[str, FloatArray | float],
+        around: tuple[Document, dict[str, Column]] | None = None,
+        parts: int = 1,
     ) -> FloatArray:
-        """Simulate the output of a recording, shape (N,)."""
+        """Simulate the output of a recording, shape (N,); with laws ``around`` it, in parts of its period."""
+        self.simulations += 1
         held = {name: value for name, value in values.items() if name in self._inputs}
         start = {name: value for name, value in values.items() if name not in self._inputs}
         since_s = record.time_s - record.time_s[0]
@@ -179,11 +221,13 @@ class FmuPlant:
             "what": "run",
             "kind": self._kind,
             "stop_s": float(since_s[-1]),
-            "step_s": record.sample_time_s,
+            "step_s": record.sample_time_s / parts,
             "start": {name: float(np.asarray(value)) for name, value in start.items()},
             "output": named.output,
         }
         columns = self._given(torque_nm, named, since_s, held)
+        if around is not None:
+            request["around"], columns = around[0], {**columns, **around[1]}
         expected = f"{self.name}: expected an FMU that simulates {record.name}"
         result = self._asked(request, expected, columns)[1]
         output = np.interp(since_s, result["time"], result["output"])
@@ -200,7 +244,7 @@ class FmuPlant:
     ) -> dict[str, Column]:
         """Return the inputs over time; each torque is held until the next, in model exchange by a step."""
         torques = torque_nm if len(named.torque) > 1 else torque_nm.sum(axis=1, keepdims=True)
-        values = {**self._inputs, **dict(zip(named.torque, torques.T, strict=False)), **held}
+        values = {**dict(zip(named.torque, torques.T, strict=False)), **held}  # the others keep their start
         columns: dict[str, Column] = {"time": since_s}
         columns |= {name: np.array(np.broadcast_to(value, since_s.size), dtype=float) for name, value in values.items()}
         if self._kind == "CoSimulation":
@@ -231,13 +275,6 @@ class _Unknown:
         return cls(
             tuple(n for n, _, _ in scales), np.array([s for _, s, _ in scales]), np.array([g for *_, g in scales])
         )
-
-
-def _number(start: object) -> float:
-    try:
-        return float(start or 0.0)  # type: ignore[arg-type]  # whatever a file says
-    except (TypeError, ValueError):
-        return 0.0
 
 
 def _ended(status: int) -> str:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from estimator.signals.record import OutputKind
 from hil.errors import UsageError
 
-KEYS = ("torque", "output", "load", "start")
+KEYS = ("torque", "output", "load", "start", "load_speed")
+SINGLE = ("output", "load", "load_speed")
 
 
 @dataclass(frozen=True, slots=True)
@@ -18,6 +19,7 @@ class Names:
     torque: tuple[str, ...] = ("T_M1", "T_M2")  # inputs, in the order of the recording's torques
     output: str = "speed_measured"  # what is held against the measured output
     load: str = "T_load"  # input or parameter that takes a constant load torque, to be estimated
+    load_speed: str = "speed_load"  # output that is the speed of the load, for laws at it; "" for none
     start: tuple[str, ...] = ("start.speed", "start.twist", "start.load_speed")
 
 
@@ -27,6 +29,32 @@ OF_A_POSITION = Names(output="angle_motor", start=("start.angle", *Names().start
 
 def names(given: Sequence[str], known: Collection[str], kind: OutputKind = OutputKind.SPEED) -> Names:
     """Return the names that ``--map`` gives, the others as ``hil export fmu`` writes them."""
+    mapped = _mapped(given)
+    standard = OF_A_POSITION if kind is OutputKind.POSITION else Names()
+
+    def several(key: str, usual: tuple[str, ...]) -> tuple[str, ...]:
+        return mapped.get(key, tuple(name for name in usual if name in known))
+
+    found = Names(
+        torque=several("torque", standard.torque),
+        output=(*mapped.get("output", ()), standard.output)[0],
+        load=(*several("load", (standard.load,)), "")[0],
+        load_speed=(*several("load_speed", (standard.load_speed,)), "")[0],
+        start=several("start", standard.start),
+    )
+    used = (found.torque or ("",), (found.output,), (found.load,), found.start, (found.load_speed,))
+    for key, each in zip(KEYS, used, strict=True):
+        for name in each if any(each) or key not in ("load", "load_speed") else ():
+            if name not in known:
+                raise UsageError(
+                    f"--map {key}={name or '...'}: expected a variable of the FMU, got {name or 'none'!r}. It has: "
+                    f"{some(known)}"
+                )
+    return found
+
+
+def _mapped(given: Sequence[str]) -> dict[str, tuple[str, ...]]:
+    """Return the names that were given for each key."""
     entries = [text.partition("=") for text in given]
     for text, (key, sign, _) in zip(given, entries, strict=True):
         if key not in KEYS or not sign:
@@ -35,30 +63,13 @@ def names(given: Sequence[str], known: Collection[str], kind: OutputKind = Outpu
             raise UsageError(f"--map {text}: expected {key} once, got it twice. Give its names in one: {key}=A,B")
     mapped = {key: tuple(name.strip() for name in value.split(",") if name.strip()) for key, _, value in entries}
     for key, named in mapped.items():
-        if len({*named}) < len(named) or (key in ("output", "load") and len(named) > 1):
-            most = "one name" if key in ("output", "load") else "each name once"
+        if len({*named}) < len(named) or (key in SINGLE and len(named) > 1):
+            most = "one name" if key in SINGLE else "each name once"
             raise UsageError(f"--map {key}={','.join(named)}: expected {most}")
-    standard = OF_A_POSITION if kind is OutputKind.POSITION else Names()
-    found = replace(
-        standard,
-        torque=mapped.get("torque", tuple(name for name in standard.torque if name in known)),
-        output=(mapped.get("output") or (standard.output,))[0],
-        load=(mapped.get("load") or ((standard.load,) if standard.load in known and "load" not in mapped else ("",)))[
-            0
-        ],
-        start=mapped.get("start", tuple(name for name in standard.start if name in known)),
-    )
-    for key, each in (("torque", found.torque or ("",)), ("output", (found.output,)), ("start", found.start)):
-        for name in each:
-            if name not in known:
-                raise UsageError(
-                    f"--map {key}=...: expected a variable of the FMU, got {name or 'none'!r}. It has: {_some(known)}"
-                )
-    if found.load and found.load not in known:
-        raise UsageError(f"--map load={found.load}: expected a variable of the FMU. It has: {_some(known)}")
-    return found
+    return mapped
 
 
-def _some(known: Collection[str]) -> str:
+def some(known: Collection[str]) -> str:
+    """Return the first names of some, and how many more there are."""
     shown = sorted(known)
     return ", ".join(shown[:20]) + (f" and {len(shown) - 20} more" if len(shown) > 20 else "")

@@ -8,11 +8,27 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from estimator.diagnosis.black_box import acts_around
+from estimator.physics.catalogue import EFFECTS
 from hil.cli.main import run
 from hil.errors import UsageError
 from hil.export.fmu import package
+from hil.plants.fmu_line import fmu_line
+from hil.plants.fmu_plant import FmuPlant
 from hil.plants.names import names
+from hil.recording import read_record
 from tests.cli import bench
+
+RUBBING = (
+    bench.MODEL
+    + """
+[effects.coulomb_friction_motor]
+friction_nm = { value = 4.0 }
+"""
+)
+"""With dry friction in it, no line answers as the FMU does."""
+
+MOST_SIMULATIONS = 400
 
 LATE = 3
 """Samples by which the torque acts later than it was read."""
@@ -26,9 +42,17 @@ def fmu(tmp_path_factory: pytest.TempPathFactory) -> str:
     return str(folder / "drive.fmu")
 
 
-def late(path: Path) -> str:
+@pytest.fixture(scope="module")
+def rubbing(tmp_path_factory: pytest.TempPathFactory) -> str:
+    folder = tmp_path_factory.mktemp("exported")
+    (folder / "rubbing.toml").write_text(RUBBING)
+    assert run(["export", "fmu", str(folder / "rubbing.toml"), "--out", str(folder / "rubbing.fmu")]) == 0
+    return str(folder / "rubbing.fmu")
+
+
+def late(path: Path, dry: float = 0.0) -> str:
     """Write a recording under other names, its torque read earlier than it acted."""
-    bench.record(path, 1, noise=0.02, n=350)
+    bench.record(path, 1, noise=0.02, dry=dry, n=350)
     time, first, second, speed = np.loadtxt(path, delimiter=",", skiprows=1).T
     rows = slice(0, time.size - LATE)
     columns = [time[rows], (first + second)[LATE:], speed[rows]]
@@ -54,9 +78,98 @@ def test_what_acts_at_an_input_is_named(fmu: str, tmp_path: Path, capsys: pytest
     delay = found["effects"][0]["parameters"]["delay_s"]["value"]
     assert delay == pytest.approx(LATE * bench.DT, rel=0.05)
     assert found["fit"]["augmented"] == pytest.approx(0.02, rel=0.15)
-    assert found["parameters"] == {}  # nothing inside an FMU is re-tuned
+    assert {key: each["value"] for key, each in found["parameters"].items()} == pytest.approx(
+        {"J_M": bench.J, "b_M": bench.B}, rel=1e-3
+    )  # a line answers as the FMU, and nothing of it is re-tuned without --tune
+    assert "To drive.fmu would have to be added: before T_M1 transport_delay." in found["statement"]
     assert [each["file"] for each in found["made"]["models"]] == [fmu]
-    assert {path.name for path in out.iterdir()} == {"diagnosis.json", "report.html"}
+    assert {path.name for path in out.iterdir()} == {"augmented.ssp", "augmented.toml", "diagnosis.json", "report.html"}
+
+
+@pytest.mark.campaign  # some 320 simulations
+def test_what_acts_at_an_input_is_named_where_no_line_answers_so(rubbing: str, tmp_path: Path) -> None:
+    recording, out = late(tmp_path / "run_1.csv", dry=4.0), tmp_path / "out"
+    (tmp_path / "signals.toml").write_text(SIGNALS)
+    mapped = [word for each in ("torque=T_M1", "output=speed_motor", "start=start.speed") for word in ("--map", each)]
+    given = ["--signals", str(tmp_path / "signals.toml"), "--trust-fmu", *mapped, "--effort", "quick"]
+    assert run(["diagnose", recording, "--model", rubbing, "--out", str(out), *given]) == 0
+    found = json.loads((out / "diagnosis.json").read_text())
+    assert [effect["name"] for effect in found["effects"]] == ["transport_delay"]
+    assert found["parameters"] == {}
+    assert "No line of one or two inertias answers as rubbing.fmu does" in found["statement"]
+    assert int(found["statement"].partition("It was simulated ")[2].split()[0]) <= MOST_SIMULATIONS
+    assert {path.name for path in out.iterdir()} == {"augmented.ssp", "diagnosis.json", "report.html"}
+
+
+def test_where_no_line_answers_so_the_fmu_itself_is_simulated(rubbing: str, tmp_path: Path) -> None:
+    bench.record(tmp_path / "run_1.csv", 1, noise=0.02, dry=4.0, n=350)
+    found = fmu_line(FmuPlant(Path(rubbing), [], trusted=True), [read_record(tmp_path / "run_1.csv")], {})
+    assert not found.is_alike
+    plant = found.model.plant
+    assert plant is not None
+    reached = {name for name, entry in EFFECTS.items() if acts_around(entry, plant)}
+    assert {"transport_delay", "coulomb_friction_motor", "speed_filter"} <= reached
+    assert not {"backlash", "tyre_slip"} & reached
+
+
+def test_a_parameter_is_retuned_by_its_name_in_the_fmu(fmu: str, tmp_path: Path) -> None:
+    """The friction is 10 % above the FMU's; nothing else is missing."""
+    (tmp_path / "other.toml").write_text(bench.MODEL.replace(f"value = {bench.B}", f"value = {bench.B / 1.1}"))
+    other, recording, out = tmp_path / "other.fmu", tmp_path / "run_1.csv", tmp_path / "out"
+    assert run(["export", "fmu", str(tmp_path / "other.toml"), "--out", str(other)]) == 0
+    bench.record(recording, 1, noise=0.02, n=700)
+    given = ["--trust-fmu", "--effort", "quick", "--tune", "b_M=20%"]
+    assert run(["diagnose", str(recording), "--model", str(other), "--out", str(out), *given]) == 0
+    found = json.loads((out / "diagnosis.json").read_text())
+    assert found["verdict"] == "no_mismatch"
+    tuned = found["parameters"]["b_M"]
+    assert tuned["nominal"] == pytest.approx(bench.B / 1.1, rel=1e-9)
+    assert tuned["ci95"][0] <= bench.B <= tuned["ci95"][1]
+    assert tuned["ci95"][1] - tuned["ci95"][0] < 0.1 * bench.B
+
+
+@pytest.mark.parametrize(
+    ("tuned", "said"),
+    [
+        ("nowhere=20%", "--tune nowhere: expected a real parameter of the FMU. It has: "),
+        ("J_M", "expected NAME=20% or NAME=0.2"),
+        ("J_M=120%", "expected NAME=20% or NAME=0.2"),
+        ("step_s=20%", "--tune step_s: expected a parameter that the output shows"),
+    ],
+)
+def test_what_can_not_be_tuned_is_refused(
+    tuned: str, said: str, fmu: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bench.record(tmp_path / "run_1.csv", 1, n=300, noise=0.02)
+    given = ["--model", fmu, "--trust-fmu", "--tune", tuned, "--out", str(tmp_path / "out")]
+    assert run(["diagnose", str(tmp_path / "run_1.csv"), *given]) == 2
+    assert said in capsys.readouterr().err
+
+
+def test_a_look_names_what_is_meant_and_runs_nothing(fmu: str, capsys: pytest.CaptureFixture[str]) -> None:
+    capsys.readouterr()
+    assert run(["look", fmu, "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["map"] == {
+        "torque": ["T_M1", "T_M2"],
+        "output": ["speed_measured"],
+        "load": ["T_load"],
+        "load_speed": [],
+        "start": ["start.speed"],
+    }
+    assert found["doubtful"]["output"] == ["speed_motor"]
+
+
+def test_it_is_simulated_as_its_model_file(fmu: str, tmp_path: Path) -> None:
+    bench.record(tmp_path / "run_1.csv", 1, n=300)
+    (tmp_path / "drive.toml").write_text(bench.MODEL)
+    columns = []
+    for model, more in ((fmu, ["--trust-fmu"]), (str(tmp_path / "drive.toml"), [])):
+        out = tmp_path / "simulated.csv"
+        command = ["simulate", "--model", model, "--input", str(tmp_path / "run_1.csv"), "--out", str(out), *more]
+        assert run(command) == 0
+        columns.append(np.loadtxt(out, delimiter=",", skiprows=1))
+    np.testing.assert_allclose(columns[0], columns[1], atol=1e-5)
 
 
 @pytest.mark.parametrize(

@@ -241,7 +241,7 @@ def _said(seen: _Seen, runs: FreeRuns, search: Search, model: DrivelineModel, le
         [each.name for each in traces],
         seen.off_nominal,
         blind,
-        decision.nothing.result.problem.grid.plant is None,
+        can_be_retuned(line),
     )
     return Diagnosis(
         verdict=verdict,
@@ -264,6 +264,11 @@ def _said(seen: _Seen, runs: FreeRuns, search: Search, model: DrivelineModel, le
         slight=slight,
         effort=effort,
     )
+
+
+def can_be_retuned(line: DrivelineModel) -> bool:
+    """Tell whether a parameter is fitted: of a plant simulated elsewhere those that it can be given."""
+    return line.plant is None or any(parameter.tolerance > 0.0 for parameter in line.parameters.values())
 
 
 def _does_not_fall(fit: Fit) -> str:
@@ -296,8 +301,7 @@ def _undecided(
     simulations = 0 if search is None else search.simulations
     effort = Effort(level, simulations, False, untried, len(names), work.limit_s)
     untestable = _untestable(blind)
-    can_be_retuned = line.plant is None
-    context = Context(untestable=untestable, can_be_retuned=can_be_retuned)
+    context = Context(untestable=untestable, can_be_retuned=can_be_retuned(line))
     return Diagnosis(
         verdict=Verdict.UNEXPLAINED,
         statement=statement(Verdict.UNEXPLAINED, fit, (), effort, context),

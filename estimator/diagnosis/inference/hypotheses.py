@@ -61,7 +61,7 @@ def open_hypotheses(model: DrivelineModel, records: Sequence[Record]) -> tuple[t
         fits = model.structure in entry.structures and all(record.kind in entry.kinds for record in records)
         turns = model.motion is Motion.ROTATION or not entry.phases
         swings = not (entry.swinging and turns_on(records))
-        reached = model.plant is None or acts_around(entry)
+        reached = model.plant is None or acts_around(entry, model.plant)
         if not (fits and turns and swings and reached) or name in model.effects or entry.recognised:
             continue
         obstacle = entry.testable(model, records)

@@ -37,12 +37,13 @@ class Driveline:
     effects: tuple[str, ...]  # those that the line has, by name
     sensor_at: str
     period_s: float
-    step_s: float  # longest integration step [s], and speed within which dry friction changes sign
-    sign_width: float  # longest integration step [s], and speed within which dry friction changes sign
+    step_s: float  # longest integration step [s]
+    sign_width: float  # speed within which dry friction changes sign
     load: float  # load torque at the beginning [Nm]
     start: Mapping[str, float]  # state at the beginning, by the name of its place (``variables.NAMED``)
     angle_is_read: bool  # whether laws over the angle take it from an input
     left_out: tuple[str, ...]  # sentences about what is not in it
+    is_around: bool = False  # whether its inertia is that at a shaft of another FMU, to which it passes on a torque
 
     @property
     def masses(self) -> int:
@@ -134,6 +135,7 @@ NAMED = (
     "SPEED_MEASURED", "SPEED_MOTOR", "SPEED_LOAD", "ANGLE_MOTOR", "TORQUE_SHAFT",
     "START_ANGLE", "START_SPEED", "START_TWIST", "START_LOAD_SPEED", "START_MIDDLE_TWIST", "START_MIDDLE_SPEED",
     "START_TRACTION", "BEFORE_ALL", "STEP_S", "SIGN_WIDTH", "ANGLE_IS_READ",
+    "SPEED_SEEN", "TORQUE_PASSED", "LOAD_PASSED", "SEEN_BEFORE", "OTHER_BEFORE", "ACTED", "STEPS_DONE",
 )  # fmt: skip
 """What stands first in the C array, in this order; the states, their derivatives and the parameters follow."""
 
@@ -188,6 +190,8 @@ def _inputs(d: Driveline) -> Iterator[Variable]:
             ("angle_read", "ANGLE_READ", "angle", "motor angle as it is read, where angle_is_read"),
             ("turn_rate", "TURN_RATE", "speed", "mean rate of angle_read over the next step, for co-simulation"),
         ]
+    if d.is_around:
+        given.append(("speed_seen", "SPEED_SEEN", "speed", "speed of the shaft in the FMU that this one is around"))
     for name, key, dimension, description in given:
         start = d.load if key == "T_LOAD" else 0.0
         yield Variable(name, place(key), "input", "continuous", unit(dimension, motion), description, start)
@@ -203,6 +207,11 @@ def _outputs(d: Driveline) -> Iterator[Variable]:
         given += [
             ("speed_load", "SPEED_LOAD", "speed", "speed of the load, or of the wheels where the tyre slips"),
             ("torque_shaft", "TORQUE_SHAFT", "torque", "torque that the (first) shaft passes on to the load"),
+        ]
+    if d.is_around:
+        given += [
+            ("torque_passed", "TORQUE_PASSED", "torque", "torque for the shaft in the FMU that this one is around"),
+            ("load_passed", "LOAD_PASSED", "torque", "the same as a load torque, against a motion forward"),
         ]
     for name, key, dimension, description in given:
         yield Variable(name, place(key), "output", "continuous", unit(dimension, d.motion), description)

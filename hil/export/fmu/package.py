@@ -93,6 +93,8 @@ def model_header(d: Driveline, token: str) -> str:
     output = state_vector.LOAD_SPEED if d.sensor_at == "load" else state_vector.SPEED
     defined = {
         "MASSES": d.masses,
+        "AROUND": int(d.is_around),
+        "INERTIA": slot("", "J_M"),
         "OUTPUT": output,
         "STATES": STATES,
         "STATE": STATE,

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.diagnosis.black_box import BlackBox, equivalent_line
+from estimator.diagnosis.black_box import Around, BlackBox, equivalent_line
 from estimator.diagnosis.inference.hypotheses import open_hypotheses
 from estimator.physics.driveline import Case, Start
 from estimator.physics.free_run import free_run
@@ -45,10 +45,10 @@ def line_of(values: dict[str, float], structure: Structure) -> DrivelineModel:
 def boxed(line: DrivelineModel) -> DrivelineModel:
     """Return a model whose plant is a line, simulated as another program would."""
 
-    def run(on: Record, torque_nm: FloatArray, load_nm: FloatArray, start: Start) -> FloatArray:
-        driven = replace(on, torque_nm=torque_nm)
-        alone = replace(start, load_torque_nm=0.0)
-        return simulate(grid_for(line, [on]), driven, flat(line), alone, load_nm)
+    def run(on: Record, around: Around) -> FloatArray:
+        driven = replace(on, torque_nm=around.torque_nm)
+        alone = replace(around.start, load_torque_nm=0.0)
+        return simulate(grid_for(line, [on]), driven, flat(line), alone, around.load_nm)
 
     return replace(line, plant=BlackBox(run, STATES, line, has_start=True))
 

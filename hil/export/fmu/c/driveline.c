@@ -158,7 +158,7 @@ int driveline_remember(Driveline *d) {
     return delay_s == 0.0 || remember(&d->history, time_s, on_shaft(d), time_s - 2.0 * delay_s);
 }
 
-int driveline_step(Driveline *d, double length_s) {
+static int step_line(Driveline *d, double length_s) {
     Array p = parameters(d);
     Line made = line(d);
     int steps = (int)fmax(1.0, ceil(length_s / d->value[STEP_S] - 1e-6));
@@ -179,12 +179,12 @@ int driveline_step(Driveline *d, double length_s) {
         Several_dddd fed = timing_lag_step(mean, rise, rest[LAGGED], rest[LAG_RISE], lag);
         rest[LAGGED] = fed.item2, rest[LAG_RISE] = fed.item3;
         if (conditions_is_bristled(p)) {
-            held = bristles_bent(made, held, x, now, p, 0.5 * h);
-            felt = bristles_rubbed(now, held, p);
+            held = conditions_bent(made, held, x, now, p, 0.5 * h);
+            felt = conditions_rubbed(now, held, p);
         }
         State before = x;
         x = rates_stepped(made, felt, fed.item0, fed.item1, x, p, h);
-        if (conditions_is_bristled(p)) held = bristles_bent(made, held, x, now, p, 0.5 * h);
+        if (conditions_is_bristled(p)) held = conditions_bent(made, held, x, now, p, 0.5 * h);
         if (p.at[FILTER] > 0.0) {
             double turned = angle + turn * j / steps, turns = angle + turn * (j + 1) / steps;
             Several_dd read = sensing_smoothed(before, x, OUTPUT, turned, turns, rest[FILTERED], rest[FILTER_RISE],
@@ -201,6 +201,25 @@ int driveline_step(Driveline *d, double length_s) {
     return 1;
 }
 
+/* Around another FMU's shaft: what is here moves as that will, and passes on the torque that reaches it. What is passed
+   on acts a step later; so begin with the speed of then, and with what else drives the shaft as it changed so far. The
+   first speeds may come from before the importer connected the two. */
+static int step_around(Driveline *d, double length_s) {
+    double *v = d->value, inertia = v[PARAMETER + INERTIA], load = v[T_LOAD];
+    double other = v[STEPS_DONE] < 3.0 ? 0.0 : inertia * (v[SPEED_SEEN] - v[SEEN_BEFORE]) / length_s - v[ACTED];
+    double change = v[STEPS_DONE] < 4.0 ? 0.0 : other - v[OTHER_BEFORE], then = other + 2.0 * change;
+    double begins = v[SPEED_SEEN] + (other + change + v[TORQUE_PASSED]) * length_s / inertia;
+    v[STEPS_DONE] += 1.0, v[SEEN_BEFORE] = v[SPEED_SEEN], v[OTHER_BEFORE] = other, v[ACTED] = v[TORQUE_PASSED];
+    v[STATE + SPEED] = begins, v[T_LOAD] = load - then;
+    int is_well = step_line(d, length_s);
+    v[T_LOAD] = load;
+    v[TORQUE_PASSED] = inertia * (v[STATE + SPEED] - begins) / length_s - then;
+    v[LOAD_PASSED] = -v[TORQUE_PASSED];
+    return is_well;
+}
+
+int driveline_step(Driveline *d, double length_s) { return AROUND ? step_around(d, length_s) : step_line(d, length_s); }
+
 /* Outputs of the present state. */
 void driveline_update(Driveline *d) {
     Array p = parameters(d);
@@ -213,7 +232,7 @@ void driveline_update(Driveline *d) {
     Conditions now =
         conditions_conditions(MASSES, time_s - 0.5 * h, h, angle, v[T_LOAD], v[SIGN_WIDTH], p), felt = now;
     Bristles held = {rest[BRISTLES_MOTOR], rest[BRISTLES_LOAD]};
-    if (conditions_is_bristled(p)) felt = bristles_rubbed(now, held, p);
+    if (conditions_is_bristled(p)) felt = conditions_rubbed(now, held, p);
     State moving = rates_rates(made, conditions_with_torque(felt, drive), x, p);
     v[SPEED_MEASURED] = sensing_shown(sensing_reading(sensing_entry(x, OUTPUT, p), angle, p), rest[FILTERED], p);
     v[SPEED_MOTOR] = x.speed;
