@@ -204,17 +204,6 @@ class SdoChannel:
             )
         return kind.decode(data)
 
-    def upload_text(self, index: int, subindex: int = 0) -> str:
-        """Read a VISIBLE_STRING, such as the device name 0x1008; one longer than 4 bytes comes in segments."""
-        data: bytes = self._transfer(index, subindex, lambda: self._client.upload(index, subindex))
-        try:
-            return data.rstrip(b"\0").decode("ascii")
-        except UnicodeDecodeError as error:
-            raise ProtocolViolation(
-                f"{self._where}: object {object_name(index, subindex)} came with [{data.hex(' ')}], expected a text in "
-                "ASCII (VISIBLE_STRING, CiA 301). Check the device's firmware version."
-            ) from error
-
     def download(self, index: int, subindex: int, value: int) -> None:
         """Write an object; returns when the node has acknowledged it."""
         where = f"{self._where}: object {object_name(index, subindex)}"

@@ -35,7 +35,6 @@ class Commissioning:
 
     node_id: int | None = None  # its node id
     bit_rate_kbit_s: int | None = None  # bit rate of its bus [kbit/s]; None if it says none from 10 to 1000
-    node_name: str = ""  # its name there
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +83,6 @@ def read_commissioning(text: EdsText) -> Commissioning | None:
     return Commissioning(
         node_id=node_id if node_id in NODE_IDS else None,
         bit_rate_kbit_s=rate if rate in BIT_RATES_KBIT_S else None,
-        node_name=section.get("NodeName") or "",
     )
 
 

@@ -152,7 +152,7 @@ def _decode(path: Path) -> tuple[str, list[EdsFinding]]:
     if data.startswith(_UTF_8_MARK):
         data = data.removeprefix(_UTF_8_MARK)
         findings.append(
-            _finding(Severity.WARNING, 1, "text", "ASCII", "a UTF-8 byte order mark", "Save it without the mark.")
+            EdsFinding(Severity.WARNING, 1, "text", "ASCII", "a UTF-8 byte order mark", "Save it without the mark.")
         )
     return data.decode("latin-1"), findings
 
@@ -163,14 +163,10 @@ def _ends_of_lines(text: str) -> Iterator[EdsFinding]:
     if len(kinds) > 1:
         line = next(n for n, end in enumerate(ends, start=1) if end != ends[0])
         found = f"{' and '.join(sorted(kinds))} mixed, first here"
-        yield _finding(Severity.NOTE, line, "text", "one kind of line end", found, "Save it with one kind.")
+        yield EdsFinding(Severity.NOTE, line, "text", "one kind of line end", found, "Save it with one kind.")
     elif kinds == {"CR"}:
         advice = "Save it with CR LF, which every tool reads."
-        yield _finding(Severity.WARNING, 1, "text", "lines that end with CR LF or LF", "CR alone", advice)
-
-
-def _finding(severity: Severity, line: int, place: str, expected: str, found: str, advice: str) -> EdsFinding:
-    return EdsFinding(severity, line, place, expected, found, advice)
+        yield EdsFinding(Severity.WARNING, 1, "text", "lines that end with CR LF or LF", "CR alone", advice)
 
 
 class _Reader:
@@ -242,10 +238,10 @@ class _Reader:
             self._err(second.line, expected, f"it again with {second.value!r}", "Keep the right one.", place)
 
     def _err(self, line: int, expected: str, found: str, advice: str, place: str = "text") -> None:
-        self.findings.append(_finding(Severity.ERROR, line, place, expected, found, advice))
+        self.findings.append(EdsFinding(Severity.ERROR, line, place, expected, found, advice))
 
     def _warn(self, line: int, expected: str, found: str, advice: str, place: str = "text") -> None:
-        self.findings.append(_finding(Severity.WARNING, line, place, expected, found, advice))
+        self.findings.append(EdsFinding(Severity.WARNING, line, place, expected, found, advice))
 
-    def _note(self, line: int, expected: str, found: str, advice: str, place: str = "text") -> None:
-        self.findings.append(_finding(Severity.NOTE, line, place, expected, found, advice))
+    def _note(self, line: int, expected: str, found: str, advice: str) -> None:
+        self.findings.append(EdsFinding(Severity.NOTE, line, "text", expected, found, advice))

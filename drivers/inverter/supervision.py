@@ -1,4 +1,4 @@
-"""Supervision of a run: one record of each cycle, one table of rules, one place that ends it.
+"""Supervision of a run: one record of each cycle, one place that ends it; the table of rules is docs/reliability.md.
 
 A rule with a size has a tolerance and a time. While a reading is outside its tolerance, its distance from what is
 expected is summed over time, and the run ends where the sum reaches tolerance times time: 31 Nm with a tolerance of
@@ -81,75 +81,6 @@ def speed_tolerance_rad_s(one_rad_s: float, other_rad_s: float, counts_rad_s: fl
 def most_late(guard: GuardLimits) -> int:
     """Give how many answers may still come: an older one is too old for another rule."""
     return round(guard.feedback_timeout_s / guard.period_s)
-
-
-class Rule(NamedTuple):
-    """One row of the table: what is looked at, what is expected, within what, for how long, and what happens."""
-
-    quantity: str
-    expected: str
-    within: str
-    time: str
-    then: str = "flag, end"
-
-
-RULES: Final = (
-    Rule("power state, 0x6041", "OPERATION ENABLED, in every mode", "none", "one TPDO", "end; never enabled again"),
-    Rule("bit 12 of 0x6041 (mode 10)", "1", "none", "`state_timeout_s` until it first is, then `torque_error_time_s`"),
-    Rule(
-        "bit 11 of 0x6041",
-        f"0, or a torque above {NO_TORQUE_COUNTS} counts",
-        "`torque_error_nm`",
-        f"tolerance × {NO_TORQUE_S:g} s",
-        "end",
-    ),
-    Rule(
-        "torque 0x6077 of a drive",
-        "range of the commands within `torque_response_s` and two cycles; from 0 with bit 11",
-        "`torque_error_nm`",
-        "tolerance × `torque_error_time_s`",
-    ),
-    Rule("torques of both", "range of the summed commands", "`torque_error_sum_nm`", "tolerance × its time"),
-    Rule(
-        "reading that repeats to the last bit",
-        "the command of its first",
-        "`torque_error_nm`",
-        "tolerance × `feedback_timeout_s`",
-        "end",
-    ),
-    Rule(
-        "speed 0x606C of m1 and m2",
-        "one speed",
-        f"{SPEED_NOISE_RAD_S:g} rad/s, a count of each, {100 * SPEED_SHARE:g} %, and its change in two periods",
-        "tolerance × `torque_error_time_s`; a repeated one: after `feedback_timeout_s`",
-    ),
-    Rule(
-        "speed against both torques",
-        "not away from standstill against their sign",
-        f"{RUNAWAY_SHARE:g} of what they can give the inertia",
-        f"torque for {RUNAWAY_RAD_S:g} rad/s",
-        "end",
-    ),
-    Rule(
-        "TPDOs of each kind per SYNC",
-        "one",
-        "none",
-        f"{MOST_SURPLUS} too many within {SURPLUS_CYCLES} cycles; {MOST_MISSING} more missing than coming",
-    ),
-    Rule("age of the feedback", "one period", "none", "`feedback_timeout_s`"),
-    Rule("heartbeat and NMT state", "OPERATIONAL, in every heartbeat and no boot-up", "none", "once", "end"),
-    Rule("heartbeat", "one per `heartbeat_ms`", "none", "five periods, 0.5 s at least", "end"),
-    Rule("EMCY", "none", "none", "once", "end"),
-    Rule("frames that only the host sends", "none from others", "none", "once", "end"),
-    Rule("lateness of the host", "none", "half a period: flag", "`feedback_timeout_s`", "flag, end; blamed first"),
-)
-"""What is supervised of each drive in each cycle."""
-
-
-def rules_table() -> str:
-    """Write the table for docs/reliability.md."""
-    lines = ["| quantity | expected | within | for how long | then |", "| --- | --- | --- | --- | --- |"]
-    return "\n".join([*lines, *(f"| {' | '.join(rule)} |" for rule in RULES)])
 
 
 class DriveRecord(NamedTuple):
@@ -395,7 +326,7 @@ class _Drive:
 
 
 class Supervision:
-    """Judges every cycle of one run by `RULES`."""
+    """Judges every cycle of one run."""
 
     def __init__(self, limits: SupervisionLimits, m1: InverterSettings, m2: InverterSettings) -> None:
         guard = limits.guard

@@ -145,15 +145,6 @@ class PlcDevice:
         """Whether its floating-point values have their words in another order than the register map says."""
         return self._faults.swaps_floats
 
-    def close_clutch(self) -> None:
-        """Close the clutch now, whatever the drive mode."""
-        with self._lock:
-            self._clutch = ClutchState.CLOSED
-
-    def withdraw_permissive(self) -> None:
-        with self._lock:
-            self._permissive = False
-
     def step(self, dt_s: float) -> None:
         """Let simulated time pass [s]; the PLC cycles that end in it run."""
         with self._lock:
@@ -199,15 +190,11 @@ class PlcDevice:
         if "host_count" in values:
             self._seen_s = self._time_s
         if "drive_mode_request" in values:
-            self._follow(DriveMode(values["drive_mode_request"]))
+            self._drive_mode = DriveMode(values["drive_mode_request"])
+            self._clutch = _clutch_in(self._drive_mode)
         if any(name.startswith("prbs_") for name in values):
             runs = self._held["prbs_enable"] and self._held["prbs_source"] == PrbsSource.PLC.value
             self._prbs = self._generator() if runs else None
-
-    def _follow(self, mode: DriveMode) -> None:
-        if mode not in self._faults.refused_modes:
-            self._drive_mode = mode
-            self._clutch = _clutch_in(mode)
 
     def _generator(self) -> PlcPrbs:
         held = self._held

@@ -67,9 +67,7 @@ def talk(
 
     async def run() -> None:
         async with serve_plc(device, MAP) as served:
-            plc = Plc(
-                "127.0.0.1", served.port, map_, timeout_s=timeout_s, mode_timeout_s=0.5, clock_ns=clock or Clock()
-            )
+            plc = Plc("127.0.0.1", served.port, map_, timeout_s=timeout_s, clock_ns=clock or Clock())
             async with plc:
                 await conversation(plc, served)
 
@@ -121,20 +119,6 @@ def test_a_setting_the_plc_refuses_is_raised(change: dict[str, int]) -> None:
         with pytest.raises(ProtocolViolation, match="illegal data value"):
             await start(plc, replace(SETTINGS, **change))
         assert not (await plc.read_status()).prbs.enabled
-
-    talk(PlcDevice(), conversation)
-
-
-def test_a_drive_mode_is_confirmed_by_the_status() -> None:
-    async def conversation(plc: Plc, _: ServedPlc) -> None:
-        for mode, clutch in (
-            (DriveMode.PARALLEL, ClutchState.CLOSED),
-            (DriveMode.ELECTRIC, ClutchState.OPEN),
-            (DriveMode.SERIES, ClutchState.OPEN),
-        ):
-            await plc.request_drive_mode(mode)
-            status = await plc.read_status()
-            assert (status.drive_mode, status.clutch) == (mode, clutch)
 
     talk(PlcDevice(), conversation)
 

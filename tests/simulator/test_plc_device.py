@@ -87,7 +87,7 @@ class TestHostWatchdog:
     def test_a_permissive_withdrawn_by_the_vehicle_does_not(self) -> None:
         device = PlcDevice(PlcSetup(host_timeout_s=0.5))
         device.write({"host_count": 1})
-        device.withdraw_permissive()
+        device._permissive = False
         device.write({"host_count": 2})
         assert device.values()["permissive"] is False
 
@@ -123,7 +123,7 @@ class TestPrbs:
         assert device.prbs_torque_nm == 0.0
         device.write({"host_count": 2})
         assert device.prbs_torque_nm != 0.0
-        device.withdraw_permissive()
+        device._permissive = False
         assert device.prbs_torque_nm == 0.0
 
     @pytest.mark.parametrize("change", [{"prbs_enable": False}, {"prbs_source": "host"}])
