@@ -60,28 +60,18 @@ def receive(stream: IO[bytes]) -> tuple[Document, dict[str, Column]]:
     return document, {name: _column(stream, Kind(kind), size) for name, kind, size in document["columns"]}
 
 
+_SAID: Final = ("units", "metadata", "remarks", "master", "elsewhere")
+"""All of a table but its columns and path."""
+
+
 def described(table: Table) -> Document:
-    """Return all of a table but its columns and path."""
-    return {
-        "units": dict(table.units),
-        "metadata": dict(table.metadata),
-        "remarks": list(table.remarks),
-        "master": table.master,
-        "elsewhere": dict(table.elsewhere),
-    }
+    return {name: getattr(table, name) for name in _SAID}
 
 
 def table_of(path: Path, document: Document, columns: Mapping[str, Column]) -> Table:
     """Return the table that `described` was made of."""
-    return Table(
-        path,
-        columns,
-        document["units"],
-        document["metadata"],
-        remarks=tuple(document["remarks"]),
-        master=document["master"],
-        elsewhere=document["elsewhere"],
-    )
+    said = {name: document[name] for name in _SAID}
+    return Table(path, columns, **{**said, "remarks": tuple(said["remarks"])})
 
 
 def _column(stream: IO[bytes], kind: Kind, size: int) -> Column:
@@ -196,8 +186,6 @@ ENVIRONMENT: Final = {
 }
 """Threads and allocators that reserve address space, which is what is bounded, are left out."""
 
-EVERYTHING: Final = Request()
-
 What = Literal["table", "metadata", "survey"]
 
 
@@ -259,7 +247,7 @@ class Reader:
         self._lock = threading.Lock()
         self._process: Sandbox | None = None
 
-    def table(self, path: Path, request: Request = EVERYTHING) -> Table:
+    def table(self, path: Path, request: Request) -> Table:
         """Read a recording."""
         document, columns = self._read(path, "table", request)
         return table_of(path, document, columns)
