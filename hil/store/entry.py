@@ -14,8 +14,7 @@ from pydantic import Field, NonNegativeInt
 from hil.files import parse_json
 from hil.recording.checksum import CHECKSUM, CHECKSUMS, RIG_CHECKSUM, RIG_TEXT, text_sha256
 from hil.recording.description import OUTCOME
-from hil.recording.recordings import Facts, facts_of, read_facts
-from hil.recording.table import Table
+from hil.recording.recordings import read_facts
 
 SCHEMA = "hil.runs/1"
 
@@ -115,17 +114,9 @@ def attachment_of(kind: str, added_utc: str, path: Path | None, document: str) -
     return Attachment(kind, added_utc, path, document, verdict if isinstance(verdict, str) else "", alarms)
 
 
-def entry_of(table: Table, outcome: str = COMPLETE) -> RunEntry:
-    """Make the entry of a recording from what it says of itself; what ended it early, too, if nobody else knows."""
-    return _entry(facts_of(table), outcome)
-
-
 def entry_at(recording: Path, outcome: str = COMPLETE) -> RunEntry:
-    """Make the entry of a recording in a file; as `entry_of`, without holding its rows."""
-    return _entry(read_facts(recording), outcome)
-
-
-def _entry(facts: Facts, outcome: str) -> RunEntry:
+    """Make the entry of a recording from what it says of itself; what ended it early, too, if nobody else knows."""
+    facts = read_facts(recording)
     said = facts.metadata
     rig_text = said.get(RIG_TEXT, "")
     eds = {key[len("eds_") : -len("_sha256")]: value for key, value in said.items() if _is_eds(key)}
