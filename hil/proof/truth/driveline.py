@@ -103,7 +103,7 @@ def observed(p: Physics, states: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 class TruthDriveline:
-    """A driveline with all it hides; has the shape of ``hil.simulator.plant.Plant``."""
+    """A driveline with all it hides; has the shape of ``hil.simulator.simulated_rig.Plant``."""
 
     def __init__(self, physics: Physics, speed_rad_s: float = 0.0) -> None:
         self._physics = physics

@@ -127,7 +127,6 @@ TORQUE_PATH = (
             FULL_TURN_RAD,
         ),
         fitted={"order": "order", "amplitude_nm": unless_zero("ripple_nm"), "share": unless_zero("ripple_over_torque")},
-        unscaled=("order",),
     ),
 )
 
@@ -185,7 +184,6 @@ SPEED_SENSOR = (
         _draw_resolver,
         _misread,
         fitted={"once_rad": "resolver_once_rad", "twice_rad": "resolver_twice_rad"},
-        unscaled=("resolver_once_phase_rad", "resolver_twice_phase_rad"),
     ),
     # A digital filter of first or second order at the inverter's cycle of 0.1 ms.
     _speed_sensor(

@@ -191,7 +191,6 @@ SHAFT = (
         draws(sliding_share=log(0.04, 0.25), slip_rad=log(0.01, 0.06)),
         _slide,
         fitted={"friction_nm": _sliding_friction},
-        unscaled=("slip_rad",),
     ),
     # The shaft behind a bent joint leads and lags twice per turn; each recording begins at another angle. Its size in
     # the catalogue is the second harmonic of the lead: the square of the tangent of half the bend.

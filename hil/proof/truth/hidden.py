@@ -64,7 +64,6 @@ class HiddenEffect:
     corrupt: Corrupt = same_recording  # acquisition and sizes to the acquisition with the effect
     when: When | None = None
     fitted: Mapping[str, str | Convert] = field(default_factory=dict)
-    unscaled: tuple[str, ...] = ()  # sizes that stay as they are where the effect is made smaller
     place: Place = Place.NOWHERE  # the element it belongs to
     catalogued: bool = True  # false for what no entry of the contract's catalogue describes
 
@@ -76,10 +75,6 @@ class HiddenEffect:
         """Return the value that a parameter of `fitted` should have; None where this draw has none."""
         how = self.fitted[parameter]
         return sizes[how] if isinstance(how, str) else how(sizes, bus)
-
-    def strength(self, sizes: Sizes) -> list[str]:
-        """Return which of the sizes say how much of it there is."""
-        return [size for size in sizes if size not in self.unscaled]
 
 
 def sets(*fields: str, **renamed: str) -> Apply:

@@ -66,8 +66,6 @@ class Noise:
 
 
 USUAL = Noise()
-SILENT = Noise(0.0, 0.0, 0.0)
-"""Draws as many numbers as `USUAL`, so that all that is drawn after them is the same."""
 
 
 def torque_reading(torque_nm: FloatArray, rng: np.random.Generator, noise: Noise = USUAL) -> FloatArray:
