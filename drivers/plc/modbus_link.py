@@ -80,8 +80,6 @@ class _Decoder(DecodePDU):
 class ModbusLink:
     """One connection to one Modbus TCP server, for one device id; it carries one request at a time."""
 
-    __slots__ = ("_device_id", "_dial", "_host", "_port", "_security", "_timeout_s", "_turn")
-
     def __init__(
         self, host: str, port: int, device_id: int, timeout_s: float, security: ClientSecurity | None = None
     ) -> None:

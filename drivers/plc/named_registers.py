@@ -111,8 +111,6 @@ def _advice(name: str, register: Register, words: Sequence[int]) -> str:
 class NamedRegisters:
     """Registers of one PLC; one request for each run of adjacent ones."""
 
-    __slots__ = ("_link", "_map")
-
     def __init__(self, link: ModbusLink, register_map: RegisterMap) -> None:
         self._link = link
         self._map = register_map
@@ -177,8 +175,6 @@ NS_PER_S: Final = 1_000_000_000
 
 class HostWatchdog:
     """Counts beats."""
-
-    __slots__ = ("_clock_ns", "_count", "_place", "_registers", "_seen_ns", "_timeout_s")
 
     def __init__(self, registers: NamedRegisters, place: str, timeout_s: float, clock_ns: Callable[[], int]) -> None:
         self._registers = registers

@@ -16,7 +16,6 @@ from __future__ import annotations
 import asyncio
 import time
 from collections.abc import Callable, Mapping, Sequence
-from types import TracebackType
 from typing import Final, Self
 
 from drivers.errors import ConfigMismatch
@@ -84,17 +83,6 @@ class Plc:
         If the map can't be used; see `drivers.plc.register_map`.
     """
 
-    __slots__ = (
-        "_clock_ns",
-        "_greeting_timeout_s",
-        "_latest",
-        "_link",
-        "_map",
-        "_registers",
-        "_setting_prbs",
-        "_watchdog",
-    )
-
     def __init__(
         self,
         host: str,
@@ -128,9 +116,7 @@ class Plc:
         await self.connect()
         return self
 
-    async def __aexit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    async def __aexit__(self, *_: object) -> None:
         """Disconnect."""
         self.close()
 

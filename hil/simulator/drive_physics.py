@@ -43,8 +43,6 @@ class SimulatedInverter:
 class Heat:
     """The temperature of one drive, from cold."""
 
-    __slots__ = ("_limits", "_x")
-
     def __init__(self, limits: DriveLimits) -> None:
         self._limits = limits
         self._x = 0.0
@@ -79,8 +77,6 @@ DISCHARGE_S: Final = 0.02
 class DcLink:
     """Voltage over simulated time."""
 
-    __slots__ = ("_voltage_v", "supplied")
-
     def __init__(self) -> None:
         self._voltage_v = SUPPLY_V
         self.supplied = True
@@ -102,8 +98,6 @@ class DcLink:
 
 class SampleClock:
     """Age of what each SYNC fetches, and the values of that age."""
-
-    __slots__ = ("_drift", "_speed_rad_s", "_steps", "_torque")
 
     def __init__(self, drift_ppm: float) -> None:
         self._drift = drift_ppm * 1e-6
@@ -142,8 +136,6 @@ def _normal(random: np.random.Generator) -> Iterator[float]:
 
 class DriveSensors:
     """The latest readings of one drive."""
-
-    __slots__ = ("_clock", "_noise", "_settings", "_velocity_scale", "current", "speed", "torque")
 
     def __init__(self, settings: SimulatedInverter, velocity: VelocityScale, seed: int) -> None:
         self._settings = settings
@@ -189,8 +181,6 @@ _NO_DATA: Final = bytes(5)
 
 class ErrorList:
     """What is wrong with one drive now, and what was."""
-
-    __slots__ = ("_active", "_due", "_history")
 
     def __init__(self) -> None:
         self._active: set[int] = set()

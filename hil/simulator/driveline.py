@@ -16,9 +16,9 @@ from estimator.signals.record import FloatArray, Location, OutputKind, Record
 from hil.config.model_file import read_model
 from hil.config.rig_file import Rig, SimulationTable
 from hil.errors import ModelFileError, UsageError
-from hil.simulator.plant import Plant
 from hil.simulator.plc_device import PlcSetup
 from hil.simulator.rig_server import required_simulation
+from hil.simulator.simulated_rig import Plant
 
 FINER = 16
 """An acceleration is the slope over an integration step: this many times shorter than those of the simulation."""
@@ -123,8 +123,6 @@ class DrivelinePlant:
     Both inverters turn one shaft. This plant shares its physics with what is fitted: it is for trying things out, the
     proof has a plant of its own.
     """
-
-    __slots__ = ("_period_s", "_stepper")
 
     def __init__(self, model: DrivelineModel, period_s: float) -> None:
         self._period_s = period_s

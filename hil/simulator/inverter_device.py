@@ -197,16 +197,16 @@ class InverterDevice:
         if leaves is not None and not self._has_left and self._steps >= leaves.step:
             if self.state is PowerState.OPERATION_ENABLED:
                 self._has_left = True
-                self._enter(leaves.state)
+                self._enter(leaves.what)
         if faults.hang_at_step == self._steps:
             self.hung = True
             self._torque = 0.0
         if faults.brown_out_at_step == self._steps:
             self._dc_link.supplied = False
         if faults.emcy is not None and faults.emcy.step == self._steps:
-            self.tell(faults.emcy.emcy_code)
+            self.tell(faults.emcy.what)
         if faults.fault is not None and faults.fault.step == self._steps:
-            self.fail(faults.fault.emcy_code)
+            self.fail(faults.fault.what)
 
     def _begin(self, stop: Stop) -> None:
         """Stop as ordered; without torque or without a ramp that is over at once."""

@@ -144,7 +144,7 @@ class InverterNode:
             for tpdo in self._tpdos:
                 self._send_if_due(tpdo)
             second = self._faults.second_tpdo
-            if second is not None and self._syncs >= second.step and self._syncs % second.every == 0:
+            if second is not None and self._syncs >= second.step and self._syncs % second.what == 0:
                 self._send_second()
 
     def close(self) -> None:

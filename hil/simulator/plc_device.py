@@ -20,8 +20,6 @@ TAPS: Final = (10, 7)
 class PlcPrbs:
     """The generator, clocked by the PLC's cycle."""
 
-    __slots__ = ("_amplitude_nm", "_divider", "_held", "_state")
-
     def __init__(self, amplitude_nm: float, divider: int, seed: int) -> None:
         self._amplitude_nm = amplitude_nm
         self._divider = divider
@@ -83,21 +81,6 @@ _ACCEPTED: Final[Mapping[str, tuple[str, Callable[[Value], bool]]]] = MappingPro
 
 class PlcDevice:
     """The PLC's program."""
-
-    __slots__ = (
-        "_clutch",
-        "_cycles",
-        "_drive_mode",
-        "_faults",
-        "_held",
-        "_lock",
-        "_permissive",
-        "_prbs",
-        "_seen_s",
-        "_sensed",
-        "_setup",
-        "_time_s",
-    )
 
     def __init__(self, setup: PlcSetup | None = None, faults: PlcFaults | None = None) -> None:
         self._setup = setup or PlcSetup()

@@ -7,7 +7,6 @@ from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from dataclasses import replace
 from functools import partial
-from types import TracebackType
 from typing import Self
 
 import numpy as np
@@ -25,10 +24,9 @@ from hil.simulator.can_bridge import CanBridge
 from hil.simulator.drive_physics import SimulatedInverter
 from hil.simulator.faults import InverterFaults, RigFaults
 from hil.simulator.faulty_wire import FaultyWire
-from hil.simulator.plant import Plant, SensedPlant
 from hil.simulator.plc_device import PlcDevice, PlcSetup
 from hil.simulator.plc_server import PlcSecurity, PlcServer
-from hil.simulator.simulated_rig import SimulatedRig
+from hil.simulator.simulated_rig import Plant, SensedPlant, SimulatedRig
 
 _OF_SENSORS = 2
 """Of a rig's random numbers: those of its nodes have streams of their own."""
@@ -158,9 +156,7 @@ class RigServer:
             self._stack = stack.pop_all()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._stack.close()
 
     def _serve_bus(self, stack: ExitStack) -> None:

@@ -3,14 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from types import TracebackType
-from typing import Self
+from typing import Protocol, Self, runtime_checkable
 
 from drivers.canopen import can
 from drivers.canopen.can_link import SYNC_COB_ID, CanLink
+from estimator.signals.record import Location, OutputKind
 from hil.simulator.drive_physics import SimulatedInverter
 from hil.simulator.inverter_node import InverterNode
-from hil.simulator.plant import Plant
+
+
+class Plant(Protocol):
+    """A driveline as the simulated rig sees it; all values reflected to the motor shaft."""
+
+    @property
+    def speed_rad_s(self) -> float:
+        """True motor speed now [rad/s]."""
+
+    def advance(self, torque_nm: tuple[float, float], duration_s: float) -> None:
+        """Let the plant run with both inverters' torques held [Nm] for ``duration_s`` [s]."""
+
+
+@runtime_checkable
+class SensedPlant(Plant, Protocol):
+    """A driveline with further places to measure at."""
+
+    def measured(self, kind: OutputKind, at: Location) -> float:
+        """Return what a sensor there shows now [rad/s, rad, Nm, rad/s^2]."""
+
 
 StepCallback = Callable[[float], None]
 """``callback(time_s)``, called in the rig's own thread after each step."""
@@ -83,12 +102,7 @@ class SimulatedRig:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        error_type: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def _on_sync(self, data: bytes, t_ns: int) -> None:

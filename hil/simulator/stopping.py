@@ -108,8 +108,6 @@ LONGEST_LOOK_NS = 15 * NS_PER_MS
 class HeartbeatConsumer:
     """Watches one heartbeat, from the first that comes; off by default."""
 
-    __slots__ = ("_silence", "_watches", "cob_id")
-
     def __init__(self, node_id: int = 0, timeout_ms: int = 0) -> None:
         self.cob_id = HEARTBEAT_COB_ID + node_id
         self._watches = timeout_ms > 0
@@ -134,8 +132,6 @@ class HeartbeatConsumer:
 class RpdoDeadline:
     """Watches one RPDO, from the first that comes."""
 
-    __slots__ = ("_deadline_ns", "_last_ns")
-
     def __init__(self, deadline_ms: int) -> None:
         self._deadline_ns = deadline_ms * NS_PER_MS
         self._last_ns: int | None = None
@@ -158,8 +154,6 @@ RPDO_TIMEOUT: Final = 0x8250
 
 class HostWatch:
     """The watch of one node."""
-
-    __slots__ = ("_deadlines", "_next_sync_ns", "_real_time", "_sync_ns", "heartbeat")
 
     def __init__(self, real_time: bool) -> None:
         self._real_time = real_time

@@ -11,8 +11,8 @@ from drivers.errors import CommandRefused, DeviceTimeout, ForeignController, Pro
 from drivers.inverter.cia402 import PowerState
 from drivers.inverter.inverter import Inverter
 from drivers.resources import data_file
-from hil.simulator.plant import RigidPlant
 from tests.drivers.can_bench import HASTY_M1, M1, Bench, bench, frame, guarded, new_channel, repeat
+from tests.simulator.rigid_plant import RigidPlant
 
 
 @pytest.fixture
