@@ -39,8 +39,7 @@ Tap = Callable[[can.Message, int], None]
 BUS_OFF = 0x040
 """Error class of an error frame: the controller is off the bus (CAN_ERR_BUSOFF of Linux; python-can passes it on)."""
 
-_RECEIVE_POLL_S = 0.02
-"""How long `CanLink.close` may wait for the receive thread."""
+_RECEIVE_POLL_S = 0.02  # how long `CanLink.close` may wait for the receive thread
 
 
 _OPENING_ERRORS = (

@@ -25,8 +25,7 @@ CAUSES: Final[Mapping[int, str]] = MappingProxyType(
 )
 """Text by code."""
 
-_MASKS: Final = (0xFFFF, 0xFFF0, 0xFF00, 0xF000)
-"""From one code to its whole range."""
+_MASKS: Final = (0xFFFF, 0xFFF0, 0xFF00, 0xF000)  # from one code to its whole range
 
 
 def cause_of(code: int) -> str:
@@ -35,8 +34,7 @@ def cause_of(code: int) -> str:
     return next(known, "a code outside CiA 301 and CiA 402")
 
 
-EMCY_COB_ID = 0x080
-"""Plus the node id."""
+EMCY_COB_ID = 0x080  # plus the node id
 
 _FRAME = struct.Struct("<HB5s")
 

@@ -13,8 +13,7 @@ from drivers.canopen.silence import Silence
 from drivers.errors import BusDown, DeviceTimeout
 
 NMT_COB_ID = 0x000
-HEARTBEAT_COB_ID = 0x700
-"""Plus the node id."""
+HEARTBEAT_COB_ID = 0x700  # plus the node id
 
 HOST_NODE_ID = 127
 """Node id of the host's own heartbeat where the rig file has no other: the highest, so that it yields to every

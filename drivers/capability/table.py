@@ -95,11 +95,8 @@ _I8, _I16, _I32 = IntegerType.INTEGER8, IntegerType.INTEGER16, IntegerType.INTEG
 _U8, _U16, _U32 = IntegerType.UNSIGNED8, IntegerType.UNSIGNED16, IntegerType.UNSIGNED32
 _F, _W = Function, Without
 
-SYNC_COB_ID: Final = 0x080
-"""Identifier of the host's SYNC."""
-
-EVENT_TIMER: Final = 5
-"""Sub-index of a PDO's communication parameter; of an RPDO it is the deadline [ms]."""
+SYNC_COB_ID: Final = 0x080  # identifier of the host's SYNC
+EVENT_TIMER: Final = 5  # sub-index of a PDO's communication parameter; of an RPDO it is the deadline [ms]
 
 
 def _one(

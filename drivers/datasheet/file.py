@@ -86,8 +86,7 @@ def read_commissioning(text: EdsText) -> Commissioning | None:
     )
 
 
-DUMMY_TYPES = range(1, 8)
-"""Data types that a PDO may carry as a filler, where ``[DummyUsage]`` allows it."""
+DUMMY_TYPES = range(1, 8)  # data types that a PDO may carry as a filler, where ``[DummyUsage]`` allows it
 
 
 def build_dictionary(text: EdsText, objects: Mapping[int, EdsObject], node_id: int) -> ObjectDictionary:
@@ -168,8 +167,7 @@ def _dummy(code: int) -> ODVariable:
 
 _INTEGER_CODES = {kind.value for kind in IntegerType}
 
-_MANDATORY_SECTION = "DeviceInfo"
-"""Without it, it is another kind of file."""
+_MANDATORY_SECTION = "DeviceInfo"  # without it, it is another kind of file
 
 
 class EdsFile:

@@ -46,10 +46,8 @@ class EdsFinding:
 
 ADVICE = "Take the file from the drive's maker."
 NO_EDS = f"Expected an EDS as CiA 306 has it. {ADVICE}"
-MAX_BYTES = 16 << 20
-"""A drive's EDS has some 100 kB; a wrong file shall not fill the memory."""
-MAX_LINE_LENGTH = 255
-"""Characters in a line of an EDS (CiA 306)."""
+MAX_BYTES = 16 << 20  # a drive's EDS has some 100 kB; a wrong file shall not fill the memory
+MAX_LINE_LENGTH = 255  # characters in a line of an EDS (CiA 306)
 
 _DCF_SUFFIX = ".dcf"
 COMMISSIONING = ("DeviceComissioning", "DeviceCommissioning")

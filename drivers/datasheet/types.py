@@ -13,8 +13,7 @@ from dataclasses import dataclass
 
 _NUMBER = re.compile(r"[+-]?(?:0x[0-9a-f]+|0[0-7]*|[1-9][0-9]*)", re.IGNORECASE)
 _OCTAL = re.compile(r"[+-]?0[0-9]+")
-_LONGEST = 100
-"""Characters of a number: those of 64 bit have at most 66."""
+_LONGEST = 100  # characters of a number: those of 64 bit have at most 66
 _NODE_ID = "$NODEID"
 
 

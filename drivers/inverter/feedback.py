@@ -20,8 +20,7 @@ from drivers.scaling import TorqueScale, VelocityScale
 _LIMITED, _FOLLOWS = StatusBit.INTERNAL_LIMIT_ACTIVE.value, StatusBit.FOLLOWS_TARGET.value
 """As plain numbers, for one statusword in every cycle."""
 
-NEVER_NS = -1
-"""Before any clock's beginning."""
+NEVER_NS = -1  # before any clock's beginning
 
 
 class Received(NamedTuple):

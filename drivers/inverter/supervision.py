@@ -27,14 +27,12 @@ from drivers.inverter.cia402 import FAULT_STATES, Command, PowerState, TorqueMod
 from drivers.inverter.feedback import InverterFeedback
 from drivers.inverter.settings import InverterSettings
 
-FORGOTTEN_S: Final = 10.0
-"""What has been summed up to its limit is forgotten in this time [s]."""
+FORGOTTEN_S: Final = 10.0  # what has been summed up to its limit is forgotten in this time [s]
 
 SPEED_NOISE_RAD_S: Final = 0.5
 """Ten times the noise of a resolver's speed, 0.05 rad/s: two such readings do not differ by it by chance."""
 
-SPEED_SHARE: Final = 0.05
-"""Of the greater reading: filters, and the ripple of a resolver."""
+SPEED_SHARE: Final = 0.05  # of the greater reading: filters, and the ripple of a resolver
 
 NO_TORQUE_S: Final = 1.0
 """So long a drive may be held at no torque by a limit of its own, at an error of the tolerance [s]."""
@@ -45,8 +43,7 @@ NO_TORQUE_COUNTS: Final = 2
 MOST_SURPLUS: Final = 3
 """So many TPDOs more than SYNCs end a run: a controller may hear one frame twice (ISO 11898, last bit of EOF)."""
 
-SURPLUS_CYCLES: Final = 100
-"""After so many cycles one that was too many is forgotten."""
+SURPLUS_CYCLES: Final = 100  # after so many cycles one that was too many is forgotten
 
 MOST_MISSING: Final = 25
 """Cycles without a TPDO more than with one: a drive that answers less than every second SYNC, within 1 s at 10 ms."""

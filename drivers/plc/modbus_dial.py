@@ -56,8 +56,7 @@ class MbapFramer(FramerSocket):
         return length, unit, transaction, pdu
 
 
-NO_RECONNECT: Final = 0
-"""pymodbus would reconnect behind the caller's back: a lost PLC must be seen."""
+NO_RECONNECT: Final = 0  # pymodbus would reconnect behind the caller's back: a lost PLC must be seen
 
 HANDSHAKE_S: Final = 5.0
 """Least time for connecting with TLS [s]: a small PLC computes for a second or two on a handshake, and once only."""

@@ -30,8 +30,7 @@ PLAUSIBLE: Final[Mapping[str, tuple[float, float]]] = MappingProxyType(
 )
 """Least and greatest value a vehicle may have, in the unit the driver works in; 0 may be everywhere: nothing is set."""
 
-LEAST_TORQUE_NM: Final = 1e-6
-"""A torque below this and not zero is no torque but a misread number [Nm]."""
+LEAST_TORQUE_NM: Final = 1e-6  # a torque below this and not zero is no torque but a misread number [Nm]
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,8 +166,7 @@ class NamedRegisters:
         return readings
 
 
-COUNTS: Final = 65536
-"""The count starts over here, so that it fits 16 bits."""
+COUNTS: Final = 65536  # the count starts over here, so that it fits 16 bits
 
 NS_PER_S: Final = 1_000_000_000
 

@@ -48,11 +48,8 @@ STATUS: Final = (
 GENERATOR_OFF: Final = PrbsSettings(False, 0.0, 1, 1, PrbsSource.HOST)
 """The PLC's own generator stands still, whatever it was set to."""
 
-BEAT_EVERY_S: Final = 0.1
-"""Between two beats while nothing else asks the PLC for anything [s]."""
-
-POLL_S: Final = 0.01
-"""Pause between two looks at a drive mode that is changing [s]: about one PLC cycle."""
+BEAT_EVERY_S: Final = 0.1  # between two beats while nothing else asks the PLC for anything [s]
+POLL_S: Final = 0.01  # pause between two looks while greeting [s]: about one PLC cycle
 
 
 class Plc:

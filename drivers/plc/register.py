@@ -25,8 +25,7 @@ Value = bool | int | float | str
 """A register's value: bool, a number in the register's unit, or the name of an enum's member."""
 
 
-ADDRESSES: Final = 65536
-"""Addresses in each of the four tables of a Modbus device."""
+ADDRESSES: Final = 65536  # addresses in each of the four tables of a Modbus device
 
 
 class RegisterKind(Enum):

@@ -47,8 +47,7 @@ IN_SI: Final[Mapping[str, Mapping[str, float]]] = MappingProxyType(
 MOST_REGISTERS: Final = 125
 """Registers that one request may read; Modbus Application Protocol V1.1b3, 6.3 and 6.4."""
 
-MOST_BITS: Final = 2000
-"""Coils or discrete inputs that one request may read; ibid., 6.1 and 6.2."""
+MOST_BITS: Final = 2000  # coils or discrete inputs that one request may read; ibid., 6.1 and 6.2
 
 
 class RegisterMapError(ConfigMismatch):

@@ -35,8 +35,7 @@ from hil.proof.work import Progress, work_on
 
 Row = dict[str, Any]
 
-LIMIT_S = 900.0
-"""Time one command may take before its case counts as failed."""
+LIMIT_S = 900.0  # time one command may take before its case counts as failed
 
 FAULT = "fault.txt"
 

@@ -18,13 +18,11 @@ from hil.child import environment, python
 from hil.errors import UsageError
 from hil.proof.truth.recording import SPEED_NOISE_RAD_S
 
-MARK: Final = ".made-by-hil"
-"""File that says that this program made a folder."""
+MARK: Final = ".made-by-hil"  # file that says that this program made a folder
 
 MARK_TEXT: Final = "This folder was made by hil, which replaces it when it makes the results anew.\n"
 
-SIMULATED: Final = "speed_sim_rad_s"
-"""Column of ``hil simulate`` (CONTRACT)."""
+SIMULATED: Final = "speed_sim_rad_s"  # column of ``hil simulate`` (CONTRACT)
 
 
 class CommandFailed(Exception):

@@ -90,8 +90,7 @@ def kind(name: str) -> Kind:
 SHARES = {Group.SINGLE: 0.5, Group.PAIR: 0.2, Group.OUTSIDE: 0.15, Group.OFF: 0.1, Group.NONE: 0.05}
 """How often each group is drawn: one effect of the catalogue in every second case."""
 
-SEEDS = 2**31
-"""Seeds of cases."""
+SEEDS = 2**31  # seeds of cases
 
 NAMES = {
     Group.SINGLE: tuple(_singles(catalogued=True)),

@@ -36,8 +36,7 @@ from hil.proof.work import Progress, read_entries, silent, work_on, write_entrie
 SCHEMA = "hil.real/2"
 FILE_NAME = "real.json"
 
-LIMIT_S = 3600.0
-"""Time one command may take before its run counts as failed."""
+LIMIT_S = 3600.0  # time one command may take before its run counts as failed
 
 Json = dict[str, Any]
 

@@ -35,8 +35,7 @@ EXPERIMENTS = ("cruise", "reversal", "tip")
 SCHEMA = "hil.wire/1"
 RESULTS = "wire.json"
 
-LIMIT_S = 600.0
-"""Time one command may take [s]."""
+LIMIT_S = 600.0  # time one command may take [s]
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,8 +80,7 @@ WIRED: Final[Mapping[str, Concealed]] = MappingProxyType(
 
 _READY = re.compile(r"ready bus=(?P<bus>\S+) modbus=(?P<modbus>\S+) commitment=(?P<commitment>[0-9a-f]{64})\n")
 
-_END_S = 5.0
-"""Time the process gets to end by itself once its input has ended [s]."""
+_END_S = 5.0  # time the process gets to end by itself once its input has ended [s]
 
 
 class SealedProcess:

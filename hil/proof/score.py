@@ -23,11 +23,8 @@ Intervals = Sequence[Sequence[float]]
 ALIKE = "alike"
 """Outcome besides those of `Outcome`: right, by way of an effect declared to be the same to torque and speed."""
 
-FAILED = "failed"
-"""Outcome besides those of `Outcome`: a command gave no result."""
-
-RESOLUTION_S = 0.01
-"""Intervals are compared on a grid of one sample."""
+FAILED = "failed"  # outcome besides those of `Outcome`: a command gave no result
+RESOLUTION_S = 0.01  # intervals are compared on a grid of one sample
 
 RECORDING_S = 30.0
 

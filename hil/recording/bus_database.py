@@ -19,8 +19,7 @@ from drivers.datasheet.objects import EdsEntry
 from drivers.errors import DriverError
 from hil.errors import RecordingError
 
-LARGEST_BYTES: Final = 32 << 20
-"""A DBC file of a whole vehicle has some megabytes."""
+LARGEST_BYTES: Final = 32 << 20  # a DBC file of a whole vehicle has some megabytes
 
 DATA_SHEETS: Final = (".eds", ".dcf")
 MOST_PDOS: Final = 512

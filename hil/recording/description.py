@@ -25,8 +25,7 @@ from hil.recording.table import Column, Kind, Table
 
 SCHEMA = "hil.recording/1"
 
-OUTCOME = "outcome"
-"""Key of the metadata of a run that did not come to its end: what ended it."""
+OUTCOME = "outcome"  # key of the metadata of a run that did not come to its end: what ended it
 
 
 def description_of(table: Table, stored_as: Mapping[str, str]) -> str:

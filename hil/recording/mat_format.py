@@ -87,8 +87,7 @@ HEADER = (
 
 REFERENCES = "#refs#"
 
-LONGEST_NAME = 63
-"""Characters of a variable's name that MATLAB tells apart (``namelengthmax``)."""
+LONGEST_NAME = 63  # characters of a variable's name that MATLAB tells apart (``namelengthmax``)
 
 
 def write(table: Table, path: Path) -> None:
@@ -267,8 +266,7 @@ def columns_of(table: Any) -> dict[str, Any]:
     return {str(table.index.name or "Time"): seconds_since_first(table.index.to_numpy()), **columns}
 
 
-DEEPEST: Final = 12
-"""Structs inside structs that are looked into."""
+DEEPEST: Final = 12  # structs inside structs that are looked into
 
 
 def walk(

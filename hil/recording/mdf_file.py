@@ -102,11 +102,8 @@ def _quiet() -> Iterator[None]:
         logger.disabled = before
 
 
-BUS_EVENT: Final = 2
-"""Flag of a group of bus events, ``cg_flags`` (ASAM MDF 4.1, table 51)."""
-
-ANY_BUS: Final = 0
-"""Channel of the bus, as asammdf counts: every one."""
+BUS_EVENT: Final = 2  # flag of a group of bus events, ``cg_flags`` (ASAM MDF 4.1, table 51)
+ANY_BUS: Final = 0  # channel of the bus, as asammdf counts: every one
 
 
 def is_bus_log(mdf: MDF) -> bool:

@@ -67,8 +67,7 @@ VERSION = "4.10"
 RIG_NAME = "rig.toml"
 ROW_NUMBER = "row"
 
-TIME_MASTER, INDEX_MASTER = 1, 4
-"""Kinds of master channel, ``cn_sync_type`` (ASAM MDF 4.1, table 59)."""
+TIME_MASTER, INDEX_MASTER = 1, 4  # kinds of master channel, ``cn_sync_type`` (ASAM MDF 4.1, table 59)
 
 LONGEST_PROPERTY = 200
 """Characters of a value that still stands in the file's comment; longer ones are in the attachments only."""

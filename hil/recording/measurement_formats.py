@@ -273,11 +273,8 @@ class _Log:
 EVENT: Final = re.compile(r"\s*\(?\d")
 """What a line of a text log begins with that is a frame, or should be one."""
 
-HEAD_LINES: Final = 40
-"""Lines among which a log says in which form it is."""
-
-FEW_ODD_LINES: Final = 3
-"""Lines that may be odd in a log of any length: its beginning is often cut."""
+HEAD_LINES: Final = 40  # lines among which a log says in which form it is
+FEW_ODD_LINES: Final = 3  # lines that may be odd in a log of any length: its beginning is often cut
 
 
 def _is_head(line: str) -> bool:

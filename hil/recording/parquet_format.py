@@ -21,8 +21,7 @@ UNIT_KEY = b"unit"
 DAMAGED = (pa.ArrowException, OSError, UnicodeDecodeError)
 """What pyarrow raises on a file that is cut or damaged; the last where a name or a text is no UTF-8."""
 
-FOREIGN_KEYS = frozenset({b"pandas", b"ARROW:schema"})
-"""Metadata other programs put there for themselves."""
+FOREIGN_KEYS = frozenset({b"pandas", b"ARROW:schema"})  # metadata other programs put there for themselves
 
 
 def read(path: Path, request: Request) -> Table:

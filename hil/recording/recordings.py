@@ -146,8 +146,7 @@ def self_description(metadata: Mapping[str, str]) -> list[str]:
 # is whole: the torque of a flagged sample is held, wrong by a step of the PRBS half of the time. With one bad cycle in
 # 20 a stretch is 20 cycles long on average, which the default model (four coefficients at twice the period) needs twice
 # over to forget where it began. A diagnosis refuses nothing: the acquisition is among what it looks into.
-WORST_SHARE = 0.05
-"""Part of the cycles that may have been late, missing or without an answer."""
+WORST_SHARE = 0.05  # part of the cycles that may have been late, missing or without an answer
 
 
 def require_even_cycles(paths: Iterable[Path]) -> None:

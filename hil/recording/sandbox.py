@@ -105,8 +105,7 @@ def _fill(stream: IO[bytes], place: memoryview) -> None:
         done += count
 
 
-TRIES: Final = 20
-"""Attempts to remove the folder of a process whose command has ended."""
+TRIES: Final = 20  # attempts to remove the folder of a process whose command has ended
 
 Answer = Callable[[Document, dict[str, Column]], tuple[Document, Mapping[str, Column] | None]]
 
@@ -175,8 +174,7 @@ PROCESS: Final = "hil.recording.reader_process"
 WAITING: Final = 6.0
 """How much longer than its processor's time a reading may last, on a machine that does other things."""
 
-ENDING_S: Final = 5.0
-"""How long a process may take to end by itself."""
+ENDING_S: Final = 5.0  # how long a process may take to end by itself
 
 ENVIRONMENT: Final = {
     "OPENBLAS_NUM_THREADS": "1",
@@ -300,7 +298,6 @@ def _why(status: int, file_bytes: int) -> str:
     )
 
 
-READER: Final = Reader()
-"""The one of this program."""
+READER: Final = Reader()  # the one of this program
 
 atexit.register(READER.end)

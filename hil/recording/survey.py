@@ -20,8 +20,7 @@ from hil.recording.text_form import MISSING
 TIME_NAMES: Final = ("time", "zeit", "t", "timestamp", "timestamps", "stamp")
 """What a column of times is called, or begins with."""
 
-EVEN: Final = 0.5
-"""Share of the period by which a step of an even time may differ from it."""
+EVEN: Final = 0.5  # share of the period by which a step of an even time may differ from it
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,8 +149,7 @@ def rounded(period_s: float) -> float:
     return period_s
 
 
-BY_UNIT, BY_WORD, BY_LETTER, BY_CHANCE = 4, 3, 2, 1
-"""How sure a role is."""
+BY_UNIT, BY_WORD, BY_LETTER, BY_CHANCE = 4, 3, 2, 1  # how sure a role is
 
 WORDS: Final = {
     Role.TORQUE: r"torque|drehmoment|trq|\btq|moment|tau|force|kraft",
@@ -167,8 +165,7 @@ LETTERS: Final = {
 }
 """Whole names."""
 
-ANY_OUTPUT: Final = r"[yz]\d*"
-"""Names of a measured output of whatever kind."""
+ANY_OUTPUT: Final = r"[yz]\d*"  # names of a measured output of whatever kind
 
 NOT_MEASURED: Final = re.compile(r"ref|soll|set|cmd|command|target|limit|max|min|prbs|demand|request", re.IGNORECASE)
 """Parts of names of what was asked for, not read."""

@@ -104,14 +104,12 @@ FloatArray = NDArray[np.float64]
 LARGEST = 1e30
 """Magnitude beyond which a number is no measurement, in whatever unit; its fourth power still is a float."""
 
-LEFT_OUT = ": left out, "
-"""What every remark on a column that was not read has behind the column's name."""
+LEFT_OUT = ": left out, "  # what every remark on a column that was not read has behind the column's name
 
 NAME_IN_MODEL = "For a foreign recording, name its columns in [signals] of the model file."
 NAME_IN_PYTHON = "Name its columns: from_pandas(frame, torque=[...], speed=..., time=...)."
 
-LONGEST_CELL = 40
-"""Characters of a wrong cell that a message shows."""
+LONGEST_CELL = 40  # characters of a wrong cell that a message shows
 
 
 @dataclass(frozen=True, slots=True)

@@ -165,20 +165,14 @@ class WritingThread:
 
 CSV, PART = ".csv", ".part.csv"
 
-CAPACITY = 20_000
-"""Samples that may wait for the disk: 200 s at 10 ms, some 10 MB."""
-
-DRAIN_S = 60.0
-"""Time the disk has for them when the run is over [s]."""
-
-FIRST_WRITE_S = 10.0
-"""Time it has for the first bytes [s]."""
+CAPACITY = 20_000  # samples that may wait for the disk: 200 s at 10 ms, some 10 MB
+DRAIN_S = 60.0  # time the disk has for them when the run is over [s]
+FIRST_WRITE_S = 10.0  # time it has for the first bytes [s]
 
 NOT_ENDED = "did not reach its end: the program was killed, or the disk was full"
 """What a recording says of its outcome until it has one."""
 
-LONGEST_ROW = 1 << 16
-"""Bytes; the disk tore at most one row."""
+LONGEST_ROW = 1 << 16  # bytes; the disk tore at most one row
 
 
 def hold(file: FileIO) -> bool:

@@ -18,8 +18,7 @@ from drivers.inverter.cia402 import TorqueMode
 from drivers.scaling import IntegerType, VelocityScale
 from hil.simulator.faults import DriveLimits, InverterFaults
 
-_WARM = 0.9
-"""Where derating begins."""
+_WARM = 0.9  # where derating begins
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,14 +63,9 @@ class Heat:
         self._x = goal + (self._x - goal) * math.exp(-duration_s / self._limits.thermal_time_constant_s)
 
 
-SUPPLY_V: Final = 650.0
-"""A bus's traction battery."""
-
-UNDER_VOLTAGE_V: Final = 0.7 * SUPPLY_V
-"""Below it the drive goes into fault."""
-
-DISCHARGE_S: Final = 0.02
-"""Time constant with which a drive under load empties its capacitors [s]."""
+SUPPLY_V: Final = 650.0  # a bus's traction battery
+UNDER_VOLTAGE_V: Final = 0.7 * SUPPLY_V  # below it the drive goes into fault
+DISCHARGE_S: Final = 0.02  # time constant with which a drive under load empties its capacitors [s]
 
 
 class DcLink:
@@ -173,8 +167,7 @@ _CLASSES: Final = {0x2000: 0x02, 0x3000: 0x04, 0x4000: 0x08, 0x8100: 0x10, 0x820
 """Bits of the error register besides the generic one, by class of error code (CiA 301, 7.5.2.2): current, voltage,
 temperature, communication, device profile."""
 
-_HISTORY: Final = 4
-"""Entries of the pre-defined error field."""
+_HISTORY: Final = 4  # entries of the pre-defined error field
 
 _NO_DATA: Final = bytes(5)
 

@@ -152,8 +152,7 @@ class DrivelinePlant:
         self._stepper.step(0.0, 0.0)
 
 
-NO_EXPERIMENT_S = 60.0
-"""Length of the widest recording where the rig file has no experiment [s]."""
+NO_EXPERIMENT_S = 60.0  # length of the widest recording where the rig file has no experiment [s]
 
 
 def out_of_bounds(rig: Rig, model: DrivelineModel, name: str, values: Mapping[str, float]) -> Iterator[str]:

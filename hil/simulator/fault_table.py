@@ -22,11 +22,8 @@ from drivers.inverter.cia402 import PowerState
 from hil.errors import UsageError
 from hil.simulator.faults import Answers, AtStep, Frames, RigFaults
 
-OVERCURRENT: Final = 0x2310
-"""EMCY error code of CiA 402: continuous over current at the output."""
-
-NOBODY: Final = (0xBAD, 0xBAD)
-"""Vendor-ID and product code of no device."""
+OVERCURRENT: Final = 0x2310  # EMCY error code of CiA 402: continuous over current at the output
+NOBODY: Final = (0xBAD, 0xBAD)  # vendor-ID and product code of no device
 
 LAST_COB_ID: Final = 0x7FF
 

@@ -10,8 +10,7 @@ from typing import Final, Generic, TypeVar
 
 from drivers.inverter.cia402 import PowerState
 
-PDO_COB_IDS = range(0x180, 0x580)
-"""The PDOs of the predefined connection set (CiA 301)."""
+PDO_COB_IDS = range(0x180, 0x580)  # the PDOs of the predefined connection set (CiA 301)
 
 
 T = TypeVar("T")

@@ -22,8 +22,7 @@ from drivers.canopen.can_link import SYNC_COB_ID, is_canopen
 from drivers.canopen.inline_bus import InlineBus
 from hil.simulator.faults import AtStep, BusFaults, Frames
 
-BUS_OFF_ERROR = 0x040
-"""Error frame of a controller that has left the bus, as SocketCAN codes it."""
+BUS_OFF_ERROR = 0x040  # error frame of a controller that has left the bus, as SocketCAN codes it
 
 Deliver = Callable[[can.Message], None]
 

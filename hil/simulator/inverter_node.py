@@ -49,14 +49,9 @@ _ERROR_BEHAVIOUR = (0x1029, 1)
 _EMCY_COB_ID = 0x1014
 _VELOCITY = 0x606C
 _SERIAL_NUMBER = (0x1018, 4)
-_PDO_LENGTH_ERROR = 0x8210
-"""Error code of CiA 301."""
-
-LOOK_EVERY_S = 0.01
-"""How often it looks for its host where no frame comes [s]."""
-
-_STALE_STREAM = 1
-"""Of a node's random numbers: the reading noise has one of its own."""
+_PDO_LENGTH_ERROR = 0x8210  # error code of CiA 301
+LOOK_EVERY_S = 0.01  # how often it looks for its host where no frame comes [s]
+_STALE_STREAM = 1  # of a node's random numbers: the reading noise has one of its own
 
 _NMT_COMMANDS = {bytes((command,)): command for command in NmtCommand}
 _CYCLIC = range(1, 241)

@@ -43,11 +43,8 @@ class PlcPrbs:
 IDENTITY: Final = MappingProxyType({"vendor_code": 0x00484944, "device_code": 0x2024, "map_version": 1})
 """What this PLC identifies as; the shipped map expects the same, which a test sees to."""
 
-COUNTS: Final = 65536
-"""The PLC's watchdog starts over here: it is a 16-bit register."""
-
-ROUNDING_CYCLES: Final = 1e-6
-"""Part of a PLC cycle by which sums of steps may fall short of a whole one."""
+COUNTS: Final = 65536  # the PLC's watchdog starts over here: it is a 16-bit register
+ROUNDING_CYCLES: Final = 1e-6  # part of a PLC cycle by which sums of steps may fall short of a whole one
 
 
 class ValueRefusedError(ValueError):

@@ -149,8 +149,7 @@ class PlcSecurity:
 REGISTERS: Final = (ReadHoldingRegistersResponse, ReadInputRegistersResponse)
 """Answers that can be a register short."""
 
-NO_LINGER: Final = struct.pack("ii", 1, 0)
-"""Value of SO_LINGER: closing such a socket sends RST and not FIN."""
+NO_LINGER: Final = struct.pack("ii", 1, 0)  # value of SO_LINGER: closing such a socket sends RST and not FIN
 
 
 class PlcTcpServer(ModbusTcpServer):

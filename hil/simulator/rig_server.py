@@ -28,8 +28,7 @@ from hil.simulator.plc_device import PlcDevice, PlcSetup
 from hil.simulator.plc_server import PlcSecurity, PlcServer
 from hil.simulator.simulated_rig import Plant, SensedPlant, SimulatedRig
 
-_OF_SENSORS = 2
-"""Of a rig's random numbers: those of its nodes have streams of their own."""
+_OF_SENSORS = 2  # of a rig's random numbers: those of its nodes have streams of their own
 
 _RANGES = {
     ValueType.UINT16: (0, (1 << 16) - 1),

@@ -31,8 +31,7 @@ class SensedPlant(Plant, Protocol):
         """Return what a sensor there shows now [rad/s, rad, Nm, rad/s^2]."""
 
 
-StepCallback = Callable[[float], None]
-"""``callback(time_s)``, called in the rig's own thread after each step."""
+StepCallback = Callable[[float], None]  # ``callback(time_s)``, called in the rig's own thread after each step
 
 TorqueSource = Callable[[], tuple[float, float]]
 """What another controller adds to the torque references of m1 and m2 [Nm], asked at each SYNC."""

@@ -148,8 +148,7 @@ class RpdoDeadline:
 
 
 HEARTBEAT_ERROR: Final = 0x8130
-RPDO_TIMEOUT: Final = 0x8250
-"""Error codes of CiA 301."""
+RPDO_TIMEOUT: Final = 0x8250  # error codes of CiA 301
 
 
 class HostWatch:

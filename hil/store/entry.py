@@ -18,8 +18,7 @@ from hil.recording.recordings import read_facts
 
 SCHEMA = "hil.runs/1"
 
-COMPLETE = "complete"
-"""Outcome of a run that reached its end; any other is what ended it."""
+COMPLETE = "complete"  # outcome of a run that reached its end; any other is what ended it
 
 DIAGNOSIS, IDENTIFICATION, ONLINE, MODEL = "diagnosis", "identification", "online", "model"
 """Kinds of attachment that mean something here; others are kept all the same."""

@@ -33,8 +33,7 @@ STORE_NAME: Final = "hil_runs"
 
 SCHEMA: Final = "hil.run_card/1"
 
-LONGEST_DOCUMENT_BYTES: Final = 16 << 20
-"""A longer attached file is known by its name only."""
+LONGEST_DOCUMENT_BYTES: Final = 16 << 20  # a longer attached file is known by its name only
 
 DAMAGED: Final = "damaged in the list of runs"
 

@@ -158,8 +158,7 @@ class TruthDriveline:
         return float(speed_as_sensed(self._physics, self._state))
 
 
-_SETTLING_S = 3.0
-"""The shaft's oscillation, 2.5 1/s and faster, is down to 0.06 % by then."""
+_SETTLING_S = 3.0  # the shaft's oscillation, 2.5 1/s and faster, is down to 0.06 % by then
 
 
 @dataclass(frozen=True, slots=True)

@@ -41,8 +41,7 @@ ORDERS = (1, 3, 4, 6, 12)
 """Periods per turn: eccentricity, three or four pole pairs, slots; faster ones never meet the shaft's resonance. Twice
 per turn is left out: to torque and speed it is the Cardan joint's."""
 
-USUAL_TORQUE_NM = 200.0
-"""Torque at which both kinds of ripple are alike."""
+USUAL_TORQUE_NM = 200.0  # torque at which both kinds of ripple are alike
 
 
 def _draw_gain(rng: np.random.Generator, bus: Bus) -> Sizes:

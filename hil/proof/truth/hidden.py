@@ -25,11 +25,8 @@ When = Callable[[Physics], Interval]
 Convert = Callable[[Sizes, Mapping[str, float]], float | None]
 """Sizes and true bus to the value that a fitted parameter should have; None where this draw has none."""
 
-ABSENT_IN = "absent_in"
-"""Size that says in which of the three tests (0, 1, 2) an event does not take place."""
-
-ONLY_IN = "only_in"
-"""Size that says in which of the three tests alone it does."""
+ABSENT_IN = "absent_in"  # size that says in which of the three tests (0, 1, 2) an event does not take place
+ONLY_IN = "only_in"  # size that says in which of the three tests alone it does
 
 
 def same_physics(physics: Physics, sizes: Sizes, rng: np.random.Generator) -> Physics:

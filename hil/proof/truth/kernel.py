@@ -149,8 +149,7 @@ closed solution the speed is right to 0.0002 rad/s, against a stiff reference of
 twentieth of the sensor's noise."""
 
 
-FASTER = 6.0
-"""By how much the smaller branch of a viscoelastic shaft relaxes faster than the other."""
+FASTER = 6.0  # by how much the smaller branch of a viscoelastic shaft relaxes faster than the other
 
 
 @compiled
