@@ -129,11 +129,9 @@ class CanLink:
         self.network.tap = tap
 
     def send(self, cob_id: int, data: bytes) -> None:
-        """Send one frame."""
         self.network.send_message(cob_id, data)
 
     def sync(self) -> int:
-        """Send SYNC."""
         self.raise_if_failed()
         t_ns = time.monotonic_ns()
         self.network.send_message(SYNC_COB_ID, b"")

@@ -62,7 +62,6 @@ class Emergency:
 
 
 def decode(data: bytes) -> Emergency:
-    """Unpack an EMCY frame."""
     if len(data) != _FRAME.size:
         raise ProtocolViolation(
             f"EMCY frame of {len(data)} bytes ({data.hex(' ')}), expected {_FRAME.size}. "

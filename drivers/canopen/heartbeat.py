@@ -60,12 +60,10 @@ class HeartbeatMonitor:
         self.state: NmtState | None = None
 
     def beat(self, state: NmtState, t_ns: int) -> None:
-        """Take one heartbeat."""
         self.state = state
         self._silence.beat(t_ns)
 
     def raise_if_lost(self, now_ns: int) -> None:
-        """Check at ``now_ns``."""
         if not self._silence.has_ended(now_ns):
             return
         age_ns = self._silence.length_ns(now_ns)

@@ -57,7 +57,6 @@ class MappedObject:
 
     @property
     def entry(self) -> int:
-        """The mapping entry, ``0xIIIISSLL``."""
         return self.index << 16 | self.subindex << 8 | self.length_bits
 
     def __str__(self) -> str:

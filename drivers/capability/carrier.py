@@ -99,7 +99,6 @@ class Carrier:
     fixed: frozenset[tuple[int, int]]  # entries ``(index, subindex)`` of its parameters that can't be written
 
     def carries(self, index: int, subindex: int = 0) -> bool:
-        """Whether an object is mapped."""
         return any((mapped.index, mapped.subindex) == (index, subindex) for mapped in self.layout.objects)
 
     @property
@@ -131,7 +130,6 @@ def cob_id_of(sheet: DataSheet, direction: Direction, number: int, taken: Collec
 
 
 def _described(sheet: DataSheet, direction: Direction, number: int) -> PdoLayout:
-    """Read what the data sheet has."""
 
     def read(index: int, subindex: int) -> int:
         value = sheet.value(index, subindex)

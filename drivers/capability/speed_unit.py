@@ -64,12 +64,10 @@ class SpeedUnit:
 
     @property
     def needs_increments(self) -> bool:
-        """Whether the unit is one of increments."""
         return self.unit in (SpeedUnitName.INCREMENTS_PER_S, SpeedUnitName.INCREMENTS_PER_MS)
 
     @property
     def scale(self) -> VelocityScale:
-        """Scale of a count."""
         return VelocityScale(_RAD_S[self.unit] / (self.counts_per_unit * (self.increments_per_turn or 1.0)))
 
     def __str__(self) -> str:

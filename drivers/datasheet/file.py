@@ -136,7 +136,6 @@ def _default(entry: EdsEntry, node_id: int) -> int | float | str | bytes | None:
 
 
 def read_real(text: str) -> float | None:
-    """Read a floating-point number; None if it is none."""
     try:
         return float(text)
     except ValueError:

@@ -43,7 +43,6 @@ class ObjectType(IntEnum):
 
     @property
     def has_entries(self) -> bool:
-        """Whether it has sub-indices."""
         return self in (ObjectType.ARRAY, ObjectType.RECORD)
 
 
@@ -81,7 +80,6 @@ class EdsEntry:
 
     @property
     def readable(self) -> bool:
-        """Whether it may be read by SDO."""
         return self.access is not None and self.access != "wo"
 
     @property

@@ -124,7 +124,6 @@ class EdsText:
 
 
 def read_eds_text(path: Path) -> EdsText:
-    """Read a file's text."""
     text, findings = _decode(path)
     reader = _Reader()
     reader.findings.extend((*findings, *_ends_of_lines(text)))
@@ -177,7 +176,6 @@ class _Reader:
         self._seen_foreign = False
 
     def take(self, number: int, line: str) -> None:
-        """Take one line."""
         stripped = line.strip()
         if len(line) > MAX_LINE_LENGTH:
             self._note(number, f"at most {MAX_LINE_LENGTH} characters in a line", str(len(line)), "Shorten it.")

@@ -18,7 +18,6 @@ _NODE_ID = "$NODEID"
 
 
 def read_number(text: str) -> int | None:
-    """Read one number; None if it is none."""
     text = text.strip()
     if len(text) > _LONGEST or not _NUMBER.fullmatch(text):
         return None

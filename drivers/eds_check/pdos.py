@@ -21,7 +21,6 @@ _AS_MAPPED = "The maker's own mapping counts."
 
 
 def check_pdos(context: EdsContext) -> Iterator[EdsFinding]:
-    """Check every PDO there is."""
     for direction in (RPDO, TPDO):
         for n in PDO_NUMBERS:
             yield from _pair(context, direction, direction.communication + n, direction.mapping + n)

@@ -128,7 +128,6 @@ class Excess:
         return self._sum >= self._limit
 
     def clear(self) -> None:
-        """Forget all of it."""
         self._sum = 0.0
 
 
@@ -456,7 +455,6 @@ class Supervision:
         )
 
     def raise_if_ended(self) -> None:
-        """End the run where a cycle has."""
         if self.ended is not None:
             raise self.ended
 

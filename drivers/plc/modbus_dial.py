@@ -81,7 +81,6 @@ class Dial:
         self.client.ctx.callback_disconnected = self._lost  # type: ignore[method-assign]
 
     async def open(self) -> None:
-        """Connect."""
         params = self.client.ctx.comm_params  # one time-out for both is all that pymodbus has
         params.timeout_connect = self._connecting_s
         if not await self.client.connect():

@@ -84,7 +84,6 @@ def server_context(credentials: Credentials) -> ssl.SSLContext:
 
 
 def role_of(certificate_der: bytes) -> str | None:
-    """Read the role out of a certificate."""
     return _role(x509.load_der_x509_certificate(certificate_der))
 
 

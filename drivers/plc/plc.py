@@ -109,12 +109,10 @@ class Plc:
         return self._latest
 
     async def __aenter__(self) -> Self:
-        """Connect; see `connect`."""
         await self.connect()
         return self
 
     async def __aexit__(self, *_: object) -> None:
-        """Disconnect."""
         self.close()
 
     async def connect(self) -> None:

@@ -124,7 +124,6 @@ class Register(MapTable):
         return self._ordered(self._words(value))
 
     def decode(self, words: Sequence[int]) -> Value:
-        """Read words as a value."""
         if len(words) != self.size:
             raise ProtocolViolation(
                 f"{self._place}: expected {self.size} word(s), got {len(words)}. Compare the register map "

@@ -69,7 +69,6 @@ class RegisterMap(MapTable):
     registers: dict[str, Register]  # the entries by name
 
     def __getitem__(self, name: str) -> Register:
-        """Return an entry by name."""
         if name not in self.registers:
             raise ConfigMismatch(
                 f"register map {self.name!r}: expected a register {name}, it has {', '.join(sorted(self.registers))}. "

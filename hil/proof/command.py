@@ -30,7 +30,6 @@ class CommandFailed(Exception):
 
 
 def run_hil(arguments: Sequence[str], folder: Path, limit_s: float) -> None:
-    """Run ``hil`` in a folder."""
     try:
         done = subprocess.run(
             python("-m", "hil", *arguments),

@@ -76,7 +76,6 @@ def _singles(catalogued: bool) -> list[str]:
 
 
 def kind(name: str) -> Kind:
-    """Return the kind of a name."""
     if name == NOTHING:
         return Kind(NOTHING, Group.NONE, NOTHING, nominal_error=0.0)
     if name == OFF:

@@ -154,7 +154,6 @@ def _end(process: Any) -> None:
 
 
 def rig_text(sealed: SealedProcess) -> str:
-    """Return the text of the rig file."""
     document: Any = tomlkit.parse(RIG_FILE.read_text(encoding="utf-8"))
     host, _, port = sealed.modbus.rpartition(":")
     document["can"]["url"] = sealed.bus

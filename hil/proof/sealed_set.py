@@ -102,7 +102,6 @@ class Shown:
 
 
 def read_commitments(folder: Path) -> dict[str, Shown]:
-    """Read the cases of a set by name."""
     path, advice = folder / COMMITMENTS, "hil prove make DIR makes one"
     listed = read_list(path, advice)
     for name, entry in listed.items():

@@ -46,7 +46,6 @@ def work_on(
 
 
 def read_entries(path: Path, schema: str, key: str, advice: str) -> Any:
-    """Return what `write_entries` has written."""
     try:
         content = read_json(path)
     except OSError as error:

@@ -61,11 +61,9 @@ class DataDigest:
         self._digest.update(_length(size))
 
     def take(self, cells: Column) -> None:
-        """Take the next cells of the column."""
         self._digest.update(_cells(cells, Kind.of(cells)))
 
     def hexdigest(self) -> str:
-        """Return the checksum, hexadecimal."""
         return self._digest.hexdigest()
 
 

@@ -38,7 +38,6 @@ def description_of(table: Table, stored_as: Mapping[str, str]) -> str:
 
 
 def described_table(path: Path, text: str, column: Callable[[str, Kind], Column]) -> Table:
-    """Read a table by its description."""
     document = _document(path, text)
     try:
         entries = [(str(e["name"]), str(e["stored_as"]), e["unit"], Kind(e["kind"])) for e in document["columns"]]
@@ -58,7 +57,6 @@ def described_table(path: Path, text: str, column: Callable[[str, Kind], Column]
 
 
 def metadata_of(path: Path, text: str) -> dict[str, str]:
-    """Return the metadata of a description alone."""
     metadata: dict[str, str] = _document(path, text)["metadata"]
     return metadata
 
@@ -95,7 +93,6 @@ class Sidecar:
 
     @property
     def is_empty(self) -> bool:
-        """Whether there is nothing to say."""
         return not (self.metadata or self.units or self.types)
 
 

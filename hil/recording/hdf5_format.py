@@ -103,7 +103,6 @@ COLUMNS = "columns"
 
 
 def read(path: Path, request: Request) -> Table:
-    """Read an HDF5 recording."""
     with reading(path, "HDF5") as file:
         return _own(path, file) if _is_own(file) else _foreign(path, file, request)
 
@@ -115,7 +114,6 @@ def read_metadata(path: Path) -> dict[str, str]:
 
 
 def write(table: Table, path: Path) -> None:
-    """Write a table with its units and metadata."""
     stored_as = {name: _link(number, name) for number, name in enumerate(table.columns)}
 
     def fill(file: File) -> None:

@@ -135,7 +135,6 @@ def channel_rows(group: Group) -> Iterator[tuple[str, str, int, int, float | Non
 
 
 def look(path: Path, dbc: Path | None = None) -> Look:
-    """Look into a recording."""
     known = format_of(path)
     encoding = None
     if known.apart:

@@ -38,7 +38,6 @@ DAMAGED = (ValueError, TypeError, IndexError, KeyError, OSError, NotImplementedE
 
 
 def read(path: Path, request: Request) -> Table:
-    """Read a .mat recording."""
     import scipy.io
     from scipy.io.matlab import MatReadError
 

@@ -74,7 +74,6 @@ LONGEST_PROPERTY = 200
 
 
 def read(path: Path, request: Request) -> Table:
-    """Read an MDF recording."""
     with opened(path) as mdf:
         text = _description(mdf)
         table = foreign_table(path, mdf, request) if text is None else _own(path, mdf, text)
@@ -99,7 +98,6 @@ def read_metadata(path: Path) -> Mapping[str, str]:
 
 
 def write(table: Table, path: Path) -> None:
-    """Write a table as MDF 4.10."""
     from asammdf import MDF
 
     stored_as = {name: _channel_name(number, name) for number, name in enumerate(table.columns)}

@@ -49,7 +49,6 @@ def is_own(path: Path) -> bool:
 
 
 def _names(path: Path) -> list[str]:
-    """Read the names of the columns."""
     with path.open("rb") as file:
         return file.readline(LONGEST_HEADER).decode("utf-8", "replace").rstrip("\n").split(",")
 

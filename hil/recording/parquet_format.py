@@ -25,7 +25,6 @@ FOREIGN_KEYS = frozenset({b"pandas", b"ARROW:schema"})  # metadata other program
 
 
 def read(path: Path, request: Request) -> Table:
-    """Read a Parquet recording."""
     try:
         with pa.parquet.ParquetFile(path, page_checksum_verification=True) as file:
             _require_sizes(path, file.metadata)
@@ -104,7 +103,6 @@ def read_metadata(path: Path) -> dict[str, str]:
 
 
 def write(table: Table, path: Path) -> None:
-    """Write a table with its units and metadata."""
     fields, arrays = [], []
     for name, column in table.columns.items():
         array = pa.array(column, type=pa.string() if column.dtype == object else None)

@@ -96,7 +96,6 @@ class Facts:
 
 
 def facts_of(table: Table) -> Facts:
-    """Return the facts of a table."""
     there = table.numeric([name for name in (columns.TIME, columns.FLAGS) if name in table.columns])
     time_s = there.get(columns.TIME, np.zeros(1))
     flagged = int(np.count_nonzero(there[columns.FLAGS])) if columns.FLAGS in there else 0

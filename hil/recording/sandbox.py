@@ -246,17 +246,14 @@ class Reader:
         self._process: Sandbox | None = None
 
     def table(self, path: Path, request: Request) -> Table:
-        """Read a recording."""
         document, columns = self._read(path, "table", request)
         return table_of(path, document, columns)
 
     def metadata(self, path: Path) -> Mapping[str, str]:
-        """Read what a recording says of itself."""
         said: Mapping[str, str] = self._read(path, "metadata", Request())[0]["metadata"]
         return said
 
     def survey(self, path: Path, request: Request) -> Survey:
-        """Read what is in a recording, in figures."""
         return Survey.of_document(self._read(path, "survey", request)[0]["survey"])
 
     def end(self) -> None:

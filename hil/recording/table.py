@@ -34,7 +34,6 @@ class Kind(Enum):
 
     @staticmethod
     def of(column: Column) -> Kind:
-        """Tell the kind of a column of a table."""
         return Kind.of_dtype(column.dtype)
 
     @staticmethod
@@ -66,7 +65,6 @@ def as_column(values: Column) -> Column:
 
 
 def as_text(cells: list[str]) -> Column:
-    """Return texts as a column."""
     column = np.empty(len(cells), dtype=object)
     column[:] = cells
     return column

@@ -33,7 +33,6 @@ class CellKind(Enum):
 
 
 def kind_of(cell: str, decimal: str = ".") -> CellKind:
-    """Tell what a cell is, with a decimal mark."""
     plain = cell.strip()
     if plain in MISSING or plain.lower() == "nan":
         return CellKind.MISSING
@@ -172,7 +171,6 @@ class _Cut:
 
 
 def recognise(lines: Sequence[str], hints: FormatHints) -> TextForm:
-    """Return the form of a text recording."""
     skipped = hints.skip_lines
     delimiter = hints.delimiter
     if len(lines) > skipped and lines[skipped].strip().lower().startswith(NAMES_THE_DELIMITER):

@@ -143,7 +143,6 @@ class DriveSensors:
         self.torque = self.current = self.speed = 0
 
     def sample(self, true_speed_rad_s: float, torque_permille: float, step: int) -> None:
-        """Read the machine at this SYNC."""
         speed_rad_s, torque = self._clock.sample(true_speed_rad_s, torque_permille)
         torque_noise, speed_noise = next(self._noise), next(self._noise)
         torque += self._settings.torque_noise_counts * torque_noise

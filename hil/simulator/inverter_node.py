@@ -96,7 +96,6 @@ class InverterNode:
 
     @property
     def torque_nm(self) -> float:
-        """Torque in effect now [Nm]."""
         return self._device.torque_nm
 
     def add_torque(self, torque_nm: float) -> None:

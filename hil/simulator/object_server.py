@@ -171,11 +171,9 @@ class PdoObjects:
                 self._check_mapping(direction, communication, index, subindex, value)
 
     def rpdos(self) -> tuple[PdoFrame, ...]:
-        """Build the RPDOs that are switched on."""
         return tuple(self._frames(RPDO))
 
     def tpdos(self) -> tuple[PdoFrame, ...]:
-        """Build the TPDOs that are switched on."""
         return tuple(self._frames(TPDO))
 
     def deadline_ms(self, rpdo: PdoLayout) -> int:

@@ -51,7 +51,6 @@ class ChannelSensors:
         self.sample()  # what a driveline has no place for is refused here, and not at the first SYNC
 
     def sample(self) -> None:
-        """Read every sensor now."""
         if self._plant is not None:
             for table in self._tables:
                 noise = self._noise.get(table.column, 0.0) * float(self._random.standard_normal())
@@ -214,7 +213,6 @@ class RigServer:
 
 
 def required_simulation(rig: Rig) -> SimulationTable:
-    """Give the table ``[simulation]`` of a rig file."""
     if rig.simulation is None:
         raise UsageError(
             f"rig {rig.name!r}: expected a table [simulation] that says what to simulate, there is none. "

@@ -89,7 +89,6 @@ class Run:
     attachments: tuple[Attachment, ...] = ()
 
     def latest(self, kind: str) -> Attachment | None:
-        """Return the last attachment of a kind."""
         return next((entry for entry in reversed(self.attachments) if entry.kind == kind), None)
 
     @property
@@ -268,7 +267,6 @@ class Row:
 
     @property
     def differs(self) -> bool:
-        """Whether the runs differ in it."""
         return bool(self.a != self.b)
 
 

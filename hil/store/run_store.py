@@ -49,7 +49,6 @@ What = Literal["note", "result"]
 
 
 def store_of(folder: Path | str) -> Path:
-    """Name the list of a folder."""
     return Path(folder) / STORE_NAME
 
 

@@ -146,5 +146,4 @@ _PLANS: dict[Test, Callable[[np.random.Generator], Plan]] = {
 
 
 def draw_plan(test: Test, rng: np.random.Generator) -> Plan:
-    """Draw one test of a kind."""
     return _PLANS[test](rng)

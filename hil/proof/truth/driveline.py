@@ -149,7 +149,6 @@ class TruthDriveline:
 
     @property
     def physics(self) -> Physics:
-        """The driveline's physics."""
         return self._physics
 
     @property

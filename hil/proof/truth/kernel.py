@@ -25,7 +25,6 @@ Speeds = tuple[float, float, float, float]
 
 @compiled
 def speeds_of(state: FloatArray) -> Speeds:
-    """Return the speeds of a state."""
     return state[State.SPEED_M], state[State.SPEED_X], state[State.SPEED_L], state[State.SPEED_V]
 
 

@@ -83,7 +83,6 @@ class Specimen:
 
     @property
     def effects(self) -> tuple[HiddenEffect, ...]:
-        """The hidden effects."""
         return find(self.effect)
 
     def physics(self, rng: np.random.Generator, test: int = 0) -> Physics:
