@@ -52,8 +52,3 @@ def at_section(severity: Severity, section: EdsSection, expected: str, found: st
 def at_file(severity: Severity, place: str, expected: str, found: str, advice: str) -> EdsFinding:
     """Say something that has no line: what it is about is not there."""
     return EdsFinding(severity, None, place, expected, found, advice)
-
-
-def hexadecimal(index: int, subindex: int | None = None) -> str:
-    """Name an object: ``0x1018`` or ``0x1018:01``."""
-    return f"0x{index:04X}" if subindex is None else f"0x{index:04X}:{subindex:02X}"

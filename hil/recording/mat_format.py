@@ -202,16 +202,11 @@ def _is_matrix(dataset: Dataset) -> bool:
 
 
 def _foreign_metadata(file: File) -> dict[str, str]:
-    datasets = _datasets(file)
+    entries = {text_of(name): entry for name, entry in file.items() if hasattr(entry, "dtype")}
+    datasets = {name: entry for name, entry in entries.items() if entry.dtype.names is None}
     scalars = {name: repr(d[()].item()) for name, d in datasets.items() if d.size == 1 and d.dtype.kind in "fiu"}
     texts = {name: _text(d) for name, d in datasets.items() if _class_of(d) == "char" and 1 in (*d.shape, d.ndim)}
     return {**scalars, **texts}
-
-
-def _datasets(file: File) -> dict[str, Dataset]:
-    return {
-        text_of(name): entry for name, entry in file.items() if hasattr(entry, "dtype") and entry.dtype.names is None
-    }
 
 
 def _is_vector(dataset: Dataset) -> bool:

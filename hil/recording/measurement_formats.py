@@ -243,7 +243,7 @@ class _Log:
             return
         readers = {".asc": can.ASCReader, ".log": can.CanutilsLogReader, ".trc": can.TRCReader}
         lines = self.path.read_text("utf-8", errors="replace").splitlines(keepends=True)
-        head = [line for line in lines[:HEAD_LINES] if _is_head(line)]
+        head = [line for line in lines[:HEAD_LINES] if line.startswith(HEADS)]
         events = sum(EVENT.match(line) is not None for line in lines)
         faults = 0
         while lines:
@@ -274,11 +274,8 @@ EVENT: Final = re.compile(r"\s*\(?\d")
 """What a line of a text log begins with that is a frame, or should be one."""
 
 HEAD_LINES: Final = 40  # lines among which a log says in which form it is
+HEADS: Final = (";", "date", "base", "internal", "//")
 FEW_ODD_LINES: Final = 3  # lines that may be odd in a log of any length: its beginning is often cut
-
-
-def _is_head(line: str) -> bool:
-    return line.startswith((";", "date", "base", "internal", "//"))
 
 
 class _Lines(io.StringIO):  # typeshed has its lines as bytes

@@ -201,7 +201,8 @@ def guesses(channel: Channel) -> list[Guess]:
     found = []
     for role in (Role.TORQUE, Role.SPEED, Role.POSITION):
         named = bool(re.search(WORDS[role], bare.lower()))
-        if unit is not None and unit.quantity in EXPECTED[role] and not _is_far(unit.quantity, named):
+        is_far = unit is not None and unit.quantity is Quantity.LENGTH and not named  # of heights and distances, too
+        if unit is not None and unit.quantity in EXPECTED[role] and not is_far:
             found.append(Guess(channel, role, BY_UNIT + named))
         elif unit is None or unit.quantity in (Quantity.OTHER, Quantity.SHARE):
             letter = re.fullmatch(LETTERS[role], last) is not None
@@ -211,11 +212,6 @@ def guesses(channel: Channel) -> list[Guess]:
     if not found and re.fullmatch(ANY_OUTPUT, last) and unit is None:
         found.append(Guess(channel, Role.SPEED, BY_CHANCE))
     return found
-
-
-def _is_far(quantity: Quantity, named: bool) -> bool:
-    """Tell whether a unit alone says nothing: metres are of heights and distances, too."""
-    return quantity is Quantity.LENGTH and not named
 
 
 def roles_of(groups: Sequence[Group]) -> Roles:

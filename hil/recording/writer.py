@@ -23,7 +23,7 @@ from contextlib import suppress
 from io import FileIO
 from pathlib import Path
 from types import TracebackType
-from typing import Protocol, Self
+from typing import Self
 
 import numpy as np
 
@@ -76,20 +76,10 @@ PAUSE_S = 0.002
 """After what was written [s]: lines that come faster, as those of a run without a clock, are written together."""
 
 
-class Unbuffered(Protocol):
-    """A file that hands to the system what it is given, and tells how much of it that has taken."""
-
-    def write(self, data: bytes, /) -> int | None:
-        """Write, perhaps only the first bytes."""
-
-    def close(self) -> None:
-        """Close it."""
-
-
 class WritingThread:
     """Writes lines in their order, all that wait at once, from its making to `finish`."""
 
-    def __init__(self, file: Unbuffered, capacity: int) -> None:
+    def __init__(self, file: FileIO, capacity: int) -> None:
         self._file = file
         self._capacity = capacity
         self._lines: list[str] = []

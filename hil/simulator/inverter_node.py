@@ -123,7 +123,7 @@ class InverterNode:
         with self._lock:
             if self._dead:
                 return
-            if self._host.heartbeat_lost(now_ns):
+            if self._host.heartbeat.lost(now_ns):
                 self._lose_host(HEARTBEAT_ERROR)
                 if self._state is NmtState.OPERATIONAL:
                     self._state = _LOST_HOST_STATES.get(self._error_behaviour(), self._state)
@@ -324,7 +324,7 @@ class InverterNode:
         if index == _PRODUCER_HEARTBEAT_TIME:
             self._start_heartbeat(value / 1000.0)
         elif (index, subindex) == _CONSUMER_HEARTBEAT_TIME:
-            self._host.heartbeat = HeartbeatConsumer.from_object(value)
+            self._host.heartbeat = HeartbeatConsumer(value)
             self._hear(self._host.heartbeat.cob_id, self._on_heartbeat)
             if self._looking is None:
                 self._looking = Ticker(LOOK_EVERY_S, self._look_by_the_clock, f"host watch of node {self._node_id}")

@@ -114,18 +114,17 @@ def attachment_of(kind: str, added_utc: str, path: Path | None, document: str) -
 
 def entry_at(recording: Path, outcome: str = COMPLETE) -> RunEntry:
     """Make the entry of a recording from what it says of itself; what ended it early, too, if nobody else knows."""
-    facts = read_facts(recording)
-    said = facts.metadata
+    said, extent = read_facts(recording)
     rig_text = said.get(RIG_TEXT, "")
     eds = {key[len("eds_") : -len("_sha256")]: value for key, value in said.items() if _is_eds(key)}
     return RunEntry(
-        recording=facts.path,
+        recording=recording,
         data_sha256=said.get(CHECKSUM, ""),
         experiment=said.get(EXPERIMENT, ""),
         started_utc=said.get(STARTED, ""),
-        duration_s=facts.extent.duration_s,
-        samples=facts.extent.n_rows,
-        flagged=facts.extent.flagged,
+        duration_s=extent.duration_s,
+        samples=extent.n_rows,
+        flagged=extent.flagged,
         software_version=said.get(VERSION, ""),
         rig_name=_rig_name(rig_text),
         rig_text=rig_text,

@@ -166,13 +166,15 @@ class RunStore:
         runs = [run for number, files in listed if (run := self._read(number, files, bool(asked.text))) is not None]
         taken = [run for run in runs if asked.takes(run)]
         taken.sort(key=lambda run: (run.entry.started_utc, run.run_id))
-        return [_without_documents(run) for run in taken] if asked.text else taken
+        if asked.text:
+            return [replace(run, attachments=tuple(replace(a, document="") for a in run.attachments)) for run in taken]
+        return taken
 
     def get(self, run_id: int) -> Run:
         files = self._listed().get(run_id)
         run = None if files is None else self._read(run_id, files, True)
         if run is None:
-            raise self._no_such(run_id)
+            raise UsageError(f"{self.path}: expected the number of a run, got {run_id}, which is none. See: hil runs")
         return run
 
     def delete(self, run_id: int) -> Run:
@@ -281,9 +283,6 @@ class RunStore:
         self.get(run_id)
         return self._listed()[run_id]
 
-    def _no_such(self, run_id: int) -> UsageError:
-        return UsageError(f"{self.path}: expected the number of a run, got {run_id}, which is none. See: hil runs")
-
     def _card(self, entry: RunEntry) -> dict[str, Any]:
         """Return an entry as it is written: its recording relative to the folder, for both may be moved together."""
         resolved = entry.recording.resolve()
@@ -313,10 +312,6 @@ class RunStore:
                 f"expected a folder that can be read and has room, got: {error.strerror or error}. Nothing of it was "
                 "entered; make room, or fix the permissions, and try again.",
             ) from error
-
-
-def _without_documents(run: Run) -> Run:
-    return replace(run, attachments=tuple(replace(each, document="") for each in run.attachments))
 
 
 def _what(path: Path) -> str:
