@@ -24,7 +24,7 @@ from drivers.plc.modbus_security import ClientSecurity
 from drivers.plc.named_registers import HostWatchdog, NamedRegisters, Reading
 from drivers.plc.register import Value
 from drivers.plc.register_map import RegisterMap, require_usable
-from drivers.plc.types import ClutchState, DriveMode, PlcStatus, PlcWatchdog, PrbsSettings, PrbsSource
+from drivers.plc.types import ClutchState, DriveMode, PlcStatus, PrbsSettings, PrbsSource
 from drivers.torque_guard import GuardedTorque
 
 NS_PER_S: Final = 1_000_000_000
@@ -197,7 +197,7 @@ class Plc:
             permissive=bool(values["permissive"]),
             speed_limit_rad_s=float(values["speed_limit"]),
             torque_limit_nm=float(values["torque_limit"]),
-            watchdog=PlcWatchdog(int(values["plc_count"]), int(values["host_count_seen"])),
+            plc_count=int(values["plc_count"]),
             prbs=_prbs_settings(values),
             prbs_torque_nm=float(values["prbs_torque"]),
             t_ns=t_ns,

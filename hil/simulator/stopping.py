@@ -106,7 +106,7 @@ LONGEST_LOOK_NS = 15 * NS_PER_MS
 
 
 class HeartbeatConsumer:
-    """Watches one heartbeat from the first that comes: node id in bits 16 to 22, time in bits 0 to 15 [ms], 0 for off."""
+    """Watches one heartbeat from the first: node id in bits 16 to 22, time in bits 0 to 15 [ms], 0 is off."""
 
     def __init__(self, value: int = 0) -> None:
         self.cob_id = HEARTBEAT_COB_ID + (value >> 16 & 0x7F)

@@ -52,7 +52,6 @@ def test_feedback_is_in_si_with_its_counts(armed: Bench) -> None:
     assert second.torque_nm == pytest.approx(second.torque_raw * 0.6)
     assert second.speed_rad_s == pytest.approx(150.0, abs=5 * 0.05)
     assert second.speed_rad_s == pytest.approx(second.speed_raw * 1e-3 * 2 * 3.14159265 / 60)
-    assert (first.sequence, second.sequence) == (1, 2)
     assert second.t_ns > first.t_ns
     assert armed.m1.latest == second
 

@@ -11,7 +11,7 @@ import pytest
 from drivers.errors import ConfigMismatch, DeviceTimeout, ProtocolViolation
 from drivers.plc.plc import GENERATOR_OFF, Plc
 from drivers.plc.register_map import RegisterMap, load_register_map
-from drivers.plc.types import ClutchState, DriveMode, PlcWatchdog, PrbsSettings, PrbsSource
+from drivers.plc.types import ClutchState, DriveMode, PrbsSettings, PrbsSource
 from drivers.resources import data_file
 from drivers.torque_guard import GuardedTorque, TorqueGuard, TorqueRequest
 from hil.simulator.plc_device import PlcDevice, PlcSetup
@@ -87,7 +87,7 @@ def test_the_status_in_si_units() -> None:
         assert status.permissive is True
         assert status.speed_limit_rad_s == 210.25
         assert status.torque_limit_nm == pytest.approx(333.3, abs=1e-9)
-        assert status.watchdog == PlcWatchdog(plc_count=7, host_count_seen=0)
+        assert status.plc_count == 7
         assert status.prbs == PrbsSettings(False, 0.0, 1, 1, PrbsSource.HOST)
         assert status.prbs_torque_nm == 0.0
         assert status.t_ns == 5 * MS

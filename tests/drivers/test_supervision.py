@@ -47,7 +47,7 @@ _noise = itertools.count()
 def answer(torque_nm: float = 0.0, speed_rad_s: float = 0.0, **more: object) -> InverterFeedback:
     """A reading that differs from the one before in its last bit, as readings do."""
     raw = next(_noise)
-    seen = InverterFeedback(torque_nm, speed_rad_s, PowerState.OPERATION_ENABLED, 0, 1, raw, 0)
+    seen = InverterFeedback(torque_nm, speed_rad_s, PowerState.OPERATION_ENABLED, 0, raw, 0)
     return seen._replace(**more)  # type: ignore[arg-type]
 
 
