@@ -42,15 +42,7 @@ BUS_OFF = 0x040
 _RECEIVE_POLL_S = 0.02  # how long `CanLink.close` may wait for the receive thread
 
 
-_OPENING_ERRORS = (
-    can.CanError,
-    HTTPException,
-    ImportError,
-    NotImplementedError,
-    OSError,
-    TypeError,
-    ValueError,
-)
+_OPENING_ERRORS = (can.CanError, HTTPException, ImportError, NotImplementedError, OSError, TypeError, ValueError)
 """What opening a bus raises, by back end: all of them mean it can't be opened as the URL has it."""
 
 

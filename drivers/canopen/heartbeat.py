@@ -78,11 +78,7 @@ class HeartbeatProducer:
     """Sends this node's heartbeat from a thread of its own until stopped."""
 
     def __init__(
-        self,
-        send: Callable[[int, bytes], None],
-        node_id: int,
-        period_s: float,
-        state: Callable[[], NmtState],
+        self, send: Callable[[int, bytes], None], node_id: int, period_s: float, state: Callable[[], NmtState]
     ) -> None:
         self._send = send
         self._cob_id = HEARTBEAT_COB_ID + node_id

@@ -99,11 +99,7 @@ EVENT_TIMER: Final = 5  # sub-index of a PDO's communication parameter; of an RP
 
 
 def _one(
-    index: int,
-    *kinds: IntegerType,
-    subindex: int = 0,
-    written: bool = False,
-    read_back: bool = False,
+    index: int, *kinds: IntegerType, subindex: int = 0, written: bool = False, read_back: bool = False
 ) -> tuple[tuple[Part, ...], ...]:
     """Write a single way of a single part."""
     return ((Part(index, subindex, kinds, written, read_back),),)

@@ -81,8 +81,7 @@ def read_commissioning(text: EdsText) -> Commissioning | None:
         return Commissioning()
     node_id, rate = (read_number(section.get(key) or "") for key in ("NodeID", "Baudrate"))
     return Commissioning(
-        node_id=node_id if node_id in NODE_IDS else None,
-        bit_rate_kbit_s=rate if rate in BIT_RATES_KBIT_S else None,
+        node_id=node_id if node_id in NODE_IDS else None, bit_rate_kbit_s=rate if rate in BIT_RATES_KBIT_S else None
     )
 
 

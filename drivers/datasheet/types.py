@@ -52,9 +52,7 @@ def read_formula(text: str) -> Formula | None:
     if node_ids > 1 or len(constants) < len(numbers):
         return None
     return Formula(
-        constant=sum(constants),
-        of_node_id=node_ids == 1,
-        hexadecimal=any(term.startswith("0X") for term in terms),
+        constant=sum(constants), of_node_id=node_ids == 1, hexadecimal=any(term.startswith("0X") for term in terms)
     )
 
 

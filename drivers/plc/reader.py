@@ -47,10 +47,7 @@ class PlcReader:
     """Reads the PLC's status whenever it can be read; an asynchronous context manager."""
 
     def __init__(
-        self,
-        plc: Plc,
-        backoff: Backoff | None = None,
-        sleep: Callable[[float], Awaitable[None]] = asyncio.sleep,
+        self, plc: Plc, backoff: Backoff | None = None, sleep: Callable[[float], Awaitable[None]] = asyncio.sleep
     ) -> None:
         self._plc = plc
         self._backoff = backoff or Backoff()

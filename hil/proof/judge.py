@@ -95,10 +95,7 @@ def judge(diagnosis: Json, truth: Json) -> Judgement:
     hidden = tuple(name for name in truth["effect"].split("+") if name != NOTHING)
     named = tuple(effect["name"] for effect in diagnosis["effects"])
     return Judgement(
-        outcome=_outcome(diagnosis, set(hidden)),
-        hidden=hidden,
-        named=named,
-        sizes=tuple(compare(diagnosis, truth)),
+        outcome=_outcome(diagnosis, set(hidden)), hidden=hidden, named=named, sizes=tuple(compare(diagnosis, truth))
     )
 
 

@@ -56,12 +56,7 @@ class Agreement:
 
 
 def run_real(
-    data: Path,
-    out: Path,
-    names: Sequence[str] = (),
-    jobs: int = 1,
-    progress: Progress = silent,
-    room: Path = ROOM,
+    data: Path, out: Path, names: Sequence[str] = (), jobs: int = 1, progress: Progress = silent, room: Path = ROOM
 ) -> list[Json]:
     """Run real recordings through the public command and judge what it says."""
     folders = case_folders(list(names), room)

@@ -212,8 +212,7 @@ def _rows(path: Path, text: str, form: TextForm) -> tuple[bytes, tuple[int, ...]
         line = body.count("\n", 0, body.index("\n\n")) + 1 + form.first_row_line
         line += sum(number <= line for number in skipped)
         raise RecordingError(
-            path,
-            f"line {line}: expected a row, got an empty line. Remove it; a missing sample is nan.",
+            path, f"line {line}: expected a row, got an empty line. Remove it; a missing sample is nan."
         )
     if form.delimiter == BLANKS:
         body = re.sub(r"[ \t]+", " ", re.sub(r"(?m)^[ \t]+|[ \t]+$", "", body))

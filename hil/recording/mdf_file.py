@@ -198,8 +198,7 @@ def readable(path: Path, mdf: MDF, request: Request) -> MDF:
         return decoded(path, mdf, request.dbc)
     if is_bus_log(mdf):
         raise RecordingError(
-            path,
-            "expected signals, got the frames of a bus as they were logged. Say what they mean: --dbc FILE",
+            path, "expected signals, got the frames of a bus as they were logged. Say what they mean: --dbc FILE"
         )
     return mdf
 

@@ -22,14 +22,7 @@ import numpy as np
 from hil.recording import columns
 from hil.recording.checksum import RIG_TEXT
 from hil.recording.description import described_table, description_of, metadata_of
-from hil.recording.mdf_file import (
-    channels_of,
-    foreign_metadata,
-    foreign_table,
-    foreign_tables,
-    is_unfinished,
-    opened,
-)
+from hil.recording.mdf_file import channels_of, foreign_metadata, foreign_table, foreign_tables, is_unfinished, opened
 from hil.recording.request import Request
 from hil.recording.table import Column, Kind, Table, as_column
 from hil.version import __version__

@@ -261,8 +261,7 @@ class RecordingWriter:
             ) from error
         except OSError as error:
             raise RecordingError(
-                self.path,
-                f"expected a place to write, got: {error.strerror}. Choose another folder, or fix this one.",
+                self.path, f"expected a place to write, got: {error.strerror}. Choose another folder, or fix this one."
             ) from error
         try:
             said = as_metadata({**self._metadata, OUTCOME: NOT_ENDED})

@@ -25,15 +25,7 @@ from drivers.inverter.cia402 import (
 )
 from drivers.scaling import VelocityScale
 from hil.simulator.drive_physics import DcLink, DriveSensors, ErrorList, Heat, SimulatedInverter
-from hil.simulator.stopping import (
-    KNOWN_CODES,
-    STANDARD_CODES,
-    AbortConnection,
-    Ramp,
-    Stop,
-    halt_ramp,
-    stop_between,
-)
+from hil.simulator.stopping import KNOWN_CODES, STANDARD_CODES, AbortConnection, Ramp, Stop, halt_ramp, stop_between
 
 VALUE_RANGE_EXCEEDED, VALUE_TOO_HIGH, VALUE_TOO_LOW = 0x06090030, 0x06090031, 0x06090032  # SDO abort codes
 TARGETS = (0x6071, 0x60B2)  # target torque and torque offset: neither is taken beyond max torque 0x6072

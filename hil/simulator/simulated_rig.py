@@ -75,10 +75,7 @@ class SimulatedRig:
     @property
     def torque_nm(self) -> tuple[float, float]:
         """Torques in effect now [Nm]; an absent inverter gives none."""
-        return (
-            0.0 if self._m1 is None else self._m1.torque_nm,
-            0.0 if self._m2 is None else self._m2.torque_nm,
-        )
+        return (0.0 if self._m1 is None else self._m1.torque_nm, 0.0 if self._m2 is None else self._m2.torque_nm)
 
     def add_step_callback(self, callback: StepCallback) -> None:
         """Have ``callback(time_s)`` called after each step, in the rig's own thread."""
