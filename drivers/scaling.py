@@ -30,22 +30,18 @@ class IntegerType(IntEnum):
 
     @property
     def signed(self) -> bool:
-        """True for the INTEGERxx types."""
         return self.name.startswith("INTEGER")
 
     @property
     def size_bytes(self) -> int:
-        """Width on the bus."""
         return _SIZE_BYTES[self]
 
     @property
     def low(self) -> int:
-        """Least value."""
         return _RANGE[self][0]
 
     @property
     def high(self) -> int:
-        """Greatest value."""
         return _RANGE[self][1]
 
     def encode(self, value: int, where: str) -> bytes:
@@ -99,7 +95,6 @@ class TorqueScale:
     rated_torque_nm: float  # motor rated torque, object 0x6076, in Nm
 
     def to_nm(self, raw: int) -> float:
-        """Torque [Nm] of a count."""
         return raw * self.rated_torque_nm / 1000.0
 
     def to_raw(self, torque_nm: float, where: str) -> int:
@@ -141,7 +136,6 @@ class VelocityScale:
         return cls(10.0**prefix * angle / time)
 
     def to_rad_s(self, raw: int) -> float:
-        """Speed [rad/s] of a count."""
         return raw * self.rad_s_per_count
 
     def to_raw(self, speed_rad_s: float, where: str) -> int:

@@ -41,15 +41,7 @@ from typing import Final
 from drivers.errors import CommandRefused
 from drivers.guard_limits import NS_PER_S, ErrorLimits, GuardLimits
 
-__all__ = [
-    "ROUNDING_NM",
-    "ErrorLimits",
-    "Evidence",
-    "GuardLimits",
-    "GuardedTorque",
-    "TorqueGuard",
-    "TorqueRequest",
-]
+__all__ = ["ROUNDING_NM", "ErrorLimits", "Evidence", "GuardLimits", "GuardedTorque", "TorqueGuard", "TorqueRequest"]
 
 ROUNDING_NM: Final = 1e-6
 """Slack for rounding in sums and products [Nm]: far above the 1e-13 of a double near 1000 Nm, and far below

@@ -15,7 +15,6 @@ import time
 from collections.abc import Callable
 from copy import copy
 from http.client import HTTPException
-from types import TracebackType
 from typing import Any, Self
 from urllib.parse import parse_qsl, urlsplit
 
@@ -40,19 +39,10 @@ Tap = Callable[[can.Message, int], None]
 BUS_OFF = 0x040
 """Error class of an error frame: the controller is off the bus (CAN_ERR_BUSOFF of Linux; python-can passes it on)."""
 
-_RECEIVE_POLL_S = 0.02
-"""How long `CanLink.close` may wait for the receive thread."""
+_RECEIVE_POLL_S = 0.02  # how long `CanLink.close` may wait for the receive thread
 
 
-_OPENING_ERRORS = (
-    can.CanError,
-    HTTPException,
-    ImportError,
-    NotImplementedError,
-    OSError,
-    TypeError,
-    ValueError,
-)
+_OPENING_ERRORS = (can.CanError, HTTPException, ImportError, NotImplementedError, OSError, TypeError, ValueError)
 """What opening a bus raises, by back end: all of them mean it can't be opened as the URL has it."""
 
 
@@ -131,11 +121,9 @@ class CanLink:
         self.network.tap = tap
 
     def send(self, cob_id: int, data: bytes) -> None:
-        """Send one frame."""
         self.network.send_message(cob_id, data)
 
     def sync(self) -> int:
-        """Send SYNC."""
         self.raise_if_failed()
         t_ns = time.monotonic_ns()
         self.network.send_message(SYNC_COB_ID, b"")
@@ -248,12 +236,7 @@ class CanLink:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        error_type: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
 

@@ -13,8 +13,7 @@ from drivers.canopen.silence import Silence
 from drivers.errors import BusDown, DeviceTimeout
 
 NMT_COB_ID = 0x000
-HEARTBEAT_COB_ID = 0x700
-"""Plus the node id."""
+HEARTBEAT_COB_ID = 0x700  # plus the node id
 
 HOST_NODE_ID = 127
 """Node id of the host's own heartbeat where the rig file has no other: the highest, so that it yields to every
@@ -61,12 +60,10 @@ class HeartbeatMonitor:
         self.state: NmtState | None = None
 
     def beat(self, state: NmtState, t_ns: int) -> None:
-        """Take one heartbeat."""
         self.state = state
         self._silence.beat(t_ns)
 
     def raise_if_lost(self, now_ns: int) -> None:
-        """Check at ``now_ns``."""
         if not self._silence.has_ended(now_ns):
             return
         age_ns = self._silence.length_ns(now_ns)
@@ -81,11 +78,7 @@ class HeartbeatProducer:
     """Sends this node's heartbeat from a thread of its own until stopped."""
 
     def __init__(
-        self,
-        send: Callable[[int, bytes], None],
-        node_id: int,
-        period_s: float,
-        state: Callable[[], NmtState],
+        self, send: Callable[[int, bytes], None], node_id: int, period_s: float, state: Callable[[], NmtState]
     ) -> None:
         self._send = send
         self._cob_id = HEARTBEAT_COB_ID + node_id

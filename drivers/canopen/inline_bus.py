@@ -20,8 +20,7 @@ from typing import Any
 import can
 from can.interfaces.virtual import VirtualBus, channels_lock
 
-Receiver = Callable[[can.Message], None]
-"""Takes one frame; it raises nothing."""
+Receiver = Callable[[can.Message], None]  # takes one frame; it raises nothing
 
 
 TURN_S = 1e-3

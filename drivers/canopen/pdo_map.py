@@ -18,19 +18,16 @@ RPDO_MAPPING = 0x1600
 TPDO_COMMUNICATION = 0x1800
 TPDO_MAPPING = 0x1A00
 
-COB_ID_INVALID = 1 << 31
-"""Bit of the COB-ID entry that switches a PDO off (CiA 301, 7.5.2.35)."""
+COB_ID_INVALID = 1 << 31  # bit of the COB-ID entry that switches a PDO off (CiA 301, 7.5.2.35)
 
 COB_ID_NO_RTR = 1 << 30
 """Bit by which a TPDO says that it can't be asked for by a remote frame; without meaning in an RPDO."""
 
-COB_ID_EXTENDED = 1 << 29
-"""Bit of an identifier of 29 bits, which this program neither sends nor hears."""
+COB_ID_EXTENDED = 1 << 29  # bit of an identifier of 29 bits, which this program neither sends nor hears
 
 MAX_PDO_BYTES = 8
 
-MAX_MAPPED = 64
-"""Objects a PDO can map, one bit each (CiA 301, 7.5.2.36)."""
+MAX_MAPPED = 64  # objects a PDO can map, one bit each (CiA 301, 7.5.2.36)
 
 ReadObject = Callable[[int, int], int]
 """``read(index, subindex)``: the object's value, from wherever the caller has it."""
@@ -60,7 +57,6 @@ class MappedObject:
 
     @property
     def entry(self) -> int:
-        """The mapping entry, ``0xIIIISSLL``."""
         return self.index << 16 | self.subindex << 8 | self.length_bits
 
     def __str__(self) -> str:

@@ -63,7 +63,6 @@ def forget_token(port: int, token: str) -> None:
 
 
 def kept_token(port: int) -> str | None:
-    """Return the token that is kept for a port; None where there is none."""
     try:
         return token_file(port).read_text(encoding="ascii")
     except (OSError, ValueError):

@@ -26,20 +26,17 @@ from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError
 from drivers.errors import ConfigMismatch, DeviceTimeout, ProtocolViolation
 from drivers.scaling import IntegerType
 
-_UPLOAD = 0x40
-"""Command byte of an upload initiate request."""
+_UPLOAD = 0x40  # command byte of an upload initiate request
 
 _INITIATE_REQUESTS = (1, 2)
 """Client command specifiers of download and upload initiate (CiA 301, 7.2.4.3); they name the object."""
 
-_ABORT = 4
-"""Command specifier of an abort, of client and server."""
+_ABORT = 4  # command specifier of an abort, of client and server
 
 _NAMING_RESPONSES = (2, 3, _ABORT)
 """Server command specifiers of upload and download initiate, and of abort; they name the object."""
 
-_UNNAMED = bytes(3)
-"""Multiplexer of an abort by a server that does not fill it in; there is no object 0x0000."""
+_UNNAMED = bytes(3)  # multiplexer of an abort by a server that does not fill it in; there is no object 0x0000
 
 PROBES = (b"\x00\x10\x00", b"\x01\x10\x00", b"\x18\x10\x01")
 """Multiplexers of objects that every node has (CiA 301): device type, error register, vendor-ID."""
@@ -49,8 +46,7 @@ _FRAME_BYTES = 8
 MOST_SEGMENTS = 1024
 """Of one transfer, 7 bytes each: the longest texts of a device have some hundred characters."""
 
-_OUT_OF_MEMORY = 0x05040005
-"""Abort code for a transfer that is longer than this client takes."""
+_OUT_OF_MEMORY = 0x05040005  # abort code for a transfer that is longer than this client takes
 
 
 class SdoSilence(SdoCommunicationError):
@@ -194,7 +190,6 @@ class SdoChannel:
         return self._eds.dictionary.get_variable(index, subindex) is not None
 
     def upload(self, index: int, subindex: int = 0) -> int:
-        """Read an object."""
         kind = self._eds.integer_type(index, subindex)
         data = self._transfer(index, subindex, lambda: self._client.upload(index, subindex))
         if len(data) != kind.size_bytes:
@@ -204,17 +199,6 @@ class SdoChannel:
             )
         return kind.decode(data)
 
-    def upload_text(self, index: int, subindex: int = 0) -> str:
-        """Read a VISIBLE_STRING, such as the device name 0x1008; one longer than 4 bytes comes in segments."""
-        data: bytes = self._transfer(index, subindex, lambda: self._client.upload(index, subindex))
-        try:
-            return data.rstrip(b"\0").decode("ascii")
-        except UnicodeDecodeError as error:
-            raise ProtocolViolation(
-                f"{self._where}: object {object_name(index, subindex)} came with [{data.hex(' ')}], expected a text in "
-                "ASCII (VISIBLE_STRING, CiA 301). Check the device's firmware version."
-            ) from error
-
     def download(self, index: int, subindex: int, value: int) -> None:
         """Write an object; returns when the node has acknowledged it."""
         where = f"{self._where}: object {object_name(index, subindex)}"
@@ -222,7 +206,6 @@ class SdoChannel:
         self._transfer(index, subindex, lambda: self._client.download(index, subindex, data))
 
     def download_confirmed(self, index: int, subindex: int, value: int, ignored: int = 0) -> None:
-        """Write an object and read it back."""
         self.download(index, subindex, value)
         found = self.upload(index, subindex)
         if (found ^ value) & ~ignored:

@@ -41,7 +41,6 @@ class Strangers:
         self._seen = None
 
     def raise_if_seen(self) -> None:
-        """Judge."""
         if self._seen is not None:
             raise foreign(self._seen)
 

@@ -29,8 +29,7 @@ from drivers.datasheet.objects import EdsEntry
 from drivers.datasheet.types import DATA_TYPES
 from drivers.scaling import IntegerType
 
-PDO_NUMBERS: Final = range(0x200)
-"""Offsets of the up to 512 PDOs from 0x1400, 0x1600, 0x1800 and 0x1A00."""
+PDO_NUMBERS: Final = range(0x200)  # offsets of the up to 512 PDOs from 0x1400, 0x1600, 0x1800 and 0x1A00
 
 PREDEFINED: Final = 4
 """PDOs of each direction that have an identifier in the pre-defined connection set (CiA 301, 7.3.5)."""
@@ -53,8 +52,7 @@ RESERVED_COB_IDS: Final = (
 """Identifiers that no PDO may have (CiA 301, table 38: restricted), and SYNC's."""
 
 
-ObjectId = tuple[int, int]
-"""Index and subindex of an object."""
+ObjectId = tuple[int, int]  # index and subindex of an object
 
 
 def object_name(index: int, subindex: int) -> str:
@@ -88,8 +86,7 @@ TPDO: Final = Direction("TPDO", TPDO_COMMUNICATION, TPDO_MAPPING, ("ro", "rw", "
 """A command may take effect at any SYNC; feedback has to come at every one."""
 
 EVERY_SYNC: Final = 1
-EVENT_DRIVEN: Final = (254, 255)
-"""Transmission types (CiA 301, 7.5.2.35)."""
+EVENT_DRIVEN: Final = (254, 255)  # transmission types (CiA 301, 7.5.2.35)
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +99,6 @@ class Carrier:
     fixed: frozenset[tuple[int, int]]  # entries ``(index, subindex)`` of its parameters that can't be written
 
     def carries(self, index: int, subindex: int = 0) -> bool:
-        """Whether an object is mapped."""
         return any((mapped.index, mapped.subindex) == (index, subindex) for mapped in self.layout.objects)
 
     @property
@@ -134,7 +130,6 @@ def cob_id_of(sheet: DataSheet, direction: Direction, number: int, taken: Collec
 
 
 def _described(sheet: DataSheet, direction: Direction, number: int) -> PdoLayout:
-    """Read what the data sheet has."""
 
     def read(index: int, subindex: int) -> int:
         value = sheet.value(index, subindex)

@@ -43,7 +43,6 @@ class CarrierSearch:
     others: tuple[str, ...] = ()
 
     def carries(self, index: int, subindex: int = 0) -> bool:
-        """Whether an object is carried."""
         return any(carrier.carries(index, subindex) for carrier in self.carriers)
 
 

@@ -39,7 +39,6 @@ class Ability:
 
     @property
     def given(self) -> bool:
-        """Whether the drive has it."""
         return bool(self.parts)
 
     def writable(self, sheet: DataSheet) -> bool:
@@ -107,7 +106,6 @@ class DrivePlan:
     further: CarrierSearch  # the search for the TPDOs that carry those which the feedback's do not carry
 
     def has(self, function: Function) -> bool:
-        """Whether the drive has a function."""
         return self.abilities[function].given
 
     @property
@@ -118,7 +116,6 @@ class DrivePlan:
 
     @property
     def carriers(self) -> tuple[Carrier, ...]:
-        """The PDOs found."""
         return (*self.command.carriers, *self.feedback.carriers, *self.further.carriers)
 
     @property
@@ -138,7 +135,6 @@ class DrivePlan:
         )
 
     def pdos(self, direction: Direction) -> tuple[Carrier, ...]:
-        """Give the PDOs of a direction, one or more."""
         if self.missing:
             lacking = "; ".join(_lacking(each) for each in self.missing)
             raise ConfigMismatch(

@@ -25,8 +25,7 @@ from drivers.scaling import IntegerType, VelocityScale
 SI_UNIT_VELOCITY: Final = 0x60A9
 NOTATION_INDEX, DIMENSION_INDEX = 0x608B, 0x608C
 
-INCREMENTS: Final = 0xB5
-"""Code of increments in the field of the angle (CiA 402)."""
+INCREMENTS: Final = 0xB5  # code of increments in the field of the angle (CiA 402)
 
 _DIMENSIONS: Final = MappingProxyType({0xA3: 2.0 * math.pi, 0xA4: 2.0 * math.pi / 60.0})
 """Velocity dimension index (CiA 402 version 2, annex B) to rad/s."""
@@ -65,12 +64,10 @@ class SpeedUnit:
 
     @property
     def needs_increments(self) -> bool:
-        """Whether the unit is one of increments."""
         return self.unit in (SpeedUnitName.INCREMENTS_PER_S, SpeedUnitName.INCREMENTS_PER_MS)
 
     @property
     def scale(self) -> VelocityScale:
-        """Scale of a count."""
         return VelocityScale(_RAD_S[self.unit] / (self.counts_per_unit * (self.increments_per_turn or 1.0)))
 
     def __str__(self) -> str:

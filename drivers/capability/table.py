@@ -75,7 +75,6 @@ class Part:
     kinds: tuple[IntegerType, ...]  # data types it may have
     written: bool = False  # whether it is written
     read_back: bool = False  # whether what is written is read back
-    carried: bool = False  # whether a PDO has to carry it
     held: range | None = None  # values it may hold for good where it can't be written
 
 
@@ -95,23 +94,15 @@ _I8, _I16, _I32 = IntegerType.INTEGER8, IntegerType.INTEGER16, IntegerType.INTEG
 _U8, _U16, _U32 = IntegerType.UNSIGNED8, IntegerType.UNSIGNED16, IntegerType.UNSIGNED32
 _F, _W = Function, Without
 
-SYNC_COB_ID: Final = 0x080
-"""Identifier of the host's SYNC."""
-
-EVENT_TIMER: Final = 5
-"""Sub-index of a PDO's communication parameter; of an RPDO it is the deadline [ms]."""
+SYNC_COB_ID: Final = 0x080  # identifier of the host's SYNC
+EVENT_TIMER: Final = 5  # sub-index of a PDO's communication parameter; of an RPDO it is the deadline [ms]
 
 
 def _one(
-    index: int,
-    *kinds: IntegerType,
-    subindex: int = 0,
-    written: bool = False,
-    read_back: bool = False,
-    carried: bool = False,
+    index: int, *kinds: IntegerType, subindex: int = 0, written: bool = False, read_back: bool = False
 ) -> tuple[tuple[Part, ...], ...]:
     """Write a single way of a single part."""
-    return ((Part(index, subindex, kinds, written, read_back, carried),),)
+    return ((Part(index, subindex, kinds, written, read_back),),)
 
 
 NEVER_WITHOUT: Final = "the drive can't be used"
@@ -119,8 +110,8 @@ NEVER_WITHOUT: Final = "the drive can't be used"
 _OWN_REACTION: Final = "the drive does what its maker has set"
 
 _ROWS: Final = (
-    Capability(_F.CONTROLWORD, _one(0x6040, _U16, written=True, carried=True), _W.REFUSED, NEVER_WITHOUT),
-    Capability(_F.STATUSWORD, _one(0x6041, _U16, carried=True), _W.REFUSED, NEVER_WITHOUT),
+    Capability(_F.CONTROLWORD, _one(0x6040, _U16, written=True), _W.REFUSED, NEVER_WITHOUT),
+    Capability(_F.STATUSWORD, _one(0x6041, _U16), _W.REFUSED, NEVER_WITHOUT),
     Capability(_F.MODE, _one(0x6060, _I8, written=True), _W.REFUSED, NEVER_WITHOUT),
     Capability(_F.MODE_DISPLAY, _one(0x6061, _I8), _W.REFUSED, NEVER_WITHOUT),
     Capability(
@@ -130,16 +121,16 @@ _ROWS: Final = (
         "the mode display 0x6061 alone confirms the mode",
         "a mode the drive does not have is found when it is armed",
     ),
-    Capability(_F.TORQUE_TARGET, _one(0x6071, _I16, written=True, carried=True), _W.REFUSED, NEVER_WITHOUT),
+    Capability(_F.TORQUE_TARGET, _one(0x6071, _I16, written=True), _W.REFUSED, NEVER_WITHOUT),
     Capability(
         _F.TORQUE_OFFSET,
-        _one(0x60B2, _I16, written=True, carried=True),
+        _one(0x60B2, _I16, written=True),
         _W.DONE,
         "base torque and PRBS are summed into 0x6071; the host keeps them apart, also in the recording",
         "the drive's own trace and a bus trace show the sum; in profile torque mode the slope acts on the PRBS too",
     ),
-    Capability(_F.TORQUE_ACTUAL, _one(0x6077, _I16, carried=True), _W.REFUSED, NEVER_WITHOUT),
-    Capability(_F.SPEED_ACTUAL, _one(0x606C, _I32, carried=True), _W.REFUSED, NEVER_WITHOUT),
+    Capability(_F.TORQUE_ACTUAL, _one(0x6077, _I16), _W.REFUSED, NEVER_WITHOUT),
+    Capability(_F.SPEED_ACTUAL, _one(0x606C, _I32), _W.REFUSED, NEVER_WITHOUT),
     Capability(
         _F.SPEED_UNIT,
         (

@@ -35,7 +35,6 @@ class Commissioning:
 
     node_id: int | None = None  # its node id
     bit_rate_kbit_s: int | None = None  # bit rate of its bus [kbit/s]; None if it says none from 10 to 1000
-    node_name: str = ""  # its name there
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,14 +81,11 @@ def read_commissioning(text: EdsText) -> Commissioning | None:
         return Commissioning()
     node_id, rate = (read_number(section.get(key) or "") for key in ("NodeID", "Baudrate"))
     return Commissioning(
-        node_id=node_id if node_id in NODE_IDS else None,
-        bit_rate_kbit_s=rate if rate in BIT_RATES_KBIT_S else None,
-        node_name=section.get("NodeName") or "",
+        node_id=node_id if node_id in NODE_IDS else None, bit_rate_kbit_s=rate if rate in BIT_RATES_KBIT_S else None
     )
 
 
-DUMMY_TYPES = range(1, 8)
-"""Data types that a PDO may carry as a filler, where ``[DummyUsage]`` allows it."""
+DUMMY_TYPES = range(1, 8)  # data types that a PDO may carry as a filler, where ``[DummyUsage]`` allows it
 
 
 def build_dictionary(text: EdsText, objects: Mapping[int, EdsObject], node_id: int) -> ObjectDictionary:
@@ -139,7 +135,6 @@ def _default(entry: EdsEntry, node_id: int) -> int | float | str | bytes | None:
 
 
 def read_real(text: str) -> float | None:
-    """Read a floating-point number; None if it is none."""
     try:
         return float(text)
     except ValueError:
@@ -170,8 +165,7 @@ def _dummy(code: int) -> ODVariable:
 
 _INTEGER_CODES = {kind.value for kind in IntegerType}
 
-_MANDATORY_SECTION = "DeviceInfo"
-"""Without it, it is another kind of file."""
+_MANDATORY_SECTION = "DeviceInfo"  # without it, it is another kind of file
 
 
 class EdsFile:

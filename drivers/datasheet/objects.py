@@ -19,14 +19,12 @@ from drivers.datasheet.text import EdsSection, EdsText
 from drivers.datasheet.types import DATA_TYPES, DOMAIN, UNSIGNED8, DataType, read_formula, read_number
 
 _PDO_PARAMETERS = range(0x1400, 0x1C00)
-_OTHER_PARAMETER = 0x200
-"""Bit by which the indices of communication and mapping parameter differ."""
+_OTHER_PARAMETER = 0x200  # bit by which the indices of communication and mapping parameter differ
 
 OBJECT_SECTION = re.compile(r"[0-9a-f]{4}")
 SUB_SECTION = re.compile(r"([0-9a-f]{4})sub([0-9a-f]{1,2})")
 
-COB_ID_MASK = 0x7FF
-"""Bits of an identifier; above them are switches."""
+COB_ID_MASK = 0x7FF  # bits of an identifier; above them are switches
 
 ACCESS_TYPES = ("ro", "wo", "rw", "rwr", "rww", "const")
 """CiA 306: rwr may be mapped into a TPDO only, rww into an RPDO only."""
@@ -45,7 +43,6 @@ class ObjectType(IntEnum):
 
     @property
     def has_entries(self) -> bool:
-        """Whether it has sub-indices."""
         return self in (ObjectType.ARRAY, ObjectType.RECORD)
 
 
@@ -83,7 +80,6 @@ class EdsEntry:
 
     @property
     def readable(self) -> bool:
-        """Whether it may be read by SDO."""
         return self.access is not None and self.access != "wo"
 
     @property

@@ -46,10 +46,8 @@ class EdsFinding:
 
 ADVICE = "Take the file from the drive's maker."
 NO_EDS = f"Expected an EDS as CiA 306 has it. {ADVICE}"
-MAX_BYTES = 16 << 20
-"""A drive's EDS has some 100 kB; a wrong file shall not fill the memory."""
-MAX_LINE_LENGTH = 255
-"""Characters in a line of an EDS (CiA 306)."""
+MAX_BYTES = 16 << 20  # a drive's EDS has some 100 kB; a wrong file shall not fill the memory
+MAX_LINE_LENGTH = 255  # characters in a line of an EDS (CiA 306)
 
 _DCF_SUFFIX = ".dcf"
 COMMISSIONING = ("DeviceComissioning", "DeviceCommissioning")
@@ -126,7 +124,6 @@ class EdsText:
 
 
 def read_eds_text(path: Path) -> EdsText:
-    """Read a file's text."""
     text, findings = _decode(path)
     reader = _Reader()
     reader.findings.extend((*findings, *_ends_of_lines(text)))
@@ -152,7 +149,7 @@ def _decode(path: Path) -> tuple[str, list[EdsFinding]]:
     if data.startswith(_UTF_8_MARK):
         data = data.removeprefix(_UTF_8_MARK)
         findings.append(
-            _finding(Severity.WARNING, 1, "text", "ASCII", "a UTF-8 byte order mark", "Save it without the mark.")
+            EdsFinding(Severity.WARNING, 1, "text", "ASCII", "a UTF-8 byte order mark", "Save it without the mark.")
         )
     return data.decode("latin-1"), findings
 
@@ -163,14 +160,10 @@ def _ends_of_lines(text: str) -> Iterator[EdsFinding]:
     if len(kinds) > 1:
         line = next(n for n, end in enumerate(ends, start=1) if end != ends[0])
         found = f"{' and '.join(sorted(kinds))} mixed, first here"
-        yield _finding(Severity.NOTE, line, "text", "one kind of line end", found, "Save it with one kind.")
+        yield EdsFinding(Severity.NOTE, line, "text", "one kind of line end", found, "Save it with one kind.")
     elif kinds == {"CR"}:
         advice = "Save it with CR LF, which every tool reads."
-        yield _finding(Severity.WARNING, 1, "text", "lines that end with CR LF or LF", "CR alone", advice)
-
-
-def _finding(severity: Severity, line: int, place: str, expected: str, found: str, advice: str) -> EdsFinding:
-    return EdsFinding(severity, line, place, expected, found, advice)
+        yield EdsFinding(Severity.WARNING, 1, "text", "lines that end with CR LF or LF", "CR alone", advice)
 
 
 class _Reader:
@@ -183,7 +176,6 @@ class _Reader:
         self._seen_foreign = False
 
     def take(self, number: int, line: str) -> None:
-        """Take one line."""
         stripped = line.strip()
         if len(line) > MAX_LINE_LENGTH:
             self._note(number, f"at most {MAX_LINE_LENGTH} characters in a line", str(len(line)), "Shorten it.")
@@ -242,10 +234,10 @@ class _Reader:
             self._err(second.line, expected, f"it again with {second.value!r}", "Keep the right one.", place)
 
     def _err(self, line: int, expected: str, found: str, advice: str, place: str = "text") -> None:
-        self.findings.append(_finding(Severity.ERROR, line, place, expected, found, advice))
+        self.findings.append(EdsFinding(Severity.ERROR, line, place, expected, found, advice))
 
     def _warn(self, line: int, expected: str, found: str, advice: str, place: str = "text") -> None:
-        self.findings.append(_finding(Severity.WARNING, line, place, expected, found, advice))
+        self.findings.append(EdsFinding(Severity.WARNING, line, place, expected, found, advice))
 
-    def _note(self, line: int, expected: str, found: str, advice: str, place: str = "text") -> None:
-        self.findings.append(_finding(Severity.NOTE, line, place, expected, found, advice))
+    def _note(self, line: int, expected: str, found: str, advice: str) -> None:
+        self.findings.append(EdsFinding(Severity.NOTE, line, "text", expected, found, advice))

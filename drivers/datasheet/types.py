@@ -13,13 +13,11 @@ from dataclasses import dataclass
 
 _NUMBER = re.compile(r"[+-]?(?:0x[0-9a-f]+|0[0-7]*|[1-9][0-9]*)", re.IGNORECASE)
 _OCTAL = re.compile(r"[+-]?0[0-9]+")
-_LONGEST = 100
-"""Characters of a number: those of 64 bit have at most 66."""
+_LONGEST = 100  # characters of a number: those of 64 bit have at most 66
 _NODE_ID = "$NODEID"
 
 
 def read_number(text: str) -> int | None:
-    """Read one number; None if it is none."""
     text = text.strip()
     if len(text) > _LONGEST or not _NUMBER.fullmatch(text):
         return None
@@ -54,9 +52,7 @@ def read_formula(text: str) -> Formula | None:
     if node_ids > 1 or len(constants) < len(numbers):
         return None
     return Formula(
-        constant=sum(constants),
-        of_node_id=node_ids == 1,
-        hexadecimal=any(term.startswith("0X") for term in terms),
+        constant=sum(constants), of_node_id=node_ids == 1, hexadecimal=any(term.startswith("0X") for term in terms)
     )
 
 

@@ -33,7 +33,6 @@ class EdsReport:
         return self.count(Severity.ERROR) == 0
 
     def count(self, severity: Severity) -> int:
-        """Count the findings of one severity."""
         return sum(finding.severity is severity for finding in self.findings)
 
 

@@ -37,12 +37,10 @@ class EdsContext:
         return None if found is None else found.entries.get(subindex)
 
 
-def at_key(
-    severity: Severity, section: EdsSection, key: str, expected: str, found: str, advice: str, *, quote: bool = True
-) -> EdsFinding:
+def at_key(severity: Severity, section: EdsSection, key: str, expected: str, found: str, advice: str) -> EdsFinding:
     """Say something about a key of a section; ``found`` is put before the value as written, if there is one."""
     written = section.keys.get(key.lower())
-    got = f"{found} {written.value!r}".lstrip() if quote and written is not None and written.value else found
+    got = f"{found} {written.value!r}".lstrip() if written is not None and written.value else found
     return EdsFinding(severity, section.line_of(key), f"[{section.name}] {key}", expected, got or "nothing", advice)
 
 
@@ -54,8 +52,3 @@ def at_section(severity: Severity, section: EdsSection, expected: str, found: st
 def at_file(severity: Severity, place: str, expected: str, found: str, advice: str) -> EdsFinding:
     """Say something that has no line: what it is about is not there."""
     return EdsFinding(severity, None, place, expected, found, advice)
-
-
-def hexadecimal(index: int, subindex: int | None = None) -> str:
-    """Name an object: ``0x1018`` or ``0x1018:01``."""
-    return f"0x{index:04X}" if subindex is None else f"0x{index:04X}:{subindex:02X}"

@@ -10,11 +10,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from drivers.canopen.emcy import EMCY_COB_ID
+from drivers.canopen.sdo import object_name
 from drivers.capability.plan import Ability, DrivePlan, Shortcoming
 from drivers.capability.speed_unit import described_scale, speed_unit_line, unit_in_words
 from drivers.capability.table import SYNC_COB_ID, Function, Without
 from drivers.datasheet.text import EdsFinding, Severity
-from drivers.eds_check.context import EdsContext, at_file, at_key, at_section, hexadecimal
+from drivers.eds_check.context import EdsContext, at_file, at_key, at_section
 from drivers.inverter.cia402 import TorqueMode
 from drivers.inverter.drive_settings import (
     ABORT_CONNECTION,
@@ -75,7 +76,7 @@ def _said_elsewhere(lacking: Shortcoming) -> bool:
 def _shortcoming(context: EdsContext, ability: Ability, lacking: Shortcoming, refused: bool) -> EdsFinding:
     row, part = ability.capability, lacking.part
     severity = Severity.ERROR if refused else Severity.WARNING
-    name = f"{row.function.value} {hexadecimal(part.index, part.subindex)}"
+    name = f"{row.function.value} {object_name(part.index, part.subindex)}"
     advice = "A drive without it can't be used." if refused else f"Not used: {row.instead}."
     if lacking.entry is not None:
         return at_key(severity, lacking.entry.section, lacking.key, f"{lacking.expected} for {name}", "", advice)

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from drivers.canopen.pdo_map import COB_ID_EXTENDED, COB_ID_INVALID, MAX_MAPPED, MAX_PDO_BYTES, MappedObject
+from drivers.canopen.sdo import object_name
 from drivers.capability.carrier import FILLERS, MULTIPLEX, PDO_NUMBERS, RPDO, TPDO, Carrier, Direction, is_reserved
 from drivers.capability.carrier_search import CarrierSearch
 from drivers.capability.plan import COMMAND, FEEDBACK, wanted_names
@@ -15,13 +16,12 @@ from drivers.capability.table import Function
 from drivers.datasheet.objects import EdsEntry, EdsObject
 from drivers.datasheet.text import EdsFinding, Severity
 from drivers.datasheet.types import read_number
-from drivers.eds_check.context import EdsContext, at_file, at_key, at_section, hexadecimal
+from drivers.eds_check.context import EdsContext, at_file, at_key, at_section
 
 _AS_MAPPED = "The maker's own mapping counts."
 
 
 def check_pdos(context: EdsContext) -> Iterator[EdsFinding]:
-    """Check every PDO there is."""
     for direction in (RPDO, TPDO):
         for n in PDO_NUMBERS:
             yield from _pair(context, direction, direction.communication + n, direction.mapping + n)
@@ -31,7 +31,7 @@ def check_pdos(context: EdsContext) -> Iterator[EdsFinding]:
 def _pair(context: EdsContext, direction: Direction, communication: int, mapping: int) -> Iterator[EdsFinding]:
     for one, other in ((communication, mapping), (mapping, communication)):
         if one in context.objects and other not in context.objects:
-            expected = f"{hexadecimal(other)} next to it, for a {direction.name} has both"
+            expected = f"0x{other:04X} next to it, for a {direction.name} has both"
             advice = "Describe both; this PDO is not used."
             yield at_section(Severity.WARNING, context.objects[one].section, expected, "none", advice)
     if communication in context.objects:
@@ -90,7 +90,7 @@ def _mapped(
     if mapped.index in FILLERS:
         yield from _dummy(context, direction, entry, mapped, severity)
         return
-    name = hexadecimal(mapped.index, mapped.subindex)
+    name = object_name(mapped.index, mapped.subindex)
     target = context.entry(mapped.index, mapped.subindex)
     advice = f"Correct this mapping or the description of {name}."
     if target is None or target.kind is None:
@@ -134,7 +134,7 @@ def _same_cob_ids(context: EdsContext) -> Iterator[EdsFinding]:
             if first is not entry:
                 both = {given.get(each.index) for each in (first, entry)}  # in a run; a third PDO is switched off
                 severity = Severity.ERROR if len(both) == 1 and None not in both else Severity.WARNING
-                expected = f"another identifier than {hexadecimal(first.index)} (line {first.section.line})"
+                expected = f"another identifier than 0x{first.index:04X} (line {first.section.line})"
                 yield at_key(
                     severity, entry.section, entry.value_key, expected, "", "Switch one off, or give it another."
                 )
@@ -207,7 +207,7 @@ def _as_described(context: EdsContext, carrier: Carrier) -> Iterator[EdsFinding]
     for place in sorted(carrier.fixed):
         entry = context.entry(*place)
         if entry is not None:
-            expected = f"{hexadecimal(*place)} that can be written"
+            expected = f"{object_name(*place)} that can be written"
             advice = "It is not written: the drive has to hold what stands here."
             yield at_key(Severity.NOTE, entry.section, "AccessType", expected, "", advice)
             return

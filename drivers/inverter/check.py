@@ -30,8 +30,7 @@ from drivers.inverter.drive_settings import (
 )
 from drivers.inverter.settings import InverterSettings
 
-SERIAL_NUMBER: Final = (0x1018, 4)
-"""Object and entry: the one thing in which two drives of one kind differ."""
+SERIAL_NUMBER: Final = (0x1018, 4)  # object and entry: the one thing in which two drives of one kind differ
 
 
 @dataclass(frozen=True, slots=True)

@@ -150,7 +150,6 @@ _STATE_OF_BITS = _state_of_bits()
 
 
 def state_of(statusword: int) -> PowerState:
-    """Decode the state from a statusword, 0x6041."""
     state = _STATE_OF_BITS.get(statusword & _STATE_MASK)
     if state is None:
         raise ProtocolViolation(

@@ -35,8 +35,7 @@ GUARDING: Final = ((0x100C, "guard time"), (0x100D, "life time factor"))
 
 NODES: Final = range(1, 128)
 
-NO_ACTION: Final = 0
-"""Abort connection option code that leaves the torque as it is."""
+NO_ACTION: Final = 0  # abort connection option code that leaves the torque as it is
 
 THIS_PROGRAM: Final = "this program"
 RIG_FILE: Final = "rig file"

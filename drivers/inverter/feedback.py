@@ -20,8 +20,7 @@ from drivers.scaling import TorqueScale, VelocityScale
 _LIMITED, _FOLLOWS = StatusBit.INTERNAL_LIMIT_ACTIVE.value, StatusBit.FOLLOWS_TARGET.value
 """As plain numbers, for one statusword in every cycle."""
 
-NEVER_NS = -1
-"""Before any clock's beginning."""
+NEVER_NS = -1  # before any clock's beginning
 
 
 class Received(NamedTuple):
@@ -38,7 +37,6 @@ class InverterFeedback(NamedTuple):
     speed_rad_s: float  # velocity actual value, 0x606C [rad/s]
     state: PowerState  # power state from the statusword, 0x6041
     t_ns: int
-    sequence: int  # counts what was received from this inverter, from 1
     torque_raw: int  # the counts on the bus, so that a wrong scale can be corrected later
     speed_raw: int  # the counts on the bus, so that a wrong scale can be corrected later
     limited: bool = False
@@ -100,7 +98,6 @@ class FeedbackReceiver(_TpdoReceiver):
         self._alone = tuple(at for _, at in self._places) if len(self._codecs) == 1 else None
         self._counts = [0] * len(self._codecs)
         self._taken = self._counts[:]
-        self._sequence = 0
         self.latest: InverterFeedback | None = None
 
     def messages(self) -> tuple[int, int]:
@@ -126,13 +123,11 @@ class FeedbackReceiver(_TpdoReceiver):
                 return
             statusword, torque_raw, speed_raw = (all_received[n].values[at] for n, at in self._places)
             t_ns = min(each.t_ns for each in all_received)
-        self._sequence += 1
         self.latest = InverterFeedback(
             self._torque.to_nm(torque_raw),
             self._velocity.to_rad_s(speed_raw),
             state_of(statusword),
             t_ns,
-            self._sequence,
             torque_raw,
             speed_raw,
             statusword & _LIMITED != 0,

@@ -22,13 +22,11 @@ from drivers.inverter.settings import InverterSettings
 from drivers.inverter.stop_proof import Protection, protections, require_protections
 from drivers.scaling import IntegerType
 
-COMMANDED: Final = frozenset({0x6040, 0x6060, 0x6071, 0x60B2})
-"""Set by every run, whatever was in them."""
+COMMANDED: Final = frozenset({0x6040, 0x6060, 0x6071, 0x60B2})  # set by every run, whatever was in them
 
 IDENTITY: Final = ((0x1018, 1), (0x1018, 2))
 
-MOST_PARAMETERS: Final = 0x1400, 0x1C00
-"""Between them are the PDO parameters, which a run sets."""
+MOST_PARAMETERS: Final = 0x1400, 0x1C00  # between them are the PDO parameters, which a run sets
 
 
 @dataclass(frozen=True, slots=True)

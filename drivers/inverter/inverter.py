@@ -32,8 +32,7 @@ __all__ = ["Difference", "Inverter", "InverterFeedback", "InverterSettings"]
 
 NO_TORQUE: Final = TorqueCounts()
 
-SDO_REQUEST_COB_ID: Final = 0x600
-"""Plus the node id."""
+SDO_REQUEST_COB_ID: Final = 0x600  # plus the node id
 
 
 class Inverter(InspectedInverter):

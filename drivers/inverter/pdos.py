@@ -107,7 +107,6 @@ class TorqueCounts:
 
     @property
     def total(self) -> int:
-        """Both together."""
         return self.target + self.offset
 
 

@@ -27,8 +27,7 @@ _POLL_PAUSE_S = 0.002
 """Between two reads of an object that has not followed yet; drives update these about once a ms."""
 
 
-_NO_TORQUE_PERMILLE = 10
-"""What counts as no torque: a reading at standstill is noisy [per mille of rated]."""
+_NO_TORQUE_PERMILLE = 10  # what counts as no torque: a reading at standstill is noisy [per mille of rated]
 
 
 class PowerControl:
@@ -127,7 +126,6 @@ class PowerControl:
         self._sdo.download(0x6040, 0, command.value)
 
     def state(self) -> PowerState:
-        """Read the power state from the statusword."""
         return state_of(self._sdo.upload(0x6041))
 
     def _await(self, accept: Callable[[PowerState], bool], expected: str) -> PowerState:

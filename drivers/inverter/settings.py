@@ -13,8 +13,7 @@ from drivers.capability.carrier import ObjectId
 from drivers.capability.speed_unit import SpeedUnit
 from drivers.inverter.cia402 import TorqueMode
 
-PLACEHOLDERS: Final = ("NAME", "REASON")
-"""Of name and reason, in a line to be filled in."""
+PLACEHOLDERS: Final = ("NAME", "REASON")  # of name and reason, in a line to be filled in
 
 
 @dataclass(frozen=True, slots=True)

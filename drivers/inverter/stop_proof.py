@@ -156,8 +156,7 @@ def _own_watchdogs(plan: DrivePlan) -> str:
     return f"{', '.join(found)}: see the manual" if found else ""
 
 
-SOURCE = "proof"
-"""Where the expectations come from, in the differences found."""
+SOURCE = "proof"  # where the expectations come from, in the differences found
 
 CONSUMER_HEARTBEAT = 0x1016
 
@@ -168,11 +167,8 @@ PATIENCE_S = 0.1
 """How much later than promised a drive may say that its host is gone [s]: neither end is a real-time system. With the
 defaults that is 0.25 s without host or command."""
 
-LONGEST_LOOK_S = 0.05
-"""A longer time between two looks is one in which this machine was held up [s]."""
-
-CONNECTION_LOST = (0x8100, 0x8200)
-"""Error classes of CiA 301 that say so: communication, protocol."""
+LONGEST_LOOK_S = 0.05  # a longer time between two looks is one in which this machine was held up [s]
+CONNECTION_LOST = (0x8100, 0x8200)  # error classes of CiA 301 that say so: communication, protocol
 
 
 class StopProof:

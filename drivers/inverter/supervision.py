@@ -1,4 +1,4 @@
-"""Supervision of a run: one record of each cycle, one table of rules, one place that ends it.
+"""Supervision of a run: one record of each cycle, one place that ends it; the table of rules is docs/reliability.md.
 
 A rule with a size has a tolerance and a time. While a reading is outside its tolerance, its distance from what is
 expected is summed over time, and the run ends where the sum reaches tolerance times time: 31 Nm with a tolerance of
@@ -27,14 +27,12 @@ from drivers.inverter.cia402 import FAULT_STATES, Command, PowerState, TorqueMod
 from drivers.inverter.feedback import InverterFeedback
 from drivers.inverter.settings import InverterSettings
 
-FORGOTTEN_S: Final = 10.0
-"""What has been summed up to its limit is forgotten in this time [s]."""
+FORGOTTEN_S: Final = 10.0  # what has been summed up to its limit is forgotten in this time [s]
 
 SPEED_NOISE_RAD_S: Final = 0.5
 """Ten times the noise of a resolver's speed, 0.05 rad/s: two such readings do not differ by it by chance."""
 
-SPEED_SHARE: Final = 0.05
-"""Of the greater reading: filters, and the ripple of a resolver."""
+SPEED_SHARE: Final = 0.05  # of the greater reading: filters, and the ripple of a resolver
 
 NO_TORQUE_S: Final = 1.0
 """So long a drive may be held at no torque by a limit of its own, at an error of the tolerance [s]."""
@@ -45,8 +43,7 @@ NO_TORQUE_COUNTS: Final = 2
 MOST_SURPLUS: Final = 3
 """So many TPDOs more than SYNCs end a run: a controller may hear one frame twice (ISO 11898, last bit of EOF)."""
 
-SURPLUS_CYCLES: Final = 100
-"""After so many cycles one that was too many is forgotten."""
+SURPLUS_CYCLES: Final = 100  # after so many cycles one that was too many is forgotten
 
 MOST_MISSING: Final = 25
 """Cycles without a TPDO more than with one: a drive that answers less than every second SYNC, within 1 s at 10 ms."""
@@ -81,75 +78,6 @@ def speed_tolerance_rad_s(one_rad_s: float, other_rad_s: float, counts_rad_s: fl
 def most_late(guard: GuardLimits) -> int:
     """Give how many answers may still come: an older one is too old for another rule."""
     return round(guard.feedback_timeout_s / guard.period_s)
-
-
-class Rule(NamedTuple):
-    """One row of the table: what is looked at, what is expected, within what, for how long, and what happens."""
-
-    quantity: str
-    expected: str
-    within: str
-    time: str
-    then: str = "flag, end"
-
-
-RULES: Final = (
-    Rule("power state, 0x6041", "OPERATION ENABLED, in every mode", "none", "one TPDO", "end; never enabled again"),
-    Rule("bit 12 of 0x6041 (mode 10)", "1", "none", "`state_timeout_s` until it first is, then `torque_error_time_s`"),
-    Rule(
-        "bit 11 of 0x6041",
-        f"0, or a torque above {NO_TORQUE_COUNTS} counts",
-        "`torque_error_nm`",
-        f"tolerance × {NO_TORQUE_S:g} s",
-        "end",
-    ),
-    Rule(
-        "torque 0x6077 of a drive",
-        "range of the commands within `torque_response_s` and two cycles; from 0 with bit 11",
-        "`torque_error_nm`",
-        "tolerance × `torque_error_time_s`",
-    ),
-    Rule("torques of both", "range of the summed commands", "`torque_error_sum_nm`", "tolerance × its time"),
-    Rule(
-        "reading that repeats to the last bit",
-        "the command of its first",
-        "`torque_error_nm`",
-        "tolerance × `feedback_timeout_s`",
-        "end",
-    ),
-    Rule(
-        "speed 0x606C of m1 and m2",
-        "one speed",
-        f"{SPEED_NOISE_RAD_S:g} rad/s, a count of each, {100 * SPEED_SHARE:g} %, and its change in two periods",
-        "tolerance × `torque_error_time_s`; a repeated one: after `feedback_timeout_s`",
-    ),
-    Rule(
-        "speed against both torques",
-        "not away from standstill against their sign",
-        f"{RUNAWAY_SHARE:g} of what they can give the inertia",
-        f"torque for {RUNAWAY_RAD_S:g} rad/s",
-        "end",
-    ),
-    Rule(
-        "TPDOs of each kind per SYNC",
-        "one",
-        "none",
-        f"{MOST_SURPLUS} too many within {SURPLUS_CYCLES} cycles; {MOST_MISSING} more missing than coming",
-    ),
-    Rule("age of the feedback", "one period", "none", "`feedback_timeout_s`"),
-    Rule("heartbeat and NMT state", "OPERATIONAL, in every heartbeat and no boot-up", "none", "once", "end"),
-    Rule("heartbeat", "one per `heartbeat_ms`", "none", "five periods, 0.5 s at least", "end"),
-    Rule("EMCY", "none", "none", "once", "end"),
-    Rule("frames that only the host sends", "none from others", "none", "once", "end"),
-    Rule("lateness of the host", "none", "half a period: flag", "`feedback_timeout_s`", "flag, end; blamed first"),
-)
-"""What is supervised of each drive in each cycle."""
-
-
-def rules_table() -> str:
-    """Write the table for docs/reliability.md."""
-    lines = ["| quantity | expected | within | for how long | then |", "| --- | --- | --- | --- | --- |"]
-    return "\n".join([*lines, *(f"| {' | '.join(rule)} |" for rule in RULES)])
 
 
 class DriveRecord(NamedTuple):
@@ -200,7 +128,6 @@ class Excess:
         return self._sum >= self._limit
 
     def clear(self) -> None:
-        """Forget all of it."""
         self._sum = 0.0
 
 
@@ -395,7 +322,7 @@ class _Drive:
 
 
 class Supervision:
-    """Judges every cycle of one run by `RULES`."""
+    """Judges every cycle of one run."""
 
     def __init__(self, limits: SupervisionLimits, m1: InverterSettings, m2: InverterSettings) -> None:
         guard = limits.guard
@@ -528,7 +455,6 @@ class Supervision:
         )
 
     def raise_if_ended(self) -> None:
-        """End the run where a cycle has."""
         if self.ended is not None:
             raise self.ended
 

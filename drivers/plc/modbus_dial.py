@@ -56,8 +56,7 @@ class MbapFramer(FramerSocket):
         return length, unit, transaction, pdu
 
 
-NO_RECONNECT: Final = 0
-"""pymodbus would reconnect behind the caller's back: a lost PLC must be seen."""
+NO_RECONNECT: Final = 0  # pymodbus would reconnect behind the caller's back: a lost PLC must be seen
 
 HANDSHAKE_S: Final = 5.0
 """Least time for connecting with TLS [s]: a small PLC computes for a second or two on a handshake, and once only."""
@@ -82,7 +81,6 @@ class Dial:
         self.client.ctx.callback_disconnected = self._lost  # type: ignore[method-assign]
 
     async def open(self) -> None:
-        """Connect."""
         params = self.client.ctx.comm_params  # one time-out for both is all that pymodbus has
         params.timeout_connect = self._connecting_s
         if not await self.client.connect():

@@ -80,8 +80,6 @@ class _Decoder(DecodePDU):
 class ModbusLink:
     """One connection to one Modbus TCP server, for one device id; it carries one request at a time."""
 
-    __slots__ = ("_device_id", "_dial", "_host", "_port", "_security", "_timeout_s", "_turn")
-
     def __init__(
         self, host: str, port: int, device_id: int, timeout_s: float, security: ClientSecurity | None = None
     ) -> None:
@@ -104,7 +102,6 @@ class ModbusLink:
         return self._dial is not None and self._dial.client.connected
 
     async def open(self) -> None:
-        """Connect."""
         self.close()
         dial = Dial(self._host, self._port, self._timeout_s, self._security, self.place)
         dial.client.ctx.framer = MbapFramer(_Decoder(False))

@@ -19,11 +19,8 @@ from cryptography.hazmat import asn1
 
 from drivers.errors import ConfigMismatch
 
-ROLE_OID: Final = x509.ObjectIdentifier("1.3.6.1.4.1.50316.802.1")
-"""Object identifier of the role extension."""
-
-OLDEST_TLS: Final = ssl.TLSVersion.TLSv1_2
-"""Anything older is refused in the handshake, on both sides."""
+ROLE_OID: Final = x509.ObjectIdentifier("1.3.6.1.4.1.50316.802.1")  # object identifier of the role extension
+OLDEST_TLS: Final = ssl.TLSVersion.TLSv1_2  # anything older is refused in the handshake, on both sides
 
 _VERIFY_TEXT: Final[Mapping[int, str]] = MappingProxyType(
     {
@@ -87,7 +84,6 @@ def server_context(credentials: Credentials) -> ssl.SSLContext:
 
 
 def role_of(certificate_der: bytes) -> str | None:
-    """Read the role out of a certificate."""
     return _role(x509.load_der_x509_certificate(certificate_der))
 
 

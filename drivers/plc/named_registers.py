@@ -30,8 +30,7 @@ PLAUSIBLE: Final[Mapping[str, tuple[float, float]]] = MappingProxyType(
 )
 """Least and greatest value a vehicle may have, in the unit the driver works in; 0 may be everywhere: nothing is set."""
 
-LEAST_TORQUE_NM: Final = 1e-6
-"""A torque below this and not zero is no torque but a misread number [Nm]."""
+LEAST_TORQUE_NM: Final = 1e-6  # a torque below this and not zero is no torque but a misread number [Nm]
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,8 +110,6 @@ def _advice(name: str, register: Register, words: Sequence[int]) -> str:
 class NamedRegisters:
     """Registers of one PLC; one request for each run of adjacent ones."""
 
-    __slots__ = ("_link", "_map")
-
     def __init__(self, link: ModbusLink, register_map: RegisterMap) -> None:
         self._link = link
         self._map = register_map
@@ -169,16 +166,13 @@ class NamedRegisters:
         return readings
 
 
-COUNTS: Final = 65536
-"""The count starts over here, so that it fits 16 bits."""
+COUNTS: Final = 65536  # the count starts over here, so that it fits 16 bits
 
 NS_PER_S: Final = 1_000_000_000
 
 
 class HostWatchdog:
     """Counts beats."""
-
-    __slots__ = ("_clock_ns", "_count", "_place", "_registers", "_seen_ns", "_timeout_s")
 
     def __init__(self, registers: NamedRegisters, place: str, timeout_s: float, clock_ns: Callable[[], int]) -> None:
         self._registers = registers

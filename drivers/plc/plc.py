@@ -7,7 +7,6 @@
     read_status      one request per run of adjacent registers
     write            read back; what the registers then hold must be what was written
     PRBS             started with torques that have passed the torque guard and with nothing else
-    drive mode       requested, then waited for in the status: the PLC decides, not the request
 
 The registers are those of a map file: ``eds/plc.toml``, or the rig's own.
 """
@@ -17,20 +16,16 @@ from __future__ import annotations
 import asyncio
 import time
 from collections.abc import Callable, Mapping, Sequence
-from enum import Enum
-from types import TracebackType
-from typing import Final, Self, TypeVar
+from typing import Final, Self
 
-from drivers.errors import ConfigMismatch, DeviceFault
+from drivers.errors import ConfigMismatch
 from drivers.plc.modbus_link import ModbusLink
 from drivers.plc.modbus_security import ClientSecurity
 from drivers.plc.named_registers import HostWatchdog, NamedRegisters, Reading
 from drivers.plc.register import Value
 from drivers.plc.register_map import RegisterMap, require_usable
-from drivers.plc.types import ClutchState, DriveMode, PlcStatus, PlcWatchdog, PrbsSettings, PrbsSource
+from drivers.plc.types import ClutchState, DriveMode, PlcStatus, PrbsSettings, PrbsSource
 from drivers.torque_guard import GuardedTorque
-
-Member = TypeVar("Member", bound=Enum)
 
 NS_PER_S: Final = 1_000_000_000
 
@@ -53,11 +48,8 @@ STATUS: Final = (
 GENERATOR_OFF: Final = PrbsSettings(False, 0.0, 1, 1, PrbsSource.HOST)
 """The PLC's own generator stands still, whatever it was set to."""
 
-BEAT_EVERY_S: Final = 0.1
-"""Between two beats while nothing else asks the PLC for anything [s]."""
-
-POLL_S: Final = 0.01
-"""Pause between two looks at a drive mode that is changing [s]: about one PLC cycle."""
+BEAT_EVERY_S: Final = 0.1  # between two beats while nothing else asks the PLC for anything [s]
+POLL_S: Final = 0.01  # pause between two looks while greeting [s]: about one PLC cycle
 
 
 class Plc:
@@ -71,36 +63,22 @@ class Plc:
         What its registers mean.
     timeout_s : float
         Time for connecting and for each answer [s].
-    mode_timeout_s : float
-        Time for a drive mode to take effect [s].
     beat_timeout_s : float
         Time the PLC may leave a beat unseen [s].
     greeting_timeout_s : float
         Time it may take from the first beat to the permissive [s].
     patience_s : float
-        Least time for each of these four [s].
+        Least time for each of these three [s].
     security : ClientSecurity or None
         How the connection is secured; None for plain Modbus TCP.
     clock_ns : callable
-        Monotonic clock [ns]; stamps the status and times the two time-outs above.
+        Monotonic clock [ns]; stamps the status and times the time-outs above.
 
     Raises
     ------
     ConfigMismatch
         If the map can't be used; see `drivers.plc.register_map`.
     """
-
-    __slots__ = (
-        "_clock_ns",
-        "_greeting_timeout_s",
-        "_latest",
-        "_link",
-        "_map",
-        "_mode_timeout_s",
-        "_registers",
-        "_setting_prbs",
-        "_watchdog",
-    )
 
     def __init__(
         self,
@@ -109,7 +87,6 @@ class Plc:
         register_map: RegisterMap,
         *,
         timeout_s: float = 1.0,
-        mode_timeout_s: float = 1.0,
         beat_timeout_s: float = 0.5,
         greeting_timeout_s: float = 0.5,
         patience_s: float = 0.0,
@@ -120,7 +97,6 @@ class Plc:
         self._link = ModbusLink(host, port, register_map.device_id, max(timeout_s, patience_s), security)
         self._map = register_map
         self._registers = NamedRegisters(self._link, register_map)
-        self._mode_timeout_s = max(mode_timeout_s, patience_s)
         self._watchdog = HostWatchdog(self._registers, self._link.place, max(beat_timeout_s, patience_s), clock_ns)
         self._greeting_timeout_s = max(greeting_timeout_s, patience_s)
         self._clock_ns = clock_ns
@@ -133,14 +109,10 @@ class Plc:
         return self._latest
 
     async def __aenter__(self) -> Self:
-        """Connect; see `connect`."""
         await self.connect()
         return self
 
-    async def __aexit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """Disconnect."""
+    async def __aexit__(self, *_: object) -> None:
         self.close()
 
     async def connect(self) -> None:
@@ -220,12 +192,12 @@ class Plc:
         t_ns = self._clock_ns()
         values = await self._registers.read(STATUS)
         self._latest = PlcStatus(
-            drive_mode=_member(DriveMode, values["drive_mode"]),
-            clutch=_member(ClutchState, values["clutch"]),
+            drive_mode=DriveMode(values["drive_mode"]),
+            clutch=ClutchState(values["clutch"]),
             permissive=bool(values["permissive"]),
             speed_limit_rad_s=float(values["speed_limit"]),
             torque_limit_nm=float(values["torque_limit"]),
-            watchdog=PlcWatchdog(int(values["plc_count"]), int(values["host_count_seen"])),
+            plc_count=int(values["plc_count"]),
             prbs=_prbs_settings(values),
             prbs_torque_nm=float(values["prbs_torque"]),
             t_ns=t_ns,
@@ -285,27 +257,6 @@ class Plc:
                 await self._registers.write(self._registers.encoded({"prbs_enable": True}))
         return settings
 
-    async def request_drive_mode(self, mode: DriveMode) -> None:
-        """Ask for a drive mode and wait until the PLC reports it.
-
-        Raises
-        ------
-        DeviceFault
-            If the PLC stays in another mode.
-        """
-        await self._registers.write(self._registers.encoded({"drive_mode_request": mode.value}))
-        deadline_ns = self._clock_ns() + int(self._mode_timeout_s * NS_PER_S)
-        while (current := await self._drive_mode()) is not mode:
-            if self._clock_ns() >= deadline_ns:
-                raise DeviceFault(
-                    f"{self._link.place}: drive mode is {current.value} after {self._mode_timeout_s:g} s, "
-                    f"expected {mode.value}. Look at the PLC for what keeps it from changing the mode."
-                )
-            await asyncio.sleep(POLL_S)
-
-    async def _drive_mode(self) -> DriveMode:
-        return _member(DriveMode, (await self._registers.read(("drive_mode",)))["drive_mode"])
-
     async def _verify_identity(self) -> None:
         found = await self._registers.read(self._map.identity)
         wrong = [
@@ -341,16 +292,11 @@ class Plc:
         return await self._registers.all()
 
 
-def _member(members: type[Member], value: Value) -> Member:
-    """Turn an enum's name into its member; that it has one is checked when the map is taken over."""
-    return members(value)
-
-
 def _prbs_settings(values: Mapping[str, Value]) -> PrbsSettings:
     return PrbsSettings(
         enabled=bool(values["prbs_enable"]),
         amplitude_nm=float(values["prbs_amplitude"]),
         clock_divider=int(values["prbs_divider"]),
         seed=int(values["prbs_seed"]),
-        source=_member(PrbsSource, values["prbs_source"]),
+        source=PrbsSource(values["prbs_source"]),
     )

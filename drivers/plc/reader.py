@@ -11,7 +11,6 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Awaitable, Callable, Iterator
 from dataclasses import dataclass
-from types import TracebackType
 from typing import Final, Self, TypeVar
 
 from drivers.errors import BusDown, ConfigMismatch, DeviceTimeout
@@ -47,13 +46,8 @@ class Backoff:
 class PlcReader:
     """Reads the PLC's status whenever it can be read; an asynchronous context manager."""
 
-    __slots__ = ("_backoff", "_connected", "_plc", "_sleep")
-
     def __init__(
-        self,
-        plc: Plc,
-        backoff: Backoff | None = None,
-        sleep: Callable[[float], Awaitable[None]] = asyncio.sleep,
+        self, plc: Plc, backoff: Backoff | None = None, sleep: Callable[[float], Awaitable[None]] = asyncio.sleep
     ) -> None:
         self._plc = plc
         self._backoff = backoff or Backoff()
@@ -63,9 +57,7 @@ class PlcReader:
     async def __aenter__(self) -> Self:
         return self
 
-    async def __aexit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    async def __aexit__(self, *_: object) -> None:
         self._plc.close()
 
     async def read_status(self) -> PlcStatus:

@@ -25,8 +25,7 @@ Value = bool | int | float | str
 """A register's value: bool, a number in the register's unit, or the name of an enum's member."""
 
 
-ADDRESSES: Final = 65536
-"""Addresses in each of the four tables of a Modbus device."""
+ADDRESSES: Final = 65536  # addresses in each of the four tables of a Modbus device
 
 
 class RegisterKind(Enum):
@@ -125,7 +124,6 @@ class Register(MapTable):
         return self._ordered(self._words(value))
 
     def decode(self, words: Sequence[int]) -> Value:
-        """Read words as a value."""
         if len(words) != self.size:
             raise ProtocolViolation(
                 f"{self._place}: expected {self.size} word(s), got {len(words)}. Compare the register map "

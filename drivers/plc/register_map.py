@@ -47,8 +47,7 @@ IN_SI: Final[Mapping[str, Mapping[str, float]]] = MappingProxyType(
 MOST_REGISTERS: Final = 125
 """Registers that one request may read; Modbus Application Protocol V1.1b3, 6.3 and 6.4."""
 
-MOST_BITS: Final = 2000
-"""Coils or discrete inputs that one request may read; ibid., 6.1 and 6.2."""
+MOST_BITS: Final = 2000  # coils or discrete inputs that one request may read; ibid., 6.1 and 6.2
 
 
 class RegisterMapError(ConfigMismatch):
@@ -70,7 +69,6 @@ class RegisterMap(MapTable):
     registers: dict[str, Register]  # the entries by name
 
     def __getitem__(self, name: str) -> Register:
-        """Return an entry by name."""
         if name not in self.registers:
             raise ConfigMismatch(
                 f"register map {self.name!r}: expected a register {name}, it has {', '.join(sorted(self.registers))}. "

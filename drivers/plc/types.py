@@ -40,14 +40,6 @@ class PrbsSettings:
 
 
 @dataclass(frozen=True, slots=True)
-class PlcWatchdog:
-    """Life signs both ways: what the PLC counts, and the last count of the host it has seen."""
-
-    plc_count: int
-    host_count_seen: int
-
-
-@dataclass(frozen=True, slots=True)
 class PlcStatus:
     """Everything the PLC reports."""
 
@@ -56,7 +48,7 @@ class PlcStatus:
     permissive: bool  # what the driveline is like, and whether torque is permitted
     speed_limit_rad_s: float  # largest motor speed, and largest torque of one inverter [rad/s, Nm]
     torque_limit_nm: float  # largest motor speed, and largest torque of one inverter [rad/s, Nm]
-    watchdog: PlcWatchdog  # life signs both ways
+    plc_count: int  # its sign of life
     prbs: PrbsSettings  # the settings its own generator holds
     prbs_torque_nm: float
     t_ns: int  # when the first of the requests for it left, on the host's monotonic clock

@@ -289,7 +289,7 @@ def export(
 
 
 def rebuild(store: Folder = HERE, as_json: AsJson = False) -> None:
-    """Update the list from the folder: enter recordings, find moved ones, read damaged ones again."""
+    """Update the list from the folder: enter recordings, find moved ones."""
     from hil.errors import StoreError
     from hil.store import store_of
     from hil.store.rebuild import rebuild as rebuilt
@@ -299,8 +299,6 @@ def rebuild(store: Folder = HERE, as_json: AsJson = False) -> None:
     result = rebuilt(store)
     for problem in result.unreadable:
         say(f"not entered: {problem}", err=True)
-    for text in result.lost_notes:
-        say(f"note to a run that is lost: {text}", err=True)
     if as_json:
         say(json.dumps(_document(result)))
         return
@@ -318,7 +316,7 @@ def _document(result: Rebuilt) -> dict[str, Any]:
         "copies": result.copies,
         "attached": result.attached,
         "unreadable": result.unreadable,
-        "lost_notes": result.lost_notes,
+        "lost_notes": [],
         "damaged": None,
         "removed": [str(path) for path in result.removed],
     }
@@ -328,7 +326,7 @@ def _said(result: Rebuilt) -> str:
     counts = (
         (result.before, "runs kept"),
         (result.found, "entered"),
-        (result.moved, "found or read again"),
+        (result.moved, "found again"),
         (result.copies, "copies left out"),
         (result.attached, "results attached"),
         (len(result.unreadable), "recordings unreadable"),

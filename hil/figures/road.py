@@ -217,7 +217,7 @@ RIG_FILE = Path(__file__).with_name("paper_rig.toml")
 EXPERIMENT = "cruise"
 
 GEAR_RATIO, WHEEL_RADIUS_M = 5.6, 0.48
-"""Of the bus that the default model is of (`hil.simulator.plant.DEFAULT_BUS`)."""
+"""Of the bus that the default model is of (`hil.simulator.driveline.DEFAULT_BUS`)."""
 
 ANY_PORT = Address("127.0.0.1", 0)
 

@@ -211,7 +211,7 @@ def _plc_lines(plc: PlcHealth) -> list[str]:
         f"mode {status.drive_mode.value}, clutch {status.clutch.value}, permissive "
         f"{'present' if status.permissive else 'WITHDRAWN'}; limits {status.torque_limit_nm:g} Nm each, "
         f"{status.speed_limit_rad_s:g} rad/s",
-        f"status {1e3 * (plc.age_s or 0.0):.0f} ms old, watchdog {status.watchdog.plc_count}, own PRBS "
+        f"status {1e3 * (plc.age_s or 0.0):.0f} ms old, watchdog {status.plc_count}, own PRBS "
         f"{'on' if status.prbs.enabled else 'off'}",
     ]
 

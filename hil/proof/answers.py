@@ -36,8 +36,7 @@ from hil.proof.work import Progress, work_on
 
 Row = dict[str, Any]
 
-LIMIT_S = 900.0
-"""Time one command may take before its case counts as failed."""
+LIMIT_S = 900.0  # time one command may take before its case counts as failed
 
 FAULT = "fault.txt"
 
@@ -148,14 +147,7 @@ def _answer(verdict: Path, fresh: Mapping[str, str], took_s: float) -> Answer:
         return Answer(None, diagnose_s=took_s, fault=(verdict / FAULT).read_text(encoding="utf-8").strip())
     diagnosis = json.loads((verdict / "diagnosis.json").read_text(encoding="utf-8"))
     try:
-        over_floor = [_over_floor(text, verdict / "augmented.toml") for text in fresh.values()]
+        over_floor = [fresh_over_floor(text, verdict / "augmented.toml", LIMIT_S) for text in fresh.values()]
     except CommandFailed as failure:
         return Answer(diagnosis, diagnose_s=took_s, fault=str(failure))
     return Answer(diagnosis, over_floor, took_s)
-
-
-def _over_floor(recording: str, model: Path) -> float:
-    with tempfile.TemporaryDirectory(prefix="hil-fresh-") as unsealed:
-        path = Path(unsealed) / "fresh.csv"
-        path.write_text(recording, encoding="utf-8")
-        return fresh_over_floor(path, model, LIMIT_S)

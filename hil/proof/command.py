@@ -13,21 +13,16 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hil.child import environment, python
 from hil.errors import UsageError
 from hil.proof.truth.recording import SPEED_NOISE_RAD_S
 
-MARK: Final = ".made-by-hil"
-"""File that says that this program made a folder."""
+MARK: Final = ".made-by-hil"  # file that says that this program made a folder
 
 MARK_TEXT: Final = "This folder was made by hil, which replaces it when it makes the results anew.\n"
 
-SIMULATED: Final = "speed_sim_rad_s"
-"""Column of ``hil simulate`` (CONTRACT)."""
-
-FloatArray = NDArray[np.float64]
+SIMULATED: Final = "speed_sim_rad_s"  # column of ``hil simulate`` (CONTRACT)
 
 
 class CommandFailed(Exception):
@@ -35,7 +30,6 @@ class CommandFailed(Exception):
 
 
 def run_hil(arguments: Sequence[str], folder: Path, limit_s: float) -> None:
-    """Run ``hil`` in a folder."""
     try:
         done = subprocess.run(
             python("-m", "hil", *arguments),
@@ -69,27 +63,22 @@ def replace_own(folder: Path, built: Path) -> None:
     shutil.copytree(built, folder, dirs_exist_ok=True)
 
 
-def fresh_over_floor(recording: Path, model: Path, limit_s: float) -> float:
+def fresh_over_floor(recording: str, model: Path, limit_s: float) -> float:
     """Return the free-run RMS error of a model file on a recording of the truth, over the noise of its speed reading.
 
-    The public command simulates, in a place of its own.
+    The public command simulates, in a place of its own; only samples that are good count.
     """
     with tempfile.TemporaryDirectory(prefix="hil-fresh-") as neutral:
         place = Path(neutral) / "fresh"
         place.mkdir()
-        shutil.copyfile(recording, place / "fresh.csv")
+        (place / "fresh.csv").write_text(recording, encoding="utf-8")
         shutil.copyfile(model, place / "model.toml")
         run_hil(["simulate", "--model", "model.toml", "--input", "fresh.csv", "--out", "simulated.csv"], place, limit_s)
-        simulated = _table(place / "simulated.csv")[SIMULATED]
-    read = _table(recording)
-    flags = read["flags"] if "flags" in (read.dtype.names or ()) else np.zeros(read.size)
-    return rms_over_floor(read["speed_rad_s"], flags, simulated)
-
-
-def rms_over_floor(speed_rad_s: FloatArray, flags: FloatArray, simulated_rad_s: FloatArray) -> float:
-    """Return a simulation's RMS error over the noise of the speed reading, where that is good; all of shape (N,)."""
-    good = np.isfinite(speed_rad_s) & (flags == 0)
-    error = simulated_rad_s[good] - speed_rad_s[good]
+        read, simulated_rad_s = _table(place / "fresh.csv"), _table(place / "simulated.csv")[SIMULATED]
+    good = np.isfinite(read["speed_rad_s"])
+    if "flags" in (read.dtype.names or ()):
+        good &= read["flags"] == 0
+    error = simulated_rad_s[good] - read["speed_rad_s"][good]
     return float(np.sqrt(np.mean(error**2)) / SPEED_NOISE_RAD_S)
 
 

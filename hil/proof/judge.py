@@ -92,14 +92,10 @@ class Judgement:
 
 
 def judge(diagnosis: Json, truth: Json) -> Judgement:
-    """Compare a diagnosis with the truth."""
     hidden = tuple(name for name in truth["effect"].split("+") if name != NOTHING)
     named = tuple(effect["name"] for effect in diagnosis["effects"])
     return Judgement(
-        outcome=_outcome(diagnosis, set(hidden)),
-        hidden=hidden,
-        named=named,
-        sizes=tuple(compare(diagnosis, truth)),
+        outcome=_outcome(diagnosis, set(hidden)), hidden=hidden, named=named, sizes=tuple(compare(diagnosis, truth))
     )
 
 

@@ -76,7 +76,6 @@ def _singles(catalogued: bool) -> list[str]:
 
 
 def kind(name: str) -> Kind:
-    """Return the kind of a name."""
     if name == NOTHING:
         return Kind(NOTHING, Group.NONE, NOTHING, nominal_error=0.0)
     if name == OFF:
@@ -90,8 +89,7 @@ def kind(name: str) -> Kind:
 SHARES = {Group.SINGLE: 0.5, Group.PAIR: 0.2, Group.OUTSIDE: 0.15, Group.OFF: 0.1, Group.NONE: 0.05}
 """How often each group is drawn: one effect of the catalogue in every second case."""
 
-SEEDS = 2**31
-"""Seeds of cases."""
+SEEDS = 2**31  # seeds of cases
 
 NAMES = {
     Group.SINGLE: tuple(_singles(catalogued=True)),

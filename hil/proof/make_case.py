@@ -89,7 +89,6 @@ def _share(text: str) -> float:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Make one case; return the exit status."""
     parser = argparse.ArgumentParser(
         prog="python -m hil.proof.make_case", description="Make one case with something hidden, as files."
     )

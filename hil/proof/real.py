@@ -37,8 +37,7 @@ from hil.proof.work import Progress, read_entries, silent, work_on, write_entrie
 SCHEMA = "hil.real/2"
 FILE_NAME = "real.json"
 
-LIMIT_S = 3600.0
-"""Time one command may take before its run counts as failed."""
+LIMIT_S = 3600.0  # time one command may take before its run counts as failed
 
 Json = dict[str, Any]
 
@@ -181,15 +180,13 @@ def _judged(folder: Path, case: CaseFile, out: Path, place: str, answer: Json) -
 
 def agreement(known: KnownValue, diagnosis: Mapping[str, Any]) -> Agreement:
     """Compare one known quantity with a diagnosis."""
-    entry = _entry(diagnosis, known.found)
+    entry = _entry(diagnosis, known.found) or {"value": None, "ci95": (None, None)}
+    found, (low, high) = entry["value"], entry["ci95"]
+    within = found is not None and abs(found - known.value) <= known.within * abs(known.value)
+    ci95 = None if found is None or low is None or high is None else (low, high)
+    inside = None if ci95 is None else ci95[0] <= known.value <= ci95[1]
     asked = f"within {known.within:.0%} of {known.value:g} {known.unit}"
-    if entry is None or entry["value"] is None:
-        return Agreement(known.what, known.unit, known.value, None, None, None, False, asked)
-    found, (low, high) = float(entry["value"]), entry["ci95"]
-    within = abs(found - known.value) <= known.within * abs(known.value)
-    if low is None or high is None:
-        return Agreement(known.what, known.unit, known.value, found, None, None, within, asked)
-    return Agreement(known.what, known.unit, known.value, found, (low, high), low <= known.value <= high, within, asked)
+    return Agreement(known.what, known.unit, known.value, found, ci95, inside, within, asked)
 
 
 def _entry(diagnosis: Mapping[str, Any], place: str) -> Mapping[str, Any] | None:

@@ -15,7 +15,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
-from typing import IO, Any, Final, cast
+from typing import IO, Any, Final
 
 import tomlkit
 
@@ -35,8 +35,7 @@ EXPERIMENTS = ("cruise", "reversal", "tip")
 SCHEMA = "hil.wire/1"
 RESULTS = "wire.json"
 
-LIMIT_S = 600.0
-"""Time one command may take [s]."""
+LIMIT_S = 600.0  # time one command may take [s]
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,62 +80,40 @@ WIRED: Final[Mapping[str, Concealed]] = MappingProxyType(
 
 _READY = re.compile(r"ready bus=(?P<bus>\S+) modbus=(?P<modbus>\S+) commitment=(?P<commitment>[0-9a-f]{64})\n")
 
-_END_S = 5.0
-"""Time the process gets to end by itself once its input has ended [s]."""
+_END_S = 5.0  # time the process gets to end by itself once its input has ended [s]
 
 
-@dataclass(frozen=True, slots=True)
 class SealedProcess:
-    """A sealed rig that is up."""
+    """A sealed rig that is up: its addresses and commitment, as in its ready line."""
 
-    bus: str  # as in its ready line
-    modbus: str  # as in its ready line
-    commitment: str  # as in its ready line
-    _pipes: _Pipes
+    def __init__(self, process: subprocess.Popen[str], complaints: IO[bytes]) -> None:
+        self._process: Any = process  # whose streams are pipes
+        self._complaints = complaints
+        line = self._answer()
+        ready = _READY.fullmatch(line)
+        if ready is None:
+            raise RunAborted(f"sealed rig: expected 'ready bus=... modbus=... commitment=...', got {line!r}")
+        self.bus, self.modbus, self.commitment = ready.group("bus", "modbus", "commitment")
 
     def open(self) -> object:
         """Have the seal opened; return it as read from JSON, to be verified against the commitment."""
-        return json.loads(self._pipes.ask(OPEN))
-
-
-@dataclass(frozen=True, slots=True)
-class _Pipes:
-    """The process with its three standard streams."""
-
-    process: subprocess.Popen[str]
-    asked: IO[str]
-    answers: IO[str]
-    complaints: IO[bytes]
-
-    def ask(self, line: str) -> str:
         try:
-            self.asked.write(f"{line}\n")
-            self.asked.flush()
+            self._process.stdin.write(f"{OPEN}\n")
+            self._process.stdin.flush()
         except BrokenPipeError as error:
             raise self._gone() from error
-        return self.answer()
+        return json.loads(self._answer())
 
-    def answer(self) -> str:
-        line = self.answers.readline()
+    def _answer(self) -> str:
+        line: str = self._process.stdout.readline()
         if not line:
             raise self._gone()
         return line
 
-    def end(self) -> None:
-        """End the process: by the end of its input, or by force if that is not heard."""
-        with suppress(BrokenPipeError):  # what was still to be written to a process that is gone
-            self.asked.close()
-        try:
-            self.process.wait(_END_S)
-        except subprocess.TimeoutExpired:
-            self.process.kill()
-            self.process.wait()
-        self.answers.close()
-
     def _gone(self) -> RunAborted:
-        status = self.process.wait()
-        self.complaints.seek(0)
-        said = self.complaints.read().decode(errors="replace").strip() or "nothing"
+        status = self._process.wait()
+        self._complaints.seek(0)
+        said = self._complaints.read().decode(errors="replace").strip() or "nothing"
         return RunAborted(f"sealed rig: expected an answer, but it ended with status {status}; it said: {said}")
 
 
@@ -148,38 +125,35 @@ def sealed_process(*arguments: str) -> Iterator[SealedProcess]:
     still has a rig to disarm. If this process dies, the end of its input ends the rig too.
     """
     with tempfile.TemporaryFile() as complaints, tempfile.TemporaryDirectory(prefix="hil-sealed-") as folder:
-        pipes = _start(arguments, complaints, folder)
+        process = subprocess.Popen(
+            python("-m", "hil.proof.sealed_rig", *arguments),
+            cwd=folder,
+            env=environment(),
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=complaints,
+            text=True,
+            start_new_session=True,
+        )
         try:
-            yield _meet(pipes)
+            yield SealedProcess(process, complaints)
         finally:
-            pipes.end()
+            _end(process)
 
 
-def _start(arguments: tuple[str, ...], complaints: IO[bytes], folder: str) -> _Pipes:
-    process = subprocess.Popen(
-        python("-m", "hil.proof.sealed_rig", *arguments),
-        cwd=folder,
-        env=environment(),
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=complaints,
-        text=True,
-        start_new_session=True,
-    )
-    asked, answers = cast(IO[str], process.stdin), cast(IO[str], process.stdout)  # both are pipes, see above
-    return _Pipes(process, asked, answers, complaints)
-
-
-def _meet(pipes: _Pipes) -> SealedProcess:
-    line = pipes.answer()
-    ready = _READY.fullmatch(line)
-    if ready is None:
-        raise RunAborted(f"sealed rig: expected 'ready bus=... modbus=... commitment=...', got {line!r}")
-    return SealedProcess(ready["bus"], ready["modbus"], ready["commitment"], pipes)
+def _end(process: Any) -> None:
+    """End a process: by the end of its input, or by force if that is not heard."""
+    with suppress(BrokenPipeError):  # what was still to be written to a process that is gone
+        process.stdin.close()
+    try:
+        process.wait(_END_S)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()
+    process.stdout.close()
 
 
 def rig_text(sealed: SealedProcess) -> str:
-    """Return the text of the rig file."""
     document: Any = tomlkit.parse(RIG_FILE.read_text(encoding="utf-8"))
     host, _, port = sealed.modbus.rpartition(":")
     document["can"]["url"] = sealed.bus

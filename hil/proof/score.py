@@ -9,6 +9,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
+from scipy.stats import binomtest
 
 from estimator.physics.catalogue import EFFECTS as CATALOGUE
 from hil.proof.judge import Judgement, Outcome, judge
@@ -22,11 +23,8 @@ Intervals = Sequence[Sequence[float]]
 ALIKE = "alike"
 """Outcome besides those of `Outcome`: right, by way of an effect declared to be the same to torque and speed."""
 
-FAILED = "failed"
-"""Outcome besides those of `Outcome`: a command gave no result."""
-
-RESOLUTION_S = 0.01
-"""Intervals are compared on a grid of one sample."""
+FAILED = "failed"  # outcome besides those of `Outcome`: a command gave no result
+RESOLUTION_S = 0.01  # intervals are compared on a grid of one sample
 
 RECORDING_S = 30.0
 
@@ -136,10 +134,6 @@ def _inside(time_s: np.ndarray[Any, Any], intervals: Intervals) -> np.ndarray[An
     return inside
 
 
-Z95 = 1.959963984540054
-"""Two-sided 95 % quantile of the standard normal distribution."""
-
-
 @dataclass(frozen=True, slots=True)
 class Rate:
     """A share of trials with its 95 % interval."""
@@ -155,12 +149,10 @@ class Rate:
     @property
     def interval(self) -> tuple[float, float]:
         """Wilson's score interval (J. Am. Stat. Assoc. 22, 1927); 0 to 1 without any trial."""
-        n = self.trials
-        if n == 0:
+        if not self.trials:
             return 0.0, 1.0
-        middle = (self.hits + 0.5 * Z95**2) / (n + Z95**2)
-        half = Z95 / (n + Z95**2) * math.sqrt(self.hits * (n - self.hits) / n + 0.25 * Z95**2)
-        return max(0.0, middle - half), min(1.0, middle + half)
+        interval = binomtest(self.hits, self.trials).proportion_ci(method="wilson")
+        return float(interval.low), float(interval.high)
 
     def as_json(self) -> dict[str, Any]:
         """Return it for ``summary.json``."""
@@ -177,14 +169,6 @@ def share(of: Iterable[bool]) -> Rate:
     """Count what is true."""
     flags = list(of)
     return Rate(sum(flags), len(flags))
-
-
-def by_kind(rows: Sequence[Row]) -> dict[str, list[Row]]:
-    """Group rows by what was planted, in the order in which it comes."""
-    groups: dict[str, list[Row]] = {}
-    for row in rows:
-        groups.setdefault(row["kind"], []).append(row)
-    return groups
 
 
 def outcomes(rows: Sequence[Row]) -> dict[str, int]:

@@ -19,11 +19,8 @@ from hil.report.made import made_section
 
 SCHEMA = "hil.scoreboard/1"
 PAGE, DATA = "scoreboard.html", "scoreboard.json"
-WIRE, REAL = "wire", "real"
-"""Folders next to the page."""
-
-FALSE_CLAIMS = ("false_claim", "wrong", "invented")
-"""Outcomes in which something was named that is not there."""
+WIRE, REAL = "wire", "real"  # folders next to the page
+FALSE_CLAIMS = ("false_claim", "wrong", "invented")  # outcomes in which something was named that is not there
 
 FOOTER = (
     "hil prove. What was hidden was drawn by a simulator that shares no code with the model that is fitted, and sealed "

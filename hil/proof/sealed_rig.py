@@ -35,8 +35,7 @@ from hil.simulator.rig_server import RigServer
 RIG_FILE = Path(__file__).with_name("demo_rig.toml")
 """The rig the challenge stands in, where no other is named."""
 
-OPEN = "open"
-"""The line that opens the seal."""
+OPEN = "open"  # the line that opens the seal
 
 _BAD_INPUT = 2
 

@@ -33,11 +33,8 @@ COMMITMENTS = Path(CASES) / "commitments.json"
 VERDICTS_LIST = Path(VERDICTS) / "verdicts.json"
 SCHEMA = "hil.prove/1"
 
-_SHOWN = 80
-"""Characters of a wrong name that a message shows."""
-
-Digests = Mapping[str, str]
-"""File name to SHA-256."""
+_SHOWN = 80  # characters of a wrong name that a message shows
+Digests = Mapping[str, str]  # file name to SHA-256
 
 
 def make(folder: Path, cases: int, seed: int, key: bytes, jobs: int, progress: Progress) -> None:
@@ -105,7 +102,6 @@ class Shown:
 
 
 def read_commitments(folder: Path) -> dict[str, Shown]:
-    """Read the cases of a set by name."""
     path, advice = folder / COMMITMENTS, "hil prove make DIR makes one"
     listed = read_list(path, advice)
     for name, entry in listed.items():

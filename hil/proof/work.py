@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from hil.errors import UsageError
-from hil.files import read_json
+from hil.files import read_json, write_whole
 
 Result = TypeVar("Result")
 
@@ -48,7 +48,6 @@ def work_on(
 
 
 def read_entries(path: Path, schema: str, key: str, advice: str) -> Any:
-    """Return what `write_entries` has written."""
     try:
         content = read_json(path)
     except OSError as error:
@@ -63,7 +62,5 @@ def read_entries(path: Path, schema: str, key: str, advice: str) -> Any:
 def write_entries(path: Path, schema: str, key: str, entries: object) -> None:
     """Write entries as JSON; a reader finds the old ones or the new ones."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    unfinished = path.with_name(f".{path.name}.unfinished")
     text = json.dumps({"schema": schema, key: entries}, indent=1, ensure_ascii=False, allow_nan=False)
-    unfinished.write_text(f"{text}\n", encoding="utf-8")
-    unfinished.replace(path)
+    write_whole(path, f"{text}\n")

@@ -13,12 +13,4 @@ from hil.recording.signals_config import SignalsConfig
 from hil.recording.table import Table
 from hil.recording.writer import RecordingWriter
 
-__all__ = [
-    "RecordingWriter",
-    "SignalsConfig",
-    "Table",
-    "read_record",
-    "read_records",
-    "read_table",
-    "write_table",
-]
+__all__ = ["RecordingWriter", "SignalsConfig", "Table", "read_record", "read_records", "read_table", "write_table"]

@@ -26,11 +26,6 @@ BYTES_PER_S: Final = 2e5
 """Time it may take: a floor, and for large files a twentieth of the 4 MB/s measured with MDF."""
 
 
-def most_cells(file_bytes: int) -> int:
-    """Return how many cells a recording of that size may have."""
-    return max(CELLS, file_bytes)
-
-
 def memory_bytes(file_bytes: int) -> int:
     """Return what reading a recording of that size may take [byte]."""
     return max(MEMORY_BYTES, MEMORY_PER_BYTE * file_bytes)
@@ -43,11 +38,12 @@ def processor_s(file_bytes: int) -> float:
 
 def require_cells(path: Path, cells: int) -> None:
     """Refuse what is more than a recording of its file's size can be, before any of it is read."""
-    most = most_cells(path.stat().st_size)
+    size = path.stat().st_size
+    most = max(CELLS, size)
     if cells > most:
         raise RecordingError(
             path,
-            f"expected at most {most} cells in a file of {path.stat().st_size} bytes, got {cells}. It is damaged, or "
+            f"expected at most {most} cells in a file of {size} bytes, got {cells}. It is damaged, or "
             "made to fill the memory; cut a recording that is so large into several.",
         )
 
@@ -62,8 +58,7 @@ def damaged(path: Path, expected: str, error: Exception) -> RecordingError:
     """Return what is raised for a file of which a library says that it is not whole."""
     got = str(error) or type(error).__name__
     return RecordingError(
-        path,
-        f"expected {expected}, got a damaged or truncated one ({got.rstrip('.')}). Take a copy that is whole.",
+        path, f"expected {expected}, got a damaged or truncated one ({got.rstrip('.')}). Take a copy that is whole."
     )
 
 

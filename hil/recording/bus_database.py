@@ -15,12 +15,10 @@ from typing import Any, Final
 from drivers.canopen.pdo_map import TPDO_COMMUNICATION, TPDO_MAPPING, PdoLayout, read_layout
 from drivers.capability.speed_unit import DIMENSION_INDEX, NOTATION_INDEX, SI_UNIT_VELOCITY, scale_of
 from drivers.datasheet.file import DataSheet, EdsFile
-from drivers.datasheet.objects import EdsEntry
 from drivers.errors import DriverError
 from hil.errors import RecordingError
 
-LARGEST_BYTES: Final = 32 << 20
-"""A DBC file of a whole vehicle has some megabytes."""
+LARGEST_BYTES: Final = 32 << 20  # a DBC file of a whole vehicle has some megabytes
 
 DATA_SHEETS: Final = (".eds", ".dcf")
 MOST_PDOS: Final = 512
@@ -88,24 +86,21 @@ def _message(sheet: DataSheet, layout: PdoLayout) -> Any:
     for mapped in layout.objects:
         entry = sheet.entry(mapped.index, mapped.subindex)
         name = "" if entry is None else re.sub(r"\W+", "_", entry.name).strip("_")
+        kind = None if entry is None else entry.kind
         scale, unit = _si(sheet, mapped.index)
         signals.append(
             Signal(
                 f"{name or f'object_{mapped.index:04X}_{mapped.subindex:02X}'}_{sheet.node_id}",
                 start,
                 mapped.length_bits,
-                is_signed=entry is not None and entry.kind is not None and entry.kind.signed,
-                conversion=BaseConversion.factory(scale=scale, is_float=entry is not None and _is_real(entry)),
+                is_signed=kind is not None and kind.signed,
+                conversion=BaseConversion.factory(scale=scale, is_float=kind is not None and kind.is_real),
                 unit=unit,
             )
         )
         start += mapped.length_bits
     name = f"TPDO_{layout.communication_index - TPDO_COMMUNICATION + 1}_{sheet.node_id}"
     return Message(layout.cob_id, name, -(-start // 8), signals)
-
-
-def _is_real(entry: EdsEntry) -> bool:
-    return entry.kind is not None and entry.kind.is_real
 
 
 def _si(sheet: DataSheet, index: int) -> tuple[float, str]:

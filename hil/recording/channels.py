@@ -20,11 +20,8 @@ from hil.recording.table import Column, FloatArray, Kind, Table, as_column
 
 DAY_S: Final = 86_400.0
 
-SAMPLE_CELLS: Final = 20
-"""Cells at the beginning of a column that tell what form all of it could have."""
-
-DAY_NUMBERS: Final = (20_000.0, 80_000.0)
-"""1954 to 2119 as a spreadsheet counts days (from 1899-12-30)."""
+SAMPLE_CELLS: Final = 20  # cells at the beginning of a column that tell what form all of it could have
+DAY_NUMBERS: Final = (20_000.0, 80_000.0)  # 1954 to 2119 as a spreadsheet counts days (from 1899-12-30)
 
 SHORTEST_STEP_S: Final = 2e-5
 """A step below it is no sampling period of a drive's logger in seconds, and can be one in days."""
@@ -238,6 +235,5 @@ def are_row_numbers(column: Column) -> bool:
 
 
 def time_quantity(unit: str) -> bool:
-    """Tell whether a unit is one of time."""
     known = unit_of(unit) if unit else None
     return known is not None and known.quantity is Quantity.TIME

@@ -24,11 +24,8 @@ import numpy as np
 from hil.errors import RecordingError
 from hil.recording.table import Column, Kind, Table
 
-CHECKSUM = "data_sha256"
-"""Key of the metadata it is kept under."""
-
-SAID = "metadata_sha256"
-"""Key of the checksum of units and metadata."""
+CHECKSUM = "data_sha256"  # key of the metadata it is kept under
+SAID = "metadata_sha256"  # key of the checksum of units and metadata
 
 CHECKSUMS = frozenset({CHECKSUM, SAID})
 
@@ -36,11 +33,8 @@ _NOT_SAID = CHECKSUMS | {"schema"}
 
 RIG_TEXT, RIG_CHECKSUM = "rig_file", "rig_sha256"
 
-_BLOCK_CELLS = 1 << 18
-"""Cells of a column that are turned into bytes at once."""
-
-_SHOWN = 12
-"""Digits of a checksum that a message shows."""
+_BLOCK_CELLS = 1 << 18  # cells of a column that are turned into bytes at once
+_SHOWN = 12  # digits of a checksum that a message shows
 
 
 def data_sha256(columns: Mapping[str, Column]) -> str:
@@ -67,11 +61,9 @@ class DataDigest:
         self._digest.update(_length(size))
 
     def take(self, cells: Column) -> None:
-        """Take the next cells of the column."""
         self._digest.update(_cells(cells, Kind.of(cells)))
 
     def hexdigest(self) -> str:
-        """Return the checksum, hexadecimal."""
         return self._digest.hexdigest()
 
 

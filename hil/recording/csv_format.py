@@ -61,17 +61,13 @@ def as_column(cells: pa.ChunkedArray, kind: Kind | None = None, decimal: str = "
     return as_text(trimmed.to_pylist())
 
 
-SPECIAL = ",;\t|"
-"""Characters that a reader could take for a delimiter."""
+SPECIAL = ",;\t|"  # characters that a reader could take for a delimiter
 
 OWN: Final[Mapping[str, object]] = {"delimiter": ",", "decimal": ".", "header_line": 1, "units_line": 0}
 """Form of a recording with a sidecar: as hil writes it, nothing has to be recognised."""
 
-BLOCK_BYTES = 1 << 22
-"""pyarrow parses this much at once; also the longest line it can take."""
-
-TRAILING = "\0"
-"""Stands for what follows a delimiter that ends a row."""
+BLOCK_BYTES = 1 << 22  # pyarrow parses this much at once; also the longest line it can take
+TRAILING = "\0"  # stands for what follows a delimiter that ends a row
 
 
 def read(path: Path, request: Request) -> Table:
@@ -216,8 +212,7 @@ def _rows(path: Path, text: str, form: TextForm) -> tuple[bytes, tuple[int, ...]
         line = body.count("\n", 0, body.index("\n\n")) + 1 + form.first_row_line
         line += sum(number <= line for number in skipped)
         raise RecordingError(
-            path,
-            f"line {line}: expected a row, got an empty line. Remove it; a missing sample is nan.",
+            path, f"line {line}: expected a row, got an empty line. Remove it; a missing sample is nan."
         )
     if form.delimiter == BLANKS:
         body = re.sub(r"[ \t]+", " ", re.sub(r"(?m)^[ \t]+|[ \t]+$", "", body))
@@ -315,8 +310,7 @@ MARKS: Final = (
 WITHOUT_MARK: Final = ((1, "utf-16-le"), (0, "utf-16-be"))
 """UTF-16 without a mark: of ASCII every second byte is NUL, from this one on."""
 
-LOOKED_AT_BYTES: Final = 64
-"""Enough for the names of a column or two."""
+LOOKED_AT_BYTES: Final = 64  # enough for the names of a column or two
 
 FALLBACK: Final = "latin-1"
 """What a file that is no UTF-8 most likely is: of a Windows program, whose other characters are in no unit."""

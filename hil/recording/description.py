@@ -25,8 +25,7 @@ from hil.recording.table import Column, Kind, Table
 
 SCHEMA = "hil.recording/1"
 
-OUTCOME = "outcome"
-"""Key of the metadata of a run that did not come to its end: what ended it."""
+OUTCOME = "outcome"  # key of the metadata of a run that did not come to its end: what ended it
 
 
 def description_of(table: Table, stored_as: Mapping[str, str]) -> str:
@@ -39,15 +38,11 @@ def description_of(table: Table, stored_as: Mapping[str, str]) -> str:
 
 
 def described_table(path: Path, text: str, column: Callable[[str, Kind], Column]) -> Table:
-    """Read a table by its description."""
+    document = _document(path, text)
     try:
-        document = parse_json(text)
         entries = [(str(e["name"]), str(e["stored_as"]), e["unit"], Kind(e["kind"])) for e in document["columns"]]
-        metadata = {str(key): str(value) for key, value in document["metadata"].items()}
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
-        raise RecordingError(
-            path, f"expected a description {SCHEMA} inside, got a damaged one ({error!r}). Take a copy that is whole."
-        ) from error
+    except _DAMAGED as error:
+        raise _damaged(path, error) from error
     columns, units = {}, {}
     for name, stored_as, unit, kind in entries:
         try:
@@ -58,23 +53,33 @@ def described_table(path: Path, text: str, column: Callable[[str, Kind], Column]
             ) from error
         if unit is not None:
             units[name] = str(unit)
-    return Table(path, columns, units, metadata)
+    return Table(path, columns, units, document["metadata"])
 
 
 def metadata_of(path: Path, text: str) -> dict[str, str]:
-    """Return the metadata of a description alone."""
+    metadata: dict[str, str] = _document(path, text)["metadata"]
+    return metadata
+
+
+def _document(path: Path, text: str) -> dict[str, Any]:
+    """Read a description; its metadata are texts."""
     try:
-        return {str(key): str(value) for key, value in parse_json(text)["metadata"].items()}
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
-        raise RecordingError(
-            path, f"expected a description {SCHEMA} inside, got a damaged one ({error!r}). Take a copy that is whole."
-        ) from error
+        document = parse_json(text)
+        return {**document, "metadata": {str(key): str(value) for key, value in document["metadata"].items()}}
+    except _DAMAGED as error:
+        raise _damaged(path, error) from error
 
 
-SCHEMA_KEY, SIDECAR_SCHEMA = "schema", "hil.recording/1"
-"""By which a file of ours is distinguished from any other of that name."""
+_DAMAGED = (ValueError, KeyError, TypeError, AttributeError)
 
-UNITS_KEY, TYPES_KEY = "units", "types"
+
+def _damaged(path: Path, error: Exception) -> RecordingError:
+    return RecordingError(
+        path, f"expected a description {SCHEMA} inside, got a damaged one ({error!r}). Take a copy that is whole."
+    )
+
+
+SCHEMA_KEY, UNITS_KEY, TYPES_KEY = "schema", "units", "types"
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,7 +93,6 @@ class Sidecar:
 
     @property
     def is_empty(self) -> bool:
-        """Whether there is nothing to say."""
         return not (self.metadata or self.units or self.types)
 
 
@@ -111,7 +115,7 @@ def write_sidecar(recording: Path, said: Sidecar, needed: bool = False) -> None:
         return
     path = sidecar_of(recording)
     tables = {UNITS_KEY: dict(said.units), TYPES_KEY: {name: kind.value for name, kind in said.types.items()}}
-    document = {**said.metadata, SCHEMA_KEY: SIDECAR_SCHEMA, **{key: table for key, table in tables.items() if table}}
+    document = {**said.metadata, SCHEMA_KEY: SCHEMA, **{key: table for key, table in tables.items() if table}}
     text = json.dumps(document, indent=1, ensure_ascii=False) + "\n"
     try:
         write_whole(path, text)
@@ -122,10 +126,13 @@ def write_sidecar(recording: Path, said: Sidecar, needed: bool = False) -> None:
 def is_sidecar(path: Path) -> bool:
     """Whether a file is one of ours."""
     try:
-        content = read_json(path)
+        return _is_ours(read_json(path))
     except (OSError, ValueError):
         return False
-    return isinstance(content, dict) and content.get(SCHEMA_KEY) == SIDECAR_SCHEMA
+
+
+def _is_ours(content: Any) -> bool:
+    return isinstance(content, dict) and content.get(SCHEMA_KEY) == SCHEMA
 
 
 def read_sidecar(recording: Path) -> Sidecar:
@@ -135,7 +142,7 @@ def read_sidecar(recording: Path) -> Sidecar:
         return Sidecar()
     try:
         content = read_json(path)
-        if not isinstance(content, dict) or content.get(SCHEMA_KEY) != SIDECAR_SCHEMA:
+        if not _is_ours(content):
             return Sidecar()
         types = {name: Kind(kind) for name, kind in _texts(content.get(TYPES_KEY)).items()}
     except (OSError, ValueError) as error:
@@ -146,7 +153,6 @@ def read_sidecar(recording: Path) -> Sidecar:
 
 
 def read_sidecar_metadata(recording: Path) -> Mapping[str, str]:
-    """Read the metadata alone; see :func:`read_sidecar`."""
     return read_sidecar(recording).metadata
 
 

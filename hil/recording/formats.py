@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from types import MappingProxyType
@@ -32,7 +33,7 @@ class Format:
     """
 
     read: Callable[[Path, Request], Table]
-    write: Callable[[Table, Path], None] | None
+    write: Callable[[Table, Path], None] | None = None
     metadata: Callable[[Path], Mapping[str, str]] | None = None
     companion: Callable[[Path], Path] | None = None
     apart: bool = True
@@ -49,47 +50,36 @@ def _of(name: str) -> Callable[..., Any]:
     return called
 
 
-def _measured(kind: str) -> Format:
-    """Return a format whose channels have times of their own."""
-    reads = _of(f"measurement_formats.read_{kind}"), _of(f"measurement_formats.read_{kind}_tables")
-    return Format(reads[0], None, tables=reads[1])
-
+_TEXT = partial(Format, _of("csv_format.read"), apart=False)
+_DESCRIBED_TEXT = partial(_TEXT, metadata=read_sidecar_metadata, companion=sidecar_of)
+_MDF = partial(
+    Format, _of("mdf_format.read"), metadata=_of("mdf_format.read_metadata"), tables=_of("mdf_format.read_all")
+)
+_HDF5 = Format(_of("hdf5_format.read"), _of("hdf5_format.write"), _of("hdf5_format.read_metadata"))
+_NUMPY = Format(_of("array_formats.read_numpy"))
+_MEASURED = Format(_of("measurement_formats.read"), tables=_of("measurement_formats.read_all"))
 
 FORMATS: Mapping[str, Format] = MappingProxyType(
     {
-        ".csv": Format(_of("csv_format.read"), _of("csv_format.write"), read_sidecar_metadata, sidecar_of, apart=False),
-        ".txt": Format(_of("csv_format.read"), None, read_sidecar_metadata, sidecar_of, apart=False),
-        ".tsv": Format(_of("csv_format.read"), None, read_sidecar_metadata, sidecar_of, apart=False),
-        ".ascii": Format(_of("csv_format.read"), None, apart=False),
-        ".lvm": Format(_of("csv_format.read"), None, apart=False),
+        ".csv": _DESCRIBED_TEXT(_of("csv_format.write")),
+        ".txt": _DESCRIBED_TEXT(),
+        ".tsv": _DESCRIBED_TEXT(),
+        ".ascii": _TEXT(),
+        ".lvm": _TEXT(),
         ".parquet": Format(
             _of("parquet_format.read"), _of("parquet_format.write"), _of("parquet_format.read_metadata")
         ),
-        ".mf4": Format(
-            _of("mdf_format.read"),
-            _of("mdf_format.write"),
-            _of("mdf_format.read_metadata"),
-            tables=_of("mdf_format.read_all"),
-        ),
-        ".mdf": Format(
-            _of("mdf_format.read"), None, _of("mdf_format.read_metadata"), tables=_of("mdf_format.read_all")
-        ),
-        ".dat": Format(
-            _of("mdf_format.read"), None, _of("mdf_format.read_metadata"), tables=_of("mdf_format.read_all")
-        ),
-        ".h5": Format(_of("hdf5_format.read"), _of("hdf5_format.write"), _of("hdf5_format.read_metadata")),
-        ".hdf5": Format(_of("hdf5_format.read"), _of("hdf5_format.write"), _of("hdf5_format.read_metadata")),
-        ".feather": Format(_of("parquet_format.read_feather"), None),
-        ".jsonl": Format(_of("parquet_format.read_json_lines"), None),
-        ".npz": Format(_of("array_formats.read_numpy"), None),
-        ".npy": Format(_of("array_formats.read_numpy"), None),
-        ".xlsx": Format(_of("array_formats.read_xlsx"), None),
-        ".tdms": _measured("tdms"),
-        ".mcap": _measured("mcap"),
-        ".blf": _measured("bus_log"),
-        ".asc": _measured("bus_log"),
-        ".log": _measured("bus_log"),
-        ".trc": _measured("bus_log"),
+        ".mf4": _MDF(_of("mdf_format.write")),
+        ".mdf": _MDF(),
+        ".dat": _MDF(),
+        ".h5": _HDF5,
+        ".hdf5": _HDF5,
+        ".feather": Format(_of("parquet_format.read_feather")),
+        ".jsonl": Format(_of("parquet_format.read_json_lines")),
+        ".npz": _NUMPY,
+        ".npy": _NUMPY,
+        ".xlsx": Format(_of("array_formats.read_xlsx")),
+        **dict.fromkeys((".tdms", ".mcap", ".blf", ".asc", ".log", ".trc"), _MEASURED),
         ".mat": Format(_of("mat_format.read"), _of("mat_format.write"), _of("mat_format.read_metadata")),
     }
 )

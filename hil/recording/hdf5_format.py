@@ -23,8 +23,7 @@ from hil.recording.description import SCHEMA, described_table, description_of, m
 from hil.recording.request import Request, under_names, vectors_of
 from hil.recording.table import Column, Kind, Table, as_column, columns_of_shared_length, is_column
 
-CELL_BYTES = 8
-"""Of the widest number; a longer element, such as a table's row, counts as several cells."""
+CELL_BYTES = 8  # of the widest number; a longer element, such as a table's row, counts as several cells
 
 DAMAGED = (OSError, KeyError, ValueError, TypeError, RuntimeError, IndexError, AttributeError)
 """What h5py raises on a file that is cut or damaged."""
@@ -94,8 +93,7 @@ def write_whole(path: Path, fill: Callable[[Any], None], header: bytes = b"") ->
 
 
 File: TypeAlias = Any
-Dataset: TypeAlias = Any
-"""Those of h5py, which has no types."""
+Dataset: TypeAlias = Any  # those of h5py, which has no types
 
 PICKLED_TEXT = re.compile(r"(?:^|\n)a?V([^\n]*)\n")
 """A text in a pickle of protocol 0, read as what it is: nothing is unpickled."""
@@ -105,7 +103,6 @@ COLUMNS = "columns"
 
 
 def read(path: Path, request: Request) -> Table:
-    """Read an HDF5 recording."""
     with reading(path, "HDF5") as file:
         return _own(path, file) if _is_own(file) else _foreign(path, file, request)
 
@@ -117,7 +114,6 @@ def read_metadata(path: Path) -> dict[str, str]:
 
 
 def write(table: Table, path: Path) -> None:
-    """Write a table with its units and metadata."""
     stored_as = {name: _link(number, name) for number, name in enumerate(table.columns)}
 
     def fill(file: File) -> None:

@@ -21,8 +21,7 @@ from hil.recording.survey import Group, Guess, Roles, Survey, guesses, roles_of,
 LONG_PERIOD_S = 1.0
 """A period that no recording of a drive has: a time without a unit whose rows are as far is one in ms, perhaps."""
 
-EPOCH_S = 1e9
-"""Seconds since 1970 that no recording lasts: what is larger is a time of day."""
+EPOCH_S = 1e9  # seconds since 1970 that no recording lasts: what is larger is a time of day
 
 
 def signals_lines(survey: Survey, roles: Roles, encoding: str | None = None) -> list[str]:
@@ -136,7 +135,6 @@ def channel_rows(group: Group) -> Iterator[tuple[str, str, int, int, float | Non
 
 
 def look(path: Path, dbc: Path | None = None) -> Look:
-    """Look into a recording."""
     known = format_of(path)
     encoding = None
     if known.apart:

@@ -19,8 +19,9 @@ import itertools
 import re
 import zlib
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from pathlib import Path
-from typing import Any, Final, TypeAlias
+from typing import Any, Final
 
 import numpy as np
 
@@ -28,7 +29,7 @@ from hil.errors import RecordingError
 from hil.recording.bounds import damaged, require_columns
 from hil.recording.channels import seconds_since_first
 from hil.recording.description import described_table, description_of, metadata_of
-from hil.recording.hdf5_format import reading, text_of, write_whole
+from hil.recording.hdf5_format import DESCRIPTION, Dataset, File, reading, text_of, write_whole
 from hil.recording.request import Request, under_names, vectors_of
 from hil.recording.table import Column, Kind, Table, as_column, as_text, columns_of_shared_length
 
@@ -37,17 +38,19 @@ DAMAGED = (ValueError, TypeError, IndexError, KeyError, OSError, NotImplementedE
 
 
 def read(path: Path, request: Request) -> Table:
-    """Read a .mat recording."""
     import scipy.io
     from scipy.io.matlab import MatReadError
 
     if is_version_73(path):
-        return read_73(path, request)
+        with reading(path, ".mat") as file:
+            return _own(path, file) if DESCRIPTION in file else _foreign(path, file, request)
     try:
         variables = scipy.io.loadmat(path, struct_as_record=False)
     except (*DAMAGED, MatReadError) as error:
         raise damaged(path, "a whole .mat file", error) from error
-    variables = with_tables_if_possible(path, variables)
+    if OBJECTS in variables:
+        with suppress(RecordingError):  # objects of other classes; what is none of them is read all the same
+            variables = with_tables(path)
     vectors: dict[str, Column] = {}
     scalars: dict[str, str] = {}
     other: list[str] = []
@@ -63,7 +66,10 @@ def read(path: Path, request: Request) -> Table:
 
 def read_metadata(path: Path) -> Mapping[str, str]:
     """Read what a .mat recording says of itself."""
-    return read_73_metadata(path) if is_version_73(path) else read(path, Request()).metadata
+    if not is_version_73(path):
+        return read(path, Request()).metadata
+    with reading(path, ".mat") as file:
+        return metadata_of(path, _text(file[DESCRIPTION])) if DESCRIPTION in file else _foreign_metadata(file)
 
 
 def is_version_73(path: Path) -> bool:
@@ -73,33 +79,14 @@ def is_version_73(path: Path) -> bool:
     return header.startswith(TITLE) or header[124:] in (b"\x00\x02IM", b"\x02\x00MI")
 
 
-File: TypeAlias = Any
-Dataset: TypeAlias = Any
-"""Those of h5py, which has no types."""
-
 TITLE = b"MATLAB 7.3 MAT-file"
 HEADER = (
     (TITLE + b", Platform: hil, HDF5 schema 1.00 .").ljust(116) + bytes(8) + b"\x00\x02IM"
 )  # text, no subsystem data, version 2.0, little-endian
 
-DESCRIPTION = "recording_json"
 REFERENCES = "#refs#"
-EVERYTHING = Request()
 
-LONGEST_NAME = 63
-"""Characters of a variable's name that MATLAB tells apart (``namelengthmax``)."""
-
-
-def read_73(path: Path, request: Request = EVERYTHING) -> Table:
-    """Read a .mat recording of version 7.3."""
-    with reading(path, ".mat") as file:
-        return _own(path, file) if DESCRIPTION in file else _foreign(path, file, request)
-
-
-def read_73_metadata(path: Path) -> dict[str, str]:
-    """Read what a .mat recording of version 7.3 says of itself."""
-    with reading(path, ".mat") as file:
-        return metadata_of(path, _text(file[DESCRIPTION])) if DESCRIPTION in file else _foreign_metadata(file)
+LONGEST_NAME = 63  # characters of a variable's name that MATLAB tells apart (``namelengthmax``)
 
 
 def write(table: Table, path: Path) -> None:
@@ -215,16 +202,11 @@ def _is_matrix(dataset: Dataset) -> bool:
 
 
 def _foreign_metadata(file: File) -> dict[str, str]:
-    datasets = _datasets(file)
+    entries = {text_of(name): entry for name, entry in file.items() if hasattr(entry, "dtype")}
+    datasets = {name: entry for name, entry in entries.items() if entry.dtype.names is None}
     scalars = {name: repr(d[()].item()) for name, d in datasets.items() if d.size == 1 and d.dtype.kind in "fiu"}
     texts = {name: _text(d) for name, d in datasets.items() if _class_of(d) == "char" and 1 in (*d.shape, d.ndim)}
     return {**scalars, **texts}
-
-
-def _datasets(file: File) -> dict[str, Dataset]:
-    return {
-        text_of(name): entry for name, entry in file.items() if hasattr(entry, "dtype") and entry.dtype.names is None
-    }
 
 
 def _is_vector(dataset: Dataset) -> bool:
@@ -269,43 +251,23 @@ def with_tables(path: Path) -> dict[str, Any]:
     return variables
 
 
-def with_tables_if_possible(path: Path, variables: dict[str, Any]) -> dict[str, Any]:
-    """Return the variables of a .mat file with its tables, where there are objects that the library can read."""
-    if OBJECTS not in variables:
-        return variables
-    try:
-        return with_tables(path)
-    except RecordingError:  # objects of other classes; what is none of them is read all the same
-        return variables
-
-
-def is_table(value: Any) -> bool:
-    """Whether a variable is a table."""
-    return hasattr(value, "columns") and hasattr(value, "index")
-
-
 def columns_of(table: Any) -> dict[str, Any]:
     """Return the columns of a table, of a timetable its times first; times in seconds."""
-    columns = {str(name): _seconds(table[name].to_numpy()) for name in table.columns}
+    columns = {str(name): table[name].to_numpy() for name in table.columns}
+    columns = {name: seconds_since_first(v) if v.dtype.kind in "mM" else v for name, v in columns.items()}
     if table.index.dtype.kind not in "mM":
         return columns
-    return {str(table.index.name or "Time"): _seconds(table.index.to_numpy()), **columns}
+    return {str(table.index.name or "Time"): seconds_since_first(table.index.to_numpy()), **columns}
 
 
-def _seconds(values: Any) -> Any:
-    """Return durations in seconds, times as seconds since the first; anything else as it is."""
-    return seconds_since_first(values) if values.dtype.kind in "mM" else values
-
-
-DEEPEST: Final = 12
-"""Structs inside structs that are looked into."""
+DEEPEST: Final = 12  # structs inside structs that are looked into
 
 
 def walk(
     name: str, value: Any, vectors: dict[str, Column], scalars: dict[str, str], other: list[str], depth: int = 0
 ) -> None:
     """Put what is in a variable where it belongs."""
-    if is_table(value):
+    if hasattr(value, "columns") and hasattr(value, "index"):  # a table
         fields = columns_of(value)
     elif hasattr(value, "_fieldnames"):
         fields = {field: getattr(value, field) for field in value._fieldnames}  # noqa: SLF001 - scipy's way to them

@@ -52,17 +52,6 @@ FINISHED, UNFINISHED = b"MDF     ", b"UnFinMF "
 IDENTIFICATION_BYTES = 64
 
 
-def require_mdf(path: Path, content: bytes) -> None:
-    """Refuse what does not begin like an MDF file."""
-    start = content[: len(FINISHED)]
-    if len(content) < IDENTIFICATION_BYTES or start not in (FINISHED, UNFINISHED):
-        raise RecordingError(
-            path,
-            f"expected a whole MDF file, one that begins with {FINISHED.decode()!r}, got one that begins "
-            f"with {start!r}",
-        )
-
-
 def is_unfinished(path: Path) -> bool:
     """Whether a file was left by a writer that did not come to its end."""
     with path.open("rb") as file:
@@ -78,8 +67,16 @@ def opened(path: Path) -> Iterator[MDF]:
     from asammdf import MDF
     from asammdf.blocks.utils import MdfException
 
+    content = path.read_bytes()
+    start = content[: len(FINISHED)]
+    if len(content) < IDENTIFICATION_BYTES or start not in (FINISHED, UNFINISHED):
+        raise RecordingError(
+            path,
+            f"expected a whole MDF file, one that begins with {FINISHED.decode()!r}, got one that begins "
+            f"with {start!r}",
+        )
     try:
-        with _quiet(), MDF(io.BytesIO(path.read_bytes())) as mdf:
+        with _quiet(), MDF(io.BytesIO(content)) as mdf:
             yield mdf
     except (*DAMAGED, MdfException) as error:
         what = "one that can be finalised: its writer never finished it" if is_unfinished(path) else "a whole MDF file"
@@ -105,11 +102,8 @@ def _quiet() -> Iterator[None]:
         logger.disabled = before
 
 
-BUS_EVENT: Final = 2
-"""Flag of a group of bus events, ``cg_flags`` (ASAM MDF 4.1, table 51)."""
-
-ANY_BUS: Final = 0
-"""Channel of the bus, as asammdf counts: every one."""
+BUS_EVENT: Final = 2  # flag of a group of bus events, ``cg_flags`` (ASAM MDF 4.1, table 51)
+ANY_BUS: Final = 0  # channel of the bus, as asammdf counts: every one
 
 
 def is_bus_log(mdf: MDF) -> bool:
@@ -204,8 +198,7 @@ def readable(path: Path, mdf: MDF, request: Request) -> MDF:
         return decoded(path, mdf, request.dbc)
     if is_bus_log(mdf):
         raise RecordingError(
-            path,
-            "expected signals, got the frames of a bus as they were logged. Say what they mean: --dbc FILE",
+            path, "expected signals, got the frames of a bus as they were logged. Say what they mean: --dbc FILE"
         )
     return mdf
 

@@ -22,16 +22,7 @@ import numpy as np
 from hil.recording import columns
 from hil.recording.checksum import RIG_TEXT
 from hil.recording.description import described_table, description_of, metadata_of
-from hil.recording.mdf_file import (
-    IDENTIFICATION_BYTES,
-    channels_of,
-    foreign_metadata,
-    foreign_table,
-    foreign_tables,
-    is_unfinished,
-    opened,
-    require_mdf,
-)
+from hil.recording.mdf_file import channels_of, foreign_metadata, foreign_table, foreign_tables, is_unfinished, opened
 from hil.recording.request import Request
 from hil.recording.table import Column, Kind, Table, as_column
 from hil.version import __version__
@@ -43,28 +34,6 @@ if TYPE_CHECKING:
 DESCRIPTION = "recording.json"
 
 FINALISED = "its writer never finished it: it was finalised in a copy and read from there, the file stays as it is"
-
-
-def parse(path: Path, mdf: MDF, request: Request) -> Table:
-    """Read a file's content."""
-    text = _description(mdf)
-    table = foreign_table(path, mdf, request) if text is None else _own(path, mdf, text)
-    # The columns become plain arrays of their own, not views into the file.
-    columns = {name: column.copy() for name, column in table.columns.items()}
-    remarks = (*table.remarks, FINALISED) if is_unfinished(path) else table.remarks
-    return replace(table, columns=columns, remarks=remarks)
-
-
-def parse_all(path: Path, mdf: MDF, request: Request) -> list[Table]:
-    """Read a file's content, a table for each of its times; see `parse`."""
-    text = _description(mdf)
-    return foreign_tables(path, mdf, request) if text is None else [_own(path, mdf, text)]
-
-
-def parse_metadata(path: Path, mdf: MDF) -> Mapping[str, str]:
-    """Read what a file says of itself."""
-    text = _description(mdf)
-    return foreign_metadata(mdf) if text is None else metadata_of(path, text)
 
 
 def _description(mdf: MDF) -> str | None:
@@ -91,41 +60,37 @@ VERSION = "4.10"
 RIG_NAME = "rig.toml"
 ROW_NUMBER = "row"
 
-TIME_MASTER, INDEX_MASTER = 1, 4
-"""Kinds of master channel, ``cn_sync_type`` (ASAM MDF 4.1, table 59)."""
+TIME_MASTER, INDEX_MASTER = 1, 4  # kinds of master channel, ``cn_sync_type`` (ASAM MDF 4.1, table 59)
 
 LONGEST_PROPERTY = 200
 """Characters of a value that still stands in the file's comment; longer ones are in the attachments only."""
 
 
 def read(path: Path, request: Request) -> Table:
-    """Read an MDF recording."""
-    _require_mdf(path)
     with opened(path) as mdf:
-        return parse(path, mdf, request)
+        text = _description(mdf)
+        table = foreign_table(path, mdf, request) if text is None else _own(path, mdf, text)
+        # The columns become plain arrays of their own, not views into the file.
+        columns = {name: column.copy() for name, column in table.columns.items()}
+        remarks = (*table.remarks, FINALISED) if is_unfinished(path) else table.remarks
+        return replace(table, columns=columns, remarks=remarks)
 
 
 def read_all(path: Path, request: Request) -> list[Table]:
     """Read an MDF recording, a table for each of its times."""
-    _require_mdf(path)
     with opened(path) as mdf:
-        return parse_all(path, mdf, request)
+        text = _description(mdf)
+        return foreign_tables(path, mdf, request) if text is None else [_own(path, mdf, text)]
 
 
 def read_metadata(path: Path) -> Mapping[str, str]:
     """Read what an MDF recording says of itself."""
-    _require_mdf(path)
     with opened(path) as mdf:
-        return parse_metadata(path, mdf)
-
-
-def _require_mdf(path: Path) -> None:
-    with path.open("rb") as file:
-        require_mdf(path, file.read(IDENTIFICATION_BYTES))
+        text = _description(mdf)
+        return foreign_metadata(mdf) if text is None else metadata_of(path, text)
 
 
 def write(table: Table, path: Path) -> None:
-    """Write a table as MDF 4.10."""
     from asammdf import MDF
 
     stored_as = {name: _channel_name(number, name) for number, name in enumerate(table.columns)}

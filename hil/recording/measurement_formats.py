@@ -41,14 +41,29 @@ class Group:
     units: dict[str, str] = field(default_factory=dict)
 
 
-def _table(path: Path, groups: Iterable[Group], request: Request, remarks: Iterable[str] = ()) -> Table:
+def read(path: Path, request: Request) -> Table:
+    """Read the channels asked for, or those that share the time of most."""
+    groups, remarks = _groups(path, request)
     table = foreign_table(path, _as_mdf(groups), replace(request, dbc=None))
     return replace(table, remarks=(*remarks, *table.remarks), metadata={})
 
 
-def _tables(path: Path, groups: Iterable[Group], request: Request, remarks: Iterable[str] = ()) -> list[Table]:
+def read_all(path: Path, request: Request) -> list[Table]:
+    """Read all channels, a table for each time."""
+    groups, remarks = _groups(path, request)
     tables = foreign_tables(path, _as_mdf(groups), replace(request, dbc=None))
     return [replace(table, remarks=(*remarks, *table.remarks)) for table in tables]
+
+
+def _groups(path: Path, request: Request) -> tuple[list[Group], list[str]]:
+    """Return what a file holds, and what is to be said of it."""
+    match path.suffix.lower():
+        case ".tdms":
+            return _tdms(path), []
+        case ".mcap":
+            return _mcap(path), []
+        case _:
+            return _bus_log(path, request)
 
 
 def _as_mdf(groups: Iterable[Group]) -> Any:
@@ -80,17 +95,8 @@ def library(path: Path, module: str, package: str) -> Any:
 # --- TDMS
 
 
-def read_tdms(path: Path, request: Request) -> Table:
-    """Read a TDMS file of LabVIEW or DIAdem."""
-    return _table(path, _tdms(path), request)
-
-
-def read_tdms_tables(path: Path, request: Request) -> list[Table]:
-    """Read a TDMS file, a table for each time."""
-    return _tables(path, _tdms(path), request)
-
-
 def _tdms(path: Path) -> list[Group]:
+    """Read a TDMS file of LabVIEW or DIAdem."""
     nptdms = library(path, "nptdms", "npTDMS")
     groups: dict[bytes, Group] = {}
     try:
@@ -121,17 +127,8 @@ def _tdms_time(channel: Any, n: int) -> Column:
 # --- MCAP
 
 
-def read_mcap(path: Path, request: Request) -> Table:
-    """Read an MCAP file whose messages are JSON."""
-    return _table(path, _mcap(path), request)
-
-
-def read_mcap_tables(path: Path, request: Request) -> list[Table]:
-    """Read an MCAP file, a table for each topic."""
-    return _tables(path, _mcap(path), request)
-
-
 def _mcap(path: Path) -> list[Group]:
+    """Read an MCAP file whose messages are JSON."""
     reader = library(path, "mcap.reader", "mcap")
     rows: dict[str, list[tuple[int, dict[str, float]]]] = {}
     others: set[str] = set()
@@ -173,19 +170,8 @@ def _topic(topic: str, messages: list[tuple[int, dict[str, float]]], is_one_of_s
 # --- logs of a CAN bus
 
 
-def read_bus_log(path: Path, request: Request) -> Table:
-    """Read the frames of a bus as a logger keeps them (BLF, ASC, candump, TRC), as the signals of a DBC file."""
-    groups, remarks = _bus_log(path, request)
-    return _table(path, groups, request, remarks)
-
-
-def read_bus_log_tables(path: Path, request: Request) -> list[Table]:
-    """Read the frames of a bus, a table for each message."""
-    groups, remarks = _bus_log(path, request)
-    return _tables(path, groups, request, remarks)
-
-
 def _bus_log(path: Path, request: Request) -> tuple[list[Group], list[str]]:
+    """Read the frames of a bus as a logger keeps them (BLF, ASC, candump, TRC), as the signals of a DBC file."""
     if request.dbc is None:
         raise RecordingError(
             path, "expected signals, got the frames of a bus as they were logged. Say what they mean: --dbc FILE"
@@ -257,7 +243,7 @@ class _Log:
             return
         readers = {".asc": can.ASCReader, ".log": can.CanutilsLogReader, ".trc": can.TRCReader}
         lines = self.path.read_text("utf-8", errors="replace").splitlines(keepends=True)
-        head = [line for line in lines[:HEAD_LINES] if _is_head(line)]
+        head = [line for line in lines[:HEAD_LINES] if line.startswith(HEADS)]
         events = sum(EVENT.match(line) is not None for line in lines)
         faults = 0
         while lines:
@@ -287,15 +273,9 @@ class _Log:
 EVENT: Final = re.compile(r"\s*\(?\d")
 """What a line of a text log begins with that is a frame, or should be one."""
 
-HEAD_LINES: Final = 40
-"""Lines among which a log says in which form it is."""
-
-FEW_ODD_LINES: Final = 3
-"""Lines that may be odd in a log of any length: its beginning is often cut."""
-
-
-def _is_head(line: str) -> bool:
-    return line.startswith((";", "date", "base", "internal", "//"))
+HEAD_LINES: Final = 40  # lines among which a log says in which form it is
+HEADS: Final = (";", "date", "base", "internal", "//")
+FEW_ODD_LINES: Final = 3  # lines that may be odd in a log of any length: its beginning is often cut
 
 
 class _Lines(io.StringIO):  # typeshed has its lines as bytes

@@ -22,14 +22,9 @@ from hil.recording.table import Column
 HEADER = ",".join(columns.UNITS)
 """Begin of the first line of such a recording; the channels of its rig file follow."""
 
-LONGEST_HEADER = 1 << 16
-"""Bytes."""
-
-BLOCK_BYTES = 1 << 20
-"""Text that is parsed at once."""
-
-HELD_BYTES = 1 << 25
-"""Cells that are held at once; a recording with more of them is read several times."""
+LONGEST_HEADER = 1 << 16  # bytes
+BLOCK_BYTES = 1 << 20  # text that is parsed at once
+HELD_BYTES = 1 << 25  # cells that are held at once; a recording with more of them is read several times
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +49,6 @@ def is_own(path: Path) -> bool:
 
 
 def _names(path: Path) -> list[str]:
-    """Read the names of the columns."""
     with path.open("rb") as file:
         return file.readline(LONGEST_HEADER).decode("utf-8", "replace").rstrip("\n").split(",")
 

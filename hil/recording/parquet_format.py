@@ -21,12 +21,10 @@ UNIT_KEY = b"unit"
 DAMAGED = (pa.ArrowException, OSError, UnicodeDecodeError)
 """What pyarrow raises on a file that is cut or damaged; the last where a name or a text is no UTF-8."""
 
-FOREIGN_KEYS = frozenset({b"pandas", b"ARROW:schema"})
-"""Metadata other programs put there for themselves."""
+FOREIGN_KEYS = frozenset({b"pandas", b"ARROW:schema"})  # metadata other programs put there for themselves
 
 
 def read(path: Path, request: Request) -> Table:
-    """Read a Parquet recording."""
     try:
         with pa.parquet.ParquetFile(path, page_checksum_verification=True) as file:
             _require_sizes(path, file.metadata)
@@ -105,7 +103,6 @@ def read_metadata(path: Path) -> dict[str, str]:
 
 
 def write(table: Table, path: Path) -> None:
-    """Write a table with its units and metadata."""
     fields, arrays = [], []
     for name, column in table.columns.items():
         array = pa.array(column, type=pa.string() if column.dtype == object else None)

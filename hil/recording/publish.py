@@ -86,11 +86,7 @@ def _metadata(before: Table, after: Table) -> list[str]:
 
 
 def write_table(
-    table: Table,
-    path: Path | str,
-    *,
-    replace: bool = False,
-    on_loss: Callable[[Sequence[str]], None] | None = None,
+    table: Table, path: Path | str, *, replace: bool = False, on_loss: Callable[[Sequence[str]], None] | None = None
 ) -> None:
     """Write a recording, whole or not at all; the suffix chooses the format, and its data get a checksum.
 
@@ -122,10 +118,7 @@ def write_table(
 
 
 def _write(
-    table: Table,
-    path: Path,
-    written: Callable[[Table], Table],
-    on_loss: Callable[[Sequence[str]], None] | None,
+    table: Table, path: Path, written: Callable[[Table], Table], on_loss: Callable[[Sequence[str]], None] | None
 ) -> None:
     kept = written(table)
     lost = losses(table, kept)

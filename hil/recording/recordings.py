@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -86,21 +86,18 @@ def _require_own_samples(paths: Sequence[Path], records: Sequence[Record]) -> No
 CSV = ".csv"
 
 
-@dataclass(frozen=True, slots=True)
-class Facts:
+class Facts(NamedTuple):
     """What is known of a recording whose rows are not kept."""
 
-    path: Path
     metadata: Mapping[str, str]
     extent: Extent
 
 
 def facts_of(table: Table) -> Facts:
-    """Return the facts of a table."""
     there = table.numeric([name for name in (columns.TIME, columns.FLAGS) if name in table.columns])
     time_s = there.get(columns.TIME, np.zeros(1))
     flagged = int(np.count_nonzero(there[columns.FLAGS])) if columns.FLAGS in there else 0
-    return Facts(table.path, table.metadata, Extent(table.n_rows, float(time_s[0]), float(time_s[-1]), flagged))
+    return Facts(table.metadata, Extent(table.n_rows, float(time_s[0]), float(time_s[-1]), flagged))
 
 
 def read_facts(path: Path) -> Facts:
@@ -113,7 +110,7 @@ def read_facts(path: Path) -> Facts:
         except ValueError:  # changed by hand: the reader of all forms of text says where
             return facts_of(read_table(path))
         if held.n_rows:
-            return Facts(path, said.metadata, held)
+            return Facts(said.metadata, held)
     return facts_of(read_table(path))
 
 
@@ -146,8 +143,7 @@ def self_description(metadata: Mapping[str, str]) -> list[str]:
 # is whole: the torque of a flagged sample is held, wrong by a step of the PRBS half of the time. With one bad cycle in
 # 20 a stretch is 20 cycles long on average, which the default model (four coefficients at twice the period) needs twice
 # over to forget where it began. A diagnosis refuses nothing: the acquisition is among what it looks into.
-WORST_SHARE = 0.05
-"""Part of the cycles that may have been late, missing or without an answer."""
+WORST_SHARE = 0.05  # part of the cycles that may have been late, missing or without an answer
 
 
 def require_even_cycles(paths: Iterable[Path]) -> None:

@@ -73,8 +73,7 @@ class Request:
         return TypeAdapter(Request).validate_python(document)
 
 
-MOST_SLICES: Final = 512
-"""Columns of a matrix that have an address each."""
+MOST_SLICES: Final = 512  # columns of a matrix that have an address each
 
 _SLICE: Final = re.compile(r"(?P<open>[\[(])\s*(?P<row>:|\d+)\s*,\s*(?P<column>:|\d+)\s*[\])]")
 

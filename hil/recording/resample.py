@@ -37,14 +37,12 @@ WINDOW_STEPS = 100
 LEVEL_ROWS = 11
 """Rows before and behind a step whose median tells whether a row is missing there: jitter is as wide at most."""
 
-FEWEST_ROWS = 4 * LEVEL_ROWS
-"""Fewer rows are not looked at for jitter."""
+FEWEST_ROWS = 4 * LEVEL_ROWS  # fewer rows are not looked at for jitter
 
 COARSER = 1.2
 """Ratio of the least step to the period from which on stamps are rounded: below, one that is repeated is a fault."""
 
-ROUND = 0.01
-"""Share of the least step within which all steps are multiples of it, where stamps are rounded."""
+ROUND = 0.01  # share of the least step within which all steps are multiples of it, where stamps are rounded
 
 
 def time_base(table: Table, signal: TimeSignal) -> tuple[FloatArray, float, tuple[str, ...]]:
@@ -140,14 +138,9 @@ EDGE, HALF_LENGTH = 1.0, 8
 GAP: Final = 2.5
 """Distance of two samples, in the channel's own period, beyond which those between are missing: jitter is less."""
 
-THINS: Final = 1.5
-"""Ratio of the new period to the channel's own from which on it is thinned."""
-
-MOST_RATIO: Final = 10_000
-"""Of both periods; the low-pass has 16 times as many taps."""
-
-HALF: Final = 0.5
-"""Weight of present samples in the low-pass below which the result is missing."""
+THINS: Final = 1.5  # ratio of the new period to the channel's own from which on it is thinned
+MOST_RATIO: Final = 10_000  # of both periods; the low-pass has 16 times as many taps
+HALF: Final = 0.5  # weight of present samples in the low-pass below which the result is missing
 
 
 @dataclass(frozen=True, slots=True)

@@ -60,28 +60,18 @@ def receive(stream: IO[bytes]) -> tuple[Document, dict[str, Column]]:
     return document, {name: _column(stream, Kind(kind), size) for name, kind, size in document["columns"]}
 
 
+_SAID: Final = ("units", "metadata", "remarks", "master", "elsewhere")
+"""All of a table but its columns and path."""
+
+
 def described(table: Table) -> Document:
-    """Return all of a table but its columns and path."""
-    return {
-        "units": dict(table.units),
-        "metadata": dict(table.metadata),
-        "remarks": list(table.remarks),
-        "master": table.master,
-        "elsewhere": dict(table.elsewhere),
-    }
+    return {name: getattr(table, name) for name in _SAID}
 
 
 def table_of(path: Path, document: Document, columns: Mapping[str, Column]) -> Table:
     """Return the table that `described` was made of."""
-    return Table(
-        path,
-        columns,
-        document["units"],
-        document["metadata"],
-        remarks=tuple(document["remarks"]),
-        master=document["master"],
-        elsewhere=document["elsewhere"],
-    )
+    said = {name: document[name] for name in _SAID}
+    return Table(path, columns, **{**said, "remarks": tuple(said["remarks"])})
 
 
 def _column(stream: IO[bytes], kind: Kind, size: int) -> Column:
@@ -115,8 +105,7 @@ def _fill(stream: IO[bytes], place: memoryview) -> None:
         done += count
 
 
-TRIES: Final = 20
-"""Attempts to remove the folder of a process whose command has ended."""
+TRIES: Final = 20  # attempts to remove the folder of a process whose command has ended
 
 Answer = Callable[[Document, dict[str, Column]], tuple[Document, Mapping[str, Column] | None]]
 
@@ -185,8 +174,7 @@ PROCESS: Final = "hil.recording.reader_process"
 WAITING: Final = 6.0
 """How much longer than its processor's time a reading may last, on a machine that does other things."""
 
-ENDING_S: Final = 5.0
-"""How long a process may take to end by itself."""
+ENDING_S: Final = 5.0  # how long a process may take to end by itself
 
 ENVIRONMENT: Final = {
     "OPENBLAS_NUM_THREADS": "1",
@@ -195,8 +183,6 @@ ENVIRONMENT: Final = {
     "ARROW_DEFAULT_MEMORY_POOL": "system",
 }
 """Threads and allocators that reserve address space, which is what is bounded, are left out."""
-
-EVERYTHING: Final = Request()
 
 What = Literal["table", "metadata", "survey"]
 
@@ -259,18 +245,15 @@ class Reader:
         self._lock = threading.Lock()
         self._process: Sandbox | None = None
 
-    def table(self, path: Path, request: Request = EVERYTHING) -> Table:
-        """Read a recording."""
+    def table(self, path: Path, request: Request) -> Table:
         document, columns = self._read(path, "table", request)
         return table_of(path, document, columns)
 
     def metadata(self, path: Path) -> Mapping[str, str]:
-        """Read what a recording says of itself."""
         said: Mapping[str, str] = self._read(path, "metadata", Request())[0]["metadata"]
         return said
 
     def survey(self, path: Path, request: Request) -> Survey:
-        """Read what is in a recording, in figures."""
         return Survey.of_document(self._read(path, "survey", request)[0]["survey"])
 
     def end(self) -> None:
@@ -312,7 +295,6 @@ def _why(status: int, file_bytes: int) -> str:
     )
 
 
-READER: Final = Reader()
-"""The one of this program."""
+READER: Final = Reader()  # the one of this program
 
 atexit.register(READER.end)

@@ -186,8 +186,7 @@ EXPECTED: Final = {
 }
 """Quantities that a column of a role may be of."""
 
-WRAPS_BITS: Final = (8, 16, 32)
-"""Lengths of the whole numbers that loggers store."""
+WRAPS_BITS: Final = (8, 16, 32)  # lengths of the whole numbers that loggers store
 
 ALIKE: Final = 4.0
 """How much larger a step may be where the reading begins anew, put right, than the largest other step."""

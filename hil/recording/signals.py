@@ -44,18 +44,14 @@ from hil.recording.table import FloatArray, Table
 SMALLEST, GREATEST = 1e-15, 1e15
 """Between them is the largest value of any signal of a drive, in SI units; their squares and products are numbers."""
 
-SHORTEST_S, LONGEST_S = 1e-9, 1e6
-"""Between them is a sampling period."""
-
-SAME_PERIOD = 1e-6
-"""Share by which the steps of a recording may differ from a period it is said to have."""
+SHORTEST_S, LONGEST_S = 1e-9, 1e6  # between them is a sampling period
+SAME_PERIOD = 1e-6  # share by which the steps of a recording may differ from a period it is said to have
 
 FEWEST_SAMPLES = 10
 """A recording with fewer usable samples can't carry a constant load, an initial state and anything next to."""
 
 
-Tell = Callable[[str], None]
-"""Takes one line of what was recognised, left out or fixed."""
+Tell = Callable[[str], None]  # takes one line of what was recognised, left out or fixed
 
 
 def read_record(

@@ -39,7 +39,6 @@ class _Scaled(_Strict):
 
     @property
     def given_scale(self) -> float | None:
-        """The scale, where it was given."""
         return self.scale if "scale" in self.model_fields_set else None
 
 
@@ -52,7 +51,6 @@ class TimeSignal(_Strict):
 
     @property
     def given_scale(self) -> float | None:
-        """The scale, where it was given."""
         return self.scale if "scale" in self.model_fields_set else None
 
     @model_validator(mode="after")

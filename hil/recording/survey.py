@@ -20,8 +20,7 @@ from hil.recording.text_form import MISSING
 TIME_NAMES: Final = ("time", "zeit", "t", "timestamp", "timestamps", "stamp")
 """What a column of times is called, or begins with."""
 
-EVEN: Final = 0.5
-"""Share of the period by which a step of an even time may differ from it."""
+EVEN: Final = 0.5  # share of the period by which a step of an even time may differ from it
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,8 +149,7 @@ def rounded(period_s: float) -> float:
     return period_s
 
 
-BY_UNIT, BY_WORD, BY_LETTER, BY_CHANCE = 4, 3, 2, 1
-"""How sure a role is."""
+BY_UNIT, BY_WORD, BY_LETTER, BY_CHANCE = 4, 3, 2, 1  # how sure a role is
 
 WORDS: Final = {
     Role.TORQUE: r"torque|drehmoment|trq|\btq|moment|tau|force|kraft",
@@ -167,8 +165,7 @@ LETTERS: Final = {
 }
 """Whole names."""
 
-ANY_OUTPUT: Final = r"[yz]\d*"
-"""Names of a measured output of whatever kind."""
+ANY_OUTPUT: Final = r"[yz]\d*"  # names of a measured output of whatever kind
 
 NOT_MEASURED: Final = re.compile(r"ref|soll|set|cmd|command|target|limit|max|min|prbs|demand|request", re.IGNORECASE)
 """Parts of names of what was asked for, not read."""
@@ -204,7 +201,8 @@ def guesses(channel: Channel) -> list[Guess]:
     found = []
     for role in (Role.TORQUE, Role.SPEED, Role.POSITION):
         named = bool(re.search(WORDS[role], bare.lower()))
-        if unit is not None and unit.quantity in EXPECTED[role] and not _is_far(unit.quantity, named):
+        is_far = unit is not None and unit.quantity is Quantity.LENGTH and not named  # of heights and distances, too
+        if unit is not None and unit.quantity in EXPECTED[role] and not is_far:
             found.append(Guess(channel, role, BY_UNIT + named))
         elif unit is None or unit.quantity in (Quantity.OTHER, Quantity.SHARE):
             letter = re.fullmatch(LETTERS[role], last) is not None
@@ -214,11 +212,6 @@ def guesses(channel: Channel) -> list[Guess]:
     if not found and re.fullmatch(ANY_OUTPUT, last) and unit is None:
         found.append(Guess(channel, Role.SPEED, BY_CHANCE))
     return found
-
-
-def _is_far(quantity: Quantity, named: bool) -> bool:
-    """Tell whether a unit alone says nothing: metres are of heights and distances, too."""
-    return quantity is Quantity.LENGTH and not named
 
 
 def roles_of(groups: Sequence[Group]) -> Roles:

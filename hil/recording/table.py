@@ -34,7 +34,6 @@ class Kind(Enum):
 
     @staticmethod
     def of(column: Column) -> Kind:
-        """Tell the kind of a column of a table."""
         return Kind.of_dtype(column.dtype)
 
     @staticmethod
@@ -66,7 +65,6 @@ def as_column(values: Column) -> Column:
 
 
 def as_text(cells: list[str]) -> Column:
-    """Return texts as a column."""
     column = np.empty(len(cells), dtype=object)
     column[:] = cells
     return column
@@ -104,14 +102,12 @@ FloatArray = NDArray[np.float64]
 LARGEST = 1e30
 """Magnitude beyond which a number is no measurement, in whatever unit; its fourth power still is a float."""
 
-LEFT_OUT = ": left out, "
-"""What every remark on a column that was not read has behind the column's name."""
+LEFT_OUT = ": left out, "  # what every remark on a column that was not read has behind the column's name
 
 NAME_IN_MODEL = "For a foreign recording, name its columns in [signals] of the model file."
 NAME_IN_PYTHON = "Name its columns: from_pandas(frame, torque=[...], speed=..., time=...)."
 
-LONGEST_CELL = 40
-"""Characters of a wrong cell that a message shows."""
+LONGEST_CELL = 40  # characters of a wrong cell that a message shows
 
 
 @dataclass(frozen=True, slots=True)

@@ -33,7 +33,6 @@ class CellKind(Enum):
 
 
 def kind_of(cell: str, decimal: str = ".") -> CellKind:
-    """Tell what a cell is, with a decimal mark."""
     plain = cell.strip()
     if plain in MISSING or plain.lower() == "nan":
         return CellKind.MISSING
@@ -92,24 +91,21 @@ class TextForm:
 SAMPLE_LINES: Final = 200
 """Lines that are looked at: more than any header has, and enough rows to tell what a column holds."""
 
-MOST_CELLS: Final = 100_000
-"""Cells that are looked at: of a hundred columns those of all lines."""
+MOST_CELLS: Final = 100_000  # cells that are looked at: of a hundred columns those of all lines
 
 DELIMITERS: Final = (COMMA, ";", TAB, "|", BLANKS)
 DECIMALS: Final = (".", ",")
 
 COMMENTS: Final = ("#", "%", "//")
 
-NAMES_THE_DELIMITER: Final = "sep="
-"""First line of a file that Excel shall read."""
+NAMES_THE_DELIMITER: Final = "sep="  # first line of a file that Excel shall read
 
 TYPE_WORDS: Final = frozenset(
     "f4 f8 i1 i2 i4 i8 u1 u2 u4 u8 b float double single real int integer uint bool boolean string text".split()
 )
 """Words of a line of data types, as INCA and others write one."""
 
-HALF: Final = 0.5
-"""Share of the cells of rows that are no texts, in most files."""
+HALF: Final = 0.5  # share of the cells of rows that are no texts, in most files
 
 
 def split(line: str, delimiter: str) -> list[str]:
@@ -175,7 +171,6 @@ class _Cut:
 
 
 def recognise(lines: Sequence[str], hints: FormatHints) -> TextForm:
-    """Return the form of a text recording."""
     skipped = hints.skip_lines
     delimiter = hints.delimiter
     if len(lines) > skipped and lines[skipped].strip().lower().startswith(NAMES_THE_DELIMITER):

@@ -23,7 +23,7 @@ from contextlib import suppress
 from io import FileIO
 from pathlib import Path
 from types import TracebackType
-from typing import Protocol, Self
+from typing import Self
 
 import numpy as np
 
@@ -76,20 +76,10 @@ PAUSE_S = 0.002
 """After what was written [s]: lines that come faster, as those of a run without a clock, are written together."""
 
 
-class Unbuffered(Protocol):
-    """A file that hands to the system what it is given, and tells how much of it that has taken."""
-
-    def write(self, data: bytes, /) -> int | None:
-        """Write, perhaps only the first bytes."""
-
-    def close(self) -> None:
-        """Close it."""
-
-
 class WritingThread:
     """Writes lines in their order, all that wait at once, from its making to `finish`."""
 
-    def __init__(self, file: Unbuffered, capacity: int) -> None:
+    def __init__(self, file: FileIO, capacity: int) -> None:
         self._file = file
         self._capacity = capacity
         self._lines: list[str] = []
@@ -165,20 +155,14 @@ class WritingThread:
 
 CSV, PART = ".csv", ".part.csv"
 
-CAPACITY = 20_000
-"""Samples that may wait for the disk: 200 s at 10 ms, some 10 MB."""
-
-DRAIN_S = 60.0
-"""Time the disk has for them when the run is over [s]."""
-
-FIRST_WRITE_S = 10.0
-"""Time it has for the first bytes [s]."""
+CAPACITY = 20_000  # samples that may wait for the disk: 200 s at 10 ms, some 10 MB
+DRAIN_S = 60.0  # time the disk has for them when the run is over [s]
+FIRST_WRITE_S = 10.0  # time it has for the first bytes [s]
 
 NOT_ENDED = "did not reach its end: the program was killed, or the disk was full"
 """What a recording says of its outcome until it has one."""
 
-LONGEST_ROW = 1 << 16
-"""Bytes; the disk tore at most one row."""
+LONGEST_ROW = 1 << 16  # bytes; the disk tore at most one row
 
 
 def hold(file: FileIO) -> bool:
@@ -277,8 +261,7 @@ class RecordingWriter:
             ) from error
         except OSError as error:
             raise RecordingError(
-                self.path,
-                f"expected a place to write, got: {error.strerror}. Choose another folder, or fix this one.",
+                self.path, f"expected a place to write, got: {error.strerror}. Choose another folder, or fix this one."
             ) from error
         try:
             said = as_metadata({**self._metadata, OUTCOME: NOT_ENDED})

@@ -13,8 +13,7 @@ from urllib.parse import urlsplit
 from hil.config.rig_file import Rig
 from hil.errors import UsageError
 
-IN_PROCESS = "virtual:"
-"""Beginning of the bus URLs that are served inside this process only."""
+IN_PROCESS = "virtual:"  # beginning of the bus URLs that are served inside this process only
 
 SOCKETCAN = "socketcan:vcan"
 """Beginning of the bus URLs of the Linux kernel's virtual buses. A simulated drive on a real one could answer in the

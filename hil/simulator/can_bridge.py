@@ -18,7 +18,6 @@ from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
 from http import HTTPStatus
-from types import TracebackType
 from typing import Any, Final, Self
 
 import can
@@ -32,20 +31,17 @@ from hil.simulator.addresses import Address
 
 LOGGER = logging.getLogger(__name__)
 
-POLL_S = 0.05
-"""How often the accepting thread looks whether it should end [s]."""
+POLL_S = 0.05  # how often the accepting thread looks whether it should end [s]
 
 HANDSHAKE_S: Final = 5.0
 """Time from a connection's first moment to its end of the handshake, HTTP and bus request together [s]."""
 
-MOST_HOSTS: Final = 16
-"""Connections at a time that have named the token."""
+MOST_HOSTS: Final = 16  # connections at a time that have named the token
 
 MOST_WAITING: Final = 64
 """Connections at a time that have not; one more ends the oldest of them, so that they keep no host out."""
 
-LONGEST_FRAME_BYTES: Final = 4096
-"""Of a WebSocket; a CAN frame in JSON has some 200."""
+LONGEST_FRAME_BYTES: Final = 4096  # of a WebSocket; a CAN frame in JSON has some 200
 
 MOST_PERIODIC: Final = 64
 SHORTEST_PERIOD_S: Final = 0.001
@@ -54,8 +50,7 @@ SHORTEST_PERIOD_S: Final = 0.001
 BINARY, JSON = "can.binary+json.v1", "can.json.v1"
 """The library's two subprotocols; the first is the quick one."""
 
-MESSAGE_TOO_BIG, POLICY_VIOLATION = 1009, 1008
-"""Status codes of RFC 6455, 7.4.1."""
+MESSAGE_TOO_BIG, POLICY_VIOLATION = 1009, 1008  # status codes of RFC 6455, 7.4.1
 
 
 class _BoundedWebSocket(WebSocket):  # type: ignore[misc]  # the library carries no types
@@ -264,9 +259,7 @@ class CanBridge:
         self._thread.start()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._server.shutdown()
         self._thread.join()
         self._server.cut_connections()

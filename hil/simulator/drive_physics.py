@@ -18,8 +18,7 @@ from drivers.inverter.cia402 import TorqueMode
 from drivers.scaling import IntegerType, VelocityScale
 from hil.simulator.faults import DriveLimits, InverterFaults
 
-_WARM = 0.9
-"""Where derating begins."""
+_WARM = 0.9  # where derating begins
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,8 +42,6 @@ class SimulatedInverter:
 class Heat:
     """The temperature of one drive, from cold."""
 
-    __slots__ = ("_limits", "_x")
-
     def __init__(self, limits: DriveLimits) -> None:
         self._limits = limits
         self._x = 0.0
@@ -66,20 +63,13 @@ class Heat:
         self._x = goal + (self._x - goal) * math.exp(-duration_s / self._limits.thermal_time_constant_s)
 
 
-SUPPLY_V: Final = 650.0
-"""A bus's traction battery."""
-
-UNDER_VOLTAGE_V: Final = 0.7 * SUPPLY_V
-"""Below it the drive goes into fault."""
-
-DISCHARGE_S: Final = 0.02
-"""Time constant with which a drive under load empties its capacitors [s]."""
+SUPPLY_V: Final = 650.0  # a bus's traction battery
+UNDER_VOLTAGE_V: Final = 0.7 * SUPPLY_V  # below it the drive goes into fault
+DISCHARGE_S: Final = 0.02  # time constant with which a drive under load empties its capacitors [s]
 
 
 class DcLink:
     """Voltage over simulated time."""
-
-    __slots__ = ("_voltage_v", "supplied")
 
     def __init__(self) -> None:
         self._voltage_v = SUPPLY_V
@@ -102,8 +92,6 @@ class DcLink:
 
 class SampleClock:
     """Age of what each SYNC fetches, and the values of that age."""
-
-    __slots__ = ("_drift", "_speed_rad_s", "_steps", "_torque")
 
     def __init__(self, drift_ppm: float) -> None:
         self._drift = drift_ppm * 1e-6
@@ -143,8 +131,6 @@ def _normal(random: np.random.Generator) -> Iterator[float]:
 class DriveSensors:
     """The latest readings of one drive."""
 
-    __slots__ = ("_clock", "_noise", "_settings", "_velocity_scale", "current", "speed", "torque")
-
     def __init__(self, settings: SimulatedInverter, velocity: VelocityScale, seed: int) -> None:
         self._settings = settings
         self._noise = _normal(np.random.default_rng([seed, settings.node_id]))
@@ -157,7 +143,6 @@ class DriveSensors:
         self.torque = self.current = self.speed = 0
 
     def sample(self, true_speed_rad_s: float, torque_permille: float, step: int) -> None:
-        """Read the machine at this SYNC."""
         speed_rad_s, torque = self._clock.sample(true_speed_rad_s, torque_permille)
         torque_noise, speed_noise = next(self._noise), next(self._noise)
         torque += self._settings.torque_noise_counts * torque_noise
@@ -181,16 +166,13 @@ _CLASSES: Final = {0x2000: 0x02, 0x3000: 0x04, 0x4000: 0x08, 0x8100: 0x10, 0x820
 """Bits of the error register besides the generic one, by class of error code (CiA 301, 7.5.2.2): current, voltage,
 temperature, communication, device profile."""
 
-_HISTORY: Final = 4
-"""Entries of the pre-defined error field."""
+_HISTORY: Final = 4  # entries of the pre-defined error field
 
 _NO_DATA: Final = bytes(5)
 
 
 class ErrorList:
     """What is wrong with one drive now, and what was."""
-
-    __slots__ = ("_active", "_due", "_history")
 
     def __init__(self) -> None:
         self._active: set[int] = set()

@@ -8,17 +8,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from estimator.physics.catalogue import EFFECTS
-from estimator.physics.effect import Effect, EffectParameter, Element
+from estimator.physics.effect import Effect, Element
 from estimator.physics.kernel import integration
 from estimator.physics.model import DrivelineModel, EffectValue, Motion, Parameter, Structure
-from estimator.physics.simulate import MASSES, SIGN_WIDTH_RAD_S, Stepper, output_state
+from estimator.physics.simulate import SIGN_WIDTH_RAD_S, Stepper, output_state
 from estimator.signals.record import FloatArray, Location, OutputKind, Record
 from hil.config.model_file import read_model
 from hil.config.rig_file import Rig, SimulationTable
 from hil.errors import ModelFileError, UsageError
-from hil.simulator.plant import Plant
 from hil.simulator.plc_device import PlcSetup
 from hil.simulator.rig_server import required_simulation
+from hil.simulator.simulated_rig import Plant
 
 FINER = 16
 """An acceleration is the slope over an integration step: this many times shorter than those of the simulation."""
@@ -74,12 +74,17 @@ def simulation_model(table: SimulationTable, trust_laws: bool = False) -> Drivel
     return file.model
 
 
-class SensedDriveline(Stepper):
-    """A stepped driveline with more to measure than the motor's speed."""
+class DrivelinePlant(Stepper):
+    """A driveline with its effects, stepped by the estimator's own simulation; more to measure than the motor's speed.
+
+    Both inverters turn one shaft. This plant shares its physics with what is fitted: it is for trying things out, the
+    proof has a plant of its own.
+    """
 
     def __init__(self, model: DrivelineModel, period_s: float) -> None:
         super().__init__(model, period_s)
         self._structure = model.structure
+        self.step(0.0, 0.0)  # at rest, where nothing moves: the compiler must not run in the first SYNC
 
     def measured(self, kind: OutputKind, at: Location) -> float:
         """Return what an ideal sensor shows now, an acceleration as under the torque that acts until now.
@@ -90,7 +95,7 @@ class SensedDriveline(Stepper):
         size, last = self._torque.size, self._torque.size - 1
         out, slopes = np.zeros((1, size)), np.zeros((2, size))
         integration.integrate_period(
-            MASSES[self._structure],
+            self._masses,
             (),
             self._period_s,
             FINER * self._substeps if is_slope else self._substeps,
@@ -110,36 +115,6 @@ class SensedDriveline(Stepper):
         )
         return float(slopes[1, last] if is_slope else out[0, last])
 
-
-def _recording_of(kind: OutputKind, at: Location) -> Record:
-    """Return a recording of such an output, as a model is asked for one."""
-    nothing = np.zeros(1)
-    return Record("channel", 1.0, nothing, nothing[:, np.newaxis], nothing, np.ones(1, dtype=np.bool_), kind, at)
-
-
-class DrivelinePlant:
-    """A driveline with its effects, stepped by the estimator's own simulation.
-
-    Both inverters turn one shaft. This plant shares its physics with what is fitted: it is for trying things out, the
-    proof has a plant of its own.
-    """
-
-    __slots__ = ("_period_s", "_stepper")
-
-    def __init__(self, model: DrivelineModel, period_s: float) -> None:
-        self._period_s = period_s
-        self._stepper = SensedDriveline(model, period_s)
-        self._compile()
-
-    @property
-    def speed_rad_s(self) -> float:
-        """True motor speed now [rad/s]."""
-        return self._stepper.speed_rad_s
-
-    def measured(self, kind: OutputKind, at: Location) -> float:
-        """Return what a sensor there shows now [rad/s, rad, Nm, rad/s^2]."""
-        return self._stepper.measured(kind, at)
-
     def advance(self, torque_nm: tuple[float, float], duration_s: float) -> None:
         """Let the driveline run with both torques held [Nm] for one period."""
         if duration_s != self._period_s:
@@ -147,15 +122,16 @@ class DrivelinePlant:
                 f"driveline: asked for a step of {duration_s:g} s, expected the {self._period_s:g} s it was made "
                 "for. Make the plant with the rig's own period_s."
             )
-        self._stepper.step(*torque_nm)
-
-    def _compile(self) -> None:
-        """Step once at rest, where nothing moves: the compiler must not run in the first SYNC."""
-        self._stepper.step(0.0, 0.0)
+        self.step(*torque_nm)
 
 
-NO_EXPERIMENT_S = 60.0
-"""Length of the widest recording where the rig file has no experiment [s]."""
+def _recording_of(kind: OutputKind, at: Location) -> Record:
+    """Return a recording of such an output, as a model is asked for one."""
+    nothing = np.zeros(1)
+    return Record("channel", 1.0, nothing, nothing[:, np.newaxis], nothing, np.ones(1, dtype=np.bool_), kind, at)
+
+
+NO_EXPERIMENT_S = 60.0  # length of the widest recording where the rig file has no experiment [s]
 
 
 def out_of_bounds(rig: Rig, model: DrivelineModel, name: str, values: Mapping[str, float]) -> Iterator[str]:
@@ -165,17 +141,13 @@ def out_of_bounds(rig: Rig, model: DrivelineModel, name: str, values: Mapping[st
     for parameter, scale in zip(effect.shared_parameters, scales, strict=True):
         low, high = scale * parameter.low, scale * parameter.high
         value = values.get(parameter.name)
-        if value is not None and not low <= value <= high and not _is_left_out(parameter, value):
+        is_left_out = parameter.optional and value == parameter.null  # wherever its bounds begin
+        if value is not None and not low <= value <= high and not is_left_out:
             unit = parameter.unit(model.motion).removeprefix("1")  # what has no unit has "1"
             yield (
                 f"effect {name!r}: {parameter.name} is {value:g}, expected {f'{low:.3g} to {high:.3g} {unit}'.strip()}"
                 ", the catalogue's bounds at this rig's period and limits of torque and speed"
             )
-
-
-def _is_left_out(parameter: EffectParameter, value: float) -> bool:
-    """Tell whether a parameter is as good as not given: optional and at its null, wherever its bounds begin."""
-    return parameter.optional and value == parameter.null
 
 
 def _widest_record(rig: Rig) -> Record:

@@ -13,18 +13,17 @@ import math
 import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
+from operator import attrgetter
 from types import MappingProxyType
 from typing import Any, Final
 
 from drivers.inverter.cia402 import PowerState
 from hil.errors import UsageError
-from hil.simulator.faults import FaultAtStep, Frames, LeavesOperation, RigFaults, SecondTpdo, Since
+from hil.simulator.faults import Answers, AtStep, Frames, RigFaults
 
-OVERCURRENT: Final = 0x2310
-"""EMCY error code of CiA 402: continuous over current at the output."""
-
-NOBODY: Final = (0xBAD, 0xBAD)
-"""Vendor-ID and product code of no device."""
+OVERCURRENT: Final = 0x2310  # EMCY error code of CiA 402: continuous over current at the output
+NOBODY: Final = (0xBAD, 0xBAD)  # vendor-ID and product code of no device
 
 LAST_COB_ID: Final = 0x7FF
 
@@ -56,28 +55,24 @@ class Size:
     default: Any = None
 
 
+@dataclass(frozen=True, slots=True)
 class Kind:
-    """One kind of fault: a row of the table."""
+    """One kind of fault: a row of the table; what it sets in its device's faults, a value or what makes it."""
 
-    def __init__(
-        self, fields: Mapping[str, Any], size: Size | None = None, timed: bool = False, since_start: bool = False
-    ) -> None:
-        self._fields = fields
-        self.size = size
-        self.timed = timed
-        self.since_start = since_start
+    fields: Mapping[str, Any]
+    size: Size | None = None
+    timed: bool = False
+    since_start: bool = False
 
     def put_into(self, faults: Any, when: Moment) -> Any:
         """Return a device's faults with this one among them."""
-        for name, value in self._fields.items():
+        for name, value in self.fields.items():
             faults = _with(faults, name, value(when) if callable(value) else value)
         return faults
 
     def adds_up(self, faults: Any) -> bool:
         """Whether it may come more than once, with other sizes."""
-        return (
-            any(isinstance(getattr(faults, name, None), frozenset) for name in self._fields) and self.size is not None
-        )
+        return any(isinstance(getattr(faults, name, None), frozenset) for name in self.fields) and self.size is not None
 
     def written(self, name: str) -> str:
         """Write it as a person does: ``emcy@S=CODE``, in brackets what may be left out; S stands for seconds."""
@@ -113,8 +108,7 @@ def _between(kind: Callable[[str], float], low: float, high: float) -> Callable[
     return read
 
 
-def _whole(text: str) -> int:
-    return int(text, 0)
+_whole = partial(int, base=0)
 
 
 def _code(sign: str, what: str, default: int | None = None) -> Size:
@@ -147,24 +141,15 @@ def _state(text: str) -> PowerState:
     return _STATES[text]
 
 
-def _step(when: Moment) -> int:
-    return when.step
+_step, _size, _at_s = attrgetter("step"), attrgetter("size"), attrgetter("at_s")
 
 
-def _size(when: Moment) -> Any:
-    return when.size
+def _at_step(when: Moment) -> AtStep[Any]:
+    return AtStep(when.step, when.size)
 
 
-def _at_s(when: Moment) -> float:
-    return when.at_s
-
-
-def _error(when: Moment) -> FaultAtStep:
-    return FaultAtStep(when.step, when.size)
-
-
-def _since(when: Moment) -> Since:
-    return Since(when.size, when.step)
+def _answers(answers: Answers) -> Kind:
+    return Kind({"answers_at_s": lambda when: (when.at_s, answers)}, timed=True)
 
 
 _STATE = Size("STATE", f"a state: {', '.join(_STATES)}", _state, PowerState.SWITCHED_ON)
@@ -187,17 +172,15 @@ _INVERTER: Final[Mapping[str, Kind]] = MappingProxyType(
         "bus_off": Kind({"bus_off_at_step": _step}, timed=True),
         "stale_pdo": Kind({"stale_from_step": _step}, timed=True),
         "ignores_target": Kind({"ignores_target_from_step": _step}, timed=True),
-        "leaves_operation": Kind(
-            {"leaves_operation": lambda when: LeavesOperation(when.step, when.size)}, _STATE, True
-        ),
+        "leaves_operation": Kind({"leaves_operation": _at_step}, _STATE, True),
         "torque_gain": Kind({"wrong_torque.step": _step, "wrong_torque.gain": _size}, _FACTOR, True),
         "torque_offset": Kind({"wrong_torque.step": _step, "wrong_torque.offset_permille": _size}, _PERMILLE, True),
         "speed_gain": Kind({"wrong_speed.gain_from_step": _step, "wrong_speed.gain": _size}, _SPEED_FACTOR, True),
         "speed_stuck": Kind({"wrong_speed.stuck_from_step": _step}, timed=True),
-        "second_tpdo": Kind({"second_tpdo": lambda when: SecondTpdo(when.step, when.size)}, _EVERY, True),
+        "second_tpdo": Kind({"second_tpdo": _at_step}, _EVERY, True),
         "stale_share": Kind({"stale_share": _size}, _number("SHARE", 0.0, 1.0, "of the PDOs")),
-        "fault": Kind({"fault": _error}, _code("CODE", "an error code", OVERCURRENT), True),
-        "emcy": Kind({"emcy": _error}, _code("CODE", "an error code"), True),
+        "fault": Kind({"fault": _at_step}, _code("CODE", "an error code", OVERCURRENT), True),
+        "emcy": Kind({"emcy": _at_step}, _code("CODE", "an error code"), True),
         "brown_out": Kind({"brown_out_at_step": _step}, timed=True),
         "clock_drift": Kind({"clock_drift_ppm": _size}, _number("PPM", -1e5, 1e5, "parts per million")),
         "forgets": Kind({"ignored_writes": _size}, _INDEX),
@@ -215,10 +198,10 @@ DEVICES: Final[Mapping[str, Mapping[str, Kind]]] = MappingProxyType(
         "m2": _INVERTER,
         "bus": {
             **{
-                name: Kind({name: _since}, _frames("SHARE", 1.0, "of all"), True, True)
+                name: Kind({name: _at_step}, _frames("SHARE", 1.0, "of all"), True, True)
                 for name in ("lose", "corrupt", "repeat", "reorder")
             },
-            **{name: Kind({name: _since}, _frames("SECONDS", 10.0, "s"), True, True) for name in ("delay", "jitter")},
+            **{name: Kind({name: _at_step}, _frames("SECONDS", 10.0, "s"), True, True) for name in ("delay", "jitter")},
             "off": Kind({"off_at_step": _step}, timed=True),
             "swapped_nodes": Kind({"swapped_nodes": True}),
         },
@@ -226,15 +209,15 @@ DEVICES: Final[Mapping[str, Mapping[str, Kind]]] = MappingProxyType(
             "clutch_closes": Kind({"clutch_closes_at_s": _at_s}, timed=True),
             "permissive_withdrawn": Kind({"permissive_withdrawn_at_s": _at_s}, timed=True),
             "mode_changes": Kind({"mode_changes_at_s": _at_s}, timed=True),
-            "hang": Kind({"hangs_at_s": _at_s}, timed=True),
-            "exception": Kind({"exceptions_at_s": _at_s}, timed=True),
-            "slow": Kind({"late_at_s": _at_s}, timed=True),
-            "half_answer": Kind({"half_at_s": _at_s}, timed=True),
-            "reset": Kind({"resets_at_s": _at_s}, timed=True),
-            "wrong_unit": Kind({"wrong_unit_at_s": _at_s}, timed=True),
-            "wrong_transaction": Kind({"wrong_transaction_at_s": _at_s}, timed=True),
+            "hang": _answers(Answers.NOT),
+            "exception": _answers(Answers.EXCEPTION),
+            "slow": _answers(Answers.LATE),
+            "half_answer": _answers(Answers.HALF),
+            "reset": _answers(Answers.RESET),
+            "wrong_unit": _answers(Answers.WRONG_UNIT),
+            "wrong_transaction": _answers(Answers.WRONG_TRANSACTION),
             "swapped_floats": Kind({"swaps_floats": True}),
-            "wrong_width": Kind({"too_few_at_s": _at_s}, timed=True),
+            "wrong_width": _answers(Answers.TOO_FEW),
         },
     }
 )

@@ -5,24 +5,23 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, replace
 from enum import Enum
-from typing import Final
+from operator import itemgetter
+from typing import Final, Generic, TypeVar
 
 from drivers.inverter.cia402 import PowerState
-from drivers.plc.types import DriveMode
 
-PDO_COB_IDS = range(0x180, 0x580)
-"""The PDOs of the predefined connection set (CiA 301)."""
+PDO_COB_IDS = range(0x180, 0x580)  # the PDOs of the predefined connection set (CiA 301)
+
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True)
-class FaultAtStep:
-    """A fault the drive meets at one step: its error code, for EMCY and object 0x603F.
-
-    Steps count the SYNCs from 1, here and below; 0 is power-on.
-    """
+class AtStep(Generic[T]):
+    """What happens at one step, or from it on. Steps count the SYNCs from 1, here and below; 0 is power-on."""
 
     step: int
-    emcy_code: int
+    what: T
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,22 +71,6 @@ class DriveLimits:
 
 
 @dataclass(frozen=True, slots=True)
-class LeavesOperation:
-    """The drive leaves OPERATION ENABLED by itself at one step, with neither fault nor EMCY, for another state."""
-
-    step: int
-    state: PowerState
-
-
-@dataclass(frozen=True, slots=True)
-class SecondTpdo:
-    """Somebody sends each TPDO again, with a speed of 0, at every n-th SYNC from one step on."""
-
-    step: int
-    every: int
-
-
-@dataclass(frozen=True, slots=True)
 class InverterFaults:
     """What is wrong with a simulated inverter; by default nothing. What each does: docs/supported-protocols.md."""
 
@@ -98,12 +81,12 @@ class InverterFaults:
     stale_from_step: int | None = None
     stale_share: float = 0.0
     ignores_target_from_step: int | None = None
-    leaves_operation: LeavesOperation | None = None
+    leaves_operation: AtStep[PowerState] | None = None  # for this state, by itself, with neither fault nor EMCY
     wrong_torque: WrongTorque = field(default_factory=WrongTorque)
     wrong_speed: WrongSpeed = field(default_factory=WrongSpeed)
-    second_tpdo: SecondTpdo | None = None
-    fault: FaultAtStep | None = None
-    emcy: FaultAtStep | None = None
+    second_tpdo: AtStep[int] | None = None  # somebody sends each TPDO again, with a speed of 0, at every n-th SYNC
+    fault: AtStep[int] | None = None  # its error code, for EMCY and object 0x603F
+    emcy: AtStep[int] | None = None
     brown_out_at_step: int | None = None
     identity: tuple[int, int] | None = None
     velocity_unit: int | None = None
@@ -127,14 +110,6 @@ class Frames:
 
 
 @dataclass(frozen=True, slots=True)
-class Since:
-    """Frames that are touched from one SYNC on; 0 is the start."""
-
-    frames: Frames
-    step: int
-
-
-@dataclass(frozen=True, slots=True)
 class BusFaults:
     """What is wrong with the bus; by default nothing.
 
@@ -142,12 +117,12 @@ class BusFaults:
     and jitter are of the wall clock. Swapped nodes: each inverter has the node id of the other.
     """
 
-    lose: Since | None = None
-    corrupt: Since | None = None
-    repeat: Since | None = None
-    reorder: Since | None = None
-    delay: Since | None = None
-    jitter: Since | None = None
+    lose: AtStep[Frames] | None = None
+    corrupt: AtStep[Frames] | None = None
+    repeat: AtStep[Frames] | None = None
+    reorder: AtStep[Frames] | None = None
+    delay: AtStep[Frames] | None = None
+    jitter: AtStep[Frames] | None = None
     off_at_step: int | None = None
     swapped_nodes: bool = False
 
@@ -179,38 +154,20 @@ class Answers(Enum):
 class PlcFaults:
     """What goes wrong, and when in simulated time [s]; nothing by default.
 
-    ``answers_at_s`` has from when on the PLC answers in another way; of several the last one counts. ``refused_modes``
-    are requests it takes and does not follow, and with ``swaps_floats`` the words of its floating-point values have the
-    other order than the register map says.
+    ``answers_at_s`` has from when on the PLC answers in another way; of several the last one counts. With
+    ``swaps_floats`` the words of its floating-point values have the other order than the register map says.
     """
 
     clutch_closes_at_s: float = math.inf
     permissive_withdrawn_at_s: float = math.inf
     mode_changes_at_s: float = math.inf
-    hangs_at_s: float = math.inf
-    exceptions_at_s: float = math.inf
-    late_at_s: float = math.inf
-    half_at_s: float = math.inf
-    resets_at_s: float = math.inf
-    too_few_at_s: float = math.inf
-    wrong_unit_at_s: float = math.inf
-    wrong_transaction_at_s: float = math.inf
+    answers_at_s: frozenset[tuple[float, Answers]] = frozenset()
     swaps_floats: bool = False
-    refused_modes: frozenset[DriveMode] = frozenset()
 
     def answers(self, time_s: float) -> Answers:
-        """Tell how the PLC answers at a simulated time [s]; of several faults the one that came last."""
-        begun = {
-            self.hangs_at_s: Answers.NOT,
-            self.exceptions_at_s: Answers.EXCEPTION,
-            self.late_at_s: Answers.LATE,
-            self.half_at_s: Answers.HALF,
-            self.resets_at_s: Answers.RESET,
-            self.too_few_at_s: Answers.TOO_FEW,
-            self.wrong_unit_at_s: Answers.WRONG_UNIT,
-            self.wrong_transaction_at_s: Answers.WRONG_TRANSACTION,
-        }
-        return begun[max(due)] if (due := [at_s for at_s in begun if at_s <= time_s]) else Answers.WELL
+        """Tell how the PLC answers at a simulated time [s]."""
+        begun = [each for each in self.answers_at_s if each[0] <= time_s]
+        return max(begun, key=itemgetter(0))[1] if begun else Answers.WELL
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,7 +13,6 @@ import threading
 import time
 from collections.abc import Callable
 from copy import copy
-from types import TracebackType
 from typing import Self
 
 import numpy as np
@@ -21,10 +20,9 @@ import numpy as np
 from drivers.canopen import can
 from drivers.canopen.can_link import SYNC_COB_ID, is_canopen
 from drivers.canopen.inline_bus import InlineBus
-from hil.simulator.faults import BusFaults, Since
+from hil.simulator.faults import AtStep, BusFaults, Frames
 
-BUS_OFF_ERROR = 0x040
-"""Error frame of a controller that has left the bus, as SocketCAN codes it."""
+BUS_OFF_ERROR = 0x040  # error frame of a controller that has left the bus, as SocketCAN codes it
 
 Deliver = Callable[[can.Message], None]
 
@@ -117,15 +115,15 @@ class Lane:
             lag_s += jitter * self._chance(5, message.arbitration_id)
         return lag_s
 
-    def _acting(self, since: Since | None, message: can.Message) -> float | None:
+    def _acting(self, since: AtStep[Frames] | None, message: can.Message) -> float | None:
         """Amount of a fault that touches this frame now."""
         if since is None or self._step() < since.step or not is_canopen(message):
             return None
-        if not since.frames.meant(message.arbitration_id):
+        if not since.what.meant(message.arbitration_id):
             return None
-        return since.frames.amount
+        return since.what.amount
 
-    def _hit(self, fault: int, since: Since | None, message: can.Message) -> bool:
+    def _hit(self, fault: int, since: AtStep[Frames] | None, message: can.Message) -> bool:
         share = self._acting(since, message)
         return share is not None and self._chance(fault, message.arbitration_id) < share
 
@@ -153,9 +151,7 @@ class FaultyWire:
         self._device.receive_by(self._from_devices)
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         if self._postman is not None:
             self._postman.close()
         self._host.shutdown()

@@ -25,38 +25,23 @@ from drivers.inverter.cia402 import (
 )
 from drivers.scaling import VelocityScale
 from hil.simulator.drive_physics import DcLink, DriveSensors, ErrorList, Heat, SimulatedInverter
-from hil.simulator.stopping import (
-    KNOWN_CODES,
-    STANDARD_CODES,
-    AbortConnection,
-    Ramp,
-    Stop,
-    halt_ramp,
-    stop_between,
-)
+from hil.simulator.stopping import KNOWN_CODES, STANDARD_CODES, AbortConnection, Ramp, Stop, halt_ramp, stop_between
 
-VALUE_RANGE_EXCEEDED, VALUE_TOO_HIGH, VALUE_TOO_LOW = 0x06090030, 0x06090031, 0x06090032
-"""SDO abort codes."""
-
-TARGETS = (0x6071, 0x60B2)
-"""Target torque and torque offset: neither is taken beyond max torque 0x6072."""
+VALUE_RANGE_EXCEEDED, VALUE_TOO_HIGH, VALUE_TOO_LOW = 0x06090030, 0x06090031, 0x06090032  # SDO abort codes
+TARGETS = (0x6071, 0x60B2)  # target torque and torque offset: neither is taken beyond max torque 0x6072
 
 PARAMETERS: Final[Mapping[int, int]] = {0x6071: 0, 0x6072: 1000, 0x6087: 100_000, 0x60B2: 0, **STANDARD_CODES}
 """Objects that are held as written, with the value of a drive whose EDS lists no such object: target torque, max
 torque, torque slope, torque offset, option codes."""
 
-QUICK_SLOPE_PERMILLE_PER_S = 10_000.0
-"""The drive's own slope for quick stops: rated torque within 100 ms."""
-
-UNDER_VOLTAGE, LOST_CONNECTION = 0x3220, 0x8100
-"""Error codes of CiA 402 and CiA 301."""
+QUICK_SLOPE_PERMILLE_PER_S = 10_000.0  # the drive's own slope for quick stops: rated torque within 100 ms
+UNDER_VOLTAGE, LOST_CONNECTION = 0x3220, 0x8100  # error codes of CiA 402 and CiA 301
 
 _HALT = 1 << 8
 
 _REMOTE, _VOLTAGE_ENABLED = StatusBit.REMOTE.value, StatusBit.VOLTAGE_ENABLED.value
 _INTERNAL_LIMIT_ACTIVE, _WARNING = StatusBit.INTERNAL_LIMIT_ACTIVE.value, StatusBit.WARNING.value
-_FOLLOWS_TARGET = StatusBit.FOLLOWS_TARGET.value
-"""Bits as plain numbers, for one statusword at every SYNC."""
+_FOLLOWS_TARGET = StatusBit.FOLLOWS_TARGET.value  # bits as plain numbers, for one statusword at every SYNC
 
 
 class ObjectRefused(Exception):
@@ -197,16 +182,16 @@ class InverterDevice:
         if leaves is not None and not self._has_left and self._steps >= leaves.step:
             if self.state is PowerState.OPERATION_ENABLED:
                 self._has_left = True
-                self._enter(leaves.state)
+                self._enter(leaves.what)
         if faults.hang_at_step == self._steps:
             self.hung = True
             self._torque = 0.0
         if faults.brown_out_at_step == self._steps:
             self._dc_link.supplied = False
         if faults.emcy is not None and faults.emcy.step == self._steps:
-            self.tell(faults.emcy.emcy_code)
+            self.tell(faults.emcy.what)
         if faults.fault is not None and faults.fault.step == self._steps:
-            self.fail(faults.fault.emcy_code)
+            self.fail(faults.fault.what)
 
     def _begin(self, stop: Stop) -> None:
         """Stop as ordered; without torque or without a ramp that is over at once."""

@@ -49,14 +49,9 @@ _ERROR_BEHAVIOUR = (0x1029, 1)
 _EMCY_COB_ID = 0x1014
 _VELOCITY = 0x606C
 _SERIAL_NUMBER = (0x1018, 4)
-_PDO_LENGTH_ERROR = 0x8210
-"""Error code of CiA 301."""
-
-LOOK_EVERY_S = 0.01
-"""How often it looks for its host where no frame comes [s]."""
-
-_STALE_STREAM = 1
-"""Of a node's random numbers: the reading noise has one of its own."""
+_PDO_LENGTH_ERROR = 0x8210  # error code of CiA 301
+LOOK_EVERY_S = 0.01  # how often it looks for its host where no frame comes [s]
+_STALE_STREAM = 1  # of a node's random numbers: the reading noise has one of its own
 
 _NMT_COMMANDS = {bytes((command,)): command for command in NmtCommand}
 _CYCLIC = range(1, 241)
@@ -101,7 +96,6 @@ class InverterNode:
 
     @property
     def torque_nm(self) -> float:
-        """Torque in effect now [Nm]."""
         return self._device.torque_nm
 
     def add_torque(self, torque_nm: float) -> None:
@@ -129,7 +123,7 @@ class InverterNode:
         with self._lock:
             if self._dead:
                 return
-            if self._host.heartbeat_lost(now_ns):
+            if self._host.heartbeat.lost(now_ns):
                 self._lose_host(HEARTBEAT_ERROR)
                 if self._state is NmtState.OPERATIONAL:
                     self._state = _LOST_HOST_STATES.get(self._error_behaviour(), self._state)
@@ -144,7 +138,7 @@ class InverterNode:
             for tpdo in self._tpdos:
                 self._send_if_due(tpdo)
             second = self._faults.second_tpdo
-            if second is not None and self._syncs >= second.step and self._syncs % second.every == 0:
+            if second is not None and self._syncs >= second.step and self._syncs % second.what == 0:
                 self._send_second()
 
     def close(self) -> None:
@@ -330,7 +324,7 @@ class InverterNode:
         if index == _PRODUCER_HEARTBEAT_TIME:
             self._start_heartbeat(value / 1000.0)
         elif (index, subindex) == _CONSUMER_HEARTBEAT_TIME:
-            self._host.heartbeat = HeartbeatConsumer.from_object(value)
+            self._host.heartbeat = HeartbeatConsumer(value)
             self._hear(self._host.heartbeat.cob_id, self._on_heartbeat)
             if self._looking is None:
                 self._looking = Ticker(LOOK_EVERY_S, self._look_by_the_clock, f"host watch of node {self._node_id}")

@@ -32,11 +32,8 @@ from hil.simulator.inverter_device import PARAMETERS, VALUE_RANGE_EXCEEDED, Obje
 
 NO_SUCH_OBJECT = 0x06020000
 READ_ONLY = 0x06010002
-NO_VALUE = 0x060A0023
-"""SDO abort codes."""
-
-_DOWNLOAD, _UPLOAD = 1, 2
-"""Client command specifiers of the requests that name an object (CiA 301, 7.2.4.3)."""
+NO_VALUE = 0x060A0023  # SDO abort codes
+_DOWNLOAD, _UPLOAD = 1, 2  # client command specifiers of the requests that name an object (CiA 301, 7.2.4.3)
 
 _ABORT = 0x80
 
@@ -147,8 +144,7 @@ class PdoFrame:
 
 NOT_MAPPABLE = 0x06040041
 LENGTH_EXCEEDED = 0x06040042
-WRONG_DEVICE_STATE = 0x08000022
-"""SDO abort codes."""
+WRONG_DEVICE_STATE = 0x08000022  # SDO abort codes
 
 EVENT_DRIVEN = range(254, 256)
 ACYCLIC = 0
@@ -175,11 +171,9 @@ class PdoObjects:
                 self._check_mapping(direction, communication, index, subindex, value)
 
     def rpdos(self) -> tuple[PdoFrame, ...]:
-        """Build the RPDOs that are switched on."""
         return tuple(self._frames(RPDO))
 
     def tpdos(self) -> tuple[PdoFrame, ...]:
-        """Build the TPDOs that are switched on."""
         return tuple(self._frames(TPDO))
 
     def deadline_ms(self, rpdo: PdoLayout) -> int:
@@ -253,8 +247,7 @@ class PdoObjects:
 MAX_TORQUE = 0x6072
 SUPPORTED_MODES = 0x6502
 
-INTEGERS = frozenset(IntegerType)
-"""Data types that are simulated by value."""
+INTEGERS = frozenset(IntegerType)  # data types that are simulated by value
 
 
 def power_on_values(eds: EdsFile) -> dict[int, int]:

@@ -20,8 +20,6 @@ TAPS: Final = (10, 7)
 class PlcPrbs:
     """The generator, clocked by the PLC's cycle."""
 
-    __slots__ = ("_amplitude_nm", "_divider", "_held", "_state")
-
     def __init__(self, amplitude_nm: float, divider: int, seed: int) -> None:
         self._amplitude_nm = amplitude_nm
         self._divider = divider
@@ -45,11 +43,8 @@ class PlcPrbs:
 IDENTITY: Final = MappingProxyType({"vendor_code": 0x00484944, "device_code": 0x2024, "map_version": 1})
 """What this PLC identifies as; the shipped map expects the same, which a test sees to."""
 
-COUNTS: Final = 65536
-"""The PLC's watchdog starts over here: it is a 16-bit register."""
-
-ROUNDING_CYCLES: Final = 1e-6
-"""Part of a PLC cycle by which sums of steps may fall short of a whole one."""
+COUNTS: Final = 65536  # the PLC's watchdog starts over here: it is a 16-bit register
+ROUNDING_CYCLES: Final = 1e-6  # part of a PLC cycle by which sums of steps may fall short of a whole one
 
 
 class ValueRefusedError(ValueError):
@@ -83,21 +78,6 @@ _ACCEPTED: Final[Mapping[str, tuple[str, Callable[[Value], bool]]]] = MappingPro
 
 class PlcDevice:
     """The PLC's program."""
-
-    __slots__ = (
-        "_clutch",
-        "_cycles",
-        "_drive_mode",
-        "_faults",
-        "_held",
-        "_lock",
-        "_permissive",
-        "_prbs",
-        "_seen_s",
-        "_sensed",
-        "_setup",
-        "_time_s",
-    )
 
     def __init__(self, setup: PlcSetup | None = None, faults: PlcFaults | None = None) -> None:
         self._setup = setup or PlcSetup()
@@ -145,15 +125,6 @@ class PlcDevice:
         """Whether its floating-point values have their words in another order than the register map says."""
         return self._faults.swaps_floats
 
-    def close_clutch(self) -> None:
-        """Close the clutch now, whatever the drive mode."""
-        with self._lock:
-            self._clutch = ClutchState.CLOSED
-
-    def withdraw_permissive(self) -> None:
-        with self._lock:
-            self._permissive = False
-
     def step(self, dt_s: float) -> None:
         """Let simulated time pass [s]; the PLC cycles that end in it run."""
         with self._lock:
@@ -199,15 +170,11 @@ class PlcDevice:
         if "host_count" in values:
             self._seen_s = self._time_s
         if "drive_mode_request" in values:
-            self._follow(DriveMode(values["drive_mode_request"]))
+            self._drive_mode = DriveMode(values["drive_mode_request"])
+            self._clutch = _clutch_in(self._drive_mode)
         if any(name.startswith("prbs_") for name in values):
             runs = self._held["prbs_enable"] and self._held["prbs_source"] == PrbsSource.PLC.value
             self._prbs = self._generator() if runs else None
-
-    def _follow(self, mode: DriveMode) -> None:
-        if mode not in self._faults.refused_modes:
-            self._drive_mode = mode
-            self._clutch = _clutch_in(mode)
 
     def _generator(self) -> PlcPrbs:
         held = self._held

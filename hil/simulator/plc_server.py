@@ -7,12 +7,10 @@ import logging
 import socket
 import struct
 from asyncio.trsock import TransportSocket
-from collections.abc import AsyncIterator, Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
-from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
 from threading import Thread
-from types import TracebackType
 from typing import Any, Final, Self
 
 from pymodbus.constants import ExcCodes
@@ -151,8 +149,7 @@ class PlcSecurity:
 REGISTERS: Final = (ReadHoldingRegistersResponse, ReadInputRegistersResponse)
 """Answers that can be a register short."""
 
-NO_LINGER: Final = struct.pack("ii", 1, 0)
-"""Value of SO_LINGER: closing such a socket sends RST and not FIN."""
+NO_LINGER: Final = struct.pack("ii", 1, 0)  # value of SO_LINGER: closing such a socket sends RST and not FIN
 
 
 class PlcTcpServer(ModbusTcpServer):
@@ -264,53 +261,6 @@ SETTLE_TURNS: Final = 5
 """Turns of the event loop; asyncio takes three from accepting a connection to telling its protocol."""
 
 
-class ServedPlc:
-    """A PLC that is being served: its port, and a way to let it hang."""
-
-    __slots__ = ("_device", "_paused", "port")
-
-    def __init__(self, device: PlcDevice) -> None:
-        self.port = 0
-        self._device = device
-        self._paused = False
-
-    def pause(self) -> None:
-        """Keep the connections up and answer nothing: the PLC that hangs."""
-        self._paused = True
-
-    def resume(self) -> None:
-        self._paused = False
-
-    def answers(self) -> Answers:
-        """Tell how the PLC answers now: as its faults say, or not at all while it is paused."""
-        return Answers.NOT if self._paused else self._device.answers
-
-
-@asynccontextmanager
-async def serve_plc(
-    device: PlcDevice,
-    register_map: RegisterMap,
-    host: str = "127.0.0.1",
-    port: int = 0,
-    security: PlcSecurity | None = None,
-) -> AsyncIterator[ServedPlc]:
-    """Serve a PLC in the running event loop, for the time of the block."""
-    registers = PlcRegisters(device, register_map)
-    served = ServedPlc(device)
-    server = PlcTcpServer(registers, host, port, served.answers, security)
-    if not await server.listen():
-        raise BusDown(
-            f"simulated PLC: expected to listen on {host}:{port}, can't. Is another program using the port? "
-            "Choose another in [plc] of the rig file, or 0 for a free one."
-        )
-    sockets: Sequence[TransportSocket] = server.transport.sockets  # type: ignore[attr-defined]
-    served.port = sockets[0].getsockname()[1]
-    try:
-        yield served
-    finally:
-        await _close(server, sockets)
-
-
 async def _close(server: PlcTcpServer, sockets: Sequence[TransportSocket]) -> None:
     """Stop listening and drop every connection, also one that is being accepted just now.
 
@@ -330,79 +280,79 @@ async def _settle() -> None:
 
 
 class PlcServer:
-    """A simulated PLC served by a thread of its own; a context manager that starts and closes."""
-
-    __slots__ = ("_device", "_host", "_loop", "_map", "_port", "_ready", "_security", "_stop", "_thread")
+    """A simulated PLC served by a thread of its own, from `__enter__` to `__exit__`."""
 
     def __init__(
         self,
-        device: PlcDevice,  # As for `serve_plc`
-        register_map: RegisterMap,  # As for `serve_plc`
-        host: str = "127.0.0.1",  # As for `serve_plc`
-        port: int = 0,  # As for `serve_plc`
-        security: PlcSecurity | None = None,  # As for `serve_plc`
+        device: PlcDevice,
+        register_map: RegisterMap,
+        host: str = "127.0.0.1",
+        port: int = 0,
+        security: PlcSecurity | None = None,
     ) -> None:
+        self.host = host
         self._device = device
         self._map = register_map
-        self._host = host
-        self._port = port
+        self._asked_port = port
         self._security = security
-        self._ready: Future[ServedPlc] = Future()
+        self._paused = False
+        self._port: Future[int] = Future()
         self._thread = Thread(target=self._run, name="plc-server", daemon=True)
         self._loop: asyncio.AbstractEventLoop | None = None
         self._stop: asyncio.Event | None = None
 
-    def __enter__(self) -> Self:
-        """Start; see `start`."""
-        return self.start()
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
-
-    @property
-    def host(self) -> str:
-        return self._host
-
     @property
     def port(self) -> int:
         """Port it listens on; known once it is started."""
-        return self._ready.result().port
+        return self._port.result()
 
-    def start(self) -> Self:
+    def __enter__(self) -> Self:
         """Start the thread and wait until it listens."""
         self._thread.start()
         try:
-            self._ready.result()
+            self._port.result()
         except BaseException:
             self._thread.join()
             raise
         return self
 
-    def close(self) -> None:
-        """Stop listening, drop the connections and end the thread; safe to call twice."""
+    def __exit__(self, *_: object) -> None:
+        """Stop listening, drop the connections and end the thread."""
         if self._loop is not None and self._stop is not None and self._thread.is_alive():
             self._loop.call_soon_threadsafe(self._stop.set)
             self._thread.join()
 
     def pause(self) -> None:
-        """Keep the connections up and answer nothing."""
-        self._ready.result().pause()
+        """Keep the connections up and answer nothing: the PLC that hangs."""
+        self._paused = True
 
     def resume(self) -> None:
-        self._ready.result().resume()
+        self._paused = False
+
+    def _answers(self) -> Answers:
+        """Tell how the PLC answers now: as its faults say, or not at all while it is paused."""
+        return Answers.NOT if self._paused else self._device.answers
 
     def _run(self) -> None:
         try:
             asyncio.run(self._serve())
-        except BaseException as error:  # carried to the caller of start(), which raises it
-            if self._ready.done():
+        except BaseException as error:  # carried to the caller of __enter__(), which raises it
+            if self._port.done():
                 raise
-            self._ready.set_exception(error)
+            self._port.set_exception(error)
 
     async def _serve(self) -> None:
         self._loop, self._stop = asyncio.get_running_loop(), asyncio.Event()
-        async with serve_plc(self._device, self._map, self._host, self._port, self._security) as served:
-            self._ready.set_result(served)
+        registers = PlcRegisters(self._device, self._map)
+        server = PlcTcpServer(registers, self.host, self._asked_port, self._answers, self._security)
+        if not await server.listen():
+            raise BusDown(
+                f"simulated PLC: expected to listen on {self.host}:{self._asked_port}, can't. Is another program using "
+                "the port? Choose another in [plc] of the rig file, or 0 for a free one."
+            )
+        sockets: Sequence[TransportSocket] = server.transport.sockets  # type: ignore[attr-defined]
+        self._port.set_result(sockets[0].getsockname()[1])
+        try:
             await self._stop.wait()
+        finally:
+            await _close(server, sockets)

@@ -7,7 +7,6 @@ from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from dataclasses import replace
 from functools import partial
-from types import TracebackType
 from typing import Self
 
 import numpy as np
@@ -25,13 +24,11 @@ from hil.simulator.can_bridge import CanBridge
 from hil.simulator.drive_physics import SimulatedInverter
 from hil.simulator.faults import InverterFaults, RigFaults
 from hil.simulator.faulty_wire import FaultyWire
-from hil.simulator.plant import Plant, SensedPlant
 from hil.simulator.plc_device import PlcDevice, PlcSetup
 from hil.simulator.plc_server import PlcSecurity, PlcServer
-from hil.simulator.simulated_rig import SimulatedRig
+from hil.simulator.simulated_rig import Plant, SensedPlant, SimulatedRig
 
-_OF_SENSORS = 2
-"""Of a rig's random numbers: those of its nodes have streams of their own."""
+_OF_SENSORS = 2  # of a rig's random numbers: those of its nodes have streams of their own
 
 _RANGES = {
     ValueType.UINT16: (0, (1 << 16) - 1),
@@ -54,7 +51,6 @@ class ChannelSensors:
         self.sample()  # what a driveline has no place for is refused here, and not at the first SYNC
 
     def sample(self) -> None:
-        """Read every sensor now."""
         if self._plant is not None:
             for table in self._tables:
                 noise = self._noise.get(table.column, 0.0) * float(self._random.standard_normal())
@@ -158,9 +154,7 @@ class RigServer:
             self._stack = stack.pop_all()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._stack.close()
 
     def _serve_bus(self, stack: ExitStack) -> None:
@@ -219,7 +213,6 @@ class RigServer:
 
 
 def required_simulation(rig: Rig) -> SimulationTable:
-    """Give the table ``[simulation]`` of a rig file."""
     if rig.simulation is None:
         raise UsageError(
             f"rig {rig.name!r}: expected a table [simulation] that says what to simulate, there is none. "

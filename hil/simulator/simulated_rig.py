@@ -3,17 +3,35 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from types import TracebackType
-from typing import Self
+from typing import Protocol, Self, runtime_checkable
 
 from drivers.canopen import can
 from drivers.canopen.can_link import SYNC_COB_ID, CanLink
+from estimator.signals.record import Location, OutputKind
 from hil.simulator.drive_physics import SimulatedInverter
 from hil.simulator.inverter_node import InverterNode
-from hil.simulator.plant import Plant
 
-StepCallback = Callable[[float], None]
-"""``callback(time_s)``, called in the rig's own thread after each step."""
+
+class Plant(Protocol):
+    """A driveline as the simulated rig sees it; all values reflected to the motor shaft."""
+
+    @property
+    def speed_rad_s(self) -> float:
+        """True motor speed now [rad/s]."""
+
+    def advance(self, torque_nm: tuple[float, float], duration_s: float) -> None:
+        """Let the plant run with both inverters' torques held [Nm] for ``duration_s`` [s]."""
+
+
+@runtime_checkable
+class SensedPlant(Plant, Protocol):
+    """A driveline with further places to measure at."""
+
+    def measured(self, kind: OutputKind, at: Location) -> float:
+        """Return what a sensor there shows now [rad/s, rad, Nm, rad/s^2]."""
+
+
+StepCallback = Callable[[float], None]  # ``callback(time_s)``, called in the rig's own thread after each step
 
 TorqueSource = Callable[[], tuple[float, float]]
 """What another controller adds to the torque references of m1 and m2 [Nm], asked at each SYNC."""
@@ -57,10 +75,7 @@ class SimulatedRig:
     @property
     def torque_nm(self) -> tuple[float, float]:
         """Torques in effect now [Nm]; an absent inverter gives none."""
-        return (
-            0.0 if self._m1 is None else self._m1.torque_nm,
-            0.0 if self._m2 is None else self._m2.torque_nm,
-        )
+        return (0.0 if self._m1 is None else self._m1.torque_nm, 0.0 if self._m2 is None else self._m2.torque_nm)
 
     def add_step_callback(self, callback: StepCallback) -> None:
         """Have ``callback(time_s)`` called after each step, in the rig's own thread."""
@@ -83,12 +98,7 @@ class SimulatedRig:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        error_type: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def _on_sync(self, data: bytes, t_ns: int) -> None:

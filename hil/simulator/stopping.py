@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import Enum, IntEnum
 from types import MappingProxyType
-from typing import Final, Self
+from typing import Final
 
 from drivers.canopen.heartbeat import HEARTBEAT_COB_ID
 from drivers.canopen.silence import Silence
@@ -106,19 +106,13 @@ LONGEST_LOOK_NS = 15 * NS_PER_MS
 
 
 class HeartbeatConsumer:
-    """Watches one heartbeat, from the first that comes; off by default."""
+    """Watches one heartbeat from the first: node id in bits 16 to 22, time in bits 0 to 15 [ms], 0 is off."""
 
-    __slots__ = ("_silence", "_watches", "cob_id")
-
-    def __init__(self, node_id: int = 0, timeout_ms: int = 0) -> None:
-        self.cob_id = HEARTBEAT_COB_ID + node_id
+    def __init__(self, value: int = 0) -> None:
+        self.cob_id = HEARTBEAT_COB_ID + (value >> 16 & 0x7F)
+        timeout_ms = value & 0xFFFF
         self._watches = timeout_ms > 0
         self._silence = Silence(timeout_ms * NS_PER_MS, GRACE_NS, LONGEST_LOOK_NS)
-
-    @classmethod
-    def from_object(cls, value: int) -> Self:
-        """Read the object: node id in bits 16 to 22, time in bits 0 to 15 [ms]."""
-        return cls(value >> 16 & 0x7F, value & 0xFFFF)
 
     def beat(self, t_ns: int) -> None:
         self._silence.beat(t_ns)
@@ -133,8 +127,6 @@ class HeartbeatConsumer:
 
 class RpdoDeadline:
     """Watches one RPDO, from the first that comes."""
-
-    __slots__ = ("_deadline_ns", "_last_ns")
 
     def __init__(self, deadline_ms: int) -> None:
         self._deadline_ns = deadline_ms * NS_PER_MS
@@ -152,14 +144,11 @@ class RpdoDeadline:
 
 
 HEARTBEAT_ERROR: Final = 0x8130
-RPDO_TIMEOUT: Final = 0x8250
-"""Error codes of CiA 301."""
+RPDO_TIMEOUT: Final = 0x8250  # error codes of CiA 301
 
 
 class HostWatch:
     """The watch of one node."""
-
-    __slots__ = ("_deadlines", "_next_sync_ns", "_real_time", "_sync_ns", "heartbeat")
 
     def __init__(self, real_time: bool) -> None:
         self._real_time = real_time
@@ -184,10 +173,6 @@ class HostWatch:
     def received(self, cob_id: int, wall_ns: int) -> None:
         """Take an RPDO, at this time of the wall clock [ns]."""
         self._deadlines[cob_id].received(wall_ns if self._real_time else self._next_sync_ns)
-
-    def heartbeat_lost(self, wall_ns: int) -> bool:
-        """Whether the host's heartbeat has ended; reported once."""
-        return self.heartbeat.lost(wall_ns)
 
     def rpdo_missed(self, wall_ns: int) -> bool:
         """Whether an RPDO is overdue; reported once for each."""

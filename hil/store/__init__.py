@@ -3,7 +3,7 @@
 The recordings are the source: each explains itself, and the list can be made again from them.
 """
 
-from hil.store.entry import Attachment, Note, Run, RunEntry, entry_of
+from hil.store.entry import Attachment, Note, Run, RunEntry, entry_at
 from hil.store.rebuild import attach_to_runs, register_run
 from hil.store.run_store import STORE_NAME, RunFilter, RunStore, store_of
 
@@ -16,7 +16,7 @@ __all__ = [
     "RunFilter",
     "RunStore",
     "attach_to_runs",
-    "entry_of",
+    "entry_at",
     "register_run",
     "store_of",
 ]

@@ -14,13 +14,11 @@ from pydantic import Field, NonNegativeInt
 from hil.files import parse_json
 from hil.recording.checksum import CHECKSUM, CHECKSUMS, RIG_CHECKSUM, RIG_TEXT, text_sha256
 from hil.recording.description import OUTCOME
-from hil.recording.recordings import Facts, facts_of, read_facts
-from hil.recording.table import Table
+from hil.recording.recordings import read_facts
 
 SCHEMA = "hil.runs/1"
 
-COMPLETE = "complete"
-"""Outcome of a run that reached its end; any other is what ended it."""
+COMPLETE = "complete"  # outcome of a run that reached its end; any other is what ended it
 
 DIAGNOSIS, IDENTIFICATION, ONLINE, MODEL = "diagnosis", "identification", "online", "model"
 """Kinds of attachment that mean something here; others are kept all the same."""
@@ -91,7 +89,6 @@ class Run:
     attachments: tuple[Attachment, ...] = ()
 
     def latest(self, kind: str) -> Attachment | None:
-        """Return the last attachment of a kind."""
         return next((entry for entry in reversed(self.attachments) if entry.kind == kind), None)
 
     @property
@@ -115,28 +112,19 @@ def attachment_of(kind: str, added_utc: str, path: Path | None, document: str) -
     return Attachment(kind, added_utc, path, document, verdict if isinstance(verdict, str) else "", alarms)
 
 
-def entry_of(table: Table, outcome: str = COMPLETE) -> RunEntry:
-    """Make the entry of a recording from what it says of itself; what ended it early, too, if nobody else knows."""
-    return _entry(facts_of(table), outcome)
-
-
 def entry_at(recording: Path, outcome: str = COMPLETE) -> RunEntry:
-    """Make the entry of a recording in a file; as `entry_of`, without holding its rows."""
-    return _entry(read_facts(recording), outcome)
-
-
-def _entry(facts: Facts, outcome: str) -> RunEntry:
-    said = facts.metadata
+    """Make the entry of a recording from what it says of itself; what ended it early, too, if nobody else knows."""
+    said, extent = read_facts(recording)
     rig_text = said.get(RIG_TEXT, "")
     eds = {key[len("eds_") : -len("_sha256")]: value for key, value in said.items() if _is_eds(key)}
     return RunEntry(
-        recording=facts.path,
+        recording=recording,
         data_sha256=said.get(CHECKSUM, ""),
         experiment=said.get(EXPERIMENT, ""),
         started_utc=said.get(STARTED, ""),
-        duration_s=facts.extent.duration_s,
-        samples=facts.extent.n_rows,
-        flagged=facts.extent.flagged,
+        duration_s=extent.duration_s,
+        samples=extent.n_rows,
+        flagged=extent.flagged,
         software_version=said.get(VERSION, ""),
         rig_name=_rig_name(rig_text),
         rig_text=rig_text,
@@ -278,7 +266,6 @@ class Row:
 
     @property
     def differs(self) -> bool:
-        """Whether the runs differ in it."""
         return bool(self.a != self.b)
 
 

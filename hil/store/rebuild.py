@@ -12,7 +12,7 @@ from hil.files import read_json, remove_abandoned
 from hil.recording.formats import FORMATS, read_metadata
 from hil.recording.writer import is_written
 from hil.store.entry import COMPLETE, DIAGNOSIS, IDENTIFICATION, ONLINE, Attachment, entry_at, is_run
-from hil.store.run_store import STORE_NAME, RunStore, store_of
+from hil.store.run_store import DAMAGED, STORE_NAME, RunStore, store_of
 
 ONLINE_SCHEMA, ONLINE_SUFFIX = "hil.online/1", ".online.json"
 """What the on-line estimate of a run is called, after the stem of its recording."""
@@ -20,16 +20,10 @@ ONLINE_SCHEMA, ONLINE_SUFFIX = "hil.online/1", ".online.json"
 _FILES = {"diagnosis.json": DIAGNOSIS, "identification.json": IDENTIFICATION}
 
 
-def register_run(
-    recording: Path | str,
-    outcome: str = COMPLETE,
-    folder: Path | str | None = None,
-    results: Mapping[str, Path] | None = None,
-) -> int:
+def register_run(recording: Path, outcome: str = COMPLETE, results: Mapping[str, Path] | None = None) -> int:
     """Enter a recording that was just made."""
-    recording = Path(recording)
     entry = entry_at(recording, outcome)
-    with RunStore(recording.parent if folder is None else folder) as store:
+    with RunStore(recording.parent) as store:
         run_id = store.add_run(entry)
         for kind, path in (results or {}).items():
             store.attach(run_id, kind, path)
@@ -65,7 +59,6 @@ class Rebuilt:
     copies: int = 0  # recordings with the data of a run whose own is still there, such as conversions
     attached: int = 0  # results (diagnosis.json, identification.json) that were attached now
     unreadable: list[str] = field(default_factory=list)
-    lost_notes: list[str] = field(default_factory=list)  # notes to runs of which nothing else is left
     removed: list[Path] = field(default_factory=list)  # unfinished files of processes that were killed
 
 
@@ -73,33 +66,14 @@ def rebuild(folder: Path) -> Rebuilt:
     """Bring the list of a folder up to what is in the folder and in those in it."""
     with RunStore(folder) as store:
         done = Rebuilt(removed=[path for each in _folders(folder) for path in remove_abandoned(each)])
-        _read_again(store, done)
         _enter(store, done)
         done.attached = _attach_results(store)
     return done
 
 
-def _read_again(store: RunStore, done: Rebuilt) -> None:
-    """Read runs again that are damaged in the list and still name their recording."""
-    for number, name in store.damaged().items():
-        path = store.folder / name
-        try:
-            if name and path.is_file() and is_run(read_metadata(path)):
-                store.move(number, entry_at(path))
-                done.moved += 1
-                continue
-        except RecordingError as error:
-            done.unreadable.append(str(error))
-        run = store.get(number)
-        done.unreadable.append(
-            f"{store.path}: run {number}: {run.entry.outcome.partition('. ')[0]}; its notes are kept"
-        )
-        done.lost_notes += [note.text for note in run.notes]
-
-
 def _enter(store: RunStore, done: Rebuilt) -> None:
     """Enter the recordings that are not in the list yet."""
-    known = [run for run in store.find() if run.run_id not in store.damaged()]
+    known = [run for run in store.find() if not run.entry.outcome.startswith(DAMAGED)]
     here = {(run.entry.recording.resolve(), run.entry.data_sha256) for run in known}
     data = {sha256 for _, sha256 in here if sha256}
     lost = {run.entry.data_sha256: run.run_id for run in known if not run.entry.recording.exists()}

@@ -110,10 +110,10 @@ def recording_state(entry: RunEntry) -> str:
     if not entry.recording.exists():
         return "missing: it was moved or removed; 'hil runs rebuild' finds it again inside the store's folder"
     try:
-        facts = read_facts(entry.recording)
+        metadata, _ = read_facts(entry.recording)
     except RecordingError as error:
         return "; ".join(error.problems)
-    checksum = facts.metadata.get(CHECKSUM, "")
+    checksum = metadata.get(CHECKSUM, "")
     if checksum != entry.data_sha256:
         return "another recording under the same name: its checksum is not that of this run"
     return VERIFIED if checksum else UNPROVEN

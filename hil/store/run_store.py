@@ -21,7 +21,6 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Final, Literal, Self, TypeVar
 
 from pydantic import TypeAdapter, ValidationError
@@ -34,8 +33,7 @@ STORE_NAME: Final = "hil_runs"
 
 SCHEMA: Final = "hil.run_card/1"
 
-LONGEST_DOCUMENT_BYTES: Final = 16 << 20
-"""A longer attached file is known by its name only."""
+LONGEST_DOCUMENT_BYTES: Final = 16 << 20  # a longer attached file is known by its name only
 
 DAMAGED: Final = "damaged in the list of runs"
 
@@ -51,7 +49,6 @@ What = Literal["note", "result"]
 
 
 def store_of(folder: Path | str) -> Path:
-    """Name the list of a folder."""
     return Path(folder) / STORE_NAME
 
 
@@ -96,12 +93,11 @@ class _Files:
 
 
 class RunStore:
-    """The runs of one folder; a context manager. What a call has written is kept when it returns, whole."""
+    """The runs of one folder; a context manager, which makes it. What a call has written is kept when it returns."""
 
     def __init__(self, folder: Path | str) -> None:
         self.folder = Path(folder)
         self.path = store_of(self.folder)
-        self._is_open = False
 
     def __enter__(self) -> Self:
         if not self.folder.is_dir():
@@ -110,13 +106,9 @@ class RunStore:
             self.path.mkdir(exist_ok=True)
         if not is_inside(self.folder, self.path):
             raise StoreError(self.path, "expected a folder, got a link to somewhere else. Move it away.")
-        self._is_open = True
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._is_open = False
+    def __exit__(self, *_: object) -> None: ...
 
     def add_run(self, entry: RunEntry) -> int:
         """Enter a run; one that is there already, the same file with the same data, keeps its number."""
@@ -174,13 +166,15 @@ class RunStore:
         runs = [run for number, files in listed if (run := self._read(number, files, bool(asked.text))) is not None]
         taken = [run for run in runs if asked.takes(run)]
         taken.sort(key=lambda run: (run.entry.started_utc, run.run_id))
-        return [_without_documents(run) for run in taken] if asked.text else taken
+        if asked.text:
+            return [replace(run, attachments=tuple(replace(a, document="") for a in run.attachments)) for run in taken]
+        return taken
 
     def get(self, run_id: int) -> Run:
         files = self._listed().get(run_id)
         run = None if files is None else self._read(run_id, files, True)
         if run is None:
-            raise self._no_such(run_id)
+            raise UsageError(f"{self.path}: expected the number of a run, got {run_id}, which is none. See: hil runs")
         return run
 
     def delete(self, run_id: int) -> Run:
@@ -194,16 +188,6 @@ class RunStore:
                     self._document_path(run_id, number).unlink(missing_ok=True)
         return run
 
-    def damaged(self) -> dict[int, str]:
-        """Return the name that each run that can't be read still has for its recording; "" for none."""
-        found = {}
-        for number in self._listed():
-            try:
-                self._content(self._run_path(number), _RUN)
-            except ValueError:
-                found[number] = self._recording_of(self._run_path(number))
-        return found
-
     def _is_here(self, name: Path) -> bool:
         """Whether a name is that of a file in the folder; a plain one that is no link needs no further look."""
         path = self.folder / name
@@ -214,17 +198,8 @@ class RunStore:
                 return False
         return is_inside(self.folder, path)
 
-    def _recording_of(self, path: Path) -> str:
-        try:
-            name = read_json(path)["run"]["recording"]
-        except (OSError, ValueError, KeyError, TypeError):
-            return ""
-        return name if isinstance(name, str) and is_inside(self.folder, self.folder / name) else ""
-
     def _listed(self) -> dict[int, _Files]:
         """Return which numbers are given, deleted ones too, with what is kept of each."""
-        if not self._is_open:
-            raise StoreError(self.path, "expected an open store, got one that is closed. Use it by 'with'.")
         found: dict[int, _Files] = {}
         with self._in_words():
             names = sorted(entry.name for entry in self.path.iterdir())
@@ -247,7 +222,7 @@ class RunStore:
                 raise ValueError("recording: expected the name of a file in the folder, got one that leads out of it")
             entry = replace(entry, recording=self.folder / entry.recording)
         except ValueError as error:
-            cure = f"'hil runs rebuild --store {self.folder}' reads the run again from its recording"
+            cure = f"'hil runs rebuild --store {self.folder}' enters its recording anew"
             entry = RunEntry(recording=self.folder / "(unknown)", outcome=f"{DAMAGED} ({error}). {cure}")
         notes = tuple(self._note(self._path(number, "note", each)) for each in files.notes)
         return Run(number, entry, notes, tuple(self._result(number, each, with_documents) for each in files.results))
@@ -308,9 +283,6 @@ class RunStore:
         self.get(run_id)
         return self._listed()[run_id]
 
-    def _no_such(self, run_id: int) -> UsageError:
-        return UsageError(f"{self.path}: expected the number of a run, got {run_id}, which is none. See: hil runs")
-
     def _card(self, entry: RunEntry) -> dict[str, Any]:
         """Return an entry as it is written: its recording relative to the folder, for both may be moved together."""
         resolved = entry.recording.resolve()
@@ -340,10 +312,6 @@ class RunStore:
                 f"expected a folder that can be read and has room, got: {error.strerror or error}. Nothing of it was "
                 "entered; make room, or fix the permissions, and try again.",
             ) from error
-
-
-def _without_documents(run: Run) -> Run:
-    return replace(run, attachments=tuple(replace(each, document="") for each in run.attachments))
 
 
 def _what(path: Path) -> str:

@@ -37,9 +37,9 @@ from hil.rig.realtime import PRIORITY, real_time
 from hil.rig.stop import StopRequest
 from hil.sample import SampleFlag
 from hil.simulator.addresses import Address, with_addresses
-from hil.simulator.plant import RigidPlant
 from hil.simulator.rig_server import RigServer
 from tests.benchmarks.ratios import machine, table, timed
+from tests.simulator.rigid_plant import RigidPlant
 
 SOURCE = Path(__file__).with_name("bare_loop.c")
 

@@ -31,6 +31,13 @@ IMPERFECTIONS = (
 )
 """What every vehicle has a little of. The bus of a seed is drawn from them in this order: another list makes others."""
 
+UNSCALED = {
+    "torque_ripple": ("order",),
+    "resolver_error": ("resolver_once_phase_rad", "resolver_twice_phase_rad"),
+    "shaft_hysteresis": ("slip_rad",),
+}
+"""Sizes that stay as they are where an effect is made smaller."""
+
 FEWEST, MOST = 3, 6
 LEAST_PART, MOST_PART = 0.05, 0.35
 """Part of the size at which an imperfection would be concealed by itself."""
@@ -67,10 +74,15 @@ def _small(strong: str, seed: int, rng: np.random.Generator) -> tuple[list[str],
         if len(names) < count and not fields & taken:
             whole = draw_specimen(name, seed).sizes[name]
             part = log_uniform(rng, LEAST_PART, MOST_PART)
-            sizes[name] = {**whole, **{key: part * whole[key] for key in EFFECTS[name].strength(whole)}}
+            sizes[name] = {**whole, **{key: part * whole[key] for key in strength_of(name, whole)}}
             names.append(name)
             taken |= fields
     return names, sizes
+
+
+def strength_of(name: str, sizes: Sizes) -> list[str]:
+    """Return which of an effect's sizes say how much of it there is."""
+    return [size for size in sizes if size not in UNSCALED.get(name, ())]
 
 
 def _fields(name: str, seed: int) -> set[str]:
@@ -107,6 +119,6 @@ def _stated(sizes: Mapping[str, Sizes], known: Known, rng: np.random.Generator) 
 
 def in_a_model_file(effect: HiddenEffect, sizes: Sizes) -> dict[str, str]:
     """Return words of a model file to the sizes that they state; empty where some of the effect's strength has none."""
-    strength = effect.strength(sizes)
+    strength = strength_of(effect.name, sizes)
     words = {word: size for word, size in effect.fitted.items() if isinstance(size, str) and size in strength}
     return words if set(words.values()) == set(strength) else {}

@@ -5,7 +5,17 @@ import pytest
 
 from hil.proof.truth.recording import USUAL, speed_reading
 from hil.proof.truth.specimen import EFFECTS, draw_specimen
-from tests.campaigns.dirty import FEWEST, IMPERFECTIONS, LEAST_PART, MOST, MOST_PART, Known, in_a_model_file, make_dirty
+from tests.campaigns.dirty import (
+    FEWEST,
+    IMPERFECTIONS,
+    LEAST_PART,
+    MOST,
+    MOST_PART,
+    Known,
+    in_a_model_file,
+    make_dirty,
+    strength_of,
+)
 
 
 @pytest.mark.parametrize(("strong", "seed"), [("brake_drag", 1), ("actuator_lag", 2), ("none", 3)])
@@ -18,7 +28,7 @@ def test_small_effects_are_some_and_small_and_not_the_strong_one_again(strong: s
     assert case.specimen.sizes[strong] == draw_specimen(strong, seed).sizes[strong]
     for name, sizes in small.items():
         whole = draw_specimen(name, seed).sizes[name]
-        for key in EFFECTS[name].strength(whole):
+        for key in strength_of(name, whole):
             assert LEAST_PART * abs(whole[key]) <= abs(sizes[key]) <= MOST_PART * abs(whole[key])
 
 

@@ -15,7 +15,7 @@ from hil.cli.main import run
 from hil.config.rig_file import read_rig
 from hil.simulator import rig_server
 from hil.simulator.drive_physics import SimulatedInverter
-from hil.simulator.faults import FaultAtStep, InverterFaults, PlcFaults, RigFaults
+from hil.simulator.faults import AtStep, InverterFaults, PlcFaults, RigFaults
 from tests.rig.serving import served
 
 
@@ -56,7 +56,7 @@ def test_registers_of_the_plc_are_shown_and_one_that_can_not_be_is_refused(
 
 @pytest.mark.parametrize("options", [(), ("--json",)])
 def test_drive_in_fault_is_noted(short_rig: Path, options: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
-    with rig_with(RigFaults(m1=InverterFaults(fault=FaultAtStep(0, 0x2310))), short_rig) as command:
+    with rig_with(RigFaults(m1=InverterFaults(fault=AtStep(0, 0x2310))), short_rig) as command:
         assert run([*command, *options]) == 0
     printed = capsys.readouterr().out
     notes = json.loads(printed)["devices"][1]["notes"] if options else [" ".join(printed.split())]

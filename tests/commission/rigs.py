@@ -19,8 +19,8 @@ from hil.rig.realtime import NOT_ASKED
 from hil.simulator.addresses import Address
 from hil.simulator.driveline import EffectSpec, plant_for
 from hil.simulator.fault_table import rig_faults
-from hil.simulator.plant import Plant
 from hil.simulator.rig_server import RigServer
+from hil.simulator.simulated_rig import Plant
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "rig.toml"
 

@@ -14,8 +14,8 @@ from drivers.inverter.inverter import Inverter, InverterFeedback, InverterSettin
 from drivers.torque_guard import ErrorLimits, Evidence, GuardedTorque, GuardLimits, TorqueGuard, TorqueRequest
 from hil.simulator.drive_physics import SimulatedInverter
 from hil.simulator.faults import InverterFaults
-from hil.simulator.plant import Plant, RigidPlant
-from hil.simulator.simulated_rig import SimulatedRig
+from hil.simulator.simulated_rig import Plant, SimulatedRig
+from tests.simulator.rigid_plant import RigidPlant
 
 _channels = itertools.count()
 

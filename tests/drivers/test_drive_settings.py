@@ -155,23 +155,6 @@ def test_slope_and_codes_are_in_the_drive_after_configuring_and_in_the_list_befo
         assert rig.m1._sdo.upload(0x1400, 5) == M1.rpdo_deadline_ms
 
 
-def test_a_drive_with_a_name_tells_it_in_segments(tmp_path: Path) -> None:
-    named = """
-[1008]
-ParameterName=Manufacturer device name
-ObjectType=0x7
-DataType=0x0009
-AccessType=const
-DefaultValue=Traction inverter
-PDOMapping=0
-"""
-    eds = changed_eds(tmp_path, more=named)
-    with bench(simulated=replace(SIMULATED_M1, eds_path=eds)) as rig:
-        assert rig.m1._sdo.upload_text(0x1008) == "Traction inverter"
-        with pytest.raises(ConfigMismatch, match=r"object 0x1008:00 refused .*Object does not exist"):
-            rig.m2._sdo.upload_text(0x1008)
-
-
 def test_a_drive_that_is_guarded_is_found_and_set_right(tmp_path: Path) -> None:
     """Some other master left it on; the EDS has it off."""
     eds = changed_eds(tmp_path, more=NODE_GUARDING.format(guard_ms=0, factor=0))

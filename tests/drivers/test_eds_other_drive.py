@@ -21,9 +21,9 @@ from drivers.resources import data_file
 from hil.config.rig_file import read_rig
 from hil.rig.build import inverter_settings
 from hil.simulator.drive_physics import SimulatedInverter
-from hil.simulator.plant import RigidPlant
 from tests.drivers.can_bench import M1, SIMULATED_M1, Bench, bench, guarded
 from tests.drivers.eds_bench import SHIPPED, without
+from tests.simulator.rigid_plant import RigidPlant
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 OTHER_EDS = EXAMPLES / "other_drive.eds"

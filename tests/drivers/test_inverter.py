@@ -11,8 +11,8 @@ from drivers.errors import CommandRefused, DeviceTimeout, ForeignController, Pro
 from drivers.inverter.cia402 import PowerState
 from drivers.inverter.inverter import Inverter
 from drivers.resources import data_file
-from hil.simulator.plant import RigidPlant
 from tests.drivers.can_bench import HASTY_M1, M1, Bench, bench, frame, guarded, new_channel, repeat
+from tests.simulator.rigid_plant import RigidPlant
 
 
 @pytest.fixture
@@ -52,7 +52,6 @@ def test_feedback_is_in_si_with_its_counts(armed: Bench) -> None:
     assert second.torque_nm == pytest.approx(second.torque_raw * 0.6)
     assert second.speed_rad_s == pytest.approx(150.0, abs=5 * 0.05)
     assert second.speed_rad_s == pytest.approx(second.speed_raw * 1e-3 * 2 * 3.14159265 / 60)
-    assert (first.sequence, second.sequence) == (1, 2)
     assert second.t_ns > first.t_ns
     assert armed.m1.latest == second
 

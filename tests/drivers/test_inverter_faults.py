@@ -8,7 +8,7 @@ import pytest
 from drivers.errors import ConfigMismatch, DeviceFault, DeviceTimeout
 from drivers.inverter.cia402 import PowerState, TorqueMode
 from drivers.resources import data_file
-from hil.simulator.faults import FaultAtStep, InverterFaults
+from hil.simulator.faults import AtStep, InverterFaults
 from tests.drivers.can_bench import M1, SIMULATED_M1, Bench, bench, guarded
 
 OVER_CURRENT = 0x2310
@@ -81,7 +81,7 @@ def test_drive_whose_own_code_leaves_the_torque_is_refused_until_the_rig_file_ha
 
 
 def test_fault_in_operation_is_raised_with_its_cause_and_takes_the_torque_away() -> None:
-    with bench(InverterFaults(fault=FaultAtStep(3, OVER_CURRENT))) as rig:
+    with bench(InverterFaults(fault=AtStep(3, OVER_CURRENT))) as rig:
         start(rig)
         for _ in range(2):
             rig.cycle(guarded(120.0))
@@ -94,7 +94,7 @@ def test_fault_in_operation_is_raised_with_its_cause_and_takes_the_torque_away()
 
 
 def test_drive_in_fault_is_not_armed_until_it_is_reset() -> None:
-    with bench(InverterFaults(fault=FaultAtStep(0, OVER_CURRENT))) as rig:
+    with bench(InverterFaults(fault=AtStep(0, OVER_CURRENT))) as rig:
         rig.m1.configure()
         with pytest.raises(DeviceFault, match="power state is fault, error code 0x603F is 0x2310"):
             rig.m1.arm()
@@ -105,7 +105,7 @@ def test_drive_in_fault_is_not_armed_until_it_is_reset() -> None:
 
 
 def test_fault_that_can_not_be_reset_is_refused() -> None:
-    faults = InverterFaults(fault=FaultAtStep(0, OVER_CURRENT), ignored_writes=frozenset({0x6040}))
+    faults = InverterFaults(fault=AtStep(0, OVER_CURRENT), ignored_writes=frozenset({0x6040}))
     with bench(faults) as rig:
         rig.m1.configure()
         with pytest.raises(DeviceTimeout, match=r"power state is fault after .* expected without fault"):

@@ -280,10 +280,10 @@ def test_what_does_is_said_with_its_line(name: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("node", "rate", "read"),
     [
-        ("0x7F", "0xFA", Commissioning(127, 250, "front")),
-        ("0", "1000", Commissioning(None, 1000, "front")),
-        ("128", "250000", Commissioning(None, None, "front")),
-        ("", "250 kbit", Commissioning(None, None, "front")),
+        ("0x7F", "0xFA", Commissioning(127, 250)),
+        ("0", "1000", Commissioning(None, 1000)),
+        ("128", "250000", Commissioning(None, None)),
+        ("", "250 kbit", Commissioning(None, None)),
     ],
 )
 def test_commissioning_that_can_not_be_is_left_out_and_reported(

@@ -11,11 +11,11 @@ import pytest
 from drivers.errors import ConfigMismatch, DeviceTimeout, ProtocolViolation
 from drivers.plc.plc import GENERATOR_OFF, Plc
 from drivers.plc.register_map import RegisterMap, load_register_map
-from drivers.plc.types import ClutchState, DriveMode, PlcWatchdog, PrbsSettings, PrbsSource
+from drivers.plc.types import ClutchState, DriveMode, PrbsSettings, PrbsSource
 from drivers.resources import data_file
 from drivers.torque_guard import GuardedTorque, TorqueGuard, TorqueRequest
 from hil.simulator.plc_device import PlcDevice, PlcSetup
-from hil.simulator.plc_server import ServedPlc, serve_plc
+from hil.simulator.plc_server import PlcServer
 from tests.drivers.can_bench import FRESH, guard_limits
 
 MAP = load_register_map(data_file("plc.toml"))
@@ -52,7 +52,7 @@ async def start(plc: Plc, settings: PrbsSettings = SETTINGS) -> PrbsSettings:
     return await plc.start_prbs(*allowed(settings.amplitude_nm), settings.clock_divider, settings.seed)
 
 
-Talk = Callable[[Plc, ServedPlc], Awaitable[None]]
+Talk = Callable[[Plc, PlcServer], Awaitable[None]]
 
 
 def talk(
@@ -66,10 +66,8 @@ def talk(
     """Serve a device, connect, talk, disconnect."""
 
     async def run() -> None:
-        async with serve_plc(device, MAP) as served:
-            plc = Plc(
-                "127.0.0.1", served.port, map_, timeout_s=timeout_s, mode_timeout_s=0.5, clock_ns=clock or Clock()
-            )
+        with PlcServer(device, MAP) as served:
+            plc = Plc("127.0.0.1", served.port, map_, timeout_s=timeout_s, clock_ns=clock or Clock())
             async with plc:
                 await conversation(plc, served)
 
@@ -82,14 +80,14 @@ def test_the_status_in_si_units() -> None:
     clock = Clock()
     clock.now_ns = 5 * MS
 
-    async def conversation(plc: Plc, _: ServedPlc) -> None:
+    async def conversation(plc: Plc, _: PlcServer) -> None:
         status = await plc.read_status()
         assert status.drive_mode is DriveMode.ELECTRIC
         assert status.clutch is ClutchState.OPEN
         assert status.permissive is True
         assert status.speed_limit_rad_s == 210.25
         assert status.torque_limit_nm == pytest.approx(333.3, abs=1e-9)
-        assert status.watchdog == PlcWatchdog(plc_count=7, host_count_seen=0)
+        assert status.plc_count == 7
         assert status.prbs == PrbsSettings(False, 0.0, 1, 1, PrbsSource.HOST)
         assert status.prbs_torque_nm == 0.0
         assert status.t_ns == 5 * MS
@@ -101,7 +99,7 @@ def test_the_status_in_si_units() -> None:
 def test_prbs_settings_arrive_and_the_generator_runs() -> None:
     device = PlcDevice()
 
-    async def conversation(plc: Plc, _: ServedPlc) -> None:
+    async def conversation(plc: Plc, _: PlcServer) -> None:
         assert await start(plc) == SETTINGS
         status = await plc.read_status()
         assert status.prbs == SETTINGS
@@ -117,24 +115,10 @@ def test_prbs_settings_arrive_and_the_generator_runs() -> None:
 
 @pytest.mark.parametrize("change", [{"clock_divider": 0}, {"seed": 0}, {"seed": 1024}, {"amplitude_nm": -1.0}])
 def test_a_setting_the_plc_refuses_is_raised(change: dict[str, int]) -> None:
-    async def conversation(plc: Plc, _: ServedPlc) -> None:
+    async def conversation(plc: Plc, _: PlcServer) -> None:
         with pytest.raises(ProtocolViolation, match="illegal data value"):
             await start(plc, replace(SETTINGS, **change))
         assert not (await plc.read_status()).prbs.enabled
-
-    talk(PlcDevice(), conversation)
-
-
-def test_a_drive_mode_is_confirmed_by_the_status() -> None:
-    async def conversation(plc: Plc, _: ServedPlc) -> None:
-        for mode, clutch in (
-            (DriveMode.PARALLEL, ClutchState.CLOSED),
-            (DriveMode.ELECTRIC, ClutchState.OPEN),
-            (DriveMode.SERIES, ClutchState.OPEN),
-        ):
-            await plc.request_drive_mode(mode)
-            status = await plc.read_status()
-            assert (status.drive_mode, status.clutch) == (mode, clutch)
 
     talk(PlcDevice(), conversation)
 
@@ -151,7 +135,7 @@ class StoppedPlc(PlcDevice):
 def test_a_plc_that_does_not_see_the_beats_is_raised_when_the_time_is_up() -> None:
     clock = Clock()
 
-    async def conversation(plc: Plc, _: ServedPlc) -> None:
+    async def conversation(plc: Plc, _: PlcServer) -> None:
         await plc.beat()
         clock.now_ns = 500 * MS
         await plc.beat()
@@ -167,7 +151,7 @@ def test_the_time_of_a_beat_counts_from_the_last_that_was_seen() -> None:
     clock = Clock()
     clock.now_ns = 1000 * 1000 * MS
 
-    async def conversation(plc: Plc, _: ServedPlc) -> None:
+    async def conversation(plc: Plc, _: PlcServer) -> None:
         await plc.beat()
         clock.now_ns += 500 * MS
         await plc.beat()
@@ -190,10 +174,10 @@ class PermitsLater(PlcDevice):
 
 
 def test_a_greeting_waits_for_the_permissive_and_no_longer_than_its_time() -> None:
-    async def waits(plc: Plc, _: ServedPlc) -> None:
+    async def waits(plc: Plc, _: PlcServer) -> None:
         assert (await plc.greet()).permissive
 
-    async def gives_up(plc: Plc, _: ServedPlc) -> None:
+    async def gives_up(plc: Plc, _: PlcServer) -> None:
         assert not (await plc.greet()).permissive
 
     device = PermitsLater()
@@ -203,7 +187,7 @@ def test_a_greeting_waits_for_the_permissive_and_no_longer_than_its_time() -> No
 
 
 def test_a_plc_that_hangs_is_a_timeout_and_can_come_back() -> None:
-    async def conversation(plc: Plc, served: ServedPlc) -> None:
+    async def conversation(plc: Plc, served: PlcServer) -> None:
         served.pause()
         with pytest.raises(DeviceTimeout, match=r"none came"):
             await plc.read_status()
@@ -217,7 +201,7 @@ def test_a_plc_that_hangs_is_a_timeout_and_can_come_back() -> None:
 def test_another_identity_is_refused(name: str) -> None:
     other = MAP.model_copy(update={"identity": {**MAP.identity, name: 7}})
 
-    async def conversation(plc: Plc, _: ServedPlc) -> None:
+    async def conversation(plc: Plc, _: PlcServer) -> None:
         raise AssertionError("connected to another PLC")
 
     with pytest.raises(ConfigMismatch, match=f"{name} is {MAP.identity[name]}, expected 7"):
@@ -228,7 +212,7 @@ def test_words_that_mean_nothing_are_refused(tmp_path: Path) -> None:
     path = tmp_path / "map.toml"
     path.write_text(re.sub(r"series = 1, parallel = 2, electric = 3", "series = 4", MAP_TEXT, count=1), "utf-8")
 
-    async def conversation(plc: Plc, _: ServedPlc) -> None:
+    async def conversation(plc: Plc, _: PlcServer) -> None:
         with pytest.raises(ProtocolViolation, match=r"expected one of \{'series': 4\}, got 1"):
             await plc.read_status()
 

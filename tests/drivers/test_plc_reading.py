@@ -2,7 +2,7 @@
 
 import asyncio
 from collections.abc import Awaitable, Callable
-from contextlib import AsyncExitStack
+from contextlib import ExitStack
 
 import pytest
 
@@ -13,9 +13,9 @@ from drivers.plc.reader import Backoff, PlcReader
 from drivers.plc.register import Register, WordOrder
 from drivers.plc.register_map import USED, RegisterMap, load_register_map
 from drivers.resources import data_file
-from hil.simulator.faults import PlcFaults
+from hil.simulator.faults import Answers, PlcFaults
 from hil.simulator.plc_device import PlcDevice
-from hil.simulator.plc_server import serve_plc
+from hil.simulator.plc_server import PlcServer
 from tests.drivers.modbus_peers import free_port
 
 MAP = load_register_map(data_file("plc.toml"))
@@ -81,7 +81,7 @@ def test_limit_that_can_not_be_is_not_believed_in_a_run_either() -> None:
     """A speed limit of 1e-43 rad/s, or of 1e25, would hold nothing back, or everything."""
 
     async def run() -> None:
-        async with serve_plc(PlcDevice(faults=PlcFaults(swaps_floats=True)), MAP) as served:
+        with PlcServer(PlcDevice(faults=PlcFaults(swaps_floats=True)), MAP) as served:
             async with Plc("127.0.0.1", served.port, MAP, timeout_s=10.0) as plc:
                 readings = {each.name: each for each in await plc.read_registers()}
                 assert readings["speed_limit"].problem is not None
@@ -110,33 +110,32 @@ def test_a_plc_that_comes_back_is_read_again() -> None:
     pauses: list[float] = []
 
     async def run() -> None:
-        async with AsyncExitStack() as served:
+        with ExitStack() as served:
 
             async def sleep(pause_s: float) -> None:
                 pauses.append(pause_s)
                 if len(pauses) >= 2:
-                    await served.enter_async_context(serve_plc(PlcDevice(), MAP, port=port))
+                    served.enter_context(PlcServer(PlcDevice(), MAP, port=port))
 
             async with reader(port, Backoff(0.5, 10.0, attempts=4), sleep) as plc:
                 assert (await plc.read_status()).permissive
-                await served.aclose()
+                served.close()
                 assert (await plc.read_status()).permissive
 
     asyncio.run(run())
     assert pauses == [0.5, 1.0, 0.5]
 
 
-@pytest.mark.parametrize(
-    ("faults", "error"), [(PlcFaults(hangs_at_s=0.0), DeviceTimeout), (PlcFaults(resets_at_s=0.0), BusDown)]
-)
-def test_it_gives_up_with_the_last_reason(faults: PlcFaults, error: type[Exception]) -> None:
+@pytest.mark.parametrize(("answers", "error"), [(Answers.NOT, DeviceTimeout), (Answers.RESET, BusDown)])
+def test_it_gives_up_with_the_last_reason(answers: Answers, error: type[Exception]) -> None:
     pauses: list[float] = []
 
     async def sleep(pause_s: float) -> None:
         pauses.append(pause_s)
 
     async def run() -> None:
-        async with serve_plc(PlcDevice(faults=faults), MAP) as served:
+        faults = PlcFaults(answers_at_s=frozenset({(0.0, answers)}))
+        with PlcServer(PlcDevice(faults=faults), MAP) as served:
             async with reader(served.port, Backoff(0.5, 10.0, attempts=3), sleep, timeout_s=0.2) as plc:
                 with pytest.raises(error, match="PLC at 127"):
                     await plc.read_status()
@@ -151,8 +150,9 @@ def test_another_plc_is_no_reason_to_try_again() -> None:
 
     async def run() -> None:
         other = MAP.model_copy(update={"identity": {**MAP.identity, "map_version": 7}})
-        async with serve_plc(PlcDevice(), MAP) as served, reader(served.port, Backoff(), sleep, other) as plc:
-            with pytest.raises(ConfigMismatch, match="map_version is 1, expected 7"):
-                await plc.read_status()
+        with PlcServer(PlcDevice(), MAP) as served:
+            async with reader(served.port, Backoff(), sleep, other) as plc:
+                with pytest.raises(ConfigMismatch, match="map_version is 1, expected 7"):
+                    await plc.read_status()
 
     asyncio.run(run())

@@ -201,10 +201,5 @@ def in_segments(text: bytes) -> Callable[[bytes], list[bytes]]:
 @pytest.mark.parametrize("text", ["Traction inverter", "14 characters.", "8 signs."])
 def test_text_comes_in_segments(pair: Pair, text: str) -> None:
     pair.node.answers = in_segments(text.encode())
-    assert pair.sdo.upload_text(0x1008) == text
+    assert pair.sdo._client.upload(0x1008, 0) == text.encode()
     assert len(pair.node.requests) == 1 + -(-len(text) // 7)
-
-
-def test_short_text_comes_at_once_and_without_its_padding(pair: Pair) -> None:
-    pair.node.answers = lambda request: [uploaded(request, b"v1\0")]
-    assert pair.sdo.upload_text(0x100A) == "v1"

@@ -15,7 +15,7 @@ from tests.monitor.two_mass import PERIOD_S, driven
 
 CYCLES = 2500
 RESONANCE_HZ, DAMPING = 8.22, 0.057
-"""Of the default bus (hil.simulator.plant)."""
+"""Of the default bus (hil.simulator.driveline)."""
 
 
 @pytest.fixture(scope="module")

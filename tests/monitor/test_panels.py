@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.plc.types import ClutchState, DriveMode, PlcStatus, PlcWatchdog, PrbsSettings, PrbsSource
+from drivers.plc.types import ClutchState, DriveMode, PlcStatus, PrbsSettings, PrbsSource
 from estimator.identification.tracking.alarm import Alarm, Level, TrackingState
 from hil.monitor import bus_panels, model_panels, signal_panels
 from hil.monitor import panel as head_panels
@@ -50,7 +50,7 @@ STATUS = PlcStatus(
     permissive=True,
     speed_limit_rad_s=300.0,
     torque_limit_nm=400.0,
-    watchdog=PlcWatchdog(5, 4),
+    plc_count=5,
     prbs=PrbsSettings(False, 0.0, 1, 1, PrbsSource.HOST),
     prbs_torque_nm=0.0,
     t_ns=0,

@@ -74,8 +74,8 @@ def test_torque_moves_the_hidden_driveline():
 @pytest.mark.campaign
 def test_a_rig_that_has_gone_is_named():
     with sealed_process("--seed", "5") as sealed:
-        sealed._pipes.process.send_signal(signal.SIGTERM)
-        sealed._pipes.process.wait()
+        sealed._process.send_signal(signal.SIGTERM)
+        sealed._process.wait()
         with pytest.raises(RunAborted, match="expected an answer, but it ended with status 0; it said: nothing"):
             sealed.open()
 

@@ -23,6 +23,7 @@ from hil.recording import Table, read_table, write_table
 from hil.recording import sandbox as apart
 from hil.recording.bounds import CELLS, MEMORY_BYTES
 from hil.recording.formats import FORMATS, read_metadata
+from hil.recording.request import Request
 from hil.recording.sandbox import ENVIRONMENT, Reader
 from hil.recording.table import as_text
 from tests.chosen import campaign
@@ -192,9 +193,9 @@ def test_a_reader_that_does_not_answer_is_ended_and_the_next_file_is_read(
         if "sleep" in act:
             patch.setattr(apart, "WAITING", 0.05)
         with pytest.raises(RecordingError, match=rf"run\.h5: .*{said}"):
-            reader.table(path)
+            reader.table(path, Request())
     try:
-        assert reader.table(path).n_rows == own_table.n_rows
+        assert reader.table(path, Request()).n_rows == own_table.n_rows
     finally:
         reader.end()
 

@@ -17,9 +17,9 @@ from hil.rig.stop import StopRequest
 from hil.sample import Sample
 from hil.simulator.addresses import Address, with_addresses
 from hil.simulator.faults import RigFaults
-from hil.simulator.plant import RigidPlant
 from hil.simulator.plc_device import PlcDevice
 from hil.simulator.rig_server import RigServer
+from tests.simulator.rigid_plant import RigidPlant
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "rig.toml"
 INERTIA_KG_M2 = 10.0

@@ -4,6 +4,7 @@ import pytest
 
 from drivers.inverter.cia402 import PowerState
 from drivers.inverter.settings import Acceptance
+from drivers.plc.types import ClutchState
 from hil.rig.check import Verdict, check_rig
 from hil.simulator.addresses import is_simulated_bus
 from hil.simulator.fault_table import rig_faults
@@ -41,7 +42,7 @@ def test_plc_that_answers_with_other_identifiers_is_reported_as_such(fault: str)
 
 def test_vehicle_that_is_not_fit_is_a_note_not_a_fault() -> None:
     with served() as (server, rig):
-        server.plc.close_clutch()
+        server.plc._clutch = ClutchState.CLOSED
         plc = check_rig(rig)[-1]
     assert plc.verdict is Verdict.AGREES
     assert plc.notes == ("clutch is closed, expected open",)

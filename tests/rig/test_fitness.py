@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from drivers.plc.types import ClutchState, DriveMode, PlcStatus, PlcWatchdog, PrbsSettings, PrbsSource
+from drivers.plc.types import ClutchState, DriveMode, PlcStatus, PrbsSettings, PrbsSource
 from hil.rig.plc_watch import Needs, changes, reasons_against
 
 FIT = PlcStatus(
@@ -13,7 +13,7 @@ FIT = PlcStatus(
     permissive=True,
     speed_limit_rad_s=300.0,
     torque_limit_nm=400.0,
-    watchdog=PlcWatchdog(0, 0),
+    plc_count=0,
     prbs=PrbsSettings(False, 0.0, 1, 1, PrbsSource.HOST),
     prbs_torque_nm=0.0,
     t_ns=0,

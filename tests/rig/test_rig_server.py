@@ -13,9 +13,9 @@ from hil.config.model_file import write_model
 from hil.errors import UsageError
 from hil.simulator.addresses import Address, with_addresses
 from hil.simulator.driveline import DEFAULT_BUS, EffectSpec, plant_for, simulation_model
-from hil.simulator.plant import RigidPlant
 from hil.simulator.rig_server import RigServer
 from tests.rig.serving import ANY_PORT, Samples, changed, run_once, small_rig
+from tests.simulator.rigid_plant import RigidPlant
 
 ANY_BUS = "ws://127.0.0.1:0/"
 BIG_GAP = EffectSpec("backlash", {"gap_rad": 0.5})

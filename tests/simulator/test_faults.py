@@ -13,23 +13,21 @@ from hil.rig.check import check_rig
 from hil.simulator.addresses import with_addresses
 from hil.simulator.fault_table import DEVICES, NOBODY, OVERCURRENT, known_faults, rig_faults
 from hil.simulator.faults import (
+    Answers,
+    AtStep,
     BusFaults,
     DriveLimits,
-    FaultAtStep,
     Frames,
     InverterFaults,
-    LeavesOperation,
     PlcFaults,
     RigFaults,
-    SecondTpdo,
-    Since,
     WrongSpeed,
     WrongTorque,
 )
-from hil.simulator.plant import RigidPlant
 from hil.simulator.rig_server import RigServer
 from tests.drivers.can_bench import M1, Bench, bench, guarded
 from tests.rig.serving import ANY_PORT, changed, small_rig
+from tests.simulator.rigid_plant import RigidPlant
 
 PERIOD_S = 0.01
 
@@ -43,12 +41,12 @@ PERIOD_S = 0.01
         ("m1.stuck", RigFaults(m1=InverterFaults(ignored_writes=frozenset({0x6040})))),
         ("m2.hang@5.0", RigFaults(m2=InverterFaults(hang_at_step=500))),
         ("m2.hang@0", RigFaults(m2=InverterFaults(hang_at_step=0))),
-        ("m1.fault@0.07", RigFaults(m1=InverterFaults(fault=FaultAtStep(7, OVERCURRENT)))),
+        ("m1.fault@0.07", RigFaults(m1=InverterFaults(fault=AtStep(7, OVERCURRENT)))),
         ("plc.clutch_closes@5", RigFaults(plc=PlcFaults(clutch_closes_at_s=5.0))),
         ("plc.permissive_withdrawn@5", RigFaults(plc=PlcFaults(permissive_withdrawn_at_s=5.0))),
         ("plc.mode_changes@5", RigFaults(plc=PlcFaults(mode_changes_at_s=5.0))),
-        ("m1.fault@0.07=0x3210", RigFaults(m1=InverterFaults(fault=FaultAtStep(7, 0x3210)))),
-        ("m1.emcy@0.07=33072", RigFaults(m1=InverterFaults(emcy=FaultAtStep(7, 0x8130)))),
+        ("m1.fault@0.07=0x3210", RigFaults(m1=InverterFaults(fault=AtStep(7, 0x3210)))),
+        ("m1.emcy@0.07=33072", RigFaults(m1=InverterFaults(emcy=AtStep(7, 0x8130)))),
         ("m2.reset@1", RigFaults(m2=InverterFaults(reset_at_step=100))),
         ("m2.bus_off@1", RigFaults(m2=InverterFaults(bus_off_at_step=100))),
         ("m2.stale_pdo@1", RigFaults(m2=InverterFaults(stale_from_step=100))),
@@ -61,24 +59,24 @@ PERIOD_S = 0.01
         ("m1.field_weakening=90", RigFaults(m1=InverterFaults(limits=DriveLimits(base_speed_rad_s=90.0)))),
         ("m1.weak_cooling=500", RigFaults(m1=InverterFaults(limits=DriveLimits(continuous_permille=500.0)))),
         ("m1.coarse_torque=5", RigFaults(m1=InverterFaults(limits=DriveLimits(torque_step_permille=5)))),
-        ("bus.lose=0.01", RigFaults(bus=BusFaults(lose=Since(Frames(0.01), 0)))),
-        ("bus.corrupt@1=1:0x181", RigFaults(bus=BusFaults(corrupt=Since(Frames(1.0, 0x181), 100)))),
-        ("bus.repeat=0.5", RigFaults(bus=BusFaults(repeat=Since(Frames(0.5), 0)))),
-        ("bus.reorder=0.5:0", RigFaults(bus=BusFaults(reorder=Since(Frames(0.5, 0), 0)))),
-        ("bus.delay@2=0.003", RigFaults(bus=BusFaults(delay=Since(Frames(0.003), 200)))),
-        ("bus.jitter=0.001", RigFaults(bus=BusFaults(jitter=Since(Frames(0.001), 0)))),
+        ("bus.lose=0.01", RigFaults(bus=BusFaults(lose=AtStep(0, Frames(0.01))))),
+        ("bus.corrupt@1=1:0x181", RigFaults(bus=BusFaults(corrupt=AtStep(100, Frames(1.0, 0x181))))),
+        ("bus.repeat=0.5", RigFaults(bus=BusFaults(repeat=AtStep(0, Frames(0.5))))),
+        ("bus.reorder=0.5:0", RigFaults(bus=BusFaults(reorder=AtStep(0, Frames(0.5, 0))))),
+        ("bus.delay@2=0.003", RigFaults(bus=BusFaults(delay=AtStep(200, Frames(0.003))))),
+        ("bus.jitter=0.001", RigFaults(bus=BusFaults(jitter=AtStep(0, Frames(0.001))))),
         ("bus.off@1", RigFaults(bus=BusFaults(off_at_step=100))),
         ("m1.torque_gain@1=-1", RigFaults(m1=InverterFaults(wrong_torque=WrongTorque(100, gain=-1.0)))),
-        ("m1.leaves_operation@1", RigFaults(m1=InverterFaults(leaves_operation=LeavesOperation(100, S.SWITCHED_ON)))),
+        ("m1.leaves_operation@1", RigFaults(m1=InverterFaults(leaves_operation=AtStep(100, S.SWITCHED_ON)))),
         (
             "m1.leaves_operation@1=quick_stop",
-            RigFaults(m1=InverterFaults(leaves_operation=LeavesOperation(100, S.QUICK_STOP_ACTIVE))),
+            RigFaults(m1=InverterFaults(leaves_operation=AtStep(100, S.QUICK_STOP_ACTIVE))),
         ),
         ("m2.speed_gain@1=-1", RigFaults(m2=InverterFaults(wrong_speed=WrongSpeed(100, -1.0)))),
         ("m2.speed_stuck@1", RigFaults(m2=InverterFaults(wrong_speed=WrongSpeed(stuck_from_step=100)))),
-        ("m1.second_tpdo@1=2", RigFaults(m1=InverterFaults(second_tpdo=SecondTpdo(100, 2)))),
+        ("m1.second_tpdo@1=2", RigFaults(m1=InverterFaults(second_tpdo=AtStep(100, 2)))),
         ("bus.swapped_nodes", RigFaults(bus=BusFaults(swapped_nodes=True))),
-        (" plc.hang@1e1 ", RigFaults(plc=PlcFaults(hangs_at_s=10.0))),
+        (" plc.hang@1e1 ", RigFaults(plc=PlcFaults(answers_at_s=frozenset({(10.0, Answers.NOT)})))),
     ],
 )
 def test_each_fault_is_put_into_its_device(text: str, faults: RigFaults) -> None:

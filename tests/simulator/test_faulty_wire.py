@@ -10,7 +10,7 @@ import can
 import pytest
 
 from drivers.canopen.inline_bus import InlineBus
-from hil.simulator.faults import BusFaults, Frames, Since
+from hil.simulator.faults import AtStep, BusFaults, Frames
 from hil.simulator.faulty_wire import BUS_OFF_ERROR, FaultyWire
 from tests.drivers.can_bench import frame
 
@@ -46,8 +46,8 @@ def cable(faults: BusFaults, seed: int = 1) -> Iterator[Ends]:
     device.shutdown()
 
 
-def some(amount: float, cob_id: int | None = None, step: int = 0) -> Since:
-    return Since(Frames(amount, cob_id), step)
+def some(amount: float, cob_id: int | None = None, step: int = 0) -> AtStep[Frames]:
+    return AtStep(step, Frames(amount, cob_id))
 
 
 def test_a_sound_cable_carries_everything_both_ways() -> None:

@@ -9,7 +9,7 @@ import pytest
 from drivers.inverter.cia402 import STATUSWORD_STATE_BITS, Command, PowerState, next_state, state_of
 from drivers.scaling import VelocityScale
 from hil.simulator.drive_physics import SimulatedInverter
-from hil.simulator.faults import FaultAtStep, InverterFaults
+from hil.simulator.faults import AtStep, InverterFaults
 from hil.simulator.inverter_device import InverterDevice, ObjectRefused
 
 DEFAULTS = {0x6007: 2, 0x605A: 6, 0x605B: 0, 0x605C: 0, 0x605D: 1, 0x605E: 0}
@@ -54,7 +54,7 @@ def test_every_command_in_every_state_does_what_the_table_says(state: PowerState
 
 @pytest.mark.parametrize("command", Command)
 def test_fault_is_left_by_fault_reset_alone(command: Command) -> None:
-    made = device(replace(QUIET, faults=InverterFaults(fault=FaultAtStep(0, 0x4310))))
+    made = device(replace(QUIET, faults=InverterFaults(fault=AtStep(0, 0x4310))))
     assert made.state is PowerState.FAULT
     made.write(0x6040, command.value)
     left = command is Command.FAULT_RESET

@@ -87,7 +87,7 @@ class TestHostWatchdog:
     def test_a_permissive_withdrawn_by_the_vehicle_does_not(self) -> None:
         device = PlcDevice(PlcSetup(host_timeout_s=0.5))
         device.write({"host_count": 1})
-        device.withdraw_permissive()
+        device._permissive = False
         device.write({"host_count": 2})
         assert device.values()["permissive"] is False
 
@@ -123,7 +123,7 @@ class TestPrbs:
         assert device.prbs_torque_nm == 0.0
         device.write({"host_count": 2})
         assert device.prbs_torque_nm != 0.0
-        device.withdraw_permissive()
+        device._permissive = False
         assert device.prbs_torque_nm == 0.0
 
     @pytest.mark.parametrize("change", [{"prbs_enable": False}, {"prbs_source": "host"}])
@@ -136,20 +136,12 @@ class TestPrbs:
 
 
 @pytest.mark.parametrize(
-    ("field", "answers"),
-    [
-        ("hangs_at_s", Answers.NOT),
-        ("exceptions_at_s", Answers.EXCEPTION),
-        ("late_at_s", Answers.LATE),
-        ("half_at_s", Answers.HALF),
-        ("resets_at_s", Answers.RESET),
-        ("too_few_at_s", Answers.TOO_FEW),
-    ],
+    "faults",
+    [{(0.5, Answers.NOT)}, {(0.2, Answers.WELL), (0.5, Answers.NOT)}, {(0.5, Answers.NOT), (0.9, Answers.HALF)}],
 )
-def test_it_answers_well_until_a_fault_begins(field: str, answers: Answers) -> None:
-    device = PlcDevice(faults=PlcFaults(**{field: 0.5}))
+def test_it_answers_well_until_a_fault_begins(faults: set[tuple[float, Answers]]) -> None:
+    device = PlcDevice(faults=PlcFaults(answers_at_s=frozenset(faults)))
     device.step(0.49)
     assert device.answers is Answers.WELL
     device.step(0.01)
-    assert device.answers is answers
-    assert PlcDevice(faults=PlcFaults(**{field: 0.0})).answers is answers
+    assert device.answers is Answers.NOT

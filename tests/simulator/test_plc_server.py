@@ -5,6 +5,7 @@ import re
 import socket
 import threading
 from collections.abc import Awaitable, Callable
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
@@ -16,7 +17,7 @@ from drivers.plc.modbus_security import Credentials
 from drivers.plc.register import Access
 from drivers.plc.register_map import load_register_map
 from drivers.resources import data_file
-from hil.simulator.faults import PlcFaults
+from hil.simulator.faults import Answers, PlcFaults
 from hil.simulator.plc_device import PlcDevice
 from hil.simulator.plc_server import PlcSecurity, PlcServer
 
@@ -137,14 +138,14 @@ def test_two_clients_see_one_device() -> None:
 
 
 def test_it_is_gone_when_closed_even_with_a_client_connected() -> None:
-    server = PlcServer(PlcDevice(), MAP).start()
-    with socket.create_connection((server.host, server.port)) as client:
-        client.settimeout(60.0)
-        client.sendall(READ_PLC_COUNT)
-        assert client.recv(64) == PLC_COUNT_0
-        server.close()
-        server.close()
-        assert client.recv(1) == b""
+    with ExitStack() as served:
+        server = served.enter_context(PlcServer(PlcDevice(), MAP))
+        with socket.create_connection((server.host, server.port)) as client:
+            client.settimeout(60.0)
+            client.sendall(READ_PLC_COUNT)
+            assert client.recv(64) == PLC_COUNT_0
+            served.close()
+            assert client.recv(1) == b""
     with pytest.raises(ConnectionRefusedError):
         socket.create_connection((server.host, server.port))
     assert "plc-server" not in [thread.name for thread in threading.enumerate()]
@@ -153,7 +154,8 @@ def test_it_is_gone_when_closed_even_with_a_client_connected() -> None:
 def test_a_map_with_a_register_the_plc_does_not_know_is_refused() -> None:
     more = {**MAP.registers, "oil_level": MAP["plc_count"]}
     with pytest.raises(ConfigMismatch, match="registers the simulated PLC knows, got oil_level"):
-        PlcServer(PlcDevice(), MAP.model_copy(update={"registers": more})).start()
+        with PlcServer(PlcDevice(), MAP.model_copy(update={"registers": more})):
+            pass
 
 
 def test_a_paused_plc_keeps_the_connection_and_says_nothing() -> None:
@@ -199,29 +201,30 @@ ONE = bytes.fromhex("0001 0000 0005 01 04 02 2024")
 DEVICE_FAILURE = bytes.fromhex("0001 0000 0003 01 84 04")
 
 
-def answer_of(faults: PlcFaults, timeout_s: float) -> bytes:
-    with PlcServer(PlcDevice(faults=faults), MAP) as server:
+def answer_of(answers: Answers, timeout_s: float) -> bytes:
+    device = PlcDevice(faults=PlcFaults(answers_at_s=frozenset({(0.0, answers)})))
+    with PlcServer(device, MAP) as server:
         with socket.create_connection((server.host, server.port), timeout=timeout_s) as client:
             client.sendall(READ_TWO)
             return client.recv(64)
 
 
 @pytest.mark.parametrize(
-    ("faults", "answer"),
+    ("answers", "answer"),
     [
-        (PlcFaults(), TWO),
-        (PlcFaults(exceptions_at_s=0.0), DEVICE_FAILURE),
-        (PlcFaults(half_at_s=0.0), TWO[: len(TWO) // 2]),
-        (PlcFaults(too_few_at_s=0.0), ONE),
-        (PlcFaults(late_at_s=0.0), TWO),
-        (PlcFaults(wrong_unit_at_s=0.0), TWO[:6] + b"\x81" + TWO[7:]),
-        (PlcFaults(wrong_transaction_at_s=0.0), b"\x80" + TWO[1:]),
+        (Answers.WELL, TWO),
+        (Answers.EXCEPTION, DEVICE_FAILURE),
+        (Answers.HALF, TWO[: len(TWO) // 2]),
+        (Answers.TOO_FEW, ONE),
+        (Answers.LATE, TWO),
+        (Answers.WRONG_UNIT, TWO[:6] + b"\x81" + TWO[7:]),
+        (Answers.WRONG_TRANSACTION, b"\x80" + TWO[1:]),
     ],
 )
-def test_what_comes_back(faults: PlcFaults, answer: bytes) -> None:
-    assert answer_of(faults, timeout_s=10.0) == answer
+def test_what_comes_back(answers: Answers, answer: bytes) -> None:
+    assert answer_of(answers, timeout_s=10.0) == answer
 
 
 def test_a_reset_is_a_reset_and_no_end() -> None:
     with pytest.raises(ConnectionResetError):
-        answer_of(PlcFaults(resets_at_s=0.0), timeout_s=10.0)
+        answer_of(Answers.RESET, timeout_s=10.0)

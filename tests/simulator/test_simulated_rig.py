@@ -7,7 +7,6 @@ import pytest
 from drivers.canopen.can_link import CanLink
 from drivers.errors import DeviceTimeout
 from hil.simulator.faults import InverterFaults
-from hil.simulator.plant import RigidPlant
 from hil.simulator.simulated_rig import SimulatedRig
 from tests.drivers.can_bench import (
     HASTY_M1,
@@ -19,6 +18,7 @@ from tests.drivers.can_bench import (
     new_channel,
     virtual_bus,
 )
+from tests.simulator.rigid_plant import RigidPlant
 
 
 class RecordingPlant:

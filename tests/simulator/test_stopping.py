@@ -12,10 +12,10 @@ from drivers.errors import DeviceFault
 from drivers.inverter.cia402 import Command, PowerState, TorqueMode
 from drivers.inverter.inverter import Inverter
 from hil.simulator.inverter_device import InverterDevice, ObjectRefused
-from hil.simulator.plant import RigidPlant
 from hil.simulator.simulated_rig import SimulatedRig
 from hil.simulator.stopping import GRACE_NS, NS_PER_MS
 from tests.drivers.can_bench import M1, M2, SIMULATED_M1, SIMULATED_M2, Bench, bench, guarded, new_channel, virtual_bus
+from tests.simulator.rigid_plant import RigidPlant
 from tests.simulator.test_inverter_device import PERIOD_S, QUIET, device
 
 SLOPE_STEP, QUICK_STEP = 50, 100

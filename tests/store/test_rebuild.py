@@ -12,7 +12,7 @@ from estimator.identification.tracking.alarm import Alarm, Level
 from hil.errors import RunAborted
 from hil.recording import RecordingWriter, read_table, write_table
 from hil.recording.checksum import text_sha256
-from hil.store import RunStore, attach_to_runs, entry_of, register_run, store_of
+from hil.store import RunStore, attach_to_runs, entry_at, register_run, store_of
 from hil.store.entry import COMPLETE, ONLINE, alarms_of, found_changes, results_of, run_facts
 from hil.store.rebuild import ONLINE_SCHEMA, rebuild
 from hil.store.run_files import VERIFIED, recording_state, remove_files
@@ -182,6 +182,6 @@ def test_a_recording_that_is_deleted_takes_its_course_along(tmp_path: Path, reco
     recording = record("a.csv")
     path = tmp_path / "a.online.json"
     path.write_text(json.dumps({"schema": ONLINE_SCHEMA}), encoding="utf-8")
-    assert path in remove_files(entry_of(read_table(recording)))
+    assert path in remove_files(entry_at(recording))
     assert not path.exists()
     assert not recording.exists()

@@ -11,9 +11,9 @@ import pytest
 from canopen.profiles.p402 import BaseNode402
 
 from drivers.resources import data_file
-from hil.simulator.plant import RigidPlant
 from hil.simulator.simulated_rig import SimulatedRig
 from tests.drivers.can_bench import SIMULATED_M1, SIMULATED_M2, new_channel, virtual_bus
+from tests.simulator.rigid_plant import RigidPlant
 
 NODE_ID = SIMULATED_M1.node_id
 SYNC_S = 0.005

@@ -9,7 +9,7 @@ import pytest
 
 from drivers.plc.register_map import load_register_map
 from drivers.resources import data_file
-from hil.simulator.faults import PlcFaults
+from hil.simulator.faults import Answers, PlcFaults
 from hil.simulator.plc_device import IDENTITY, PlcDevice, PlcSetup
 from hil.simulator.plc_server import PlcServer
 
@@ -113,14 +113,15 @@ def test_a_refused_write_shows_the_exception_and_changes_nothing(
 
 
 @pytest.mark.parametrize(
-    ("faults", "shown"),
+    ("answers", "shown"),
     [
-        (PlcFaults(exceptions_at_s=0.0), "Slave device or server failure"),
-        (PlcFaults(half_at_s=0.0), "Connection timed out"),
-        (PlcFaults(resets_at_s=0.0), "Connection reset by peer"),
-        (PlcFaults(too_few_at_s=0.0), "Invalid data"),
+        (Answers.EXCEPTION, "Slave device or server failure"),
+        (Answers.HALF, "Connection timed out"),
+        (Answers.RESET, "Connection reset by peer"),
+        (Answers.TOO_FEW, "Invalid data"),
     ],
 )
-def test_a_plc_that_fails_fails_for_it_too(faults: PlcFaults, shown: str) -> None:
-    with PlcServer(PlcDevice(faults=faults), MAP) as server:
+def test_a_plc_that_fails_fails_for_it_too(answers: Answers, shown: str) -> None:
+    device = PlcDevice(faults=PlcFaults(answers_at_s=frozenset({(0.0, answers)})))
+    with PlcServer(device, MAP) as server:
         assert shown in mbpoll(server, INPUT, 0, "-c", "4", timeout_s=1.0)

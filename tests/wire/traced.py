@@ -8,7 +8,7 @@ from drivers.errors import DeviceFault
 from hil.config.rig_file import Rig
 from hil.rig.build import open_devices
 from hil.rig.trace import BusTrace
-from hil.simulator.faults import FaultAtStep, InverterFaults, RigFaults
+from hil.simulator.faults import AtStep, InverterFaults, RigFaults
 from tests.rig.serving import Samples, run, served
 
 EXCESS_TEMPERATURE = 0x4310
@@ -29,6 +29,6 @@ def traced_run(path: Path, rig: Rig | None = None, faults: RigFaults | None = No
 
 def traced_fault(path: Path) -> None:
     """A run that an inverter's fault ends: every kind of message the host and the drives know is on the bus."""
-    faults = RigFaults(m1=InverterFaults(fault=FaultAtStep(FAULT_AT_STEP, EXCESS_TEMPERATURE)))
+    faults = RigFaults(m1=InverterFaults(fault=AtStep(FAULT_AT_STEP, EXCESS_TEMPERATURE)))
     with pytest.raises(DeviceFault):
         traced_run(path, faults=faults)

@@ -12,8 +12,7 @@ from hil.proof.truth.physics import FloatArray, Physics
 
 STANDARD_GRAVITY_M_S2 = 9.80665
 
-NOMINAL_ERROR = 0.15
-"""Each nominal value is off by up to this share of the true one."""
+NOMINAL_ERROR = 0.15  # each nominal value is off by up to this share of the true one
 
 NOMINAL_TOLERANCE = 0.2
 """Tolerance stated in the nominal model: wide enough that ``true = nominal (1 + tolerance)`` is never passed
@@ -147,5 +146,4 @@ _PLANS: dict[Test, Callable[[np.random.Generator], Plan]] = {
 
 
 def draw_plan(test: Test, rng: np.random.Generator) -> Plan:
-    """Draw one test of a kind."""
     return _PLANS[test](rng)

@@ -27,8 +27,7 @@ from hil.proof.truth.specimen import Specimen, Stream, draw_specimen, stream
 
 TESTS = tuple(Test)
 
-PROFILE_STRIDE = 25
-"""The truth keeps the load's disturbance every 0.25 s."""
+PROFILE_STRIDE = 25  # the truth keeps the load's disturbance every 0.25 s
 
 
 @dataclass(frozen=True, slots=True)

@@ -103,7 +103,7 @@ def observed(p: Physics, states: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 class TruthDriveline:
-    """A driveline with all it hides; has the shape of ``hil.simulator.plant.Plant``."""
+    """A driveline with all it hides; has the shape of ``hil.simulator.simulated_rig.Plant``."""
 
     def __init__(self, physics: Physics, speed_rad_s: float = 0.0) -> None:
         self._physics = physics
@@ -149,7 +149,6 @@ class TruthDriveline:
 
     @property
     def physics(self) -> Physics:
-        """The driveline's physics."""
         return self._physics
 
     @property
@@ -158,8 +157,7 @@ class TruthDriveline:
         return float(speed_as_sensed(self._physics, self._state))
 
 
-_SETTLING_S = 3.0
-"""The shaft's oscillation, 2.5 1/s and faster, is down to 0.06 % by then."""
+_SETTLING_S = 3.0  # the shaft's oscillation, 2.5 1/s and faster, is down to 0.06 % by then
 
 
 @dataclass(frozen=True, slots=True)

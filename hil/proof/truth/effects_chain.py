@@ -41,8 +41,7 @@ ORDERS = (1, 3, 4, 6, 12)
 """Periods per turn: eccentricity, three or four pole pairs, slots; faster ones never meet the shaft's resonance. Twice
 per turn is left out: to torque and speed it is the Cardan joint's."""
 
-USUAL_TORQUE_NM = 200.0
-"""Torque at which both kinds of ripple are alike."""
+USUAL_TORQUE_NM = 200.0  # torque at which both kinds of ripple are alike
 
 
 def _draw_gain(rng: np.random.Generator, bus: Bus) -> Sizes:
@@ -127,7 +126,6 @@ TORQUE_PATH = (
             FULL_TURN_RAD,
         ),
         fitted={"order": "order", "amplitude_nm": unless_zero("ripple_nm"), "share": unless_zero("ripple_over_torque")},
-        unscaled=("order",),
     ),
 )
 
@@ -185,7 +183,6 @@ SPEED_SENSOR = (
         _draw_resolver,
         _misread,
         fitted={"once_rad": "resolver_once_rad", "twice_rad": "resolver_twice_rad"},
-        unscaled=("resolver_once_phase_rad", "resolver_twice_phase_rad"),
     ),
     # A digital filter of first or second order at the inverter's cycle of 0.1 ms.
     _speed_sensor(

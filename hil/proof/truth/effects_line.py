@@ -191,7 +191,6 @@ SHAFT = (
         draws(sliding_share=log(0.04, 0.25), slip_rad=log(0.01, 0.06)),
         _slide,
         fitted={"friction_nm": _sliding_friction},
-        unscaled=("slip_rad",),
     ),
     # The shaft behind a bent joint leads and lags twice per turn; each recording begins at another angle. Its size in
     # the catalogue is the second harmonic of the lead: the square of the tangent of half the bend.
@@ -265,10 +264,6 @@ def _draw_payload(rng: np.random.Generator, bus: Bus) -> Sizes:
     }
 
 
-def _draw_warming(rng: np.random.Generator, bus: Bus) -> Sizes:
-    return {"cold_factor": 1.0 + log_uniform(rng, 0.12, 1.5), "warming_time_s": log_uniform(rng, 4.0, 15.0)}
-
-
 LOAD = (
     # Dragging pads, wheel bearings, axle seals.
     _load(
@@ -329,7 +324,11 @@ LOAD = (
         fitted={"change_kg_m2": lambda sizes, bus: sizes["payload_share"] * bus["J_L"]},
     ),
     # Axle oil that is thick when cold; every recording begins cold.
-    _load("warming_friction", _draw_warming, sets("cold_factor", "warming_time_s")),
+    _load(
+        "warming_friction",
+        draws(cold_factor=lambda rng: 1.0 + log_uniform(rng, 0.12, 1.5), warming_time_s=log(4.0, 15.0)),
+        sets("cold_factor", "warming_time_s"),
+    ),
 )
 
 FURTHER = (

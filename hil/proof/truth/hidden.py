@@ -25,11 +25,8 @@ When = Callable[[Physics], Interval]
 Convert = Callable[[Sizes, Mapping[str, float]], float | None]
 """Sizes and true bus to the value that a fitted parameter should have; None where this draw has none."""
 
-ABSENT_IN = "absent_in"
-"""Size that says in which of the three tests (0, 1, 2) an event does not take place."""
-
-ONLY_IN = "only_in"
-"""Size that says in which of the three tests alone it does."""
+ABSENT_IN = "absent_in"  # size that says in which of the three tests (0, 1, 2) an event does not take place
+ONLY_IN = "only_in"  # size that says in which of the three tests alone it does
 
 
 def same_physics(physics: Physics, sizes: Sizes, rng: np.random.Generator) -> Physics:
@@ -64,7 +61,6 @@ class HiddenEffect:
     corrupt: Corrupt = same_recording  # acquisition and sizes to the acquisition with the effect
     when: When | None = None
     fitted: Mapping[str, str | Convert] = field(default_factory=dict)
-    unscaled: tuple[str, ...] = ()  # sizes that stay as they are where the effect is made smaller
     place: Place = Place.NOWHERE  # the element it belongs to
     catalogued: bool = True  # false for what no entry of the contract's catalogue describes
 
@@ -76,10 +72,6 @@ class HiddenEffect:
         """Return the value that a parameter of `fitted` should have; None where this draw has none."""
         how = self.fitted[parameter]
         return sizes[how] if isinstance(how, str) else how(sizes, bus)
-
-    def strength(self, sizes: Sizes) -> list[str]:
-        """Return which of the sizes say how much of it there is."""
-        return [size for size in sizes if size not in self.unscaled]
 
 
 def sets(*fields: str, **renamed: str) -> Apply:

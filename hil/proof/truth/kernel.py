@@ -25,7 +25,6 @@ Speeds = tuple[float, float, float, float]
 
 @compiled
 def speeds_of(state: FloatArray) -> Speeds:
-    """Return the speeds of a state."""
     return state[State.SPEED_M], state[State.SPEED_X], state[State.SPEED_L], state[State.SPEED_V]
 
 
@@ -149,8 +148,7 @@ closed solution the speed is right to 0.0002 rad/s, against a stiff reference of
 twentieth of the sensor's noise."""
 
 
-FASTER = 6.0
-"""By how much the smaller branch of a viscoelastic shaft relaxes faster than the other."""
+FASTER = 6.0  # by how much the smaller branch of a viscoelastic shaft relaxes faster than the other
 
 
 @compiled

@@ -91,8 +91,7 @@ def inertia_over_rotor(p: Physics, speed: float) -> float:
     return 1.0 + p.drawn_share * square / (1.0 + square)
 
 
-STANDSTILL_RAD_S = 0.02
-"""Speed within which a torque that depends on the direction changes over."""
+STANDSTILL_RAD_S = 0.02  # speed within which a torque that depends on the direction changes over
 
 
 @compiled
@@ -167,14 +166,9 @@ def resolver_speed(p: Physics, angle_motor: float, speed_motor: float) -> float:
     return speed_motor * (1.0 + slope)
 
 
-BRAKE_RISE_S = 0.15
-"""Time a brake pad takes to come on and off."""
-
-CLUTCH_FALL_S = 0.03
-"""Time a clutch takes to open."""
-
-TIME_TO_DERATE_S = 30.0
-"""A loss that grows evenly is complete by then: the length of a recording."""
+BRAKE_RISE_S = 0.15  # time a brake pad takes to come on and off
+CLUTCH_FALL_S = 0.03  # time a clutch takes to open
+TIME_TO_DERATE_S = 30.0  # a loss that grows evenly is complete by then: the length of a recording
 
 
 @compiled
@@ -251,8 +245,7 @@ def is_blocked(p: Physics, time_s: float) -> bool:
     return bool(p.dropout_every_s > 0.0 and (time_s + 0.5 * p.dropout_every_s) % p.dropout_every_s < p.dropout_s)
 
 
-TYRE_SHAPE = 1.6
-"""Shape factor of the magic formula for longitudinal slip."""
+TYRE_SHAPE = 1.6  # shape factor of the magic formula for longitudinal slip
 
 STANDSTILL_DAMPING_S = 0.01
 STANDSTILL_SPEED_RAD_S = 5.0

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 
-FLAT_ROAD: FloatArray = np.zeros((0, 3))
-"""A height profile without hills."""
+FLAT_ROAD: FloatArray = np.zeros((0, 3))  # a height profile without hills
 
 
 class Physics(NamedTuple):
@@ -118,8 +117,7 @@ class Physics(NamedTuple):
     filter_damping: float = 1.0  # speed filter of first order
 
 
-ELEMENTS = 8
-"""Jenkins elements of a shaft with hysteresis."""
+ELEMENTS = 8  # Jenkins elements of a shaft with hysteresis
 
 
 class State(IntEnum):
@@ -152,5 +150,4 @@ class State(IntEnum):
 SPEEDS = (State.SPEED_M, State.SPEED_X, State.SPEED_L, State.SPEED_V, State.SPEED_G, State.FILTERED)
 """All that has the speed of the whole line when it rolls as one."""
 
-STATES = State.SLIDERS + ELEMENTS
-"""Length of the state array."""
+STATES = State.SLIDERS + ELEMENTS  # length of the state array

@@ -41,8 +41,7 @@ class Acquisition:
 FAULTLESS = Acquisition()
 
 
-TORQUE_QUANTUM_NM = 0.6
-"""0.1 % of a rated torque of 600 Nm: the resolution of object 0x6077."""
+TORQUE_QUANTUM_NM = 0.6  # 0.1 % of a rated torque of 600 Nm: the resolution of object 0x6077
 
 TORQUE_NOISE_NM = 0.5
 SPEED_NOISE_RAD_S = 0.05
@@ -66,8 +65,6 @@ class Noise:
 
 
 USUAL = Noise()
-SILENT = Noise(0.0, 0.0, 0.0)
-"""Draws as many numbers as `USUAL`, so that all that is drawn after them is the same."""
 
 
 def torque_reading(torque_nm: FloatArray, rng: np.random.Generator, noise: Noise = USUAL) -> FloatArray:
@@ -96,8 +93,7 @@ def coloured(size: float, corner_hz: float, shape: tuple[int, ...], rng: np.rand
     return noise
 
 
-CURVATURE_SPEED_RAD_S = 100.0
-"""Speed at which the curvature's share of the reading is missing."""
+CURVATURE_SPEED_RAD_S = 100.0  # speed at which the curvature's share of the reading is missing
 
 
 def sampling_instants_s(time_s: FloatArray, acquisition: Acquisition, rng: np.random.Generator) -> FloatArray:
@@ -136,8 +132,7 @@ def _counted(speed_rad_s: FloatArray, count_rad: float, time_s: float, rng: np.r
 IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 
-FLAG_M1, FLAG_M2 = 1, 2
-"""Quality flags of a row: an inverter did not answer. The speed comes from m1."""
+FLAG_M1, FLAG_M2 = 1, 2  # quality flags of a row: an inverter did not answer. The speed comes from m1
 
 
 @dataclass(frozen=True, slots=True)

@@ -83,7 +83,6 @@ class Specimen:
 
     @property
     def effects(self) -> tuple[HiddenEffect, ...]:
-        """The hidden effects."""
         return find(self.effect)
 
     def physics(self, rng: np.random.Generator, test: int = 0) -> Physics:
@@ -130,12 +129,16 @@ class Specimen:
 def draw_specimen(effect: str, seed: int, nominal_error: float = NOMINAL_ERROR) -> Specimen:
     """Draw a bus and hide an effect in it."""
     bus = draw_bus(stream(seed, Stream.BUS))
+    sizes = {
+        hidden.name: hidden.draw(stream(seed, Stream.SIZES, zlib.crc32(hidden.name.encode())), bus)
+        for hidden in find(effect)
+    }
     specimen = Specimen(
         effect=effect,
         seed=seed,
         bus=bus,
         nominal=draw_nominal(bus, stream(seed, Stream.NOMINAL), nominal_error),
-        sizes={hidden.name: hidden.draw(_size_stream(seed, hidden), bus) for hidden in find(effect)},
+        sizes=sizes,
     )
     _refuse_rivals(specimen)
     return specimen
@@ -166,7 +169,3 @@ def _what_is_set_by(effect: HiddenEffect, specimen: Specimen) -> list[str]:
 def choose_effect(names: Sequence[str], seed: int) -> str:
     """Return one of the names, each as likely as any other."""
     return names[int(stream(seed, Stream.CHOICE).integers(len(names)))]
-
-
-def _size_stream(seed: int, effect: HiddenEffect) -> np.random.Generator:
-    return stream(seed, Stream.SIZES, zlib.crc32(effect.name.encode()))

@@ -9,6 +9,7 @@ import uuid
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
+from io import FileIO
 from pathlib import Path
 from unittest import mock
 
@@ -17,7 +18,7 @@ from drivers.errors import BusDown
 from hil.config.rig_file import Rig
 from hil.errors import RecordingError
 from hil.recording import RecordingWriter, read_table, writer
-from hil.recording.writer import Unbuffered, WritingThread
+from hil.recording.writer import WritingThread
 from hil.rig.build import open_devices
 from hil.rig.experiments.base import Phase
 from hil.rig.pacing import FreePacer, Tick, period_ns
@@ -59,7 +60,7 @@ class Outcome:
 class _FullDisk:
     """A file whose disk is full from a moment on."""
 
-    def __init__(self, file: Unbuffered, meets: _Moment) -> None:
+    def __init__(self, file: FileIO, meets: _Moment) -> None:
         self._file = file
         self._meets = meets
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from drivers.canopen.can_link import CanLink
 from hil.config.rig_file import Rig, read_rig
-from hil.simulator.plant import RigidPlant
+from tests.simulator.rigid_plant import RigidPlant
 
 EXAMPLE = Path(__file__).resolve().parents[3] / "examples" / "rig.toml"
 

@@ -83,7 +83,6 @@ def _sdo(folder: Path) -> Iterator[Read]:
         endless = data[:1] == _ENDLESS
         network.frames = itertools.chain(itertools.islice(frames, 2), itertools.cycle(frames)) if endless else frames
         for ask in (
-            lambda: channel.upload_text(0x1008),
             lambda: channel.upload(0x6076),
             lambda: channel.download_confirmed(0x6060, 0, 10),
             lambda: channel.upload(0x1018, 1),

@@ -1,30 +1,6 @@
-"""What simulated inverters drive: the plant as they see it, and a rigid one."""
-
-from __future__ import annotations
+"""A plant for rigs whose driveline does not matter."""
 
 import math
-from typing import Protocol, runtime_checkable
-
-from estimator.signals.record import Location, OutputKind
-
-
-class Plant(Protocol):
-    """A driveline as the simulated rig sees it; all values reflected to the motor shaft."""
-
-    @property
-    def speed_rad_s(self) -> float:
-        """True motor speed now [rad/s]."""
-
-    def advance(self, torque_nm: tuple[float, float], duration_s: float) -> None:
-        """Let the plant run with both inverters' torques held [Nm] for ``duration_s`` [s]."""
-
-
-@runtime_checkable
-class SensedPlant(Plant, Protocol):
-    """A driveline with further places to measure at."""
-
-    def measured(self, kind: OutputKind, at: Location) -> float:
-        """Return what a sensor there shows now [rad/s, rad, Nm, rad/s^2]."""
 
 
 class RigidPlant:
