@@ -19,7 +19,7 @@ from hil.report.bode import responses_figure
 from hil.report.figures import Line, Panel, Style, time_figure
 from hil.report.identification_figures import PoleSet, known_sets, pole_figure
 from hil.report.made import facts, made_section
-from hil.report.numbers import json_number, shown
+from hil.report.numbers import as_json, shown
 
 SHOWN_SIGNALS = 3
 """Recordings in Fig. 2, as in the paper."""
@@ -238,19 +238,13 @@ def paper_text(
         "schema": SCHEMA,
         "seed": seed,
         "settings": {
-            "na": settings.orders.na,
-            "nb": settings.orders.nb,
-            "nk": settings.orders.nk,
+            **as_json(settings.orders),
             "sample_time_s": settings.sample_time_s,
             "samples": settings.samples,
             "high_pass_hz": settings.high_pass_hz,
         },
-        "experiments": [_row(row) for row in rows],
+        "experiments": as_json(rows),
         "conditions": [asdict(each) for each in driven],
         **({} if made is None else {"made": made.document()}),
     }
     return json.dumps(document, indent=1, allow_nan=False) + "\n"
-
-
-def _row(row: Row) -> dict[str, Any]:
-    return {key: json_number(value) if isinstance(value, float) else value for key, value in asdict(row).items()}
