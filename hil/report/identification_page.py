@@ -282,37 +282,30 @@ def physical_tables(studies: Sequence[Study], together: Together | None = None) 
 
 def orders_table(choice: OrderChoice) -> list[Any]:
     """Return the best structures of an order selection, the chosen one first."""
-    rows = [
-        (
-            str(each.orders.na),
-            str(each.orders.nb),
-            str(each.orders.nk),
-            shown(each.criterion),
-            shown(each.rms),
-            shown(each.unseen_fit_percent, "%"),
-        )
-        for each in choice.candidates[:MOST_CANDIDATES]
-    ]
-    headings = ("nA", "nB", "delay", "BIC above the best", "RMS of the whitened error", "fit on unseen")
-    return [html.paragraph(choice.statement), html.table(headings, rows, numbers=range(6))]
+    columns = (
+        ("nA", lambda each: each.orders.na),
+        ("nB", lambda each: each.orders.nb),
+        ("delay", lambda each: each.orders.nk),
+        ("BIC above the best", lambda each: shown(each.criterion)),
+        ("RMS of the whitened error", lambda each: shown(each.rms)),
+        ("fit on unseen", lambda each: shown(each.unseen_fit_percent, "%")),
+    )
+    table = html.table_of(choice.candidates[:MOST_CANDIDATES], columns, numbers=range(6))
+    return [html.paragraph(choice.statement), table]
 
 
 def compared_table(compared: Sequence[Compared]) -> list[Any]:
     """Return what several recursive estimators made of the same data, and why one has no estimate."""
-    rows = [
-        (
-            each.recording,
-            each.estimator,
-            "–" if each.resonance is None else shown(each.resonance.frequency_hz),
-            "–" if each.resonance is None else shown(each.resonance.damping),
-            shown(each.fit_percent, "%"),
-            each.status.value,
-        )
-        for each in compared
-    ]
-    headings = ("recording", "estimator", "frequency [Hz]", "damping", "free-run fit", "status")
+    columns = (
+        ("recording", lambda each: each.recording),
+        ("estimator", lambda each: each.estimator),
+        ("frequency [Hz]", lambda each: "–" if each.resonance is None else shown(each.resonance.frequency_hz)),
+        ("damping", lambda each: "–" if each.resonance is None else shown(each.resonance.damping)),
+        ("free-run fit", lambda each: shown(each.fit_percent, "%")),
+        ("status", lambda each: each.status.value),
+    )
     reasons = [html.paragraph(f"{each.recording}, {each.estimator}: {each.reason}") for each in compared if each.reason]
-    return [html.table(headings, rows, numbers=(2, 3, 4)), *reasons]
+    return [html.table_of(compared, columns, numbers=(2, 3, 4)), *reasons]
 
 
 def identification_page(
@@ -323,7 +316,6 @@ def identification_page(
     made: Provenance | None = None,
     together: Together | None = None,
 ) -> str:
-    """Return the text of the page."""
     drawn = list(zip(models, studies, strict=True))[:MOST_DRAWN]
     left = len(models) - len(drawn)
     return html.page(
