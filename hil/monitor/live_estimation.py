@@ -22,6 +22,7 @@ from hil.child import safe_path
 from hil.monitor.plot import Ring
 from hil.monitor.snapshot import ComplexArray, Estimation, History, Model
 from hil.rig.live import USUAL, LiveEstimate, OnlineSetup, tracking_chain
+from hil.rig.pacing import NS_PER_S
 from hil.sample import Sample
 
 SPECTRUM_S = 30.0
@@ -48,8 +49,6 @@ RESPONSE_POINTS = 160
 KEPT_ALARMS = 20
 
 VALUES_PER_WIDTH = 2
-
-NS_PER_S = 1_000_000_000
 
 
 class LiveEstimation:
@@ -234,7 +233,6 @@ class WarmUp:
         self._thread.start()
 
     def is_done(self) -> bool:
-        """Tell whether the chain is ready."""
         if self._failed is not None:
             raise self._failed
         return not self._thread.is_alive()
