@@ -28,7 +28,6 @@ PROFILES: Final[Mapping[str, type[Any]]] = MappingProxyType(
 
 
 def profile(text: str) -> Adaptation:
-    """Read a profile."""
     name, _, rest = text.partition(":")
     kind = PROFILES.get(name.strip())
     if kind is None:
@@ -88,7 +87,6 @@ class PlcEstimator:
 
     @property
     def adapts_filter(self) -> bool:
-        """Whether the observation filter follows the estimate."""
         return self.L is None
 
     @property

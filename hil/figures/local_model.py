@@ -129,7 +129,6 @@ class LocalModel:
 
     @property
     def name(self) -> str:
-        """The recording's."""
         return self.record.name
 
     @property
@@ -139,7 +138,6 @@ class LocalModel:
 
     @property
     def reference_mode(self) -> Mode | None:
-        """The reference's resonance."""
         return None if self.reference is None else self.reference.line.resonance
 
     def reference_response(self, frequency_hz: FloatArray) -> ComplexArray | None:

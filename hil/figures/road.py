@@ -96,12 +96,10 @@ class PedalCruise:
 
     @property
     def start_speed_rad_s(self) -> float:
-        """The speed that is held [rad/s]."""
         return self._cruise.start_speed_rad_s
 
     @property
     def duration_s(self) -> float:
-        """Length of the measured part [s]."""
         return self._cruise.duration_s
 
     def begin(self, torque_nm: float) -> None:
@@ -238,7 +236,6 @@ def drive(
     stop: StopRequest,
     progress: Progress = lambda phase, time_s: None,
 ) -> Driven:
-    """Drive one experiment and record it."""
     rig = read_rig(RIG_FILE)
     bus, line = _loaded(rig, conditions)
     load = RoadLoad(bus, conditions)

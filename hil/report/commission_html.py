@@ -7,7 +7,6 @@ within?), its pictures and its runs; what was decided on the way; the rig file. 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -28,26 +27,23 @@ Evidence = Mapping[str, Any]
 MOST_NAMED = 4
 """Findings outside their limits that the head of the page names."""
 
-MARKS = MappingProxyType({True: ("no_mismatch", "✓ within"), False: ("unexplained", "✗ outside"), None: ("", "–")})
+MARKS = {True: ("no_mismatch", "✓ within"), False: ("unexplained", "✗ outside"), None: ("", "–")}
 """CSS class and words for within, outside, and no limit: the words say it, not the colour alone."""
 
-STATUSES = MappingProxyType(
-    {
-        "done": ("explained", "done"),
-        "skipped": ("", "skipped"),
-        "blocked": ("unexplained", "blocked"),
-        "interrupted": ("unexplained", "interrupted"),
-        "running": ("", "under way"),
-        "pending": ("", "to do"),
-    }
-)
+STATUSES = {
+    "done": ("explained", "done"),
+    "skipped": ("", "skipped"),
+    "blocked": ("unexplained", "blocked"),
+    "interrupted": ("unexplained", "interrupted"),
+    "running": ("", "under way"),
+    "pending": ("", "to do"),
+}
 
 COURSES = 4
 """Figures over time that share the page."""
 
 
 def commission_page(state: State, titles: Mapping[str, str], made: Provenance | None = None) -> str:
-    """Return the text of the page."""
     steps = state["steps"]
     begun, updated = moment(state["started_utc"]), moment(state["updated_utc"])
     return html.page(
@@ -338,13 +334,11 @@ def _diagnosis(evidence: Evidence) -> list[Any]:
     return [html.paragraph("Evidence, rivals and pictures: ", report, ". Model file: ", model, ".")]
 
 
-_FIGURES: Mapping[str, Callable[[Evidence], list[Any]]] = MappingProxyType(
-    {
-        "noise": _noise,
-        "signs": _signs,
-        "friction": _friction,
-        "identification": _identification,
-        "validation": _validation,
-        "diagnosis": _diagnosis,
-    }
-)
+_FIGURES: Mapping[str, Callable[[Evidence], list[Any]]] = {
+    "noise": _noise,
+    "signs": _signs,
+    "friction": _friction,
+    "identification": _identification,
+    "validation": _validation,
+    "diagnosis": _diagnosis,
+}

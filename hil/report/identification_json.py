@@ -156,7 +156,6 @@ def identification_text(
     made: Provenance | None = None,
     together: Together | None = None,
 ) -> str:
-    """Return the text of the file."""
     extras: list[dict[str, Any]] = [studied(each) for each in studies] or [{} for _ in results]
     document = {
         "schema": SCHEMA,

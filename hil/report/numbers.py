@@ -73,7 +73,6 @@ def shown_interval(interval: tuple[float, float]) -> str:
 
 
 def shown_p(value: float) -> str:
-    """Format a probability."""
     if not math.isfinite(value):
         return "–"
     return f"< {SMALLEST_P:.0e}" if value < SMALLEST_P else f"{value:.2g}"

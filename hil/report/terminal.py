@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from types import MappingProxyType
 from typing import Any
 
 from rich.console import Group, RenderableType
@@ -13,9 +12,12 @@ from rich.text import Text
 
 from hil.report import page as html
 
-COLOURS: Mapping[str, str] = MappingProxyType(
-    {"explained": "blue", "partly_explained": "blue", "unexplained": "yellow", "no_mismatch": "green"}
-)
+COLOURS: Mapping[str, str] = {
+    "explained": "blue",
+    "partly_explained": "blue",
+    "unexplained": "yellow",
+    "no_mismatch": "green",
+}
 
 
 def rendered(blocks: Iterable[Any]) -> RenderableType:
