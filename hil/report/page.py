@@ -267,7 +267,7 @@ def table(headings: Sequence[str], rows: Iterable[Sequence[Any] | Row], numbers:
 
 
 def table_of(
-    items: Iterable[Any], columns: Sequence[tuple[str, Callable[[Any], Any]]], numbers: Iterable[int]
+    items: Iterable[Any], columns: Sequence[tuple[str, Callable[[Any], Any]]], numbers: Iterable[int] = ()
 ) -> Table:
     """Make a table with a row for each item; a column has its heading and what gives a cell."""
     rows = [tuple(cell(item) for _, cell in columns) for item in items]
