@@ -13,6 +13,7 @@ import numpy as np
 
 from estimator.errors import EstimatorError, NotExciting
 from estimator.identification.chain import OnlineEstimate
+from estimator.identification.linear_model import ComplexArray
 from estimator.identification.modes.modes import Mode
 from estimator.identification.online.recursive import Status
 from estimator.identification.tracking.alarm import Alarm
@@ -20,7 +21,7 @@ from estimator.signals.decimate import high_passed
 from estimator.signals.record import FloatArray, Record
 from hil.child import safe_path
 from hil.monitor.plot import Ring
-from hil.monitor.snapshot import ComplexArray, Estimation, History, Model
+from hil.monitor.snapshot import Estimation, History, Model
 from hil.rig.live import USUAL, LiveEstimate, OnlineSetup, tracking_chain
 from hil.rig.pacing import NS_PER_S
 from hil.sample import Sample

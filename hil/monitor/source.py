@@ -115,7 +115,7 @@ class ReplaySource:
         name: str,
         samples: Sequence[Sample],
         speed: float = 1.0,
-        measured: Callable[[Sample], bool] = lambda sample: True,
+        measured: Callable[[Sample], bool] | None = None,
         clock_ns: Callable[[], int] = time.monotonic_ns,
     ) -> None:
         self._name = name
@@ -142,7 +142,8 @@ class ReplaySource:
         upto = self._due()
         if upto > self._next:
             due = self._samples[self._next : upto]
-            reports.append(Samples(tuple((row, Phase.MEASURE if self._measured(row) else None) for row in due)))
+            is_measured = self._measured or (lambda sample: True)  # nothing else is recorded
+            reports.append(Samples(tuple((row, Phase.MEASURE if is_measured(row) else None) for row in due)))
             self._next = upto
         if upto == len(self._samples):
             self._over = True
