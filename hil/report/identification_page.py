@@ -10,9 +10,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from rich.box import SIMPLE_HEAD
 from rich.console import RenderableType
-from rich.table import Table
 
 from estimator.identification.identify import Compared, Study
 from estimator.identification.joint import Together
@@ -377,29 +375,25 @@ def _together(models: Sequence[LocalModel]) -> html.Section:
     )  # fmt: skip
 
 
-NAME_WIDTH = 20
-"""Longest name of a recording in the table; a longer one wraps."""
-
-
-def summary(studies: Sequence[Study], nominal: Mode | None) -> Table:
-    """Return each recording's best estimate and on-line estimate; it fits into 80 columns, numbers are never cut.
+def summary(studies: Sequence[Study], nominal: Mode | None) -> RenderableType:
+    """Return each recording's best and on-line estimate, for a terminal of 80 columns.
 
     The status of the on-line estimates has a column where one of them is not as it should be.
     """
     wrong = any(each.found.estimate.status is not Status.ESTIMATED for each in studies)
-    table = Table(title="Resonance and damping", title_justify="left", box=SIMPLE_HEAD, pad_edge=False)
-    table.add_column("recording", overflow="fold", max_width=NAME_WIDTH)
-    for heading in ("best [Hz]", "damping", "on line", "damping"):
-        table.add_column(heading, no_wrap=True, justify="right")
-    if wrong:
-        table.add_column("on line is", no_wrap=True)
-    for each in studies:
-        status = [each.found.estimate.status.value] if wrong else []
-        table.add_row(each.name, *_known(each), *_shown(each.found.online_resonance), *status)
+    rows = [
+        (
+            each.name,
+            *_known(each),
+            *_shown(each.found.online_resonance),
+            each.found.estimate.status.value if wrong else "",
+        )
+        for each in studies
+    ]
     if nominal is not None:
-        table.add_section()
-        table.add_row("model file", *_shown(nominal), "", "")
-    return table
+        rows.append(("model file", *_shown(nominal), "", "", ""))
+    headings = ("recording", "best [Hz]", "damping", "on line", "damping", "on line is")
+    return rendered([html.section("Resonance and damping", html.table(headings, rows, numbers=range(1, 5)))])
 
 
 def compared_summary(compared: Sequence[Compared]) -> RenderableType:
