@@ -98,10 +98,10 @@ def plcopen(
     from datetime import UTC, datetime
 
     from hil.export.plc_estimator import written_estimator
-    from hil.export.plcopen import plcopen_xml, project
+    from hil.export.plcopen import plcopen_xml
 
     estimator = written_estimator(identification, run, adaptive, cycle, profile)
-    _write(out, plcopen_xml(project(estimator, _precision(single)), datetime.now(UTC), tc6), estimator)
+    _write(out, plcopen_xml(estimator, datetime.now(UTC), _precision(single), tc6), estimator)
 
 
 def _precision(single: bool) -> Precision:

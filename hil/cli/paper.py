@@ -60,7 +60,7 @@ def paper(
     trust_laws: TrustLaws = False,
     as_json: Annotated[bool, typer.Option("--json", help=f"Print {DATA} instead of the table.")] = False,
 ) -> None:
-    """Make the paper's Fig. 2, 4 and 5, in print quality and as an interactive page, with the truth drawn in.
+    """Make the paper's Fig. 2, 4 and 5, in print quality and on a page, with the truth drawn in.
 
     Eight experiments at near-constant speed, each with a payload, road, wind and driver of its own, are driven over
     CANopen and Modbus; all of it takes half a minute. The same seed makes the same files. Writes DIR/fig2, fig4 and
@@ -158,14 +158,17 @@ def _publish(
     rows = [row_of(model) for model in models]
     conditions = [each.conditions for each in driven or ()]
     text = paper_text(rows, settings, conditions, seed if driven else None, made)
-    page = paper_page(models, rows, conditions, made)
+
+    def write_page(to: Path) -> None:  # shows the figures that are written before it
+        to.write_text(paper_page(models, rows, conditions, to.parent, made), encoding="utf-8")
+
     publish(
         out,
         {
             **_figures(models),
             **_kept(driven or []),
             DATA: lambda to: to.write_text(text, encoding="utf-8"),
-            PAGE: lambda to: to.write_text(page, encoding="utf-8"),
+            PAGE: write_page,
         },
     )
     if as_json:

@@ -89,21 +89,12 @@ def candidates(rig: Rig, limits: Limits) -> Iterator[tuple[str, Table]]:
     fastest, strongest = limits.speed_rad_s, limits.torque_nm
     for part in SPEEDS:
         speed = part * fastest
-        yield f"cruise at {speed:.3g} rad/s", {"kind": "cruise", "speed_rad_s": speed, **common}
-        held = {"prbs_clock_divider": 5 * rig.prbs.clock_divider}
-        yield f"cruise at {speed:.3g} rad/s, slow PRBS", {"kind": "cruise", "speed_rad_s": speed, **common, **held}
-        strong = _strong_prbs(rig, limits)
-        yield (
-            f"cruise at {speed:.3g} rad/s, strong fast PRBS",
-            {
-                "kind": "cruise",
-                "speed_rad_s": speed,
-                **common,
-                **strong,
-            },
-        )
-        band = {"multisine": _multisine(rig)}
-        yield f"cruise at {speed:.3g} rad/s, multi-sine", {"kind": "cruise", "speed_rad_s": speed, **common, **band}
+        cruise = {"kind": "cruise", "speed_rad_s": speed, **common}
+        yield f"cruise at {speed:.3g} rad/s", cruise
+        slow = {"prbs_clock_divider": 5 * rig.prbs.clock_divider}
+        yield f"cruise at {speed:.3g} rad/s, slow PRBS", {**cruise, **slow}
+        yield f"cruise at {speed:.3g} rad/s, strong fast PRBS", {**cruise, **_strong_prbs(rig, limits)}
+        yield f"cruise at {speed:.3g} rad/s, multi-sine", {**cruise, "multisine": _multisine(rig)}
         yield f"coast from {speed:.3g} rad/s", {"kind": "coast", "speed_rad_s": speed, **common}
     for turn, part, share in itertools.product(TURNS, TORQUES, ONE_ALONE):
         shared = {**common, "share_m1": share, **_within(rig, limits, share)}

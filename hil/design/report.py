@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -119,7 +120,7 @@ def design_document(known: Open, design: Design | None, aim: Aim) -> dict[str, A
     }
     if design is None:
         return document
-    planned, low_high = design.planned, design.planned.speed_rad_s
+    planned = design.planned
     return document | {
         "worth_driving": design.is_worth_driving,
         "obstacle": None if design.is_worth_driving else obstacle(design),
@@ -127,15 +128,12 @@ def design_document(known: Open, design: Design | None, aim: Aim) -> dict[str, A
         "expected": {
             "factor": min(design.factor, MOST_SHOWN),
             "probability": None if design.decides is None else design.decides.right,
-            "intervals": [
-                {"name": w.name, "value": w.value, "now": w.now, "after": w.after, "unit": w.unit}
-                for w in design.widths
-            ],
+            "intervals": [asdict(each) for each in design.widths],
         },
         "drive": {
             "seconds": planned.seconds,
             "torque_nm": planned.largest_nm,
-            "speed_rad_s": list(low_high),
+            "speed_rad_s": list(planned.speed_rad_s),
             "angle_rad": planned.angle_rad,
         },
         "others": [{"name": name, "value": value} for name, value in design.others],

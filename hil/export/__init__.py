@@ -22,5 +22,4 @@ class Tc6(Enum):
 
     @property
     def namespace(self) -> str:
-        """The namespace of its elements."""
         return {Tc6.V2_01: "http://www.plcopen.org/xml/tc6_0201", Tc6.V2_0: "http://www.plcopen.org/xml/tc6_0200"}[self]

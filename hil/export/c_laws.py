@@ -120,7 +120,6 @@ class Translation:
         self._structures[kind] = definition(kind)
 
     def text(self) -> str:
-        """Return the C text."""
         return "\n".join((PRELUDE, *self._structures.values(), "", *self._functions))
 
 

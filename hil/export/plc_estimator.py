@@ -14,8 +14,7 @@ from estimator.identification.chain import OnlineChain, oefo
 from estimator.identification.online.adaptation import PROFILES as KINDS
 from estimator.identification.online.adaptation import Adaptation
 from estimator.identification.online.estimators import Oefo
-from estimator.identification.settings import SAMPLES_PER_PARAMETER, Settings
-from estimator.identification.tracking.watch import WatchSettings
+from estimator.identification.settings import Settings
 from estimator.signals.decimate import Decimator, low_pass_length
 from estimator.signals.record import FloatArray
 from hil.errors import FileProblem, UsageError
@@ -28,7 +27,6 @@ PROFILES: Final[Mapping[str, type[Any]]] = MappingProxyType(
 
 
 def profile(text: str) -> Adaptation:
-    """Read a profile."""
     name, _, rest = text.partition(":")
     kind = PROFILES.get(name.strip())
     if kind is None:
@@ -87,24 +85,9 @@ class PlcEstimator:
         return max(orders.na, orders.nk + orders.nb, filter_order + 1)
 
     @property
-    def adapts_filter(self) -> bool:
-        """Whether the observation filter follows the estimate."""
-        return self.L is None
-
-    @property
     def factor(self) -> int:
         """Cycles per sample of the model."""
         return round(self.settings.sample_time_s / self.cycle_s)
-
-    @property
-    def block_samples(self) -> int:
-        """Samples of a block, at the end of which the excitation is judged."""
-        return WatchSettings().block_samples(self.settings.sample_time_s)
-
-    @property
-    def start_up_samples(self) -> int:
-        """Good samples at the start that are learnt from without the filter."""
-        return SAMPLES_PER_PARAMETER * self.settings.orders.n_parameters
 
     def decimator(self) -> Decimator:
         """Return the host's own decimator of these settings, ready for samples."""

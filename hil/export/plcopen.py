@@ -11,9 +11,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
 from datetime import datetime
-from enum import Enum
 from inspect import cleandoc
 from typing import Final
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
@@ -22,79 +20,6 @@ from hil.export import Tc6
 from hil.export.plc_estimator import PlcEstimator
 from hil.export.structured_text import Precision, parts
 from hil.version import __version__
-
-
-class PouKind(Enum):
-    """The kinds of POU that are exported; the value is the keyword."""
-
-    FUNCTION_BLOCK = "FUNCTION_BLOCK"
-    PROGRAM = "PROGRAM"
-
-
-class SectionKind(Enum):
-    """What a section declares; the value is its keyword."""
-
-    INPUT = "VAR_INPUT"
-    OUTPUT = "VAR_OUTPUT"
-    LOCAL = "VAR"
-
-
-@dataclass(frozen=True, slots=True)
-class Array:
-    """``ARRAY[low..high, ..] OF element``; the element is of an elementary type."""
-
-    bounds: tuple[tuple[int, int], ...]
-    element: str
-
-
-@dataclass(frozen=True, slots=True)
-class DataType:
-    """A named array type. Arrays that are handed over have one: two unnamed array types are never the same type."""
-
-    name: str
-    array: Array
-    comment: str
-
-
-@dataclass(frozen=True, slots=True)
-class Variable:
-    """A declaration; ``initial`` holds no, one, or (of an array) each literal; ``type`` is a name or an array."""
-
-    name: str
-    type: str | Array
-    initial: tuple[str, ...]
-    comment: str
-
-
-@dataclass(frozen=True, slots=True)
-class Section:
-    """``VAR .. END_VAR``; ``comment`` says what its variables have in common, or nothing."""
-
-    kind: SectionKind
-    constant: bool
-    variables: tuple[Variable, ...]
-    comment: str
-
-
-@dataclass(frozen=True, slots=True)
-class Pou:
-    """A program organization unit; ``body`` is Structured Text without the last newline."""
-
-    kind: PouKind
-    name: str
-    sections: tuple[Section, ...]
-    body: str
-    comment: str
-
-
-@dataclass(frozen=True, slots=True)
-class Project:
-    """Data types and POUs, each after those it uses; ``comment`` says where they come from."""
-
-    types: tuple[DataType, ...]
-    pous: tuple[Pou, ...]
-    comment: str
-
 
 _COMMENT: Final = r"\(\*(?P<comment>(?:(?!\(\*|\*\)).)*)\*\)"
 
@@ -113,90 +38,31 @@ _VARIABLE: Final = re.compile(
 _ARRAY: Final = re.compile(r"ARRAY\[(?P<bounds>[^\]]+)\] OF (?P<element>\w+)")
 
 
-def project(estimator: PlcEstimator, precision: Precision = Precision.DOUBLE) -> Project:
-    """Return the POUs of an estimator, and the data types they share."""
-    head, types, pous = parts(estimator, precision)
-    comment = re.fullmatch(_COMMENT, head.strip(), re.S)
-    assert comment is not None  # noqa: S101 - the head is one comment
-    return Project(read_types(types), tuple(read_pou(text) for text in pous), _plain(comment["comment"]))
-
-
-def read_types(text: str) -> tuple[DataType, ...]:
-    """Return the data types of a text."""
-    return tuple(
-        DataType(found["name"], _array(found["type"]), _plain(found["comment"])) for found in _each(_TYPE, text)
-    )
-
-
-def read_pou(text: str) -> Pou:
-    """Return the one POU of a text."""
-    (found,) = _each(_POU, text)
-    return Pou(
-        PouKind(found["kind"]), found["name"], _sections(found["sections"]), found["body"], _plain(found["comment"])
-    )
-
-
-def _sections(text: str) -> tuple[Section, ...]:
-    return tuple(
-        Section(
-            SectionKind(found["kind"]),
-            found["constant"] is not None,
-            tuple(_read_variable(entry) for entry in _each(_VARIABLE, found["variables"])),
-            _plain(found["comment"]),
-        )
-        for found in _each(_SECTION, text)
-    )
-
-
-def _read_variable(found: re.Match[str]) -> Variable:
-    initial = tuple(re.findall(r"[^\[\],\s]+", found["initial"] or ""))
-    kind = _array(found["type"]) if found["type"].startswith("ARRAY") else found["type"]
-    return Variable(found["name"], kind, initial, _plain(found["comment"]))
-
-
-def _array(text: str) -> Array:
-    found = _ARRAY.fullmatch(text)
-    if found is None:
-        raise ValueError(f"expected ARRAY[low..high] OF name, got {text!r}")
-    bounds = (tuple(map(int, part.split(".."))) for part in found["bounds"].split(","))
-    return Array(tuple((low, high) for low, high in bounds), found["element"])
-
-
-def _each(pattern: re.Pattern[str], text: str) -> Iterator[re.Match[str]]:
-    """Yield one match after the other, with nothing between them."""
-    place = 0
-    while place < len(text):
-        found = pattern.match(text, place)
-        if found is None:
-            raise ValueError(f"not laid out as the files of st/ are: {text[place : place + 60]!r}")
-        yield found
-        place = found.end()
-
-
-def _plain(comment: str | None) -> str:
-    """Return the lines of a comment without the indentation they have in common."""
-    return cleandoc((comment or "").strip())
-
-
 XHTML: Final = "http://www.w3.org/1999/xhtml"
 
 ELEMENTARY: Final = frozenset(("BOOL", "INT", "DINT", "REAL", "LREAL"))
 """Types that are an element of their own name; every other is ``<derived name=".."/>``."""
 
-_POU_TYPE: Final = {PouKind.FUNCTION_BLOCK: "functionBlock", PouKind.PROGRAM: "program"}
-_VARIABLES: Final = {SectionKind.INPUT: "inputVars", SectionKind.OUTPUT: "outputVars", SectionKind.LOCAL: "localVars"}
+_POU_TYPE: Final = {"FUNCTION_BLOCK": "functionBlock", "PROGRAM": "program"}
+_VARIABLES: Final = {"VAR_INPUT": "inputVars", "VAR_OUTPUT": "outputVars", "VAR": "localVars"}
 
 
-def plcopen_xml(project: Project, written: datetime, version: Tc6 = Tc6.V2_01) -> str:
-    """Return the document."""
+def plcopen_xml(
+    estimator: PlcEstimator, written: datetime, precision: Precision = Precision.DOUBLE, version: Tc6 = Tc6.V2_01
+) -> str:
+    """Return the POUs of an estimator, and the data types they share, as a document."""
+    head, data_types, pous = parts(estimator, precision)
+    comment = re.fullmatch(_COMMENT, head.strip(), re.S)
+    assert comment is not None  # noqa: S101 - the head is one comment
     root = Element("project", {"xmlns": version.namespace, "xmlns:xhtml": XHTML})
-    _headers(root, project.comment, written.isoformat(timespec="seconds"))
+    _headers(root, _plain(comment["comment"]), written.isoformat(timespec="seconds"))
     types = SubElement(root, "types")
-    data_types, pous = SubElement(types, "dataTypes"), SubElement(types, "pous")
-    for kind in project.types:
-        _data_type(data_types, kind)
-    for pou in project.pous:
-        _pou(pous, pou)
+    of_data, of_pous = SubElement(types, "dataTypes"), SubElement(types, "pous")
+    for found in _each(_TYPE, data_types):
+        _data_type(of_data, found)
+    for text in pous:
+        (found,) = _each(_POU, text)
+        _pou(of_pous, found)
     SubElement(SubElement(root, "instances"), "configurations")
     indent(root)
     return f'<?xml version="1.0" encoding="utf-8"?>\n{tostring(root, encoding="unicode")}\n'
@@ -212,61 +78,81 @@ def _headers(root: Element, comment: str, written: str) -> None:
         SubElement(SubElement(coordinates, language), "scaling", {"x": "1", "y": "1"})
 
 
-def _data_type(parent: Element, kind: DataType) -> None:
-    element = SubElement(parent, "dataType", {"name": kind.name})
-    _type(SubElement(element, "baseType"), kind.array)
-    _documentation(element, kind.comment)
+def _data_type(parent: Element, found: re.Match[str]) -> None:
+    element = SubElement(parent, "dataType", {"name": found["name"]})
+    _type(SubElement(element, "baseType"), found["type"])
+    _documentation(element, found["comment"])
 
 
-def _pou(parent: Element, pou: Pou) -> None:
-    element = SubElement(parent, "pou", {"name": pou.name, "pouType": _POU_TYPE[pou.kind]})
+def _pou(parent: Element, found: re.Match[str]) -> None:
+    element = SubElement(parent, "pou", {"name": found["name"], "pouType": _POU_TYPE[found["kind"]]})
     interface = SubElement(element, "interface")
-    for section in pou.sections:
+    for section in _each(_SECTION, found["sections"]):
         _section(interface, section)
-    _documentation(interface, pou.comment)
-    _text(SubElement(SubElement(element, "body"), "ST"), pou.body)
+    _documentation(interface, found["comment"])
+    _text(SubElement(SubElement(element, "body"), "ST"), found["body"])
 
 
-def _section(parent: Element, section: Section) -> None:
-    element = SubElement(parent, _VARIABLES[section.kind], {"constant": "true"} if section.constant else {})
-    for variable in section.variables:
+def _section(parent: Element, found: re.Match[str]) -> None:
+    element = SubElement(parent, _VARIABLES[found["kind"]], {"constant": "true"} if found["constant"] else {})
+    for variable in _each(_VARIABLE, found["variables"]):
         _variable(element, variable)
-    _documentation(element, section.comment)
+    _documentation(element, found["comment"])
 
 
-def _variable(parent: Element, variable: Variable) -> None:
-    element = SubElement(parent, "variable", {"name": variable.name})
-    _type(SubElement(element, "type"), variable.type)
-    if variable.initial:
-        _initial(SubElement(element, "initialValue"), variable)
-    _documentation(element, variable.comment)
+def _variable(parent: Element, found: re.Match[str]) -> None:
+    element = SubElement(parent, "variable", {"name": found["name"]})
+    _type(SubElement(element, "type"), found["type"])
+    if found["initial"]:
+        _initial(SubElement(element, "initialValue"), found["initial"])
+    _documentation(element, found["comment"])
 
 
-def _type(parent: Element, kind: str | Array) -> None:
-    if isinstance(kind, Array):
-        array = SubElement(parent, "array")
-        for low, high in kind.bounds:
-            SubElement(array, "dimension", {"lower": str(low), "upper": str(high)})
-        _type(SubElement(array, "baseType"), kind.element)
-    elif kind in ELEMENTARY:
-        SubElement(parent, kind)
+def _type(parent: Element, text: str) -> None:
+    array = _ARRAY.fullmatch(text)
+    if array is not None:
+        element = SubElement(parent, "array")
+        for bounds in array["bounds"].split(","):
+            low, high = bounds.split("..")
+            SubElement(element, "dimension", {"lower": low.strip(), "upper": high.strip()})
+        _type(SubElement(element, "baseType"), array["element"])
+    elif text in ELEMENTARY:
+        SubElement(parent, text)
     else:
-        SubElement(parent, "derived", {"name": kind})
+        SubElement(parent, "derived", {"name": text})
 
 
-def _initial(parent: Element, variable: Variable) -> None:
-    if not isinstance(variable.type, Array):
-        SubElement(parent, "simpleValue", {"value": variable.initial[0]})
+def _initial(parent: Element, text: str) -> None:
+    """Write one literal, or of an array, which is in brackets, each."""
+    literals = re.findall(r"[^\[\],\s]+", text)
+    if not text.startswith("["):
+        SubElement(parent, "simpleValue", {"value": literals[0]})
         return
     values = SubElement(parent, "arrayValue")
-    for literal in variable.initial:
+    for literal in literals:
         SubElement(SubElement(values, "value"), "simpleValue", {"value": literal})
 
 
-def _documentation(parent: Element, comment: str) -> None:
+def _documentation(parent: Element, comment: str | None) -> None:
     if comment:
-        _text(SubElement(parent, "documentation"), comment)
+        _text(SubElement(parent, "documentation"), _plain(comment))
 
 
 def _text(parent: Element, text: str) -> None:
     SubElement(parent, "xhtml:p").text = text
+
+
+def _each(pattern: re.Pattern[str], text: str) -> Iterator[re.Match[str]]:
+    """Yield one match after the other, with nothing between them."""
+    place = 0
+    while place < len(text):
+        found = pattern.match(text, place)
+        if found is None:
+            raise ValueError(f"not laid out as the files of st/ are: {text[place : place + 60]!r}")
+        yield found
+        place = found.end()
+
+
+def _plain(comment: str) -> str:
+    """Return the lines of a comment without the indentation they have in common."""
+    return cleandoc(comment.strip())

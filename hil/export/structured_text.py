@@ -21,7 +21,9 @@ import numpy as np
 from estimator.errors import BadModel, BadSetting
 from estimator.identification.modes.modes import LIGHTLY_DAMPED
 from estimator.identification.online import adaptation, regression
+from estimator.identification.settings import SAMPLES_PER_PARAMETER
 from estimator.identification.tracking import follow, poles
+from estimator.identification.tracking.watch import WatchSettings
 from estimator.signals.decimate import UNTRUSTED
 from hil.export.plc_estimator import PlcEstimator
 from hil.version import __version__
@@ -150,9 +152,9 @@ class _Filling:
             "nl": len(coefficients),
             "nl_room": max(1, len(coefficients)),  # an array has at least one element
             "L": self._literals(coefficients or [0.0]),
-            "adapt": _truth(self.estimator.adapts_filter),
+            "adapt": _truth(self.estimator.L is None),
             "depth": self.estimator.depth,
-            "start_up": self.estimator.start_up_samples,
+            "start_up": SAMPLES_PER_PARAMETER * orders.n_parameters,
             "settled": round(regression.SETTLING * orders.n_parameters),
         }
 
@@ -176,7 +178,8 @@ class _Filling:
 
     def _excitation(self) -> dict[str, object]:
         literal, settings = self.precision.literal, self.estimator.settings
-        period_s, (lowest, highest), samples = settings.sample_time_s, settings.band_hz, self.estimator.block_samples
+        period_s, (lowest, highest) = settings.sample_time_s, settings.band_hz
+        samples = WatchSettings().block_samples(period_s)
         coarse = self.precision is Precision.SINGLE  # rounding leaves more of a change
         return {
             "na_room": max(1, settings.orders.na),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -77,14 +78,11 @@ def drawing() -> Iterator[None]:
 def files_of(name: str, draw: Callable[[], Figure]) -> dict[str, Callable[[Path], object]]:
     """Return what writes a figure in every format, by file name, for `hil.report.outputs.publish`."""
 
-    def writer(suffix: str) -> Callable[[Path], object]:
-        def write(path: Path) -> None:
-            with drawing():
-                draw().savefig(path, format=suffix, metadata=dict(NO_DATE[suffix]))
+    def write(suffix: str, path: Path) -> None:
+        with drawing():
+            draw().savefig(path, format=suffix, metadata=dict(NO_DATE[suffix]))
 
-        return write
-
-    return {f"{name}.{suffix}": writer(suffix) for suffix in FORMATS}
+    return {f"{name}.{suffix}": partial(write, suffix) for suffix in FORMATS}
 
 
 def label_panel(axes: Axes, text: str) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,33 +21,31 @@ STATES, INPUTS = 3, 2
 
 @dataclass(frozen=True, slots=True)
 class TwoMassLine:
-    """A two-mass driveline without anything nonlinear."""
+    """A two-mass driveline without anything nonlinear, by the names of a model file [kg m^2, Nm/rad, Nm s/rad]."""
 
-    inertia_motor_kg_m2: float  # J_M and J_L [kg m^2]
-    inertia_load_kg_m2: float  # J_M and J_L [kg m^2]
-    stiffness_nm_per_rad: float  # k and c of the shaft
-    damping_nm_s_per_rad: float  # k and c of the shaft
-    friction_motor_nm_s_per_rad: float  # viscous friction b_M and b_L
-    friction_load_nm_s_per_rad: float  # viscous friction b_M and b_L
+    J_M: float
+    J_L: float
+    k: float
+    c: float
+    b_M: float  # noqa: N815
+    b_L: float  # noqa: N815
 
     @classmethod
     def of(cls, values: Mapping[str, float]) -> TwoMassLine:
-        """Take the parameters of a two-mass model by their names in a model file: J_M, J_L, k, c, b_M, b_L."""
-        return cls(*(values[name] for name in ("J_M", "J_L", "k", "c", "b_M", "b_L")))
+        """Take the parameters of a two-mass model."""
+        return cls(**{name: values[name] for name in Structure.TWO_MASS.parameter_names})
 
     @property
     def matrices(self) -> tuple[FloatArray, FloatArray]:
-        """A, shape (3, 3), and B, shape (3, 2); see the module's text."""
-        j_m, j_l = self.inertia_motor_kg_m2, self.inertia_load_kg_m2
-        k, c = self.stiffness_nm_per_rad, self.damping_nm_s_per_rad
+        """A, shape (3, 3), and B, shape (3, 2), of speeds and twist under the torques of motor and load."""
         a = np.array(
             [
-                [-(c + self.friction_motor_nm_s_per_rad) / j_m, c / j_m, -k / j_m],
-                [c / j_l, -(c + self.friction_load_nm_s_per_rad) / j_l, k / j_l],
+                [-(self.c + self.b_M) / self.J_M, self.c / self.J_M, -self.k / self.J_M],
+                [self.c / self.J_L, -(self.c + self.b_L) / self.J_L, self.k / self.J_L],
                 [1.0, -1.0, 0.0],
             ]
         )
-        return a, np.array([[1.0 / j_m, 0.0], [0.0, -1.0 / j_l], [0.0, 0.0]])
+        return a, np.array([[1.0 / self.J_M, 0.0], [0.0, -1.0 / self.J_L], [0.0, 0.0]])
 
     def discrete(self, period_s: float) -> tuple[FloatArray, FloatArray]:
         """Return A and B for both torques held over a period [s]: the exponential of [[A, B], [0, 0]] T."""
@@ -59,14 +57,7 @@ class TwoMassLine:
     @property
     def resonance(self) -> Mode | None:
         """The oscillating pair of poles; None if it does not oscillate."""
-        return two_mass_resonance(
-            self.inertia_motor_kg_m2,
-            self.inertia_load_kg_m2,
-            self.stiffness_nm_per_rad,
-            self.damping_nm_s_per_rad,
-            self.friction_motor_nm_s_per_rad,
-            self.friction_load_nm_s_per_rad,
-        )
+        return two_mass_resonance(**asdict(self))
 
     def poles(self, sample_time_s: float) -> ComplexArray:
         """Return the three poles in z, exp(s T) of those in s."""
@@ -78,13 +69,7 @@ class TwoMassLine:
 
         A sampled model has its zeros there only roughly, the better the slower they are.
         """
-        s = np.roots(
-            [
-                self.inertia_load_kg_m2,
-                self.damping_nm_s_per_rad + self.friction_load_nm_s_per_rad,
-                self.stiffness_nm_per_rad,
-            ]
-        )
+        s = np.roots([self.J_L, self.c + self.b_L, self.k])
         return np.exp(s.astype(np.complex128) * sample_time_s)
 
     def response(self, frequency_hz: FloatArray, held_s: float) -> ComplexArray:
@@ -129,7 +114,6 @@ class LocalModel:
 
     @property
     def name(self) -> str:
-        """The recording's."""
         return self.record.name
 
     @property
@@ -139,7 +123,6 @@ class LocalModel:
 
     @property
     def reference_mode(self) -> Mode | None:
-        """The reference's resonance."""
         return None if self.reference is None else self.reference.line.resonance
 
     def reference_response(self, frequency_hz: FloatArray) -> ComplexArray | None:

@@ -81,40 +81,33 @@ SHORTEST_S, LONGEST_S = 1.5, 6.0
 """Time between two corrections [s]."""
 
 
-class PedalCruise:
-    """The law of one measured part; see `hil.rig.experiments.base.MeasureLaw`."""
+class PedalCruise(Cruise):
+    """A cruise with a driver whose foot corrects the torque."""
 
-    __slots__ = ("_cruise", "_foot", "_next_s", "_pedal_nm", "_rng", "_wanted_nm")
+    __slots__ = ("_foot", "_next_s", "_pedal_nm", "_rng", "_wanted_nm")
 
-    def __init__(self, cruise: Cruise, pedal_nm: float, period_s: float, rng: np.random.Generator) -> None:
-        self._cruise = cruise
-        self._pedal_nm = pedal_nm
-        self._rng = rng
+    def __init__(
+        self,
+        conditions: Conditions,
+        duration_s: float,
+        inertia_kg_m2: float,
+        torque_limit_nm: float,
+        period_s: float,
+    ) -> None:
+        super().__init__(conditions.speed_rad_s, duration_s, inertia_kg_m2, torque_limit_nm, period_s)
+        self._pedal_nm = conditions.pedal_nm
+        self._rng = np.random.default_rng([conditions.seed, 1])
         self._foot = LowPass(LAG_S, period_s)
         self._wanted_nm = 0.0
         self._next_s = 0.0
 
-    @property
-    def start_speed_rad_s(self) -> float:
-        """The speed that is held [rad/s]."""
-        return self._cruise.start_speed_rad_s
-
-    @property
-    def duration_s(self) -> float:
-        """Length of the measured part [s]."""
-        return self._cruise.duration_s
-
-    def begin(self, torque_nm: float) -> None:
-        """Take over at the torque that holds the speed [Nm]."""
-        self._cruise.begin(torque_nm)
-
     def torque_nm(self, time_s: float, speed_rad_s: float) -> float:
-        """Torque of the driver's foot [Nm]."""
+        """Torque that holds the speed, and that of the driver's foot [Nm]."""
         self._foot.update(self._wanted_nm)
         if time_s >= self._next_s:
             self._wanted_nm = self._pedal_nm * float(self._rng.standard_normal())
             self._next_s += float(self._rng.uniform(SHORTEST_S, LONGEST_S))
-        return self._cruise.torque_nm(time_s, speed_rad_s) + self._foot.value
+        return super().torque_nm(time_s, speed_rad_s) + self._foot.value
 
 
 GRAVITY_M_S2: Final = 9.80665
@@ -238,7 +231,6 @@ def drive(
     stop: StopRequest,
     progress: Progress = lambda phase, time_s: None,
 ) -> Driven:
-    """Drive one experiment and record it."""
     rig = read_rig(RIG_FILE)
     bus, line = _loaded(rig, conditions)
     load = RoadLoad(bus, conditions)
@@ -273,8 +265,7 @@ def _plan(rig: Rig, conditions: Conditions, duration_s: float) -> Plan:
     if not isinstance(table, CruiseTable):
         raise UsageError(f"rig {rig.name!r}, experiments.{EXPERIMENT}: expected kind = 'cruise', got {table.kind!r}")
     inertia, period_s, speed = rig.vehicle.inertia_kg_m2, rig.period_s, conditions.speed_rad_s
-    cruise = Cruise(speed, duration_s, inertia, table.torque_nm, period_s)
-    law = PedalCruise(cruise, conditions.pedal_nm, period_s, np.random.default_rng([conditions.seed, 1]))
+    law = PedalCruise(conditions, duration_s, inertia, table.torque_nm, period_s)
     approach = Approach(speed, inertia, table.torque_nm, period_s, table.approach_timeout_s)
     bounds = TorqueBounds(table.torque_nm, table.slew_nm_per_s)
     return replace(plan, experiment=StagedExperiment(law, approach, bounds, period_s))

@@ -88,7 +88,6 @@ class MonitorApp(App[None]):
         self.interrupted = False
 
     def compose(self) -> ComposeResult:
-        """Lay the screen out."""
         yield Panel(head_panels.headline, "headline")
         yield from pages(len(self._state.channel_units))
         yield Static("", id="too-small")
@@ -96,7 +95,6 @@ class MonitorApp(App[None]):
         yield Static("", id="keys", classes="keys", markup=False)
 
     def on_mount(self) -> None:
-        """Begin to draw."""
         self.action_page(self._page)
         self.set_interval(DRAW_EVERY_S, self._tick)
         if self._picture is not None:
@@ -108,7 +106,6 @@ class MonitorApp(App[None]):
                     self._handlers[number] = signal.signal(number, self._on_signal)
 
     def on_unmount(self) -> None:
-        """Give the signals back."""
         for number, handler in self._handlers.items():
             signal.signal(number, handler)
         self._handlers.clear()
@@ -154,7 +151,6 @@ class MonitorApp(App[None]):
         self.action_leave()
 
     def action_page(self, name: str) -> None:
-        """Show a page."""
         self._page = name
         for container in self.screen_stack[0].query(".page").results(Container):
             container.set_class(container.id == name, "shown")
@@ -180,7 +176,6 @@ class MonitorApp(App[None]):
         self._draw()
 
     def action_start(self) -> None:
-        """Ask which experiment, and start it."""
         if self._refuse(self._state.activity is Activity.LISTENING, "only a rig that is listened to can be started"):
             return
         if self._refuse(bool(self._choices), "the rig file has no [experiments]"):
@@ -194,26 +189,22 @@ class MonitorApp(App[None]):
         self._source.send(Start(name))
 
     def action_stop(self) -> None:
-        """Stop at once."""
         self._source.send(Stop())
         self._state.stopping("stop: zero torque, disarming")
 
     def action_mark(self) -> None:
-        """Mark this moment."""
         t_ns = time.monotonic_ns()
         if self._refuse(self._state.is_driving, "a mark goes into a recording; nothing is being recorded"):
             return
         self.push_screen(MarkDialog(), lambda text: None if text is None else self._source.send(Mark(t_ns, text)))
 
     def action_reset(self) -> None:
-        """Reset the drives' faults."""
         if self._refuse(self._state.activity is Activity.LISTENING, "stop first: faults are reset at rest"):
             return
         self._state.take(Notice(time.monotonic_ns(), Kind.INFO, "reset of the drives' faults asked for"))
         self._source.send(Reset())
 
     def action_help(self) -> None:
-        """Show the keys."""
         self.push_screen(HelpDialog(HELP))
 
     def action_leave(self) -> None:

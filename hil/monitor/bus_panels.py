@@ -104,8 +104,9 @@ def brief(snapshot: Snapshot, width: int, height: int) -> list[str]:
 
 
 def _brief_figures(timing: TimingHealth, quality: Quality) -> list[str]:
+    _, p99_s, max_s = timing.lateness_s
     return [
-        f"late p99 {_ms(timing.lateness_p99_s)} max {_ms(timing.lateness_max_s)} ms",
+        f"late p99 {_ms(p99_s)} max {_ms(max_s)} ms",
         f"samples {good(quality)}",
         quality.reasons,
     ]
@@ -146,13 +147,11 @@ def _node_table(health: Health) -> list[str]:
 
 
 def _cycle_table(timing: TimingHealth, width: int) -> list[str]:
-    lateness_s = (timing.lateness_p50_s, timing.lateness_p99_s, timing.lateness_max_s)
-    reply_s = (timing.reply_p50_s, timing.reply_p99_s, timing.reply_max_s)
     return [
         title("cycle", f"period {1e3 * timing.period_s:g} ms", width),
         f"{'[ms]':14}{'p50':>10}{'p99':>10}{'max':>10}",
-        f"{'lateness':14}" + "".join(f"{_ms(time_s):>10}" for time_s in lateness_s),
-        f"{'reply age':14}" + "".join(f"{_ms(time_s):>10}" for time_s in reply_s),
+        f"{'lateness':14}" + "".join(f"{_ms(time_s):>10}" for time_s in timing.lateness_s),
+        f"{'reply age':14}" + "".join(f"{_ms(time_s):>10}" for time_s in timing.reply_s),
     ]
 
 

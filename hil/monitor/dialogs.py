@@ -33,7 +33,6 @@ class StartDialog(ModalScreen[str | None]):
         self._chosen: str | None = None
 
     def compose(self) -> ComposeResult:
-        """Offer the experiments."""
         with Vertical(classes="dialog"):
             yield Static("Start an experiment: arrows and Enter choose, Esc goes back", classes="lead")
             yield OptionList(
@@ -52,7 +51,6 @@ class StartDialog(ModalScreen[str | None]):
         self.query_one("#question", Static).update("")
 
     def on_option_list_option_selected(self, event: OptionList.OptionSelected) -> None:
-        """Ask once more."""
         self._chosen = self._names[event.option_index]
         question = f"Arm both drives and run {self._chosen}, recorded in {self._out}? Press y for yes, Esc for no."
         self.query_one("#question", Static).update(printable(question))
@@ -63,7 +61,6 @@ class StartDialog(ModalScreen[str | None]):
             self.dismiss(self._chosen)
 
     def action_back(self) -> None:
-        """Start nothing."""
         self.dismiss(None)
 
 
@@ -77,18 +74,15 @@ class MarkDialog(ModalScreen[str | None]):
     BINDINGS: ClassVar[list[BindingType]] = [Binding("escape", "back", "Back")]
 
     def compose(self) -> ComposeResult:
-        """Ask."""
         with Vertical(classes="dialog"):
             yield Static("Mark (its time is that of the key m). What happened?", classes="lead")
             yield Input(placeholder="mark", max_length=200)
             yield Static("Enter keeps it, Esc drops it. Ctrl-C ends the run, as everywhere.")
 
     def on_input_submitted(self, event: Input.Submitted) -> None:
-        """Keep it."""
         self.dismiss(event.value.strip() or "mark")
 
     def action_back(self) -> None:
-        """Drop it."""
         self.dismiss(None)
 
 
@@ -105,12 +99,10 @@ class HelpDialog(ModalScreen[None]):
         self._text = text
 
     def compose(self) -> ComposeResult:
-        """Show them."""
         with Vertical(classes="dialog"):
             yield Static(self._text, markup=False)
 
     def action_back(self) -> None:
-        """Go back."""
         self.dismiss(None)
 
 

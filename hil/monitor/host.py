@@ -54,13 +54,11 @@ from hil.monitor.recorded_run import RecordedRun
 from hil.rig.build import Devices, open_devices
 from hil.rig.idle import Listening
 from hil.rig.live import USUAL, OnlineSetup
-from hil.rig.pacing import RealTimePacer, period_ns
+from hil.rig.pacing import NS_PER_S, RealTimePacer, period_ns
 from hil.rig.realtime import real_time
 from hil.rig.stop import StopRequest, stop_on_signals
 from hil.rig.timing import Histogram, RunTiming
 from hil.simulator.addresses import IN_PROCESS, Address, with_addresses
-
-NS_PER_S = 1_000_000_000
 
 _NMT_TITLES = {state.value: state.title for state in NmtState}
 
@@ -137,25 +135,23 @@ def plc_health(status: PlcStatus | None, trouble: str | None) -> PlcHealth:
 
 def timing_health(timing: RunTiming) -> TimingHealth:
     """Take the figures of a timing record that continues."""
-    lateness, reply = timing.lateness, timing.reply_age
     return TimingHealth(
         period_s=timing.period_ns / NS_PER_S,
         cycles=timing.cycles,
         missed=timing.missed,
         late=timing.late,
         unanswered=timing.unanswered,
-        lateness_p50_s=_quantile_s(lateness, 0.5),
-        lateness_p99_s=_quantile_s(lateness, 0.99),
-        lateness_max_s=lateness.max_ns / NS_PER_S if lateness.total else math.nan,
-        reply_p50_s=_quantile_s(reply, 0.5),
-        reply_p99_s=_quantile_s(reply, 0.99),
-        reply_max_s=reply.max_ns / NS_PER_S if reply.total else math.nan,
+        lateness_s=_spread_s(timing.lateness),
+        reply_s=_spread_s(timing.reply_age),
     )
 
 
-def _quantile_s(histogram: Histogram, share: float) -> float:
-    time_ns = histogram.quantile_ns(share)
-    return math.nan if time_ns is None else time_ns / NS_PER_S
+def _spread_s(histogram: Histogram) -> tuple[float, float, float]:
+    """Return median, 99th percentile and largest value [s]; NaN while there is none."""
+    if not histogram.total:
+        return math.nan, math.nan, math.nan
+    p50_ns, p99_ns = (histogram.quantile_ns(share) or 0 for share in (0.5, 0.99))
+    return p50_ns / NS_PER_S, p99_ns / NS_PER_S, histogram.max_ns / NS_PER_S
 
 
 HEALTH_EVERY_NS = 200_000_000

@@ -13,6 +13,7 @@ import numpy as np
 
 from estimator.errors import EstimatorError, NotExciting
 from estimator.identification.chain import OnlineEstimate
+from estimator.identification.linear_model import ComplexArray
 from estimator.identification.modes.modes import Mode
 from estimator.identification.online.recursive import Status
 from estimator.identification.tracking.alarm import Alarm
@@ -20,8 +21,9 @@ from estimator.signals.decimate import high_passed
 from estimator.signals.record import FloatArray, Record
 from hil.child import safe_path
 from hil.monitor.plot import Ring
-from hil.monitor.snapshot import ComplexArray, Estimation, History, Model
+from hil.monitor.snapshot import Estimation, History, Model
 from hil.rig.live import USUAL, LiveEstimate, OnlineSetup, tracking_chain
+from hil.rig.pacing import NS_PER_S
 from hil.sample import Sample
 
 SPECTRUM_S = 30.0
@@ -48,8 +50,6 @@ RESPONSE_POINTS = 160
 KEPT_ALARMS = 20
 
 VALUES_PER_WIDTH = 2
-
-NS_PER_S = 1_000_000_000
 
 
 class LiveEstimation:
@@ -234,7 +234,6 @@ class WarmUp:
         self._thread.start()
 
     def is_done(self) -> bool:
-        """Tell whether the chain is ready."""
         if self._failed is not None:
             raise self._failed
         return not self._thread.is_alive()

@@ -58,12 +58,8 @@ class TimingHealth:
     missed: int
     late: int
     unanswered: int
-    lateness_p50_s: float
-    lateness_p99_s: float
-    lateness_max_s: float
-    reply_p50_s: float
-    reply_p99_s: float
-    reply_max_s: float
+    lateness_s: tuple[float, float, float]  # median, 99th percentile and largest
+    reply_s: tuple[float, float, float]
 
 
 @dataclass(frozen=True, slots=True)

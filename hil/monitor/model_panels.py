@@ -8,6 +8,7 @@ import textwrap
 import numpy as np
 
 from estimator.identification.tracking.alarm import Alarm, TrackingState
+from estimator.signals.record import FloatArray
 from hil.monitor.plot import AXIS, Canvas, Range, height_of, nice_range, strip, time_axis, title, with_axis, wrapped
 from hil.monitor.snapshot import Estimation, Model, Snapshot
 
@@ -153,19 +154,14 @@ def resonance(snapshot: Snapshot, width: int, height: int) -> list[str]:
     """Resonance over time, with its band of two standard deviations."""
     history = snapshot.estimation.history
     head = title("resonance [Hz]", resonance_in_words(snapshot.estimation), width)
-    if not history.time_s.size:
-        return wrapped(head, nothing_yet(snapshot), width, height)
-    return _history(head, history.time_s, history.frequency_hz, history.frequency_std_hz, 0.5, width, height)
+    return _history(snapshot, head, history.frequency_hz, history.frequency_std_hz, 0.5, width, height)
 
 
 def damping(snapshot: Snapshot, width: int, height: int) -> list[str]:
     """Damping ratio over time, with its band of two standard deviations."""
     estimation = snapshot.estimation
     head = title("damping ratio", with_interval(estimation.damping, estimation.damping_std, "", 4), width)
-    history = estimation.history
-    if not history.time_s.size:
-        return wrapped(head, nothing_yet(snapshot), width, height)
-    return _history(head, history.time_s, history.damping, history.damping_std, 0.02, width, height)
+    return _history(snapshot, head, estimation.history.damping, estimation.history.damping_std, 0.02, width, height)
 
 
 def figures(snapshot: Snapshot, width: int, height: int) -> list[str]:
@@ -204,10 +200,12 @@ def alarms(snapshot: Snapshot, width: int, height: int) -> list[str]:
 
 
 def _history(
-    head: str, time_s: np.ndarray, values: np.ndarray, std: np.ndarray, least: float, width: int, height: int
+    snapshot: Snapshot, head: str, values: FloatArray, std: FloatArray, least: float, width: int, height: int
 ) -> list[str]:
     """Plot points over the last two minutes, each with its band, cut at `WIDEST_BAND`."""
-    rows = height - 2
+    time_s, rows = snapshot.estimation.history.time_s, height - 2
+    if not time_s.size:
+        return wrapped(head, nothing_yet(snapshot), width, height)
     recent = time_s >= -HISTORY_S
     time_s, values = time_s[recent], values[recent]
     std = np.minimum(np.nan_to_num(2.0 * std[recent]), WIDEST_BAND * np.abs(values))

@@ -72,17 +72,15 @@ def open_recording(
         if rig is None:
             raise UsageError(f"{path}: expected its rig file as well: hil monitor RIG --replay {path.name}; got none")
         samples, units = list(replay(path, rig, whole=True, channel=channel)), rig.channel_units
-        measured = _has_prbs
     else:
         samples, units = recorded_samples(path)
-        measured = _always
     if len(samples) < 2:
         raise RecordingError(path, f"expected samples to play, got {len(samples)}. Record again.")
     period_s = float(np.median(np.diff([sample.time_s for sample in samples])))
     _require_chain(period_s, setup)
     warm, shaft = WarmUp(period_s, setup), _shaft(model, rig, trust_laws)
     state = LiveState(path.name, period_s, shaft, False, warm.is_done, setup, units)
-    return Opening(ReplaySource(path.name, samples, speed, measured), state)
+    return Opening(ReplaySource(path.name, samples, speed, _has_prbs if is_trace(path) else None), state)
 
 
 def _require_chain(period_s: float, setup: OnlineSetup) -> None:
@@ -95,11 +93,6 @@ def _require_chain(period_s: float, setup: OnlineSetup) -> None:
 def _has_prbs(sample: Sample) -> bool:
     """Whether a sample of a bus trace is of the measured part: only there the PRBS runs."""
     return sample.prbs_nm != 0.0
-
-
-def _always(sample: Sample) -> bool:
-    """Whether a sample of a recording is: nothing else is recorded."""
-    return True
 
 
 def _shaft(model: Path | None, rig: Rig | None, trust_laws: bool) -> Shaft | None:

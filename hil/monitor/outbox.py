@@ -43,7 +43,6 @@ class Outbox:
         self._thread.join()
 
     def sample(self, sample: Sample, phase: Phase | None) -> None:
-        """Leave one sample."""
         self._samples.append((sample, phase))
         self._left += 1
 

@@ -14,6 +14,7 @@ from hil.monitor.messages import Notice
 from hil.monitor.plot import title
 from hil.monitor.snapshot import SILENT_AFTER_S, Activity, Headline, Snapshot
 from hil.printable import printable as printable
+from hil.rig.pacing import NS_PER_S
 
 Draw = Callable[[Snapshot, int, int], list[str]]
 """``draw(snapshot, width, height)``: at most ``height`` lines of at most ``width`` characters."""
@@ -46,13 +47,11 @@ class Panel(Widget):
         self._snapshot: Snapshot | None = None
 
     def show(self, snapshot: Snapshot) -> None:
-        """Draw another snapshot."""
         self._snapshot = snapshot
         if self.is_on_screen:
             self.refresh()
 
     def render(self) -> Text:
-        """Draw for the present size."""
         width, height = self.size
         if self._snapshot is None:
             return Text("")
@@ -93,8 +92,6 @@ def message(snapshot: Snapshot, width: int, height: int) -> list[str]:
     text = " ".join(snapshot.headline.message.split())
     return [text if len(text) <= width else (text[: max(0, width - len(MORE))] + MORE)[:width]]
 
-
-NS_PER_S = 1_000_000_000
 
 TIME, KIND = 10, 5
 """Characters of the time and of the kind before an entry's text; a blank follows each."""
@@ -143,7 +140,6 @@ class LogPanel(Panel):
         self._n_lines = 0
 
     def show(self, snapshot: Snapshot) -> None:
-        """Draw another snapshot."""
         n_lines = len(log_lines(snapshot, self.size.width)) if self.size.width else 0
         if self._top and self._n_lines:
             self._top += max(0, n_lines - self._n_lines)
@@ -161,7 +157,6 @@ class LogPanel(Panel):
 
     @property
     def page_lines(self) -> int:
-        """How many lines it shows at once."""
         return max(1, self.size.height - 1)
 
     def _log(self, snapshot: Snapshot, width: int, height: int) -> list[str]:

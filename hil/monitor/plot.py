@@ -38,12 +38,6 @@ class Canvas:
         if 0 <= x < self.width and high >= 0 and low < self.height:
             self._dots[max(low, 0) : high + 1, x] = True
 
-    def line(self, x0: float, y0: float, x1: float, y1: float) -> None:
-        """Switch the dots on the way from one place to another on."""
-        steps = max(1, round(max(abs(x1 - x0), abs(y1 - y0))))
-        for share in np.linspace(0.0, 1.0, steps + 1).tolist():
-            self.dot(x0 + share * (x1 - x0), y0 + share * (y1 - y0))
-
     def lines(self) -> list[str]:
         """Give the text, one string for each row of cells."""
         cells = self._dots.reshape(self.height // 4, 4, self.width // 2, 2).transpose(0, 2, 1, 3)
@@ -166,7 +160,6 @@ class Ring:
         self._end = 0
 
     def append(self, row: tuple[float, ...]) -> None:
-        """Add one row."""
         if self._end == self._rows.shape[0]:  # move the younger half to the front: once in ``length`` rows
             self._rows[: self._length] = self._rows[self._length :]
             self._end = self._length
@@ -178,5 +171,4 @@ class Ring:
         return self._rows[max(0, self._end - self._length) : self._end].copy()
 
     def clear(self) -> None:
-        """Forget everything."""
         self._end = 0

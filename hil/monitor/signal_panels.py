@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -15,37 +14,25 @@ ROOM_FOR_PARTS = 60
 """Characters from which on the torque's title has each inverter's."""
 
 
-@dataclass(frozen=True, slots=True)
-class Trace:
-    """One signal as it is drawn."""
-
-    name: str  # for the title
-    unit: str  # for the title
-    values: FloatArray  # shape (N,)
-    least: float  # smallest span of its axis [unit]
-    now: str  # its present value, in words
-
-
 def torque(snapshot: Snapshot, width: int, height: int) -> list[str]:
     """Draw the total torque as both inverters report it."""
     s = snapshot.signals
     total_nm, reference_nm = _latest(s.torque_nm), _latest(s.reference_nm)
     parts = f"m1 {s.torque_m1_nm:.1f} m2 {s.torque_m2_nm:.1f} " if width >= ROOM_FOR_PARTS else ""
     now = f"{total_nm:.1f} ({parts}ref {reference_nm:.1f})"
-    return _draw(s, Trace("torque [Nm]", "Nm", s.torque_nm, 10.0, _or_why_not(snapshot, now)), width, height)
+    return _draw(s, "torque [Nm]", s.torque_nm, 10.0, _or_why_not(snapshot, now), width, height)
 
 
 def speed(snapshot: Snapshot, width: int, height: int) -> list[str]:
-    """Draw the motor speed."""
     s = snapshot.signals
     now = _or_why_not(snapshot, f"{_latest(s.speed_rad_s):.2f}")
-    return _draw(s, Trace("speed [rad/s]", "rad/s", s.speed_rad_s, 1.0, now), width, height)
+    return _draw(s, "speed [rad/s]", s.speed_rad_s, 1.0, now, width, height)
 
 
 def prbs(snapshot: Snapshot, width: int, height: int) -> list[str]:
     """Draw the part of the reference that is PRBS."""
     s = snapshot.signals
-    return _draw(s, Trace("PRBS [Nm]", "Nm", s.prbs_nm, 10.0, f"{_latest(s.prbs_nm):.0f}"), width, height)
+    return _draw(s, "PRBS [Nm]", s.prbs_nm, 10.0, f"{_latest(s.prbs_nm):.0f}", width, height)
 
 
 def twist(snapshot: Snapshot, width: int, height: int) -> list[str]:
@@ -54,7 +41,7 @@ def twist(snapshot: Snapshot, width: int, height: int) -> list[str]:
     mrad = 1e3 * s.twist_rad
     now = f"{_latest(mrad):.1f} ±{2e3 * s.twist_std_rad:.1f}" if math.isfinite(s.twist_std_rad) else "--"
     now = _or_why_not(snapshot, now)  # without readings it is the model's word alone
-    lines = _draw(s, Trace(f"twist [mrad], {s.twist_of}", "mrad", mrad, 2.0, now), width, height - 1)
+    lines = _draw(s, f"twist [mrad], {s.twist_of}", mrad, 2.0, now, width, height - 1)
     return [*lines, time_axis(s.window_s, width)]
 
 
@@ -70,10 +57,13 @@ def channels(snapshot: Snapshot, width: int, height: int) -> list[str]:
     return lines
 
 
-def _draw(signals: Signals, trace: Trace, width: int, height: int) -> list[str]:
-    y_range = nice_range(trace.values, trace.least)
-    plot = strip(signals.time_s, trace.values, Range(-signals.window_s, 0.0), y_range, width, height - 1)
-    return [title(trace.name, trace.now.replace("nan", "--"), width), *plot]
+def _draw(
+    signals: Signals, name: str, values: FloatArray, least: float, now: str, width: int, height: int
+) -> list[str]:
+    """Draw a signal under its name and its present value; its axis spans ``least`` at least."""
+    y_range = nice_range(values, least)
+    plot = strip(signals.time_s, values, Range(-signals.window_s, 0.0), y_range, width, height - 1)
+    return [title(name, now.replace("nan", "--"), width), *plot]
 
 
 def _or_why_not(snapshot: Snapshot, now: str) -> str:

@@ -7,9 +7,10 @@ from dataclasses import dataclass, field
 from enum import Enum
 
 import numpy as np
-from numpy.typing import NDArray
 
+from estimator.identification.linear_model import ComplexArray
 from estimator.identification.tracking.alarm import Alarm, TrackingState
+from estimator.signals.record import FloatArray
 from hil.monitor.messages import Health, Notice
 from hil.monitor.plot import Ring
 from hil.sample import REMARKS, Sample, SampleFlag
@@ -112,10 +113,6 @@ class QualityWatch:
             standing_s=standing_ns / 1e9,
             why=words(self._latest),
         )
-
-
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 
 SILENT_AFTER_S = 2.0

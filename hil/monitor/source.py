@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Sequence
 from multiprocessing.connection import wait
 from pathlib import Path
 from types import TracebackType
-from typing import Protocol, Self
+from typing import Self
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from hil.recording import columns
 from hil.recording.formats import read_table
 from hil.recording.table import Kind, Table
 from hil.rig.experiments.base import Phase
+from hil.rig.pacing import NS_PER_S
 from hil.sample import Sample, SampleFlag
 
 LONGEST_END_S = 30.0
@@ -32,37 +33,6 @@ HARD_END = (
 )
 
 
-class Source(Protocol):
-    """What the view watches; a context manager."""
-
-    @property
-    def can_drive(self) -> bool:
-        """Whether there is a rig that takes orders."""
-        ...
-
-    def poll(self) -> Sequence[Report]:
-        """Give what has come since the last call; never waits."""
-        ...
-
-    def send(self, order: Order) -> None:
-        """Give an order; nothing happens where nothing can take it."""
-        ...
-
-    def await_end(self) -> None:
-        """Return once nothing can drive any more, at the latest after `LONGEST_END_S`; from any thread."""
-        ...
-
-    def __enter__(self) -> Self:
-        """Begin."""
-        ...
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """End it; where there is a rig, at zero torque and with its drives disarmed."""
-        ...
-
-
 class RigSource:
     """A rig in a process of its own, from `__enter__` to `__exit__`.
 
@@ -70,6 +40,7 @@ class RigSource:
     """
 
     can_drive = True
+    """Whether there is a rig that takes orders."""
 
     def __init__(self, job: Job) -> None:
         context = multiprocessing.get_context("spawn")  # a fork would share this program's terminal and threads
@@ -130,8 +101,6 @@ class RigSource:
         self._connection.close()
 
 
-NS_PER_S = 1_000_000_000
-
 OPTIONAL = (columns.REFERENCE, "prbs_nm", columns.FLAGS)
 """Columns a recording may lack; zero stands for them."""
 
@@ -146,7 +115,7 @@ class ReplaySource:
         name: str,
         samples: Sequence[Sample],
         speed: float = 1.0,
-        measured: Callable[[Sample], bool] = lambda sample: True,
+        measured: Callable[[Sample], bool] | None = None,
         clock_ns: Callable[[], int] = time.monotonic_ns,
     ) -> None:
         self._name = name
@@ -173,7 +142,8 @@ class ReplaySource:
         upto = self._due()
         if upto > self._next:
             due = self._samples[self._next : upto]
-            reports.append(Samples(tuple((row, Phase.MEASURE if self._measured(row) else None) for row in due)))
+            is_measured = self._measured or (lambda sample: True)  # nothing else is recorded
+            reports.append(Samples(tuple((row, Phase.MEASURE if is_measured(row) else None) for row in due)))
             self._next = upto
         if upto == len(self._samples):
             self._over = True
@@ -188,7 +158,6 @@ class ReplaySource:
         """Return at once: nothing drives."""
 
     def _due(self) -> int:
-        """Count the samples that are due now."""
         passed_s = (self._clock_ns() - self._began_ns) / NS_PER_S * self._speed
         until_s = self._samples[0].time_s + passed_s
         upto = self._next
@@ -200,6 +169,10 @@ class ReplaySource:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._over = True
+
+
+Source = RigSource | ReplaySource
+"""What the view watches, a context manager: `poll` never waits."""
 
 
 def recorded_samples(path: Path) -> tuple[list[Sample], dict[str, str]]:

@@ -29,6 +29,7 @@ from hil.monitor.plot import Ring
 from hil.monitor.snapshot import Activity, Channel, Headline, QualityWatch, Signals, Snapshot
 from hil.rig.experiments.base import Phase
 from hil.rig.live import USUAL, OnlineSetup
+from hil.rig.pacing import NS_PER_S
 from hil.sample import Sample
 
 WINDOWS_S = (1.0, 2.0, 5.0, 10.0, 20.0, 60.0)
@@ -45,8 +46,6 @@ OWN_SIGNALS = 6
 """Columns of the ring before those of the channels: time, torque, its reference, PRBS, speed, twist."""
 
 NO_MODEL = "no model: give --model"
-
-NS_PER_S = 1_000_000_000
 
 
 class LiveState:
@@ -81,12 +80,10 @@ class LiveState:
 
     @property
     def activity(self) -> Activity:
-        """What is happening."""
         return self._headline.activity
 
     @property
     def is_driving(self) -> bool:
-        """Whether an experiment is under way."""
         return self.activity in (Activity.STARTING, Activity.RUNNING, Activity.STOPPING)
 
     def zoom(self, by: int) -> None:
@@ -109,7 +106,6 @@ class LiveState:
         )
 
     def take(self, report: Report) -> None:
-        """Take one report."""
         match report:
             case Samples():
                 self._take_samples(report)

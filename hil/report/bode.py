@@ -17,8 +17,8 @@ from estimator.identification.modes.modes import QUANTILE, propagate
 from estimator.identification.offline.fits import LinearFit
 from estimator.signals.record import FloatArray, IntArray
 from hil.figures.local_model import LocalModel, decibels, degrees
-from hil.figures.palette import BLACK, BLUE, GREY, VERMILION, faded, series_colour
-from hil.report.figures import DECADES, figure_block
+from hil.figures.palette import BLACK, BLUE, GREY, VERMILION, series_colour
+from hil.report.figures import DECADES, band, compact, figure_block
 from hil.report.page import Figure
 
 MAGNITUDE, PHASE, COHERENCE = 1, 2, 3
@@ -70,8 +70,8 @@ def curve(
     for row, y in ((MAGNITUDE, decibels(response)), (PHASE, degrees(response))):
         figure.add_trace(
             go.Scatter(
-                x=_compact(f),
-                y=_compact(y),
+                x=compact(f),
+                y=compact(y),
                 name=name,
                 legendgroup=name,
                 showlegend=first and row == MAGNITUDE,
@@ -110,23 +110,23 @@ def estimate(
     colour: str,
     name: str,
     *,
-    band: bool = True,
+    has_band: bool = True,
 ) -> None:
     """Draw an estimate without a model, (M,), with the 95 % band of its standard deviation."""
     relative = QUANTILE * std / np.abs(response)
     angle = np.rad2deg(np.angle(response))
     group = {"legendgroup": name, "name": name}
-    if band:
+    if has_band:
         _band(figure, f, decibels(response), DB_PER_LOG * relative, MAGNITUDE, colour, group)
         _turns(figure, f, np.angle(response), relative, colour, group)
     dots = {"mode": "markers", "marker": {"color": colour, "size": 4, "opacity": 0.55}, **group}
     for row, y in ((MAGNITUDE, decibels(response)), (PHASE, angle), (COHERENCE, coherence)):
-        trace = go.Scatter(x=_compact(f), y=_compact(y), showlegend=row == MAGNITUDE and band, **dots)
+        trace = go.Scatter(x=compact(f), y=compact(y), showlegend=row == MAGNITUDE and has_band, **dots)
         figure.add_trace(trace, row=row, col=1)
 
 
 def _turns(
-    figure: go.Figure, f: FloatArray, angle: FloatArray, half: FloatArray, colour: str, group: dict[str, str]
+    figure: go.Figure, f: FloatArray, angle: FloatArray, half: FloatArray, colour: str, group: dict[str, Any]
 ) -> None:
     """Draw the band of a phase [rad], once for every turn that it goes through: none crosses the figure."""
     whole = np.rad2deg(np.unwrap(angle))
@@ -135,17 +135,9 @@ def _turns(
 
 
 def _band(
-    figure: go.Figure, f: FloatArray, y: FloatArray, half: FloatArray, row: int, colour: str, group: dict[str, str]
+    figure: go.Figure, f: FloatArray, y: FloatArray, half: FloatArray, row: int, colour: str, group: dict[str, Any]
 ) -> None:
-    edge = {"mode": "lines", "line": {"width": 0}, "showlegend": False, "hoverinfo": "skip", **group}
-    figure.add_trace(go.Scatter(x=_compact(f), y=_compact(y - half), **edge), row=row, col=1)
-    area = {"fill": "tonexty", "fillcolor": faded(colour, 0.2)}
-    figure.add_trace(go.Scatter(x=_compact(f), y=_compact(y + half), **edge, **area), row=row, col=1)
-
-
-def _compact(values: FloatArray) -> FloatArray:
-    """Halve what a figure takes up; seven digits are more than a screen shows."""
-    return values.astype(np.float32)
+    figure.add_traces(band(f, y - half, y + half, colour, **group), rows=row, cols=1)
 
 
 LOWEST_HZ = 0.5
@@ -158,7 +150,6 @@ POINTS = 300
 
 
 def response_figure(name: str, model: LocalModel, best: LinearFit | None = None) -> Figure:
-    """Draw one experiment on a page."""
     return figure_block(response(model, best), name, HEIGHT_PX)
 
 
@@ -166,7 +157,7 @@ def response(model: LocalModel, best: LinearFit | None = None) -> go.Figure:
     """Draw one experiment: spectral estimate and models with their 95 % intervals, and the reference."""
     figure = panels()
     f = frequencies_hz(model)
-    _spectral(figure, model, GREY, "spectral estimate, 95 %", band=True)
+    _spectral(figure, model, GREY, "spectral estimate, 95 %", has_band=True)
     if best is not None:
         look = {"color": BLACK, "width": 2.2}
         curve(figure, f, best.model.response(f), "best: Box-Jenkins, 95 %", look, fit=best)
@@ -187,7 +178,7 @@ def responses_figure(name: str, models: Sequence[LocalModel]) -> Figure:
     figure = panels()
     for number, model in enumerate(models):
         colour, f = series_colour(number), frequencies_hz(model)
-        _spectral(figure, model, colour, f"{model.name}, spectral", band=False)
+        _spectral(figure, model, colour, f"{model.name}, spectral", has_band=False)
         curve(figure, f, model.online.response(f), model.name, {"color": colour, "width": 2.0})
         offline = model.found.batch.model.response(f)
         look = {"color": colour, "dash": "dash", "width": 1.2}
@@ -222,8 +213,8 @@ def _shown(model: LocalModel) -> IntArray:
     return np.flatnonzero((found.frequency_hz >= LOWEST_HZ) & np.isfinite(found.magnitude_std))
 
 
-def _spectral(figure: go.Figure, model: LocalModel, colour: str, name: str, *, band: bool) -> None:
+def _spectral(figure: go.Figure, model: LocalModel, colour: str, name: str, *, has_band: bool) -> None:
     found, shown = model.found.spectral, _shown(model)
     if found is not None:
         seen = (found.response[shown], found.magnitude_std[shown], found.coherence[shown])
-        estimate(figure, found.frequency_hz[shown], *seen, colour, name, band=band)
+        estimate(figure, found.frequency_hz[shown], *seen, colour, name, has_band=has_band)

@@ -16,7 +16,7 @@ from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Effect, EffectParameter
 from estimator.physics.model import Motion, Structure
 from hil.errors import UsageError
-from hil.report.numbers import json_number
+from hil.report.numbers import as_json, fields_as_json, json_number
 from hil.report.wording import ELEMENTS
 
 SCALES = "Bounds are in multiples of a scale that the recordings give: torque in use, top speed, sampling period."
@@ -41,12 +41,7 @@ def entries_text(entries: Sequence[Effect]) -> str:
 
 def _entry(entry: Effect) -> dict[str, Any]:
     return {
-        "name": entry.name,
-        "element": entry.element.value,
-        "title": entry.title,
-        "law": entry.law,
-        "source": entry.source,
-        "excited_by": entry.excited_by,
+        **fields_as_json(entry, "name", "element", "title", "law", "source", "excited_by"),
         "structures": sorted(structure.value for structure in entry.structures),
         "parameters": {parameter.name: _parameter(parameter) for parameter in entry.parameters},
         "resembles": list(entry.resembles),
@@ -60,7 +55,7 @@ def _parameter(parameter: EffectParameter) -> dict[str, Any]:
         "meaning": parameter.meaning,
         "unit": {motion.value: parameter.unit(motion) for motion in Motion},
         "null": json_number(parameter.null),
-        "bounds_in_scales": [json_number(parameter.low), json_number(parameter.high)],
+        "bounds_in_scales": as_json((parameter.low, parameter.high)),
         "optional": parameter.optional,
         "per_recording": parameter.own,
     }

@@ -7,7 +7,6 @@ within?), its pictures and its runs; what was decided on the way; the rig file. 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -28,26 +27,23 @@ Evidence = Mapping[str, Any]
 MOST_NAMED = 4
 """Findings outside their limits that the head of the page names."""
 
-MARKS = MappingProxyType({True: ("no_mismatch", "✓ within"), False: ("unexplained", "✗ outside"), None: ("", "–")})
+MARKS = {True: ("no_mismatch", "✓ within"), False: ("unexplained", "✗ outside"), None: ("", "–")}
 """CSS class and words for within, outside, and no limit: the words say it, not the colour alone."""
 
-STATUSES = MappingProxyType(
-    {
-        "done": ("explained", "done"),
-        "skipped": ("", "skipped"),
-        "blocked": ("unexplained", "blocked"),
-        "interrupted": ("unexplained", "interrupted"),
-        "running": ("", "under way"),
-        "pending": ("", "to do"),
-    }
-)
+STATUSES = {
+    "done": ("explained", "done"),
+    "skipped": ("", "skipped"),
+    "blocked": ("unexplained", "blocked"),
+    "interrupted": ("unexplained", "interrupted"),
+    "running": ("", "under way"),
+    "pending": ("", "to do"),
+}
 
 COURSES = 4
 """Figures over time that share the page."""
 
 
 def commission_page(state: State, titles: Mapping[str, str], made: Provenance | None = None) -> str:
-    """Return the text of the page."""
     steps = state["steps"]
     begun, updated = moment(state["started_utc"]), moment(state["updated_utc"])
     return html.page(
@@ -177,39 +173,34 @@ def _finding(finding: Mapping[str, Any]) -> html.Row:
 
 
 def _runs(runs: Sequence[Mapping[str, Any]]) -> html.Table:
-    headings = ("run", "recording", "s", "m1 [Nm]", "predicted", "m2 [Nm]", "predicted", "speed [rad/s]", "predicted")
-    rows = [
-        (
-            run["name"] + ("" if run["whole"] else " (ended early)"),
-            run["recording"] or "none",
-            f"{run['seconds']:.1f}",
-            *_both(run, "torque_m1_nm", 0),
-            *_both(run, "torque_m2_nm", 0),
-            *_both(run, "speed_rad_s", 1),
-        )
-        for run in runs
-    ]
-    return html.table(headings, rows, numbers=range(2, len(headings)))
+    columns = (
+        ("run", lambda run: run["name"] + ("" if run["whole"] else " (ended early)")),
+        ("recording", lambda run: run["recording"] or "none"),
+        ("s", lambda run: f"{run['seconds']:.1f}"),
+        ("m1 [Nm]", lambda run: _range(run["measured"], "torque_m1_nm", 0)),
+        ("predicted", lambda run: _range(run["predicted"], "torque_m1_nm", 0)),
+        ("m2 [Nm]", lambda run: _range(run["measured"], "torque_m2_nm", 0)),
+        ("predicted", lambda run: _range(run["predicted"], "torque_m2_nm", 0)),
+        ("speed [rad/s]", lambda run: _range(run["measured"], "speed_rad_s", 1)),
+        ("predicted", lambda run: _range(run["predicted"], "speed_rad_s", 1)),
+    )
+    return html.table_of(runs, columns, numbers=range(2, len(columns)))
 
 
-def _both(run: Mapping[str, Any], key: str, digits: int) -> Iterator[str]:
-    for ranges in (run["measured"], run["predicted"]):
-        yield f"{ranges[key][0]:z.{digits}f} … {ranges[key][1]:z.{digits}f}" if key in ranges else "–"
+def _range(ranges: Mapping[str, Any], key: str, digits: int) -> str:
+    return f"{ranges[key][0]:z.{digits}f} … {ranges[key][1]:z.{digits}f}" if key in ranges else "–"
 
 
 def _history(history: Sequence[Mapping[str, Any]]) -> html.Table:
-    rows = [
-        (
-            str(each["attempt"]),
-            each["status"],
-            moment(each["ended_utc"]) if each["ended_utc"] else "",
-            each["because"],
-            str(sum(finding["within"] is False for finding in each["findings"])),
-            ", ".join(each["recordings"]),
-        )
-        for each in history
-    ]
-    return html.table(("attempt", "ended as", "at", "because", "outside", "recordings"), rows)
+    columns = (
+        ("attempt", lambda each: each["attempt"]),
+        ("ended as", lambda each: each["status"]),
+        ("at", lambda each: moment(each["ended_utc"]) if each["ended_utc"] else ""),
+        ("because", lambda each: each["because"]),
+        ("outside", lambda each: sum(finding["within"] is False for finding in each["findings"])),
+        ("recordings", lambda each: ", ".join(each["recordings"])),
+    )
+    return html.table_of(history, columns)
 
 
 def _decisions(state: State) -> html.Section:
@@ -338,13 +329,11 @@ def _diagnosis(evidence: Evidence) -> list[Any]:
     return [html.paragraph("Evidence, rivals and pictures: ", report, ". Model file: ", model, ".")]
 
 
-_FIGURES: Mapping[str, Callable[[Evidence], list[Any]]] = MappingProxyType(
-    {
-        "noise": _noise,
-        "signs": _signs,
-        "friction": _friction,
-        "identification": _identification,
-        "validation": _validation,
-        "diagnosis": _diagnosis,
-    }
-)
+_FIGURES: Mapping[str, Callable[[Evidence], list[Any]]] = {
+    "noise": _noise,
+    "signs": _signs,
+    "friction": _friction,
+    "identification": _identification,
+    "validation": _validation,
+    "diagnosis": _diagnosis,
+}

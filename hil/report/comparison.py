@@ -25,7 +25,7 @@ from hil.plants.scales import tell_scales
 from hil.provenance import Provenance
 from hil.recording import read_records
 from hil.recording.signals import Tell
-from hil.report.numbers import json_number, shown
+from hil.report.numbers import fields_as_json, json_number, shown
 from hil.report.wording import output_unit
 
 SCHEMA = "hil.compare/1"
@@ -148,10 +148,7 @@ def _recordings(comparisons: Sequence[Comparison]) -> dict[str, Any]:
 
 def _output(each: Comparison) -> dict[str, Any]:
     return {
-        "unit": each.unit,
-        "rms": json_number(each.rms),
-        "largest": json_number(each.largest),
-        "fit_percent": json_number(each.fit_percent),
+        **fields_as_json(each, "unit", "rms", "largest", "fit_percent"),
         "samples_used": int(each.record.okay.sum()),
         "samples": int(each.record.okay.size),
         "residual": {

@@ -183,17 +183,15 @@ def _fit(fit: Fit) -> html.Table:
 
 
 def _further_outputs(fit: Fit) -> html.Table | None:
-    headings = ("further output", "where", "re-tuned", "augmented", "noise of its reading", "augmented to noise")
-    cells = [
-        (
-            each.name,
-            f"{each.kind} at the {each.at}",
-            *(shown(value, each.unit) for value in (each.retuned, each.augmented, each.noise)),
-            shown_ratio(each.augmented, each.noise),
-        )
-        for each in fit.outputs
-    ]
-    return html.table(headings, cells, numbers=(2, 3, 4, 5)) if cells else None
+    columns = (
+        ("further output", lambda each: each.name),
+        ("where", lambda each: f"{each.kind} at the {each.at}"),
+        ("re-tuned", lambda each: shown(each.retuned, each.unit)),
+        ("augmented", lambda each: shown(each.augmented, each.unit)),
+        ("noise of its reading", lambda each: shown(each.noise, each.unit)),
+        ("augmented to noise", lambda each: shown_ratio(each.augmented, each.noise)),
+    )
+    return html.table_of(fit.outputs, columns, numbers=(2, 3, 4, 5)) if fit.outputs else None
 
 
 def _effects(effects: Sequence[FoundEffect]) -> html.Table | None:
@@ -322,15 +320,15 @@ def _places(diagnosis: Diagnosis, seen: Discrepancy, drawn: Sequence[Trace]) -> 
     names = [trace.name for trace in drawn if all(trace.name in each.courses for each in seen.equivalents)]
     if not names:
         return []
-    most = max(each.log_likelihood for each in seen.equivalents)
-    rows = [
+    likeliest_first = sorted(seen.equivalents, key=lambda each: -each.log_likelihood)
+    columns = (
+        ("place", lambda each: f"{'●' if each.plausible else '○'}\u00a0{PLACES[each.place]}"),
+        ("size (RMS)", lambda each: shown(_size(each), each.unit)),
         (
-            f"{'●' if each.plausible else '○'}\u00a0{PLACES[each.place]}",
-            shown(_size(each), each.unit),
-            shown(most - each.log_likelihood),
-        )
-        for each in sorted(seen.equivalents, key=lambda each: -each.log_likelihood)
-    ]
+            "log-likelihood, difference to the likeliest place",
+            lambda each: shown(likeliest_first[0].log_likelihood - each.log_likelihood),
+        ),
+    )
     text = (
         "What would have to act at one place to explain the error of the re-tuned model by itself, with its 95 % band. "
         "At the true place a simple input explains it; at the others it must vary wildly and is less likely. "
@@ -340,7 +338,7 @@ def _places(diagnosis: Diagnosis, seen: Discrepancy, drawn: Sequence[Trace]) -> 
     return [
         html.Heading("What would have to act, and where"),
         html.note(text),
-        html.table(("place", "size (RMS)", "log-likelihood, difference to the likeliest place"), rows, numbers=(1, 2)),
+        html.table_of(likeliest_first, columns, numbers=(1, 2)),
         course_figure("equivalent", seen.equivalents, names, marked, stretches_for(3 * len(names))),
     ]
 
@@ -353,18 +351,15 @@ def _size(equivalent: Equivalent) -> float:
 def _laws(seen: Discrepancy, unit: str) -> list[Any]:
     if not seen.laws:
         return []
-    rows = [
-        (
-            ELEMENTS[law.element],
-            " + ".join(name for name, _ in law.terms),
-            shown(law.rms, unit),
-            shown(law.delta_bic),
-            shown_p(law.p_value),
-        )
-        for law in seen.laws
-    ]
-    headings = ("element", "best law without a name there", "RMS error with it", "ΔBIC", "p")
-    return [html.Heading("Laws without a name, element by element"), html.table(headings, rows, numbers=(2, 3, 4))]
+    columns = (
+        ("element", lambda law: ELEMENTS[law.element]),
+        ("best law without a name there", lambda law: " + ".join(name for name, _ in law.terms)),
+        ("RMS error with it", lambda law: shown(law.rms, unit)),
+        ("ΔBIC", lambda law: shown(law.delta_bic)),
+        ("p", lambda law: shown_p(law.p_value)),
+    )
+    table = html.table_of(seen.laws, columns, numbers=(2, 3, 4))
+    return [html.Heading("Laws without a name, element by element"), table]
 
 
 def _frequency(diagnosis: Diagnosis) -> html.Section | None:

@@ -9,29 +9,11 @@ values that alone would explain the mismatch, beyond what they are trusted to.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
 from typing import Any
 
-from estimator.diagnosis.result import (
-    Diagnosis,
-    Discrepancy,
-    Estimated,
-    Evidence,
-    Fit,
-    FoundEffect,
-    Interval,
-    LawPicture,
-    Mismatch,
-    OutputFit,
-    Profile,
-    RejectedEffect,
-    Remainder,
-    Retuned,
-    Slight,
-    UnnamedLaw,
-)
+from estimator.diagnosis.result import Diagnosis, Discrepancy, Fit, FoundEffect, RankedLaw, UnnamedLaw, UntestableEffect
 from hil.provenance import Provenance
-from hil.report.numbers import json_number
+from hil.report.numbers import as_json, fields_as_json, json_number
 
 SCHEMA = "hil.diagnosis/1"
 
@@ -39,119 +21,86 @@ Json = dict[str, Any]
 
 
 def diagnosis_text(diagnosis: Diagnosis, made: Provenance | None = None) -> str:
-    """Return the text of the file."""
     content = diagnosis_json(diagnosis) | ({} if made is None else {"made": made.document()})
     return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
 def diagnosis_json(diagnosis: Diagnosis) -> Json:
     """Return the content of the file; a number that is not finite is None."""
+    unnamed, seen, remainder = diagnosis.unnamed, diagnosis.discrepancy, diagnosis.remainder
     return {
         "schema": SCHEMA,
-        "verdict": diagnosis.verdict.value,
-        "statement": diagnosis.statement,
-        "mismatch": _mismatch(diagnosis.mismatch),
+        **fields_as_json(diagnosis, "verdict", "statement", "mismatch"),
         "effects": [_effect(effect) for effect in diagnosis.effects],
-        "rejected": [_rejected(rival) for rival in diagnosis.rejected],
-        "untestable": [
-            {"name": entry.name, "reason": entry.reason, "suggested_test": entry.suggested_test}
-            | ({"needs": entry.needs} if entry.needs else {})
-            for entry in diagnosis.untestable
-        ],
-        "unnamed": None if diagnosis.unnamed is None else _unnamed(diagnosis.unnamed),
+        "rejected": as_json(diagnosis.rejected),
+        "untestable": [_untestable(entry) for entry in diagnosis.untestable],
+        "unnamed": None if unnamed is None else _unnamed(unnamed),
         "fit": _fit(diagnosis.fit),
-        "parameters": {name: _retuned(value) for name, value in diagnosis.parameters.items()},
-        "load_torque": {name: _estimated(value) for name, value in diagnosis.load_torque.items()},
-        "timing_s": {name: json_number(value) for name, value in diagnosis.timing_s.items()},
-        "warnings": list(diagnosis.warnings),
-        "discrepancy": None if diagnosis.discrepancy is None else _discrepancy(diagnosis.discrepancy),
+        **fields_as_json(diagnosis, "parameters", "load_torque", "timing_s", "warnings"),
+        "discrepancy": None if seen is None else _discrepancy(seen),
         "strays": [
-            {"parameter": value.name, "ratio": json_number(value.ratio), "tolerance": json_number(value.tolerance)}
-            for value in diagnosis.off_nominal
+            {"parameter": value.name} | fields_as_json(value, "ratio", "tolerance") for value in diagnosis.off_nominal
         ],
-        "remainder": None if diagnosis.remainder is None else _remainder(diagnosis.remainder),
-        "traces": [_slight(each) for each in diagnosis.slight],
-        "effort": {
-            "level": diagnosis.effort.level,
-            "simulations": diagnosis.effort.simulations,
-            "finished": diagnosis.effort.finished,
-            "untried": list(diagnosis.effort.untried),
-        },
+        "remainder": None
+        if remainder is None
+        else fields_as_json(remainder, "share", "times_noise", "element", "band_hz", "law"),
+        "traces": as_json(diagnosis.slight),
+        "effort": fields_as_json(diagnosis.effort, "level", "simulations", "finished", "untried"),
     }
 
 
-def _remainder(remainder: Remainder) -> Json:
+def _effect(effect: FoundEffect) -> Json:
     return {
-        "share": json_number(remainder.share),
-        "times_noise": json_number(remainder.times_noise),
-        "element": None if remainder.element is None else remainder.element.value,
-        "band_hz": None if remainder.band_hz is None else _numbers(remainder.band_hz),
-        "law": remainder.law,
-    }
+        "name": effect.name,
+        **({"form": effect.form} if effect.form else {}),
+        **fields_as_json(
+            effect, "element", "statement", "parameters", "time_s", "indistinguishable_from", "alternatives", "share",
+            "probability", "evidence",
+        ),
+        **({"profiles": as_json(effect.profiles)} if effect.profiles else {}),
+    }  # fmt: skip
 
 
-def _slight(trace: Slight) -> Json:
-    parameters = {name: json_number(value) for name, value in trace.parameters.items()}
-    return {"name": trace.name, "share": json_number(trace.share), "parameters": parameters}
-
-
-def _numbers(values: Iterable[float]) -> list[float | None]:
-    return [json_number(float(value)) for value in values]
-
-
-def _times(time_s: Mapping[str, Iterable[Interval]]) -> Json:
-    return {name: [_numbers(interval) for interval in intervals] for name, intervals in time_s.items()}
-
-
-def _mismatch(mismatch: Mismatch) -> Json:
-    region = mismatch.region
-    return {
-        "detected": mismatch.detected,
-        "element": None if mismatch.element is None else mismatch.element.value,
-        "time_s": _times(mismatch.time_s),
-        "band_hz": None if mismatch.band_hz is None else _numbers(mismatch.band_hz),
-        "region": None
-        if region is None
-        else {"signal": region.signal, "low": json_number(region.low), "high": json_number(region.high)},
-        "p_value": json_number(mismatch.p_value),
-    }
+def _untestable(entry: UntestableEffect) -> Json:
+    return fields_as_json(entry, "name", "reason", "suggested_test", *(["needs"] if entry.needs else []))
 
 
 def _unnamed(law: UnnamedLaw) -> Json:
     return {
         "element": law.element.value,
-        "terms": [{"law": name, "coefficient": json_number(value)} for name, value in law.terms],
-        "rms_before": json_number(law.rms_before),
-        "rms_after": json_number(law.rms_after),
+        "terms": _terms(law),
+        **fields_as_json(law, "rms_before", "rms_after"),
     }
+
+
+def _terms(law: UnnamedLaw | RankedLaw) -> list[Json]:
+    return [{"law": name, "coefficient": json_number(value)} for name, value in law.terms]
+
+
+def _fit(fit: Fit) -> Json:
+    figures = ("nominal", "retuned", "augmented", "holdout_retuned", "holdout_augmented", "noise_floor")
+    of_output = ("kind", "at", "unit", "retuned", "augmented", "noise")
+    outputs = [{"column": each.name} | fields_as_json(each, *of_output) for each in fit.outputs]
+    return fields_as_json(fit, "unit", *figures) | {"outputs": outputs}
 
 
 def _discrepancy(seen: Discrepancy) -> Json:
     """Return what a script may want of the report's pictures: tests and laws, not courses over time."""
     return {
-        "element": None if seen.element is None else seen.element.value,
+        "element": as_json(seen.element),
         "laws": [
             {
                 "element": law.element.value,
-                "terms": [{"law": name, "coefficient": json_number(value)} for name, value in law.terms],
+                "terms": _terms(law),
                 "rms_after": json_number(law.rms),
-                "delta_bic": json_number(law.delta_bic),
-                "p_value": json_number(law.p_value),
+                **fields_as_json(law, "delta_bic", "p_value"),
             }
             for law in seen.laws
         ],
-        "places": [
-            {
-                "place": each.place,
-                "unit": each.unit,
-                "log_likelihood": json_number(each.log_likelihood),
-                "plausible": each.plausible,
-            }
-            for each in seen.equivalents
-        ],
+        "places": [fields_as_json(each, "place", "unit", "log_likelihood", "plausible") for each in seen.equivalents],
         "bands": [
             {
-                "band_hz": _numbers((band.low_hz, band.high_hz)),
+                "band_hz": as_json((band.low_hz, band.high_hz)),
                 "power_to_floor": json_number(band.ratio),
                 "p_value": json_number(band.p_value),
             }
@@ -161,97 +110,8 @@ def _discrepancy(seen: Discrepancy) -> Json:
             name: {"retuned": json_number(each.p_before), "augmented": json_number(each.p_after)}
             for name, each in seen.responses.items()
         },
-        "pictures": [_picture(picture) for picture in seen.pictures],
+        "pictures": [
+            fields_as_json(each, "name", "element", "signal", "signal_unit", "unit", "x", "data", "low", "high", "law")
+            for each in seen.pictures
+        ],
     }
-
-
-def _picture(picture: LawPicture) -> Json:
-    arrays = {"x": picture.x, "data": picture.data, "low": picture.low, "high": picture.high, "law": picture.law}
-    return {
-        "name": picture.name,
-        "element": picture.element.value,
-        "signal": picture.signal,
-        "signal_unit": picture.signal_unit,
-        "unit": picture.unit,
-        **{name: _numbers(values) for name, values in arrays.items()},
-    }
-
-
-def _effect(effect: FoundEffect) -> Json:
-    content = {
-        "name": effect.name,
-        **({"form": effect.form} if effect.form else {}),
-        "element": effect.element.value,
-        "statement": effect.statement,
-        "parameters": {name: _estimated(value) for name, value in effect.parameters.items()},
-        "time_s": _times(effect.time_s),
-        "indistinguishable_from": list(effect.indistinguishable_from),
-        "alternatives": {
-            name: {key: json_number(value) for key, value in values.items()}
-            for name, values in effect.alternatives.items()
-        },
-        "share": json_number(effect.share),
-        "probability": json_number(effect.probability),
-        "evidence": _evidence(effect.evidence),
-    }
-    if effect.profiles:
-        content["profiles"] = {name: _profile(profile) for name, profile in effect.profiles.items()}
-    return content
-
-
-def _estimated(estimated: Estimated) -> Json:
-    return {
-        "value": json_number(estimated.value),
-        "ci95": _numbers(estimated.ci95),
-        "unit": estimated.unit,
-    }
-
-
-def _retuned(parameter: Retuned) -> Json:
-    return {
-        "nominal": json_number(parameter.nominal),
-        "value": json_number(parameter.value),
-        "ci95": _numbers(parameter.ci95),
-        "unit": parameter.unit,
-    }
-
-
-def _evidence(evidence: Evidence) -> Json:
-    return {
-        "delta_bic": json_number(evidence.delta_bic),
-        "holdout_rms_before": json_number(evidence.holdout_rms_before),
-        "holdout_rms_after": json_number(evidence.holdout_rms_after),
-        "p_value": json_number(evidence.p_value),
-    }
-
-
-def _profile(profile: Profile) -> Json:
-    return {
-        "time_s": _numbers(profile.time_s),
-        "value": _numbers(profile.value),
-        "low": _numbers(profile.low),
-        "high": _numbers(profile.high),
-        "unit": profile.unit,
-    }
-
-
-def _rejected(rival: RejectedEffect) -> Json:
-    return {"name": rival.name, "reason": rival.reason, "delta_bic": json_number(rival.delta_bic)}
-
-
-def _fit(fit: Fit) -> Json:
-    return {
-        "unit": fit.unit,
-        "nominal": json_number(fit.nominal),
-        "retuned": json_number(fit.retuned),
-        "augmented": json_number(fit.augmented),
-        "holdout_retuned": json_number(fit.holdout_retuned),
-        "holdout_augmented": json_number(fit.holdout_augmented),
-        "noise_floor": json_number(fit.noise_floor),
-        "outputs": [_output(each) for each in fit.outputs],
-    }
-
-
-def _output(each: OutputFit) -> Json:
-    figures = {name: json_number(getattr(each, name)) for name in ("retuned", "augmented", "noise")}
-    return {"column": each.name, "kind": each.kind, "at": each.at, "unit": each.unit, **figures}

@@ -12,7 +12,7 @@ from estimator.diagnosis.result import Course, Equivalent, ErrorSpectrum, Interv
 from estimator.signals.record import FloatArray
 from hil.figures.palette import GREY
 from hil.report import bode
-from hil.report.figures import DECADES, LEGEND_PX, PANEL_PX, SHADE, Style, extremes, figure_block
+from hil.report.figures import DECADES, LEGEND_PX, PANEL_PX, SHADE, Style, band, compact, extremes, figure_block
 from hil.report.page import Figure
 from hil.report.wording import PLACES
 
@@ -22,7 +22,6 @@ CHOICE_PX = 46
 GAP = 8.0
 """In distances of neighbouring bins: from here on nothing is drawn between two of them."""
 
-BAND = "rgba(0,114,178,0.18)"
 FLOOR = {"color": "#777777", "width": 1.2, "dash": "dot"}
 
 
@@ -83,7 +82,7 @@ def course_figure(
     shown: list[str] = []
     for recording in recordings:
         for row, equivalent in enumerate(equivalents, start=1):
-            for trace in _band(equivalent.courses[recording], stretches, first=row == 1):
+            for trace in _course(equivalent.courses[recording], stretches, first=row == 1):
                 trace.visible = recording == recordings[0]
                 figure.add_trace(trace, row=row, col=1)
                 shown.append(recording)
@@ -101,32 +100,15 @@ def _shade(low: float, high: float) -> dict[str, object]:
     return {**place, "fillcolor": SHADE, "opacity": 0.18, "line": {"width": 0}, "layer": "below"}
 
 
-def _band(course: Course, stretches: int, *, first: bool) -> list[go.Scatter]:
+def _course(course: Course, stretches: int, *, first: bool) -> list[go.Scatter]:
     colour, width, _ = Style.AFTER.value
     kept = extremes(course.value, stretches)
-    x = course.time_s[kept].astype(np.float32)
-    edge = {"mode": "lines", "line": {"width": 0}, "showlegend": False, "hoverinfo": "skip"}
+    x = course.time_s[kept]
+    line = {"color": colour, "width": width}
+    name = "would explain the error by itself"
     return [
-        go.Scatter(x=x, y=course.low[kept].astype(np.float32), **edge),
-        go.Scatter(
-            x=x,
-            y=course.high[kept].astype(np.float32),
-            mode="lines",
-            line={"width": 0},
-            fill="tonexty",
-            fillcolor=BAND,
-            hoverinfo="skip",
-            name="95 % band",
-            showlegend=first,
-        ),
-        go.Scatter(
-            x=x,
-            y=course.value[kept].astype(np.float32),
-            mode="lines",
-            line={"color": colour, "width": width},
-            name="would explain the error by itself",
-            showlegend=first,
-        ),
+        *band(x, course.low[kept], course.high[kept], colour, shown=first, name="95 % band"),
+        go.Scatter(x=compact(x), y=compact(course.value[kept]), mode="lines", line=line, name=name, showlegend=first),
     ]
 
 

@@ -7,8 +7,9 @@ from typing import Any
 
 from drivers.capability.carrier import RPDO, TPDO
 from drivers.capability.plan import Ability
-from drivers.datasheet.text import EdsFinding, Severity
+from drivers.datasheet.text import Severity
 from drivers.eds_check import EdsReport
+from hil.report.numbers import as_json, fields_as_json
 
 
 def eds_lines(report: EdsReport) -> Iterator[str]:
@@ -57,7 +58,7 @@ def eds_section(report: EdsReport) -> dict[str, Any]:
     return {
         "file": str(report.path),
         "usable": report.usable,
-        "findings": [_finding(finding) for finding in report.findings],
+        "findings": as_json(report.findings),
         "rig_file_lines": [{"line": line.text, "reason": line.reason} for line in report.lines],
         "capabilities": [] if report.plan is None else [_ability(each) for each in report.plan.abilities.values()],
     }
@@ -68,19 +69,5 @@ def _ability(ability: Ability) -> dict[str, Any]:
     return {
         "function": row.function.value,
         "by": [f"0x{part.index:04X}:{part.subindex:02X}" for part in ability.parts],
-        "without": row.without.value,
-        "instead": row.instead,
-        "cost": row.cost,
-        "key": row.key,
-    }
-
-
-def _finding(finding: EdsFinding) -> dict[str, Any]:
-    return {
-        "severity": finding.severity.value,
-        "line": finding.line,
-        "place": finding.place,
-        "expected": finding.expected,
-        "found": finding.found,
-        "advice": finding.advice,
+        **fields_as_json(row, "without", "instead", "cost", "key"),
     }

@@ -26,7 +26,7 @@ from hil.figures.palette import (
     series_colour,
     unit_circle,
 )
-from hil.report.figures import extremes, figure_block
+from hil.report.figures import band, compact, extremes, figure_block
 from hil.report.page import Figure
 
 MAP_PX = 640
@@ -208,16 +208,12 @@ def _followed(
 def _band(figure: go.Figure, row: int, x: FloatArray, y: FloatArray, half: FloatArray) -> None:
     """Shade where a standard deviation is given; from the first such moment on."""
     given: IntArray = np.flatnonzero(np.isfinite(half) & np.isfinite(y))
-    edge = {"mode": "lines", "line": {"width": 0}, "showlegend": False, "hoverinfo": "skip"}
-    low, high = (y - half)[given].astype(np.float32), (y + half)[given].astype(np.float32)
-    figure.add_trace(go.Scatter(x=x[given], y=low, **edge), row=row, col=1)
-    area = {"fill": "tonexty", "fillcolor": faded(BLUE, 0.2)}
-    figure.add_trace(go.Scatter(x=x[given], y=high, **edge, **area), row=row, col=1)
+    figure.add_traces(band(x[given], (y - half)[given], (y + half)[given], BLUE), rows=row, cols=1)
 
 
 def _line(x: FloatArray, y: FloatArray, name: str, look: Mapping[str, object], *, shown: bool = True) -> go.Scatter:
-    x, y = x.astype(np.float32), y.astype(np.float32)
-    return go.Scatter(x=x, y=y, name=name, legendgroup=name, showlegend=shown, mode="lines", line=look)
+    xy = {"x": compact(x), "y": compact(y)}
+    return go.Scatter(**xy, name=name, legendgroup=name, showlegend=shown, mode="lines", line=look)
 
 
 def _levels(figure: go.Figure, model: LocalModel) -> None:

@@ -14,12 +14,12 @@ from estimator.identification.linear_model import ComplexArray, LinearModel
 from estimator.identification.modes.modes import Mode, Uncertain
 from estimator.identification.modes.physical import PhysicalEstimate
 from estimator.identification.offline.fits import FreeRun
-from estimator.identification.offline.validation import CorrelationTest, OrderChoice
+from estimator.identification.offline.validation import OrderChoice
 from estimator.identification.settings import Settings
-from estimator.identification.spectral import SpectralEstimate
+from estimator.identification.spectral import Distortion, SpectralEstimate
 from hil.provenance import Provenance
 from hil.report.identification_wording import best_statement, joint_statement, verdict
-from hil.report.numbers import json_number
+from hil.report.numbers import as_json, fields_as_json, json_number
 
 
 def studied(each: Study) -> dict[str, Any]:
@@ -35,22 +35,17 @@ def studied(each: Study) -> dict[str, Any]:
         "third_order": {
             "theta": each.third_order.model.theta.tolist(),
             "nk": each.third_order.model.nk,
-            "poles": [[root.real, root.imag] for root in each.third_order.model.poles.tolist()],
-            "zeros": [[root.real, root.imag] for root in each.third_order.model.zeros.tolist()],
+            "poles": _pairs(each.third_order.model.poles),
+            "zeros": _pairs(each.third_order.model.zeros),
             "largest_change": json_number(each.third_order.largest_error),
         },
         "validation": {
             "statement": each.validation.statement,
             "own": _free_run(each.validation.own),
             "unseen": [_free_run(run) for run in each.validation.unseen],
-            "independence": _test(each.validation.independence),
-            "autocorrelation": _test(each.validation.autocorrelation),
+            **fields_as_json(each.validation, "independence", "autocorrelation"),
         },
-        "feedback": {
-            "detected": each.feedback.detected,
-            "p_value": json_number(each.feedback.p_value),
-            "statement": each.feedback.statement,
-        },
+        "feedback": as_json(each.feedback),
         "cancellations": [
             {
                 "pole": [one.pole.real, one.pole.imag],
@@ -74,7 +69,7 @@ def _joint(together: Together | None) -> dict[str, Any] | None:
     mode = joint.mode
     return content | {
         "recordings": list(joint.names),
-        "disagreeing": {name: json_number(p_value) for name, p_value in joint.disagreeing.items()},
+        "disagreeing": as_json(joint.disagreeing),
         "doubtful": list(joint.doubtful),
         "frequency_hz": None if mode is None else _uncertain(mode.frequency_hz),
         "damping": None if mode is None else _uncertain(mode.damping),
@@ -94,8 +89,8 @@ def _best(each: Study) -> dict[str, Any]:
         "estimator": best.fit.method.value,
         "frequency_hz": None if mode is None else mode.frequency_hz.value,
         "damping": None if mode is None else mode.damping.value,
-        "frequency_ci95_hz": None if mode is None else [json_number(end) for end in mode.frequency_hz.ci95],
-        "damping_ci95": None if mode is None else [json_number(end) for end in mode.damping.ci95],
+        "frequency_ci95_hz": None if mode is None else as_json(mode.frequency_hz.ci95),
+        "damping_ci95": None if mode is None else as_json(mode.damping.ci95),
         "statement": best_statement(each),
         "verdict": best.verdict.value,
         "advice": verdict(each),
@@ -105,7 +100,7 @@ def _best(each: Study) -> dict[str, Any]:
         "A": best.fit.model.A.tolist(),
         "B": best.fit.model.B.tolist(),
         "covariance": best.fit.covariance.tolist(),
-        "independence": _test(best.validation.independence),
+        "independence": as_json(best.validation.independence),
         "linearity": {
             "p_value": json_number(linearity.p_value),
             "linear": linearity.is_linear,
@@ -125,29 +120,11 @@ def _best(each: Study) -> dict[str, Any]:
 
 def _uncertain(estimate: Uncertain) -> dict[str, Any]:
     """Return a value with its standard deviation and interval; null where not finite."""
-    return {
-        "value": json_number(estimate.value),
-        "std": json_number(estimate.std),
-        "ci95": [json_number(end) for end in estimate.ci95],
-    }
+    return fields_as_json(estimate, "value", "std", "ci95")
 
 
 def _free_run(run: FreeRun) -> dict[str, Any]:
-    return {
-        "name": run.name,
-        "rms": json_number(run.rms),
-        "fit_percent": json_number(run.fit_percent),
-        "one_step_fit_percent": json_number(run.one_step_fit_percent),
-    }
-
-
-def _test(test: CorrelationTest) -> dict[str, Any]:
-    return {
-        "lag": test.lag.tolist(),
-        "correlation": [json_number(value) for value in test.correlation.tolist()],
-        "bound": json_number(test.bound),
-        "p_value": json_number(test.p_value),
-    }
+    return fields_as_json(run, "name", "rms", "fit_percent", "one_step_fit_percent")
 
 
 def _physical(physical: PhysicalEstimate | None, reason: str) -> dict[str, Any]:
@@ -179,14 +156,11 @@ def identification_text(
     made: Provenance | None = None,
     together: Together | None = None,
 ) -> str:
-    """Return the text of the file."""
     extras: list[dict[str, Any]] = [studied(each) for each in studies] or [{} for _ in results]
     document = {
         "schema": SCHEMA,
         "settings": {
-            "na": settings.orders.na,
-            "nb": settings.orders.nb,
-            "nk": settings.orders.nk,
+            **as_json(settings.orders),
             "sample_time_s": settings.sample_time_s,
             "offline_sample_time_s": settings.offline_sample_time_s,
             "high_pass_hz": settings.high_pass_hz,
@@ -252,39 +226,28 @@ def _mode(mode: Mode | None) -> dict[str, float] | None:
 
 def _spectral(estimate: SpectralEstimate) -> dict[str, Any]:
     return {
-        "frequency_hz": [json_number(f) for f in estimate.frequency_hz.tolist()],
-        "magnitude": [json_number(m) for m in np.abs(estimate.response).tolist()],
-        "phase_rad": [json_number(p) for p in np.angle(estimate.response).tolist()],
-        "magnitude_std": [json_number(s) for s in estimate.magnitude_std.tolist()],
-        "coherence": [json_number(c) for c in estimate.coherence.tolist()],
+        "frequency_hz": as_json(estimate.frequency_hz),
+        "magnitude": as_json(np.abs(estimate.response)),
+        "phase_rad": as_json(np.angle(estimate.response)),
+        **fields_as_json(estimate, "magnitude_std", "coherence"),
         "n_averages": estimate.n_averages,
         "used_samples": estimate.used_samples,
         "bridged_samples": estimate.bridged_samples,
-        "distortion": None
-        if estimate.distortion is None
-        else {
-            name: {"rms": json_number(level), "p_value": json_number(p_value)}
-            for name, (level, p_value) in (
-                ("even", estimate.distortion.level(even=True)),
-                ("odd", estimate.distortion.level(even=False)),
-            )
-        }
-        | {"noise": json_number(estimate.distortion.noise_rms)},
+        "distortion": None if estimate.distortion is None else _distortion(estimate.distortion),
     }
+
+
+def _distortion(distortion: Distortion) -> dict[str, Any]:
+    levels = {"even": distortion.level(even=True), "odd": distortion.level(even=False)}
+    by_kind = {name: as_json({"rms": level, "p_value": p_value}) for name, (level, p_value) in levels.items()}
+    return by_kind | {"noise": json_number(distortion.noise_rms)}
 
 
 def _choice(choice: OrderChoice) -> dict[str, Any]:
     return {
         "statement": choice.statement,
         "candidates": [
-            {
-                "na": each.orders.na,
-                "nb": each.orders.nb,
-                "nk": each.orders.nk,
-                "criterion": json_number(each.criterion),
-                "rms": json_number(each.rms),
-                "unseen_fit_percent": json_number(each.unseen_fit_percent),
-            }
+            as_json(each.orders) | fields_as_json(each, "criterion", "rms", "unseen_fit_percent")
             for each in choice.candidates
         ],
     }
@@ -292,10 +255,7 @@ def _choice(choice: OrderChoice) -> dict[str, Any]:
 
 def _compared(each: Compared) -> dict[str, Any]:
     return {
-        "recording": each.recording,
-        "estimator": each.estimator,
+        **fields_as_json(each, "recording", "estimator"),
         "resonance": _mode(each.resonance),
-        "fit_percent": json_number(each.fit_percent),
-        "status": each.status.value,
-        "reason": each.reason,
+        **fields_as_json(each, "fit_percent", "status", "reason"),
     }

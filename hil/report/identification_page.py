@@ -10,9 +10,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from rich.box import SIMPLE_HEAD
 from rich.console import RenderableType
-from rich.table import Table
 
 from estimator.identification.identify import Compared, Study
 from estimator.identification.joint import Together
@@ -282,37 +280,30 @@ def physical_tables(studies: Sequence[Study], together: Together | None = None) 
 
 def orders_table(choice: OrderChoice) -> list[Any]:
     """Return the best structures of an order selection, the chosen one first."""
-    rows = [
-        (
-            str(each.orders.na),
-            str(each.orders.nb),
-            str(each.orders.nk),
-            shown(each.criterion),
-            shown(each.rms),
-            shown(each.unseen_fit_percent, "%"),
-        )
-        for each in choice.candidates[:MOST_CANDIDATES]
-    ]
-    headings = ("nA", "nB", "delay", "BIC above the best", "RMS of the whitened error", "fit on unseen")
-    return [html.paragraph(choice.statement), html.table(headings, rows, numbers=range(6))]
+    columns = (
+        ("nA", lambda each: each.orders.na),
+        ("nB", lambda each: each.orders.nb),
+        ("delay", lambda each: each.orders.nk),
+        ("BIC above the best", lambda each: shown(each.criterion)),
+        ("RMS of the whitened error", lambda each: shown(each.rms)),
+        ("fit on unseen", lambda each: shown(each.unseen_fit_percent, "%")),
+    )
+    table = html.table_of(choice.candidates[:MOST_CANDIDATES], columns, numbers=range(6))
+    return [html.paragraph(choice.statement), table]
 
 
 def compared_table(compared: Sequence[Compared]) -> list[Any]:
     """Return what several recursive estimators made of the same data, and why one has no estimate."""
-    rows = [
-        (
-            each.recording,
-            each.estimator,
-            "–" if each.resonance is None else shown(each.resonance.frequency_hz),
-            "–" if each.resonance is None else shown(each.resonance.damping),
-            shown(each.fit_percent, "%"),
-            each.status.value,
-        )
-        for each in compared
-    ]
-    headings = ("recording", "estimator", "frequency [Hz]", "damping", "free-run fit", "status")
+    columns = (
+        ("recording", lambda each: each.recording),
+        ("estimator", lambda each: each.estimator),
+        ("frequency [Hz]", lambda each: "–" if each.resonance is None else shown(each.resonance.frequency_hz)),
+        ("damping", lambda each: "–" if each.resonance is None else shown(each.resonance.damping)),
+        ("free-run fit", lambda each: shown(each.fit_percent, "%")),
+        ("status", lambda each: each.status.value),
+    )
     reasons = [html.paragraph(f"{each.recording}, {each.estimator}: {each.reason}") for each in compared if each.reason]
-    return [html.table(headings, rows, numbers=(2, 3, 4)), *reasons]
+    return [html.table_of(compared, columns, numbers=(2, 3, 4)), *reasons]
 
 
 def identification_page(
@@ -323,7 +314,6 @@ def identification_page(
     made: Provenance | None = None,
     together: Together | None = None,
 ) -> str:
-    """Return the text of the page."""
     drawn = list(zip(models, studies, strict=True))[:MOST_DRAWN]
     left = len(models) - len(drawn)
     return html.page(
@@ -385,29 +375,25 @@ def _together(models: Sequence[LocalModel]) -> html.Section:
     )  # fmt: skip
 
 
-NAME_WIDTH = 20
-"""Longest name of a recording in the table; a longer one wraps."""
-
-
-def summary(studies: Sequence[Study], nominal: Mode | None) -> Table:
-    """Return each recording's best estimate and on-line estimate; it fits into 80 columns, numbers are never cut.
+def summary(studies: Sequence[Study], nominal: Mode | None) -> RenderableType:
+    """Return each recording's best and on-line estimate, for a terminal of 80 columns.
 
     The status of the on-line estimates has a column where one of them is not as it should be.
     """
     wrong = any(each.found.estimate.status is not Status.ESTIMATED for each in studies)
-    table = Table(title="Resonance and damping", title_justify="left", box=SIMPLE_HEAD, pad_edge=False)
-    table.add_column("recording", overflow="fold", max_width=NAME_WIDTH)
-    for heading in ("best [Hz]", "damping", "on line", "damping"):
-        table.add_column(heading, no_wrap=True, justify="right")
-    if wrong:
-        table.add_column("on line is", no_wrap=True)
-    for each in studies:
-        status = [each.found.estimate.status.value] if wrong else []
-        table.add_row(each.name, *_known(each), *_shown(each.found.online_resonance), *status)
+    rows = [
+        (
+            each.name,
+            *_known(each),
+            *_shown(each.found.online_resonance),
+            each.found.estimate.status.value if wrong else "",
+        )
+        for each in studies
+    ]
     if nominal is not None:
-        table.add_section()
-        table.add_row("model file", *_shown(nominal), "", "")
-    return table
+        rows.append(("model file", *_shown(nominal), "", "", ""))
+    headings = ("recording", "best [Hz]", "damping", "on line", "damping", "on line is")
+    return rendered([html.section("Resonance and damping", html.table(headings, rows, numbers=range(1, 5)))])
 
 
 def compared_summary(compared: Sequence[Compared]) -> RenderableType:

@@ -23,32 +23,31 @@ LITTLE_PERCENT = 50.0
 """Free-run fit below which most of the output comes from elsewhere than from the torque."""
 
 ADVICE = {
-    Verdict.GOOD: "the linear model is good",
-    Verdict.NOT_LINEAR: "the drive is not linear, and its damping depends on {depends}",
-    Verdict.CLOSED_LOOP: "the torque follows the speed (closed loop); the Box-Jenkins model allows for that, the "
-    "output-error, recursive and spectral estimates may be biased",
-    Verdict.NOT_EXCITED: "no pole pair: {reason}",
-    Verdict.INCOMPLETE: "the model misses a part of the response to past torque",
-    Verdict.ONE_MASS: "one mass: {reason}",
+    Verdict.GOOD: ("the linear model is good", ""),
+    Verdict.NOT_LINEAR: (
+        "the drive is not linear, and its damping depends on {depends}",
+        " Take frequency and damping for this torque only; hil diagnose names the cause.",
+    ),
+    Verdict.CLOSED_LOOP: (
+        "the torque follows the speed (closed loop); the Box-Jenkins model allows for that, the output-error, "
+        "recursive and spectral estimates may be biased",
+        " Hold the torque constant except for the PRBS, or use the Box-Jenkins model.",
+    ),
+    Verdict.NOT_EXCITED: ("no pole pair: {reason}", " Raise the PRBS, record longer or faster; or there is none."),
+    Verdict.INCOMPLETE: (
+        "the model misses a part of the response to past torque",
+        " Look at the residual tests; try --order auto, or diagnose the recording.",
+    ),
+    Verdict.ONE_MASS: ("one mass: {reason}", " If the shaft is soft, raise the PRBS, record longer or faster."),
 }
-"""What each verdict says of a recording."""
-
-CURES = {
-    Verdict.GOOD: "",
-    Verdict.NOT_LINEAR: "Take frequency and damping for this torque only; hil diagnose names the cause",
-    Verdict.CLOSED_LOOP: "Hold the torque constant except for the PRBS, or use the Box-Jenkins model",
-    Verdict.NOT_EXCITED: "Raise the PRBS, record longer or faster; or there is none",
-    Verdict.INCOMPLETE: "Look at the residual tests; try --order auto, or diagnose the recording",
-    Verdict.ONE_MASS: "If the shaft is soft, raise the PRBS, record longer or faster",
-}
+"""What each verdict says of a recording, and what to do."""
 
 
 def verdict(each: Study) -> str:
     """Return one sentence: whether to believe the linear model of a recording, and what to do."""
     best = each.best
-    says = ADVICE[best.verdict].format(depends=best.linearity.depends_on, reason=best.reason)
-    cure = CURES[best.verdict]
-    text = f"{each.name}: {says}." + (f" {cure}." if cure else "")
+    says, cure = ADVICE[best.verdict]
+    text = f"{each.name}: {says.format(depends=best.linearity.depends_on, reason=best.reason)}.{cure}"
     if best.too_slow and best.mode is not None:
         f, period_s = best.mode.frequency_hz.value, best.fit.model.sample_time_s
         text += (

@@ -1,10 +1,13 @@
-"""Numbers, moments and lists as people read them, and numbers for programs."""
+"""Numbers, moments and lists as people read them, and results as programs do."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
 from datetime import UTC, datetime
+from typing import Any
+
+from pydantic_core import to_jsonable_python
 
 JSON_DIGITS = 10
 """Significant digits in JSON: more than any estimate here carries, without the noise of the last bits."""
@@ -25,6 +28,33 @@ def json_number(value: float) -> float | None:
     return rounded if math.isfinite(rounded) else value  # the largest doubles round beyond their range
 
 
+def as_json(result: Any) -> Any:
+    """Return a result, or several, as JSON has them: fields by name, enumerations by value, numbers rounded."""
+    return _rounded(to_jsonable_python(result, fallback=_plain))
+
+
+def fields_as_json(result: Any, *names: str) -> dict[str, Any]:
+    """Return some fields of a result as JSON has them."""
+    return {name: as_json(getattr(result, name)) for name in names}
+
+
+def _plain(value: Any) -> Any:
+    """Return an array as a list, and a mapping of another kind as a dictionary."""
+    return value.tolist() if hasattr(value, "tolist") else dict(value)
+
+
+def _rounded(value: Any) -> Any:
+    match value:
+        case float():
+            return json_number(value)
+        case dict():
+            return {key: _rounded(each) for key, each in value.items()}
+        case list():
+            return [_rounded(each) for each in value]
+        case _:
+            return value
+
+
 def shown(value: float, unit: str = "") -> str:
     """Format a number for a table: four significant digits and its unit, a dash where there is none."""
     if not math.isfinite(value):
@@ -43,7 +73,6 @@ def shown_interval(interval: tuple[float, float]) -> str:
 
 
 def shown_p(value: float) -> str:
-    """Format a probability."""
     if not math.isfinite(value):
         return "–"
     return f"< {SMALLEST_P:.0e}" if value < SMALLEST_P else f"{value:.2g}"

@@ -12,7 +12,7 @@ import gzip
 import hashlib
 import json
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
@@ -295,6 +295,14 @@ def table(headings: Sequence[str], rows: Iterable[Sequence[Any] | Row], numbers:
     """Make a table of texts and inline pieces; no headings, no head."""
     made = tuple(row if isinstance(row, Row) else Row(tuple(row)) for row in rows)
     return Table(tuple(headings), made, frozenset(numbers))
+
+
+def table_of(
+    items: Iterable[Any], columns: Sequence[tuple[str, Callable[[Any], Any]]], numbers: Iterable[int] = ()
+) -> Table:
+    """Make a table with a row for each item; a column has its heading and what gives a cell."""
+    rows = [tuple(cell(item) for _, cell in columns) for item in items]
+    return table([heading for heading, _ in columns], rows, numbers)
 
 
 def tiles(entries: Iterable[tuple[str, str, str]]) -> Tiles:

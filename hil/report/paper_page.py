@@ -3,26 +3,20 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict
+from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
 from estimator.identification.settings import Settings
 from hil.figures.local_model import LocalModel, Row
-from hil.figures.palette import series_colour
 from hil.figures.road import Conditions
 from hil.provenance import Provenance
 from hil.report import page as html
-from hil.report.bode import responses_figure
-from hil.report.figures import Line, Panel, Style, time_figure
-from hil.report.identification_figures import PoleSet, known_sets, pole_figure
 from hil.report.made import facts, made_section
-from hil.report.numbers import json_number, shown
-
-SHOWN_SIGNALS = 3
-"""Recordings in Fig. 2, as in the paper."""
+from hil.report.numbers import as_json, shown
 
 SOURCE = (
     "N. Nevaranta, J.-H. Montonen, T. Lindh: Online Estimation of a Mechanical Driveline Parameters of a Hybrid Bus, "
@@ -34,15 +28,14 @@ def paper_page(
     models: Sequence[LocalModel],
     rows: Sequence[Row],
     driven: Sequence[Conditions],
+    folder: Path,
     made: Provenance | None = None,
 ) -> str:
-    """Return the text of the page."""
+    """Return the text of the page; in ``folder`` are the printed figures."""
     sections = [
         _top(models, rows, driven, made),
         html.section("Resonance and damping", _numbers(rows)),
-        _signals(models),
-        _responses(models),
-        _poles(models),
+        *_figures(folder, models[0].online.orders.na),
         *([html.section("What was driven", *_conditions(models, driven))] if driven else []),
         made_section(made),
     ]
@@ -83,46 +76,28 @@ def _worst(rows: Sequence[Row], what: str) -> str:
 
 
 def _numbers(rows: Sequence[Row]) -> list[Any]:
-    headings = (
-        "experiment",
-        "on line [Hz]",
-        "off line [Hz]",
-        "reference [Hz]",
-        "error",
-        "damping on line",
-        "off line",
-        "reference",
-        "error",
-        "to off line [dB]",
-        "agrees with the spectrum [Hz]",
-        "fit",
-        "status",
+    columns = (
+        ("experiment", lambda row: row.name),
+        ("on line [Hz]", lambda row: shown(row.online_hz)),
+        ("off line [Hz]", lambda row: shown(row.offline_hz)),
+        ("reference [Hz]", lambda row: shown(row.reference_hz)),
+        ("error", lambda row: _percent(row.error("hz", "online"))),
+        ("damping on line", lambda row: shown(row.online_damping)),
+        ("off line", lambda row: shown(row.offline_damping)),
+        ("reference", lambda row: shown(row.reference_damping)),
+        ("error", lambda row: _percent(row.error("damping", "online"))),
+        ("to off line [dB]", lambda row: shown(row.offline_db)),
+        ("agrees with the spectrum [Hz]", lambda row: _band(row.agrees_hz)),
+        ("fit", lambda row: shown(row.fit_percent, "%")),
+        ("status", lambda row: row.status),
     )
-    cells = [
-        (
-            row.name,
-            shown(row.online_hz),
-            shown(row.offline_hz),
-            shown(row.reference_hz),
-            _percent(row.error("hz", "online")),
-            shown(row.online_damping),
-            shown(row.offline_damping),
-            shown(row.reference_damping),
-            _percent(row.error("damping", "online")),
-            shown(row.offline_db),
-            _band(row.agrees_hz),
-            shown(row.fit_percent, "%"),
-            row.status,
-        )
-        for row in rows
-    ]
     note = (
         "Error: of the on-line estimate to the reference. To off line: largest difference of the two models' frequency "
         "responses in the unbroken band around the resonance where the coherence is above 0.9. Agrees: the unbroken "
         "band around the resonance in which on-line model and spectral estimate differ by 3 dB at most. Fit: free run "
         "of the off-line model over the whole recording, after the high-pass."
     )
-    return [html.table(headings, cells, numbers=range(1, 12)), html.note(note)]
+    return [html.table_of(rows, columns, numbers=range(1, 12)), html.note(note)]
 
 
 def _band(band_hz: tuple[float, float] | None) -> str:
@@ -133,61 +108,23 @@ def _percent(share: float) -> str:
     return "–" if np.isnan(share) else f"{100.0 * share:+.2f} %"
 
 
-def _signals(models: Sequence[LocalModel]) -> html.Section:
-    drawn = models[:SHOWN_SIGNALS]
-    pieces: list[Any] = []
-    for number, model in enumerate(drawn):
-        record = model.record
-        speed = np.where(record.okay, record.output, np.nan)
-        panels = (
-            Panel("T_tot [Nm]", (Line("total torque", record.total_torque_nm, Style.BEFORE),)),
-            Panel("ω_M [rad/s]", (Line("motor speed", speed, Style.AFTER),)),
-        )
-        pieces += [
-            html.Heading(model.name),
-            time_figure(f"signals-{number}", record.time_s, panels, 4 * len(drawn)),
-        ]
-    text = f"As recorded, every {1e3 * drawn[0].record.sample_time_s:g} ms. Drag to zoom, double click to go back."
-    return html.section("Fig. 2: total torque and motor speed", html.note(text), *pieces)
-
-
-def _responses(models: Sequence[LocalModel]) -> html.Section:
-    text = (
-        "Lines: on-line models. Dots: spectral estimates of the same data. Click a name in the legend to hide a line, "
-        "double click to see it alone; the off-line models are hidden at first."
-    )
-    return html.section(
-        "Fig. 4: on-line models against spectral estimates",
-        html.note(text),
-        responses_figure("responses", models),
-    )
-
-
-def _poles(models: Sequence[LocalModel]) -> html.Section:
-    whole = [_set(model, number) for number, model in enumerate(models)]
-    third = [
-        PoleSet(model.name, low.poles, low.zeros, series_colour(number))
-        for number, model in enumerate(models)
-        if (low := model.third_order) is not None
-    ]
-    known = known_sets(models)
-    period_s = models[0].online.sample_time_s
-    order = models[0].online.orders.na
-    return html.section(
-        "Fig. 5: poles and zeros",
-        html.note(
-            "Crosses are poles, circles zeros, in the plane of z; what is known is black. Dotted: damping 0.1, 0.3, "
-            "0.6. The zeros of a sampled model are only roughly those of the continuous one.",
+def _figures(folder: Path, poles: int) -> Iterator[html.Section]:
+    """Yield the printed figures, each with a line on how to read it."""
+    for name, title, how in (
+        ("fig2", "Fig. 2: total torque and motor speed", "As recorded."),
+        (
+            "fig4",
+            "Fig. 4: on-line models against spectral estimates",
+            "To zoom into, hil identify shows the same of any recordings.",
         ),
-        html.Heading(f"As identified, nA = {order}"),
-        pole_figure("poles", [*whole, *known], period_s),
-        html.Heading("Their third-order equivalents"),
-        pole_figure("poles-third", [*third, *known], period_s),
-    )
-
-
-def _set(model: LocalModel, number: int) -> PoleSet:
-    return PoleSet(model.name, model.online.poles, model.online.zeros, series_colour(number))
+        (
+            "fig5",
+            "Fig. 5: poles and zeros",
+            f"As identified, nA = {poles}, and their third-order equivalents; what is known is black. Dotted: damping "
+            "0.1, 0.3, 0.6. The zeros of a sampled model are only roughly those of the continuous one.",
+        ),
+    ):
+        yield html.section(title, html.note(how), html.Picture((folder / f"{name}.svg").read_text("utf-8"), title))
 
 
 def _conditions(models: Sequence[LocalModel], driven: Sequence[Conditions]) -> list[Any]:
@@ -238,19 +175,13 @@ def paper_text(
         "schema": SCHEMA,
         "seed": seed,
         "settings": {
-            "na": settings.orders.na,
-            "nb": settings.orders.nb,
-            "nk": settings.orders.nk,
+            **as_json(settings.orders),
             "sample_time_s": settings.sample_time_s,
             "samples": settings.samples,
             "high_pass_hz": settings.high_pass_hz,
         },
-        "experiments": [_row(row) for row in rows],
+        "experiments": as_json(rows),
         "conditions": [asdict(each) for each in driven],
         **({} if made is None else {"made": made.document()}),
     }
     return json.dumps(document, indent=1, allow_nan=False) + "\n"
-
-
-def _row(row: Row) -> dict[str, Any]:
-    return {key: json_number(value) if isinstance(value, float) else value for key, value in asdict(row).items()}

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from types import MappingProxyType
-from typing import Any
+from typing import Any, Literal
 
 from rich.console import Group, RenderableType
 from rich.panel import Panel
@@ -13,9 +12,12 @@ from rich.text import Text
 
 from hil.report import page as html
 
-COLOURS: Mapping[str, str] = MappingProxyType(
-    {"explained": "blue", "partly_explained": "blue", "unexplained": "yellow", "no_mismatch": "green"}
-)
+COLOURS: Mapping[str, str] = {
+    "explained": "blue",
+    "partly_explained": "blue",
+    "unexplained": "yellow",
+    "no_mismatch": "green",
+}
 
 
 def rendered(blocks: Iterable[Any]) -> RenderableType:
@@ -43,12 +45,13 @@ def _words(block: html.Paragraph) -> str:
 
 
 def _table(block: html.Table) -> Table:
-    """Make a table of the columns that hold text."""
+    """Make a table of the columns that hold text; numbers are never cut."""
     columns = [i for i, _ in enumerate(block.headings) if any(str(row.cells[i]) for row in block.rows)]
     table = Table(box=None, pad_edge=False, show_header=any(block.headings))
     for i in columns:
         is_number = i in block.numbers
-        table.add_column(Text(block.headings[i]), justify="right" if is_number else "left", overflow="fold")
+        justify: Literal["right", "left"] = "right" if is_number else "left"
+        table.add_column(Text(block.headings[i]), justify=justify, overflow="fold", no_wrap=is_number)
     for row in block.rows:
         style = "dim" if row.kind == "undetermined" else ""
         table.add_row(*(Text(str(row.cells[i])) for i in columns), style=style)

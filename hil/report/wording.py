@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from types import MappingProxyType
 
 from estimator.diagnosis.result import Diagnosis, FoundEffect, Mismatch, Verdict
 from estimator.physics.catalogue import EFFECTS
@@ -12,48 +11,33 @@ from estimator.physics.model import Motion, unit
 from estimator.signals.record import OutputKind
 from hil.report.numbers import listed, shown, shown_p, shown_times
 
-BADGES = MappingProxyType(
-    {
-        Verdict.EXPLAINED: "✓ explained",
-        Verdict.PARTLY_EXPLAINED: "✓ partly explained",
-        Verdict.UNEXPLAINED: "? mismatch, not explained",
-        Verdict.NO_MISMATCH: "= no mismatch",
-    }
-)
+BADGES = {
+    Verdict.EXPLAINED: "✓ explained",
+    Verdict.PARTLY_EXPLAINED: "✓ partly explained",
+    Verdict.UNEXPLAINED: "? mismatch, not explained",
+    Verdict.NO_MISMATCH: "= no mismatch",
+}
 
-ELEMENTS = MappingProxyType(
-    {
-        Element.TORQUE_PATH: "torque path",
-        Element.MOTOR: "motor",
-        Element.SHAFT: "shaft",
-        Element.LOAD: "load",
-        Element.SPEED_SENSOR: "speed sensor",
-        Element.ACQUISITION: "acquisition",
-    }
-)
+ELEMENTS = {each: each.value.replace("_", " ") for each in Element}
 
-PLACES = MappingProxyType({"motor": "motor", "shaft": "shaft", "load": "load", "sensor": "reading"})
+PLACES = {"motor": "motor", "shaft": "shaft", "load": "load", "sensor": "reading"}
 """Places where an input may explain a mismatch."""
 
-CHECKS = MappingProxyType(
-    {
-        Element.TORQUE_PATH: "the torque readings against a second source (current, a torque transducer), each "
-        "inverter alone, limits and dead times, and the delay between command and shaft.",
-        Element.MOTOR: "bearings, brakes and whatever else may drag or turn with the motor; run a reversal and a "
-        "coast-down with the shaft disconnected.",
-        Element.SHAFT: "couplings, joints and mounts for play, rubber and cracks; repeat the reversal with larger and "
-        "smaller torque, and at another temperature.",
-        Element.LOAD: "road, wind, brakes, tyres and payload; repeat on a level road in both directions.",
-        Element.SPEED_SENSOR: "the resolver against an encoder, its filter and scale, and the reading at standstill "
-        "and at constant speed.",
-        Element.ACQUISITION: "time stamps, lost and repeated frames, and both clocks.",
-    }
-)
+CHECKS = {
+    Element.TORQUE_PATH: "the torque readings against a second source (current, a torque transducer), each "
+    "inverter alone, limits and dead times, and the delay between command and shaft.",
+    Element.MOTOR: "bearings, brakes and whatever else may drag or turn with the motor; run a reversal and a "
+    "coast-down with the shaft disconnected.",
+    Element.SHAFT: "couplings, joints and mounts for play, rubber and cracks; repeat the reversal with larger and "
+    "smaller torque, and at another temperature.",
+    Element.LOAD: "road, wind, brakes, tyres and payload; repeat on a level road in both directions.",
+    Element.SPEED_SENSOR: "the resolver against an encoder, its filter and scale, and the reading at standstill "
+    "and at constant speed.",
+    Element.ACQUISITION: "time stamps, lost and repeated frames, and both clocks.",
+}
 """What to look at where nothing in the catalogue explains a mismatch."""
 
-_QUANTITIES = MappingProxyType(
-    {"rad/s": "speed", "m/s": "speed", "rad": "position", "m": "position", "Nm": "torque", "N": "force"}
-)
+_QUANTITIES = {"rad/s": "speed", "m/s": "speed", "rad": "position", "m": "position", "Nm": "torque", "N": "force"}
 
 
 def quantity(output_unit: str) -> str:
@@ -61,15 +45,13 @@ def quantity(output_unit: str) -> str:
     return _QUANTITIES.get(output_unit, "output")
 
 
-_DIMENSIONS = MappingProxyType(
-    {
-        OutputKind.SPEED: "speed",
-        OutputKind.POSITION: "angle",
-        OutputKind.FORCE: "torque",
-        OutputKind.TORQUE: "torque",
-        OutputKind.ACCELERATION: "acceleration",
-    }
-)
+_DIMENSIONS = {
+    OutputKind.SPEED: "speed",
+    OutputKind.POSITION: "angle",
+    OutputKind.FORCE: "torque",
+    OutputKind.TORQUE: "torque",
+    OutputKind.ACCELERATION: "acceleration",
+}
 
 
 def output_unit(kind: OutputKind, motion: Motion) -> str:

@@ -67,6 +67,12 @@ def _values(value: Any, key: str = "") -> Any:
     return [_values(each, key) for each in value] if isinstance(value, list) else value
 
 
+def hostile_paper(folder: Path) -> str:
+    for name in ("fig2", "fig4", "fig5"):
+        (folder / f"{name}.svg").write_text(f'<svg xmlns="http://www.w3.org/2000/svg"><script>{RUN}</script></svg>')
+    return paper_page(*hostile(paper_results()), folder, MADE)
+
+
 def hostile_scoreboard(_: Path) -> str:
     rig = {"case": "clutch", "where": "the PLC", "said": "open", "outcome": "right", "success": True}
     size = {"what": "gap", "unit": "mm", "truth": 4.0, "found": 4.1, "ci95": [4.0, 4.2], "inside": True, "within": True}
@@ -88,7 +94,7 @@ PAGES: dict[str, Callable[[Path], str]] = {
     "diagnosis": lambda _: diagnosis_page(hostile(hand_made_diagnosis.__wrapped__()), MADE),
     "comparison": lambda _: comparison_page(hostile(comparisons()), MADE),
     "identification": lambda _: identification_page(*hostile(identified()), MADE),
-    "paper": lambda _: paper_page(*hostile(paper_results()), MADE),
+    "paper": hostile_paper,
     "commissioning": hostile_state,
     "scoreboard": hostile_scoreboard,
 }

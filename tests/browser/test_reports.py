@@ -13,9 +13,8 @@ from hil.report.commission_html import commission_page
 from hil.report.comparison_html import comparison_page
 from hil.report.diagnosis_html import diagnosis_page
 from hil.report.identification_page import identification_page
-from hil.report.paper_page import paper_page
 from tests.browser.conftest import Opened, opened
-from tests.browser.results import comparisons, identified, paper_results
+from tests.browser.results import comparisons, identified
 from tests.chosen import one_in
 from tests.commission.whole_state import whole_state
 from tests.report.conftest import diagnosis as hand_made_diagnosis
@@ -28,7 +27,6 @@ MADE = Provenance("0.2.0", "2026-11-27T10:00:00+00:00", "", (Source("model.toml"
 
 PAGES: dict[str, Callable[[], str]] = {
     "identification": lambda: identification_page(*identified()),
-    "paper": lambda: paper_page(*paper_results()),
     "diagnosis": lambda: diagnosis_page(hand_made_diagnosis.__wrapped__()),
     "comparison": lambda: comparison_page(comparisons(), MADE),
     "commissioning": lambda: commission_page(whole_state(Path()).document(), {step.name: step.title for step in STEPS}),

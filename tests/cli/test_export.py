@@ -13,7 +13,7 @@ from estimator.identification.settings import Settings
 from estimator.signals.record import Record
 from hil.cli.main import run
 from hil.export.plc_estimator import PlcEstimator
-from hil.export.plcopen import Tc6, plcopen_xml, project
+from hil.export.plcopen import Tc6, plcopen_xml
 from hil.export.structured_text import Precision, structured_text
 from hil.recording import read_table
 from hil.report.identification_json import identification_text
@@ -63,9 +63,9 @@ def test_plcopen_has_the_same_content(
     assert run(["export", "plcopen", str(identified), "--run", "run_2", "--out", str(out), *options]) == 0
     text = out.read_text(encoding="ascii")
     L = json.loads(identified.read_text())["recordings"][1]["filter_L"]
-    expected = project(PlcEstimator(Settings(), 0.01, np.array(L), "identification.json, recording run_2"), precision)
+    estimator = PlcEstimator(Settings(), 0.01, np.array(L), "identification.json, recording run_2")
     written = datetime.fromisoformat(text.partition('creationDateTime="')[2].partition('"')[0])
-    assert text == plcopen_xml(expected, written, version)
+    assert text == plcopen_xml(estimator, written, precision, version)
 
 
 def test_the_example_is_what_the_command_writes_today(tmp_path: Path) -> None:

@@ -29,7 +29,7 @@ def text_of(element: Any) -> str:
 
 def as_structured_text(project: Any) -> str:
     """Return data types and POUs as one text, without comments."""
-    types = (f"TYPE {kind.name} : {_type(kind.base_type)}; END_TYPE" for kind in project.types.data_types.data_type)
+    types = (f"TYPE {kind.name} : {type_of(kind.base_type)}; END_TYPE" for kind in project.types.data_types.data_type)
     return "\n".join((*types, *map(_pou, project.types.pous.pou)))
 
 
@@ -40,27 +40,33 @@ def _pou(pou: Any) -> str:
 
 
 def _sections(interface: Any) -> Iterator[str]:
+    for keyword, section in sections_of(interface):
+        lines = (f"{each.name} : {type_of(each.type)}{initial_of(each)};" for each in section.variable)
+        yield "\n".join((keyword + " CONSTANT" * section.constant, *lines, "END_VAR"))
+
+
+def sections_of(interface: Any) -> Iterator[tuple[str, Any]]:
+    """Yield what is declared, each with its keyword."""
     for keyword, sections in (
         ("VAR_INPUT", interface.input_vars),
         ("VAR_OUTPUT", interface.output_vars),
         ("VAR", interface.local_vars),
     ):
         for section in sections:
-            lines = (f"{each.name} : {_type(each.type)}{_initial(each)};" for each in section.variable)
-            yield "\n".join((keyword + " CONSTANT" * section.constant, *lines, "END_VAR"))
+            yield keyword, section
 
 
-def _type(kind: Any) -> str:
+def type_of(kind: Any) -> str:
     if kind.array is not None:
         bounds = ", ".join(f"{dimension.lower}..{dimension.upper}" for dimension in kind.array.dimension)
-        return f"ARRAY[{bounds}] OF {_type(kind.array.base_type)}"
+        return f"ARRAY[{bounds}] OF {type_of(kind.array.base_type)}"
     if kind.derived is not None:
         return str(kind.derived.name)
     (name,) = (name for field, name in ELEMENTARY.items() if getattr(kind, field) is not None)
     return name
 
 
-def _initial(variable: Any) -> str:
+def initial_of(variable: Any) -> str:
     given = variable.initial_value
     if given is None:
         return ""

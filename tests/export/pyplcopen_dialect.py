@@ -1,4 +1,4 @@
-"""A project in the part of Structured Text that the compiler of ``pyplcopen`` takes.
+"""A PLCopen project, as `plcopen_reading` reads it, in the part of Structured Text that pyplcopen compiles.
 
 What it has not got, and the standard has: unnamed array types, constants in function blocks, calls that leave out an
 input, and a name that is declared in two POUs (it puts the bodies of the blocks that are called into one program).
@@ -7,8 +7,9 @@ Statements and expressions stay as they are, but for the names.
 
 import re
 from collections.abc import Iterator
+from typing import Any
 
-from hil.export.plcopen import Array, Pou, Project, Section, SectionKind, Variable
+from tests.export.plcopen_reading import KEYWORD, initial_of, sections_of, text_of, type_of
 
 CALL = re.compile(r"\b(?P<instance>\w+)\((?P<inputs>\w+ := [^;]*)\);")
 MEMBER = re.compile(r"\b(?P<instance>[A-Za-z]\w*)\.(?P<member>\w+)")
@@ -17,68 +18,56 @@ NAME = re.compile(r"(?<![\w@])[A-Za-z]\w*")
 NOTHING = {"BOOL": "FALSE", "INT": "0", "DINT": "0", "LREAL": "0.0", "REAL": "0.0"}
 
 
-def in_dialect(project: Project) -> str:
+def in_dialect(project: Any) -> str:
     """Return the whole text."""
-    named = (f"TYPE\n{kind.name} : {_array(kind.array)};\nEND_TYPE" for kind in project.types)
-    pous = {pou.name: pou for pou in project.pous}
-    return "\n".join((*named, *(each for pou in project.pous for each in _pou(pou, pous)), ""))
+    named = (f"TYPE\n{kind.name} : {type_of(kind.base_type)};\nEND_TYPE" for kind in project.types.data_types.data_type)
+    pous = {pou.name: pou for pou in project.types.pous.pou}
+    return "\n".join((*named, *(each for pou in pous.values() for each in _pou(pou, pous)), ""))
 
 
-def _pou(pou: Pou, pous: dict[str, Pou]) -> Iterator[str]:
+def _pou(pou: Any, pous: dict[str, Any]) -> Iterator[str]:
+    keyword = KEYWORD[pou.pou_type.value]
     for variable in _variables(pou):
-        if isinstance(variable.type, Array):
-            yield f"TYPE\n{_type(variable, pou)} : {_array(variable.type)};\nEND_TYPE"
-    yield f"{pou.kind.value} {pou.name}"
-    for section in pou.sections:
-        yield from _section(section, pou)
-    yield f"{_Body(pou, pous).text()}\nEND_{pou.kind.value}"
+        if variable.type.array is not None:
+            yield f"TYPE\n{_type(variable, pou)} : {type_of(variable.type)};\nEND_TYPE"
+    yield f"{keyword} {pou.name}"
+    for kind, section in sections_of(pou.interface):
+        lines = (f"{each.name}_{pou.name} : {_type(each, pou)}{initial_of(each)};" for each in section.variable)
+        yield "\n".join((kind, *lines, "END_VAR"))
+    yield f"{_Body(pou, pous).text()}\nEND_{keyword}"
 
 
-def _section(section: Section, pou: Pou) -> Iterator[str]:
-    yield section.kind.value
-    for variable in section.variables:
-        values = ", ".join(variable.initial)
-        initial = f" := {f'[{values}]' if isinstance(variable.type, Array) else values}" if values else ""
-        yield f"{variable.name}_{pou.name} : {_type(variable, pou)}{initial};"
-    yield "END_VAR"
+def _variables(pou: Any) -> Iterator[Any]:
+    for _, section in sections_of(pou.interface):
+        yield from section.variable
 
 
-def _variables(pou: Pou) -> Iterator[Variable]:
-    for section in pou.sections:
-        yield from section.variables
-
-
-def _type(variable: Variable, pou: Pou) -> str:
-    return f"T_{pou.name}_{variable.name}" if isinstance(variable.type, Array) else variable.type
-
-
-def _array(array: Array) -> str:
-    return f"ARRAY[{', '.join(f'{low}..{high}' for low, high in array.bounds)}] OF {array.element}"
+def _type(variable: Any, pou: Any) -> str:
+    return type_of(variable.type) if variable.type.array is None else f"T_{pou.name}_{variable.name}"
 
 
 class _Body:
     """A body whose names are made those of its POU; ``@`` marks names that are done."""
 
-    def __init__(self, pou: Pou, pous: dict[str, Pou]) -> None:
+    def __init__(self, pou: Any, pous: dict[str, Any]) -> None:
         self._pou, self._pous = pou, pous
         self._own = {variable.name: variable for variable in _variables(pou)}
 
     def text(self) -> str:
-        body = re.sub(r"\(\*.*?\*\)", "", self._pou.body, flags=re.S)
+        body = re.sub(r"\(\*.*?\*\)", "", text_of(self._pou.body[0].st), flags=re.S)
         body = MEMBER.sub(self._member, CALL.sub(self._call, body))
         return NAME.sub(self._name, body).replace("@", "")
 
-    def _called(self, instance: str) -> Pou:
-        return self._pous[str(self._own[instance].type)]
+    def _called(self, instance: str) -> Any:
+        return self._pous[type_of(self._own[instance].type)]
 
     def _call(self, found: re.Match[str]) -> str:
         called = self._called(found["instance"])
         given = dict(re.split(r"\s*:=\s*", each.strip()) for each in found["inputs"].split(","))
         every = (
-            f"@{variable.name}_{called.name} := {given.get(variable.name) or NOTHING[str(variable.type)]}"
-            for section in called.sections
-            if section.kind is SectionKind.INPUT
-            for variable in section.variables
+            f"@{variable.name}_{called.name} := {given.get(variable.name) or NOTHING[type_of(variable.type)]}"
+            for section in called.interface.input_vars
+            for variable in section.variable
         )
         return f"{found['instance']}({', '.join(every)});"
 

@@ -5,7 +5,7 @@ it checks names, types, calls, indices and statements by its own reading of the 
 semicolon after END_IF and END_FOR; our own reader does.
 """
 
-from dataclasses import replace
+from datetime import UTC, datetime
 
 import numpy as np
 import pytest
@@ -13,11 +13,12 @@ import pytest
 from estimator.identification.linear_model import Orders
 from estimator.identification.settings import Settings
 from hil.export.plc_estimator import PlcEstimator
-from hil.export.plcopen import project
+from hil.export.plcopen import plcopen_xml
 from hil.export.structured_text import Precision
 from tests.chosen import one_in
 from tests.export.iec.parser import Parser
 from tests.export.iec.tokens import NotStructuredText
+from tests.export.plcopen_reading import read_plcopen
 from tests.export.pyplcopen_dialect import in_dialect
 
 pyplcopen = pytest.importorskip("pyplcopen", reason="pyplcopen, which has a compiler of IEC 61131-3, is not installed")
@@ -40,7 +41,8 @@ def diagnostics(text: str) -> list[str]:
 @pytest.mark.parametrize("precision", Precision)
 @pytest.mark.parametrize("estimator", one_in(3, ESTIMATORS), ids=range(len(ESTIMATORS)))
 def test_the_program_compiles(estimator: PlcEstimator, precision: Precision) -> None:
-    assert diagnostics(in_dialect(project(estimator, precision))) == []
+    document = plcopen_xml(estimator, datetime.now(UTC), precision)
+    assert diagnostics(in_dialect(read_plcopen(document))) == []
 
 
 @pytest.mark.parametrize(
@@ -65,10 +67,9 @@ def test_the_program_compiles(estimator: PlcEstimator, precision: Precision) -> 
     ],
 )
 def test_it_would_notice_a_fault(before: str, after: str) -> None:
-    right = project(PlcEstimator(L=L))
-    assert sum(before in pou.body for pou in right.pous) == 1
-    wrong = replace(right, pous=tuple(replace(pou, body=pou.body.replace(before, after)) for pou in right.pous))
-    assert diagnostics(in_dialect(wrong)) != []
+    document = plcopen_xml(PlcEstimator(L=L), datetime.now(UTC))
+    assert before in document
+    assert diagnostics(in_dialect(read_plcopen(document.replace(before, after)))) != []
 
 
 BODY = """

@@ -11,7 +11,7 @@ from estimator.identification.linear_model import Orders
 from estimator.identification.settings import Settings
 from hil.export import Tc6
 from hil.export.plc_estimator import PlcEstimator
-from hil.export.plcopen import plcopen_xml, project
+from hil.export.plcopen import plcopen_xml
 from hil.export.structured_text import Precision
 from tests.chosen import one_in
 from tests.export.drives import bad_drive
@@ -34,7 +34,7 @@ ESTIMATORS = [
 
 
 def document(estimator: PlcEstimator, precision: Precision = Precision.DOUBLE) -> str:
-    return plcopen_xml(project(estimator, precision), WRITTEN)
+    return plcopen_xml(estimator, WRITTEN, precision)
 
 
 def refusal(text: str) -> str:
@@ -62,7 +62,6 @@ def test_what_it_read_is_executed_and_equals_the_host_to_the_bit(tmp_path: Path)
 
 
 def test_the_versions_differ_in_the_namespace_alone() -> None:
-    written = project(PlcEstimator(L=L))
-    newer, older = (plcopen_xml(written, WRITTEN, version) for version in (Tc6.V2_01, Tc6.V2_0))
+    newer, older = (plcopen_xml(PlcEstimator(L=L), WRITTEN, version=version) for version in (Tc6.V2_01, Tc6.V2_0))
     assert newer.count("tc6_0201") == 1
     assert older == newer.replace("tc6_0201", "tc6_0200")

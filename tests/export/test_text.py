@@ -1,6 +1,7 @@
 """The exported text as a PLC programmer gets it: the standard's language, readable, complete."""
 
 import re
+from datetime import UTC, datetime
 from importlib.util import find_spec
 
 import numpy as np
@@ -10,12 +11,13 @@ from estimator.identification.linear_model import Orders
 from estimator.identification.settings import Settings
 from estimator.signals.record import FloatArray
 from hil.export.plc_estimator import PlcEstimator
-from hil.export.plcopen import SectionKind, project
+from hil.export.plcopen import plcopen_xml
 from hil.export.structured_text import POUS, Precision
 from tests.export.iec.parser import Parser
 from tests.export.iec.to_c import to_c
 from tests.export.iec.tree import REALS
 from tests.export.plc_runs import exported
+from tests.export.plcopen_reading import read_plcopen
 
 L = np.array([1.0, -0.9, 0.72])
 
@@ -40,22 +42,14 @@ def test_it_has_one_real_type_alone(precision: Precision) -> None:
     assert types & set(REALS) == {precision.value}
 
 
-def test_every_input_and_output_has_a_comment() -> None:
-    parameters = [
-        variable
-        for pou in project(PlcEstimator(L=L)).pous
-        for section in pou.sections
-        if section.kind is not SectionKind.LOCAL
-        for variable in section.variables
-    ]
+def test_every_input_and_output_has_a_comment_and_a_named_type() -> None:
+    document = read_plcopen(plcopen_xml(PlcEstimator(L=L), datetime.now(UTC)))
+    interfaces = [pou.interface for pou in document.types.pous.pou]
+    sections = [section for each in interfaces for section in (*each.input_vars, *each.output_vars)]
+    parameters = [variable for section in sections for variable in section.variable]
     assert len(parameters) > 40
-    assert [variable.name for variable in parameters if not variable.comment] == []
-
-
-def test_what_is_handed_over_has_a_named_type() -> None:
-    for pou in project(PlcEstimator(L=L)).pous:
-        for section in pou.sections:
-            assert section.kind is SectionKind.LOCAL or all(isinstance(each.type, str) for each in section.variables)
+    assert [variable.name for variable in parameters if variable.documentation is None] == []
+    assert [variable.name for variable in parameters if variable.type.array is not None] == []
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,6 @@
 """Roads, drivers and the experiments on them."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +22,6 @@ from hil.figures.road import (
     drive,
 )
 from hil.recording import read_record
-from hil.rig.experiments.cruise import Cruise
 from hil.rig.stop import StopRequest
 
 BUS = Bus(mass_kg=13_600.0, metres_per_rad=0.48 / 5.6)
@@ -70,8 +70,7 @@ def test_conditions_differ_and_do_not_depend_on_how_many_are_drawn() -> None:
 
 
 def test_a_driver_corrects_with_a_lag_and_ends_no_cruise() -> None:
-    cruise = Cruise(80.0, 30.0, 100.0, 500.0, PERIOD_S)
-    law = PedalCruise(cruise, 20.0, PERIOD_S, np.random.default_rng(5))
+    law = PedalCruise(replace(CALM, pedal_nm=20.0), 30.0, 100.0, 500.0, PERIOD_S)
     assert (law.start_speed_rad_s, law.duration_s) == (80.0, 30.0)
     law.begin(200.0)
     torque = np.array([law.torque_nm(k * PERIOD_S, 80.0) for k in range(3000)])
@@ -93,7 +92,7 @@ def test_an_experiment_is_recorded_over_the_protocols_and_the_same_seed_makes_th
     assert record.time_s.shape == (300,)
     assert record.output.mean() == pytest.approx(conditions.speed_rad_s, rel=0.1)
     assert np.ptp(record.total_torque_nm) > 200.0  # the PRBS of 120 Nm either way
-    assert first.line.inertia_load_kg_m2 == pytest.approx(100.0 + conditions.payload_kg * BUS.metres_per_rad**2)
+    assert first.line.J_L == pytest.approx(100.0 + conditions.payload_kg * BUS.metres_per_rad**2)
 
 
 def test_a_stop_ends_an_experiment(tmp_path: Path) -> None:

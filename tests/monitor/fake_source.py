@@ -84,7 +84,7 @@ def node(**changes: object) -> NodeHealth:
 def health(m1: NodeHealth | None = None, plc: PlcHealth | None = None) -> Health:
     """A healthy rig, with another first inverter or PLC."""
     nan = math.nan
-    timing = TimingHealth(PERIOD_S, 0, 0, 0, 0, nan, nan, nan, nan, nan, nan)
+    timing = TimingHealth(PERIOD_S, 0, 0, 0, 0, (nan, nan, nan), (nan, nan, nan))
     return Health(m1 or node(), node(node_id=2), plc or PlcHealth(None, None, None), timing)
 
 

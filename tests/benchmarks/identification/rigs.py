@@ -98,13 +98,7 @@ def paper_rig(runs: int) -> Iterator[Truth]:
             line, mode = driven.line, driven.line.resonance
             if mode is None:
                 raise ValueError(f"the bus of experiment {number} does not oscillate; expected one that does")
-            parameters = _parameters(
-                line.inertia_motor_kg_m2,
-                line.inertia_load_kg_m2,
-                line.stiffness_nm_per_rad,
-                line.damping_nm_s_per_rad,
-                line.friction_motor_nm_s_per_rad,
-            )
+            parameters = _parameters(line.J_M, line.J_L, line.k, line.c, line.b_M)
             yield Truth(read_record(driven.path), mode, parameters)
 
 

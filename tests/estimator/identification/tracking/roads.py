@@ -8,10 +8,9 @@ import numpy as np
 from estimator.signals.prbs import Prbs
 from estimator.signals.record import FloatArray, Record
 from hil.figures.local_model import TwoMassLine
-from hil.figures.road import Bus, Conditions, PedalCruise, RoadLoad, draw_conditions
+from hil.figures.road import Bus, PedalCruise, RoadLoad, draw_conditions
 from hil.proof.truth.bus import draw_bus
 from hil.proof.truth.recording import speed_reading, torque_reading
-from hil.rig.experiments.cruise import Cruise
 
 PERIOD_S = 0.01
 CHUNK_S = 1.0
@@ -39,7 +38,7 @@ def drive(
     bus = Bus(truth.J_L / truth.metres_per_rad**2, truth.metres_per_rad)
     n = round(duration_s / PERIOD_S)
     torque, speed, frequency_hz = np.empty(n), np.empty(n), np.empty(n)
-    load, law = RoadLoad(bus, conditions), _driver(conditions, truth.J_M + truth.J_L)
+    load, law = RoadLoad(bus, conditions), PedalCruise(conditions, np.inf, truth.J_M + truth.J_L, 1e4, PERIOD_S)
     prbs = Prbs(1.0, clock_divider=2, seed=conditions.prbs_seed)
     holding_nm = (
         load.torque_nm(conditions.speed_rad_s, 0.0, PERIOD_S) + (truth.b_M + truth.b_L) * conditions.speed_rad_s
@@ -49,7 +48,7 @@ def drive(
     for k in range(n):
         time_s = k * PERIOD_S
         if k % round(CHUNK_S / PERIOD_S) == 0:
-            now = replace(line, stiffness_nm_per_rad=truth.k * stiffness(time_s))
+            now = replace(line, k=truth.k * stiffness(time_s))
             a, b = now.discrete(PERIOD_S)
             mode = now.resonance
             assert mode is not None
@@ -59,11 +58,6 @@ def drive(
         distance_m += float(x[1]) * bus.metres_per_rad * PERIOD_S
         x = a @ x + b @ np.array([torque[k], load_nm])
     return Drive(_read(seed, torque, speed), frequency_hz)
-
-
-def _driver(conditions: Conditions, inertia_kg_m2: float) -> PedalCruise:
-    cruise = Cruise(conditions.speed_rad_s, np.inf, inertia_kg_m2, 1e4, PERIOD_S)
-    return PedalCruise(cruise, conditions.pedal_nm, PERIOD_S, np.random.default_rng([conditions.seed, 1]))
 
 
 def _read(seed: int, torque_nm: FloatArray, speed_rad_s: FloatArray) -> Record:
