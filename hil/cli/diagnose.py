@@ -12,7 +12,6 @@ import typer
 from typer.core import TyperCommand
 
 from hil.cli.command_line import is_silent
-from hil.cli.importing import without_collecting
 from hil.cli.options import Dbc, Jobs, Mapped, TrustFmu, TrustLaws, tell
 
 HOLDOUT = "--holdout"
@@ -71,7 +70,7 @@ def diagnose(
             "--budget-s",
             min=0.0,
             metavar="S",
-            help="Time after which it is ended, undecided \\[s]; by default there is no limit.",
+            help="Time after which it is ended, undecided [s]; by default there is no limit.",
         ),
     ] = None,
     effort: Annotated[
@@ -80,9 +79,7 @@ def diagnose(
     dbc: Dbc = None,
     signals: Annotated[
         Path | None,
-        typer.Option(
-            metavar="FILE", help=r"File with the \[signals] to read recordings by, where the model is an FMU."
-        ),
+        typer.Option(metavar="FILE", help="File with the [signals] to read recordings by, where the model is an FMU."),
     ] = None,
     mapped: Mapped = None,
     trust_fmu: TrustFmu = False,
@@ -95,20 +92,19 @@ def diagnose(
     Writes DIR/diagnosis.json, DIR/augmented.toml and DIR/report.html. Of an FMU, what acts at its inputs and outputs is
     sought, and no augmented.toml written.
     """
-    with without_collecting():
-        from rich.console import Console
+    from rich.console import Console
 
-        from estimator.diagnosis.diagnose import diagnose as diagnose_records
-        from hil.plants.plant import Trust
-        from hil.plants.questioned import Asked, questioned
-        from hil.plants.scales import with_the_line_to_write
-        from hil.provenance import provenance
-        from hil.report.diagnosis_files import publish_diagnosis
-        from hil.report.diagnosis_html import diagnosis_summary
-        from hil.report.diagnosis_json import diagnosis_text
-        from hil.report.outputs import require_folder
-        from hil.store import attach_to_runs
-        from hil.store.entry import DIAGNOSIS, MODEL
+    from estimator.diagnosis.diagnose import diagnose as diagnose_records
+    from hil.plants.plant import Trust
+    from hil.plants.questioned import Asked, questioned
+    from hil.plants.scales import with_the_line_to_write
+    from hil.provenance import provenance
+    from hil.report.diagnosis_files import publish_diagnosis
+    from hil.report.diagnosis_html import diagnosis_summary
+    from hil.report.diagnosis_json import diagnosis_text
+    from hil.report.outputs import require_folder
+    from hil.store import attach_to_runs
+    from hil.store.entry import DIAGNOSIS, MODEL
 
     require_folder(out)
     every = [*recordings, *(holdout or ())]

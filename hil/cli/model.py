@@ -56,7 +56,7 @@ def new(
         typer.Option("--run", metavar="NAME", help="Recording of --from; else the most certain one."),
     ] = None,
     recording: Annotated[
-        Path | None, typer.Option("--recording", metavar="REC", help="Look into it, and write its \\[signals].")
+        Path | None, typer.Option("--recording", metavar="REC", help="Look into it, and write its [signals].")
     ] = None,
     dbc: Dbc = None,
     yes: Annotated[bool, typer.Option("--yes", help="Ask nothing: missing values are an error.")] = False,

@@ -29,13 +29,13 @@ def monitor(
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder of the recordings.")] = Path("runs"),
     model: Annotated[
         Path | None,
-        typer.Option(metavar="MODEL", help=r"Two-mass model file for the twist; that of \[simulation] otherwise."),
+        typer.Option(metavar="MODEL", help="Two-mass model file for the twist; that of [simulation] otherwise."),
     ] = None,
     bus: Annotated[str | None, typer.Option(metavar="URL", help="CAN bus in place of the rig file's.")] = None,
     modbus: Annotated[str | None, typer.Option(metavar="HOST:PORT", help="PLC in place of the rig file's.")] = None,
     take_over: TakeOver = False,
     simulate: Annotated[
-        bool, typer.Option("--simulate", help=r"Simulate the rig, with nothing connected; needs \[simulation].")
+        bool, typer.Option("--simulate", help="Simulate the rig, with nothing connected; needs [simulation].")
     ] = False,
     replay: Annotated[
         Path | None,

@@ -53,7 +53,7 @@ TrustFmu = Annotated[bool, typer.Option("--trust-fmu", help="Run the program in 
 TrustLaws = Annotated[
     bool,
     typer.Option(
-        "--trust-laws", help=r"Run the Python code that \[laws] of the model file name; without it they are refused."
+        "--trust-laws", help="Run the Python code that [laws] of the model file name; without it they are refused."
     ),
 ]
 

@@ -24,7 +24,7 @@ def solve(
     ] = None,
     vehicle_s: Annotated[
         float,
-        typer.Option("--vehicle-s", min=0.0, metavar="S", help="Time the vehicle may be needed for in all \\[s]."),
+        typer.Option("--vehicle-s", min=0.0, metavar="S", help="Time the vehicle may be needed for in all [s]."),
     ] = 600.0,
     yes: Annotated[bool, typer.Option("--yes", help="Command torque without asking; for scripts.")] = False,
     effort: Annotated[Effort, typer.Option("--effort", help="Work each search may cost.")] = Effort.NORMAL,

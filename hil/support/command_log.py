@@ -76,7 +76,7 @@ def level_of(given: str | None) -> str:
 
 
 @contextmanager
-def logged(command: str, arguments: Sequence[str], level: str) -> Iterator[None]:
+def logged(line: Sequence[str], level: str) -> Iterator[None]:
     """Keep the log while a command runs; whatever it raises is logged and continues its way."""
     handler = None if level == "off" else _opened(level)
     if handler is None:
@@ -87,7 +87,7 @@ def logged(command: str, arguments: Sequence[str], level: str) -> Iterator[None]
     _set_levels({**dict.fromkeys(OURS, level.upper()), **_other_levels(level)})
     started_s = time.monotonic()
     try:
-        _begin(command, arguments)
+        _begin(line)
         yield
     except KeyboardInterrupt:
         LOGGER.info("interrupted after %.3f s", time.monotonic() - started_s)
@@ -113,8 +113,8 @@ def _other_levels(level: str) -> dict[str, str]:
     return {"": "DEBUG" if level == "debug" else "ERROR" if level == "error" else "WARNING", "numba": "INFO"}
 
 
-def _begin(command: str, arguments: Sequence[str]) -> None:
-    LOGGER.info("hil %s", shlex.join((command, *arguments)))
+def _begin(line: Sequence[str]) -> None:
+    LOGGER.info("hil %s", shlex.join(line))
     LOGGER.info("version %s, Python %s, %s", __version__, platform.python_version(), platform.platform())
 
 
