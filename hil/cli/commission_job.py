@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Self
 from hil.cli.diagnose import progress_bar
 from hil.cli.options import Pace, pacer_for, scheduling
 from hil.cli.printing import say
-from hil.cli.run_job import RunProgress
+from hil.cli.run_job import run_progress
 from hil.commission.engine import NAMES, STEPS, Asked, plan_document
 from hil.commission.order import RigSource
 from hil.commission.prbs_design import DEFAULT_TRAVEL_M_PER_RAD
@@ -43,7 +43,7 @@ def job_in(
     state = load_state(folder, NAMES) or State(
         folder, rig.name, str(source.path), source.text, {name: StepRecord() for name in NAMES}
     )
-    conditions = Conditions(pace.value, lambda rig: pacer_for(rig, pace), lambda: scheduling(pace), RunProgress)
+    conditions = Conditions(pace.value, lambda rig: pacer_for(rig, pace), lambda: scheduling(pace), run_progress)
     return Job(
         source=source,
         rig=rig,

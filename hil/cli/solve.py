@@ -46,7 +46,7 @@ def solve(
     from hil.cli.commission_job import Bar, who_answers
     from hil.cli.options import pacer_for, scheduling
     from hil.cli.printing import new_console, say
-    from hil.cli.run_job import RunProgress
+    from hil.cli.run_job import run_progress
     from hil.commission.order import RigSource
     from hil.commission.runner import Conditions, Runner
     from hil.commission.state import sole_use
@@ -64,7 +64,7 @@ def solve(
     if given:
         require_of_rig(given, read_records(given, file.signals, file.on_bench), source.rig())
     console = new_console(stderr=as_json, highlight=False)
-    conditions = Conditions(pace.value, lambda of: pacer_for(of, pace), lambda: scheduling(pace), RunProgress)
+    conditions = Conditions(pace.value, lambda of: pacer_for(of, pace), lambda: scheduling(pace), run_progress)
     conditions.pacer(source.rig())  # refuses a pace this rig must not be driven at, before anything
     out.mkdir(parents=True, exist_ok=True)
     with sole_use(out), Bar() as bar:

@@ -21,7 +21,7 @@ from hil.figures.road import (
     drive,
 )
 from hil.recording import read_record
-from hil.rig.experiments.cruise import Cruise
+from hil.rig.experiments.laws import Cruise
 from hil.rig.stop import StopRequest
 
 BUS = Bus(mass_kg=13_600.0, metres_per_rad=0.48 / 5.6)

@@ -29,7 +29,7 @@ from hil.commission.state import Finding, model_json, stated
 from hil.commission.step import Job, Outcome, Step
 from hil.recording.columns import SPEED, TIME
 from hil.report.numbers import shown
-from hil.rig.experiments.pulses import LEAD_S, WAVE_STEPS
+from hil.rig.experiments.laws import LEAD_S, WAVE_STEPS
 
 LEVELS = (0.05, 0.1, 0.2)
 """Heights of the pulses, in parts of an inverter's torque limit, each tried where the one before moved nothing."""

@@ -11,7 +11,7 @@ from hil.figures.local_model import TwoMassLine
 from hil.figures.road import Bus, Conditions, PedalCruise, RoadLoad, draw_conditions
 from hil.proof.truth.bus import draw_bus
 from hil.proof.truth.recording import speed_reading, torque_reading
-from hil.rig.experiments.cruise import Cruise
+from hil.rig.experiments.laws import Cruise
 
 PERIOD_S = 0.01
 CHUNK_S = 1.0
