@@ -19,7 +19,7 @@ from hil.commission.prbs_design import DEFAULT_TRAVEL_M_PER_RAD
 from hil.commission.runner import Conditions, Runner
 from hil.commission.state import State, StepRecord, load_state
 from hil.commission.step import Job
-from hil.commission.talk import Person, Script, Talk, plan_lines, result_document, result_lines
+from hil.commission.talk import Talk, plan_lines, result_document, result_lines
 from hil.config.model_file import read_model
 from hil.errors import UsageError
 from hil.provenance import provenance
@@ -75,9 +75,8 @@ def asked_of_steps(skip: Sequence[str], because: Sequence[str], repeat: Sequence
 
 def who_answers(console: Console, yes: bool, keep: str) -> Talk:
     """Choose who is asked: someone at the terminal, where standard input and output are one."""
-    if sys.stdin.isatty() and console.is_terminal:
-        return Person(lambda question: console.input(question, markup=False), yes, keep)
-    return Script(yes, keep)
+    at_a_terminal = sys.stdin.isatty() and console.is_terminal
+    return Talk((lambda question: console.input(question, markup=False)) if at_a_terminal else None, yes, keep)
 
 
 class Bar:

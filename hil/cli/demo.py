@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from hil.cli.printing import new_console
+
 if TYPE_CHECKING:
     from rich.console import Console
 
@@ -46,7 +48,6 @@ def demo(
 
     Takes about a minute. The verdict is written before the seal is opened, and is judged unchanged.
     """
-    from hil.cli.printing import new_console
     from hil.report.outputs import require_folder
 
     require_folder(out)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from enum import Enum
 from pathlib import Path
 from typing import Annotated
@@ -46,8 +47,6 @@ def design(
     [design]; how well it tells explanations apart is the distance of what each would let the sensor read, in units of
     its noise. Writes TOML, which hil run drives, unless nothing is open or nothing that may be driven would tell.
     """
-    import json
-
     from estimator.design import left_open
     from hil.commission.order import RigSource
     from hil.config.model_file import read_model_for_recordings

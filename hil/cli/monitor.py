@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import sys
 from contextlib import nullcontext, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -152,9 +154,6 @@ def _require_page(page: str) -> None:
 
 def _require_terminal() -> None:
     """Refuse to draw where nobody can see it, or where it has no room."""
-    import os
-    import sys
-
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
         raise UsageError(
             "hil monitor: expected a terminal on standard input and output, got a pipe or a file. Over ssh ask for "

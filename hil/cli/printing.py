@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import typer
 
+from hil.errors import UsageError
 from hil.printable import shown
 
 if TYPE_CHECKING:
     from rich.console import Console
+
+    from hil.config.table import FileKind
 
 
 def say(text: object = "", err: bool = False, nl: bool = True) -> None:
@@ -40,3 +44,30 @@ class _Filtered:
 
         for segment in console.render(self._content, options):
             yield segment if segment.control else Segment(shown(segment.text), segment.style)
+
+
+def ask_at_terminal(heading: str) -> Callable[[str, str, str], str]:
+    """Return what asks: what for, the default (empty: none), what was wrong with the answer before (empty: nothing)."""
+    say(f"{heading} Enter takes what stands in [brackets]; Ctrl-C writes nothing.")
+
+    def ask(what: str, default: str, wrong: str) -> str:
+        if wrong:
+            say(f"  {wrong}")
+        try:
+            return input(f"{what}{f' [{default}]' if default else ''}: ")
+        except EOFError as end:
+            raise UsageError(f"{what}: expected an answer, got the end of the input") from end
+
+    return ask
+
+
+def print_schema(kind: FileKind, out: Path | None) -> None:
+    """Print the JSON schema of a kind of file, or write it."""
+    from hil.config.schema import schema_text
+    from hil.report.outputs import publish
+
+    text = schema_text(kind)
+    if out is None:
+        say(text, nl=False)
+    else:
+        publish(out.parent, {out.name: lambda path: path.write_text(text, encoding="utf-8")})

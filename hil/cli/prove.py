@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from hil.cli.printing import new_console, say
+from hil.errors import UsageError
 
 if TYPE_CHECKING:
     from hil.proof.work import Progress
@@ -175,16 +176,12 @@ def real(
 
 
 def _key_text(key: str | None, key_file: Path | None) -> str:
-    from hil.errors import UsageError
-
     if (key is None) == (key_file is None):
         raise UsageError("expected the key once, with --key or --key-file. hil prove make has printed or written it.")
     return key if key is not None else Path(str(key_file)).read_text(encoding="utf-8")
 
 
 def _require_set(folder: Path, key_file: Path) -> None:
-    from hil.errors import UsageError
-
     if not folder.exists():
         raise UsageError(
             f"{key_file}: expected the set that this key opens in {folder}, which is not there (deleted?). "
@@ -193,8 +190,6 @@ def _require_set(folder: Path, key_file: Path) -> None:
 
 
 def _require_outside(key_file: Path, folder: Path) -> None:
-    from hil.errors import UsageError
-
     if folder.resolve() in key_file.resolve().parents:
         raise UsageError(
             f"{key_file}: expected a file outside {folder}: whoever answers the cases must not see the key."

@@ -10,6 +10,7 @@ import typer
 
 from hil.cli.options import Dbc, TrustLaws, tell
 from hil.cli.printing import say
+from hil.errors import UsageError
 
 app = typer.Typer(add_completion=False)
 
@@ -30,7 +31,6 @@ def simulate(
     """
     from estimator.physics.model import unit
     from hil.config.model_file import read_model_for_recordings
-    from hil.errors import UsageError
     from hil.plants import ModelPlant
     from hil.plants.prepared import known_events, prepare_again
     from hil.provenance import provenance

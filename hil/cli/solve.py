@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from hil.cli.diagnose import Effort
-from hil.cli.options import Jobs, Pace, PaceOption, TakeOver, TrustLaws
+from hil.cli.options import Jobs, Pace, PaceOption, TakeOver, TrustLaws, pacer_for, scheduling
+from hil.cli.printing import new_console, say
 
 app = typer.Typer(add_completion=False)
 
@@ -41,11 +43,7 @@ def solve(
     Begins with the recordings given, else with the rig file's first experiment. After each run the verdict is in DIR:
     diagnosis.json, augmented.toml, report.html. Ctrl-C ends a run at zero torque; the next call resumes.
     """
-    import json
-
     from hil.cli.commission_job import Bar, who_answers
-    from hil.cli.options import pacer_for, scheduling
-    from hil.cli.printing import new_console, say
     from hil.cli.run_job import run_progress
     from hil.commission.order import RigSource
     from hil.commission.runner import Conditions, Runner

@@ -160,8 +160,8 @@ QUESTIONS: Final[tuple[Question, ...]] = (
 BY_NAME: Final[Mapping[str, Question]] = MappingProxyType({question.name: question for question in QUESTIONS})
 
 
-Ask = Callable[[Question, str, str], str]
-"""Asks a person: the question, its default (empty: none), what was wrong with the answer before (empty: nothing)."""
+Ask = Callable[[str, str, str], str]
+"""Asks a person: what for, its default (empty: none), what was wrong with the answer before (empty: nothing)."""
 
 
 def answers(
@@ -192,7 +192,7 @@ def answers(
 def _asked(question: Question, default: str, found: Answers, ask: Ask) -> Value:
     wrong = ""
     while True:
-        text = ask(question, default, wrong).strip() or default
+        text = ask(question.asks, default, wrong).strip() or default
         try:
             return question.read(text, found)
         except NotAnAnswer as fits:

@@ -20,19 +20,16 @@ from logging.handlers import RotatingFileHandler
 from pathlib import Path
 from typing import Final
 
+from platformdirs import user_state_path
+
 from hil.errors import UsageError
 from hil.support.redact import Redaction
 from hil.version import __version__
 
 
 def state_folder() -> Path:
-    """Return the user's folder for logs: $XDG_STATE_HOME/hil, by default ~/.local/state/hil.
-
-    On Windows %LOCALAPPDATA%/hil. It may not be there yet.
-    """
-    if sys.platform == "win32":
-        return Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local") / "hil"
-    return Path(os.environ.get("XDG_STATE_HOME") or Path.home() / ".local" / "state") / "hil"
+    """Return the user's folder for logs, such as ~/.local/state/hil; it may not be there yet."""
+    return user_state_path("hil", appauthor=False)
 
 
 def log_file() -> Path:

@@ -11,7 +11,7 @@ from hil.commission.order import RigSource
 from hil.commission.runner import Conditions, Runner
 from hil.commission.state import Finding, State, StepRecord, load_state
 from hil.commission.step import Job, Step
-from hil.commission.talk import Script, Talk
+from hil.commission.talk import Talk
 from hil.config.rig_file import read_rig
 from hil.rig.pacing import FreePacer, period_ns
 from hil.rig.realtime import NOT_ASKED
@@ -70,7 +70,7 @@ class Bench:
         def show(step: Step, findings: list[Finding]) -> None:
             self.shown += findings
 
-        Commissioning(job, talk or Script(True), Asked(skip, frozenset(repeat)), show).run()
+        Commissioning(job, talk or Talk(None, True), Asked(skip, frozenset(repeat)), show).run()
         return job.state
 
     def finding(self, what: str) -> Finding:
