@@ -34,9 +34,10 @@ class ResonanceSpread:
 def resonance_spread(fit: LinearFit, band_hz: tuple[float, float]) -> ResonanceSpread | None:
     """Return the resonance of a fit and how well it is known; None without one in the band."""
     mode = resonance(fit.model, band_hz)
-    known = next((each for each in uncertain_modes(fit.model, fit.covariance) if each.mode == mode), None)
-    if mode is None or known is None:
+    if mode is None:
         return None
+    every = uncertain_modes(fit.model, fit.covariance)
+    known = next(each for each in every if each.frequency_hz.value == mode.frequency_hz)
     return ResonanceSpread(mode, known.frequency_hz.std / mode.frequency_hz, known.damping.std / abs(mode.damping))
 
 
