@@ -10,7 +10,7 @@ import shlex
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -18,8 +18,6 @@ from typing import Any
 from hil.version import __version__
 
 _LINE: ContextVar[tuple[str, ...]] = ContextVar("_LINE", default=())
-
-CHUNK_BYTES = 1 << 20
 
 
 @contextmanager
@@ -42,11 +40,8 @@ class Source:
     @classmethod
     def of(cls, path: Path) -> Source:
         """Take the checksum of a file."""
-        digest = hashlib.sha256()
         with path.open("rb") as stream:
-            while chunk := stream.read(CHUNK_BYTES):
-                digest.update(chunk)
-        return cls(str(path), digest.hexdigest())
+            return cls(str(path), hashlib.file_digest(stream, "sha256").hexdigest())
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,11 +56,8 @@ class Provenance:
 
     def document(self) -> dict[str, Any]:
         """Return it for JSON."""
-        listed = {
-            key: [{"file": each.file, "sha256": each.sha256} for each in sources]
-            for key, sources in (("models", self.models), ("recordings", self.recordings))
-        }
-        return {"program": f"hil {self.version}", "date": self.date, "command": self.command, **listed}
+        kept = asdict(self)
+        return {"program": f"hil {kept.pop('version')}", **kept}
 
 
 def provenance(models: Sequence[Path] = (), recordings: Sequence[Path] = ()) -> Provenance:

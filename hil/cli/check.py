@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from hil.cli.options import TakeOver
-from hil.cli.printing import say
+from hil.cli.printing import new_console, say
 from hil.errors import InputError, UsageError
 
 if TYPE_CHECKING:
@@ -129,8 +129,6 @@ def _print_eds(reports: tuple[EdsReport, ...]) -> None:
 def _print(name: str, findings: tuple[Finding, ...]) -> None:
     from rich.markup import escape
     from rich.table import Table
-
-    from hil.cli.printing import new_console
 
     table = Table(title=name, title_justify="left")
     for column in ("device", "address", "result", "what", "expected", "found"):

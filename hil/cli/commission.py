@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from hil.cli.options import Pace, PaceOption, TakeOver, TrustLaws
+from hil.cli.printing import new_console
+from hil.errors import UsageError
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -79,7 +81,6 @@ def commission(
     the step that was interrupted. Writes DIR/commissioning.html, DIR/model.toml, DIR/commission.json and DIR/runs/.
     """
     from hil.cli.commission_job import asked_of_steps, job_in, print_plan, who_answers
-    from hil.cli.printing import new_console
     from hil.commission.order import RigSource
     from hil.commission.state import sole_use
     from hil.config.rig_file import read_rig
@@ -102,7 +103,6 @@ def commission(
 def _to_its_report(job: Job, talk: Talk, asked: Asked, console: Console, as_json: bool) -> None:
     """Go through the steps, and report however they end."""
     from hil.cli.commission_job import print_result, write_report
-    from hil.errors import UsageError
 
     try:
         _commission(job, talk, asked, console)

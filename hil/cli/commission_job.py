@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING, Self
 from hil.cli.diagnose import progress_bar
 from hil.cli.options import Pace, pacer_for, scheduling
 from hil.cli.printing import say
-from hil.cli.run_job import RunProgress
+from hil.cli.run_job import run_progress
 from hil.commission.engine import NAMES, STEPS, Asked, plan_document
 from hil.commission.order import RigSource
 from hil.commission.prbs_design import DEFAULT_TRAVEL_M_PER_RAD
 from hil.commission.runner import Conditions, Runner
 from hil.commission.state import State, StepRecord, load_state
 from hil.commission.step import Job
-from hil.commission.talk import Person, Script, Talk, plan_lines, result_document, result_lines
+from hil.commission.talk import Talk, plan_lines, result_document, result_lines
 from hil.config.model_file import read_model
 from hil.errors import UsageError
 from hil.provenance import provenance
@@ -43,7 +43,7 @@ def job_in(
     state = load_state(folder, NAMES) or State(
         folder, rig.name, str(source.path), source.text, {name: StepRecord() for name in NAMES}
     )
-    conditions = Conditions(pace.value, lambda rig: pacer_for(rig, pace), lambda: scheduling(pace), RunProgress)
+    conditions = Conditions(pace.value, lambda rig: pacer_for(rig, pace), lambda: scheduling(pace), run_progress)
     return Job(
         source=source,
         rig=rig,
@@ -75,9 +75,8 @@ def asked_of_steps(skip: Sequence[str], because: Sequence[str], repeat: Sequence
 
 def who_answers(console: Console, yes: bool, keep: str) -> Talk:
     """Choose who is asked: someone at the terminal, where standard input and output are one."""
-    if sys.stdin.isatty() and console.is_terminal:
-        return Person(lambda question: console.input(question, markup=False), yes, keep)
-    return Script(yes, keep)
+    at_a_terminal = sys.stdin.isatty() and console.is_terminal
+    return Talk((lambda question: console.input(question, markup=False)) if at_a_terminal else None, yes, keep)
 
 
 class Bar:

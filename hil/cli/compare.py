@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from hil.cli.options import Dbc, Mapped, TrustFmu, TrustLaws, tell
-from hil.cli.printing import say
+from hil.cli.printing import new_console, say
 
 app = typer.Typer(add_completion=False)
 
@@ -33,7 +33,6 @@ def compare(
     Only initial state and constant load torque are estimated; the model's parameters stay as they are. Recordings are
     prepared as the diagnosis did that wrote the model.
     """
-    from hil.cli.printing import new_console
     from hil.plants.plant import Trust
     from hil.provenance import provenance
     from hil.report.comparison import compared, comparison_text

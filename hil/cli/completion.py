@@ -5,21 +5,17 @@ The commands name here what is offered for their arguments: effects, and the exp
 
 from __future__ import annotations
 
-import importlib
 import re
 from collections.abc import Iterator
 from enum import Enum
 from importlib.resources import files
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 from typer.completion import get_completion_script  # type: ignore[attr-defined]
-from typer.core import TyperCommand, TyperGroup
 
-from hil.cli.command_line import COMMANDS, module_of
 from hil.cli.printing import say
-from hil.support.command_log import Level
 
 app = typer.Typer(add_completion=False)
 
@@ -39,46 +35,6 @@ class Shell(Enum):
 def completion(shell: Annotated[Shell, typer.Argument(metavar="SHELL", help="bash, zsh or fish.")]) -> None:
     """Print the completion script of a shell: commands, options, experiments of a rig file, effects, files."""
     say(get_completion_script(prog_name="hil", complete_var=VARIABLE, shell=shell.value))
-
-
-class Commands(TyperGroup):
-    """All commands with their lines of help; only the one on the line is imported."""
-
-    def list_commands(self, ctx: Any) -> list[str]:
-        """Return their names."""
-        return [name for name in COMMANDS if " " not in name]
-
-    def get_command(self, ctx: Any, cmd_name: str) -> Any:
-        """Return what is shown of a command in a list."""
-        return TyperCommand(cmd_name, help=COMMANDS[cmd_name])
-
-    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
-        """Return the command on the line, with the options that all have."""
-        name, *rest = args
-        if name not in self.list_commands(ctx):
-            return None, None, []
-        if rest and f"{name} {rest[0]}" in COMMANDS:
-            name, rest = f"{name} {rest[0]}", rest[1:]
-        command = typer.main.get_command(importlib.import_module(module_of(name)).app)
-        command.params += [option for option in self.params if option.name in ("quiet", "log_level")]
-        return name, command, rest
-
-
-root = typer.Typer(cls=Commands, add_completion=True)
-
-
-@root.callback()
-def everywhere(
-    quiet: Annotated[bool, typer.Option("--quiet", help="Print errors only.")] = False,
-    log_level: Annotated[Level | None, typer.Option(help="What the log keeps.")] = None,
-    version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
-) -> None:
-    """Stand for ``hil`` where a shell asks."""
-
-
-def complete() -> None:
-    """Answer the shell that asks by `VARIABLE`, and end."""
-    root(prog_name="hil")
 
 
 def effect_names(incomplete: str) -> Iterator[str]:

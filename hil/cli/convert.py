@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -9,6 +10,7 @@ import typer
 
 from hil.cli.options import Dbc
 from hil.cli.printing import say
+from hil.errors import UsageError
 
 if TYPE_CHECKING:
     from hil.recording.table import Table
@@ -42,12 +44,13 @@ def convert(
     OUT is read back and compared with IN, bit for bit, before it gets its name. Units, rig file, settings and the
     checksum of the data go along.
     """
-    import json
-
     from hil.recording import write_table
+    from hil.recording.formats import read_metadata
+    from hil.recording.recordings import self_description
+    from hil.rig.trace import is_trace
 
     _require_room(target, force)
-    if _is_trace(source):
+    if is_trace(source):
         _refuse_for_trace(source, dbc)
         table = _trace(source, rig, every, channel)
     else:
@@ -61,27 +64,17 @@ def convert(
         say(json.dumps(_document(source, target, table, lost)))
         return
     say(f"{target}: {table.n_rows} rows, {len(table.columns)} columns{', not all of it' if lost else ''}")
-    for line in _said(target):
+    for line in self_description(read_metadata(target)):  # what the recording says of itself
         say(f"  {line}")
 
 
 def _require_room(target: Path, force: bool) -> None:
     """Refuse before anything is read; whatever else can be wrong with the name is reported by what writes."""
-    from hil.errors import UsageError
-
     if target.is_file() and not force:
         raise UsageError(f"{target}: expected a new name, got one that exists. Replace it with --force.")
 
 
-def _is_trace(source: Path) -> bool:
-    from hil.rig.trace import is_trace
-
-    return is_trace(source)
-
-
 def _refuse_for_recording(source: Path, rig: Path | None, every: bool, channel: str | None) -> None:
-    from hil.errors import UsageError
-
     if rig is not None or every or channel is not None:
         raise UsageError(
             f"{source}: expected a bus trace with --rig, --all or --channel, got a recording. Leave them out."
@@ -89,8 +82,6 @@ def _refuse_for_recording(source: Path, rig: Path | None, every: bool, channel: 
 
 
 def _refuse_for_trace(source: Path, dbc: Path | None) -> None:
-    from hil.errors import UsageError
-
     if dbc is not None:
         raise UsageError(
             f"{source}: expected --dbc with a recording of a logged bus (MDF), got a bus trace, whose frames the EDS "
@@ -101,7 +92,6 @@ def _refuse_for_trace(source: Path, dbc: Path | None) -> None:
 def _recording(source: Path, encoding: str, delimiter: str, dbc: Path | None) -> Table:
     from pydantic import ValidationError
 
-    from hil.errors import UsageError
     from hil.recording import read_table
     from hil.recording.request import FormatHints, Request
 
@@ -116,7 +106,6 @@ def _recording(source: Path, encoding: str, delimiter: str, dbc: Path | None) ->
 
 def _trace(source: Path, rig: Path | None, every: bool, channel: str | None) -> Table:
     from hil.config.rig_file import read_rig
-    from hil.errors import UsageError
     from hil.recording.writer import table_of
     from hil.rig.metadata import replay_metadata
     from hil.rig.replay import replay
@@ -149,11 +138,3 @@ def _document(source: Path, target: Path, table: Table, lost: list[str]) -> dict
         "remarks": list(table.remarks),
         "lost": lost,
     }
-
-
-def _said(target: Path) -> list[str]:
-    """Say what the recording says of itself."""
-    from hil.recording.formats import read_metadata
-    from hil.recording.recordings import self_description
-
-    return self_description(read_metadata(target))

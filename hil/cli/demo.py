@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from hil.cli.printing import new_console
+
 if TYPE_CHECKING:
     from rich.console import Console
 
@@ -46,7 +48,6 @@ def demo(
 
     Takes about a minute. The verdict is written before the seal is opened, and is judged unchanged.
     """
-    from hil.cli.printing import new_console
     from hil.report.outputs import require_folder
 
     require_folder(out)
@@ -108,7 +109,7 @@ class _Demo:
                 raise ConfigMismatch(f"{finding.device}: {_faults(finding)}. The rig file is {self._rig_path}.")
 
     def _record(self, rig: Rig, name: str) -> Path:
-        from hil.cli.run_job import RunProgress
+        from hil.cli.run_job import run_progress
         from hil.recording import RecordingWriter
         from hil.rig.build import open_devices
         from hil.rig.metadata import run_metadata
@@ -121,8 +122,8 @@ class _Demo:
         recorder = RecordingWriter(self._workshop / f"{name}.csv", run_metadata(self._rig_path, name))
         pacer = FreePacer(period_ns(rig.period_s))
         opened = open_devices(rig, device_patience_s(pacer))
-        with stop_on_signals(stop), recorder, opened as devices, RunProgress(plan) as progress:
-            summary = run_plan(devices, plan, pacer, recorder, stop, progress.show)
+        with stop_on_signals(stop), recorder, opened as devices, run_progress(plan) as progress:
+            summary = run_plan(devices, plan, pacer, recorder, stop, progress)
         self._say(f"    {name}: {summary.recorded} samples, {summary.flagged} flagged")
         return recorder.path
 

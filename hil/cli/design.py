@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from enum import Enum
 from pathlib import Path
 from typing import Annotated
@@ -40,14 +41,12 @@ def design(
     jobs: Jobs = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the design as JSON.")] = False,
 ) -> None:
-    r"""Find the experiment, among those that the rig may drive, that tells most about what is left open.
+    """Find the experiment, among those that the rig may drive, that tells most about what is left open.
 
     Every one is driven on paper by the most probable explanation, through the torque guard and within the rig file's
-    \[design]; how well it tells explanations apart is the distance of what each would let the sensor read, in units of
+    [design]; how well it tells explanations apart is the distance of what each would let the sensor read, in units of
     its noise. Writes TOML, which hil run drives, unless nothing is open or nothing that may be driven would tell.
     """
-    import json
-
     from estimator.design import left_open
     from hil.commission.order import RigSource
     from hil.config.model_file import read_model_for_recordings

@@ -12,7 +12,6 @@ import typer
 from typer.core import TyperCommand
 
 from hil.cli.command_line import is_silent
-from hil.cli.importing import without_collecting
 from hil.cli.options import Dbc, Jobs, Mapped, Signals, TrustFmu, TrustLaws, Tuned, tell
 
 HOLDOUT = "--holdout"
@@ -71,7 +70,7 @@ def diagnose(
             "--budget-s",
             min=0.0,
             metavar="S",
-            help="Time after which it is ended, undecided \\[s]; by default there is no limit.",
+            help="Time after which it is ended, undecided [s]; by default there is no limit.",
         ),
     ] = None,
     effort: Annotated[
@@ -92,22 +91,21 @@ def diagnose(
     answers as it does; where there is none, what acts at its inputs, shafts and output is sought, and no augmented.toml
     written. DIR/augmented.ssp is the FMU with the effects around it, where none is inside.
     """
-    with without_collecting():
-        from rich.console import Console
+    from rich.console import Console
 
-        from estimator.diagnosis.diagnose import diagnose as diagnose_records
-        from hil.errors import UsageError
-        from hil.plants.plant import Trust
-        from hil.plants.questioned import Asked, questioned
-        from hil.plants.scales import with_the_line_to_write
-        from hil.provenance import provenance
-        from hil.report.diagnosis_files import publish_diagnosis
-        from hil.report.diagnosis_html import diagnosis_summary
-        from hil.report.diagnosis_json import diagnosis_text
-        from hil.report.fmu_terms import in_its_terms
-        from hil.report.outputs import require_folder
-        from hil.store import attach_to_runs
-        from hil.store.entry import DIAGNOSIS, MODEL
+    from estimator.diagnosis.diagnose import diagnose as diagnose_records
+    from hil.errors import UsageError
+    from hil.plants.plant import Trust
+    from hil.plants.questioned import Asked, questioned
+    from hil.plants.scales import with_the_line_to_write
+    from hil.provenance import provenance
+    from hil.report.diagnosis_files import publish_diagnosis
+    from hil.report.diagnosis_html import diagnosis_summary
+    from hil.report.diagnosis_json import diagnosis_text
+    from hil.report.fmu_terms import in_its_terms
+    from hil.report.outputs import require_folder
+    from hil.store import attach_to_runs
+    from hil.store.entry import DIAGNOSIS, MODEL
 
     require_folder(out)
     every = [*recordings, *(holdout or ())]

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from hil.cli.completion import effect_names
-from hil.cli.printing import say
+from hil.cli.printing import new_console, say
 
 app = typer.Typer(add_completion=False)
 
@@ -21,7 +21,6 @@ def effects(
     as_json: Annotated[bool, typer.Option("--json", help="Print as JSON.")] = False,
 ) -> None:
     """List the catalogue, or one entry: law, parameters, what excites it, what it is confused with."""
-    from hil.cli.printing import new_console
     from hil.report.catalogue import catalogue_table, effect_details, entries_text, select
 
     entries = select(name)

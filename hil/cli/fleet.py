@@ -41,7 +41,7 @@ Workers = Annotated[
 ]
 Memory = Annotated[str, typer.Option(metavar="SIZE", help="Of each worker on this machine, as in 2GiB.")]
 Retries = Annotated[int, typer.Option(min=0, metavar="N", help="How often Dask tries again what a worker died of.")]
-Limit = Annotated[float, typer.Option("--budget-s", min=1.0, metavar="S", help="Time that one result may take \\[s].")]
+Limit = Annotated[float, typer.Option("--budget-s", min=1.0, metavar="S", help="Time that one result may take [s].")]
 Pattern = Annotated[
     str | None,
     typer.Option(metavar="REGEX", help="Takes vehicle, rig and started from a path: (?P<vehicle>bus_[0-9]+)/."),

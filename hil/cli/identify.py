@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 import typer
 
 from hil.cli.options import Dbc, TrustLaws, tell
-from hil.cli.printing import say
+from hil.cli.printing import new_console, say
+from hil.errors import ModelFileError
 
 if TYPE_CHECKING:
     from estimator.identification.identify import Compared, Study
@@ -93,7 +94,6 @@ def _read(
 ) -> tuple[Sequence[Record], DrivelineModel | None]:
     """Read the recordings, as a model file says where there is one, and that."""
     from hil.config.model_file import read_model_for_recordings
-    from hil.errors import ModelFileError
     from hil.plants.scales import tell_scales
     from hil.recording import read_records
 
@@ -123,7 +123,6 @@ def _identified(records: Sequence[Record], settings: Settings) -> list[Study]:
     """Identify from each and examine it, with a bar on standard error where that is a terminal."""
     from rich.progress import track
 
-    from hil.cli.printing import new_console
     from hil.report.identification_files import identify_all
 
     console = new_console(stderr=True)
@@ -143,7 +142,6 @@ def _publish(
     *,
     as_json: bool,
 ) -> None:
-    from hil.cli.printing import new_console
     from hil.report.identification_files import PAGE, publish_identification
     from hil.report.identification_json import FILE_NAME
     from hil.report.identification_page import compared_summary, summary

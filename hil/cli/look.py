@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import json
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from hil.cli.options import Dbc
-from hil.cli.printing import say
+from hil.cli.options import Dbc, tell
+from hil.cli.printing import new_console, say
+from hil.errors import RecordingError
+from hil.printable import printable
 
 if TYPE_CHECKING:
     from hil.recording.look import Look
@@ -35,8 +39,6 @@ def look(
 
     Of an FMU, its variables and the options --map that name them; nothing of it runs.
     """
-    import json
-
     from hil.plants.fmu_plant import is_fmu
     from hil.printable import printable
     from hil.recording.look import look as look_into
@@ -67,8 +69,6 @@ def look(
 
 def _look_into_fmu(file: Path, as_json: bool) -> None:
     """Print an FMU's variables, and what of them is meant by ``--map`` most probably."""
-    import json
-
     from rich.table import Table
 
     from hil.cli.printing import new_console
@@ -95,7 +95,6 @@ def _look_into_fmu(file: Path, as_json: bool) -> None:
 
 def _plot(found: Look, model: Path | None, dbc: Path | None) -> None:
     """Write the page with the channels into this folder, and open it where a person sits at a terminal."""
-    import sys
     import webbrowser
 
     from hil.config.model_file import read_model_for_recordings, signals_of
@@ -117,7 +116,6 @@ def _plot(found: Look, model: Path | None, dbc: Path | None) -> None:
 
 def _tell_scales(file: Path, model: Path, dbc: Path | None) -> None:
     """Read a recording by a model file and tell which scale does not fit the model, with the line that cures it."""
-    from hil.cli.options import tell
     from hil.config.model_file import read_model_for_recordings
     from hil.plants.scales import tell_scales
     from hil.recording import read_record
@@ -129,9 +127,7 @@ def _tell_scales(file: Path, model: Path, dbc: Path | None) -> None:
 
 def _tell_scales_alone(found: Look, dbc: Path | None) -> None:
     """Read a recording by the lines that were found and tell which scale can't be, with the line that cures it."""
-    from hil.cli.options import tell
     from hil.config.model_file import signals_of
-    from hil.errors import RecordingError
     from hil.plants.scales import tell_scales_alone
     from hil.recording import read_record
 
@@ -155,7 +151,6 @@ def _show(found: Look) -> None:
     """Print a table of the channels for each time."""
     from rich.table import Table
 
-    from hil.cli.printing import new_console
     from hil.recording.look import CHANNEL_HEADINGS, channel_rows
 
     console = new_console()
@@ -173,8 +168,6 @@ def _show(found: Look) -> None:
 def _plain(text: str) -> str:
     """Return a text that steers no terminal, and whose brackets are no markup."""
     from rich.markup import escape
-
-    from hil.printable import printable
 
     return escape(printable(text))
 

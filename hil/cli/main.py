@@ -1,4 +1,4 @@
-"""The command line: one table of commands, each imported only when called, and one map to exit statuses.
+"""The command line: carried out by the group of all commands, and one map to exit statuses.
 
 Whatever takes time to import is imported inside the functions: Ctrl-C during it is an interruption like any
 other, with its exit status and without a traceback.
@@ -7,17 +7,14 @@ other, with its exit status and without a traceback.
 from __future__ import annotations
 
 import contextlib
-import importlib
-import os
 import sys
 from collections.abc import Sequence
 from enum import IntEnum
 
-from hil.cli.command_line import COMMANDS, Call, module_of, overview, silence
+from hil.cli.command_line import COMMANDS, common_options, silence
 from hil.errors import HilError, InputError
 from hil.printable import shown
 from hil.rig.stop import interrupt_on_signals
-from hil.version import __version__
 
 
 class ExitStatus(IntEnum):
@@ -28,13 +25,6 @@ class ExitStatus(IntEnum):
     DEVICE_FAULT = 3
     REFUSED_BY_GUARD = 4
     INTERRUPTED = 130
-
-
-"""Each command's line in ``hil --help``; the command itself is ``app`` in ``hil.cli.<name>``."""
-
-
-HELP_OPTIONS = ["--help", "-h"]
-"""What asks for help, of every command and of those below it."""
 
 
 def exit_status(error: BaseException) -> ExitStatus | None:
@@ -57,37 +47,22 @@ def exit_status(error: BaseException) -> ExitStatus | None:
 def run(line: Sequence[str], keep_log: bool = False) -> int:
     """Run one command line."""
     try:
-        return _run(Call.parse(line, COMMANDS), keep_log)
+        return _run(line, keep_log)
     except (Exception, KeyboardInterrupt) as error:  # noqa: BLE001 - the one place that maps errors to statuses
         return _report(error)
 
 
-def _run(call: Call, keep_log: bool) -> int:
-    if call.command not in COMMANDS:
-        sys.stdout.write(f"hil {__version__}\n" if call.command == "--version" else overview(COMMANDS))
-        return ExitStatus.DONE if call.command else ExitStatus.BAD_INPUT
+def _run(line: Sequence[str], keep_log: bool) -> int:
+    from hil.cli.group import root
+    from hil.cli.options import use_cores_of_environment
     from hil.provenance import under
     from hil.support.command_log import level_of, logged
 
-    level = level_of(call.log_level)
-    with (
-        logged(call.command, call.arguments, level if keep_log else "off"),
-        silence(call.silent),
-        under((call.command, *call.arguments)),
-    ):
-        return _called(call)
-
-
-def _called(call: Call) -> int:
-    """Import the command that is called, it alone, and carry it out."""
-    from hil.cli.options import use_cores_of_environment
-    from hil.cli.printing import flow
-
-    use_cores_of_environment()
-    app = importlib.import_module(module_of(call.command)).app
-    flow(app)
-    name = f"hil {call.command}"
-    result = app(list(call.arguments), prog_name=name, standalone_mode=False, help_option_names=HELP_OPTIONS)
+    own, silent, log_level = common_options(line)
+    level = level_of(log_level) if keep_log and own and own[0] in COMMANDS else "off"
+    with logged(own, level), silence(silent), under(own):
+        use_cores_of_environment()
+        result = root(own, prog_name="hil", standalone_mode=False)
     if result == ExitStatus.INTERRUPTED:  # what typer makes of Ctrl-C
         raise KeyboardInterrupt
     return result if isinstance(result, int) else ExitStatus.DONE
@@ -100,8 +75,9 @@ def _report(error: BaseException) -> int:
         _complain(("interrupted" if isinstance(error, KeyboardInterrupt) else f"error: {error}") + notes)
         return status
     if hasattr(error, "format_message") and hasattr(error, "exit_code"):  # typer's own usage errors
-        if message := error.format_message():  # empty where typer printed the help instead
-            _complain(f"error: {message}{'' if message[-1] in '.?' else '.'}{_see_help(error)}")
+        message = error.format_message()
+        is_help = message.startswith("Usage: ")  # of a group that was called without a command
+        _complain(message if is_help else f"error: {message}{'' if message[-1] in '.?' else '.'}{_see_help(error)}")
         return int(error.exit_code)
     raise error
 
@@ -120,8 +96,4 @@ def _complain(text: str) -> None:
 def main() -> None:
     """Entry point of the console script ``hil``."""
     interrupt_on_signals()
-    if "_HIL_COMPLETE" in os.environ:  # a shell asks what can stand where the cursor is
-        from hil.cli.completion import complete
-
-        complete()
     sys.exit(run(sys.argv[1:], keep_log=True))

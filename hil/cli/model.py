@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING, Annotated, TypeVar
 import typer
 
 from hil.cli.options import Dbc
-from hil.cli.printing import say
+from hil.cli.printing import ask_at_terminal, print_schema, say
+from hil.errors import UsageError
 
 if TYPE_CHECKING:
-    from hil.config.new_model import Ask, Known
+    from hil.config.new_model import Known
 
 USUAL = "two_mass"
 
@@ -56,7 +57,7 @@ def new(
         typer.Option("--run", metavar="NAME", help="Recording of --from; else the most certain one."),
     ] = None,
     recording: Annotated[
-        Path | None, typer.Option("--recording", metavar="REC", help="Look into it, and write its \\[signals].")
+        Path | None, typer.Option("--recording", metavar="REC", help="Look into it, and write its [signals].")
     ] = None,
     dbc: Dbc = None,
     yes: Annotated[bool, typer.Option("--yes", help="Ask nothing: missing values are an error.")] = False,
@@ -67,13 +68,12 @@ def new(
     """
     from estimator.physics.model import DrivelineModel, Motion, Structure
     from hil.config.new_model import TOLERANCE, assignments, model_text, parameters
-    from hil.errors import UsageError
     from hil.files import refuse_existing, write_new
     from hil.recording.look import look
 
     refuse_existing(file)
     may_ask = not yes and sys.stdin.isatty()
-    ask = _asker() if may_ask and not value else None
+    ask = ask_at_terminal("A model file.") if may_ask and not value else None
     if structure is None and ask is not None:
         structure = ask(f"structure: {', '.join(each.value for each in Structure)}", USUAL, "").strip()
     shape = _member(Structure, "--structure", structure or USUAL)
@@ -86,7 +86,7 @@ def new(
     if not (yes or complete or may_ask):
         raise UsageError("expected someone at a terminal to ask, or --yes with every --value, got neither")
     if ask is None and may_ask and not complete:
-        ask = _asker()
+        ask = ask_at_terminal("A model file.")
     found = parameters(shape, kind, values, assignments("--tolerance", own, shape), usual, known, ask)
     built = DrivelineModel(structure=shape, motion=kind, parameters=found)
     write_new(file, model_text(file, built, known, signals, recording))
@@ -95,8 +95,6 @@ def new(
 
 def _member(kind: type[Kind], option: str, text: str) -> Kind:
     """Return the member of that value."""
-    from hil.errors import UsageError
-
     found = next((member for member in kind if member.value == text), None)
     if found is None:
         raise UsageError(f"{option} {text} | expected one of {', '.join(member.value for member in kind)}")
@@ -105,8 +103,6 @@ def _member(kind: type[Kind], option: str, text: str) -> Kind:
 
 def _tolerances(texts: list[str] | tuple[str, ...], usual: float) -> tuple[list[str], float]:
     """Return the tolerances of single parameters, as they were given, and that of all others."""
-    from hil.errors import UsageError
-
     own = [text for text in texts if "=" in text]
     for text in texts:
         if "=" in text:
@@ -134,23 +130,6 @@ def _known(path: Path, run: str | None) -> dict[str, Known]:
     }
 
 
-def _asker() -> Ask:
-    """Ask at the terminal; the first words say how."""
-    from hil.errors import UsageError
-
-    say("A model file. Enter takes what stands in [brackets]; Ctrl-C writes nothing.")
-
-    def ask(what: str, default: str, wrong: str) -> str:
-        if wrong:
-            say(f"  {wrong}")
-        try:
-            return input(f"{what}{f' [{default}]' if default else ''}: ")
-        except EOFError as end:
-            raise UsageError(f"{what}: expected an answer, got the end of the input") from end
-
-    return ask
-
-
 @app.command(epilog="Example: hil model schema --out model.schema.json")
 def schema(
     out: Annotated[
@@ -158,12 +137,6 @@ def schema(
     ] = None,
 ) -> None:
     """Print the JSON schema of model files, for editors that read `#:schema ./model.schema.json`."""
-    from hil.config.schema import schema_text
     from hil.config.table import FileKind
-    from hil.report.outputs import publish
 
-    text = schema_text(FileKind.MODEL)
-    if out is None:
-        say(text, nl=False)
-    else:
-        publish(out.parent, {out.name: lambda path: path.write_text(text, encoding="utf-8")})
+    print_schema(FileKind.MODEL, out)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import sys
 from contextlib import nullcontext, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -29,13 +31,13 @@ def monitor(
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder of the recordings.")] = Path("runs"),
     model: Annotated[
         Path | None,
-        typer.Option(metavar="MODEL", help=r"Two-mass model file for the twist; that of \[simulation] otherwise."),
+        typer.Option(metavar="MODEL", help="Two-mass model file for the twist; that of [simulation] otherwise."),
     ] = None,
     bus: Annotated[str | None, typer.Option(metavar="URL", help="CAN bus in place of the rig file's.")] = None,
     modbus: Annotated[str | None, typer.Option(metavar="HOST:PORT", help="PLC in place of the rig file's.")] = None,
     take_over: TakeOver = False,
     simulate: Annotated[
-        bool, typer.Option("--simulate", help=r"Simulate the rig, with nothing connected; needs \[simulation].")
+        bool, typer.Option("--simulate", help="Simulate the rig, with nothing connected; needs [simulation].")
     ] = False,
     replay: Annotated[
         Path | None,
@@ -152,9 +154,6 @@ def _require_page(page: str) -> None:
 
 def _require_terminal() -> None:
     """Refuse to draw where nobody can see it, or where it has no room."""
-    import os
-    import sys
-
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
         raise UsageError(
             "hil monitor: expected a terminal on standard input and output, got a pipe or a file. Over ssh ask for "

@@ -51,7 +51,7 @@ Mapped = Annotated[
 Signals = Annotated[
     Path | None,
     typer.Option(
-        "--signals", metavar="FILE", help=r"File with the \[signals] to read recordings by, where the model is an FMU."
+        "--signals", metavar="FILE", help="File with the [signals] to read recordings by, where the model is an FMU."
     ),
 ]
 
@@ -70,7 +70,7 @@ TrustFmu = Annotated[bool, typer.Option("--trust-fmu", help="Run the program in 
 TrustLaws = Annotated[
     bool,
     typer.Option(
-        "--trust-laws", help=r"Run the Python code that \[laws] of the model file name; without it they are refused."
+        "--trust-laws", help="Run the Python code that [laws] of the model file name; without it they are refused."
     ),
 ]
 

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from hil.cli.options import TrustLaws
-from hil.cli.printing import say
+from hil.cli.printing import new_console, say
+from hil.errors import UsageError
 
 if TYPE_CHECKING:
     from estimator.identification.settings import Settings
@@ -80,8 +81,6 @@ def paper(
         _publish(out, _recorded(recordings, model, trust_laws, settings), settings, made=made, as_json=as_json)
         return
     if model is not None:
-        from hil.errors import UsageError
-
         raise UsageError("hil paper: expected recordings with --model, got none: the simulated rig has its own model.")
     with tempfile.TemporaryDirectory(prefix="hil-paper-") as workshop:
         driven = _drive(Path(workshop), seed, duration)
@@ -103,7 +102,6 @@ def _recorded(recordings: list[Path], model: Path | None, trust_laws: bool, sett
 
 
 def _drive(workshop: Path, seed: int, duration_s: float) -> list[Driven]:
-    from hil.errors import UsageError
     from hil.figures.road import drive_all
     from hil.rig.stop import StopRequest, stop_on_signals
 
@@ -120,7 +118,6 @@ def _bar(count: int, duration_s: float) -> Iterator[Callable[[int], Progress]]:
     from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
     from rich.progress import Progress as Bar
 
-    from hil.cli.printing import new_console
     from hil.rig.experiments.base import Phase
 
     console = new_console(stderr=True)
@@ -150,7 +147,6 @@ def _publish(
     made: Provenance | None = None,
     as_json: bool,
 ) -> None:
-    from hil.cli.printing import new_console
     from hil.figures.local_model import row_of
     from hil.report.outputs import publish
     from hil.report.paper_page import paper_page, paper_text

@@ -1,24 +1,21 @@
-"""The one way of the commands to print: whatever is foreign in a text, its control characters are shown, not done.
-
-And help texts that flow: a paragraph of a docstring is one paragraph on the terminal, whatever its width. Typer joins
-the lines of the first paragraph only and prints the others as they are broken in the source, which on 80 columns leaves
-single words on lines of their own.
-"""
+"""The one way of the commands to print: whatever is foreign in a text, its control characters are shown, not done."""
 
 from __future__ import annotations
 
-import inspect
-import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import typer
 
+from hil.errors import UsageError
 from hil.printable import shown
 
 if TYPE_CHECKING:
     from rich.console import Console
+
+    from hil.config.table import FileKind
 
 
 def say(text: object = "", err: bool = False, nl: bool = True) -> None:
@@ -69,19 +66,28 @@ class _Filtered:
             yield segment if segment.control else Segment(shown(segment.text), segment.style)
 
 
-def flow(app: typer.Typer) -> None:
-    """Let the help of every command of an application, and of its groups, flow."""
-    infos: list[Any] = [*app.registered_commands, app.registered_callback]
-    for info in infos:
-        if info is not None and info.callback is not None:
-            text = info.help if isinstance(info.help, str) else info.callback.__doc__
-            info.help = flowing(text or "")
-    for group in app.registered_groups:
-        if group.typer_instance:
-            flow(group.typer_instance)
+def ask_at_terminal(heading: str) -> Callable[[str, str, str], str]:
+    """Return what asks: what for, the default (empty: none), what was wrong with the answer before (empty: nothing)."""
+    say(f"{heading} Enter takes what stands in [brackets]; Ctrl-C writes nothing.")
+
+    def ask(what: str, default: str, wrong: str) -> str:
+        if wrong:
+            say(f"  {wrong}")
+        try:
+            return input(f"{what}{f' [{default}]' if default else ''}: ")
+        except EOFError as end:
+            raise UsageError(f"{what}: expected an answer, got the end of the input") from end
+
+    return ask
 
 
-def flowing(text: str) -> str:
-    """Join the lines of each paragraph; a paragraph with an indented line, such as a list, stays as it is."""
-    paragraphs = re.split(r"\n\s*\n", inspect.cleandoc(text))
-    return "\n\n".join(part if "\n " in part else part.replace("\n", " ") for part in paragraphs)
+def print_schema(kind: FileKind, out: Path | None) -> None:
+    """Print the JSON schema of a kind of file, or write it."""
+    from hil.config.schema import schema_text
+    from hil.report.outputs import publish
+
+    text = schema_text(kind)
+    if out is None:
+        say(text, nl=False)
+    else:
+        publish(out.parent, {out.name: lambda path: path.write_text(text, encoding="utf-8")})

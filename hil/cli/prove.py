@@ -13,6 +13,7 @@ import typer
 
 from hil.cli.options import Scheduler, require_dask
 from hil.cli.printing import progress_bar, say
+from hil.errors import UsageError
 
 SEEDS = 2**31
 RIG_SEED = 11
@@ -188,16 +189,12 @@ def _pool(scheduler: str | None) -> Iterator[Executor | None]:
 
 
 def _key_text(key: str | None, key_file: Path | None) -> str:
-    from hil.errors import UsageError
-
     if (key is None) == (key_file is None):
         raise UsageError("expected the key once, with --key or --key-file. hil prove make has printed or written it.")
     return key if key is not None else Path(str(key_file)).read_text(encoding="utf-8")
 
 
 def _require_set(folder: Path, key_file: Path) -> None:
-    from hil.errors import UsageError
-
     if not folder.exists():
         raise UsageError(
             f"{key_file}: expected the set that this key opens in {folder}, which is not there (deleted?). "
@@ -206,8 +203,6 @@ def _require_set(folder: Path, key_file: Path) -> None:
 
 
 def _require_outside(key_file: Path, folder: Path) -> None:
-    from hil.errors import UsageError
-
     if folder.resolve() in key_file.resolve().parents:
         raise UsageError(
             f"{key_file}: expected a file outside {folder}: whoever answers the cases must not see the key."

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from hil.cli.options import FilterOf, FilterRun, TrustLaws, with_filter
-from hil.cli.printing import say
+from hil.cli.printing import new_console, say
 from hil.errors import UsageError
 
 if TYPE_CHECKING:
@@ -153,8 +153,6 @@ def _play_trace(
 
 def _show(pace: Pace) -> OnCourse:
     """Return what shows the estimate as it goes: on a terminal, where the eye can follow."""
-    from hil.cli.printing import new_console
-
     console = new_console(stderr=True)
     if pace.speed is None or not console.is_terminal:
         return lambda course, time_s: None

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
-from hil.cli.printing import say
-
-if TYPE_CHECKING:
-    from hil.config.new_rig import Ask, Question
+from hil.cli.printing import ask_at_terminal, print_schema, say
+from hil.errors import UsageError
 
 app = typer.Typer(add_completion=False, no_args_is_help=True)
 
@@ -30,6 +28,7 @@ def rig() -> None:
     "0x3E7 --product-code 0x402 --rated-torque-nm 600 --torque-limit-nm 100 --inertia-kg-m2 100 --speed-rad-s 60"
 )
 def new(
+    context: typer.Context,
     file: Annotated[Path, typer.Argument(metavar="FILE", help="The rig file; a new one.")] = Path("rig.toml"),
     simulated: Annotated[
         bool, typer.Option("--simulated", help="For the simulated rig of hil sim: every answer has a default.")
@@ -64,32 +63,18 @@ def new(
     With --eds identity, mode, and from a DCF node id and bit rate, are the data sheet's; what it does not say and the
     drive needs is written with its reason. On a vehicle such a line is a comment until somebody fills it in.
     """
-    from hil.config.new_rig import answers, new_drive, rig_text
+    from hil.config.new_rig import QUESTIONS, answers, new_drive, rig_text
     from hil.config.schema import schema_text
     from hil.config.table import FileKind
-    from hil.errors import UsageError
     from hil.files import refuse_existing, write_new
 
     refuse_existing(file)
-    given = {
-        "name": name,
-        "can": can,
-        "period_s": period_s,
-        "plc": plc,
-        "node_m1": node_m1,
-        "node_m2": node_m2,
-        "vendor_id": vendor_id,
-        "product_code": product_code,
-        "mode": mode,
-        "rated_torque_nm": rated_torque_nm,
-        "torque_limit_nm": torque_limit_nm,
-        "inertia_kg_m2": inertia_kg_m2,
-        "speed_rad_s": speed_rad_s,
-    }
+    given: dict[str, str | None] = {question.name: context.params[question.name] for question in QUESTIONS}
     if not yes and not sys.stdin.isatty():
         raise UsageError("expected someone at a terminal to ask, or --yes, got neither. See: hil rig new --help")
     drive = None if eds is None else new_drive(eds, file, simulated)
-    ask = None if yes else _asker(simulated)
+    kind = "the simulated rig of hil sim" if simulated else "a vehicle; for the simulated rig: --simulated"
+    ask = None if yes else ask_at_terminal(f"A rig file for {kind}.")
     given_texts = {key: text for key, text in given.items() if text is not None}
     found = answers(given_texts, simulated, ask, None if drive is None else drive.defaults)
     write_new(file, rig_text(found, file, simulated, () if drive is None else drive.lines))
@@ -107,30 +92,6 @@ def schema(
     ] = None,
 ) -> None:
     """Print the JSON schema of rig files, for editors that read `#:schema ./rig.schema.json`."""
-    from hil.config.schema import schema_text
     from hil.config.table import FileKind
-    from hil.report.outputs import publish
 
-    text = schema_text(FileKind.RIG)
-    if out is None:
-        say(text, nl=False)
-    else:
-        publish(out.parent, {out.name: lambda path: path.write_text(text, encoding="utf-8")})
-
-
-def _asker(simulated: bool) -> Ask:
-    """Ask at the terminal; the first words say how."""
-    kind = "the simulated rig of hil sim" if simulated else "a vehicle; for the simulated rig: --simulated"
-    say(f"A rig file for {kind}. Enter takes what stands in [brackets]; Ctrl-C writes nothing.")
-
-    def ask(question: Question, default: str, wrong: str) -> str:
-        from hil.errors import UsageError
-
-        if wrong:
-            say(f"  {wrong}")
-        try:
-            return input(f"{question.asks}{f' [{default}]' if default else ''}: ")
-        except EOFError as end:
-            raise UsageError(f"{question.asks}: expected an answer, got the end of the input") from end
-
-    return ask
+    print_schema(FileKind.RIG, out)

@@ -7,8 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from types import TracebackType
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any
 
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
@@ -20,6 +19,7 @@ from hil.errors import HilError, UsageError
 from hil.recording.writer import RecordingWriter
 from hil.report.outputs import publish
 from hil.rig.build import open_devices
+from hil.rig.drive import Progress as ShowCycle
 from hil.rig.drive import RunSummary
 from hil.rig.experiments.base import Phase
 from hil.rig.live_course import course_path, statement
@@ -34,7 +34,6 @@ from hil.store import register_run
 from hil.store.entry import COMPLETE, ONLINE, statements
 
 if TYPE_CHECKING:
-    from estimator.identification.chain import OnlineEstimate
     from hil.rig.damper import Damping
     from hil.rig.live import LiveEstimate
 
@@ -110,13 +109,13 @@ def record(job: Job, grants: RealTimeGrants) -> RunSummary:
             _described_at_the_end(recorder, timing),
             open_devices(job.rig, device_patience_s(job.pacer)) as devices,
             _traced(devices.link, job.trace) as trace,
-            RunProgress(plan) as progress,
+            run_progress(plan, job.live) as show_cycle,
         ):
 
             def show(phase: Phase, time_s: float) -> None:
                 if trace is not None:
                     trace.raise_if_failed()
-                progress.show(phase, time_s, None if job.live is None else job.live.latest)
+                show_cycle(phase, time_s)
 
             return run_plan(devices, plan, job.pacer, recorder, stop, show, timing, observers)
     except BaseException as error:
@@ -236,38 +235,28 @@ SHOW_EVERY_S = 0.1
 """Time between two changes of the bar [s of the run]; the cycle has better things to do."""
 
 
-class RunProgress:
-    """The bar of one run, from `__enter__` to `__exit__`."""
+@contextmanager
+def run_progress(plan: Plan, live: LiveEstimate | None = None) -> Iterator[ShowCycle]:
+    """Show a bar of one run on standard error, where that is a terminal, with the estimate where there is one."""
+    console = new_console(stderr=True)
+    columns = (
+        TextColumn("{task.description}", markup=False),
+        BarColumn(),
+        TextColumn("{task.completed:.1f} of {task.total:.1f} s"),
+        TimeElapsedColumn(),
+        TextColumn("{task.fields[estimate]}", markup=False),
+    )
+    last: tuple[Phase, float] | None = None
+    with Progress(*columns, console=console, disable=not console.is_terminal) as bar:
+        task = bar.add_task(plan.name, total=plan.experiment.duration_s, estimate="")
 
-    def __init__(self, plan: Plan) -> None:
-        console = new_console(stderr=True)
-        self._bar = Progress(
-            TextColumn("{task.description}", markup=False),
-            BarColumn(),
-            TextColumn("{task.completed:.1f} of {task.total:.1f} s"),
-            TimeElapsedColumn(),
-            TextColumn("{task.fields[estimate]}", markup=False),
-            console=console,
-            disable=not console.is_terminal,
-        )
-        self._task = self._bar.add_task(plan.name, total=plan.experiment.duration_s, estimate="")
-        self._name = plan.name
-        self._shown: tuple[Phase, float] | None = None
+        def show(phase: Phase, time_s: float) -> None:
+            nonlocal last
+            if last is not None and last[0] is phase and time_s - last[1] < SHOW_EVERY_S:
+                return
+            last = (phase, time_s)
+            measured_s = time_s if phase is Phase.MEASURE else None
+            said = "" if live is None or live.latest is None else statement(live.latest)
+            bar.update(task, description=f"{plan.name}: {phase.value}", completed=measured_s, estimate=said)
 
-    def __enter__(self) -> Self:
-        self._bar.start()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._bar.stop()
-
-    def show(self, phase: Phase, time_s: float, estimate: OnlineEstimate | None = None) -> None:
-        """Take note of one cycle: its phase, the time since the phase began [s], and the estimate, if there is one."""
-        if self._shown is not None and self._shown[0] is phase and time_s - self._shown[1] < SHOW_EVERY_S:
-            return
-        self._shown = (phase, time_s)
-        measured_s = time_s if phase is Phase.MEASURE else None
-        shown = "" if estimate is None else statement(estimate)
-        self._bar.update(self._task, description=f"{self._name}: {phase.value}", completed=measured_s, estimate=shown)
+        yield show

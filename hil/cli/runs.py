@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from hil.cli.printing import new_console, say
-from hil.errors import UsageError
+from hil.errors import StoreError, UsageError
 from hil.printable import shown
 
 if TYPE_CHECKING:
@@ -90,8 +90,6 @@ def listed(
 
 def _require_date(option: str, date: str) -> None:
     from datetime import datetime
-
-    from hil.errors import UsageError
 
     if not date:
         return
@@ -290,7 +288,6 @@ def export(
 
 def rebuild(store: Folder = HERE, as_json: AsJson = False) -> None:
     """Update the list from the folder: enter recordings, find moved ones."""
-    from hil.errors import StoreError
     from hil.store import store_of
     from hil.store.rebuild import rebuild as rebuilt
 

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.markup import escape
 
 from hil.cli.completion import effect_names
 from hil.cli.options import TrustLaws
@@ -30,7 +29,7 @@ app = typer.Typer(add_completion=False)
     " --effect backlash:gap_rad=0.02 --fault plc.clutch_closes@5.0"
 )
 def sim(
-    rig: Annotated[Path, typer.Argument(metavar="RIG", help=r"Rig file with a table \[simulation].")],
+    rig: Annotated[Path, typer.Argument(metavar="RIG", help="Rig file with a table [simulation].")],
     bus: Annotated[
         str | None,
         typer.Option(
@@ -53,7 +52,7 @@ def sim(
         list[str] | None,
         typer.Option(
             metavar="SPEC",
-            help=f"Let a device fail, where given after S seconds of simulated time: {escape(known_faults())}. "
+            help=f"Let a device fail, where given after S seconds of simulated time: {known_faults()}. "
             "May be repeated.",
         ),
     ] = None,

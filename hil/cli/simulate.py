@@ -10,6 +10,7 @@ import typer
 
 from hil.cli.options import Dbc, Mapped, Signals, TrustFmu, TrustLaws, tell
 from hil.cli.printing import say
+from hil.errors import UsageError
 
 app = typer.Typer(add_completion=False)
 
@@ -32,7 +33,6 @@ def simulate(
     such effects, also phases of angles, moments of events and the profile of the road.
     """
     from estimator.physics.model import unit
-    from hil.errors import UsageError
     from hil.plants.plant import Trust
     from hil.plants.questioned import Asked, simulated_by
     from hil.provenance import provenance

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from hil.cli.diagnose import Effort
-from hil.cli.options import Jobs, Pace, PaceOption, TakeOver, TrustLaws
+from hil.cli.options import Jobs, Pace, PaceOption, TakeOver, TrustLaws, pacer_for, scheduling
+from hil.cli.printing import new_console, say
 
 app = typer.Typer(add_completion=False)
 
@@ -24,7 +26,7 @@ def solve(
     ] = None,
     vehicle_s: Annotated[
         float,
-        typer.Option("--vehicle-s", min=0.0, metavar="S", help="Time the vehicle may be needed for in all \\[s]."),
+        typer.Option("--vehicle-s", min=0.0, metavar="S", help="Time the vehicle may be needed for in all [s]."),
     ] = 600.0,
     yes: Annotated[bool, typer.Option("--yes", help="Command torque without asking; for scripts.")] = False,
     effort: Annotated[Effort, typer.Option("--effort", help="Work each search may cost.")] = Effort.NORMAL,
@@ -41,12 +43,8 @@ def solve(
     Begins with the recordings given, else with the rig file's first experiment. After each run the verdict is in DIR:
     diagnosis.json, augmented.toml, report.html. Ctrl-C ends a run at zero torque; the next call resumes.
     """
-    import json
-
     from hil.cli.commission_job import Bar, who_answers
-    from hil.cli.options import pacer_for, scheduling
-    from hil.cli.printing import new_console, say
-    from hil.cli.run_job import RunProgress
+    from hil.cli.run_job import run_progress
     from hil.commission.order import RigSource
     from hil.commission.runner import Conditions, Runner
     from hil.commission.state import sole_use
@@ -64,7 +62,7 @@ def solve(
     if given:
         require_of_rig(given, read_records(given, file.signals, file.on_bench), source.rig())
     console = new_console(stderr=as_json, highlight=False)
-    conditions = Conditions(pace.value, lambda of: pacer_for(of, pace), lambda: scheduling(pace), RunProgress)
+    conditions = Conditions(pace.value, lambda of: pacer_for(of, pace), lambda: scheduling(pace), run_progress)
     conditions.pacer(source.rig())  # refuses a pace this rig must not be driven at, before anything
     out.mkdir(parents=True, exist_ok=True)
     with sole_use(out), Bar() as bar:

@@ -130,7 +130,6 @@ class DelaySelection:
 
     extra_samples: int
     fit: LinearFit
-    rms_by_delay: tuple[float, ...]
 
 
 def select_delay(record: Record) -> DelaySelection:
@@ -140,4 +139,4 @@ def select_delay(record: Record) -> DelaySelection:
 
     fits = [fit_output_error(data, Orders(nk=nk)) for nk in range(NATURAL_DELAY, LONGEST + 1)]
     best = min(range(len(fits)), key=lambda i: fits[i].rms)
-    return DelaySelection(best, fits[best], tuple(fit.rms for fit in fits))
+    return DelaySelection(best, fits[best])

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -70,8 +70,7 @@ TRUSTED = 0.2
 """Tolerance that the parameters of a model from here are given: temperature, load and tyres move them by as much."""
 
 
-@dataclass(frozen=True, slots=True)
-class Measured:
+class Measured(NamedTuple):
     """A value and half the width of its 95 % interval; infinite where the data don't tell."""
 
     value: float
@@ -171,11 +170,14 @@ def _gain(reading: FloatArray, reference: FloatArray) -> float:
     return _slope(reading[lag:], reference[:n])
 
 
-def reading_lag(reading: FloatArray, reference: FloatArray, most: int = 5) -> int:
+LONGEST_LAG = 5
+
+
+def reading_lag(reading: FloatArray, reference: FloatArray) -> int:
     """Return by how many samples a reading follows its reference: where their covariance is largest in size."""
-    n = reading.shape[0] - most
+    n = reading.shape[0] - LONGEST_LAG
     centred = reference[:n] - np.mean(reference[:n])
-    return int(np.argmax([abs(float(centred @ reading[lag : lag + n])) for lag in range(most + 1)]))
+    return int(np.argmax([abs(float(centred @ reading[lag : lag + n])) for lag in range(LONGEST_LAG + 1)]))
 
 
 HIGH_PASS_HZ = 0.3

@@ -7,11 +7,9 @@ from collections.abc import Callable, Hashable
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 
-from drivers.torque_guard import Evidence, TorqueGuard
 from estimator.physics.model import DrivelineModel, Parameter, Structure
 from estimator.physics.simulate import Stepper
 from estimator.signals.record import FloatArray
@@ -22,11 +20,12 @@ from hil.errors import RunAborted, StoreError
 from hil.recording.checksum import RIG_CHECKSUM, RIG_TEXT, text_sha256
 from hil.recording.writer import RecordingWriter
 from hil.rig.build import open_devices
-from hil.rig.dry_run import Range
+from hil.rig.drive import Progress
+from hil.rig.dry_run import Ranges, on_paper
 from hil.rig.experiments.base import BaseTorque, Experiment, Phase
 from hil.rig.experiments.staged import LowPass
 from hil.rig.metadata import run_metadata
-from hil.rig.pacing import FreePacer, Pacer, device_patience_s, disk_patience_s, period_ns
+from hil.rig.pacing import Pacer, device_patience_s, disk_patience_s
 from hil.rig.plan import Plan, plan_run
 from hil.rig.realtime import RealTimeGrants
 from hil.rig.session import run_plan
@@ -39,15 +38,11 @@ NO_DRAG = 1e-3
 """Viscous friction of a vehicle of which only the inertia is known, over that inertia [1/s]: next to none."""
 
 
-@dataclass(frozen=True, slots=True)
-class Prediction:
+@dataclass(slots=True, kw_only=True)
+class Prediction(Ranges):
     """What to expect of a run."""
 
     seconds: float  # Length of the whole run
-    torque_m1_nm: Range  # Range of each inverter's torque, PRBS included
-    torque_m2_nm: Range  # Range of each inverter's torque, PRBS included
-    speed_rad_s: Range  # Range of the speed over the whole run and over its recorded part
-    speed_measured_rad_s: Range  # Range of the speed over the whole run and over its recorded part
     last_rad_s: float  # Speed at the end
     each_nm: FloatArray  # Torque of each inverter in the recorded part, shape (N, 2)
     course_rad_s: FloatArray  # Speed in the recorded part, shape (N,)
@@ -57,15 +52,6 @@ class Prediction:
         """Total torque of the recorded part, shape (N,)."""
         total: FloatArray = self.each_nm.sum(axis=1)
         return total
-
-    def as_json(self) -> dict[str, list[float]]:
-        """Return the ranges for the state file."""
-        return {
-            "torque_m1_nm": [self.torque_m1_nm.low, self.torque_m1_nm.high],
-            "torque_m2_nm": [self.torque_m2_nm.low, self.torque_m2_nm.high],
-            "speed_rad_s": [self.speed_rad_s.low, self.speed_rad_s.high],
-            "speed_measured_rad_s": [self.speed_measured_rad_s.low, self.speed_measured_rad_s.high],
-        }
 
 
 def rigid_model(rig: Rig) -> DrivelineModel:
@@ -78,35 +64,27 @@ def rigid_model(rig: Rig) -> DrivelineModel:
 
 def predict(rig: Rig, name: str, model: DrivelineModel, speed_rad_s: float = 0.0) -> Prediction:
     """Predict a run of one experiment of a rig file, from standstill or rolling at a speed [rad/s]."""
-    plan = plan_run(rig, name)
     vehicle = Stepper(model, rig.period_s, speed_rad_s=speed_rad_s)
-    guard = TorqueGuard(rig.guard_limits)
-    guard.enable()
-    pacer = FreePacer(period_ns(rig.period_s))
-    guard.check(plan.split.request(0.0, 0.0), pacer.next().due_ns, Evidence(0, 0, vehicle.speed_rad_s))
-    m1, m2, speed, measured = Range(), Range(), Range(), Range()
+    ranges, cycles = Ranges(), 0
     torque: list[tuple[float, float]] = []
     course: list[float] = []
-    cycles, phase = 0, Phase.APPROACH
-    while phase is not Phase.DONE:
-        tick = pacer.next()
-        base = plan.experiment.torque(cycles * rig.period_s, vehicle.speed_rad_s)
-        phase, cycles = base.phase, cycles + 1
-        request = plan.split.request(base.torque_nm, plan.prbs_nm(phase))
-        guard.check(request, tick.due_ns, Evidence(0, 0, vehicle.speed_rad_s))
-        if plan.plc_prbs is not None:  # not the host's to send, but there all the same
-            request = plan.split.request(base.torque_nm, plan.expected_plc_prbs_nm(phase))
-        m1.see(request.total_m1_nm)
-        m2.see(request.total_m2_nm)
-        speed.see(vehicle.speed_rad_s)
+    for phase, request, now_rad_s in on_paper(rig, name, vehicle):
+        each_nm = request.total_m1_nm, request.total_m2_nm
+        ranges.see(phase, *each_nm, now_rad_s)
+        cycles += 1
         if phase is Phase.MEASURE:
-            measured.see(vehicle.speed_rad_s)
-            torque.append((request.total_m1_nm, request.total_m2_nm))
-            course.append(vehicle.speed_rad_s)
-        vehicle.step(request.total_m1_nm, request.total_m2_nm)
-    seconds = cycles * rig.period_s
-    last_rad_s = vehicle.speed_rad_s
-    return Prediction(seconds, m1, m2, speed, measured, last_rad_s, np.array(torque).reshape(-1, 2), np.array(course))
+            torque.append(each_nm)
+            course.append(now_rad_s)
+    return Prediction(
+        ranges.torque_m1_nm,
+        ranges.torque_m2_nm,
+        ranges.speed_rad_s,
+        ranges.speed_measured_rad_s,
+        seconds=cycles * rig.period_s,
+        last_rad_s=vehicle.speed_rad_s,
+        each_nm=np.array(torque).reshape(-1, 2),
+        course_rad_s=np.array(course),
+    )
 
 
 FILTER_S = 0.2
@@ -160,14 +138,6 @@ RUNS = "runs"
 """Folder of the recordings, and of the store of runs, inside that of the commissioning."""
 
 
-class Shows(Protocol):
-    """Shows how a run continues."""
-
-    def show(self, phase: Phase, time_s: float) -> None:
-        """Take note of one cycle: its phase and the time since the phase began [s]."""
-        ...
-
-
 @dataclass(frozen=True, slots=True)
 class Conditions:
     """What a run is driven under: pacing, real-time scheduling, progress."""
@@ -175,41 +145,25 @@ class Conditions:
     pace: str  # Its name, for the recording
     pacer: Callable[[Rig], Pacer]  # Makes a fresh pacer
     scheduling: Callable[[], AbstractContextManager[RealTimeGrants]]
-    progress: Callable[[Plan], AbstractContextManager[Shows]]  # Shows a run for the time of a block
+    progress: Callable[[Plan], AbstractContextManager[Progress]]  # Shows a run for the time of a block
 
 
 @dataclass(slots=True)
-class _Seen:
-    """Ranges of what was measured over a whole run."""
+class _Seen(Ranges):
+    """What was measured over a whole run."""
 
-    torque_m1_nm: Range = field(default_factory=Range)
-    torque_m2_nm: Range = field(default_factory=Range)
-    speed_rad_s: Range = field(default_factory=Range)
-    speed_measured_rad_s: Range = field(default_factory=Range)
     last_rad_s: float = 0.0
     cycles: int = 0
     recorded: int = 0
     flagged: int = 0
 
     def take(self, sample: Sample, phase: Phase) -> None:
+        self.see(phase, sample.torque_m1_nm, sample.torque_m2_nm, sample.speed_rad_s)
         self.cycles += 1
         self.last_rad_s = sample.speed_rad_s
-        self.torque_m1_nm.see(sample.torque_m1_nm)
-        self.torque_m2_nm.see(sample.torque_m2_nm)
-        self.speed_rad_s.see(sample.speed_rad_s)
         if phase is Phase.MEASURE:
-            self.speed_measured_rad_s.see(sample.speed_rad_s)
             self.recorded += 1
             self.flagged += bool(sample.flags)
-
-    def as_json(self) -> dict[str, list[float]]:
-        ranges = {
-            "torque_m1_nm": self.torque_m1_nm,
-            "torque_m2_nm": self.torque_m2_nm,
-            "speed_rad_s": self.speed_rad_s,
-            "speed_measured_rad_s": self.speed_measured_rad_s,
-        }
-        return {name: [seen.low, seen.high] for name, seen in ranges.items() if seen.low <= seen.high}
 
 
 @dataclass(frozen=True, slots=True)
@@ -290,7 +244,7 @@ class Runner:
         ):
             recorder.describe("real_time", json.dumps(grants.as_json()))
             try:
-                run_plan(devices, plan, pacer, recorder, stop, progress.show, timing, (seen.take,))
+                run_plan(devices, plan, pacer, recorder, stop, progress, timing, (seen.take,))
             finally:
                 recorder.describe("timing", json.dumps(timing.as_json()))
 

@@ -8,7 +8,7 @@ import os
 import sys
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from enum import Enum
 from pathlib import Path
@@ -19,7 +19,7 @@ from pydantic import Field, TypeAdapter, ValidationError
 from estimator.physics.model import DrivelineModel
 from hil.commission.evidence import EVIDENCE, Both, ModelEvidence, Utc
 from hil.errors import UsageError
-from hil.files import is_inside, read_json
+from hil.files import is_inside, read_json, write_whole
 from hil.version import __version__
 
 
@@ -147,24 +147,6 @@ class Note:
     steps: str
 
 
-@dataclass(frozen=True, slots=True)
-class _Document:
-    """The state file."""
-
-    schema: Literal["hil.commission/1"]
-    rig_name: str
-    rig_path: str
-    rig_text: str
-    started_utc: Annotated[Utc, Field(min_length=1)]
-    notes: list[Note]
-    steps: dict[str, StepRecord]
-    made: dict[str, Any] | None = None
-
-
-_DOCUMENT: Final = TypeAdapter(_Document)
-_STEP: Final = TypeAdapter(StepRecord)
-
-
 @dataclass(slots=True)
 class State:
     """A commissioning as far as it is."""
@@ -174,55 +156,32 @@ class State:
     rig_path: str  # The rig file as of the last call
     rig_text: str  # The rig file as of the last call
     steps: dict[str, StepRecord]  # Record of every step, by name, in order
-    started_utc: str = field(default_factory=now_utc)
+    started_utc: Annotated[Utc, Field(min_length=1)] = field(default_factory=now_utc)
     notes: list[Note] = field(default_factory=list)
     made: dict[str, Any] | None = None  # What the report was made from (``hil.provenance``); None before there is one
+    schema: Literal["hil.commission/1"] = SCHEMA
 
     @property
     def path(self) -> Path:
         return self.folder / FILE_NAME
 
     def document(self) -> dict[str, Any]:
-        return {
-            "schema": SCHEMA,
-            "hil_version": __version__,
-            "rig_name": self.rig_name,
-            "rig_path": self.rig_path,
-            "rig_text": self.rig_text,
-            "started_utc": self.started_utc,
-            "updated_utc": now_utc(),
-            "notes": [asdict(note) for note in self.notes],
-            "made": self.made,
-            "steps": {name: _STEP.dump_python(record, mode="json") for name, record in self.steps.items()},
-        }
+        kept: dict[str, Any] = _STATE.dump_python(self, mode="json", exclude={"folder"})
+        return {**kept, "hil_version": __version__, "updated_utc": now_utc()}
 
     def save(self) -> None:
         """Write the file, whole or not at all."""
         text = json.dumps(self.document(), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
-        part = self.path.with_name(f".{FILE_NAME}.{os.getpid()}.part")
         try:
-            with part.open("w", encoding="utf-8") as file:
-                file.write(text)
-                file.flush()
-                os.fsync(file.fileno())
-            part.replace(self.path)
+            write_whole(self.path, text)
         except OSError as error:
             raise UsageError(
                 f"{self.path}: expected room for the state, got: {error.strerror or error}. The one before it is "
                 "kept; make room and call again."
             ) from error
-        finally:
-            part.unlink(missing_ok=True)
 
-    @property
-    def outside(self) -> int:
-        """How many findings are outside their limits."""
-        return sum(finding.within is False for record in self.steps.values() for finding in record.findings)
 
-    @property
-    def is_complete(self) -> bool:
-        """Whether every step is done, or was skipped for a reason."""
-        return all(record.status.is_settled for record in self.steps.values())
+_STATE: Final = TypeAdapter(State)
 
 
 def load_state(folder: Path, names: Iterable[str]) -> State | None:
@@ -231,24 +190,16 @@ def load_state(folder: Path, names: Iterable[str]) -> State | None:
     if not path.exists():
         return None
     try:
-        document = _DOCUMENT.validate_python(read_json(path))
-        steps = {name: _checked(folder, name, document.steps.get(name, StepRecord())) for name in names}
+        content = read_json(path)
+        state = _STATE.validate_python({**content, "folder": folder} if isinstance(content, dict) else content)
+        state.steps = {name: _checked(folder, name, state.steps.get(name, StepRecord())) for name in names}
     except ValueError as error:
         raise UsageError(
             f"{path}: expected the state of a commissioning ({SCHEMA}), got a file that can't be read as one: "
             f"{_first(error)}. Move it away to begin anew in this folder (its recordings stay), or choose another by "
             "--out."
         ) from error
-    return State(
-        folder,
-        document.rig_name,
-        document.rig_path,
-        document.rig_text,
-        steps,
-        document.started_utc,
-        document.notes,
-        document.made,
-    )
+    return state
 
 
 def _checked(folder: Path, name: str, record: StepRecord) -> StepRecord:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Protocol
+from typing import Any
 
 from rich.table import Table
 from rich.text import Text
@@ -36,70 +36,27 @@ class Answer:
 GO = Answer(What.GO)
 
 
-class Talk(Protocol):
-    """Asks, and is answered."""
-
-    def may_command(self, step: str, first: bool) -> Answer:
-        """Ask whether a step may command the torque that was just announced; ``first`` is the first of this call."""
-        ...
-
-    def after(self, step: str, outside: int, blocked: bool) -> Answer:
-        """Ask how to continue after a step with findings outside their limits."""
-        ...
-
-    def confirm(self, question: str) -> Answer:
-        """Ask whether something read is right: `GO`, or `QUIT`."""
-        ...
-
-    def keep_results(self, changes: Sequence[str]) -> Answer:
-        """Ask whether results from before the rig file was changed are kept (`GO`, with the reason) or repeated."""
-        ...
-
-
-@dataclass(frozen=True, slots=True)
-class Script:
-    """Nobody to ask."""
-
-    yes: bool  # Whether torque may be commanded
-    keep: str = ""  # Why results from before a change of the rig file are kept; empty to repeat those steps
-
-    def may_command(self, step: str, first: bool) -> Answer:
-        if not self.yes:
-            raise UsageError(
-                f"step {step} commands torque: expected someone at a terminal to ask, or --yes, got neither. What was "
-                "done up to here is kept; read the plan by --dry-run, then call again with --yes."
-            )
-        return GO
-
-    def after(self, step: str, outside: int, blocked: bool) -> Answer:
-        """Continue; what blocks ends the commissioning all the same."""
-        return GO
-
-    def confirm(self, question: str) -> Answer:
-        """Take it for right: it was printed, and what can't be right is refused without asking."""
-        return GO
-
-    def keep_results(self, changes: Sequence[str]) -> Answer:
-        """Keep them where a reason was given."""
-        return Answer(What.GO, self.keep) if self.keep else Answer(What.REPEAT)
-
-
 Ask = Callable[[str], str]
 """Shows a question and returns the line that was typed."""
 
 
-@dataclass(slots=True)
-class Person:
-    """Someone at a terminal."""
+@dataclass(frozen=True, slots=True)
+class Talk:
+    """Asks a person at a terminal; a script has nobody to ask, and what the command line says counts."""
 
-    ask: Ask  # Shows a question and returns the answer
+    ask: Ask | None  # None in a script
     yes: bool = False  # Whether torque was agreed to on the command line
-    keep: str = ""  # As in `Script`
+    keep: str = ""  # Why results from before a change of the rig file are kept
 
     def may_command(self, step: str, first: bool) -> Answer:
-        """Ask before every step with torque, with more words before the first."""
+        """Ask whether a step may command the torque that was announced; ``first``, with more words, of this call."""
         if self.yes:
             return GO
+        if self.ask is None:
+            raise UsageError(
+                f"step {step} commands torque: expected someone at a terminal to ask, or --yes, got neither. What was "
+                "done up to here is kept; read the plan by --dry-run, then call again with --yes."
+            )
         if first:
             question = (
                 "  From here on the drives are armed. Is the vehicle where it may move, someone at the emergency stop, "
@@ -107,43 +64,51 @@ class Person:
             )
         else:
             question = "  Command this torque? [y]es, [s]kip, [q]uit: "
-        return self._answer(question, {"y": What.GO, "yes": What.GO, "s": What.SKIP, "q": What.QUIT})
+        return _answer(self.ask, question, {"y": What.GO, "yes": What.GO, "s": What.SKIP, "q": What.QUIT})
 
     def after(self, step: str, outside: int, blocked: bool) -> Answer:
-        """Ask where something is outside its limits."""
-        if not outside or (self.yes and not blocked):
+        """Ask how to continue after findings outside their limits; in a script, what blocks ends it all the same."""
+        if self.ask is None or not outside or (self.yes and not blocked):
             return GO
         if blocked:
             question = "  This has to be fixed first. [r]epeat, [s]kip with a reason, [q]uit: "
-            return self._answer(question, {"r": What.REPEAT, "s": What.SKIP, "q": What.QUIT, "": What.QUIT})
+            words = {"r": What.REPEAT, "s": What.SKIP, "q": What.QUIT, "": What.QUIT}
+            return _answer(self.ask, question, words)
         question = "  Go [o]n, [r]epeat, [q]uit: "
-        return self._answer(question, {"o": What.GO, "": What.GO, "r": What.REPEAT, "q": What.QUIT})
+        return _answer(self.ask, question, {"o": What.GO, "": What.GO, "r": What.REPEAT, "q": What.QUIT})
 
     def confirm(self, question: str) -> Answer:
-        """Ask, also where torque was agreed to on the command line: nobody has seen the value before."""
-        return self._answer(
-            f"  {question} [y]es, [n]o: ", {"y": What.GO, "yes": What.GO, "n": What.QUIT, "no": What.QUIT}
-        )
+        """Ask whether something read is right, also where torque was agreed to: nobody has seen the value before.
+
+        A script takes it for right: it was printed, and what can't be right is refused without asking.
+        """
+        if self.ask is None:
+            return GO
+        words = {"y": What.GO, "yes": What.GO, "n": What.QUIT, "no": What.QUIT}
+        return _answer(self.ask, f"  {question} [y]es, [n]o: ", words)
 
     def keep_results(self, changes: Sequence[str]) -> Answer:
-        """Ask, unless a reason to keep them was given."""
+        """Ask whether results from before the rig file was changed are kept (`GO`, with the reason) or repeated."""
         if self.keep:
             return Answer(What.GO, self.keep)
+        if self.ask is None:
+            return Answer(What.REPEAT)
         question = "  [r]epeat the steps done before, [k]eep their results with a reason, [q]uit: "
-        answer = self._answer(question, {"r": What.REPEAT, "": What.REPEAT, "k": What.SKIP, "q": What.QUIT})
+        answer = _answer(self.ask, question, {"r": What.REPEAT, "": What.REPEAT, "k": What.SKIP, "q": What.QUIT})
         return Answer(What.GO, answer.because) if answer.what is What.SKIP else answer
 
-    def _answer(self, question: str, words: dict[str, What]) -> Answer:
-        """Ask until one of the words comes; `SKIP` asks for a reason until there is one."""
-        expected = " or ".join(word for word in words if word)
-        while (word := self.ask(question).strip().lower()) not in words:
-            question = f"  expected {expected}, got {word or 'nothing'}\n{question.splitlines()[-1]}"
-        if words[word] is not What.SKIP:
-            return Answer(words[word])
-        question = "  Because: "
-        while not (reason := self.ask(question).strip()):
-            question = "  A reason is needed, it is recorded. Because: "
-        return Answer(What.SKIP, reason)
+
+def _answer(ask: Ask, question: str, words: dict[str, What]) -> Answer:
+    """Ask until one of the words comes; `SKIP` asks for a reason until there is one."""
+    expected = " or ".join(word for word in words if word)
+    while (word := ask(question).strip().lower()) not in words:
+        question = f"  expected {expected}, got {word or 'nothing'}\n{question.splitlines()[-1]}"
+    if words[word] is not What.SKIP:
+        return Answer(words[word])
+    question = "  Because: "
+    while not (reason := ask(question).strip()):
+        question = "  A reason is needed, it is recorded. Because: "
+    return Answer(What.SKIP, reason)
 
 
 RESULT_SCHEMA = "hil.commission_result/1"

@@ -73,11 +73,14 @@ class ExperimentTable(Table):
     multisine: MultisineTable | None = None
 
     @model_validator(mode="after")
-    def _one_excitation(self) -> Self:
-        refuse(self._excitation_faults())
+    def _consistent(self) -> Self:
+        refuse(self._faults())
         return self
 
-    def _excitation_faults(self) -> Iterator[Fault]:
+    def _faults(self) -> Iterator[Fault]:
+        for key in ("swing_nm", "step_nm"):
+            if (part_nm := getattr(self, key, 0.0)) > self.torque_nm:
+                yield Fault(key, f"at most torque_nm of the same table ({self.torque_nm:g})", part_nm)
         if self.multisine is not None and not self.prbs:
             yield Fault("multisine", "no such table while prbs is false", {})
         for key in ("prbs_amplitude_nm", "prbs_clock_divider"):
@@ -99,11 +102,6 @@ class ReversalTable(ExperimentTable):
     turning_speed_rad_s: Positive
     swing_nm: Positive
 
-    @model_validator(mode="after")
-    def _swing_within_torque(self) -> Self:
-        refuse(_part_above_torque("swing_nm", self.swing_nm, self.torque_nm))
-        return self
-
 
 class TipTable(ExperimentTable):
     """Step the torque by ``step_nm`` up and down about what holds ``speed_rad_s``, ``step_s`` each."""
@@ -112,11 +110,6 @@ class TipTable(ExperimentTable):
     speed_rad_s: NotNegative
     step_nm: Positive
     step_s: Positive
-
-    @model_validator(mode="after")
-    def _step_within_torque(self) -> Self:
-        refuse(_part_above_torque("step_nm", self.step_nm, self.torque_nm))
-        return self
 
 
 class PulsesTable(ExperimentTable):
@@ -137,11 +130,6 @@ class PulsesTable(ExperimentTable):
         known = isinstance(keys, Mapping) and "step_nm" in keys
         return {"torque_nm": keys["step_nm"], **keys} if known else keys
 
-    @model_validator(mode="after")
-    def _step_within_torque(self) -> Self:
-        refuse(_part_above_torque("step_nm", self.step_nm, self.torque_nm))
-        return self
-
 
 class CoastTable(ExperimentTable):
     """Let go of the torque at ``speed_rad_s``: what slows the vehicle is its own. No PRBS."""
@@ -158,11 +146,6 @@ class RampTable(ExperimentTable):
     swing_nm: Positive
     ramp_s: Positive
 
-    @model_validator(mode="after")
-    def _swing_within_torque(self) -> Self:
-        refuse(_part_above_torque("swing_nm", self.swing_nm, self.torque_nm))
-        return self
-
 
 class RestTable(ExperimentTable):
     """Zero torque at standstill, armed: what the readings show of themselves. No torque, no slew, no PRBS."""
@@ -177,11 +160,6 @@ DrivenTable = CruiseTable | ReversalTable | TipTable | CoastTable | RampTable
 """Kinds that a speed control leads up to."""
 
 AnyExperiment = Annotated[DrivenTable | PulsesTable | RestTable, Field(discriminator="kind")]
-
-
-def _part_above_torque(key: str, value_nm: float, torque_nm: float) -> Iterator[Fault]:
-    if value_nm > torque_nm:
-        yield Fault(key, f"at most torque_nm of the same table ({torque_nm:g})", value_nm)
 
 
 class PrbsTarget(Enum):

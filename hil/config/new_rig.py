@@ -8,7 +8,6 @@ leave it room under every limit, also where one inverter gives 65 % of it. Rates
 
 from __future__ import annotations
 
-import math
 import os
 import re
 import tomllib
@@ -18,7 +17,9 @@ from importlib.resources import files
 from pathlib import Path
 from string import Template
 from types import MappingProxyType
-from typing import Final
+from typing import Annotated, Any, Final, Literal
+
+from pydantic import AfterValidator, BeforeValidator, Field, TypeAdapter, ValidationError
 
 from drivers.capability.plan import DrivePlan
 from drivers.capability.table import Function
@@ -28,6 +29,7 @@ from drivers.eds_check import EdsReport, check_eds
 from drivers.eds_check.needs import RigLine, usual_mode
 from drivers.inverter.cia402 import TorqueMode
 from hil.config.rig_file import Rig
+from hil.config.table import Text
 from hil.errors import InputError, RigFileError, UsageError
 from hil.problems import validate
 
@@ -43,12 +45,58 @@ class NotAnAnswer(Exception):
 
 
 @dataclass(frozen=True, slots=True)
+class Kind:
+    """What an answer has to be: its type, as pydantic reads it from text, and the same in words."""
+
+    type: Any
+    fits: str
+
+    def read(self, text: str) -> Value:
+        try:
+            value: Value = TypeAdapter(self.type).validate_python(text)
+        except ValidationError as error:
+            raise NotAnAnswer(self.fits) from error
+        return value
+
+
+def _whole(low: int, high: int) -> Kind:
+    any_base = BeforeValidator(lambda text: int(text, 0))
+    fits = f"a whole number from {low} to {high}; 0x makes it hexadecimal"
+    return Kind(Annotated[int, any_base, Field(ge=low, le=high)], fits)
+
+
+def _positive(unit: str) -> Kind:
+    return Kind(Annotated[float, Field(gt=0.0, le=1e9)], f"a number above 0 [{unit}]")
+
+
+def _with_port(text: str) -> str:
+    host, colon, port = text.rpartition(":")
+    if not (host and colon and port.isdecimal() and 1 <= int(port) <= 65535):
+        raise ValueError(text)
+    return text
+
+
+TEXT: Final = Kind(Text, "a text that is not empty")
+URL: Final = Kind(
+    Annotated[str, Field(pattern=r"^[^\W\d]\w*:.")],
+    "INTERFACE:CHANNEL, such as socketcan:can0, pcan:PCAN_USBBUS1 or ws://127.0.0.1:54701/",
+)
+HOST_PORT: Final = Kind(
+    Annotated[str, AfterValidator(_with_port)], "HOST:PORT with a port from 1 to 65535, such as 192.168.0.10:502"
+)
+PERIOD: Final = Kind(Annotated[float, Field(ge=0.001, le=1.0)], "a period from 0.001 to 1 s")
+NODE: Final = _whole(1, 127)
+UNSIGNED32: Final = _whole(0, 0xFFFF_FFFF)
+MODE: Final = Kind(Literal[MODES], " or ".join(MODES))
+
+
+@dataclass(frozen=True, slots=True)
 class Question:
     """One question."""
 
     name: str  # key among the answers, and the option's name
     asks: str  # what is asked, unit included
-    read: Callable[[str, Answers], Value]  # turns text into the value, given the answers before it
+    kind: Kind
     simulated: str  # answer for the simulated rig of ``hil sim``
     vehicle: str = ""  # default on a vehicle
 
@@ -61,97 +109,28 @@ class Question:
         """Return the answer that stands if none is given."""
         return self.simulated if simulated else self.vehicle
 
-
-def _text(text: str, _: Answers) -> str:
-    if not text:
-        raise NotAnAnswer("a text that is not empty")
-    return text
-
-
-def _url(text: str, _: Answers) -> str:
-    scheme, colon, rest = text.partition(":")
-    if not (scheme.isidentifier() and colon and rest):
-        raise NotAnAnswer("INTERFACE:CHANNEL, such as socketcan:can0, pcan:PCAN_USBBUS1 or ws://127.0.0.1:54701/")
-    return text
-
-
-def _host_port(text: str, _: Answers) -> str:
-    host, colon, port = text.rpartition(":")
-    if not (host and colon and port.isdecimal() and 1 <= int(port) <= 65535):
-        raise NotAnAnswer("HOST:PORT with a port from 1 to 65535, such as 192.168.0.10:502")
-    return text
-
-
-def _whole(low: int, high: int) -> Callable[[str, Answers], int]:
-    def read(text: str, _: Answers) -> int:
-        try:
-            value = int(text, 0)
-        except ValueError:
-            value = low - 1
-        if not low <= value <= high:
-            raise NotAnAnswer(f"a whole number from {low} to {high}; 0x makes it hexadecimal")
+    def read(self, text: str, before: Answers) -> Value:
+        """Return the value, given the answers before it."""
+        value, rated_nm = self.kind.read(text), before.get("rated_torque_nm")
+        if self.name == "node_m2" and value == before.get("node_m1"):
+            raise NotAnAnswer(f"another node than m1 ({value})")
+        if self.name == "torque_limit_nm" and isinstance(rated_nm, float) and float(value) > rated_nm:
+            raise NotAnAnswer(f"at most the rated torque ({rated_nm:g} Nm)")
         return value
-
-    return read
-
-
-def _node_m2(text: str, before: Answers) -> int:
-    value = _whole(1, 127)(text, before)
-    if value == before.get("node_m1"):
-        raise NotAnAnswer(f"another node than m1 ({value})")
-    return value
-
-
-def _number(low: float, high: float, expected: str) -> Callable[[str, Answers], float]:
-    def read(text: str, _: Answers) -> float:
-        try:
-            value = float(text)
-        except ValueError:
-            value = math.nan
-        if not (low < value <= high and math.isfinite(value)):
-            raise NotAnAnswer(expected)
-        return value
-
-    return read
-
-
-def _positive(unit: str) -> Callable[[str, Answers], float]:
-    return _number(0.0, 1e9, f"a number above 0 [{unit}]")
-
-
-def _torque_limit(text: str, before: Answers) -> float:
-    value = _positive("Nm")(text, before)
-    rated = before.get("rated_torque_nm")
-    if isinstance(rated, float) and value > rated:
-        raise NotAnAnswer(f"at most the rated torque ({rated:g} Nm)")
-    return value
-
-
-def _mode(text: str, _: Answers) -> str:
-    if text not in MODES:
-        raise NotAnAnswer(" or ".join(MODES))
-    return text
-
-
-def _period(text: str, _: Answers) -> float:
-    value = _number(0.0, 1.0, "a period from 0.001 to 1 s")(text, {})
-    if value < 0.001:
-        raise NotAnAnswer("a period from 0.001 to 1 s")
-    return value
 
 
 QUESTIONS: Final[tuple[Question, ...]] = (
-    Question("name", "Name of the rig, for people", _text, "simulated bus", "vehicle"),
-    Question("can", "CAN bus, INTERFACE:CHANNEL", _url, "ws://127.0.0.1:54701/", "socketcan:can0"),
-    Question("period_s", "SYNC period [s]", _period, "0.01", "0.01"),
-    Question("plc", "PLC, HOST:PORT", _host_port, "127.0.0.1:5020"),
-    Question("node_m1", "CANopen node of inverter m1, 1 to 127", _whole(1, 127), "1", "1"),
-    Question("node_m2", "CANopen node of inverter m2, 1 to 127", _node_m2, "2", "2"),
-    Question("vendor_id", "Vendor ID of both inverters, object 0x1018:1", _whole(0, 0xFFFF_FFFF), "0x3E7"),
-    Question("product_code", "Product code of both inverters, object 0x1018:2", _whole(0, 0xFFFF_FFFF), "0x402"),
-    Question("mode", f"Mode of operation: {' or '.join(MODES)}", _mode, USUAL_MODE, USUAL_MODE),
+    Question("name", "Name of the rig, for people", TEXT, "simulated bus", "vehicle"),
+    Question("can", "CAN bus, INTERFACE:CHANNEL", URL, "ws://127.0.0.1:54701/", "socketcan:can0"),
+    Question("period_s", "SYNC period [s]", PERIOD, "0.01", "0.01"),
+    Question("plc", "PLC, HOST:PORT", HOST_PORT, "127.0.0.1:5020"),
+    Question("node_m1", "CANopen node of inverter m1, 1 to 127", NODE, "1", "1"),
+    Question("node_m2", "CANopen node of inverter m2, 1 to 127", NODE, "2", "2"),
+    Question("vendor_id", "Vendor ID of both inverters, object 0x1018:1", UNSIGNED32, "0x3E7"),
+    Question("product_code", "Product code of both inverters, object 0x1018:2", UNSIGNED32, "0x402"),
+    Question("mode", f"Mode of operation: {' or '.join(MODES)}", MODE, USUAL_MODE, USUAL_MODE),
     Question("rated_torque_nm", "Rated torque of one inverter, object 0x6076 [Nm]", _positive("Nm"), "600.0"),
-    Question("torque_limit_nm", "Most torque one inverter may ever give here [Nm]", _torque_limit, "400.0"),
+    Question("torque_limit_nm", "Most torque one inverter may ever give here [Nm]", _positive("Nm"), "400.0"),
     Question("inertia_kg_m2", "Vehicle and driveline at the motor shaft [kg m^2]", _positive("kg m^2"), "100.0"),
     Question("speed_rad_s", "Motor speed of the cruise [rad/s]", _positive("rad/s"), "60.0"),
 )
@@ -160,8 +139,8 @@ QUESTIONS: Final[tuple[Question, ...]] = (
 BY_NAME: Final[Mapping[str, Question]] = MappingProxyType({question.name: question for question in QUESTIONS})
 
 
-Ask = Callable[[Question, str, str], str]
-"""Asks a person: the question, its default (empty: none), what was wrong with the answer before (empty: nothing)."""
+Ask = Callable[[str, str, str], str]
+"""Asks a person: what for, its default (empty: none), what was wrong with the answer before (empty: nothing)."""
 
 
 def answers(
@@ -192,7 +171,7 @@ def answers(
 def _asked(question: Question, default: str, found: Answers, ask: Ask) -> Value:
     wrong = ""
     while True:
-        text = ask(question, default, wrong).strip() or default
+        text = ask(question.asks, default, wrong).strip() or default
         try:
             return question.read(text, found)
         except NotAnAnswer as fits:

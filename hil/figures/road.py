@@ -24,7 +24,7 @@ from hil.recording import read_record
 from hil.recording.writer import RecordingWriter
 from hil.rig.build import open_devices
 from hil.rig.drive import Progress
-from hil.rig.experiments.cruise import Cruise
+from hil.rig.experiments.laws import Cruise
 from hil.rig.experiments.registry import experiment_table
 from hil.rig.experiments.staged import Approach, LowPass, StagedExperiment, TorqueBounds
 from hil.rig.pacing import FreePacer, device_patience_s, period_ns

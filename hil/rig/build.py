@@ -45,24 +45,8 @@ class Devices:
 def open_devices(rig: Rig, patience_s: float = 0.0) -> Iterator[Devices]:
     """Open bus and PLC of a rig; both are closed at the end of the block. No device is changed.
 
-    Parameters
-    ----------
-    patience_s
-        Least time that the drives, when they are configured, wait for the host's heartbeat, and the host for the PLC
-        [s]; see `hil.rig.pacing.device_patience_s`.
-
-    Raises
-    ------
-    UsageError
-        If the bus may hold real drives, and nobody has filled in who accepts what they lack.
-    BusDown
-        If the CAN bus or the PLC's address is not there.
-    ForeignController
-        If another host is on the bus, or a drive may carry torque already.
-    ConfigMismatch
-        If an EDS or the register map can't be used, or the PLC is another one.
-    DeviceTimeout
-        If the PLC does not answer.
+    ``patience_s`` is the least time that the drives, when they are configured, wait for the host's heartbeat, and the
+    host for the PLC [s]; see `hil.rig.pacing.device_patience_s`.
     """
     _require_acceptances(rig)
     with CanLink.open(rig.can.url) as link, PlcLoop() as loop:

@@ -10,12 +10,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from drivers.canopen.can_link import CanLink
 from drivers.inverter.inverter import Inverter, InverterFeedback
 from drivers.inverter.supervision import CycleRecord, DriveRecord, Supervision, SupervisionLimits
-from drivers.torque_guard import Evidence, TorqueGuard, TorqueRequest
+from drivers.torque_guard import Evidence, TorqueRequest
 from hil.errors import RunAborted
-from hil.rig.channels import Channels
+from hil.rig.build import Devices
 from hil.rig.pacing import NS_PER_S, Tick
 from hil.rig.timing import RunTiming
 from hil.sample import Sample, SampleFlag
@@ -54,25 +53,15 @@ class Cycle:
     __slots__ = ("_answer_timeout_ns", "_channels", "_guard", "_link", "_m1", "_m2", "_supervision", "timing")
 
     def __init__(
-        self,
-        link: CanLink,
-        m1: Inverter,
-        m2: Inverter,
-        guard: TorqueGuard,
-        period_ns: int,
-        answer_timeout_s: float,
-        timing: RunTiming | None = None,
-        channels: Channels | None = None,
-        inertia_kg_m2: float | None = None,
+        self, devices: Devices, period_ns: int, answer_timeout_s: float, timing: RunTiming | None = None
     ) -> None:
-        self._link = link
+        m1, m2 = devices.m1, devices.m2
+        self._link, self._guard, self._channels = devices.link, devices.guard, devices.channels
         self._m1 = _Station(m1, SampleFlag.M1_STALE, SampleFlag.M1_LIMITED)
         self._m2 = _Station(m2, SampleFlag.M2_STALE, SampleFlag.M2_LIMITED)
-        self._guard = guard
         self.timing = timing or RunTiming(period_ns)
         self._answer_timeout_ns = round(answer_timeout_s * NS_PER_S)
-        self._channels = channels
-        limits = SupervisionLimits(guard.limits, m1.count_rad_s, m2.count_rad_s, inertia_kg_m2)
+        limits = SupervisionLimits(self._guard.limits, m1.count_rad_s, m2.count_rad_s, devices.inertia_kg_m2)
         self._supervision = Supervision(limits, m1.settings, m2.settings)
 
     @property
@@ -112,10 +101,23 @@ class Cycle:
             DriveRecord(command_m2.base_nm + command_m2.prbs_nm, m2, *self._m2.inverter.messages()),
         )
         flags |= self._m1.take(m1) | self._m2.take(m2) | _DOUBTS[self._supervision.take(record)]
-        channels = self._read_channels(sync_ns, waited_ns)
+        channels = self._channels.read(sync_ns, (self._answer_timeout_ns - waited_ns) / NS_PER_S)  # what is left of it
         if any(map(math.isnan, channels)):
             flags |= SampleFlag.CHANNEL_LOST
-        return self._sample(tick, request, time_s, sync_ns, flags, channels)
+        return Sample(
+            cycle=tick.cycle,
+            t_ns=sync_ns,
+            time_s=time_s,
+            torque_ref_m1_nm=request.total_m1_nm,
+            torque_ref_m2_nm=request.total_m2_nm,
+            prbs_nm=request.prbs_m1_nm + request.prbs_m2_nm,
+            torque_m1_nm=self._m1.torque_nm,
+            torque_m2_nm=self._m2.torque_nm,
+            speed_rad_s=self.speed_rad_s,
+            age_ns=max(self._supervision.ages_ns(tick.now_ns)),
+            flags=flags,
+            channels=channels,
+        )
 
     def raise_if_ended(self) -> None:
         """End the run where its last cycle has, once the sample is kept; the guard is then disabled."""
@@ -131,12 +133,6 @@ class Cycle:
         age_m1_ns, m1 = self._await_answer(self._m1, sync_ns, 0)
         age_m2_ns, m2 = self._await_answer(self._m2, sync_ns, age_m1_ns)
         return max(age_m1_ns, age_m2_ns), m1, m2
-
-    def _read_channels(self, sync_ns: int, waited_ns: int) -> tuple[float, ...]:
-        """Read the further channels in the time that the inverters have left."""
-        if self._channels is None:
-            return ()
-        return self._channels.read(sync_ns, (self._answer_timeout_ns - waited_ns) / NS_PER_S)
 
     def _await_answer(self, station: _Station, sync_ns: int, waited_ns: int) -> tuple[int, InverterFeedback | None]:
         """Wait for one; give how long after the SYNC the waiting ended [ns], and the answer if it came in time."""
@@ -184,27 +180,3 @@ class Cycle:
                 f"cycle {tick.cycle} began {tick.late_ns / NS_PER_S:.3f} s late, expected at most {timeout_s:g} s "
                 "(feedback_timeout_s). This machine was too busy, or the program was suspended: close other programs."
             )
-
-    def _sample(
-        self,
-        tick: Tick,
-        request: TorqueRequest,
-        time_s: float,
-        sync_ns: int,
-        flags: SampleFlag,
-        channels: tuple[float, ...],
-    ) -> Sample:
-        return Sample(
-            cycle=tick.cycle,
-            t_ns=sync_ns,
-            time_s=time_s,
-            torque_ref_m1_nm=request.total_m1_nm,
-            torque_ref_m2_nm=request.total_m2_nm,
-            prbs_nm=request.prbs_m1_nm + request.prbs_m2_nm,
-            torque_m1_nm=self._m1.torque_nm,
-            torque_m2_nm=self._m2.torque_nm,
-            speed_rad_s=self.speed_rad_s,
-            age_ns=max(self._supervision.ages_ns(tick.now_ns)),
-            flags=flags,
-            channels=channels,
-        )

@@ -52,24 +52,11 @@ class Tick:
 class Pacer(Protocol):
     """Says when each cycle begins."""
 
-    @property
-    def period_ns(self) -> int:
-        """Time between two cycles [ns]."""
-        ...
+    period_ns: int  # between two cycles
+    answer_timeout_s: float  # how long a device may take to answer a SYNC, by the wall clock
+    poll_patience_s: float  # how long a cycle may wait for an answer that is not part of it, such as the PLC's
 
-    @property
-    def answer_timeout_s(self) -> float:
-        """How long a device may take to answer a SYNC [s of the wall clock]."""
-        ...
-
-    @property
-    def poll_patience_s(self) -> float:
-        """How long a cycle may wait for an answer that is not part of it, such as the PLC's [s]."""
-        ...
-
-    def next(self) -> Tick:
-        """Return when the next cycle is due."""
-        ...
+    def next(self) -> Tick: ...  # when the next cycle is due
 
 
 DISK_PATIENCE_S = 60.0
@@ -94,27 +81,12 @@ def device_patience_s(pacer: Pacer) -> float:
 class RealTimePacer:
     """An absolute schedule on the monotonic clock: a late cycle does not delay those after it."""
 
-    __slots__ = ("_due_ns", "_next_cycle", "_period_ns")
-
     def __init__(self, period_ns: int) -> None:
-        self._period_ns = period_ns
+        self.period_ns = period_ns
+        self.answer_timeout_s = answer_timeout_ns(period_ns) / NS_PER_S
+        self.poll_patience_s = 0.0  # the torque cycle waits for nothing
         self._next_cycle = 0
         self._due_ns: int | None = None
-
-    @property
-    def period_ns(self) -> int:
-        """Time between two cycles [ns]."""
-        return self._period_ns
-
-    @property
-    def answer_timeout_s(self) -> float:
-        """Four fifths of a period [s]; see `answer_timeout_ns`."""
-        return answer_timeout_ns(self._period_ns) / NS_PER_S
-
-    @property
-    def poll_patience_s(self) -> float:
-        """No time at all [s]: the torque cycle waits for nothing."""
-        return 0.0
 
     def next(self) -> Tick:
         """Sleep until the next cycle is due."""
@@ -125,8 +97,8 @@ class RealTimePacer:
             now_ns = time.monotonic_ns()
         late_ns = now_ns - due_ns
         tick = Tick(self._next_cycle, due_ns, late_ns)
-        used_up = periods_used_up(late_ns, self._period_ns)
-        self._due_ns = due_ns + used_up * self._period_ns
+        used_up = periods_used_up(late_ns, self.period_ns)
+        self._due_ns = due_ns + used_up * self.period_ns
         self._next_cycle += used_up
         return tick
 
@@ -134,29 +106,11 @@ class RealTimePacer:
 class FreePacer:
     """No waiting: simulated time, one period per cycle, however long the answers take."""
 
-    __slots__ = ("_answer_timeout_s", "_cycle", "_period_ns")
-
     def __init__(self, period_ns: int, answer_timeout_s: float = FREE_PATIENCE_S) -> None:
-        self._period_ns = period_ns
-        self._answer_timeout_s = answer_timeout_s
+        self.period_ns = period_ns
+        self.answer_timeout_s = self.poll_patience_s = answer_timeout_s
         self._cycle = -1
 
-    @property
-    def period_ns(self) -> int:
-        """Time between two cycles [ns]."""
-        return self._period_ns
-
-    @property
-    def answer_timeout_s(self) -> float:
-        """Patience with a device [s of the wall clock]."""
-        return self._answer_timeout_s
-
-    @property
-    def poll_patience_s(self) -> float:
-        """Patience with the PLC [s of the wall clock]."""
-        return self._answer_timeout_s
-
     def next(self) -> Tick:
-        """Return the next cycle at once."""
         self._cycle += 1
-        return Tick(self._cycle, self._cycle * self._period_ns, 0)
+        return Tick(self._cycle, self._cycle * self.period_ns, 0)

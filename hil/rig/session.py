@@ -48,18 +48,7 @@ def run_plan(
         _configure(devices, stop)
         prbs = PlcPrbs(devices.plc_loop, devices.plc, plan.plc_prbs, pacer.poll_patience_s)
         with prbs, ArmedDrives(devices, stop):
-            period_ns, patience_s = pacer.period_ns, pacer.answer_timeout_s
-            cycle = Cycle(
-                devices.link,
-                devices.m1,
-                devices.m2,
-                devices.guard,
-                period_ns,
-                patience_s,
-                timing,
-                devices.channels,
-                devices.inertia_kg_m2,
-            )
+            cycle = Cycle(devices, pacer.period_ns, pacer.answer_timeout_s, timing)
             watch = PlcWatch(devices.plc_loop, devices.plc, before, plan.needs, pacer.poll_patience_s)
             drive = Drive(plan, cycle, watch, prbs, pacer, recorder, stop, progress, observers)
             beat.hand_over()

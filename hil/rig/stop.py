@@ -19,23 +19,16 @@ STOP_SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SI
 class StopRequest:
     """Whether someone asked for the run to end."""
 
-    __slots__ = ("_requested",)
-
     def __init__(self) -> None:
-        self._requested = False
-
-    @property
-    def requested(self) -> bool:
-        """Whether it was asked for."""
-        return self._requested
+        self.requested = False
 
     def request(self) -> None:
         """Ask for the run to end; safe from a signal handler and from another thread."""
-        self._requested = True
+        self.requested = True
 
     def raise_if_requested(self) -> None:
         """End the run here if that was asked for."""
-        if self._requested:
+        if self.requested:
             raise KeyboardInterrupt
 
 

@@ -20,19 +20,16 @@ from logging.handlers import RotatingFileHandler
 from pathlib import Path
 from typing import Final
 
+from platformdirs import user_state_path
+
 from hil.errors import UsageError
 from hil.support.redact import Redaction
 from hil.version import __version__
 
 
 def state_folder() -> Path:
-    """Return the user's folder for logs: $XDG_STATE_HOME/hil, by default ~/.local/state/hil.
-
-    On Windows %LOCALAPPDATA%/hil. It may not be there yet.
-    """
-    if sys.platform == "win32":
-        return Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local") / "hil"
-    return Path(os.environ.get("XDG_STATE_HOME") or Path.home() / ".local" / "state") / "hil"
+    """Return the user's folder for logs, such as ~/.local/state/hil; it may not be there yet."""
+    return user_state_path("hil", appauthor=False)
 
 
 def log_file() -> Path:
@@ -76,7 +73,7 @@ def level_of(given: str | None) -> str:
 
 
 @contextmanager
-def logged(command: str, arguments: Sequence[str], level: str) -> Iterator[None]:
+def logged(line: Sequence[str], level: str) -> Iterator[None]:
     """Keep the log while a command runs; whatever it raises is logged and continues its way."""
     handler = None if level == "off" else _opened(level)
     if handler is None:
@@ -87,7 +84,7 @@ def logged(command: str, arguments: Sequence[str], level: str) -> Iterator[None]
     _set_levels({**dict.fromkeys(OURS, level.upper()), **_other_levels(level)})
     started_s = time.monotonic()
     try:
-        _begin(command, arguments)
+        _begin(line)
         yield
     except KeyboardInterrupt:
         LOGGER.info("interrupted after %.3f s", time.monotonic() - started_s)
@@ -113,8 +110,8 @@ def _other_levels(level: str) -> dict[str, str]:
     return {"": "DEBUG" if level == "debug" else "ERROR" if level == "error" else "WARNING", "numba": "INFO"}
 
 
-def _begin(command: str, arguments: Sequence[str]) -> None:
-    LOGGER.info("hil %s", shlex.join((command, *arguments)))
+def _begin(line: Sequence[str]) -> None:
+    LOGGER.info("hil %s", shlex.join(line))
     LOGGER.info("version %s, Python %s, %s", __version__, platform.python_version(), platform.platform())
 
 

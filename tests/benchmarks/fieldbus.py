@@ -144,7 +144,7 @@ def armed(rig: Rig, pacer: Pacer) -> Iterator[Host]:
             inverter.configure()
         status = devices.plc_loop.call(devices.plc.read_status())
         with ArmedDrives(devices, StopRequest()):
-            cycle = Cycle(devices.link, devices.m1, devices.m2, devices.guard, pacer.period_ns, pacer.answer_timeout_s)
+            cycle = Cycle(devices, pacer.period_ns, pacer.answer_timeout_s)
             while not cycle.answered:
                 cycle.step(pacer.next(), NO_TORQUE, 0.0, SampleFlag.GOOD)
             devices.guard.enable()

@@ -1,6 +1,5 @@
 """What takes a second to import stays out of the way of commands that do not need it."""
 
-import gc
 import json
 import os
 import subprocess
@@ -9,7 +8,6 @@ from pathlib import Path
 
 import pytest
 
-from hil.cli.importing import without_collecting
 from tests.chosen import campaign
 
 SCIPY = ("scipy.interpolate", "scipy.linalg", "scipy.optimize", "scipy.signal", "scipy.special", "scipy.stats")
@@ -81,17 +79,3 @@ def test_what_is_not_needed_is_not_imported_before_the_bus_is_opened(command: st
     )
     assert done.returncode == 0, done.stderr
     assert sorted(set(absent) & set(json.loads((tmp_path / "modules.json").read_text()))) == []
-
-
-@pytest.mark.parametrize("enabled", [True, False])
-@pytest.mark.parametrize("fails", [True, False])
-def test_the_collector_is_as_it_was(enabled: bool, fails: bool) -> None:
-    (gc.enable if enabled else gc.disable)()
-    try:
-        with pytest.raises(ImportError) if fails else without_collecting(), without_collecting():
-            assert not gc.isenabled()
-            if fails:
-                raise ImportError
-        assert gc.isenabled() is enabled
-    finally:
-        gc.enable()

@@ -11,9 +11,8 @@ from hil.commission.order import RigSource
 from hil.commission.runner import Conditions, Runner
 from hil.commission.state import Finding, State, StepRecord, load_state
 from hil.commission.step import Job, Step
-from hil.commission.talk import Script, Talk
+from hil.commission.talk import Talk
 from hil.config.rig_file import read_rig
-from hil.rig.experiments.base import Phase
 from hil.rig.pacing import FreePacer, period_ns
 from hil.rig.realtime import NOT_ASKED
 from hil.simulator.addresses import Address
@@ -39,13 +38,6 @@ class Miswired:
         self.plant.advance((torque_nm[0], -torque_nm[1]), duration_s)
 
 
-class Quiet:
-    """Shows nothing of a run."""
-
-    def show(self, phase: Phase, time_s: float) -> None:
-        return
-
-
 @dataclass
 class Bench:
     """A served rig and one commissioning on it; every `call` is one call of the command."""
@@ -65,7 +57,7 @@ class Bench:
             "fast",
             lambda rig: FreePacer(period_ns(rig.period_s), 2.0),
             lambda: nullcontext(NOT_ASKED),
-            lambda plan: nullcontext(Quiet()),
+            lambda plan: nullcontext(lambda phase, time_s: None),
         )
         runner = Runner(self.source, self.folder, conditions)
         return Job(self.source, rig, state, runner, None, 0.0857, False, self.said.append, lambda stage, share: None)
@@ -78,7 +70,7 @@ class Bench:
         def show(step: Step, findings: list[Finding]) -> None:
             self.shown += findings
 
-        Commissioning(job, talk or Script(True), Asked(skip, frozenset(repeat)), show).run()
+        Commissioning(job, talk or Talk(None, True), Asked(skip, frozenset(repeat)), show).run()
         return job.state
 
     def finding(self, what: str) -> Finding:

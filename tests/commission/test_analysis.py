@@ -16,7 +16,7 @@ from hil.commission.prbs_design import Cap, resonance_spread, vibration_m_s2
 from hil.commission.responses import Measured, pulse_response, response_ratio
 from hil.commission.runner import rigid_model
 from hil.config.rig_file import read_rig
-from hil.rig.experiments.pulses import LEAD_S, Pulses
+from hil.rig.experiments.laws import LEAD_S, Pulses
 from hil.simulator.driveline import DEFAULT_BUS
 from tests.commission.rigs import EXAMPLE
 
@@ -59,7 +59,7 @@ def test_a_word_stands_for_the_sign(value: float, text: str) -> None:
 
 @pytest.mark.parametrize("factor", [1.0, -1.0, 0.3])
 def test_pulses_tell_sign_and_size(factor: float) -> None:
-    course = Pulses(20.0, 1.0, 18.0)
+    course = Pulses(18.0, 20.0, 1.0)
     reference = np.array([course.torque_nm(PERIOD_S * k) for k in range(1800)])
     impulse = np.concatenate([[0.0], np.cumsum(reference)[:-1]]) * PERIOD_S
     noise = 0.05 * np.random.default_rng(2).normal(size=impulse.size)

@@ -9,7 +9,7 @@ from hil.commission.engine import Asked, Commissioning
 from hil.commission.order import RigSource
 from hil.commission.state import Finding, State, Status, StepRecord, load_state
 from hil.commission.step import Job, Outcome, Step
-from hil.commission.talk import Person, Script, Talk
+from hil.commission.talk import Talk
 from hil.errors import RunAborted, UsageError
 from tests.commission.rigs import EXAMPLE
 
@@ -51,7 +51,7 @@ class World:
         self.done.clear()
         source = RigSource(EXAMPLE, self.text)
         job = Job(source, source.rig(), self.state(), None, None, 0.1, True, self.said.append, lambda a, b: None)  # type: ignore[arg-type]
-        Commissioning(job, talk or Script(True), Asked(**asked), lambda step, findings: None).run()  # type: ignore[arg-type]
+        Commissioning(job, talk or Talk(None, True), Asked(**asked), lambda step, findings: None).run()  # type: ignore[arg-type]
         return list(self.done)
 
 
@@ -60,9 +60,9 @@ def world(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> World:
     return World(tmp_path, monkeypatch)
 
 
-def person(*answers: str) -> Person:
+def person(*answers: str) -> Talk:
     given = iter(answers)
-    return Person(lambda question: next(given))
+    return Talk(lambda question: next(given))
 
 
 def test_every_step_once_and_then_none(world: World) -> None:
@@ -107,7 +107,7 @@ def test_blocking_finding_ends_it_and_is_done_again(world: World) -> None:
 
 def test_without_yes_and_terminal_no_torque(world: World) -> None:
     with pytest.raises(UsageError, match="step second commands torque: expected someone at a terminal"):
-        world.call(Script(False))
+        world.call(Talk(None, False))
     assert world.done == ["first"]
 
 

@@ -11,25 +11,25 @@ from hil.commission.state import Status
 from hil.commission.step import Job
 from hil.errors import RunAborted
 from hil.recording import read_table
+from hil.rig.drive import Progress
 from hil.rig.experiments.base import Phase
 from hil.rig.stop import StopRequest
 from tests.chosen import campaign
-from tests.commission.rigs import Bench, Quiet, bench
+from tests.commission.rigs import Bench, bench
 from tests.rig.observer import assert_disarmed
 
 SHORT = (("duration_s = 30.0", "duration_s = 6.0"), ("speed_rad_s = 60.0", "speed_rad_s = 6.0"))
 DRIVEN = ("noise", "signs", "scales", "friction", "prbs", "experiments")
 
 
-class StopsAt(Quiet):
-    """Presses Ctrl-C when the measured part of a run is so old [s]."""
+def stops_at(stop: StopRequest, at_s: float) -> Progress:
+    """Press Ctrl-C when the measured part of a run is so old [s]."""
 
-    def __init__(self, stop: StopRequest, at_s: float) -> None:
-        self.stop, self.at_s = stop, at_s
+    def show(phase: Phase, time_s: float) -> None:
+        if phase is Phase.MEASURE and time_s >= at_s:
+            stop.request()
 
-    def show(self, phase: Phase, time_s: float) -> None:
-        if phase is Phase.MEASURE and time_s >= self.at_s:
-            self.stop.request()
+    return show
 
 
 @pytest.fixture
@@ -53,7 +53,7 @@ def press(monkeypatch: pytest.MonkeyPatch) -> Callable[[Bench], None]:
                 conditions.pace,
                 conditions.pacer,
                 conditions.scheduling,
-                lambda plan: nullcontext(StopsAt(stops[-1], 0.5)),
+                lambda plan: nullcontext(stops_at(stops[-1], 0.5)),
             )
             made.runner = runner.Runner(made.source, made.folder, pressing)
             return made

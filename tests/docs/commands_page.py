@@ -9,7 +9,10 @@ from enum import Enum
 from pathlib import Path
 from typing import Any, Final, get_args
 
-from hil.cli.command_line import COMMANDS, OPTIONS
+import typer
+
+from hil.cli.command_line import COMMANDS
+from hil.cli.group import root
 from hil.cli.main import ExitStatus
 from tests.cli.command_lines import command, examples
 
@@ -79,7 +82,8 @@ def _map() -> Iterator[str]:
 
 def _everywhere() -> Iterator[str]:
     yield from ("## Options of every command", "", "| option | |", "| --- | --- |")
-    yield from (f"| `{option}` | {_cell(text)} |" for option, text in OPTIONS.items())
+    yield "| `--help` | Show this and exit; after a command: its own help, with an example. |"
+    yield from (f"| {_names(each)} | {_cell(each.help)} |" for each in typer.main.get_command(root).params)
     yield ""
 
 

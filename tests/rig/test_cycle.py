@@ -49,7 +49,7 @@ def armed(syncs: int = 1, answer_timeout_s: float = 2.0) -> Iterator[tuple[Devic
         with ArmedDrives(devices, StopRequest()):
             yield (
                 devices,
-                Cycle(devices.link, devices.m1, devices.m2, devices.guard, PERIOD_NS, answer_timeout_s),
+                Cycle(devices, PERIOD_NS, answer_timeout_s),
             )
 
 

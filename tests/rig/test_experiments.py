@@ -12,12 +12,9 @@ from hil.config.rig_file import read_rig
 from hil.errors import HilError, RigFileError, RunAborted
 from hil.rig.excitation import Split
 from hil.rig.experiments.base import MeasureLaw, Phase
-from hil.rig.experiments.cruise import Cruise
+from hil.rig.experiments.laws import Cruise, Pulses, Reversal, Tip
 from hil.rig.experiments.open_loop import OpenLoop
-from hil.rig.experiments.pulses import Pulses
-from hil.rig.experiments.reversal import Reversal
 from hil.rig.experiments.staged import Approach, StagedExperiment, TorqueBounds
-from hil.rig.experiments.tip import Tip
 from hil.rig.plan import plan_run
 from tests.rig.serving import EXAMPLE
 from tests.rig.vehicle import INERTIA_KG_M2, PERIOD_S, RigidVehicle, drive
@@ -36,8 +33,8 @@ def cruise(speed_rad_s: float = 40.0, duration_s: float = 20.0) -> Cruise:
 
 LAWS = {
     "cruise": cruise,
-    "reversal": lambda: Reversal(8.0, swing_nm=400.0, duration_s=20.0, period_s=PERIOD_S),
-    "tip": lambda: Tip(speed_rad_s=30.0, step_nm=300.0, step_s=1.5, duration_s=20.0),
+    "reversal": lambda: Reversal(0.0, 20.0, 8.0, swing_nm=400.0, period_s=PERIOD_S),
+    "tip": lambda: Tip(30.0, 20.0, step_nm=300.0, step_s=1.5),
 }
 
 
@@ -79,7 +76,7 @@ def test_cruise_does_not_answer_at_the_frequencies_that_are_identified() -> None
 
 @pytest.mark.parametrize("load_nm", [-100.0, 0.0, 100.0])
 def test_reversal_crosses_standstill_several_times(load_nm: float) -> None:
-    law = Reversal(8.0, swing_nm=400.0, duration_s=30.0, period_s=PERIOD_S)
+    law = Reversal(0.0, 30.0, 8.0, swing_nm=400.0, period_s=PERIOD_S)
     course = drive(staged(law), RigidVehicle(load_nm=load_nm))
     speed = np.array(course.measured(course.speed_rad_s))
     crossings = np.count_nonzero(np.diff(np.sign(speed[speed != 0.0])))
@@ -145,7 +142,7 @@ STEP_NM, INERTIA = 20.0, 100.0
 
 
 def pulses(most_speed_rad_s: float = 1.0) -> OpenLoop:
-    return OpenLoop(Pulses(STEP_NM, 1.0, 18.0), 1000.0, most_speed_rad_s, PERIOD_S)
+    return OpenLoop(Pulses(18.0, STEP_NM, 1.0), 1000.0, most_speed_rad_s, PERIOD_S)
 
 
 def test_pulses_bring_speed_and_place_back() -> None:

@@ -11,7 +11,7 @@ from drivers.canopen.can_link import CanLink
 from drivers.plc.plc import Plc
 from drivers.plc.register_map import load_register_map
 from drivers.resources import data_file
-from hil.commission.talk import Script
+from hil.commission.talk import Talk
 from hil.errors import RunAborted
 from hil.rig.build import open_devices
 from hil.rig.experiments.base import Phase
@@ -125,6 +125,6 @@ def test_commissioning_asks_before_any_torque(torque_nm: float, tmp_path: Path) 
         rig.server.plc._setup = PlcSetup(torque_limit_nm=torque_nm)
         believed = torque_nm == 450.0
         with pytest.raises(RunAborted, match="answer was no" if believed else "at most 1,800 Nm, 3 times rated torque"):
-            rig.call("limits", talk=person("y", "n") if believed else Script(True))
+            rig.call("limits", talk=person("y", "n") if believed else Talk(None, True))
         if believed:
             assert rig.call("limits", talk=person("y", "yes")).steps["limits"].status.is_settled

@@ -13,7 +13,7 @@ from hil.commission.order import Order, as_table, cruise_of, first_of, halt
 from hil.commission.responses import of_repeats, record_of, rounded
 from hil.commission.state import Finding
 from hil.commission.step import Job, Outcome, Step
-from hil.commission.steps.noise_friction import LOST_SHARE
+from hil.commission.steps.noise_friction import samples_lost
 from hil.config.experiment_tables import ReversalTable, TipTable
 from hil.errors import UsageError
 
@@ -77,18 +77,10 @@ def _do_experiments(job: Job) -> Outcome:
         job.say(f"  {number} of {len(asked)}: {order.name}")
         job.run("experiments", order)
     runs = job.runs_of("experiments")
-    flagged, recorded = sum(run.flagged for run in runs), sum(run.recorded for run in runs)
-    share = flagged / max(1, recorded)
     missing = [name for name, table in _others(job) if table is None]
     findings = [
         Finding("runs recorded", str(len(asked)), str(len(runs)), len(runs) == len(asked)),
-        Finding(
-            "samples stale or late",
-            f"at most {100.0 * LOST_SHARE:g} %",
-            f"{100.0 * share:.2f} % of {recorded}",
-            share <= LOST_SHARE,
-            "Close other programs; look at bus load and cabling",
-        ),
+        samples_lost(runs),
         *(
             Finding(name, f"an experiment of kind {name!r} in the rig file", "none", None, f"Add [experiments.{name}]")
             for name in missing

@@ -136,7 +136,7 @@ def _evidence_validation(fit: PhysicalFit, compared: list[Comparison]) -> dict[s
     drawn = thinned(worst.record.time_s, worst.simulated, np.nan_to_num(measured, nan=float(np.nanmean(measured))))
     return {
         "model": model_json(fit.model),
-        "parameters": {name: [value.value, value.ci95] for name, value in fit.parameters.items()},
+        "parameters": fit.parameters,
         "rms_rad_s": fit.rms,
         "unseen": {each.record.name: {"rms_rad_s": each.rms, "fit_percent": each.fit_percent} for each in compared},
         "worst": {

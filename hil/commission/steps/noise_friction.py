@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from hil.commission.order import Order, as_table, first_of
 from hil.commission.responses import READING, Measured, columns_of, record_of, thinned
-from hil.commission.state import Finding, stated
+from hil.commission.state import Finding, RunRecord, stated
 from hil.commission.step import Job, Outcome, Step
 from hil.config.experiment_tables import ReversalTable
 from hil.recording.columns import FLAGS, SPEED, TIME
@@ -60,7 +62,7 @@ def _do_noise(job: Job) -> Outcome:
             "The vehicle rolls, or the speed has an offset: brake it and repeat; then look at the resolver",
         ),
         *(_torque_finding(job, name, columns[READING[name]][good]) for name in READING),
-        _lost(run.flagged, run.recorded),
+        samples_lost([run]),
     ]
     evidence = {
         "speed_std_rad_s": std,
@@ -82,8 +84,10 @@ def _torque_finding(job: Job, name: str, reading: np.ndarray) -> Finding:
     )
 
 
-def _lost(flagged: int, recorded: int) -> Finding:
-    share = flagged / max(1, recorded)
+def samples_lost(runs: Sequence[RunRecord]) -> Finding:
+    """Hold what was stale or late in some runs against its limit."""
+    recorded = sum(run.recorded for run in runs)
+    share = sum(run.flagged for run in runs) / max(1, recorded)
     return Finding(
         "samples stale or late",
         f"at most {100.0 * LOST_SHARE:g} %",
@@ -162,10 +166,10 @@ def _do_friction(job: Job) -> Outcome:
     ]
     drawn = thinned(record.time_s, record.total_torque_nm, record.output)
     evidence = {
-        "inertia_kg_m2": [inertia.value, inertia.ci95],
-        "dry_nm": [dry.value, dry.ci95],
-        "viscous_nm_s": [viscous.value, viscous.ci95],
-        "load_nm": [load.value, load.ci95],
+        "inertia_kg_m2": inertia,
+        "dry_nm": dry,
+        "viscous_nm_s": viscous,
+        "load_nm": load,
         "rms_rad_s": fit.rms,
         "course": dict(zip(("time_s", "torque_nm", "speed_rad_s"), drawn, strict=True)),
     }

@@ -16,6 +16,7 @@ from hil.commission.prbs_design import ResonanceSpread, resonance_spread
 from hil.commission.responses import (
     READING,
     REFERENCE,
+    Measured,
     PulseResponse,
     ResponseRatio,
     columns_of,
@@ -29,7 +30,7 @@ from hil.commission.state import Finding, model_json, stated
 from hil.commission.step import Job, Outcome, Step
 from hil.recording.columns import SPEED, TIME
 from hil.report.numbers import shown
-from hil.rig.experiments.pulses import LEAD_S, WAVE_STEPS
+from hil.rig.experiments.laws import LEAD_S, WAVE_STEPS
 
 LEVELS = (0.05, 0.1, 0.2)
 """Heights of the pulses, in parts of an inverter's torque limit, each tried where the one before moved nothing."""
@@ -38,7 +39,7 @@ STEP_S = 1.0
 WAVES = 4
 DURATION_S_SIGNS = 2.0 * LEAD_S + WAVES * WAVE_STEPS * STEP_S
 
-SHARES_SIGNS = {"m1": 1.0, "m2": 0.0}
+SHARES_M1 = {"m1": 1.0, "m2": 0.0}
 
 SIZE = (0.5, 2.0)
 """Response over that of the rig file's inertia: it is roughly known, and a wrong scale is off by more."""
@@ -79,18 +80,18 @@ def _order_signs(job: Job, name: str, level: int) -> Order:
             "step_s": STEP_S,
             "slew_nm_per_s": 0.5 * job.rig.guard.rate_limit_nm_per_s,
             "most_speed_rad_s": SPARE_SPEED * expected_rad_s + SPARE_RAD_S,
-            "share_m1": SHARES_SIGNS[name],
+            "share_m1": SHARES_M1[name],
         },
         least_margin_rad_s=SPARE_SPEED * expected_rad_s + 2.0 * SPARE_RAD_S,
     )
 
 
 def _orders_signs(job: Job) -> list[Order]:
-    return [_order_signs(job, name, 0) for name in SHARES_SIGNS]
+    return [_order_signs(job, name, 0) for name in SHARES_M1]
 
 
 def _about_signs(job: Job) -> str:
-    largest = [f"{_order_signs(job, name, len(LEVELS) - 1).table['step_nm']:g} Nm" for name in SHARES_SIGNS]
+    largest = [f"{_order_signs(job, name, len(LEVELS) - 1).table['step_nm']:g} Nm" for name in SHARES_M1]
     return (
         "gives pulses of torque from standstill, both ways, with m1 alone and then with m2 alone; no speed controller "
         "takes part. Release the brakes. The vehicle moves by a hand's breadth and back. Where nothing moves, twice "
@@ -101,13 +102,13 @@ def _about_signs(job: Job) -> str:
 def _do_signs(job: Job) -> Outcome:
     findings: list[Finding] = []
     evidence = {}
-    for name in SHARES_SIGNS:
+    for name in SHARES_M1:
         answer = _ask(job, name)
         findings += _findings(name, answer)
         evidence[name] = {
             "step_nm": answer.step_nm,
-            "speed": [answer.response.speed.value, answer.response.speed.ci95],
-            "reading": [answer.response.reading.value, answer.response.reading.ci95],
+            "speed": answer.response.speed,
+            "reading": answer.response.reading,
             "course": answer.course,
         }
     return Outcome(findings, evidence)
@@ -200,8 +201,6 @@ GAIN = (0.98, 1.02)
 DELAY_PERIODS = 0.1
 """How much later one inverter may act than the other, in sampling periods."""
 
-SHARES_SCALES = {"m1": 1.0, "m2": 0.0}
-
 
 @dataclass(frozen=True, slots=True)
 class _Test:
@@ -228,7 +227,7 @@ def _order_scales(job: Job, name: str) -> Order:
         duration_s=DURATION_S_SCALES,
         torque_nm=min(cruise.torque_nm, BASE_SHARE * limit_nm),
         slew_nm_per_s=min(cruise.slew_nm_per_s, job.rig.guard.rate_limit_nm_per_s),
-        share_m1=SHARES_SCALES[name],
+        share_m1=SHARES_M1[name],
         prbs=True,
     )
     prbs = {"amplitude_nm": _amplitude_nm(job, name), "target": name, "share_m1": None}
@@ -236,7 +235,7 @@ def _order_scales(job: Job, name: str) -> Order:
 
 
 def _orders_scales(job: Job) -> list[Order]:
-    return [*(_order_scales(job, name) for name in SHARES_SCALES), halt(job.rig)]
+    return [*(_order_scales(job, name) for name in SHARES_M1), halt(job.rig)]
 
 
 def _about_scales(job: Job) -> str:
@@ -250,14 +249,14 @@ def _about_scales(job: Job) -> str:
 
 def _do_scales(job: Job) -> Outcome:
     runs = [job.run("scales", order) for order in _orders_scales(job)]
-    tests = {run.name: _test(job, run.name) for run in runs if run.name in SHARES_SCALES}
+    tests = {run.name: _test(job, run.name) for run in runs if run.name in SHARES_M1}
     first, second = tests["m1"], tests["m2"]
     ratio = response_ratio(first.record, second.record)
     findings = [finding for name, test in tests.items() for finding in _own_findings(name, test)]
     findings += _mutual_findings(ratio, job.rig.period_s)
     evidence: dict[str, Any] = {
-        "gain": [ratio.gain.value, ratio.gain.ci95],
-        "delay_s": [ratio.delay_s.value, ratio.delay_s.ci95],
+        "gain": ratio.gain,
+        "delay_s": ratio.delay_s,
         "extra_samples": max(first.delay.extra_samples, second.delay.extra_samples),
         "amplitude_nm": _amplitude_nm(job, "m1"),
         "duration_s": DURATION_S_SCALES,
@@ -328,7 +327,7 @@ def _own_findings(name: str, test: _Test) -> list[Finding]:
 def _mutual_findings(ratio: ResponseRatio, period_s: float) -> list[Finding]:
     gain, delay = ratio.gain, ratio.delay_s
     limit_ms = 1e3 * DELAY_PERIODS * period_s
-    difference = type(gain)(gain.value - 1.0, gain.ci95)
+    difference = Measured(gain.value - 1.0, gain.ci95)
     return [
         Finding(
             "m2 against m1: gain, for the same reading",

@@ -1,1 +1,1 @@
-"""What can be driven on the rig: one file each, and one line each in ``registry``."""
+"""What can be driven on the rig: a law for each kind, and a case for each in ``registry``."""

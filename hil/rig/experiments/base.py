@@ -39,32 +39,20 @@ class Experiment(Protocol):
     """A plan that answers each cycle with a base torque."""
 
     @property
-    def duration_s(self) -> float:
-        """Length of the measured part [s]."""
-        ...
+    def duration_s(self) -> float: ...  # of the measured part
 
-    def torque(self, time_s: float, speed_rad_s: float) -> BaseTorque:
-        """Ask for the torque of one cycle."""
-        ...
+    def torque(self, time_s: float, speed_rad_s: float) -> BaseTorque: ...  # of one cycle
 
 
 class MeasureLaw(Protocol):
     """The law that makes one kind of experiment: its torque during the measured part."""
 
     @property
-    def start_speed_rad_s(self) -> float:
-        """Speed the vehicle must have when the measured part begins [rad/s]."""
-        ...
+    def start_speed_rad_s(self) -> float: ...  # what the vehicle must have when the measured part begins
 
     @property
-    def duration_s(self) -> float:
-        """Length of the measured part [s]."""
-        ...
+    def duration_s(self) -> float: ...
 
-    def begin(self, torque_nm: float) -> None:
-        """Take over at the torque that holds the start speed [Nm]."""
-        ...
+    def begin(self, torque_nm: float) -> None: ...  # takes over at the torque that holds the start speed
 
-    def torque_nm(self, time_s: float, speed_rad_s: float) -> float:
-        """Torque ``time_s`` after the beginning of the measured part [Nm]."""
-        ...
+    def torque_nm(self, time_s: float, speed_rad_s: float) -> float: ...  # since the beginning of the measured part

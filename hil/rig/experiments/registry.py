@@ -1,4 +1,4 @@
-"""From a table of the rig file to the experiment it describes: a new kind is one file and one case here."""
+"""From a table of the rig file to the experiment it describes: a new kind is one law and one case here."""
 
 from __future__ import annotations
 
@@ -16,13 +16,9 @@ from hil.config.experiment_tables import (
 from hil.config.rig_file import Rig
 from hil.errors import UsageError
 from hil.rig.experiments.base import Experiment, MeasureLaw
-from hil.rig.experiments.cruise import Cruise
+from hil.rig.experiments.laws import Coast, Cruise, Pulses, Ramp, Rest, Reversal, Tip
 from hil.rig.experiments.open_loop import MOVING_RAD_S, OpenLoop
-from hil.rig.experiments.pulses import Pulses, Rest
-from hil.rig.experiments.reversal import Reversal
-from hil.rig.experiments.slow import Coast, Ramp
 from hil.rig.experiments.staged import Approach, StagedExperiment, TorqueBounds
-from hil.rig.experiments.tip import Tip
 
 
 def experiment_table(rig: Rig, name: str) -> AnyExperiment:
@@ -42,7 +38,7 @@ def build_experiment(rig: Rig, name: str) -> Experiment:
     table = experiment_table(rig, name)
     match table:
         case PulsesTable():
-            course = Pulses(table.step_nm, table.step_s, table.duration_s)
+            course = Pulses(table.duration_s, table.step_nm, table.step_s)
             return OpenLoop(course, table.slew_nm_per_s, table.most_speed_rad_s, rig.period_s)
         case RestTable():
             return OpenLoop(Rest(table.duration_s), 0.0, MOVING_RAD_S, rig.period_s)
@@ -67,10 +63,10 @@ def _law(table: DrivenTable, inertia_kg_m2: float, period_s: float) -> MeasureLa
         case CruiseTable():
             return Cruise(table.speed_rad_s, table.duration_s, inertia_kg_m2, table.torque_nm, period_s)
         case ReversalTable():
-            return Reversal(table.turning_speed_rad_s, table.swing_nm, table.duration_s, period_s)
+            return Reversal(0.0, table.duration_s, table.turning_speed_rad_s, table.swing_nm, period_s)
         case TipTable():
-            return Tip(table.speed_rad_s, table.step_nm, table.step_s, table.duration_s)
+            return Tip(table.speed_rad_s, table.duration_s, table.step_nm, table.step_s)
         case CoastTable():
             return Coast(table.speed_rad_s, table.duration_s)
         case RampTable():
-            return Ramp(table.swing_nm, table.ramp_s, table.duration_s)
+            return Ramp(0.0, table.duration_s, table.swing_nm, table.ramp_s)

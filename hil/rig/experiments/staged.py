@@ -112,24 +112,8 @@ TOLERANCE_LEAST_RAD_S = 0.5
 class Approach:
     """Speed control up to a start speed."""
 
-    __slots__ = (
-        "_errors_rad_s",
-        "_hold",
-        "_mean_rad_s",
-        "_mean_since_s",
-        "_speed_rad_s",
-        "_timeout_s",
-        "_tolerance_rad_s",
-        "settled",
-    )
-
     def __init__(
-        self,
-        speed_rad_s: float,
-        inertia_kg_m2: float,
-        torque_limit_nm: float,
-        period_s: float,
-        timeout_s: float,
+        self, speed_rad_s: float, inertia_kg_m2: float, torque_limit_nm: float, period_s: float, timeout_s: float
     ) -> None:
         tuning = HoldTuning.for_bandwidth(BANDWIDTH_HZ, inertia_kg_m2)
         self._hold = SpeedHold(speed_rad_s, tuning, torque_limit_nm, period_s)
@@ -178,9 +162,10 @@ class TorqueBounds:
 class StagedExperiment:
     """One law, led up to and let out of safely."""
 
-    __slots__ = ("_approach", "_bounds", "_law", "_measure_from_s", "_period_s", "_phase", "_torque_nm")
+    __slots__ = ("_approach", "_bounds", "_law", "_measure_from_s", "_period_s", "_phase", "_torque_nm", "duration_s")
 
     def __init__(self, law: MeasureLaw, approach: Approach, bounds: TorqueBounds, period_s: float) -> None:
+        self.duration_s = law.duration_s
         self._law = law
         self._approach = approach
         self._bounds = bounds
@@ -188,11 +173,6 @@ class StagedExperiment:
         self._phase = Phase.APPROACH
         self._measure_from_s = 0.0
         self._torque_nm = 0.0
-
-    @property
-    def duration_s(self) -> float:
-        """Length of the measured part [s]."""
-        return self._law.duration_s
 
     def torque(self, time_s: float, speed_rad_s: float) -> BaseTorque:
         """Torque and phase of one cycle; see `hil.rig.experiments.base.Experiment`."""
@@ -208,7 +188,7 @@ class StagedExperiment:
             self._law.begin(self._torque_nm)
         elif self._phase is Phase.MEASURE:
             half_period_s = self._period_s / 2.0
-            if time_s - self._measure_from_s > self._law.duration_s - half_period_s:
+            if time_s - self._measure_from_s > self.duration_s - half_period_s:
                 self._phase = Phase.RELEASE
         elif self._phase is Phase.RELEASE and self._torque_nm == 0.0:
             self._phase = Phase.DONE
