@@ -15,7 +15,7 @@ makes it pay, and an amount that matters, does not agree with the others; it is 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -28,11 +28,18 @@ from estimator.identification.best import BestEstimate, Verdict, known_pair
 from estimator.identification.linear_model import LinearModel
 from estimator.identification.modes.modes import UncertainMode
 from estimator.identification.modes.physical import PhysicalEstimate, physical_parameters
-from estimator.identification.offline.problem import Problem, descended
+from estimator.identification.offline.problem import SETTLED, Problem
 from estimator.signals.record import FloatArray
 
 MOST_STARTS = 3
 """Recordings whose own parameters are followed as a start, the best first: the valley has more than one floor."""
+
+MOST_STEPS = 60
+FIRST_DAMPING = 1e-3
+"""Levenberg and Marquardt's, of the shared parameters scaled by their slopes."""
+
+MOST_DAMPING = 1e6
+"""From here on a step is too short to matter: there is none that is better."""
 
 SIGNIFICANCE = 0.001
 """False alarms of the agreement, on recordings of one drive."""
@@ -186,16 +193,22 @@ def _start(experiments: Sequence[_Experiment], leader: _Experiment, n: int) -> l
 
 
 def _descended(experiments: Sequence[_Experiment], xs: list[FloatArray], n: int) -> list[FloatArray]:
-    ends = np.cumsum([x.size for x in xs])[:-1]
-
-    def cost(joined: FloatArray) -> float:
-        return _cost(experiments, np.split(joined, ends))
-
-    def steps(joined: FloatArray) -> Callable[[float], FloatArray]:
-        parts = [_Slopes.at(each, x, n) for each, x in zip(experiments, np.split(joined, ends), strict=True)]
-        return lambda damping: np.concatenate(_steps(parts, damping))
-
-    return np.split(descended(np.concatenate(xs), cost, steps), ends)
+    """Follow the descent by Levenberg's and Marquardt's steps to its end."""
+    cost, damping, parts = _cost(experiments, xs), FIRST_DAMPING, None
+    for _ in range(MOST_STEPS):
+        parts = parts or [_Slopes.at(each, x, n) for each, x in zip(experiments, xs, strict=True)]
+        tried = [x + step for x, step in zip(xs, _steps(parts, damping), strict=True)]
+        after = _cost(experiments, tried)
+        if not after < cost:
+            damping *= 8.0
+            if damping > MOST_DAMPING:
+                break
+            continue
+        settled = cost - after < SETTLED * cost and damping <= FIRST_DAMPING
+        xs, cost, damping, parts = tried, after, 0.125 * damping, None
+        if settled:
+            break
+    return xs
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -13,7 +13,6 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
-from estimator.compiled import compiled
 from estimator.errors import BadShape
 
 Object = TypeVar("Object")
@@ -252,15 +251,6 @@ def uniform_period_s(time_s: FloatArray) -> float:
         if abs(rounded - slope) <= allowed:
             return rounded
     return float(f"{slope:.{DIGITS}g}")
-
-
-@compiled
-def carried(values: FloatArray, width: float) -> FloatArray:
-    """Return the deflection of a slider that is moved by a signal, from rest, and yields at a width."""
-    found = np.zeros(values.size)
-    for k in range(1, values.size):
-        found[k] = min(max(found[k - 1] + values[k] - values[k - 1], -width), width)
-    return found
 
 
 Noise = Callable[[Sequence[Record]], float]

@@ -12,9 +12,10 @@ from functools import partial
 import numpy as np
 from scipy.signal import lfilter
 
+from estimator.compiled import compiled
 from estimator.diagnosis.line.blocks import Motion
 from estimator.physics.effect import Element
-from estimator.signals.record import FloatArray, carried
+from estimator.signals.record import FloatArray
 
 ROUNDED = 0.02  # a sign function changes over this share of its argument's range
 
@@ -41,6 +42,15 @@ def inside(values: FloatArray, share: float) -> FloatArray:
 
 def beyond(values: FloatArray, share: float) -> FloatArray:
     return values - inside(values, share)
+
+
+@compiled
+def carried(values: FloatArray, width: float) -> FloatArray:
+    """Return the deflection of a slider that is moved by a signal, from rest, and yields at a width."""
+    found = np.zeros(values.size)
+    for k in range(1, values.size):
+        found[k] = min(max(found[k - 1] + values[k] - values[k - 1], -width), width)
+    return found
 
 
 def slide(values: FloatArray, share: float) -> FloatArray:

@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from statistics import NormalDist
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
-from scipy.stats import chi2, norm
 
 from estimator.errors import BadShape
 from estimator.identification.linear_model import ComplexArray, LinearModel
@@ -109,7 +108,7 @@ def two_mass_resonance(J_M: float, J_L: float, k: float, c: float, b_M: float, b
 
 CONFIDENCE = 0.95  # of every interval and ellipse that does not say otherwise
 
-QUANTILE = float(norm.ppf(0.5 + CONFIDENCE / 2.0))
+QUANTILE = NormalDist().inv_cdf(0.5 + CONFIDENCE / 2.0)
 """Half width of such an interval in standard deviations: 1.96."""
 
 SHORT = 0.5  # reach of an interval to either side, against the value, up to which a number is known
@@ -217,6 +216,9 @@ class Cancellation:
 
 def cancellations(poles: Roots, zeros: Roots, P: FloatArray, confidence: float) -> tuple[Cancellation, ...]:
     """Pair poles and zeros of one kind, closest in units of their uncertainty first, each at most once."""
+    from scipy.optimize import linear_sum_assignment  # both take a second to import, and on line nothing is paired
+    from scipy.special import chdtrc
+
     found = []
     for imaginary, freedom in ((False, 1), (True, 2)):
         p_at, z_at = (
@@ -224,7 +226,7 @@ def cancellations(poles: Roots, zeros: Roots, P: FloatArray, confidence: float) 
         )
         distance = np.array([[_distance(poles, int(i), zeros, int(j), P, freedom) for j in z_at] for i in p_at])
         for row, column in zip(*linear_sum_assignment(distance.reshape(len(p_at), len(z_at))), strict=True):
-            p_value = float(chi2.sf(distance[row, column], freedom))
+            p_value = float(chdtrc(freedom, distance[row, column]))
             if p_value > 1.0 - confidence:
                 found.append(
                     Cancellation(complex(poles.values[p_at[row]]), complex(zeros.values[z_at[column]]), p_value)
@@ -254,7 +256,9 @@ class UncertainRoot:
     def ellipse(self, confidence: float = CONFIDENCE, points: int = 73) -> ComplexArray:
         """Return the outline of the confidence region, closed, shape (points,); a segment for a real root."""
         freedom = 2 if self.value.imag != 0.0 else 1
-        radius = np.sqrt(chi2.ppf(confidence, freedom))
+        from scipy.special import chdtri  # see above
+
+        radius = np.sqrt(chdtri(freedom, 1.0 - confidence))
         around = np.linspace(0.0, 2.0 * np.pi, points)
         offset = radius * square_root(self.covariance) @ np.array([np.cos(around), np.sin(around)])
         return np.asarray(self.value + offset[0] + 1j * offset[1], dtype=np.complex128)

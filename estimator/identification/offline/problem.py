@@ -8,23 +8,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
+from scipy.optimize import least_squares
 from scipy.signal import lfilter
 from scipy.sparse import csc_array, diags_array
 from scipy.sparse.linalg import splu
 from threadpoolctl import threadpool_limits
 
-from estimator.identification.linear_model import (
-    ComplexArray,
-    LinearModel,
-    Orders,
-    free_response,
-    solve_least_squares,
-)
+from estimator.identification.linear_model import ComplexArray, LinearModel, Orders, free_response, solve_least_squares
 from estimator.identification.offline.starts import delayed
 from estimator.signals.decimate import HIGH_PASS_HZ, Blocks
 from estimator.signals.record import BoolArray, FloatArray
@@ -184,33 +179,11 @@ def gaps(okay: BoolArray) -> list[tuple[int, int]]:
     return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
 
 
-MOST_STEPS = 60  # per start: 10 to 30 are needed; more are spent in a valley with a flat floor
+MOST_EVALUATIONS = 60
+"""Evaluations per start. Gauss-Newton needs 10 to 30; more are spent in a valley with a flat floor."""
 
 SETTLED = 1e-7
 """Relative change of the sum of squares that ends a fit: of 10 000 samples, a thousandth of one parameter's share."""
-
-FIRST_DAMPING, MOST_DAMPING = 1e-3, 1e6  # of Levenberg's and Marquardt's steps, in squares of a slope's norm
-
-
-def descended(
-    x: FloatArray, cost: Callable[[FloatArray], float], steps: Callable[[FloatArray], Callable[[float], FloatArray]]
-) -> FloatArray:
-    """Return where Levenberg's and Marquardt's steps from x end; ``steps(x)`` gives the step of a damping."""
-    least, damping, step = cost(x), FIRST_DAMPING, steps(x)
-    for _ in range(MOST_STEPS):
-        tried = x + step(damping)
-        after = cost(tried)
-        if not after < least:
-            damping *= 8.0
-            if damping > MOST_DAMPING:
-                break
-            continue
-        settled = least - after < SETTLED * least and damping <= FIRST_DAMPING
-        x, least, damping = tried, after, 0.125 * damping
-        if settled:
-            break
-        step = steps(x)
-    return x
 
 
 def transient(n_samples: int, sample_time_s: float) -> FloatArray:
@@ -375,24 +348,17 @@ class Problem:
 
     def solve(self, starts: Iterable[LinearModel | FloatArray]) -> FloatArray:
         """Return the x of least cost over all starts, each a model or an x."""
-        begins = [self.start(start) if isinstance(start, LinearModel) else start for start in starts]
         with threadpool_limits(1):  # problems this small wait for other threads longer than they compute
-            ends = [descended(x, self._cost, self._steps) for x in begins]
-        return min(ends, key=self._cost)
-
-    def _cost(self, x: FloatArray) -> float:
-        w = self.residual(x)
-        return float(w @ w)
-
-    def _steps(self, x: FloatArray) -> Callable[[float], FloatArray]:
-        """Return the Gauss-Newton step from x by its damping, in the scale of each unknown's own effect."""
-        R = np.asarray(np.linalg.qr(np.column_stack([self.jacobian(x), self.residual(x)]), mode="r"))
-        J, w = R[:, :-1], R[:, -1]
-        scale = np.maximum(np.linalg.norm(J, axis=0), np.finfo(np.float64).tiny)
-        rest = np.concatenate([-w, np.zeros(scale.size)])
-
-        def step(damping: float) -> FloatArray:
-            rows = np.concatenate([J / scale, np.sqrt(damping) * np.eye(scale.size)])
-            return np.asarray(np.linalg.lstsq(rows, rest, rcond=None)[0] / scale, dtype=np.float64)
-
-        return step
+            solutions = [
+                least_squares(
+                    self.residual,
+                    self.start(start) if isinstance(start, LinearModel) else start,
+                    jac=self.jacobian,
+                    x_scale="jac",
+                    method="lm",
+                    ftol=SETTLED,
+                    max_nfev=MOST_EVALUATIONS,
+                )
+                for start in starts
+            ]
+        return min(solutions, key=lambda solution: float(solution.cost)).x

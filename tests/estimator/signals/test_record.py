@@ -6,8 +6,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from estimator.diagnosis.unnamed.laws import carried
 from estimator.errors import BadShape
-from estimator.signals.record import Record, carried, once, uniform_period_s
+from estimator.signals.record import Record, once, uniform_period_s
 
 
 def record(**changed: Any) -> Record:
