@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import expm, solve_discrete_are
 
 from estimator.compiled import compiled
 from estimator.identification.modes.modes import Mode
@@ -68,6 +67,8 @@ class TwistFilter:
 
     def use(self, shaft: Shaft) -> None:
         """Continue with other numbers, from the present state."""
+        from scipy.linalg import solve_discrete_are  # a second to import, and a simulated rig filters nothing
+
         self.shaft = shaft
         self._F, self._g = _discrete(shaft, self._period_s)
         u = self._uncertainty
@@ -95,6 +96,8 @@ class TwistFilter:
 
 def _discrete(shaft: Shaft, period_s: float) -> tuple[FloatArray, FloatArray]:
     """Return F, shape (4, 4), and g, shape (4,), for a torque held over one period."""
+    from scipy.linalg import expm  # see above
+
     s = shaft
     A = np.zeros((5, 5))
     A[0, :3] = -(s.b_M + s.c) / s.J_M, s.c / s.J_M, -s.k / s.J_M
