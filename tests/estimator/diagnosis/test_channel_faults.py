@@ -112,7 +112,7 @@ def test_the_rate_is_found_on_slow_and_fast_lines(periods: float, samples: int, 
     records = drifting(line, true, rate, samples)
     bench = Bench(line, records, everything(records))
     nominal = bench.fit(NOTHING)
-    looks = promising(Screen(nominal, line).looks("clock_drift"))
+    looks = promising(Screen(nominal, line).starts("clock_drift"))
     found = bench.fit(frozenset({"clock_drift"}), nominal, [look.release for look in looks])
     assert found.value("clock_drift", "rate") == pytest.approx(rate, rel=0.01)
     assert found.rms == pytest.approx(SIGMA, rel=0.05)

@@ -8,12 +8,16 @@ import numpy as np
 import pytest
 
 from estimator.diagnosis import diagnose
-from estimator.diagnosis.preconditions import prepare
 from estimator.diagnosis.preconditions.channels import clipped, unwrapped, without_clipped
 from estimator.diagnosis.preconditions.inertia import model_warnings
-from estimator.diagnosis.preconditions.prepare import not_read, require_excitation, without_not_read
+from estimator.diagnosis.preconditions.prepare import (
+    FEWEST_SAMPLES,
+    not_read,
+    prepare,
+    require_excitation,
+    without_not_read,
+)
 from estimator.diagnosis.result import Verdict
-from estimator.diagnosis.segments import FEWEST_SAMPLES
 from estimator.errors import BadShape, NotExciting
 from estimator.physics.driveline import Start
 from estimator.signals.record import FloatArray, OutputKind, Record

@@ -11,7 +11,7 @@ from estimator.diagnosis.inference.hypotheses import everything, open_hypotheses
 from estimator.diagnosis.inference.judge import Grounds, decide, grounds
 from estimator.diagnosis.inference.rivals import Law, best_law, rival_laws, searches_around
 from estimator.diagnosis.inference.search import Search
-from estimator.diagnosis.unnamed import scene
+from estimator.diagnosis.unnamed.scene import scene
 from estimator.physics.effect import Element
 from estimator.signals.record import Record
 from tests.estimator.diagnosis.one_effect import bench_with

@@ -60,7 +60,7 @@ def test_what_is_left_is_computed_and_not_promised(monkeypatch: pytest.MonkeyPat
     ground = ground_of(scene(nominal_fit(quiet((1,))), SIGMA))
     pool = pool_of([rng.standard_normal((ground.error.size, 1))])
     whole = float(ground.error @ ground.error)
-    monkeypatch.setattr("estimator.diagnosis.unnamed.scene._gains", lambda *_: (np.array([whole]), np.array([1.0])))
+    monkeypatch.setattr("estimator.diagnosis.unnamed.forms._gains", lambda *_: (np.array([whole]), np.array([1.0])))
     path = pursue(pool, ground)
     assert path.chosen == []
     assert path.squares == [pytest.approx(whole)]

@@ -100,7 +100,7 @@ def test_a_step_of_the_load_is_found_in_its_recording_at_its_moment() -> None:
 @pytest.mark.parametrize("seed", range(3, 7))
 def test_where_nothing_is_missing_no_law_is_beyond_chance(seed: int) -> None:
     found = best_unnamed(nominal_fit(quiet((seed, seed + 100))))
-    assert found is None or found.gain.delta_bic < 10.0
+    assert found is None or found.delta_bic < 10.0
 
 
 def test_a_large_mismatch_is_located_by_simulating_with_the_law_found() -> None:
@@ -108,7 +108,7 @@ def test_a_large_mismatch_is_located_by_simulating_with_the_law_found() -> None:
     loose = recordings(Element.SHAFT, lambda m: np.tanh(m.twist / 4e-3), 12.0, seeds=(1, 2))
     result = nominal_fit(loose, tolerance=0.2)
     laws = unnamed_laws(result, ROUNDS)
-    best = max(laws, key=lambda law: law.gain.delta_bic)
+    best = max(laws, key=lambda law: law.delta_bic)
     assert best.element is Element.SHAFT
     others = [law.rms for law in laws if law.element is not Element.SHAFT]
     assert best.rms < 0.5 * result.rms

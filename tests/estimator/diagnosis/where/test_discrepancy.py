@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from estimator.diagnosis.inference.hypotheses import NOTHING, everything
-from estimator.diagnosis.unnamed import scene
+from estimator.diagnosis.unnamed.scene import scene
 from estimator.diagnosis.unnamed.search import ROUNDS, searches_at
 from estimator.diagnosis.where.discrepancy import discrepancy, effects_added, without_effect
 from estimator.diagnosis.where.locate import error_spectrum, responses
