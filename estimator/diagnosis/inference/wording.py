@@ -194,8 +194,24 @@ def _sure(effects: Sequence[FoundEffect]) -> str:
 def _wrong_values(left: str, off_nominal: Sequence[OffNominal]) -> str:
     return (
         f"No physics need be missing, but the data sheet is off: {off_the_sheet(off_nominal)}. With that the nominal "
-        f"model explains the recordings down to the noise; {left}. Check the data sheet, or widen the tolerance where "
-        "it is a guess, and diagnose again."
+        f"model explains the recordings down to the noise; {left}. {_common_factor(off_nominal)}Check the data sheet, "
+        "or widen the tolerance where it is a guess, and diagnose again."
+    )
+
+
+FEWEST_IN_COMMON = 3  # values off by one factor, from which on the torque is as likely off as each of them
+
+
+def _common_factor(off_nominal: Sequence[OffNominal]) -> str:
+    """Say what else makes all values of a line wrong by one factor: it answers to a torque that was not read so."""
+    ratios = [each.ratio for each in off_nominal]
+    middle = sum(ratios) / len(ratios)
+    least_trusted = max(each.tolerance for each in off_nominal)
+    if len(ratios) < FEWEST_IN_COMMON or max(ratios) - min(ratios) > least_trusted * middle:
+        return ""
+    return (
+        f"All of them are about {middle:.2g} times their nominal values, which is the same as a torque of "
+        f"{1.0 / middle:.2g} times what was read: check first that every input is recorded, alive and in Nm. "
     )
 
 

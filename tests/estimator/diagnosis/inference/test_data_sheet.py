@@ -11,7 +11,8 @@ from estimator.diagnosis.diagnose import diagnose
 from estimator.diagnosis.inference.hypotheses import everything, open_hypotheses
 from estimator.diagnosis.inference.rivals import free_line
 from estimator.diagnosis.inference.search import Search
-from estimator.diagnosis.result import Verdict
+from estimator.diagnosis.inference.wording import Context, statement
+from estimator.diagnosis.result import Effort, Fit, OffNominal, Verdict
 from estimator.physics.effect import Element
 from estimator.physics.model import DrivelineModel
 from tests.estimator.diagnosis.planted import quiet
@@ -45,6 +46,14 @@ def test_what_left_its_tolerance_is_given_with_its_size_and_place(name: str, fac
 
 def test_inside_its_tolerances_nothing_is_beyond() -> None:
     assert free_line(searched({"k": 1.08})) is None
+
+
+@pytest.mark.parametrize(("k", "is_torque"), [(0.47, True), (1.3, False)])
+def test_values_off_by_one_factor_are_a_torque_that_was_not_read(k: float, is_torque: bool) -> None:
+    off = [OffNominal("J_M", 0.5, 0.1), OffNominal("J_L", 0.49, 0.1), OffNominal("k", k, 0.1)]
+    fit = Fit("rad/s", 1.0, 0.1, 0.1, 0.1, 0.1, 0.1)
+    text = statement(Verdict.UNEXPLAINED, fit, (), Effort(), Context(off_nominal=off))
+    assert ("a torque of 2.1 times what was read: check first that every input is recorded" in text) is is_torque
 
 
 @pytest.mark.campaign
