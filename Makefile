@@ -2,19 +2,25 @@
 PYTHON ?= python3
 BIN    := .venv/bin
 READY  := .venv/.ready
+RUNS   := .venv/.runs
 
 .PHONY: setup demo prove test kernels campaign bench docs lint dist lock clean
 
 setup: $(READY)
 
-$(READY): requirements.lock pyproject.toml
+# What hil runs with: a quarter of the libraries that its tests need.
+$(RUNS): run.lock pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "hil needs Python 3.11 or newer, found " + sys.version.split()[0] + ": make PYTHON=/path/to/python3.11 ...")'
 	$(PYTHON) -m venv .venv
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r run.lock
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
 	touch $@
 
-demo: $(READY)
+$(READY): requirements.lock $(RUNS)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
+	touch $@
+
+demo: $(RUNS)
 	$(BIN)/hil demo
 
 # Sealed cases, answered by the public command and opened: out/proof/scoreboard.html. Continues where it was interrupted.
@@ -74,6 +80,8 @@ dist: $(READY)
 lock:   # needs `pip install uv`; writes names, versions and hashes only
 	uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-emit-find-links \
 	    --no-header --no-annotate --group dev --group docs pyproject.toml -o requirements.lock
+	uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-emit-find-links \
+	    --no-header --no-annotate --constraints requirements.lock --group install pyproject.toml -o run.lock
 	uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-emit-find-links \
 	    --no-header --no-annotate --group audit -o .ci/audit.lock
 
