@@ -22,9 +22,6 @@ from hil.fleet.dataset import Writer
 from hil.fleet.sources import Found
 from hil.fleet.tasks import Job, Outcome, analyse, describe, row_of
 
-IN_FLIGHT = 4
-"""Tasks for each core that the scheduler knows of: enough that none waits, and few to hold."""
-
 OF_DASK: tuple[str, ...] = ("python", "dask", "distributed", "cloudpickle")
 """What client, scheduler and workers must have alike to understand one another."""
 
@@ -109,7 +106,7 @@ def hand_out(
             running[future.key] = item
             done.add(future)
 
-    begin(islice(waiting, IN_FLIGHT * cores))
+    begin(islice(waiting, cores))  # one for each: Dask blames a worker's death on all that wait there
     for future in done:
         item = running.pop(future.key)
         if future.status == "cancelled" or isinstance(error := future.exception(), CommClosedError):
