@@ -61,7 +61,11 @@ def inlined(function: Function) -> Function:
 
 
 def ir_inlined(function: Function) -> Function:
-    """Compile a function as a part of each compiled one that calls it, and never by itself."""
+    """Compile a function as a part of each compiled one that calls it, and never by itself.
+
+    What calls a kernel takes the kernel's whole code in and works on it anew. Where several small functions stand in
+    between, each would; so they are inlined before anything is compiled.
+    """
     return cast(Function, numba.njit(nogil=True, error_model="numpy", inline="always")(function))
 
 

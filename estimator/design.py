@@ -1,4 +1,11 @@
-"""The next experiment, judged before it is driven: how well it distinguishes hypotheses, what it makes known."""
+"""The next experiment, judged before it is driven: how well it distinguishes hypotheses, what it makes known.
+
+An experiment on paper is a recording that one hypothesis would give. Another hypothesis is fitted to it: its unknowns,
+held by what earlier recordings say of them, move to where the innovations are least, and what these still are is the
+expected difference of scores (T-optimality: Atkinson and Fedorov, Biometrika 62, 1975; Box and Hill, Technometrics 9,
+1967). Around a fit the information about its unknowns is that of its whitened derivative (D-optimality; Goodwin and
+Payne, Dynamic System Identification, 1977).
+"""
 
 from __future__ import annotations
 

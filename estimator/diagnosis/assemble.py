@@ -49,7 +49,12 @@ def covariance(result: FitResult) -> FloatArray:
 
 
 def reported_covariance(result: FitResult) -> FloatArray:
-    """Return the covariance that intervals are reported from, shape (U, U): of the noise, and of what is no noise."""
+    """Return the covariance that intervals are reported from, shape (U, U): of the noise, and of what is no noise.
+
+    The part of the error that its own past predicts is physics written another way, or the torque reading's own
+    noise. It pulls the unknowns as an error would that keeps its value for ``COHERENT_S``: its mean square times that
+    many samples takes the place of the noise's variance in ``sigma^2 (J'J)^-1``.
+    """
     free = _free(result)
     full = covariance(result)
     full[np.ix_(free, free)] += coherent_variance(result) * _bread(result.jacobian[:, free])
@@ -88,7 +93,7 @@ def _meat(result: FitResult, jacobian: FloatArray) -> FloatArray:
 
 
 def _long_run(scores: FloatArray, lags: int) -> FloatArray:
-    """Sum the Bartlett-weighted cross products of the scores up to ``lags`` apart, by block differences."""
+    """Sum the Bartlett-weighted cross products of the scores up to a distance of ``lags``, by block differences."""
     window = max(lags, 1)
     padded = np.vstack([np.zeros((window, scores.shape[1])), scores, np.zeros((window - 1, scores.shape[1]))])
     sums = np.cumsum(padded, axis=0)

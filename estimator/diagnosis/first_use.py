@@ -1,4 +1,9 @@
-"""The first use on a machine: the simulation has yet to be compiled there, which takes a minute, once."""
+"""The first use on a machine: the simulation has yet to be compiled there, which takes a minute, once.
+
+A compiler works on one core, so two processes share the kernels. What calls a kernel takes its code in from where it is
+kept on disk: first each process compiles a kernel that calls no other, then each a caller. What is quickly compiled
+fills the time of the one that would be done first.
+"""
 
 from __future__ import annotations
 

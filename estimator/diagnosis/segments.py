@@ -1,4 +1,10 @@
-"""Recordings with long gaps, cut into segments for the fit, and the diagnosis of segments put together again."""
+"""Recordings with long gaps, cut into segments for the fit, and the diagnosis of segments put together again.
+
+Over a short gap the simulation continues with the torque it has. Over a long one it would diverge: the torque there was
+not read, or the model does not hold there (a mask: another brake, a gear change). So each segment is a recording of its
+own, with its own initial state and, as every recording, its own constant load torque: a road is not as steep behind a
+gap as before it. Time continues (``Record.began_s``), for laws over time.
+"""
 
 from __future__ import annotations
 

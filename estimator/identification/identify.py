@@ -1,4 +1,18 @@
-"""The paper's chain from a recording to a model: one pure function and its settings."""
+"""The paper's chain from a recording to a model: one pure function and its settings.
+
+1. Both signals lose their slow part by the same high-pass and go from 10 to 20 ms through the same low-pass.
+2. A batch output-error model of these gives the observation filter L.
+3. OEFO runs through N = 1024 samples: the on-line model.
+4. Off line, at the recording's own period, at which the torque was held: the output-error model and the spectral
+   estimate of all samples.
+5. Poles become natural frequency and damping.
+
+The filter L. The paper takes all of A_hat. Where the load varies strongly, the batch model puts one or two
+poles within 0.001 of z = 1, and 1 / L then drowns Phi in the slow part that the high-pass had just removed.
+By default L therefore holds the oscillating poles alone (:attr:`FilterPart.OSCILLATING`); the paper's choice
+is :attr:`FilterPart.ALL`. In 24 simulated cruises each, the worst error of the damping was 1.5 % against 9.6
+% with the load of the tests, and with twice its variation 2.1 % against more than 15 % in 13 of the 24.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,18 @@
-"""Tall least-squares problems, brought to triangular form by Householder reflections first."""
+"""Tall least-squares problems, brought to triangular form by Householder reflections first.
+
+::
+
+    y(t) = - a_1 y(t-1) - ... - a_na y(t-na) + b_1 u(t-nk) + ... + b_nb u(t-nk-nb+1)
+
+    B(q^-1)   b_1 q^-nk + ... + b_nb q^-(nk+nb-1)
+    ------- = -----------------------------------        theta = [a_1 .. a_na, b_1 .. b_nb]
+    A(q^-1)   1 + a_1 q^-1 + ... + a_na q^-na
+
+- ``nk`` is the *total* delay between u and y. A sampled mechanical system with a zero-order hold has nk = 1.
+  The paper's d = 1 is nk = 1. Where another text counts a pure delay d on top of that one, ``nk = d + 1``.
+- ``na`` is the order of A in *this* output-error model; MATLAB calls it nf there and keeps na for ARX.
+- Poles and zeros are those in z.
+"""
 
 from __future__ import annotations
 

@@ -5,6 +5,8 @@ Equations of motion, reflected to the motor shaft (translation: read kg, N, m, N
     two_mass   J_M dw_M/dt = T - b_M w_M - T_S          one_mass   J_M dw_M/dt = T - b_M w_M - T_0
                J_L dw_L/dt = T_S - b_L w_L - T_0
                T_S = k (phi_M - phi_L) + c (w_M - w_L)
+
+    joint      T = k phi + c dphi/dt - T_0: the twist phi is imposed, the torque T is measured
 """
 
 from __future__ import annotations

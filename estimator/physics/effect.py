@@ -1,4 +1,9 @@
-"""What an entry of the catalogue is: a law that can be released from its null, and what is known of it."""
+"""What an entry of the catalogue is: a law that can be released from its null, and what is known of it.
+
+A missing effect is a constraint of the superset model to release: at ``null`` its law does nothing. A law
+that acts at one of the places of ``estimator.physics.effect`` is taken into the one kernel from its entry; one that
+changes the line itself is written into the kernel. Everything else about it stands in its entry.
+"""
 
 from __future__ import annotations
 
@@ -92,7 +97,10 @@ class Within:
 
 @dataclass(frozen=True, slots=True)
 class Untestable:
-    """Why a set of recordings can't tell whether an effect is there, and which test would."""
+    """Why a set of recordings can't tell whether an effect is there, and which test would.
+
+    ``needs`` is what must be given next to any test; without it no recording can tell.
+    """
 
     reason: str
     suggested_test: str

@@ -57,7 +57,11 @@ def limited(torque: FloatArray, limit: float, sharpness: float) -> FloatArray:
 
 
 def warmth(torque: FloatArray, since_start_s: FloatArray, period_s: float, p: FloatArray, begun: float) -> FloatArray:
-    """Return how warm the windings are when each row begins and after the last, 1 at the full loss; (N + 1,)."""
+    """Return how warm the windings are when each row begins and after the last, 1 at the full loss; (N + 1,).
+
+    By time alone, or, where they are heated, by the torque's own losses: ``tau dh/dt + h = (T / T_n)^2``, held over
+    each period; ``begun`` is the first row's then.
+    """
     if p[_HEATED] <= 0.0:
         rows_and_end = np.append(since_start_s, since_start_s[-1] + period_s)
         return np.asarray(-np.expm1(-rows_and_end / p[_DERATING_TIME]))

@@ -49,6 +49,10 @@ class Shaft:
         return cls(**{name: float(values[name]) for name in model.structure.parameter_names}, source=source)
 
     def with_resonance(self, mode: Mode) -> Shaft:
+        """Return a shaft between two free inertias with this resonance, friction left out.
+
+        With J = J_M J_L / (J_M + J_L): k = J w^2 and c = 2 J zeta w, w the natural frequency [rad/s].
+        """
         inertia = self.J_M * self.J_L / (self.J_M + self.J_L)
         w = 2.0 * math.pi * mode.frequency_hz
         return replace(self, k=inertia * w * w, c=2.0 * inertia * mode.damping * w, source="resonance")

@@ -56,6 +56,7 @@ def _typical_torque(record: Record) -> float:
 
 
 def _typical(signal: FloatArray) -> float:
+    """Where it rests for all but a short pulse, its peak; where it rests throughout, 1: a scale must not be zero."""
     size = np.abs(signal)
     return float(np.nanpercentile(size, 99)) or float(np.nanmax(size)) or 1.0
 
@@ -118,7 +119,11 @@ def speed_sweeps(record: Record) -> bool:
 
 @once
 def motor_angle(record: Record) -> FloatArray:
-    """Return the motor angle by the record's own output, from 0 at its start; shape (N,) [rad]."""
+    """Return the motor angle by the record's own output, from 0 at its start; shape (N,) [rad].
+
+    Laws that are periodic in the angle take their phase from it. A simulated angle would drift off by whole radians
+    while a fit is still on its way.
+    """
     if record.lead is not None:
         return motor_angle(record.lead)
     good = np.flatnonzero(record.okay)

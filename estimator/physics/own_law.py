@@ -156,6 +156,7 @@ class OwnLaw:
         return float(self(np.array([[time_s], [motor], [load], [twist], [torque]]), values)[0])
 
     def _compiled(self, values: Mapping[str, float]) -> Callable[..., float] | None:
+        """Return the function compiled; None where it can't be, raises by itself, or returns something else then."""
         try:
             if any(each.opname == "RAISE_VARARGS" for each in dis.get_instructions(self.function)):
                 return None

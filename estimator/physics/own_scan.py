@@ -1,4 +1,9 @@
-"""What a recording has of its own of an effect, found by a scan: phases of an angle, moments of an event."""
+"""What a recording has of its own of an effect, found by a scan: phases of an angle, moments of an event.
+
+Neither is convex: a fit that starts half a period or a few seconds off ends in the wrong place. Around the state
+without the effect the output answers to a small one in proportion, so that phases follow from the answers to a cosine
+and a sine, and moments from the answers to the effect in every cell of a grid over time.
+"""
 
 from __future__ import annotations
 

@@ -3,6 +3,12 @@
 The model between u and y survives any linear filter that both pass through. Two are used, in this order:
 
 The same causal loop serves the rig on line, sample by sample, and a recording as a block, with equal bits.
+
+1. First-order high-pass: each signal minus its exponentially weighted mean, ``m += (1 - p)(x - m)`` with the
+   pole ``p = exp(-2 pi f_c T)``. It takes away what a road grade or the driver does slowly, which a model of
+   the driveline can't explain. Trials gave 0.3 Hz; see DESIGN "Identification".
+2. Linear-phase low-pass (FIR, Hamming window) ahead of keeping every M-th sample. It delays by a whole number
+   of the *kept* samples, which :func:`decimate` takes out of the time base.
 """
 
 from __future__ import annotations

@@ -44,7 +44,7 @@ def design(
     """Find the experiment, among those that the rig may drive, that tells most about what is left open.
 
     Every one is driven on paper by the most probable explanation, through the torque guard and within the rig file's
-    [design]; how well it tells explanations apart is the distance of what each would let the sensor read, in units of
+    [design]; how well it distinguishes explanations is the distance of what each would let the sensor read, in units of
     its noise. Writes TOML, which hil run drives, unless nothing is open or nothing that may be driven would tell.
     """
     from estimator.design import left_open

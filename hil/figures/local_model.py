@@ -253,9 +253,9 @@ def _agreement(model: LocalModel) -> tuple[float, float] | None:
     if spectral is None or mode is None:
         return None
     f = spectral.frequency_hz[spectral.frequency_hz <= 0.5 / model.online.sample_time_s]
-    apart = np.abs(decibels(model.online.response(f)) - decibels(spectral.response[: f.size]))
+    difference_db = np.abs(decibels(model.online.response(f)) - decibels(spectral.response[: f.size]))
     at = int(np.argmin(np.abs(f - mode.frequency_hz)))
-    inside = f[unbroken(apart <= AGREEMENT_DB, at)]
+    inside = f[unbroken(difference_db <= AGREEMENT_DB, at)]
     return (float(inside[0]), float(inside[-1])) if inside.size else None
 
 

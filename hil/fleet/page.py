@@ -152,15 +152,15 @@ def fleet_page(folder: Path, made: Provenance) -> str:
     failures = read(folder, "failures").to_pylist()
     courses = courses_of(folder, rows)
     vehicles = sorted({(row["vehicle"], row["rig"]) for row in rows.values()})
-    apart = [each for each in vehicles if any(_is_apart(course) for course in courses.get(each, ()))]
+    outliers = [each for each in vehicles if any(_is_outlier(course) for course in courses.get(each, ()))]
     changed = [each for each in vehicles if any(course.change for course in courses.get(each, ()))]
     having = {(each["vehicle"], each["rig"]) for each in effects}
-    title = f"{len(vehicles)} vehicles: {len(having)} with an effect, {len(apart)} unlike the others"
+    title = f"{len(vehicles)} vehicles: {len(having)} with an effect, {len(outliers)} unlike the others"
     tiles = [
         ("vehicles", str(len(vehicles)), ""),
         ("recordings", str(sum(row["n_recordings"] for row in rows.values())), ""),
         ("with an effect", str(len(having)), "vehicles"),
-        ("unlike the others", str(len(apart)), f"vehicles; {FALSE_RATE:.1%} of sound ones, of each value"),
+        ("unlike the others", str(len(outliers)), f"vehicles; {FALSE_RATE:.1%} of sound ones, of each value"),
         ("changed", str(len(changed)), "vehicles"),
         ("not computed", str(len(failures)), "of the last run"),
     ]
@@ -182,8 +182,8 @@ def _day(started: str) -> str:
     return started[:16].replace("T", " ")
 
 
-def _is_apart(course: Course) -> bool:
-    return course.pooled is not None and course.pooled.is_apart
+def _is_outlier(course: Course) -> bool:
+    return course.pooled is not None and course.pooled.is_outlier
 
 
 def _name(vehicle: Vehicle) -> str:
@@ -206,7 +206,7 @@ def _vehicles(
     lines = []
     for each in vehicles:
         own, followed = of_vehicle[each], courses.get(each, [])
-        away = [f"{FOLLOWED[c.of]} {c.pooled.away:+.1f} σ" for c in followed if c.pooled and c.pooled.is_apart]
+        away = [f"{FOLLOWED[c.of]} {c.pooled.away:+.1f} σ" for c in followed if c.pooled and c.pooled.is_outlier]
         steps = [
             f"{FOLLOWED[c.of]} {shown(c.change.before)} → {shown(c.change.after, c.unit)} at {c.dates[c.change.first]}"
             for c in followed

@@ -67,7 +67,7 @@ class Pooled:
     away: float  # from what is usual to its own recordings alone, in standard deviations of a usual vehicle's
 
     @property
-    def is_apart(self) -> bool:
+    def is_outlier(self) -> bool:
         """Whether the vehicle is not as the others, at `FALSE_RATE`."""
         return abs(self.away) > threshold(1)
 

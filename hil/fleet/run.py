@@ -146,7 +146,7 @@ class Fleet:
         for each in self.recordings:
             rigs.setdefault(each.vehicle, set()).add(each.rig)
         lines += [
-            f"vehicle {vehicle}: recordings of {len(names)} rigs ({', '.join(sorted(names))}), kept apart"
+            f"vehicle {vehicle}: recordings of {len(names)} rigs ({', '.join(sorted(names))}), kept separate"
             for vehicle, names in sorted(rigs.items())
             if len(names) > 1
         ]

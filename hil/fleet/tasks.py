@@ -80,7 +80,7 @@ def analyse(recordings: Sequence[Found], job: Job) -> Outcome:
     if job.version != __version__:
         return Outcome({}, "", f"expected a worker of hil {job.version}, got one of hil {__version__}")
     work_on(1)
-    begun = time.monotonic()
+    started_s = time.monotonic()
     try:
         with (
             _ended_after(PATIENCE * job.budget_s),
@@ -101,7 +101,7 @@ def analyse(recordings: Sequence[Found], job: Job) -> Outcome:
         "n_recordings": len(records),
         "n_samples": sum(int(each.okay.sum()) for each in records),
         "duration_s": sum(float(each.time_s[-1] - each.time_s[0]) for each in records),
-        "seconds": time.monotonic() - begun,
+        "seconds": time.monotonic() - started_s,
     }
     of, tables = row_of(recordings, job), {"recordings": [head], "effects": effects, "parameters": parameters}
     return Outcome({name: [of | row for row in rows] for name, rows in tables.items()}, verdict)

@@ -165,8 +165,8 @@ class Runner:
             return
         if array not in into:
             variable = next(each for each in self._described.modelVariables if each.name == array)
-            begun = np.array([number(each) for _, each in elements(array, variable.shape, variable.start)])
-            into[array] = np.broadcast_to(begun.reshape(variable.shape), (*np.shape(value), *variable.shape)).copy()
+            starts = np.array([number(each) for _, each in elements(array, variable.shape, variable.start)])
+            into[array] = np.broadcast_to(starts.reshape(variable.shape), (*np.shape(value), *variable.shape)).copy()
         into[array][(..., *place)] = value
 
 

@@ -29,14 +29,14 @@ class Format:
     ``write`` is None for a format that is only read, ``metadata`` for one whose metadata come with the table alone.
     ``companion`` names the file that belongs to a recording in a format that has no place for all there is to say.
     ``tables`` reads a table for each time of a format that may have several.
-    ``apart`` is True where a compiled library parses it: in a process of its own (`hil.recording.sandbox`).
+    ``is_sandboxed`` is True where a compiled library parses it: in a process of its own (`hil.recording.sandbox`).
     """
 
     read: Callable[[Path, Request], Table]
     write: Callable[[Table, Path], None] | None = None
     metadata: Callable[[Path], Mapping[str, str]] | None = None
     companion: Callable[[Path], Path] | None = None
-    apart: bool = True
+    is_sandboxed: bool = True
     tables: Callable[[Path, Request], list[Table]] | None = None
 
 
@@ -50,7 +50,7 @@ def _of(name: str) -> Callable[..., Any]:
     return called
 
 
-_TEXT = partial(Format, _of("csv_format.read"), apart=False)
+_TEXT = partial(Format, _of("csv_format.read"), is_sandboxed=False)
 _DESCRIBED_TEXT = partial(_TEXT, metadata=read_sidecar_metadata, companion=sidecar_of)
 _MDF = partial(
     Format, _of("mdf_format.read"), metadata=_of("mdf_format.read_metadata"), tables=_of("mdf_format.read_all")
@@ -96,7 +96,7 @@ def read_table(path: Path | str, request: Request | None = None) -> Table:
     path = Path(path)
     known = format_of(path)
     asked = request or Request()
-    table = READER.table(path, asked) if known.apart else tables_of(known, path, asked)[0]
+    table = READER.table(path, asked) if known.is_sandboxed else tables_of(known, path, asked)[0]
     require_whole(table)
     return table
 
@@ -111,7 +111,7 @@ def read_metadata(path: Path | str) -> Mapping[str, str]:
     """Read what a recording says of itself, without its rows where the format allows."""
     path = Path(path)
     known = format_of(path)
-    return READER.metadata(path) if known.apart else metadata_of(known, path)
+    return READER.metadata(path) if known.is_sandboxed else metadata_of(known, path)
 
 
 def metadata_of(known: Format, path: Path) -> Mapping[str, str]:
@@ -145,7 +145,8 @@ def format_of(path: Path) -> Format:
 
 def _require_readable(path: Path, known: Format) -> None:
     try:
-        if known.apart and path.exists() and not path.is_file():  # these are read from their end, and a pipe has none
+        # these are read from their end, and a pipe has none
+        if known.is_sandboxed and path.exists() and not path.is_file():
             raise RecordingError(path, "expected a file, got a folder, a pipe or a device. Name a recording.")
         with path.open("rb"):
             pass

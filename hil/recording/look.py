@@ -137,7 +137,7 @@ def channel_rows(group: Group) -> Iterator[tuple[str, str, int, int, float | Non
 def look(path: Path, dbc: Path | None = None) -> Look:
     known = format_of(path)
     encoding = None
-    if known.apart:
+    if known.is_sandboxed:
         survey = READER.survey(path, Request(dbc=dbc))
     else:
         encoding = likely_encoding(path.read_bytes())

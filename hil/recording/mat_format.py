@@ -86,7 +86,7 @@ HEADER = (
 
 REFERENCES = "#refs#"
 
-LONGEST_NAME = 63  # characters of a variable's name that MATLAB tells apart (``namelengthmax``)
+LONGEST_NAME = 63  # characters of a variable's name that MATLAB distinguishes (``namelengthmax``)
 
 
 def write(table: Table, path: Path) -> None:

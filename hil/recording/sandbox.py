@@ -239,7 +239,7 @@ class Sandbox:
 
 
 class Reader:
-    """Reads recordings in a process apart, one after the other."""
+    """Reads recordings in a process of its own, one after the other."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()

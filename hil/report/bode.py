@@ -92,11 +92,11 @@ def spread_of(fit: LinearFit, frequency_hz: FloatArray) -> FloatArray:
     model = fit.model
     known = model.response(frequency_hz)
 
-    def apart(theta: FloatArray) -> FloatArray:
+    def log_gain_and_phase(theta: FloatArray) -> FloatArray:
         ratio = LinearModel.from_theta(theta, model.orders, model.sample_time_s).response(frequency_hz) / known
         return np.concatenate([np.log(np.abs(ratio)), np.angle(ratio)])
 
-    _, covariance = propagate(apart, model.theta, fit.covariance)
+    _, covariance = propagate(log_gain_and_phase, model.theta, fit.covariance)
     deviations = np.sqrt(np.maximum(np.diag(covariance), 0.0)).reshape(2, -1)
     return np.asarray(QUANTILE * deviations.max(axis=0), dtype=np.float64)
 

@@ -16,7 +16,7 @@ from estimator.identification.online.recursive import Status
 from hil.figures.local_model import LocalModel
 from hil.report.numbers import listed, shown
 
-FAR_APART = 0.03
+WORTH_A_WARNING = 0.03
 """On-line and off-line frequency further apart than this share are worth a warning: docs/identification.md."""
 
 LITTLE_PERCENT = 50.0
@@ -59,8 +59,9 @@ def verdict(each: Study) -> str:
             f" Sampled every {1e3 * best.fit.model.sample_time_s:g} ms, no mode above {best.band_hz[1]:.3g} Hz can be "
             f"seen: record every {1e3 * SEEN * 0.5 / LEAST_BAND_HZ:g} ms or faster."
         )
-    if apart := _apart(each):
-        text += f" The on-line estimate is {100.0 * apart:.1f} % off in frequency: see its course before you use it."
+    if disagreement := _disagreement(each):
+        off = f"{100.0 * disagreement:.1f} %"
+        text += f" The on-line estimate is {off} off in frequency: see its course before you use it."
     return text
 
 
@@ -176,13 +177,13 @@ def _passed(validation: Validation) -> bool:
     return validation.independence.is_independent
 
 
-def _apart(each: Study) -> float:
+def _disagreement(each: Study) -> float:
     """Return by how much on-line and best frequency differ, relative; 0 where they agree or one is missing."""
     online, best = each.found.online_resonance, each.resonance
     if online is None or best is None:
         return 0.0
-    apart = abs(online.frequency_hz / best.frequency_hz.value - 1.0)
-    return apart if apart > FAR_APART else 0.0
+    disagreement = abs(online.frequency_hz / best.frequency_hz.value - 1.0)
+    return disagreement if disagreement > WORTH_A_WARNING else 0.0
 
 
 def plus_minus(value: Uncertain, unit: str = "") -> str:

@@ -166,8 +166,8 @@ class PlcFaults:
 
     def answers(self, time_s: float) -> Answers:
         """Tell how the PLC answers at a simulated time [s]."""
-        begun = [each for each in self.answers_at_s if each[0] <= time_s]
-        return max(begun, key=itemgetter(0))[1] if begun else Answers.WELL
+        active = [each for each in self.answers_at_s if each[0] <= time_s]
+        return max(active, key=itemgetter(0))[1] if active else Answers.WELL
 
 
 @dataclass(frozen=True, slots=True)

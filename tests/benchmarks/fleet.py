@@ -47,10 +47,10 @@ def identified(drives: Path, workers: int) -> tuple[float, float]:
         warm_up, out = Path(place) / "warm_up", Path(place) / "results"
         for folder, some in ((warm_up, found[:workers]), (out, found[workers:])):
             fleet = survey(client, some, 0, _no_progress)
-            begun = time.perf_counter()
+            started_s = time.perf_counter()
             job = Job(IDENTIFY, None)
             carry_out(client, fleet, job, Writer(folder, job.command), Engine(), False, _no_progress)
-            spent = time.perf_counter() - begun
+            spent = time.perf_counter() - started_s
         return spent, float(np.sum(read(out, "recordings", ["seconds"])["seconds"].to_numpy()))
 
 
@@ -61,9 +61,9 @@ def surveyed(client: Client, folder: Path, count: int) -> tuple[str, str, str, s
     for number in range(count):
         (drives / f"{number}.csv").write_text(f"time_s,torque_m1_nm,torque_m2_nm,speed_rad_s\n0,{number},1,1\n")
     found, _ = find([str(drives)], None)
-    begun = time.perf_counter()
+    started_s = time.perf_counter()
     survey(client, found, 0, _no_progress)
-    each_ms = 1e3 * (time.perf_counter() - begun) / count
+    each_ms = 1e3 * (time.perf_counter() - started_s) / count
     (worker,) = client.run(resident_mib).values()
     return f"{count:,}", f"{each_ms:.1f} ms", f"{resident_mib():.0f} MiB", f"{worker:.0f} MiB"
 

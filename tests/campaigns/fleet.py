@@ -111,8 +111,8 @@ def judged(rows: list[Row], drives: range) -> tuple[Usual, dict[int, Pooled]]:
 
 def line_for(what: str, known: Usual, found: dict[int, Pooled]) -> str:
     """Return the line of one way to judge."""
-    hits = sum(each.is_apart for vehicle, each in found.items() if is_faulty(vehicle))
-    false = sum(each.is_apart for vehicle, each in found.items() if not is_faulty(vehicle))
+    hits = sum(each.is_outlier for vehicle, each in found.items() if is_faulty(vehicle))
+    false = sum(each.is_outlier for vehicle, each in found.items() if not is_faulty(vehicle))
     sound = sum(not is_faulty(vehicle) for vehicle in found)
     return (
         f"{what}: {hits} of {sum(map(is_faulty, found))} found, {false} of {sound} sound ones named; usual "

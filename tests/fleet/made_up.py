@@ -7,7 +7,7 @@ import numpy as np
 from hil.fleet.dataset import Row, Writer
 
 RESONANCE_HZ, BETWEEN_HZ, WITHIN_HZ = 8.2, 0.08, 0.12
-APART, CHANGED = 3, 7
+OUTLIER, CHANGED = 3, 7
 """The bus whose resonance is a tenth lower than that of the others, and the one where it falls in the middle."""
 
 
@@ -18,7 +18,7 @@ def write_fleet(folder: Path, vehicles: int, drives: int, seed: int = 57) -> Non
     for vehicle in range(vehicles):
         usual_hz = RESONANCE_HZ + rng.normal(0.0, BETWEEN_HZ)
         for drive in range(drives):
-            weak = vehicle == APART or (vehicle == CHANGED and drive >= drives // 2)
+            weak = vehicle == OUTLIER or (vehicle == CHANGED and drive >= drives // 2)
             hz = (usual_hz + rng.normal(0.0, WITHIN_HZ)) * (0.9 if weak else 1.0)
             has_gap = vehicle % 9 == 0 and drive >= 3
             writer.add(_rows(vehicle, drive, hz, has_gap, float(rng.normal(0.02, 0.001))), "{}\n")

@@ -12,7 +12,7 @@ from hil.fleet.page import courses_of, fleet_page, usual_parameters
 from hil.provenance import Provenance
 from tests.browser.conftest import browser, opened
 from tests.fleet import made_up
-from tests.fleet.made_up import APART, CHANGED, write_fleet
+from tests.fleet.made_up import CHANGED, OUTLIER, write_fleet
 
 __all__ = ["browser"]
 
@@ -35,8 +35,8 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_the_one_unlike_the_others_and_the_one_that_changed_are_found(results: Path) -> None:
     courses = courses_of(results, current(results))
     resonance = {vehicle: of[0] for (vehicle, _), of in courses.items()}
-    away = {vehicle for vehicle, course in resonance.items() if course.pooled and course.pooled.is_apart}
-    assert f"bus_{APART}" in away
+    away = {vehicle for vehicle, course in resonance.items() if course.pooled and course.pooled.is_outlier}
+    assert f"bus_{OUTLIER}" in away
     assert len(away) <= 4
     step = resonance[f"bus_{CHANGED}"].change
     assert step is not None

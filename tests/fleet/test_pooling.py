@@ -33,9 +33,9 @@ def test_vehicles_with_a_fault_do_not_make_themselves_usual() -> None:
     seen = fleet(200, 5, np.random.default_rng(2), faulty=10)
     known = usual(seen)
     assert known.between == pytest.approx(BETWEEN, rel=0.25)
-    apart = [i for i, each in enumerate(seen) if pooled(each, known).is_apart]
-    assert set(range(10)) <= set(apart)
-    assert len(apart) <= 12
+    outliers = [i for i, each in enumerate(seen) if pooled(each, known).is_outlier]
+    assert set(range(10)) <= set(outliers)
+    assert len(outliers) <= 12
 
 
 def test_sound_vehicles_are_named_as_rarely_as_said() -> None:
@@ -43,7 +43,7 @@ def test_sound_vehicles_are_named_as_rarely_as_said() -> None:
     for seed in range(10):
         seen = fleet(200, 4, np.random.default_rng([3, seed]))
         known = usual(seen)
-        named += sum(pooled(each, known).is_apart for each in seen)
+        named += sum(pooled(each, known).is_outlier for each in seen)
     assert named <= 12  # 4 of 2000 are expected; 13 or more in one of 10,000 such fleets
     assert FALSE_RATE == 0.002
 

@@ -87,7 +87,7 @@ def test_vehicles_of_two_rigs_are_kept_apart_and_duplicates_named() -> None:
     assert len(fleet.pieces(by_vehicle=False)) == 3
     assert fleet.remarks() == [
         "d: the same content as a, counted once",
-        "vehicle bus_1: recordings of 2 rigs (x, y), kept apart",
+        "vehicle bus_1: recordings of 2 rigs (x, y), kept separate",
     ]
 
 

@@ -1,4 +1,11 @@
-"""Gauss-Newton descent of the squared innovations, with derivatives that are carried from fit to fit."""
+"""Gauss-Newton descent of the squared innovations, with derivatives that are carried from fit to fit.
+
+A derivative by differences costs a simulation per unknown, a step one. So a fit begins with the derivative of the fit
+it extends, of which only the new unknowns' columns are found, and follows it by Broyden's update (Math. Comp. 19,
+1965; with Marquardt's damping: Madsen, Nielsen and Tingleff, Methods for Non-Linear Least Squares Problems, DTU 2004,
+3.5). It is found anew where a step does not keep what it promised, and before a fit counts as ended. Derivatives are
+those of the plain errors: they hold under any weighting.
+"""
 
 from __future__ import annotations
 

@@ -87,7 +87,11 @@ def kept(previous: FitResult, effects: Collection[str]) -> Release:
 
 
 def inheriting(name: str, release: Release, previous: FitResult) -> Release:
-    """Return a start of a general law that keeps what a fit of its special case has found out by another telling."""
+    """Return a start of a general law that keeps what a fit of its special case has found out by another telling.
+
+    Friction that was seen to bend before it slides does so with a Stribeck range, too: begun without, such a fit is far
+    behind the special case and would be given up.
+    """
     found = {
         key: value for special in EFFECTS[name].contains for key, value in previous.values_of(special).items() if value
     }
@@ -262,6 +266,7 @@ class Hypothesis:
 
     @property
     def score(self) -> float:
+        """Minus twice the log-likelihood with the price of the unknowns and of the choice (Schwarz, 1978)."""
         n = self.result.residual.size
         freed = "road_grade" in self.effects
         return self.minus_twice_log + (self.unknowns + freed) * math.log(n) + 2.0 * self.choices

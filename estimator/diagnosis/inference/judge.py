@@ -120,7 +120,11 @@ def _alike(
 
 
 def probability_of(names: Collection[str], scores: Sequence[Score], tempered: float) -> float:
-    """Return the probability that one of some effects is there, over all sets that were fitted."""
+    """Return the probability that one of some effects is there, over all sets that were fitted.
+
+    A set with values that are no case of its effects is evidence of something else: against the effects it does
+    without, and for none that it holds.
+    """
     holds = [any(name in names for name in each.effects) for each in scores]
     counted = [(each.score, has) for each, has in zip(scores, holds, strict=True) if each.is_plausible or not has]
     values = np.array([score for score, _ in counted])

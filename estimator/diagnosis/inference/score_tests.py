@@ -70,7 +70,11 @@ class ScoredStart:
 
 
 def promising(starts: Sequence[ScoredStart]) -> list[ScoredStart]:
-    """Return the starts worth a fit: the best, and others where they promise nearly as much."""
+    """Return the starts worth a fit: the best, and others where they promise nearly as much.
+
+    These are the second best, and the best of other shapes, since a law has an optimum near each, and of every other
+    variant: a look at one is no look at another.
+    """
     near = [scored for scored in starts if scored.promise >= PROMISING * starts[0].promise or scored is starts[0]]
     best = {(scored.variant, scored.shape): scored for scored in reversed(near)}
     distinct = [scored for scored in near[STARTS:] if best[scored.variant, scored.shape] is scored]
@@ -159,7 +163,7 @@ class Screen:
 
     def _along(self, steps: _Steps, step: float, moved: FloatArray) -> ScoredStart:
         release, first, zero = steps.release, steps.first, steps.zero
-        if not np.isfinite(moved).all():  # so far out that the line flies apart: this start promises nothing
+        if not np.isfinite(moved).all():  # so far out that the line is unstable: this start promises nothing
             return ScoredStart(release, 0.0)
         ends = sorted((limit - zero) / step for limit in (first.low, first.high))
         most = LARGEST_SCALING * abs((first.start - zero) / step)
@@ -182,7 +186,7 @@ class Screen:
 
     def _in_phase(self, release: Release, found: list[list[Wave]]) -> ScoredStart:
         if not all(np.isfinite(wave.answers @ wave.answers.T).all() for mine in found for wave in mine):
-            return ScoredStart(release, 0.0)  # so far out that the line flies apart
+            return ScoredStart(release, 0.0)  # so far out that the line is unstable
         amplitudes, phases, promise = self._regress(found)
         shared = tuple(
             replace(u, start=float(np.clip(amplitudes[u.name] / u.scale, u.low, u.high))) if u.name in amplitudes else u

@@ -352,6 +352,7 @@ class Search:
         return None if rough is None else self.finish(rough, current)
 
     def fit_look_alikes(self, best: Hypothesis) -> None:
+        """Fit to their end what came near in the place of an effect, so that each look-alike has its own values."""
         for effects, rough in sorted(self.rough.items(), key=lambda item: sorted(item[0])):
             exchanged = len(effects) == len(best.effects) and len(effects & best.effects) == len(effects) - 1
             if exchanged and effects not in self.visited:

@@ -199,7 +199,7 @@ def _wrong_values(left: str, off_nominal: Sequence[OffNominal]) -> str:
     )
 
 
-FEWEST_IN_COMMON = 3  # values off by one factor, from which on the torque is as likely off as each of them
+LINE = frozenset({"J_M", "J_L", "k"})  # what a line's answer to a torque is in proportion to
 
 
 def _common_factor(off_nominal: Sequence[OffNominal]) -> str:
@@ -207,7 +207,7 @@ def _common_factor(off_nominal: Sequence[OffNominal]) -> str:
     ratios = [each.ratio for each in off_nominal]
     middle = sum(ratios) / len(ratios)
     least_trusted = max(each.tolerance for each in off_nominal)
-    if len(ratios) < FEWEST_IN_COMMON or max(ratios) - min(ratios) > least_trusted * middle:
+    if not LINE <= {each.name for each in off_nominal} or max(ratios) - min(ratios) > least_trusted * middle:
         return ""
     return (
         f"All of them are about {middle:.2g} times their nominal values, which is the same as a torque of "

@@ -1,4 +1,10 @@
-"""The torque at one place of the line, or the error of the reading, that by itself would explain a fit's error."""
+"""The torque at one place of the line, or the error of the reading, that by itself would explain a fit's error.
+
+What the simulation lacks is taken for an unknown input of the linearised line: a random walk, estimated with its
+standard error by a fixed-interval Kalman smoother (Durbin and Koopman, Time Series Analysis by State Space Methods,
+chapter 4). How fast the walk may go is found by the marginal likelihood of the error, and that likelihood tells how
+plausible the place is: at the right one a simple input explains the error, elsewhere it takes a wild one.
+"""
 
 from __future__ import annotations
 

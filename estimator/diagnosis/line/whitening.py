@@ -1,4 +1,9 @@
-"""The Kalman filter that turns a free-run error into its innovations, compiled: gains once, then any signals."""
+"""The Kalman filter that turns a free-run error into its innovations, compiled: gains once, then any signals.
+
+Model: ``x[t+1] = F x[t] + w``, ``y[t] = H x[t] + v`` with ``cov w = Q`` and ``cov v = diag(r)``. What was not observed
+is predicted and not corrected, and the outputs of a sample correct the state one after the other (Durbin and Koopman,
+Time Series Analysis by State Space Methods, chapters 4 and 6.4). F and H are sparse.
+"""
 
 from __future__ import annotations
 

@@ -111,6 +111,7 @@ def binned_by_pass(
 
 
 def _edges(values: FloatArray, low: float, high: float) -> FloatArray:
+    """Return bin edges, half as bins of one width would have them and half as bins of one count would."""
     grid = np.linspace(low, high, 20 * BINS + 1)
     counted = np.searchsorted(np.sort(values), grid) / values.size
     share = 0.5 * (grid - low) / (high - low) + 0.5 * (counted - counted[0]) / (counted[-1] - counted[0])
@@ -244,6 +245,7 @@ def _picture_of_effect(
 
 
 def without_effect(result: FitResult, name: str) -> FitResult:
+    """Return a fit with one effect's shared parameters at their nulls and all else as it is, simulated."""
     nulls = {parameter.name: parameter.null for parameter in EFFECTS[name].shared_parameters}
     kept = [j for j, shared in enumerate(result.problem.shared) if shared.effect != name]
     p = result.problem.p.copy()

@@ -69,7 +69,7 @@ def _bands(frequency: FloatArray, ratio: FloatArray, averages: float) -> tuple[B
 
 
 def _octaves(frequency: FloatArray) -> FloatArray:
-    """Return band edges an octave apart, each band with a few frequencies; the last holds the highest."""
+    """Return band edges at octaves, each band with a few frequencies; the last holds the highest."""
     edges = [float(frequency[-1]) * (1.0 + 1e-9)]
     step = float(frequency[1] - frequency[0])
     while 0.5 * edges[-1] >= max(float(frequency[0]), FEWEST_PER_BAND * step):
@@ -81,6 +81,12 @@ COHERENT = 0.5  # share of the output's power that the torque must explain befor
 
 
 def responses(before: FitResult, after: FitResult) -> dict[str, Response]:
+    """Return the response of each recording and of both models in it; recordings too short or masked have none.
+
+    Torque and output are differenced first: that changes no response, and a slow course of the speed does not leak. The
+    models' responses are estimated from their simulations in the same way, so that what the method distorts is alike.
+    A joint has none: its torque is the output.
+    """
     found: dict[str, Response] = {}
     if before.problem.grid.structure is Structure.JOINT:
         return found
@@ -126,9 +132,9 @@ def _p_value(measured: SpectralEstimate, model: SpectralEstimate) -> float:
     good = (measured.coherence > COHERENT) & (measured.coherence < 1.0)
     if not good.any():
         return 1.0
-    apart = np.abs(measured.response - model.response)[good] / measured.magnitude_std[good]
+    deviation = np.abs(measured.response - model.response)[good] / measured.magnitude_std[good]
     degrees = 2.0 * float(good.sum())
-    return float(stats.chi2.sf(float(apart @ apart), degrees))
+    return float(stats.chi2.sf(float(deviation @ deviation), degrees))
 
 
 WINDOW_S = 0.5  # errors are averaged over this time before they are called a mismatch

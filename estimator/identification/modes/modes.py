@@ -1,4 +1,9 @@
-"""From poles to what an engineer means: natural frequency, damping, and which of them is the resonance."""
+"""From poles to what an engineer means: natural frequency, damping, and which of them is the resonance.
+
+A pole z of a model sampled with period T belongs to the continuous-time pole ``s = ln(z) / T``; it is the
+matched one as long as the mode lies below the Nyquist frequency. Natural frequency ``|s| / 2 pi``, damping
+ratio ``-Re s / |s|``.
+"""
 
 from __future__ import annotations
 
@@ -198,7 +203,7 @@ FAR = 1e6
 
 @dataclass(frozen=True, slots=True)
 class Cancellation:
-    """A pole and a zero that the data can't tell apart."""
+    """A pole and a zero that the data can't distinguish."""
 
     pole: complex  # in z
     zero: complex
@@ -236,9 +241,9 @@ def cancellations(poles: Roots, zeros: Roots, P: FloatArray, confidence: float) 
 
 def _distance(poles: Roots, i: int, zeros: Roots, j: int, P: FloatArray, freedom: int) -> float:
     """Return the squared distance of a pole and a zero in units of its own uncertainty."""
-    apart = zeros.values[j] - poles.values[i]
+    difference = zeros.values[j] - poles.values[i]
     spread = covariance_of(zeros.slopes[j] - poles.slopes[i], P)[:freedom, :freedom]
-    d = np.array([apart.real, apart.imag])[:freedom]
+    d = np.array([difference.real, difference.imag])[:freedom]
     if not np.isfinite(spread).all():
         return 0.0
     variances, axes = np.linalg.eigh(spread)

@@ -5,6 +5,18 @@ Torque at the motor in, motor speed out, is of third order with six coefficients
     w_M     1          J_L s^2 + (c + b_L) s + k
     --- =  ---  ----------------------------------------------------------------------------------------------------
     T_M     1   J_M J_L s^3 + (J_M (c+b_L) + J_L (c+b_M)) s^2 + ((J_M+J_L) k + c (b_M+b_L) + b_M b_L) s + k (b_M+b_L)
+
+They are estimated from the linear model in place of the data (indirect prediction-error method: T. Soderstrom, P.
+Stoica and B. Friedlander, Automatica 27, 1991): with theta(x) the coefficients of the drive x, sampled with held
+input, and P the covariance of the estimate theta_hat, minimise the deviance::
+
+    D(x) = (theta(x) - theta_hat)^T P^-1 (theta(x) - theta_hat)  +  sum of ((x_i - known_i) / std_i)^2
+
+over what a line can be: inertias and stiffness above 0, damping and frictions 0 or more (it is then passive). The
+second sum holds what is known beforehand. Intervals are profile likelihood (Meeker and Escobar, The American
+Statistician 49, 1995): the values v of a parameter for which the least D with x_i = v is within the chi-square quantile
+of the minimum.
+They end at 0 where the data allow it, and reach as far up as the data do: no normal distribution is supposed.
 """
 
 from __future__ import annotations

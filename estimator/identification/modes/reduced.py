@@ -6,6 +6,10 @@ Moore, IEEE Trans. Automatic Control 26, 1981) leaves out the states that are bo
 hard to see in the output. Its error is bounded at every frequency (D. F. Enns, 1984)::
 
     |G(f) - G_r(f)|  <=  2 (sigma_(r+1) + ... + sigma_n),    sigma the Hankel singular values
+
+With the input held between samples, ``exp([[A_c, B_c], [0, 0]] T) = [[A, B], [0, 1]]`` (Astrom and Wittenmark,
+Computer-Controlled Systems, chapter 2); its matrix logarithm takes a sampled model back to continuous time, zeros and
+all. Signals that were decimated through a low-pass were not held: their zeros, unlike their poles, are off.
 """
 
 from __future__ import annotations

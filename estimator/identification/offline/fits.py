@@ -5,6 +5,15 @@ Burg's method (J. P. Burg, 1967; S. M. Kay, Modern Spectral Estimation, chapter 
 at a time from the forward error f and the backward error g::
 
     k_m = - 2 sum f_(m-1)(t) g_(m-1)(t-1) / sum (f_(m-1)(t)^2 + g_(m-1)(t-1)^2)
+
+Output error: the prediction-error method on the free-run simulation (:mod:`problem` has the equations); consistent
+whatever the colour of the noise on y as long as torque does not follow speed; its covariance takes the colour into
+account. Box-Jenkins: ``y = B / A u + 1 / D w``, w white. The sum of w^2 over A, B and D together is least at the
+maximum-likelihood estimate (Box and Jenkins, Time Series Analysis, chapter 11; Ljung, System Identification, 2nd ed.,
+section 7.4). D is long, a second: road, grade and the driver's slow changes are the noise's, and no pole of the
+driveline has to follow them. The covariance is that of the joint estimate, so that what feedback correlates, plant and
+noise, widens the intervals. On 200 buses on a road, with a driver, the errors of frequency and damping were 0.24 and
+0.38 times those of the output-error fit (``python -m tests.benchmarks.identification``).
 """
 
 from __future__ import annotations

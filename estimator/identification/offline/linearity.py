@@ -1,4 +1,13 @@
-"""Whether a linear model is enough: a score test on what makes a driveline's response nonlinear."""
+"""Whether a linear model is enough: a score test on what makes a driveline's response nonlinear.
+
+With the linear model right, its innovation w(t) is independent of everything that was known at t - 1, so also of any
+nonlinear function of the torque in the shaft or of the speed. Piecewise linear functions of both, whose knots lie at
+quantiles, at zero torque (a gap) and at standstill (dry friction), drive the model as inputs of their own; w is
+regressed on their whitened responses next to its own gradient (T. S. Breusch and A. R. Pagan, Review of Economic
+Studies 47, 1980; an LM test in its F form, which holds in closed loop as well)::
+
+    F = ((S_0 - S_1) / q) / (S_1 / (n - p - q))
+"""
 
 from __future__ import annotations
 

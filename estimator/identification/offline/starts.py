@@ -4,6 +4,10 @@ Least squares on the equation error (ARX) needs no start but is biased by noise 
 L. E. McBride (IEEE Trans. Automatic Control 10, 1965) filters u and y by the last 1 / A_hat and repeats it; it is
 started from the ARX model itself, and from the simulated output of an ARX model of high order, in which the noise is
 averaged out.
+
+Predictor-based subspace identification has no minimum to miss and no bias by coloured noise or feedback: a long
+autoregression with input predicts y from the past; its coefficients, shifted, give the next outputs as a linear map of
+the past, whose n strongest directions are the state (A. Chiuso, Automatica 43, 2007). A, B, C follow by least squares.
 """
 
 from __future__ import annotations

@@ -6,6 +6,15 @@ Every profile is a choice of lambda_1(t) and lambda_2(t) in the paper's equation
 
 The initial gain F(0) = GI times the unit matrix is a choice that each profile has: 1000 where nothing is known of
 theta, at most 1 where an estimate is given as theta(0) (ibid.).
+
+All of I. D. Landau and G. Zito, Digital Control Systems (Springer, 2006), chapter 3, under the names they have
+there. A profile is a small object of its own; what an estimator's compiled loop needs of it is :class:`GainLaw`,
+the same for all of them.
+
+F is kept as U D U^T (U unit upper triangular, D diagonal) and updated after G. J. Bierman, Factorization Methods for
+Discrete Sequential Estimation (Academic Press, 1977), chapter V: it can then not lose symmetry or turn indefinite by
+rounding, however long the run. Row j of the array ``U`` is *column* j of U, with its unit diagonal and the zeros below
+it: the inner loops run over whole rows of fixed length, which a compiler turns into vector instructions.
 """
 
 from __future__ import annotations
@@ -107,7 +116,12 @@ class VariableForgetting:
 
 @dataclass(frozen=True, slots=True)
 class DecreasingThenConstantTrace:
-    """Decreasing gain until tr F has fallen to ``trace``, which is then held: fast start, then tracking."""
+    """Decreasing gain until tr F has fallen to ``trace``, which is then held: fast start, then tracking.
+
+    The paper's profile. While the trace is held, lambda_1(t) and lambda_2(t) follow from it and from their
+    constant ratio alpha. The paper gives "lambda_1 = 0.993" next to "tr F(0) = 0.01"; since lambda_1(t) itself
+    is fixed by the trace, its number is taken as the ratio (lambda_1 for lambda_2 = 1).
+    """
 
     lambda1: float = 0.993
     trace: float = 0.01
@@ -192,6 +206,7 @@ def dot(a: FloatArray, b: FloatArray) -> float:
 
 @inlined
 def project(Phi: FloatArray, U: FloatArray, f: FloatArray) -> None:
+    """Set f = U^T Phi."""
     for j in range(Phi.shape[0]):
         total = Phi[j]
         for i in range(j):
@@ -201,6 +216,7 @@ def project(Phi: FloatArray, U: FloatArray, f: FloatArray) -> None:
 
 @inlined
 def gain(Phi: FloatArray, U: FloatArray, D: FloatArray, g: FloatArray, f: FloatArray) -> float:
+    """Set g = F Phi and return Phi^T F Phi."""
     n = Phi.shape[0]
     project(Phi, U, f)
     s = 0.0

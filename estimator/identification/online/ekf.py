@@ -8,6 +8,11 @@ the two masses below::
     K(t)      = P(t) H^T / (H P(t) H^T + R),       H = [1 0 .. 0]
     x(t|t)    = x(t) + K(t) (y(t) - w_M(t)),       P(t|t) = P(t) - K(t) H P(t)
     x(t+1)    = f(x(t|t), u(t+1-nk)),              P(t+1) = Phi P(t|t) Phi^T + Q,      Phi = df/dx
+
+Logarithms, so that no inertia, stiffness or damping can turn negative. T_0 is a load torque that wanders: a hill, the
+driver, and near a constant speed the viscous frictions, which are therefore given and not estimated. P is kept as
+U D U^T: G. J. Bierman, Factorization Methods for Discrete Sequential Estimation (Academic Press, 1977), chapters V
+(correction) and VI (prediction, Thornton's).
 """
 
 from __future__ import annotations

@@ -1,4 +1,14 @@
-"""Alarms of a change of the resonance: record, state of the tracking, and the threshold for a rate of false ones."""
+"""Alarms of a change of the resonance: record, state of the tracking, and the threshold for a rate of false ones.
+
+The rule: two statistics in a row beyond a threshold h, on the same side. Each is standardised with the mean m and the
+standard deviation s of statistics before, ``tau = (x - m) / (s sqrt(1 + 1/n))``: m of n of them, s with nu degrees of
+freedom. Where nothing changes, and the statistics are independent and normal, two tau have a bivariate t distribution
+with nu degrees of freedom, correlated by ``rho = 1 / (n + 1)`` through m. By Plackett's identity for its derivative
+with respect to the correlation (Biometrika 41, 1954; A. Genz, Statistics and Computing 14, 2004), from -1, where both
+can't be beyond h, up to rho::
+
+    P(both beyond h) = 2 / (2 pi) integral (1 + 2 h^2 / (nu (1 + sin theta)))^(-nu / 2) dtheta,  -pi/2 to asin(rho)
+"""
 
 from __future__ import annotations
 

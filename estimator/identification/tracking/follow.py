@@ -8,6 +8,22 @@ covariance of its error is::
     P(t) = (I - K psi^T) P(t-1) (I - K psi^T)^T + S K K^T
 
 and K is *seen*, not assumed: it is the correction made, divided by the error it was made for.
+
+**The noise S.** The residual is coloured (road, aliasing, what the model lacks), and what counts is its density where
+psi has its own: at the resonance. Hence S is the residual's density there, found by passing it twice through the
+resonance's own pole, which weighs it as psi^2 does, and relating the mean square to what a white residual would give
+(L. Ljung, System Identification, 2nd ed. 1999, (9.54): the covariance of the estimate with the noise spectrum under
+the integral). The mean runs over the last :data:`MEMORY` samples.
+
+**Excitation.** At the end of every block, what the torque makes of the output at the resonance is held against the
+density S of the residual there. *Excited* is a block in which it is the larger; to become so, and to stay so with a
+torque that has become much weaker, it takes :data:`OPENS` times as much: a torque that is nothing but the noise of its
+reading makes an output that is not there, and a single look at a narrow band of noise exceeds ln(1000) times its mean
+once in 1000. *Lacking*: the torque's steps have less than 1 / :data:`OPENS` of the power they had while excited (the
+PRBS is off); the estimator is held, for it would learn noise, and forget. *Drowned*, which two blocks in a row have to
+say: the noise is above what the model makes of the torque; what has been learnt is begun anew. An estimate that is held
+keeps its covariance, but the samples within :data:`MEMORY` say less and less: by what is left of their information the
+variances are divided, up to those of a value that may be anywhere in the band in which the resonance is looked for.
 """
 
 from __future__ import annotations

@@ -8,6 +8,10 @@ A mode is the part rho / (1 - p q^-1) and its conjugate in the partial fractions
 its output changes with the natural frequency f by::
 
     psi(t) = dy/df = 2 Re [ rho dp/df q^-1 / (1 - p q^-1)^2 ] u(t),      dp/df = 2 pi T p (-zeta + j sqrt(1 - zeta^2))
+
+It converges quadratically: from the poles of the sample before in two or three rounds. Two real poles that become a
+pair can't be found so, since real values stay real; then, and at the start, the rounds begin at points that lie on no
+axis of symmetry, and take about ten.
 """
 
 from __future__ import annotations
@@ -52,12 +56,12 @@ def go_round(a: FloatArray, z: ComplexArray) -> float:
     largest = 0.0
     for i in range(n):
         value = 1.0 + 0.0j
-        apart = 1.0 + 0.0j
+        product = 1.0 + 0.0j
         for j in range(n):
             value = value * z[i] + a[j]
             if j != i:
-                apart *= z[i] - z[j]
-        step = ratio(value, apart)
+                product *= z[i] - z[j]
+        step = ratio(value, product)
         z[i] -= step
         change = abs(step.real) + abs(step.imag)
         largest = change if not change <= largest else largest  # NaN goes through

@@ -1,4 +1,9 @@
-"""A recursive estimator, followed and watched, block by block of samples."""
+"""A recursive estimator, followed and watched, block by block of samples.
+
+What a block says of the excitation decides what becomes of the next: it is learnt from, the estimator is held, or it
+begins anew (:mod:`follow`). Blocks begin with the first sample that comes, so that samples one by one, or all at
+once, are cut alike.
+"""
 
 from __future__ import annotations
 

@@ -5,6 +5,16 @@ by delta, its error is to first order ``e = w + psi delta``, with psi the sensit
 (:mod:`poles`; e and psi are both taken in steps). Every second the samples come to one deviation::
 
     d = sum psi e / sum psi^2
+
+the score of that change over its information (the local approach: M. Basseville, I. V. Nikiforov, Detection of Abrupt
+Changes, Prentice Hall 1993, chapter 8). A tracked parameter would tell the same later: the estimate takes seconds to
+move, the score has it in the first block.
+
+No noise model is believed: level and spread of d are those of :attr:`WatchSettings.reference_blocks` blocks seen
+before, a period of the PRBS and more, so that what the model lacks, which the PRBS repeats, is part of them. With the
+information p = sum psi^2 of a block, x = d sqrt(p) has one spread s for every p as long as noise is what spreads it;
+what the model lacks spreads d instead. Which of the two it was is not known: the variance of d is the larger of both,
+``s^2 max(1/p, 1/p_usual)``. The threshold follows from the rate of false alarms (:mod:`alarm`).
 """
 
 from __future__ import annotations
@@ -70,7 +80,10 @@ class Baseline:
 
 
 def spread_of(number: FloatArray, deviation_hz: FloatArray, information: FloatArray) -> Spread:
-    """Return how blocks scatter about a straight line over their numbers, each array of shape (n,), n of 3 or more."""
+    """Return how blocks scatter about a straight line over their numbers, each array of shape (n,), n of 3 or more.
+
+    A line, since a resonance that drifts while it is learnt would be taken for one that scatters.
+    """
     mean = (information @ number) / information.sum()
     level = (information @ deviation_hz) / information.sum()
     slope = (information @ ((number - mean) * (deviation_hz - level))) / (information @ (number - mean) ** 2)

@@ -83,6 +83,7 @@ def other_power(size: str, scale: float, values: Mapping[str, float]) -> list[Ot
 
 
 def quadratic_testable(model: Driveline, records: Sequence[Record]) -> Untestable | None:
+    """Need speeds that differ, or else it is the constant load."""
     if speeds_differ(records):
         return None
     return Untestable("the speed is the same all along: not separable from the constant load torque", "reversal")
@@ -305,6 +306,7 @@ def gears_law(torque: float, sign: float, driving: float, back: float) -> float:
 
 
 def gears_testable(model: Driveline, records: Sequence[Record]) -> Untestable | None:
+    """Need both signs of torque and of speed, or else it is a gain of the torque or a constant load."""
     if turns(model, records) and any(torque_reverses(record) for record in records):
         return None
     return Untestable("torque or speed never change sign: not separable from gain and constant load", "reversal")

@@ -134,7 +134,11 @@ def mode_scales(model: Driveline, records: Sequence[Record]) -> tuple[float, ...
 
 
 def mode_starts(model: Driveline, records: Sequence[Record]) -> list[Start]:
-    """Return heavy modes far above the first resonance, and light ones below, around and above it."""
+    """Return heavy modes far above the first resonance, and light ones below, around and above it.
+
+    The heavy ones come first: where only what their spring does to the line shows, nothing else distinguishes them. An
+    inertia within the line is looked for from where such a branch has been fitted (``retold``).
+    """
     none = Held(0.0)
     heavy = [(1.5, ratio, 0.95, 1.0, none, none) for ratio in (3.0, 4.0, 5.0, 6.0)]
     light = [(0.2, float(ratio), 1.0, 1.0, none, none) for ratio in np.geomspace(0.3, 5.0, 24)]

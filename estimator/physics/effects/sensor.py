@@ -94,6 +94,7 @@ def blind_testable(model: Driveline, records: Sequence[Record]) -> Untestable | 
 
 
 def blind_implausible(model: Driveline, records: Sequence[Record], values: Mapping[str, float]) -> str:
+    """Object to a sensor that tells the sign of most of the speed: what differs with the sign is something else."""
     if values["share"] >= LEAST_SHARE:
         return ""
     return f"a sensor that reads {values['share']:.2g} of the speed without its sign is not blind for it"

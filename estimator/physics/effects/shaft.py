@@ -82,6 +82,7 @@ def gap_completed(values: Mapping[str, float]) -> Mapping[str, float]:
 
 
 def gap_testable(model: Driveline, records: Sequence[Record]) -> Untestable | None:
+    """Need torque of both signs, so that the gap is crossed."""
     if any(torque_reverses(record) for record in records):
         return None
     return Untestable("the shaft torque never changes sign: the gap stays closed on one side", "reversal")
@@ -134,7 +135,11 @@ BACKLASH = Effect(
 
 @compiled
 def stiffness_factor(twist: float, hardening: float, shape: float) -> float:
-    """Return the factor on the stiffness, ``(1 + |h| e^2 / m)^(+-m)`` with the sign of h."""
+    """Return the factor on the stiffness, ``(1 + |h| e^2 / m)^(+-m)`` with the sign of h.
+
+    To first order it is ``1 + h e^2`` whatever the shape m. A hardening shaft with m = 1 is the Duffing spring; a
+    softening one with m = 1/2 ends in a constant torque, and none ever pulls the wrong way.
+    """
     if every(hardening == 0.0):
         return 1.0
     size = 1.0 + abs(hardening) * twist * twist / shape

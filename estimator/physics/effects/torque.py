@@ -35,6 +35,7 @@ from estimator.signals.record import FloatArray, Record
 
 
 def gain_testable(model: Driveline, records: Sequence[Record]) -> Untestable | None:
+    """Need two inputs whose ratio changes, or else a wrong gain is a change of all other parameters."""
     if any(record.torque_nm.shape[1] < 2 for record in records):
         return Untestable("there is one torque input only: its gain is that of all other parameters", "cruise")
     if shares_differ(records):

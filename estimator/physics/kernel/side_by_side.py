@@ -287,8 +287,8 @@ def integrate_each(
     they were.
     """
     given = (sample_time_s, substeps, sign_width)
-    apart = not np.any(alike[1:])
-    order = compatible_together(p) if apart else 1 + np.argsort(alike[1:])
+    all_differ = not np.any(alike[1:])
+    order = compatible_together(p) if all_differ else 1 + np.argsort(alike[1:])
     samples, reached, i = torque.shape[1], 0, 0
     while i < order.size:
         rows = order[i : i + LANES]
@@ -297,7 +297,7 @@ def integrate_each(
         if not together:
             rows = rows[:1]
         i += rows.size
-        common = 0 if apart else alike[rows[0]]
+        common = 0 if all_differ else alike[rows[0]]
         if common > reached:
             known = (torque[fed_by[0]], load[loaded_by[0]], angle, p[0], state[0])
             integrate(masses, own, *given, reached, common, start_s, *known, outputs, sensor, out[0], slopes[0])
@@ -319,6 +319,6 @@ def integrate_each(
             row = rows[0]
             it = (torque[fed_by[row]], load[loaded_by[row]], angle, p[row], state[row])
             integrate(masses, own, *given, reached, samples, start_s, *it, outputs, sensor, out[row], slopes[row])
-    if not apart:
+    if not all_differ:
         rest = (torque[fed_by[0]], load[loaded_by[0]], angle, p[0], state[0])
         integrate(masses, own, *given, reached, samples, start_s, *rest, outputs, sensor, out[0], slopes[0])

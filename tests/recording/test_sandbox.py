@@ -155,7 +155,7 @@ def test_content_in_another_file_is_refused(tmp_path: Path, kind: str) -> None:
         read_table(tmp_path / "run.h5")
 
 
-@pytest.mark.parametrize("suffix", sorted(suffix for suffix, form in FORMATS.items() if form.apart))
+@pytest.mark.parametrize("suffix", sorted(suffix for suffix, form in FORMATS.items() if form.is_sandboxed))
 @pytest.mark.parametrize("read", [read_table, read_metadata])
 def test_a_pipe_is_refused_and_not_waited_for(tmp_path: Path, suffix: str, read: Callable[[Path], object]) -> None:
     path = tmp_path / f"pipe{suffix}"
@@ -200,7 +200,7 @@ def test_a_reader_that_does_not_answer_is_ended_and_the_next_file_is_read(
         reader.end()
 
 
-@pytest.mark.parametrize("suffix", [suffix for suffix, form in FORMATS.items() if form.write and form.apart])
+@pytest.mark.parametrize("suffix", [suffix for suffix, form in FORMATS.items() if form.write and form.is_sandboxed])
 def test_every_kind_of_column_comes_through(tmp_path: Path, suffix: str) -> None:
     columns = {
         "x": np.array([0.0, -0.0, np.nan]),
