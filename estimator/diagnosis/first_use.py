@@ -31,7 +31,7 @@ from estimator.physics.model import DrivelineModel
 from estimator.physics.simulate import simulate
 from estimator.signals.record import Record
 
-COMPILING = "compiling, once on this machine: about a minute"
+COMPILING = "compiling, once on this machine: one to five minutes"
 
 _ROW, _ROWS, _STACK, _INDICES = float64[::1], float64[:, ::1], float64[:, :, ::1], int64[::1]
 _fields: Any = types.NamedTuple
