@@ -74,7 +74,7 @@ def headline(diagnosis: Diagnosis) -> str:
     """Say the verdict in one line."""
     if not diagnosis.effort.finished:
         return f"Not decided: the search was ended after {diagnosis.effort.limit_s:.3g} s"
-    found = [f"{title_of(effect.name)}{_sure(effect)}" for effect in diagnosis.effects]
+    found = [f"{_with_look_alikes(effect)}{_sure(effect)}" for effect in diagnosis.effects]
     if diagnosis.verdict is Verdict.EXPLAINED:
         return f"Missing in the model: {listed(found)}"
     if diagnosis.verdict is Verdict.PARTLY_EXPLAINED:
@@ -86,6 +86,11 @@ def headline(diagnosis: Diagnosis) -> str:
             f"No physics need be missing, but the data sheet is off: {listed([v.name for v in diagnosis.off_nominal])}"
         )
     return "Something is missing, and no effect of the catalogue explains it"
+
+
+def _with_look_alikes(effect: FoundEffect) -> str:
+    """Name an effect and what it can't be distinguished from: the probability is that one of them is there."""
+    return " or ".join(title_of(name) for name in (effect.name, *effect.indistinguishable_from))
 
 
 def _sure(effect: FoundEffect) -> str:
@@ -105,7 +110,10 @@ def belief(effect: FoundEffect) -> str:
     """Say how much of the mismatch goes with an effect and how probable it is; "" where that is not known."""
     if not (math.isfinite(effect.share) and math.isfinite(effect.probability)):
         return ""
-    return f"{effect.share:.0%} of the squared error explained; probability {probability(effect.probability)}. "
+    of_which = " that it or a look-alike is there" if effect.indistinguishable_from else ""
+    return (
+        f"{effect.share:.0%} of the squared error explained; probability {probability(effect.probability)}{of_which}. "
+    )
 
 
 def title_of(name: str) -> str:

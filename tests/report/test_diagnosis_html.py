@@ -70,7 +70,7 @@ def test_the_page_says_everything_from_the_verdict_down(diagnosis: Diagnosis) ->
     expected = (
         diagnosis.statement,  # holds characters that HTML has to escape
         "✓ explained",
-        "Missing in the model: backlash in the shaft line (99.9 % sure) and road grade",
+        "Missing in the model: backlash in the shaft line or hysteresis of the shaft (99.9 % sure) and road grade",
         "run_2 has 60 samples missing",
         "1.41 rad/s",
         "0.0521 rad/s",
@@ -209,4 +209,4 @@ def test_a_law_without_a_name_is_shown(diagnosis):
 def test_share_and_probability_of_an_effect_are_shown(diagnosis: Diagnosis) -> None:
     page = diagnosis_page(diagnosis)
     assert page.count("% of the squared error explained") == 1
-    assert "94% of the squared error explained; probability 99.9 %. Evidence:" in page
+    assert "94% of the squared error explained; probability 99.9 % that it or a look-alike is there. Evidence:" in page

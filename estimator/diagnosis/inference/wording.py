@@ -116,7 +116,8 @@ def statement(
         parts.append(f"Seen, but too small to matter: {', '.join(context.traces)}.")
     twins = sorted({twin for effect in effects for twin in effect.indistinguishable_from})
     if twins:
-        parts.append(f"These recordings could as well be explained by {' or '.join(twins)}.")
+        others = " or ".join(twins)
+        parts.append(f"These recordings could as well be explained by {others}: the probability is that one is there.")
     tests = sorted({entry.suggested_test for entry in context.untestable if not entry.needs})
     if tests:
         names = ", ".join(entry.name for entry in context.untestable if not entry.needs)
