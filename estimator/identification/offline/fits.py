@@ -270,10 +270,6 @@ def fit_output_error(record: Record, orders: Orders | None = None) -> LinearFit:
     return summarised(Method.OUTPUT_ERROR, problem, x, first, covariance[:n, :n], noise)
 
 
-MOST_STARTS = 2
-"""Starts that are followed, those of the least innovations first: the next best is there for what the best misses."""
-
-
 def fit_box_jenkins(record: Record, orders: Orders | None = None, memory: int | None = None) -> LinearFit:
     """Fit a Box-Jenkins model to a recording's total torque and output."""
     return fit_of(*solved(record, orders, memory))
@@ -290,7 +286,7 @@ def solved(record: Record, orders: Orders | None, memory: int | None = None) -> 
     """Return the joint problem, its minimum, and the first sample it counts from; as :func:`fit_box_jenkins`."""
     plain, first = problem_of(record, orders)
     order = reach(plain.period_s) if memory is None else memory
-    begin = sorted(((x, _noise_of(plain, x, order)) for x in starts(plain)), key=lambda each: each[1].std)[:MOST_STARTS]
+    begin = [(x, _noise_of(plain, x, order)) for x in starts(plain)]
     problem = replace(plain, noise_order=min(noise.order for _, noise in begin))
     x = problem.solve([np.concatenate([x, noise.D[1 : problem.noise_order + 1]]) for x, noise in begin])
     return problem, x, first
