@@ -60,6 +60,10 @@ RUNAWAY_SHARE: Final = 0.5
 SWING_S: Final = 0.2
 """Low-pass of the speed that is compared [s]: after a step of torque the motor swings on its shaft, faster than it."""
 
+UNWOUND_S: Final = 3.0 * SWING_S
+"""From a turn of the torque on, in which nothing is compared [s]: the shaft unwinds, and the low-passed speed is the
+vehicle's only when that has faded."""
+
 
 def left_operation(where: str, state: PowerState) -> str:
     """Say that a drive is not in the state it was armed in."""
@@ -334,6 +338,7 @@ class Supervision:
         self._stale_ns = guard.feedback_timeout_s * NS_PER_S
         self._apart: Excess | None = None
         self._opposing_nm = self._could_rad_s = 0.0
+        self._unturned_s = UNWOUND_S
         self._smooth: tuple[float, float] | None = None
         self._from: tuple[float, float, float] | None = None
         self._first_ns: int | None = None
@@ -421,7 +426,7 @@ class Supervision:
         if inertia is None:
             return
         torque_nm, period_s = one.torque_nm + other.torque_nm, self._limits.guard.period_s
-        turns = torque_nm * self._opposing_nm < 0.0
+        self._unturned_s = 0.0 if torque_nm * self._opposing_nm < 0.0 else self._unturned_s + period_s
         self._opposing_nm = torque_nm
         self._could_rad_s += abs(torque_nm) * period_s / inertia
         speed, could = self._smooth or (one.speed_rad_s, self._could_rad_s)
@@ -429,7 +434,7 @@ class Supervision:
         speed += taken * (one.speed_rad_s - speed)
         could += taken * (self._could_rad_s - could)  # as late as the speed that it is compared with
         self._smooth = speed, could
-        if self._from is None or turns or torque_nm * speed >= 0.0:
+        if self._from is None or self._unturned_s < UNWOUND_S or torque_nm * speed >= 0.0:
             self._from = speed, could, self._could_rad_s
             return
         from_rad_s, could_from, whole_from = self._from

@@ -311,6 +311,32 @@ def test_a_speed_that_runs_away_against_the_torque_ends_it() -> None:
     assert run(-0.45) is None, "a grade that is steeper than the torque"
 
 
+@pytest.mark.parametrize("size_nm", [100.0, 500.0, 2000.0])
+@pytest.mark.parametrize("from_rad_s", [0.0, 0.4, 0.9, 1.4, 2.6])
+def test_a_shaft_that_unwinds_when_the_torque_turns_is_no_vehicle_that_runs_away(
+    size_nm: float, from_rad_s: float
+) -> None:
+    """Motor of 2 kg m² and load of 83 kg m² on a shaft of 3500 Nm/rad, in steps of 1 ms."""
+
+    def run(sign: float) -> int | None:
+        speed, seen = [from_rad_s, from_rad_s], []
+        twist = -size_nm / 3500.0
+        for step in range(4400):
+            torque_nm = -size_nm if step < 400 else size_nm
+            if step % 10 == 0:
+                read = answer(torque_nm, sign * speed[0])
+                seen.append((DriveRecord(torque_nm, read), DriveRecord(0.0, answer(0.0, sign * speed[0]))))
+            shaft_nm = 3500.0 * twist + 9.0 * (speed[0] - speed[1])
+            speed[0] += 0.001 * (torque_nm - shaft_nm) / 2.0
+            speed[1] += 0.001 * shaft_nm / 83.0
+            twist += 0.001 * (speed[0] - speed[1])
+        wide = replace(ERROR, m1_nm=1e5, sum_nm=1e5)  # torques are not what is judged here
+        return cycles_to_end(supervised(error=wide, inertia_kg_m2=85.0), seen)
+
+    assert run(1.0) is None
+    assert run(-1.0) is not None
+
+
 SWINGING = """
 -532 -5.42  -532 -6.19  -291 -6.00  -261 -3.80  -472 -1.27  -442 -0.52  -411 -0.41  -382 -0.65  -112 -1.52  -82 -1.09
 -292 -1.07  -262 -2.77  8 -4.40  38 -4.05  68 -3.30  98 -2.45  128 -1.62  158 -1.12  -52 -0.99  -22 -2.58  8 -4.12
