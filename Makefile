@@ -27,7 +27,6 @@ demo: $(RUNS)
 prove: $(READY)
 	$(BIN)/hil prove --out out/proof
 
-# Three workers on two cores: a third of the time a test waits, for a process that starts or a rig that stays silent.
 test: $(READY)
 	$(MAKE) --jobs 2 --output-sync lint kernels
 	$(BIN)/python -m pytest -n 2 -m "not campaign"

@@ -14,7 +14,12 @@ Inside a sample loop nothing raises: there a status says what is wrong with the 
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from typing import TypeVar
+
+Item = TypeVar("Item")
+Made = TypeVar("Made")
 
 
 class EstimatorError(Exception):
@@ -49,6 +54,25 @@ class NotExciting(EstimatorError):
     def __init__(self, message: str, names: tuple[str, ...] = ()) -> None:
         super().__init__(message)
         self.names = names
+
+
+def made_of_each(
+    items: Iterable[Item], make: Callable[[Item], Made], fault: type[Exception], joined: Callable[[str], Exception]
+) -> list[Made]:
+    """Return what is made of each of several recordings; refuse all that are at fault together."""
+    made: list[Made] = []
+    faults: list[Exception] = []
+    for item in items:
+        try:
+            made.append(make(item))
+        except fault as error:
+            faults.append(error)
+    if not faults:
+        return made
+    refusal = faults[0] if len(faults) == 1 else joined("\n".join(map(str, faults)))
+    if made:
+        refusal.add_note(f"Correct or leave out what is named; the other {len(made)} have no such fault.")
+    raise refusal
 
 
 @dataclass(frozen=True, slots=True)

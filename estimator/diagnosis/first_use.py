@@ -1,8 +1,9 @@
-"""The first use on a machine: the simulation has yet to be compiled there, which takes a minute, once.
+"""The first use on a machine: the simulation has yet to be compiled there, once.
 
 A compiler works on one core, so two processes share the kernels. What calls a kernel takes its code in from where it is
 kept on disk: first each process compiles a kernel that calls no other, then each a caller. What is quickly compiled
-fills the time of the one that would be done first.
+fills the time of the one that would be done first. numba writes a function when all of it is compiled: a process that
+is killed loses the one it was at.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ from estimator.physics.model import DrivelineModel
 from estimator.physics.simulate import simulate
 from estimator.signals.record import Record
 
-COMPILING = "compiling, once on this machine: one to five minutes"
+COMPILING = "compiling, once on this machine, for some minutes"
 
 _ROW, _ROWS, _STACK, _INDICES = float64[::1], float64[:, ::1], float64[:, :, ::1], int64[::1]
 _fields: Any = types.NamedTuple

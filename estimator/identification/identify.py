@@ -33,7 +33,7 @@ from estimator.identification.offline.validation import Feedback, Validation, va
 from estimator.identification.online.ekf import TwoMass
 from estimator.identification.online.estimators import Entry, Feed, Setup
 from estimator.identification.online.recursive import Estimate, Status, Trajectory
-from estimator.identification.settings import SAMPLES_PER_PARAMETER, FilterPart, Settings
+from estimator.identification.settings import SAMPLES_PER_PARAMETER, FilterPart, Settings, require_excitation
 from estimator.identification.spectral import SpectralEstimate, spectral_estimate
 from estimator.signals.decimate import decimate
 from estimator.signals.record import FloatArray, Record
@@ -96,6 +96,12 @@ def observation_filter(model: LinearModel, part: FilterPart, lowest_hz: float) -
     natural_hz = np.abs(continuous(poles, model.sample_time_s)) / (2.0 * np.pi)
     kept = poles[(poles.imag != 0.0) & (natural_hz >= lowest_hz)]
     return np.atleast_1d(np.real(np.poly(kept))).astype(np.float64)
+
+
+def require_determined(record: Record, settings: Settings) -> None:
+    """Refuse a recording that can't determine the models of these settings, before anything is fitted."""
+    for data in (settings.offline(record), decimate(record, settings.factor(record), settings.high_pass_hz)):
+        require_excitation(data.name, data.total_torque_nm, data.output, data.okay, settings.orders)
 
 
 def identify(record: Record, settings: Settings | None = None) -> Identification:

@@ -53,7 +53,7 @@ def require_excitation(name: str, u: FloatArray, y: FloatArray, okay: BoolArray,
         names = _beyond(order, orders)
         raise NotExciting(
             f"recording {name}: the torque excites {order} parameters, expected {n}; "
-            f"{', '.join(names)} can't be determined. Superpose a PRBS on the torque, or lower the orders.",
+            f"{', '.join(names)} can't be determined. Let the torque vary: superpose a PRBS on it.",
             names,
         )
     if np.ptp(y[okay]) == 0.0:

@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING
 
 from estimator.diagnosis.diagnose import diagnose as diagnose_records
 from estimator.diagnosis.result import Diagnosis, Trace
+from estimator.errors import made_of_each
 from hil.api.models import Model, as_file
 from hil.api.record import DRAWN, Record, read
 from hil.config.model_file import ModelFile
-from hil.errors import UsageError
+from hil.errors import InputError, RecordingError, UsageError
 from hil.provenance import Provenance, provenance
 from hil.report import page as html
 from hil.report.diagnosis_files import publish_diagnosis
@@ -129,7 +130,14 @@ def diagnose(
 def records_of(given: Recordings, file: ModelFile | None) -> tuple[Record, ...]:
     """Return recordings, read where paths are given."""
     several = [given] if isinstance(given, Record | Path | str) else given
-    return tuple(each if isinstance(each, Record) else read(each, model=file) for each in several)
+    return tuple(
+        made_of_each(
+            several,
+            lambda each: each if isinstance(each, Record) else read(each, model=file),
+            RecordingError,
+            InputError,
+        )
+    )
 
 
 def sources_of(records: Sequence[Record]) -> list[Path]:

@@ -46,8 +46,8 @@ def demo(
 ) -> None:
     """Conceal an effect in a simulated rig, find it over CANopen and Modbus, then open the seal.
 
-    Takes one to two minutes, the first time five more to compile. The verdict is written before the seal is opened, and
-    is judged unchanged.
+    The first run compiles for some minutes more. The verdict is written before the seal is opened, and is judged
+    unchanged.
     """
     from hil.report.outputs import require_folder
 

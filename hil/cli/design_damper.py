@@ -61,4 +61,5 @@ def damper(
         return
     for line in design_lines(file, found):
         say(line)
-    say(f"{out / 'damper.toml'}: hil run RIG EXPERIMENT --damper drives it; {out / 'damper.png'} shows it")
+    drives = "needs --rig to be driven" if file.rig is None else "hil run RIG EXPERIMENT --damper drives it"
+    say(f"{out / 'damper.toml'}: {drives}; {out / 'damper.png'} shows it")

@@ -131,12 +131,14 @@ def report(
 ) -> None:
     """Write DATASET/fleet.html: which vehicles have what since when, trends, each vehicle against its own fleet."""
     from hil.files import write_whole
-    from hil.fleet.dataset import require_dataset
+    from hil.fleet.dataset import require_dataset, room
     from hil.fleet.page import FILE_NAME, fleet_page
     from hil.provenance import provenance
 
     require_dataset(dataset)
-    write_whole(dataset / FILE_NAME, fleet_page(dataset, provenance()))
+    page = fleet_page(dataset, provenance())
+    with room(dataset):
+        write_whole(dataset / FILE_NAME, page)
     say(f"report: {dataset / FILE_NAME}")
 
 

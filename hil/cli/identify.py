@@ -159,6 +159,6 @@ def _publish(
         console.print(joint_statement(together), highlight=False, markup=False)
     if compared:
         console.print(compared_summary(compared))
-    for text in warnings(studies):
+    for text in warnings(records, studies):
         console.print(f"note: {text}", highlight=False, markup=False)
     say(f"all of it: {out / FILE_NAME}    report: {out / PAGE}")

@@ -64,7 +64,7 @@ def paper(
     """Make the paper's Fig. 2, 4 and 5, in print quality and on a page, with the truth drawn in.
 
     Eight experiments at near-constant speed, each with a payload, road, wind and driver of its own, are driven over
-    CANopen and Modbus; all of it takes half a minute. The same seed makes the same files. Writes DIR/fig2, fig4 and
+    CANopen and Modbus. The same seed makes the same files. Writes DIR/fig2, fig4 and
     fig5 as .svg and .pdf, DIR/report.html, DIR/paper.json, and the recordings with their rig file.
     """
     from estimator.identification.linear_model import Orders

@@ -27,7 +27,7 @@ from hil.figures.local_model import decibels, degrees
 from hil.figures.palette import BLACK, PALE, VERMILION
 from hil.recording.formats import read_table
 from hil.report.diagnosis_json import SCHEMA as DIAGNOSIS
-from hil.report.identification_input import PhysicalValue, json_object, physical_value, physical_values
+from hil.report.identification_input import PhysicalValue, json_object, physical_value, physical_values, table
 
 USUAL_PERIOD_S = 0.01
 Z95 = 1.96
@@ -91,8 +91,8 @@ def _known(path: Path) -> dict[str, PhysicalValue]:
     """Read what a diagnosis or an identification determined, with its 95 % intervals."""
     content = json_object(path)
     if content.get("schema") == DIAGNOSIS:
-        entries = (content.get("parameters") or {}).items()
-        read = {name: physical_value({"determined": True, **one}, "") for name, one in entries}
+        entries = table(content, "parameters")
+        read = {name: physical_value({"determined": True, **table(entries, name)}, "") for name in entries}
         found = {name: value for name, value in read.items() if name in PARAMETERS and value is not None}
     else:
         found = physical_values(path)

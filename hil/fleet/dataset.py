@@ -32,6 +32,7 @@ Row = dict[str, Any]
 
 VERDICTS = "verdicts"
 FAILURES = "failures.parquet"
+RESULTS = "command="  # begins the name of a folder of results
 
 
 def _columns(texts: str, numbers: str = "", counts: str = "") -> pa.Schema:
@@ -64,7 +65,7 @@ class Writer:
         self._rows: dict[str, list[Row]] = {name: [] for name in TABLES}
         self._failures: list[Row] = []
         self._written = time.monotonic()
-        with _room(folder):
+        with room(folder):
             for name in (*TABLES, VERDICTS):
                 place = folder / name if name == VERDICTS else self._place(name)
                 place.mkdir(parents=True, exist_ok=True)
@@ -72,7 +73,7 @@ class Writer:
             self._remove_uncommitted()
 
     def _place(self, table: str) -> Path:
-        return self.folder / table / f"command={self._command}"
+        return self.folder / table / f"{RESULTS}{self._command}"
 
     def _remove_uncommitted(self) -> None:
         whole_parts = {path.name for path in self._place("recordings").glob("part-*.parquet")}
@@ -87,7 +88,7 @@ class Writer:
 
     def add(self, rows: Mapping[str, Sequence[Row]], verdict: str) -> None:
         """Take the rows of one recording, and its verdict's text."""
-        with _room(self.folder):
+        with room(self.folder):
             write_whole(self.folder / VERDICTS / f"{rows['recordings'][0]['key']}.json", verdict)
         for name, of_table in rows.items():
             self._rows[name] += of_table
@@ -104,7 +105,7 @@ class Writer:
         keys = [row["key"] for row in self._rows["recordings"]]
         if keys:
             name = f"part-{hashlib.sha256(''.join(keys).encode()).hexdigest()[:16]}.parquet"
-            with _room(self.folder):
+            with room(self.folder):
                 for table in ("effects", "parameters", "recordings"):
                     _write(self._place(table) / name, self._rows[table], TABLES[table])
                     self._rows[table] = []
@@ -113,7 +114,7 @@ class Writer:
     def finish(self) -> None:
         """Write what is left, and the failures."""
         self.flush()
-        with _room(self.folder):
+        with room(self.folder):
             _write(self.folder / FAILURES, self._failures, _FAILURE)
 
 
@@ -123,7 +124,8 @@ def _write(path: Path, rows: Sequence[Row], schema: pa.Schema) -> None:
 
 
 @contextmanager
-def _room(folder: Path) -> Iterator[None]:
+def room(folder: Path) -> Iterator[None]:
+    """Say what to do where there is none."""
     try:
         yield
     except OSError as error:

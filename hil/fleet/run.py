@@ -14,6 +14,7 @@ from itertools import groupby, islice
 from typing import Any, TypeVar
 
 import dask
+from dask.utils import parse_bytes
 from distributed import Client, Future, KilledWorker, LocalCluster, as_completed
 from distributed.comm.core import CommClosedError
 
@@ -61,6 +62,7 @@ def client_of(engine: Engine) -> Iterator[Client]:
             _require_alike(client)
             yield client
         return
+    _require_room(engine.memory)
     settings = {"distributed.scheduler.allowed-failures": engine.retries, "distributed.worker.daemon": False}
     with (
         dask.config.set(settings),
@@ -71,6 +73,18 @@ def client_of(engine: Engine) -> Iterator[Client]:
         Client(cluster) as client,
     ):  # fmt: skip
         yield client
+
+
+LEAST_MEMORY = 512 << 20  # of a worker [bytes]: hil alone takes 300 MiB, and Dask kills one at 95 % of its limit
+
+
+def _require_room(memory: str) -> None:
+    try:
+        enough = memory == "auto" or parse_bytes(memory) >= LEAST_MEMORY
+    except ValueError:
+        enough = False
+    if not enough:
+        raise UsageError(f"--memory: expected auto, or {LEAST_MEMORY >> 20}MiB or more, got {memory!r}")
 
 
 def _require_alike(client: Client) -> None:

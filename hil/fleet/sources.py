@@ -17,6 +17,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from hil.errors import RecordingError, UsageError
+from hil.fleet.dataset import FAILURES, RESULTS
 from hil.provenance import Source
 from hil.recording.checksum import RIG_TEXT
 from hil.recording.description import sidecar_of
@@ -96,7 +97,8 @@ def _urls(source: str) -> list[str]:
 def _is_recording(path: str, root: str) -> bool:
     """Whether a file in a folder that was given is one; a file given by its name is, whatever it is called."""
     inside = PurePosixPath(path[len(root) :])
-    return inside.suffix.lower() in FORMATS and not any(part.startswith((".", "_")) for part in inside.parts)
+    hidden = any(part.startswith((".", "_", RESULTS)) for part in inside.parts)
+    return inside.suffix.lower() in FORMATS and not hidden and inside.name != FAILURES
 
 
 def _placed(url: str, pattern: re.Pattern[str] | None) -> Found:

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from estimator.errors import made_of_each
 from estimator.signals.record import Record
 from hil.errors import InputError, RecordingError, UsageError
 from hil.files import parse_json
@@ -34,17 +35,9 @@ def read_records(
     prove nothing held out; and of different sampling periods. Where several can't be read, all faults are said.
     """
     _require_own_names(paths)
-    records: list[Record] = []
-    errors: list[RecordingError] = []
-    for path in paths:
-        try:
-            records.append(read_record(path, signals, on_bench, dbc, tell))
-        except RecordingError as error:
-            errors.append(error)
-    if len(errors) == 1:
-        raise errors[0]
-    if errors:
-        raise InputError("\n".join(str(error) for error in errors))
+    records = made_of_each(
+        paths, lambda path: read_record(path, signals, on_bench, dbc, tell), RecordingError, InputError
+    )
     _require_one_period(paths, records)
     _require_own_samples(paths, records)
     return tuple(records)
@@ -148,14 +141,15 @@ WORST_SHARE = 0.05  # part of the cycles that may have been late, missing or wit
 
 def require_even_cycles(paths: Iterable[Path]) -> None:
     """See that the runs that left a timing record kept their cycles; a recording without one passes."""
-    for path in paths:
-        if "timing" in (metadata := read_metadata(path)):
-            _require_even(path, metadata["timing"])
+    made_of_each(paths, _require_even, RecordingError, InputError)
 
 
-def _require_even(path: Path, text: str) -> None:
+def _require_even(path: Path) -> None:
+    metadata = read_metadata(path)
+    if "timing" not in metadata:
+        return
     try:
-        timing = parse_json(text)
+        timing = parse_json(metadata["timing"])
         cycles, missed = int(timing["cycles"]), int(timing["missed"])
         late, unanswered = int(timing["late"]), int(timing["unanswered"])
     except (ValueError, TypeError, KeyError) as error:

@@ -6,7 +6,8 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-from estimator.identification.identify import Compared, Study, identify, study
+from estimator.errors import NotExciting, made_of_each
+from estimator.identification.identify import Compared, Study, identify, require_determined, study
 from estimator.identification.joint import Together, joint_estimate
 from estimator.identification.modes.modes import Mode
 from estimator.identification.offline.validation import OrderChoice
@@ -31,6 +32,7 @@ def _no_bar(items: Sequence[Any], what: str) -> Iterable[Any]:
 
 def identify_all(records: Sequence[Record], settings: Settings, bar: Bar = _no_bar) -> list[Study]:
     """Identify from each recording, and examine it, also on the others."""
+    made_of_each(records, lambda record: require_determined(record, settings), NotExciting, NotExciting)
     found = [identify(record, settings) for record in bar(records, "identifying")]
     pairs = list(zip(records, found, strict=True))
     return [

@@ -191,11 +191,17 @@ def physical_values(path: Path, run: str | None = None) -> dict[str, PhysicalVal
         raise UsageError(f"{path}: expected a recording {run!r} in it, got a file without. See --run.")
     best: dict[str, PhysicalValue] = {}
     for entry in entries:
-        for name, one in ((entry.get("physical") or {}).get("parameters") or {}).items():
+        for name, one in table(table(entry, "physical"), "parameters").items():
             found = physical_value(one, str(entry["name"]))
             if found is not None and (name not in best or found.half_width < best[name].half_width):
                 best[name] = found
     return best
+
+
+def table(of: Mapping[str, Any], key: str) -> dict[str, Any]:
+    """Return what is a table under a key; an empty one for all else."""
+    found = of.get(key)
+    return found if isinstance(found, dict) else {}
 
 
 def physical_value(one: Any, recording: str) -> PhysicalValue | None:
@@ -205,6 +211,6 @@ def physical_value(one: Any, recording: str) -> PhysicalValue | None:
             "determined": True,
             "value": int() | float() as value,
             "ci95": [int() | float() as low, int() | float() as high],
-        }:
+        } if np.isfinite((value, low, high)).all():
             return PhysicalValue(float(value), 0.5 * float(high - low), recording)
     return None

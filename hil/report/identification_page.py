@@ -324,7 +324,7 @@ def identification_page(
                 [html.paragraph(verdict(each), kind="statement") for each in studies],
                 html.paragraph(statement(models, studies)),
                 None if together is None else html.paragraph(joint_statement(together)),
-                [html.warning(f"Note: {text}") for text in warnings(studies)],
+                [html.warning(f"Note: {text}") for text in warnings([each.record for each in models], studies)],
                 html.tiles(_tiles(studies)),
                 facts=facts(made),
             ),

@@ -7,12 +7,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from estimator.diagnosis.preconditions.channels import dead_torques
 from estimator.identification.best import SEEN, Verdict
 from estimator.identification.identify import Study
 from estimator.identification.joint import Together
 from estimator.identification.modes.modes import Uncertain
 from estimator.identification.offline.validation import Validation
 from estimator.identification.online.recursive import Status
+from estimator.signals.record import Record
 from hil.figures.local_model import LocalModel
 from hil.report.numbers import listed, shown
 
@@ -146,9 +148,9 @@ def statement(models: Sequence[LocalModel], studies: Sequence[Study]) -> str:
     return text + (f" and {_span(unseen, '%')} of the others." if unseen else ".")
 
 
-def warnings(studies: Sequence[Study]) -> list[str]:
+def warnings(records: Sequence[Record], studies: Sequence[Study]) -> list[str]:
     """Return what a reader must know before believing it."""
-    texts = []
+    texts = [text for record in records for text in dead_torques(record)]
     for each in studies:
         estimate = each.found.estimate
         if estimate.status is not Status.ESTIMATED:

@@ -69,7 +69,7 @@ REFUSED: dict[str, tuple[Change, str]] = {
     "torque turned round": (times(-1.0, *TORQUES), "is the sign of torque or output turned round?"),
     "speed turned round": (times(-1.0, SPEED), "is the sign of torque or output turned round?"),
     "noise alone": (noise_alone, "expected more than the noise"),
-    "coasting": (coasting, "the torque excites nothing"),
+    "coasting": (coasting, "the torque read excites nothing"),
     "gaps everywhere": (scraps, "none of which holds 2 s of good samples"),
 }
 

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -90,6 +91,7 @@ def test_the_dead_time_is_measured_where_the_torque_changes(tmp_path: Path) -> N
     ("estimate", "rig", "model", "said"),
     [
         (5000.0, "", "", "diagnosis.json: k is known too little"),
+        (inf, "", "", "diagnosis.json: parameters | expected intervals of some of J_M"),
         (None, "amplitude_nm = 120.0|amplitude_nm = 240.0", "", "the PRBS takes all of guard.prbs_limit_nm"),
         (None, "", "rotation|translation", "structure | expected a rotating two_mass line"),
         (None, "", "\n[effects.backlash]\ngap_rad = { value = 0.02 }\n", "effects.backlash | expected a line that is"),
@@ -111,3 +113,13 @@ def test_what_there_is_no_design_for_is_refused(
     extra = [] if estimate is None else write_estimate(tmp_path / "diagnosis.json", estimate)
     assert run(["design", "damper", *given, *extra]) == 2
     assert said in capsys.readouterr().err
+
+
+def test_a_design_without_a_rig_is_not_said_to_be_driven(
+    given: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "diagnosis.json").write_text('{"schema": "hil.diagnosis/1", "parameters": {"k": 5}}')
+    assert run(["design", "damper", *given[:2], *given[4:], "--estimate", str(tmp_path / "diagnosis.json")]) == 2
+    assert "expected intervals" in capsys.readouterr().err
+    assert run(["design", "damper", *given[:2], *given[4:]]) == 0
+    assert "damper.toml: needs --rig to be driven" in capsys.readouterr().out

@@ -178,3 +178,17 @@ def test_wrong_use_is_refused_and_nothing_written(
     assert run(arguments(recordings[:1], tmp_path / "out", *more)) == 2
     assert named in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
+
+
+def test_every_recording_that_determines_nothing_is_named_before_any_is_fitted(
+    recordings: list[Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bad = [write(tmp_path / "short.csv", 3, duration_s=1.0), write(tmp_path / "constant.csv", 3, prbs_nm=0.0)]
+    assert run(arguments([*recordings, *bad], tmp_path / "out")) == 2
+    said = capsys.readouterr().err
+    assert "recording short: 34 good samples" in said
+    assert "recording constant: the torque excites" in said
+    assert "superpose a PRBS" in said
+    assert "lower the orders" not in said.partition("recording constant")[2]
+    assert "leave out what is named; the other 2 have no such fault" in said
+    assert not (tmp_path / "out").exists()

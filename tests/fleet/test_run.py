@@ -17,7 +17,7 @@ import pytest
 from hil.cli.prove import _pool
 from hil.errors import UsageError
 from hil.fleet.dataset import TABLES, read
-from hil.fleet.run import OF_DASK, OF_RESULTS, _require_alike
+from hil.fleet.run import OF_DASK, OF_RESULTS, Engine, _require_alike, client_of
 from hil.fleet.tasks import IDENTIFY, Job, analyse
 from hil.proof.work import work_on
 from tests.benchmarks.buses import draw_bus, drive
@@ -243,6 +243,12 @@ def test_a_scheduler_that_is_not_there_is_named(drives: Path, tmp_path: Path) ->
     assert done.returncode == 2
     assert "--scheduler tcp://127.0.0.1:1: expected a Dask scheduler that answers" in done.stderr
     assert not (tmp_path / "results").exists()
+
+
+@pytest.mark.parametrize("memory", ["lots", "1MB"])
+def test_workers_without_room_are_refused(memory: str) -> None:
+    with pytest.raises(UsageError, match="--memory: expected auto, or 512MiB"), client_of(Engine(memory=memory)):
+        pass
 
 
 def test_nothing_but_empty_sources_is_refused(tmp_path: Path) -> None:

@@ -35,6 +35,13 @@ def test_a_folder_a_glob_and_a_file_name_recordings_once(drives: Path) -> None:
     assert (found[2].vehicle, found[2].rig) == ("7", "a")
 
 
+def test_results_among_the_recordings_are_none(drives: Path) -> None:
+    for name in ("recordings/command=identify/part-1.parquet", "failures.parquet"):
+        (drives / name).parent.mkdir(parents=True, exist_ok=True)
+        (drives / name).write_text("a part")
+    assert len(find([str(drives)], None)[0]) == 3
+
+
 def test_an_empty_folder_and_one_that_is_not_there_are_named_and_the_rest_continues(drives: Path) -> None:
     (drives / "empty").mkdir()
     found, complaints = find([str(drives / "empty"), str(drives / "nowhere"), str(drives / "bus_1")], None)

@@ -122,7 +122,7 @@ def without_clipped(records: Sequence[Record]) -> tuple[list[Record], list[str]]
                 "Widen the range of the sensor or of its scale."
             )
         mended.append(record if np.array_equal(okay, record.okay) else replace(record, okay=okay))
-        warnings += _torques(record)
+        warnings += [*_torques(record), *dead_torques(record)]
     return mended, warnings
 
 
@@ -134,6 +134,18 @@ def _torques(record: Record) -> list[str]:
         "trusted: mask these rows ([signals] mask) or widen the range."
         for i in range(record.torque_nm.shape[1])
         for found in clipped(f"torque input {i + 1}", record.torque_nm[:, i], trusted[:, i])
+    ]
+
+
+def dead_torques(record: Record) -> list[str]:
+    """Say which of several torques never changes."""
+    inputs = record.torque_nm.T if record.torque_nm.shape[1] > 1 else ()
+    return [
+        f"recording {record.name}: torque input {i + 1} stays at {values[0]:g}. If its inverter did not work, that is "
+        "right; if the channel is dead, noise, values and verdict can't be trusted: what was not read counts as noise "
+        "and as missing physics."
+        for i, values in enumerate(inputs)
+        if np.ptp(values) == 0.0
     ]
 
 

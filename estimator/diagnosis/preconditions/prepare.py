@@ -20,7 +20,7 @@ from estimator.diagnosis.preconditions.inertia import driven, model_warnings
 from estimator.diagnosis.preconditions.units import require_plausible_units
 from estimator.diagnosis.result import Diagnosis
 from estimator.diagnosis.segments import Cut, cut, joined
-from estimator.errors import BadShape, Implausible, NotExciting
+from estimator.errors import BadShape, Implausible, NotExciting, made_of_each
 from estimator.physics.layout import Grid, grid_for
 from estimator.physics.model import DrivelineModel, Structure, natural_frequencies_rad_s
 from estimator.physics.simulate import output_state
@@ -214,6 +214,9 @@ NEAR_MODE = 0.7
 twice as much."""
 
 
+UNREAD = ", and that every torque is read: what another one does counts as noise."
+
+
 def require_signals(record: Record) -> None:
     """Refuse a recording with too few good samples, or of which torque or output does not change."""
     good = int(record.okay.sum())
@@ -246,7 +249,7 @@ def require_excitation(records: Sequence[Record], model: DrivelineModel) -> list
     if excited < floor:
         raise NotExciting(
             f"the {unit} moves by {excited:.3g} (rms) beyond a noise of {floor:.3g}, expected more than the noise. "
-            "Excite the driveline (PRBS, reversal, tip-in).",
+            f"Excite the driveline (PRBS, reversal, tip-in){UNREAD}",
             tuple(record.name for record in records),
         )
     if records[0].imposed is not None:  # no torque that could be too small
@@ -257,8 +260,8 @@ def require_excitation(records: Sequence[Record], model: DrivelineModel) -> list
     if answer < floor:
         raise NotExciting(
             f"by the nominal model the torque moves the {unit} by {answer:.3g} (rms), less than its noise of "
-            f"{floor:.3g}: the torque excites nothing. Excite the driveline (PRBS, reversal, tip-in), and check that "
-            "the torque is in Nm (force: N).",
+            f"{floor:.3g}: the torque read excites nothing. Excite the driveline (PRBS, reversal, tip-in), check that "
+            f"the torque is in Nm (force: N){UNREAD}",
             tuple(record.name for record in records),
         )
     return _unexcited_mode(records, line, grid, floor)
@@ -372,7 +375,7 @@ def prepare(records: Sequence[Record], model: DrivelineModel, holdout: Sequence[
     for record in mended:
         for each in separated_outputs([record], lambda _: 1.0):
             output_state(each, model.structure)
-        require_signals(record)
+    made_of_each(mended, require_signals, NotExciting, NotExciting)
     names = [record.name for record in records]
     segments, few = with_room(cut(thinned(mended, model)), names)
     training = segments.of(names)

@@ -92,6 +92,19 @@ def test_a_torque_that_never_changes() -> None:
     assert refusal.value.names == ("dead",)
 
 
+def test_all_recordings_at_fault_are_refused_together() -> None:
+    with pytest.raises(NotExciting, match=r"recording a: 100 good .*\nrecording b: 50 good") as refusal:
+        prepare([drive("a", samples=100), drive("b", samples=50), drive()], LINE, [])
+    assert refusal.value.__notes__ == ["Correct or leave out what is named; the other 1 have no such fault."]
+
+
+def test_a_dead_torque_is_named() -> None:
+    sound = drive()
+    dead = replace(sound, torque_nm=np.column_stack([sound.torque_nm[:, 0], np.zeros(400)]))
+    assert any("torque input 2 stays at 0" in text for text in prepare([dead], LINE).warnings)
+    assert not any("stays at" in text for text in prepare([sound], LINE).warnings)
+
+
 def test_the_diagnosis_refuses_before_it_fits() -> None:
     called = []
     with pytest.raises(NotExciting, match="Record longer"):
@@ -200,7 +213,7 @@ def test_a_torque_that_moves_nothing_is_refused() -> None:
         80.0 * np.exp(-0.05 * 0.01 * np.arange(N)) + noise(SIGMA, 2),
         name="coast",
     )
-    with pytest.raises(NotExciting, match=r"less than its noise of .*: the torque excites nothing") as refusal:
+    with pytest.raises(NotExciting, match=r"less than its noise of .*: the torque read excites nothing") as refusal:
         prepare([coast], EXCITED_LINE)
     assert refusal.value.names == ("coast",)
 

@@ -111,7 +111,7 @@ def test_what_can_not_be_determined_is_refused_by_name(method: Method, fit: Fit,
     sine = 60.0 * np.sin(2 * np.pi * 5.0 * record.time_s)[:, np.newaxis]
     short = slice(0, 50)
     for made, why, names in (
-        (broken(record, torque_nm=np.full((n, 1), 300.0)), "can't be determined. Superpose a PRBS", THIRD.names[1:3]),
+        (broken(record, torque_nm=np.full((n, 1), 300.0)), "determined. Let the torque vary", THIRD.names[1:3]),
         (broken(record, torque_nm=sine), "the torque excites 2 parameters, expected 6", THIRD.names[1:3]),
         (broken(record, output=np.full(n, 120.0)), "the measured output never changes", THIRD.names),
         (
