@@ -74,7 +74,7 @@ def commission(
     take_over: TakeOver = False,
     as_json: AsJson = False,
 ) -> None:
-    """Lead through commissioning: devices, limits, signs, scales, friction, PRBS, experiments, models, diagnosis.
+    """Lead through commissioning, from devices and limits to models, diagnosis and what decides between explanations.
 
     Each step says what it will do and what torque it will command, and asks before it does. Ctrl-C, a lost permissive,
     a speed outside its band or a dead device end it at zero torque with the drives disarmed; the next call resumes at

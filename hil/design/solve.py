@@ -176,8 +176,8 @@ def _undecidable(known: Open, diagnosis: Diagnosis) -> str:
     """Say why a verdict is no decision though nothing is left to drive for it; "" where it is one."""
     if diagnosis.verdict in (Verdict.UNEXPLAINED, Verdict.PARTLY_EXPLAINED):
         return "what is left has no name in the catalogue, and an experiment is designed to decide between names"
-    alike = sorted(name for name in known.candidates[0].effects if name in known.twins)
-    return f"{', '.join(alike)}: another output decides it, no experiment" if alike else ""
+    twins = {name: known.twins[name] for name in sorted(known.candidates[0].effects) if name in known.twins}
+    return "; ".join(f"{name} or {' or '.join(others)}: another output decides it" for name, others in twins.items())
 
 
 def _first(rig: Rig) -> tuple[str, dict[str, Any]]:

@@ -78,7 +78,7 @@ def _needless(job: Job) -> str:
 def _findings(state: State) -> list[Finding]:
     odds = [", ".join(f"{name} {p:.3f}" for name, p in each.probabilities.items()) for each in state.odds]
     findings = [
-        stated(f"driven: {run.name}", f"before: {before}. After: {after}")
+        stated(f"driven: {run.name}", f"odds before: {before}. After: {after}")
         for run, before, after in zip(state.driven, odds, odds[1:], strict=False)
     ]
     advice = state.because if state.end is End.NOTHING_DECIDES else f"{state.because}. Again by --repeat {NAME}"
