@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from hil.commission.engine import Asked
     from hil.commission.step import Job
-    from hil.commission.talk import Talk
+    from hil.orders.operator import Talk
 
 app = typer.Typer(add_completion=False)
 
@@ -74,16 +74,16 @@ def commission(
     take_over: TakeOver = False,
     as_json: AsJson = False,
 ) -> None:
-    """Lead through commissioning: devices, limits, signs, scales, friction, PRBS, experiments, models, diagnosis.
+    """Lead through commissioning, from devices and limits to models, diagnosis and what decides between explanations.
 
     Each step says what it will do and what torque it will command, and asks before it does. Ctrl-C, a lost permissive,
     a speed outside its band or a dead device end it at zero torque with the drives disarmed; the next call resumes at
     the step that was interrupted. Writes DIR/commissioning.html, DIR/model.toml, DIR/commission.json and DIR/runs/.
     """
     from hil.cli.commission_job import asked_of_steps, job_in, print_plan, who_answers
-    from hil.commission.order import RigSource
     from hil.commission.state import sole_use
     from hil.config.rig_file import read_rig
+    from hil.orders.order import RigSource
     from hil.report.outputs import require_folder
 
     asked = asked_of_steps(skip or (), because or (), repeat or ())

@@ -14,14 +14,15 @@ from hil.cli.options import Pace, pacer_for, scheduling
 from hil.cli.printing import say
 from hil.cli.run_job import run_progress
 from hil.commission.engine import NAMES, STEPS, Asked, plan_document
-from hil.commission.order import RigSource
 from hil.commission.prbs_design import DEFAULT_TRAVEL_M_PER_RAD
-from hil.commission.runner import Conditions, Runner
 from hil.commission.state import State, StepRecord, load_state
 from hil.commission.step import Job
-from hil.commission.talk import Talk, plan_lines, result_document, result_lines
+from hil.commission.talk import plan_lines, result_document, result_lines
 from hil.config.model_file import read_model
 from hil.errors import UsageError
+from hil.orders.operator import Talk
+from hil.orders.order import RigSource
+from hil.orders.runner import Conditions, Runner
 from hil.provenance import provenance
 from hil.report.outputs import publish
 

@@ -48,12 +48,12 @@ def design(
     its noise. Writes TOML, which hil run drives, unless nothing is open or nothing that may be driven would tell.
     """
     from estimator.design import left_open
-    from hil.commission.order import RigSource
     from hil.config.model_file import read_model_for_recordings
     from hil.config.rig_file import read_rig
     from hil.design.design import Aim, designed, is_needed
     from hil.design.inputs import require_of_rig
     from hil.design.report import design_document, design_lines, design_toml, draw, question_lines
+    from hil.orders.order import RigSource
     from hil.recording import read_records
     from hil.report.outputs import publish, require_folder
 

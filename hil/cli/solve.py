@@ -45,13 +45,14 @@ def solve(
     """
     from hil.cli.commission_job import Bar, who_answers
     from hil.cli.run_job import run_progress
-    from hil.commission.order import RigSource
-    from hil.commission.runner import Conditions, Runner
     from hil.commission.state import sole_use
     from hil.config.model_file import read_model_for_recordings
     from hil.config.rig_file import read_rig
     from hil.design.inputs import require_of_rig
-    from hil.design.solve import Solving, load_state
+    from hil.design.solve import Solving
+    from hil.design.solve_state import keep_in, load_state
+    from hil.orders.order import RigSource
+    from hil.orders.runner import Conditions, Runner
     from hil.recording import read_records
     from hil.report.outputs import require_folder
 
@@ -66,17 +67,20 @@ def solve(
     conditions.pacer(source.rig())  # refuses a pace this rig must not be driven at, before anything
     out.mkdir(parents=True, exist_ok=True)
     with sole_use(out), Bar() as bar:
+        state = load_state(out, source, model)
         job = Solving(
             out,
             source,
             file,
             model,
             Runner(source, out, conditions),
-            who_answers(console, yes, ""),
-            load_state(out, source, model),
+            who_answers(console, yes, "").may_command,
+            state,
             given,
             effort.value,
             vehicle_s,
+            state.driven[-1].last_rad_s if state.driven else 0.0,
+            keep_in(out),
             lambda line: console.print(line, markup=False, soft_wrap=not console.is_terminal),
             bar.show,
         )

@@ -6,19 +6,20 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from hil.commission.order import changed_keys, rig_digest
 from hil.commission.responses import json_safe
-from hil.commission.runner import Prediction
-from hil.commission.state import Finding, Note, Status, now_utc
+from hil.commission.state import Finding, Note, Status
 from hil.commission.step import Job, Outcome, Step
 from hil.commission.steps.checks import DEVICES, LIMITS
 from hil.commission.steps.experiments import EXPERIMENTS, IDENTIFICATION
 from hil.commission.steps.models import DIAGNOSIS, VALIDATION
+from hil.commission.steps.next_experiments import SOLVE
 from hil.commission.steps.noise_friction import FRICTION, NOISE
 from hil.commission.steps.prbs import PRBS
 from hil.commission.steps.signs_scales import SCALES, SIGNS
-from hil.commission.talk import Answer, Talk, What
 from hil.errors import RunAborted, UsageError
+from hil.orders.operator import Answer, Talk, What
+from hil.orders.order import changed_keys, rig_digest
+from hil.orders.runner import Prediction, now_utc
 from hil.report.numbers import moment
 
 STEPS = (
@@ -33,6 +34,7 @@ STEPS = (
     IDENTIFICATION,
     VALIDATION,
     DIAGNOSIS,
+    SOLVE,
 )
 
 NAMES = tuple(step.name for step in STEPS)
@@ -142,11 +144,11 @@ class Commissioning:
     talk: Talk  # Who is asked
     asked: Asked  # What the command line asks of single steps
     show: Callable[[Step, list[Finding]], None]  # Called with the findings of each step
-    _first_torque: bool = True
     _redone: set[str] = field(default_factory=set)
 
     def run(self) -> None:
         """Do every step that is not settled."""
+        self.job.may_command = self._may_command
         self._look_for_changes()
         for step in STEPS:
             self._through(step)
@@ -183,7 +185,8 @@ class Commissioning:
         if record.status.is_settled and not self._is_due(step):
             self._say_settled(step)
             return
-        answer = self._do(step, keep_runs=record.status is not Status.DONE and step.name not in self.asked.repeat)
+        is_anew = record.status.is_settled or record.status is Status.PENDING or step.name in self.asked.repeat
+        answer = self._do(step, keep_runs=not is_anew)
         while answer.what is What.REPEAT:
             answer = self._do(step, keep_runs=False)
         if answer.what is What.SKIP:
@@ -194,7 +197,8 @@ class Commissioning:
         if step.name in self.asked.repeat:
             return True
         rebuilt = self._redone.intersection(step.needs)
-        skipped = step.record(self.job).status is Status.SKIPPED
+        record = step.record(self.job)
+        skipped = record.status is Status.SKIPPED and not record.evidence  # by a person, and not by itself
         return bool(rebuilt) and not step.orders(self.job) and not skipped
 
     def _say_settled(self, step: Step) -> None:
@@ -220,13 +224,16 @@ class Commissioning:
         for line in announcement(self.job, step, plan):
             self.job.say(line)
         if plan:
-            answer = self.talk.may_command(step.name, self._first_torque)
-            _quit_if_asked(answer)
+            answer = self._may_command(step.name)
             if answer.what is What.SKIP:
                 return answer
-            self._first_torque = False
         outcome = self._attempt(step, keep_runs)
         return self._after(step, outcome)
+
+    def _may_command(self, what: str) -> Answer:
+        answer = self.talk.may_command(what)
+        _quit_if_asked(answer)
+        return answer
 
     def _attempt(self, step: Step, keep_runs: bool) -> Outcome:
         record = step.record(self.job)
@@ -244,14 +251,18 @@ class Commissioning:
             raise
         record.findings, record.evidence = list(outcome.findings), json_safe(outcome.evidence)
         blocked = any(finding.stops for finding in record.findings)
-        record.end(Status.BLOCKED if blocked else Status.DONE)
+        done = Status.SKIPPED if outcome.needless else Status.DONE
+        record.end(Status.BLOCKED if blocked else done, outcome.needless)
         self.job.state.save()
         self._redone.add(step.name)
         return outcome
 
     def _after(self, step: Step, outcome: Outcome) -> Answer:
         findings = list(outcome.findings)
-        self.show(step, findings)
+        if outcome.needless:
+            self.job.say(f"{step.title}: skipped, because: {outcome.needless}")
+        else:
+            self.show(step, findings)
         for question in outcome.questions:
             self._confirm(step, question)
         stops = [finding for finding in findings if finding.stops]

@@ -15,15 +15,13 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, FiniteFloat, 
 
 from estimator.errors import EstimatorError
 from estimator.physics.model import DrivelineModel, Parameter, Structure
-
-Number = Annotated[FiniteFloat, Field(ge=-1e30, le=1e30)]
-"""Far beyond any quantity here, and what pages draw and multiply."""
+from hil.design.solve_state import STATE
+from hil.orders.runner import Both, Number
 
 Known = Number | None
 Interval = Annotated[list[Known], Field(min_length=2, max_length=2)]
 """A value and half of its 95 % interval."""
 
-Both = Annotated[list[Number], Field(min_length=2, max_length=2)]
 Whole = tuple[Number, Known]
 """A value that is there, and half of its interval."""
 
@@ -210,6 +208,7 @@ class _Diagnosis(_Table):
     headline: str
     statement: str
     effects: list[Name]
+    alike: list[Name] = Field(default_factory=list)
     report: PathBelow
     model_file: PathBelow
     seconds: Known
@@ -226,6 +225,7 @@ EVIDENCE: Final[Mapping[str, TypeAdapter[Any]]] = MappingProxyType(
         "identification": TypeAdapter(_Identification),
         "validation": TypeAdapter(_Validation),
         "diagnosis": TypeAdapter(_Diagnosis),
+        "solve": STATE,
     }
 )
 """What each step's evidence is; steps that leave none are not listed."""

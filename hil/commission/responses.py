@@ -12,6 +12,7 @@ import numpy as np
 
 from estimator.signals.decimate import decimate
 from estimator.signals.record import BoolArray, FloatArray, Record
+from hil.orders.reading_lag import reading_lag
 from hil.recording import read_record, read_table
 from hil.recording.columns import FLAGS, SPEED, TIME, TORQUE_M1, TORQUE_M2
 
@@ -168,16 +169,6 @@ def _gain(reading: FloatArray, reference: FloatArray) -> float:
     lag = reading_lag(reading, reference)
     n = reading.shape[0] - lag
     return _slope(reading[lag:], reference[:n])
-
-
-LONGEST_LAG = 5
-
-
-def reading_lag(reading: FloatArray, reference: FloatArray) -> int:
-    """Return by how many samples a reading follows its reference: where their covariance is largest in size."""
-    n = reading.shape[0] - LONGEST_LAG
-    centred = reference[:n] - np.mean(reference[:n])
-    return int(np.argmax([abs(float(centred @ reading[lag : lag + n])) for lag in range(LONGEST_LAG + 1)]))
 
 
 HIGH_PASS_HZ = 0.3

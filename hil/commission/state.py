@@ -9,7 +9,6 @@ import sys
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from datetime import UTC, datetime
 from enum import Enum
 from pathlib import Path
 from typing import IO, Annotated, Any, Final, Literal
@@ -17,9 +16,10 @@ from typing import IO, Annotated, Any, Final, Literal
 from pydantic import Field, TypeAdapter, ValidationError
 
 from estimator.physics.model import DrivelineModel
-from hil.commission.evidence import EVIDENCE, Both, ModelEvidence, Utc
+from hil.commission.evidence import EVIDENCE, ModelEvidence, Utc
 from hil.errors import UsageError
 from hil.files import is_inside, read_json, write_whole
+from hil.orders.runner import RunRecord, now_utc
 from hil.version import __version__
 
 
@@ -61,25 +61,6 @@ class Status(Enum):
         return self in (Status.DONE, Status.SKIPPED)
 
 
-@dataclass(slots=True)
-class RunRecord:
-    """One run of a step: its recording next to the state file, and what was predicted and measured [Nm, rad/s].
-
-    ``whole`` is False where the run was ended early; its recording then holds what there was.
-    """
-
-    name: str
-    recording: str | None
-    whole: bool
-    seconds: float
-    predicted: dict[str, Both]
-    measured: dict[str, Both]
-    flagged: int = 0
-    recorded: int = 0
-    prbs_nm: float = 0.0
-    last_rad_s: float = 0.0
-
-
 @dataclass(frozen=True, slots=True)
 class Attempt:
     """An attempt before the last one."""
@@ -108,7 +89,7 @@ class StepRecord:
     history: list[Attempt] = field(default_factory=list)
 
     def begin(self, rig_digest: str, keep_runs: bool) -> None:
-        """Begin an attempt; the one before it goes to the history, its whole runs stay where ``keep_runs``."""
+        """Begin an attempt; the one before it goes to the history, by ``keep_runs`` whole runs and evidence stay."""
         if self.attempt:
             recordings = [run.recording for run in self.runs if run.recording]
             self.history.append(
@@ -117,7 +98,7 @@ class StepRecord:
         self.attempt += 1
         self.runs = [run for run in self.runs if run.whole] if keep_runs else []
         self.status, self.because, self.rig_digest = Status.RUNNING, "", rig_digest
-        self.findings, self.evidence = [], {}
+        self.findings, self.evidence = [], self.evidence if keep_runs else {}
         self.started_utc, self.ended_utc = now_utc(), ""
 
     def end(self, status: Status, because: str = "") -> None:
@@ -126,11 +107,6 @@ class StepRecord:
     def run(self, name: str) -> RunRecord | None:
         """Return the whole run of a name, if there is one."""
         return next((run for run in self.runs if run.name == name and run.whole), None)
-
-
-def now_utc() -> str:
-    """Return the present time as text."""
-    return datetime.now(UTC).isoformat(timespec="seconds")
 
 
 SCHEMA: Final = "hil.commission/1"

@@ -8,10 +8,11 @@ from pathlib import Path
 from typing import Any
 
 from estimator.physics.model import DrivelineModel
-from hil.commission.order import Order, RigSource
-from hil.commission.runner import Prediction, Runner, rigid_model
-from hil.commission.state import Finding, RunRecord, State, StepRecord, model_from_json
+from hil.commission.state import Finding, State, StepRecord, model_from_json
 from hil.config.rig_file import Rig
+from hil.orders.operator import Answer, Talk
+from hil.orders.order import Order, RigSource
+from hil.orders.runner import Prediction, Runner, RunRecord, rigid_model
 
 MODEL_STEPS = ("validation", "scales")
 """Steps whose evidence has a ``model``, the better one first."""
@@ -24,6 +25,7 @@ class Outcome:
     findings: Sequence[Finding]
     evidence: Mapping[str, Any] = field(default_factory=dict)
     questions: Sequence[str] = ()
+    needless: str = ""  # Why there was nothing to do: the step is skipped
 
 
 @dataclass(slots=True)
@@ -39,6 +41,7 @@ class Job:
     travel_is_given: bool  # Whether the user said so; else it is assumed
     say: Callable[[str], None]  # Called with what happens
     progress: Callable[[str, float], None]  # Called during long computations: what, and the share done
+    may_command: Callable[[str], Answer] = field(default_factory=lambda: Talk(None).may_command)  # Asks the operator
 
     @property
     def folder(self) -> Path:
@@ -71,16 +74,14 @@ class Job:
 
     def run(self, step: str, order: Order) -> RunRecord:
         """Drive a run of a step, or return it where it was already driven whole in this attempt."""
-        record = self.state.steps[step]
-        known = record.run(order.name)
+        known = self.state.steps[step].run(order.name)
         if known is not None and known.prbs_nm in (0.0, order.prbs.get("amplitude_nm", known.prbs_nm)):
             return known
+        return self.runner.run(step, order, self.model(), self.rolling_rad_s(), lambda run: self.note(step, run))
 
-        def note(run: RunRecord) -> None:
-            record.runs.append(run)
-            self.state.save()
-
-        return self.runner.run(step, order, self.model(), self.rolling_rad_s(), note)
+    def note(self, step: str, run: RunRecord) -> None:
+        self.state.steps[step].runs.append(run)
+        self.state.save()
 
     def recording(self, run: RunRecord) -> Path:
         return self.folder / (run.recording or "")

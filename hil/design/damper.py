@@ -17,7 +17,6 @@ from estimator.physics.effect import Element
 from estimator.physics.model import DrivelineModel, Motion, Structure
 from estimator.signals.prbs import prbs_nm
 from estimator.signals.record import FloatArray
-from hil.commission.responses import reading_lag
 from hil.config.damper_file import SCHEMA, DamperFile, DesignedFor
 from hil.config.model_file import read_model
 from hil.config.rig_file import read_rig
@@ -25,6 +24,7 @@ from hil.errors import FileProblem, ModelFileError, UsageError
 from hil.figures.drawn import WIDTH_IN, drawing, require_matplotlib
 from hil.figures.local_model import decibels, degrees
 from hil.figures.palette import BLACK, PALE, VERMILION
+from hil.orders.reading_lag import reading_lag
 from hil.recording.formats import read_table
 from hil.report.diagnosis_json import SCHEMA as DIAGNOSIS
 from hil.report.identification_input import PhysicalValue, json_object, physical_value, physical_values, table

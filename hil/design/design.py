@@ -14,10 +14,10 @@ from drivers.errors import CommandRefused
 from estimator.design import Expected, Open, Width, as_model, expected, shown, widths
 from estimator.physics.model import DrivelineModel
 from estimator.signals.record import Record
-from hil.commission.order import Order, RigSource
-from hil.commission.runner import Prediction, predict
 from hil.design.candidates import Limits, Table, candidates
 from hil.errors import InputError, RunAborted, UsageError
+from hil.orders.order import Order, RigSource
+from hil.orders.runner import Prediction, predict
 
 Progress = Callable[[str, float], None]
 
@@ -29,6 +29,10 @@ NEARLY = 0.02
 
 WIDE = 0.1
 """Half of a 95 % interval over its value from which a parameter is not well known."""
+
+
+class NothingAllowed(UsageError):
+    """No experiment passes the rig's limits."""
 
 
 class Aim(Enum):
@@ -120,7 +124,7 @@ def designed(source: RigSource, known: Open, aim: Aim, progress: Progress) -> De
     progress("designed", 1.0)
     if not found:
         why = next(iter(refused.values()))
-        raise UsageError(
+        raise NothingAllowed(
             f"rig {rig.name!r}: expected an experiment that it may drive, got none: of {len(wanted)} none passes its "
             f"limits, the first because: {why}"
         )

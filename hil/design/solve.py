@@ -4,34 +4,26 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
-from enum import Enum
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Final, Literal
-
-from pydantic import Field, TypeAdapter
+from typing import Any
 
 from estimator.design import Open, left_open
-from estimator.diagnosis.result import Diagnosis
+from estimator.diagnosis.result import Diagnosis, Verdict
 from estimator.signals.record import Record
-from hil.commission.order import Order, RigSource, as_table, rig_digest
-from hil.commission.runner import Runner
-from hil.commission.state import now_utc
-from hil.commission.talk import Talk, What
 from hil.config.model_file import ModelFile
 from hil.config.rig_file import Rig
-from hil.design.design import Aim, Design, designed, is_needed
-from hil.design.report import design_lines, question_lines
+from hil.design.design import Aim, Design, NothingAllowed, designed, is_needed
+from hil.design.report import design_lines, obstacle, question_lines
+from hil.design.solve_state import STATE, Driven, End, Odds, State
 from hil.errors import UsageError
-from hil.files import is_inside, read_json
+from hil.orders.operator import Answer, What
+from hil.orders.order import Order, RigSource, as_table
+from hil.orders.runner import Runner, RunRecord, now_utc
 from hil.provenance import provenance
 from hil.recording import read_records
-from hil.recording.checksum import text_sha256
 from hil.report.diagnosis_files import publish_diagnosis
-from hil.report.outputs import publish
 
-FILE_NAME: Final = "solve.json"
-SCHEMA: Final = "hil.solve/1"
 STEP = "solve"
 """Name of the step that drives: the first part of its recordings' names."""
 
@@ -40,106 +32,40 @@ LEAST_MARGIN_RAD_S = 2.0
 """How far a speed may leave its predicted range, at least [rad/s]: what is missing in the model is not predicted."""
 
 
-class End(Enum):
-    """What a call came to."""
-
-    DECIDED = "decided"
-    NOTHING_DECIDES = "nothing that may be driven would decide"
-    TIME = "the vehicle's time is used up"
-    DECLINED = "the operator declined"
-
-
-@dataclass(frozen=True, slots=True)
-class Driven:
-    """One experiment that was driven: why, what was promised of it, and its recording next to the state file."""
-
-    name: str
-    table: dict[str, Any]
-    recording: str
-    seconds: float
-    last_rad_s: float  # Speed at its end: the next one begins there
-    promised_factor: float | None
-    promised_probability: float | None
-
-
-@dataclass(slots=True)
-class State:
-    """A search for a verdict as far as it is."""
-
-    schema: Literal["hil.solve/1"]
-    rig_sha256: str
-    model_sha256: str
-    driven: list[Driven] = field(default_factory=list)
-    end: End | None = None
-    verdict: str = ""
-    statement: str = ""
-    updated_utc: Annotated[str, Field(max_length=40)] = ""
-
-    @property
-    def vehicle_s(self) -> float:
-        """Time that the vehicle was needed so far [s]."""
-        return sum(each.seconds for each in self.driven)
-
-
-_STATE: Final = TypeAdapter(State)
-
-
-def load_state(folder: Path, source: RigSource, model: Path) -> State:
-    """Read the state of a folder, or begin one; refuse one of another rig or model."""
-    path = folder / FILE_NAME
-    fresh = State(SCHEMA, rig_digest(source.text), text_sha256(model.read_text(encoding="utf-8")))
-    if not path.exists():
-        return fresh
-    try:
-        known = _STATE.validate_python(read_json(path))
-    except ValueError as error:
-        raise UsageError(
-            f"{path}: expected the state of hil solve ({SCHEMA}), got a file that can't be read as one. Move it away "
-            "to begin anew in this folder, or choose another by --out."
-        ) from error
-    for what, was, now in (
-        ("rig file", known.rig_sha256, fresh.rig_sha256),
-        ("model file", known.model_sha256, fresh.model_sha256),
-    ):
-        if was != now:
-            raise UsageError(
-                f"{path}: started with another {what} than {source.path if what == 'rig file' else model}. Name that "
-                "one, or begin anew in another folder by --out."
-            )
-    for each in known.driven:
-        if not is_inside(folder, folder / each.recording):
-            raise UsageError(f"{path}: a recording outside {folder}: {each.recording}")
-    return known
-
-
 @dataclass(slots=True)
 class Solving:
     """One call: from where the last one ended to a verdict, or to what keeps it from there."""
 
-    folder: Path
+    folder: Path  # where the verdict is published; recordings are in the runner's
     source: RigSource
     file: ModelFile
     model: Path
     runner: Runner
-    talk: Talk
+    may_command: Callable[[str], Answer]  # asks the operator
     state: State
     given: Sequence[Path]  # recordings of the rig from before
     effort: str
     most_vehicle_s: float  # time that the vehicle may be needed for in all [s]
+    rolling_rad_s: float  # speed of the vehicle before the next run
+    keep: Callable[[dict[str, Any]], None]  # keeps the state
     say: Callable[[str], None]
     progress: Callable[[str, float], None]
+    note: Callable[[RunRecord], None] = lambda _: None  # called after each run, also of one that was ended early
 
     def run(self) -> End:
         """Continue until it ends; what ends it is in the state."""
         if self.state.end is End.DECIDED:
             self.say(f"decided before: {self.state.statement}")
             return End.DECIDED
-        self.state.end = None
+        self.state.end, self.state.because = None, ""
         if not self.given and not self.state.driven and (end := self._drive(*_first(self.source.rig()))):
             return self._ended(end)
         while True:
-            known, _ = self._diagnosed()
+            known, diagnosis = self._diagnosed()
             found = self._next(known)
+            if found is End.DECIDED:
+                self.state.because = _undecidable(known, diagnosis)
+                found = End.NOTHING_DECIDES if self.state.because else found
             end = found if isinstance(found, End) else self._drive(*found)
             if end is not None:
                 return self._ended(end)
@@ -151,10 +77,8 @@ class Solving:
         """
         is_open = not known.is_decided or bool(known.untested)
         if is_open and is_needed(known, Aim.DECIDE):
-            design = designed(self.source, known, Aim.DECIDE, self.progress)
-            for line in design_lines(known, design):
-                self.say(line)
-            if design.is_worth_driving:
+            design = self._designed(known)
+            if design is not None and design.is_worth_driving:
                 return design.planned.name, dict(design.planned.table), design
             if len(known.candidates) > 1:
                 return End.NOTHING_DECIDES
@@ -166,13 +90,21 @@ class Solving:
                     return name, as_table(table), None
         return End.DECIDED
 
-    @property
-    def _left_s(self) -> float:
-        return max(self.most_vehicle_s - self.state.vehicle_s, 0.0)
+    def _designed(self, known: Open) -> Design | None:
+        """Design the next experiment and say it; None where the rig's limits allow none."""
+        try:
+            design = designed(self.source, known, Aim.DECIDE, self.progress)
+        except NothingAllowed as error:
+            self.state.because = str(error)
+            return None
+        for line in design_lines(known, design):
+            self.say(line)
+        self.state.because = "" if design.is_worth_driving else obstacle(design)
+        return design
 
     @property
     def _paths(self) -> list[Path]:
-        return [*self.given, *(self.folder / each.recording for each in self.state.driven)]
+        return [*self.given, *(self.runner.folder / each.recording for each in self.state.driven)]
 
     def _diagnosed(self) -> tuple[Open, Diagnosis]:
         """Diagnose all recordings, and publish the verdict: it stands whatever comes after."""
@@ -181,6 +113,8 @@ class Solving:
         made = provenance([self.model], self._paths)
         publish_diagnosis(self.folder, diagnosis, self.file, records, self._paths, made)
         self.state.verdict, self.state.statement = diagnosis.verdict.value, diagnosis.statement
+        now = Odds(len(records), {each.name: each.probability for each in known.candidates})
+        self.state.odds = [each for each in self.state.odds if each.recordings < now.recordings] + [now]
         self._save()
         self.say(f"after {len(self._paths)} recordings: {diagnosis.statement}")
         for line in question_lines(known):
@@ -190,19 +124,22 @@ class Solving:
     def _drive(self, name: str, table: Any, design: Design | None = None) -> End | None:
         """Drive an experiment if there is time and the operator agrees; what was driven whole is in the state."""
         order = Order(f"next_{len(self.state.driven) + 1}", dict(table), least_margin_rad_s=LEAST_MARGIN_RAD_S)
-        model, rolling_rad_s = self.file.model, self.state.driven[-1].last_rad_s if self.state.driven else 0.0
-        prediction = self.runner.predict(order, model, rolling_rad_s)
+        prediction = self.runner.predict(order, self.file.model, self.rolling_rad_s)
         if self.state.vehicle_s + prediction.seconds > self.most_vehicle_s:
-            self.say(f"{name}: it needs {prediction.seconds:.0f} s of {self._left_s:.0f} s that the vehicle is left")
+            left_s = max(self.most_vehicle_s - self.state.vehicle_s, 0.0)
+            self.state.because = f"{name} needs the vehicle for {prediction.seconds:.0f} s, left are {left_s:.0f} s"
             return End.TIME
         m1, m2, speed = prediction.torque_m1_nm, prediction.torque_m2_nm, prediction.speed_rad_s
         self.say(
             f"{name}: {prediction.seconds:.0f} s, m1 {m1.low:.0f} to {m1.high:.0f} Nm, m2 {m2.low:.0f} to "
             f"{m2.high:.0f} Nm, speed {speed.low:.1f} to {speed.high:.1f} rad/s, through the torque guard"
         )
-        if self.talk.may_command(name, not self.state.driven).what is not What.GO:
+        answer = self.may_command(name)
+        if answer.what is not What.GO:
+            self.state.because = answer.because
             return End.DECLINED
-        run = self.runner.run(STEP, order, model, rolling_rad_s, lambda _: None)
+        run = self.runner.run(STEP, order, self.file.model, self.rolling_rad_s, self.note)
+        self.rolling_rad_s = run.last_rad_s
         decides = None if design is None else design.decides
         self.state.driven.append(
             Driven(
@@ -221,18 +158,26 @@ class Solving:
     def _ended(self, end: End) -> End:
         self.state.end = end
         self._save()
-        self.say(f"ended: {end.value}. {self.state.statement}")
+        because = f" ({self.state.because})" if self.state.because else ""
+        self.say(f"ended: {end.value}{because}. {self.state.statement}")
         return end
 
     def _save(self) -> None:
         self.state.updated_utc = now_utc()
-        text = json.dumps(_STATE.dump_python(self.state, mode="json"), indent=1, allow_nan=False) + "\n"
-        publish(self.folder, {FILE_NAME: lambda path: path.write_text(text, encoding="utf-8")})
+        self.keep(self.document())
 
     def document(self) -> dict[str, Any]:
         """Return the result as JSON: the state."""
-        found: dict[str, Any] = _STATE.dump_python(self.state, mode="json")
+        found: dict[str, Any] = STATE.dump_python(self.state, mode="json")
         return found
+
+
+def _undecidable(known: Open, diagnosis: Diagnosis) -> str:
+    """Say why a verdict is no decision though nothing is left to drive for it; "" where it is one."""
+    if diagnosis.verdict in (Verdict.UNEXPLAINED, Verdict.PARTLY_EXPLAINED):
+        return "what is left has no name in the catalogue, and an experiment is designed to decide between names"
+    twins = {name: known.twins[name] for name in sorted(known.candidates[0].effects) if name in known.twins}
+    return "; ".join(f"{name} or {' or '.join(others)}: another output decides it" for name, others in twins.items())
 
 
 def _first(rig: Rig) -> tuple[str, dict[str, Any]]:

@@ -86,9 +86,9 @@ def _top(state: State, updated: str) -> html.Header:
 
 
 def _statements(state: State) -> Iterator[str]:
-    diagnosis = state["steps"]["diagnosis"]["evidence"]
-    if diagnosis:
-        yield diagnosis["statement"]
+    found = [state["steps"][name]["evidence"].get("statement") for name in ("solve", "diagnosis")]
+    if statement := next(filter(None, found), None):
+        yield statement
     outside = [
         f"{finding['what']}: {finding['measured']}"
         for name, record in state["steps"].items()
@@ -329,6 +329,11 @@ def _diagnosis(evidence: Evidence) -> list[Any]:
     return [html.paragraph("Evidence, rivals and pictures: ", report, ". Model file: ", model, ".")]
 
 
+def _solve(evidence: Evidence) -> list[Any]:
+    report = html.Link("solve/report.html", "solve/report.html")
+    return [html.paragraph("Evidence, rivals and pictures: ", report, ".")] if evidence["odds"] else []
+
+
 _FIGURES: Mapping[str, Callable[[Evidence], list[Any]]] = {
     "noise": _noise,
     "signs": _signs,
@@ -336,4 +341,5 @@ _FIGURES: Mapping[str, Callable[[Evidence], list[Any]]] = {
     "identification": _identification,
     "validation": _validation,
     "diagnosis": _diagnosis,
+    "solve": _solve,
 }

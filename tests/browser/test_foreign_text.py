@@ -109,7 +109,7 @@ def test_no_text_of_a_result_runs_or_becomes_markup(browser: Any, tmp_path: Path
     path.write_text(PAGES[name](tmp_path), encoding="utf-8")
     assert "onerror=" in path.read_text(encoding="utf-8")  # the text is there, as text
     with opened(browser, path, 1200) as shown:
-        for link in shown.page.locator("main a").all()[:20]:
+        for link in shown.page.locator("main a:not([href='solve/report.html'])").all()[:20]:  # the page's own
             link.dispatch_event("click")
         assert shown.page.evaluate(RAN) == ""
         assert shown.page.evaluate(PLANTED) == 0

@@ -13,8 +13,8 @@ import pytest
 
 from estimator.physics.model import EffectValue
 from hil.cli.main import run
-from hil.commission.runner import predict
 from hil.config.rig_file import read_rig
+from hil.orders.runner import predict
 from hil.simulator.driveline import DEFAULT_BUS
 from tests.cli.bus_model import MODEL
 from tests.cli.conftest import Simulation

@@ -7,12 +7,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from hil.commission.engine import NAMES, Asked, Commissioning
-from hil.commission.order import RigSource
-from hil.commission.runner import Conditions, Runner
 from hil.commission.state import Finding, State, StepRecord, load_state
 from hil.commission.step import Job, Step
-from hil.commission.talk import Talk
 from hil.config.rig_file import read_rig
+from hil.orders.operator import Talk
+from hil.orders.order import RigSource
+from hil.orders.runner import Conditions, Runner
 from hil.rig.pacing import FreePacer, period_ns
 from hil.rig.realtime import NOT_ASKED
 from hil.simulator.addresses import Address

@@ -14,8 +14,8 @@ from hil.commission import prbs_design as amplitude
 from hil.commission.physical_fit import select_delay
 from hil.commission.prbs_design import Cap, resonance_spread, vibration_m_s2
 from hil.commission.responses import Measured, pulse_response, response_ratio
-from hil.commission.runner import rigid_model
 from hil.config.rig_file import read_rig
+from hil.orders.runner import rigid_model
 from hil.rig.experiments.laws import LEAD_S, Pulses
 from hil.simulator.driveline import DEFAULT_BUS
 from tests.commission.rigs import EXAMPLE

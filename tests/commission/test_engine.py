@@ -6,11 +6,11 @@ import pytest
 
 from hil.commission import engine
 from hil.commission.engine import Asked, Commissioning
-from hil.commission.order import RigSource
 from hil.commission.state import Finding, State, Status, StepRecord, load_state
 from hil.commission.step import Job, Outcome, Step
-from hil.commission.talk import Talk
 from hil.errors import RunAborted, UsageError
+from hil.orders.operator import Talk
+from hil.orders.order import RigSource
 from tests.commission.rigs import EXAMPLE
 
 NAMES = ("first", "second", "third")

@@ -10,8 +10,9 @@ import pytest
 from rich.console import Console
 
 from hil.commission.engine import STEPS
-from hil.commission.state import Finding, RunRecord, State, Status, StepRecord, stated
+from hil.commission.state import Finding, State, Status, StepRecord, stated
 from hil.commission.talk import findings_table, result_document, result_lines
+from hil.orders.runner import RunRecord
 from hil.report.commission_html import commission_page
 
 TITLES = {step.name: step.title for step in STEPS}
@@ -45,7 +46,7 @@ def state(tmp_path: Path) -> dict[str, Any]:
 def test_page_says_everything_and_fetches_nothing(state: dict[str, Any]) -> None:
     page = commission_page(state, TITLES)
     for text in (
-        "not complete: 8 to do, next is limits",
+        "not complete: 9 to do, next is limits",
         "gain &lt;m2&gt;",
         "3.1 ± 0.4 %",
         "→ Calibrate one",
@@ -65,7 +66,7 @@ def test_page_says_everything_and_fetches_nothing(state: dict[str, Any]) -> None
 def test_result_tells_where_it_continues(state: dict[str, Any], tmp_path: Path) -> None:
     result = result_document(state, str(tmp_path), "commissioning.html")
     assert (result["complete"], result["outside"], result["driven_s"], result["model"]) == (False, 1, 3.5, None)
-    assert "not complete: it continues with limits at the next call, 8 steps to go" in list(result_lines(result))
+    assert "not complete: it continues with limits at the next call, 9 steps to go" in list(result_lines(result))
     assert "skipped: devices" in list(result_lines(result))
     assert f"report: {tmp_path / 'commissioning.html'}" in list(result_lines(result))
 

@@ -11,8 +11,9 @@ import pytest
 
 from hil.cli.main import run
 from hil.commission.engine import NAMES
-from hil.commission.state import FILE_NAME, LOCK, RunRecord, State, Status, StepRecord, load_state, sole_use
+from hil.commission.state import FILE_NAME, LOCK, State, Status, StepRecord, load_state, sole_use
 from hil.errors import UsageError
+from hil.orders.runner import RunRecord
 from hil.report.commission_html import commission_page
 from tests.cli.conftest import EXAMPLE
 from tests.commission.whole_state import whole_state

@@ -6,10 +6,10 @@ from pathlib import Path
 import pytest
 
 from drivers.errors import DriverError
-from hil.commission import runner
 from hil.commission.state import Status
 from hil.commission.step import Job
 from hil.errors import RunAborted
+from hil.orders import runner
 from hil.recording import read_table
 from hil.rig.drive import Progress
 from hil.rig.experiments.base import Phase

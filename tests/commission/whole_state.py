@@ -4,7 +4,8 @@ from pathlib import Path
 from typing import Any
 
 from hil.commission.engine import STEPS
-from hil.commission.state import Finding, Note, RunRecord, State, Status, StepRecord, stated
+from hil.commission.state import Finding, Note, State, Status, StepRecord, stated
+from hil.orders.runner import RunRecord
 
 COURSE = {"time_s": [0.0, 0.1, 0.2], "speed_rad_s": [0.0, None, 0.2]}
 LINEAR = {
@@ -73,6 +74,28 @@ EVIDENCE: dict[str, Any] = {
         "model_file": "model.toml",
         "seconds": 4.2,
         "parameters": {"J_M": {"nominal": 100.0, "value": 101.0, "ci95": [100.0, 102.0], "unit": "kg m^2"}},
+    },
+    "solve": {
+        "schema": "hil.solve/1",
+        "rig_sha256": "0",
+        "model_sha256": "0",
+        "driven": [
+            {
+                "name": "coast from 60 rad/s",
+                "table": {"kind": "coast"},
+                "recording": "runs/solve.csv",
+                "seconds": 3.5,
+                "last_rad_s": 0.1,
+                "promised_factor": 12.0,
+                "promised_probability": 0.9,
+            }
+        ],
+        "odds": [{"recordings": 2, "probabilities": {"backlash": 0.6, "nothing": 0.4}}],
+        "end": "decided",
+        "because": "",
+        "verdict": "explained",
+        "statement": "Missing is backlash.",
+        "updated_utc": "2026-11-28T10:00:00+00:00",
     },
 }
 

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from estimator.signals.multisine import Lines, Multisine, crest_factor, excited_lines, multisine_nm
-from hil.commission.order import Order, RigSource
-from hil.commission.runner import rigid_model
 from hil.config.rig_file import read_rig, with_experiment_of
 from hil.design.candidates import Limits, candidates
 from hil.design.design import on_paper
 from hil.errors import HilError, RigFileError, UsageError
+from hil.orders.order import Order, RigSource
+from hil.orders.runner import rigid_model
 from hil.rig.plan import plan_run
 from tests.rig.serving import EXAMPLE
 

@@ -8,7 +8,8 @@ from typing import Any, cast
 
 import pytest
 
-from hil.design.solve import Driven, End, Solving, State
+from hil.design.solve import Solving
+from hil.design.solve_state import Driven, End, State
 from tests.design.test_candidates import SOURCE
 
 OWN = list(SOURCE.rig().experiments)
@@ -19,7 +20,8 @@ def solving(driven: list[str], given: list[Path], most_vehicle_s: float = 600.0)
     state = State("hil.solve/1", "", "", [Driven(name, {}, "x.csv", 40.0, 0.0, None, None) for name in driven])
     nobody: Any = SimpleNamespace()
     return Solving(
-        Path(), SOURCE, nobody, Path(), nobody, nobody, state, given, "quick", most_vehicle_s, print, lambda *_: None
+        *(Path(), SOURCE, nobody, Path(), nobody, nobody, state, given, "quick", most_vehicle_s, 0.0),
+        *(print, print, lambda *_: None),
     )
 
 

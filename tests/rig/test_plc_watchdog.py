@@ -11,8 +11,8 @@ from drivers.canopen.can_link import CanLink
 from drivers.plc.plc import Plc
 from drivers.plc.register_map import load_register_map
 from drivers.resources import data_file
-from hil.commission.talk import Talk
 from hil.errors import RunAborted
+from hil.orders.operator import Talk
 from hil.rig.build import open_devices
 from hil.rig.experiments.base import Phase
 from hil.rig.plc_loop import HostBeat

@@ -11,12 +11,12 @@ from drivers.errors import CommandRefused, DriverError
 from drivers.guard_limits import NS_PER_S
 from drivers.plc.types import PlcStatus
 from drivers.torque_guard import Evidence, GuardLimits, TorqueGuard, TorqueRequest
-from hil.commission.order import Order
-from hil.commission.runner import rigid_model
 from hil.commission.state import Finding, stated
 from hil.commission.step import Job, Outcome, Step
 from hil.commission.steps import experiments
 from hil.config.rig_file import Rig
+from hil.orders.order import Order
+from hil.orders.runner import rigid_model
 from hil.rig.build import open_devices
 from hil.rig.check import Finding as Found
 from hil.rig.check import Verdict, check_rig

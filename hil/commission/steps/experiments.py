@@ -9,13 +9,13 @@ import numpy as np
 from estimator.identification.modes.modes import Mode
 from estimator.identification.online.recursive import Status as OnlineStatus
 from estimator.identification.settings import Settings
-from hil.commission.order import Order, as_table, cruise_of, first_of, halt
 from hil.commission.responses import of_repeats, record_of, rounded
 from hil.commission.state import Finding
 from hil.commission.step import Job, Outcome, Step
 from hil.commission.steps.noise_friction import samples_lost
 from hil.config.experiment_tables import ReversalTable, TipTable
 from hil.errors import UsageError
+from hil.orders.order import Order, as_table, cruise_of, first_of, halt
 
 if TYPE_CHECKING:
     from estimator.identification.best import BestEstimate

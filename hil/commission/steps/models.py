@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -174,20 +175,22 @@ def _about_diagnosis(job: Job) -> str:
 def _do_diagnosis(job: Job) -> Outcome:
     from estimator.diagnosis.diagnose import diagnose  # a second, and the bus comes first; so do those below
 
-    nominal = _nominal(job)
+    nominal, paths = nominal_of(job), explained(job)
+    result = diagnose([record_of(path) for path in paths], nominal, (), job.progress)
+    _publish(job, result, nominal, provenance(recordings=paths))
+    return Outcome(_findings_diagnosis(result), _evidence_diagnosis(result))
+
+
+def explained(job: Job) -> list[Path]:
+    """Return the recordings that are diagnosed together."""
     runs = {run.name: run for run in cruises(job)}
     slow_to_fast = sorted(runs.values(), key=lambda run: run.measured["speed_measured_rad_s"][0])
     others = [run for run in job.runs_of("experiments") if run.name in OTHERS]
     others += [run for run in job.runs_of("scales") if run.name in ALONE]
-    chosen = [slow_to_fast[0], slow_to_fast[-1], *others]
-    records = [record_of(job.recording(run)) for run in chosen]
-    result = diagnose(records, nominal, (), job.progress)
-    made = provenance(recordings=[job.recording(run) for run in chosen])
-    _publish(job, result, nominal, made)
-    return Outcome(_findings_diagnosis(result), _evidence_diagnosis(result))
+    return [job.recording(run) for run in (slow_to_fast[0], slow_to_fast[-1], *others)]
 
 
-def _nominal(job: Job) -> DrivelineModel:
+def nominal_of(job: Job) -> DrivelineModel:
     if job.nominal is not None:
         return job.nominal
     document = job.evidence("validation").get("model")
@@ -260,6 +263,7 @@ def _evidence_diagnosis(result: Diagnosis) -> dict[str, object]:
         "headline": headline(result),
         "statement": result.statement,
         "effects": [effect.name for effect in result.effects],
+        "alike": sorted({name for effect in result.effects for name in effect.indistinguishable_from}),
         "report": f"{FOLDER}/report.html",
         "model_file": AUGMENTED,
         "seconds": result.timing_s.get("total"),

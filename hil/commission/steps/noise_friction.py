@@ -6,11 +6,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from hil.commission.order import Order, as_table, first_of
 from hil.commission.responses import READING, Measured, columns_of, record_of, thinned
-from hil.commission.state import Finding, RunRecord, stated
+from hil.commission.state import Finding, stated
 from hil.commission.step import Job, Outcome, Step
 from hil.config.experiment_tables import ReversalTable
+from hil.orders.order import Order, as_table, first_of
+from hil.orders.runner import RunRecord
 from hil.recording.columns import FLAGS, SPEED, TIME
 from hil.report.numbers import shown
 

@@ -20,7 +20,6 @@ from estimator.identification.settings import Settings
 from estimator.signals.decimate import decimate
 from estimator.signals.record import FloatArray, Record
 from hil.commission import prbs_design as amplitude
-from hil.commission.order import Order, as_table, cruise_of, halt
 from hil.commission.prbs_design import (
     COMFORT_LIMIT_M_S2,
     DAMPING_STD,
@@ -32,8 +31,10 @@ from hil.commission.prbs_design import (
     vibration_m_s2,
 )
 from hil.commission.responses import HIGH_PASS_HZ, RINGING_S, averaged, record_of
-from hil.commission.state import Finding, RunRecord
+from hil.commission.state import Finding
 from hil.commission.step import Job, Outcome, Step
+from hil.orders.order import Order, as_table, cruise_of, halt
+from hil.orders.runner import RunRecord
 from hil.report.numbers import shown
 
 SPEED_BAND = 0.1

@@ -10,7 +10,6 @@ import numpy as np
 from estimator.errors import NotExciting
 from estimator.identification.settings import Settings
 from estimator.signals.record import Record
-from hil.commission.order import Order, as_table, cruise_of, halt
 from hil.commission.physical_fit import NATURAL_DELAY, DelaySelection, select_delay
 from hil.commission.prbs_design import ResonanceSpread, resonance_spread
 from hil.commission.responses import (
@@ -21,13 +20,14 @@ from hil.commission.responses import (
     ResponseRatio,
     columns_of,
     pulse_response,
-    reading_lag,
     record_of,
     response_ratio,
     thinned,
 )
 from hil.commission.state import Finding, model_json, stated
 from hil.commission.step import Job, Outcome, Step
+from hil.orders.order import Order, as_table, cruise_of, halt
+from hil.orders.reading_lag import reading_lag
 from hil.recording.columns import SPEED, TIME
 from hil.report.numbers import shown
 from hil.rig.experiments.laws import LEAD_S, WAVE_STEPS

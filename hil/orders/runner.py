@@ -6,17 +6,19 @@ import json
 from collections.abc import Callable, Hashable
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
+from datetime import UTC, datetime
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
+from pydantic import Field, FiniteFloat
 
 from estimator.physics.model import DrivelineModel, Parameter, Structure
 from estimator.physics.simulate import Stepper
 from estimator.signals.record import FloatArray
-from hil.commission.order import Order, RigSource
-from hil.commission.state import RunRecord
 from hil.config.rig_file import Rig
 from hil.errors import RunAborted, StoreError
+from hil.orders.order import Order, RigSource
 from hil.recording.checksum import RIG_CHECKSUM, RIG_TEXT, text_sha256
 from hil.recording.writer import RecordingWriter
 from hil.rig.build import open_devices
@@ -33,6 +35,36 @@ from hil.rig.stop import StopRequest, stop_on_signals
 from hil.rig.timing import RunTiming
 from hil.sample import Sample
 from hil.store import register_run
+
+Number = Annotated[FiniteFloat, Field(ge=-1e30, le=1e30)]
+"""Far beyond any quantity here, and what pages draw and multiply."""
+
+Both = Annotated[list[Number], Field(min_length=2, max_length=2)]
+
+
+@dataclass(slots=True)
+class RunRecord:
+    """One run: its recording next to the state file, and what was predicted and measured [Nm, rad/s].
+
+    ``whole`` is False where the run was ended early; its recording then holds what there was.
+    """
+
+    name: str
+    recording: str | None
+    whole: bool
+    seconds: float
+    predicted: dict[str, Both]
+    measured: dict[str, Both]
+    flagged: int = 0
+    recorded: int = 0
+    prbs_nm: float = 0.0
+    last_rad_s: float = 0.0
+
+
+def now_utc() -> str:
+    """Return the present time as text."""
+    return datetime.now(UTC).isoformat(timespec="seconds")
+
 
 NO_DRAG = 1e-3
 """Viscous friction of a vehicle of which only the inertia is known, over that inertia [1/s]: next to none."""
