@@ -61,8 +61,8 @@ SWING_S: Final = 0.2
 """Low-pass of the speed that is compared [s]: after a step of torque the motor swings on its shaft, faster than it."""
 
 UNWOUND_S: Final = 3.0 * SWING_S
-"""From a turn of the torque on, in which nothing is compared [s]: the shaft unwinds, and the low-passed speed is the
-vehicle's only when that has faded."""
+"""From the first reading and each turn of the torque on [s], in which nothing is compared: the shaft unwinds, and the
+low-passed speed is the vehicle's only when that has faded."""
 
 
 def left_operation(where: str, state: PowerState) -> str:
@@ -338,7 +338,7 @@ class Supervision:
         self._stale_ns = guard.feedback_timeout_s * NS_PER_S
         self._apart: Excess | None = None
         self._opposing_nm = self._could_rad_s = 0.0
-        self._unturned_s = UNWOUND_S
+        self._unturned_s = 0.0
         self._smooth: tuple[float, float] | None = None
         self._from: tuple[float, float, float] | None = None
         self._first_ns: int | None = None

@@ -23,6 +23,7 @@ from drivers.inverter.supervision import (
     SPEED_NOISE_RAD_S,
     SPEED_SHARE,
     SURPLUS_CYCLES,
+    UNWOUND_S,
     CycleRecord,
     DriveRecord,
     Supervision,
@@ -306,7 +307,7 @@ def test_a_speed_that_runs_away_against_the_torque_ends_it() -> None:
         seen = ((DriveRecord(torque_nm, answer(torque_nm, w)), DriveRecord(0.0, answer(0.0, w))) for w in speed)
         return cycles_to_end(made, seen)
 
-    assert run(-1.0) == 21
+    assert run(-1.0) == 20 + round(UNWOUND_S / PERIOD_S)
     assert run(1.0) is None
     assert run(-0.45) is None, "a grade that is steeper than the torque"
 
