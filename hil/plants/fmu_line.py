@@ -19,6 +19,7 @@ from estimator.diagnosis.preconditions.prepare import thin
 from estimator.physics.layout import flat
 from estimator.physics.model import DrivelineModel, Load, Structure
 from estimator.physics.motion import motor_angle
+from estimator.physics.parallel import concurrently
 from estimator.signals.record import FloatArray, Location, OutputKind, Record
 from hil.errors import UsageError
 from hil.plants.fmu_plant import FmuPlant
@@ -62,7 +63,7 @@ def fmu_line(fmu: FmuPlant, records: Sequence[Record], tolerances: Mapping[str, 
     """Return what is diagnosed of an FMU, of recordings of one kind of output."""
     named = fmu.named(records[0].kind)
     known = {name: fmu.parameter(name) for name in tolerances}
-    answered = [_answered(record, fmu.run(record).output) for record in records]
+    answered = concurrently(lambda record: _answered(record, fmu.run(record).output), records)
     line = equivalent_line([_thinned(record) for record in answered])
     errors = [replay(line, record).output - record.output for record in answered]
     error = float(np.sqrt(np.mean(np.concatenate(errors) ** 2)))
@@ -70,7 +71,9 @@ def fmu_line(fmu: FmuPlant, records: Sequence[Record], tolerances: Mapping[str, 
     for name, tolerance in tolerances.items():
         value, unit = known[name]
         moved = {name: value * (1.0 + 0.5 * tolerance)}
-        changed = [_thinned(_answered(record, fmu.changed(record, moved))) for record in records]
+        changed = concurrently(
+            lambda record, moved=moved: _thinned(_answered(record, fmu.changed(record, moved))), records
+        )
         place, exponent = acting_as(name, line, changed, error, 1.0 + 0.5 * tolerance)
         if place in tuned:
             raise UsageError(f"--tune {name}: it acts as {tuned[place].name} does, {place} of a line. Take one of them")
@@ -99,7 +102,7 @@ def _flanges(fmu: FmuPlant, record: Record, named: Names, line: DrivelineModel) 
 def _around(record: Record, found: FmuLine) -> DrivelineModel:
     """Return a model whose every simulation is the FMU's."""
     fmu, named, line, kind = found.fmu, found.named, found.model, record.kind
-    flanges, parts = _flanges(fmu, record, named, line), dict[bytes, int]()
+    flanges = _flanges(fmu, record, named, line)
     states = ("angle_rad", *STARTS) if kind is OutputKind.POSITION else STARTS
     starts = dict(zip(named.start, states, strict=False))
 
@@ -114,14 +117,7 @@ def _around(record: Record, found: FmuLine) -> DrivelineModel:
         settings = {"flanges": acting, "sign_width": around.sign_width, "start_s": float(record.since_start_s[0])}
         given = (settings, {"p": around.laws, "angle": motor_angle(record)})
 
-        def in_parts(count: int) -> FloatArray:
-            return fmu.simulated(record, named, around.torque_nm, values, given, count)
-
-        which = np.append(around.laws, record.sample_time_s).astype(bool).tobytes()
-        if which in parts:
-            return in_parts(parts[which])
-        parts[which], output = _fine_enough(in_parts)
-        return output
+        return _fine_enough(lambda count: fmu.simulated(record, named, around.torque_nm, values, given, count))
 
     is_alike = {*named.start} <= {*Names().start, *OF_A_POSITION.start}
     plant = BlackBox(
@@ -130,16 +126,14 @@ def _around(record: Record, found: FmuLine) -> DrivelineModel:
     return replace(line, plant=plant, load=Load.OWN if named.load else 0.0)
 
 
-def _fine_enough(in_parts: Callable[[int], FloatArray]) -> tuple[int, FloatArray]:
-    """Return in how many parts a period is simulated so that twice as many change nothing, and the output."""
-    parts, output = 1, in_parts(1)
-    while parts < MOST_PARTS:
-        finer = in_parts(2 * parts)
-        change = float(np.abs(finer - output).max())
-        if change <= NOTHING * float(np.ptp(finer)):
-            break
-        parts, output = 2 * parts, finer
-    return parts, output
+def _fine_enough(in_parts: Callable[[int], FloatArray]) -> FloatArray:
+    """Return the output with a period in so many parts that twice as many change nothing."""
+    output, finer = concurrently(in_parts, [1, 2])
+    parts = 2
+    while parts < MOST_PARTS and float(np.abs(finer - output).max()) > NOTHING * float(np.ptp(finer)):
+        parts *= 2
+        output, finer = finer, in_parts(parts)
+    return finer
 
 
 def _answered(record: Record, output: FloatArray) -> Record:
