@@ -175,6 +175,12 @@ class FmuPlant:
         load = float(x[0] * unknown.scale[0]) if named.load else float("nan")
         return FreeRun(output, float(np.sqrt(np.mean(error**2))), Start(load, 0.0, float("nan")))
 
+    def settled(self, record: Record, named: Names) -> dict[str, FloatArray | float]:
+        """Return load and initial state that were found of a recording, where it was `run`, by the FMU's names."""
+        unknown = _Unknown.of(named, record)
+        x = self._settled.get((record.name, float(record.time_s[0])), unknown.guess)
+        return dict(zip(unknown.names, (x * unknown.scale).tolist(), strict=True))
+
     def changed(self, record: Record, values: Mapping[str, float]) -> FloatArray:
         """Simulate a recording that was `run` with some parameters changed, its load and initial state kept."""
         named, parts = self.named(record.kind), []
