@@ -29,7 +29,7 @@ class Work:
         self.samples = 0
         self.limit_s = limit_s
         outer = _work.get()
-        self.began_s = time.perf_counter() if outer is None else outer.began_s
+        self.began_s: float = time.perf_counter() if outer is None else outer.began_s
         self._end = self.began_s + share * limit_s
         self._lock = threading.Lock()
 

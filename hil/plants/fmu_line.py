@@ -9,6 +9,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -74,9 +75,8 @@ def fmu_line(fmu: FmuPlant, records: Sequence[Record], tolerances: Mapping[str, 
     for name, tolerance in tolerances.items():
         value, unit = known[name]
         moved = {name: value * (1.0 + 0.5 * tolerance)}
-        changed = concurrently(
-            lambda record, moved=moved: _thinned(_answered(record, fmu.changed(record, moved))), records
-        )
+        outputs = concurrently(partial(fmu.changed, values=moved), records)
+        changed = [_thinned(_answered(record, output)) for record, output in zip(records, outputs, strict=True)]
         place, exponent = acting_as(name, line, changed, error, 1.0 + 0.5 * tolerance)
         if place in tuned:
             raise UsageError(f"--tune {name}: it acts as {tuned[place].name} does, {place} of a line. Take one of them")

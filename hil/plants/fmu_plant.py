@@ -14,6 +14,7 @@ import weakref
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from types import MappingProxyType
 
@@ -159,11 +160,9 @@ class FmuPlant:
         named = self.named(record.kind)
         unknown = _Unknown.of(named, record)
         x = unknown.guess
-        output = self._simulated(record, named, unknown, x)
+        output, steps = self._simulated(record, named, unknown, x), SMALL * np.eye(x.size)
         for _ in range(ROUNDS if x.size else 0):
-            moved = concurrently(
-                lambda row, x=x: self._simulated(record, named, unknown, x + SMALL * row), list(np.eye(x.size))
-            )
+            moved = concurrently(partial(self._simulated, record, named, unknown), [x + row for row in steps])
             slopes = np.array([(each - output)[record.okay] / SMALL for each in moved]).T
             step = np.linalg.lstsq(slopes, (record.output - output)[record.okay], rcond=None)[0]
             x = x + step
