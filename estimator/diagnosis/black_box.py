@@ -18,7 +18,8 @@ import math
 import threading
 from collections import deque
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from concurrent.futures import Future
+from dataclasses import astuple, dataclass, field, fields, replace
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -96,12 +97,17 @@ class _Known:
     case: Case
     output: FloatArray
 
-    def is_near(self, case: Case, has_start: bool) -> bool:
+    def distance(self, case: Case, has_start: bool) -> float:
+        """Return how far a case is from this one, as the sum of relative changes; infinity where it is not near."""
         if self.case.extra_load_nm is not case.extra_load_nm:
-            return False
-        changed = {_EFFECT_AT[i] for i in np.flatnonzero(self.case.p != case.p).tolist()}
+            return math.inf
+        places = np.flatnonzero(self.case.p != case.p).tolist()
         moved = [name for name in _STATE if getattr(self.case.start, name) != getattr(case.start, name)]
-        return len(changed) + len(moved) <= 1 and (has_start or not {*moved} - {"load_torque_nm"})
+        if len({_EFFECT_AT[i] for i in places}) + len(moved) > 1 or not (has_start or {*moved} <= {"load_torque_nm"}):
+            return math.inf
+        pairs = [(float(self.case.p[i]), float(case.p[i])) for i in places]
+        pairs += [(getattr(self.case.start, name), getattr(case.start, name)) for name in moved]
+        return sum(abs(a - b) / (abs(a) + abs(b)) if math.isfinite(a + b) else 1.0 for a, b in pairs)
 
 
 @dataclass
@@ -114,13 +120,14 @@ class BlackBox:
     has_start: bool  # whether the initial state of that line means the same
     tuned: Collection[str] = ()  # parameters of that line that parameters of the plant act as
     laws: Collection[str] = ()  # effects whose torque can be put at its shafts
-    _known: dict[bytes, FloatArray] = field(default_factory=dict)
+    _known: dict[bytes, Future[FloatArray]] = field(default_factory=dict)
     _around: WeakKeyDictionary[Record, deque[_Known]] = field(default_factory=WeakKeyDictionary)
-    _alone: threading.Lock = field(default_factory=threading.Lock)
+    _lock: threading.Lock = field(default_factory=threading.Lock)
 
     def simulated(self, record: Record, cases: Sequence[Case]) -> FloatArray:
         """Simulate the recorded output of a recording, as its sensor shows it, under each case; shape (K, N)."""
-        around = self._around.setdefault(record, deque(maxlen=_most_kept(record)))
+        with self._lock:
+            around = self._around.setdefault(record, deque(maxlen=_most_kept(record)))
         if len(cases) == 1:
             output = self._read(record, cases[0])
             around.append(_Known(cases[0], output))
@@ -128,9 +135,12 @@ class BlackBox:
         return np.array([self._near(record, tuple(around), case) for case in cases])
 
     def _near(self, record: Record, around: Sequence[_Known], case: Case) -> FloatArray:
-        known = next((each for each in reversed(around) if each.is_near(case, self.has_start)), None)
-        if known is None:
+        """Add what the line's output changes to that of the nearest case, in whatever order they came to be known."""
+        distances = [each.distance(case, self.has_start) for each in around]
+        if (least := min(distances, default=math.inf)) == math.inf:
             return self._read(record, case)
+        equals = [each for each, distance in zip(around, distances, strict=True) if distance == least]
+        known = min(equals, key=lambda each: (each.case.p.tobytes(), astuple(each.case.start)))
         before, after = simulate_each(grid_for(self.line, [record]), record, [known.case, case])
         return known.output + (after - before)
 
@@ -158,12 +168,22 @@ class BlackBox:
         settings = [record.sample_time_s, record.since_start_s[0], *settable, *tuned.values()]
         at_shafts = [] if acting is None else [acting, motor_angle(record)]
         key = hashlib.sha256(np.concatenate([settings, torque.ravel(), load, *at_shafts]).tobytes()).digest()
-        with self._alone:  # most FMUs allow one simulation at a time
-            if key not in self._known:
+        with self._lock:
+            known = self._known.get(key)
+            if known is None:
                 while len(self._known) >= _most_kept(record):
                     self._known.pop(next(iter(self._known)))
-                self._known[key] = self.run(record, Around(torque, load, case.start, tuned, acting, width))
-            return self._known[key]
+                self._known[key] = mine = Future[FloatArray]()
+        if known is not None:
+            return known.result()
+        try:
+            mine.set_result(self.run(record, Around(torque, load, case.start, tuned, acting, width)))
+        except BaseException as error:
+            with self._lock:
+                self._known.pop(key, None)
+            mine.set_exception(error)
+            raise
+        return mine.result()
 
 
 def _most_kept(record: Record) -> int:

@@ -20,12 +20,17 @@ class TimeIsUp(Exception):
 
 
 class Work:
-    """Samples that were simulated, and the moment at which no further ones are."""
+    """Samples that were simulated, and the moment at which no further ones are: after a share of the limit.
+
+    Work inside other work shares its beginning.
+    """
 
     def __init__(self, limit_s: float = math.inf, share: float = 1.0) -> None:
         self.samples = 0
         self.limit_s = limit_s
-        self._end = time.perf_counter() + share * limit_s
+        outer = _work.get()
+        self.began_s: float = time.perf_counter() if outer is None else outer.began_s
+        self._end = self.began_s + share * limit_s
         self._lock = threading.Lock()
 
     def add(self, samples: int) -> None:
@@ -35,14 +40,14 @@ class Work:
             self.samples += samples
 
     def check(self) -> None:
-        """Raise ``TimeIsUp`` where the limit has passed."""
-        if self.left_s < 0.0:
+        """Raise ``TimeIsUp`` where nothing further is to be begun."""
+        if time.perf_counter() > self._end:
             raise TimeIsUp
 
     @property
     def left_s(self) -> float:
-        """Time until the limit [s]; negative where it has passed."""
-        return self._end - time.perf_counter()
+        """Time until the whole limit [s]; negative where it has passed."""
+        return self.began_s + self.limit_s - time.perf_counter()
 
 
 _work: ContextVar[Work | None] = ContextVar("work", default=None)
@@ -65,7 +70,7 @@ def count_samples(samples: int) -> None:
 
 
 def time_left_s() -> float:
-    """Return the time until the limit [s], for what is done outside this process; infinity without one."""
+    """Return the time until the whole limit [s], for what is done outside this process; infinity without one."""
     work = _work.get()
     return math.inf if work is None else work.left_s
 

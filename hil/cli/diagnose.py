@@ -110,11 +110,11 @@ def diagnose(
     require_folder(out)
     every = [*recordings, *(holdout or ())]
     asked = Asked(model, signals, mapped or (), Trust(trust_laws, trust_fmu), tuned or (), budget_s)
-    found = questioned(asked, every, dbc, tell)
-    file, records = found.file, found.records
-    training, kept_back = records[: len(recordings)], records[len(recordings) :]
-    with with_the_line_to_write(every, file.signals, dbc), progress_bar() as progress:
-        diagnosis = diagnose_records(training, file.model, kept_back, progress, budget_s, effort.value)
+    with questioned(asked, every, dbc, tell) as found:
+        file, records = found.file, found.records
+        training, kept_back = records[: len(recordings)], records[len(recordings) :]
+        with with_the_line_to_write(every, file.signals, dbc), progress_bar() as progress:
+            diagnosis = diagnose_records(training, file.model, kept_back, progress, budget_s, effort.value)
     more = {}
     if found.fmu is not None:
         from hil.export.fmu.ssp import augmented_ssp

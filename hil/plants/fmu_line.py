@@ -6,8 +6,10 @@ whole catalogue. Elsewhere every output that is compared is the FMU's, and only 
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -16,9 +18,11 @@ from estimator.diagnosis.black_box import Around, BlackBox, equivalent_line
 from estimator.diagnosis.flange import AT_LOAD, AT_MOTOR, FREE, slots_of, with_only
 from estimator.diagnosis.noise import noise_floor
 from estimator.diagnosis.preconditions.prepare import thin
-from estimator.physics.layout import flat
+from estimator.physics.catalogue import BUILT_IN
+from estimator.physics.layout import flat, slot
 from estimator.physics.model import DrivelineModel, Load, Structure
 from estimator.physics.motion import motor_angle
+from estimator.physics.parallel import concurrently
 from estimator.signals.record import FloatArray, Location, OutputKind, Record
 from hil.errors import UsageError
 from hil.plants.fmu_plant import FmuPlant
@@ -36,7 +40,8 @@ ALIKE = 0.1
 """Share of the noise of the readings within which a line answers as the FMU: a hundredth of its square."""
 
 NOTHING = 1e-3
-"""Share of the output's range that half a step may change where a law is put at a shaft."""
+"""Share of the output's range that half a step may change where a law is put at a shaft; half as much is allowed where
+that is tried, with the law rounded down to powers of two."""
 
 MOST_PARTS = 16
 
@@ -62,7 +67,7 @@ def fmu_line(fmu: FmuPlant, records: Sequence[Record], tolerances: Mapping[str, 
     """Return what is diagnosed of an FMU, of recordings of one kind of output."""
     named = fmu.named(records[0].kind)
     known = {name: fmu.parameter(name) for name in tolerances}
-    answered = [_answered(record, fmu.run(record).output) for record in records]
+    answered = concurrently(lambda record: _answered(record, fmu.run(record).output), records)
     line = equivalent_line([_thinned(record) for record in answered])
     errors = [replay(line, record).output - record.output for record in answered]
     error = float(np.sqrt(np.mean(np.concatenate(errors) ** 2)))
@@ -70,7 +75,8 @@ def fmu_line(fmu: FmuPlant, records: Sequence[Record], tolerances: Mapping[str, 
     for name, tolerance in tolerances.items():
         value, unit = known[name]
         moved = {name: value * (1.0 + 0.5 * tolerance)}
-        changed = [_thinned(_answered(record, fmu.changed(record, moved))) for record in records]
+        outputs = concurrently(partial(fmu.changed, values=moved), records)
+        changed = [_thinned(_answered(record, output)) for record, output in zip(records, outputs, strict=True)]
         place, exponent = acting_as(name, line, changed, error, 1.0 + 0.5 * tolerance)
         if place in tuned:
             raise UsageError(f"--tune {name}: it acts as {tuned[place].name} does, {place} of a line. Take one of them")
@@ -99,7 +105,7 @@ def _flanges(fmu: FmuPlant, record: Record, named: Names, line: DrivelineModel) 
 def _around(record: Record, found: FmuLine) -> DrivelineModel:
     """Return a model whose every simulation is the FMU's."""
     fmu, named, line, kind = found.fmu, found.named, found.model, record.kind
-    flanges, parts = _flanges(fmu, record, named, line), dict[bytes, int]()
+    flanges, parts, lock = _flanges(fmu, record, named, line), dict[tuple[str, float, bytes], int](), threading.Lock()
     states = ("angle_rad", *STARTS) if kind is OutputKind.POSITION else STARTS
     starts = dict(zip(named.start, states, strict=False))
 
@@ -114,14 +120,13 @@ def _around(record: Record, found: FmuLine) -> DrivelineModel:
         settings = {"flanges": acting, "sign_width": around.sign_width, "start_s": float(record.since_start_s[0])}
         given = (settings, {"p": around.laws, "angle": motor_angle(record)})
 
-        def in_parts(count: int) -> FloatArray:
-            return fmu.simulated(record, named, around.torque_nm, values, given, count)
-
-        which = np.append(around.laws, record.sample_time_s).astype(bool).tobytes()
-        if which in parts:
-            return in_parts(parts[which])
-        parts[which], output = _fine_enough(in_parts)
-        return output
+        usual = _rounded(around.laws, record)
+        key = (record.name, record.sample_time_s, usual.tobytes())
+        with lock:
+            if key not in parts:  # the same, whichever of the cases that are rounded to it comes first
+                start, at = fmu.settled(record, named), (settings, {**given[1], "p": usual})
+                parts[key] = _fine_enough(lambda n: fmu.simulated(record, named, record.torque_nm, start, at, n))
+        return fmu.simulated(record, named, around.torque_nm, values, given, parts[key])
 
     is_alike = {*named.start} <= {*Names().start, *OF_A_POSITION.start}
     plant = BlackBox(
@@ -130,16 +135,22 @@ def _around(record: Record, found: FmuLine) -> DrivelineModel:
     return replace(line, plant=plant, load=Load.OWN if named.load else 0.0)
 
 
-def _fine_enough(in_parts: Callable[[int], FloatArray]) -> tuple[int, FloatArray]:
-    """Return in how many parts a period is simulated so that twice as many change nothing, and the output."""
-    parts, output = 1, in_parts(1)
-    while parts < MOST_PARTS:
-        finer = in_parts(2 * parts)
-        change = float(np.abs(finer - output).max())
-        if change <= NOTHING * float(np.ptp(finer)):
-            break
-        parts, output = 2 * parts, finer
-    return parts, output
+def _rounded(laws: FloatArray, record: Record) -> FloatArray:
+    """Return parameters of laws rounded to powers of two, towards 0; events last all the recording, phases are 0."""
+    p = np.where(np.isfinite(laws), np.ldexp(np.sign(laws) * 0.5, np.frexp(laws)[1]), laws)
+    for name, parameter in ((name, each.name) for name, entry in BUILT_IN.items() for each in entry.own_parameters):
+        p[slot(name, parameter)] = record.since_start_s[-1] if parameter == "to_s" else 0.0
+    return np.asarray(p, dtype=np.float64)
+
+
+def _fine_enough(in_parts: Callable[[int], FloatArray]) -> int:
+    """Return in how many parts a period is simulated so that twice as many change nothing."""
+    parts, (output, finer) = 1, concurrently(in_parts, [1, 2])
+    while parts < MOST_PARTS and float(np.abs(finer - output).max()) > 0.5 * NOTHING * float(np.ptp(finer)):
+        parts *= 2
+        if parts < MOST_PARTS:
+            output, finer = finer, in_parts(2 * parts)
+    return parts
 
 
 def _answered(record: Record, output: FloatArray) -> Record:

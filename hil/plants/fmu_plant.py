@@ -8,10 +8,13 @@ from __future__ import annotations
 
 import importlib.util
 import signal
+import threading
 import time
 import weakref
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from types import MappingProxyType
 
@@ -21,7 +24,7 @@ from estimator.diagnosis.segments import tiles
 from estimator.physics.driveline import Start
 from estimator.physics.free_run import FreeRun
 from estimator.physics.model import Motion
-from estimator.physics.parallel import TimeIsUp, check_time, time_left_s
+from estimator.physics.parallel import TimeIsUp, check_time, concurrently, time_left_s
 from estimator.signals.record import FloatArray, OutputKind, Record
 from hil.errors import UsageError
 from hil.plants.fmu_process import HUNG, MEMORY_BYTES, STEP_S, number
@@ -41,9 +44,6 @@ NUMBERS = ("Real", "Float64", "Float32")
 
 LONGEST_S = 86400.0
 """Time for a simulation of any length [s]; one that hangs is ended long before (`hil.plants.fmu_process`)."""
-
-AFTERWARDS_S = 10.0
-"""Time for a simulation once that of the whole command has been used up: what was found so far is still said [s]."""
 
 CURE = "Simulate it in the program that made it, and export it for Linux, 64 bit."
 
@@ -73,8 +73,11 @@ class FmuPlant:
             raise UsageError(
                 "expected FMPy, which simulates FMUs, got none. Install it: pip install 'hil-driveline[fmu]'"
             )
-        self._path, self._longest_s, self._is_ended = path.absolute(), LONGEST_S, False
-        described = self._open()
+        self._path, self._is_ended = path.absolute(), False
+        self._idle, self._every, self._free = list[Sandbox](), list[Sandbox](), threading.Condition()
+        self._opening_s = self._worked_s = 0.0
+        process, described = self._opened()
+        self._idle.append(process)
         variables = {str(each["name"]): each for each in described["variables"]}
         self._kind: str = described["kind"]
         self._mapped, self._known = tuple(mapped), tuple(variables)
@@ -85,38 +88,61 @@ class FmuPlant:
             name for name, each in variables.items() if each["causality"] == "input" and each["type"] in NUMBERS
         ]
 
-    def _open(self) -> Document:
-        """Start the FMU's process, and return what it says of itself."""
-        self._sandbox = Sandbox("hil.plants.fmu_process")
-        weakref.finalize(self, self._sandbox.end)
-        return self._asked(
-            {"what": "open", "path": str(self._path)}, f"{self._path}: expected an FMU of FMI 1.0, 2.0 or 3.0"
-        )[0]
+    def _opened(self) -> tuple[Sandbox, Document]:
+        """Start a process of the FMU, and return what it says of itself."""
+        began_s = time.monotonic()
+        process = Sandbox("hil.plants.fmu_process")
+        self._every.append(process)
+        weakref.finalize(self, process.end)
+        request = {"what": "open", "path": str(self._path)}
+        said = self._asked(process, request, f"{self._path}: expected an FMU of FMI 1.0, 2.0 or 3.0")[0]
+        self._opening_s = time.monotonic() - began_s
+        return process, said
+
+    @property
+    def _cure(self) -> str:
+        return f"{CURE} Where only one of it may run at a time: --jobs 1." if len(self._every) > 1 else CURE
+
+    @contextmanager
+    def _process(self) -> Iterator[Sandbox]:
+        """Take an idle process: one more, where none is and they have worked for longer than an opening lasts."""
+        with self._free:
+            self._free.wait_for(lambda: self._idle or self._worked_s >= self._opening_s)
+            idle = self._idle.pop() if self._idle else None
+        process = idle or self._opened()[0]
+        began_s = time.monotonic()
+        try:
+            yield process
+        finally:
+            with self._free:
+                self._worked_s += time.monotonic() - began_s
+                self._idle.append(process)
+                self._free.notify_all()
 
     def _asked(
-        self, request: Document, expected: str, columns: Mapping[str, Column] | None = None
+        self, process: Sandbox, request: Document, expected: str, columns: Mapping[str, Column] | None = None
     ) -> tuple[Document, dict[str, Column]]:
-        """Have the FMU's process do something; a `UsageError` says what it did instead."""
+        """Have a process of the FMU do something; a `UsageError` says what it did instead."""
         check_time()
         if self._is_ended:
-            self._is_ended = False
-            self._open()
-        limit_s, began_s = min(self._longest_s, time_left_s()), time.monotonic()
+            raise TimeIsUp
+        limit_s, began_s = min(LONGEST_S, time_left_s()), time.monotonic()
         try:
-            document, answered = self._sandbox.ask(request, limit_s, columns)
+            document, answered = process.ask(request, limit_s, columns)
         except Gone:
-            status = self._sandbox.end(at_once=False)
+            status = process.end(at_once=False)
             took_s = time.monotonic() - began_s
-            if time_left_s() < 0.0:  # it was ended, and did not end; one that hangs is not waited for again
-                self._longest_s, self._is_ended = AFTERWARDS_S, True
+            if time_left_s() < 0.0:  # it was ended, and did not end
+                self._is_ended = True
                 raise TimeIsUp from None
             ended = f"one that does not return in {limit_s:g} s" if took_s >= limit_s else _ended(status)
-            raise UsageError(f"{expected}, got {ended}. {CURE}") from None
-        except BaseException:  # Ctrl-C, for one: it may not return by itself
-            self._sandbox.end()
+            raise UsageError(f"{expected}, got {ended}. {self._cure}") from None
+        except BaseException:  # Ctrl-C, for one: they may not return by themselves
+            for each in [*self._every]:
+                each.end()
             raise
         if "problem" in document:
-            raise UsageError(f"{expected}, got: {printable(str(document['problem']))}. {CURE}")
+            raise UsageError(f"{expected}, got: {printable(str(document['problem']))}. {self._cure}")
         return document, answered
 
     def run(self, record: Record) -> FreeRun:
@@ -134,9 +160,9 @@ class FmuPlant:
         named = self.named(record.kind)
         unknown = _Unknown.of(named, record)
         x = unknown.guess
-        output = self._simulated(record, named, unknown, x)
+        output, steps = self._simulated(record, named, unknown, x), SMALL * np.eye(x.size)
         for _ in range(ROUNDS if x.size else 0):
-            moved = [self._simulated(record, named, unknown, x + SMALL * row) for row in np.eye(x.size)]
+            moved = concurrently(partial(self._simulated, record, named, unknown), [x + row for row in steps])
             slopes = np.array([(each - output)[record.okay] / SMALL for each in moved]).T
             step = np.linalg.lstsq(slopes, (record.output - output)[record.okay], rcond=None)[0]
             x = x + step
@@ -147,6 +173,12 @@ class FmuPlant:
         error = (output - record.output)[record.okay]
         load = float(x[0] * unknown.scale[0]) if named.load else float("nan")
         return FreeRun(output, float(np.sqrt(np.mean(error**2))), Start(load, 0.0, float("nan")))
+
+    def settled(self, record: Record, named: Names) -> dict[str, FloatArray | float]:
+        """Return load and initial state that were found of a recording, where it was `run`, by the FMU's names."""
+        unknown = _Unknown.of(named, record)
+        x = self._settled.get((record.name, float(record.time_s[0])), unknown.guess)
+        return dict(zip(unknown.names, (x * unknown.scale).tolist(), strict=True))
 
     def changed(self, record: Record, values: Mapping[str, float]) -> FloatArray:
         """Simulate a recording that was `run` with some parameters changed, its load and initial state kept."""
@@ -213,7 +245,8 @@ class FmuPlant:
         parts: int = 1,
     ) -> FloatArray:
         """Simulate the output of a recording, shape (N,); with laws ``around`` it, in parts of its period."""
-        self.simulations += 1
+        with self._free:
+            self.simulations += 1
         held = {name: value for name, value in values.items() if name in self._inputs}
         start = {name: value for name, value in values.items() if name not in self._inputs}
         since_s = record.time_s - record.time_s[0]
@@ -229,7 +262,8 @@ class FmuPlant:
         if around is not None:
             request["around"], columns = around[0], {**columns, **around[1]}
         expected = f"{self.name}: expected an FMU that simulates {record.name}"
-        result = self._asked(request, expected, columns)[1]
+        with self._process() as process:
+            result = self._asked(process, request, expected, columns)[1]
         output = np.interp(since_s, result["time"], result["output"])
         if not np.isfinite(output).all():
             used = ", ".join(f"{name} = {float(np.mean(value)):.4g}" for name, value in values.items())

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from estimator.diagnosis.first_use import COMPILING, compile_kernels, is_first_use
 from estimator.physics.parallel import TimeIsUp, Work, counted
 from estimator.signals.record import Record
 from hil.config.model_file import ModelFile, read_model_for_recordings, read_signals
@@ -30,7 +32,7 @@ class Asked:
     mapped: Sequence[str]  # variables of an FMU (``names``)
     trust: Trust
     tuned: Sequence[str] = ()  # parameters of an FMU with what they are trusted to (``tolerances``)
-    budget_s: float | None = None  # time that an FMU's first simulations may take, too [s]
+    budget_s: float | None = None  # time that all simulations of an FMU may take [s]
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,20 +44,26 @@ class Questioned:
     fmu: FmuLine | None = None
 
 
-def questioned(asked: Asked, recordings: Sequence[Path], dbc: Path | None, tell: Tell) -> Questioned:
-    """Read a model and recordings, and find what is questioned in the place of an FMU."""
+@contextmanager
+def questioned(asked: Asked, recordings: Sequence[Path], dbc: Path | None, tell: Tell) -> Iterator[Questioned]:
+    """Read a model and recordings, and find what is questioned in the place of an FMU, which its budget ends."""
     if not is_fmu(asked.model):
-        return Questioned(*_of_model_file(asked, recordings, dbc, tell))
+        yield Questioned(*_of_model_file(asked, recordings, dbc, tell))
+        return
     tuned = tolerances(asked.tuned)
     fmu, signals, records = _of_fmu(asked, recordings, dbc, tell)
+    for masses in (1, 2):  # of the lines that are fitted to it; compiling does not count
+        if is_first_use(masses):
+            tell(COMPILING)
+            compile_kernels(masses)
     try:
         with counted(Work(math.inf if asked.budget_s is None else asked.budget_s)):
             line = fmu_line(fmu, records, tuned)
-            return Questioned(ModelFile(line.model, signals), records, line)
+            yield Questioned(ModelFile(line.model, signals), records, line)
     except TimeIsUp:
         raise UsageError(
-            f"{asked.model}: expected an FMU that simulates the recordings once in {asked.budget_s:g} s "
-            "(--budget-s), got one that does not. Give it more time, fewer or shorter recordings; one that hangs "
+            f"{asked.model}: expected an FMU of which load and initial state are found in {asked.budget_s:g} s "
+            "(--budget-s), got one that takes longer. Give it more time, fewer or shorter recordings; one that hangs "
             "is to be repaired in the program that made it."
         ) from None
 

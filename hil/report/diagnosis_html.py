@@ -167,7 +167,7 @@ def _fit(fit: Fit) -> html.Table:
         ("augmented", fit.augmented, fit.holdout_augmented, "after"),
         ("noise floor", fit.noise_floor, float("nan"), "floor"),
     )
-    largest = np.nanmax([value for _, value, _, _ in rows])
+    largest = max((value for _, value, _, _ in rows if np.isfinite(value)), default=0.0)
     cells = [
         (
             name,

@@ -1,9 +1,12 @@
 """``hil diagnose`` with an FMU: what acts at its inputs and outputs is named, and it runs only where it is trusted."""
 
+import gc
 import json
 import re
 import shutil
+import subprocess
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -13,10 +16,12 @@ from estimator.physics.catalogue import EFFECTS
 from hil.cli.main import run
 from hil.errors import UsageError
 from hil.export.fmu import package
+from hil.plants import fmu_plant
 from hil.plants.fmu_line import fmu_line
 from hil.plants.fmu_plant import FmuPlant
 from hil.plants.names import names
 from hil.recording import read_record
+from hil.recording.sandbox import Sandbox
 from tests.cli import bench
 
 RUBBING = (
@@ -86,14 +91,18 @@ def test_what_acts_at_an_input_is_named(fmu: str, tmp_path: Path, capsys: pytest
     assert {path.name for path in out.iterdir()} == {"augmented.ssp", "augmented.toml", "diagnosis.json", "report.html"}
 
 
-@pytest.mark.campaign  # some 320 simulations
+@pytest.mark.campaign  # some 340 simulations, twice
 def test_what_acts_at_an_input_is_named_where_no_line_answers_so(rubbing: str, tmp_path: Path) -> None:
     recording, out = late(tmp_path / "run_1.csv", dry=4.0), tmp_path / "out"
     (tmp_path / "signals.toml").write_text(SIGNALS)
     mapped = [word for each in ("torque=T_M1", "output=speed_motor", "start=start.speed") for word in ("--map", each)]
     given = ["--signals", str(tmp_path / "signals.toml"), "--trust-fmu", *mapped, "--effort", "quick"]
-    assert run(["diagnose", recording, "--model", rubbing, "--out", str(out), *given]) == 0
-    found = json.loads((out / "diagnosis.json").read_text())
+    answers = []
+    for jobs in ("1", "2"):
+        assert run(["diagnose", recording, "--model", rubbing, "--out", str(out), *given, "--jobs", jobs]) == 0
+        answers.append(json.loads((out / "diagnosis.json").read_text()) | {"timing_s": None, "made": None})
+    found, other = answers
+    assert found == other
     assert [effect["name"] for effect in found["effects"]] == ["transport_delay"]
     assert found["parameters"] == {}
     assert "No line of one or two inertias answers as rubbing.fmu does" in found["statement"]
@@ -213,32 +222,50 @@ fmi2Status fmi2EnterInitializationMode(Instance c) {{
     """
 
 
+class Seen(Sandbox):
+    """Keeps every process of an FMU."""
+
+    every: ClassVar[list[subprocess.Popen[bytes]]] = []
+
+    def __init__(self, module: str) -> None:
+        super().__init__(module)
+        self.every.append(self._process)
+
+
 @pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
-@pytest.mark.parametrize(("good", "status"), [(0, 2), pytest.param(60, 0, marks=pytest.mark.campaign)])
+@pytest.mark.parametrize(
+    ("good", "budget_s", "status", "said"),
+    [
+        (0, "3", 2, "in 3 s (--budget-s)"),
+        pytest.param(40, "20", 0, "Not decided: the search was ended after 20 s", marks=pytest.mark.campaign),
+    ],
+)
 def test_one_that_hangs_ends_with_the_budget(
-    good: int, status: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    good: int,
+    budget_s: str,
+    status: int,
+    said: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """At its first simulation there is no diagnosis; at a later one, once, nothing is decided."""
+    """At its first simulation there is no diagnosis; at a later one, once, nothing is decided. No process is left."""
     before, own = "fmi2Status fmi2EnterInitializationMode(Instance c) { ", package.own
     assert before in own("fmi2.c")
     hangs = HANGS.format(counter=tmp_path / "begun", good=good)
     monkeypatch.setattr(package, "own", lambda name: own(name).replace(before, hangs))
-    (tmp_path / "drive.toml").write_text(bench.MODEL)
+    monkeypatch.setattr(fmu_plant, "Sandbox", Seen)
+    Seen.every.clear()
+    (tmp_path / "drive.toml").write_text(RUBBING)
     export = ["export", "fmu", str(tmp_path / "drive.toml"), "--fmi", "2.0", "--out", str(tmp_path / "drive.fmu")]
     assert run(export) == 0
-    bench.record(tmp_path / "run_1.csv", 1, n=300)
-    given = [
-        "--model",
-        str(tmp_path / "drive.fmu"),
-        "--trust-fmu",
-        "--budget-s",
-        "20" if good else "3",
-        "--out",
-        str(tmp_path / "out"),
-    ]
+    bench.record(tmp_path / "run_1.csv", 1, noise=0.02, dry=4.0, n=350)
+    given = ["--model", str(tmp_path / "drive.fmu"), "--trust-fmu", "--budget-s", budget_s, "--out"]
     capsys.readouterr()
-    assert run(["diagnose", str(tmp_path / "run_1.csv"), *given]) == status
+    assert run(["diagnose", str(tmp_path / "run_1.csv"), *given, str(tmp_path / "out")]) == status
     printed = capsys.readouterr()
-    expected = "Not decided: the search was ended after 20 s" if good else "in 3 s (--budget-s)"
-    assert expected in printed.out + printed.err
+    assert said in printed.out + printed.err
     assert len((tmp_path / "begun").read_bytes()) > good
+    gc.collect()
+    assert Seen.every
+    assert all(process.poll() is not None for process in Seen.every)

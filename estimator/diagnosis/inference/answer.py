@@ -20,6 +20,7 @@ from estimator.diagnosis.inference.figures import (
     courses_of,
     effects_of,
     figures_of,
+    figures_without,
     first_figures,
     free_runs,
     on_recordings,
@@ -54,6 +55,7 @@ from estimator.diagnosis.result import (
     Diagnosis,
     Discrepancy,
     Effort,
+    Estimated,
     Fit,
     FoundEffect,
     Interval,
@@ -61,6 +63,7 @@ from estimator.diagnosis.result import (
     OffNominal,
     RejectedEffect,
     Remainder,
+    Retuned,
     Slight,
     UnnamedLaw,
     UntestableEffect,
@@ -295,7 +298,14 @@ def _undecided(
 ) -> Diagnosis:
     """Return the answer of a search that the limit of time has ended: nothing is decided, and nothing rejected."""
     names, blind = open_hypotheses(line, chain.records)
-    fit, estimate = first_figures(chain, line, None if search is None else search.visited.get(frozenset()))
+    nothing = None if search is None else search.visited.get(frozenset())
+    parameters, loads, augmented = dict[str, Retuned](), dict[str, Estimated](), model
+    try:
+        fit, estimate = first_figures(chain, line, nothing)
+        augmented = augmented_model(estimate, model, ())
+        parameters, loads = retuned_parameters(estimate, line, False), load_torques(estimate, line)
+    except TimeIsUp:  # the whole limit, after which another program simulates no more
+        fit = figures_without(chain, line, nothing)
     tried = set() if search is None else {*search.rivals, *search.implausible}
     untried = tuple(name for name in names if name not in tried)
     simulations = 0 if search is None else search.simulations
@@ -311,10 +321,10 @@ def _undecided(
         untestable=untestable,
         unnamed=None,
         fit=fit,
-        parameters=retuned_parameters(estimate, line, False),
-        load_torque=load_torques(estimate, line),
+        parameters=parameters,
+        load_torque=loads,
         timing_s={},
-        augmented=augmented_model(estimate, model, ()),
+        augmented=augmented,
         traces=(),
         effort=effort,
     )

@@ -266,9 +266,16 @@ def first_figures(chain: Chain, line: DrivelineModel, nothing: Hypothesis | None
     """Return the errors that are known where a search was ended at once: of the model as given, and re-tuned."""
     nominal = not_fitted(problem := make_problem(line, chain.separated, ()), start_vector(problem)).first_outputs()
     estimate = nominal if nothing is None else nothing.result.first_outputs()
+    found = figures_without(chain, line, nothing)
+    return replace(found, nominal=nominal.rms, retuned=estimate.rms, augmented=estimate.rms), estimate
+
+
+def figures_without(chain: Chain, line: DrivelineModel, nothing: Hypothesis | None) -> Fit:
+    """Return the errors that are known without a further simulation."""
+    rms = math.nan if nothing is None else nothing.result.first_outputs().rms
     noise = math.nan if nothing is None else float(reading_noise(nothing.sizes)[0])
     of = unit(DIMENSIONS[chain.raw[0].kind], line.motion)
-    return Fit(of, nominal.rms, estimate.rms, estimate.rms, math.nan, math.nan, noise), estimate
+    return Fit(of, math.nan, rms, rms, math.nan, math.nan, noise)
 
 
 def acquired(runs: FreeRuns) -> tuple[FoundEffect, ...]:

@@ -138,7 +138,8 @@ def _headline(verdict: Verdict, fit: Fit, effects: Sequence[FoundEffect], effort
     noise = f" at a noise of {fit.noise_floor:.3g} {fit.unit}" if math.isfinite(fit.noise_floor) else ""
     left = f"{model} leaves a free-run error of {fit.retuned:.3g} {fit.unit}{noise}"
     if not effort.finished:
-        return f"So far {left}. Give it more time (--budget-s), or fewer or shorter recordings."
+        so_far = f"So far {left}. " if math.isfinite(fit.retuned) else ""
+        return f"{so_far}Give it more time (--budget-s), or fewer or shorter recordings."
     if verdict is Verdict.NO_MISMATCH:
         return (
             f"Nothing is missing: {model} leaves nothing but the noise and slow drift of the readings ({_noise(fit)})."

@@ -23,6 +23,7 @@ from estimator.diagnosis.segments import Cut, cut, joined
 from estimator.errors import BadShape, Implausible, NotExciting, made_of_each
 from estimator.physics.layout import Grid, grid_for
 from estimator.physics.model import DrivelineModel, Structure, natural_frequencies_rad_s
+from estimator.physics.parallel import TimeIsUp
 from estimator.physics.simulate import output_state
 from estimator.signals.record import BoolArray, FloatArray, OutputKind, Record, separated_outputs
 
@@ -381,7 +382,11 @@ def prepare(records: Sequence[Record], model: DrivelineModel, holdout: Sequence[
     training = segments.of(names)
     if not training:
         raise NotExciting(" ".join(segments.warnings), tuple(names))
-    warnings += map(str, _plausible(segments, model))
-    warnings += [*model_warnings(model), *segments.warnings, *few, *require_excitation(as_if_not_lost(training), model)]
+    try:
+        doubts = [str(doubt) for doubt in _plausible(segments, model)]
+        unexcited = require_excitation(as_if_not_lost(training), model)
+    except TimeIsUp:  # nothing will be decided in any case
+        doubts, unexcited = [], ["whether units and excitation are plausible was not looked at: the time was up"]
+    warnings += [*doubts, *model_warnings(model), *segments.warnings, *few, *unexcited]
     unseen = segments.of(record.name for record in holdout)
     return Prepared(training, unseen, tuple(warnings), segments)

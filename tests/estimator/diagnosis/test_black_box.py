@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 
 from estimator.diagnosis.black_box import Around, BlackBox, equivalent_line
+from estimator.diagnosis.diagnose import diagnose
 from estimator.diagnosis.inference.hypotheses import open_hypotheses
 from estimator.physics.driveline import Case, Start
 from estimator.physics.free_run import free_run
 from estimator.physics.layout import flat, grid_for, slot
 from estimator.physics.model import DrivelineModel, Parameter, Structure
+from estimator.physics.parallel import TimeIsUp
 from estimator.physics.simulate import simulate, simulate_each
 from estimator.signals.record import FloatArray, Record
 from tests.estimator.physics.bench import ONE_MASS, TWO_MASS, random_steps, record
@@ -107,3 +109,33 @@ def test_nothing_inside_is_a_hypothesis(driven: Record) -> None:
     named = {*known[0], *known[1]}
     assert {"transport_delay", "torque_bias", "resolver_error", "road_grade", "clock_drift"} <= named
     assert not named & {"backlash", "coulomb_friction_motor", "brake_drag", "inertia_change", "eddy_drag"}
+
+
+def test_when_a_plant_answers_no_more_nothing_is_decided(driven: Record) -> None:
+    """Its process was ended with the limit of time: the last words do without it."""
+
+    def ended(_on: Record, _around: Around) -> FloatArray:
+        raise TimeIsUp
+
+    line = line_of(TWO_MASS, Structure.TWO_MASS)
+    shown = replace(driven, output=simulate(grid_for(line, [driven]), driven, flat(line), START))
+    answer = diagnose([shown], replace(line, plant=BlackBox(ended, STATES, line, has_start=True)), budget_s=0.0)
+    assert answer.statement.startswith("Not decided: the search was ended after 0 s")
+    assert "free-run error" not in answer.statement
+    assert np.isnan(answer.fit.retuned)
+    assert (answer.effects, answer.parameters, answer.load_torque) == ((), {}, {})
+
+
+def test_what_comes_to_be_known_in_another_order_changes_nothing(driven: Record) -> None:
+    line, found = line_of(TWO_MASS, Structure.TWO_MASS), []
+    case = given("torque_bias", line)
+    p, far = case.p.copy(), case.p.copy()
+    p[slot("torque_bias", "offset_nm")] *= 1.0 + 1e-5
+    far[slot("torque_bias", "offset_nm")] *= 1.5
+    known = [case, replace(case, p=far)]
+    for order in (known, known[::-1]):
+        grid = grid_for(boxed(line_of({**TWO_MASS, "k": 1.1 * TWO_MASS["k"]}, Structure.TWO_MASS)), [driven])
+        for each in order:
+            simulate_each(grid, driven, [each])
+        found.append(simulate_each(grid, driven, [replace(case, p=p), replace(case, p=p)]))
+    np.testing.assert_array_equal(found[0], found[1])
