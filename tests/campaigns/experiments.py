@@ -128,7 +128,7 @@ def main() -> int:
         if seed not in known:
             try:
                 rows.append(answered(seed, asked.effort))
-            except CommandFailed as refused:  # told, and not counted: a run that the supervision ended is no verdict
+            except CommandFailed as refused:  # printed, and not counted: a run that the supervision ended is no verdict
                 sys.stderr.write(f"seed {seed}: {refused}\n")
                 continue
             with path.open("a", encoding="utf-8") as file:
