@@ -1,4 +1,4 @@
-"""How many independent samples an error holds."""
+"""Correlation: how many independent samples an error holds, and by how many a reading follows its reference."""
 
 from __future__ import annotations
 
@@ -63,3 +63,13 @@ def _line_error(torque: FloatArray, gap: int) -> float:
     ends, middle = (torque[:-whole], torque[whole:]), torque[half : torque.size - whole + half]
     line = ends[0] + half / whole * (ends[1] - ends[0])
     return float(np.mean((middle - line) ** 2))
+
+
+LONGEST_LAG = 5
+
+
+def reading_lag(reading: FloatArray, reference: FloatArray) -> int:
+    """Return by how many samples a reading follows its reference: where their covariance is largest in size."""
+    n = reading.shape[0] - LONGEST_LAG
+    centred = reference[:n] - np.mean(reference[:n])
+    return int(np.argmax([abs(float(centred @ reading[lag : lag + n])) for lag in range(LONGEST_LAG + 1)]))

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from estimator.signals.correlation import reading_lag
 from estimator.signals.decimate import decimate
 from estimator.signals.record import BoolArray, FloatArray, Record
-from hil.orders.reading_lag import reading_lag
 from hil.recording import read_record, read_table
 from hil.recording.columns import FLAGS, SPEED, TIME, TORQUE_M1, TORQUE_M2
 

@@ -15,6 +15,7 @@ from estimator.damper import MOST_SENSITIVE, PARAMETERS, Damper, Demand, Loop, R
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Element
 from estimator.physics.model import DrivelineModel, Motion, Structure
+from estimator.signals.correlation import reading_lag
 from estimator.signals.prbs import prbs_nm
 from estimator.signals.record import FloatArray
 from hil.config.damper_file import SCHEMA, DamperFile, DesignedFor
@@ -24,7 +25,6 @@ from hil.errors import FileProblem, ModelFileError, UsageError
 from hil.figures.drawn import WIDTH_IN, drawing, require_matplotlib
 from hil.figures.local_model import decibels, degrees
 from hil.figures.palette import BLACK, PALE, VERMILION
-from hil.orders.reading_lag import reading_lag
 from hil.recording.formats import read_table
 from hil.report.diagnosis_json import SCHEMA as DIAGNOSIS
 from hil.report.identification_input import PhysicalValue, json_object, physical_value, physical_values, table

@@ -9,6 +9,7 @@ import numpy as np
 
 from estimator.errors import NotExciting
 from estimator.identification.settings import Settings
+from estimator.signals.correlation import reading_lag
 from estimator.signals.record import Record
 from hil.commission.physical_fit import NATURAL_DELAY, DelaySelection, select_delay
 from hil.commission.prbs_design import ResonanceSpread, resonance_spread
@@ -27,7 +28,6 @@ from hil.commission.responses import (
 from hil.commission.state import Finding, model_json, stated
 from hil.commission.step import Job, Outcome, Step
 from hil.orders.order import Order, as_table, cruise_of, halt
-from hil.orders.reading_lag import reading_lag
 from hil.recording.columns import SPEED, TIME
 from hil.report.numbers import shown
 from hil.rig.experiments.laws import LEAD_S, WAVE_STEPS
