@@ -227,6 +227,9 @@ def _about_its_mean(signal: FloatArray, lengths: tuple[int, ...]) -> FloatArray:
     return np.concatenate([part - part.mean() for part in parts])
 
 
+ROUNDING = 1e-6  # least noise of an error, in parts of its standard deviation
+
+
 @dataclass(frozen=True, slots=True)
 class _Jitter:
     jitter_s: float
@@ -239,6 +242,7 @@ def _likeliest(error: FloatArray, steepness: FloatArray) -> _Jitter | None:
 
     def cost(logs: FloatArray, jitter: float | None = None) -> float:
         variance = np.exp(2.0 * logs[0]) + (np.exp(2.0 * logs[1]) if jitter is None else jitter**2) * steepness**2
+        variance = variance + (ROUNDING * size) ** 2  # an error of exactly 0 would be infinitely likely without noise
         return float(np.sum(np.log(variance) + error**2 / variance))
 
     size, steep = float(np.std(error)), float(np.sqrt(np.mean(steepness**2)))
