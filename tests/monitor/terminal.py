@@ -82,9 +82,9 @@ class Terminal:
         os.kill(self.pid, number)
 
     def await_text(self, *words: str) -> str:
-        """Read until the screen shows all the words; give what it shows."""
+        """Read until the screen shows all the words, in a box over two lines too; give what it shows."""
         until = time.monotonic() + PATIENCE_S
-        while not all(word in self.text for word in words):
+        while not all(word in self.text or word in " ".join(self.text.replace("|", " ").split()) for word in words):
             assert time.monotonic() < until, f"no {words} on the screen:\n{self.text}"
             assert self._read(), f"the program ended without {words}:\n{self.text}"
         return self.text
