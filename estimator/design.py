@@ -146,7 +146,8 @@ def as_model(candidate: Candidate, line: DrivelineModel) -> DrivelineModel:
     values = line_values(result)
     always = {"from_s": EffectValue(0.0), "to_s": EffectValue(1e9)}
     added = {
-        name: {key: EffectValue(value) for key, value in result.values_of(name).items()}
+        # a parameter that a model may leave out is none where there is no such limit
+        name: {key: EffectValue(value) for key, value in result.values_of(name).items() if math.isfinite(value)}
         | (always if EFFECTS[name].event else {})
         for name in candidate.effects - {GRADE}
     }

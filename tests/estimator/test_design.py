@@ -40,6 +40,15 @@ def known() -> Open:
     return Open(search.model, candidates, {}, 1.0, ("speed_sign_blind", "coulomb_friction_motor"))
 
 
+def test_a_limit_that_is_not_there_is_left_out_of_the_model() -> None:
+    bench = bench_with("torque_saturation", {"limit_m1_nm": 30.0, "limit_m2_nm": 30.0})
+    search = Search(bench.model, bench.records, bench.use, ["torque_saturation"])
+    best = grounds(search).best
+    assert not np.isfinite(list(best.result.values_of("torque_saturation").values())).all()
+    model = as_model(Candidate(name_of(best.effects), 1.0, best, precision(best)), search.model)
+    assert "torque_saturation" in model.effects
+
+
 def driven(known: Open, torque_nm: float, cycles: int = 400) -> Record:
     """Back and forth through standstill, as the first hypothesis lets the motor turn."""
     model = as_model(known.candidates[0], known.line)
