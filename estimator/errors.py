@@ -71,7 +71,7 @@ def made_of_each(
         return made
     refusal = faults[0] if len(faults) == 1 else joined("\n".join(map(str, faults)))
     if made:
-        refusal.add_note(f"Correct or leave out what is named; the other {len(made)} have no such fault.")
+        refusal.add_note(f"Correct or leave out what is named; recordings without such a fault: {len(made)}.")
     raise refusal
 
 

@@ -95,7 +95,7 @@ def test_a_torque_that_never_changes() -> None:
 def test_all_recordings_at_fault_are_refused_together() -> None:
     with pytest.raises(NotExciting, match=r"recording a: 100 good .*\nrecording b: 50 good") as refusal:
         prepare([drive("a", samples=100), drive("b", samples=50), drive()], LINE, [])
-    assert refusal.value.__notes__ == ["Correct or leave out what is named; the other 1 have no such fault."]
+    assert refusal.value.__notes__ == ["Correct or leave out what is named; recordings without such a fault: 1."]
 
 
 def test_a_dead_torque_is_named() -> None:
