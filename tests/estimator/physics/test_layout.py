@@ -2,6 +2,7 @@
 
 import math
 import shutil
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -13,31 +14,49 @@ from estimator.physics.catalogue import EFFECTS
 from estimator.physics.layout import LOAD, NOMINAL, SIZE, flat, slot
 from tests.estimator.physics.bench import TWO_MASS, model
 
-SOURCE = Path(module.__file__).parent
-
 
 @pytest.fixture
-def copy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A copy of the sources that the module takes for its own."""
-    for package in module.PACKAGES:
-        shutil.copytree(SOURCE / package, tmp_path / package, ignore=shutil.ignore_patterns("__pycache__"))
-    shutil.copy(SOURCE / "compiled.py", tmp_path)
-    monkeypatch.setattr(module, "__file__", str(tmp_path / "compiled.py"))
-    return tmp_path
+def sources(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """Return a package with a kernel, a law that it imports, and a file that neither imports."""
+    package = tmp_path / "estimator"
+    package.mkdir()
+    (package / "kernel.py").write_text("def run():\n    from estimator import law\n\n    return law.drag(1.0)\n")
+    (package / "law.py").write_text('"""A law."""\n\n\ndef drag(speed):\n    """Return it."""\n    return speed\n')
+    (package / "other.py").write_text("OTHER = 1\n")
+    monkeypatch.setattr(module, "ROOT", tmp_path)
+    monkeypatch.setattr(module, "take", lambda folder: None)
+    yield package
+    forget()
 
 
-def test_a_copy_of_the_sources_has_the_same_digest(copy: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    in_copy = module._digest()
-    monkeypatch.setattr(module, "__file__", str(SOURCE / "compiled.py"))
-    assert module._digest() == in_copy
+def forget() -> None:
+    """Forget what was read of source files, as a new process has."""
+    for cached in (module._code, module._imports, module._sources, module.cache_folder):
+        cached.cache_clear()
 
 
-@pytest.mark.parametrize("changed", ["physics/effects/backlash.py", "physics/layout.py", "compiled.py"])
-def test_a_changed_source_changes_the_digest(copy: Path, changed: str) -> None:
-    before = module._digest()
-    with (copy / changed).open("a") as file:
-        file.write("# another law\n")
-    assert module._digest() != before
+def folder_after(kernel: Path, changed: Path, text: str) -> Path:
+    """Return where a kernel is kept once a source file has another text."""
+    changed.write_text(text)
+    forget()
+    return module.cache_folder(kernel)
+
+
+def test_a_kernel_is_kept_for_as_long_as_no_code_that_it_may_contain_has_changed(sources: Path, tmp_path: Path) -> None:
+    kernel, law = sources / "kernel.py", sources / "law.py"
+    before = module.cache_folder(kernel)
+    assert folder_after(kernel, sources / "other.py", "OTHER = 2\n") == before
+    in_words = (
+        '"""Another word."""\n\n\ndef drag(speed):\n    """Return\n    it."""\n    # why\n    return speed  # so\n'
+    )
+    assert (
+        folder_after(kernel, law, in_words).name != folder_after(kernel, law, "def drag(speed):\n    return 0.0\n").name
+    )
+    copied = Path(shutil.copytree(sources, tmp_path / "copy" / "estimator")) / "kernel.py"
+    here = module.cache_folder(kernel)
+    module.ROOT = tmp_path / "copy"
+    forget()
+    assert module.cache_folder(copied) == here
 
 
 def test_compiled_code_divides_as_arrays_do() -> None:
