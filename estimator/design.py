@@ -19,9 +19,10 @@ from threadpoolctl import threadpool_limits
 from estimator.diagnosis.assemble import Z95
 from estimator.diagnosis.first_use import compile_kernels, is_first_use
 from estimator.diagnosis.inference.answer import Found, answer
-from estimator.diagnosis.inference.checks import ALIKE_WITHIN, GRADE, LEAST_PROBABILITY, TEMPERED
+from estimator.diagnosis.inference.checks import THRESHOLDS
 from estimator.diagnosis.inference.disturbances import whitener_of
 from estimator.diagnosis.inference.hypotheses import (
+    GRADE,
     Effects,
     Hypothesis,
     Progress,
@@ -30,8 +31,7 @@ from estimator.diagnosis.inference.hypotheses import (
     of_first_outputs,
     silent,
 )
-from estimator.diagnosis.inference.judge import Grounds, tempered_by
-from estimator.diagnosis.inference.search import Search
+from estimator.diagnosis.inference.standing import ALIKE_WITHIN
 from estimator.diagnosis.preconditions.prepare import prepare
 from estimator.diagnosis.result import Diagnosis
 from estimator.physics.catalogue import EFFECTS
@@ -49,6 +49,11 @@ MOST_OPEN = 4
 """Hypotheses that are compared, the most probable: each pair is fitted to every experiment on paper."""
 
 ITERATIONS = 8  # steps of a fit of what is a recording's own, which is nearly linear
+TEMPERED: float = THRESHOLDS["odds"]["tempered"]
+"""By which differences of scores are divided: laws of nature are written in other forms than the model's."""
+
+LEAST_PROBABILITY = 0.9  # odds from which one hypothesis is enough
+
 MOST_LOG_ODDS = 700.0  # largest logarithm of odds that is given: its exponential is still a number
 
 
@@ -74,7 +79,6 @@ class Open:
     line: DrivelineModel
     candidates: tuple[Candidate, ...]  # the most probable first
     twins: Mapping[str, tuple[str, ...]]
-    tempered: float  # by which differences of scores are divided (``judge``)
     untested: tuple[str, ...]  # effects that these recordings can neither show nor exclude, and others could
 
     @property
@@ -96,30 +100,29 @@ def left_open(
         ready = prepare(records, model)
         diagnosis = ready.finished(answer(ready, model, progress, effort, Work(), kept.append))
     untested = tuple(each.name for each in diagnosis.untestable if not each.needs)
-    return _open(kept[0].search, kept[0].grounds, untested), diagnosis
+    return _open(kept[0], untested), diagnosis
 
 
-def _open(search: Search, ground: Grounds, untested: tuple[str, ...]) -> Open:
-    best = ground.best
-    tempered = tempered_by(ground.tests, best.result.residual.size, TEMPERED)
-    within = max(ALIKE_WITHIN, 2.0 * tempered * math.log(1.0 / (1.0 - LEAST_PROBABILITY)))
+def _open(found: Found, untested: tuple[str, ...]) -> Open:
+    search, best = found.search, found.decision.judged.believed.hypothesis
+    within = max(ALIKE_WITHIN, 2.0 * TEMPERED * math.log(1.0 / (1.0 - LEAST_PROBABILITY)))
     near = {
-        each.effects: search.visited[each.effects]
-        for each in ground.scores
-        if each.is_plausible and each.score - best.score < within and not _holds(each.effects, best.effects)
+        each.effects: each
+        for each in search.visited.values()
+        if search.is_plausible(each) and each.score - best.score < within and not _holds(each.effects, best.effects)
     } | {best.effects: best}
     ordered: list[Hypothesis] = []
     for each in sorted(near.values(), key=lambda each: (each.score, sorted(each.effects))):
         if len(ordered) < MOST_OPEN and not any(_are_twins(each, other) for other in ordered):
             ordered.append(each)
-    weights = np.exp([-0.5 * (each.score - ordered[0].score) / tempered for each in ordered])
+    weights = np.exp([-0.5 * (each.score - ordered[0].score) / TEMPERED for each in ordered])
     candidates = tuple(
         Candidate(name_of(each.effects), float(weight), of_first_outputs(each), _precision(of_first_outputs(each)))
         for each, weight in zip(ordered, weights / weights.sum(), strict=True)
     )
     names = sorted({name for each in candidates for name in each.effects})
     twins = {name: tuple(EFFECTS[name].equivalent) for name in names if EFFECTS[name].equivalent}
-    return Open(search.model, candidates, twins if best.outputs == 1 else {}, tempered, untested)
+    return Open(search.model, candidates, twins if best.outputs == 1 else {}, untested)
 
 
 def _are_twins(one: Hypothesis, other: Hypothesis) -> bool:
@@ -233,7 +236,7 @@ def expected(known: Open, record: Record) -> Expected:
     for i, j in np.ndindex(count, count):
         if i != j:
             truth, rival = known.candidates[i], known.candidates[j]
-            gained[i, j] = 0.5 * distance(truth, rival, known.line, record) / known.tempered
+            gained[i, j] = 0.5 * distance(truth, rival, known.line, record) / TEMPERED
     probability = np.array([each.probability for each in known.candidates])
     rivals = np.exp(-np.minimum(gained, MOST_LOG_ODDS)) * probability / probability[:, np.newaxis]
     return Expected(gained, float(probability @ (1.0 / rivals.sum(axis=1))))

@@ -86,6 +86,19 @@ class Profile:
 
 
 @dataclass(frozen=True, slots=True)
+class Counted:
+    """How many names of such a standing were there, in worlds that took no part in choosing a threshold."""
+
+    right: int
+    of: int
+
+    @property
+    def probability(self) -> float:
+        """What the count shows of the next such name: Laplace's rule of succession, never above the share itself."""
+        return min((self.right + 1.0) / (self.of + 2.0), self.right / self.of)
+
+
+@dataclass(frozen=True, slots=True)
 class FoundEffect:
     """An effect that explains the mismatch."""
 
@@ -101,6 +114,10 @@ class FoundEffect:
     share: float = math.nan
     probability: float = math.nan
     form: str = ""
+    necessity: float = (
+        math.nan
+    )  # share of the squared error beyond the noise that comes back without it, on unseen data
+    counted: Counted | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,6 +144,16 @@ class Slight:
 
     name: str
     share: float
+    parameters: Mapping[str, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Refinement:
+    """An effect of the set that simulates best that is not established, and is not in the augmented model."""
+
+    name: str
+    reason: str
+    necessity: float  # of a name, as `FoundEffect` has it
     parameters: Mapping[str, float]
 
 
@@ -369,4 +396,5 @@ class Diagnosis:
     off_nominal: tuple[OffNominal, ...] = ()
     remainder: Remainder | None = None
     slight: tuple[Slight, ...] = ()
+    refinements: tuple[Refinement, ...] = ()
     effort: Effort = field(default_factory=Effort)

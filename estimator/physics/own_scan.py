@@ -21,7 +21,7 @@ from estimator.physics.layout import slot
 from estimator.physics.least_squares import least_inside, unbounded_first
 from estimator.physics.problem import bounds
 from estimator.physics.unknowns import Shared
-from estimator.signals.record import FloatArray
+from estimator.signals.record import FloatArray, Record
 
 
 class Projector:
@@ -78,6 +78,12 @@ SHORTEST_CELL_S = 0.5
 """Grid of the moments of an event: half a second, or a fortieth of a longer recording; a fit moves them from there."""
 
 SMALL = 0.1  # answers are taken at this share of an effect's size, where they are in proportion to it
+
+
+def cell_s(record: Record) -> float:
+    """Return how far apart the moments are that are tried in a recording [s]."""
+    length_s = float(record.since_start_s[-1])
+    return length_s / min(MOST_CELLS, max(4, round(length_s / SHORTEST_CELL_S)))
 
 
 @dataclass(frozen=True, slots=True)

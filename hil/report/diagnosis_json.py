@@ -45,6 +45,7 @@ def diagnosis_json(diagnosis: Diagnosis) -> Json:
         if remainder is None
         else fields_as_json(remainder, "share", "times_noise", "element", "band_hz", "law"),
         "traces": as_json(diagnosis.slight),
+        "refinements": as_json(diagnosis.refinements),
         "effort": fields_as_json(diagnosis.effort, "level", "simulations", "finished", "untried"),
     }
 
@@ -55,8 +56,9 @@ def _effect(effect: FoundEffect) -> Json:
         **({"form": effect.form} if effect.form else {}),
         **fields_as_json(
             effect, "element", "statement", "parameters", "time_s", "indistinguishable_from", "alternatives", "share",
-            "probability", "evidence",
+            "probability", "evidence", "necessity",
         ),
+        "counted": None if effect.counted is None else fields_as_json(effect.counted, "right", "of"),
         **({"profiles": as_json(effect.profiles)} if effect.profiles else {}),
     }  # fmt: skip
 

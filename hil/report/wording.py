@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import math
-
-from estimator.diagnosis.result import Diagnosis, FoundEffect, Mismatch, Verdict
+from estimator.diagnosis.result import Counted, Diagnosis, FoundEffect, Mismatch, Verdict
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Element
 from estimator.physics.model import Motion, unit
@@ -94,25 +92,23 @@ def _with_look_alikes(effect: FoundEffect) -> str:
 
 
 def _sure(effect: FoundEffect) -> str:
-    """Say how probable an effect is, in brackets; "" where that is not known: it was read off the raw data."""
-    if not math.isfinite(effect.probability):
-        return ""
-    return f" ({probability(effect.probability)} sure)"
+    """Say how often such names were right, in brackets; "" of a fault that was read off the raw data."""
+    return "" if effect.counted is None else f" ({counted_in_words(effect.counted)})"
 
 
-def probability(value: float) -> str:
-    """Return a probability in per cent, as many digits as it is sure: never 100 %."""
-    digits = next((d for d in (0, 1, 2) if 100.0 * (1.0 - value) >= 0.5 * 10.0**-d), None)
-    return "over 99.99 %" if digits is None else f"{100.0 * value:.{digits}f} %"
+def counted_in_words(counted: Counted) -> str:
+    """Return how often names of such a standing were right, in worlds that chose no threshold."""
+    return f"{counted.right} of {counted.of} such names were right"
 
 
 def belief(effect: FoundEffect) -> str:
-    """Say how much of the mismatch goes with an effect and how probable it is; "" where that is not known."""
-    if not (math.isfinite(effect.share) and math.isfinite(effect.probability)):
+    """Say how much the simulation needs an effect and how often such names were right; "" where it was not judged so."""
+    if effect.counted is None:
         return ""
-    of_which = " that it or a look-alike is there" if effect.indistinguishable_from else ""
+    of_which = ", it or a look-alike" if effect.indistinguishable_from else ""
     return (
-        f"{effect.share:.0%} of the squared error explained; probability {probability(effect.probability)}{of_which}. "
+        f"Without it {effect.necessity:.0%} of the error beyond the noise comes back, on samples not used for the fit; "
+        f"{effect.share:.0%} of the squared error goes with it. {counted_in_words(effect.counted)}{of_which}. "
     )
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from estimator.diagnosis.inference.disturbances import Size
-from estimator.diagnosis.inference.hypotheses import Effects, Hypothesis, line_values, residuals
+from estimator.diagnosis.inference.hypotheses import GRADE, Effects, Hypothesis, line_values, residuals
 from estimator.diagnosis.noise import PREDICTOR_ORDER, unpredictable
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Element, Span
@@ -27,37 +27,12 @@ THRESHOLDS_FILE = Path(__file__).parent / "thresholds.toml"
 
 THRESHOLDS = tomllib.loads(THRESHOLDS_FILE.read_text(encoding="utf-8"))
 
-TEMPERED: float = THRESHOLDS["tempered"]
-"""By which differences of scores are divided: laws of nature are written in other forms than the model's, and what
-they leave takes part in every difference."""
-
-LEAST_PROBABILITY: float = THRESHOLDS["least_probability"]
-"""Probability from which an effect is named."""
-
-
 TEST_LIMITS: dict[str, float] = {
-    key: THRESHOLDS[key] for key in ("most_predictable", "most_dependent", "most_line", "most_change")
+    key: THRESHOLDS["noise"][key] for key in ("most_predictable", "most_dependent", "most_line", "most_change")
 }
 """What their own past may predict of the innovations, and what torque, speed and angle may, beyond chance; the power
 of a line in their spectrum over their mean power; their mean square in a second, in standard deviations from that of
 all."""
-
-LEAST_SHARE = 0.01
-"""Share of the re-tuned model's squared free-run error below which an effect is a trace (CONTRACT)."""
-
-ALIKE_WITHIN = 10.0
-"""Difference in score within which another effect in an effect's place is as good: very strong evidence in the scale
-of Kass and Raftery, J. Am. Stat. Assoc. 90, 1995."""
-
-ALIKE_SHARE = 0.03
-"""The same over what the effect itself explains: nature's laws are written in other forms, and none is known to better
-than some per cent of what it does."""
-
-CLEARLY_BELOW = 0.5
-"""RMS of the augmented model's error, over the spread of the signal, up to which anything is explained."""
-
-
-GRADE = "road_grade"  # the effect that is no law: a load that walks further than any load does by itself
 
 LEAST_THROUGH, PARTS = 0.2, 4
 """Share of the torque's RMS that must get through the torque path in each of so many parts of a recording: less

@@ -19,10 +19,10 @@ from estimator.diagnosis.assemble import (
     reported_covariance,
     rms_of,
 )
-from estimator.diagnosis.inference.checks import GRADE, LEAST_SHARE
 from estimator.diagnosis.inference.descent import descended
 from estimator.diagnosis.inference.disturbances import reading_noise
 from estimator.diagnosis.inference.hypotheses import (
+    GRADE,
     NOTHING,
     THOROUGH,
     Effects,
@@ -31,7 +31,8 @@ from estimator.diagnosis.inference.hypotheses import (
     everything,
     refitted,
 )
-from estimator.diagnosis.inference.judge import Belief, Decision, free_rms
+from estimator.diagnosis.inference.standing import LEAST_SHARE, Standing
+from estimator.diagnosis.inference.trials import blocks
 from estimator.diagnosis.noise import SMALLEST_P
 from estimator.diagnosis.result import Evidence, Fit, FoundEffect, OutputFit, Trace
 from estimator.physics.catalogue import EFFECTS
@@ -41,21 +42,6 @@ from estimator.physics.model import DrivelineModel, unit
 from estimator.physics.problem import Problem, make_problem, parameters, start_vector
 from estimator.physics.unknowns import LocalBasis, Shared
 from estimator.signals.record import BoolArray, FloatArray, OutputKind, Record, by_output
-
-BLOCK_S, EVERY_S = 0.6, 2.0
-"""Blocks kept out for a profile: shorter than its knot spacing, so that its neighbours predict it."""
-
-FEWEST_BLOCKS = 3  # blocks of a recording at least: it may be shorter than one of these
-
-
-def blocks(record: Record) -> BoolArray:
-    """Return which samples are kept out: blocks all along, none at the very ends; shape (N,)."""
-    since_s = record.time_s - record.time_s[0]
-    scale = min(1.0, float(since_s[-1]) / (FEWEST_BLOCKS * EVERY_S))
-    every_s, block_s = scale * EVERY_S, scale * BLOCK_S
-    phase = np.mod(since_s, every_s)
-    middle = 0.5 * (every_s - block_s)
-    return (phase >= middle) & (phase < middle + block_s)
 
 
 def foreign_outputs(
@@ -153,36 +139,35 @@ class Unseen:
         return float(np.sqrt(np.mean(np.concatenate(errors) ** 2)))
 
 
-def _found(belief: Belief, decision: Decision, runs: FreeRuns) -> FoundEffect:
-    entry, best, model = EFFECTS[belief.name], runs.believed, runs.unseen.line
+def found_effect(standing: Standing, runs: FreeRuns) -> FoundEffect:
+    """Return an effect of the believed set with its values, from the fit that is told."""
+    entry, model, best = EFFECTS[standing.name], runs.unseen.line, runs.believed.result
     nulls = {parameter.name: parameter.null for parameter in entry.parameters}
     profiles = {}
-    if belief.name == GRADE:
-        of = best.result.problem
+    if standing.name == GRADE:
+        of = best.problem
         problem = make_problem(model, of.records, of.shared, own=[b.own for b in of.local], profile=True, use=of.use)
-        course = fit(problem, warm_start(problem, best.result))
+        course = fit(problem, warm_start(problem, best))
         of_course = reported_covariance(course)
         profiles, parameters = profiles_of(course, of_course, model), profile_size(course, of_course, model)
     else:
-        parameters = parameters_of(belief.name, runs.estimate, runs.covariance, model)
+        parameters = parameters_of(standing.name, runs.estimate, runs.covariance, model)
+    p_value = max(math.exp(-0.5 * max(standing.evidence, 0.0)), SMALLEST_P)
     return FoundEffect(
         name=entry.name,
         element=entry.element,
         statement=entry.sentence(nulls | {name: p.value for name, p in parameters.items()}, model.motion),
         parameters=parameters,
-        time_s=moments_in(belief.name, runs.estimate) if entry.event else {},
-        indistinguishable_from=tuple(belief.alike),
-        alternatives=belief.alike,
-        evidence=Evidence(
-            belief.score,
-            free_rms(decision.nothing),
-            free_rms(best),
-            max(math.exp(-0.5 * max(belief.score, 0.0)), SMALLEST_P),
-        ),
+        time_s=moments_in(standing.name, runs.estimate) if entry.event else {},
+        indistinguishable_from=tuple(standing.alike),
+        alternatives=standing.alike,
+        evidence=Evidence(standing.evidence, runs.held_before, runs.held_after, p_value),
         profiles=profiles,
-        share=belief.share,
-        probability=belief.probability,
+        share=standing.share,
+        probability=standing.probability,
         form=entry.form({name: p.value for name, p in parameters.items()}),
+        necessity=standing.necessity.value,
+        counted=standing.counted,
     )
 
 
@@ -322,17 +307,6 @@ def _rms(fit: FitResult, part: slice) -> float:
     rows = zip(fit.outputs[part], problem.records[part], problem.use[part], strict=True)
     errors = np.concatenate([(output - record.output)[use] for output, record, use in rows])
     return float(np.sqrt(np.mean(errors**2)))
-
-
-def effects_of(runs: FreeRuns, decision: Decision) -> tuple[FoundEffect, ...]:
-    """Return the effects that are named, the weightiest first."""
-    held = {"holdout_rms_before": runs.held_before, "holdout_rms_after": runs.held_after}
-    found = (_found(belief, decision, runs) for belief in decision.named)
-    return tuple(replace(each, evidence=replace(each.evidence, **held)) for each in found)
-
-
-def traces_of(runs: FreeRuns, decision: Decision) -> tuple[FoundEffect, ...]:
-    return tuple(_found(each, decision, runs) for each in decision.traces if each.name in runs.believed.effects)
 
 
 def courses_of(runs: FreeRuns) -> tuple[Trace, ...]:

@@ -17,7 +17,6 @@ from estimator.diagnosis.inference.disturbances import (
     estimated,
     minus_twice_log_prior,
     of_first,
-    reading_noise,
     readings,
     whitener_of,
 )
@@ -34,6 +33,8 @@ from estimator.signals.record import BoolArray, FloatArray, Record, by_output
 
 Effects = frozenset[str]
 NOTHING: Effects = frozenset()
+GRADE = "road_grade"
+"""The effect that is no law: a load that walks further than any load does by itself."""
 
 
 Progress = Callable[[str, float], None]
@@ -231,9 +232,6 @@ MOST_PASSES = 6
 THOROUGH, ROUGH = Effort(derivatives=6, steps=30), Effort(derivatives=1, steps=6)
 """What a pass may cost at most, and a first comparison."""
 
-FREE = Effort(derivatives=1, steps=6)
-"""What least squares of the free run may cost, from where the likelihood is greatest."""
-
 MOST_ROUGH, MUCH = 3, 0.05
 """Such comparisons under disturbances of their own at most, and the fall of minus twice the log-likelihood per sample
 for the next."""
@@ -268,16 +266,8 @@ class Hypothesis:
     def score(self) -> float:
         """Minus twice the log-likelihood with the price of the unknowns and of the choice (Schwarz, 1978)."""
         n = self.result.residual.size
-        freed = "road_grade" in self.effects
+        freed = GRADE in self.effects
         return self.minus_twice_log + (self.unknowns + freed) * math.log(n) + 2.0 * self.choices
-
-    @cached_property
-    def free_squares(self) -> float:
-        """The squared free-run error, unknowns as they leave least of it."""
-        if "road_grade" in self.effects:
-            return float(np.sum(samples_of(self.result) * reading_noise(self.sizes) ** 2))
-        rms = self.result.rms
-        return descended(self.result, lambda errors: errors / rms, FREE).squares
 
     @cached_property
     def filter(self) -> Whitener:
@@ -319,7 +309,8 @@ def fitted(
         result = descended(result, whitener_of(result, sizes), THOROUGH)
         if len(passes) < WITH_MOMENTS:
             result = _with_moments(result, sizes)
-        sizes, now = estimated(result, result.residual, sizes, limits, ROUNDS, is_anew=not passes)
+        is_anew = not passes and math.isnan(rival)  # with a rival they begin where its own ended
+        sizes, now = estimated(result, result.residual, sizes, limits, ROUNDS, is_anew)
         enough = SAME if math.isnan(rival) else max(SAME, DIGITS * abs(now - rival))
         last = best is not None and now > best.minus_twice_log - enough
         if best is None or now < best.minus_twice_log:
@@ -336,7 +327,7 @@ def compared(effects: Effects, initial: FitResult, parent: Hypothesis, limits: L
     result, now = initial, math.inf
     for _ in range(MOST_ROUGH):
         result = descended(result, whitener_of(result, sizes), ROUGH)
-        sizes, now = estimated(result, result.residual, sizes, limits, ROUNDS)
+        sizes, now = estimated(result, result.residual, sizes, limits, rounds=1)
         if now > best - MUCH * result.residual.size:
             break
         best = now

@@ -1,86 +1,21 @@
-"""Rivals of the names: a law without a name, and nominal values off their data sheet."""
+"""Laws without a name: what the re-tuned model lacks, and what the names leave."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from estimator.diagnosis.inference.checks import LEAST_SHARE, tests
-from estimator.diagnosis.inference.disturbances import MOST_FORM, estimated, reading_noise
-from estimator.diagnosis.inference.hypotheses import (
-    NOTHING,
-    ROUNDS,
-    Effects,
-    Hypothesis,
-    choices_of,
-    covariance,
-    fitted,
-    of_first_outputs,
-)
-from estimator.diagnosis.inference.judge import Grounds, Score, free_rms
-from estimator.diagnosis.inference.search import Search
-from estimator.diagnosis.result import OffNominal
+from estimator.diagnosis.inference.decide import Judged
+from estimator.diagnosis.inference.disturbances import estimated, reading_noise
+from estimator.diagnosis.inference.hypotheses import ROUNDS, Hypothesis, of_first_outputs
 from estimator.diagnosis.unnamed.scene import scene
 from estimator.diagnosis.unnamed.search import ElementSearch, searches_at
-from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Element
-from estimator.physics.fit import not_fitted
 from estimator.physics.jacobian import changes
-from estimator.physics.model import parameter_unit
 from estimator.physics.problem import outputs_at, own_part
-
-FREELY = 3.0
-"""Factor, either way, within which a nominal parameter is looked for: beyond it a value is no slip of a data sheet, and
-the integration's steps, chosen for the nominal line, would not follow."""
-
-CLEARLY = 3.0  # standard errors by which a value must lie beyond what it is trusted to
-
-
-@dataclass(frozen=True, slots=True)
-class FreeLine:
-    """The nominal line with its values free."""
-
-    score: float  # that of a hypothesis (``likelihood``)
-    leaves_noise: bool  # whether what it leaves passes for noise
-    off_nominal: tuple[OffNominal, ...]  # what clearly left its tolerance, the clearest first
-
-
-def free_line(search: Search) -> FreeLine | None:
-    """Fit the nominal line beyond its tolerances; None where these hold nothing back."""
-    nothing = search.nothing().result
-    shared = nothing.problem.shared
-    trusted = [not s.effect and np.isfinite(s.low) and s.low < s.high for s in shared]
-    if not any(free and at_bound for free, at_bound in zip(trusted, nothing.pinned, strict=False)):
-        return None
-    freed = tuple(
-        replace(s, low=1.0 / FREELY, high=FREELY) if free else s for s, free in zip(shared, trusted, strict=True)
-    )
-    problem = replace(nothing.problem, shared=freed)
-    sizes, hypotheses = search.nothing().sizes, len(search.names)
-    initial = not_fitted(problem, nothing.x)
-    found = fitted(NOTHING, initial, sizes, search.limits, hypotheses, search.nothing().minus_twice_log)
-    off_nominal = _off_nominal(search, found)
-    if not off_nominal:
-        return None
-    chosen = choices_of(frozenset(value.name for value in off_nominal), hypotheses + sum(trusted))
-    return FreeLine(found.score + 2.0 * chosen, not any(test.failed for test in tests(found)), off_nominal)
-
-
-def _off_nominal(search: Search, found: Hypothesis) -> tuple[OffNominal, ...]:
-    spread = np.sqrt(np.maximum(np.diag(covariance(found)), 0.0))
-    clear = []
-    for i, trusted in enumerate(search.nothing().result.problem.shared):
-        ratio = float(found.result.x[i])
-        by = max(trusted.low - ratio, ratio - trusted.high)
-        if not trusted.effect and trusted.low < trusted.high and by > CLEARLY * spread[i]:
-            sureness = by / max(float(spread[i]), np.finfo(float).tiny)
-            given, unit = search.model.parameters[trusted.name], parameter_unit(trusted.name, search.model.motion)
-            clear.append((sureness, OffNominal(trusted.name, ratio, trusted.high - 1.0, given.value, unit)))
-    return tuple(value for _, value in sorted(clear, key=lambda each: -each[0]))
-
 
 LOOKING_ROUNDS = 6  # rounds of the search for a law without a name, at most
 
@@ -151,42 +86,21 @@ def _rms(search: ElementSearch) -> float:
 
 
 @dataclass(frozen=True, slots=True)
-class Rivals:
-    """What the names of the best set are weighed against."""
+class Laws:
+    """Laws without a name around a decision."""
 
-    alone: Law | None  # the best law without a name
-    added: Law | None
-    sheet: FreeLine | None
-    searches: list[ElementSearch]  # for the law alone, element by element
-    scores: tuple[Score, ...]  # those of all these
+    alone: Law | None = None  # the best one beside the re-tuned model
+    left: Law | None = None  # the best one for what is left
+    searches: Sequence[ElementSearch] = ()  # for the one alone, element by element
 
 
-def rivals_of(search: Search, ground: Grounds) -> Rivals:
-    """Fit laws without a name, and the nominal line with its values free."""
-    nothing, best = of_first_outputs(ground.nothing), of_first_outputs(ground.best)
+def laws_around(judged: Judged) -> Laws:
+    """Look for a law where something is left, or was."""
+    if not judged.failed and not judged.named:
+        return Laws()
+    nothing, believed = of_first_outputs(judged.nothing.hypothesis), of_first_outputs(judged.believed.hypothesis)
     searches = searches_around(nothing)
     alone = best_law(nothing, searches)
-    added = alone if ground.best is ground.nothing else best_law(best, searches_around(best))
-    sheet = free_line(search)
-    off = () if sheet is None else (Score(NOTHING, sheet.score),)
-    return Rivals(alone, added, sheet, searches, (*rival_laws(ground, alone, added), *off))
-
-
-def rival_laws(ground: Grounds, alone: Law | None, added: Law | None) -> tuple[Score, ...]:
-    """Return laws without a name as hypotheses: one instead of all effects, and one added to the best set of these."""
-    best, first = of_first_outputs(ground.best), of_first_outputs(ground.nothing)
-    offset = ground.best.score - best.score
-    found = []
-    if alone is not None and 1.0 - (alone.rms / free_rms(first)) ** 2 >= LEAST_SHARE:
-        found.append(Score(_at_its_place(ground, alone, first.score - alone.score), offset + alone.score))
-    if added is not None and best.effects:
-        found.append(Score(best.effects, offset + added.score))
-    return tuple(found)
-
-
-def _at_its_place(ground: Grounds, law: Law, gained: float) -> Effects:
-    """Return the names of which a law is another form: those at its place, where they gain nearly all that it gains."""
-    names = frozenset(name for name in ground.best.effects if EFFECTS[name].element is law.element)
-    score = {each.effects: each.score for each in ground.scores}.get(names, math.inf)
-    is_form = ground.nothing.score - score >= (1.0 - MOST_FORM**2) * gained
-    return names if is_form else NOTHING
+    if judged.believed is judged.nothing or not judged.failed:
+        return Laws(alone, alone if judged.failed else None, searches)
+    return Laws(alone, best_law(believed, searches_around(believed)), searches)

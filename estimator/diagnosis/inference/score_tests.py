@@ -22,13 +22,15 @@ from estimator.physics.own_scan import (
     Stretch,
     Wave,
     answers_to,
+    cell_s,
     cells,
     scanned,
     small_waves,
 )
 from estimator.physics.problem import simulated_cases, start_of
+from estimator.physics.steps import Moments
 from estimator.physics.unknowns import Release, Shared, effect_unknowns
-from estimator.signals.record import FloatArray
+from estimator.signals.record import FloatArray, Record
 
 SMALLEST_SCALING, LARGEST_SCALING = 0.1, 4.0
 """How far from a start's own size the first look may place a fit's start: the direction holds no further."""
@@ -127,6 +129,26 @@ class Screen:
             return [ScoredStart(release, np.inf) for release in releases]
         looker = self._periodic if entry.phases else self._events if entry.event else self._plain
         return sorted(looker(entry, releases), key=lambda scored: -scored.promise)
+
+    def handed_over(self, name: str, moments: Sequence[Moments]) -> list[ScoredStart]:
+        """Return a look at each start of an event at moments that another event was found at, the best first.
+
+        A moment belongs to what happened and not to the law that is tried on it: sought anew around a bad fit, it may
+        be lost. ``moments`` are of each recording [s since it began]; a fit may move them by a cell of the grid.
+        """
+        entry, records = EFFECTS[name], self._result.problem.records
+        found = []
+        for release in effect_unknowns(name, self._model, records):
+            own = tuple(_at_moments(*each) for each in zip(release.own, records, moments, strict=False))
+            steps = _Steps.of(entry, _with_own(release, own))
+            changes = []
+            for i in range(len(self._rows)):
+                began = _filled(self._result.p_of(i), own[i])
+                changes.append(self._runner(i)(steps.filled(began)) - self._output(i))
+            moved = self._stacked(changes)
+            starts = [self._along(steps, step, change) for step, change in zip(steps.sizes, moved, strict=True)]
+            found.append(max(starts, key=lambda scored: scored.promise))
+        return sorted(found, key=lambda scored: -scored.promise)
 
     def _keeping(self, kept: str, release: Release) -> Release:
         p = self._result.p
@@ -311,6 +333,17 @@ def _with_own(release: Release, own: tuple[tuple[Shared, ...], ...]) -> Release:
 
 def _with_start(release: Release, unknown: Shared, start: float) -> Release:
     return replace(release, shared=tuple(replace(u, start=start) if u is unknown else u for u in release.shared))
+
+
+def _at_moments(own: tuple[Shared, ...], record: Record, moments: Moments) -> tuple[Shared, ...]:
+    """Return an event's own unknowns at moments, which a fit may move as far as a scan is sure of them."""
+    reach, at = cell_s(record), dict(zip(("from_s", "to_s"), moments, strict=True))
+    return tuple(
+        replace(u, start=at[u.name], low=max(u.low, at[u.name] - reach), high=min(u.high, at[u.name] + reach))
+        if u.name in at and moments[0] < moments[1]
+        else replace(u, start=u.low, low=u.low, high=u.low)
+        for u in own
+    )
 
 
 def _zero(unknown: Shared, null: float) -> float:

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from threading import Lock
 
 import numpy as np
 
-from estimator.diagnosis.inference.checks import GRADE, is_plausible, may_be_loose, widened
+from estimator.diagnosis.inference.checks import is_plausible, may_be_loose, widened
 from estimator.diagnosis.inference.descent import extended
 from estimator.diagnosis.inference.disturbances import Limits, limits_of
 from estimator.diagnosis.inference.hypotheses import (
+    GRADE,
     NOTHING,
     Effects,
     Hypothesis,
@@ -30,6 +32,8 @@ from estimator.diagnosis.inference.hypotheses import (
     with_effect,
 )
 from estimator.diagnosis.inference.score_tests import Answers, Remembering, ScoredStart, promising
+from estimator.diagnosis.inference.standing import LEAST_NECESSITY
+from estimator.diagnosis.inference.trials import Trials, necessity, noise_of
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult, not_fitted, warm_start
@@ -38,6 +42,7 @@ from estimator.physics.model import DrivelineModel
 from estimator.physics.parallel import Work, concurrently
 from estimator.physics.problem import Problem, make_problem, start_of, start_vector
 from estimator.physics.simulate import simulate
+from estimator.physics.steps import Moments, moments_of
 from estimator.physics.unknowns import Release, nominal_unknowns, own_unknowns, released
 from estimator.signals.record import BoolArray, Record
 
@@ -56,7 +61,22 @@ NEARLY = 0.3
 FINISHED = 2  # best of these that are fitted to their end
 STARTS = 5  # effects from each of which a search begins, the most promising
 
+WORTH_ADDING = 0.15
+"""Share of the squared free-run error beyond the noise that a further law must take for a search to go on from it."""
+
 MOST_EFFECTS = 8
+
+COMMON = (
+    "coulomb_friction_motor",
+    "load_imbalance",
+    "backlash",
+    "actuator_lag",
+    "transport_delay",
+    "inverter_gain_mismatch",
+    "aerodynamic_drag",
+)
+"""Laws that most machines have: each search begins from these, too, whatever a look at the bare line promises of them.
+Dry friction, for one, shows little around a line that has settled on too much damping."""
 
 
 @dataclass
@@ -81,6 +101,7 @@ class Search:
     answers: Answers = field(default_factory=Answers)
     _lessened: set[tuple[Effects, str]] = field(default_factory=set)
     _restarted: defaultdict[Effects, set[str]] = field(default_factory=lambda: defaultdict(set))
+    _moments: dict[tuple[Effects, str], list[Moments]] = field(default_factory=dict)
     _limits: Limits | None = None
     _lock: Lock = field(default_factory=Lock)
 
@@ -99,6 +120,8 @@ class Search:
             if len(self.path[-1].effects) < 2:
                 break
             if first.effects <= self.path[-1].effects or not self.is_plausible(first):
+                continue
+            if self._is_far_behind(first, firsts[0]):
                 continue
             path = self._climbed([self.nothing(), first], self.path)
             if path[-1].score < self.path[-1].score:
@@ -120,11 +143,33 @@ class Search:
             if count > 1 and any(len(r.effects) <= count and r.score < current.score for r in rival):
                 break
             better = self._best_addition(current) if count < MOST_EFFECTS else None
+            better = better if better is not None and self._simulates_better(better, current) else None
             better = better or self._best_drop(current) or self._best_exchange(current) or self._graded(current)
             if better is None:
                 break
             path = [*path, better]
         return path
+
+    def _simulates_better(self, larger: Hypothesis, smaller: Hypothesis) -> bool:
+        """Tell whether a law that makes a set more probable also makes its free run better, by more than a little.
+
+        What the form of a law leaves is predicted a little better by nearly every further law; a search that follows
+        the likelihood alone wanders among sets of these.
+        """
+        if larger.effects <= smaller.effects:  # of the same laws, or fewer, a better fit
+            return True
+        one, other = self.trials.of([smaller, larger])
+        return necessity(other, one, noise_of(larger)).value >= WORTH_ADDING
+
+    def _is_far_behind(self, one: Hypothesis, best: Hypothesis) -> bool:
+        """Tell whether another first effect clearly leaves so much less that no search need begin from this one."""
+        mine, its = self.trials.of([one, best])
+        return necessity(its, mine, noise_of(best)).least >= LEAST_NECESSITY
+
+    @cached_property
+    def trials(self) -> Trials:
+        """The sets that were tried in free simulation."""
+        return Trials(self.model)
 
     @property
     def simulations(self) -> int:
@@ -250,8 +295,38 @@ class Search:
         equals = {name: EFFECTS[name].equivalent if current.outputs == 1 else () for name in worth}
         twins = {twin for name in worth for twin in equals[name] if precedes(name, twin)}
         worth = [name for name in worth if name not in twins][:MOST_FITS]
-        chosen = dict.fromkeys([*worth, *(loose if not current.effects and not rival else [])])
-        return {name: promising(starts[name]) for name in chosen}, view
+        first = [*loose, *(name for name in COMMON if name in tried)] if not current.effects and not rival else []
+        chosen = {name: promising(starts[name]) for name in dict.fromkeys([*worth, *first])}
+        return chosen | self._at_known_moments(current, tried, starts, rival, view), view
+
+    def _at_known_moments(
+        self,
+        current: Hypothesis,
+        names: Sequence[str],
+        starts: Mapping[str, Sequence[ScoredStart]],
+        instead: str,
+        view: Remembering,
+    ) -> dict[str, list[ScoredStart]]:
+        """Return the starts of the events among some effects at moments that are known, next to those of their own.
+
+        Known are those of the event that one takes the place of; else of the most promising one. What happened once in
+        a recording is found once, and each law that may have happened is tried on it.
+        """
+        events = [name for name in names if EFFECTS[name].event]
+        if instead and EFFECTS[instead].event:
+            moments = self._moments.get((current.effects, instead))
+        else:
+            best = max(events, key=lambda name: starts[name][0].promise, default="")
+            moments = _moments_of(starts[best][0].release) if best and starts[best][0].promise > 0.0 else None
+        if moments is None or not any(begin < end for begin, end in moments):
+            return {}
+        least = float(np.log(current.result.residual.size))
+        handed = {name: view.handed_over(name, moments)[:1] for name in events}
+        return {
+            name: [*promising(starts[name]), *found]
+            for name, found in handed.items()
+            if found and found[0].promise > least
+        }
 
     def _added(
         self, current: Hypothesis, name: str, starts: Sequence[ScoredStart], instead: Hypothesis | None = None
@@ -361,7 +436,17 @@ class Search:
                     self.finish(rough, best)
 
     def _best_drop(self, current: Hypothesis) -> Hypothesis | None:
-        return self._better(concurrently(lambda name: self.without(current, name), sorted(current.effects)), current)
+        """Return a set without one of the effects that is more probable, or that simulates as well.
+
+        Fitted anew from there, fewer laws may have found a better optimum than the one that others were added to.
+        """
+        fewer = concurrently(lambda name: self.without(current, name), sorted(current.effects))
+        better = self._better(fewer, current)
+        if better is not None or not fewer:
+            return better
+        whole = self.trials.one(current)
+        as_good = [each for each in self.trials.of(fewer) if each.beats(whole) and self.is_plausible(each.hypothesis)]
+        return min(as_good, key=lambda each: each.rms).hypothesis if as_good else None
 
     def _best_exchange(self, current: Hypothesis) -> Hypothesis | None:
         nearest = concurrently(lambda name: self._nearest(current, name), sorted(current.effects))
@@ -376,6 +461,8 @@ class Search:
         """
         reduced = self.without(current, name)
         alike = [other for other in self.names if other not in current.effects and are_alike(name, other)]
+        if name != GRADE and EFFECTS[name].event:
+            self._moments[reduced.effects, name] = moments_of(current.result, name)
         starts, view = self._scores(reduced, alike, name)
         rough = [self._added(reduced, other, starts[other], current) for other in starts]
         near = current.score + NEARLY * _gain(current, reduced)
@@ -414,6 +501,12 @@ def _is_event_of_load(name: str) -> bool:
     return EFFECTS[name].event and EFFECTS[name].element is Element.LOAD
 
 
+def _moments_of(release: Release) -> list[Moments]:
+    """Return from when to when an event acts in each recording where a fit of it would start [s since it began]."""
+    each = [{unknown.name: unknown.start for unknown in own} for own in release.own]
+    return [(own["from_s"], own["to_s"]) for own in each]
+
+
 def _gain(better: Hypothesis, than: Hypothesis) -> float:
     return max(than.score - better.score, 0.0)
 
@@ -425,6 +518,7 @@ def precedes(one: str, other: str) -> bool:
 
 
 def are_alike(one: str, other: str) -> bool:
+    """Tell whether one effect is tried in another's place: a look-alike, a neighbour, or an event for an event."""
     a, b = EFFECTS[one], EFFECTS[other]
     alike_to = {*a.resembles, *a.equivalent}, {*b.resembles, *b.equivalent}
-    return other in alike_to[0] or one in alike_to[1] or a.element is b.element
+    return other in alike_to[0] or one in alike_to[1] or a.element is b.element or (a.event and b.event)

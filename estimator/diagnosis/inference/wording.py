@@ -89,7 +89,6 @@ def times(ratio: float) -> str:
     return f"{float(f'{ratio:.3g}'):.0f}" if ratio >= 100.0 else f"{ratio:.3g}"
 
 
-SURE = 0.999  # probability from which a sentence gives no more digits
 MOST_NAMES = 4  # untried effects that a headline lists
 
 
@@ -99,6 +98,7 @@ class Context:
 
     remainder: Remainder | None = None
     traces: Sequence[str] = ()
+    refinements: Sequence[str] = ()
     off_nominal: Sequence[OffNominal] = ()
     untestable: Sequence[UntestableEffect] = ()
     can_be_retuned: bool = True  # false for a plant whose parameters are not fitted
@@ -114,6 +114,8 @@ def statement(
         parts.append(_left(verdict, context.remainder))
     if context.traces:
         parts.append(f"Seen, but too small to matter: {', '.join(context.traces)}.")
+    if context.refinements:
+        parts.append(f"Not established, and not in the model: {', '.join(context.refinements)}.")
     twins = sorted({twin for effect in effects for twin in effect.indistinguishable_from})
     if twins:
         others = " or ".join(twins)
@@ -186,11 +188,12 @@ def _noise(fit: Fit) -> str:
 
 
 def _sure(effects: Sequence[FoundEffect]) -> str:
-    """Say how probable the least probable of the effects is; nothing of faults that are seen in the readings."""
-    least = min((each.probability for each in effects if not math.isnan(each.probability)), default=math.nan)
-    if math.isnan(least):
+    """Say how often names of such a standing were right, of the least sure of them; nothing of faults of readings."""
+    counts = [each.counted for each in effects if each.counted is not None]
+    if not counts:
         return ""
-    return f" (probability {least:.3f})" if least < SURE else f" (probability above {SURE})"
+    least = min(counts, key=lambda each: each.probability)
+    return f" ({least.right} of {least.of} such names were right)"
 
 
 def _wrong_values(left: str, off_nominal: Sequence[OffNominal]) -> str:

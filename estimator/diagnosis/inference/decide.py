@@ -1,0 +1,309 @@
+"""The decision: from the sets of effects that were fitted to what is believed, in one place, and nothing after it.
+
+A name is established if and only if
+
+1. its set simulates better than every fitted set of as few laws or fewer, on samples that no fit has seen; from nothing
+   on, a larger set is taken only where the simulation needs it in the place of a smaller one;
+2. the set needs it: at least `LEAST_NECESSITY` of the squared error beyond the noise comes back without it, on those
+   samples, whatever the scatter between their blocks (95 %);
+3. no free form of a law that is there already does as well: what a law of a wrong form leaves is no second law;
+4. the likelihood agrees that it is there (`LEAST_EVIDENCE`).
+
+What is in the most probable set and not established is a possible refinement: it is listed, and is not in the model. A
+general law is named in the place of its special case where what it has beyond that is needed in the same way. Nothing
+at all is established that leaves about as much as the signal itself, or whose free run is no better on the recordings
+as read.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from estimator.diagnosis.acquisition.chain import Chain
+from estimator.diagnosis.inference.checks import Test, is_possible, tests
+from estimator.diagnosis.inference.figures import FreeRuns, Unseen, acquired, figures_of, free_runs
+from estimator.diagnosis.inference.hypotheses import SAME, Effects, Hypothesis, fitted
+from estimator.diagnosis.inference.search import Search
+from estimator.diagnosis.inference.sheet import free_line
+from estimator.diagnosis.inference.standing import (
+    ALIKE_SHARE,
+    ALIKE_WITHIN,
+    CLEARLY_BELOW,
+    LEAST_EVIDENCE,
+    LEAST_NECESSITY,
+    LEAST_SHARE,
+    Standing,
+)
+from estimator.diagnosis.inference.trials import Trial, Trials, necessity, noise_of
+from estimator.diagnosis.result import Fit, FoundEffect, OffNominal, Verdict
+from estimator.physics.catalogue import EFFECTS
+from estimator.physics.fit import not_fitted
+from estimator.physics.problem import Problem
+from estimator.physics.steps import from_their_moment
+
+NEAREST = 2
+"""Sets of each size that are tried in free simulation: the most probable, and as many that simulate best as fitted."""
+
+Rival = Callable[[Trial, str], Trial | None]
+"""A set without a name, and the name, to that set with a free form of one of its own laws; None where it has none."""
+
+
+NOT_NEEDED = "the most probable set has it, and the free run does without it as well"
+
+
+def no_rival(_without: Trial, _name: str) -> Trial | None:
+    """Return none: no law of the set has a free form."""
+    return None
+
+
+@dataclass(frozen=True, slots=True)
+class Judged:
+    """Which names of the sets that were fitted are established."""
+
+    nothing: Trial  # the nominal model, re-tuned
+    best: Trial  # the most probable set
+    believed: Trial  # with what is established alone: the model that is told
+    named: tuple[Standing, ...] = ()  # effects that are established, the weightiest first
+    traces: tuple[Standing, ...] = ()  # established, and too small to matter
+    refinements: tuple[Standing, ...] = ()  # of the most probable set or a larger one, and not established
+    off_nominal: tuple[OffNominal, ...] = ()  # nominal values off their sheet, which leave nothing but noise
+    tried: Mapping[Effects, Trial] = field(default_factory=dict)  # all sets that were tried in free simulation
+    failed: tuple[Test, ...] = ()  # what the believed set leaves that noise has not
+
+    @property
+    def noise(self) -> float:
+        """The noise of the reading [unit of the output]."""
+        return noise_of(self.best.hypothesis)
+
+
+@dataclass(frozen=True, slots=True)
+class Decision:
+    """What is believed, and what its free runs leave: everything that is told is made from this record."""
+
+    judged: Judged
+    runs: FreeRuns
+    figures: Fit
+    acquired: tuple[FoundEffect, ...]  # faults of the acquisition that matter
+    verdict: Verdict
+
+
+def decide(search: Search, chain: Chain, unseen: Unseen, rival: Rival = no_rival) -> Decision:
+    """Decide what the sets say that a search has fitted; ``unseen`` has recordings kept out of every fit."""
+    judged = _judged(search, rival)
+    decision = _with_runs(judged, chain, unseen)
+    objection = _objection(decision)
+    if not objection:
+        return decision
+    doubted = tuple(replace(each, objection=objection) for each in (*judged.named, *judged.traces))
+    nothing = judged.nothing
+    judged = replace(
+        judged,
+        believed=nothing,
+        named=(),
+        traces=(),
+        refinements=(*doubted, *judged.refinements),
+        failed=_failed(nothing.hypothesis),
+    )
+    return _with_runs(judged, chain, unseen)
+
+
+def _with_runs(judged: Judged, chain: Chain, unseen: Unseen) -> Decision:
+    nothing, believed = judged.nothing.hypothesis, judged.believed.hypothesis
+    runs = free_runs(nothing, believed, not judged.failed, chain, unseen)
+    findings = acquired(runs)
+    figures = figures_of(runs, judged.noise, findings)
+    of_spread = runs.final.rms / spread(runs.final.problem)
+    verdict = verdict_of(of_spread, bool(judged.named or findings), bool(judged.failed))
+    if judged.off_nominal and verdict is Verdict.NO_MISMATCH:
+        verdict = Verdict.UNEXPLAINED
+    return Decision(judged, runs, figures, findings, verdict)
+
+
+def verdict_of(of_spread: float, is_named: bool, is_more_than_noise: bool) -> Verdict:
+    """Return the verdict on a set that leaves an error of so much of the signal's spread (CONTRACT)."""
+    if of_spread > CLEARLY_BELOW:
+        return Verdict.UNEXPLAINED
+    if is_named:
+        return Verdict.PARTLY_EXPLAINED if is_more_than_noise else Verdict.EXPLAINED
+    return Verdict.UNEXPLAINED if is_more_than_noise else Verdict.NO_MISMATCH
+
+
+def _objection(decision: Decision) -> str:
+    """Return why nothing is established, whatever the sets say; "" where it may be."""
+    if not decision.judged.named:
+        return ""
+    fit, runs = decision.figures, decision.runs
+    if runs.final.rms > CLEARLY_BELOW * spread(runs.final.problem):
+        return "it leaves as much as the signal itself"
+    if fit.augmented < fit.retuned and fit.holdout_augmented < fit.holdout_retuned:
+        return ""
+    return (
+        f"with it the free-run error goes from {fit.retuned:.4g} to {fit.augmented:.4g} {fit.unit}, on samples "
+        f"not used for the fit from {fit.holdout_retuned:.4g} to {fit.holdout_augmented:.4g}"
+    )
+
+
+def spread(problem: Problem) -> float:
+    """Return the standard deviation of the recorded output, each recording about its mean [unit of the output]."""
+    parts = [record.output[use] for record, use in zip(problem.records, problem.use, strict=True)]
+    return float(np.std(np.concatenate([part - part.mean() for part in parts])))
+
+
+def _failed(hypothesis: Hypothesis) -> tuple[Test, ...]:
+    return tuple(test for test in tests(hypothesis) if test.failed)
+
+
+def _judged(search: Search, rival: Rival) -> Judged:
+    trials = search.trials
+    nothing = trials.one(search.nothing())
+    failed = _failed(nothing.hypothesis)
+    if not failed and not search.path[-1].effects:
+        return Judged(nothing, nothing, nothing, tried=trials.all)
+    sheet = free_line(search)
+    likely, tried = _candidates(search, trials)
+    noise = noise_of(likely.hypothesis)
+    chosen = nothing
+    while (larger := _needed_beyond(chosen, tried, noise)) is not None:
+        chosen = larger
+    if sheet is not None and sheet.tried(search.model).beats(chosen):
+        off_nominal = sheet.off_nominal if sheet.leaves_noise else ()
+        return Judged(nothing, likely, nothing, off_nominal=off_nominal, tried=trials.all, failed=failed)
+    believed, weak = chosen, dict[str, Standing]()
+    while True:
+        believed = _no_more_general_than_needed(search, trials, believed, noise)
+        standings = [_standing(name, search, trials, believed, noise, rival) for name in sorted(believed.effects)]
+        doubted = [each for each in standings if each.objection]
+        if not doubted:
+            break
+        weakest = min(doubted, key=lambda each: (each.necessity.least, each.evidence))
+        weak[weakest.name] = weakest
+        believed = trials.one(search.without(believed.hypothesis, weakest.name))
+    standings.sort(key=lambda each: -each.share)
+    beside = {other for each in standings for other in each.alike} | believed.effects | {*weak}
+    possible = (_standing(name, search, trials, likely, noise, rival) for name in sorted(likely.effects - beside))
+    return Judged(
+        nothing,
+        likely,
+        believed,
+        named=tuple(each for each in standings if each.share >= LEAST_SHARE),
+        traces=tuple(each for each in standings if each.share < LEAST_SHARE),
+        refinements=(
+            *reversed(weak.values()),
+            *(replace(each, objection=each.objection or NOT_NEEDED) for each in possible),
+        ),
+        tried=trials.all,
+        failed=_failed(believed.hypothesis),
+    )
+
+
+def _candidates(search: Search, trials: Trials) -> tuple[Trial, list[Trial]]:
+    """Return the most probable set that a search has found, and the sets that are judged, each tried."""
+    found = search.path[-1]
+    for name in sorted(found.effects):
+        search.without(found, name)
+    search.fit_look_alikes(found)
+    tried = trials.of([_from_its_moment(search, each) for each in _nearest(search, found)])
+    return next(trial for trial in tried if trial.effects == found.effects), tried
+
+
+def _needed_beyond(chosen: Trial, tried: Sequence[Trial], noise: float) -> Trial | None:
+    """Return the smallest set that the simulation needs in the place of another one; None where it needs none.
+
+    It leaves at most the `LEAST_NECESSITY`-th part of the error beyond the noise that the other one leaves, and no set
+    of as few laws simulates better; of several that do, the most probable.
+    """
+    better = [
+        each
+        for each in tried
+        if each.size > chosen.size
+        and each.hypothesis.score < chosen.hypothesis.score
+        and necessity(each, chosen, noise).least >= LEAST_NECESSITY
+        and not any(other.beats(each) for other in tried)
+    ]
+    return min(better, key=lambda each: (each.size, each.hypothesis.score, sorted(each.effects)), default=None)
+
+
+def _nearest(search: Search, found: Hypothesis) -> list[Hypothesis]:
+    """Return the sets worth a trial: of each size the most probable, and those that simulate best as fitted."""
+    possible = [each for each in search.visited.values() if search.is_plausible(each)]
+    chosen: dict[Effects, Hypothesis] = {each.effects: each for each in (search.nothing(), found)}
+    for size in range(1, len(found.effects) + 1):
+        same = [each for each in possible if len(each.effects) == size]
+        chosen |= {each.effects: each for each in sorted(same, key=lambda each: each.score)[:NEAREST]}
+        chosen |= {each.effects: each for each in sorted(same, key=lambda each: each.result.squares)[:NEAREST]}
+    return [each for each in chosen.values() if is_possible(each, search.records)]
+
+
+def _from_its_moment(search: Search, hypothesis: Hypothesis) -> Hypothesis:
+    """Return a set with steps of payload or stiffness that begin inside recordings, where that is as probable."""
+    turned = from_their_moment(hypothesis.result, search.model)
+    if turned is hypothesis.result:
+        return hypothesis
+    initial = not_fitted(turned.problem, turned.x)
+    names, before = len(search.names), hypothesis.minus_twice_log
+    found = fitted(hypothesis.effects, initial, hypothesis.sizes, hypothesis.limits, names, before)
+    return found if found.score <= hypothesis.score + SAME else hypothesis
+
+
+def _standing(name: str, search: Search, trials: Trials, whole: Trial, noise: float, rival: Rival) -> Standing:
+    """Return what speaks for an effect of a set, and the first thing that speaks against it."""
+    without = trials.one(search.without(whole.hypothesis, name))
+    total = float(trials.one(search.nothing()).squares.sum())
+    share = min(max(float(without.squares.sum() - whole.squares.sum()) / total, 0.0), 1.0)
+    needed = necessity(whole, without, noise)
+    evidence = without.hypothesis.score - whole.hypothesis.score
+    alike = _alike(name, search, trials, whole, evidence)
+    standing = Standing(name, needed, share, evidence, alike)
+    return replace(standing, objection=_against(standing, search, whole, without, rival))
+
+
+def _against(standing: Standing, search: Search, whole: Trial, without: Trial, rival: Rival) -> str:
+    """Return what speaks against a name, as the end of a sentence; "" where nothing does."""
+    back = f"{standing.necessity.value:.0%}".replace("%", " %")
+    if standing.necessity.least < LEAST_NECESSITY:
+        return f"without it {back} of the error beyond the noise comes back, which is too little to be sure"
+    if standing.evidence < LEAST_EVIDENCE:
+        return f"minus twice the log-probability rises by {standing.evidence:.3g} only without it"
+    if not search.is_resolved(whole.hypothesis, standing.name):
+        return "it is too small to be distinguished from another way of sampling"
+    free = rival(without, standing.name)
+    if free is not None and not whole.clearly_beats(free):
+        return "another form of a law that is there already does as well"
+    return ""
+
+
+def _alike(name: str, search: Search, trials: Trials, whole: Trial, evidence: float) -> dict[str, Mapping[str, float]]:
+    """Return the effects that are as probable in an effect's place and simulate as well, with their values there."""
+    best, others = whole.hypothesis, whole.effects - {name}
+    within = max(ALIKE_WITHIN, ALIKE_SHARE * evidence)
+    exchanged = [
+        each
+        for effects, each in sorted(search.visited.items(), key=lambda item: sorted(item[0]))
+        if others <= effects and len(effects - others) == 1 and name not in effects
+    ]
+    near = [each for each in exchanged if each.score - best.score < within and search.is_plausible(each)]
+    as_good = [each for each in near if not whole.clearly_beats(trials.one(each))]
+    found = {next(iter(each.effects - others)): each for each in as_good} | {name: best}
+    values = {other: each.result.values_of(other) for other, each in found.items()}
+    for other in found:
+        for twin in EFFECTS[other].equivalent if best.outputs == 1 else ():
+            values.setdefault(twin, values[other])  # the same linear system: the same parameters
+    return {other: values[other] for other in sorted({*values} - best.effects)}
+
+
+def _no_more_general_than_needed(search: Search, trials: Trials, whole: Trial, noise: float) -> Trial:
+    """Return a set with special cases in the place of general laws whose generality it does not need."""
+    total = float(trials.one(search.nothing()).squares.sum())
+    for name in sorted(whole.effects):
+        for special in EFFECTS[name].contains:
+            simpler = search.exchanged(whole.hypothesis, name, special)
+            if simpler is None:
+                continue
+            trial = trials.one(simpler)
+            beyond = float(trial.squares.sum() - whole.squares.sum()) / total
+            if necessity(whole, trial, noise).least < LEAST_NECESSITY or beyond < LEAST_SHARE:
+                return _no_more_general_than_needed(search, trials, trial, noise)
+    return whole

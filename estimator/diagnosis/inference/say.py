@@ -1,0 +1,288 @@
+"""What is said: the result of a diagnosis, made from the decision's record and from nothing else."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from estimator.diagnosis.acquisition.chain import Chain
+from estimator.diagnosis.assemble import augmented_model, load_torques, retuned_parameters
+from estimator.diagnosis.inference.checks import tests_in_words
+from estimator.diagnosis.inference.decide import Decision
+from estimator.diagnosis.inference.figures import courses_of, figures_without, first_figures, found_effect
+from estimator.diagnosis.inference.hypotheses import Hypothesis, of_first_outputs, open_hypotheses
+from estimator.diagnosis.inference.rivals import Laws
+from estimator.diagnosis.inference.search import Search
+from estimator.diagnosis.inference.standing import Standing
+from estimator.diagnosis.inference.trials import Trial
+from estimator.diagnosis.inference.wording import Context, law_in_words, statement
+from estimator.diagnosis.noise import SMALLEST_P
+from estimator.diagnosis.result import (
+    Diagnosis,
+    Discrepancy,
+    Effort,
+    Estimated,
+    Interval,
+    Mismatch,
+    Refinement,
+    RejectedEffect,
+    Remainder,
+    Retuned,
+    Slight,
+    UnnamedLaw,
+    UntestableEffect,
+    Verdict,
+)
+from estimator.diagnosis.where import locate
+from estimator.diagnosis.where.discrepancy import discrepancy
+from estimator.physics.catalogue import EFFECTS
+from estimator.physics.effect import Element, Untestable
+from estimator.physics.model import DrivelineModel
+from estimator.physics.parallel import TimeIsUp, Work
+from estimator.signals.record import FloatArray
+
+
+@dataclass(frozen=True, slots=True)
+class Told:
+    """What a result is made from: the decision, the laws without a name around it, and what the search did."""
+
+    decision: Decision
+    laws: Laws
+    search: Search
+    model: DrivelineModel  # as it was given, with what the line reads through
+    effort: Effort
+    warnings: tuple[str, ...] = ()
+
+
+def said(told: Told) -> Diagnosis:
+    """Return the diagnosis."""
+    decision, search = told.decision, told.search
+    judged, runs, verdict = decision.judged, decision.runs, decision.verdict
+    is_explained = verdict is not Verdict.UNEXPLAINED
+    named = [found_effect(each, runs) for each in judged.named]
+    effects = (*named, *decision.acquired) if is_explained else ()
+    traces = judged.traces if is_explained else ()
+    added = [*effects, *(found_effect(each, runs) for each in traces)]
+    mismatch, remainder = _mismatch(told), _remainder(told)
+    untestable = untestable_effects(open_hypotheses(search.model, runs.chain.records)[1])
+    line = search.model
+    context = Context(
+        remainder,
+        [each.name for each in traces],
+        [each.name for each in judged.refinements],
+        judged.off_nominal,
+        untestable,
+        can_be_retuned(line),
+    )
+    return Diagnosis(
+        verdict=verdict,
+        statement=statement(verdict, decision.figures, effects, told.effort, context),
+        mismatch=mismatch,
+        effects=effects,
+        rejected=_rejected(told),
+        untestable=untestable,
+        unnamed=_unnamed(told),
+        fit=decision.figures,
+        parameters=retuned_parameters(runs.estimate, line, is_explained),
+        load_torque=load_torques(runs.estimate, line),
+        timing_s={},
+        augmented=augmented_model(runs.estimate, told.model, added),
+        traces=courses_of(runs),
+        warnings=told.warnings,
+        discrepancy=_discrepancy(told) if mismatch.detected and line.plant is None else None,
+        remainder=remainder,
+        off_nominal=judged.off_nominal,
+        slight=tuple(Slight(each.name, each.share, _values(judged.believed, each)) for each in traces),
+        refinements=tuple(
+            Refinement(each.name, each.objection, each.necessity.value, _values(judged.best, each))
+            for each in judged.refinements
+        ),
+        effort=told.effort,
+    )
+
+
+def undecided(
+    search: Search | None, chain: Chain, line: DrivelineModel, model: DrivelineModel, work: Work, level: str
+) -> Diagnosis:
+    """Return the answer of a search that the limit of time has ended: nothing is decided, and nothing rejected."""
+    names, blind = open_hypotheses(line, chain.records)
+    nothing = None if search is None else search.visited.get(frozenset())
+    parameters, loads, augmented = dict[str, Retuned](), dict[str, Estimated](), model
+    try:
+        fit, estimate = first_figures(chain, line, nothing)
+        augmented = augmented_model(estimate, model, ())
+        parameters, loads = retuned_parameters(estimate, line, False), load_torques(estimate, line)
+    except TimeIsUp:  # the whole limit, after which another program simulates no more
+        fit = figures_without(chain, line, nothing)
+    tried = set() if search is None else {*search.rivals, *search.implausible}
+    untried = tuple(name for name in names if name not in tried)
+    simulations = 0 if search is None else search.simulations
+    effort = Effort(level, simulations, False, untried, len(names), work.limit_s)
+    untestable = untestable_effects(blind)
+    context = Context(untestable=untestable, can_be_retuned=can_be_retuned(line))
+    return Diagnosis(
+        verdict=Verdict.UNEXPLAINED,
+        statement=statement(Verdict.UNEXPLAINED, fit, (), effort, context),
+        mismatch=Mismatch(True, None, {}, None, None, math.nan),
+        effects=(),
+        rejected=(),
+        untestable=untestable,
+        unnamed=None,
+        fit=fit,
+        parameters=parameters,
+        load_torque=loads,
+        timing_s={},
+        augmented=augmented,
+        traces=(),
+        effort=effort,
+    )
+
+
+def can_be_retuned(line: DrivelineModel) -> bool:
+    """Tell whether a parameter is fitted: of a plant simulated elsewhere those that it can be given."""
+    return line.plant is None or any(parameter.tolerance > 0.0 for parameter in line.parameters.values())
+
+
+def untestable_effects(blind: Mapping[str, Untestable]) -> tuple[UntestableEffect, ...]:
+    """Return the effects that the recordings can't tell, with the reason and a test that could."""
+    return tuple(UntestableEffect(n, u.reason, u.suggested_test, u.needs) for n, u in blind.items())
+
+
+def _values(trial: Trial, standing: Standing) -> Mapping[str, float]:
+    return trial.hypothesis.result.values_of(standing.name)
+
+
+def _errors(hypothesis: Hypothesis) -> list[FloatArray]:
+    """Return the free-run error per recording, 0 where a sample is missing."""
+    result = hypothesis.result.first_outputs()
+    return [
+        np.where(r.okay, r.output - out, 0.0) for r, out in zip(result.problem.records, result.outputs, strict=True)
+    ]
+
+
+def _band_hz(hypothesis: Hypothesis, noise: float) -> Interval | None:
+    errors = _errors(hypothesis)
+    return locate.band_hz(errors, [hypothesis.result.problem.records[0].sample_time_s] * len(errors), noise)
+
+
+def _place(told: Told) -> Element | None:
+    """Return where the mismatch is: of what is named, of values off their sheet, of all that is possible, of a law."""
+    decision, laws = told.decision, told.laws
+    if decision.verdict is not Verdict.UNEXPLAINED and (decision.judged.named or decision.acquired):
+        names = [each.name for each in decision.judged.named] + [each.name for each in decision.acquired]
+        return EFFECTS[names[0]].element
+    if decision.judged.off_nominal:
+        return decision.judged.off_nominal[0].element
+    possible = {EFFECTS[each.name].element for each in decision.judged.refinements}
+    if len(possible) == 1:
+        return possible.pop()
+    law = laws.alone if laws.left is None else laws.left
+    return None if law is None else law.element
+
+
+def _mismatch(told: Told) -> Mismatch:
+    judged, noise = told.decision.judged, told.decision.judged.noise
+    if told.decision.verdict is Verdict.NO_MISMATCH:
+        return Mismatch(False, None, {}, None, None, 1.0)
+    nothing = judged.nothing.hypothesis
+    result, element = nothing.result.first_outputs(), _place(told)
+    gained = max(nothing.score - judged.best.hypothesis.score, 0.0)
+    return Mismatch(
+        detected=True,
+        element=element,
+        time_s=locate.intervals(result, noise),
+        band_hz=_band_hz(nothing, noise),
+        region=None if element is None else locate.region(result, element, noise),
+        p_value=max(math.exp(-0.5 * gained), SMALLEST_P),
+    )
+
+
+def _discrepancy(told: Told) -> Discrepancy:
+    """Return the mismatch as the report draws it."""
+    judged = told.decision.judged
+    nothing, believed = of_first_outputs(judged.nothing.hypothesis), judged.believed.hypothesis.result.first_outputs()
+    motion, searches = told.search.model.motion, told.laws.searches
+    return discrepancy(
+        nothing.result, believed, judged.noise, motion, rounds=1, initial=searches, whitening=nothing.filter
+    )
+
+
+def _remainder(told: Told) -> Remainder | None:
+    judged, law = told.decision.judged, told.laws.left
+    if not judged.failed:
+        return None
+    noise, left, failed = judged.noise, judged.believed.rms, tests_in_words(judged.failed)
+    return Remainder(
+        share=min(max(left**2 - noise**2, 0.0) / judged.nothing.rms**2, 1.0),
+        times_noise=left / noise,
+        element=None if law is None else law.element,
+        band_hz=_band_hz(judged.believed.hypothesis, noise),
+        law=failed if law is None else law_in_words(law.element, law.terms),
+        tests=failed,
+    )
+
+
+def _unnamed(told: Told) -> UnnamedLaw | None:
+    law, decision = told.laws.alone, told.decision
+    if decision.verdict is not Verdict.UNEXPLAINED or law is None:
+        return None
+    return UnnamedLaw(law.element, law.terms, decision.figures.retuned, law.rms)
+
+
+def _rejected(told: Told) -> tuple[RejectedEffect, ...]:
+    """Return the rivals that lost, the nearest first, each with what was done and by how much it is worse.
+
+    ``delta_bic`` is by how much the best set with a rival is less probable than the best of all: fitted, or as a score
+    test foresees it at most.
+    """
+    search, judged = told.search, told.decision.judged
+    best = judged.believed.hypothesis.score
+    standings = (*judged.named, *judged.traces, *judged.refinements)
+    known = {each.name for each in standings} | {other for each in standings for other in each.alike}
+    known |= {each.name for each in told.decision.acquired} | {*told.effort.untried}
+    found = {each.name: RejectedEffect(each.name, each.objection, 0.0) for each in judged.refinements}
+    for scores, reason in (
+        (_fitted(search), "fitted: the best set with it is {} in minus twice the log-probability"),
+        (
+            search.implausible,
+            "fitted, and ended at values that are no case of it: {} in minus twice the log-probability",
+        ),
+        (search.foreseen, "not fitted: a score test foresees that on top of what was found it makes that {} at best"),
+    ):
+        for name, score in sorted(scores.items(), key=lambda item: item[::-1]):  # not as cores came to their end
+            if name not in found and name not in known:
+                worse = _simulates_worse(name, judged.tried.values(), judged.believed)
+                text = worse if worse and score < best else reason.format(_compared(score - best))
+                found[name] = RejectedEffect(name, text, min(best - score, 0.0))
+    return tuple(sorted(found.values(), key=lambda each: -each.delta_bic))
+
+
+def _simulates_worse(name: str, tried: Iterable[Trial], believed: Trial) -> str:
+    """Say that the best set with an effect was tried and simulates worse; "" where none was."""
+    holding = [each for each in tried if name in each.effects]
+    if not holding:
+        return ""
+    best = min(holding, key=lambda each: each.rms)
+    return (
+        f"tried: it leaves {best.rms:.3g} on samples not used for the fit, with {best.size} effects; what is told "
+        f"leaves {believed.rms:.3g} with {believed.size}"
+    )
+
+
+def _fitted(search: Search) -> dict[str, float]:
+    """Return the best score of a set with each effect that was fitted, to its end or a few steps."""
+    scores = dict(search.rivals)
+    for effects, each in search.visited.items():
+        for name in effects if search.is_plausible(each) else ():
+            scores[name] = min(each.score, scores.get(name, math.inf))
+    return scores
+
+
+def _compared(worse: float) -> str:
+    """Say by how much a score is worse than that of the best set; as good where it differs by less than a tenth."""
+    if abs(worse) < 0.1:
+        return "as good as without"
+    return f"{'worse' if worse > 0.0 else 'better'} by {abs(worse):.3g}"

@@ -1,0 +1,68 @@
+"""What speaks for an effect: how much the simulation needs it, and how often a name of such a standing was right.
+
+The likelihood's odds of a second law next to a first one grow with what the first law's form leaves, without a bound,
+so no probability is computed from them. How sure a name is was counted: of names of such a necessity, in worlds that
+chose no threshold, so many were there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from estimator.diagnosis.inference.checks import THRESHOLDS
+from estimator.diagnosis.result import Counted
+
+LEAST_NECESSITY: float = THRESHOLDS["least_necessity"]
+"""Share of the squared error beyond the noise that must come back without a law for it to be named."""
+
+LEAST_EVIDENCE: float = THRESHOLDS["least_evidence"]
+"""Rise of minus twice the log-probability without a law from which the likelihood agrees that it is there."""
+
+LEAST_SHARE: float = THRESHOLDS["least_share"]
+"""Share of the re-tuned model's squared free-run error below which an effect is a trace (CONTRACT)."""
+
+CLEARLY_BELOW: float = THRESHOLDS["clearly_below"]
+"""RMS of the augmented model's error, over the spread of the signal, up to which anything is explained."""
+
+ALIKE_WITHIN: float = THRESHOLDS["alike_within"]
+"""Difference in score within which another effect in an effect's place is as good."""
+
+ALIKE_SHARE: float = THRESHOLDS["alike_share"]
+"""The same over what the effect itself explains: laws of nature are written in other forms than the model's."""
+
+
+@dataclass(frozen=True, slots=True)
+class Necessity:
+    """Which share of the squared error beyond the noise comes back without a law, on samples that no fit has seen."""
+
+    value: float
+    least: float  # lower end of its one-sided 95 % interval, by the scatter of the blocks
+
+
+COUNTED: Sequence[tuple[float, Counted]] = [
+    (row["necessity_from"], Counted(row["right"], row["of"])) for row in THRESHOLDS["counted"]
+]
+"""Of names whose necessity is at least so much (its lower end): the count. Rising; the last that holds is told."""
+
+
+@dataclass(frozen=True, slots=True)
+class Standing:
+    """What speaks for one effect of a set."""
+
+    name: str
+    necessity: Necessity
+    share: float  # of the re-tuned model's squared free-run error on unseen samples, that comes back without it
+    evidence: float  # by which the score rises without it
+    alike: Mapping[str, Mapping[str, float]]  # effects that explain as much in its place, with their values there
+    objection: str = ""  # why it is not established; "" where it is
+
+    @property
+    def counted(self) -> Counted:
+        """How many names of such a necessity were there."""
+        return next((count for least, count in reversed(COUNTED) if self.necessity.least >= least), COUNTED[0][1])
+
+    @property
+    def probability(self) -> float:
+        """Probability that this effect, or one that it can't be distinguished from, is there."""
+        return self.counted.probability
