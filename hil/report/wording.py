@@ -102,7 +102,7 @@ def counted_in_words(counted: Counted) -> str:
 
 
 def belief(effect: FoundEffect) -> str:
-    """Say how much the simulation needs an effect and how often such names were right; "" where it was not judged so."""
+    """Say how much the simulation needs an effect, and how often such names were right; "" where that was not asked."""
     if effect.counted is None:
         return ""
     of_which = ", it or a look-alike" if effect.indistinguishable_from else ""
