@@ -9,6 +9,7 @@ from types import MappingProxyType
 import numpy as np
 
 from estimator.physics.catalogue import EFFECTS
+from estimator.physics.curve import span
 from estimator.physics.driveline import Case, Start
 from estimator.physics.fit import FitResult, fit
 from estimator.physics.layout import LOAD, Grid, slot
@@ -16,11 +17,14 @@ from estimator.physics.model import DrivelineModel
 from estimator.physics.own_scan import Projector, cells, scan, waves
 from estimator.physics.problem import Problem, case_of, make_problem, start_of, start_vector
 from estimator.physics.simulate import simulate_each
+from estimator.physics.tables import COUNT, PREFIX, TABLES
 from estimator.physics.unknowns import own_unknowns
 from estimator.signals.record import BoolArray, FloatArray, Record, separated_outputs
 
 Own = Mapping[tuple[str, str], float]
 """Effect and parameter to a recording's own value."""
+
+ANGLE = f"{PREFIX}load_angle"
 
 NOTHING_KNOWN: Own = MappingProxyType({})
 
@@ -57,15 +61,32 @@ def settle(problem: Problem, known: Own = NOTHING_KNOWN) -> FitResult:
         for side in (-0.5, -0.25, 0.25, 0.5):
             starts.append(start.copy())
             starts[-1][twist] += side * gap_rad / problem.local[0].scale[twist]
+    starts = [turned for start in starts for turned in _turned(problem, start)]
     results = [fit(problem, x0) for x0 in starts]
     return min(results, key=lambda result: result.rms)
+
+
+TURNS = 8  # places of a period from which the phase of a curve over the angle is fitted
+
+
+def _turned(problem: Problem, x: FloatArray) -> list[FloatArray]:
+    """Return starts all around where a curve over the angle may begin in a recording; the one given without one."""
+    basis = problem.local[0]
+    row = next((i for i, own in enumerate(basis.own, basis.own_rows.start) if own.effect == ANGLE), None)
+    if row is None:
+        return [x]
+    first, end = span(problem.p, slot(ANGLE, COUNT))
+    starts = [x.copy() for _ in range(TURNS)]
+    for i, start in enumerate(starts):
+        start[row] = i * (end - first) / TURNS
+    return starts
 
 
 def _with_own(problem: Problem, known: Own) -> FloatArray:
     """Return a start with phases and moments found by a scan around the fit without their effects."""
     basis, record, use = problem.local[0], problem.records[0], problem.use[0]
     sought = {u.effect for u in basis.own if EFFECTS[u.effect].event or EFFECTS[u.effect].phases}
-    names = sorted(sought - {effect for effect, _ in known})
+    names = sorted(sought - {effect for effect, _ in known} - {*TABLES})
     sizes = {name: _sizes(problem.p, name) for name in names}
     silent = problem.p.copy()
     for name in names:
