@@ -53,7 +53,7 @@ def shortest_formula(table: Table, slope: float) -> str:
         fits = []
         for names in combinations(TERMS, count):
             columns = np.column_stack([TERMS[name](x) for name in names])
-            found = np.linalg.lstsq(columns / room[:, None], total / room, rcond=1e-9)[0]
+            found: FloatArray = np.linalg.lstsq(columns / room[:, None], total / room, rcond=1e-9)[0].astype(np.float64)
             worst = float(np.max(np.abs(columns @ found - total) / room))
             if worst <= 1.0:
                 fits.append((worst, names, found))
@@ -111,7 +111,7 @@ def _limited(limit: float, total: FloatArray, x: FloatArray) -> Function:
 
 def _drag(x: FloatArray, total: FloatArray, room: FloatArray) -> str:
     """Return the same of a torque against a speed."""
-    known = {
+    known: dict[str, Function] = {
         "dry friction": np.sign,
         "a drag with the square of the speed": TERMS["x |x|"],
         "viscous friction": TERMS["x"],

@@ -1,8 +1,9 @@
 """Laws without a name as tables: at each place the curve with which the free run fits best, if any is better.
 
-A curve's unknowns are the slopes between its knots, which are laid by the data. A fit from a straight curve stays where
-the law bends strongly, a gap or a freewheel: so each place is begun from several shapes, under an observer whose gain is
-let down to 0 (``layout.OBSERVER``): with a large one every sample is a fresh start and no simulation runs away.
+A curve's unknowns are the slopes between its knots, which are laid by the data. A fit from a straight curve stays near
+it where the law bends strongly, as a gap or a freewheel does: so each place is begun from several shapes, under an
+observer whose gain is let down to 0 (``layout.OBSERVER``). With a large one every sample is a fresh start, and no
+simulation runs away.
 
 The samples of each recording are cut into blocks: on some the curve is fitted, others choose its shape, its smoothness
 and its place, and the rest, which no choice has seen, say whether it is a law at all.
@@ -21,16 +22,14 @@ from estimator.diagnosis.table_words import looks_like, shortest_formula
 from estimator.physics.driveline import Structure
 from estimator.physics.fit import ITERATIONS, FitResult, fit
 from estimator.physics.free_run import simulate_foreign
-from estimator.physics.inputs import recorded_shaft_torque
 from estimator.physics.jacobian import jacobian_at
-from estimator.physics.kernel import state_vector
 from estimator.physics.layout import OBSERVER, slot
 from estimator.physics.least_squares import minimise
 from estimator.physics.model import DrivelineModel
 from estimator.physics.motion import torque_scale
 from estimator.physics.problem import Problem, bounds, case_of, outputs_at, residual_at
-from estimator.physics.simulate import simulate_each
-from estimator.physics.tables import COUNT, DAMPING, PLACES, PREFIX, Table
+from estimator.physics.table_signals import signal_of
+from estimator.physics.tables import COUNT, DAMPING, PREFIX, Table
 from estimator.physics.unknowns import Shared
 from estimator.signals.correlation import effective_samples
 from estimator.signals.record import BoolArray, FloatArray, Record
@@ -215,17 +214,10 @@ def _signals(place: str, result: FitResult, gain: float) -> list[FloatArray]:
     """Return what a curve is over in every recording, of a simulation that follows the readings a little."""
     problem, found = result.problem, []
     for first, *_ in problem.drives:
-        record, p = problem.records[first], result.p_of(first).copy()
-        if place == "torque":
-            found.append(recorded_shaft_torque(record, p))
-            continue
-        if problem.grid.structure is not Structure.JOINT:
-            p[slot("", OBSERVER)] = gain
-        case = replace(case_of(problem.local[first], result.p, result.local_of(first)), p=p)
-        states = {"shaft_twist": (state_vector.TWIST,), "load_speed": (state_vector.LOAD_SPEED,)}
-        states |= {"motor_speed": (state_vector.SPEED,), "shaft_rate": (state_vector.SPEED, state_vector.LOAD_SPEED)}
-        runs = [simulate_each(problem.grid, record, [case], state)[0] for state in states[place]]
-        found.append(runs[0] - runs[1] if len(runs) > 1 and problem.grid.structure is not Structure.JOINT else runs[0])
+        case = case_of(problem.local[first], result.p, result.local_of(first))
+        p = case.p.copy()
+        p[slot("", OBSERVER)] = gain
+        found.append(signal_of(place, problem.grid, problem.records[first], replace(case, p=p)))
     return found
 
 
@@ -343,17 +335,14 @@ def _best_curve(curve: Curve, retuned: FitResult, fitting: Masks, choosing: Mask
         for gain in GAINS[:SCOUTS]:
             z, squares = descent.fitted(z, gain, SMOOTHNESS[1], SCOUT_STEPS)
         scouts.append((squares, z))
-    best: Candidate | None = None
+    found: list[Candidate] = []
     for _, z in sorted(scouts, key=lambda each: each[0])[:CONTINUED]:
         for gain in GAINS[SCOUTS:]:
             z, _ = descent.fitted(z, gain, SMOOTHNESS[1], STEPS)
         for smooth in SMOOTHNESS:
             z, _ = descent.fitted(z, 0.0, smooth, STEPS)
-            error = descent.error(z, choosing)
-            if best is None or error < best.chosen_by:
-                best = Candidate(descent, z, smooth, error)
-    assert best is not None
-    return best
+            found.append(Candidate(descent, z, smooth, descent.error(z, choosing)))
+    return min(found, key=lambda each: each.chosen_by)
 
 
 def table_at(hypothesis: Hypothesis, place: str) -> Candidate | None:

@@ -17,6 +17,7 @@ from estimator.physics.model import DrivelineModel
 from estimator.physics.own_scan import Projector, cells, scan, waves
 from estimator.physics.problem import Problem, case_of, make_problem, start_of, start_vector
 from estimator.physics.simulate import simulate_each
+from estimator.physics.table_signals import beyond_knots
 from estimator.physics.tables import COUNT, PREFIX, TABLES
 from estimator.physics.unknowns import own_unknowns
 from estimator.signals.record import BoolArray, FloatArray, Record, separated_outputs
@@ -37,6 +38,7 @@ class FreeRun:
     rms: float  # RMS of its error over the good samples
     start: Start  # load torque and initial state that were estimated
     further: tuple[FloatArray, ...] = ()  # (N,)
+    beyond: tuple[str, ...] = ()  # sentences on curves of the model beyond whose knots it went
 
 
 def free_run(model: DrivelineModel, record: Record, known: Own = NOTHING_KNOWN) -> FreeRun:
@@ -49,7 +51,8 @@ def free_run(model: DrivelineModel, record: Record, known: Own = NOTHING_KNOWN) 
     case = case_of(problem.local[0], problem.p, result.x)
     views = separated_outputs([record], lambda _: 1.0)[1:]
     further = tuple(simulate_each(problem.grid, view, [case])[0] for view in views)
-    return FreeRun(result.outputs[0], result.rms, whole, further)
+    beyond = beyond_knots(model.effects, problem.grid, record, case, model.motion) if model.plant is None else ()
+    return FreeRun(result.outputs[0], result.rms, whole, further, beyond)
 
 
 def settle(problem: Problem, known: Own = NOTHING_KNOWN) -> FitResult:
