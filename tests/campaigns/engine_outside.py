@@ -1,8 +1,8 @@
 """Worlds of an engine of its own whose laws the catalogue has no entry for, one each.
 
 A freewheel, a clutch that slips, a stiffness with an even part, a branch that relaxes, a dead band, a limit of the
-torque's rate, a corrugated road, a hose and a belt with slip, each written as its trade writes it. Nothing of ``estimator``
-is read here. Bus, nominal model and tests are the proof's.
+torque's rate, a corrugated road, a hose and a belt with slip, each as its trade writes it. Nothing of ``estimator`` is
+read here. Bus, nominal model and tests are the proof's.
 """
 
 import math

@@ -292,10 +292,12 @@ def test_a_law_without_a_name_is_read_and_written_back(tmp_path: Path) -> None:
     model = read_model(write(tmp_path, TWO_MASS + CURVE)).model
     law = table_of("table_shaft_twist", model.effects["table_shaft_twist"])
     assert (law.place, law.knots[0], law.values[-1], law.damping) == ("shaft_twist", -0.04, 120.0, 1.5)
-    assert law.ci95 is not None and law.ci95[1] == (-43.0, -37.0)
+    assert law.ci95 is not None
+    assert law.ci95[1] == (-43.0, -37.0)
     again = tmp_path / "again.toml"
     write_model(again, model)
-    assert "[tables.shaft_twist]" in again.read_text() and "[effects" not in again.read_text()
+    assert "[tables.shaft_twist]" in again.read_text()
+    assert "[effects" not in again.read_text()
     assert read_model(again).model.effects == model.effects
 
 

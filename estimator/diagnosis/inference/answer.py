@@ -69,6 +69,7 @@ from estimator.diagnosis.result import (
     UntestableEffect,
     Verdict,
 )
+from estimator.diagnosis.table_answer import with_law
 from estimator.diagnosis.unnamed.search import ElementSearch
 from estimator.diagnosis.where import locate
 from estimator.diagnosis.where.discrepancy import discrepancy
@@ -164,7 +165,8 @@ def _decided(
     progress("simulating what was found", 0.9)
     unseen = Unseen(line, read_through(ready.holdout))
     runs = free_runs(seen.decision.nothing, seen.believed, not seen.failed, found.chain, unseen)
-    return _said(seen, runs, found.search, model, level)
+    diagnosis = _said(seen, runs, found.search, model, level)
+    return with_law(diagnosis, seen.believed, runs) if seen.failed else diagnosis
 
 
 @dataclass(frozen=True, slots=True)

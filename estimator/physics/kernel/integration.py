@@ -131,8 +131,8 @@ RADIANS_PER_STEP_OF_MODE = 0.6
 
 
 DECAY_PER_STEP, RADIANS_ON_CURVE = 1.0, 0.6
-"""Integration step over a curve's fastest decay and mode: fourth order is stable to 2.8, and its slope between knots may
-be more than that of a secant."""
+"""Integration step over a curve's fastest decay and mode: fourth order is stable to 2.8, and between knots a curve may
+be steeper than a secant."""
 
 
 @inlined
@@ -176,6 +176,14 @@ def leave_slope(k: int, slope: float, slopes: FloatArray) -> None:
     """Leave the slope before a sample where there is room for it."""
     if k < slopes.shape[1]:
         slopes[0, k] = slope
+
+
+@inlined
+def following(x: State, followed: FloatArray, k: int, seen: float, output: int, p: FloatArray) -> State:
+    """Return a state at sample k that an observer corrects by what its reading differs from what is ``seen``."""
+    if followed.shape[0] == 0:
+        return x
+    return corrected(x, p[slots.OBSERVER] * (followed[k] - seen), output)
 
 
 @inlined
@@ -229,7 +237,7 @@ def integrate_made(
     feed = feed_from(torque, start_s / sample_time_s, sample_time_s, p, h)
     low = low_pass(p[slots.FILTER], p[slots.FILTER_SHAPE], h)
     waving, filtering = is_waving(p), p[slots.FILTER] > 0.0
-    steep, following = slopes.shape[1] > 0, followed.shape[0] > 0
+    steep = slopes.shape[1] > 0
     slope = slope_before(first, slopes)
     output = outputs[0]
     linear = torque.shape[0] >= WORTHWHILE_SAMPLES and is_linear(line, p)
@@ -247,8 +255,7 @@ def integrate_made(
             value = read_out(line, now, x, outputs[i], p)
             out[i, k] = shown(reading(value, angle[k], p), filtered, p) if sensor and i == 0 else value
         leave_slope(k, slope, slopes)
-        if following:
-            x = corrected(x, p[slots.OBSERVER] * (followed[k] - out[0, k]), output)
+        x = following(x, followed, k, out[0, k], output, p)
         time_s = start_s + k * sample_time_s
         varying = waving or len(line.own) > 0 or is_changing(time_s - sample_time_s, time_s + sample_time_s, p)
         if not varying:
@@ -300,7 +307,7 @@ def integrate(
     out: FloatArray,
     slopes: FloatArray,
 ) -> None:
-    """Simulate samples ``first`` to ``last``, without this one; with the readings that are ``followed``, as an observer.
+    """Simulate samples ``first`` to ``last``, without this one; as an observer of the readings that are ``followed``.
 
     Column k of ``out`` is the states' entries before torque k acts.
     """
