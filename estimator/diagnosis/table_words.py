@@ -12,11 +12,14 @@ from estimator.physics.laws import beyond_gap
 from estimator.physics.tables import Table
 from estimator.signals.record import FloatArray
 
-WITHIN = 0.04
+WITHIN = 0.02
 """How far off its values a curve may be described, as a share of the torque it spans, where its band is narrower."""
 
-STARTS = np.array([0.02, 0.05, 0.1, 0.2, 0.4, 0.6, 0.8])
-"""Sizes that are tried, as shares of the knots' reach or of the torque."""
+SIZES = np.linspace(0.01, 0.9, 90)
+"""Halves of a dead band that are tried, as shares of the knots' reach."""
+
+AT_LIMIT, FEWEST_AT_LIMIT = 0.95, 3
+"""Share of the largest torque from which a knot is at a limit, and how many knots have to be."""
 
 Function = Callable[[FloatArray], FloatArray]
 
@@ -82,10 +85,10 @@ def looks_like(table: Table, slope: float) -> str:
         (f"a {what} that acts one way only", lambda x: np.maximum(x, 0.0)),
         (f"a {what} that acts one way only, backwards", lambda x: np.minimum(x, 0.0)),
     ]
-    for share in STARTS:
-        gap, limit = float(2.0 * share * reach), float(share * top)
-        shapes.append((f"a dead band of {gap:.3g} {unit}", _beyond(gap)))
-        shapes.append((f"a limit of {limit:.3g} Nm", _limited(limit, total, x)))
+    for half in (SIZES * reach).tolist():
+        shapes.append((f"a dead band of {2.0 * half:.3g} {unit}", _beyond(2.0 * half)))
+    if np.count_nonzero(np.abs(total) > AT_LIMIT * top) >= FEWEST_AT_LIMIT:
+        shapes.append((f"a limit of {top:.3g} Nm", _limited(top, total, x)))
     best, text = 1.0, ""
     for name, shape in shapes:
         column = shape(x)
@@ -104,7 +107,7 @@ def _beyond(gap: float) -> Function:
 
 
 def _limited(limit: float, total: FloatArray, x: FloatArray) -> Function:
-    near = np.abs(total) < limit
+    near = np.abs(total) < AT_LIMIT * limit
     steep = float(x[near] @ total[near]) / max(float(x[near] @ x[near]), 1e-300)
     return lambda x: np.clip(steep * x, -limit, limit)
 

@@ -29,8 +29,8 @@ def section(table: UnnamedTable, error_unit: str) -> html.Section:
 def _parts(table: UnnamedTable, error_unit: str) -> Iterator[object]:
     yield html.paragraph(
         f"At the {ELEMENTS[table.element]}: a torque over {table.over}. On samples that no fit has seen the error "
-        f"falls with it from {shown(table.rms_before, error_unit)} to {shown(table.rms_after, error_unit)}. It is in the "
-        "augmented model, next to what the line has there: a description, not a cause."
+        f"falls with it from {shown(table.rms_before, error_unit)} to {shown(table.rms_after, error_unit)}. It is in "
+        "the augmented model, next to what the line has there: a description, not a cause."
     )
     if table.looks_like:
         yield html.paragraph(f"It looks like {table.looks_like}.")
