@@ -8,9 +8,8 @@ where nothing holds it, not at all.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from types import MappingProxyType
 
 from estimator.physics.curve import MOST_KNOTS
@@ -146,37 +145,30 @@ TABLES: Mapping[str, Effect] = MappingProxyType({PREFIX + place: _entry(place, a
 """Effects that are a table, by name: the kernel has them, the catalogue, which names physics, does not."""
 
 
-Fault = tuple[str, str, object]
-"""Key, what was expected, what came."""
-
-
-def table_faults(table: Table) -> Iterator[Fault]:
-    """Yield what is wrong with a table."""
-    yield from _knot_faults(table)
-    yield from _value_faults(table)
-    if table.ci95 is not None and len(table.ci95) != len(table.values):
-        yield "ci95", f"an interval for each value, {len(table.values)}", len(table.ci95)
-    elif table.ci95 is not None and any(low > high for low, high in table.ci95):
-        yield "ci95", "the lower bound first in every interval", [list(each) for each in table.ci95]
+def table_faults(table: Table) -> Iterator[tuple[str, str, object]]:  # noqa: C901  # a fault each
+    """Yield what is wrong with a table: key, what was expected, what came."""
+    count, at = len(table.knots), PLACES[table.place]
+    fewest = FEWEST_KNOTS + at.periodic
+    if not fewest <= count <= MOST_KNOTS:
+        yield "knots", f"{fewest} to {MOST_KNOTS} knots", count
+    if not all(map(math.isfinite, table.knots)) or any(b <= a for a, b in _pairs(table.knots)):
+        yield "knots", "finite numbers, each larger than the one before", list(table.knots)
+    if len(table.values) != count:
+        yield "values", f"as many as knots, {count}", len(table.values)
+    elif not all(map(math.isfinite, table.values)):
+        yield "values", "finite numbers", list(table.values)
+    elif at.periodic and count and table.values[0] != table.values[-1]:
+        yield "values", f"the last one like the first, {table.values[0]:g}, since it repeats", table.values[-1]
+    if table.ci95 is not None:
+        if len(table.ci95) != len(table.values):
+            yield "ci95", f"an interval for each value, {len(table.values)}", len(table.ci95)
+        elif any(low > high for low, high in table.ci95):
+            yield "ci95", "the lower bound first in every interval", [list(each) for each in table.ci95]
     if not (math.isfinite(table.damping) and table.damping >= 0.0):
         yield "damping", "a finite number, 0 or greater", table.damping
     if table.damping and table.place != "shaft_twist":
         yield "damping", "none but over shaft_twist", table.damping
 
 
-def _knot_faults(table: Table) -> Iterator[Fault]:
-    fewest = FEWEST_KNOTS + PLACES[table.place].periodic
-    if not fewest <= len(table.knots) <= MOST_KNOTS:
-        yield "knots", f"{fewest} to {MOST_KNOTS} knots", len(table.knots)
-    if not all(map(math.isfinite, table.knots)) or any(b <= a for a, b in pairwise(table.knots)):
-        yield "knots", "finite numbers, each larger than the one before", list(table.knots)
-
-
-def _value_faults(table: Table) -> Iterator[Fault]:
-    values = table.values
-    if len(values) != len(table.knots):
-        yield "values", f"as many as knots, {len(table.knots)}", len(values)
-    elif not all(map(math.isfinite, values)):
-        yield "values", "finite numbers", list(values)
-    elif PLACES[table.place].periodic and values and values[0] != values[-1]:
-        yield "values", f"the last one like the first, {values[0]:g}, since it repeats", values[-1]
+def _pairs(values: Sequence[float]) -> list[tuple[float, float]]:
+    return list(zip(values[:-1], values[1:], strict=True))  # noqa: RUF007

@@ -26,7 +26,7 @@ class Line(NamedTuple):
     """What a line is made of."""
 
     masses: int  # 1, 2 or 3
-    elastic: bool  # whether the first shaft is a spring and a damper, and no law next to them, nor a curve at its ends
+    elastic: bool  # whether the first shaft is a spring and a damper, and no law next to them
     sliding: bool  # whether there may be a slider inside that shaft
     extended: bool  # whether it has states beyond those of its masses and a slider
     own: tuple[Any, ...]
@@ -34,12 +34,11 @@ class Line(NamedTuple):
 
 @inlined
 def is_elastic(p: FloatArray) -> bool:
-    """Tell whether the first shaft is a spring and a damper, and no law next to them, nor a curve at its ends."""
+    """Tell whether the first shaft is a spring and a damper, and no law next to them."""
     bent = p[slots.GAP] > 0.0 or p[slots.HARDENING] != 0.0 or p[slots.STAGE] != 0.0
     sliding = p[slots.SLIDER] != 0.0 or p[slots.SLIDER_INSIDE] > 0.0
     jointed = p[slots.CARDAN] != 0.0 or p[slots.CARDAN_ANGLE] != 0.0 or p[slots.CARDAN_SHARE] != 0.0
     tabled = p[slots.TABLE_TWIST] > 0.0 or p[slots.TABLE_RATE] > 0.0
-    tabled = tabled or p[slots.TABLE_MOTOR_SPEED] > 0.0 or p[slots.TABLE_LOAD_SPEED] > 0.0
     return not (bent or sliding or jointed or tabled)
 
 

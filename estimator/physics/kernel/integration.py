@@ -179,14 +179,6 @@ def leave_slope(k: int, slope: float, slopes: FloatArray) -> None:
 
 
 @inlined
-def following(x: State, followed: FloatArray, k: int, seen: float, output: int, p: FloatArray) -> State:
-    """Return a state at sample k that an observer corrects by what its reading differs from what is ``seen``."""
-    if followed.shape[0] == 0:
-        return x
-    return corrected(x, p[slots.OBSERVER] * (followed[k] - seen), output)
-
-
-@inlined
 def rubbed_on(
     line: Line,
     summing: bool,
@@ -211,7 +203,7 @@ def rubbed_on(
 
 
 @inlined
-def integrate_made(
+def integrate_made(  # noqa: C901  # one question more than usual, and a change costs each user a minute
     line: Line,
     sample_time_s: float,
     substeps: int,
@@ -237,7 +229,7 @@ def integrate_made(
     feed = feed_from(torque, start_s / sample_time_s, sample_time_s, p, h)
     low = low_pass(p[slots.FILTER], p[slots.FILTER_SHAPE], h)
     waving, filtering = is_waving(p), p[slots.FILTER] > 0.0
-    steep = slopes.shape[1] > 0
+    steep, following = slopes.shape[1] > 0, followed.shape[0] > 0
     slope = slope_before(first, slopes)
     output = outputs[0]
     linear = torque.shape[0] >= WORTHWHILE_SAMPLES and is_linear(line, p)
@@ -255,7 +247,8 @@ def integrate_made(
             value = read_out(line, now, x, outputs[i], p)
             out[i, k] = shown(reading(value, angle[k], p), filtered, p) if sensor and i == 0 else value
         leave_slope(k, slope, slopes)
-        x = following(x, followed, k, out[0, k], output, p)
+        if following:
+            x = corrected(x, p[slots.OBSERVER] * (followed[k] - out[0, k]), output)
         time_s = start_s + k * sample_time_s
         varying = waving or len(line.own) > 0 or is_changing(time_s - sample_time_s, time_s + sample_time_s, p)
         if not varying:

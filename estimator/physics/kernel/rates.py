@@ -66,6 +66,8 @@ def motor_friction(speed: float, p: FloatArray, width: float, dry: float) -> flo
     """Return the torque of every friction law at the motor [Nm], viscous included; the dry ones where there are any."""
     friction = float(p[slots.B_M]) * speed
     friction += motor_drag(speed, p)
+    if some(p[slots.TABLE_MOTOR_SPEED] > 0.0):
+        friction += curve(speed, p, slots.TABLE_MOTOR_SPEED, False)[0]
     if every(dry == 0.0):
         return friction
     coulomb, excess = p[slots.STRIBECK_COULOMB], p[slots.STRIBECK]
@@ -147,7 +149,6 @@ def rates(line: Line, now: Conditions, x: State, p: FloatArray) -> State:
     """Return the time derivative of the mechanical state under the conditions ``now``."""
     now = under_own(now, line, x, p)
     drive = now.torque - motor_friction(x.speed, p, now.width_motor, now.dry_motor)
-    drive -= unnamed_drag(line, x.speed, p, slots.TABLE_MOTOR_SPEED)
     if line.masses == 1:
         drag = load_friction(x.speed, x.speed, now, p) + now.load + held_by_angle(x.angle, p)
         branch = branch_rate(x.branch_twist, x.speed - x.branch_speed, now, p) if line.extended else 0.0
@@ -237,18 +238,10 @@ def dry_at_load(wheel: float, now: Conditions) -> float:
 @inlined
 def load_friction(wheel: float, vehicle: float, now: Conditions, p: FloatArray) -> float:
     """Return what slows the load down [Nm]: dry friction at the wheel, viscous and other drag at the vehicle."""
-    return dry_at_load(wheel, now) + now.viscous_load * vehicle + load_drag(vehicle, p)
-
-
-@inlined
-def unnamed_drag(line: Line, speed: float, p: FloatArray, at: int) -> float:
-    """Return the torque against a speed by the curve whose count stands at ``at`` [Nm]; 0 without one.
-
-    Of a line with a shaft that is a spring and a damper alone it is known, when it is compiled, that there is none.
-    """
-    if (line.masses > 1 and line.elastic) or every(p[at] <= 0.0):
-        return like(0.0, speed)
-    return like(curve(speed, p, at, False)[0], speed)
+    drag = dry_at_load(wheel, now) + now.viscous_load * vehicle + load_drag(vehicle, p)
+    if some(p[slots.TABLE_LOAD_SPEED] > 0.0):
+        drag += curve(vehicle, p, slots.TABLE_LOAD_SPEED, False)[0]
+    return drag
 
 
 @inlined
@@ -268,10 +261,8 @@ def load_rates(line: Line, pull: float, now: Conditions, x: State, p: FloatArray
     pull -= shaft_loss(pull, smooth_sign(wheel, now.width_load), p)
     load = now.load + held_by_angle(load_angle(line, x, p), p)
     if not line.extended or every(p[slots.SLIP] <= 0.0):
-        load += unnamed_drag(line, wheel, p, slots.TABLE_LOAD_SPEED)
         return (pull - load_friction(wheel, wheel, now, p) - load) * now.inverse_load, still, still
     vehicle = x.vehicle_speed
-    load += unnamed_drag(line, vehicle, p, slots.TABLE_LOAD_SPEED)
     tyre, slide, rate = now.tyre, wheel - vehicle, still
     inverse_wheel, inverse_vehicle = tyre.inverse_wheel, tyre.inverse_vehicle
     if every(p[slots.RELAXATION] > 0.0):

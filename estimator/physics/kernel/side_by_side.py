@@ -22,16 +22,7 @@ from estimator.physics.kernel.conditions import (
     rubbed,
     with_torques,
 )
-from estimator.physics.kernel.integration import (
-    Masses,
-    call_specialised,
-    fed,
-    feed_from,
-    following,
-    integrate,
-    is_late,
-    with_mode,
-)
+from estimator.physics.kernel.integration import Masses, call_specialised, fed, feed_from, integrate, is_late, with_mode
 from estimator.physics.kernel.linear import is_linear
 from estimator.physics.kernel.rates import read_out, stepped
 from estimator.physics.kernel.sensing import reading, shown, smoothed
@@ -43,6 +34,7 @@ from estimator.physics.kernel.state_vector import (
     LAG_RISE,
     LAGGED,
     Bristles,
+    corrected,
     unpacked,
 )
 from estimator.physics.layout import slot
@@ -196,7 +188,7 @@ def advance(
     h = sample_time_s / substeps
     length = 1.0 / substeps
     waving = is_waving(one_of_them)
-    samples, output = load_lanes.shape[0], outputs[0]
+    samples, output, following = load_lanes.shape[0], outputs[0], followed.shape[0] > 0
     parts = torque_lanes.shape[0] // samples
     x = unpacked(start)
     bristled, bristles = is_bristled(one_of_them), Bristles(start[BRISTLES_MOTOR], start[BRISTLES_LOAD])
@@ -207,7 +199,8 @@ def advance(
         for i in range(outputs.shape[0]):
             seen = filtered if filtering and i == 0 else read_out(line, now, x, outputs[i], p)
             out[k * outputs.shape[0] + i] = seen
-        x = following(x, followed, k, out[k * outputs.shape[0]], output, p)
+        if following:
+            x = corrected(x, p[slots.OBSERVER] * (followed[k] - out[k * outputs.shape[0]]), output)
         turn = angle[k + 1] - angle[k] if k + 1 < angle.shape[0] else angle[k] - angle[k - 1]
         time_s = start_s + k * sample_time_s
         varying = waving or is_changing(time_s - sample_time_s, time_s + sample_time_s, p)
