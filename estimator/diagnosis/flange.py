@@ -90,6 +90,7 @@ class Flange:
             np.full(2, drive),
             np.zeros(2),
             np.array([angle, angle + speed * step_s]),
+            np.zeros(0),
             self._p,
             self._state,
             np.array([state_vector.SPEED]),

@@ -204,6 +204,27 @@ class UnnamedLaw:
 
 
 @dataclass(frozen=True, slots=True)
+class UnnamedTable:
+    """A law without a name that is in the augmented model: a torque over one quantity, a curve through knots."""
+
+    place: str  # key of the model file's ``[tables]``
+    element: Element
+    over: str  # what it is a function of, in words, and its unit
+    unit: str
+    torque_unit: str
+    knots: tuple[float, ...]
+    values: tuple[float, ...]  # at the knots, and their 95 % intervals
+    ci95: tuple[Interval, ...]
+    reached: Interval  # where the recordings were: beyond, the curve is a guess
+    rms_before: float  # free-run error on samples that no fit has seen, without it and with it [unit of the output]
+    rms_after: float
+    looks_like: str  # known law within the band, the end of a sentence; "" where none is
+    formula: str  # shortest one within the band; "" without one
+    rival: str  # what a curve over which explains nearly as much
+    not_carried: tuple[str, ...]  # recordings on which the error does not fall
+
+
+@dataclass(frozen=True, slots=True)
 class OutputFit:
     """RMS of the free-run error of a further measured output, in ``unit``, and the noise of its reading."""
 
@@ -397,4 +418,5 @@ class Diagnosis:
     remainder: Remainder | None = None
     slight: tuple[Slight, ...] = ()
     refinements: tuple[Refinement, ...] = ()
+    table: UnnamedTable | None = None
     effort: Effort = field(default_factory=Effort)

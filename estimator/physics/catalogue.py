@@ -11,6 +11,7 @@ from estimator.physics.driveline import EffectValue, Structure
 from estimator.physics.effect import Effect
 from estimator.physics.effects import drag, dry_friction, inertia, load, sensor, shaft, timing, torque
 from estimator.physics.own_law import LawName
+from estimator.physics.tables import PREFIX, TABLES, table_faults, table_of
 
 _ENTRIES = (
     torque.INVERTER_GAIN_MISMATCH,
@@ -75,11 +76,15 @@ BUILT_IN: Mapping[str, Effect] = MappingProxyType(_mutual(_ENTRIES))
 """The entries that the kernel has."""
 
 
+KERNEL: Mapping[str, Effect] = MappingProxyType({**BUILT_IN, **TABLES})
+"""All that the kernel has a place for: the catalogue, and the laws without a name."""
+
+
 class _Effects(Mapping[str, Effect]):
-    """The catalogue, in which the name of a user's own law finds its law, too."""
+    """The catalogue, in which the names of a user's own law and of a table find their law, too."""
 
     def __getitem__(self, name: str) -> Effect:
-        return name.entry if isinstance(name, LawName) else BUILT_IN[name]
+        return name.entry if isinstance(name, LawName) else KERNEL[name]
 
     def __iter__(self) -> Iterator[str]:
         return iter(BUILT_IN)
@@ -97,6 +102,8 @@ def effect_problems(
 ) -> list[str]:
     """Return what is wrong with an effect of a model that has these laws of its own, one line per fault."""
     entry = EFFECTS.get(name)
+    if name in TABLES:
+        return _table_problems(name, values, structure)
     if entry is None:
         return [f"effects.{name}: unknown effect, expected one of {', '.join([*EFFECTS, *laws])}"]
     problems = []
@@ -132,3 +139,13 @@ def _limit_problems(entry: Effect, values: Mapping[str, EffectValue]) -> list[st
         if too_small or value > parameter.most:
             problems.append(f"effects.{entry.name}.{parameter.name}.value: expected a number {allowed}, got {value}")
     return problems
+
+
+def _table_problems(name: str, values: Mapping[str, EffectValue], structure: Structure) -> list[str]:
+    where, entry = f"tables.{name.removeprefix(PREFIX)}", TABLES[name]
+    problems = []
+    if structure not in entry.structures:
+        fits = ", ".join(sorted(each.value for each in entry.structures))
+        problems.append(f"{where}: makes no sense in {structure.value}, expected {fits}")
+    faults = table_faults(table_of(name, values))
+    return problems + [f"{where}.{key}: expected {expected}, got {got}" for key, expected, got in faults]

@@ -9,6 +9,7 @@ from types import MappingProxyType
 import numpy as np
 
 from estimator.physics.catalogue import EFFECTS
+from estimator.physics.curve import span
 from estimator.physics.driveline import Case, Start
 from estimator.physics.fit import FitResult, fit
 from estimator.physics.layout import LOAD, Grid, slot
@@ -16,11 +17,15 @@ from estimator.physics.model import DrivelineModel
 from estimator.physics.own_scan import Projector, cells, scan, waves
 from estimator.physics.problem import Problem, case_of, make_problem, start_of, start_vector
 from estimator.physics.simulate import simulate_each
+from estimator.physics.table_signals import beyond_knots
+from estimator.physics.tables import COUNT, PREFIX, TABLES
 from estimator.physics.unknowns import own_unknowns
 from estimator.signals.record import BoolArray, FloatArray, Record, separated_outputs
 
 Own = Mapping[tuple[str, str], float]
 """Effect and parameter to a recording's own value."""
+
+ANGLE = f"{PREFIX}load_angle"
 
 NOTHING_KNOWN: Own = MappingProxyType({})
 
@@ -33,6 +38,7 @@ class FreeRun:
     rms: float  # RMS of its error over the good samples
     start: Start  # load torque and initial state that were estimated
     further: tuple[FloatArray, ...] = ()  # (N,)
+    beyond: tuple[str, ...] = ()  # sentences on curves of the model beyond whose knots it went
 
 
 def free_run(model: DrivelineModel, record: Record, known: Own = NOTHING_KNOWN) -> FreeRun:
@@ -45,7 +51,8 @@ def free_run(model: DrivelineModel, record: Record, known: Own = NOTHING_KNOWN) 
     case = case_of(problem.local[0], problem.p, result.x)
     views = separated_outputs([record], lambda _: 1.0)[1:]
     further = tuple(simulate_each(problem.grid, view, [case])[0] for view in views)
-    return FreeRun(result.outputs[0], result.rms, whole, further)
+    beyond = beyond_knots(model.effects, problem.grid, record, case, model.motion) if model.plant is None else ()
+    return FreeRun(result.outputs[0], result.rms, whole, further, beyond)
 
 
 def settle(problem: Problem, known: Own = NOTHING_KNOWN) -> FitResult:
@@ -57,15 +64,32 @@ def settle(problem: Problem, known: Own = NOTHING_KNOWN) -> FitResult:
         for side in (-0.5, -0.25, 0.25, 0.5):
             starts.append(start.copy())
             starts[-1][twist] += side * gap_rad / problem.local[0].scale[twist]
+    starts = [turned for start in starts for turned in _turned(problem, start)]
     results = [fit(problem, x0) for x0 in starts]
     return min(results, key=lambda result: result.rms)
+
+
+TURNS = 8  # places of a period from which the phase of a curve over the angle is fitted
+
+
+def _turned(problem: Problem, x: FloatArray) -> list[FloatArray]:
+    """Return starts all around where a curve over the angle may begin in a recording; the one given without one."""
+    basis = problem.local[0]
+    row = next((i for i, own in enumerate(basis.own, basis.own_rows.start) if own.effect == ANGLE), None)
+    if row is None:
+        return [x]
+    first, end = span(problem.p, slot(ANGLE, COUNT))
+    starts = [x.copy() for _ in range(TURNS)]
+    for i, start in enumerate(starts):
+        start[row] = i * (end - first) / TURNS
+    return starts
 
 
 def _with_own(problem: Problem, known: Own) -> FloatArray:
     """Return a start with phases and moments found by a scan around the fit without their effects."""
     basis, record, use = problem.local[0], problem.records[0], problem.use[0]
     sought = {u.effect for u in basis.own if EFFECTS[u.effect].event or EFFECTS[u.effect].phases}
-    names = sorted(sought - {effect for effect, _ in known})
+    names = sorted(sought - {effect for effect, _ in known} - {*TABLES})
     sizes = {name: _sizes(problem.p, name) for name in names}
     silent = problem.p.copy()
     for name in names:

@@ -11,6 +11,7 @@ import numpy as np
 
 from estimator.compiled import compiled, inlined
 from estimator.physics.catalogue import BUILT_IN
+from estimator.physics.curve import MOST_KNOTS, VALUES, curve_over
 from estimator.physics.driveline import Case, Start
 from estimator.physics.effect import Place
 from estimator.physics.effects.torque import EDGE
@@ -36,7 +37,8 @@ DECLARED = [
 """Laws of entries at this place, where their parameters are, and at which value of the first they do nothing."""
 
 _WRITTEN = [_GAIN_M1, _GAIN_M2, _LIMIT_M1, _LIMIT_M2, _SHARPNESS, _LIMIT_SUM, _DEPTH, _DERATING_TIME, _HEATED]
-_PATH = np.array([*_WRITTEN, *(place for _, places, _ in DECLARED for place in places)])
+_TABLE = range(slots.TABLE_TORQUE, slots.TABLE_TORQUE + VALUES + MOST_KNOTS)
+_PATH = np.array([*_WRITTEN, *(place for _, places, _ in DECLARED for place in places), *_TABLE])
 """Where all stands that ``shaft_torque`` depends on."""
 
 
@@ -96,6 +98,8 @@ def shaft_torque_from(
     for law, places, null in DECLARED:
         if p[places[0]] != null:
             total = law(total, since_start_s, *p[places])
+    if p[slots.TABLE_TORQUE] > 0.0:
+        total = total + curve_over(total, p, slots.TABLE_TORQUE)
     if p[_DEPTH] == 0.0:
         return total, 0.0
     warm = warmth(total, since_start_s, period_s, p, begun)

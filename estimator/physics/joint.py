@@ -10,6 +10,7 @@ import numpy as np
 
 from estimator.compiled import compiled
 from estimator.identification.modes.modes import Mode
+from estimator.physics.curve import curve
 from estimator.physics.effects.shaft import damping_share, loaded_twist, loading_rate
 from estimator.physics.kernel import slots, state_vector
 from estimator.physics.laws import beyond_gap, share_inside
@@ -190,7 +191,13 @@ def respond(
             share = min(max((inside - before) / moved, 0.0), 1.0) if moved != 0.0 else 0.0
             share *= damping_share(inside, p[slots.CONTACT])
             share += p[slots.ACROSS] * (1.0 - share)
-        out[k] = carried(inside, loading, stiffness, preload, p) + share * p[slots.C] * rate[k]
+        damping = p[slots.C]
+        if p[slots.TABLE_TWIST] > 0.0:
+            slope = curve(inside, p, slots.TABLE_TWIST, False)[1]
+            damping = damping * max(1.0 + slope / p[slots.K], 0.0) + p[slots.TABLE_DAMPING]
+        out[k] = carried(inside, loading, stiffness, preload, p) + share * damping * rate[k]
+        if p[slots.TABLE_RATE] > 0.0:
+            out[k] += curve(rate[k], p, slots.TABLE_RATE, False)[0]
 
 
 @compiled
@@ -250,5 +257,7 @@ def carried(inside: float, loading: float, stiffness: float, preload: float, p: 
     """Return the torque of spring and slider, less the preload [Nm]."""
     if p[slots.SLIDER_INSIDE] > 0.0:
         stiffness = max(stiffness - float(p[slots.SLIDER_INSIDE] * p[slots.SLIDER] / p[slots.YIELD]), 0.0)
+    if p[slots.TABLE_TWIST] > 0.0:
+        preload = preload - curve(inside, p, slots.TABLE_TWIST, False)[0]
     law = p[slots.HARDENING], p[slots.SHAPE], p[slots.STAGE], p[slots.STAGE_FROM]
     return stiffness * loaded_twist(inside, *law) + float(p[slots.SLIDER]) * loading - preload

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from estimator.errors import BadModel
-from estimator.physics.catalogue import BUILT_IN
+from estimator.physics.catalogue import BUILT_IN, KERNEL
 from estimator.physics.model import DrivelineModel, Load, Plant, Structure, natural_frequencies_rad_s
 from estimator.physics.motion import reverses, speed_scale
 from estimator.physics.own_law import Forces, LawName, OwnLaw
@@ -108,7 +108,7 @@ NOMINAL = Structure.THREE_MASS.parameter_names
 _SLOTS: dict[tuple[str, str], int] = {}
 for _name in NOMINAL:
     _SLOTS["", _name] = len(_SLOTS)
-for _entry in BUILT_IN.values():
+for _entry in KERNEL.values():
     for _parameter in _entry.parameters:
         _SLOTS[_entry.name, _parameter.name] = len(_SLOTS)
 
@@ -117,6 +117,12 @@ LOAD = "load"
 kernel reads it (``inputs``)."""
 
 _SLOTS["", LOAD] = len(_SLOTS)
+
+OBSERVER = "observer"
+"""Name of the share of the reading's error by which each sample corrects a simulation that follows the reading: 0 of a
+free run, and of every model. A fit from afar begins with more and ends with none."""
+
+_SLOTS["", OBSERVER] = len(_SLOTS)
 
 SIZE = len(_SLOTS)  # length of the flat vector, without a user's own laws
 
@@ -138,7 +144,7 @@ def flat_values(
 ) -> FloatArray:
     """Return the same from plain values; ``laws`` are those of a user's own that the model has."""
     own: dict[str, LawName] = {name: name for name in laws}
-    entries = [*BUILT_IN.values(), *(name.entry for name in laws)]
+    entries = [*KERNEL.values(), *(name.entry for name in laws)]
     vector = np.zeros(SIZE + sum(len(name.places) for name in laws))
     for entry in entries:
         for parameter in entry.parameters:

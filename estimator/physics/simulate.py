@@ -19,7 +19,7 @@ from estimator.physics.inputs import initial_state, inputs_of, load_of, shaft_to
 from estimator.physics.kernel import integration, sensing, side_by_side, state_vector
 from estimator.physics.kernel import side_by_side as many
 from estimator.physics.kernel.integration import Masses
-from estimator.physics.layout import Grid, flat, slot, substeps_for
+from estimator.physics.layout import OBSERVER, Grid, flat, slot, substeps_for
 from estimator.physics.model import DrivelineModel, Structure
 from estimator.physics.motion import motor_angle
 from estimator.physics.own_law import FORCES
@@ -162,6 +162,7 @@ def _simulated(
         given.fed_by,
         given.loaded_by,
         _angle(record, given.p),
+        _followed(record, given.p),
         given.p,
         given.state,
         wanted,
@@ -206,6 +207,14 @@ def _angle(record: Record, p: FloatArray) -> FloatArray:
     return np.zeros(record.time_s.size)
 
 
+def _followed(record: Record, p: FloatArray) -> FloatArray:
+    """Return the reading that simulations follow as observers, shape (N,) in SI units; (0,) where none does."""
+    if not p[:, slot("", OBSERVER)].any():
+        return np.zeros(0)
+    good = np.flatnonzero(record.okay)
+    return np.interp(record.time_s, record.time_s[good], record.output[good]) * record.unit
+
+
 def _sampled_off_time(out: FloatArray, slopes: FloatArray, offset_s: FloatArray | None) -> FloatArray:
     """Return outputs (..., C, N) as they were when the samples were taken, off their time stamps [s]."""
     if offset_s is None or slopes.shape[-1] == 0:
@@ -240,7 +249,7 @@ def _misread(grid: Grid, record: Record, case: Case) -> FloatArray | float:
 TIMED = np.array([slot(e.name, e.parameters[0].name) for e in catalogue.BUILT_IN.values() if e.event or e.timed])
 """Sizes of the laws that depend on the time since a recording began."""
 
-PERIODIC = np.array([slot(e.name, size) for e in catalogue.BUILT_IN.values() for size in e.phases.values()])
+PERIODIC = np.array([slot(e.name, size) for e in catalogue.KERNEL.values() for size in e.phases.values()])
 """Amplitudes of the laws that are periodic in the motor's angle."""
 
 
@@ -286,7 +295,7 @@ def go_together(grid: Grid, drives: Sequence[Outputs], lines: Sequence[FloatArra
     if len({_make(outputs) for outputs in drives}) > 1 or any(is_steep(each) for outputs in drives for each in outputs):
         return False
     begin_alike = len({outputs[0].since_start_s[0] for outputs in drives}) == 1
-    if acts[PERIODIC].any() or not (begin_alike or not acts[TIMED].any()):
+    if acts[PERIODIC].any() or acts[slot("", OBSERVER)] or not (begin_alike or not acts[TIMED].any()):
         return False
     return side_by_side.go_side_by_side(MASSES[grid.structure], p, np.arange(len(lines)))
 
@@ -315,6 +324,7 @@ def simulate_together(grid: Grid, drives: Sequence[Outputs], of: Sequence[int], 
         given.fed_by,
         given.loaded_by,
         np.zeros(out.shape[-1]),
+        np.zeros(0),
         given.p,
         given.state,
         wanted,
@@ -392,6 +402,7 @@ class Stepper:
             self._torque,
             self._load,
             self._angle,
+            np.zeros(0),
             self._p,
             self._state,
             self._outputs,

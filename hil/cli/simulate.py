@@ -49,6 +49,8 @@ def simulate(
     asked = Asked(model, signals, mapped or (), Trust(trust_laws, trust_fmu))
     plant, record = simulated_by(asked, recording, dbc, tell)
     run = plant.run(record)
+    for sentence in run.beyond:
+        tell(sentence)
     column = simulated_column(record.kind, plant.motion)
     further = {f"{each.label}_sim": found for each, found in zip(record.channels, run.further, strict=True)}
     table = Table(out, {"time_s": record.time_s, column: run.output, **further})

@@ -20,8 +20,9 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from estimator.errors import BadModel
 from estimator.physics.model import DrivelineModel, EffectValue, Load, Motion, Parameter, Structure
 from estimator.physics.own_law import LawName
+from estimator.physics.tables import PLACES, PREFIX, TABLES, table_faults
 from hil.config.laws import LawTable, laws_of, moved
-from hil.config.model_tables import ModelDocument, Prepared, as_toml
+from hil.config.model_tables import ModelDocument, Prepared, TableEntry, as_toml
 from hil.errors import ModelFileError
 from hil.files import write_whole
 from hil.problems import problem_lines, read_toml
@@ -83,9 +84,11 @@ def read_model(path: Path | str, trust_laws: bool = False) -> ModelFile:
         laws = laws_of(path, {} if document is None else document.laws, trust_laws)
     except ModelFileError as error:
         problems += error.problems
+    laws_as_data, faults = _tables(content)
+    problems += faults
     known = {} if document is not None and trust_laws else _table(content.get("laws"))
     try:
-        model = _model(content, laws, without=known)
+        model = _model(content, laws, laws_as_data, without=known)
     except BadModel as error:
         problems += str(error).splitlines()
     if document is None or model is None or problems:
@@ -159,7 +162,10 @@ def write_model(
 
 
 def _model(
-    content: Mapping[str, Any], laws: tuple[LawName, ...], without: Collection[str] = ()
+    content: Mapping[str, Any],
+    laws: tuple[LawName, ...],
+    tables: Mapping[str, Mapping[str, EffectValue]],
+    without: Collection[str] = (),
 ) -> DrivelineModel | None:
     """Build the model from what is usable of a file's tables; None where not even the structure is known.
 
@@ -178,12 +184,36 @@ def _model(
         effects={
             name: {key: _effect_value(entry) for key, entry in _table(values).items()}
             for name, values in _table(content.get("effects")).items()
-            if name not in without
-        },
+            if name not in without and name not in TABLES
+        }
+        | dict(tables),
         gear_ratio=_number(content.get("geometry"), "gear_ratio", None),
         load=_load(content.get("load")),
         laws=laws,
     )
+
+
+def _tables(content: Mapping[str, Any]) -> tuple[dict[str, dict[str, EffectValue]], list[str]]:
+    """Return the laws without a name as effects, and a line for each fault of the others that no schema knows."""
+    found, problems = {}, []
+    for place, entry in _table(content.get("tables")).items():
+        if place not in PLACES:
+            problems.append(f"tables.{place} | expected one of {', '.join(PLACES)} | got {place!r}")
+            continue
+        try:
+            law = TableEntry.model_validate(entry).law(place)
+        except ValidationError:  # the document has said what is wrong with it
+            continue
+        faults = [f"tables.{place}.{key} | expected {expected} | got {got}" for key, expected, got in table_faults(law)]
+        problems += faults
+        if not faults:
+            found[law.name] = law.effect()
+    problems += [
+        f"effects.{name} | expected it as data | got an effect: write it as [tables.{name.removeprefix(PREFIX)}]"
+        for name in _table(content.get("effects"))
+        if name in TABLES
+    ]
+    return found, problems
 
 
 def _load(table: object) -> Load | float:

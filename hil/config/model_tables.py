@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Literal, Self
 
 import tomlkit
 from pydantic import BaseModel, ConfigDict, Field, model_validator
-from tomlkit.items import InlineTable, Table
+from tomlkit.items import Array, InlineTable, Table
 
-from estimator.physics.model import DrivelineModel, Load, Motion, Structure, parameter_unit
+from estimator.physics.model import DrivelineModel, Load, Motion, Structure, parameter_unit, unit
+from estimator.physics.tables import PLACES, TABLES, table_of
+from estimator.physics.tables import Table as LawAsTable
 from hil.config.laws import LawTable
 from hil.config.table import FileKind, schema_line
 from hil.problems import Fault, refuse
@@ -57,6 +59,23 @@ class _Load(_Strict):
     constant: Literal["own", "shared"] | float = "own"
 
 
+Bounds = Annotated[list[float], Field(min_length=2, max_length=2)]
+
+
+class TableEntry(_Strict):
+    """A law without a name, as data: its knots rise, and each has a value (``estimator.physics.tables``)."""
+
+    knots: list[float]
+    values: list[float]
+    ci95: list[Bounds] | None = None
+    damping: float = 0.0
+
+    def law(self, place: str) -> LawAsTable:
+        """Return it as the law at a place."""
+        bands = None if self.ci95 is None else tuple((low, high) for low, high in self.ci95)
+        return LawAsTable(place, tuple(self.knots), tuple(self.values), bands, self.damping)
+
+
 class PreparedRecording(_Strict):
     """A recording that was used."""
 
@@ -84,6 +103,7 @@ class ModelDocument(_Strict):
     geometry: _Geometry | None = None
     load: _Load | None = None
     effects: dict[str, dict[str, _EffectEntry]] = {}
+    tables: dict[str, TableEntry] = {}
     laws: dict[str, LawTable] = {}
     signals: SignalsConfig | None = None
     prepared: Prepared | None = None
@@ -111,8 +131,10 @@ def as_toml(
     if model.load is not Load.OWN:
         constant = model.load.value if isinstance(model.load, Load) else float(model.load)
         document["load"] = {"constant": constant}
-    if model.effects:
+    if {*model.effects} - {*TABLES}:
         document["effects"] = _effects_table(model)
+    if {*model.effects} & {*TABLES}:
+        document["tables"] = _law_tables(model)
     if laws:
         document["laws"] = _laws_table(laws)
     if signals is not None:
@@ -125,6 +147,8 @@ def as_toml(
 def _effects_table(model: DrivelineModel) -> Table:
     effects = tomlkit.table(is_super_table=True)
     for name, values in model.effects.items():
+        if name in TABLES:
+            continue
         effect = tomlkit.table()
         for key, value in values.items():
             entry: dict[str, Any] = {"value": float(value.value)}
@@ -135,6 +159,30 @@ def _effects_table(model: DrivelineModel) -> Table:
             effect[key] = _inline(entry)
         effects[name] = effect
     return effects
+
+
+def _law_tables(model: DrivelineModel) -> Table:
+    tables = tomlkit.table(is_super_table=True)
+    for name, values in model.effects.items():
+        if name not in TABLES:
+            continue
+        law = table_of(name, values)
+        at, table = PLACES[law.place], tomlkit.table()
+        table.comment(f"a law without a name, next to what the line has there: {at.sign}, over {at.over}")
+        table["knots"] = _row(law.knots).comment(unit(at.dimension, model.motion))
+        table["values"] = _row(law.values).comment(unit("torque", model.motion))
+        if law.ci95 is not None and all(math.isfinite(bound) for band in law.ci95 for bound in band):
+            table["ci95"] = _row(law.ci95)
+        if law.damping:
+            table["damping"] = tomlkit.item(float(law.damping)).comment(unit("damping", model.motion))
+        tables[law.place] = table
+    return tables
+
+
+def _row(values: Sequence[Any]) -> Array:
+    row = tomlkit.array()
+    row.extend([[*each] if isinstance(each, tuple) else float(each) for each in values])
+    return row
 
 
 def _laws_table(laws: Mapping[str, LawTable]) -> Table:

@@ -15,6 +15,8 @@ from estimator.damper import MOST_SENSITIVE, PARAMETERS, Damper, Demand, Loop, R
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Element
 from estimator.physics.model import DrivelineModel, Motion, Structure
+from estimator.physics.table_signals import slopes_of
+from estimator.physics.tables import table_of
 from estimator.signals.correlation import reading_lag
 from estimator.signals.prbs import prbs_nm
 from estimator.signals.record import FloatArray
@@ -34,6 +36,14 @@ Z95 = 1.96
 
 LINEAR = ("actuator_lag", "transport_delay", "torque_bias", "torque_ripple", "speed_quantisation")
 """Effects between torque and speed that the design takes into account, or that leave the loop as it is."""
+
+LINEARISED = {
+    "table_shaft_twist": "k",
+    "table_shaft_rate": "c",
+    "table_motor_speed": "b_M",
+    "table_load_speed": "b_L",
+}
+"""Curves whose slope is more of a parameter: from the least to the largest, each is a line that is possible."""
 
 BETWEEN = (Element.TORQUE_PATH, Element.SHAFT, Element.SPEED_SENSOR)
 
@@ -71,7 +81,7 @@ def region_of(path: Path, estimate: Path | None) -> tuple[Region, DrivelineModel
         got = f"{model.motion.value}, {model.structure.value}"
         raise ModelFileError(path, f"structure | expected a rotating two_mass line | got {got}")
     for name in model.effects:
-        if name not in LINEAR and EFFECTS[name].element in BETWEEN:
+        if name not in LINEAR and name not in LINEARISED and EFFECTS[name].element in BETWEEN:
             raise ModelFileError(path, f"effects.{name} | expected a line that is linear from torque to speed | got it")
     value = {name: parameter.value for name, parameter in model.parameters.items()}
     half = {name: abs(p.value) * p.tolerance for name, p in model.parameters.items()}
@@ -81,6 +91,10 @@ def region_of(path: Path, estimate: Path | None) -> tuple[Region, DrivelineModel
         value |= {name: one.value for name, one in known.items()}
         half |= {name: widened * one.half_width for name, one in known.items()}
     least, most = ({n: value[n] + sign * half[n] for n in PARAMETERS} for sign in (-1.0, 1.0))
+    for name in [each for each in LINEARISED if each in model.effects]:
+        slopes, of = slopes_of(table_of(name, model.effects[name])), LINEARISED[name]
+        value[of] += 0.5 * (min(slopes) + max(slopes))
+        least[of], most[of] = least[of] + min(slopes), most[of] + max(slopes)
     for name in PARAMETERS[:3]:
         if least[name] <= 0.0:
             raise UsageError(f"{estimate or path}: {name} is known too little, its region reaches {least[name]:.3g}.")

@@ -31,6 +31,7 @@ from estimator.physics.effect import Element
 from estimator.signals.record import FloatArray
 from hil.provenance import Provenance
 from hil.report import page as html
+from hil.report import table_figure
 from hil.report.discrepancy_figures import course_figure, error_spectrum_figure, law_figure, response_figure
 from hil.report.figures import (
     Line,
@@ -93,6 +94,7 @@ def diagnosis_page(diagnosis: Diagnosis, made: Provenance | None = None, one_in:
             ),
             html.section("Fit", _fit(diagnosis.fit), _further_outputs(diagnosis.fit)),
             _acquired(diagnosis),
+            None if diagnosis.table is None else table_figure.section(diagnosis.table, diagnosis.fit.unit),
             _found(diagnosis),
             _location(diagnosis, [trace for trace in drawn if not trace.holdout]),
             _frequency(diagnosis),

@@ -11,7 +11,16 @@ from __future__ import annotations
 import json
 from typing import Any
 
-from estimator.diagnosis.result import Diagnosis, Discrepancy, Fit, FoundEffect, RankedLaw, UnnamedLaw, UntestableEffect
+from estimator.diagnosis.result import (
+    Diagnosis,
+    Discrepancy,
+    Fit,
+    FoundEffect,
+    RankedLaw,
+    UnnamedLaw,
+    UnnamedTable,
+    UntestableEffect,
+)
 from hil.provenance import Provenance
 from hil.report.numbers import as_json, fields_as_json, json_number
 
@@ -44,6 +53,7 @@ def diagnosis_json(diagnosis: Diagnosis) -> Json:
         "remainder": None
         if remainder is None
         else fields_as_json(remainder, "share", "times_noise", "element", "band_hz", "law"),
+        "tables": {} if diagnosis.table is None else {diagnosis.table.place: _table(diagnosis.table)},
         "traces": as_json(diagnosis.slight),
         "refinements": as_json(diagnosis.refinements),
         "effort": fields_as_json(diagnosis.effort, "level", "simulations", "finished", "untried"),
@@ -73,6 +83,13 @@ def _unnamed(law: UnnamedLaw) -> Json:
         "terms": _terms(law),
         **fields_as_json(law, "rms_before", "rms_after"),
     }
+
+
+def _table(table: UnnamedTable) -> Json:
+    return fields_as_json(
+        table, "element", "over", "unit", "knots", "values", "ci95", "reached", "rms_before", "rms_after",
+        "looks_like", "formula", "rival", "not_carried",
+    )  # fmt: skip
 
 
 def _terms(law: UnnamedLaw | RankedLaw) -> list[Json]:

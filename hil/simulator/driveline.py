@@ -106,6 +106,7 @@ class DrivelinePlant(Stepper):
             np.append(self._torque[1:], self._torque[-1]),
             self._load,
             self._angle,
+            np.zeros(0),
             self._p,
             self._state.copy(),
             np.array([output_state(_recording_of(kind, at), self._structure)]),

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.model import DrivelineModel, EffectValue, Load, Motion, Parameter, Structure
+from estimator.physics.tables import table_of
 from estimator.signals.record import Location, OutputKind
 from hil.config.model_file import read_model, read_model_for_recordings, write_model
 from hil.errors import ModelFileError
@@ -276,3 +277,57 @@ def test_a_tolerance_of_an_effect_is_a_share_below_one(tmp_path: Path, tolerance
     (tmp_path / "m.toml").write_text(text)
     with pytest.raises(ModelFileError, match=r"coulomb_friction_motor\.friction_nm\.tolerance"):
         read_model(tmp_path / "m.toml")
+
+
+CURVE = """
+[tables.shaft_twist]
+knots = [-0.04, -0.02, 0.0, 0.02, 0.04]
+values = [-120.0, -40.0, 0.0, 40.0, 120.0]
+ci95 = [[-124.0, -116.0], [-43.0, -37.0], [-2.0, 2.0], [37.0, 43.0], [116.0, 124.0]]
+damping = 1.5
+"""
+
+
+def test_a_law_without_a_name_is_read_and_written_back(tmp_path: Path) -> None:
+    model = read_model(write(tmp_path, TWO_MASS + CURVE)).model
+    law = table_of("table_shaft_twist", model.effects["table_shaft_twist"])
+    assert (law.place, law.knots[0], law.values[-1], law.damping) == ("shaft_twist", -0.04, 120.0, 1.5)
+    assert law.ci95 is not None
+    assert law.ci95[1] == (-43.0, -37.0)
+    again = tmp_path / "again.toml"
+    write_model(again, model)
+    assert "[tables.shaft_twist]" in again.read_text()
+    assert "[effects" not in again.read_text()
+    assert read_model(again).model.effects == model.effects
+
+
+def test_tables_that_are_no_curves_are_refused_with_every_fault(tmp_path: Path) -> None:
+    tables = """
+[tables.shaft_twist]
+knots = [0.0, -0.01, 0.02]
+values = [0.0, 1.0]
+ci95 = [[2.0, 1.0], [0.0, 1.0]]
+[tables.wheel]
+knots = [0.0, 1.0]
+values = [0.0, 1.0]
+[tables.torque]
+knots = "none"
+values = [0.0]
+"""
+    assert refusal(tmp_path, TWO_MASS + tables) == [
+        "tables.torque.knots | expected a list in [ ] | got 'none'",
+        "tables.shaft_twist.knots | expected finite numbers, each larger than the one before | got [0.0, -0.01, 0.02]",
+        "tables.shaft_twist.values | expected as many as knots, 3 | got 2",
+        "tables.shaft_twist.ci95 | expected the lower bound first in every interval | got [[2.0, 1.0], [0.0, 1.0]]",
+        "tables.wheel | expected one of torque, motor_speed, shaft_twist, shaft_rate, load_speed, load_angle | "
+        "got 'wheel'",
+    ]
+
+
+def test_a_table_is_no_effect_and_needs_its_place(tmp_path: Path) -> None:
+    as_effect = "[effects.table_torque]\nknots = { value = 2 }\n"
+    assert refusal(tmp_path, TWO_MASS + as_effect) == [
+        "effects.table_torque | expected it as data | got an effect: write it as [tables.torque]"
+    ]
+    found = refusal(tmp_path, ONE_MASS + "[tables.load_speed]\nknots = [0.0, 1.0]\nvalues = [0.0, 1.0]\n")
+    assert found == ["tables.load_speed: makes no sense in one_mass, expected three_mass, two_mass"]

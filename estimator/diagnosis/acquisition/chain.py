@@ -174,7 +174,8 @@ def replay(model: DrivelineModel, record: Record, known: Own = NOTHING_KNOWN) ->
     read = np.concatenate([rows for _, rows in runs])
     error = (output - record.output)[read]
     further = tuple(np.concatenate(each) for each in zip(*(run.further for run, _ in runs), strict=True))
-    return FreeRun(output, float(np.sqrt(np.mean(error**2))), runs[most][0].start, further)
+    beyond = tuple(dict.fromkeys(sentence for run, _ in runs for sentence in run.beyond))
+    return FreeRun(output, float(np.sqrt(np.mean(error**2))), runs[most][0].start, further, beyond)
 
 
 def _replay(model: DrivelineModel, record: Record, known: Own) -> tuple[FreeRun, BoolArray]:

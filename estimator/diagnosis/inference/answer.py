@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from estimator.diagnosis.acquisition.chain import Chain, mechanical, read_through
 from estimator.diagnosis.inference.decide import Decision, decide
 from estimator.diagnosis.inference.figures import Unseen, on_recordings
+from estimator.diagnosis.inference.free_forms import free_form
 from estimator.diagnosis.inference.hypotheses import Progress, everything, open_hypotheses, silent
 from estimator.diagnosis.inference.rivals import laws_around
 from estimator.diagnosis.inference.say import Told, said, undecided
@@ -20,6 +21,7 @@ from estimator.diagnosis.inference.search import Search
 from estimator.diagnosis.noise import noise_floor
 from estimator.diagnosis.preconditions.prepare import Prepared, as_slow_as_needed
 from estimator.diagnosis.result import Diagnosis, Effort
+from estimator.diagnosis.table_answer import with_law
 from estimator.physics.model import DrivelineModel
 from estimator.physics.parallel import TimeIsUp, Work, counted
 from estimator.signals.record import separated_outputs
@@ -83,12 +85,14 @@ def answer(
         try:
             read, search = searched(chain, line, work, LEVELS[level], started.append, progress)
             progress("weighing what was found", 0.8)
-            decision = decide(search, read, Unseen(line, read_through(ready.holdout)))
+            decision = decide(search, read, Unseen(line, read_through(ready.holdout)), free_form)
             keep(Found(read, search, decision))
             progress("simulating what was found", 0.9)
             laws = laws_around(decision.judged)
             told = Told(decision, laws, search, model, _effort(search, level, decision), _warnings(search, level))
             diagnosis = said(told)
+            if decision.judged.failed and not decision.judged.off_nominal:
+                diagnosis = with_law(diagnosis, decision.judged.believed.hypothesis, decision.runs)
         except TimeIsUp:
             diagnosis = undecided(started[-1] if started else None, chain, line, model, work, level)
     progress("done", 1.0)

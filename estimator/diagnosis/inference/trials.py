@@ -49,6 +49,11 @@ def blocks(record: Record) -> BoolArray:
     return block_numbers(record) >= 0
 
 
+def between_blocks(records: Sequence[Record]) -> tuple[BoolArray, ...]:
+    """Return which good samples of each recording a fit may see, each of shape (N,)."""
+    return tuple(record.okay & ~blocks(record) for record in records)
+
+
 def block_numbers(record: Record) -> FloatArray:
     """Return the number of the block that each sample is in, -1 between the blocks; shape (N,)."""
     since_s = record.time_s - record.time_s[0]
@@ -169,14 +174,14 @@ def tried(hypothesis: Hypothesis, model: DrivelineModel, size: int, subsets: Seq
     can do, it can do too.
     """
     of = hypothesis.result.problem
-    use = [record.okay & ~blocks(record) for record in of.records]
+    use = between_blocks(of.records)
     own = [basis.own for basis in of.local]
     is_free = GRADE in hypothesis.effects
     problem = make_problem(model, of.records, of.shared, own=own, profile=is_free, use=use, grid=of.grid)
     likely = warm_start(problem, hypothesis.result)
     fits = [_descended(problem, x) for x in (likely, *(_continued(problem, likely, subset) for subset in subsets))]
     best = min(fits, key=lambda each: each.squares)
-    squares, samples = _inside_blocks(best)
+    squares, samples = inside_blocks(best)
     return Trial(hypothesis, size, best.light(), squares, samples)
 
 
@@ -195,7 +200,7 @@ def _continued(problem: Problem, likely: FloatArray, subset: FitResult) -> Float
     return x
 
 
-def _inside_blocks(result: FitResult) -> tuple[FloatArray, FloatArray]:
+def inside_blocks(result: FitResult) -> tuple[FloatArray, FloatArray]:
     """Return the squared error and the count of samples of every block of every recording, shapes (B,)."""
     squares, samples = [], []
     for record, output in zip(result.problem.records, result.outputs, strict=True):

@@ -236,6 +236,7 @@ def run_block(setting: Setting, first: int, torques: Torques, p: FloatArray, sta
         torque,
         load,
         setting.angle,
+        setting.angle[:0],
         p,
         state,
         setting.outputs,

@@ -10,7 +10,8 @@ import numpy as np
 
 from estimator.compiled import assembled, inlined
 from estimator.lanes import choose, every, like, some
-from estimator.physics.catalogue import BUILT_IN
+from estimator.physics.catalogue import BUILT_IN, KERNEL
+from estimator.physics.curve import curve, wrapped
 from estimator.physics.effect import Place
 from estimator.physics.effects.drag import cold_part
 from estimator.physics.effects.inertia import frequency_within
@@ -37,7 +38,8 @@ def is_elastic(p: FloatArray) -> bool:
     bent = p[slots.GAP] > 0.0 or p[slots.HARDENING] != 0.0 or p[slots.STAGE] != 0.0
     sliding = p[slots.SLIDER] != 0.0 or p[slots.SLIDER_INSIDE] > 0.0
     jointed = p[slots.CARDAN] != 0.0 or p[slots.CARDAN_ANGLE] != 0.0 or p[slots.CARDAN_SHARE] != 0.0
-    return not (bent or sliding or jointed)
+    tabled = p[slots.TABLE_TWIST] > 0.0 or p[slots.TABLE_RATE] > 0.0
+    return not (bent or sliding or jointed or tabled)
 
 
 @inlined
@@ -140,7 +142,7 @@ STICK_STABILITY = 1.5
 WAVING = np.array(
     [
         slot(entry.name, name)
-        for entry in BUILT_IN.values()
+        for entry in KERNEL.values()
         if entry.waving
         for name in entry.phases.values() or [entry.parameters[0].name]
     ]
@@ -215,6 +217,8 @@ def conditions(
     ripple = overtoned_wave(p[slots.RIPPLE], turned, p[slots.RIPPLE_PHASE], *overtone)
     torque_factor = 1.0 + overtoned_wave(p[slots.RIPPLE_SHARE], turned, p[slots.RIPPLE_SHARE_PHASE], *overtone)
     rolled, oval = angle / p[slots.IMBALANCE_RATIO], (p[slots.IMBALANCE_IN_STEP], p[slots.IMBALANCE_ACROSS])
+    if some(p[slots.TABLE_ANGLE] > 0.0):
+        load += curve(wrapped(angle + p[slots.TABLE_PHASE], p, slots.TABLE_ANGLE), p, slots.TABLE_ANGLE, True)[0]
     load += over_recorded_angle(angle, p) + overtoned_wave(p[slots.IMBALANCE], rolled, p[slots.IMBALANCE_PHASE], *oval)
     cardan = wave(p[slots.CARDAN], 2.0 * angle, p[slots.CARDAN_PHASE])
     shaft_factor = 1.0 + wave(p[slots.CARDAN_SHARE], 2.0 * angle, p[slots.CARDAN_SHARE_PHASE])

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 from estimator.compiled import brief, compiled, inlined, ir_inlined
 from estimator.lanes import borrowed
+from estimator.physics.curve import steepest
 from estimator.physics.effects.timing import LowPass, delayed, lag_step, low_pass
 from estimator.physics.kernel import slots
 from estimator.physics.kernel.conditions import (
@@ -38,6 +39,7 @@ from estimator.physics.kernel.state_vector import (
     Bristles,
     Conditions,
     State,
+    corrected,
     unpacked,
 )
 from estimator.signals.record import FloatArray, IntArray
@@ -128,9 +130,31 @@ RADIANS_PER_STEP_OF_MODE = 0.6
 """Integration step in radians of the extra mode, which is seen through the motor's inertia only."""
 
 
+DECAY_PER_STEP, RADIANS_ON_CURVE = 1.0, 0.6
+"""Integration step over a curve's fastest decay and mode: fourth order is stable to 2.8, and between knots a curve may
+be steeper than a secant."""
+
+
+@inlined
+def with_tables(substeps: int, sample_time_s: float, p: FloatArray) -> int:
+    """Return the integration steps per period that the line and the curves of laws without a name need."""
+    if max(p[slots.TABLE_MOTOR_SPEED], p[slots.TABLE_TWIST], p[slots.TABLE_RATE], p[slots.TABLE_LOAD_SPEED]) <= 0.0:
+        return substeps
+    motor, load = 1.0 / float(p[slots.J_M]), 1.0 / float(p[slots.J_L]) if p[slots.J_L] > 0.0 else 0.0
+    stiffness = float(p[slots.K]) + steepest(p, slots.TABLE_TWIST)
+    damping = float(p[slots.TABLE_DAMPING]) + steepest(p, slots.TABLE_RATE)
+    if p[slots.K] > 0.0:
+        damping += float(p[slots.C]) * stiffness / float(p[slots.K])
+    decay = (motor + load) * damping
+    decay += motor * steepest(p, slots.TABLE_MOTOR_SPEED) + load * steepest(p, slots.TABLE_LOAD_SPEED)
+    swing = math.sqrt((motor + load) * stiffness) if load > 0.0 else 0.0
+    return max(substeps, math.ceil(sample_time_s * max(decay / DECAY_PER_STEP, swing / RADIANS_ON_CURVE)))
+
+
 @inlined
 def with_mode(substeps: int, sample_time_s: float, p: FloatArray) -> int:
-    """Return the integration steps per period that the line and its extra mode need."""
+    """Return the integration steps per period that the line, its extra mode and its curves need."""
+    substeps = with_tables(substeps, sample_time_s, p)
     inertia = branch_inertia(p)
     if inertia <= 0.0:
         return substeps
@@ -179,7 +203,7 @@ def rubbed_on(
 
 
 @inlined
-def integrate_made(
+def integrate_made(  # noqa: C901  # one question more than usual, and a change costs each user a minute
     line: Line,
     sample_time_s: float,
     substeps: int,
@@ -190,6 +214,7 @@ def integrate_made(
     torque: FloatArray,
     load: FloatArray,
     angle: FloatArray,
+    followed: FloatArray,
     p: FloatArray,
     state: FloatArray,
     outputs: IntArray,
@@ -204,7 +229,7 @@ def integrate_made(
     feed = feed_from(torque, start_s / sample_time_s, sample_time_s, p, h)
     low = low_pass(p[slots.FILTER], p[slots.FILTER_SHAPE], h)
     waving, filtering = is_waving(p), p[slots.FILTER] > 0.0
-    steep = slopes.shape[1] > 0
+    steep, following = slopes.shape[1] > 0, followed.shape[0] > 0
     slope = slope_before(first, slopes)
     output = outputs[0]
     linear = torque.shape[0] >= WORTHWHILE_SAMPLES and is_linear(line, p)
@@ -222,6 +247,8 @@ def integrate_made(
             value = read_out(line, now, x, outputs[i], p)
             out[i, k] = shown(reading(value, angle[k], p), filtered, p) if sensor and i == 0 else value
         leave_slope(k, slope, slopes)
+        if following:
+            x = corrected(x, p[slots.OBSERVER] * (followed[k] - out[0, k]), output)
         time_s = start_s + k * sample_time_s
         varying = waving or len(line.own) > 0 or is_changing(time_s - sample_time_s, time_s + sample_time_s, p)
         if not varying:
@@ -265,6 +292,7 @@ def integrate(
     torque: FloatArray,
     load: FloatArray,
     angle: FloatArray,
+    followed: FloatArray,
     p: FloatArray,
     state: FloatArray,
     outputs: IntArray,
@@ -272,7 +300,7 @@ def integrate(
     out: FloatArray,
     slopes: FloatArray,
 ) -> None:
-    """Simulate samples ``first`` to ``last``, without this one.
+    """Simulate samples ``first`` to ``last``, without this one; as an observer of the readings that are ``followed``.
 
     Column k of ``out`` is the states' entries before torque k acts.
     """
@@ -286,6 +314,7 @@ def integrate(
         borrowed(torque),
         borrowed(load),
         borrowed(angle),
+        borrowed(followed),
         borrowed(p),
     )
     given_back = (borrowed(state), borrowed(outputs), sensor, borrowed(out), borrowed(slopes))

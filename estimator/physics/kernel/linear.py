@@ -14,11 +14,15 @@ from estimator.physics.kernel.rates import dry_at_load, moved, runge_kutta, step
 from estimator.physics.kernel.state_vector import Conditions, State
 from estimator.physics.laws import BEYOND, dry_friction
 from estimator.physics.layout import slot
+from estimator.physics.tables import TABLES
 from estimator.signals.record import FloatArray
+
+FED_OR_LOADED = ("table_torque", "table_load_angle")  # curves that change a torque from outside, and no line
 
 WORTHWHILE_SAMPLES = 50  # samples from which on reading the answers takes less time than they save
 
 _OTHERS = [(entry.name, each) for entry in BUILT_IN.values() if not entry.linear for each in entry.parameters]
+_OTHERS += [(entry.name, entry.parameters[0]) for entry in TABLES.values() if entry.name not in FED_OR_LOADED]
 BENDING = np.array([slot(effect, parameter.name) for effect, parameter in _OTHERS])
 NULLS = np.array([parameter.null for _, parameter in _OTHERS])
 """Where the parameters of all effects stand that leave no line linear, and what each is where its effect is not there:

@@ -7,6 +7,7 @@ from typing import Any
 from estimator.compiled import inlined
 from estimator.lanes import choose, every, like, some
 from estimator.lanes.types import overload
+from estimator.physics.curve import curve
 from estimator.physics.effects.dry_friction import stribeck_law
 from estimator.physics.effects.load import build_up, carcass, coupling, gripped
 from estimator.physics.effects.shaft import damping_share, loaded_twist, loading_rate, pressed, relaxing_rate
@@ -65,6 +66,8 @@ def motor_friction(speed: float, p: FloatArray, width: float, dry: float) -> flo
     """Return the torque of every friction law at the motor [Nm], viscous included; the dry ones where there are any."""
     friction = float(p[slots.B_M]) * speed
     friction += motor_drag(speed, p)
+    if some(p[slots.TABLE_MOTOR_SPEED] > 0.0):
+        friction += curve(speed, p, slots.TABLE_MOTOR_SPEED, False)[0]
     if every(dry == 0.0):
         return friction
     coulomb, excess = p[slots.STRIBECK_COULOMB], p[slots.STRIBECK]
@@ -84,6 +87,12 @@ def shaft_torque(twist: float, rate: float, loading: float, p: FloatArray, stiff
     """Return the torque the shaft carries [Nm] at a twist [rad], its rate [rad/s] and the hysteresis' loading [-]."""
     damping = damping_torque(rate, p)
     across = like(0.0, damping)
+    held = like(0.0, damping)
+    if some(p[slots.TABLE_TWIST] > 0.0):
+        held, slope = curve(twist, p, slots.TABLE_TWIST, False)
+        damping = damping * max(1.0 + slope / p[slots.K], 0.0) + p[slots.TABLE_DAMPING] * rate
+    if some(p[slots.TABLE_RATE] > 0.0):
+        held += curve(rate, p, slots.TABLE_RATE, False)[0]
     loaded, closed = twist, every(p[slots.GAP] <= 0.0)
     if not closed:
         loaded = beyond_gap(twist, p[slots.GAP])
@@ -92,7 +101,7 @@ def shaft_torque(twist: float, rate: float, loading: float, p: FloatArray, stiff
     law = p[slots.HARDENING], p[slots.SHAPE], p[slots.STAGE], p[slots.STAGE_FROM]
     elastic = stiffness * loaded_twist(loaded, *law)
     torque = float(elastic) + damping + float(p[slots.SLIDER]) * loading
-    return torque if closed else pressed(torque, loaded, p[slots.PULL]) + across
+    return held + (torque if closed else pressed(torque, loaded, p[slots.PULL]) + across)
 
 
 @inlined
@@ -229,7 +238,10 @@ def dry_at_load(wheel: float, now: Conditions) -> float:
 @inlined
 def load_friction(wheel: float, vehicle: float, now: Conditions, p: FloatArray) -> float:
     """Return what slows the load down [Nm]: dry friction at the wheel, viscous and other drag at the vehicle."""
-    return dry_at_load(wheel, now) + now.viscous_load * vehicle + load_drag(vehicle, p)
+    drag = dry_at_load(wheel, now) + now.viscous_load * vehicle + load_drag(vehicle, p)
+    if some(p[slots.TABLE_LOAD_SPEED] > 0.0):
+        drag += curve(vehicle, p, slots.TABLE_LOAD_SPEED, False)[0]
+    return drag
 
 
 @inlined

@@ -34,13 +34,16 @@ from estimator.physics.kernel.state_vector import (
     LAG_RISE,
     LAGGED,
     Bristles,
+    corrected,
     unpacked,
 )
 from estimator.physics.layout import slot
+from estimator.physics.tables import TABLES
 from estimator.signals.record import FloatArray, IntArray
 
 MAKING = np.array(
     [slot(entry.name, each.name) for entry in BUILT_IN.values() for each in entry.parameters if not each.own]
+    + [slot(entry.name, entry.parameters[0].name) for entry in TABLES.values()]
 )
 """Where it is written what a line is made of; phases and moments, which are a recording's own, say when."""
 
@@ -167,6 +170,7 @@ def advance(
     rise_lanes: FloatArray,
     load_lanes: FloatArray,
     angle: FloatArray,
+    followed: FloatArray,
     one_of_them: FloatArray,
     p_lanes: FloatArray,
     state_lanes: FloatArray,
@@ -184,7 +188,7 @@ def advance(
     h = sample_time_s / substeps
     length = 1.0 / substeps
     waving = is_waving(one_of_them)
-    samples, output = load_lanes.shape[0], outputs[0]
+    samples, output, following = load_lanes.shape[0], outputs[0], followed.shape[0] > 0
     parts = torque_lanes.shape[0] // samples
     x = unpacked(start)
     bristled, bristles = is_bristled(one_of_them), Bristles(start[BRISTLES_MOTOR], start[BRISTLES_LOAD])
@@ -195,6 +199,8 @@ def advance(
         for i in range(outputs.shape[0]):
             seen = filtered if filtering and i == 0 else read_out(line, now, x, outputs[i], p)
             out[k * outputs.shape[0] + i] = seen
+        if following:
+            x = corrected(x, p[slots.OBSERVER] * (followed[k] - out[k * outputs.shape[0]]), output)
         turn = angle[k + 1] - angle[k] if k + 1 < angle.shape[0] else angle[k] - angle[k - 1]
         time_s = start_s + k * sample_time_s
         varying = waving or is_changing(time_s - sample_time_s, time_s + sample_time_s, p)
@@ -231,6 +237,7 @@ def integrate_side_by_side(
     fed_by: IntArray,
     loaded_by: IntArray,
     angle: FloatArray,
+    followed: FloatArray,
     p: FloatArray,
     state: FloatArray,
     outputs: IntArray,
@@ -239,13 +246,14 @@ def integrate_side_by_side(
 ) -> None:
     """Do what ``integration.integrate`` does for some rows, at most `LANES`; their states stay as they are."""
     rows, torque, load, angle = borrowed(rows), borrowed(torque), borrowed(load), borrowed(angle)
+    followed = borrowed(followed)
     fed_by, loaded_by, outputs = borrowed(fed_by), borrowed(loaded_by), borrowed(outputs)
     p, state, out = borrowed(p), borrowed(state), borrowed(out)
     count = outputs.shape[0]
     values = np.empty((torque.shape[1] * count, LANES))
     mean, rise = supplied_lanes(sample_time_s, substeps, first, start_s, rows, torque, fed_by, p, state)
     loads = in_lanes(load, loaded_by[rows])
-    given = (sample_time_s, substeps, sign_width, first, start_s, mean, rise, loads, angle)
+    given = (sample_time_s, substeps, sign_width, first, start_s, mean, rise, loads, angle, followed)
     filtering = sensor and p[rows[0], slots.FILTER] > 0.0
     them = (in_lanes(p, rows), in_lanes(state, rows), low_passes(rows, p, sample_time_s / substeps))
     call_specialised(len(masses), (), advance, p[rows[0]], (*given, p[rows[0]], *them, outputs, filtering, values))
@@ -271,6 +279,7 @@ def integrate_each(
     fed_by: IntArray,
     loaded_by: IntArray,
     angle: FloatArray,
+    followed: FloatArray,
     p: FloatArray,
     state: FloatArray,
     outputs: IntArray,
@@ -299,7 +308,7 @@ def integrate_each(
         i += rows.size
         common = 0 if all_differ else alike[rows[0]]
         if common > reached:
-            known = (torque[fed_by[0]], load[loaded_by[0]], angle, p[0], state[0])
+            known = (torque[fed_by[0]], load[loaded_by[0]], angle, followed, p[0], state[0])
             integrate(masses, own, *given, reached, common, start_s, *known, outputs, sensor, out[0], slopes[0])
             reached = common
         if reached > 0:
@@ -311,14 +320,14 @@ def integrate_each(
             finest = substeps
             for row in rows:
                 finest = max(finest, with_mode(substeps, sample_time_s, p[row]))
-            them = (torque, load, fed_by, loaded_by, angle, p, state)
+            them = (torque, load, fed_by, loaded_by, angle, followed, p, state)
             integrate_side_by_side(
                 masses, sample_time_s, finest, sign_width, reached, start_s, rows, *them, outputs, sensor, out
             )
         else:
             row = rows[0]
-            it = (torque[fed_by[row]], load[loaded_by[row]], angle, p[row], state[row])
+            it = (torque[fed_by[row]], load[loaded_by[row]], angle, followed, p[row], state[row])
             integrate(masses, own, *given, reached, samples, start_s, *it, outputs, sensor, out[row], slopes[row])
     if not all_differ:
-        rest = (torque[fed_by[0]], load[loaded_by[0]], angle, p[0], state[0])
+        rest = (torque[fed_by[0]], load[loaded_by[0]], angle, followed, p[0], state[0])
         integrate(masses, own, *given, reached, samples, start_s, *rest, outputs, sensor, out[0], slopes[0])

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from estimator.compiled import inlined
+from estimator.lanes import choose
 from estimator.signals.record import FloatArray
 
 ANGLE, SPEED, TWIST, LOAD_SPEED = 0, 1, 2, 3  # mechanical states that can be an output; see ``State``
@@ -43,6 +44,32 @@ def unpacked(state: FloatArray) -> State:
         state[0], state[1], state[2], state[3], state[4], state[5],
         state[6], state[7], state[8], state[9], state[10], state[11],
     )  # fmt: skip
+
+
+FOLLOWS = 0.3  # part of its correction with which the other end of a line follows
+
+
+@inlined
+def corrected(x: State, error: float, output: int) -> State:
+    """Return a state that an observer has moved by an error of a speed [rad/s]; of no other output."""
+    at_motor = choose(output == SPEED, 1.0, FOLLOWS) * error
+    at_load = choose(output == LOAD_SPEED, 1.0, FOLLOWS) * error
+    if output != SPEED and output != LOAD_SPEED:
+        return x
+    return State(
+        x.angle,
+        x.speed + at_motor,
+        x.twist,
+        x.load_speed + at_load,
+        x.loading,
+        x.vehicle_speed + at_load,
+        x.branch_twist,
+        x.branch_speed + at_motor,
+        x.middle_twist,
+        x.middle_speed + at_load,
+        x.traction,
+        x.relaxing,
+    )
 
 
 class Bristles(NamedTuple):

@@ -16,6 +16,7 @@ from importlib import resources
 from pathlib import Path
 
 from estimator.physics import inputs
+from estimator.physics.curve import curve
 from estimator.physics.effects.timing import FASTEST_S, lag_step, low_pass
 from estimator.physics.kernel import conditions, rates, sensing, slots, state_vector
 from estimator.physics.layout import SIZE, slot
@@ -85,6 +86,8 @@ def _torque_laws(unit: Translation) -> str:
         name, _ = unit.function(law, of_one_number=True)
         values = ", ".join(["torque", "time_s", *(f"p.at[{place}]" for place in at)])
         lines.append(f"    if (p.at[{at[0]}] != {_number(null)}) torque = {name}({values});")
+    name, at = unit.function(curve)[0], slots.TABLE_TORQUE
+    lines.append(f"    if (p.at[{at}] > 0.0) torque = torque + {name}(torque, p, {at}, 0).item0;")
     return "\n".join((*lines, "    return torque;", "}", ""))
 
 

@@ -19,6 +19,7 @@ from estimator.physics.driveline import Case, Start
 from estimator.physics.layout import Grid, flat_values
 from estimator.physics.model import DrivelineModel, EffectValue, Parameter, Structure
 from estimator.physics.simulate import motor_angle, simulate
+from estimator.physics.tables import Table
 from estimator.signals.record import FloatArray, Record
 from hil.export.fmu.driveline import OF_THE_RECORDER, Driveline, driveline, started, variables
 from hil.export.fmu.package import write
@@ -160,3 +161,22 @@ def test_the_standards_checker_finds_nothing(version: str, structure: Structure,
     write(line, version, tmp_path / "line.fmu")
     assert validate_fmu(str(tmp_path / "line.fmu")) == []
     assert off(simulated(tmp_path / "line.fmu", line, load), expected) < AGREES
+
+
+CURVES = [
+    Table("torque", (-100.0, -20.0, 0.0, 30.0, 100.0), (9.0, 0.0, 0.0, -2.0, -14.0)),
+    Table("motor_speed", (-8.0, -1.0, 0.0, 2.0, 8.0), (-6.0, -3.0, 0.0, 2.0, 5.0)),
+    Table("shaft_twist", (-0.02, -0.01, 0.0, 0.01, 0.02), (30.0, 35.0, 0.0, -35.0, 20.0), damping=1.5),
+    Table("shaft_rate", (-3.0, 0.0, 3.0), (-9.0, 0.0, 4.0)),
+    Table("load_speed", (-8.0, 0.0, 1.0, 8.0), (-9.0, 0.0, 4.0, 6.0)),
+    Table("load_angle", (0.0, 1.0, 2.0, 3.0), (0.0, 12.0, -9.0, 0.0)),
+]
+
+
+@pytest.mark.parametrize("curves", [CURVES, CURVES[2:3]], ids=["all", "twist"])
+def test_a_law_without_a_name_is_exported_to_rounding(curves: list[Table], tmp_path: Path) -> None:
+    effects = {each.name: {key: value.value for key, value in each.effect().items()} for each in curves}
+    line, load, expected = begun(Structure.TWO_MASS, effects)
+    write(line, "2.0", tmp_path / "line.fmu")
+    assert off(simulated(tmp_path / "line.fmu", line, load), expected) < 1e-9
+    assert off(begun(Structure.TWO_MASS, {})[2], expected) > 0.01

@@ -1,0 +1,92 @@
+"""Laws without a name: found where there is one, none where there is none, and what is said of them."""
+
+import numpy as np
+import pytest
+
+from estimator.diagnosis.inference.disturbances import Limits
+from estimator.diagnosis.inference.hypotheses import NOTHING, Hypothesis
+from estimator.diagnosis.table_words import looks_like, shortest_formula
+from estimator.diagnosis.tables import best_table, table_at
+from estimator.physics.driveline import Start
+from estimator.physics.layout import flat_values, grid_for
+from estimator.physics.simulate import simulate
+from estimator.physics.tables import Table
+from estimator.signals.record import FloatArray, Record
+from tests.estimator.diagnosis.plain import Bench
+from tests.estimator.physics.bench import TWO_MASS, model, random_steps, record
+
+NOISE_RAD_S = 0.02
+START = Start(5.0, 0.0, 2.0, 0.003, 2.0)
+KNOTS = np.array([-0.08, -0.04, -0.02, -0.01, -0.005, 0.0, 0.005, 0.01, 0.02, 0.04, 0.08])
+
+
+def recorded(effects: dict[str, dict[str, float]], seeds: tuple[int, ...] = (1, 2)) -> list[Record]:
+    """Return recordings of a line with these effects, read with noise."""
+    found = []
+    for seed in seeds:
+        torque = 5.0 + random_steps(1500, seed=seed, size_nm=60.0, hold=15)
+        empty = record(torque, np.ones(1500), name=f"run_{seed}")
+        out = simulate(grid_for(model(TWO_MASS), [empty]), empty, flat_values(TWO_MASS, effects), START)
+        out += NOISE_RAD_S * np.random.default_rng(seed).standard_normal(out.size)
+        found.append(record(torque, out, name=f"run_{seed}"))
+    return found
+
+
+def retuned(records: list[Record]) -> Hypothesis:
+    """Return the line alone, fitted to recordings."""
+    result = Bench(model(TWO_MASS, tolerance=0.1), records, [each.okay for each in records]).fit(NOTHING)
+    nothing = np.zeros(0)
+    return Hypothesis(NOTHING, result, nothing, Limits(nothing, nothing, nothing), 0.0, 0.0)  # type: ignore[call-arg]
+
+
+def test_a_gap_is_found_as_a_curve_over_the_twist_without_the_catalogue() -> None:
+    """A gap of 0.02 rad, which the re-tuned line can't follow."""
+    hypothesis = retuned(recorded({"backlash": {"gap_rad": 0.02, "contact_rad": 0.0005}}))
+    law = best_table(hypothesis)
+    assert law is not None
+    assert law.place == "shaft_twist"
+    assert law.after < 0.5 * law.before
+    assert law.result.rms < 0.5 * hypothesis.result.rms
+    inside = np.abs(law.knots) < 0.008
+    total = np.array(law.values) + TWO_MASS["k"] * np.array(law.knots)
+    assert np.max(np.abs(total[inside])) < 0.3 * TWO_MASS["k"] * 0.008
+
+
+def test_a_line_that_lacks_nothing_gets_no_law() -> None:
+    assert best_table(retuned(recorded({}))) is None
+
+
+def test_the_free_form_of_a_place_fits_all_samples() -> None:
+    hypothesis = retuned(recorded({"quadratic_friction": {"quadratic_nm_s2": 0.4}}))
+    free = table_at(hypothesis, "motor_speed")
+    assert free is not None
+    assert free.chosen_by < 0.5 * hypothesis.result.rms
+    assert table_at(hypothesis, "load_angle") is None
+
+
+def total_of(total: FloatArray, place: str = "shaft_twist", slope: float = 4000.0) -> Table:
+    values = total - slope * KNOTS
+    bands = tuple((float(v) - 2.0, float(v) + 2.0) for v in values)
+    return Table(place, tuple(KNOTS.tolist()), tuple(values.tolist()), bands)
+
+
+@pytest.mark.parametrize(
+    ("total", "expected"),
+    [
+        (4000.0 * np.sign(KNOTS) * np.maximum(np.abs(KNOTS) - 0.008, 0.0), "a dead band of 0.016 rad"),
+        (4000.0 * np.maximum(KNOTS, 0.0), "a spring that acts one way only"),
+        (np.clip(4000.0 * KNOTS, -64.0, 64.0), "a limit of 64 Nm"),
+        (4000.0 * KNOTS + 4e5 * KNOTS**2, ""),
+    ],
+)
+def test_what_a_curve_looks_like(total: FloatArray, expected: str) -> None:
+    assert looks_like(total_of(total), 4000.0) == expected
+
+
+def test_the_shortest_formula_within_the_band() -> None:
+    assert shortest_formula(total_of(3000.0 * KNOTS), 4000.0) == "torque = 3e+03 x"
+    assert shortest_formula(total_of(300.0 * np.sign(KNOTS)), 4000.0) == "torque = 300 sign(x)"
+    two = shortest_formula(total_of(3000.0 * KNOTS - 200.0 * np.sign(KNOTS)), 4000.0)
+    assert two == "torque = 3e+03 x - 200 sign(x)"
+    rough = total_of(300.0 * np.sin(200.0 * KNOTS))
+    assert shortest_formula(rough, 4000.0) == ""
