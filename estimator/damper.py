@@ -267,7 +267,19 @@ def open_mode(line: Line) -> Mode:
 
 def design_damper(region: Region, timing: Timing, demand: Demand) -> Damper:
     """Design the damper of least gain that does what is asked at every line of a region, or say what is in the way."""
+    try:
+        with np.errstate(over="ignore", divide="ignore", invalid="ignore"):  # such a filter is not chosen
+            return _designed(region, timing, demand)
+    except (np.linalg.LinAlgError, ArithmeticError) as error:
+        said = ", ".join(f"{name} = {value:g}" for name, value in region.value.items())
+        raise BadSetting(
+            f"damper: expected a line that can be computed with, got values too far apart for it: {said}."
+        ) from error
+
+
+def _designed(region: Region, timing: Timing, demand: Demand) -> Damper:
     lines, others = list(region.corners()), [region.value, *region.random(CHECKED)]
+    _require_seen([*lines, *others], timing)
     check = _Search(others, timing, demand)
     for _ in range(ROUNDS):
         search = _Search(lines, timing, demand)
@@ -292,6 +304,16 @@ def design_damper(region: Region, timing: Timing, demand: Demand) -> Damper:
         torque_nm=max(torques_nm),
         n_lines=len(lines) + CHECKED,
     )
+
+
+def _require_seen(lines: list[Line], timing: Timing) -> None:
+    """Refuse a region with a resonance at or beyond half the sampling rate, where a sampled speed shows another one."""
+    highest_hz, most_hz = max(open_mode(line).frequency_hz for line in lines), 0.5 / timing.period_s
+    if not highest_hz < most_hz:
+        raise BadSetting(
+            f"damper: the region has a resonance of {highest_hz:.4g} Hz, expected less than {most_hz:.4g} Hz, half the "
+            f"sampling rate at a period of {timing.period_s * 1e3:g} ms. Know the line better, or sample faster."
+        )
 
 
 def _obstacle(region: Region, timing: Timing, demand: Demand, best: tuple[float, float, float]) -> str:

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import errno
 import json
 import os
 import platform
 import re
-import stat
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, Final
 
+from drivers.foreign_file import read_regular
 from hil.errors import UsageError
 
 PLAIN: Final = r"[A-Za-z0-9_][A-Za-z0-9_.+-]*"
@@ -51,15 +50,7 @@ LARGEST_BYTES: Final = 32 << 20
 
 def read_json(path: Path) -> Any:
     """Return what a JSON file says."""
-    handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))  # a pipe that nobody writes to is not waited for
-    with os.fdopen(handle, "rb", buffering=0) as file:
-        about = os.fstat(handle)
-        if not stat.S_ISREG(about.st_mode):
-            raise OSError(errno.EINVAL, "expected a file, got a folder, a pipe or a device")
-        if about.st_size > LARGEST_BYTES:
-            raise ValueError(f"more than {LARGEST_BYTES >> 20} MB")
-        content = file.read(about.st_size)
-    return parse_json(content.decode("utf-8"))
+    return parse_json(read_regular(path, LARGEST_BYTES).decode("utf-8"))
 
 
 def parse_json(text: str) -> Any:

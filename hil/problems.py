@@ -14,7 +14,6 @@ follows the place through the annotations of the model.
 
 from __future__ import annotations
 
-import errno
 import re
 import tomllib
 import types
@@ -28,6 +27,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails, PydanticCustomError
 
+from drivers.foreign_file import read_regular
 from hil.errors import FileProblem
 
 Model = TypeVar("Model", bound=BaseModel)
@@ -76,7 +76,7 @@ def refuse(faults: Iterable[Fault]) -> None:
 def read_toml(path: Path, error: type[FileProblem]) -> dict[str, Any]:
     """Read one TOML file."""
     try:
-        content = _content(path)
+        content = read_regular(path, LARGEST_BYTES)
     except OSError as cause:
         raise error(path, f"the file | expected a readable TOML file | got: {cause.strerror}") from cause
     try:
@@ -95,15 +95,6 @@ def read_toml(path: Path, error: type[FileProblem]) -> dict[str, Any]:
     if problems:
         raise error(path, *problems)
     return tables
-
-
-def _content(path: Path) -> bytes:
-    """Read a file, no more of it than a person writes."""
-    with path.open("rb") as file:
-        content = file.read(LARGEST_BYTES + 1)
-    if len(content) > LARGEST_BYTES:
-        raise OSError(errno.EFBIG, f"more than {LARGEST_BYTES >> 20} MB")
-    return content
 
 
 def _beyond_64_bit(value: object, *keys: int | str) -> Iterator[str]:

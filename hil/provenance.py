@@ -15,6 +15,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from drivers.foreign_file import open_regular
 from hil.version import __version__
 
 _LINE: ContextVar[tuple[str, ...]] = ContextVar("_LINE", default=())
@@ -40,7 +41,7 @@ class Source:
     @classmethod
     def of(cls, path: Path) -> Source:
         """Take the checksum of a file."""
-        with path.open("rb") as stream:
+        with open_regular(path) as stream:
             return cls(str(path), hashlib.file_digest(stream, "sha256").hexdigest())
 
 

@@ -14,6 +14,7 @@ from enum import Enum
 from pathlib import Path
 
 from drivers.errors import ConfigMismatch
+from drivers.foreign_file import read_regular
 
 
 class Severity(Enum):
@@ -134,12 +135,9 @@ def read_eds_text(path: Path) -> EdsText:
 
 def _decode(path: Path) -> tuple[str, list[EdsFinding]]:
     try:
-        with path.open("rb") as file:
-            data = file.read(MAX_BYTES + 1)
+        data = read_regular(path, MAX_BYTES)
     except OSError as error:
         raise EdsUnreadable(path, str(error.strerror)) from error
-    if len(data) > MAX_BYTES:
-        raise EdsUnreadable(path, f"more than {MAX_BYTES >> 20} MB")
     if data.startswith(_UTF_16_MARKS):
         raise EdsUnreadable(path, "UTF-16 text", "Save it as ANSI or ASCII text.")
     if b"\0" in data:

@@ -8,7 +8,7 @@ there. Source: MODBUS/TCP Security Protocol Specification v2.1 (2018), "mbaps", 
 from __future__ import annotations
 
 import ssl
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
@@ -18,6 +18,7 @@ from cryptography import x509
 from cryptography.hazmat import asn1
 
 from drivers.errors import ConfigMismatch
+from drivers.foreign_file import read_regular, require_regular
 
 ROLE_OID: Final = x509.ObjectIdentifier("1.3.6.1.4.1.50316.802.1")  # object identifier of the role extension
 OLDEST_TLS: Final = ssl.TLSVersion.TLSv1_2  # anything older is refused in the handshake, on both sides
@@ -89,7 +90,7 @@ def role_of(certificate_der: bytes) -> str | None:
 
 def own_role(credentials: Credentials) -> str | None:
     """Read the role out of a side's own certificate file; see `role_of`."""
-    return _role(x509.load_pem_x509_certificate(credentials.certificate.read_bytes()))
+    return _role(x509.load_pem_x509_certificate(read_regular(credentials.certificate)))
 
 
 def _role(certificate: x509.Certificate) -> str | None:
@@ -125,22 +126,24 @@ def _said(cause: Exception | None) -> str:
 def _context(protocol: ssl._SSLMethod, credentials: Credentials) -> ssl.SSLContext:
     context = ssl.SSLContext(protocol)
     context.minimum_version = OLDEST_TLS
-    _load("ca", credentials.ca, lambda: context.load_verify_locations(credentials.ca))
+    _load("ca", [credentials.ca], lambda: context.load_verify_locations(credentials.ca))
     _load(
         "certificate and key",
-        f"{credentials.certificate}, {credentials.key}",
+        [credentials.certificate, credentials.key],
         lambda: context.load_cert_chain(credentials.certificate, credentials.key, _no_password),
     )
     return context
 
 
-def _load(what: str, files: object, load: Callable[[], None]) -> None:
+def _load(what: str, files: Sequence[Path], load: Callable[[], None]) -> None:
     try:
+        for file in files:
+            require_regular(file)
         load()
     except OSError as cause:  # ssl.SSLError is one
         reason = getattr(cause, "reason", None) or cause.strerror or str(cause)
         raise ConfigMismatch(
-            f"{what} ({files}): expected PEM files that belong together, got: {reason}. "
+            f"{what} ({', '.join(map(str, files))}): expected PEM files that belong together, got: {reason}. "
             "Look at the paths in the rig file, and make the files again."
         ) from cause
 

@@ -21,6 +21,7 @@ from typing import Annotated, Final, Literal
 from pydantic import Field, ValidationError
 
 from drivers.errors import ConfigMismatch
+from drivers.foreign_file import read_regular_text
 from drivers.plc.register import Access, MapTable, Register, RegisterKind, Value, ValueType
 from drivers.plc.types import ClutchState, DriveMode, PrbsSource
 
@@ -110,7 +111,7 @@ def _continues(block: Block, register: Register) -> bool:
 def load_register_map(path: Path) -> RegisterMap:
     """Read and check a map file."""
     try:
-        data = tomllib.loads(path.read_text("utf-8"))
+        data = tomllib.loads(read_regular_text(path))
     except OSError as cause:
         raise RegisterMapError(path, f"the file | expected a readable file | got: {cause.strerror}") from cause
     except (ValueError, RecursionError) as cause:  # tomllib's own error, and text that is not UTF-8

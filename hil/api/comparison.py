@@ -19,7 +19,7 @@ from hil.report.comparison import Comparison, compare_record, comparison_text, t
 from hil.report.comparison_html import comparison_page, comparison_panels
 from hil.report.figures import time_panels
 from hil.report.numbers import shown
-from hil.report.outputs import publish
+from hil.result_folder import publish
 
 if TYPE_CHECKING:
     import pandas

@@ -83,7 +83,7 @@ def check(
 
 def _require_proof(proof: Path, prove_stop: bool) -> None:
     """Refuse a file that can't be written, before drives are touched."""
-    from hil.report.outputs import require_folder
+    from hil.result_folder import require_folder
 
     if not prove_stop:
         raise UsageError(f"--out {proof}: expected --prove-stop, whose proof it keeps. Give both or neither.")
@@ -93,7 +93,7 @@ def _require_proof(proof: Path, prove_stop: bool) -> None:
 def _keep(proof: Path, document: dict[str, Any], rig: Path) -> None:
     """Write what was seen, with what made it: a proof that is not kept is none."""
     from hil.provenance import provenance
-    from hil.report.outputs import publish
+    from hil.result_folder import publish
 
     text = json.dumps({**document, "made": provenance([rig]).document()}, indent=2) + "\n"
     publish(proof.parent, {proof.name: lambda path: path.write_text(text, encoding="utf-8")})

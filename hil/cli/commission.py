@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from hil.cli.options import Pace, PaceOption, TakeOver, TrustLaws
+from drivers.foreign_file import read_regular_text
+from hil.cli.options import Pace, PaceOption, TakeOver, TrustLaws, hold
 from hil.cli.printing import new_console
 from hil.errors import UsageError
 
@@ -81,23 +82,19 @@ def commission(
     the step that was interrupted. Writes DIR/commissioning.html, DIR/model.toml, DIR/commission.json and DIR/runs/.
     """
     from hil.cli.commission_job import asked_of_steps, job_in, print_plan, who_answers
-    from hil.commission.state import sole_use
     from hil.config.rig_file import read_rig
     from hil.orders.order import RigSource
-    from hil.report.outputs import require_folder
 
     asked = asked_of_steps(skip or (), because or (), repeat or ())
     read_rig(rig)  # names every fault of the file, and of what it names, by the line
-    source = RigSource(rig, rig.read_text(encoding="utf-8"), bus, modbus, take_over)
+    source = RigSource(rig, read_regular_text(rig), bus, modbus, take_over)
     console = new_console(stderr=as_json, highlight=False)
     if dry_run:
         print_plan(job_in(out, source, model, trust_laws, travel, pace, console), console, as_json)
         return
-    require_folder(out)
-    out.mkdir(parents=True, exist_ok=True)
-    with sole_use(out):
-        job = job_in(out, source, model, trust_laws, travel, pace, console)
-        _to_its_report(job, who_answers(console, yes, keep_results), asked, console, as_json)
+    hold(out)
+    job = job_in(out, source, model, trust_laws, travel, pace, console)
+    _to_its_report(job, who_answers(console, yes, keep_results), asked, console, as_json)
 
 
 def _to_its_report(job: Job, talk: Talk, asked: Asked, console: Console, as_json: bool) -> None:

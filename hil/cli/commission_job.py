@@ -24,7 +24,7 @@ from hil.orders.operator import Talk
 from hil.orders.order import RigSource
 from hil.orders.runner import Conditions, Runner
 from hil.provenance import provenance
-from hil.report.outputs import publish
+from hil.result_folder import publish
 
 if TYPE_CHECKING:
     from rich.console import Console

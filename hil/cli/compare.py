@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from hil.cli.options import Dbc, Mapped, TrustFmu, TrustLaws, tell
+from hil.cli.options import Dbc, Mapped, TrustFmu, TrustLaws, hold, tell
 from hil.cli.printing import new_console, say
 
 app = typer.Typer(add_completion=False)
@@ -37,10 +37,10 @@ def compare(
     from hil.provenance import provenance
     from hil.report.comparison import compared, comparison_text
     from hil.report.comparison_html import comparison_page, comparison_summary
-    from hil.report.outputs import publish, require_folder
+    from hil.result_folder import publish
 
     if out is not None:
-        require_folder(out)
+        hold(out)
     models = [model, *(more or ())]
     comparisons = compared(models, recordings, mapped or (), Trust(trust_laws, trust_fmu), dbc, tell)
     made = provenance(models, recordings)

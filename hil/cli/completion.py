@@ -9,12 +9,12 @@ import re
 from collections.abc import Iterator
 from enum import Enum
 from importlib.resources import files
-from pathlib import Path
 from typing import Annotated
 
 import typer
 from typer.completion import get_completion_script  # type: ignore[attr-defined]
 
+from drivers.foreign_file import read_regular_text
 from hil.cli.printing import say
 
 app = typer.Typer(add_completion=False)
@@ -48,7 +48,7 @@ def effect_names(incomplete: str) -> Iterator[str]:
 def experiment_names(ctx: typer.Context, incomplete: str) -> Iterator[str]:
     """Yield the experiments of the rig file on the line that begin so; none of a file that can't be read."""
     try:
-        text = Path(ctx.params.get("rig") or "").read_text("utf-8")
+        text = read_regular_text(ctx.params.get("rig") or "")
     except (OSError, UnicodeDecodeError):
         return
     for name in re.findall(r"^\s*\[experiments\.([^].]*)\]", text, re.MULTILINE):

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from hil.cli.options import hold
 from hil.cli.printing import new_console
 
 if TYPE_CHECKING:
@@ -49,9 +50,7 @@ def demo(
     The first run compiles for some minutes more. The verdict is written before the seal is opened, and is judged
     unchanged.
     """
-    from hil.report.outputs import require_folder
-
-    require_folder(out)
+    hold(out)
     chosen = secrets.randbelow(SEEDS) if seed is None else seed
     with tempfile.TemporaryDirectory(prefix="hil-demo-") as workshop:
         _Demo(new_console(), chosen, Path(workshop), out).run()
@@ -155,7 +154,7 @@ class _Demo:
         from hil.provenance import provenance
         from hil.report.diagnosis_html import diagnosis_page, diagnosis_summary
         from hil.report.diagnosis_json import diagnosis_text
-        from hil.report.outputs import publish
+        from hil.result_folder import publish
 
         made = provenance([self._nominal], recordings)
         text, page = diagnosis_text(diagnosis, made), diagnosis_page(diagnosis, made)
@@ -177,7 +176,7 @@ class _Demo:
 
     def _judge(self, verdict: dict[str, Any], truth: dict[str, object], opened: object, commitment: str) -> None:
         from hil.proof.judge import judge, judgement_text
-        from hil.report.outputs import publish
+        from hil.result_folder import publish
 
         judgement = judge(verdict, truth)
         seal = {"commitment": commitment, "opened": opened}

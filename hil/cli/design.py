@@ -9,6 +9,7 @@ from typing import Annotated
 
 import typer
 
+from drivers.foreign_file import read_regular_text
 from hil.cli.diagnose import Effort, progress_bar
 from hil.cli.options import Jobs, TrustLaws, tell
 from hil.cli.printing import say
@@ -55,11 +56,11 @@ def design(
     from hil.design.report import design_document, design_lines, design_toml, draw, question_lines
     from hil.orders.order import RigSource
     from hil.recording import read_records
-    from hil.report.outputs import publish, require_folder
+    from hil.result_folder import publish, require_folder
 
     require_folder(out.parent)
     read_rig(rig)  # names every fault of the file by the line
-    source = RigSource(rig, rig.read_text(encoding="utf-8"))
+    source = RigSource(rig, read_regular_text(rig))
     file = read_model_for_recordings(model, trust_laws)
     records = read_records(recordings, file.signals, file.on_bench, None, tell)
     require_of_rig(recordings, records, source.rig())

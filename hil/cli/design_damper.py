@@ -42,7 +42,7 @@ def damper(
     from estimator.damper import design_damper
     from hil.config.damper_file import damper_toml
     from hil.design.damper import asked, design_document, design_lines, draw, file_of, region_of, timing_of
-    from hil.report.outputs import publish, require_folder
+    from hil.result_folder import publish, require_folder
 
     require_folder(out)
     order = asked(rig, target, share)

@@ -12,7 +12,7 @@ import typer
 from typer.core import TyperCommand
 
 from hil.cli.command_line import is_silent
-from hil.cli.options import Dbc, Jobs, Mapped, Signals, TrustFmu, TrustLaws, Tuned, tell
+from hil.cli.options import Dbc, Jobs, Mapped, Signals, TrustFmu, TrustLaws, Tuned, hold, tell
 
 HOLDOUT = "--holdout"
 
@@ -103,11 +103,10 @@ def diagnose(
     from hil.report.diagnosis_html import diagnosis_summary
     from hil.report.diagnosis_json import diagnosis_text
     from hil.report.fmu_terms import in_its_terms
-    from hil.report.outputs import require_folder
     from hil.store import attach_to_runs
     from hil.store.entry import DIAGNOSIS, MODEL
 
-    require_folder(out)
+    hold(out)
     every = [*recordings, *(holdout or ())]
     asked = Asked(model, signals, mapped or (), Trust(trust_laws, trust_fmu), tuned or (), budget_s)
     with questioned(asked, every, dbc, tell) as found:

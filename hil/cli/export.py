@@ -111,7 +111,7 @@ def _precision(single: bool) -> Precision:
 
 
 def _write(out: Path, text: str, estimator: PlcEstimator) -> None:
-    from hil.report.outputs import publish
+    from hil.result_folder import publish
 
     publish(out.parent, {out.name: lambda path: path.write_text(text, encoding="ascii")})
     orders = estimator.settings.orders
@@ -126,7 +126,7 @@ def damper(
     """Write active damping for a PLC or a drive: the torque of hil run --damper, to the bit."""
     from hil.config.damper_file import drivable
     from hil.export.damper import damper_text
-    from hil.report.outputs import publish
+    from hil.result_folder import publish
 
     file, rig = drivable(design)
     text = damper_text(file, rig, out.suffix.lower())

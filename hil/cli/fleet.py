@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from hil.cli.diagnose import Effort
-from hil.cli.options import Scheduler, require_dask, tell
+from hil.cli.options import Scheduler, hold, require_dask, tell
 from hil.cli.printing import progress_bar, say
 
 if TYPE_CHECKING:
@@ -46,6 +46,14 @@ Pattern = Annotated[
     str | None,
     typer.Option(metavar="REGEX", help="Takes vehicle, rig and started from a path: (?P<vehicle>bus_[0-9]+)/."),
 ]
+Dashboard = Annotated[
+    bool,
+    typer.Option(
+        "--dashboard",
+        help="Open Dask's own pages of this machine's workers on a port of 127.0.0.1: every user of the machine can "
+        "read them, and they load style sheets from the internet.",
+    ),
+]
 AsJson = Annotated[bool, typer.Option("--json", help="Print the counts as JSON.")]
 
 
@@ -68,6 +76,7 @@ def diagnose(
     memory: Memory = "auto",
     retries: Retries = 2,
     budget_s: Limit = 3600.0,
+    dashboard: Dashboard = False,
     as_json: AsJson = False,
 ) -> None:
     """Diagnose every recording, or every vehicle's together.
@@ -93,7 +102,8 @@ def diagnose(
         file = replace(file, model=prior_model)
         tell(f"from the fleet: {', '.join(named) or 'nothing, it has too few vehicles'}")
     job = Job(DIAGNOSE, file, model.name, Source.of(model).sha256, named, effort.value, budget_s)
-    _carry_out(sources, out, job, by is By.VEHICLE, pattern, _engine(scheduler, jobs, memory, retries), as_json)
+    engine = _engine(scheduler, jobs, memory, retries, dashboard)
+    _carry_out(sources, out, job, by is By.VEHICLE, pattern, engine, as_json)
 
 
 @app.command(epilog="Example: hil fleet identify 's3://drives/2026-11/*.parquet' --out results")
@@ -109,6 +119,7 @@ def identify(
     memory: Memory = "auto",
     retries: Retries = 2,
     budget_s: Limit = 3600.0,
+    dashboard: Dashboard = False,
     as_json: AsJson = False,
 ) -> None:
     """Identify the driveline from every recording: resonance, damping, physical parameters."""
@@ -122,7 +133,7 @@ def identify(
     else:
         file = read_model_for_recordings(model, False)
         job = Job(IDENTIFY, file, model.name, Source.of(model).sha256, budget_s=budget_s)
-    _carry_out(sources, out, job, False, pattern, _engine(scheduler, jobs, memory, retries), as_json)
+    _carry_out(sources, out, job, False, pattern, _engine(scheduler, jobs, memory, retries, dashboard), as_json)
 
 
 @app.command(epilog="Example: hil fleet report results")
@@ -142,11 +153,11 @@ def report(
     say(f"report: {dataset / FILE_NAME}")
 
 
-def _engine(scheduler: str | None, jobs: int | None, memory: str, retries: int) -> Engine:
+def _engine(scheduler: str | None, jobs: int | None, memory: str, retries: int, dashboard: bool) -> Engine:
     from estimator.physics.parallel import workers
     from hil.fleet.run import Engine
 
-    return Engine(scheduler, jobs or workers(), memory, retries)
+    return Engine(scheduler, jobs or workers(), memory, retries, dashboard)
 
 
 def _carry_out(
@@ -157,22 +168,24 @@ def _carry_out(
 
     from hil.errors import UsageError
     from hil.fleet.dataset import Writer
-    from hil.fleet.run import carry_out, client_of, survey
+    from hil.fleet.known import Survey
+    from hil.fleet.run import carry_out, connecting, survey
     from hil.fleet.sources import find, pattern_of
-    from hil.report.outputs import require_folder
 
-    require_folder(out)
+    hold(out)
     found, complaints = find(sources, pattern_of(pattern))
     for line in complaints:
         tell(line)
     if not found:
         raise UsageError("expected recordings, got none: " + "; ".join(complaints))
-    with client_of(engine) as client, progress_bar() as progress:
-        tell(f"dashboard: {client.dashboard_link}")
-        fleet = survey(client, found, engine.retries, progress)
+    known = Survey.of(out)
+    with connecting(engine, tell) as connect, progress_bar() as progress:
+        fleet = survey(connect, found, known, job, engine, progress)
         for line in fleet.remarks():
             tell(line)
-        done = carry_out(client, fleet, job, Writer(out, job.command), engine, by_vehicle, progress)
+        writer = Writer(out, job.command)
+        writer.survey(known.rows())
+        done = carry_out(connect, fleet, job, writer, engine, by_vehicle, progress)
     if as_json:
         say(json.dumps({**asdict(done), "duplicates": len(fleet.duplicates), "sources": complaints}))
     else:
@@ -182,7 +195,7 @@ def _carry_out(
 def _say_done(out: Path, done: Done) -> None:
     from hil.fleet.dataset import FAILURES, read
 
-    for row in read(out, "failures").to_pylist():
+    for row in read(out, "failures"):
         say(f"not done: {row['url']}: {row['error']}", err=True)
     failed = f", {done.failed} failed: {out / FAILURES}" if done.failed else ""
     say(f"{done.computed} computed, {done.known} known before{failed}    results: {out}")

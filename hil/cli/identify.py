@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from hil.cli.options import Dbc, TrustLaws, tell
+from hil.cli.options import Dbc, TrustLaws, hold, tell
 from hil.cli.printing import new_console, say
 from hil.errors import ModelFileError
 
@@ -64,11 +64,10 @@ def identify(
     from hil.provenance import provenance
     from hil.recording.recordings import require_even_cycles
     from hil.report.identification_input import chosen_estimators, chosen_orders, start_values
-    from hil.report.outputs import require_folder
     from hil.store import attach_to_runs
     from hil.store.entry import IDENTIFICATION
 
-    require_folder(out)
+    hold(out)
     require_even_cycles(recordings)
     settings = Settings(samples=samples or None)
     if sample_time is not None:

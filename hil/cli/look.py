@@ -100,7 +100,7 @@ def _plot(found: Look, model: Path | None, dbc: Path | None) -> None:
     from hil.config.model_file import read_model_for_recordings, signals_of
     from hil.recording.signals_config import SignalsConfig
     from hil.report.look_page import look_page
-    from hil.report.outputs import publish
+    from hil.result_folder import publish
 
     known = None if model is None else read_model_for_recordings(model).signals
     if known is None and found.signals:

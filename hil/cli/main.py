@@ -54,13 +54,13 @@ def run(line: Sequence[str], keep_log: bool = False) -> int:
 
 def _run(line: Sequence[str], keep_log: bool) -> int:
     from hil.cli.group import root
-    from hil.cli.options import use_cores_of_environment
+    from hil.cli.options import letting_go, use_cores_of_environment
     from hil.provenance import under
     from hil.support.command_log import level_of, logged
 
     own, silent, log_level = common_options(line)
     level = level_of(log_level) if keep_log and own and own[0] in COMMANDS else "off"
-    with logged(own, level), silence(silent), under(own):
+    with logged(own, level), silence(silent), under(own), letting_go():
         use_cores_of_environment()
         result = root(own, prog_name="hil", standalone_mode=False)
     if result == ExitStatus.INTERRUPTED:  # what typer makes of Ctrl-C

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
+from contextvars import ContextVar
 from dataclasses import replace
 from enum import Enum
 from pathlib import Path
@@ -22,6 +24,33 @@ if TYPE_CHECKING:
     from hil.rig.live import OnlineSetup
     from hil.rig.pacing import Pacer
     from hil.rig.realtime import RealTimeGrants
+
+
+def hold(folder: Path) -> None:
+    """Hold the folder of the results until the command ends: no other command writes there, nor computes for nothing.
+
+    Raises a `UsageError` where another one is at work there, or nothing can be written.
+    """
+    from hil.result_folder import sole_use
+
+    stack, held = _HELD.get()
+    if folder.resolve() not in held:  # a command may be made of others
+        stack.enter_context(sole_use(folder))
+        held.add(folder.resolve())
+
+
+_HELD: ContextVar[tuple[ExitStack, set[Path]]] = ContextVar("held")
+
+
+@contextmanager
+def letting_go() -> Iterator[None]:
+    """Let go of what is held at the end of a command line."""
+    with ExitStack() as stack:
+        token = _HELD.set((stack, set()))
+        try:
+            yield
+        finally:
+            _HELD.reset(token)
 
 
 Dbc = Annotated[

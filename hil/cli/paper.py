@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from hil.cli.options import TrustLaws
+from hil.cli.options import TrustLaws, hold
 from hil.cli.printing import new_console, say
 from hil.errors import UsageError
 
@@ -71,9 +71,8 @@ def paper(
     from estimator.identification.settings import Settings
     from hil.figures.drawn import require_matplotlib
     from hil.provenance import provenance
-    from hil.report.outputs import require_folder
 
-    require_folder(out)
+    hold(out)
     require_matplotlib()
     settings = Settings(orders=Orders(nk=delay), offline_sample_time_s=PAPER_PERIOD_S)
     if recordings:
@@ -148,8 +147,8 @@ def _publish(
     as_json: bool,
 ) -> None:
     from hil.figures.local_model import row_of
-    from hil.report.outputs import publish
     from hil.report.paper_page import paper_page, paper_text
+    from hil.result_folder import publish
 
     rows = [row_of(model) for model in models]
     conditions = [each.conditions for each in driven or ()]

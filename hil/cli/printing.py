@@ -84,7 +84,7 @@ def ask_at_terminal(heading: str) -> Callable[[str, str, str], str]:
 def print_schema(kind: FileKind, out: Path | None) -> None:
     """Print the JSON schema of a kind of file, or write it."""
     from hil.config.schema import schema_text
-    from hil.report.outputs import publish
+    from hil.result_folder import publish
 
     text = schema_text(kind)
     if out is None:

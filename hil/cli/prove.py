@@ -11,7 +11,8 @@ from typing import Annotated
 
 import typer
 
-from hil.cli.options import Scheduler, require_dask
+from drivers.foreign_file import read_regular_text
+from hil.cli.options import Scheduler, hold, require_dask
 from hil.cli.printing import progress_bar, say
 from hil.errors import UsageError
 
@@ -53,6 +54,7 @@ def prove(
     """
     if context.invoked_subcommand is not None:
         return
+    hold(out)
     key_path = out.with_name(f"{out.name}.key")
     if not key_path.exists():
         make(out, cases, seed, jobs, key_path)
@@ -76,9 +78,9 @@ def make(
     """Draw, record and seal a set of cases. Prints the key, or writes it to FILE."""
     from hil.proof.seal import new_key, parse_key
     from hil.proof.sealed_set import make as make_set
-    from hil.report.outputs import require_folder
+    from hil.result_folder import require_folder
 
-    require_folder(folder)
+    hold(folder)
     key = new_key()
     if key_file is not None:
         _require_outside(key_file, folder)
@@ -100,6 +102,7 @@ def run(folder: Folder, jobs: Jobs = 2, scheduler: Scheduler = None) -> None:
     """Let the public command answer every case; it sees only DIR/cases, one case at a time."""
     from hil.proof.answers import answer
 
+    hold(folder)
     with _pool(scheduler) as pool, progress_bar() as progress:
         digest = answer(folder.absolute(), jobs, progress, pool=pool)
     say(f"verdicts: {folder}/verdicts   digest: {digest}")
@@ -123,8 +126,9 @@ def open_(
     from hil.proof.seal import parse_key
     from hil.proof.sealed_set import CASES
     from hil.provenance import provenance
-    from hil.report.outputs import publish
+    from hil.result_folder import publish
 
+    hold(folder)
     secret = parse_key(_key_text(key, key_file))
     with progress_bar() as progress:
         rows = judge_set(folder, secret, jobs, progress, verdicts)
@@ -149,6 +153,7 @@ def wire(
     from hil.proof.rigs import WIRED, run_wire
     from hil.proof.scoreboard import WIRE
 
+    hold(folder)
     with progress_bar() as progress:
         rows = run_wire(folder / WIRE, seed, only or list(WIRED), progress)
     for row in rows:
@@ -169,6 +174,7 @@ def real(
     from hil.proof.real import run_real
     from hil.proof.scoreboard import REAL
 
+    hold(folder)
     with _pool(scheduler) as pool, progress_bar() as progress:
         results = run_real(data.absolute(), folder.absolute() / REAL, only or (), jobs, progress, pool=pool)
     for result in results:
@@ -191,7 +197,7 @@ def _pool(scheduler: str | None) -> Iterator[Executor | None]:
 def _key_text(key: str | None, key_file: Path | None) -> str:
     if (key is None) == (key_file is None):
         raise UsageError("expected the key once, with --key or --key-file. hil prove make has printed or written it.")
-    return key if key is not None else Path(str(key_file)).read_text(encoding="utf-8")
+    return key if key is not None else read_regular_text(str(key_file))
 
 
 def _require_set(folder: Path, key_file: Path) -> None:

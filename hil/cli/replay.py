@@ -65,7 +65,7 @@ def replay(
     From a bus trace, torque and speed are those the run recorded, to the bit; references are what was on the bus:
     whole per mille of the rated torque. The PLC is not on this bus, so no sample is flagged for it.
     """
-    from hil.report.outputs import publish
+    from hil.result_folder import publish
     from hil.rig.live import Pace, tracking_settings
     from hil.rig.trace import is_trace
     from hil.store.entry import statements

@@ -17,7 +17,7 @@ from hil.cli.printing import new_console, say
 from hil.config.rig_file import Rig
 from hil.errors import HilError, UsageError
 from hil.recording.writer import RecordingWriter
-from hil.report.outputs import publish
+from hil.result_folder import publish
 from hil.rig.build import open_devices
 from hil.rig.drive import Progress as ShowCycle
 from hil.rig.drive import RunSummary

@@ -38,8 +38,8 @@ def simulate(
     from hil.provenance import provenance
     from hil.recording import Table, csv_format
     from hil.report.numbers import json_number, shown
-    from hil.report.outputs import publish, require_folder
     from hil.report.wording import output_unit, simulated_column
+    from hil.result_folder import publish, require_folder
 
     if out.suffix.lower() != ".csv":
         raise UsageError(f"--out {out}: expected a name that ends in .csv, got {out.suffix!r}")

@@ -8,8 +8,9 @@ from typing import Annotated
 
 import typer
 
+from drivers.foreign_file import read_regular_text
 from hil.cli.diagnose import Effort
-from hil.cli.options import Jobs, Pace, PaceOption, TakeOver, TrustLaws, pacer_for, scheduling
+from hil.cli.options import Jobs, Pace, PaceOption, TakeOver, TrustLaws, hold, pacer_for, scheduling
 from hil.cli.printing import new_console, say
 
 app = typer.Typer(add_completion=False)
@@ -45,7 +46,6 @@ def solve(
     """
     from hil.cli.commission_job import Bar, who_answers
     from hil.cli.run_job import run_progress
-    from hil.commission.state import sole_use
     from hil.config.model_file import read_model_for_recordings
     from hil.config.rig_file import read_rig
     from hil.design.inputs import require_of_rig
@@ -54,19 +54,17 @@ def solve(
     from hil.orders.order import RigSource
     from hil.orders.runner import Conditions, Runner
     from hil.recording import read_records
-    from hil.report.outputs import require_folder
 
-    require_folder(out)
+    hold(out)
     read_rig(rig)  # names every fault of the file by the line
-    source = RigSource(rig, rig.read_text(encoding="utf-8"), bus, modbus, take_over)
+    source = RigSource(rig, read_regular_text(rig), bus, modbus, take_over)
     file, given = read_model_for_recordings(model, trust_laws), recordings or []
     if given:
         require_of_rig(given, read_records(given, file.signals, file.on_bench), source.rig())
     console = new_console(stderr=as_json, highlight=False)
     conditions = Conditions(pace.value, lambda of: pacer_for(of, pace), lambda: scheduling(pace), run_progress)
     conditions.pacer(source.rig())  # refuses a pace this rig must not be driven at, before anything
-    out.mkdir(parents=True, exist_ok=True)
-    with sole_use(out), Bar() as bar:
+    with Bar() as bar:
         state = load_state(out, source, model)
         job = Solving(
             out,

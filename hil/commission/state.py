@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import errno
 import json
-import os
-import sys
-from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
-from typing import IO, Annotated, Any, Final, Literal
+from typing import Annotated, Any, Final, Literal
 
 from pydantic import Field, TypeAdapter, ValidationError
 
@@ -169,7 +165,7 @@ def load_state(folder: Path, names: Iterable[str]) -> State | None:
         content = read_json(path)
         state = _STATE.validate_python({**content, "folder": folder} if isinstance(content, dict) else content)
         state.steps = {name: _checked(folder, name, state.steps.get(name, StepRecord())) for name in names}
-    except ValueError as error:
+    except (OSError, ValueError) as error:
         raise UsageError(
             f"{path}: expected the state of a commissioning ({SCHEMA}), got a file that can't be read as one: "
             f"{_first(error)}. Move it away to begin anew in this folder (its recordings stay), or choose another by "
@@ -189,7 +185,7 @@ def _checked(folder: Path, name: str, record: StepRecord) -> StepRecord:
     return record
 
 
-def _first(error: ValueError) -> str:
+def _first(error: OSError | ValueError) -> str:
     """Say the first thing that is wrong, and where."""
     if not isinstance(error, ValidationError):
         return str(error)
@@ -209,68 +205,3 @@ def model_json(model: DrivelineModel) -> dict[str, Any]:
 def model_from_json(document: Mapping[str, Any]) -> DrivelineModel:
     """Return the model again."""
     return ModelEvidence.model_validate(document).model()
-
-
-LOCK: Final = ".commission.lock"
-_BEHIND_THE_TEXT: Final = 1 << 20
-
-
-@contextmanager
-def sole_use(folder: Path) -> Iterator[None]:
-    """Hold a folder for the time of a block.
-
-    The operating system lets go of it when the process ends, however it ends: a lock is never left behind. The file
-    stays, for a lock on a file that is removed and made anew holds nobody off.
-    """
-    with _opened(folder / LOCK) as file:
-        if not _taken(file):
-            file.seek(0)
-            holder = file.read().strip() or "?"
-            raise UsageError(
-                f"{folder}: expected no other call at work on this commissioning, got process {holder}. "
-                "Wait for its end or end it by Ctrl-C, or choose another folder by --out."
-            )
-        _sign(file)
-        yield
-
-
-def _opened(path: Path) -> IO[str]:
-    try:
-        return path.open("a+", encoding="utf-8", buffering=1)
-    except OSError as error:
-        raise _unwritable(path, error) from error
-
-
-def _sign(file: IO[str]) -> None:
-    """Write who holds it."""
-    try:
-        file.truncate(0)
-        print(os.getpid(), file=file, flush=True)
-    except OSError as error:
-        raise _unwritable(Path(file.name), error) from error
-
-
-def _unwritable(path: Path, error: OSError) -> UsageError:
-    return UsageError(
-        f"{path}: expected a place to write to, got: {error.strerror or error}. Make room there, or choose another "
-        "folder by --out."
-    )
-
-
-def _taken(file: IO[str]) -> bool:
-    """Take the lock where nobody has it; never waits."""
-    try:
-        if sys.platform == "win32":
-            import msvcrt
-
-            file.seek(_BEHIND_THE_TEXT)  # what is locked there can't be read by others
-            msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
-        else:
-            import fcntl
-
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError as error:
-        if error.errno in (errno.EACCES, errno.EAGAIN, errno.EDEADLK):
-            return False
-        raise
-    return True

@@ -23,6 +23,7 @@ from pydantic import Field, PrivateAttr, model_validator
 from drivers.capability.plan import plan_drive
 from drivers.datasheet.file import EdsFile
 from drivers.errors import ConfigMismatch
+from drivers.foreign_file import read_regular_text
 from drivers.plc.register_map import RegisterMap, RegisterMapError, load_register_map, require_usable
 from drivers.plc.types import PrbsSource
 from drivers.resources import data_file
@@ -254,7 +255,7 @@ def with_experiment_of(path: Path, experiment: str) -> tuple[Rig, str | None, st
         raise RigFileError(
             file, f"experiments.{name} | expected a name that {path} does not have | got one that it has"
         )
-    document = tomlkit.parse(path.read_text(encoding="utf-8"))
+    document = tomlkit.parse(read_regular_text(path))
     if "experiments" not in document:
         document.add("experiments", tomlkit.table(is_super_table=True))
     added: Any = document["experiments"]

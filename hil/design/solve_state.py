@@ -11,11 +11,12 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import Field, TypeAdapter
 
+from drivers.foreign_file import read_regular_text
 from hil.errors import UsageError
 from hil.files import is_inside, read_json
 from hil.orders.order import RigSource, rig_digest
 from hil.recording.checksum import text_sha256
-from hil.report.outputs import publish
+from hil.result_folder import publish
 
 FILE_NAME: Final = "solve.json"
 SCHEMA: Final = "hil.solve/1"
@@ -77,7 +78,7 @@ STATE: Final = TypeAdapter(State)
 
 def fresh_state(source: RigSource, model: Path) -> State:
     """Begin a state."""
-    return State(SCHEMA, rig_digest(source.text), text_sha256(model.read_text(encoding="utf-8")))
+    return State(SCHEMA, rig_digest(source.text), text_sha256(read_regular_text(model)))
 
 
 def load_state(folder: Path, source: RigSource, model: Path) -> State:
@@ -88,7 +89,7 @@ def load_state(folder: Path, source: RigSource, model: Path) -> State:
         return fresh
     try:
         known = STATE.validate_python(read_json(path))
-    except ValueError as error:
+    except (OSError, ValueError) as error:
         raise UsageError(
             f"{path}: expected the state of hil solve ({SCHEMA}), got a file that can't be read as one. Move it away "
             "to begin anew in this folder, or choose another by --out."

@@ -76,7 +76,7 @@ def drawing() -> Iterator[None]:
 
 
 def files_of(name: str, draw: Callable[[], Figure]) -> dict[str, Callable[[Path], object]]:
-    """Return what writes a figure in every format, by file name, for `hil.report.outputs.publish`."""
+    """Return what writes a figure in every format, by file name, for `hil.result_folder.publish`."""
 
     def write(suffix: str, path: Path) -> None:
         with drawing():

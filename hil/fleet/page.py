@@ -27,6 +27,7 @@ from hil.fleet.pooling import (
     pooled,
     usual,
 )
+from hil.fleet.sources import in_order
 from hil.provenance import Provenance
 from hil.report import page as html
 from hil.report.made import made_section
@@ -69,12 +70,15 @@ class Course:
 
 
 def _current(folder: Path) -> dict[str, Row]:
-    """Return the recordings' rows by their keys, of several results of the same content the last."""
-    last: dict[tuple[str, ...], Row] = {}
-    for row in read(folder, "recordings").to_pylist():
-        of = (row["vehicle"], row["rig"]) if row["n_recordings"] > 1 else (row["sha256"],)
-        last[(row["command"], *of)] = row
-    return {row["key"]: row for row in sorted(last.values(), key=lambda row: (row["started"], row["url"]))}
+    """Return the recordings' rows by their keys, of several results that share a content the last."""
+    known: set[tuple[str, bool, str]] = set()
+    last: list[Row] = []
+    for row in reversed(read(folder, "recordings")):
+        contents = {(row["command"], row["n_recordings"] > 1, sha256) for sha256 in row["sha256"].split()}
+        if not contents & known:
+            last.append(row)
+        known |= contents
+    return {row["key"]: row for row in sorted(last, key=lambda row: (row["started"], row["url"]))}
 
 
 def _values(folder: Path, rows: Mapping[str, Row]) -> dict[tuple[str, Of], dict[Vehicle, list[Row]]]:
@@ -86,7 +90,7 @@ def _values(folder: Path, rows: Mapping[str, Row]) -> dict[tuple[str, Of], dict[
         row = rows[key]
         found[row["model_sha256"], (effect, of["parameter"])][row["vehicle"], row["rig"]].append({**of, "of": row})
 
-    for each in read(folder, "parameters").to_pylist():
+    for each in read(folder, "parameters"):
         if each["key"] in rows and each["value"] is not None and _is_known(each):
             take(each["key"], each["effect"], each)
     for key, row in rows.items():
@@ -148,10 +152,12 @@ def courses_of(folder: Path, rows: Mapping[str, Row]) -> dict[Vehicle, list[Cour
 def fleet_page(folder: Path, made: Provenance) -> str:
     """Return the page of a dataset."""
     rows = _current(folder)
-    effects = [each for each in read(folder, "effects").to_pylist() if each["key"] in rows]
-    failures = read(folder, "failures").to_pylist()
+    effects = [each for each in read(folder, "effects") if each["key"] in rows]
+    failures = read(folder, "failures")
     courses = courses_of(folder, rows)
-    vehicles = sorted({(row["vehicle"], row["rig"]) for row in rows.values()})
+    vehicles = sorted(
+        {(row["vehicle"], row["rig"]) for row in rows.values()}, key=lambda each: [in_order(name) for name in each]
+    )
     outliers = [each for each in vehicles if any(_is_outlier(course) for course in courses.get(each, ()))]
     changed = [each for each in vehicles if any(course.change for course in courses.get(each, ()))]
     having = {(each["vehicle"], each["rig"]) for each in effects}

@@ -7,21 +7,25 @@ client hold as much for 100 recordings as for 10,000.
 from __future__ import annotations
 
 import logging
+import tempfile
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
+from functools import cache
 from itertools import groupby, islice
 from typing import Any, TypeVar
 
 import dask
 from dask.utils import parse_bytes
-from distributed import Client, Future, KilledWorker, LocalCluster, as_completed
+from distributed import Client, Future, KilledWorker, LocalCluster, Security, WorkerPlugin, as_completed
 from distributed.comm.core import CommClosedError
 
+from hil.child import safe_path
 from hil.errors import UsageError
-from hil.fleet.dataset import Writer
-from hil.fleet.sources import Found
-from hil.fleet.tasks import Job, Outcome, analyse, describe, row_of
+from hil.fleet.dataset import Row, Writer
+from hil.fleet.known import Survey, stamp
+from hil.fleet.sources import Found, Seen, in_order
+from hil.fleet.tasks import PATIENCE, Job, Outcome, analyse, describe, place, row_of
 
 OF_DASK: tuple[str, ...] = ("python", "dask", "distributed", "cloudpickle")
 """What client, scheduler and workers must have alike to understand one another."""
@@ -45,6 +49,7 @@ class Engine:
     workers: int = 1
     memory: str = "auto"  # of each worker, as Dask writes it; "auto" divides what there is
     retries: int = 2  # how often Dask tries again what a worker died of, or failed at
+    dashboard: bool = False  # of this machine's cluster: a page of Dask's, which every local user can open
 
 
 @contextmanager
@@ -63,16 +68,48 @@ def client_of(engine: Engine) -> Iterator[Client]:
             yield client
         return
     _require_room(engine.memory)
-    settings = {"distributed.scheduler.allowed-failures": engine.retries, "distributed.worker.daemon": False}
+    with tempfile.TemporaryDirectory(prefix="hil-fleet-") as folder, _own_cluster(engine, folder) as client:
+        yield client
+
+
+@contextmanager
+def _own_cluster(engine: Engine, folder: str) -> Iterator[Client]:
+    """Start a cluster on this machine that nobody else can use: Dask runs whatever reaches its ports.
+
+    They are on loopback, which all users share, so both sides of a connection show a certificate, which is in the
+    memory of these processes only. Workers look for modules neither here nor in a folder others can write to.
+    """
+    settings = {
+        "distributed.scheduler.allowed-failures": engine.retries,
+        "distributed.worker.daemon": False,
+        "distributed.worker.http.routes": [],
+        "temporary-directory": folder,
+        **({} if engine.dashboard else {"distributed.scheduler.http.routes": []}),
+    }
     with (
+        safe_path(),
         dask.config.set(settings),
         LocalCluster(
             n_workers=engine.workers, threads_per_worker=1, memory_limit=engine.memory, host="127.0.0.1",
-            dashboard_address="127.0.0.1:0", silence_logs=logging.CRITICAL,
+            protocol="tls://", security=Security.temporary(), silence_logs=logging.CRITICAL,
+            dashboard_address="127.0.0.1:0", scheduler_kwargs={"dashboard": engine.dashboard},
         ) as cluster,
         Client(cluster) as client,
     ):  # fmt: skip
+        client.register_plugin(WithoutHttp())
+        if not engine.dashboard:
+            cluster.scheduler.http_server.stop()
         yield client
+
+
+class WithoutHttp(WorkerPlugin):
+    """Closes the web server that Dask gives each worker."""
+
+    name = "without HTTP"
+
+    def setup(self, worker: Any) -> None:
+        """Close it before the first task."""
+        worker.http_server.stop()
 
 
 LEAST_MEMORY = 512 << 20  # of a worker [bytes]: hil alone takes 300 MiB, and Dask kills one at 95 % of its limit
@@ -105,11 +142,31 @@ def _require_alike(client: Client) -> None:
         raise UsageError(f"--scheduler: expected the versions of this machine, got {'; '.join(differing)}. Align them.")
 
 
+Connect = Callable[[], Client]
+
+
+@contextmanager
+def connecting(engine: Engine, tell: Callable[[str], None]) -> Iterator[Connect]:
+    """Give what starts the cluster, or connects to it, when it is first asked: what is known needs none."""
+    with ExitStack() as stack:
+
+        @cache
+        def connect() -> Client:
+            client = stack.enter_context(client_of(engine))
+            if engine.dashboard and engine.scheduler is None:
+                tell(f"dashboard: {client.dashboard_link}, open to every user of this machine")
+            return client
+
+        yield connect
+
+
 def hand_out(
-    client: Client, items: Iterable[Item], submit: Callable[[Item], Future[Any]]
+    connect: Connect, items: Sequence[Item], submit: Callable[[Item], Future[Any]]
 ) -> Iterator[tuple[Item, Any, str]]:
     """Yield each item with its result as it comes, or with what became of it."""
-    waiting = iter(items)
+    if not items:
+        return
+    client, waiting = connect(), iter(items)
     running = {}
     done = as_completed(loop=client.loop)
     cores = sum(client.nthreads().values()) or 1
@@ -148,7 +205,9 @@ class Fleet:
 
     def pieces(self, by_vehicle: bool) -> list[tuple[Found, ...]]:
         """Return what is computed together, in an order of its own: every recording, or a vehicle's on one rig."""
-        ordered = sorted(self.recordings, key=lambda each: (each.vehicle, each.rig, each.started, each.url))
+        ordered = sorted(
+            self.recordings, key=lambda each: (in_order(each.vehicle), in_order(each.rig), each.started, each.url)
+        )
         if not by_vehicle:
             return [(each,) for each in ordered]
         return [tuple(group) for _, group in groupby(ordered, key=lambda each: (each.vehicle, each.rig))]
@@ -161,29 +220,47 @@ class Fleet:
             rigs.setdefault(each.vehicle, set()).add(each.rig)
         lines += [
             f"vehicle {vehicle}: recordings of {len(names)} rigs ({', '.join(sorted(names))}), kept separate"
-            for vehicle, names in sorted(rigs.items())
+            for vehicle, names in sorted(rigs.items(), key=lambda each: in_order(each[0]))
             if len(names) > 1
         ]
         return lines
 
+    def place_of(self) -> Callable[[Sequence[str]], Row | None]:
+        """Return what says where recordings with these checksums belong; None where they are of no one vehicle."""
+        by_content = {each.sha256: each for each in self.recordings}
 
-def survey(client: Client, found: Sequence[Found], retries: int, progress: Progress) -> Fleet:
-    """Take the checksum and the metadata of every recording."""
-    fleet, described = Fleet(), {}
+        def found(sums: Sequence[str]) -> Row | None:
+            recordings = [by_content[each] for each in sums if each in by_content]
+            is_one = len({(each.vehicle, each.rig) for each in recordings}) == 1
+            return place(recordings) if is_one and len(recordings) == len(sums) else None
+
+        return found
+
+
+def survey(
+    connect: Connect, found: Sequence[Found], known: Survey, job: Job, engine: Engine, progress: Progress
+) -> Fleet:
+    """Take the checksum and the metadata of every recording that is not known, or has changed since."""
+    fleet = Fleet()
+    stamps = {each.url: stamp(each.url) for each in found}
+    described = {each.url: seen for each in found if (seen := known.seen(each.url, stamps[each.url]))}
+    unknown = [each for each in found if each.url not in described]
 
     def submit(each: Found) -> Future[Any]:
-        return client.submit(describe, each, pure=False, retries=retries)
+        return connect().submit(describe, each, PATIENCE * job.budget_s, pure=False, retries=engine.retries)
 
-    for number, (each, result, error) in enumerate(hand_out(client, found, submit), start=1):
-        if isinstance(result, Found):
+    for number, (each, result, error) in enumerate(hand_out(connect, unknown, submit), start=1):
+        if isinstance(result, Seen):
             described[each.url] = result
+            known.note(each.url, stamps[each.url], result)
         else:
             fleet.failed.append((each, error or result))
-        progress("reading", number, len(found))
+        progress("reading", number, len(unknown))
     first: dict[str, Found] = {}
     for each in found:  # in their order, whichever worker was faster
-        if (one := described.get(each.url)) is None:
+        if (seen := described.get(each.url)) is None:
             continue
+        one = each.seen_as(seen)
         if one.sha256 in first:
             fleet.duplicates.append((one, first[one.sha256]))
         else:
@@ -202,9 +279,13 @@ class Done:
 
 
 def carry_out(
-    client: Client, fleet: Fleet, job: Job, writer: Writer, engine: Engine, by_vehicle: bool, progress: Progress
+    connect: Connect, fleet: Fleet, job: Job, writer: Writer, engine: Engine, by_vehicle: bool, progress: Progress
 ) -> Done:
-    """Compute what is not in the dataset yet, and keep it as it comes; what fails costs itself alone."""
+    """Compute what is not in the dataset yet, and keep it as it comes; what fails costs itself alone.
+
+    What is in it belongs from now on where this survey has found it.
+    """
+    writer.settle(fleet.place_of())
     known, pieces = writer.known(), fleet.pieces(by_vehicle)
     todo = [piece for piece in pieces if job.key(piece) not in known]
     done = Done(known=len(pieces) - len(todo))
@@ -214,12 +295,12 @@ def carry_out(
         writer.fail({**row_of(piece, job), "error": error})
 
     def submit(piece: tuple[Found, ...]) -> Future[Any]:
-        return client.submit(analyse, piece, job, pure=False, retries=engine.retries)
+        return connect().submit(analyse, piece, job, pure=False, retries=engine.retries)
 
     try:
         for each, error in fleet.failed:
             fail((each,), error)
-        for piece, result, error in hand_out(client, todo, submit):
+        for piece, result, error in hand_out(connect, todo, submit):
             if isinstance(result, Outcome) and not result.error:
                 writer.add(result.rows, result.verdict)
                 done.computed += 1

@@ -2,11 +2,15 @@
 
 A recording belongs to a vehicle and a rig: as the pattern of the path says; else a Parquet dataset's folders
 (``vehicle=7/rig=a``); else the recording's own metadata (``vehicle``, the name in its rig file); else its folder.
+
+A name on this machine is a name, whatever is in it, ``::`` for one; it is a glob only where nothing is called so.
 """
 
 from __future__ import annotations
 
+import glob
 import hashlib
+import os
 import re
 import tempfile
 import tomllib
@@ -17,18 +21,28 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from hil.errors import RecordingError, UsageError
-from hil.fleet.dataset import FAILURES, RESULTS
+from hil.fleet.dataset import FAILURES, RESULTS, SURVEY
 from hil.provenance import Source
 from hil.recording.checksum import RIG_TEXT
 from hil.recording.description import sidecar_of
 from hil.recording.formats import FORMATS, read_metadata
 
-REMOTE = "://"
+REMOTE, CHAIN = "://", "::"
 
 GROUPS = ("vehicle", "rig", "started")
 """What a pattern may take from a path; all but the last are named by a Parquet dataset's folders as well."""
 
 _FOLDER = re.compile(r"(?:^|/)(vehicle|rig)=([^/]+)(?=/)")
+
+
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """What a recording's file says of itself: kept, so that one that is known is not read again."""
+
+    sha256: str  # of its content, and of the sidecar that belongs to it
+    vehicle: str = ""
+    rig: str = ""
+    started: str = ""  # ISO 8601
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,12 +53,23 @@ class Found:
     vehicle: str = ""
     rig: str = ""
     started: str = ""  # ISO 8601
-    sha256: str = ""  # of its content, and of the sidecar that belongs to it
+    sha256: str = ""
 
     @property
     def name(self) -> str:
         """The name of the file."""
         return PurePosixPath(self.url).name
+
+    def seen_as(self, seen: Seen) -> Found:
+        """Return it with what its file says, where the path has not said it."""
+        rig = self.rig or seen.rig
+        vehicle = self.vehicle or seen.vehicle or rig or PurePosixPath(self.url).parent.name
+        return replace(self, vehicle=vehicle, rig=rig, started=self.started or seen.started, sha256=seen.sha256)
+
+
+def in_order(text: str) -> list[tuple[str, int, str]]:
+    """Return by what names are sorted as people count: bus_2 before bus_10."""
+    return [(words, len(digits), digits) for words, digits in re.findall("([^0-9]*)0*([0-9]*)", text)]
 
 
 def pattern_of(text: str | None) -> re.Pattern[str] | None:
@@ -68,22 +93,46 @@ def find(sources: Sequence[str], pattern: re.Pattern[str] | None) -> tuple[list[
     complaints: list[str] = []
     for source in sources:
         try:
-            urls = _urls(source)
+            urls = _elsewhere(source) if REMOTE in source else _here(source)
         except Exception as error:  # noqa: BLE001 - each file system of fsspec has errors of its own
             complaints.append(f"{source}: expected files that can be listed, got: {_said(error)}")
             continue
         if not urls:
             complaints.append(f"{source}: expected recordings, got none")
-        found.update((url, _placed(url, pattern)) for url in urls)
+        found.update((url, _placed(url, pattern)) for url in sorted(urls))
     return list(found.values()), complaints
 
 
-def _urls(source: str) -> list[str]:
-    """Return the files of one source, sorted."""
+def _here(source: str) -> list[str]:
+    """Return the files of a name on this machine."""
+    root = os.path.abspath(os.path.expanduser(source))
+    if os.path.isdir(root):
+        return [path for path in _below(root) if _is_recording(path, root)]
+    if os.path.lexists(root):
+        return [root]
+    if not glob.has_magic(root):
+        raise FileNotFoundError("no such file or folder")
+    return [path for path in glob.glob(root, recursive=True) if not os.path.isdir(path)]
+
+
+def _below(root: str) -> Iterator[str]:
+    """Yield the files below a folder; links are followed, none of them in a circle."""
+    visited = set()
+    for folder, folders, files in os.walk(root, followlinks=True):
+        about = os.stat(folder)
+        if (about.st_dev, about.st_ino) in visited:
+            folders.clear()
+            continue
+        visited.add((about.st_dev, about.st_ino))
+        yield from (os.path.join(folder, file) for file in files)
+
+
+def _elsewhere(source: str) -> list[str]:
+    """Return the files of an address of fsspec; where it is a chain (``zip://*.csv::file:///x.zip``), each as one."""
     from fsspec.core import has_magic, url_to_fs
 
     fs, root = url_to_fs(source)
-    if has_magic(root):
+    if has_magic(root) and not fs.isfile(root):
         paths = [path for path in fs.glob(root) if fs.isfile(path) and not PurePosixPath(path).name.startswith(".")]
     elif fs.isdir(root):
         paths = [path for path in fs.find(root) if _is_recording(path, root)]
@@ -91,14 +140,15 @@ def _urls(source: str) -> list[str]:
         paths = [root]
     else:
         raise FileNotFoundError("no such file or folder")
-    return sorted(fs.unstrip_protocol(path) if REMOTE in source else str(path) for path in paths)
+    _, chained, rest = source.partition(CHAIN)
+    return [f"{fs.unstrip_protocol(path)}{chained}{rest}" for path in paths]
 
 
 def _is_recording(path: str, root: str) -> bool:
     """Whether a file in a folder that was given is one; a file given by its name is, whatever it is called."""
     inside = PurePosixPath(path[len(root) :])
     hidden = any(part.startswith((".", "_", RESULTS)) for part in inside.parts)
-    return inside.suffix.lower() in FORMATS and not hidden and inside.name != FAILURES
+    return inside.suffix.lower() in FORMATS and not hidden and inside.name not in (FAILURES, SURVEY)
 
 
 def _placed(url: str, pattern: re.Pattern[str] | None) -> Found:
@@ -125,11 +175,16 @@ def at_hand(url: str) -> Iterator[Path]:
         path = Path(folder) / PurePosixPath(remote).name
         try:
             fs.get_file(remote, str(path))
-            if fs.exists(str(sidecar_of(PurePosixPath(remote)))):  # type: ignore[arg-type]
-                fs.get_file(str(sidecar_of(PurePosixPath(remote))), str(sidecar_of(path)))  # type: ignore[arg-type]
+            if fs.exists(remote_sidecar(remote)):
+                fs.get_file(remote_sidecar(remote), str(sidecar_of(path)))
         except FileNotFoundError as error:
             raise RecordingError(url, "expected a readable file, got none of that name") from error
         yield path
+
+
+def remote_sidecar(path: str) -> str:
+    """Return where the description of a recording is that is elsewhere."""
+    return str(sidecar_of(PurePosixPath(path)))  # type: ignore[arg-type]
 
 
 @contextmanager
@@ -150,16 +205,13 @@ def side_by_side(found: Sequence[Found]) -> Iterator[list[Path]]:
         yield named
 
 
-def described(found: Found) -> Found:
-    """Return a recording with its checksum, and with what it says of itself where the path has not said it."""
-    with at_hand(found.url) as path:
-        sums = [Source.of(each).sha256 for each in (path, sidecar_of(path)) if each == path or each.is_file()]
+def seen(url: str) -> Seen:
+    """Read the checksum of a recording, and what it says of itself."""
+    with at_hand(url) as path:
         metadata = read_metadata(path)
+        sums = [Source.of(each).sha256 for each in (path, sidecar_of(path)) if each == path or each.is_file()]
     sha256 = sums[0] if len(sums) == 1 else hashlib.sha256("".join(sums).encode()).hexdigest()
-    rig = found.rig or _rig_of(metadata)
-    vehicle = found.vehicle or metadata.get("vehicle", "") or rig or PurePosixPath(found.url).parent.name
-    started = found.started or metadata.get("started_utc", "")
-    return replace(found, vehicle=vehicle, rig=rig, started=started, sha256=sha256)
+    return Seen(sha256, metadata.get("vehicle", ""), _rig_of(metadata), metadata.get("started_utc", ""))
 
 
 def _rig_of(metadata: Mapping[str, str]) -> str:

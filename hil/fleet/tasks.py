@@ -23,7 +23,7 @@ from estimator.signals.record import Record
 from hil.config.model_file import ModelFile
 from hil.errors import HilError
 from hil.fleet.dataset import Row
-from hil.fleet.sources import Found, described, side_by_side
+from hil.fleet.sources import Found, Seen, seen, side_by_side
 from hil.plants.scales import with_the_line_to_write
 from hil.recording import read_records
 from hil.report.diagnosis_json import diagnosis_json
@@ -67,10 +67,11 @@ class Outcome:
     error: str = ""
 
 
-def describe(found: Found) -> Found | str:
-    """Return a recording with its checksum and place in the fleet, or what is wrong with it."""
+def describe(found: Found, limit_s: float) -> Seen | str:
+    """Return what a recording's file says, or what is wrong with it; the worker ends where that takes too long."""
     try:
-        return described(found)
+        with _ended_after(limit_s):
+            return seen(found.url)
     except HilError as error:
         return str(error)
 
@@ -109,19 +110,26 @@ def analyse(recordings: Sequence[Found], job: Job) -> Outcome:
 
 def row_of(recordings: Sequence[Found], job: Job) -> Row:
     """Return the columns that say of what and by what a row is."""
-    first = min(recordings, key=lambda each: (each.started, each.url))
     return {
         "key": job.key(recordings),
-        "vehicle": first.vehicle,
-        "rig": first.rig,
-        "started": first.started,
-        "name": first.name if len(recordings) == 1 else f"{len(recordings)} recordings",
-        "url": " ".join(each.url for each in recordings),
+        **place(recordings),
         "sha256": " ".join(each.sha256 for each in recordings),
         "model": job.model,
         "model_sha256": job.model_sha256,
         "from_fleet": " ".join(job.from_fleet),
         "version": job.version,
+    }
+
+
+def place(recordings: Sequence[Found]) -> Row:
+    """Return the columns that say where what was found belongs."""
+    first = min(recordings, key=lambda each: (each.started, each.url))
+    return {
+        "vehicle": first.vehicle,
+        "rig": first.rig,
+        "started": first.started,
+        "name": first.name if len(recordings) == 1 else f"{len(recordings)} recordings",
+        "url": " ".join(each.url for each in recordings),
     }
 
 

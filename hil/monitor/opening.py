@@ -19,7 +19,7 @@ from hil.monitor.live_estimation import WarmUp
 from hil.monitor.messages import Choice
 from hil.monitor.source import ReplaySource, RigSource, Source, recorded_samples
 from hil.monitor.state import LiveState
-from hil.report.outputs import require_folder
+from hil.result_folder import require_folder
 from hil.rig.dry_run import dry_run
 from hil.rig.live import USUAL, OnlineSetup
 from hil.rig.replay import replay

@@ -15,7 +15,7 @@ from hil.errors import HilError, UsageError
 from hil.monitor.messages import Began, Kind, Mark, Notice, Over
 from hil.monitor.outbox import Outbox
 from hil.recording.writer import RecordingWriter
-from hil.report.outputs import publish
+from hil.result_folder import publish
 from hil.rig.build import Devices
 from hil.rig.experiments.base import Phase
 from hil.rig.live import USUAL, LiveEstimate, OnlineSetup, tracking_chain

@@ -18,6 +18,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from drivers.foreign_file import open_regular
 from hil.files import inside, is_plain
 from hil.recording.sandbox import Document, limit, serve
 from hil.recording.table import Column
@@ -254,7 +255,7 @@ def _system(name: str, *arguments: Any) -> Any:
 def unpack(path: Path, home: Path) -> None:
     """Unpack an FMU into a folder, none of it elsewhere, no more of it than one may take."""
     room = UNPACKED_BYTES
-    with zipfile.ZipFile(path) as archive:
+    with open_regular(path) as packed, zipfile.ZipFile(packed) as archive:
         for entry in archive.infolist():
             target = inside(home, entry.filename.replace("\\", "/"))
             if entry.is_dir():

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shutil
 import tempfile
 import time
 import zlib
@@ -12,6 +11,7 @@ from concurrent.futures import Executor
 from pathlib import Path
 from typing import Any
 
+from drivers.foreign_file import read_regular, read_regular_text
 from hil.errors import UsageError
 from hil.files import parse_json
 from hil.proof.command import CommandFailed, fresh_over_floor, replace_own, run_hil
@@ -82,7 +82,7 @@ def _answer_one(folder: Path, name: str, shown: Shown, limit_s: float) -> dict[s
         place.mkdir()
         built.mkdir()
         for file in shown.files:
-            shutil.copyfile(case / file, place / file)
+            (place / file).write_bytes(read_regular(case / file))
         try:
             runs = sorted(file for file in shown.files if file.endswith(".csv"))
             run_hil(["diagnose", *runs, "--model", "model.toml", "--out", "../out"], place, limit_s)
@@ -144,8 +144,8 @@ def _unpacked(path: Path, content: bytes) -> object:
 
 def _answer(verdict: Path, fresh: Mapping[str, str], took_s: float) -> Answer:
     if (verdict / FAULT).exists():
-        return Answer(None, diagnose_s=took_s, fault=(verdict / FAULT).read_text(encoding="utf-8").strip())
-    diagnosis = json.loads((verdict / "diagnosis.json").read_text(encoding="utf-8"))
+        return Answer(None, diagnose_s=took_s, fault=read_regular_text(verdict / FAULT).strip())
+    diagnosis = json.loads(read_regular_text(verdict / "diagnosis.json"))
     try:
         over_floor = [fresh_over_floor(text, verdict / "augmented.toml", LIMIT_S) for text in fresh.values()]
     except CommandFailed as failure:

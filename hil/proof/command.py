@@ -6,7 +6,6 @@ What it has written replaces earlier results, and only such as this program has 
 from __future__ import annotations
 
 import shutil
-import subprocess
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
@@ -14,7 +13,7 @@ from typing import Final
 
 import numpy as np
 
-from hil.child import environment, python
+from hil.child import environment, python, run
 from hil.errors import UsageError
 from hil.proof.truth.recording import SPEED_NOISE_RAD_S
 
@@ -30,23 +29,13 @@ class CommandFailed(Exception):
 
 
 def run_hil(arguments: Sequence[str], folder: Path, limit_s: float) -> None:
-    try:
-        done = subprocess.run(
-            python("-m", "hil", *arguments),
-            cwd=folder,
-            env=environment(),
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.PIPE,
-            text=True,
-            timeout=limit_s,
-            check=False,
-        )
-    except subprocess.TimeoutExpired:
-        raise CommandFailed(f"hil {arguments[0]}: took longer than {limit_s:g} s and was ended") from None
-    if done.returncode != 0:
-        (folder.parent / f"{arguments[0]}.stderr.txt").write_text(done.stderr, encoding="utf-8")
-        said = done.stderr.strip().splitlines() or ["nothing on standard error"]
-        raise CommandFailed(f"hil {arguments[0]}: ended with status {done.returncode}: {said[-1].strip()}")
+    done = run(python("-m", "hil", *arguments), folder, limit_s, environment())
+    if done.status is None:
+        raise CommandFailed(f"hil {arguments[0]}: took longer than {limit_s:g} s and was ended")
+    if done.status != 0:
+        (folder.parent / f"{arguments[0]}.stderr.txt").write_text(done.said, encoding="utf-8")
+        said = done.said.strip().splitlines() or ["nothing on standard error"]
+        raise CommandFailed(f"hil {arguments[0]}: ended with status {done.status}: {said[-1].strip()}")
 
 
 def replace_own(folder: Path, built: Path) -> None:

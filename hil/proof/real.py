@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import shutil
 import tempfile
 import time
 from collections.abc import Mapping, Sequence
@@ -17,6 +16,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from drivers.foreign_file import read_regular, read_regular_text
 from hil.errors import UsageError
 from hil.proof.command import CommandFailed, replace_own, run_hil
 from hil.proof.real_files import (
@@ -121,7 +121,7 @@ def _known(out: Path, folders: Mapping[str, Path]) -> dict[str, Json]:
 
 def _key(folder: Path) -> str:
     """Return what changes with the question; the recordings are in it by their checksums."""
-    return hashlib.sha256(b"".join((folder / name).read_bytes() for name in (CASE, MODEL))).hexdigest()
+    return hashlib.sha256(b"".join(read_regular(folder / name) for name in (CASE, MODEL))).hexdigest()
 
 
 def _ask(folder: Path, case: CaseFile, run: RunEntry, data: Path, out: Path) -> Json:
@@ -131,7 +131,7 @@ def _ask(folder: Path, case: CaseFile, run: RunEntry, data: Path, out: Path) -> 
         place, answered = Path(neutral) / "case", Path(neutral) / "out"
         place.mkdir()
         answered.mkdir()
-        shutil.copyfile(folder / MODEL, place / MODEL)
+        (place / MODEL).write_bytes(read_regular(folder / MODEL))
         fit = [write_shown(case, name, data, place).name for name in run.fit]
         held_out = [write_shown(case, name, data, place).name for name in run.held_out]
         arguments = ["diagnose", *fit, "--model", MODEL, "--out", "../out"]
@@ -163,7 +163,7 @@ def _judged(folder: Path, case: CaseFile, out: Path, place: str, answer: Json) -
     if answer["fault"] is not None:
         empty: Json = {"verdict": None, "named": [], "statement": "", "unit": "", "agreements": [], "report": None}
         return {**empty, "held_out": {"before": None, "after": None}, "right": False}
-    diagnosis = json.loads((out / place / "diagnosis.json").read_text(encoding="utf-8"))
+    diagnosis = json.loads(read_regular_text(out / place / "diagnosis.json"))
     named = [effect["name"] for effect in diagnosis["effects"]]
     fit = diagnosis["fit"]
     return {

@@ -20,6 +20,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
+from drivers.foreign_file import open_regular
 from hil.config.table import Positive, Table, Text
 from hil.errors import FileProblem, UsageError
 from hil.files import PLAIN
@@ -159,7 +160,7 @@ def case_folders(names: list[str] | tuple[str, ...], room: Path = ROOM) -> dict[
 
 def sha256_of(path: Path) -> str:
     """Return the checksum of a file, hexadecimal."""
-    with path.open("rb") as file:
+    with open_regular(path) as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 

@@ -19,7 +19,8 @@ from typing import IO, Any, Final
 
 import tomlkit
 
-from hil.child import environment, python
+from drivers.foreign_file import read_regular_text
+from hil.child import end, environment, python, start
 from hil.errors import RunAborted, UsageError
 from hil.proof.command import CommandFailed, replace_own, run_hil
 from hil.proof.kinds import kind
@@ -125,7 +126,7 @@ def sealed_process(*arguments: str) -> Iterator[SealedProcess]:
     still has a rig to disarm. If this process dies, the end of its input ends the rig too.
     """
     with tempfile.TemporaryFile() as complaints, tempfile.TemporaryDirectory(prefix="hil-sealed-") as folder:
-        process = subprocess.Popen(
+        process = start(
             python("-m", "hil.proof.sealed_rig", *arguments),
             cwd=folder,
             env=environment(),
@@ -133,7 +134,6 @@ def sealed_process(*arguments: str) -> Iterator[SealedProcess]:
             stdout=subprocess.PIPE,
             stderr=complaints,
             text=True,
-            start_new_session=True,
         )
         try:
             yield SealedProcess(process, complaints)
@@ -145,12 +145,7 @@ def _end(process: Any) -> None:
     """End a process: by the end of its input, or by force if that is not heard."""
     with suppress(BrokenPipeError):  # what was still to be written to a process that is gone
         process.stdin.close()
-    try:
-        process.wait(_END_S)
-    except subprocess.TimeoutExpired:
-        process.kill()
-        process.wait()
-    process.stdout.close()
+    end(process, _END_S)
 
 
 def rig_text(sealed: SealedProcess) -> str:
@@ -191,7 +186,7 @@ def _work(place: Path, limit_s: float) -> Answer:
         run_hil(["diagnose", *recordings, "--model", "nominal.toml", "--out", "."], place, limit_s)
     except CommandFailed as failure:
         return Answer(None, diagnose_s=time.perf_counter() - began, fault=str(failure))
-    diagnosis = json.loads((place / "diagnosis.json").read_text(encoding="utf-8"))
+    diagnosis = json.loads(read_regular_text(place / "diagnosis.json"))
     return Answer(diagnosis, diagnose_s=time.perf_counter() - began)
 
 

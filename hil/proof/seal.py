@@ -25,6 +25,7 @@ from pathlib import Path
 from cryptography.exceptions import InvalidTag
 from cryptography.hazmat.primitives.ciphers.aead import AESGCM
 
+from drivers.foreign_file import read_regular
 from hil.errors import InputError, UsageError
 
 SCHEMA = "hil.seal/1"
@@ -147,7 +148,7 @@ def lock(key: bytes, name: str, content: bytes) -> bytes:
 def unlock(key: bytes, name: str, path: Path) -> bytes:
     """Decrypt a file that belongs to the case of a name."""
     try:
-        locked = path.read_bytes()
+        locked = read_regular(path)
     except OSError as error:
         raise SealBroken(f"{path}: expected what was sealed with {name}, can't be read: {error.strerror}") from error
     start = len(MAGIC) + AES_NONCE_BYTES

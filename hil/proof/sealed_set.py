@@ -20,6 +20,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from drivers.foreign_file import read_regular
 from hil.errors import UsageError
 from hil.files import is_inside, is_plain
 from hil.proof.kinds import Drawn, draw
@@ -27,6 +28,7 @@ from hil.proof.make_case import write_recording, write_shown
 from hil.proof.seal import SealBroken, canonical_json, lock, seal
 from hil.proof.truth.case import Case, make_case
 from hil.proof.work import Progress, read_entries, work_on, write_entries
+from hil.result_folder import LOCK
 
 CASES, SEALED, VERDICTS = "cases", "sealed", "verdicts"
 COMMITMENTS = Path(CASES) / "commitments.json"
@@ -39,7 +41,7 @@ Digests = Mapping[str, str]  # file name to SHA-256
 
 def make(folder: Path, cases: int, seed: int, key: bytes, jobs: int, progress: Progress) -> None:
     """Make and seal a set of cases; the folder appears when all of it is there."""
-    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+    if folder.exists() and (not folder.is_dir() or any(path.name != LOCK for path in folder.iterdir())):
         raise UsageError(f"{folder}: expected a folder that is not there yet or is empty. Choose another.")
     folder.parent.mkdir(parents=True, exist_ok=True)
     drawn = {case.name: case for case in draw(cases, seed)}
@@ -48,7 +50,9 @@ def make(folder: Path, cases: int, seed: int, key: bytes, jobs: int, progress: P
         (built / SEALED).mkdir(parents=True)
         listed = work_on(list(drawn), lambda name: _make_one(built, drawn[name], key), progress, jobs=jobs, said="made")
         write_list(built / COMMITMENTS, listed)
-        built.replace(folder)
+        folder.mkdir(exist_ok=True)
+        for name in (SEALED, CASES):  # what lists them is in the last
+            (built / name).replace(folder / name)
 
 
 def _make_one(folder: Path, drawn: Drawn, key: bytes) -> dict[str, object]:
@@ -75,7 +79,7 @@ def _fresh(case: Case) -> Mapping[str, str]:
 
 def digests_of(folder: Path, names: Iterable[str]) -> dict[str, str]:
     """Return the SHA-256 of files of a folder, by name."""
-    return {name: hashlib.sha256((folder / name).read_bytes()).hexdigest() for name in names}
+    return {name: hashlib.sha256(read_regular(folder / name)).hexdigest() for name in names}
 
 
 def digest_of(listed: object) -> str:

@@ -10,6 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from drivers.foreign_file import open_regular
 from hil.errors import RecordingError
 from hil.recording.bounds import damaged, require_cells
 from hil.recording.channels import column_of
@@ -24,7 +25,7 @@ MOMENTS: Final = "mM"
 def read_numpy(path: Path, request: Request) -> Table:
     """Read arrays: vectors by their names, columns of matrices by address, fields of structured arrays."""
     try:
-        with path.open("rb") as file:
+        with open_regular(path) as file:
             loaded: Any = np.load(file, allow_pickle=False)
             arrays = {path.stem: loaded} if isinstance(loaded, np.ndarray) else dict(loaded)
     except Exception as error:  # zipfile and NumPy raise anything on a damaged file

@@ -16,6 +16,7 @@ from drivers.canopen.pdo_map import TPDO_COMMUNICATION, TPDO_MAPPING, PdoLayout,
 from drivers.capability.speed_unit import DIMENSION_INDEX, NOTATION_INDEX, SI_UNIT_VELOCITY, scale_of
 from drivers.datasheet.file import DataSheet, EdsFile
 from drivers.errors import DriverError
+from drivers.foreign_file import require_regular
 from hil.errors import RecordingError
 
 LARGEST_BYTES: Final = 32 << 20  # a DBC file of a whole vehicle has some megabytes
@@ -37,7 +38,7 @@ def database_of(path: Path, dbc: Path) -> Any:
         raise RecordingError(path, f"--dbc {dbc}: expected a DBC file (.dbc), an EDS or a DCF, got {dbc.suffix!r}")
     kind = "DBC file" if dbc.suffix.lower() == ".dbc" else "data sheet"
     try:
-        if dbc.stat().st_size > LARGEST_BYTES:
+        if require_regular(dbc).st_size > LARGEST_BYTES:
             raise ValueError(f"more than {LARGEST_BYTES >> 20} MB")
         if kind == "DBC file":
             database: Any = cantools.database.load_file(dbc, "dbc")

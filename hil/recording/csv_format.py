@@ -26,6 +26,7 @@ import pyarrow as pa
 import pyarrow.compute
 import pyarrow.csv
 
+from drivers.foreign_file import read_regular
 from hil.errors import RecordingError
 from hil.recording.bounds import require_columns
 from hil.recording.channels import numbers_of_texts
@@ -73,7 +74,7 @@ TRAILING = "\0"  # stands for what follows a delimiter that ends a row
 def read(path: Path, request: Request) -> Table:
     """Read a text recording, in the form that it is recognised to have or that was set by hand."""
     said = read_sidecar(path)
-    text, encoding = decoded(path, path.read_bytes(), request.form.encoding)
+    text, encoding = decoded(path, read_regular(path), request.form.encoding)
     if path.suffix.lower() == ".lvm":
         text = labview_text(text)
     return table_of_text(path, text, request.form, encoding, said)

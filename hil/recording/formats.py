@@ -13,6 +13,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+from drivers.foreign_file import open_regular
 from hil.errors import RecordingError
 from hil.recording.channels import understood
 from hil.recording.checksum import CHECKSUM, require_whole
@@ -139,17 +140,13 @@ def format_of(path: Path) -> Format:
     known = FORMATS.get(path.suffix.lower())
     if known is None:
         raise RecordingError(path, f"expected a recording ({', '.join(FORMATS)}), got {path.suffix!r}")
-    _require_readable(path, known)
+    _require_readable(path)
     return known
 
 
-def _require_readable(path: Path, known: Format) -> None:
+def _require_readable(path: Path) -> None:
     try:
-        # these are read from their end, and a pipe has none
-        if known.is_sandboxed and path.exists() and not path.is_file():
-            raise RecordingError(path, "expected a file, got a folder, a pipe or a device. Name a recording.")
-        with path.open("rb"):
-            pass
+        open_regular(path).close()  # libraries open the name themselves
     except OSError as error:
         raise RecordingError(path, f"expected a readable file, got: {error.strerror}") from error
 

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import tomlkit
 
+from drivers.foreign_file import read_regular
 from hil.printable import printable
 from hil.recording import columns
 from hil.recording.csv_format import FALLBACK, likely_encoding
@@ -140,7 +141,7 @@ def look(path: Path, dbc: Path | None = None) -> Look:
     if known.is_sandboxed:
         survey = READER.survey(path, Request(dbc=dbc))
     else:
-        encoding = likely_encoding(path.read_bytes())
+        encoding = likely_encoding(read_regular(path))
         survey = survey_of(tables_of(known, path, Request(FormatHints(encoding=encoding))))
     roles = roles_of(survey.groups)
     by_hand = encoding if encoding == FALLBACK else None

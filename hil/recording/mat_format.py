@@ -25,6 +25,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from drivers.foreign_file import open_regular
 from hil.errors import RecordingError
 from hil.recording.bounds import damaged, require_columns
 from hil.recording.channels import seconds_since_first
@@ -74,7 +75,7 @@ def read_metadata(path: Path) -> Mapping[str, str]:
 
 def is_version_73(path: Path) -> bool:
     """Whether a .mat file is HDF5 inside; its header says so (MAT-File Format, version 7.3: version 0x0200)."""
-    with path.open("rb") as file:
+    with open_regular(path) as file:
         header = file.read(128)
     return header.startswith(TITLE) or header[124:] in (b"\x00\x02IM", b"\x02\x00MI")
 

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from drivers.foreign_file import open_regular, read_regular
 from hil.errors import RecordingError
 from hil.recording.bounds import damaged, require_columns
 from hil.recording.bus_database import DATA_SHEETS, database_of
@@ -54,7 +55,7 @@ IDENTIFICATION_BYTES = 64
 
 def is_unfinished(path: Path) -> bool:
     """Whether a file was left by a writer that did not come to its end."""
-    with path.open("rb") as file:
+    with open_regular(path) as file:
         return file.read(len(UNFINISHED)) == UNFINISHED
 
 
@@ -67,7 +68,7 @@ def opened(path: Path) -> Iterator[MDF]:
     from asammdf import MDF
     from asammdf.blocks.utils import MdfException
 
-    content = path.read_bytes()
+    content = read_regular(path)
     start = content[: len(FINISHED)]
     if len(content) < IDENTIFICATION_BYTES or start not in (FINISHED, UNFINISHED):
         raise RecordingError(

@@ -19,6 +19,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from drivers.foreign_file import open_regular, read_regular_text
 from hil.errors import RecordingError
 from hil.recording.bounds import damaged, require_cells
 from hil.recording.bus_database import DATA_SHEETS, database_of
@@ -133,7 +134,7 @@ def _mcap(path: Path) -> list[Group]:
     rows: dict[str, list[tuple[int, dict[str, float]]]] = {}
     others: set[str] = set()
     try:
-        with path.open("rb") as file:
+        with open_regular(path) as file:
             for _, channel, message in reader.make_reader(file).iter_messages():
                 if channel.message_encoding != "json":
                     others.add(f"{channel.topic} ({channel.message_encoding})")
@@ -242,7 +243,7 @@ class _Log:
             yield from self._counted(can.BLFReader(self.path))
             return
         readers = {".asc": can.ASCReader, ".log": can.CanutilsLogReader, ".trc": can.TRCReader}
-        lines = self.path.read_text("utf-8", errors="replace").splitlines(keepends=True)
+        lines = read_regular_text(self.path, errors="replace").splitlines(keepends=True)
         head = [line for line in lines[:HEAD_LINES] if line.startswith(HEADS)]
         events = sum(EVENT.match(line) is not None for line in lines)
         faults = 0

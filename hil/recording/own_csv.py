@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from drivers.foreign_file import open_regular
 from hil.recording import columns
 from hil.recording.bounds import damaged
 from hil.recording.checksum import CHECKSUM, SAID, DataDigest, said_sha256
@@ -49,7 +50,7 @@ def is_own(path: Path) -> bool:
 
 
 def _names(path: Path) -> list[str]:
-    with path.open("rb") as file:
+    with open_regular(path) as file:
         return file.readline(LONGEST_HEADER).decode("utf-8", "replace").rstrip("\n").split(",")
 
 

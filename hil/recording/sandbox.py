@@ -6,24 +6,25 @@ Requests and answers go through pipes, a header in JSON, then columns of cells: 
 from __future__ import annotations
 
 import atexit
+import io
 import json
 import math
 import os
 import queue
 import shutil
 import signal
-import subprocess
 import sys
 import tempfile
 import threading
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from subprocess import DEVNULL, PIPE
 from typing import IO, Any, Final, Literal
 
 import numpy as np
 
-from hil.child import environment, python
+from hil.child import Pipe, end, environment, python, start
 from hil.errors import RecordingError
 from hil.recording.bounds import memory_bytes, processor_s
 from hil.recording.request import Request
@@ -131,6 +132,8 @@ def serve(answer: Answer) -> None:
                 shutil.rmtree(folder, ignore_errors=True)
                 if not os.path.exists(folder):
                     break
+            if hasattr(os, "killpg"):
+                os.killpg(0, signal.SIGKILL)  # with what was started here
             os._exit(0)
 
     threading.Thread(target=read, name="requests", daemon=True).start()
@@ -196,46 +199,35 @@ class Sandbox:
 
     def __init__(self, module: str) -> None:
         self._folder = tempfile.TemporaryDirectory(prefix="hil-sandbox-", ignore_cleanup_errors=True)
-        self._process: Any = subprocess.Popen(
+        self._process = start(
             python("-m", module),
             cwd=self._folder.name,
             env=environment(**ENVIRONMENT),
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
+            stdin=PIPE,
+            stdout=PIPE,
+            stderr=DEVNULL,
+            bufsize=0,
         )
+        self._ends = [Pipe(stream, self._process) for stream in (self._process.stdin, self._process.stdout) if stream]
+        self._requests, self._answers = io.BufferedWriter(self._ends[0]), io.BufferedReader(self._ends[1])
 
     def ask(
         self, request: Document, limit_s: float, columns: Mapping[str, Column] | None = None
     ) -> tuple[Document, dict[str, Column]]:
         """Have a request answered; raises `Gone` where the process ends, or does not answer in time."""
-        watchdog = threading.Timer(limit_s, self._process.kill)
-        watchdog.start()
+        for pipe in self._ends:
+            pipe.limit_at_s = time.monotonic() + limit_s
         try:
-            send(self._process.stdin, request, columns)
-            return receive(self._process.stdout)
+            send(self._requests, request, columns)
+            return receive(self._answers)
         except (OSError, EOFError, ValueError, MemoryError, KeyError, TypeError) as error:  # also what is no answer
             raise Gone from error
-        finally:
-            watchdog.cancel()
-            watchdog.join()
 
     def end(self, at_once: bool = True) -> int:
         """End it, and return the status it ended with; one that is ending by itself is waited for."""
-        if at_once:
-            self._process.kill()
-        try:
-            self._process.wait(ENDING_S)  # how it ends by itself tells why
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.wait()
-        for pipe in (self._process.stdin, self._process.stdout):
-            try:
-                pipe.close()
-            except OSError:  # what was still to be written to a process that is gone
-                continue
+        status = end(self._process, 0.0 if at_once else ENDING_S)  # how it ends by itself tells why
         self._folder.cleanup()
-        return int(self._process.returncode)
+        return status
 
 
 class Reader:

@@ -27,6 +27,7 @@ from typing import Self
 
 import numpy as np
 
+from drivers.foreign_file import open_regular
 from hil.errors import RecordingError
 from hil.files import remove_abandoned
 from hil.recording import columns
@@ -165,7 +166,7 @@ NOT_ENDED = "did not reach its end: the program was killed, or the disk was full
 LONGEST_ROW = 1 << 16  # bytes; the disk tore at most one row
 
 
-def hold(file: FileIO) -> bool:
+def hold(file: FileIO | int) -> bool:
     """Hold a file for this process, and tell whether that could be; where the system can't, nobody can tell."""
     try:
         import fcntl
@@ -434,5 +435,5 @@ def is_written(path: Path) -> bool:
     """Whether a run writes a file at this moment; where the system can't tell, it does not."""
     if not path.name.endswith(PART):
         return False
-    with path.open("rb", buffering=0) as file:
-        return not hold(file)
+    with open_regular(path) as file:
+        return not hold(file.fileno())

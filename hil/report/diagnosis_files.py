@@ -13,7 +13,7 @@ from hil.plants.prepared import prepared_by
 from hil.provenance import Provenance
 from hil.report.diagnosis_html import diagnosis_page
 from hil.report.diagnosis_json import diagnosis_text
-from hil.report.outputs import publish
+from hil.result_folder import publish
 
 NO_MORE: Mapping[str, Callable[[Path], object]] = MappingProxyType({})
 

@@ -18,7 +18,7 @@ from hil.figures.local_model import LocalModel
 from hil.provenance import Provenance
 from hil.report.identification_json import FILE_NAME, identification_text
 from hil.report.identification_page import identification_page
-from hil.report.outputs import publish
+from hil.result_folder import publish
 
 PAGE = "report.html"
 

@@ -6,6 +6,7 @@ import hashlib
 from datetime import UTC, datetime
 from pathlib import Path
 
+from drivers.foreign_file import read_regular, read_regular_text
 from drivers.resources import data_file
 from hil.config.rig_file import read_rig
 from hil.recording.checksum import RIG_CHECKSUM, RIG_TEXT, text_sha256
@@ -15,7 +16,7 @@ from hil.version import __version__
 def run_metadata(rig_path: Path, experiment: str, text: str | None = None) -> dict[str, str]:
     """Describe a run that begins now; ``text`` is that of the rig file with what was changed for this run."""
     inverters = read_rig(rig_path).inverters
-    text = rig_path.read_text(encoding="utf-8") if text is None else text
+    text = read_regular_text(rig_path) if text is None else text
     shipped = data_file("inverter.eds")
     return {
         "schema": "hil.recording/1",
@@ -44,4 +45,4 @@ def replay_metadata(rig_path: Path, trace: Path, first_ns: int) -> dict[str, str
 
 
 def _sha256(path: Path) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()
+    return hashlib.sha256(read_regular(path)).hexdigest()

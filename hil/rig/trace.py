@@ -24,6 +24,7 @@ from typing import IO, Any, BinaryIO, Final, Self
 
 from drivers.canopen import can
 from drivers.canopen.can_link import is_canopen
+from drivers.foreign_file import open_regular, open_regular_text
 from hil.errors import RecordingError
 from hil.recording.bounds import no_room
 
@@ -269,5 +270,5 @@ def _time_ns(path: Path, timestamp_s: float) -> int:
 def _opened(path: Path) -> IO[Any]:
     """Open a trace; a reader that opens it itself leaves it open where the file is at fault."""
     if path.suffix.lower() == ".blf":
-        return path.open("rb")
-    return path.open(encoding="utf-8", errors="replace")  # comments and names may be of another code page
+        return open_regular(path)
+    return open_regular_text(path, errors="replace")  # comments and names may be of another code page

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from drivers.foreign_file import read_regular_text
 from hil.errors import HilError, RecordingError
 from hil.files import read_json, remove_abandoned
 from hil.recording.formats import FORMATS, read_metadata
@@ -140,7 +141,7 @@ def _kind(path: Path, recording: Path) -> str:
 
 
 def _has(attachments: Iterable[Attachment], kind: str, path: Path) -> bool:
-    text = path.read_text(encoding="utf-8", errors="replace")
+    text = read_regular_text(path, errors="replace")
     return any(entry.kind == kind and entry.document == text for entry in attachments)
 
 

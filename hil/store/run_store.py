@@ -25,6 +25,7 @@ from typing import Any, Final, Literal, Self, TypeVar
 
 from pydantic import TypeAdapter, ValidationError
 
+from drivers.foreign_file import read_regular, read_regular_text
 from hil.errors import StoreError, UsageError
 from hil.files import is_inside, read_json, write_whole
 from hil.store.entry import Attachment, Note, Run, RunEntry, attachment_of
@@ -327,7 +328,7 @@ def _read_text(path: Path) -> str:
     """Return a kept document; empty where it is gone, or no longer what is kept here."""
     try:
         if path.is_file() and path.stat().st_size <= LONGEST_DOCUMENT_BYTES:
-            return path.read_text(encoding="utf-8", errors="replace")
+            return read_regular_text(path, errors="replace")
     except OSError:
         pass
     return ""
@@ -339,7 +340,7 @@ def _document(content: Path | str | Mapping[str, Any]) -> str:
     if isinstance(content, Mapping):
         return json.dumps(content, ensure_ascii=False)
     try:
-        raw = content.read_bytes()
+        raw = read_regular(content)
     except OSError as error:
         raise UsageError(f"{content}: expected a file to attach, got: {error.strerror or error}") from error
     try:

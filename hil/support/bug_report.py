@@ -15,6 +15,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
+from drivers.foreign_file import read_regular_text
 from hil.errors import InputError, UsageError
 from hil.support.command_log import VARIABLE, log_file
 from hil.support.redact import Redaction
@@ -79,14 +80,14 @@ def bug_report(rigs: tuple[Path, ...], runs: Path) -> BugReport:
 
 def _rig(path: Path, redaction: Redaction) -> Part:
     try:
-        text = path.read_text(encoding="utf-8", errors="replace")
+        text = read_regular_text(path, errors="replace")
         return Part(f"rig/{path.name}", redaction.toml(text).encode())
     except OSError as error:
         raise UsageError(f"--rig {path}: expected a readable file, got: {error.strerror}") from error
 
 
 def _redacted(path: Path, redaction: Redaction) -> bytes:
-    return redaction.text(path.read_text(encoding="utf-8", errors="replace")).encode()
+    return redaction.text(read_regular_text(path, errors="replace")).encode()
 
 
 def _logs() -> Iterator[Path]:

@@ -1,12 +1,14 @@
 """Places that can't be written to: refused before the work where that can be seen, and never half written."""
 
+import ctypes
 import importlib
 import os
 import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -91,46 +93,51 @@ def others(than: signal.Signals) -> list[Any]:
     return [pytest.param(each, marks=pytest.mark.campaign) for each in sorted(ends - {than})]
 
 
-def opened_by(process: subprocess.Popen[str], pipe: Path) -> int:
-    """Wait until a process opens a named pipe to read; give the end to write to."""
-    while process.poll() is None:
-        try:
-            return os.open(pipe, os.O_WRONLY | os.O_NONBLOCK)
-        except OSError:  # nobody reads yet, and shall have the processor to come to it
-            time.sleep(0.01)
-    raise AssertionError(process.communicate())
+IN_OPEN, IN_CLOSE_NOWRITE = 0x20, 0x10  # inotify(7)
 
 
+@contextmanager
+def watched(path: Path, event: int) -> Iterator[Callable[[subprocess.Popen[str]], None]]:
+    """Give what waits until a process has opened a file, or has closed it again."""
+    system = ctypes.CDLL(None)
+    handle = system.inotify_init1(os.O_NONBLOCK)
+    assert system.inotify_add_watch(handle, os.fsencode(path), event) >= 0
+
+    def wait(process: subprocess.Popen[str]) -> None:
+        while process.poll() is None:
+            try:
+                os.read(handle, 4096)
+                return
+            except BlockingIOError:  # not yet, and the process shall have the processor to come to it
+                time.sleep(0.01)
+        raise AssertionError(process.communicate())
+
+    try:
+        yield wait
+    finally:
+        os.close(handle)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="no inotify")
 @pytest.mark.parametrize("number", [*others(signal.SIGHUP), signal.SIGHUP])
 @pytest.mark.parametrize(
-    "command",
-    ["identify PIPE --out OUT", pytest.param("diagnose PIPE --model MODEL --out OUT", marks=pytest.mark.campaign)],
+    ("command", "event"),
+    [
+        ("identify REC --out OUT", IN_OPEN),
+        pytest.param("diagnose REC --model MODEL --out OUT", IN_OPEN, marks=pytest.mark.campaign),
+        ("diagnose REC --model MODEL --out OUT", IN_CLOSE_NOWRITE),  # what it computes takes far longer
+    ],
 )
-def test_while_it_reads(spawn: Spawn, drive: Path, command: str, number: signal.Signals) -> None:
-    """The recording is a named pipe with nothing in it: the command is at it, and stays there."""
-    pipe, out = drive / "pipe.csv", drive / "out"
-    os.mkfifo(pipe)
-    words = {"PIPE": str(pipe), "MODEL": str(drive / "drive.toml"), "OUT": str(out)}
-    process = spawn(*(words.get(word, word) for word in command.split()))
-    writing = opened_by(process, pipe)
-    process.send_signal(number)
-    printed, complaint = process.communicate(timeout=60)
-    os.close(writing)
-    assert (process.returncode, printed, complaint) == (130, "", "interrupted\n")
-    assert not out.exists()
-
-
-@pytest.mark.parametrize("number", [*others(signal.SIGINT), signal.SIGINT])
-def test_while_it_computes(spawn: Spawn, drive: Path, number: signal.Signals) -> None:
-    """The model is whole as soon as the pipe has been emptied and closed; the fit takes far longer."""
-    pipe, out = drive / "pipe.toml", drive / "out"
-    os.mkfifo(pipe)
-    process = spawn("diagnose", str(drive / "run_1.csv"), "--model", str(pipe), "--out", str(out))
-    writing = opened_by(process, pipe)
-    os.write(writing, (drive / "drive.toml").read_bytes())
-    os.close(writing)
-    process.send_signal(number)
-    printed, complaint = process.communicate(timeout=60)
+def test_while_it_reads_and_while_it_computes(
+    spawn: Spawn, drive: Path, command: str, event: int, number: signal.Signals
+) -> None:
+    recording, out = drive / "run_1.csv", drive / "out"
+    words = {"REC": str(recording), "MODEL": str(drive / "drive.toml"), "OUT": str(out)}
+    with watched(recording, event) as wait:
+        process = spawn(*(words.get(word, word) for word in command.split()))
+        wait(process)
+        process.send_signal(number)
+        printed, complaint = process.communicate(timeout=60)
     assert (process.returncode, printed, complaint) == (130, "", "interrupted\n")
     assert not out.exists()
 

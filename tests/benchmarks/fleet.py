@@ -17,6 +17,7 @@ import psutil
 from distributed import Client
 
 from hil.fleet.dataset import Writer, read
+from hil.fleet.known import Survey
 from hil.fleet.run import Engine, carry_out, client_of, survey
 from hil.fleet.sources import find
 from hil.fleet.tasks import IDENTIFY, Job
@@ -46,12 +47,12 @@ def identified(drives: Path, workers: int) -> tuple[float, float]:
     with tempfile.TemporaryDirectory() as place, client_of(Engine(workers=workers)) as client:
         warm_up, out = Path(place) / "warm_up", Path(place) / "results"
         for folder, some in ((warm_up, found[:workers]), (out, found[workers:])):
-            fleet = survey(client, some, 0, _no_progress)
-            started_s = time.perf_counter()
             job = Job(IDENTIFY, None)
-            carry_out(client, fleet, job, Writer(folder, job.command), Engine(), False, _no_progress)
+            fleet = survey(lambda: client, some, Survey([]), job, Engine(), _no_progress)
+            started_s = time.perf_counter()
+            carry_out(lambda: client, fleet, job, Writer(folder, job.command), Engine(), False, _no_progress)
             spent = time.perf_counter() - started_s
-        return spent, float(np.sum(read(out, "recordings", ["seconds"])["seconds"].to_numpy()))
+        return spent, sum(row["seconds"] for row in read(out, "recordings"))
 
 
 def surveyed(client: Client, folder: Path, count: int) -> tuple[str, str, str, str]:
@@ -62,7 +63,7 @@ def surveyed(client: Client, folder: Path, count: int) -> tuple[str, str, str, s
         (drives / f"{number}.csv").write_text(f"time_s,torque_m1_nm,torque_m2_nm,speed_rad_s\n0,{number},1,1\n")
     found, _ = find([str(drives)], None)
     started_s = time.perf_counter()
-    survey(client, found, 0, _no_progress)
+    survey(lambda: client, found, Survey([]), Job(IDENTIFY, None), Engine(), _no_progress)
     each_ms = 1e3 * (time.perf_counter() - started_s) / count
     (worker,) = client.run(resident_mib).values()
     return f"{count:,}", f"{each_ms:.1f} ms", f"{resident_mib():.0f} MiB", f"{worker:.0f} MiB"

@@ -90,7 +90,7 @@ def identify_all(path: Path, drives: list[Drive], jobs: int) -> list[Row]:
             def submit(at: Drive) -> Future:
                 return client.submit(resonance_of, at, pure=False, retries=2)
 
-            for at, row, error in hand_out(client, todo, submit):
+            for at, row, error in hand_out(lambda: client, todo, submit):
                 if error:
                     raise RuntimeError(f"drive {at}: {error}")
                 file.write(json.dumps(row) + "\n")

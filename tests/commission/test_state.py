@@ -11,10 +11,11 @@ import pytest
 
 from hil.cli.main import run
 from hil.commission.engine import NAMES
-from hil.commission.state import FILE_NAME, LOCK, State, Status, StepRecord, load_state, sole_use
+from hil.commission.state import FILE_NAME, State, Status, StepRecord, load_state
 from hil.errors import UsageError
 from hil.orders.runner import RunRecord
 from hil.report.commission_html import commission_page
+from hil.result_folder import LOCK, sole_use
 from tests.cli.conftest import EXAMPLE
 from tests.commission.whole_state import whole_state
 
@@ -39,7 +40,7 @@ def test_one_that_leads_elsewhere_is_refused(tmp_path: Path, recording: str) -> 
 HOLDER = """
 import sys
 from pathlib import Path
-from hil.commission.state import sole_use
+from hil.result_folder import sole_use
 with sole_use(Path(sys.argv[1])):
     print("held", flush=True)
     sys.stdin.read()

@@ -99,3 +99,20 @@ def test_what_can_not_be_damped_is_refused_with_what_is_in_the_way(
 ) -> None:
     with pytest.raises(BadSetting, match=f"In the way is {reason}"):
         design_damper(region(tolerance), timing, Demand(0.3, limit_nm, excitation))
+
+
+@pytest.mark.parametrize(
+    ("changed", "said"),
+    [
+        ({"k": 1e12}, "has a resonance of 1.268e.05 Hz, expected less than 50 Hz, half the sampling rate"),
+        ({"k": 1.7e5}, "has a resonance of 52.* Hz, expected less than 50 Hz"),
+        ({"J_M": 1e300}, "values too far apart for it: J_M = 1e\\+300"),
+        ({"b_M": 1e100}, "values too far apart|no resonance that oscillates"),
+        ({"k": 1e300, "J_M": 1e-300}, "values too far apart"),
+        ({"J_M": 1e-300, "J_L": 1e-300}, "values too far apart|has a resonance of"),
+    ],
+)
+def test_a_line_that_no_sampled_damper_can_be_designed_for_is_refused(changed: dict[str, float], said: str) -> None:
+    line = LINE | changed
+    with pytest.raises(BadSetting, match=said):
+        design_damper(Region(line, line, line), Timing(T, T), Demand(0.3, 120.0, NONE))

@@ -10,9 +10,15 @@ import pytest
 
 from hil.errors import HilError, UsageError
 from hil.fleet.run import Fleet
-from hil.fleet.sources import Found, at_hand, described, find, pattern_of, side_by_side
+from hil.fleet.sources import Found, at_hand, find, pattern_of, seen, side_by_side
 
 ROWS = "time_s,torque_m1_nm,torque_m2_nm,speed_rad_s\n0,1,1,1\n0.01,1,1,1\n"
+
+
+def described(found: Found) -> Found:
+    return found.seen_as(seen(found.url))
+
+
 KEYS = {"AWS_ACCESS_KEY_ID": "none", "AWS_SECRET_ACCESS_KEY": "none", "AWS_DEFAULT_REGION": "us-east-1"}
 
 

@@ -20,10 +20,11 @@ from hil.errors import UsageError
 from hil.export.fmu import package
 from hil.export.fmu.driveline import driveline
 from hil.plants.fmu_plant import FmuPlant
-from hil.plants.fmu_process import UNPACKED_BYTES, unpack
+from hil.plants.fmu_process import STEP_S, UNPACKED_BYTES, unpack
 from hil.plants.names import Names
 from tests.chosen import campaign, one_in
 from tests.estimator.physics.bench import TWO_MASS
+from tests.processes import GONE_S, is_gone
 
 pytest.importorskip("fmpy")
 
@@ -36,7 +37,7 @@ DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
 </ScalarVariable>
 </ModelVariables><ModelStructure><Outputs><Unknown index="2"/></Outputs></ModelStructure></fmiModelDescription>"""
 
-HEADERS = ("fcntl", "signal", "stdlib", "unistd")
+HEADERS = ("fcntl", "signal", "stdio", "stdlib", "unistd")
 LOADED = "".join(f"#include <{each}.h>\n" for each in HEADERS) + "__attribute__((constructor)) static void f(void) "
 
 
@@ -101,6 +102,29 @@ def test_an_fmu_that_ends_its_process_is_named(tmp_path: Path, home: Path, does:
     with pytest.raises(UsageError, match=said):
         simulate(fmu(tmp_path, does))
     assert not list(home.iterdir())
+
+
+@pytest.mark.skipif(shutil.which("cc") is None or not Path("/proc").is_dir(), reason="no C compiler, or no /proc")
+@pytest.mark.parametrize("leaves", [False, True])
+def test_a_process_that_an_fmu_has_started_keeps_nobody_waiting_and_ends_with_its_group(
+    tmp_path: Path, home: Path, leaves: bool
+) -> None:
+    child = tmp_path / "child"
+    does = f"""{{
+        if (!fork()) {{ {"setsid();" if leaves else ""}
+            char text[20]; int file = creat("{child}", 0600);
+            write(file, text, sprintf(text, "%d ", getpid())); for (;;) pause(); }}
+        while (access("{child}", F_OK)) ; usleep(100000); raise(SIGSEGV); }}"""
+    began_s = time.monotonic()
+    with pytest.raises(UsageError, match="one that crashes \\(SIGSEGV\\)"):
+        simulate(fmu(tmp_path, does))
+    process = int(child.read_text())
+    try:
+        assert time.monotonic() - began_s < STEP_S
+        assert is_gone(process, 0.2 if leaves else GONE_S) != leaves
+    finally:
+        if leaves:
+            os.kill(process, signal.SIGKILL)
 
 
 @pytest.mark.parametrize("name", one_in(4, ["../../x", "/x", "..", ""]))

@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from hil.errors import RecordingError
 from hil.recording import Table, read_table, write_table
 from hil.recording.checksum import CHECKSUMS
+from hil.recording.description import sidecar_of
 from hil.recording.formats import FORMATS, read_metadata
 from hil.recording.publish import losses
 from hil.recording.table import as_text
@@ -120,3 +121,26 @@ def test_what_is_lost_is_reported_and_the_rest_is_kept_with_a_checksum_of_its_ow
     read = read_table(tmp_path / "a.mf4")
     assert read.columns["word"].tolist() == ["a", "c"]
     assert (read.units["x"], read.metadata["note"]) == ("m", "kept")
+
+
+def test_a_replaced_recording_never_has_the_old_ones_description(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "run.csv"
+    old = Table(path, {"time_s": np.arange(3.0)}, {"time_s": "s"}, {"experiment": "old"})
+    write_table(old, path)
+    rename = Path.replace
+
+    def killed_between_the_two(part: Path, target: Path) -> Path:
+        if target == sidecar_of(path):
+            raise OSError("killed")
+        return rename(part, target)
+
+    monkeypatch.setattr(Path, "replace", killed_between_the_two)
+    with pytest.raises(RecordingError, match="killed"):
+        write_table(
+            replace(old, columns={"time_s": np.arange(4.0)}, metadata={"experiment": "new"}), path, replace=True
+        )
+    assert read_table(path).columns["time_s"].size == 4
+    assert "experiment" not in read_metadata(path)
+    assert [each.name for each in tmp_path.iterdir()] == ["run.csv"]

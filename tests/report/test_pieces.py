@@ -20,8 +20,8 @@ from hil.report import bode
 from hil.report.diagnosis_html import diagnosis_summary
 from hil.report.figures import LONGEST_STRETCHES, extremes, input_lines, stretches_for
 from hil.report.numbers import listed, p_statement, shown, shown_interval, shown_p, shown_ratio
-from hil.report.outputs import publish
 from hil.report.wording import simulated_column
+from hil.result_folder import publish
 from tests.estimator.identification.driveline import cruise
 
 NAN = float("nan")

@@ -90,6 +90,13 @@ def test_without_its_token_nobody_is_served(bridge: CanBridge, path: str) -> Non
         connection.close()
 
 
+@pytest.mark.parametrize("origin", ["http://127.0.0.1", "https://example.org", "null", ""])
+def test_a_browser_is_not_served_even_with_the_token(bridge: CanBridge, origin: str) -> None:
+    connection, answer = upgrade(bridge, None, f"Origin: {origin}")
+    assert status_of(answer) == 403
+    connection.close()
+
+
 def test_nothing_but_a_websocket_is_served(bridge: CanBridge) -> None:
     path = urlsplit(bridge.url).path
     for asked, method in (

@@ -17,7 +17,7 @@ from hil.config.model_file import write_model
 from hil.errors import UsageError
 from hil.provenance import Provenance, provenance
 from hil.report.numbers import shown
-from hil.report.outputs import publish
+from hil.result_folder import publish
 
 if TYPE_CHECKING:
     from estimator.diagnosis.result import Diagnosis

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
+from drivers.foreign_file import read_regular
 from hil.commission.state import Finding, stated
 from hil.commission.step import Job, Outcome, Step
 from hil.commission.steps.models import AUGMENTED, NOMINAL_FILE, explained, nominal_of
 from hil.config.model_file import ModelFile
 from hil.design.solve_state import SCHEMA, STATE, End, State, fresh_state
-from hil.report.outputs import publish
+from hil.result_folder import publish
 
 NAME = "solve"
 FOLDER = "solve"
@@ -60,7 +61,7 @@ def _do(job: Job) -> Outcome:
         job.progress,
         lambda run: job.note(NAME, run),
     ).run()
-    augmented = (job.folder / FOLDER / "augmented.toml").read_bytes()
+    augmented = read_regular(job.folder / FOLDER / "augmented.toml")
     publish(job.folder, {AUGMENTED: lambda path: path.write_bytes(augmented)})
     return Outcome(_findings(state), record.evidence)
 

@@ -7,19 +7,21 @@ import math
 import os
 import re
 import shutil
-import subprocess
 import tempfile
 import zipfile
 from collections.abc import Iterator
 from datetime import UTC, datetime
 from importlib import resources
 from pathlib import Path
+from typing import Final
 
+from drivers.foreign_file import read_regular
 from estimator.physics import inputs
 from estimator.physics.curve import curve
 from estimator.physics.effects.timing import FASTEST_S, lag_step, low_pass
 from estimator.physics.kernel import conditions, rates, sensing, slots, state_vector
 from estimator.physics.layout import SIZE, slot
+from hil.child import run
 from hil.config.model_file import read_model, read_model_for_recordings
 from hil.errors import ModelFileError, UsageError
 from hil.export.c_laws import Translation
@@ -40,7 +42,7 @@ from hil.export.fmu.driveline import (
 from hil.problems import read_toml
 from hil.recording import read_record
 from hil.recording.signals_config import SignalsConfig
-from hil.report.outputs import publish
+from hil.result_folder import publish
 
 USED = (
     conditions.conditions, conditions.with_torque, conditions.is_elastic, conditions.is_extended,
@@ -215,16 +217,21 @@ def _compiler() -> str:
     return found
 
 
+COMPILER_S: Final = 300.0
+"""Time for compiling an FMU's sources [s]."""
+
+
 def _binary(files: dict[str, str], compiled: list[str]) -> bytes:
     compiler = _compiler()
     with tempfile.TemporaryDirectory() as folder:
         for name, text in files.items():
             (Path(folder) / name).write_text(text, "utf-8")
         command = [compiler, *OPTIONS, *compiled, "-o", "out.so", "-lm"]
-        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
-        if done.returncode:
-            raise UsageError(f"{compiler}: expected a compiler that takes C99, got: {done.stderr.strip()[:500]}")
-        return (Path(folder) / "out.so").read_bytes()
+        done = run(command, Path(folder), COMPILER_S)
+        if done.status != 0:
+            said = done.said.strip()[:500] or f"one that is not done in {COMPILER_S:g} s"
+            raise UsageError(f"{compiler}: expected a compiler that takes C99, got: {said}")
+        return read_regular(Path(folder) / "out.so")
 
 
 def written_fmu(

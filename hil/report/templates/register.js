@@ -22,7 +22,9 @@
   }
 
   const shown = (value) => (value === null ? "" : typeof value === "number" ? String(+value.toPrecision(4)) : value);
-  const compared = (a, b) => (a === null) - (b === null) || (a < b ? -1 : Number(a > b));
+  const names = new Intl.Collator("en", { numeric: true }); // bus_2 before bus_10
+  const compared = (a, b) =>
+    (a === null) - (b === null) || (typeof a === "string" ? names.compare(a, b) : a < b ? -1 : Number(a > b));
 
   async function register(box) {
     const { headings, rows, folder, choose } = await unpacked(box.dataset.register);

@@ -54,4 +54,11 @@ TARGETS: dict[str, Target] = {
         ("tests/rig/test_catch_up.py",), {"0.0 -> 1.0": "what is held before the first cycle, which sets it"}
     ),
     "hil.config.guard_table": Target(("tests/config/test_rig_file.py", "tests/config/test_guard_table.py")),
+    "drivers.foreign_file": Target(("tests/bad_input/test_one_rule.py",)),
+    "hil.result_folder": Target(("tests/commission/test_state.py", "tests/report/test_pieces.py")),
+    "hil.child": Target(("tests/bad_input/test_child.py",)),
+    "hil.fleet.known": Target(("tests/fleet/test_known.py",)),
+    "hil.fleet.sources": Target(("tests/fleet/test_known.py", "tests/fleet/test_sources.py")),
+    "hil.fleet.dataset": Target(("tests/fleet/test_foreign_dataset.py", "tests/fleet/test_dataset.py")),
+    "hil.recording.publish": Target(("tests/recording/test_round_trip.py",)),
 }
