@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from enum import Enum
 from typing import Annotated, Final
 
 from pydantic import Field
@@ -18,6 +19,13 @@ reading comes from the currents the drive controls, so that it follows the comma
 
 LEAST_RESPONSE_S: Final = 0.01
 """Time in which a current loop follows [s]: some milliseconds."""
+
+
+class WithoutDamper(Enum):
+    """How a run goes on whose damper was switched off."""
+
+    CONTINUE = "continue"  # with its reference alone
+    END = "end"  # at zero torque
 
 
 class GuardTable(Table):
@@ -38,6 +46,7 @@ class GuardTable(Table):
     torque_error_sum_nm: Positive | None = None
     torque_error_time_s: Annotated[float, Field(gt=0, le=1)] = 0.12
     torque_response_s: Annotated[float, Field(gt=0, le=10)] | None = None
+    without_damper: Annotated[WithoutDamper, Field(strict=False)] = WithoutDamper.CONTINUE
 
     def error_limits(self, inverters: InvertersTable, period_s: float) -> ErrorLimits:
         """Give the limits of what comes back, with the defaults of these inverters."""
