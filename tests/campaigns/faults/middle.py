@@ -45,6 +45,7 @@ from tests.campaigns.faults.middle_kinds import (
     ADDED,
     COMMAND,
     KINDS,
+    LASTING,
     PATTERNS,
     RPDO,
     TO_DRIVE,
@@ -337,6 +338,8 @@ def main(arguments: list[str] | None = None) -> int:
                 experiment, next((each for each in PLAIN if kind.startswith(each)), "none")
             )
             fault = drawn(rng, kind, steps)
+            if kind in LASTING:
+                fault.pattern = "for ever"
             outcome, _ = run_with(rig, experiment, fault, folder, fastest_rad_s)
             return fault.kind, f"in {experiment}, {fault}: {outcome.said[:120] or 'went to its end'}", outcome
 

@@ -151,6 +151,8 @@ ADDED: dict[str, float] = {"PLC's PRBS ignored": 0.0, "PLC's PRBS turned": -1.0}
 
 OTHERS = ("node ids exchanged", "second host", "two hosts at once", "clock stepped", "PLC registers exchanged")
 KINDS = (*dict.fromkeys((*TO_DRIVE, *TO_HOST, *TO_HOST_OF_BOTH, *WITH_SYNC, *ADDED, *OTHERS)),)
+LASTING = (*TO_HOST_OF_BOTH, *ADDED, *(kind for kind in TO_DRIVE if "slope" in kind or "PLC's" in kind))
+"""Kinds that stay once they have come: what of them is short is another kind."""
 
 
 def rig_of(kind: str, rig: Rig) -> Rig:
