@@ -47,6 +47,10 @@ def most_late(guard: GuardLimits) -> int:
     return round(guard.feedback_timeout_s / guard.period_s)
 
 
+ALONE: Final = (0.0,)
+"""Levels of a PLC that adds nothing."""
+
+
 class DriveRecord(NamedTuple):
     """One drive in one cycle: its command, its answer (None without), TPDOs of its seldomest and commonest kind."""
 
@@ -140,7 +144,9 @@ class DriveSupervision:
             self._stale.clear()
         self.speed.take(feedback.speed_rad_s, cycles)
         late = min(max(cycles - 1, seen.most - 1) + self.repeated, self._most_late)
-        self._compare(t_ns, feedback, tuple([part_nm * level for level in levels]), late, cycles)
+        self._compare(
+            t_ns, feedback, ALONE if levels == ALONE else tuple([part_nm * level for level in levels]), late, cycles
+        )
         if feedback.limited:
             self._limited(t_ns, feedback.torque_nm, seen.commanded_nm, cycles)
 
@@ -152,8 +158,10 @@ class DriveSupervision:
         low, high = self.torque.range(late)
         if feedback.limited:
             low, high = min(low, 0.0), max(high, 0.0)
-        off_nm = [torque_nm - min(max(torque_nm, low + each), high + each) for each in added_nm]
-        self.off_nm = tuple(off_nm)
+        if low <= torque_nm <= high and added_nm == ALONE:  # as in nearly every cycle
+            self.off_nm = ALONE
+            return
+        self.off_nm = off_nm = tuple([torque_nm - min(max(torque_nm, low + each), high + each) for each in added_nm])
         distance_nm = min(map(abs, off_nm))
         counted_nm = distance_nm
         if len(added_nm) > 1:  # between its levels it may be once, while it goes from one to the other

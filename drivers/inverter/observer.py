@@ -70,6 +70,9 @@ class TorquePrediction:
     def range(self, late_cycles: int = 0) -> tuple[float, float]:
         """Give the least and greatest torque of an answer to one of so many more SYNCs than the last [Nm]."""
         ranges = self._ranges
+        if late_cycles == 0 and len(ranges) > SAMPLED_CYCLES:  # as in nearly every cycle
+            (low, high), (low_1, high_1), (low_2, high_2) = ranges[-1], ranges[-2], ranges[-3]
+            return min(low, low_1, low_2), max(high, high_1, high_2)
         first = max(0, len(ranges) - 1 - SAMPLED_CYCLES - late_cycles)
         recent = [ranges[at] for at in range(first, len(ranges))]
         return min(low for low, _ in recent), max(high for _, high in recent)

@@ -133,7 +133,8 @@ def experiments(rng: np.random.Generator) -> dict[str, dict[str, Any]]:
 
 def drawn_rig(rng: np.random.Generator, rig: Rig, name: str) -> tuple[Rig, list[str]]:
     """Draw a rig and what its drives are like, for one experiment."""
-    inverters: dict[str, dict[str, object]] = {"m1": {"torque_limit_nm": 600.0}, "m2": {"torque_limit_nm": 600.0}}
+    usual = {"torque_limit_nm": 600.0, "heartbeat_ms": 1000, "host_timeout_ms": 5000}  # beats go by the wall clock
+    inverters: dict[str, dict[str, object]] = {"m1": dict(usual), "m2": dict(usual)}
     if rng.random() < 0.4:
         sloped = {
             "mode": TorqueMode.PROFILE_TORQUE,
