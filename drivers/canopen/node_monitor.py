@@ -107,6 +107,11 @@ class NodeMonitor:
                 f"{self._where}: {self._emergency}, expected none. Fix the cause at the drive, reset the fault."
             )
         self._heartbeat.raise_if_lost(now_ns)
+        if self._expected is not None and self._past_emergency is not None:
+            raise DeviceFault(
+                f"{self._where}: {self._past_emergency}, and its end, expected none. It went away by itself: read the "
+                "drive's list of errors (0x1003)."
+            )
         state = self._heartbeat.state if self._strayed is None else self._strayed
         if self._expected is not None and state is not self._expected:
             cause = "Something else reset or stopped the drive"

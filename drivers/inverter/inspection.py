@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from drivers.canopen.can_link import CanLink
+from drivers.canopen.pdo_map import PdoLayout
 from drivers.canopen.sdo import SdoChannel, SdoNode, object_name
 from drivers.capability.carrier import ObjectId
 from drivers.capability.plan import DrivePlan
@@ -130,6 +131,15 @@ class InspectedInverter:
         return tuple(
             replace(each, proof=self._proof.get(each.name, "")) for each in protections(self._plan, self.settings)
         )
+
+    @property
+    def layouts(self) -> tuple[PdoLayout, ...]:
+        """The PDOs of a run."""
+        return tuple(carrier.layout for carrier in self._plan.carriers)
+
+    def read_cob_id(self, layout: PdoLayout) -> int:
+        """Read the COB-ID entry of a PDO over SDO, with its flags."""
+        return self._sdo.upload(layout.communication_index, 1)
 
     @property
     def count_rad_s(self) -> float:

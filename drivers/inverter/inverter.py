@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Final
 
 from drivers.canopen.can_link import CanLink
@@ -17,15 +18,15 @@ from drivers.canopen.heartbeat import HEARTBEAT_COB_ID, NMT_COB_ID, NmtCommand, 
 from drivers.canopen.node_monitor import NodeMonitor
 from drivers.errors import CommandRefused, ConfigMismatch, DeviceFault, DriverError
 from drivers.inverter.check import Difference, fixed_differences
-from drivers.inverter.cia402 import Command, PowerState
-from drivers.inverter.drive_settings import emcy_cob_id
+from drivers.inverter.cia402 import Command, PowerState, TorqueMode
+from drivers.inverter.drive_settings import TORQUE_SLOPE, emcy_cob_id
+from drivers.inverter.drive_supervision import left_operation
 from drivers.inverter.feedback import InverterFeedback
 from drivers.inverter.inspection import InspectedInverter
 from drivers.inverter.pdos import TARGET_TORQUE, TORQUE_OFFSET, TorqueCounts, set_up_pdos
 from drivers.inverter.power_control import PowerControl
 from drivers.inverter.settings import InverterSettings
 from drivers.inverter.stop_proof import StopProof
-from drivers.inverter.supervision import left_operation
 from drivers.torque_guard import GuardedTorque
 
 __all__ = ["Difference", "Inverter", "InverterFeedback", "InverterSettings"]
@@ -71,6 +72,11 @@ class Inverter(InspectedInverter):
     def latest(self) -> InverterFeedback | None:
         """The last feedback received; None before the first after `configure`."""
         return self._feedback.latest
+
+    @property
+    def has_offset(self) -> bool:
+        """Whether the PRBS goes into the torque offset, which no torque slope holds."""
+        return self._pdos.has_offset
 
     def messages(self) -> tuple[int, int]:
         """How often the seldomest and the commonest kind of its TPDOs has come since this was last asked."""
@@ -126,6 +132,7 @@ class Inverter(InspectedInverter):
             NmtState.OPERATIONAL, self.settings.nmt_timeout_s, ask=lambda: self._send_nmt(NmtCommand.START)
         )
         self._monitor.expect(NmtState.OPERATIONAL)
+        self.settings = replace(self.settings, torque_slope_nm_per_s=self._slope_in_effect())
 
     def arm(self) -> None:
         """Select the torque mode and step to OPERATION_ENABLED at zero torque, each step confirmed.
@@ -299,6 +306,16 @@ class Inverter(InspectedInverter):
         latest = self.latest
         if latest is not None:
             self._power.raise_if_fault(latest.state)
+
+    def _slope_in_effect(self) -> float | None:
+        """Give the torque slope of profile torque mode, the drive's own where none is given; None without one."""
+        given, entry = self.settings.torque_slope_nm_per_s, self._plan.sheet.entry(TORQUE_SLOPE)
+        if given is not None or self.settings.mode is not TorqueMode.PROFILE_TORQUE:
+            return given
+        if entry is None or not entry.readable:
+            return None
+        permille_per_s = self._sdo.upload(TORQUE_SLOPE)
+        return permille_per_s * self.settings.rated_torque_nm / 1000.0 or None
 
     def _error_code(self) -> int | None:
         """Give the error code of the drive's last EMCY; None if it sent none."""

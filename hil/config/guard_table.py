@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
+from enum import Enum
 from typing import Annotated, Final
 
 from pydantic import Field
 
-from drivers.inverter.cia402 import TorqueMode
 from drivers.torque_guard import ErrorLimits
-from hil.config.device_tables import InvertersTable, InverterTable
+from hil.config.device_tables import InvertersTable
 from hil.config.table import Positive, Table
 
 ERROR_SHARE: Final = 0.05
@@ -21,12 +21,19 @@ LEAST_RESPONSE_S: Final = 0.01
 """Time in which a current loop follows [s]: some milliseconds."""
 
 
+class WithoutDamper(Enum):
+    """How a run goes on whose damper was switched off."""
+
+    CONTINUE = "continue"  # with its reference alone
+    END = "end"  # at zero torque
+
+
 class GuardTable(Table):
     """Limits of the torque guard besides the torque limit of each inverter; see `drivers.torque_guard`.
 
     ``torque_error_nm`` is that of one inverter, by default 5 % of its rated torque; ``torque_error_sum_nm`` that of
     both together, by default the root of the sum of both squares. ``torque_response_s`` is the time in which a drive
-    follows its command: by default one period, 10 ms at least, and what its torque slope needs for a step of the PRBS.
+    follows its command, besides its torque slope: by default one period, 10 ms at least.
     """
 
     rate_limit_nm_per_s: Positive
@@ -39,6 +46,7 @@ class GuardTable(Table):
     torque_error_sum_nm: Positive | None = None
     torque_error_time_s: Annotated[float, Field(gt=0, le=1)] = 0.12
     torque_response_s: Annotated[float, Field(gt=0, le=10)] | None = None
+    without_damper: Annotated[WithoutDamper, Field(strict=False)] = WithoutDamper.CONTINUE
 
     def error_limits(self, inverters: InvertersTable, period_s: float) -> ErrorLimits:
         """Give the limits of what comes back, with the defaults of these inverters."""
@@ -47,8 +55,7 @@ class GuardTable(Table):
             for table in (inverters.m1, inverters.m2)
         )
         both_nm = math.hypot(m1_nm, m2_nm) if self.torque_error_sum_nm is None else self.torque_error_sum_nm
-        slowest_s = max(self._ramp_s(inverters.m1), self._ramp_s(inverters.m2))
-        response_s = max(LEAST_RESPONSE_S, period_s) + slowest_s
+        response_s = max(LEAST_RESPONSE_S, period_s)
         return ErrorLimits(
             m1_nm=m1_nm,
             m2_nm=m2_nm,
@@ -56,10 +63,3 @@ class GuardTable(Table):
             time_s=self.torque_error_time_s,
             response_s=response_s if self.torque_response_s is None else self.torque_response_s,
         )
-
-    def _ramp_s(self, inverter: InverterTable) -> float:
-        """Time a step of the PRBS takes on the drive's own slope [s]."""
-        slope = inverter.torque_slope_nm_per_s
-        if inverter.mode is not TorqueMode.PROFILE_TORQUE or slope is None:
-            return 0.0
-        return 2.0 * self.prbs_limit_nm / slope

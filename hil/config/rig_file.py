@@ -24,10 +24,11 @@ from drivers.capability.plan import plan_drive
 from drivers.datasheet.file import EdsFile
 from drivers.errors import ConfigMismatch
 from drivers.foreign_file import read_regular_text
+from drivers.inverter.vehicle import Vehicle
 from drivers.plc.register_map import RegisterMap, RegisterMapError, load_register_map, require_usable
 from drivers.plc.types import PrbsSource
 from drivers.resources import data_file
-from drivers.torque_guard import ErrorLimits, GuardLimits
+from drivers.torque_guard import GuardLimits
 from estimator.signals.multisine import FEWEST_LINES
 from hil.config.channel_table import ChannelTable
 from hil.config.device_tables import InvertersTable, NodeId, SimulatedPlcSecurityTable
@@ -54,9 +55,32 @@ class CanTable(Table):
 
 
 class VehicleTable(Table):
-    """What is known of the vehicle beforehand; ``inertia_kg_m2`` is the total at the motor shaft."""
+    """What is known of the vehicle beforehand; ``inertia_kg_m2`` is the total at the motor shaft.
+
+    Empty it has half of it and full one and a half times as much, where the file does not say. ``most_grade`` is the
+    steepest road, rise over way; ``travel_m_per_rad`` the way per angle of the shaft, wheel radius over gear ratio.
+    """
 
     inertia_kg_m2: Positive
+    inertia_empty_kg_m2: Positive | None = None
+    inertia_full_kg_m2: Positive | None = None
+    most_grade: Annotated[float, Field(ge=0, le=1)] = 0.12
+    travel_m_per_rad: Positive = 0.086
+
+    @property
+    def vehicle(self) -> Vehicle:
+        """The vehicle as the supervision of a run takes it."""
+        usual, empty, full = self.inertia_kg_m2, self.inertia_empty_kg_m2, self.inertia_full_kg_m2
+        return Vehicle(usual, empty or 0.5 * usual, full or 1.5 * usual, self.most_grade, self.travel_m_per_rad)
+
+    @model_validator(mode="after")
+    def _empty_to_full(self) -> Self:
+        usual, empty, full = self.inertia_kg_m2, self.inertia_empty_kg_m2, self.inertia_full_kg_m2
+        if empty is not None and empty > usual:
+            refuse([Fault("inertia_empty_kg_m2", f"at most inertia_kg_m2 of the same table ({usual:g})", empty)])
+        if full is not None and full < usual:
+            refuse([Fault("inertia_full_kg_m2", f"at least inertia_kg_m2 of the same table ({usual:g})", full)])
+        return self
 
 
 class SimulationTable(Table):
@@ -192,17 +216,6 @@ class Rig(Table):
             torque_limit_m1_nm=self.inverters.m1.torque_limit_nm - parts_nm["m1"],
             torque_limit_m2_nm=self.inverters.m2.torque_limit_nm - parts_nm["m2"],
             sum_limit_nm=self.guard.sum_limit_nm - self.prbs.amplitude_nm,
-            error=self._error_next_to_prbs(parts_nm["m1"], parts_nm["m2"]),
-        )
-
-    def _error_next_to_prbs(self, part_m1_nm: float, part_m2_nm: float) -> ErrorLimits:
-        """Let the torques be off by what the PLC adds without the host knowing when."""
-        error = self.torque_limits.error
-        return replace(
-            error,
-            m1_nm=error.m1_nm + part_m1_nm,
-            m2_nm=error.m2_nm + part_m2_nm,
-            sum_nm=error.sum_nm + self.prbs.amplitude_nm,
         )
 
     @model_validator(mode="after")

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from drivers.canopen.can_link import CanLink
 from drivers.inverter.inverter import Inverter
 from drivers.inverter.settings import InverterSettings
+from drivers.inverter.vehicle import Vehicle
 from drivers.plc.plc import Plc
 from drivers.plc.register_map import load_register_map
 from drivers.resources import data_file
@@ -38,7 +39,7 @@ class Devices:
     plc_loop: PlcLoop
     plc: Plc
     channels: Channels
-    inertia_kg_m2: float | None = None
+    vehicle: Vehicle | None = None
 
 
 @contextmanager
@@ -54,7 +55,7 @@ def open_devices(rig: Rig, patience_s: float = 0.0) -> Iterator[Devices]:
         require_sole_host(link, rig, min(m1.settings.host_heartbeat_s, m2.settings.host_heartbeat_s))
         with connected_plc(rig.plc, loop, patience_s) as plc:
             channels = Channels(rig.channels, rig.register_map, {"m1": m1, "m2": m2}, loop, plc)
-            yield Devices(link, m1, m2, TorqueGuard(rig.guard_limits), loop, plc, channels, rig.vehicle.inertia_kg_m2)
+            yield Devices(link, m1, m2, TorqueGuard(rig.guard_limits), loop, plc, channels, rig.vehicle.vehicle)
 
 
 def _watching(settings: InverterSettings, patience_s: float) -> InverterSettings:

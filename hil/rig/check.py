@@ -15,6 +15,7 @@ from drivers.datasheet.text import Severity
 from drivers.eds_check import check_eds
 from drivers.errors import DeviceFault, DriverError, ProtocolViolation
 from drivers.inverter.check import Difference
+from drivers.inverter.cob_ids import shared_cob_ids
 from drivers.inverter.inspection import CommissionedValue
 from drivers.inverter.inverter import Inverter
 from drivers.inverter.stop_proof import Protection
@@ -98,7 +99,15 @@ def _can(rig: Rig, prove_stop: bool) -> tuple[Finding, ...]:
         m1, m2 = (_inverter(link, name, rig, prove_stop, made) for name in tables)
         if len(made) == len(tables):
             m2 = _or_failed("m2", m2.address, lambda: _one_shaft(m2, made["m1"], made["m2"]))
+            m2 = _or_failed("m2", m2.address, lambda: _one_bus(m2, made["m1"], made["m2"]))
         return bus, m1, m2
+
+
+def _one_bus(finding: Finding, m1: Inverter, m2: Inverter) -> Finding:
+    """See that each COB-ID is used once."""
+    if shared := tuple(shared_cob_ids(m1, m2)):
+        return replace(finding, verdict=Verdict.DIFFERS, differences=(*finding.differences, *shared))
+    return finding
 
 
 def _one_shaft(finding: Finding, m1: Inverter, m2: Inverter) -> Finding:

@@ -10,9 +10,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from drivers.inverter.drive_supervision import DriveRecord
 from drivers.inverter.inverter import Inverter, InverterFeedback
-from drivers.inverter.supervision import CycleRecord, DriveRecord, Supervision, SupervisionLimits
-from drivers.torque_guard import Evidence, TorqueRequest
+from drivers.inverter.supervision import NO_PART, CycleRecord, PlcPart, Supervision, SupervisionLimits
+from drivers.torque_guard import Evidence, GuardedTorque, TorqueRequest
 from hil.errors import RunAborted
 from hil.rig.build import Devices
 from hil.rig.pacing import NS_PER_S, Tick
@@ -38,6 +39,11 @@ class _Station:
         self.speed_rad_s = feedback.speed_rad_s
         return self.limited if feedback.limited else SampleFlag.GOOD
 
+    def record(self, command: GuardedTorque, feedback: InverterFeedback | None) -> DriveRecord:
+        """Build what the supervision judges."""
+        offset_nm = command.prbs_nm if self.inverter.has_offset else 0.0
+        return DriveRecord(command.base_nm + command.prbs_nm, feedback, *self.inverter.messages(), offset_nm)
+
 
 _DOUBTS = {
     (False, False): SampleFlag.GOOD,
@@ -61,7 +67,7 @@ class Cycle:
         self._m2 = _Station(m2, SampleFlag.M2_STALE, SampleFlag.M2_LIMITED)
         self.timing = timing or RunTiming(period_ns)
         self._answer_timeout_ns = round(answer_timeout_s * NS_PER_S)
-        limits = SupervisionLimits(self._guard.limits, m1.count_rad_s, m2.count_rad_s, devices.inertia_kg_m2)
+        limits = SupervisionLimits(self._guard.limits, m1.count_rad_s, m2.count_rad_s, devices.vehicle)
         self._supervision = Supervision(limits, m1.settings, m2.settings)
 
     @property
@@ -81,9 +87,15 @@ class Cycle:
         return self._supervision.ready
 
     def step(
-        self, tick: Tick, request: TorqueRequest, time_s: float, flags: SampleFlag, permissive_age_ns: int = 0
+        self,
+        tick: Tick,
+        request: TorqueRequest,
+        time_s: float,
+        flags: SampleFlag,
+        permissive_age_ns: int = 0,
+        plc: PlcPart = NO_PART,
     ) -> Sample:
-        """Run one cycle."""
+        """Run one cycle, in which the PLC may add what ``plc`` has."""
         self.raise_if_ended()
         age_ns = self._age_if_fit(tick)
         evidence = Evidence(age_ns, permissive_age_ns, self.fastest_rad_s)
@@ -95,11 +107,7 @@ class Cycle:
         sync_ns = self._link.sync()
         self.timing.begin(tick, sync_ns)
         waited_ns, m1, m2 = self._await_answers(sync_ns)
-        record = CycleRecord(
-            tick.now_ns,
-            DriveRecord(command_m1.base_nm + command_m1.prbs_nm, m1, *self._m1.inverter.messages()),
-            DriveRecord(command_m2.base_nm + command_m2.prbs_nm, m2, *self._m2.inverter.messages()),
-        )
+        record = CycleRecord(tick.now_ns, self._m1.record(command_m1, m1), self._m2.record(command_m2, m2), plc)
         flags |= self._m1.take(m1) | self._m2.take(m2) | _DOUBTS[self._supervision.take(record)]
         channels = self._channels.read(sync_ns, (self._answer_timeout_ns - waited_ns) / NS_PER_S)  # what is left of it
         if any(map(math.isnan, channels)):

@@ -2,9 +2,10 @@
 
 Its torque goes with the PRBS, in the torque offset, through the one guard and under the PRBS limit. It acts in the
 measured part alone, on the speed of the cycle before. Where that was not read, or is in doubt, its torque is zero, and
-it starts anew with the next good one. It goes off for the rest of the run in the cycle after the on-line estimate has
-left the region of the design by more than it can be wrong, or its own torque has stood at the limit for a period of
-the resonance.
+it starts anew with the next good one. It goes off for the rest of the run in the cycle after the shaft has swung more
+than it would without it (`hil.rig.swing_watch`), the on-line estimate has left the region of the design by more than it
+can be wrong, or its own torque has stood at the limit for a period of the resonance. The run then goes on with its
+reference alone, or ends, as ``[guard] without_damper`` of the rig file has it.
 """
 
 from __future__ import annotations
@@ -23,8 +24,10 @@ from estimator.identification.online.recursive import Status
 from estimator.identification.settings import Settings
 from estimator.signals.record import Record
 from hil.config.damper_file import DamperFile, DesignedFor
+from hil.errors import RunAborted
 from hil.rig.experiments.base import Phase
 from hil.rig.live import LiveEstimate
+from hil.rig.swing_watch import SwingWatch
 from hil.sample import Sample
 
 DEVIATIONS = 3.0
@@ -43,13 +46,23 @@ class Damping:
     rig: DesignedFor
     live: LiveEstimate
     off: str = ""
+    ends_run: bool = False
+    _watch: SwingWatch = field(init=False)
+    _given_nm: float = 0.0
     _last: Sample | None = None
     _states: tuple[float, float] | None = None
     _at_limit: int = 0
     _rows: list[tuple[float, float, float, bool]] = field(default_factory=list)
 
+    def __post_init__(self) -> None:
+        self._watch = SwingWatch(self.file)
+
     def torque_nm(self, cycle: int) -> float:
         """Return the torque of a cycle [Nm]; zero while it is off, or without a good speed of the cycle before."""
+        self._given_nm = self._torque_nm(cycle)
+        return self._given_nm
+
+    def _torque_nm(self, cycle: int) -> float:
         last = self._last
         fresh = last is not None and last.counts and last.cycle == cycle - 1
         if last is None or self.off or not fresh or not abs(last.speed_rad_s) < 1e30:  # nor of NaN
@@ -74,8 +87,12 @@ class Damping:
         if phase is not Phase.MEASURE or self.off:
             return
         self._rows.append((sample.time_s, sample.prbs_nm, sample.speed_rad_s, sample.counts))
-        if reason := self._reason():
+        open_nm = sample.torque_ref_m1_nm + sample.torque_ref_m2_nm - self._given_nm
+        swings = self._watch.take(open_nm, sample.speed_rad_s) if sample.counts else ""
+        if reason := swings or self._reason():
             self.off = f"at {sample.time_s:.2f} s: {reason}"
+            if self.ends_run:
+                raise RunAborted(f"damper: switched off {self.off}. [guard] without_damper = 'end' ends the run.")
 
     def _reason(self) -> str:
         (low, high), latest = self.file.region_hz, self.live.latest

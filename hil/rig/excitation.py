@@ -21,16 +21,21 @@ from types import TracebackType
 from typing import Self
 
 from drivers.errors import BusDown, DriverError, WrongTorque
+from drivers.inverter.supervision import NO_PART, PlcPart
 from drivers.plc.plc import GENERATOR_OFF, Plc
 from drivers.plc.types import PlcStatus, PrbsSettings
 from drivers.torque_guard import Evidence, GuardedTorque, GuardLimits, TorqueGuard, TorqueRequest
 from hil.errors import RunAborted
 from hil.rig.experiments.base import Phase
-from hil.rig.pacing import Tick
+from hil.rig.pacing import NS_PER_S, Tick
 from hil.rig.plc_loop import PlcLoop
 
 NO_TORQUE = TorqueRequest(0.0, 0.0, 0.0, 0.0)
 """What is asked for while nothing is driven."""
+
+
+SETTLED_S = 0.05
+"""After the PLC has confirmed a change, the drives have the torque that it makes by then [s]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,6 +133,20 @@ class PlcPrbs:
         self._take_change(tick)
         if self._change is None and (self._since_ns is None or status.t_ns > self._since_ns):
             self._judge(status)
+
+    def part(self, tick: Tick, news: PlcStatus | None) -> PlcPart:
+        """Give what the PLC may add in this cycle: nothing while it is confirmed off, anything while that changes."""
+        if self._order is None:
+            return NO_PART
+        parts_nm = self._order.m1.prbs_nm, self._order.m2.prbs_nm
+        settled = self._since_ns is None or tick.now_ns - self._since_ns > SETTLED_S * NS_PER_S
+        if self._change is not None or not settled:
+            return PlcPart(*parts_nm, levels=(0.0, 1.0, -1.0))
+        if not self._holds.enabled:
+            return NO_PART
+        fresh = news is not None and news.age_ns(tick.now_ns) <= SETTLED_S * NS_PER_S
+        seen = math.copysign(1.0, news.prbs_torque_nm) if news is not None and fresh and news.prbs_torque_nm else 0.0
+        return PlcPart(*parts_nm, levels=(1.0, -1.0), seen=seen)
 
     def known_nm(self, news: PlcStatus | None) -> float:
         """Give what the PLC reports to put out, where it reported since the last cycle; NaN otherwise [Nm]."""

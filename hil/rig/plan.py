@@ -9,6 +9,7 @@ from drivers.plc.types import PrbsSource
 from estimator.signals.multisine import Multisine
 from estimator.signals.prbs import Prbs
 from hil.config.experiment_tables import AnyExperiment
+from hil.config.guard_table import WithoutDamper
 from hil.config.rig_file import Rig, torque_rests
 from hil.errors import UsageError
 from hil.rig.excitation import PlcPrbsOrder, Split, guarded_prbs
@@ -70,6 +71,7 @@ def plan_run(rig: Rig, name: str, damper: Damping | None = None) -> Plan:
     if damper is not None:
         _require_fit(rig, table, split, damper)
         excitation_nm += damper.rig.limit_nm
+        damper.ends_run = rig.guard.without_damper is WithoutDamper.END
     largest = split.request(table.torque_nm, excitation_nm)
     return Plan(
         name=name,

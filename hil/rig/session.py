@@ -16,7 +16,8 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
 from drivers.canopen.strangers import Strangers, foreign
-from drivers.errors import DriverError, ForeignController
+from drivers.errors import ConfigMismatch, DriverError, ForeignController
+from drivers.inverter.cob_ids import shared_cob_ids
 from drivers.plc.types import PlcStatus
 from hil.errors import RunAborted
 from hil.rig.arming import ArmedDrives
@@ -95,6 +96,8 @@ def _fit(devices: Devices, plan: Plan) -> PlcStatus:
 
 
 def _configure(devices: Devices, stop: StopRequest) -> None:
+    if shared := tuple(shared_cob_ids(devices.m1, devices.m2)):
+        raise ConfigMismatch(f"{'; '.join(map(str, shared))}. Give each drive a data sheet with COB-IDs of its own.")
     for inverter in (devices.m1, devices.m2):
         stop.raise_if_requested()
         inverter.configure()

@@ -11,24 +11,17 @@ import pytest
 from drivers.errors import DeviceFault, DeviceTimeout, WrongTorque
 from drivers.guard_limits import ErrorLimits, GuardLimits
 from drivers.inverter.cia402 import FAULT_STATES, PowerState, TorqueMode
+from drivers.inverter.drive_supervision import MOST_SURPLUS, DriveRecord
 from drivers.inverter.feedback import InverterFeedback
 from drivers.inverter.settings import InverterSettings
 from drivers.inverter.supervision import (
-    MOST_MISSING,
-    MOST_SURPLUS,
-    NO_TORQUE_COUNTS,
-    NO_TORQUE_S,
-    RUNAWAY_RAD_S,
-    RUNAWAY_SHARE,
     SPEED_NOISE_RAD_S,
-    SPEED_SHARE,
-    SURPLUS_CYCLES,
-    UNWOUND_S,
     CycleRecord,
-    DriveRecord,
     Supervision,
     SupervisionLimits,
+    rules_table,
 )
+from drivers.inverter.vehicle import Vehicle
 from estimator.signals.prbs import Prbs
 from tests.drivers.can_bench import M1, M2
 
@@ -55,7 +48,11 @@ def answer(torque_nm: float = 0.0, speed_rad_s: float = 0.0, **more: object) -> 
 def supervised(
     settings: InverterSettings = M1, error: ErrorLimits = ERROR, inertia_kg_m2: float | None = None
 ) -> Supervision:
-    return Supervision(SupervisionLimits(replace(GUARD, error=error), 0.0, 0.0, inertia_kg_m2), settings, M2)
+    usual = inertia_kg_m2
+    vehicle = (
+        None if usual is None else Vehicle(usual, 0.5 * usual, 1.5 * usual, most_grade=0.12, travel_m_per_rad=0.086)
+    )
+    return Supervision(SupervisionLimits(replace(GUARD, error=error), 0.0, 0.0, vehicle), settings, M2)
 
 
 def cycles_to_end(made: Supervision, course: Iterable[tuple[DriveRecord, DriveRecord]]) -> int | None:
@@ -190,7 +187,8 @@ def test_a_limit_that_takes_all_of_the_torque_ends_the_run() -> None:
     made = supervised()
     assert m1_alone(torques(*[1.2] * 500, limited=True), made=made) == 31
     assert "bit 11 (internal limit) is set and the torque 0x6077 is 1.2 Nm, expected some of the 100" in str(made.ended)
-    assert m1_alone(torques(*[1.3] * 500, limited=True)) is None
+    assert m1_alone(torques(*[-27.0] * 500, limited=True), 250.0) == 14
+    assert m1_alone(torques(*[31.0] * 500, limited=True)) is None
     assert m1_alone(torques(*[0.0] * 500, limited=True), command_nm=30.0) is None
 
 
@@ -273,6 +271,26 @@ def test_two_readings_of_one_shaft_may_differ_by_noise_and_share() -> None:
     assert speeds([(0.0, 0.53)] * 500) == AT_LIMIT
 
 
+def test_drives_with_other_filters_read_one_speed() -> None:
+    """A swing of 5 rad/s at 8 Hz, of which a filter of 20 ms leaves 0.7 and delays the rest."""
+
+    def swing(cycle: int, lag_s: float) -> float:
+        omega = 2.0 * math.pi * 8.0
+        grown = 5.0 * min(1.0, cycle / 50.0)
+        return grown / math.hypot(1.0, omega * lag_s) * math.sin(omega * cycle * PERIOD_S - math.atan(omega * lag_s))
+
+    assert speeds([(swing(k, 0.0), swing(k, 0.02)) for k in range(500)]) is None
+
+
+@pytest.mark.parametrize("factor", [1.0, 0.5, 0.0, -1.0])
+def test_drives_that_answer_in_turn_are_compared(factor: float) -> None:
+    """m1 at odd, m2 at even SYNCs, for 4 s: too short for their share to count as lost."""
+    made = supervised()
+    course = [(answer(0.0, factor * 20.0) if k % 2 else None, None if k % 2 else answer(0.0, 20.0)) for k in range(400)]
+    pairs = ((DriveRecord(0.0, one, one is not None), DriveRecord(0.0, two, two is not None)) for one, two in course)
+    assert (cycles_to_end(made, pairs) is None) is (factor == 1.0)
+
+
 WRONG_SPEEDS: dict[str, Callable[[float], float]] = {
     "reversed": lambda speed: -speed,
     "zero": lambda speed: 0.0,
@@ -287,75 +305,12 @@ def test_a_speed_that_is_wrong_on_one_drive_ends_the_run(wrong: str) -> None:
     course = [(WRONG_SPEEDS[wrong](0.05 * k), 0.05 * k) for k in range(400)]
     ended = speeds(course, made)
     assert ended is not None
-    assert abs(course[ended - 1][1]) < 2.0
+    assert abs(course[ended - 1][1]) < 10.0
     assert "expected one speed within" in str(made.ended)
 
 
 def test_a_speed_that_jumps_in_every_second_cycle_ends_it() -> None:
-    assert (speeds([(40.0 * (k % 2), 40.0) for k in range(100)]) or math.inf) <= 6
-
-
-def test_quick_changes_of_both_are_no_difference() -> None:
-    """100 rad/s² sampled a period apart: 1 rad/s."""
-    assert speeds([(1.0 * k, 1.0 * (k + 1)) for k in range(-50, 50)]) is None
-
-
-def test_a_speed_that_runs_away_against_the_torque_ends_it() -> None:
-    def run(share: float, torque_nm: float = 100.0) -> int | None:
-        made = supervised(inertia_kg_m2=10.0)
-        speed = [share * torque_nm / 10.0 * PERIOD_S * k for k in range(300)]
-        seen = ((DriveRecord(torque_nm, answer(torque_nm, w)), DriveRecord(0.0, answer(0.0, w))) for w in speed)
-        return cycles_to_end(made, seen)
-
-    assert run(-1.0) == 20 + round(UNWOUND_S / PERIOD_S)
-    assert run(1.0) is None
-    assert run(-0.45) is None, "a grade that is steeper than the torque"
-
-
-@pytest.mark.parametrize("size_nm", [100.0, 500.0, 2000.0])
-@pytest.mark.parametrize("from_rad_s", [0.0, 0.4, 0.9, 1.4, 2.6])
-def test_a_shaft_that_unwinds_when_the_torque_turns_is_no_vehicle_that_runs_away(
-    size_nm: float, from_rad_s: float
-) -> None:
-    """Motor of 2 kg m² and load of 83 kg m² on a shaft of 3500 Nm/rad, in steps of 1 ms."""
-
-    def run(sign: float) -> int | None:
-        speed, seen = [from_rad_s, from_rad_s], []
-        twist = -size_nm / 3500.0
-        for step in range(4400):
-            torque_nm = -size_nm if step < 400 else size_nm
-            if step % 10 == 0:
-                read = answer(torque_nm, sign * speed[0])
-                seen.append((DriveRecord(torque_nm, read), DriveRecord(0.0, answer(0.0, sign * speed[0]))))
-            shaft_nm = 3500.0 * twist + 9.0 * (speed[0] - speed[1])
-            speed[0] += 0.001 * (torque_nm - shaft_nm) / 2.0
-            speed[1] += 0.001 * shaft_nm / 83.0
-            twist += 0.001 * (speed[0] - speed[1])
-        wide = replace(ERROR, m1_nm=1e5, sum_nm=1e5)  # torques are not what is judged here
-        return cycles_to_end(supervised(error=wide, inertia_kg_m2=85.0), seen)
-
-    assert run(1.0) is None
-    assert run(-1.0) is not None
-
-
-SWINGING = """
--532 -5.42  -532 -6.19  -291 -6.00  -261 -3.80  -472 -1.27  -442 -0.52  -411 -0.41  -382 -0.65  -112 -1.52  -82 -1.09
--292 -1.07  -262 -2.77  8 -4.40  38 -4.05  68 -3.30  98 -2.45  128 -1.62  158 -1.12  -52 -0.99  -22 -2.58  8 -4.12
-38 -5.18  68 -5.51  98 -4.91  128 -3.86  158 -2.48  429 -1.20  458 1.03  248 2.24  269 0.77  509 -1.31  509 -2.33
-509 -3.27  509 -4.19  509 -4.60  509 -4.55  509 -4.02  509 -3.29  269 -2.30  269 -2.83  509 -3.25  509 -2.18  269 -1.16
-268 -1.90  509 -2.69  509 -2.03  268 -1.39  269 -2.48  509 -3.44  510 -2.51  269 -1.59  269 -2.36  509 -2.91  509 -1.82
-269 -0.82  269 -1.53  509 -2.37  509 -1.63  509 -0.91  509 -0.50  509 -0.51  509 -0.64  509 -1.09  508 -1.61  509 -1.99
-509 -2.37  509 -2.38  509 -2.25  509 -1.74  509 -1.08  509 -0.70  508 -0.20  269 -0.23  269 -1.66  509 -2.99
-"""
-"""Torque [Nm] and motor speed [rad/s] of a simulated bus of 100 kg m², cycle by cycle: a reversal of 400 Nm with a PRBS
-of 120 Nm. The motor swings on its shaft at 8 Hz and beyond zero while the vehicle slows down."""
-
-
-def test_a_motor_that_swings_on_its_shaft_does_not_run_away() -> None:
-    torque_nm, speed = ([float(word) for word in SWINGING.split()[first::2]] for first in (0, 1))
-    halves = zip((0.5 * torque for torque in torque_nm), speed, strict=True)
-    seen = ((DriveRecord(half, answer(half, w)), DriveRecord(half, answer(half, w))) for half, w in halves)
-    assert cycles_to_end(supervised(inertia_kg_m2=100.0), seen) is None
+    assert (speeds([(40.0 * (k % 2), 40.0) for k in range(100)]) or math.inf) <= 20
 
 
 def messages(*counts: int | tuple[int, int]) -> int | None:
@@ -367,12 +322,13 @@ def messages(*counts: int | tuple[int, int]) -> int | None:
 def test_one_tpdo_per_sync() -> None:
     pair: list[int | tuple[int, int]] = [1, (1, 2)]
     assert messages(*[1] * 1000) is None
-    assert messages(*[1, 0] * 500) is None, "each second is lost: its row is flagged"
     assert messages(*[0, 2] * 500) is None, "each second is late"
+    assert messages(*[0, *[1] * 9] * 500) is None, "a tenth is lost: their rows are flagged"
+    assert 500 < (messages(*[1, 0] * 1000) or 0) < 520, "half of them are: a fifth of what counts after 5.1 s"
+    assert 1300 < (messages(*[1, 1, 1, 0] * 1000) or 0) < 1700
     assert messages(*[1, 1, 2] * 500) == 3 * MOST_SURPLUS
     assert messages(*pair * 500) == 2 * MOST_SURPLUS, "one kind of two"
     assert messages(*([2] + [1] * 200) * 20) is None, "a controller that hears a frame twice"
-    assert messages(*[1, 0, 0] * 500) == 3 * (MOST_MISSING - 1)
 
 
 def test_late_ones_are_awaited_for_as_long_as_feedback_may_be_old() -> None:
@@ -392,7 +348,6 @@ def test_doubtful_rows_are_those_of_the_drive_that_is() -> None:
     assert doubtful(100.0, answer()) == (False, False)
     assert doubtful(131.0, answer()) == (True, False)
     assert doubtful(100.0, answer(), messages=2) == (False, True)
-    assert doubtful(100.0, answer(0.0, 0.9)) == (True, True)
     assert doubtful(100.0, answer(), messages=1) == (False, False)
     assert made.ended is None
 
@@ -414,12 +369,6 @@ def test_the_first_end_is_kept() -> None:
         made.raise_if_ended()
 
 
-def test_the_table_of_the_documentation_has_the_numbers_of_the_rules() -> None:
+def test_the_table_of_the_documentation_is_that_of_the_rules() -> None:
     page = (Path(__file__).parents[2] / "docs" / "reliability.md").read_text("utf-8")
-    for rule in (
-        f"a torque above {NO_TORQUE_COUNTS} counts | `torque_error_nm` | tolerance × {NO_TORQUE_S:g} s |",
-        f"| {SPEED_NOISE_RAD_S:g} rad/s, a count of each, {100 * SPEED_SHARE:g} %, and its change in two periods |",
-        f"| {RUNAWAY_SHARE:g} of what they can give the inertia | torque for {RUNAWAY_RAD_S:g} rad/s |",
-        f"| {MOST_SURPLUS} too many within {SURPLUS_CYCLES} cycles; {MOST_MISSING} more missing than coming |",
-    ):
-        assert rule in page
+    assert rules_table() in page

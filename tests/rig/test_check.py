@@ -1,16 +1,20 @@
 """`hil check`: the rig as described, the proof that the drives stop, and what somebody has accepted."""
 
+from pathlib import Path
+
 import pytest
 
+from drivers.errors import ConfigMismatch
 from drivers.inverter.cia402 import PowerState
 from drivers.inverter.settings import Acceptance
 from drivers.plc.types import ClutchState
+from drivers.resources import data_file
 from hil.rig.check import Verdict, check_rig
 from hil.simulator.addresses import is_simulated_bus
 from hil.simulator.fault_table import rig_faults
 from hil.simulator.faults import InverterFaults, RigFaults
 from tests.rig.observer import assert_disarmed, power_state
-from tests.rig.serving import changed, served, small_rig
+from tests.rig.serving import Samples, changed, run_once, served, small_rig
 
 
 def test_rig_as_described_agrees_and_stays_as_it_is() -> None:
@@ -21,6 +25,19 @@ def test_rig_as_described_agrees_and_stays_as_it_is() -> None:
     assert {finding.verdict for finding in findings} == {Verdict.AGREES}
     assert not any(finding.notes for finding in findings)
     assert states == {PowerState.SWITCH_ON_DISABLED}
+
+
+def test_cob_ids_that_both_drives_would_use_are_named_before_anything_is_armed(tmp_path: Path) -> None:
+    """m1 has the TPDO that m2 is to get: until m1 is set up too both send under one identifier."""
+    path = tmp_path / "m1.eds"
+    path.write_text(data_file("inverter.eds").read_text("utf-8").replace("$NODEID+0x180", "0x182"), "utf-8")
+    with served(changed(small_rig(), {"inverters.m1": {"eds": path}})) as (server, rig):
+        m2 = check_rig(rig)[2]
+        with pytest.raises(ConfigMismatch, match=r"COB-ID of its TPDO 0x1800 is 0x182, which m1 uses for its TPDO"):
+            run_once(rig, Samples())
+        assert_disarmed(server.bus_url, 1, 2)
+    assert m2.verdict is Verdict.DIFFERS
+    assert "0x182, which m1 uses" in str(m2.differences[-1])
 
 
 def test_missing_bus_is_one_fault_and_the_plc_is_still_checked() -> None:

@@ -27,9 +27,14 @@ PLACES: Mapping[Element, str] = {
 
 
 def free_form(without: Trial, name: str) -> Trial | None:
-    """Return a set without a name, with a free form of one of its laws at the name's element; None where it has none."""
+    """Return a set without a name, with a free form of one of its laws at the name's element; None where none has one.
+
+    Of several measured outputs there is none: a curve is fitted to the first.
+    """
     element = EFFECTS[name].element
-    if element not in PLACES or all(EFFECTS[other].element is not element for other in without.effects):
+    if element not in PLACES or without.hypothesis.outputs > 1:
+        return None
+    if all(EFFECTS[other].element is not element for other in without.effects):
         return None
     hypothesis = without.hypothesis
     result = hypothesis.result

@@ -88,8 +88,8 @@ def _torque_laws(unit: Translation) -> str:
         name, _ = unit.function(law, of_one_number=True)
         values = ", ".join(["torque", "time_s", *(f"p.at[{place}]" for place in at)])
         lines.append(f"    if (p.at[{at[0]}] != {_number(null)}) torque = {name}({values});")
-    name, at = unit.function(curve)[0], slots.TABLE_TORQUE
-    lines.append(f"    if (p.at[{at}] > 0.0) torque = torque + {name}(torque, p, {at}, 0).item0;")
+    name, count = unit.function(curve)[0], slots.TABLE_TORQUE
+    lines.append(f"    if (p.at[{count}] > 0.0) torque = torque + {name}(torque, p, {count}, 0).item0;")
     return "\n".join((*lines, "    return torque;", "}", ""))
 
 

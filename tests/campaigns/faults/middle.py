@@ -7,8 +7,8 @@ changed, and the plant's own speed. A failure is a run that continues after the 
 a shaft that got faster than the experiment has it, or a drive that is not disarmed at the end.
 """
 
+import math
 import re
-import struct
 import sys
 import tempfile
 import time
@@ -16,7 +16,6 @@ import uuid
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, nullcontext
-from dataclasses import dataclass, field
 from functools import cache, partial
 from itertools import combinations
 from pathlib import Path
@@ -27,7 +26,7 @@ import can
 import numpy as np
 
 from drivers.canopen.can_link import SYNC_COB_ID, CanLink
-from drivers.inverter.supervision import NO_TORQUE_S
+from drivers.inverter.drive_supervision import NO_TORQUE_S
 from drivers.plc.plc import Plc
 from drivers.plc.register import Register, RegisterKind
 from drivers.plc.register_map import RegisterMap
@@ -42,104 +41,36 @@ from hil.rig.session import run_plan
 from hil.rig.stop import StopRequest
 from hil.simulator.addresses import Address, with_addresses
 from hil.simulator.rig_server import RigServer
+from tests.campaigns.faults.middle_kinds import (
+    ADDED,
+    COMMAND,
+    KINDS,
+    LASTING,
+    PATTERNS,
+    RPDO,
+    TO_DRIVE,
+    TO_HOST,
+    TO_HOST_OF_BOTH,
+    TPDO,
+    WITH_SYNC,
+    Fault,
+    rig_of,
+)
 from tests.campaigns.faults.one_run import COUNT_NM, PATIENCE_S, Outcome
 from tests.campaigns.faults.rig import WatchedPlant, campaign_rig
 from tests.campaigns.faults.runs import asked_for, tried
 from tests.rig.observer import DISARMED, power_state
 
-RPDO, TPDO, HEARTBEAT = 0x200, 0x180, 0x700
 EXPERIMENTS = ("cruise", "reversal", "tip", "pulses")
-PATTERNS = ("once", "burst", "periodic", "for ever")
-COMMAND = struct.Struct("<Hhh")
-"""Controlword, target torque, torque offset."""
-
-ANSWER = struct.Struct("<Hhi")
-"""Statusword, torque and velocity actual value."""
 
 LATE_CYCLES = 2
 """From the cycle that is too much to zero: the answer to the next SYNC shows it, and disarming takes one."""
 
+PLAIN = ("PLC's", "slow slope")
+"""Beginnings of kinds that are tried on rigs of their own: without what follows nothing goes wrong."""
+
 SPEED_SLACK_RAD_S = 3.0
-
-
-@dataclass
-class Fault:
-    """What happens, from a moment on, in the cycles of its pattern."""
-
-    kind: str
-    drive: int
-    at: int
-    pattern: str
-    on: int
-    period: int
-    size: float
-    frozen: dict[int, bytes] = field(default_factory=dict)
-
-    def acts(self, cycle: int) -> bool:
-        since = cycle - self.at
-        if since < 0 or self.pattern == "for ever":
-            return since >= 0
-        length = {"once": 1, "burst": self.on}.get(self.pattern)
-        return since < length if length is not None else since % self.period < self.on
-
-    def __str__(self) -> str:
-        pattern = {"periodic": f"{self.on} of {self.period}", "burst": f"burst of {self.on}"}
-        return f"m{self.drive} from cycle {self.at}, {pattern.get(self.pattern, self.pattern)}, size {self.size:.2f}"
-
-
-Change = Callable[[Fault, bytes], list[bytes]]
-
-
-def command(fault: Fault, data: bytes, word: int | None = None, factor: float = 1.0, offset: int = 0) -> list[bytes]:
-    controlword, target, prbs = COMMAND.unpack(data[:6])
-    changed = (round(factor * target) + offset, round(factor * prbs))
-    clipped = [max(-1000, min(1000, each)) for each in changed]
-    return [COMMAND.pack(controlword if word is None else word, *clipped) + data[6:]]
-
-
-def answer(data: bytes, set_bits: int = 0, clear_bits: int = 0, speed: Callable[[int], float] | None = None) -> bytes:
-    status, torque, velocity = ANSWER.unpack(data[:8])
-    status = (status | set_bits) & ~clear_bits
-    return ANSWER.pack(status, torque, velocity if speed is None else round(speed(velocity)))
-
-
-def kept(fault: Fault, cob_id: int, data: bytes) -> list[bytes]:
-    return [fault.frozen.setdefault(cob_id, data)]
-
-
-LEAVES = (0x0006, 0x0007, 0x0002)
-"""Shutdown, disable operation, quick stop."""
-
-TO_DRIVE: dict[str, Change] = {
-    "leaves operation": lambda f, d: command(f, d, word=LEAVES[int(f.size * 100) % 3]),
-    "torque times": lambda f, d: command(f, d, factor=4.0 * f.size - 2.0),
-    "torque plus": lambda f, d: command(f, d, offset=round(800 * f.size - 400)),
-    "torque nothing": lambda f, d: command(f, d, factor=0.0),
-    "limit bit, no torque": lambda f, d: command(f, d, factor=0.0),
-    "ignores its target": lambda f, d: command(f, d, factor=0.0),
-    "RPDO lost": lambda f, d: [],
-    "stuck and frozen": lambda f, d: kept(f, RPDO, d),
-}
-TO_HOST: dict[str, Change] = {
-    "speed reversed": lambda f, d: [answer(d, speed=lambda v: -v)],
-    "speed stuck": lambda f, d: [answer(d, speed=lambda v: ANSWER.unpack(kept(f, TPDO, d)[0][:8])[2])],
-    "speed zero": lambda f, d: [answer(d, speed=lambda v: 0)],
-    "speed times": lambda f, d: [answer(d, speed=lambda v: 2.0 * f.size * v)],
-    "foreign TPDO": lambda f, d: [d, answer(d, speed=lambda v: 0)],
-    "TPDO doubled": lambda f, d: [d, d],
-    "TPDO lost": lambda f, d: [],
-    "limit bit, no torque": lambda f, d: [answer(d, set_bits=1 << 11)],
-    "ignores its target": lambda f, d: [answer(d, clear_bits=1 << 12)],
-    "stuck and frozen": lambda f, d: kept(f, TPDO, d),
-}
-WITH_SYNC: dict[str, tuple[int, bytes]] = {
-    "PRE-OPERATIONAL heartbeat": (HEARTBEAT, b"\x7f"),
-    "boot-up": (HEARTBEAT, b"\x00"),
-}
-"""Frames that come to the host next to those of the drive."""
-
-OTHERS = ("node ids exchanged", "second host", "two hosts at once", "clock stepped", "PLC registers exchanged")
-KINDS = (*dict.fromkeys((*TO_DRIVE, *TO_HOST, *WITH_SYNC, *OTHERS)),)
+INERTIA_KG_M2 = 100.0
 
 
 NAMED = {"PLC registers exchanged": "PLC", "two hosts at once": "somebody else|[Aa]nother host"}
@@ -153,10 +84,13 @@ class Man:
         self._fault = fault
         self.kind = fault.kind
         self._scale_nm = rated_nm / 1000.0
-        self._sent = [0.0, 0.0]
+        self._sent = [(0.0, 0.0), (0.0, 0.0)]
+        self._ramp_nm = [0.0, 0.0]
+        self.step_nm = math.inf
         self.cycle = 0
         self.asked_nm: list[tuple[float, float]] = []
         self.on_fault: Callable[[], None] = lambda: None
+        self.added_nm: Callable[[], tuple[float, float]] = lambda: (0.0, 0.0)
 
     def stand_between(self, devices: Devices) -> None:
         link = devices.link
@@ -177,14 +111,15 @@ class Man:
     def _out(self, message: can.Message) -> Iterator[can.Message]:
         fault, cob_id, data = self._fault, message.arbitration_id, bytes(message.data)
         if cob_id in (RPDO + 1, RPDO + 2):
-            self._sent[cob_id - RPDO - 1] = sum(COMMAND.unpack(data[:6])[1:]) * self._scale_nm
+            _, target, offset = COMMAND.unpack(data[:6])
+            self._sent[cob_id - RPDO - 1] = target * self._scale_nm, offset * self._scale_nm
         if cob_id == SYNC_COB_ID:
             self.cycle += 1
-            self.asked_nm.append((self._sent[0], self._sent[1]))
+            added = self.added_nm()
+            self.asked_nm.append((self._sloped(0) + added[0], self._sloped(1) + added[1]))
             if fault.acts(self.cycle):
                 self.on_fault()
-                if fault.kind in WITH_SYNC:
-                    base, extra = WITH_SYNC[fault.kind]
+                for base, extra in WITH_SYNC.get(fault.kind, ()):
                     self._take(_frame(base + fault.drive, extra))
         if not fault.acts(self.cycle):
             yield message
@@ -195,12 +130,22 @@ class Man:
         else:
             yield message
 
+    def _sloped(self, drive: int) -> float:
+        """What a drive must give for what it was last sent: its slope holds the target torque [Nm]."""
+        target_nm, offset_nm = self._sent[drive]
+        step_nm = target_nm - self._ramp_nm[drive]
+        self._ramp_nm[drive] += min(max(step_nm, -self.step_nm), self.step_nm)
+        return self._ramp_nm[drive] + offset_nm
+
     def _into(self, message: can.Message) -> Iterator[can.Message]:
         fault, cob_id, data = self._fault, message.arbitration_id, bytes(message.data)
         if not fault.acts(self.cycle):
             yield message
         elif fault.kind == "node ids exchanged" and cob_id in (TPDO + 1, TPDO + 2):
             yield _frame(2 * TPDO + 3 - cob_id, data)
+        elif cob_id in (TPDO + 1, TPDO + 2) and fault.kind in TO_HOST_OF_BOTH:
+            changed = TO_HOST_OF_BOTH[fault.kind](fault, cob_id - TPDO, self.cycle, data)
+            yield from (_frame(cob_id, each) for each in changed)
         elif cob_id == TPDO + fault.drive and fault.kind in TO_HOST:
             yield from (_frame(cob_id, each) for each in TO_HOST[fault.kind](fault, data))
         else:
@@ -215,7 +160,7 @@ class Shaft(WatchedPlant):
     """The plant, with its own speed kept [rad/s]."""
 
     def __init__(self, rated_nm: float) -> None:
-        super().__init__(rated_nm)
+        super().__init__(rated_nm, INERTIA_KG_M2)
         self.speeds_rad_s: list[float] = []
 
     def advance(self, torque_nm: tuple[float, float], duration_s: float) -> None:
@@ -238,14 +183,17 @@ def drawn(rng: np.random.Generator, kind: str, steps: int) -> Fault:
 
 def run_with(rig: Rig, experiment: str, fault: Fault, folder: Path, fastest_rad_s: float) -> tuple[Outcome, Shaft]:
     """Carry out one run and judge it."""
+    rig = rig_of(fault.kind, rig)
     outcome, shaft = Outcome(), Shaft(rig.inverters.m1.rated_torque_nm)
     man = Man(fault, rig.inverters.m1.rated_torque_nm)
+    man.step_nm = (rig.inverters.m1.torque_slope_nm_per_s or math.inf) * rig.period_s
     path = folder / f"{uuid.uuid4()}.csv"
     server = RigServer(shaft, rig, f"virtual:{uuid.uuid4()}", Address("127.0.0.1", 0))
     patient = mock.patch.object(build, "Plc", partial(_plc, fault))
     with ExitStack() as stack:
         stack.enter_context(server)
         at = with_addresses(rig, server.bus_url, str(server.modbus))
+        man.added_nm = _with_added(fault, server, man)
         recorder = RecordingWriter(path)
         man.on_fault = _also(fault, server, stack)
         stack.enter_context(patient)
@@ -261,6 +209,20 @@ def run_with(rig: Rig, experiment: str, fault: Fault, folder: Path, fastest_rad_
     for left in folder.glob(f"{path.stem}*"):
         left.unlink()
     return outcome, shaft
+
+
+def _with_added(fault: Fault, server: RigServer, man: Man) -> Callable[[], tuple[float, float]]:
+    """Have one drive make something else of what the PLC adds; give what the PLC means to add [Nm]."""
+    added_nm = server._plc_torque_nm
+
+    def given() -> tuple[float, float]:
+        both = list(added_nm())
+        if fault.kind in ADDED and fault.acts(man.cycle):
+            both[fault.drive - 1] *= ADDED[fault.kind]
+        return both[0], both[1]
+
+    server._slaves.add_torque_from(given)
+    return added_nm
 
 
 def _driven(at: Rig, experiment: str, recorder: RecordingWriter | None, man: Man | None = None) -> str:
@@ -359,11 +321,11 @@ def main(arguments: list[str] | None = None) -> int:
     asked = asked_for("tests.campaigns.faults.middle", 2000, arguments)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        rig = campaign_rig(folder)
+        rig = campaign_rig(folder, inertia_kg_m2=INERTIA_KG_M2)
 
         @cache
-        def untouched(experiment: str) -> tuple[int, float]:
-            outcome, shaft = run_with(rig, experiment, Fault("none", 1, 1 << 30, "once", 1, 1, 0.0), folder, 0.0)
+        def untouched(experiment: str, plain: str) -> tuple[int, float]:
+            outcome, shaft = run_with(rig, experiment, Fault(plain, 1, 1 << 30, "once", 1, 1, 0.0), folder, 0.0)
             if outcome.problems or outcome.said:
                 raise AssertionError((experiment, outcome))
             return outcome.steps, max(map(abs, shaft.speeds_rad_s))
@@ -371,8 +333,13 @@ def main(arguments: list[str] | None = None) -> int:
         def one(number: int) -> tuple[str, str, Outcome]:
             rng = np.random.default_rng((asked.seed, number))
             experiment = str(rng.choice(EXPERIMENTS))
-            steps, fastest_rad_s = untouched(experiment)
-            fault = drawn(rng, KINDS[number % len(KINDS)], steps)
+            kind = KINDS[number % len(KINDS)]
+            steps, fastest_rad_s = untouched(
+                experiment, next((each for each in PLAIN if kind.startswith(each)), "none")
+            )
+            fault = drawn(rng, kind, steps)
+            if kind in LASTING:
+                fault.pattern = "for ever"
             outcome, _ = run_with(rig, experiment, fault, folder, fastest_rad_s)
             return fault.kind, f"in {experiment}, {fault}: {outcome.said[:120] or 'went to its end'}", outcome
 

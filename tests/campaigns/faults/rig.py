@@ -73,10 +73,11 @@ LONG = (
 """By the wall clock only: what is looked at is how runs end, not whether a busy machine gets them to begin."""
 
 
-def campaign_rig(folder: Path, by_the_clock: bool = False) -> Rig:
+def campaign_rig(folder: Path, by_the_clock: bool = False, inertia_kg_m2: float = INERTIA_KG_M2) -> Rig:
     """Write the rig file and read it."""
+    vehicle = ("inertia_kg_m2 = 100.0", f"inertia_kg_m2 = {inertia_kg_m2}")
     text = EXAMPLE.read_text("utf-8").partition("[experiments.cruise]")[0] + EXPERIMENTS
-    for before, after in (*QUICK, *(LONG if by_the_clock else PATIENT)):
+    for before, after in (vehicle, *QUICK, *(LONG if by_the_clock else PATIENT)):
         assert before in text, before
         text = text.replace(before, after)
     path = folder / "rig.toml"
@@ -87,8 +88,8 @@ def campaign_rig(folder: Path, by_the_clock: bool = False) -> Rig:
 class WatchedPlant(RigidPlant):
     """A rigid vehicle that keeps, for each SYNC, the torques it was driven with and those of the last RPDOs [Nm]."""
 
-    def __init__(self, rated_nm: float) -> None:
-        super().__init__(INERTIA_KG_M2, DRAG_NM_S)
+    def __init__(self, rated_nm: float, inertia_kg_m2: float = INERTIA_KG_M2) -> None:
+        super().__init__(inertia_kg_m2, DRAG_NM_S)
         self.torques_nm: list[tuple[float, float]] = []
         self.asked_nm: list[tuple[float, float]] = []
         self._rated_nm = rated_nm

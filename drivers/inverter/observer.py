@@ -1,0 +1,214 @@
+"""What drives and vehicle must do: the torque of a drive by its own response, the speed by inertia and load.
+
+A drive's torque follows its command through its slope and within its response time, and may be sampled up to
+`SAMPLED_CYCLES` late; an answer that may be to an older SYNC reaches back so many cycles more, and that answer only.
+
+The vehicle is one inertia against an unknown load: speed' = gain torque / inertia - load. A Kalman filter follows
+speed, load and gain, the load as a random walk whose steps grow with the way driven, for a grade lies in the road.
+Torque and speed pass the same low-pass filter, which leaves the equation as it is and the swings of the shaft outside.
+
+No clock or bus here, and nothing is judged: predictions with their uncertainty, one step per cycle.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from typing import Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from drivers.inverter.vehicle import GRAVITY_M_S2, ROLLING_RAD_S2, Vehicle
+
+FloatArray = npt.NDArray[np.float64]
+
+SAMPLED_CYCLES: Final = 2
+"""A drive may take its command, and sample its torque, each a cycle later than another."""
+
+SPEED_AND_LOAD: Final = np.array([1.0, 1.0, 0.0, 0.0])  # what is learnt where friction may turn
+
+SWING_S: Final = 0.15
+"""Each of two low-pass filters in series [s]: a swing of 5 Hz is left at 1/23, one of 8 Hz at 1/58."""
+
+TWIST_S2: Final = 0.03
+"""Inertia over stiffness: while a torque changes its shaft twists, and the motor is ahead of the vehicle by this times
+the rate of the torque's acceleration; 0.024 of the example's bus, as uncertain as it is long."""
+
+TIMING_S: Final = 0.01  # by so much torque and speed may be sampled apart [s]
+
+BLOCK_S: Final = 0.1  # time between two steps of the vehicle's filter [s]
+GRADE_PER_ROOT_M: Final = 0.004  # how far a grade goes from what it was, over the root of the way [1/m^0.5]
+WIND_RAD_S2: Final = 0.15  # how far the rest of the load goes in a second [rad/s²]
+UNKNOWN_LOAD_RAD_S2: Final = 2.0  # deviation of the first load [rad/s²]: a grade of 1.7 %
+GAIN_WALK: Final = 0.02  # how far the gain goes in a second
+STILL_RAD_S: Final = 0.15  # ten times the noise of a resolver's low-passed speed: nearer to zero a vehicle may stand
+SLOW_RAD_S: Final = 0.5  # nearer to zero dry friction may turn at any time, so that a torque's gain is not to be had
+
+
+class TorquePrediction:
+    """The torque that one drive must give, as a range."""
+
+    __slots__ = ("_lagged_nm", "_left", "_ramp_nm", "_ranges", "_slope_nm", "commanded_nm")
+
+    def __init__(self, period_s: float, response_s: float, slope_nm_per_s: float | None, most_late: int) -> None:
+        self._ranges: deque[tuple[float, float]] = deque(maxlen=1 + SAMPLED_CYCLES + most_late)
+        self._slope_nm = math.inf if slope_nm_per_s is None else slope_nm_per_s * period_s
+        # 5 % is left after the response time; one of a period is over by the next SYNC
+        self._left = math.exp(-3.0 * period_s / response_s) if response_s > period_s else 0.0
+        self._ramp_nm = self._lagged_nm = self.commanded_nm = 0.0
+
+    def command(self, target_nm: float, offset_nm: float) -> None:
+        """Take the command of a cycle; the slope holds the target torque alone."""
+        step_nm = target_nm - self._ramp_nm
+        self._ramp_nm += min(max(step_nm, -self._slope_nm), self._slope_nm)
+        given_nm = self._ramp_nm + offset_nm
+        self._lagged_nm = lagged_nm = given_nm + self._left * (self._lagged_nm - given_nm)
+        self.commanded_nm = target_nm + offset_nm
+        self._ranges.append((given_nm, lagged_nm) if given_nm < lagged_nm else (lagged_nm, given_nm))
+
+    def range(self, late_cycles: int = 0) -> tuple[float, float]:
+        """Give the least and greatest torque of an answer to one of so many more SYNCs than the last [Nm]."""
+        ranges = self._ranges
+        if late_cycles == 0 and len(ranges) > SAMPLED_CYCLES:  # as in nearly every cycle
+            (low, high), (low_1, high_1), (low_2, high_2) = ranges[-1], ranges[-2], ranges[-3]
+            return min(low, low_1, low_2), max(high, high_1, high_2)
+        first = max(0, len(ranges) - 1 - SAMPLED_CYCLES - late_cycles)
+        recent = [ranges[at] for at in range(first, len(ranges))]
+        return min(low for low, _ in recent), max(high for _, high in recent)
+
+
+class LowPass:
+    """Two first-order filters in series, for samples that may be missing."""
+
+    __slots__ = ("_first", "_left", "value")
+
+    def __init__(self, period_s: float) -> None:
+        self._left = math.exp(-period_s / SWING_S)
+        self._first = self.value = math.nan
+
+    def take(self, sample: float, cycles: int = 1) -> float:
+        """Take a sample that stands for so many cycles; the first is taken as it is."""
+        if math.isnan(self.value):
+            self._first = self.value = sample
+            return sample
+        left = self._left if cycles == 1 else self._left**cycles
+        self._first = first = sample + left * (self._first - sample)
+        self.value = value = first + left * (self.value - first)
+        return value
+
+    @property
+    def rate_per_s(self) -> float:
+        """Change of the value per second at the last sample."""
+        return (self._first - self.value) / SWING_S
+
+
+class Motion(NamedTuple):
+    """The vehicle as estimated at the end of one block."""
+
+    speed_rad_s: float  # as read, low-passed
+    predicted_rad_s: float  # from the blocks before
+    deviation_rad_s: float  # of the difference of both
+    gain: float  # acceleration per torque over what the usual inertia has, and its deviation
+    gain_deviation: float  # acceleration per torque over what the usual inertia has, and its deviation
+    load_rad_s2: float  # and its deviation
+    load_deviation_rad_s2: float  # and its deviation
+    held_rad_s: float  # speed that a standing vehicle should have got by now, at least
+    surprise: float  # Page's sum of the differences of one sign, each over its deviation and less 1
+
+
+class VehicleObserver:
+    """Follows one vehicle: speed, load, gain and twist by a Kalman filter of a step per block."""
+
+    def __init__(self, vehicle: Vehicle, period_s: float) -> None:
+        self._vehicle = vehicle
+        self._period_s = period_s
+        self._cycles = max(1, round(BLOCK_S / period_s))
+        self._torque = LowPass(period_s)
+        self._count = 0
+        self._swing = self._pushed = self._last_u = 0.0
+        self._reading_rad_s = math.nan
+        self._changed = True
+        self._x = np.array([math.nan, 0.0, 1.0, TWIST_S2])
+        self._p = np.diag([0.01, UNKNOWN_LOAD_RAD_S2**2, 1.0, TWIST_S2**2])
+        self._held_rad_s = 0.0
+        self._surprise = (0.0, 0.0)
+
+    def take(self, torque_nm: float, speed_rad_s: float, reading_rad_s: float, cycles: int) -> Motion | None:
+        """Take the torque of both drives, the low-passed speed, and the last reading; give the motion once a block."""
+        u = self._torque.take(torque_nm, cycles) / self._vehicle.inertia_kg_m2
+        self._pushed += 0.5 * cycles * (u + self._last_u)
+        self._last_u = u
+        self._swing += cycles * (reading_rad_s - speed_rad_s) ** 2
+        self._changed |= reading_rad_s != self._reading_rad_s
+        self._reading_rad_s = reading_rad_s
+        self._count += cycles
+        if self._count < self._cycles:
+            return None
+        dt_s, u, swing_rad_s = (
+            self._count * self._period_s,
+            self._pushed / self._count,
+            math.sqrt(self._swing / self._count),
+        )
+        rate = self._torque.rate_per_s / self._vehicle.inertia_kg_m2
+        motion = self._step(dt_s, u, rate, speed_rad_s, 0.03 + 0.05 * swing_rad_s + TIMING_S * abs(rate) * dt_s)
+        self._count, self._swing, self._pushed, self._changed = 0, 0.0, 0.0, False
+        return motion
+
+    def _step(self, dt_s: float, u: float, rate: float, speed_rad_s: float, noise_rad_s: float) -> Motion:
+        if math.isnan(self._x[0]):
+            self._x[0] = speed_rad_s
+        before, load = float(self._x[0]), float(self._x[1])
+        self._spread(dt_s, u, abs(speed_rad_s), turned=speed_rad_s * before < 0.0)
+        x, h = self._x, np.array([1.0, 0.0, 0.0, rate])
+        predicted = float(h @ x)
+        k = self._p @ h
+        s = float(h @ k) + noise_rad_s**2
+        if max(abs(speed_rad_s), abs(before)) < STILL_RAD_S or not self._changed:
+            self._stand(dt_s, u, load, speed_rad_s, noise_rad_s)
+        else:
+            self._held_rad_s = 0.0
+            off = speed_rad_s - predicted
+            if abs(speed_rad_s) < SLOW_RAD_S:
+                self._learn(k * SPEED_AND_LOAD, h, off, s)
+            else:
+                self._learn(k, h, off, s)
+                faster, slower = self._surprise
+                deviations = off / math.sqrt(s)
+                self._surprise = max(0.0, faster + deviations - 1.0), max(0.0, slower - deviations - 1.0)
+        (_, load, gain, _), (_, load_std, gain_std, _) = self._x.tolist(), np.sqrt(self._p.diagonal()).tolist()
+        return Motion(
+            speed_rad_s, predicted, math.sqrt(s), gain, gain_std, load, load_std, self._held_rad_s, max(self._surprise)
+        )
+
+    def _learn(self, k: FloatArray, h: FloatArray, off: float, s: float) -> None:
+        """Take a speed; where ``k`` has been cut, by Joseph's form of the update."""
+        left = np.eye(4) - np.outer(k, h) / s
+        noise = s - float(h @ self._p @ h)
+        self._x = self._x + k / s * off
+        self._p = left @ self._p @ left.T + np.outer(k, k) * (noise / s**2)
+
+    def _spread(self, dt_s: float, u: float, speed_rad_s: float, turned: bool) -> None:
+        """Carry state and covariance over a block."""
+        f = np.eye(4)
+        f[0, 1], f[0, 2] = -dt_s, u * dt_s
+        self._x = f @ self._x
+        self._p = f @ self._p @ f.T
+        travel_m = self._vehicle.travel_m_per_rad
+        walk = WIND_RAD_S2**2 + (GRAVITY_M_S2 * GRADE_PER_ROOT_M) ** 2 / travel_m * speed_rad_s
+        self._p[0, 0] += walk * dt_s**3 / 3.0
+        self._p[0, 1] -= walk * dt_s**2 / 2.0
+        self._p[1, 0] = self._p[0, 1]
+        self._p[1, 1] += walk * dt_s + (ROLLING_RAD_S2**2 if turned else 0.0)  # friction changes its sign
+        self._p[2, 2] += GAIN_WALK**2 * dt_s
+
+    def _stand(self, dt_s: float, u: float, load: float, speed_rad_s: float, noise_rad_s: float) -> None:
+        """Take a speed that is zero, or stands to the last bit: only that it does not change is learnt from it."""
+        surely = max(abs(u - load) - ROLLING_RAD_S2, 0.0) * self._vehicle.gains[0]
+        self._held_rad_s += math.copysign(surely, u - load) * dt_s
+        load_var = max(self._p[1, 1], ROLLING_RAD_S2**2)
+        if abs(u) < 0.5 * ROLLING_RAD_S2 and abs(speed_rad_s) < STILL_RAD_S:
+            load, load_var = 0.0, ROLLING_RAD_S2**2  # it stands without a torque
+        self._x[:2] = speed_rad_s, load
+        self._p[:2, :], self._p[:, :2] = 0.0, 0.0
+        self._p[0, 0], self._p[1, 1] = noise_rad_s**2, load_var
