@@ -72,6 +72,11 @@ class Inverter(InspectedInverter):
         """The last feedback received; None before the first after `configure`."""
         return self._feedback.latest
 
+    @property
+    def is_armed(self) -> bool:
+        """Whether this program commands it: its power stage may be on."""
+        return self._armed
+
     def messages(self) -> tuple[int, int]:
         """How often the seldomest and the commonest kind of its TPDOs has come since this was last asked."""
         return self._feedback.messages()
