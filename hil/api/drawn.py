@@ -10,7 +10,7 @@ import plotly.graph_objects as go
 from hil.report.page import plotly_bundle
 
 
-class Drawn(go.Figure):
+class Drawn(go.Figure):  # type: ignore[misc]  # plotly has no types
     """A figure that brings what draws it: plotly's own output is empty once nbconvert has made a page of it."""
 
     def _repr_mimebundle_(self, *_: Any, **__: Any) -> dict[str, Any]:
@@ -21,6 +21,6 @@ class Drawn(go.Figure):
         }
 
     def _ipython_display_(self) -> None:
-        from IPython.display import display  # a notebook has it
+        from IPython.display import display  # type: ignore[import-not-found]  # a notebook has it
 
         display(self._repr_mimebundle_(), raw=True)
