@@ -54,15 +54,16 @@ class Provenance:
     command: str  # the command line
     models: tuple[Source, ...]
     recordings: tuple[Source, ...]
+    rig: str = ""  # name of the rig that was recorded, where that is known
 
     def document(self) -> dict[str, Any]:
         """Return it for JSON."""
-        kept = asdict(self)
+        kept = {key: value for key, value in asdict(self).items() if key != "rig" or value}
         return {"program": f"hil {kept.pop('version')}", **kept}
 
 
-def provenance(models: Sequence[Path] = (), recordings: Sequence[Path] = ()) -> Provenance:
+def provenance(models: Sequence[Path] = (), recordings: Sequence[Path] = (), rig: str = "") -> Provenance:
     """Return what a result is made from that these files go into, now."""
     now = datetime.now(UTC).isoformat(timespec="seconds")
     line = shlex.join(("hil", *_LINE.get())) if _LINE.get() else ""
-    return Provenance(__version__, now, line, tuple(map(Source.of, models)), tuple(map(Source.of, recordings)))
+    return Provenance(__version__, now, line, tuple(map(Source.of, models)), tuple(map(Source.of, recordings)), rig)

@@ -36,6 +36,8 @@ def cause_of(code: int) -> str:
 
 EMCY_COB_ID = 0x080  # plus the node id
 
+RPDO_TIMEOUT: Final = 0x8250  # no command within the deadline: also what a drive says of a host that has ended its run
+
 _FRAME = struct.Struct("<HB5s")
 
 

@@ -78,6 +78,11 @@ class Inverter(InspectedInverter):
         """Whether the PRBS goes into the torque offset, which no torque slope holds."""
         return self._pdos.has_offset
 
+    @property
+    def is_armed(self) -> bool:
+        """Whether this program commands it: its power stage may be on."""
+        return self._armed
+
     def messages(self) -> tuple[int, int]:
         """How often the seldomest and the commonest kind of its TPDOs has come since this was last asked."""
         return self._feedback.messages()

@@ -19,7 +19,7 @@ from estimator.physics.effects.load import ROAD_GRADE, grade_basis
 from estimator.physics.fit import FitResult
 from estimator.physics.jacobian import STEP
 from estimator.physics.layout import LOAD, slot
-from estimator.physics.model import DrivelineModel, EffectValue, parameter_dimension, parameter_unit, unit
+from estimator.physics.model import DrivelineModel, EffectValue, Parameter, parameter_dimension, parameter_unit, unit
 from estimator.physics.problem import local_part
 from estimator.physics.steps import inside, moments_of
 from estimator.physics.unknowns import LOAD_TORQUE, Shared
@@ -327,19 +327,27 @@ def load_torques(result: FitResult, model: DrivelineModel) -> dict[str, Estimate
 
 def augmented_model(result: FitResult, model: DrivelineModel, effects: Sequence[FoundEffect]) -> DrivelineModel:
     """Return the model with re-tuned parameters and the effects found in addition to those it had."""
-    values = {
-        shared.name: float(result.x[i]) * shared.scale
-        for i, shared in enumerate(result.problem.shared)
-        if not shared.effect
-    }
-    parameters = {
-        name: replace(parameter, value=values.get(name, parameter.value))
-        for name, parameter in model.parameters.items()
-    }
+    parameters = {**model.parameters, **_retuned_line(result, model)}
     added: dict[str, Mapping[str, EffectValue]] = {
         effect.name: {name: EffectValue(p.value, p.ci95) for name, p in effect.parameters.items()} for effect in effects
     }
     return replace(model, parameters=parameters, effects={**_retuned_effects(result, model), **added})
+
+
+def _retuned_line(result: FitResult, model: DrivelineModel) -> dict[str, Parameter]:
+    """Return the nominal parameters that were fitted; one that was unknown, with the interval that it has now."""
+    unknown = any(parameter.is_unknown for parameter in model.parameters.values())
+    cov, found = reported_covariance(result) if unknown else None, dict[str, Parameter]()
+    for i, shared in enumerate(result.problem.shared):
+        if shared.effect or shared.name not in model.parameters:
+            continue
+        value, known = float(result.x[i]) * shared.scale, model.parameters[shared.name]
+        if known.ci95 is None:
+            found[shared.name] = replace(known, value=value)
+            continue
+        low, high = interval(result, cov, i) if known.is_unknown and cov is not None else known.ci95
+        found[shared.name] = Parameter(value, ci95=(min(low, value), max(high, value)))
+    return found
 
 
 def _retuned_effects(result: FitResult, model: DrivelineModel) -> dict[str, Mapping[str, EffectValue]]:

@@ -125,6 +125,12 @@ def effect_problems(
         for key, entry_value in values.items()
         if not 0 <= entry_value.tolerance < 1
     ]
+    problems += [
+        f"effects.{name}.{key}.tolerance: expected none for a value of 0, of which every share is 0, got "
+        f"{entry_value.tolerance}: leave it out to hold the value, or leave out the effect to have it looked for"
+        for key, entry_value in values.items()
+        if entry_value.tolerance > 0 and entry_value.value == 0
+    ]
     return problems + _limit_problems(entry, values)
 
 

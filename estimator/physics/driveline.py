@@ -11,6 +11,7 @@ Equations of motion, reflected to the motor shaft (translation: read kg, N, m, N
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
@@ -115,12 +116,58 @@ class Load(Enum):
     SHARED = "shared"
 
 
+UNKNOWN_WITHIN = 10.0
+"""Factor beyond its interval's ends within which an unknown parameter is fitted: the integration, whose steps suit the
+values as they are given, still follows a spring ten times as stiff (0.6 rad of its mode in a step)."""
+
+
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """A nominal value [SI] and the relative tolerance within which re-tuning it is no missing physics."""
+    """A nominal value [SI] and what it is trusted to: re-tuning it within that is no missing physics.
+
+    That is a relative tolerance, or the 95 % interval to which it was measured; then the tolerance follows from it.
+    """
 
     value: float
-    tolerance: float
+    tolerance: float = 0.0
+    ci95: tuple[float, float] | None = None
+
+    def __post_init__(self) -> None:
+        if self.ci95 is not None:
+            reach = max(self.high - self.value, self.value - self.low)
+            object.__setattr__(self, "tolerance", reach / self.value if self.value > 0.0 else math.inf)
+
+    @classmethod
+    def measured(cls, value: float, half_width: float, least_share: float) -> Parameter:
+        """Return a measured value of 0 or more, by half its 95 % interval; trusted to no less than a share of it.
+
+        An interval that is not finite is one of all that an unknown may be.
+        """
+        reach = max(half_width, least_share * value)
+        reach = reach if math.isfinite(reach) else UNKNOWN_WITHIN * value
+        return cls(value, ci95=(max(value - reach, 0.0), value + reach))
+
+    @property
+    def low(self) -> float:
+        """Lower end of what it is trusted to."""
+        return self.value * (1.0 - self.tolerance) if self.ci95 is None else self.ci95[0]
+
+    @property
+    def high(self) -> float:
+        """Upper end of what it is trusted to."""
+        return self.value * (1.0 + self.tolerance) if self.ci95 is None else self.ci95[1]
+
+    @property
+    def is_unknown(self) -> bool:
+        """Whether its interval holds 0, or is wider than its value: nothing is known of it but that it is there."""
+        return self.ci95 is not None and self.low < self.high and (self.low <= 0.0 or self.high - self.low > self.value)
+
+    def bounds(self, may_be_zero: bool) -> tuple[float, float]:
+        """Return within what a fit may change it; an unknown one far beyond its interval, where no physics forbids."""
+        if not self.is_unknown:
+            return self.low, self.high
+        least = 0.0 if may_be_zero else (self.low if self.low > 0.0 else self.value) / UNKNOWN_WITHIN
+        return least, UNKNOWN_WITHIN * self.high
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""A driveline model: nominal parameters with the tolerance they are trusted to, and effects beyond them."""
+"""A driveline model: nominal parameters with what they are trusted to, and effects beyond them."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from estimator.errors import BadModel
-from estimator.physics.catalogue import effect_problems
+from estimator.physics.catalogue import EFFECTS, effect_problems
 from estimator.physics.driveline import (
     STRICTLY_POSITIVE,
     Case,
@@ -23,6 +23,7 @@ from estimator.physics.driveline import (
     parameter_unit,
     unit,
 )
+from estimator.physics.machine import Prior, part_problems, prior_problems
 from estimator.physics.own_law import LawName
 from estimator.signals.record import FloatArray, Record
 
@@ -34,6 +35,7 @@ __all__ = [
     "Motion",
     "Parameter",
     "Plant",
+    "Prior",
     "Structure",
     "load_inertia",
     "natural_frequencies_rad_s",
@@ -73,6 +75,10 @@ class DrivelineModel:
     plant : Plant or None
         What simulates the line in the place of its equations: structure and parameters are then those of a line that
         answers much as it does, by which noise, scales and starts are judged.
+    has : frozenset of str, or None
+        The machine's parts, of `machine.PARTS`; None where nobody says, and structure and signals imply them.
+    priors : mapping of effect name to Prior
+        Odds and sizes of effects that a person knows better than is usual (``prior``).
 
     Raises
     ------
@@ -88,10 +94,13 @@ class DrivelineModel:
     load: Load | float = Load.OWN
     laws: tuple[LawName, ...] = ()
     plant: Plant | None = None
+    has: frozenset[str] | None = None
+    priors: Mapping[str, Prior] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "effects", {self.own(name): values for name, values in self.effects.items()})
-        problems = [*self._parameter_problems(), *self._effect_problems()]
+        problems = [*self._parameter_problems(), *self._effect_problems(), *self._prior_problems()]
+        problems += part_problems(self.has, self.effects)
         if not isinstance(self.load, Load) and not math.isfinite(self.load):
             problems.append(f"load.constant: expected 'own', 'shared' or a finite number, got {self.load}")
         if problems:
@@ -121,6 +130,26 @@ class DrivelineModel:
             for problem in effect_problems(name, values, self.structure, self.laws)
         ]
 
+    def _prior_problems(self) -> list[str]:
+        known = ", ".join([*EFFECTS, *self.laws])
+        return [
+            problem
+            for name, prior in self.priors.items()
+            for problem in (
+                prior_problems(EFFECTS[self.own(name)], prior)
+                if name in EFFECTS or name in self.laws
+                else [f"priors.{name}: unknown effect, expected one of {known}"]
+            )
+        ]
+
+    def prior(self, name: str) -> Prior:
+        """Return what a person knows of an effect before any recording is seen; nothing is a ``Prior()``.
+
+        ``odds`` is p / (1 - p), or None: as usual. ``sizes`` holds the 95 % range of each parameter that has one, in
+        its unit as in the model file.
+        """
+        return self.priors.get(name, Prior())
+
     def own(self, name: str) -> str:
         """Return the name of an effect as this model knows it: one of its own laws by the name that knows the law."""
         return next((law for law in self.laws if law == name), name)
@@ -136,8 +165,20 @@ def _value_problems(name: str, parameter: Parameter) -> list[str]:
     fits = parameter.value > 0 if name in STRICTLY_POSITIVE else parameter.value >= 0
     if not (math.isfinite(parameter.value) and fits):
         problems.append(f"parameters.{name}.value: expected a finite number {low}, got {parameter.value}")
-    if not 0 <= parameter.tolerance < 1:
-        problems.append(
-            f"parameters.{name}.tolerance: expected a relative tolerance from 0 up to 1, got {parameter.tolerance}"
-        )
-    return problems
+    return problems or [f"parameters.{name}.{problem}" for problem in _trust_problems(parameter)]
+
+
+def _trust_problems(parameter: Parameter) -> list[str]:
+    """Return what is wrong with the tolerance of a parameter or its interval, each with the key first."""
+    value, ci95, tolerance = parameter.value, parameter.ci95, parameter.tolerance
+    if ci95 is not None:
+        holds = all(math.isfinite(end) for end in ci95) and ci95[0] <= value <= ci95[1]
+        return [] if holds else [f"ci95: expected two finite numbers with the value, {value}, between them, got {ci95}"]
+    if not 0 <= tolerance < 1:
+        return [f"tolerance: expected a relative tolerance from 0 up to 1, got {tolerance}"]
+    if tolerance > 0 and value == 0:
+        return [
+            f"tolerance: expected 0 for a value of 0, of which every share is 0, got {tolerance}: write tolerance = 0 "
+            "where there is none, or in its place the interval in which it may lie, such as ci95 = [0.0, 0.5]"
+        ]
+    return []

@@ -16,7 +16,13 @@ from estimator.physics.driveline import Start
 from estimator.physics.effect import Effect, EffectParameter, Held, Within
 from estimator.physics.effects.load import grade_basis
 from estimator.physics.layout import LOAD, slot
-from estimator.physics.model import DrivelineModel, Structure, natural_frequencies_rad_s
+from estimator.physics.model import (
+    STRICTLY_POSITIVE,
+    DrivelineModel,
+    Parameter,
+    Structure,
+    natural_frequencies_rad_s,
+)
 from estimator.physics.motion import measured_speed, motor_angle, speed_scale, torque_scale
 from estimator.signals.record import FloatArray, OutputKind, Record
 
@@ -42,13 +48,24 @@ class Shared:
 
 
 def nominal_unknowns(model: DrivelineModel) -> tuple[Shared, ...]:
-    """Return the nominal parameters as unknowns within their tolerances; one trusted exactly is not free."""
-    line = (
-        Shared("", name, p.value, 1.0 - p.tolerance, 1.0 + p.tolerance, 1.0)
-        for name, p in model.parameters.items()
-        if p.tolerance > 0 and p.value > 0
-    )
-    return (*line, *_known_roughly(model))
+    """Return the nominal parameters as unknowns within what they are trusted to; one trusted exactly is not free."""
+    return (*filter(None, (_nominal(name, p) for name, p in model.parameters.items())), *_known_roughly(model))
+
+
+def _nominal(name: str, parameter: Parameter) -> Shared | None:
+    """Return a nominal parameter in units of its value; of the end of its interval where the value is 0."""
+    if parameter.ci95 is None:
+        sure = parameter.tolerance == 0.0 or parameter.value == 0.0
+        return (
+            None
+            if sure
+            else Shared("", name, parameter.value, 1.0 - parameter.tolerance, 1.0 + parameter.tolerance, 1.0)
+        )
+    low, high = parameter.bounds(may_be_zero=name not in STRICTLY_POSITIVE)
+    if low == high:
+        return None
+    scale = parameter.value or parameter.high
+    return Shared("", name, scale, low / scale, high / scale, parameter.value / scale)
 
 
 def _known_roughly(model: DrivelineModel) -> Iterable[Shared]:
@@ -56,7 +73,7 @@ def _known_roughly(model: DrivelineModel) -> Iterable[Shared]:
     for name, values in model.effects.items():
         for parameter in EFFECTS[name].shared_parameters:
             given = values.get(parameter.name)
-            if given is not None and given.tolerance > 0 and given.value != 0.0:
+            if given is not None and given.tolerance > 0:
                 high = min(1.0 + given.tolerance, max(parameter.most / abs(given.value), 1.0))
                 yield Shared(name, parameter.name, given.value, 1.0 - given.tolerance, high, 1.0)
 

@@ -50,7 +50,9 @@ class ComparisonResult:
     def plot(self, recording: int = 0) -> go.Figure:
         """Draw measured and simulated output of a recording, by its place, and the errors."""
         of_recording = self.comparisons[recording]
-        return time_panels(of_recording[0].record.time_s, comparison_panels(of_recording), DRAWN)
+        from hil.api.drawn import Drawn
+
+        return Drawn(time_panels(of_recording[0].record.time_s, comparison_panels(of_recording), DRAWN))
 
     def save(self, folder: Path | str) -> Path:
         """Write compare.json and compare.html, as ``hil compare --out`` does; return the folder."""

@@ -64,7 +64,9 @@ class DiagnosisResult:
     def plot(self, recording: str | None = None) -> go.Figure:
         """Draw measured and simulated output of a recording, by default the first, and their errors."""
         trace = self._trace(recording)
-        return time_panels(trace.time_s, course_panels(self.diagnosis, trace), DRAWN)
+        from hil.api.drawn import Drawn
+
+        return Drawn(time_panels(trace.time_s, course_panels(self.diagnosis, trace), DRAWN))
 
     def _trace(self, recording: str | None) -> Trace:
         traces = self.diagnosis.traces

@@ -58,7 +58,9 @@ class IdentificationResult:
         if recording is not None and recording not in by_name:
             raise UsageError(f"recording {recording!r}: expected one of {', '.join(by_name)}")
         at = 0 if recording is None else by_name[recording]
-        return response(self._models()[at], self.studies[at].best.fit)
+        from hil.api.drawn import Drawn
+
+        return Drawn(response(self._models()[at], self.studies[at].best.fit))
 
     def save(self, folder: Path | str) -> Path:
         """Write identification.json and report.html, as ``hil identify --out`` does; return the folder."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -33,13 +34,31 @@ def as_file(model: Model) -> ModelFile:
     return model if isinstance(model, ModelFile) else read_model(model)
 
 
-def signals_of(signals: Mapping[str, Any] | None, model: Model | None) -> tuple[SignalsConfig, bool]:
+Signals = Mapping[str, Any] | str
+"""A ``[signals]`` table: as a mapping, or its lines as `hil.look` gives them."""
+
+
+def signals_of(signals: Signals | None, model: Model | None) -> tuple[SignalsConfig, bool]:
     """Return how a recording is read, and whether it is of a joint on a bench."""
     file = None if model is None else as_file(model)
     on_bench = file is not None and file.on_bench
     if signals is None:
         return (file.signals if file is not None else None) or SignalsConfig(), on_bench
     try:
-        return SignalsConfig.model_validate(dict(signals)), on_bench
+        return SignalsConfig.model_validate(signals_as_table(signals)), on_bench
     except ValidationError as error:
         raise UsageError("signals: " + "; ".join(problem_lines(SignalsConfig, error))) from error
+
+
+def signals_as_table(signals: Signals) -> dict[str, Any]:
+    """Return the keys of a ``[signals]`` table."""
+    try:
+        if isinstance(signals, str):
+            content = tomllib.loads(signals)
+            return dict(content.get("signals", content))
+        return dict(signals)
+    except (TypeError, ValueError) as error:
+        raise UsageError(
+            "signals: expected a mapping, or the lines of a [signals] table such as hil.look(FILE).signals, got "
+            f"{type(signals).__name__}: {error}"
+        ) from error

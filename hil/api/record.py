@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from estimator.signals import record as base
-from hil.api.models import Model, signals_of
+from hil.api.models import Model, Signals, signals_as_table, signals_of
 from hil.recording import columns
 from hil.recording.channels import column_of, understood
 from hil.recording.look import CHANNEL_HEADINGS, Look, channel_rows
@@ -50,7 +50,7 @@ class Record(base.Record):
         cls,
         frame: pandas.DataFrame,
         name: str = "frame",
-        signals: Mapping[str, Any] | None = None,
+        signals: Signals | None = None,
         model: Model | None = None,
         *,
         torque: str | Sequence[str] | None = None,
@@ -67,8 +67,8 @@ class Record(base.Record):
             column that rises evenly.
         name : str
             What the recording is called in results.
-        signals : mapping, optional
-            As ``[signals]`` of a model file; the contract's columns without it.
+        signals : mapping or str, optional
+            As ``[signals]`` of a model file, or its lines as `look` gives them; the contract's columns without it.
         model : path or model file, optional
             Whose ``[signals]`` count, where ``signals`` is not given.
         torque, speed, position, time : str, or several for ``torque``, optional
@@ -83,7 +83,7 @@ class Record(base.Record):
         given: dict[str, Any] = {role: {"column": column} for role, column in named.items() if column is not None}
         if torque is not None:
             given["torque"] = [{"column": each} for each in ([torque] if isinstance(torque, str) else torque)]
-        known, on_bench = signals_of({**(signals or {}), **given} if given else signals, model)
+        known, on_bench = signals_of({**signals_as_table(signals or {}), **given} if given else signals, model)
         cells = {str(key): column_of(frame[key].to_numpy()) for key in frame.columns}
         counted = known.time.column or columns.TIME
         is_counted = type(frame.index).__name__ == "RangeIndex"  # of rows, which are no time
@@ -113,7 +113,9 @@ class Record(base.Record):
             Panel("torque [Nm]", input_lines(self.torque_nm)),
             Panel(f"{quantity(unit)} [{unit}]", (measured,)),
         )
-        return time_panels(self.time_s, panels, DRAWN)
+        from hil.api.drawn import Drawn
+
+        return Drawn(time_panels(self.time_s, panels, DRAWN))
 
     def __repr__(self) -> str:
         duration_s = self.sample_time_s * self.time_s.size
@@ -124,8 +126,8 @@ class Record(base.Record):
         )
 
 
-def read(path: Path | str, signals: Mapping[str, Any] | None = None, model: Model | None = None) -> Record:
-    """Read a recording from a file of any format that ``hil`` reads."""
+def read(path: Path | str, signals: Signals | None = None, model: Model | None = None) -> Record:
+    """Read a recording from a file of any format that ``hil`` reads; ``signals`` may be ``look(path).signals``."""
     known, on_bench = signals_of(signals, model)
     return Record.of(read_record(path, known, on_bench), Path(path))
 

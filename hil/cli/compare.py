@@ -13,13 +13,18 @@ from hil.cli.printing import new_console, say
 app = typer.Typer(add_completion=False)
 
 
-@app.command(epilog="Example: hil compare bus.toml run_1.csv run_2.csv --model out/augmented.toml --out comparison")
+@app.command(epilog="Example: hil compare bus.toml out/augmented.toml run_1.csv run_2.csv --out comparison")
 def compare(
-    model: Annotated[Path, typer.Argument(metavar="MODEL", help="Model file, nominal or augmented, or an FMU.")],
-    recordings: Annotated[list[Path], typer.Argument(metavar="REC", help="Recordings to compare with.")],
+    files: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="MODEL... REC...",
+            help="Model files, nominal or augmented, or FMUs, side by side; then the recordings to compare with.",
+        ),
+    ],
     more: Annotated[
         list[Path] | None,
-        typer.Option("--model", metavar="MODEL", help="A further model in the same plots; may be given several times."),
+        typer.Option("--model", metavar="MODEL", help="A further model; may be given several times."),
     ] = None,
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="Folder for compare.html and compare.json.")] = None,
     mapped: Mapped = None,
@@ -33,15 +38,24 @@ def compare(
     Only initial state and constant load torque are estimated; the model's parameters stay as they are. Recordings are
     prepared as the diagnosis did that wrote the model.
     """
+    from hil.errors import UsageError
+    from hil.plants.fmu_plant import is_fmu
     from hil.plants.plant import Trust
     from hil.provenance import provenance
     from hil.report.comparison import compared, comparison_text
     from hil.report.comparison_html import comparison_page, comparison_summary
     from hil.result_folder import publish
 
+    def is_model(path: Path) -> bool:
+        return path.suffix.lower() == ".toml" or is_fmu(path)
+
     if out is not None:
         hold(out)
-    models = [model, *(more or ())]
+    models = [*(path for path in files if is_model(path)), *(more or ())]
+    recordings = [path for path in files if not is_model(path)]
+    if not models or not recordings:
+        got = f"{len(models)} and {len(recordings)}"
+        raise UsageError(f"compare: expected at least one model (.toml or .fmu) and one recording, got {got}")
     comparisons = compared(models, recordings, mapped or (), Trust(trust_laws, trust_fmu), dbc, tell)
     made = provenance(models, recordings)
     text = comparison_text(comparisons, made)

@@ -48,7 +48,7 @@ def damper(
     order = asked(rig, target, share)
     region, known = region_of(model, estimate)
     found = design_damper(region, timing_of(known, order.period_s, recording, tell), order.demand)
-    file = file_of(found, order, str(model))
+    file = file_of(found, region, order, str(model))
     publish(
         out,
         {

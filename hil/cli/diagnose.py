@@ -99,6 +99,7 @@ def diagnose(
     from hil.plants.questioned import Asked, questioned
     from hil.plants.scales import with_the_line_to_write
     from hil.provenance import provenance
+    from hil.recording.recordings import rig_of
     from hil.report.diagnosis_files import publish_diagnosis
     from hil.report.diagnosis_html import diagnosis_summary
     from hil.report.diagnosis_json import diagnosis_text
@@ -124,7 +125,7 @@ def diagnose(
                 more["augmented.ssp"] = write
         except UsageError as error:  # no C compiler
             tell(f"augmented.ssp is not written: {error}")
-    made = provenance([model], every)
+    made = provenance([model], every, rig_of(every))
     text = diagnosis_text(diagnosis, made)
     try:
         publish_diagnosis(out, diagnosis, file, records, every, made, more)

@@ -63,7 +63,7 @@ def _write_new(source: Path | None, law: str, table: str | None, out: Path) -> N
     if source is None:
         raise UsageError("hil effects new: expected --from AUGMENTED, a model file with a table, got none")
     from hil.config.new_law import declaration
-    from hil.report.outputs import publish
+    from hil.result_folder import publish
 
     files = declaration(source, law, table)
     if there := [path for path in (out / name for name in files) if path.exists()]:

@@ -50,7 +50,7 @@ def new(
     ] = None,
     identification: Annotated[
         Path | None,
-        typer.Option("--from", metavar="FILE", help="identification.json of hil identify: values and tolerances."),
+        typer.Option("--from", metavar="FILE", help="identification.json of hil identify: values and intervals."),
     ] = None,
     run: Annotated[
         str | None,
@@ -116,17 +116,17 @@ def _tolerances(texts: list[str] | tuple[str, ...], usual: float) -> tuple[list[
 
 def _known(path: Path, run: str | None) -> dict[str, Known]:
     """Return what an identification knows of the parameters."""
-    from hil.config.new_model import LEAST_TOLERANCE, MOST_TOLERANCE, Known
+    from estimator.physics.model import STRICTLY_POSITIVE, Parameter
+    from hil.config.new_model import LEAST_TOLERANCE, Known
     from hil.report.identification_input import physical_values
 
     return {
         name: Known(
-            found.value,
-            round(min(max(found.half_width / abs(found.value), LEAST_TOLERANCE), MOST_TOLERANCE), 3),
+            Parameter.measured(max(found.value, 0.0), found.half_width, LEAST_TOLERANCE),
             f"identified from {found.recording}",
         )
         for name, found in physical_values(path, run).items()
-        if found.value > 0.0
+        if found.value > 0.0 or (name not in STRICTLY_POSITIVE and found.value + found.half_width > 0.0)
     }
 
 

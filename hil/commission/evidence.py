@@ -15,6 +15,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, FiniteFloat, 
 
 from estimator.errors import EstimatorError
 from estimator.physics.model import DrivelineModel, Parameter, Structure
+from hil.config.model_tables import ParameterEntry
 from hil.design.solve_state import STATE
 from hil.orders.runner import Both, Number
 
@@ -91,10 +92,10 @@ class _Worst(_Course):
 
 
 class ModelEvidence(_Table):
-    """A driveline: structure, and value and tolerance of each parameter."""
+    """A driveline: structure, and each parameter as in a model file, or as value and tolerance alone."""
 
     structure: Structure
-    parameters: dict[str, Both]
+    parameters: dict[str, Both | ParameterEntry]
 
     @model_validator(mode="after")
     def _is_a_driveline(self) -> ModelEvidence:
@@ -105,7 +106,13 @@ class ModelEvidence(_Table):
         return self
 
     def model(self) -> DrivelineModel:
-        return DrivelineModel(self.structure, {name: Parameter(*each) for name, each in self.parameters.items()})
+        return DrivelineModel(
+            self.structure,
+            {
+                name: Parameter(each[0], each[1]) if isinstance(each, list) else each.parameter()
+                for name, each in self.parameters.items()
+            },
+        )
 
 
 class _Noise(_Table):

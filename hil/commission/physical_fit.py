@@ -38,7 +38,7 @@ FRICTION_RATE = 0.01
 class PhysicalFit:
     """A fitted model, its parameters with intervals, and what is left."""
 
-    model: DrivelineModel  # Its tolerances are `TRUSTED`
+    model: DrivelineModel  # Its parameters have their intervals, no shorter than `TRUSTED`
     parameters: Mapping[str, Measured]  # Every parameter by name
     load_nm: Mapping[str, Measured]  # Constant load torque of each recording
     rms: float  # RMS of the free-run error [rad/s]
@@ -109,7 +109,7 @@ def _summary(model: DrivelineModel, result: FitResult) -> PhysicalFit:
         )
         for i, shared in enumerate(result.problem.shared)
     }
-    parameters = {name: Parameter(values[name].value, TRUSTED) for name in model.parameters}
+    parameters = {name: Parameter.measured(*values[name], TRUSTED) for name in model.parameters}
     loads = {
         name: Measured(load.value, 0.5 * (load.ci95[1] - load.ci95[0]))
         for name, load in load_torques(result, model).items()

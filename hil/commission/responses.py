@@ -68,7 +68,8 @@ Z95 = 1.959963984540054
 """97.5 % point of the normal distribution."""
 
 TRUSTED = 0.2
-"""Tolerance that the parameters of a model from here are given: temperature, load and tyres move them by as much."""
+"""Share of its value that a parameter of a model from here is trusted to at best: temperature, load and tyres move it
+by as much, however short its interval."""
 
 
 class Measured(NamedTuple):

@@ -13,6 +13,7 @@ from pydantic import Field, TypeAdapter, ValidationError
 
 from estimator.physics.model import DrivelineModel
 from hil.commission.evidence import EVIDENCE, ModelEvidence, Utc
+from hil.config.model_tables import trusted_entry
 from hil.errors import UsageError
 from hil.files import is_inside, read_json, write_whole
 from hil.orders.runner import RunRecord, now_utc
@@ -198,7 +199,7 @@ def model_json(model: DrivelineModel) -> dict[str, Any]:
     """Return structure and parameters; effects are left to model files."""
     return {
         "structure": model.structure.value,
-        "parameters": {name: [each.value, each.tolerance] for name, each in model.parameters.items()},
+        "parameters": {name: trusted_entry(each) for name, each in model.parameters.items()},
     }
 
 

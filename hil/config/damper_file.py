@@ -23,6 +23,7 @@ from hil.problems import Fault, read_toml, refuse, validate
 
 SCHEMA = "hil.damper/1"
 
+Two = Annotated[list[NotNegative], Field(min_length=2, max_length=2)]
 Three = Annotated[list[float], Field(min_length=3, max_length=3)]
 
 
@@ -63,6 +64,7 @@ class DamperFile(Table):
     sensitivity: Positive
     torque_nm: NotNegative
     line: dict[str, NotNegative]
+    intervals: dict[str, Two] = Field(default_factory=dict)  # of the lines that it is good for
     filter: FilterTable
     rig: DesignedFor | None = None
 

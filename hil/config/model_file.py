@@ -18,7 +18,7 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from estimator.errors import BadModel
-from estimator.physics.model import DrivelineModel, EffectValue, Load, Motion, Parameter, Structure
+from estimator.physics.model import DrivelineModel, EffectValue, Load, Motion, Parameter, Prior, Structure
 from estimator.physics.own_law import LawName
 from estimator.physics.tables import PLACES, PREFIX, TABLES, table_faults
 from hil.config.laws import LawTable, laws_of, moved
@@ -178,7 +178,7 @@ def _model(
         structure=structure,
         motion=_member(Motion, content.get("motion")) or Motion.ROTATION,
         parameters={
-            name: Parameter(_number(entry, "value", NEUTRAL), _number(entry, "tolerance", 0.0))
+            name: Parameter(_number(entry, "value", NEUTRAL), _number(entry, "tolerance", 0.0), _ends(entry, "ci95"))
             for name, entry in _table(content.get("parameters")).items()
         },
         effects={
@@ -190,6 +190,8 @@ def _model(
         gear_ratio=_number(content.get("geometry"), "gear_ratio", None),
         load=_load(content.get("load")),
         laws=laws,
+        has=_parts(content.get("machine")),
+        priors={name: _prior(entry) for name, entry in _table(content.get("priors")).items() if name not in without},
     )
 
 
@@ -216,6 +218,24 @@ def _tables(content: Mapping[str, Any]) -> tuple[dict[str, dict[str, EffectValue
     return found, problems
 
 
+def _parts(table: object) -> frozenset[str] | None:
+    has = _table(table).get("has")
+    return frozenset(part for part in has if isinstance(part, str)) if isinstance(has, list) else None
+
+
+def _prior(entry: object) -> Prior:
+    ranges = {name: _ends(entry, name) for name in _table(entry)}
+    return Prior(_number(entry, "odds", None), {name: ends for name, ends in ranges.items() if ends is not None})
+
+
+def _ends(entry: object, key: str) -> tuple[float, float] | None:
+    """Return the two ends of an interval; None where there are no two numbers."""
+    match _table(entry).get(key):
+        case [int() | float() as low, int() | float() as high]:
+            return float(low), float(high)
+    return None
+
+
 def _load(table: object) -> Load | float:
     """Return whose the constant load torque is, or what it is."""
     given = _number(table, "constant", None)
@@ -238,8 +258,4 @@ def _number(entry: object, key: str, otherwise: Default) -> float | Default:
 
 
 def _effect_value(entry: object) -> EffectValue:
-    value, tolerance = _number(entry, "value", NEUTRAL), _number(entry, "tolerance", 0.0)
-    match _table(entry).get("ci95"):
-        case [int() | float() as low, int() | float() as high]:
-            return EffectValue(value, (float(low), float(high)), tolerance)
-    return EffectValue(value, None, tolerance)
+    return EffectValue(_number(entry, "value", NEUTRAL), _ends(entry, "ci95"), _number(entry, "tolerance", 0.0))

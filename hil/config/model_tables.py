@@ -10,7 +10,7 @@ import tomlkit
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 from tomlkit.items import Array, InlineTable, Table
 
-from estimator.physics.model import DrivelineModel, Load, Motion, Structure, parameter_unit, unit
+from estimator.physics.model import DrivelineModel, Load, Motion, Parameter, Structure, parameter_unit, unit
 from estimator.physics.tables import PLACES, TABLES, table_of
 from estimator.physics.tables import Table as LawAsTable
 from hil.config.laws import LawTable
@@ -36,12 +36,11 @@ class _Entry(_Strict):
         return entry
 
 
-class _ParameterEntry(_Entry):
-    tolerance: float
+Interval = Annotated[list[float], Field(min_length=2, max_length=2)]
 
 
 class _EffectEntry(_Entry):
-    ci95: Annotated[list[float], Field(min_length=2, max_length=2)] | None = None
+    ci95: Interval | None = None
     tolerance: float = 0.0
 
     @model_validator(mode="after")
@@ -49,6 +48,24 @@ class _EffectEntry(_Entry):
         if self.ci95 and self.ci95[0] > self.ci95[1]:
             refuse([Fault("ci95", "the lower bound first", self.ci95)])
         return self
+
+
+class ParameterEntry(_Entry):
+    """A nominal value with the relative tolerance it is trusted to, or the 95 % interval to which it was measured."""
+
+    tolerance: float | None = None
+    ci95: Interval | None = None
+
+    @model_validator(mode="after")
+    def _one_of_both(self) -> Self:
+        if (self.tolerance is None) == (self.ci95 is None):
+            got = "neither" if self.ci95 is None else "both"
+            refuse([Fault("tolerance", "what the value is trusted to, or ci95 = [low, high] in its place", got)])
+        return self
+
+    def parameter(self) -> Parameter:
+        """Return the value with what it is trusted to."""
+        return Parameter(self.value, self.tolerance or 0.0, None if self.ci95 is None else (self.ci95[0], self.ci95[1]))
 
 
 class _Geometry(_Strict):
@@ -76,6 +93,21 @@ class TableEntry(_Strict):
         return LawAsTable(place, tuple(self.knots), tuple(self.values), bands, self.damping)
 
 
+class _Machine(_Strict):
+    """The parts that the machine has, of those that only some have: the effects of all others are no candidates."""
+
+    has: list[str]
+
+
+class PriorEntry(_Strict):
+    """Odds of an effect, p / (1 - p), and the 95 % range of each of its parameters by name."""
+
+    model_config = ConfigDict(extra="allow")
+    __pydantic_extra__: dict[str, Interval]
+
+    odds: float | None = None
+
+
 class PreparedRecording(_Strict):
     """A recording that was used."""
 
@@ -99,9 +131,11 @@ class ModelDocument(_Strict):
     schema_: Literal["hil.model/1"] = Field(alias="schema")
     structure: Annotated[Structure, Field(strict=False)]
     motion: Annotated[Motion, Field(strict=False)] = Motion.ROTATION
-    parameters: dict[str, _ParameterEntry]
+    parameters: dict[str, ParameterEntry]
     geometry: _Geometry | None = None
     load: _Load | None = None
+    machine: _Machine | None = None
+    priors: dict[str, PriorEntry] = {}
     effects: dict[str, dict[str, _EffectEntry]] = {}
     tables: dict[str, TableEntry] = {}
     laws: dict[str, LawTable] = {}
@@ -122,19 +156,18 @@ def as_toml(
     document["motion"] = model.motion.value
     parameters = tomlkit.table()
     for name in model.structure.parameter_names:
-        parameter = model.parameters[name]
-        entry = {"value": float(parameter.value), "tolerance": float(parameter.tolerance)}
-        parameters[name] = _inline(entry).comment(parameter_unit(name, model.motion))
+        parameters[name] = _inline(trusted_entry(model.parameters[name])).comment(parameter_unit(name, model.motion))
     document["parameters"] = parameters
     if model.gear_ratio is not None:
         document["geometry"] = {"gear_ratio": float(model.gear_ratio)}
     if model.load is not Load.OWN:
         constant = model.load.value if isinstance(model.load, Load) else float(model.load)
         document["load"] = {"constant": constant}
-    if {*model.effects} - {*TABLES}:
-        document["effects"] = _effects_table(model)
-    if {*model.effects} & {*TABLES}:
-        document["tables"] = _law_tables(model)
+    if model.has is not None:
+        document["machine"] = {"has": sorted(model.has)}
+    if model.priors:
+        document["priors"] = _priors_table(model)
+    _add_effects(document, model)
     if laws:
         document["laws"] = _laws_table(laws)
     if signals is not None:
@@ -142,6 +175,30 @@ def as_toml(
     if prepared is not None:
         document["prepared"] = _prepared_table(prepared)
     return f"{schema_line(FileKind.MODEL)}\n{tomlkit.dumps(document)}"
+
+
+def _add_effects(document: tomlkit.TOMLDocument, model: DrivelineModel) -> None:
+    """Add what the model has beyond the line: effects of the catalogue, and laws without a name as tables."""
+    if {*model.effects} - {*TABLES}:
+        document["effects"] = _effects_table(model)
+    if {*model.effects} & {*TABLES}:
+        document["tables"] = _law_tables(model)
+
+
+def trusted_entry(parameter: Parameter) -> dict[str, Any]:
+    """Return a nominal parameter as its table: the value, and what it is trusted to."""
+    value = float(parameter.value)
+    if parameter.ci95 is None:
+        return {"value": value, "tolerance": float(parameter.tolerance)}
+    return {"value": value, "ci95": [float(end) for end in parameter.ci95]}
+
+
+def _priors_table(model: DrivelineModel) -> Table:
+    table = tomlkit.table()
+    for name, prior in model.priors.items():
+        odds = {} if prior.odds is None else {"odds": float(prior.odds)}
+        table[name] = _inline({**odds, **{key: [float(end) for end in ends] for key, ends in prior.sizes.items()}})
+    return table
 
 
 def _effects_table(model: DrivelineModel) -> Table:

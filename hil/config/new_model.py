@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Final
 
 from estimator.physics.model import STRICTLY_POSITIVE, DrivelineModel, Motion, Parameter, Structure, parameter_unit
-from hil.config.model_tables import SCHEMA, ModelDocument
+from hil.config.model_tables import SCHEMA, ModelDocument, trusted_entry
 from hil.config.table import FileKind, schema_line
 from hil.errors import ModelFileError, UsageError
 from hil.printable import printable
@@ -19,8 +19,8 @@ from hil.problems import validate
 TOLERANCE: Final = 0.2
 """Of a value from a data sheet, where nothing else is said."""
 
-LEAST_TOLERANCE, MOST_TOLERANCE = 0.05, 0.95
-"""Of a value from an identification: no interval is that short over the days, nor worth more than that."""
+LEAST_TOLERANCE: Final = 0.05
+"""Share of a value from an identification to which it is trusted at best: no interval is that short over the days."""
 
 MEANINGS: Final[Mapping[str, str]] = {
     "J_M": "inertia of the motor",
@@ -42,8 +42,7 @@ Ask = Callable[[str, str, str], str]
 class Known:
     """What is known of a parameter before anybody is asked, and from where."""
 
-    value: float
-    tolerance: float
+    parameter: Parameter
     source: str
 
 
@@ -79,16 +78,26 @@ def parameters(
     found: dict[str, Parameter] = {}
     missing = []
     for name in structure.parameter_names:
-        value = values.get(name, known[name].value if name in known else None)
-        tolerance = tolerances.get(name, known[name].tolerance if name in known else usual_tolerance)
+        measured = known[name].parameter if name in known else None
+        value = values.get(name, None if measured is None else measured.value)
+        what = f"{MEANINGS[name]}, {name} [{parameter_unit(name, motion)}]"
         if ask is not None and name not in values:
-            what = f"{MEANINGS[name]}, {name} [{parameter_unit(name, motion)}]"
             value = _asked(what, value, ask, name in STRICTLY_POSITIVE)
-            tolerance = _asked(f"its relative tolerance, {name}", tolerance, ask, False)
+        if measured is not None and value == measured.value and name not in tolerances:
+            found[name] = measured
+            continue
+        tolerance = tolerances.get(name, usual_tolerance)
+        if ask is not None and name not in values:
+            tolerance = _asked(f"its relative tolerance, {name}", tolerance, ask, False) if value else 0.0
         if value is None:
             missing.append(f"--value {name}=NUMBER | expected {MEANINGS[name]} | got nothing")
-            continue
-        found[name] = Parameter(value, tolerance)
+        elif value == 0.0 < tolerance:
+            missing.append(
+                f"--value {name}=0 | expected --tolerance {name}=0 beside it where there is none, or a value | got "
+                f"{100.0 * tolerance:g} % of 0, which is 0: in the file, ci95 = [0.0, 0.5] says where it may lie"
+            )
+        else:
+            found[name] = Parameter(value, tolerance)
     if missing:
         raise UsageError("\n".join(missing))
     return found
@@ -109,6 +118,9 @@ def _asked(what: str, default: float | None, ask: Ask, positive: bool) -> float:
         wrong = f"expected a number {'above 0' if positive else 'of 0 or more'}, got {text!r}"
 
 
+DIGITS = 6
+"""Of an interval's ends."""
+
 COMMENTS_AT = 48
 """Column in which comments begin."""
 
@@ -128,15 +140,18 @@ def model_text(
         _line(f'structure = "{model.structure.value}"', "one_mass, two_mass, three_mass or joint"),
         _line(f'motion = "{model.motion.value}"', "rotation, or translation: kg, N, m"),
         "",
-        "# Each value with the relative tolerance that it is trusted to: what re-tuning within it explains is no",
-        "# missing physics. 0: known exactly.",
+        "# Each value with what it is trusted to, a relative tolerance or the 95 % interval of its measurement: what",
+        "# re-tuning within it explains is no missing physics. tolerance = 0: known exactly.",
         "[parameters]",
     ]
     for name, parameter in model.parameters.items():
-        by = known[name].source if name in known and known[name].value == parameter.value else ""
+        by = known[name].source if name in known and known[name].parameter.value == parameter.value else ""
         comment = f"{MEANINGS[name]}, {parameter_unit(name, model.motion)}{f'; {printable(by)}' if by else ''}"
-        entry = f"{name} = {{ value = {parameter.value!r}, tolerance = {parameter.tolerance!r} }}"
-        lines.append(_line(entry, comment))
+        entry = trusted_entry(parameter)
+        if "ci95" in entry:
+            entry["ci95"] = [float(f"{end:.{DIGITS}g}") for end in entry["ci95"]]
+        text = ", ".join(f"{key} = {value!r}" for key, value in entry.items())
+        lines.append(_line(f"{name} = {{ {text} }}", comment))
     if signals:
         lines += ["", f"# What is what in a recording, as hil look found it in {source}: check it.", *signals]
     text = "\n".join([*lines, ""])

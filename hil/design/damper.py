@@ -84,13 +84,13 @@ def region_of(path: Path, estimate: Path | None) -> tuple[Region, DrivelineModel
         if name not in LINEAR and name not in LINEARISED and EFFECTS[name].element in BETWEEN:
             raise ModelFileError(path, f"effects.{name} | expected a line that is linear from torque to speed | got it")
     value = {name: parameter.value for name, parameter in model.parameters.items()}
-    half = {name: abs(p.value) * p.tolerance for name, p in model.parameters.items()}
+    least, most = {n: p.low for n, p in model.parameters.items()}, {n: p.high for n, p in model.parameters.items()}
     if estimate is not None:
         known = _known(estimate)
         widened = math.sqrt(chdtri(len(known), 0.05)) / Z95  # the box around the joint 95 % ellipsoid
         value |= {name: one.value for name, one in known.items()}
-        half |= {name: widened * one.half_width for name, one in known.items()}
-    least, most = ({n: value[n] + sign * half[n] for n in PARAMETERS} for sign in (-1.0, 1.0))
+        least |= {name: one.value - widened * one.half_width for name, one in known.items()}
+        most |= {name: one.value + widened * one.half_width for name, one in known.items()}
     for name in [each for each in LINEARISED if each in model.effects]:
         slopes, of = slopes_of(table_of(name, model.effects[name])), LINEARISED[name]
         value[of] += 0.5 * (min(slopes) + max(slopes))
@@ -98,7 +98,8 @@ def region_of(path: Path, estimate: Path | None) -> tuple[Region, DrivelineModel
     for name in PARAMETERS[:3]:
         if least[name] <= 0.0:
             raise UsageError(f"{estimate or path}: {name} is known too little, its region reaches {least[name]:.3g}.")
-    return Region({n: value[n] for n in PARAMETERS}, {n: max(x, 0.0) for n, x in least.items()}, most), model
+    at_least, at_most = {n: max(least[n], 0.0) for n in PARAMETERS}, {n: most[n] for n in PARAMETERS}
+    return Region({n: value[n] for n in PARAMETERS}, at_least, at_most), model
 
 
 def _known(path: Path) -> dict[str, PhysicalValue]:
@@ -145,7 +146,7 @@ def _cycles_late(path: Path, period_s: float) -> int:
     return reading_lag(m1 + m2, reference)
 
 
-def file_of(found: Damper, order: Order, model: str) -> DamperFile:
+def file_of(found: Damper, region: Region, order: Order, model: str) -> DamperFile:
     """Return the design as its file."""
     return DamperFile.model_validate(
         {
@@ -159,6 +160,7 @@ def file_of(found: Damper, order: Order, model: str) -> DamperFile:
             "sensitivity": found.sensitivity,
             "torque_nm": found.torque_nm,
             "line": found.line,
+            "intervals": {name: [region.low[name], region.high[name]] for name in PARAMETERS},
             "filter": {"b": found.filter.b.tolist(), "a": found.filter.a.tolist()},
             "rig": order.rig,
         }

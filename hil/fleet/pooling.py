@@ -23,7 +23,7 @@ import numpy as np
 from scipy.optimize import minimize
 from scipy.stats import norm
 
-from estimator.physics.model import DrivelineModel
+from estimator.physics.model import DrivelineModel, Parameter
 from estimator.signals.record import FloatArray, IntArray
 
 FALSE_RATE = 0.002
@@ -35,7 +35,6 @@ FEW, WIDER = 0.05, 8.0
 FEWEST_VEHICLES = 8
 """With fewer, their spread is hardly known: twice too large or too small."""
 
-LARGEST_TOLERANCE = 0.95
 QUANTILE = float(norm.ppf(0.975))
 
 
@@ -155,11 +154,9 @@ def change(seen: Seen, within: float) -> Change | None:
 
 
 def with_prior(model: DrivelineModel, known: Mapping[str, Usual]) -> tuple[DrivelineModel, tuple[str, ...]]:
-    """Return a model whose parameters are what is usual, trusted to 95 % of the fleet's vehicles and drives."""
+    """Return a model whose parameters are what is usual, with the interval of 95 % of the vehicles and drives."""
     priors = {}
     for name, each in known.items():
         if name in model.parameters and each.n_vehicles >= FEWEST_VEHICLES and each.mean > 0.0:
-            reach = QUANTILE * math.hypot(each.between, each.within) / each.mean
-            tolerance = min(reach, LARGEST_TOLERANCE)
-            priors[name] = replace(model.parameters[name], value=each.mean, tolerance=tolerance)
+            priors[name] = Parameter.measured(each.mean, QUANTILE * math.hypot(each.between, each.within), 0.0)
     return replace(model, parameters={**model.parameters, **priors}), tuple(priors)

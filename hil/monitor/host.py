@@ -24,7 +24,7 @@ from pathlib import Path
 
 from drivers.canopen import emcy
 from drivers.canopen.can_link import CanLink
-from drivers.canopen.emcy import EMCY_COB_ID
+from drivers.canopen.emcy import EMCY_COB_ID, RPDO_TIMEOUT
 from drivers.canopen.heartbeat import HEARTBEAT_COB_ID, NmtState
 from drivers.errors import DriverError
 from drivers.inverter.inverter import Inverter
@@ -100,7 +100,15 @@ class NodeWatch:
 
     def _on_emergency(self, data: bytes, t_ns: int) -> None:
         emergency = emcy.decode(data)
+        if emergency.code == RPDO_TIMEOUT and not self._inverter.is_armed:
+            text = (
+                f"{self._name}: has noticed that no command follows, as it is set up to (EMCY 0x{emergency.code:04X})"
+            )
+            self._tell(Notice(t_ns, Kind.INFO, text))
+            return
         if emergency.is_reset:
+            if self._emergency is None:
+                return  # of what was none
             self._emergency = None
             self._tell(Notice(t_ns, Kind.EMCY, f"{self._name}: reset"))
             return

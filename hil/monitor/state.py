@@ -236,7 +236,9 @@ class LiveState:
                 if self.activity is Activity.LOST:
                     self._tell(Kind.INFO, "the bus is there again")
                 self._quality.begin()
-                self._headline = replace(self._headline, activity=Activity.LISTENING)
+                waited = self.activity in (Activity.CONNECTING, Activity.LOST)  # and what was said then is over
+                message = "" if waited else self._headline.message
+                self._headline = replace(self._headline, activity=Activity.LISTENING, message=message)
             case Lost():
                 if self.activity is not Activity.LOST:
                     self._tell(Kind.FAULT, report.reason)

@@ -1,18 +1,20 @@
-"""Files of NumPy and of spreadsheets: .npz, .npy, .xlsx. Nothing in them is run: no pickled objects, no formulas."""
+"""Files of NumPy and of spreadsheets: .npz, .npy, .xlsx, .ods. No pickled object in them is run, and no formula."""
 
 from __future__ import annotations
 
 import csv
 import io
+import zipfile
 from datetime import date, datetime, time
 from pathlib import Path
 from typing import Any, Final
+from xml.etree.ElementTree import Element, iterparse
 
 import numpy as np
 
 from drivers.foreign_file import open_regular
 from hil.errors import RecordingError
-from hil.recording.bounds import damaged, require_cells
+from hil.recording.bounds import COLUMNS, damaged, require_cells
 from hil.recording.channels import column_of
 from hil.recording.csv_format import table_of_text
 from hil.recording.measurement_formats import library
@@ -79,3 +81,53 @@ def _cell(cell: object) -> str:
     if isinstance(cell, datetime | date | time):
         return str(cell)
     return "" if cell is None else repr(cell) if isinstance(cell, float) else str(cell)
+
+
+TABLE, OFFICE, TEXT = (f"{{urn:oasis:names:tc:opendocument:xmlns:{each}:1.0}}" for each in ("table", "office", "text"))
+
+
+def read_ods(path: Path, request: Request) -> Table:
+    """Read the sheet with the most rows of an OpenDocument workbook, as if it had been saved as CSV."""
+    sheets: dict[str, list[str]] = {}
+    try:
+        with zipfile.ZipFile(path) as book, book.open("content.xml") as content:
+            for _, sheet in iterparse(content):
+                if sheet.tag == f"{TABLE}table":
+                    sheets[sheet.get(f"{TABLE}name", "")] = _ods_lines(path, sheet)
+                    sheet.clear()
+    except RecordingError:
+        raise
+    except Exception as error:  # zipfile and the parser raise anything on a damaged file
+        raise damaged(path, "a whole OpenDocument workbook", error) from error
+    name, lines = max(sheets.items(), key=lambda sheet: len(sheet[1]), default=("", []))
+    hints = request.form.model_copy(update={"delimiter": ",", "decimal": "."})
+    return table_of_text(path, "\n".join(lines), hints, remark=f"sheet {name}" if len(sheets) > 1 else "")
+
+
+def _ods_lines(path: Path, sheet: Element) -> list[str]:
+    """Return the rows of a sheet that are not empty; cells and rows that are alike are stored once, and counted."""
+    lines: list[str] = []
+    count = 0
+    for row in sheet.iter(f"{TABLE}table-row"):
+        cells: list[str] = []
+        for cell in row:
+            value = _ods_cell(cell)
+            times = int(cell.get(f"{TABLE}number-columns-repeated", "1"))
+            cells += [value] * (times if value else min(times, COLUMNS))
+        while cells and not cells[-1]:
+            cells.pop()
+        if not cells:
+            continue
+        times = int(row.get(f"{TABLE}number-rows-repeated", "1"))
+        count += times * len(cells)
+        require_cells(path, count)
+        text = io.StringIO()
+        csv.writer(text, lineterminator="").writerow(cells)
+        lines += [text.getvalue()] * times
+    return lines
+
+
+def _ods_cell(cell: Element) -> str:
+    """Return a number as it is stored, and all else as it is shown."""
+    stored = cell.get(f"{OFFICE}value") or cell.get(f"{OFFICE}date-value")
+    return stored or "\n".join("".join(part.itertext()) for part in cell.iter(f"{TEXT}p"))

@@ -15,7 +15,9 @@
 from __future__ import annotations
 
 import codecs
+import gzip
 import re
+import zlib
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -28,7 +30,7 @@ import pyarrow.csv
 
 from drivers.foreign_file import read_regular
 from hil.errors import RecordingError
-from hil.recording.bounds import require_columns
+from hil.recording.bounds import CELLS, damaged, require_columns
 from hil.recording.channels import numbers_of_texts
 from hil.recording.description import NO_SIDECAR, Sidecar, as_metadata, read_sidecar, write_sidecar
 from hil.recording.request import FormatHints, Request
@@ -47,9 +49,9 @@ def as_column(cells: pa.ChunkedArray, kind: Kind | None = None, decimal: str = "
         return np.asarray(pa.compute.equal(cells, "True").to_numpy())
     trimmed = pa.compute.utf8_trim_whitespace(cells)
     present = pa.compute.if_else(pa.compute.is_in(trimmed, pa.array(MISSING)), pa.scalar(None, pa.string()), trimmed)
-    plain = present
+    plain = without_groups(present, "," if decimal == "." else ".")
     if decimal == ",":
-        swapped = pa.compute.replace_substring(present, ".", "_")
+        swapped = pa.compute.replace_substring(plain, ".", "_")
         plain = pa.compute.replace_substring(swapped, ",", ".")
     for numeric in (pa.int64(), pa.float64()):
         try:
@@ -60,6 +62,20 @@ def as_column(cells: pa.ChunkedArray, kind: Kind | None = None, decimal: str = "
             break  # nothing but missing cells: an empty text is one, too
         return np.asarray((numbers.cast(pa.float64()) if numbers.null_count else numbers).to_numpy())
     return as_text(trimmed.to_pylist())
+
+
+def without_groups(cells: pa.ChunkedArray, mark: str) -> pa.ChunkedArray:
+    """Return cells with the digits of numbers such as 1,079.941 together, as spreadsheets and people group them.
+
+    1,079 alone may be a decimal comma: it is a group only where another cell of the column shows that.
+    """
+    groups = rf"[+-]?[1-9]\d{{0,2}}([{mark}]\d{{3}})"
+    if not pa.compute.any(
+        pa.compute.match_substring_regex(cells, rf"^({groups}+[^{mark}\d]\d+|{groups}{{2,}})$")
+    ).as_py():
+        return cells
+    grouped = pa.compute.match_substring_regex(cells, rf"^{groups}+([^{mark}\d]\d*)?$")
+    return pa.compute.if_else(grouped, pa.compute.replace_substring(cells, mark, ""), cells)
 
 
 SPECIAL = ",;\t|"  # characters that a reader could take for a delimiter
@@ -78,6 +94,25 @@ def read(path: Path, request: Request) -> Table:
     if path.suffix.lower() == ".lvm":
         text = labview_text(text)
     return table_of_text(path, text, request.form, encoding, said)
+
+
+UNPACKED_PER_BYTE: Final = 200  # text of numbers packs to a tenth: beyond, it was made to fill the memory
+
+
+def read_packed(path: Path, request: Request) -> Table:
+    """Read a text recording that gzip packed, such as run.csv.gz."""
+    if (inner := Path(path.stem).suffix.lower()) not in ("", ".csv", ".txt", ".tsv"):
+        raise RecordingError(path, f"expected text in it, as in run.csv.gz, got {inner}: unpack it first (gunzip)")
+    most = max(CELLS, UNPACKED_PER_BYTE * path.stat().st_size)
+    try:
+        with gzip.open(path) as file:
+            content = file.read(most + 1)
+    except (OSError, EOFError, zlib.error) as error:
+        raise damaged(path, "a whole file of gzip", error) from error
+    if len(content) > most:
+        raise RecordingError(path, f"expected at most {most} bytes of text in it, got more: it is no recording")
+    text, encoding = decoded(path, content, request.form.encoding)
+    return table_of_text(path, text, request.form, encoding)
 
 
 def table_of_text(

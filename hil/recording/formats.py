@@ -67,6 +67,7 @@ FORMATS: Mapping[str, Format] = MappingProxyType(
         ".tsv": _DESCRIBED_TEXT(),
         ".ascii": _TEXT(),
         ".lvm": _TEXT(),
+        ".gz": Format(_of("csv_format.read_packed")),
         ".parquet": Format(
             _of("parquet_format.read"), _of("parquet_format.write"), _of("parquet_format.read_metadata")
         ),
@@ -75,12 +76,14 @@ FORMATS: Mapping[str, Format] = MappingProxyType(
         ".dat": _MDF(),
         ".h5": _HDF5,
         ".hdf5": _HDF5,
-        ".feather": Format(_of("parquet_format.read_feather")),
+        **dict.fromkeys((".feather", ".arrow"), Format(_of("parquet_format.read_feather"))),
         ".jsonl": Format(_of("parquet_format.read_json_lines")),
         ".npz": _NUMPY,
         ".npy": _NUMPY,
         ".xlsx": Format(_of("array_formats.read_xlsx")),
-        **dict.fromkeys((".tdms", ".mcap", ".blf", ".asc", ".log", ".trc"), _MEASURED),
+        ".ods": Format(_of("array_formats.read_ods")),
+        ".json": Format(_of("wpilib_formats.sysid")),
+        **dict.fromkeys((".wpilog", ".tdms", ".mcap", ".blf", ".asc", ".log", ".trc"), _MEASURED),
         ".mat": Format(_of("mat_format.read"), _of("mat_format.write"), _of("mat_format.read_metadata")),
     }
 )
@@ -139,9 +142,27 @@ def format_of(path: Path) -> Format:
     """Return the format of a file that is there and can be read."""
     known = FORMATS.get(path.suffix.lower())
     if known is None:
-        raise RecordingError(path, f"expected a recording ({', '.join(FORMATS)}), got {path.suffix!r}")
+        raise RecordingError(path, f"expected a recording, got {path.suffix or 'no ending'!r}. {_way_out(path)}")
     _require_readable(path)
     return known
+
+
+TEXT_BYTES = 4096  # of a file, by which it is seen to be text
+
+
+def _way_out(path: Path) -> str:
+    """Say how a file of an unknown format gets in."""
+    try:
+        with open_regular(path) as file:
+            start = file.read(TEXT_BYTES)
+    except OSError:
+        start = b""
+    if start and b"\0" not in start and any(mark in start for mark in b",;\t "):
+        return "It looks like text: copy it to a name that ends in .csv, and let hil look read it."
+    return (
+        "Save it as CSV, Parquet or MDF 4 where it was recorded: most programs can. Which formats are read as they "
+        "are, and how the usual loggers write them, is in docs/from-your-logger.md."
+    )
 
 
 def _require_readable(path: Path) -> None:

@@ -63,6 +63,10 @@ def _groups(path: Path, request: Request) -> tuple[list[Group], list[str]]:
             return _tdms(path), []
         case ".mcap":
             return _mcap(path), []
+        case ".wpilog":
+            from hil.recording.wpilib_formats import data_log
+
+            return data_log(path), []
         case _:
             return _bus_log(path, request)
 

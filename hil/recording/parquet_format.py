@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.ipc
 import pyarrow.parquet
 
 from hil.errors import RecordingError
@@ -36,12 +37,18 @@ def read(path: Path, request: Request) -> Table:
 
 
 def read_feather(path: Path, request: Request) -> Table:
-    """Read a Feather file (Arrow IPC)."""
+    """Read a file of Arrow (IPC, also called Feather), or what was streamed into one."""
     from pyarrow import feather
 
-    what = "a whole Feather file"
+    what = "a whole Feather file" if path.suffix.lower() == ".feather" else "a whole Arrow file"
     try:
-        content = feather.read_table(path, memory_map=False)
+        with path.open("rb") as file:
+            is_stream = not file.read(6).startswith((b"ARROW1", b"FEA1"))
+        if is_stream:
+            with path.open("rb") as file, pa.ipc.open_stream(file) as stream:
+                content = stream.read_all()
+        else:
+            content = feather.read_table(path, memory_map=False)
     except DAMAGED as error:
         raise damaged(path, what, error) from error
     require_cells(path, content.num_rows * content.num_columns)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -12,6 +13,7 @@ from estimator.errors import made_of_each
 from estimator.signals.record import Record
 from hil.errors import InputError, RecordingError, UsageError
 from hil.files import parse_json
+from hil.printable import printable
 from hil.recording import columns
 from hil.recording.checksum import CHECKSUM, RIG_CHECKSUM, RIG_TEXT, SAID, require_unchanged
 from hil.recording.description import read_sidecar
@@ -164,3 +166,16 @@ def _require_even(path: Path) -> None:
             f"{missed} missed, {late} late by more than half a period, {unanswered} answers missing. Record again "
             "on a machine that is less busy or grants real-time scheduling, or at a longer period.",
         )
+
+
+def rig_of(paths: Iterable[Path]) -> str:
+    """Return the name of the rig that recordings are of, as they say themselves; "" where none does."""
+    for path in paths:
+        said = read_metadata(path).get(RIG_TEXT, "") if format_of(path).metadata is not None else ""
+        try:
+            name = tomllib.loads(said).get("name")
+        except tomllib.TOMLDecodeError:  # another program's key of that name
+            continue
+        if isinstance(name, str):
+            return printable(name)
+    return ""

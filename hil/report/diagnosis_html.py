@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -75,6 +75,10 @@ WHOLE = 0.95
 FEWEST_ALIKE = 3
 """Rejected effects with the same reason from which on they share a line."""
 
+UNFITTED = "not fitted"
+WHY = {UNFITTED: "not fitted: a score test foresees that none of them would make the explanation better by enough"}
+"""What is said of many effects at once, of which each has its own figure."""
+
 REJECTED = ("rejected", "why", "ΔBIC to the explanation")
 
 LEAST_RANGE = 0.05
@@ -117,15 +121,16 @@ def diagnosis_page(diagnosis: Diagnosis, made: Provenance | None = None, one_in:
 def diagnosis_summary(diagnosis: Diagnosis) -> RenderableType:
     """Return what a terminal shows of a diagnosis: the verdict first, then what it rests on."""
     found = [html.paragraph(f"{title_of(e.name)}: {said}") for e in diagnosis.effects if (said := belief(e).rstrip())]
+    names = listed([trace.name for trace in diagnosis.traces if not trace.holdout])
     return rendered(
         [
             html.header(
-                headline(diagnosis), html.paragraph(diagnosis.statement), kind=diagnosis.verdict.value,
-                badge=BADGES[diagnosis.verdict],
+                headline(diagnosis), html.paragraph(f"Recordings: {names}."), html.paragraph(diagnosis.statement),
+                kind=diagnosis.verdict.value, badge=BADGES[diagnosis.verdict],
             ),
             _fit(diagnosis.fit),
             _further_outputs(diagnosis.fit),
-            _effects(diagnosis.effects),
+            _effects(diagnosis.effects, is_main),
             *found,
             _parameters(diagnosis),
             _rejected(diagnosis) if diagnosis.rejected else None,
@@ -196,7 +201,16 @@ def _further_outputs(fit: Fit) -> html.Table | None:
     return html.table_of(fit.outputs, columns, numbers=(2, 3, 4, 5)) if fit.outputs else None
 
 
-def _effects(effects: Sequence[FoundEffect]) -> html.Table | None:
+def is_main(effect: FoundEffect, name: str) -> bool:
+    """Tell whether a parameter is one that a law can't do without; those that only shape it stand behind it."""
+    entry = EFFECTS.get(effect.name)
+    needed = () if entry is None else [each.name for each in entry.parameters if not each.optional]
+    return not needed or name in needed or not set(needed) & set(effect.parameters)
+
+
+def _effects(
+    effects: Sequence[FoundEffect], shown_if: Callable[[FoundEffect, str], bool] = lambda _effect, _name: True
+) -> html.Table | None:
     """Return the values of effects, a row each; what is not determined is grey."""
     rows = [
         _determined(
@@ -205,6 +219,7 @@ def _effects(effects: Sequence[FoundEffect]) -> html.Table | None:
         )
         for effect in effects
         for name, p in effect.parameters.items()
+        if shown_if(effect, name)
     ]  # fmt: skip
     return html.table(("found", "element", "parameter", "value", "95 % interval"), rows, (3, 4)) if rows else None
 
@@ -256,7 +271,9 @@ def _effect(diagnosis: Diagnosis, effect: FoundEffect) -> Iterator[Any]:
     if entry:
         yield html.paragraph(entry.law, kind="law")
         yield html.note("Law: ", entry.source, ". In files: ", html.Code(effect.name), ".")
-    yield _effects([effect])
+    yield _effects([effect], is_main)
+    shaping = _effects([effect], lambda each, name: not is_main(each, name))
+    yield None if shaping is None else html.details("Parameters that shape the law", shaping)
     yield _law_pictures(diagnosis, effect.name)
     yield html.paragraph(
         f"{belief(effect)}Evidence: information criterion {_bettered(evidence.delta_bic)}; error on unseen "
@@ -464,11 +481,13 @@ def _rejected_section(diagnosis: Diagnosis) -> html.Section:
 
 
 def _rejected(diagnosis: Diagnosis) -> html.Table:
-    """Return why effects were rejected; many with one reason share a line."""
-    counts = Counter(each.reason for each in diagnosis.rejected)
+    """Return why effects were rejected; many with one reason share a line, and those that were not fitted one."""
+    reasons = [UNFITTED if each.reason.startswith(UNFITTED) else each.reason for each in diagnosis.rejected]
+    counts = Counter(reasons)
     alike = {reason for reason, count in counts.items() if count >= FEWEST_ALIKE}
-    rows = [(title_of(e.name), e.reason, shown(e.delta_bic)) for e in diagnosis.rejected if e.reason not in alike]
-    rows += [(f"{counts[reason]} others tested, none better", reason, "") for reason in sorted(alike)]
+    pairs = zip(diagnosis.rejected, reasons, strict=True)
+    rows = [(title_of(e.name), e.reason, shown(e.delta_bic)) for e, reason in pairs if reason not in alike]
+    rows += [(f"{counts[reason]} others tested, none better", WHY.get(reason, reason), "") for reason in sorted(alike)]
     return html.table(REJECTED, rows, numbers=(2,))
 
 

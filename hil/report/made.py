@@ -19,6 +19,7 @@ def facts(made: Provenance | None) -> Iterator[tuple[str, str]]:
         return
     names = [Path(each.file).name for each in made.recordings]
     more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
+    yield "rig", made.rig
     yield "model", ", ".join(Path(each.file).name for each in made.models)
     yield "recordings", ", ".join(names[:MOST_NAMED]) + more
     yield "date", moment(made.date)
@@ -29,7 +30,8 @@ def made_section(made: Provenance | None) -> html.Section | None:
     """Return program, date, command and the files with their checksums; None where nothing is known."""
     if made is None:
         return None
-    rows = [("program", f"hil {made.version}"), ("date", made.date), ("command", made.command or "from Python")]
+    rows = [("rig", made.rig)] if made.rig else []
+    rows += [("program", f"hil {made.version}"), ("date", made.date), ("command", made.command or "from Python")]
     for kind, sources in (("model", made.models), ("recording", made.recordings)):
         rows += [(kind, f"{each.file}, SHA-256 {each.sha256}") for each in sources]
     return html.section("How this was made", html.table(("", ""), rows))

@@ -324,7 +324,7 @@ def page(title: str, blocks: Iterable[Any], footer: str) -> str:
     has_figures, has_registers = any(_of_kind(Figure, kept)), any(_of_kind(Register, kept))
     sections = [block for block in kept if isinstance(block, Section)]
     behaviour, register = Markup(_text("page.js")), Markup(_text("register.js") if has_registers else "")
-    scripts = [str(behaviour), str(register), *([_plotly()] if has_figures else [])]
+    scripts = [str(behaviour), str(register), *([plotly_bundle()] if has_figures else [])]
     return (
         _environment()
         .get_template("page.html")
@@ -336,7 +336,7 @@ def page(title: str, blocks: Iterable[Any], footer: str) -> str:
             style=Markup(_text("page.css")),
             behaviour=behaviour,
             register=register,
-            plotly=_packed(_plotly().encode()) if has_figures else "",
+            plotly=_packed(plotly_bundle().encode()) if has_figures else "",
             hashes=" ".join(f"'sha256-{_hash(script)}'" for script in scripts),
         )
     )
@@ -385,7 +385,7 @@ def _text(name: str) -> str:
 
 
 @cache
-def _plotly() -> str:
+def plotly_bundle() -> str:
     """Return plotly's basic bundle, which draws all figures here: scatter and bars."""
     packed = files("hil.report").joinpath("templates", "plotly-basic.min.js.gz").read_bytes()
     return gzip.decompress(packed).decode("utf-8")

@@ -21,7 +21,7 @@ import numpy as np
 from canopen.sdo.exceptions import SdoAbortedError
 
 from drivers.canopen.can_link import CanLink, FrameCallback
-from drivers.canopen.emcy import EMCY_COB_ID, Emergency
+from drivers.canopen.emcy import EMCY_COB_ID, RPDO_TIMEOUT, Emergency
 from drivers.canopen.heartbeat import HEARTBEAT_COB_ID, NMT_COB_ID, HeartbeatProducer, NmtCommand, NmtState
 from drivers.canopen.pdo_map import COB_ID_INVALID
 from drivers.datasheet.file import EdsFile
@@ -40,7 +40,7 @@ from hil.simulator.object_server import (
     power_on_values,
     velocity_scale,
 )
-from hil.simulator.stopping import HEARTBEAT_ERROR, RPDO_TIMEOUT, HeartbeatConsumer, HostWatch, Ticker
+from hil.simulator.stopping import HEARTBEAT_ERROR, HeartbeatConsumer, HostWatch, Ticker
 
 _SDO_REQUEST_COB_ID = 0x600
 _CONSUMER_HEARTBEAT_TIME = (0x1016, 1)

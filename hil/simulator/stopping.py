@@ -143,8 +143,7 @@ class RpdoDeadline:
         return True
 
 
-HEARTBEAT_ERROR: Final = 0x8130
-RPDO_TIMEOUT: Final = 0x8250  # error codes of CiA 301
+HEARTBEAT_ERROR: Final = 0x8130  # error code of CiA 301
 
 
 class HostWatch:

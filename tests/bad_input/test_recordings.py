@@ -5,7 +5,6 @@ from pathlib import Path
 
 import pytest
 
-from hil.recording.formats import FORMATS
 from tests.bad_input.conftest import Refused
 
 Lines = list[str]
@@ -73,8 +72,22 @@ def test_refused_by_line_and_nothing_is_written(refused: Refused, drive: Path, f
         ("run.parquet", b"", "a damaged or truncated one"),
         ("run.mat", b"time_s,speed_rad_s\n", "a damaged or truncated one"),
         ("run.xlsx", b"PK", "a damaged or truncated one"),
-        ("run.wav", b"RIFF", f"expected a recording ({', '.join(FORMATS)}), got '.wav'"),
-        ("run", b"", f"expected a recording ({', '.join(FORMATS)}), got ''"),
+        ("run.wav", b"RIFF", "expected a recording, got '.wav'. Save it as CSV, Parquet or MDF 4 where it was"),
+        ("run", b"", "expected a recording, got 'no ending'. Save it as CSV"),
+        (
+            "run.out",
+            b"t;u\n0;1\n",
+            "expected a recording, got '.out'. It looks like text: copy it to a name that ends in",
+        ),
+        ("run.csv.gz", b"no gzip", "expected a whole file of gzip, got a damaged or truncated one"),
+        (
+            "run.json",
+            b"{}",
+            "expected the JSON of WPILib's SysId, whose tests have rows of 4 or 9 numbers, got another",
+        ),
+        ("run.wpilog", b"MDF", "expected a data log of WPILib, which begins with WPILOG, got b'MDF'"),
+        ("run.ods", b"PK", "expected a whole OpenDocument workbook, got a damaged or truncated one"),
+        ("run.arrow", b"ARROW1", "expected a whole Arrow file, got a damaged or truncated one"),
     ],
 )
 def test_what_is_no_recording_is_refused(

@@ -49,11 +49,16 @@ def bus(seed: int) -> tuple[dict[str, float], dict[str, float]]:
     return true, {name: value * (1.0 + random.uniform(-TOLERANCE, TOLERANCE) / 1.02) for name, value in true.items()}
 
 
+def region(model: dict[str, float]) -> Region:
+    """Return the lines that a model file leaves possible."""
+    low, high = ({name: value * (1.0 + sign * TOLERANCE) for name, value in model.items()} for sign in (-1.0, 1.0))
+    return Region(model, low, high)
+
+
 def designed(model: dict[str, float]) -> Damper:
     """Design the damper of a model file."""
-    low, high = ({name: value * (1.0 + sign * TOLERANCE) for name, value in model.items()} for sign in (-1.0, 1.0))
     excitation = prbs_nm(2046, PRBS_NM, clock_divider=2)
-    return design_damper(Region(model, low, high), Timing(PERIOD_S, PERIOD_S), Demand(TARGET, LIMIT_NM, excitation))
+    return design_damper(region(model), Timing(PERIOD_S, PERIOD_S), Demand(TARGET, LIMIT_NM, excitation))
 
 
 def damping_of(damper: Damper) -> Damping:
@@ -63,7 +68,7 @@ def damping_of(damper: Damper) -> Damping:
         {"name": "campaign", "torque_limit_m1_nm": 400.0, "torque_limit_m2_nm": 400.0, "prbs_limit_nm": 120.0}
         | {"limit_nm": LIMIT_NM}
     )
-    file = file_of(damper, Order(PERIOD_S, demand, rig), "bus.toml")
+    file = file_of(damper, region(damper.line), Order(PERIOD_S, demand, rig), "bus.toml")
     return Damping(file, rig, LiveEstimate(tracking_chain(PERIOD_S)))
 
 

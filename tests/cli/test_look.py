@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from estimator.physics.model import Parameter
 from hil.cli.main import run
 from hil.config.model_file import read_model, read_model_for_recordings
 from hil.recording import read_record
@@ -110,17 +111,16 @@ def identification(path: Path) -> None:
     path.write_text(json.dumps(document))
 
 
-def test_an_identification_gives_values_and_tolerances(tmp_path: Path) -> None:
+def test_an_identification_gives_values_with_their_intervals(tmp_path: Path) -> None:
     identification(tmp_path / "identification.json")
     source = ["--from", str(tmp_path / "identification.json"), "--structure", "one_mass", "--yes"]
     assert run(["model", "new", str(tmp_path / "surest.toml"), *source]) == 0
     surest = read_model(tmp_path / "surest.toml").model.parameters
-    assert (surest["J_M"].value, surest["J_M"].tolerance) == (1.5, 0.2)
-    assert (surest["b_M"].value, surest["b_M"].tolerance) == (0.4, 0.25)
+    assert surest == {"J_M": Parameter(1.5, ci95=(1.2, 1.8)), "b_M": Parameter(0.4, ci95=(0.3, 0.5))}
     assert "identified from b" in (tmp_path / "surest.toml").read_text()
     assert run(["model", "new", str(tmp_path / "a.toml"), *source, "--run", "a", "--value", "b_M=0.1"]) == 0
     of_a = read_model(tmp_path / "a.toml").model.parameters
-    assert (of_a["J_M"].value, of_a["b_M"].value) == (1.6, 0.1)
+    assert of_a == {"J_M": Parameter(1.6, ci95=(1.1, 2.1)), "b_M": Parameter(0.1, 0.2)}
 
 
 @pytest.mark.parametrize(
@@ -132,6 +132,7 @@ def test_an_identification_gives_values_and_tolerances(tmp_path: Path) -> None:
         (["--tolerance", "wide"], "--tolerance wide | expected a number, or NAME=NUMBER"),
         (["--value", "J_M=1"], "--value J_L=NUMBER | expected inertia of the load"),
         ([*VALUES, "--value", "k=-5"], "parameters.k"),
+        ([*VALUES, "--value", "b_M=0"], "expected --tolerance b_M=0 beside it"),
         (["--from", "gone.json"], "gone.json"),
         (["--recording", "gone.csv"], "gone.csv"),
     ],

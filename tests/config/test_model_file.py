@@ -7,7 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from estimator.physics.catalogue import EFFECTS
-from estimator.physics.model import DrivelineModel, EffectValue, Load, Motion, Parameter, Structure
+from estimator.physics.machine import PARTS
+from estimator.physics.model import DrivelineModel, EffectValue, Load, Motion, Parameter, Prior, Structure
 from estimator.physics.tables import table_of
 from estimator.signals.record import Location, OutputKind
 from hil.config.model_file import read_model, read_model_for_recordings, write_model
@@ -128,7 +129,19 @@ def test_a_joint_needs_both_its_motion_and_what_it_takes(tmp_path: Path, signals
         ("J_M = { value = '1', tolerance = 0.2 }", "parameters.J_M.value | expected a valid number | got '1'"),
         ("J_M = { value = true, tolerance = 0.2 }", "parameters.J_M.value | expected a valid number | got True"),
         ("J_M = { value = nan, tolerance = 0.2 }", "parameters.J_M.value | expected a finite number | got nan"),
-        ("J_M = { value = 1 }", "parameters.J_M.tolerance | expected this key | got nothing"),
+        (
+            "J_M = { value = 1 }",
+            "parameters.J_M.tolerance | expected what the value is trusted to, or ci95 = [low, high]",
+        ),
+        (
+            "J_M = { value = 1, tolerance = 0.2, ci95 = [0.5, 2] }",
+            "parameters.J_M.tolerance | expected what the value is trusted to, or ci95 = [low, high] in",
+        ),
+        ("J_M = { value = 1, ci95 = [2, 3] }", "parameters.J_M.ci95: expected two finite numbers with the value, 1.0,"),
+        (
+            "b_M = { value = 0, tolerance = 0.2 }",
+            "parameters.b_M.tolerance: expected 0 for a value of 0, of which every",
+        ),
         (
             "J_M = { value = 1, tolerance = 0.2, x = 1 }",
             "parameters.J_M.x | expected one of the known keys (value, tol",
@@ -166,6 +179,29 @@ def test_a_wrong_line_is_refused_by_its_key(tmp_path: Path, line: str, said: str
             "effects.backlash: makes no sense in one_mass, expected joint, three_mass, two_mass",
         ),
         ("[effects.coulomb_friction_motor]", "effects.coulomb_friction_motor.friction_nm: missing"),
+        (
+            "[effects.coulomb_friction_motor]\nfriction_nm = { value = 0, tolerance = 0.3 }",
+            "effects.coulomb_friction_motor.friction_nm.tolerance: expected none for a value of 0",
+        ),
+        (
+            "[machine]\nhas = ['sail']",
+            "machine.has: expected parts among brake, clutch, payload, tyre, resolver, got 's",
+        ),
+        ("[machine]\nhas = 'brake'", "machine.has | expected a list in [ ] | got 'brake'"),
+        (
+            "[machine]\nhas = []\n[effects.inertia_change]\nchange_kg_m2 = { value = 1 }",
+            "machine.has: expected 'payload' in it, since the model has effects.inertia_change, got none",
+        ),
+        ("[priors]\ngremlins = { odds = 1.0 }", "priors.gremlins: unknown effect, expected one of"),
+        ("[priors]\nbacklash = { odds = 0.0 }", "priors.backlash.odds: expected odds above 0"),
+        (
+            "[priors]\nbacklash = { gap_deg = [1, 2] }",
+            "priors.backlash.gap_deg: unknown parameter, expected odds or one",
+        ),
+        ("[priors]\nbacklash = { gap_rad = [2, 1] }", "priors.backlash.gap_rad: expected two numbers, the lower first"),
+        ("[priors]\nbacklash = { gap_rad = [-2, 1] }", "priors.backlash.gap_rad: expected sizes of 0 or greater"),
+        ("[priors]\nbacklash = { gap_rad = 0.01 }", "priors.backlash.gap_rad | expected a list in [ ] | got 0.01"),
+        ("[priors]\nbacklash = { }", "priors.backlash: expected odds or the range of a parameter, got neither"),
         (
             "[effects.coulomb_friction_motor]\nfriction_nm = { value = 1, ci95 = [2, 1] }",
             "effects.coulomb_friction_motor.friction_nm.ci95 | expected the lower bound first",
@@ -208,6 +244,14 @@ finite = st.floats(min_value=1e-12, max_value=1e12)
 
 
 @st.composite
+def parameters(draw: st.DrawFn) -> Parameter:
+    if draw(st.booleans()):
+        return Parameter(draw(finite), draw(st.floats(0, 0.99)))
+    low, value, high = sorted([draw(finite), draw(finite), draw(finite)])
+    return Parameter(value, ci95=(low, high))
+
+
+@st.composite
 def models(draw: st.DrawFn) -> DrivelineModel:
     structure = draw(st.sampled_from(Structure))
     fitting = sorted(name for name, entry in EFFECTS.items() if structure in entry.structures)
@@ -216,7 +260,7 @@ def models(draw: st.DrawFn) -> DrivelineModel:
     return DrivelineModel(
         structure=structure,
         motion=draw(st.sampled_from(Motion)),
-        parameters={name: Parameter(draw(finite), draw(st.floats(0, 0.99))) for name in structure.parameter_names},
+        parameters={name: draw(parameters()) for name in structure.parameter_names},
         effects={
             name: {
                 parameter.name: EffectValue(min(draw(finite), parameter.most), draw(st.none() | pairs))
@@ -226,7 +270,18 @@ def models(draw: st.DrawFn) -> DrivelineModel:
         },
         gear_ratio=draw(st.none() | finite),
         load=draw(st.sampled_from(Load) | finite),
+        has=draw(st.none() | st.just(frozenset(PARTS))),
+        priors=draw(st.just({}) | st.just({"backlash": Prior(0.5, {"gap_rad": (0.005, 0.05)}), "gravity": Prior(2.0)})),
     )
+
+
+def test_parts_and_priors_are_what_the_model_knows(tmp_path: Path) -> None:
+    added = "[machine]\nhas = ['brake']\n[priors]\nbacklash = { odds = 0.5, gap_rad = [0.005, 0.05] }\n"
+    model = read_model(write(tmp_path, TWO_MASS + added)).model
+    assert model.has == {"brake"}
+    assert model.prior("backlash") == Prior(0.5, {"gap_rad": (0.005, 0.05)})
+    assert model.prior("gravity") == Prior()
+    assert read_model(write(tmp_path, TWO_MASS)).model.has is None
 
 
 names = st.text(st.characters(codec="utf-8", exclude_categories=("Cs",)), min_size=1, max_size=10)

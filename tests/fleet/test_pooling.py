@@ -74,5 +74,5 @@ def test_a_fleet_that_is_large_enough_becomes_the_nominal_model() -> None:
     model, named = with_prior(LINE, {"J_M": Usual(2.0, 0.1, 0.0, 20), "b_M": Usual(0.7, 0.1, 0.0, 3)})
     assert named == ("J_M",)
     assert model.parameters["J_M"].value == 2.0
-    assert model.parameters["J_M"].tolerance == pytest.approx(1.96 * 0.05, rel=1e-3)
+    assert model.parameters["J_M"].ci95 == pytest.approx((2.0 - 1.96 * 0.1, 2.0 + 1.96 * 0.1), rel=1e-3)
     assert model.parameters["b_M"] == LINE.parameters["b_M"]

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import json
+import struct
+import zipfile
 from collections.abc import Callable
 from datetime import datetime, timedelta
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
+import pyarrow as pa
 import pytest
 
 N, PERIOD_S = 500, 0.01
@@ -319,6 +322,80 @@ def excel_with_moments(folder: Path) -> Path:
     frame.insert(0, "when", [_moment(k) for k in range(N)])
     frame.to_excel(folder / "a.xlsx", index=False)
     return folder / "a.xlsx"
+
+
+@maker
+def open_document(folder: Path) -> Path:
+    """As LibreOffice stores it: numbers as such, empty cells and rows counted to the end of the sheet."""
+    names = "urn:oasis:names:tc:opendocument:xmlns:"
+    frame = _frame()
+    head = "".join(f"<table:table-cell><text:p>{name}</text:p></table:table-cell>" for name in frame)
+    rows = "".join(
+        "<table:table-row>"
+        + "".join(
+            f'<table:table-cell office:value="{value!r}"><text:p>{value:.2f}</text:p></table:table-cell>'
+            for value in row
+        )
+        + '<table:table-cell table:number-columns-repeated="16380"/></table:table-row>'
+        for row in frame.to_numpy().tolist()
+    )
+    empty = '<table:table-row table:number-rows-repeated="1048000"><table:table-cell/></table:table-row>'
+    spaces = " ".join(f'xmlns:{each}="{names}{each}:1.0"' for each in ("table", "office", "text"))
+    with zipfile.ZipFile(folder / "a.ods", "w", zipfile.ZIP_DEFLATED) as book:
+        book.writestr(
+            "content.xml",
+            f'<office:body {spaces}><table:table table:name="Sheet1"><table:table-row>{head}</table:table-row>'
+            f"{rows}{empty}</table:table></office:body>",
+        )
+    return folder / "a.ods"
+
+
+@maker
+def arrow_stream(folder: Path) -> Path:
+    table = pa.Table.from_pandas(_frame("time", "n_rpm", "T{}_Nm"))
+    with pa.ipc.new_stream(folder / "a.arrow", table.schema) as stream:
+        stream.write_table(table)
+    return folder / "a.arrow"
+
+
+@maker
+def packed_text(folder: Path) -> Path:
+    _frame().to_csv(folder / "a.csv.gz", index=False)
+    return folder / "a.csv.gz"
+
+
+@maker
+def grouped_digits(folder: Path) -> Path:
+    """As a spreadsheet shows numbers of a thousand and more, between quotes."""
+    rows = [
+        f'{t:.2f},{a},{b},"{1e3 * n:,.4f}"' for t, a, b, n in zip(TIME, TORQUE_M1, TORQUE_M2, RPM / 1e3, strict=True)
+    ]
+    return _text(folder / "a.csv", ["t,T1 [Nm],T2 [Nm],n [1/min]", *rows])
+
+
+def wpilib_data_log(path: Path, entries: dict[str, tuple[str, list[bytes]]], us: list[int]) -> Path:
+    """Write a data log of version 1.0, all entries at the same moments."""
+
+    def record(entry: int, stamp: int, value: bytes) -> bytes:
+        return bytes([0b0111_1101]) + struct.pack("<HIQ", entry, len(value), stamp) + value
+
+    def text(of: str) -> bytes:
+        return struct.pack("<I", len(of)) + of.encode()
+
+    content = b"WPILOG" + struct.pack("<HI", 0x0100, 5) + b"extra"
+    for number, (name, (kind, _)) in enumerate(entries.items(), start=1):
+        content += record(0, us[0], b"\0" + struct.pack("<I", number) + text(name) + text(kind) + text(""))
+    for k, stamp in enumerate(us):
+        content += b"".join(record(number, stamp, values[k]) for number, (_, values) in enumerate(entries.values(), 1))
+    path.write_bytes(content)
+    return path
+
+
+@maker
+def wpilog(folder: Path) -> Path:
+    columns = {"/T1_Nm": TORQUE_M1, "/T2_Nm": TORQUE_M2, "/n_rpm": RPM}
+    entries = {name: ("double", [struct.pack("<d", value) for value in of]) for name, of in columns.items()}
+    return wpilib_data_log(folder / "a.wpilog", entries, [4_000_000 + 10_000 * k for k in range(N)])
 
 
 @maker

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import re
+import struct
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
@@ -84,7 +86,53 @@ def test_a_dbc_that_does_not_describe_the_log_is_named(dbc: str, said: str, tmp_
         look(path, tmp_path / "other.dbc")
 
 
-@pytest.mark.parametrize("suffix", [".npz", ".npy", ".xlsx", ".feather", ".jsonl", ".tdms", ".mcap", ".blf", ".h5"])
+def test_a_data_log_has_arrays_whole_numbers_and_truth_and_may_be_cut(tmp_path: Path) -> None:
+    entries = {
+        "pair": ("double[]", [struct.pack("<2d", k, 10.0 * k) for k in range(4)]),
+        "count": ("int64", [struct.pack("<q", k) for k in range(4)]),
+        "on": ("boolean", [bytes([k % 2]) for k in range(4)]),
+        "said": ("string", [b"text"] * 4),
+    }
+    path = made.wpilib_data_log(tmp_path / "run.wpilog", entries, [100, 20_100, 40_100, 60_100])
+    path.write_bytes(path.read_bytes()[:-3])
+    table = read_table(path)
+    assert {name: column.tolist() for name, column in table.columns.items() if "time" not in name.lower()} == {
+        "pair[0]": [0.0, 1.0, 2.0, 3.0],
+        "pair[1]": [0.0, 10.0, 20.0, 30.0],
+        "count": [0.0, 1.0, 2.0, 3.0],
+        "on": [0.0, 1.0, 0.0, 1.0],
+    }
+
+
+def test_the_tests_of_sysid_are_read_in_the_order_of_their_times(tmp_path: Path) -> None:
+    tests = {"fast-forward": [[5.0, 7.0, 1.0, 2.0]], "slow-forward": [[1.0, 0.25, 0.0, 0.0], [1.02, 0.26, 0.1, 0.2]]}
+    (tmp_path / "run.json").write_text(json.dumps({"sysid": True, "test": "Simple", "units": "Rotations", **tests}))
+    table = read_table(tmp_path / "run.json")
+    assert table.columns["time_s"].tolist() == [1.0, 1.02, 5.0]
+    assert table.columns["voltage"].tolist() == [0.25, 0.26, 7.0]
+    assert table.columns["test"].tolist() == ["slow-forward", "slow-forward", "fast-forward"]
+    assert dict(table.units) == {"time_s": "s", "voltage": "V", "position": "rev", "velocity": "rev/s"}
+
+
+@pytest.mark.parametrize(
+    "suffix",
+    [
+        ".npz",
+        ".npy",
+        ".xlsx",
+        ".ods",
+        ".arrow",
+        ".gz",
+        ".json",
+        ".wpilog",
+        ".feather",
+        ".jsonl",
+        ".tdms",
+        ".mcap",
+        ".blf",
+        ".h5",
+    ],
+)
 @pytest.mark.parametrize("content", [b"", b"\x00" * 100, b"PK\x03\x04 no archive", bytes(range(256)) * 8])
 def test_what_is_no_such_file_is_refused(suffix: str, content: bytes, tmp_path: Path) -> None:
     path = tmp_path / f"a{suffix}"

@@ -89,7 +89,7 @@ def may_be_loose(shared: Shared, effects: Effects, model: DrivelineModel) -> boo
 
 
 def _is_tight(shared: Shared, model: DrivelineModel) -> bool:
-    return shared.low < shared.high <= 1.0 + model.parameters[shared.name].tolerance
+    return shared.low < shared.high <= 1.0 + model.parameters[shared.name].tolerance + ROUNDING
 
 
 def _spans(hypothesis: Hypothesis, model: DrivelineModel) -> dict[str, list[Span]]:

@@ -25,6 +25,7 @@ from estimator.physics.effect import Untestable
 from estimator.physics.fit import MOMENT_NAMES, FitResult, not_fitted
 from estimator.physics.jacobian import changes, jacobian_at
 from estimator.physics.layout import slot
+from estimator.physics.machine import out_of_question
 from estimator.physics.model import DrivelineModel, Motion
 from estimator.physics.motion import turns_on
 from estimator.physics.problem import Problem, bounds, own_part, simulated_each
@@ -53,17 +54,19 @@ def with_effect(effects: Effects, name: str) -> Effects:
 def open_hypotheses(model: DrivelineModel, records: Sequence[Record]) -> tuple[tuple[str, ...], dict[str, Untestable]]:
     """Sort the catalogue into effects that the recordings can tell and those they can't, with the reason.
 
-    Effects that make no sense in the model's structure or for such a motion, that act inside a plant simulated
-    elsewhere, or that the model already has, are in neither.
+    Effects that make no sense in the model's structure or for such a motion, of parts that the machine has not, that
+    act inside a plant simulated elsewhere, or that the model already has, are in neither.
     """
     testable, untestable = [], {}
+    impossible = out_of_question(model.has, records)
     for name in (*EFFECTS, *model.laws):
         entry = EFFECTS[name]
         fits = model.structure in entry.structures and all(record.kind in entry.kinds for record in records)
         turns = model.motion is Motion.ROTATION or not entry.phases
         swings = not (entry.swinging and turns_on(records))
         reached = model.plant is None or acts_around(entry, model.plant)
-        if not (fits and turns and swings and reached) or name in model.effects or entry.recognised:
+        possible = fits and turns and swings and reached and name not in impossible
+        if not possible or name in model.effects or entry.recognised:
             continue
         obstacle = entry.testable(model, records)
         if obstacle is None:

@@ -43,7 +43,8 @@ def free_line(search: Search) -> FreeLine | None:
     if not any(free and at_bound for free, at_bound in zip(trusted, nothing.pinned, strict=False)):
         return None
     freed = tuple(
-        replace(s, low=1.0 / FREELY, high=FREELY) if free else s for s, free in zip(shared, trusted, strict=True)
+        replace(s, low=min(s.low, 1.0 / FREELY), high=max(s.high, FREELY)) if free else s
+        for s, free in zip(shared, trusted, strict=True)
     )
     problem = replace(nothing.problem, shared=freed)
     sizes, hypotheses = search.nothing().sizes, len(search.names)

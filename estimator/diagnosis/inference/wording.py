@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from estimator.diagnosis.result import Effort, Fit, FoundEffect, OffNominal, Remainder, UntestableEffect, Verdict
+from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Element
 
 PLACE_NAMES: Mapping[Element, str] = {
@@ -124,7 +125,9 @@ def statement(
     if tests:
         names = ", ".join(entry.name for entry in context.untestable if not entry.needs)
         parts.append(f"Neither found nor excluded by these recordings: {names}. Record a {' or a '.join(tests)}.")
-    parts += [f"Neither found nor excluded without {e.needs}: {e.name}." for e in context.untestable if e.needs]
+    parts += [
+        f"Neither found nor excluded without {e.needs}: {EFFECTS[e.name].title}." for e in context.untestable if e.needs
+    ]
     return " ".join(parts)
 
 

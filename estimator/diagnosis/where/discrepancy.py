@@ -34,6 +34,7 @@ class Axis:
     name: str
     dimension: str
     values: Callable[[Motion, FitResult], FloatArray]
+    without: Callable[[Motion, FitResult], FloatArray] | None = None  # the torque there without the law, drawn with it
 
 
 def _twist_torque(motion: Motion, result: FitResult) -> FloatArray:
@@ -48,6 +49,21 @@ TWIST_RATE = Axis("twist rate", "speed", lambda m, _: m.speed - m.load_speed)
 ACCELERATION = Axis("acceleration", "speed/s", lambda m, _: np.gradient(m.speed, m.time_s))
 ANGLE = Axis("motor angle in its turn", "rad", lambda m, _: np.mod(m.angle, 2.0 * np.pi))
 TIME = Axis("time", "s", lambda m, _: m.time_s)
+
+TWIST = Axis("twist of the shaft", "angle", lambda m, _: m.twist, _twist_torque)
+READ_TORQUE = Axis("torque as read", "torque", lambda m, _: m.torque, lambda m, _: m.torque)
+
+OWN_AXES: Mapping[str, Axis] = {
+    **dict.fromkeys(("backlash", "stiffness_nonlinearity", "shaft_hysteresis"), TWIST),
+    **dict.fromkeys(("torque_saturation", "torque_nonlinearity"), READ_TORQUE),
+    **dict.fromkeys(
+        ("coulomb_friction_motor", "stribeck_friction", "quadratic_friction", "asymmetric_friction", "eddy_drag"),
+        MOTOR_SPEED,
+    ),
+    **dict.fromkeys(("coulomb_friction_load", "aerodynamic_drag"), LOAD_SPEED),
+}
+"""What a law is drawn over in every book: the whole torque of a shaft over its twist, what acts over what is read, and
+friction over the speed. All others are drawn over the signal that they are most nearly a function of."""
 
 AXES: Mapping[Element, tuple[Axis, ...]] = {
     Element.TORQUE_PATH: (TORQUE, MOTOR_SPEED, ANGLE, TIME),
@@ -145,7 +161,7 @@ def picture(
     kind: Kind,
     length: int,
 ) -> LawPicture | None:
-    """Return a law over the signal that it is most nearly a function of; None where it is a function of none."""
+    """Return a law over its own variable, or else over what it is most nearly a function of; None without either."""
     cut = lines(without, length=length)
     place = PLACES[element]
     found = explain(without, cut, place, floor)
@@ -156,13 +172,22 @@ def picture(
     law = [sign * smooth(line, place, found.rate, size, floor).value for line in difference]
     okay = [line.okay for line in cut]
     best: LawPicture | None = None
-    for axis in AXES[element]:
+    own = OWN_AXES.get(name)
+    for axis in AXES[element] if own is None else (own,):
         x = [axis.values(motion, without) for motion in motions]
-        binned = binned_by_pass(x, data, law, okay)
+        if axis.without is None:
+            binned = binned_by_pass(x, data, law, okay)
+        else:
+            base = [axis.without(motion, without) for motion in motions]
+            binned = binned_by_pass(x, _sums(data, base), _sums(law, base), okay)
         if binned is not None and (best is None or binned.explained > best.explained + 1e-9):
             labels = (name, element, axis.name, signal_unit(axis.dimension, kind), input_unit(place, without, kind))
             best = LawPicture(*labels, *binned.arrays, binned.explained)
-    return best if best is not None and best.explained >= FUNCTION else None
+    return best if best is not None and (own is not None or best.explained >= FUNCTION) else None
+
+
+def _sums(first: Sequence[FloatArray], second: Sequence[FloatArray]) -> list[FloatArray]:
+    return [a + b for a, b in zip(first, second, strict=True)]
 
 
 def _as_error(line: Line, difference: FloatArray) -> Line:

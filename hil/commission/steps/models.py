@@ -177,7 +177,7 @@ def _do_diagnosis(job: Job) -> Outcome:
 
     nominal, paths = nominal_of(job), explained(job)
     result = diagnose([record_of(path) for path in paths], nominal, (), job.progress)
-    _publish(job, result, nominal, provenance(recordings=paths))
+    _publish(job, result, nominal, provenance(recordings=paths, rig=job.rig.name))
     return Outcome(_findings_diagnosis(result), _evidence_diagnosis(result))
 
 
@@ -224,7 +224,7 @@ def _publish(job: Job, result: Diagnosis, nominal: DrivelineModel, made: Provena
 
 def _findings_diagnosis(result: Diagnosis) -> list[Finding]:
     from estimator.diagnosis.result import Verdict
-    from hil.report.wording import headline
+    from hil.report.wording import headline, title_of
 
     fit = result.fit
     advice = {
@@ -247,9 +247,9 @@ def _findings_diagnosis(result: Diagnosis) -> list[Finding]:
             f"{shown(fit.augmented, fit.unit)}, noise floor {shown(fit.noise_floor, fit.unit)}",
         ),
     ]
-    findings += [stated(f"found: {effect.name}", effect.statement) for effect in result.effects]
+    findings += [stated(f"found: {title_of(effect.name)}", effect.statement) for effect in result.effects]
     findings += [
-        Finding(f"can't tell: {each.name}", "–", each.reason, None, f"{each.cure[0].upper()}{each.cure[1:]}.")
+        Finding(f"can't tell: {title_of(each.name)}", "–", each.reason, None, f"{each.cure[0].upper()}{each.cure[1:]}.")
         for each in result.untestable
     ]
     return findings

@@ -11,6 +11,7 @@ from estimator.physics.effects.torque import ORDERS
 from estimator.physics.fit import fit
 from estimator.physics.free_run import free_run
 from estimator.physics.layout import flat, grid_for, slot
+from estimator.physics.model import Parameter
 from estimator.physics.problem import make_problem
 from estimator.physics.simulate import simulate
 from estimator.physics.unknowns import effect_unknowns, local_basis, nominal_unknowns, released
@@ -28,6 +29,48 @@ def test_nominal_unknowns_stay_within_their_tolerance() -> None:
         assert shared.scale * shared.high == pytest.approx(1.3 * TWO_MASS[name])
         assert shared.scale * shared.start == TWO_MASS[name]
         assert shared.slot == slot("", name)
+
+
+@pytest.mark.parametrize(
+    ("name", "given", "low", "high"),
+    [
+        ("J_L", Parameter(99.0, ci95=(62.0, 136.0)), 62.0, 136.0),  # measured: the interval
+        ("b_M", Parameter(0.0, ci95=(0.0, 3.1)), 0.0, 31.0),  # nothing known: none, or ten times what is possible
+        ("b_M", Parameter(0.4, ci95=(-0.2, 1.0)), 0.0, 10.0),
+        ("c", Parameter(8.0, ci95=(2.0, 14.0)), 0.0, 140.0),  # wider than its value
+        ("k", Parameter(4000.0, ci95=(1000.0, 7000.0)), 100.0, 70000.0),  # never none
+        ("k", Parameter(4000.0, ci95=(-1.0, 7000.0)), 400.0, 70000.0),
+    ],
+)
+def test_a_measured_parameter_is_fitted_within_its_interval_and_an_unknown_one_freely(
+    name: str, given: Parameter, low: float, high: float
+) -> None:
+    line = model(TWO_MASS)
+    (shared,) = (
+        each
+        for each in nominal_unknowns(replace(line, parameters={**line.parameters, name: given}))
+        if each.name == name
+    )
+    assert shared.scale * shared.low == pytest.approx(low)
+    assert shared.scale * shared.high == pytest.approx(high)
+    assert shared.scale * shared.start == pytest.approx(given.value)
+
+
+def test_friction_that_was_measured_as_none_is_found_from_there() -> None:
+    line = model(TWO_MASS)
+    rec = linear_record(TWO_MASS, random_steps(2000, seed=1), CRUISE)
+    unsure = replace(line, parameters={**line.parameters, "b_M": Parameter(0.0, ci95=(0.0, 3.1))})
+    found = fit(make_problem(unsure, [rec], nominal_unknowns(unsure)))
+    assert found.value("", "b_M") == pytest.approx(TWO_MASS["b_M"], rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("half_width", "expected"), [(0.1, (1.6, 2.4)), (1.0, (1.0, 3.0)), (5.0, (0.0, 7.0)), (np.inf, (0.0, 22.0))]
+)
+def test_a_measured_value_is_trusted_to_its_interval_and_to_no_less_than_a_share(
+    half_width: float, expected: tuple[float, float]
+) -> None:
+    assert Parameter.measured(2.0, half_width, 0.2).ci95 == pytest.approx(expected)
 
 
 def test_an_effect_has_unknowns_once_per_start() -> None:

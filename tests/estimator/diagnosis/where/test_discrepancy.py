@@ -10,13 +10,16 @@ import pytest
 from estimator.diagnosis.inference.hypotheses import NOTHING, everything
 from estimator.diagnosis.unnamed.scene import scene
 from estimator.diagnosis.unnamed.search import ROUNDS, searches_at
-from estimator.diagnosis.where.discrepancy import discrepancy, effects_added, without_effect
+from estimator.diagnosis.where.discrepancy import _pictures_of_effects, discrepancy, effects_added, without_effect
 from estimator.diagnosis.where.locate import error_spectrum, responses
 from estimator.physics.driveline import Start
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult, fit
+from estimator.physics.layout import flat_values, grid_for
 from estimator.physics.model import Motion
 from estimator.physics.problem import make_problem
+from estimator.physics.simulate import simulate
+from estimator.physics.unknowns import effect_unknowns
 from tests.estimator.diagnosis.plain import Bench
 from tests.estimator.diagnosis.planted import SIGMA, drive_torque, nominal_fit, quiet, recordings, rubbing
 from tests.estimator.physics.bench import ONE_MASS, TWO_MASS, linear_record, model
@@ -59,6 +62,22 @@ class TestPicture:
         shape = picture.x * np.abs(picture.x)
         bent = [y - np.polyval(np.polyfit(picture.x, y, 1), picture.x) for y in (picture.data, shape)]
         assert np.corrcoef(bent[0], bent[1])[0, 1] > 0.9
+
+
+def test_a_gap_is_drawn_as_the_torque_of_the_shaft_over_its_twist_with_its_dead_zone() -> None:
+    gap_rad, line = 0.02, model(TWO_MASS)
+    k, p = TWO_MASS["k"], flat_values(TWO_MASS, {"backlash": {"gap_rad": gap_rad}})
+    drive = linear_record(TWO_MASS, drive_torque(1, 3000), START, sigma=SIGMA, seed=4)
+    noise = SIGMA * np.random.default_rng(4).standard_normal(drive.output.size)
+    with_gap = replace(drive, output=simulate(grid_for(line, [drive]), drive, p, START) + noise)
+    final = fit(make_problem(line, [with_gap], effect_unknowns("backlash", line, [with_gap])[1].shared))
+    (picture,) = _pictures_of_effects(("backlash",), final, SIGMA, Motion.ROTATION)
+    assert (picture.signal, picture.signal_unit, picture.unit) == ("twist of the shaft", "rad", "Nm")
+    beyond = np.abs(picture.x) - 0.5 * gap_rad
+    outside = beyond > 0.3 * gap_rad
+    assert outside.sum() >= 4
+    np.testing.assert_allclose(picture.law[outside], (k * beyond * np.sign(picture.x))[outside], rtol=0.3)
+    assert np.abs(picture.law[np.abs(picture.x) < 0.3 * gap_rad]).max() < 0.2 * k * gap_rad
 
 
 class TestEffects:
