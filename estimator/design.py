@@ -21,7 +21,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from estimator.diagnosis.assemble import Z95
+from estimator.diagnosis.assemble import Z95, moved_values
 from estimator.diagnosis.first_use import compile_kernels, is_first_use
 from estimator.diagnosis.inference.answer import Found, answer
 from estimator.diagnosis.inference.checks import ALIKE_WITHIN, GRADE, LEAST_PROBABILITY, TEMPERED
@@ -196,12 +196,7 @@ def _supposed(known: Open, name: str) -> Untested | None:
     begun = extended(problem, warm_start(problem, result), result)
     settled = descended(begun, whitener_of(begun, first.fit.sizes), SUPPOSED)
     fit_with = replace(first.fit, effects=first.effects | {name}, result=settled)
-    spread = np.sqrt(np.diag(covariance(first.fit)))
-    moves = {
-        each.name: float(settled.x[i] / result.x[i] - 1.0)
-        for i, each in enumerate(result.problem.shared)
-        if spread[i] > 0.0 and result.x[i] != 0.0 and abs(settled.x[i] - result.x[i]) > Z95 * spread[i]
-    }
+    moves = moved_values(first.fit, settled)
     candidate = Candidate(name_of(fit_with.effects), math.nan, fit_with, np.zeros((len(problem.shared),) * 2))
     nulls = {each.name: each.null for each in EFFECTS[name].parameters}
     values = settled.values_of(name)

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from estimator.diagnosis.acquisition.chain import Chain, mechanical, read_through
-from estimator.diagnosis.assemble import augmented_model, load_torques, retuned_parameters
+from estimator.diagnosis.assemble import augmented_model, load_torques, moved_values, retuned_parameters
 from estimator.diagnosis.inference.checks import Test, tests, tests_in_words
 from estimator.diagnosis.inference.disturbances import reading_noise
 from estimator.diagnosis.inference.figures import (
@@ -37,6 +37,7 @@ from estimator.diagnosis.inference.hypotheses import (
     silent,
 )
 from estimator.diagnosis.inference.judge import (
+    Belief,
     Decision,
     Grounds,
     decide,
@@ -238,10 +239,10 @@ def _said(seen: _Seen, runs: FreeRuns, search: Search, model: DrivelineModel, le
     traces = (*decision.traces,) if verdict is not Verdict.UNEXPLAINED else ()
     named = {each.name for each in effects} | {each.name for each in traces}
     named |= {name for each in effects for name in each.indistinguishable_from}
-    slight = tuple(Slight(each.name, each.share, decision.best.result.values_of(each.name)) for each in traces)
+    slight = tuple(_slight(each, decision.best, search) for each in traces)
     context = Context(
         remainder,
-        [each.name for each in traces],
+        slight,
         seen.off_nominal,
         blind,
         can_be_retuned(line),
@@ -267,6 +268,12 @@ def _said(seen: _Seen, runs: FreeRuns, search: Search, model: DrivelineModel, le
         slight=slight,
         effort=effort,
     )
+
+
+def _slight(trace: Belief, best: Hypothesis, search: Search) -> Slight:
+    """Return a trace; without it some values are others, though the error hardly is."""
+    without = search.without(best, trace.name)
+    return Slight(trace.name, trace.share, best.result.values_of(trace.name), moved_values(best, without.result))
 
 
 def can_be_retuned(line: DrivelineModel) -> bool:
