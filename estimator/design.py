@@ -5,21 +5,27 @@ held by what earlier recordings say of them, move to where the innovations are l
 expected difference of scores (T-optimality: Atkinson and Fedorov, Biometrika 62, 1975; Box and Hill, Technometrics 9,
 1967). Around a fit the information about its unknowns is that of its whitened derivative (D-optimality; Goodwin and
 Payne, Dynamic System Identification, 1977).
+
+An effect that the recordings so far can neither show nor exclude is supposed in the size at which a fit of it begins,
+the other unknowns fitted to these recordings. How far that moves the values that are told is what may be wrong with
+them; an experiment shows the effect if the recordings and it together can, and tell the supposed line from the one
+without.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from estimator.diagnosis.assemble import Z95
+from estimator.diagnosis.assemble import Z95, moved_values
 from estimator.diagnosis.first_use import compile_kernels, is_first_use
 from estimator.diagnosis.inference.answer import Found, answer
 from estimator.diagnosis.inference.checks import THRESHOLDS
+from estimator.diagnosis.inference.descent import Effort, descended, extended
 from estimator.diagnosis.inference.disturbances import whitener_of
 from estimator.diagnosis.inference.hypotheses import (
     GRADE,
@@ -27,22 +33,23 @@ from estimator.diagnosis.inference.hypotheses import (
     Hypothesis,
     Progress,
     covariance,
+    kept,
     line_values,
     of_first_outputs,
     silent,
 )
 from estimator.diagnosis.inference.standing import ALIKE_WITHIN
 from estimator.diagnosis.preconditions.prepare import prepare
-from estimator.diagnosis.result import Diagnosis
+from estimator.diagnosis.result import Diagnosis, Verdict
 from estimator.physics.catalogue import EFFECTS
-from estimator.physics.fit import FitResult, fit
+from estimator.physics.fit import FitResult, fit, warm_start
 from estimator.physics.jacobian import jacobian_at
 from estimator.physics.layout import grid_for
 from estimator.physics.model import DrivelineModel, EffectValue, parameter_unit
 from estimator.physics.parallel import Work
 from estimator.physics.problem import make_problem, parameters
 from estimator.physics.simulate import MASSES
-from estimator.physics.unknowns import Shared, own_unknowns
+from estimator.physics.unknowns import Shared, effect_unknowns, own_unknowns
 from estimator.signals.record import FloatArray, Record
 
 MOST_OPEN = 4
@@ -53,6 +60,11 @@ TEMPERED: float = THRESHOLDS["odds"]["tempered"]
 """By which differences of scores are divided: laws of nature are written in other forms than the model's."""
 
 LEAST_PROBABILITY = 0.9  # odds from which one hypothesis is enough
+
+STANDS = 0.05
+"""Probability from which another explanation stands against the verdict: what one in twenty would be wrong by."""
+
+SUPPOSED = Effort(derivatives=2, steps=6)  # of a fit of what is nearly a change of the other unknowns
 
 MOST_LOG_ODDS = 700.0  # largest logarithm of odds that is given: its exponential is still a number
 
@@ -73,6 +85,16 @@ class Candidate:
 
 
 @dataclass(frozen=True, slots=True)
+class Untested:
+    """An effect that recordings can neither show nor exclude, in the size at which a fit of it begins."""
+
+    name: str
+    size: Mapping[str, float]  # values of its parameters, where they are not those at which the law does nothing
+    supposed: Candidate  # the most probable hypothesis with it, its other unknowns fitted to the recordings
+    moves: Mapping[str, float]  # values told that leave their 95 % intervals with it: by what share of themselves
+
+
+@dataclass(frozen=True, slots=True)
 class Open:
     """What recordings leave open."""
 
@@ -80,11 +102,29 @@ class Open:
     candidates: tuple[Candidate, ...]  # the most probable first
     twins: Mapping[str, tuple[str, ...]]
     untested: tuple[str, ...]  # effects that these recordings can neither show nor exclude, and others could
+    supposed: Mapping[str, Untested] = field(default_factory=dict)  # those of them that have a size to suppose
+    named: Effects | None = None  # what the verdict names; None where it leaves something without a name
+    traces: Effects = frozenset()  # seen, and too small to matter: with or without them, the verdict is the same
+
+    @property
+    def records(self) -> tuple[Record, ...]:
+        """The recordings so far, by their first outputs."""
+        return self.candidates[0].fit.result.problem.records
+
+    @property
+    def against(self) -> tuple[Candidate, ...]:
+        """Explanations other than the verdict's that are too probable for it to stand."""
+        return tuple(
+            each
+            for each in self.candidates
+            if each.probability > STANDS and each.effects - self.traces != (self.named or frozenset()) - self.traces
+        )
 
     @property
     def is_decided(self) -> bool:
-        """Whether one hypothesis is as probable as what a diagnosis names."""
-        return len(self.candidates) == 1 or self.candidates[0].probability >= LEAST_PROBABILITY
+        """Whether the verdict explains the recordings, and no other explanation stands against it."""
+        has_twins = any(name in self.twins for name in self.candidates[0].effects)
+        return self.named is not None and not self.against and not has_twins
 
 
 def left_open(
@@ -95,34 +135,76 @@ def left_open(
     if masses and is_first_use(masses):
         progress("preparing", 0.0)
         compile_kernels(masses)
-    kept: list[Found] = []
+    kept_of: list[Found] = []
     with threadpool_limits(1, user_api="blas"):
         ready = prepare(records, model)
-        diagnosis = ready.finished(answer(ready, model, progress, effort, Work(), kept.append))
-    untested = tuple(each.name for each in diagnosis.untestable if not each.needs)
-    return _open(kept[0], untested), diagnosis
+        diagnosis = ready.finished(answer(ready, model, progress, effort, Work(), kept_of.append))
+        untested = tuple(each.name for each in diagnosis.untestable if not each.needs)
+        known = _open(kept_of[0], untested, diagnosis)
+        each_supposed = {name: _supposed(known, name) for name in untested}
+    return replace(known, supposed={name: each for name, each in each_supposed.items() if each}), diagnosis
 
 
-def _open(found: Found, untested: tuple[str, ...]) -> Open:
-    search, best = found.search, found.decision.judged.believed.hypothesis
+def _open(found: Found, untested: tuple[str, ...], diagnosis: Diagnosis) -> Open:
+    """Return the verdict's set and those as probable that do not simulate worse; none counts for more than it does."""
+    search, judged = found.search, found.decision.judged
+    best = judged.believed.hypothesis
     within = max(ALIKE_WITHIN, 2.0 * TEMPERED * math.log(1.0 / (1.0 - LEAST_PROBABILITY)))
     near = {
         each.effects: each
         for each in search.visited.values()
-        if search.is_plausible(each) and each.score - best.score < within and not _holds(each.effects, best.effects)
+        if search.is_plausible(each)
+        and each.score - best.score < within
+        and not _holds(each.effects, best.effects)
+        and not (each.effects in judged.tried and judged.believed.beats(judged.tried[each.effects]))
     } | {best.effects: best}
+    behind = {effects: max(each.score - best.score, 0.0) for effects, each in near.items()}
     ordered: list[Hypothesis] = []
-    for each in sorted(near.values(), key=lambda each: (each.score, sorted(each.effects))):
-        if len(ordered) < MOST_OPEN and not any(_are_twins(each, other) for other in ordered):
-            ordered.append(each)
-    weights = np.exp([-0.5 * (each.score - ordered[0].score) / TEMPERED for each in ordered])
+    for effects in sorted(near, key=lambda effects: (behind[effects], effects != best.effects, sorted(effects))):
+        if len(ordered) < MOST_OPEN and not any(_are_twins(near[effects], other) for other in ordered):
+            ordered.append(near[effects])
+    weights = [math.exp(-0.5 * behind[each.effects] / TEMPERED) for each in ordered]
+    is_made = diagnosis.verdict in (Verdict.EXPLAINED, Verdict.NO_MISMATCH)
+    named = frozenset(each.name for each in diagnosis.effects if not EFFECTS[each.name].recognised)
+    traces = frozenset(each.name for each in diagnosis.slight)
+    total = sum(weights)
     candidates = tuple(
-        Candidate(name_of(each.effects), float(weight), of_first_outputs(each), _precision(of_first_outputs(each)))
-        for each, weight in zip(ordered, weights / weights.sum(), strict=True)
+        Candidate(name_of(each.effects), weight / total, of_first_outputs(each), _precision(of_first_outputs(each)))
+        for each, weight in zip(ordered, weights, strict=True)
     )
     names = sorted({name for each in candidates for name in each.effects})
     twins = {name: tuple(EFFECTS[name].equivalent) for name in names if EFFECTS[name].equivalent}
-    return Open(search.model, candidates, twins if best.outputs == 1 else {}, untested)
+    return Open(
+        search.model,
+        candidates,
+        twins if best.outputs == 1 else {},
+        untested,
+        named=named if is_made else None,
+        traces=traces,
+    )
+
+
+def _supposed(known: Open, name: str) -> Untested | None:
+    """Suppose an untested effect next to the most probable hypothesis; None of a profile, which has no size."""
+    first, line = known.candidates[0], known.line
+    result, release = first.fit.result, effect_unknowns(name, line, known.records)[0]
+    if not release.shared or GRADE in first.effects:
+        return None
+    held = tuple(replace(each, low=each.start, high=each.start) for each in release.shared)
+    before = kept(result, first.effects | set(line.effects))
+    own = [
+        (*old, *(_throughout(each, record) for each in mine))
+        for old, mine, record in zip(before.own, release.own, known.records, strict=True)
+    ]
+    problem = make_problem(line, known.records, (*before.shared, *held), own=own, use=result.problem.use)
+    begun = extended(problem, warm_start(problem, result), result)
+    settled = descended(begun, whitener_of(begun, first.fit.sizes), SUPPOSED)
+    fit_with = replace(first.fit, effects=first.effects | {name}, result=settled)
+    moves = moved_values(first.fit, settled)
+    candidate = Candidate(name_of(fit_with.effects), math.nan, fit_with, np.zeros((len(problem.shared),) * 2))
+    nulls = {each.name: each.null for each in EFFECTS[name].parameters}
+    values = settled.values_of(name)
+    return Untested(name, {key: x for key, x in values.items() if x != nulls[key]}, candidate, moves)
 
 
 def _are_twins(one: Hypothesis, other: Hypothesis) -> bool:
@@ -243,8 +325,21 @@ def expected(known: Open, record: Record) -> Expected:
 
 
 def shown(known: Open, record: Record) -> tuple[str, ...]:
-    """Return the effects that no recording so far could show, and an experiment on paper would."""
-    return tuple(name for name in known.untested if EFFECTS[name].testable(known.line, [record]) is None)
+    """Return the effects that no recording so far could show, and all of them with an experiment on paper would.
+
+    One that has a size to suppose has to change the odds by as much as a diagnosis asks for.
+    """
+    least = 2.0 * TEMPERED * math.log(LEAST_PROBABILITY / (1.0 - LEAST_PROBABILITY))
+    together = [*known.records, record]
+    return tuple(
+        name
+        for name in known.untested
+        if EFFECTS[name].testable(known.line, together) is None
+        and (
+            name not in known.supposed
+            or distance(known.supposed[name].supposed, known.candidates[0], known.line, record) > least
+        )
+    )
 
 
 @dataclass(frozen=True, slots=True)

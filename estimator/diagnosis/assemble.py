@@ -10,7 +10,8 @@ from functools import partial
 import numpy as np
 
 from estimator.diagnosis.acquisition.chain import Chain
-from estimator.diagnosis.inference.hypotheses import line_values
+from estimator.diagnosis.inference.hypotheses import Hypothesis, line_values
+from estimator.diagnosis.inference.hypotheses import covariance as of_innovations
 from estimator.diagnosis.noise import gain_from_squares, residuals_by_record, unpredictable
 from estimator.diagnosis.result import Estimated, Evidence, FoundEffect, Interval, Profile, Retuned
 from estimator.physics.catalogue import EFFECTS
@@ -281,6 +282,23 @@ def profile_size(result: FitResult, cov: FloatArray, model: DrivelineModel) -> d
     spread = float(np.sqrt(np.mean(half**2) / max(len(value), 1)))
     name = ROAD_GRADE.parameters[0].name
     return {name: Estimated(size, (max(size - spread, 0.0), size + spread), unit("torque", model.motion))}
+
+
+def moved_values(of: Hypothesis, other: FitResult) -> dict[str, float]:
+    """Return by what share of itself each shared value of a hypothesis is another in another fit.
+
+    Of those that are outside of their 95 % intervals there.
+    """
+    spread, result = np.sqrt(np.diag(of_innovations(of))), of.result
+    there = {(each.effect, each.name): i for i, each in enumerate(other.problem.shared)}
+    moved = {}
+    for i, each in enumerate(result.problem.shared):
+        j = there.get((each.effect, each.name))
+        if j is not None and spread[i] > 0.0 and result.x[i] != 0.0:
+            value = other.x[j] * other.problem.shared[j].scale / each.scale
+            if abs(value - result.x[i]) > Z95 * spread[i]:
+                moved[f"{each.effect}.{each.name}" if each.effect else each.name] = float(value / result.x[i] - 1.0)
+    return moved
 
 
 def retuned_parameters(result: FitResult, model: DrivelineModel, whole: bool) -> dict[str, Retuned]:

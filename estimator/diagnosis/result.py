@@ -145,6 +145,7 @@ class Slight:
     name: str
     share: float
     parameters: Mapping[str, float]
+    moves: Mapping[str, float] = field(default_factory=dict)  # values that leave their intervals without it: share
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,17 +1,20 @@
 """Frequency response without a model, to hold the models against.
 
-*Local polynomial method*, for any torque. The discrete Fourier transforms of one unbroken stretch obey (R. Pintelon and
+*Local rational method*, for any torque. The discrete Fourier transforms of one unbroken stretch obey (R. Pintelon and
 J. Schoukens, System Identification: A Frequency Domain Approach, 2nd ed., 2012, chapter 7)::
 
     Y(k) = G(k) U(k) + T(k) + V(k)
 
-with T the transform of begin and end of the stretch: leakage. G and T are smooth in frequency, U is not, so that around
-each frequency both are polynomials of degree R over 2n + 1 lines, found by least squares::
+with T the transform of begin and end of the stretch: leakage. U is not smooth in frequency; around each frequency G and
+T are, but for a pole of the line nearby, which both have. Over 2n + 1 lines they are polynomials of degree R over one
+pole in common, ``1 + p r``, found by least squares (T. McKelvey and G. Guérin, 16th IFAC Symposium on System
+Identification, 2012)::
 
-    Y(r) = U(r) (G + g_1 r + .. + g_R r^R) + (T + t_1 r + .. + t_R r^R) + V(r)
-    var V = sum |residual|^2 / (2n + 1 - 2 (R + 1)),      var G = var V [(K^H K)^-1]_11
+    Y(r) = U(r) (G + g_1 r + .. + g_R r^R) + (T + t_1 r + .. + t_R r^R) - p r Y(r) + V(r)
+    var V = sum |residual|^2 / (2n + 1 - 2 (R + 1) - 1),      var G = var V [(K^H K)^-1]_11
 
-There is no window, hence no blurred peak. Stretches between long gaps are averaged by their variances.
+There is no window, and a peak narrower than the 2n + 1 lines is not blurred: with polynomials alone its height was low
+by up to 1.3 dB at a damping ratio of 0.027. Stretches between long gaps are averaged by their variances.
 
 *Periodic torque* (ibid., chapters 3 and 4): at the lines of the period the response is that of the mean over the
 periods, and its variance that of their scatter. Lines that carry no torque detect distortion: at even lines an even one
@@ -34,13 +37,13 @@ from estimator.signals.record import BoolArray, FloatArray, IntArray, Record
 DEGREE = 2
 """R. The usual choice: odd terms cancel at the middle line, so that the bias is that of a fourth-order term."""
 
-COLUMNS = 2 * (DEGREE + 1)
+COLUMNS = 2 * (DEGREE + 1) + 1
 
 HALF_WIDTH_HZ = 0.2
 """Half of what the polynomials span: the half-power band of a resonance of 8 Hz with 5 % damping is 0.8 Hz."""
 
 FEWEST_NEIGHBOURS = 6
-"""Lines to either side at least: of 13 lines 7 are left for the variance."""
+"""Lines to either side at least: of 13 lines 6 are left for the variance."""
 
 SHORT_S = 0.03
 """Gaps up to this long are bridged by straight lines [s]: under a quarter of a period at 8 Hz, a resonance's."""
@@ -196,7 +199,7 @@ def _neighbours(duration_s: float) -> int:
 
 
 def _local(u: FloatArray, y: FloatArray, frequency_hz: FloatArray, period_s: float) -> _Local:
-    """Fit the polynomials around each frequency; near either end of the band their lines lie to one side."""
+    """Fit polynomials and pole around each frequency; near either end of the band their lines lie to one side."""
     n = u.shape[0]
     half, lines = _neighbours(n * period_s), (n - 1) // 2
     half = min(half, (lines - 1) // 2)
@@ -206,8 +209,9 @@ def _local(u: FloatArray, y: FloatArray, frequency_hz: FloatArray, period_s: flo
     first = np.clip(np.rint(at).astype(np.int64) - half, 0, lines - width)
     around = first[:, np.newaxis] + np.arange(width)
     powers = ((around - at[:, np.newaxis]) / half)[:, :, np.newaxis] ** np.arange(DEGREE + 1)
-    scale = np.sqrt(np.mean(np.abs(U[around]) ** 2, axis=1, keepdims=True) + np.finfo(np.float64).tiny)
-    K = np.concatenate([(U[around] / scale)[:, :, np.newaxis] * powers, powers.astype(np.complex128)], axis=2)
+    scale = _size(U[around])
+    pole = powers[:, :, 1:2] * (Y[around] / _size(Y[around]))[:, :, np.newaxis]
+    K = np.concatenate([(U[around] / scale)[:, :, np.newaxis] * powers, powers.astype(np.complex128), pole], axis=2)
     KH = K.conj().transpose(0, 2, 1)
     inverse = np.linalg.pinv(KH @ K, hermitian=True)
     theta = (inverse @ (KH @ Y[around][:, :, np.newaxis]))[:, :, 0]
@@ -218,6 +222,11 @@ def _local(u: FloatArray, y: FloatArray, frequency_hz: FloatArray, period_s: flo
     variance = noise * inverse[:, 0, 0].real / scale[:, 0] ** 2
     variance[inverse[:, 0, 0].real <= 0.0] = np.inf
     return _Local(G, variance, noise / n, np.abs(theta[:, 0]) ** 2 / n, freedom)
+
+
+def _size(X: ComplexArray) -> FloatArray:
+    """Return the RMS magnitude of each row, shape (M, 1); never zero."""
+    return np.asarray(np.sqrt(np.mean(np.abs(X) ** 2, axis=1, keepdims=True) + np.finfo(np.float64).tiny))
 
 
 def _averaged(

@@ -93,19 +93,25 @@ class Design:
     @property
     def is_worth_driving(self) -> bool:
         """Whether it tells enough to take the vehicle out."""
+        if self.aim is Aim.DECIDE and self.shows:
+            return True
         if self.aim is Aim.DECIDE and self.decides is None:
-            return bool(self.shows)
+            return False
         return self.factor >= (WORTH if self.decides is not None else 1.0 + WIDE)
 
 
 def designed(source: RigSource, known: Open, aim: Aim, progress: Progress) -> Design:
-    """Choose the next experiment for a rig."""
+    """Choose the next experiment for a rig.
+
+    To decide, it is one that decides between explanations, where any does; of these the one that shows most of what no
+    recording so far could. Where none decides, or nothing is to be decided between, it is the one that shows most.
+    """
     rig = source.rig()
     limits = Limits.of(rig)
     model = as_model(known.candidates[0], known.line)
-    found: list[tuple[float, Planned, Expected | None]] = []
+    found: list[_Judged] = []
     refused: dict[str, str] = {}
-    wanted, is_single = list(candidates(rig, limits)), aim is Aim.DECIDE and len(known.candidates) == 1
+    wanted = list(candidates(rig, limits))
     with threadpool_limits(1, user_api="blas"):
         for i, (name, table) in enumerate(wanted):
             progress(f"on paper: {name}", i / len(wanted))
@@ -114,13 +120,7 @@ def designed(source: RigSource, known: Open, aim: Aim, progress: Progress) -> De
             except (InputError, CommandRefused, RunAborted) as error:
                 refused[name] = str(error)
                 continue
-            decides = expected(known, planned.record) if aim is Aim.DECIDE and not is_single else None
-            if decides is not None:
-                found.append((decides.right, planned, decides))
-            elif is_single:
-                found.append((float(len(shown(known, planned.record))), planned, None))
-            else:
-                found.append((_shortened(_widths(known, planned)), planned, None))
+            found.append(_judged(known, planned, aim))
     progress("designed", 1.0)
     if not found:
         why = next(iter(refused.values()))
@@ -128,18 +128,61 @@ def designed(source: RigSource, known: Open, aim: Aim, progress: Progress) -> De
             f"rig {rig.name!r}: expected an experiment that it may drive, got none: of {len(wanted)} none passes its "
             f"limits, the first because: {why}"
         )
-    found.sort(key=lambda each: -each[0])
-    enough = found[0][0] - NEARLY if found[0][2] is not None else found[0][0] * (1.0 - NEARLY)
-    near = [each for each in found if each[0] >= enough]
-    _, planned, decides = min(near, key=lambda each: each[1].seconds)
-    others = tuple((each.name, value) for value, each, _ in found if each is not planned)
-    key, shows = free_key(list(rig.experiments)), shown(known, planned.record) if is_single else ()
-    return Design(aim, key, planned, decides, _widths(known, planned), shows, others, refused)
+    decide = [each for each in found if each.decides is not None and each.decides.factor >= WORTH]
+    shows = [each for each in found if each.shows]
+    chosen = _best(decide) if decide else max(shows, key=_most_shown) if shows else _best(found)
+    decides = chosen.decides if decide or not shows else None
+    others = tuple((each.planned.name, each.value(decides)) for each in found if each is not chosen)
+    return Design(
+        aim,
+        free_key(list(rig.experiments)),
+        chosen.planned,
+        decides,
+        _widths(known, chosen.planned),
+        chosen.shows,
+        tuple(sorted(others, key=lambda each: -each[1])),
+        refused,
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _Judged:
+    """An experiment on paper, and what it tells."""
+
+    planned: Planned
+    decides: Expected | None
+    shows: tuple[str, ...]
+    shortened: float  # factor by which wide intervals shorten; NaN where that is not asked
+
+    def value(self, decides: Expected | None) -> float:
+        """Return what it is compared by: probability of the true explanation, effects shown, or shorter intervals."""
+        if decides is not None and self.decides is not None:
+            return self.decides.right
+        return float(len(self.shows)) if math.isnan(self.shortened) else self.shortened
+
+
+def _judged(known: Open, planned: Planned, aim: Aim) -> _Judged:
+    if aim is Aim.PARAMETERS:
+        return _Judged(planned, None, (), _shortened(_widths(known, planned)))
+    is_single = len(known.candidates) == 1 or known.is_decided
+    decides = None if is_single else expected(known, planned.record)
+    return _Judged(planned, decides, shown(known, planned.record), math.nan)
+
+
+def _best(judged: Sequence[_Judged]) -> _Judged:
+    """Return the one that tells most; of those that tell nearly as much, what shows most, in the shortest drive."""
+    values = [each.value(each.decides) for each in judged]
+    enough = max(values) - NEARLY * (1.0 if judged[0].decides is not None else max(values))
+    return max((each for each, value in zip(judged, values, strict=True) if value >= enough), key=_most_shown)
+
+
+def _most_shown(judged: _Judged) -> tuple[int, float]:
+    return len(judged.shows), -judged.planned.seconds
 
 
 def is_needed(known: Open, aim: Aim) -> bool:
     """Tell whether there is anything that an experiment could tell."""
-    return aim is Aim.PARAMETERS or len(known.candidates) > 1 or bool(known.untested)
+    return aim is Aim.PARAMETERS or bool(known.untested) or (len(known.candidates) > 1 and not known.is_decided)
 
 
 def _widths(known: Open, planned: Planned) -> tuple[Width, ...]:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import tomlkit
 
-from estimator.design import Open, Width
+from estimator.design import Open, Width, name_of
 from hil.design.design import WORTH, Aim, Design, Planned
 from hil.figures.drawn import drawing, require_matplotlib
 
@@ -32,13 +32,28 @@ def question_lines(known: Open) -> Iterator[str]:
     else:
         yield "The recordings leave open, with the odds of each among these:"
         yield from (f"  {each.name:40} {each.probability:.3f}" for each in known.candidates)
+    for each in known.against if known.named is not None else ():
+        yield (
+            f"  The verdict names {name_of(known.named or frozenset())}; with odds of {each.probability:.3f} it is "
+            f"{each.name}: not decided."
+        )
     if known.untested:
         yield f"  Neither found nor excluded so far: {', '.join(known.untested)}."
+    yield from (f"  {condition}." for condition in conditions(known))
     for name, twins in known.twins.items():
         yield (
             f"  {name} and {' and '.join(twins)} are the same linear system by this output: no experiment "
             "distinguishes them. Measure another output, such as the load's speed."
         )
+
+
+def conditions(known: Open) -> Iterator[str]:
+    """Say what the values told take for granted: that what was not tested is not there."""
+    for name, each in known.supposed.items():
+        if each.moves:
+            size = ", ".join(f"{parameter} = {value:.3g}" for parameter, value in each.size.items())
+            moved = ", ".join(f"{value} by {100.0 * share:+.2g} %" for value, share in each.moves.items())
+            yield f"as if without {name}, which no recording could show: {size} would move {moved}"
 
 
 def design_lines(known: Open, design: Design) -> Iterator[str]:
@@ -56,11 +71,11 @@ def design_lines(known: Open, design: Design) -> Iterator[str]:
             f"  expected: the odds change by a factor of {_factor(design.factor)}; the true one then has a probability "
             f"of {design.decides.right:.3f} in the mean, now {now:.3f}"
         )
-    elif design.shows:
-        yield f"  shows what no recording so far could: {', '.join(design.shows)}"
-    else:
+    elif not design.shows:
         yield f"  expected: intervals that are wide become shorter by a factor of {_factor(design.factor)}"
         yield from (f"    {line}" for line in width_lines(design.widths))
+    if design.shows:
+        yield f"  shows what no recording so far could: {', '.join(design.shows)}"
     if not design.is_worth_driving:
         yield f"  {obstacle(design)}"
     others = ", ".join(f"{name} ({_value(value, design)})" for name, value in design.others[:LISTED])
@@ -115,6 +130,7 @@ def design_document(known: Open, design: Design | None, aim: Aim) -> dict[str, A
         "hypotheses": [{"effects": sorted(each.effects), "probability": each.probability} for each in known.candidates],
         "same_by_this_output": {name: list(twins) for name, twins in known.twins.items()},
         "untested": list(known.untested),
+        "conditions": list(conditions(known)),
         "decided": known.is_decided,
         "experiment": None,
     }

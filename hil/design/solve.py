@@ -8,13 +8,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from estimator.design import Open, left_open
+from estimator.design import Open, left_open, name_of
 from estimator.diagnosis.result import Diagnosis, Verdict
 from estimator.signals.record import Record
 from hil.config.model_file import ModelFile
 from hil.config.rig_file import Rig
 from hil.design.design import Aim, Design, NothingAllowed, designed, is_needed
-from hil.design.report import design_lines, obstacle, question_lines
+from hil.design.report import conditions, design_lines, obstacle, question_lines
 from hil.design.solve_state import STATE, Driven, End, Odds, State
 from hil.errors import UsageError
 from hil.orders.operator import Answer, What
@@ -64,8 +64,9 @@ class Solving:
             known, diagnosis = self._diagnosed()
             found = self._next(known)
             if found is End.DECIDED:
-                self.state.because = _undecidable(known, diagnosis)
-                found = End.NOTHING_DECIDES if self.state.because else found
+                self.state.because, self.state.provided = "", [*conditions(known)]
+            elif found is End.NOTHING_DECIDES:
+                self.state.because = self.state.because or _undecidable(known, diagnosis)
             end = found if isinstance(found, End) else self._drive(*found)
             if end is not None:
                 return self._ended(end)
@@ -73,22 +74,21 @@ class Solving:
     def _next(self, known: Open) -> tuple[str, dict[str, Any], Design | None] | End:
         """Return what to drive next, by name, table and design, or how it ends.
 
-        That nothing is missing is decided after all of the rig file: a short run may miss what acts for a while.
+        It is decided by the verdict, where the odds agree with it. That nothing is missing is decided after all of the
+        rig file, and after what shows effects that were not tested: a short run may miss what acts for a while.
         """
-        is_open = not known.is_decided or bool(known.untested)
-        if is_open and is_needed(known, Aim.DECIDE):
+        self.state.because = ""
+        if is_needed(known, Aim.DECIDE):
             design = self._designed(known)
             if design is not None and design.is_worth_driving:
                 return design.planned.name, dict(design.planned.table), design
-            if len(known.candidates) > 1:
-                return End.NOTHING_DECIDES
-        if not self.given and not known.candidates[0].effects:
+        if not self.given and not known.named:
             done = {each.name for each in self.state.driven}
             for name, table in self.source.rig().experiments.items():
                 if name not in done:
-                    self.say(f"nothing is missing so far: {name} of the rig file is still to be driven")
+                    self.say(f"nothing has a name so far: {name} of the rig file is still to be driven")
                     return name, as_table(table), None
-        return End.DECIDED
+        return End.DECIDED if known.is_decided else End.NOTHING_DECIDES
 
     def _designed(self, known: Open) -> Design | None:
         """Design the next experiment and say it; None where the rig's limits allow none."""
@@ -160,6 +160,8 @@ class Solving:
         self._save()
         because = f" ({self.state.because})" if self.state.because else ""
         self.say(f"ended: {end.value}{because}. {self.state.statement}")
+        for condition in self.state.provided if end is End.DECIDED else ():
+            self.say(f"decided {condition}")
         return end
 
     def _save(self) -> None:
@@ -173,9 +175,12 @@ class Solving:
 
 
 def _undecidable(known: Open, diagnosis: Diagnosis) -> str:
-    """Say why a verdict is no decision though nothing is left to drive for it; "" where it is one."""
+    """Say why a verdict is no decision though nothing is left to drive for it."""
     if diagnosis.verdict in (Verdict.UNEXPLAINED, Verdict.PARTLY_EXPLAINED):
         return "what is left has no name in the catalogue, and an experiment is designed to decide between names"
+    if known.against:
+        rivals = ", ".join(f"{each.name} ({each.probability:.2f})" for each in known.against)
+        return f"the verdict names {name_of(known.named or frozenset())}, and the odds leave {rivals}"
     twins = {name: known.twins[name] for name in sorted(known.candidates[0].effects) if name in known.twins}
     return "; ".join(f"{name} or {' or '.join(others)}: another output decides it" for name, others in twins.items())
 

@@ -63,6 +63,7 @@ class State:
     odds: list[Odds] = field(default_factory=list)
     end: End | None = None
     because: str = ""  # what kept it from a decision: a limit, the time, the operator's reason
+    provided: list[str] = field(default_factory=list)  # what a decision takes for granted: effects not tested
     verdict: str = ""
     statement: str = ""
     updated_utc: Annotated[str, Field(max_length=40)] = ""

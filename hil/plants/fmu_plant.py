@@ -45,7 +45,10 @@ NUMBERS = ("Real", "Float64", "Float32")
 LONGEST_S = 86400.0
 """Time for a simulation of any length [s]; one that hangs is ended long before (`hil.plants.fmu_process`)."""
 
-CURE = "Simulate it in the program that made it, and export it for Linux, 64 bit."
+ENDED = "See that it simulates these torques in the program that made it."
+"""What to do about an FMU that crashes or hangs. What one says of itself is its own cure, or none."""
+
+SEVERAL = "Where only one of it may run at a time: --jobs 1."
 
 NO_CHANGE: Mapping[str, float] = MappingProxyType({})
 
@@ -100,8 +103,8 @@ class FmuPlant:
         return process, said
 
     @property
-    def _cure(self) -> str:
-        return f"{CURE} Where only one of it may run at a time: --jobs 1." if len(self._every) > 1 else CURE
+    def _several(self) -> list[str]:
+        return [SEVERAL] if len(self._every) > 1 else []
 
     @contextmanager
     def _process(self) -> Iterator[Sandbox]:
@@ -136,13 +139,14 @@ class FmuPlant:
                 self._is_ended = True
                 raise TimeIsUp from None
             ended = f"one that does not return in {limit_s:g} s" if took_s >= limit_s else _ended(status)
-            raise UsageError(f"{expected}, got {ended}. {self._cure}") from None
+            raise UsageError(" ".join([f"{expected}, got {ended}. {ENDED}", *self._several])) from None
         except BaseException:  # Ctrl-C, for one: they may not return by themselves
             for each in [*self._every]:
                 each.end()
             raise
         if "problem" in document:
-            raise UsageError(f"{expected}, got: {printable(str(document['problem']))}. {self._cure}")
+            problem = printable(str(document["problem"])).rstrip(".")
+            raise UsageError(" ".join([f"{expected}, got: {problem}.", *self._several]))
         return document, answered
 
     def run(self, record: Record) -> FreeRun:

@@ -119,7 +119,13 @@ class Runner:
             rows[name] = values
         home = str(Path(HOME).absolute())  # FMPy makes an address of it
         with _loaded((self._described.coSimulation if is_stepped else self._described.modelExchange).modelIdentifier):
-            instance = self._with_laws(home, request["around"], columns) if "around" in request else None
+            instance = None
+            if "around" in request:
+                instance = self._with_laws(home, request["around"], columns)
+            elif len({each.shape for name, each in given.items() if name != "time"}) > 1:
+                time_s = given.pop("time")
+                instance = self._with_inputs(home, is_stepped, time_s, given)
+                start |= {name: each[0] for name, each in given.items()}
             result = fmpy.simulate_fmu(
                 home,
                 model_description=self._described,
@@ -149,6 +155,18 @@ class Runner:
         instance = instantiate_fmu(home, self._described, "CoSimulation")
         references = {each.name: each.valueReference for each in self._described.modelVariables}
         Flanges(instance, references, around, columns)
+        return instance
+
+    def _with_inputs(self, home: str, is_stepped: bool, time_s: Column, given: Mapping[str, Any]) -> Any:
+        """Return an instance that is given arrays and scalars before each step."""
+        from fmpy.simulation import instantiate_fmu
+
+        from hil.plants.fmu_inputs import Inputs
+
+        if not is_stepped:
+            raise ValueError("arrays next to scalars at the inputs of a model exchange: export it for co-simulation")
+        instance = instantiate_fmu(home, self._described, "CoSimulation")
+        Inputs(instance, {each.name: each for each in self._described.modelVariables}, time_s, given)
         return instance
 
     def _array_of(self, name: str) -> tuple[str, tuple[int, ...]]:
@@ -207,7 +225,7 @@ def _require_simulated(described: Any, kind: str) -> None:
     folder, library = Path(HOME, "binaries"), f"{of_kind.modelIdentifier}{fmpy.sharedLibraryExtension}"
     if not (folder / platform / library).is_file():
         has = sorted(each.name for each in folder.iterdir()) if folder.is_dir() else []
-        raise ValueError(f"binaries for {', '.join(has) or 'no platform'}, and this one is {platform}")
+        raise ValueError(f"binaries for {', '.join(has) or 'no platform'}: export it for this one, {platform}")
 
 
 class _Progress:

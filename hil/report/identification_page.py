@@ -85,7 +85,7 @@ def _spectral(study: Study) -> str:
     bridged = f", {spectral.bridged_samples} missing ones bridged" if spectral.bridged_samples else ""
     samples = f"{spectral.used_samples} of {study.found.offline.okay.size} samples{bridged}"
     if spectral.distortion is None:
-        return f"Frequency response without a model, from {samples}: polynomials over {spectral.n_averages:.0f} lines."
+        return f"Frequency response without a model, from {samples}: fits over {spectral.n_averages:.0f} lines."
     levels = " and ".join(
         f"{name} {shown(level)} (p = {p_value:.2g})"
         for name, (level, p_value) in (

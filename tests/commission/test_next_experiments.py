@@ -106,7 +106,10 @@ class World:
     def _left_open(self, records: tuple[str, ...], *_: object) -> Any:
         odds = OPEN if len(records) < self.enough else DECIDED
         left = [SimpleNamespace(name=name, probability=p, effects=frozenset({name})) for name, p in odds.items()]
-        known = SimpleNamespace(candidates=left, is_decided=odds is DECIDED, untested=(), twins={})
+        decided = odds is DECIDED
+        known = SimpleNamespace(
+            candidates=left, is_decided=decided, named=left[0].effects, against=(), untested=(), supposed={}, twins={}
+        )
         return known, SimpleNamespace(verdict=Verdict.EXPLAINED, statement=f"after {len(records)} recordings")
 
     def _designed(self, *_: object) -> Any:

@@ -28,7 +28,7 @@ def solving(driven: list[str], given: list[Path], most_vehicle_s: float = 600.0)
 def decided_on(*effects: str) -> Any:
     """What a diagnosis leaves open: nothing; it names these effects."""
     candidate = SimpleNamespace(effects=frozenset(effects))
-    return cast("Any", SimpleNamespace(is_decided=True, untested=(), candidates=(candidate,)))
+    return cast("Any", SimpleNamespace(is_decided=True, named=frozenset(effects), untested=(), candidates=(candidate,)))
 
 
 def test_nothing_missing_is_decided_when_the_rigs_own_experiments_are_all_driven() -> None:
@@ -48,3 +48,9 @@ def test_no_experiment_goes_beyond_the_vehicles_time() -> None:
     job.runner = cast("Any", SimpleNamespace(predict=lambda *_: SimpleNamespace(seconds=20.0)))
     job.file = cast("Any", SimpleNamespace(model=None))
     assert job._drive(OWN[1], {}) is End.TIME
+
+
+def test_odds_that_contradict_the_verdict_are_no_decision() -> None:
+    known = decided_on()
+    known.is_decided = False
+    assert solving(OWN, [])._next(known) is End.NOTHING_DECIDES

@@ -6,14 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from estimator.diagnosis.inference.judge import grounds
 
 from estimator.design import Candidate, Open, as_model, distance, expected, name_of, shown, widths
 from estimator.design import _on_paper as on_paper
 from estimator.design import _precision as precision
+from estimator.design import _supposed as supposed
 from estimator.diagnosis.inference.descent import descended
 from estimator.diagnosis.inference.disturbances import whitener_of
 from estimator.diagnosis.inference.hypotheses import THOROUGH
-from estimator.diagnosis.inference.judge import grounds
 from estimator.diagnosis.inference.search import Search
 from estimator.physics.driveline import Start
 from estimator.physics.fit import not_fitted
@@ -58,6 +59,23 @@ def driven(known: Open, torque_nm: float, cycles: int = 400) -> Record:
     return record(turns, output, name="paper")
 
 
+def with_share(of: Record, share: float) -> Record:
+    """The same sum of torques, so much of it from the first inverter."""
+    return replace(of, torque_nm=np.outer(of.total_torque_nm, [share, 1.0 - share]))
+
+
+def recorded_with_share(known: Open, share: float) -> Open:
+    """The same, the recordings so far as one share of the inverters gives them."""
+
+    def changed(candidate: Candidate) -> Candidate:
+        result = candidate.fit.result
+        records = tuple(with_share(each, share) for each in result.problem.records)
+        problem = replace(result.problem, records=records)
+        return replace(candidate, fit=replace(candidate.fit, result=replace(result, problem=problem)))
+
+    return replace(known, candidates=tuple(map(changed, known.candidates)))
+
+
 def test_both_hypotheses_are_there(known: Open) -> None:
     assert [each.name for each in known.candidates] == NAMES
 
@@ -96,3 +114,42 @@ def test_values_become_better_known(known: Open) -> None:
 
 def test_what_a_reversal_shows_is_asked_of_the_catalogue(known: Open) -> None:
     assert "coulomb_friction_motor" in shown(known, driven(known, 60.0))
+
+
+GAIN = "inverter_gain_mismatch"
+
+
+def test_a_gain_is_shown_by_two_shares_neither_of_which_shows_it_alone(known: Open) -> None:
+    halves = recorded_with_share(replace(known, untested=(GAIN,)), 0.5)
+    paper = driven(known, 60.0)
+    assert shown(halves, with_share(paper, 0.5)) == ()
+    assert shown(halves, with_share(paper, 1.0)) == (GAIN,)
+
+
+def test_what_an_experiment_hardly_tells_is_not_shown_by_it(known: Open) -> None:
+    halves = recorded_with_share(replace(known, untested=(GAIN,)), 0.5)
+    found = supposed(halves, GAIN)
+    assert found is not None
+    asked = replace(halves, supposed={GAIN: found})
+    short, long = (with_share(driven(known, 60.0, cycles), 1.0) for cycles in (8, 800))
+    assert shown(asked, long) == (GAIN,)
+    assert shown(asked, short) == ()
+
+
+def test_a_gain_that_was_not_tested_moves_the_values_by_what_it_changes_the_torque(known: Open) -> None:
+    found = supposed(recorded_with_share(known, 0.5), GAIN)
+    assert found is not None
+    assert found.size == {"gain_m1": pytest.approx(0.9)}
+    moved = [share for name, share in found.moves.items() if name in ("J_M", "k")]
+    assert moved
+    assert all(share == pytest.approx(-0.05, abs=0.01) for share in moved)
+
+
+def test_decided_is_the_verdict_that_the_odds_do_not_contradict(known: Open) -> None:
+    one, other = (replace(each, probability=p) for each, p in zip(known.candidates, (0.96, 0.04), strict=True))
+    agreed = replace(known, candidates=(one, other), named=one.effects)
+    assert agreed.is_decided
+    assert not replace(agreed, named=frozenset()).is_decided  # the verdict names nothing
+    assert replace(agreed, named=frozenset(), traces=one.effects).is_decided  # what is left out is a trace
+    assert not replace(agreed, named=None).is_decided  # something has no name
+    assert [each.name for each in replace(known, named=one.effects).against] == [other.name]

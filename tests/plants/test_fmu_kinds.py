@@ -92,6 +92,14 @@ def test_an_array_is_driven_by_its_elements(tmp_path: Path, monkeypatch: pytest.
     np.testing.assert_allclose(halves, reference, rtol=1e-12)
     np.testing.assert_allclose(second, reference, rtol=1e-12)
     assert np.ptp(reference) > 0.1
+    load = np.linspace(0.0, 20.0, 100)
+    mixed = FmuPlant(tmp_path / "drive.fmu", ["torque=u[1],u[2]"], trusted=True)
+    assert mixed.is_input("T_load")
+    loaded, expected = (
+        each.simulated(record, each.named(record.kind), record.torque_nm, {"T_load": load}) for each in (mixed, scalar)
+    )
+    np.testing.assert_allclose(loaded, expected, rtol=1e-12)
+    assert np.abs(loaded - reference).max() > 0.1
 
 
 @COMPILES
@@ -108,7 +116,7 @@ def test_another_platform_is_named(tmp_path: Path) -> None:
     with zipfile.ZipFile(tmp_path / "x.fmu", "w") as archive:
         archive.writestr("modelDescription.xml", DESCRIPTION.format(name="x"))
         archive.writestr("binaries/win64/x.dll", "MZ")
-    with pytest.raises(UsageError, match="binaries for win64, and this one is "):
+    with pytest.raises(UsageError, match="binaries for win64: export it for this one, "):
         FmuPlant(tmp_path / "x.fmu", [], trusted=True)
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from estimator.diagnosis.acquisition.chain import Chain
-from estimator.diagnosis.assemble import augmented_model, load_torques, retuned_parameters
+from estimator.diagnosis.assemble import augmented_model, load_torques, moved_values, retuned_parameters
 from estimator.diagnosis.inference.checks import tests_in_words
 from estimator.diagnosis.inference.decide import Decision
 from estimator.diagnosis.inference.figures import courses_of, figures_without, first_figures, found_effect
@@ -69,9 +69,10 @@ def said(told: Told) -> Diagnosis:
     mismatch, remainder = _mismatch(told), _remainder(told)
     untestable = untestable_effects(open_hypotheses(search.model, runs.chain.records)[1])
     line = search.model
+    slight = tuple(_slight(each, told) for each in traces)
     context = Context(
         remainder,
-        [each.name for each in traces],
+        slight,
         [each.name for each in judged.refinements],
         judged.off_nominal,
         untestable,
@@ -95,7 +96,7 @@ def said(told: Told) -> Diagnosis:
         discrepancy=_discrepancy(told) if mismatch.detected and line.plant is None else None,
         remainder=remainder,
         off_nominal=judged.off_nominal,
-        slight=tuple(Slight(each.name, each.share, _values(judged.believed, each)) for each in traces),
+        slight=slight,
         refinements=tuple(
             Refinement(each.name, each.objection, each.necessity.value, _values(judged.best, each))
             for each in judged.refinements
@@ -149,6 +150,13 @@ def can_be_retuned(line: DrivelineModel) -> bool:
 def untestable_effects(blind: Mapping[str, Untestable]) -> tuple[UntestableEffect, ...]:
     """Return the effects that the recordings can't tell, with the reason and a test that could."""
     return tuple(UntestableEffect(n, u.reason, u.suggested_test, u.needs) for n, u in blind.items())
+
+
+def _slight(trace: Standing, told: Told) -> Slight:
+    """Return a trace; without it some values are others, though the error hardly is."""
+    believed = told.decision.judged.believed
+    without = told.search.without(believed.hypothesis, trace.name)
+    return Slight(trace.name, trace.share, _values(believed, trace), moved_values(believed.hypothesis, without.result))
 
 
 def _values(trial: Trial, standing: Standing) -> Mapping[str, float]:

@@ -7,7 +7,16 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from estimator.diagnosis.result import Effort, Fit, FoundEffect, OffNominal, Remainder, UntestableEffect, Verdict
+from estimator.diagnosis.result import (
+    Effort,
+    Fit,
+    FoundEffect,
+    OffNominal,
+    Remainder,
+    Slight,
+    UntestableEffect,
+    Verdict,
+)
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Element
 
@@ -98,7 +107,7 @@ class Context:
     """What a statement adds to the verdict."""
 
     remainder: Remainder | None = None
-    traces: Sequence[str] = ()
+    traces: Sequence[Slight] = ()
     refinements: Sequence[str] = ()
     off_nominal: Sequence[OffNominal] = ()
     untestable: Sequence[UntestableEffect] = ()
@@ -114,7 +123,8 @@ def statement(
     if context.remainder is not None and not context.off_nominal:
         parts.append(_left(verdict, context.remainder))
     if context.traces:
-        parts.append(f"Seen, but too small to matter: {', '.join(context.traces)}.")
+        parts.append(f"Seen, but too small to matter: {', '.join(each.name for each in context.traces)}.")
+        parts += [_moving(each) for each in context.traces if each.moves]
     if context.refinements:
         parts.append(f"Not established, and not in the model: {', '.join(context.refinements)}.")
     twins = sorted({twin for effect in effects for twin in effect.indistinguishable_from})
@@ -129,6 +139,12 @@ def statement(
         f"Neither found nor excluded without {e.needs}: {EFFECTS[e.name].title}." for e in context.untestable if e.needs
     ]
     return " ".join(parts)
+
+
+def _moving(trace: Slight) -> str:
+    """Say what a trace does to the values that are told, though it hardly moves the error."""
+    moved = ", ".join(f"{name} by {100.0 * share:+.2g} %" for name, share in trace.moves.items())
+    return f"The values are those with {trace.name}: without it, {moved}."
 
 
 def _not_decided(effort: Effort) -> str:

@@ -6,7 +6,8 @@ import re
 
 import pytest
 
-from estimator.diagnosis.inference.wording import law_in_words
+from estimator.diagnosis.inference.wording import Context, law_in_words, statement
+from estimator.diagnosis.result import Effort, Fit, Slight, Verdict
 from estimator.diagnosis.unnamed.laws import LAWS
 from estimator.physics.effect import Element
 
@@ -46,3 +47,12 @@ def test_a_law_is_said_by_what_it_goes_with(element: Element, terms: list[tuple[
 def test_no_formula_is_said(element: Element, name: str) -> None:
     said = law_in_words(element, [(name, 0.5)])
     assert not re.search(r"w_|\^|\||\b[Tt]\b", said), said
+
+
+def test_a_trace_says_what_it_does_to_the_values() -> None:
+    fit = Fit("rad/s", 0.2, 0.05, 0.05, 0.05, 0.05, 0.05)
+    still, moving = Slight("resolver_error", 0.001, {}), Slight("inertia_change", 0.002, {}, {"J_M": -0.05})
+    said = statement(Verdict.NO_MISMATCH, fit, (), Effort(), Context(traces=(still, moving)))
+    assert "Seen, but too small to matter: resolver_error, inertia_change." in said
+    assert "The values are those with inertia_change: without it, J_M by -5 %." in said
+    assert "with resolver_error" not in said
