@@ -15,7 +15,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from hil.version import __version__
+from hil.version import program
 
 _LINE: ContextVar[tuple[str, ...]] = ContextVar("_LINE", default=())
 
@@ -48,20 +48,19 @@ class Source:
 class Provenance:
     """What a result was made from."""
 
-    version: str
+    program: str  # with version and commit: hil 0.3.0 (1a2b3c4d5e6f)
     date: str  # ISO 8601, UTC
-    command: str  # the command line
+    command: str  # the command line; empty from Python
     models: tuple[Source, ...]
     recordings: tuple[Source, ...]
 
     def document(self) -> dict[str, Any]:
         """Return it for JSON."""
-        kept = asdict(self)
-        return {"program": f"hil {kept.pop('version')}", **kept}
+        return asdict(self)
 
 
 def provenance(models: Sequence[Path] = (), recordings: Sequence[Path] = ()) -> Provenance:
     """Return what a result is made from that these files go into, now."""
     now = datetime.now(UTC).isoformat(timespec="seconds")
     line = shlex.join(("hil", *_LINE.get())) if _LINE.get() else ""
-    return Provenance(__version__, now, line, tuple(map(Source.of, models)), tuple(map(Source.of, recordings)))
+    return Provenance(program(), now, line, tuple(map(Source.of, models)), tuple(map(Source.of, recordings)))
