@@ -47,9 +47,7 @@ def test_the_repository_that_a_hook_names_is_not_asked(checkout: Path, monkeypat
     assert re.fullmatch("[0-9a-f]{12}", version.commit_of(checkout))
 
 
-def test_a_built_copy_names_the_commit_that_it_was_built_from(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_built_copy_names_the_commit_that_it_was_built_from(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / version.COMMIT_FILE).write_text("0123456789ab\n")
     monkeypatch.setattr(version, "PACKAGE", tmp_path)
     version.program.cache_clear()
