@@ -43,7 +43,7 @@ MOST_REFUSED = 0.01
 
 OTHER_FORMS = {"most_predictable": 0.03, "most_dependent": 0.015}
 """Shares of the innovations' variance that machines leave by the form of their laws alone: simulated worlds are nearer
-to the model than any real one. Set by hand, from the real recordings in docs/real-recordings.md."""
+to the model than any real one. Set by hand, from the real recordings in docs/how-good.md."""
 
 BELIEVED = 0.9
 """Probability below which nothing is reported as found, however well it went in simulated worlds."""
