@@ -13,7 +13,7 @@ class CommitHook(BuildHookInterface):
     """Called by hatchling before it builds; see `[tool.hatch.build.hooks.custom]`."""
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
-        """Add ``hil/commit.txt``: the commit of this checkout, or of the sdist that is built from; none where unknown."""
+        """Add ``hil/commit.txt``: the commit of this checkout, or of the sdist; none where unknown."""
         if version == "editable":  # runs from the checkout, whose commit changes
             return
         root = Path(self.root)

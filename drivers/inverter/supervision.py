@@ -87,28 +87,28 @@ def most_late(guard: GuardLimits) -> int:
 class DriveRecord(NamedTuple):
     """One drive in one cycle: its command, its answer (None without), TPDOs of its seldomest and commonest kind."""
 
-    commanded_nm: float
-    feedback: InverterFeedback | None
-    fewest: int = 1
-    most: int = 1
+    commanded_nm: float  # target plus offset [Nm]
+    feedback: InverterFeedback | None  # None where none came in this cycle
+    fewest: int = 1  # TPDOs of the kind that came most seldom
+    most: int = 1  # TPDOs of the kind that came most often
 
 
 class CycleRecord(NamedTuple):
     """One cycle, as everything is judged by it."""
 
-    t_ns: int
-    m1: DriveRecord
-    m2: DriveRecord
+    t_ns: int  # of its SYNC, host's monotonic clock [ns]
+    m1: DriveRecord  # first inverter
+    m2: DriveRecord  # second inverter
 
 
 @dataclass(frozen=True, slots=True)
 class SupervisionLimits:
     """What the rules of one rig need: its guard's limits, a count of each speed [rad/s], the inertia [kg m²]."""
 
-    guard: GuardLimits
-    count_m1_rad_s: float = 0.0
-    count_m2_rad_s: float = 0.0
-    inertia_kg_m2: float | None = None
+    guard: GuardLimits  # of the rig file
+    count_m1_rad_s: float = 0.0  # one count of m1's 0x606C [rad/s]
+    count_m2_rad_s: float = 0.0  # one count of m2's [rad/s]
+    inertia_kg_m2: float | None = None  # of line and vehicle at the motor shaft; None where it is not known
 
 
 class Excess:
@@ -132,6 +132,7 @@ class Excess:
         return self._sum >= self._limit
 
     def clear(self) -> None:
+        """Forget what was summed."""
         self._sum = 0.0
 
 
@@ -460,6 +461,7 @@ class Supervision:
         )
 
     def raise_if_ended(self) -> None:
+        """Raise what ended the run, if anything has."""
         if self.ended is not None:
             raise self.ended
 

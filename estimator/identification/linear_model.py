@@ -93,9 +93,9 @@ class Orders:
         If an order is negative or nb is 0.
     """
 
-    na: int = 4
-    nb: int = 4
-    nk: int = 1
+    na: int = 4  # coefficients of A behind its leading 1
+    nb: int = 4  # coefficients of B
+    nk: int = 1  # samples from u to its first effect on y; 1 for a torque held until the next row
 
     def __post_init__(self) -> None:
         require(
@@ -143,8 +143,8 @@ class LinearModel:
         If a coefficient is not finite.
     """
 
-    a: tuple[float, ...]
-    b: tuple[float, ...]
+    a: tuple[float, ...]  # a_1 ... a_na of A
+    b: tuple[float, ...]  # b_1 ... b_nb of B [output unit per input unit]
     nk: int
     sample_time_s: float
 

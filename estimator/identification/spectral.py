@@ -131,11 +131,11 @@ class SpectralEstimate:
 class _Local:
     """Estimate of one stretch: response, its variance, noise and explained power of the output per sample."""
 
-    response: ComplexArray
-    variance: FloatArray
-    noise: FloatArray
-    explained: FloatArray
-    freedom: int
+    response: ComplexArray  # at each line [output unit per input unit]
+    variance: FloatArray  # of the response
+    noise: FloatArray  # power of the output that the input does not explain
+    explained: FloatArray  # power that it explains
+    freedom: int  # degrees of freedom of the variance
 
 
 def spectral_estimate(record: Record, values_per_width: int = 1) -> SpectralEstimate:

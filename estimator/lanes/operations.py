@@ -143,6 +143,7 @@ def define(function: Any, kinds: tuple[type, ...], wanted: Any, result: Any, mak
 
 
 def called(builder: Any, name: str, *args: Any) -> Any:
+    """Call LLVM's intrinsic of this name on all lanes at once."""
     kind = ir.FunctionType(NUMBERS, [NUMBERS] * len(args))
     return builder.call(defined_once(builder.module, kind, f"llvm.{name}.v{LANES}f64"), args)
 

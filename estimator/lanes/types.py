@@ -40,6 +40,7 @@ class LanesType(types.Type):
         super().__init__("Lanes")
 
     def can_convert_from(self, typingctx: Any, other: Any) -> Any:
+        """Let numba take a plain number for one in every lane."""
         return Conversion.safe if isinstance(other, types.Number) else None
 
     def unify(self, typingctx: Any, other: Any) -> Any:

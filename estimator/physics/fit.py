@@ -49,7 +49,7 @@ class FitResult:
         False where the iteration limit ended the fit.
     """
 
-    problem: Problem
+    problem: Problem  # what was fitted
     x: FloatArray
     outputs: tuple[FloatArray, ...]
     residual: FloatArray
@@ -112,6 +112,7 @@ class FitResult:
         return float(self.p[next(s.slot for s in self.problem.shared if (s.effect, s.name) == (effect, name))])
 
     def values_of(self, effect: str) -> dict[str, float]:
+        """Return the fitted values of an effect, in its parameters' units."""
         return {
             s.name: float(x) * s.scale for s, x in zip(self.problem.shared, self.x, strict=False) if s.effect == effect
         }
@@ -249,6 +250,7 @@ def _scales(problem: Problem) -> FloatArray:
 
 
 def rates(result: FitResult) -> list[FloatArray]:
+    """Return the rate of each recording's output at its samples [output unit / s]."""
     if result.problem.grid.structure is Structure.JOINT:
         pairs = zip(result.outputs, result.problem.records, strict=True)
         return [_secants(output, record.sample_time_s) for output, record in pairs]

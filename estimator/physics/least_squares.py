@@ -143,11 +143,11 @@ LEAST_DAMPING, MOST_DAMPING = 1e-10, 1e9
 class Solution:
     """Where a fit ended: unknowns (U,), errors (R,), Jacobian there, or one last small step before (R, U)."""
 
-    x: FloatArray
-    residual: FloatArray
-    jacobian: FloatArray | None
-    converged: bool
-    stuck: bool = False
+    x: FloatArray  # scaled, at the minimum
+    residual: FloatArray  # errors there
+    jacobian: FloatArray | None  # None where none was made
+    converged: bool  # whether the last step promised too little to matter
+    stuck: bool = False  # whether no step, however short, made the error smaller
 
 
 def minimise(
@@ -226,6 +226,7 @@ def damped_step(
     low: FloatArray,
     high: FloatArray,
 ) -> FloatArray:
+    """Return the step (U,) that minimises the damped quadratic inside the bounds."""
     free = unbounded_first(low, high, low < high)
     diagonal = np.diag(curvature)
     damped = curvature + np.diag(damping * np.maximum(diagonal, 1e-12 * diagonal.max()))

@@ -49,6 +49,7 @@ _SENSED = (state_vector.SPEED, state_vector.LOAD_SPEED)  # what the effects of a
 
 
 def output_state(record: Record, structure: Structure) -> int:
+    """Return the entry of the state that a recording measures; BadModel where recording and structure do not fit."""
     if (record.imposed is not None) != (structure is Structure.JOINT):
         got = "an imposed motion" if record.imposed is not None else f"{record.kind.value} as the output"
         raise BadModel(

@@ -1,15 +1,15 @@
 """Figures of the manual: each is a result file with its command and commit, and the pages are filled in from them.
 
-``docs/results/NAME.toml`` holds what a campaign or benchmark printed (``text``), the ``command``, the ``commit`` that it
-ran at, and the ``rooms`` that it measures. A page has a place for it:
+``docs/results/NAME.toml`` holds what a campaign or benchmark printed (``text``), the ``command``, the ``commit`` that
+it ran at, and the ``rooms`` that it measures. A page has a place for it:
 
     <!-- result: NAME -->
     ...
     <!-- end -->
 
 ``python -m tests.docs.results`` fills in all places. Where a room has changed since the commit, the page says so by
-itself; a test fails where the page does not (`tests/docs/test_results.py`). To renew a figure, run its command, put what
-it prints and the commit into the file, and fill in again.
+itself; a test fails where the page does not (`tests/docs/test_results.py`). To renew a figure, run its command, put
+what it prints and the commit into the file, and fill in again.
 """
 
 from __future__ import annotations

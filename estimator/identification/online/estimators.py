@@ -165,6 +165,7 @@ def _of_length(L: FloatArray, length: int) -> FloatArray:
 
 
 def rls_past(of: Orders) -> Shapes:
+    """Return how many past values recursive least squares keeps of each signal."""
     return {"outputs": (of.na,), "inputs": (of.nk + of.nb,)}
 
 
@@ -201,6 +202,7 @@ class Rls(RegressionEstimator):
 
 
 def riv_past(of: Orders, n_L: int) -> Shapes:
+    """Return how many past values the instrumental variable method keeps of each signal; n_L is the filter's length."""
     outputs_f, inputs_f = (max(of.na, n_L - 1),), (max(of.nk + of.nb, n_L - 1),)
     filtered_rows = {"auxiliary_f": outputs_f, "outputs_f": outputs_f, "inputs_f": inputs_f}
     return {"outputs": (of.na,), "inputs": (of.nk + of.nb,), **filtered_rows, "auxiliary": (of.n_parameters,)}
@@ -265,6 +267,7 @@ class Riv(RegressionEstimator):
 
 
 def oeepm_past(of: Orders) -> Shapes:
+    """Return how many past values the output error method with extended prediction model keeps of each signal."""
     return {"outputs": (of.na,), "inputs": (of.nk + of.nb,), "errors": (of.na,)}
 
 
