@@ -47,8 +47,6 @@ def test_a_kernel_is_kept_for_as_long_as_no_code_that_it_may_contain_has_changed
     before = module.cache_folder(kernel)
     assert folder_after(kernel, sources / "other.py", "OTHER = 2\n") == before
     in_words = '"""Another,\nof two."""\n\n\ndef drag(speed):\n    """Return\n    it."""\n    # why\n    return speed\n'
-        '"""Another,\nof two."""\n\n\ndef drag(speed):\n    """Return\n    it."""\n    # why\n    return speed  # so\n'
-    )
     assert folder_after(kernel, law, in_words) == before
     assert folder_after(kernel, law, "def drag(speed):\n    return 0.0\n") != before
     copied = Path(shutil.copytree(sources, tmp_path / "copy" / "estimator")) / "kernel.py"
