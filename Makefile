@@ -64,6 +64,7 @@ lint: $(READY)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/python tools/words.py
+	$(BIN)/python tools/layout.py
 	$(BIN)/python tools/budget.py
 	$(BIN)/lint-imports
 	$(BIN)/mypy

@@ -266,6 +266,10 @@ def _period(u: FloatArray) -> int | None:
     return int(period) if period * FEWEST_PERIODS <= n else None
 
 
+SMOOTHED = 5
+"""Neighbouring lines whose noise is averaged: it is smooth in frequency."""
+
+
 def _periodic(u: FloatArray, y: FloatArray, period: int, period_s: float, block: int, bridged: int) -> SpectralEstimate:
     """Average the periods of a stretch, the first one left out."""
     count = u.shape[0] // period - 1
@@ -291,10 +295,6 @@ def _periodic(u: FloatArray, y: FloatArray, period: int, period_s: float, block:
         bridged,
         _distortion(line, excited, mean_y - everywhere * mean_u, noise / count, period, period_s),
     )
-
-
-SMOOTHED = 5
-"""Neighbouring lines whose noise is averaged: it is smooth in frequency."""
 
 
 def _smoothed(noise: FloatArray) -> FloatArray:

@@ -1,7 +1,7 @@
 """What an entry of the catalogue is: a law that can be released from its null, and what is known of it.
 
 A missing effect is a constraint of the superset model to release: at ``null`` its law does nothing. A law
-that acts at one of the places of ``estimator.physics.effect`` is taken into the one kernel from its entry; one that
+that acts at a `Place` is taken into the one kernel from its entry; one that
 changes the line itself is written into the kernel. Everything else about it stands in its entry.
 """
 

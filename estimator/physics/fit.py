@@ -17,12 +17,12 @@ from estimator.physics.problem import (
     Problem,
     bounds,
     local_part,
+    make_problem as make_problem,  # where users have always found it
     outputs_at,
     parameters,
     residual_at,
     start_vector,
 )
-from estimator.physics.problem import make_problem as make_problem  # where users have always found it
 from estimator.signals.record import BoolArray, FloatArray, IntArray
 
 ITERATIONS = 50  # jacobians at most; a fit that needs more is not converged

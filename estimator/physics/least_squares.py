@@ -3,7 +3,7 @@
 ``scipy.optimize.least_squares`` decomposes the whole Jacobian at every step; with ten thousand errors and twenty
 unknowns that costs more than the simulations that made it. Here the step comes from the normal equations, with
 Marquardt's scaling (SIAM J. Appl. Math. 11, 1963), and is the least of the damped quadratic inside the bounds
-(``estimator.physics.least_squares``). Near the end, where steps keep what they promise, the Jacobian is carried on by
+(`damped_step`). Near the end, where steps keep what they promise, the Jacobian is carried on by
 Broyden's update (Math. Comp. 19, 1965; with Marquardt's method: Madsen, Nielsen and Tingleff, Methods for Non-Linear
 Least Squares Problems, DTU 2004, 3.5): it costs a simulation per unknown, a step one. A fit ends a last small step from
 a Jacobian found anew.

@@ -79,6 +79,10 @@ def read(path: Path, request: Request) -> Table:
     return table_of_text(path, text, request.form, encoding, said)
 
 
+LONG_FORM: Final = frozenset({"_time", "_field", "_value"})
+"""Columns of a text of InfluxDB, with a row for each value of each series."""
+
+
 def table_of_text(
     path: Path, text: str, hints: FormatHints, encoding: str = "utf-8", said: Sidecar = NO_SIDECAR, remark: str = ""
 ) -> Table:
@@ -113,10 +117,6 @@ def table_of_text(
         },
     )
     return pivoted(table) if LONG_FORM <= columns.keys() else table
-
-
-LONG_FORM: Final = frozenset({"_time", "_field", "_value"})
-"""Columns of a text of InfluxDB, with a row for each value of each series."""
 
 
 def pivoted(table: Table) -> Table:

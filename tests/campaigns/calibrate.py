@@ -24,8 +24,7 @@ from scipy.optimize import minimize_scalar
 from threadpoolctl import threadpool_limits
 
 from estimator.diagnosis.acquisition.chain import mechanical, read_through
-from estimator.diagnosis.inference.answer import LEVELS
-from estimator.diagnosis.inference.answer import searched as searched_for
+from estimator.diagnosis.inference.answer import LEVELS, searched as searched_for
 from estimator.diagnosis.inference.checks import COLUMNS, LEAST_SHARE, TEST_LIMITS, THRESHOLDS_FILE, chance
 from estimator.diagnosis.inference.judge import Score, probability_of
 from estimator.diagnosis.inference.rivals import rivals_of

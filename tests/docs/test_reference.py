@@ -9,8 +9,7 @@ from pydantic import BaseModel
 
 from drivers.inverter.drive_settings import OPTION_CODES
 from drivers.plc.register_map import USED
-from estimator.diagnosis.inference import checks
-from estimator.diagnosis.inference import figures as holdout
+from estimator.diagnosis.inference import checks, figures as holdout
 from estimator.diagnosis.inference.search import STARTS
 from estimator.diagnosis.where import locate
 from hil.cli.main import ExitStatus

@@ -7,9 +7,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.design import Candidate, Open, as_model, distance, expected, name_of, shown, widths
-from estimator.design import _on_paper as on_paper
-from estimator.design import _precision as precision
+from estimator.design import (
+    Candidate,
+    Open,
+    _on_paper as on_paper,
+    _precision as precision,
+    as_model,
+    distance,
+    expected,
+    name_of,
+    shown,
+    widths,
+)
 from estimator.diagnosis.inference.descent import descended
 from estimator.diagnosis.inference.disturbances import whitener_of
 from estimator.diagnosis.inference.hypotheses import THOROUGH

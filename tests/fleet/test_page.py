@@ -7,8 +7,7 @@ from typing import Any
 import pytest
 
 from hil.fleet.dataset import Writer
-from hil.fleet.page import _current as current
-from hil.fleet.page import courses_of, fleet_page, usual_parameters
+from hil.fleet.page import _current as current, courses_of, fleet_page, usual_parameters
 from hil.provenance import Provenance
 from tests.browser.conftest import browser, opened
 from tests.fleet import made_up

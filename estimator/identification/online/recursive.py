@@ -339,7 +339,7 @@ class RecursiveEstimator:
         return bool(live[TORQUE_MOVES] == 0.0 or live[OUTPUT_MOVES] == 0.0)
 
     def state(self) -> State:
-        """Return everything it remembers, as plain arrays; see :mod:`estimator.identification.online.recursive`."""
+        """Return everything it remembers, as plain arrays; how they are kept is at the head of this file."""
         return saved(self._name, self._memory)
 
     def restore(self, state: Mapping[str, Any]) -> None:

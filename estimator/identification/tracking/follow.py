@@ -64,6 +64,10 @@ CLOSES = 1.0
 """The same, below which it is none any more: the torque moves the output less than everything else does."""
 
 
+# Verdicts, as in estimator.identification.tracking.follow.Excitation.
+_, EXCITED, LACKING, DROWNED = 0, 1, 2, 3
+
+
 class Excitation(IntEnum):
     """Verdict on a block; the numbers are those of the compiled loop."""
 
@@ -92,9 +96,6 @@ WITHIN = 2  # mean of TORQUE over the memory
 USUAL = 3  # mean of TORQUE while excited; 0 before it ever was
 IN_A_ROW = 4  # excited blocks without another in between
 N_LASTING = 5
-
-# Verdicts, as in estimator.identification.tracking.follow.Excitation.
-_, EXCITED, LACKING, DROWNED = 0, 1, 2, 3
 
 
 @compiled
