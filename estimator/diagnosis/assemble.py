@@ -1,4 +1,7 @@
-"""Intervals of fitted parameters that hold although the errors are correlated."""
+"""A result put together from a fit: intervals, moments, profiles, load torques, and the model to continue with.
+
+The intervals hold although the errors are correlated.
+"""
 
 from __future__ import annotations
 

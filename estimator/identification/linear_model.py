@@ -1,6 +1,4 @@
-"""Tall least-squares problems, brought to triangular form by Householder reflections first.
-
-::
+"""The linear model that every estimator here fits, its conventions, and the least-squares solver that they share::
 
     y(t) = - a_1 y(t-1) - ... - a_na y(t-na) + b_1 u(t-nk) + ... + b_nb u(t-nk-nb+1)
 
@@ -12,6 +10,8 @@
   The paper's d = 1 is nk = 1. Where another text counts a pure delay d on top of that one, ``nk = d + 1``.
 - ``na`` is the order of A in *this* output-error model; MATLAB calls it nf there and keeps na for ARX.
 - Poles and zeros are those in z.
+
+Tall least-squares problems are brought to triangular form by Householder reflections first (`triangular`).
 """
 
 from __future__ import annotations

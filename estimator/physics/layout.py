@@ -1,4 +1,4 @@
-"""How finely a line is integrated on a set of recordings."""
+"""How finely a line is integrated on a set of recordings, and where each parameter stands in the kernel's vector."""
 
 from __future__ import annotations
 

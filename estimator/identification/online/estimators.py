@@ -1,6 +1,8 @@
-"""Recursive output error with filtered observations (OEFO), the paper's algorithm.
+"""The recursive estimators, each as the step that its loop compiles, and the table that they are chosen from.
 
-Nevaranta, Montonen, Lindh, "Online Estimation of a Mechanical Driveline Parameters of a Hybrid Bus", EPE'18
+OEFO, recursive output error with filtered observations, is the paper's algorithm. Recursive least squares, the
+instrumental variable method and the output error method with extended prediction model stand below it, each with its
+equations. Nevaranta, Montonen, Lindh, "Online Estimation of a Mechanical Driveline Parameters of a Hybrid Bus", EPE'18
 ECCE Europe, equations (1) to (7); I. D. Landau and G. Zito, Digital Control Systems (Springer, 2006),
 chapters 3 and 5. With t for the paper's k + 1 and the total delay nk (its d = 1 is nk = 1, see
 ``linear_model``)::
