@@ -1,4 +1,6 @@
-"""The linear model that every estimator here fits, its conventions, and the least-squares solver that they share::
+"""The linear model that every estimator here fits, its conventions, and the least-squares solver that they share.
+
+::
 
     y(t) = - a_1 y(t-1) - ... - a_na y(t-na) + b_1 u(t-nk) + ... + b_nb u(t-nk-nb+1)
 
