@@ -187,12 +187,12 @@ CLOSE = 1.1  # squared error, over the best start's, up to which a start continu
 Name = tuple[object, ...]
 
 
-def best_fit(problems: Sequence[Problem], previous: FitResult | None = None, iterations: int = ITERATIONS) -> FitResult:
+def best_fit(problems: Sequence[Problem], previous: FitResult | None = None) -> FitResult:
     """Fit from several starts and return the best; what a fit ``warm`` has in common starts where that one ended."""
     if len(problems) == 1:
-        return _initial_fit(problems[0], previous, iterations)
-    heat = initial_fits(problems, previous, min(HEAT, iterations))
-    finals = concurrently(partial(converge, iterations=iterations), [heat[i] for i in close(heat)])
+        return _initial_fit(problems[0], previous, ITERATIONS)
+    heat = initial_fits(problems, previous, HEAT)
+    finals = concurrently(converge, [heat[i] for i in close(heat)])
     return min(finals, key=lambda result: result.squares)
 
 
@@ -210,9 +210,9 @@ def close(heat: Sequence[FitResult]) -> list[int]:
     return [i for i in order if heat[i].squares <= CLOSE * least]
 
 
-def converge(result: FitResult, iterations: int = ITERATIONS) -> FitResult:
+def converge(result: FitResult) -> FitResult:
     """Continue with a fit that its iteration limit ended."""
-    return result if result.converged or iterations <= HEAT else fit(result.problem, result.x, iterations)
+    return result if result.converged else fit(result.problem, result.x)
 
 
 def _initial_fit(problem: Problem, previous: FitResult | None, iterations: int) -> FitResult:

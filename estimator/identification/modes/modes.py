@@ -112,6 +112,7 @@ def two_mass_resonance(J_M: float, J_L: float, k: float, c: float, b_M: float, b
 
 
 CONFIDENCE = 0.95  # of every interval and ellipse that does not say otherwise
+OUTLINE = 73  # points of an ellipse: every 5 degrees, the first one twice
 
 QUANTILE = NormalDist().inv_cdf(0.5 + CONFIDENCE / 2.0)
 """Half width of such an interval in standard deviations: 1.96."""
@@ -261,13 +262,13 @@ class UncertainRoot:
     value: complex  # in the z plane
     covariance: FloatArray  # of its real and imaginary part
 
-    def ellipse(self, confidence: float = CONFIDENCE, points: int = 73) -> ComplexArray:
-        """Return the outline of the confidence region, closed, shape (points,); a segment for a real root."""
+    def ellipse(self) -> ComplexArray:
+        """Return the outline of the 95 % region, closed, shape (OUTLINE,); a segment for a real root."""
         freedom = 2 if self.value.imag != 0.0 else 1
         from scipy.special import chdtri  # see above
 
-        radius = np.sqrt(chdtri(freedom, 1.0 - confidence))
-        around = np.linspace(0.0, 2.0 * np.pi, points)
+        radius = np.sqrt(chdtri(freedom, 1.0 - CONFIDENCE))
+        around = np.linspace(0.0, 2.0 * np.pi, OUTLINE)
         offset = radius * square_root(self.covariance) @ np.array([np.cos(around), np.sin(around)])
         return np.asarray(self.value + offset[0] + 1j * offset[1], dtype=np.complex128)
 

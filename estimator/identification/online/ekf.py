@@ -215,7 +215,6 @@ PERIOD, VARIANCE = 0, 1
 NOISE = 2  # variance each state gains per sample
 START = NOISE + N_STATES  # variance of each state before the first sample
 ORIGIN = START + N_STATES  # value of each state before the first sample
-N_LAW = ORIGIN + N_STATES
 
 # Places in `live` besides those of all estimators, where theirs have the gain.
 STARTED = 0  # 1 once an output has set the speeds
