@@ -20,13 +20,13 @@ from itertools import product
 from pathlib import Path
 
 import numpy as np
+from estimator.diagnosis.inference.judge import Score, probability_of
 from scipy.optimize import minimize_scalar
 from threadpoolctl import threadpool_limits
 
 from estimator.diagnosis.acquisition.chain import mechanical, read_through
 from estimator.diagnosis.inference.answer import LEVELS, searched as searched_for
 from estimator.diagnosis.inference.checks import COLUMNS, LEAST_SHARE, TEST_LIMITS, THRESHOLDS_FILE, chance
-from estimator.diagnosis.inference.judge import Score, probability_of
 from estimator.diagnosis.inference.rivals import rivals_of
 from estimator.diagnosis.preconditions.prepare import prepare
 from estimator.errors import EstimatorError

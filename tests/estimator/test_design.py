@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from estimator.diagnosis.inference.judge import grounds
 
 from estimator.design import (
     Candidate,
@@ -22,7 +23,6 @@ from estimator.design import (
 from estimator.diagnosis.inference.descent import descended
 from estimator.diagnosis.inference.disturbances import whitener_of
 from estimator.diagnosis.inference.hypotheses import THOROUGH
-from estimator.diagnosis.inference.judge import grounds
 from estimator.diagnosis.inference.search import Search
 from estimator.physics.driveline import Start
 from estimator.physics.fit import not_fitted
