@@ -64,17 +64,22 @@ lint: $(READY)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/python tools/words.py
+	$(BIN)/python tools/layout.py
 	$(BIN)/python tools/budget.py
 	$(BIN)/lint-imports
 	$(BIN)/mypy
 
-# Wheel and sdist in dist/, and a trial of the wheel in an empty environment, with the declared ranges and not the lock.
+# Wheel and sdist in dist/; each is tried in an environment where nothing else of this project is, with the declared ranges
+# of its libraries and not the lock. Both must name the commit that they were built from.
 dist: $(READY)
 	rm -rf dist out/dist
 	$(BIN)/python -m hatchling build
 	$(PYTHON) -m venv out/dist
-	out/dist/bin/python -m pip install --quiet --disable-pip-version-check dist/*.whl
-	cd out/dist && bin/hil --version && bin/hil effects backlash
+	for built in dist/*.whl dist/*.tar.gz; do \
+	    out/dist/bin/python -m pip install --quiet --disable-pip-version-check $$built && \
+	    tools/trial.sh $$built out/dist && \
+	    out/dist/bin/python -m pip uninstall --quiet --yes hil-driveline || exit 1; \
+	done
 
 lock:   # needs `pip install uv`; writes names, versions and hashes only
 	uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-emit-find-links \

@@ -56,8 +56,8 @@ class GuardLimits:
         If a limit is not a finite number above zero; names all that are not.
     """
 
-    torque_limit_m1_nm: float
-    torque_limit_m2_nm: float
+    torque_limit_m1_nm: float  # largest absolute torque of inverter m1 [Nm]
+    torque_limit_m2_nm: float  # ... of inverter m2 [Nm]
     prbs_limit_nm: float
     rate_limit_nm_per_s: float
     sum_limit_nm: float

@@ -30,18 +30,22 @@ class IntegerType(IntEnum):
 
     @property
     def signed(self) -> bool:
+        """Whether it has a sign."""
         return self.name.startswith("INTEGER")
 
     @property
     def size_bytes(self) -> int:
+        """Length on the bus."""
         return _SIZE_BYTES[self]
 
     @property
     def low(self) -> int:
+        """Smallest value."""
         return _RANGE[self][0]
 
     @property
     def high(self) -> int:
+        """Largest value."""
         return _RANGE[self][1]
 
     def encode(self, value: int, where: str) -> bytes:
@@ -95,6 +99,7 @@ class TorqueScale:
     rated_torque_nm: float  # motor rated torque, object 0x6076, in Nm
 
     def to_nm(self, raw: int) -> float:
+        """Return a torque [Nm] of counts [per mille of the rated torque]."""
         return raw * self.rated_torque_nm / 1000.0
 
     def to_raw(self, torque_nm: float, where: str) -> int:
@@ -136,6 +141,7 @@ class VelocityScale:
         return cls(10.0**prefix * angle / time)
 
     def to_rad_s(self, raw: int) -> float:
+        """Return a speed [rad/s] of counts of 0x606C."""
         return raw * self.rad_s_per_count
 
     def to_raw(self, speed_rad_s: float, where: str) -> int:

@@ -70,10 +70,10 @@ class Evidence:
 class TorqueRequest:
     """What an experiment asks for, not yet allowed [Nm]; base and PRBS stay separate up to the inverter."""
 
-    base_m1_nm: float
-    prbs_m1_nm: float
-    base_m2_nm: float
-    prbs_m2_nm: float
+    base_m1_nm: float  # of inverter m1, without PRBS [Nm]
+    prbs_m1_nm: float  # PRBS of m1, and the damper's torque [Nm]
+    base_m2_nm: float  # of inverter m2, without PRBS [Nm]
+    prbs_m2_nm: float  # PRBS of m2, and the damper's torque [Nm]
 
     @property
     def total_m1_nm(self) -> float:
@@ -113,7 +113,7 @@ class GuardedTorque:
 
     base_nm: float
     prbs_nm: float
-    seal: InitVar[_Seal]
+    seal: InitVar[_Seal]  # that only this module has: nobody else can make one
 
     def __post_init__(self, seal: _Seal) -> None:
         if seal is not _SEAL:
@@ -130,9 +130,9 @@ _ZERO: Final = GuardedTorque(0.0, 0.0, _SEAL)
 class _Past:
     """The last command that was let through: where the base torques stand, and since when."""
 
-    t_ns: int
-    base_m1_nm: float
-    base_m2_nm: float
+    t_ns: int  # when, host's monotonic clock [ns]
+    base_m1_nm: float  # of m1 [Nm]
+    base_m2_nm: float  # of m2 [Nm]
 
 
 class TorqueGuard:

@@ -34,13 +34,14 @@ _IMPORT = re.compile(
     r"^[ \t]*(?:from ((?:estimator|hil)\b[\w.]*) import (\([^)]*\)|.*)|import ((?:estimator|hil)\b[\w.]*))", re.M
 )
 _NO_CODE = re.compile(r'^[ \t]*r?"""[\s\S]*?"""[ \t]*$|^[ \t]*#.*$|(?<=\S)  # .*$', re.M)
-"""Docstrings and comments, each with a line's end: what is compiled is the same without them."""
+"""Docstrings and comments: what is compiled is the same without them."""
 
 
 @cache
 def _code(path: Path) -> str:
-    """Return a source file without its comments and docstrings."""
-    return _NO_CODE.sub("", path.read_text("utf-8"))
+    """Return a source file without its comments and docstrings, nor the empty lines where they were."""
+    lines = _NO_CODE.sub("", path.read_text("utf-8")).splitlines()
+    return "\n".join(line for line in lines if line.strip())
 
 
 @cache

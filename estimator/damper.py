@@ -43,9 +43,9 @@ KEEPS_WITHIN = 0.01
 class Region:
     """Lines that are possible: each parameter's value, and its lowest and highest."""
 
-    value: Line
-    low: Line
-    high: Line
+    value: Line  # the nominal line
+    low: Line  # the smallest value of each parameter that is still possible
+    high: Line  # the largest
 
     def corners(self) -> Iterator[Line]:
         """Yield the nominal line, then every combination of the ends of J_M, J_L, k and c, at the least friction."""
@@ -63,9 +63,9 @@ class Region:
 class Timing:
     """Period of the feedback, from speed sampled to torque acting, and the torque's time constant [s]."""
 
-    period_s: float
-    dead_time_s: float
-    lag_s: float = 0.0
+    period_s: float  # of the torque's SYNC [s]
+    dead_time_s: float  # from the speed sampled to the torque acting [s]
+    lag_s: float = 0.0  # time constant of the torque [s]
 
     @property
     def held(self) -> int:
@@ -77,8 +77,8 @@ class Timing:
 class Filter:
     """K(z): numerator b, denominator a with leading 1 [Nm s/rad]."""
 
-    b: FloatArray
-    a: FloatArray
+    b: FloatArray  # (n,), highest power of z first [Nm s/rad]
+    a: FloatArray  # (n,), the first is 1
 
     def response(self, z: ComplexArray) -> ComplexArray:
         """Return K at points z."""
@@ -89,23 +89,23 @@ class Filter:
 class Demand:
     """What is asked: least damping, and the most torque [Nm] under an excitation of both inverters together [Nm]."""
 
-    damping: float
-    limit_nm: float
-    excitation_nm: FloatArray
+    damping: float  # damping ratio that every possible line keeps at least
+    limit_nm: float  # most torque of both inverters together [Nm]
+    excitation_nm: FloatArray  # (N,), the rig's PRBS of both inverters together [Nm]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Damper:
     """A design that keeps what was asked: its worst of all lines that were tried, their resonances, its torque."""
 
-    filter: Filter
-    timing: Timing
-    line: Line
-    least_damping: float
-    sensitivity: float
-    region_hz: tuple[float, float]
-    torque_nm: float
-    n_lines: int
+    filter: Filter  # K(z)
+    timing: Timing  # what it was designed for
+    line: Line  # the nominal line
+    least_damping: float  # of the lines that were tried: the smallest damping ratio
+    sensitivity: float  # ... the largest peak of the sensitivity function
+    region_hz: tuple[float, float]  # ... the lowest and highest resonance [Hz]
+    torque_nm: float  # largest torque of the damper at the nominal line under the excitation [Nm]
+    n_lines: int  # how many lines were tried
 
 
 def sampled_line(line: Line, timing: Timing) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -98,9 +98,9 @@ class Untested:
 class Open:
     """What recordings leave open."""
 
-    line: DrivelineModel
+    line: DrivelineModel  # the model without effects, as re-tuned
     candidates: tuple[Candidate, ...]  # the most probable first
-    twins: Mapping[str, tuple[str, ...]]
+    twins: Mapping[str, tuple[str, ...]]  # by effect: those that the recordings cannot distinguish from it
     untested: tuple[str, ...]  # effects that these recordings can neither show nor exclude, and others could
     supposed: Mapping[str, Untested] = field(default_factory=dict)  # those of them that have a size to suppose
     named: Effects | None = None  # what the verdict names; None where it leaves something without a name
@@ -222,6 +222,7 @@ def _holds(effects: Effects, others: Effects) -> bool:
 
 
 def name_of(effects: Effects) -> str:
+    """Return a set of effects as one name."""
     return " + ".join(sorted(effects)) or "nothing"
 
 
@@ -302,7 +303,7 @@ class Expected:
     """What an experiment is expected to decide."""
 
     gained: FloatArray  # (K, K)
-    right: float
+    right: float  # expected probability of the true hypothesis after it
 
     @property
     def factor(self) -> float:
@@ -346,11 +347,11 @@ def shown(known: Open, record: Record) -> tuple[str, ...]:
 class Width:
     """How well a value is known: half of its 95 % interval, now and after an experiment, in its unit."""
 
-    name: str
-    value: float
-    now: float
-    after: float
-    unit: str
+    name: str  # of the parameter
+    value: float  # as it is known now, in `unit`
+    now: float  # half of the 95 % interval now
+    after: float  # half of it after the experiment
+    unit: str  # SI, as reports show it
 
 
 def widths(candidate: Candidate, line: DrivelineModel, record: Record) -> Iterator[Width]:

@@ -98,8 +98,8 @@ class Cure:
     recording: str
     torque: float = 1.0
     inputs: tuple[int, ...] = ()
-    output: float = 1.0
-    time: float = 1.0
+    output: float = 1.0  # factor on the measured output
+    time: float = 1.0  # factor on the time stamps
     swapped: int | None = None
     kind: str | None = None
 

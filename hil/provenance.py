@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from drivers.foreign_file import open_regular
-from hil.version import __version__
+from hil.version import program
 
 _LINE: ContextVar[tuple[str, ...]] = ContextVar("_LINE", default=())
 
@@ -49,21 +49,20 @@ class Source:
 class Provenance:
     """What a result was made from."""
 
-    version: str
+    program: str  # with version and commit: hil 0.3.0 (1a2b3c4d5e6f)
     date: str  # ISO 8601, UTC
-    command: str  # the command line
+    command: str  # the command line; empty from Python
     models: tuple[Source, ...]
     recordings: tuple[Source, ...]
     rig: str = ""  # name of the rig that was recorded, where that is known
 
     def document(self) -> dict[str, Any]:
         """Return it for JSON."""
-        kept = {key: value for key, value in asdict(self).items() if key != "rig" or value}
-        return {"program": f"hil {kept.pop('version')}", **kept}
+        return {key: value for key, value in asdict(self).items() if key != "rig" or value}
 
 
 def provenance(models: Sequence[Path] = (), recordings: Sequence[Path] = (), rig: str = "") -> Provenance:
     """Return what a result is made from that these files go into, now."""
     now = datetime.now(UTC).isoformat(timespec="seconds")
     line = shlex.join(("hil", *_LINE.get())) if _LINE.get() else ""
-    return Provenance(__version__, now, line, tuple(map(Source.of, models)), tuple(map(Source.of, recordings)), rig)
+    return Provenance(program(), now, line, tuple(map(Source.of, models)), tuple(map(Source.of, recordings)), rig)

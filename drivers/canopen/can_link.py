@@ -121,9 +121,11 @@ class CanLink:
         self.network.tap = tap
 
     def send(self, cob_id: int, data: bytes) -> None:
+        """Send one frame with classic CAN's up to 8 bytes."""
         self.network.send_message(cob_id, data)
 
     def sync(self) -> int:
+        """Send SYNC; return when, on the host's monotonic clock [ns]."""
         self.raise_if_failed()
         t_ns = time.monotonic_ns()
         self.network.send_message(SYNC_COB_ID, b"")

@@ -64,6 +64,7 @@ class Emergency:
 
 
 def decode(data: bytes) -> Emergency:
+    """Decode the 8 bytes of an EMCY frame (CiA 301); ProtocolViolation if there are not 8."""
     if len(data) != _FRAME.size:
         raise ProtocolViolation(
             f"EMCY frame of {len(data)} bytes ({data.hex(' ')}), expected {_FRAME.size}. "

@@ -60,10 +60,12 @@ class HeartbeatMonitor:
         self.state: NmtState | None = None
 
     def beat(self, state: NmtState, t_ns: int) -> None:
+        """Take a heartbeat that arrived at ``t_ns`` on the host's monotonic clock."""
         self.state = state
         self._silence.beat(t_ns)
 
     def raise_if_lost(self, now_ns: int) -> None:
+        """Raise DeviceTimeout if no heartbeat has come for too long, ``now_ns`` being the host's monotonic clock."""
         if not self._silence.has_ended(now_ns):
             return
         age_ns = self._silence.length_ns(now_ns)

@@ -46,9 +46,9 @@ _STRUCT_CODES = {
 class MappedObject:
     """One entry of a PDO mapping: index, subindex and length in bits."""
 
-    index: int
-    subindex: int
-    length_bits: int
+    index: int  # 0x1000 to 0xFFFF
+    subindex: int  # 0 to 255
+    length_bits: int  # 8, 16, 32 or 64 in practice
 
     @classmethod
     def from_entry(cls, entry: int) -> MappedObject:
@@ -57,6 +57,7 @@ class MappedObject:
 
     @property
     def entry(self) -> int:
+        """The mapping entry as objects 0x1600 and 0x1A00 hold it: index, subindex and bits in one 32-bit number."""
         return self.index << 16 | self.subindex << 8 | self.length_bits
 
     def __str__(self) -> str:

@@ -63,6 +63,7 @@ def forget_token(port: int, token: str) -> None:
 
 
 def kept_token(port: int) -> str | None:
+    """Return the token of the simulated bus on a port of this machine; None where there is none to read."""
     try:
         return token_file(port).read_text(encoding="ascii")
     except (OSError, ValueError):

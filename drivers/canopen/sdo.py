@@ -190,6 +190,7 @@ class SdoChannel:
         return self._eds.dictionary.get_variable(index, subindex) is not None
 
     def upload(self, index: int, subindex: int = 0) -> int:
+        """Read an integer from the node's object dictionary, in the type that the EDS gives it."""
         kind = self._eds.integer_type(index, subindex)
         data = self._transfer(index, subindex, lambda: self._client.upload(index, subindex))
         if len(data) != kind.size_bytes:
@@ -206,6 +207,7 @@ class SdoChannel:
         self._transfer(index, subindex, lambda: self._client.download(index, subindex, data))
 
     def download_confirmed(self, index: int, subindex: int, value: int, ignored: int = 0) -> None:
+        """Write an integer and read it back; ConfigMismatch if it differs in bits that are not ``ignored``."""
         self.download(index, subindex, value)
         found = self.upload(index, subindex)
         if (found ^ value) & ~ignored:

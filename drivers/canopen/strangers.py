@@ -41,6 +41,7 @@ class Strangers:
         self._seen = None
 
     def raise_if_seen(self) -> None:
+        """Raise if another controller's frame was seen, and say which."""
         if self._seen is not None:
             raise foreign(self._seen)
 

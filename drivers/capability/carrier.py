@@ -73,7 +73,7 @@ class Direction:
     communication: int  # indices of the parameters of the first
     mapping: int  # indices of the parameters of the first
     access: tuple[str, ...]  # access types of what one may carry
-    first_cob_id: int
+    first_cob_id: int  # of the first PDO, node 0, in CiA 301's pre-defined connection set
     types: range  # transmission types that this program can use
 
     def predefined(self, number: int) -> int:
@@ -99,6 +99,7 @@ class Carrier:
     fixed: frozenset[tuple[int, int]]  # entries ``(index, subindex)`` of its parameters that can't be written
 
     def carries(self, index: int, subindex: int = 0) -> bool:
+        """Tell whether an object is mapped in this PDO."""
         return any((mapped.index, mapped.subindex) == (index, subindex) for mapped in self.layout.objects)
 
     @property

@@ -39,10 +39,11 @@ MODES_OF_OPERATION: Final = 0x6060
 class CarrierSearch:
     """What a search came to: the PDOs found, none if they do not carry it all, and others looked at, in words."""
 
-    carriers: tuple[Carrier, ...]
-    others: tuple[str, ...] = ()
+    carriers: tuple[Carrier, ...]  # the PDOs, in their order
+    others: tuple[str, ...] = ()  # PDOs that would not do, each with its reason
 
     def carries(self, index: int, subindex: int = 0) -> bool:
+        """Tell whether one of the PDOs found carries an object."""
         return any(carrier.carries(index, subindex) for carrier in self.carriers)
 
 

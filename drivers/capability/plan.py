@@ -39,6 +39,7 @@ class Ability:
 
     @property
     def given(self) -> bool:
+        """Whether the drive has it at all."""
         return bool(self.parts)
 
     def writable(self, sheet: DataSheet) -> bool:
@@ -106,6 +107,7 @@ class DrivePlan:
     further: CarrierSearch  # the search for the TPDOs that carry those which the feedback's do not carry
 
     def has(self, function: Function) -> bool:
+        """Tell whether the drive has a function."""
         return self.abilities[function].given
 
     @property
@@ -116,6 +118,7 @@ class DrivePlan:
 
     @property
     def carriers(self) -> tuple[Carrier, ...]:
+        """All PDOs in use: of commands, of feedback, of further channels."""
         return (*self.command.carriers, *self.feedback.carriers, *self.further.carriers)
 
     @property
@@ -135,6 +138,7 @@ class DrivePlan:
         )
 
     def pdos(self, direction: Direction) -> tuple[Carrier, ...]:
+        """Return the PDOs of a direction; ConfigMismatch, with what is lacking, for a drive that can't be used."""
         if self.missing:
             lacking = "; ".join(_lacking(each) for each in self.missing)
             raise ConfigMismatch(

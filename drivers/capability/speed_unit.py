@@ -60,14 +60,16 @@ class SpeedUnit:
 
     unit: SpeedUnitName  # its name
     counts_per_unit: float = 1.0  # counts of one unit
-    increments_per_turn: float | None = None
+    increments_per_turn: float | None = None  # of the encoder, where the unit counts increments
 
     @property
     def needs_increments(self) -> bool:
+        """Whether the unit counts increments of an encoder, whose number per turn must be given."""
         return self.unit in (SpeedUnitName.INCREMENTS_PER_S, SpeedUnitName.INCREMENTS_PER_MS)
 
     @property
     def scale(self) -> VelocityScale:
+        """The factor from counts to rad/s."""
         return VelocityScale(_RAD_S[self.unit] / (self.counts_per_unit * (self.increments_per_turn or 1.0)))
 
     def __str__(self) -> str:

@@ -135,6 +135,7 @@ def _default(entry: EdsEntry, node_id: int) -> int | float | str | bytes | None:
 
 
 def read_real(text: str) -> float | None:
+    """Read a decimal number; None for what is none."""
     try:
         return float(text)
     except ValueError:

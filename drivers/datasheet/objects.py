@@ -43,6 +43,7 @@ class ObjectType(IntEnum):
 
     @property
     def has_entries(self) -> bool:
+        """Whether its values are in entries from subindex 1 on."""
         return self in (ObjectType.ARRAY, ObjectType.RECORD)
 
 
@@ -80,6 +81,7 @@ class EdsEntry:
 
     @property
     def readable(self) -> bool:
+        """Whether it can be read by SDO."""
         return self.access is not None and self.access != "wo"
 
     @property
@@ -111,10 +113,10 @@ class EdsEntry:
 class EdsObject:
     """One object: a variable has its one value as entry 0."""
 
-    index: int
-    section: EdsSection
-    object_type: ObjectType | None
-    entries: Mapping[int, EdsEntry]
+    index: int  # 0x1000 to 0xFFFF
+    section: EdsSection  # of the file
+    object_type: ObjectType | None  # by CiA 306; None where the file does not say
+    entries: Mapping[int, EdsEntry]  # by subindex
 
 
 def read_objects(text: EdsText) -> dict[int, EdsObject]:

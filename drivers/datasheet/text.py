@@ -76,18 +76,18 @@ class EdsUnreadable(ConfigMismatch):
 class EdsKey:
     """One ``name=value`` and its line."""
 
-    name: str
-    value: str
-    line: int
+    name: str  # as written
+    value: str  # as written
+    line: int  # from 1
 
 
 @dataclass(frozen=True, slots=True)
 class EdsSection:
     """One section: its name as written, its line, its keys by lower-case name."""
 
-    name: str
-    line: int
-    keys: dict[str, EdsKey] = field(default_factory=dict)
+    name: str  # as written
+    line: int  # from 1
+    keys: dict[str, EdsKey] = field(default_factory=dict)  # by lower-case name
 
     def get(self, key: str) -> str | None:
         """Look up a key's value, whatever its case; None if it is missing or blank."""
@@ -104,9 +104,9 @@ class EdsSection:
 class EdsText:
     """A file's sections by lower-case name, in the order of the file, and what is odd about its text."""
 
-    path: Path
-    sections: dict[str, EdsSection]
-    findings: tuple[EdsFinding, ...]
+    path: Path  # of the file
+    sections: dict[str, EdsSection]  # by lower-case name
+    findings: tuple[EdsFinding, ...]  # about encoding and form
 
     def section(self, name: str) -> EdsSection | None:
         """Look up a section, whatever its case."""
@@ -125,6 +125,7 @@ class EdsText:
 
 
 def read_eds_text(path: Path) -> EdsText:
+    """Read a file's sections and keys, whatever its encoding and ends of lines; what is odd becomes findings."""
     text, findings = _decode(path)
     reader = _Reader()
     reader.findings.extend((*findings, *_ends_of_lines(text)))

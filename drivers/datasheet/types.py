@@ -18,6 +18,7 @@ _NODE_ID = "$NODEID"
 
 
 def read_number(text: str) -> int | None:
+    """Read an integer as CiA 306 writes it (decimal, 0x hexadecimal, leading 0 octal); None for what is none."""
     text = text.strip()
     if len(text) > _LONGEST or not _NUMBER.fullmatch(text):
         return None

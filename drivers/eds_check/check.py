@@ -33,6 +33,7 @@ class EdsReport:
         return self.count(Severity.ERROR) == 0
 
     def count(self, severity: Severity) -> int:
+        """Count the findings of a severity."""
         return sum(finding.severity is severity for finding in self.findings)
 
 

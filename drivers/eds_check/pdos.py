@@ -22,6 +22,7 @@ _AS_MAPPED = "The maker's own mapping counts."
 
 
 def check_pdos(context: EdsContext) -> Iterator[EdsFinding]:
+    """Yield what is wrong with the PDOs of a file: communication, mapping, identifiers that are given twice."""
     for direction in (RPDO, TPDO):
         for n in PDO_NUMBERS:
             yield from _pair(context, direction, direction.communication + n, direction.mapping + n)

@@ -150,6 +150,7 @@ _STATE_OF_BITS = _state_of_bits()
 
 
 def state_of(statusword: int) -> PowerState:
+    """Return the power state that a statusword 0x6041 shows (CiA 402); ProtocolViolation if its bits are no state."""
     state = _STATE_OF_BITS.get(statusword & _STATE_MASK)
     if state is None:
         raise ProtocolViolation(

@@ -26,8 +26,8 @@ NEVER_NS = -1  # before any clock's beginning
 class Received(NamedTuple):
     """The values of one TPDO, and when it arrived on the host's monotonic clock [ns]."""
 
-    values: tuple[int, ...]
-    t_ns: int
+    values: tuple[int, ...]  # raw, in the order of the mapping
+    t_ns: int  # host's monotonic clock [ns]
 
 
 class InverterFeedback(NamedTuple):
@@ -36,11 +36,11 @@ class InverterFeedback(NamedTuple):
     torque_nm: float  # torque actual value, 0x6077 [Nm]
     speed_rad_s: float  # velocity actual value, 0x606C [rad/s]
     state: PowerState  # power state from the statusword, 0x6041
-    t_ns: int
+    t_ns: int  # when it arrived, host's monotonic clock [ns]
     torque_raw: int  # the counts on the bus, so that a wrong scale can be corrected later
     speed_raw: int  # the counts on the bus, so that a wrong scale can be corrected later
-    limited: bool = False
-    follows: bool = True
+    limited: bool = False  # bit 11 of the statusword: the drive limits its torque
+    follows: bool = True  # bit 12: the drive follows its target
 
 
 class _TpdoReceiver:

@@ -102,11 +102,12 @@ class InverterPdos:
 class TorqueCounts:
     """Target torque and torque offset in per mille of the rated torque."""
 
-    target: int = 0
-    offset: int = 0
+    target: int = 0  # object 0x6071
+    offset: int = 0  # object 0x60B2
 
     @property
     def total(self) -> int:
+        """Target plus offset [per mille of the rated torque]."""
         return self.target + self.offset
 
 
@@ -114,8 +115,8 @@ class TorqueCounts:
 class TorqueOnBus:
     """Target torque and torque offset of a frame [Nm]; None what it does not carry."""
 
-    target_nm: float | None
-    offset_nm: float | None
+    target_nm: float | None  # object 0x6071 [Nm]
+    offset_nm: float | None  # object 0x60B2 [Nm]
 
 
 def set_up_pdos(sdo: SdoChannel, plan: DrivePlan, where: str) -> None:

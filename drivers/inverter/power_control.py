@@ -126,6 +126,7 @@ class PowerControl:
         self._sdo.download(0x6040, 0, command.value)
 
     def state(self) -> PowerState:
+        """Power state, read by SDO."""
         return state_of(self._sdo.upload(0x6041))
 
     def _await(self, accept: Callable[[PowerState], bool], expected: str) -> PowerState:

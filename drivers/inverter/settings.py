@@ -60,13 +60,15 @@ class InverterSettings:
     heartbeat_ms: int = 100  # heartbeat period of the drive [ms]
     host_node_id: int = HOST_NODE_ID  # node id of the host's own heartbeat, 1 to 127
     host_timeout_ms: int = 150  # without the host's heartbeat for so long the drive takes the host for dead [ms]
-    follow_bit: bool = True
+    follow_bit: bool = True  # whether bit 12 of the statusword is to be believed
     rpdo_deadline_ms: int = 150  # without an RPDO for so long the drive takes the host for dead [ms]
     option_codes: Mapping[int, int] = field(default_factory=dict)
-    torque_slope_nm_per_s: float | None = None
+    """By object (0x605A to 0x605E, 0x6007): what the drive does when it stops."""
+    torque_slope_nm_per_s: float | None = None  # object 0x6087; None leaves the drive's own [Nm/s]
     speed_unit: SpeedUnit | None = None  # unit of 0x606C; None for the drive's own
     rated_torque_unit_nm: float = 1e-3  # what one count of 0x6076 is
     accepted: Mapping[str, Acceptance] = field(default_factory=dict)
+    """What the drive lacks and the rig file accepts, by name."""
     channels: tuple[ObjectId, ...] = ()  # further objects to be recorded in each cycle
     sdo_timeout_s: float = 0.5  # longest wait for an SDO answer [s]
     mode_timeout_s: float = 2.0  # longest wait for the mode of operation to be shown in 0x6061 [s]

@@ -30,8 +30,8 @@ from drivers.plc.modbus_security import ClientSecurity, client_context, tls_fail
 class AnswerIds:
     """Identifiers in the MBAP header of an answer (Modbus Messaging on TCP/IP V1.0b, 3.1.3)."""
 
-    transaction: int
-    unit: int
+    transaction: int  # as in the request
+    unit: int  # as in the request
 
     def __str__(self) -> str:
         return f"transaction id {self.transaction}, unit id {self.unit}"
@@ -81,6 +81,7 @@ class Dial:
         self.client.ctx.callback_disconnected = self._lost  # type: ignore[method-assign]
 
     async def open(self) -> None:
+        """Connect within the time allowed; DeviceTimeout or BusDown with the reason if that fails."""
         params = self.client.ctx.comm_params  # one time-out for both is all that pymodbus has
         params.timeout_connect = self._connecting_s
         if not await self.client.connect():

@@ -102,6 +102,7 @@ class ModbusLink:
         return self._dial is not None and self._dial.client.connected
 
     async def open(self) -> None:
+        """Connect anew; a connection that is open is closed first."""
         self.close()
         dial = Dial(self._host, self._port, self._timeout_s, self._security, self.place)
         dial.client.ctx.framer = MbapFramer(_Decoder(False))

@@ -60,15 +60,15 @@ class Credentials:
     """What one side shows and what it trusts: paths of PEM files."""
 
     ca: Path  # certificate of the authority that must have signed the other side's certificate
-    certificate: Path
-    key: Path
+    certificate: Path  # its own
+    key: Path  # the certificate's private key
 
 
 @dataclass(frozen=True, slots=True)
 class ClientSecurity:
     """How a client secures its connection; without ``server_name`` the certificate must name the host."""
 
-    credentials: Credentials
+    credentials: Credentials  # of this host
     server_name: str | None = None
 
 
@@ -85,6 +85,7 @@ def server_context(credentials: Credentials) -> ssl.SSLContext:
 
 
 def role_of(certificate_der: bytes) -> str | None:
+    """Return the role in a certificate's extension (Modbus/TCP Security, OID 1.3.6.1.4.1.50316.802.1); None without."""
     return _role(x509.load_der_x509_certificate(certificate_der))
 
 

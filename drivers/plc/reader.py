@@ -28,8 +28,8 @@ PASSING: Final = (BusDown, DeviceTimeout)
 class Backoff:
     """Pauses between attempts."""
 
-    first_s: float = 0.2
-    longest_s: float = 5.0
+    first_s: float = 0.2  # the first pause [s]; each next one is twice as long
+    longest_s: float = 5.0  # the longest [s]
     attempts: int = 6  # attempts in all, the first one counted
 
     def __post_init__(self) -> None:

@@ -124,6 +124,7 @@ class Register(MapTable):
         return self._ordered(self._words(value))
 
     def decode(self, words: Sequence[int]) -> Value:
+        """Return the value in SI of the raw words; ProtocolViolation if they are too few, too many or no such value."""
         if len(words) != self.size:
             raise ProtocolViolation(
                 f"{self._place}: expected {self.size} word(s), got {len(words)}. Compare the register map "

@@ -82,10 +82,10 @@ class RegisterMap(MapTable):
 class Block:
     """Registers of one kind at adjacent addresses: what one request reads or writes."""
 
-    kind: RegisterKind
-    address: int
-    count: int
-    names: tuple[str, ...]
+    kind: RegisterKind  # coils, discrete inputs, holding or input registers
+    address: int  # of the first, from 0
+    count: int  # of registers
+    names: tuple[str, ...]  # of the values in them
 
 
 def blocks_of(map_: RegisterMap, names: Iterable[str]) -> tuple[Block, ...]:

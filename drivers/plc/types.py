@@ -50,7 +50,7 @@ class PlcStatus:
     torque_limit_nm: float  # largest motor speed, and largest torque of one inverter [rad/s, Nm]
     plc_count: int  # its sign of life
     prbs: PrbsSettings  # the settings its own generator holds
-    prbs_torque_nm: float
+    prbs_torque_nm: float  # that the PLC adds itself [Nm]
     t_ns: int  # when the first of the requests for it left, on the host's monotonic clock
 
     def age_ns(self, now_ns: int) -> int:

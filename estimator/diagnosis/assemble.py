@@ -1,4 +1,7 @@
-"""Intervals of fitted parameters that hold although the errors are correlated."""
+"""A result put together from a fit: intervals, moments, profiles, load torques, and the model to continue with.
+
+The intervals hold although the errors are correlated.
+"""
 
 from __future__ import annotations
 
@@ -10,8 +13,7 @@ from functools import partial
 import numpy as np
 
 from estimator.diagnosis.acquisition.chain import Chain
-from estimator.diagnosis.inference.hypotheses import Hypothesis, line_values
-from estimator.diagnosis.inference.hypotheses import covariance as of_innovations
+from estimator.diagnosis.inference.hypotheses import Hypothesis, covariance as of_innovations, line_values
 from estimator.diagnosis.noise import gain_from_squares, residuals_by_record, unpredictable
 from estimator.diagnosis.result import Estimated, Evidence, FoundEffect, Interval, Profile, Retuned
 from estimator.physics.catalogue import EFFECTS

@@ -20,7 +20,7 @@ import numpy as np
 from numba.core import types
 from numba.core.types import boolean, float64, int64
 
-from estimator.compiled import IS_COMPILED
+from estimator.compiled import IS_COMPILED, ROOT
 from estimator.diagnosis.line.equivalent import Chain, Filtered, run_filter, run_smoother
 from estimator.diagnosis.line.tangent import Nudges, Setting, linearise
 from estimator.physics.driveline import Start
@@ -114,7 +114,8 @@ def compile_named(masses: int, *names: str) -> None:
 def _compiling(masses: int, kernels: Sequence[Any]) -> Iterator[None]:
     """Compile kernels in a process of their own meanwhile, and wait for it; whoever is interrupted ends it."""
     names = [kernel.__name__ for kernel in kernels]
-    program = f"from estimator.diagnosis.first_use import compile_named; compile_named({masses}, *{names!r})"
+    here = f"import sys; sys.path.insert(0, {str(ROOT)!r})"  # this program and no other that is installed next to it
+    program = f"{here}; from estimator.diagnosis.first_use import compile_named; compile_named({masses}, *{names!r})"
     with (
         tempfile.TemporaryDirectory(prefix="hil-compiling-") as folder,
         # -P: else Python would look for modules in the working folder, which may hold anybody's

@@ -67,7 +67,7 @@ class BestEstimate:
 
     fit: LinearFit  # the Box-Jenkins model it is taken from
     two_mass: LinearFit  # the one of third order, which physical parameters are taken from
-    problem: Problem
+    problem: Problem  # the least-squares problem of `fit`
     x: FloatArray  # its minimum
     mode: UncertainMode | None  # the pole pair, None where the data carry none
     reason: str  # why there is none
@@ -76,10 +76,11 @@ class BestEstimate:
     feedback: Feedback  # whether the torque followed the speed
     linearity: Linearity  # whether a linear model is enough
     regions: tuple[RegionalMode, ...]  # the resonance by region of the shaft's torque [Nm]; empty where linear
-    verdict: Verdict
+    verdict: Verdict  # whether it may be believed, and if not, why
 
     @property
     def too_slow(self) -> bool:
+        """Whether the sampling is too slow: fewer than SAMPLES_PER_PERIOD samples in a period of the resonance."""
         period_s = self.fit.model.sample_time_s
         return self.mode is not None and self.mode.frequency_hz.value * period_s > 1.0 / SAMPLES_PER_PERIOD
 
@@ -88,14 +89,15 @@ class BestEstimate:
 class _Rung:
     """One order tried: its problem, minimum and fit."""
 
-    problem: Problem
-    x: FloatArray
-    first: int
-    fit: LinearFit
-    validation: Validation
+    problem: Problem  # with these orders
+    x: FloatArray  # its minimum
+    first: int  # first sample that counts
+    fit: LinearFit  # the model at the minimum
+    validation: Validation  # of the fit on its own recording
 
 
 def best_estimate(record: Record, high_pass_hz: float = HIGH_PASS_HZ) -> BestEstimate:
+    """Return the headline of a recording: the Box-Jenkins model with the orders that the criterion prefers."""
     record = first_part(record)
     data = high_passed(record, high_pass_hz)
     rungs = [_rung(data, RESPONDING)]

@@ -33,12 +33,12 @@ NOT_EXCITED = "at the resonance the torque moves the output less than the noise 
 class OnlineEstimate:
     """State of the on-line chain after one kept sample."""
 
-    time_s: float
+    time_s: float  # of the sample, in the recording's time [s]
     estimate: Estimate  # of the recursive estimator, with its status
     model: LinearModel  # its parameters as a model
     resonance: Mode | None  # dominant lightly damped mode
     frequency_std_hz: float  # standard deviations of its natural frequency [Hz] and damping ratio
-    damping_std: float
+    damping_std: float  # standard deviation of the damping ratio
     state: TrackingState  # what the tracking is doing
     alarm: Alarm | None = None  # A change that was found at this sample
 
@@ -68,7 +68,7 @@ class OnlineTrajectory:
     alarms: tuple[Alarm, ...]  # changes found in the block, in order of time
     alarm_at: tuple[int, ...]  # at which kept sample of the block each was found
     orders: Orders  # structure and sampling period of the models [s]
-    sample_time_s: float
+    sample_time_s: float  # period of the kept samples [s]
 
     def __len__(self) -> int:
         return int(self.time_s.shape[0])

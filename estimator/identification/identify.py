@@ -79,8 +79,8 @@ class Identification:
     online: LinearModel
     spectral: SpectralEstimate | None
     no_spectral: str
-    batch_resonance: Mode | None
-    online_resonance: Mode | None
+    batch_resonance: Mode | None  # of the off-line output-error model; None where it has none
+    online_resonance: Mode | None  # of the recursive estimate at its end; None where it has none
 
     @property
     def estimate(self) -> Estimate:
@@ -172,9 +172,9 @@ class Compared:
     """What one estimator made of one recording."""
 
     recording: str  # names
-    estimator: str
+    estimator: str  # name as `--estimator` takes it
     resonance: Mode | None  # of its last model
-    fit_percent: float
+    fit_percent: float  # of its free run, 100 (1 - NRMSE) [%]
     status: Status  # of its last estimate
     reason: str = ""  # why it has that status and what to do
 

@@ -92,10 +92,10 @@ Together = tuple[Joint | None, str]
 class _Experiment:
     """One recording in the joint fit: its problem, its own minimum x and the scale of its innovations."""
 
-    name: str
-    problem: Problem
-    own: FloatArray
-    std: float
+    name: str  # of the recording
+    problem: Problem  # its own least-squares problem
+    own: FloatArray  # minimum of that alone
+    std: float  # RMS of the innovations there [output unit]
 
     def cost(self, x: FloatArray) -> float:
         """Return ``|w|^2 / s^2``; infinite where the model is unstable."""
@@ -215,9 +215,9 @@ def _descended(experiments: Sequence[_Experiment], xs: list[FloatArray], n: int)
 class _Slopes:
     """Whitened errors of one recording, and their slopes by what is shared and by what is its own."""
 
-    w: FloatArray
-    shared: FloatArray
-    own: FloatArray
+    w: FloatArray  # (N,), errors over their standard deviation
+    shared: FloatArray  # (N, n), d w / d what all recordings share
+    own: FloatArray  # (N, m), d w / d what is the recording's own
 
     @classmethod
     def at(cls, experiment: _Experiment, x: FloatArray, n: int, *, of_theta: bool = False) -> _Slopes:

@@ -1,4 +1,4 @@
-"""Tall least-squares problems, brought to triangular form by Householder reflections first.
+"""The linear model that every estimator here fits, its conventions, and the least-squares solver that they share.
 
 ::
 
@@ -12,6 +12,8 @@
   The paper's d = 1 is nk = 1. Where another text counts a pure delay d on top of that one, ``nk = d + 1``.
 - ``na`` is the order of A in *this* output-error model; MATLAB calls it nf there and keeps na for ARX.
 - Poles and zeros are those in z.
+
+Tall least-squares problems are brought to triangular form by Householder reflections first (`triangular`).
 """
 
 from __future__ import annotations
@@ -93,9 +95,9 @@ class Orders:
         If an order is negative or nb is 0.
     """
 
-    na: int = 4
-    nb: int = 4
-    nk: int = 1
+    na: int = 4  # coefficients of A behind its leading 1
+    nb: int = 4  # coefficients of B
+    nk: int = 1  # samples from u to its first effect on y; 1 for a torque held until the next row
 
     def __post_init__(self) -> None:
         require(
@@ -143,8 +145,8 @@ class LinearModel:
         If a coefficient is not finite.
     """
 
-    a: tuple[float, ...]
-    b: tuple[float, ...]
+    a: tuple[float, ...]  # a_1 ... a_na of A
+    b: tuple[float, ...]  # b_1 ... b_nb of B [output unit per input unit]
     nk: int
     sample_time_s: float
 

@@ -134,11 +134,11 @@ class SpectralEstimate:
 class _Local:
     """Estimate of one stretch: response, its variance, noise and explained power of the output per sample."""
 
-    response: ComplexArray
-    variance: FloatArray
-    noise: FloatArray
-    explained: FloatArray
-    freedom: int
+    response: ComplexArray  # at each line [output unit per input unit]
+    variance: FloatArray  # of the response
+    noise: FloatArray  # power of the output that the input does not explain
+    explained: FloatArray  # power that it explains
+    freedom: int  # degrees of freedom of the variance
 
 
 def spectral_estimate(record: Record, values_per_width: int = 1) -> SpectralEstimate:
@@ -275,6 +275,10 @@ def _period(u: FloatArray) -> int | None:
     return int(period) if period * FEWEST_PERIODS <= n else None
 
 
+SMOOTHED = 5
+"""Neighbouring lines whose noise is averaged: it is smooth in frequency."""
+
+
 def _periodic(u: FloatArray, y: FloatArray, period: int, period_s: float, block: int, bridged: int) -> SpectralEstimate:
     """Average the periods of a stretch, the first one left out."""
     count = u.shape[0] // period - 1
@@ -300,10 +304,6 @@ def _periodic(u: FloatArray, y: FloatArray, period: int, period_s: float, block:
         bridged,
         _distortion(line, excited, mean_y - everywhere * mean_u, noise / count, period, period_s),
     )
-
-
-SMOOTHED = 5
-"""Neighbouring lines whose noise is averaged: it is smooth in frequency."""
 
 
 def _smoothed(noise: FloatArray) -> FloatArray:

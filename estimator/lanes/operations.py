@@ -1,4 +1,4 @@
-"""Which way to go, of one number or of many in lanes.
+"""What laws may do with a number, or with one in each of several SIMD lanes: decisions, arithmetic, functions.
 
 ``if`` asks one question. Lanes give an answer each: ``choose`` takes of two values, both worked out, the one each lane
 asks for; ``every`` and ``some`` tell whether anything has to be worked out at all.
@@ -143,6 +143,7 @@ def define(function: Any, kinds: tuple[type, ...], wanted: Any, result: Any, mak
 
 
 def called(builder: Any, name: str, *args: Any) -> Any:
+    """Call LLVM's intrinsic of this name on all lanes at once."""
     kind = ir.FunctionType(NUMBERS, [NUMBERS] * len(args))
     return builder.call(defined_once(builder.module, kind, f"llvm.{name}.v{LANES}f64"), args)
 

@@ -6,9 +6,7 @@ from typing import Any
 
 from llvmlite import ir
 from numba import extending
-from numba.core import cgutils as core_cgutils
-from numba.core import datamodel, typeconv, typing
-from numba.core import types as core_types
+from numba.core import cgutils as core_cgutils, datamodel, typeconv, types as core_types, typing
 
 types: Any = core_types
 cgutils: Any = core_cgutils
@@ -40,6 +38,7 @@ class LanesType(types.Type):
         super().__init__("Lanes")
 
     def can_convert_from(self, typingctx: Any, other: Any) -> Any:
+        """Let numba take a plain number for one in every lane."""
         return Conversion.safe if isinstance(other, types.Number) else None
 
     def unify(self, typingctx: Any, other: Any) -> Any:

@@ -128,9 +128,9 @@ class Parameter:
     That is a relative tolerance, or the 95 % interval to which it was measured; then the tolerance follows from it.
     """
 
-    value: float
-    tolerance: float = 0.0
-    ci95: tuple[float, float] | None = None
+    value: float  # in SI, at the motor shaft
+    tolerance: float = 0.0  # relative, 0 for a value that is trusted exactly
+    ci95: tuple[float, float] | None = None  # in SI, where it was measured
 
     def __post_init__(self) -> None:
         if self.ci95 is not None:
@@ -174,9 +174,9 @@ class Parameter:
 class EffectValue:
     """One parameter of an effect: its value and, where it was estimated, its 95 % interval."""
 
-    value: float
-    ci95: tuple[float, float] | None = None
-    tolerance: float = 0.0
+    value: float  # in the parameter's unit
+    ci95: tuple[float, float] | None = None  # in the same unit; None where it was given
+    tolerance: float = 0.0  # relative, 0 for a value that is trusted exactly
 
 
 class Driveline(Protocol):
@@ -220,6 +220,7 @@ def natural_frequencies_rad_s(values: Mapping[str, float]) -> FloatArray:
 
 
 def load_inertia(model: Driveline) -> str:
+    """Return the name of the parameter that is the load's inertia; with one mass the whole line's."""
     return "J_M" if model.structure is Structure.ONE_MASS else "J_L"
 
 
@@ -230,14 +231,14 @@ class Start:
     Of a joint also the preload behind its gap [Nm].
     """
 
-    load_torque_nm: float
-    angle_rad: float
-    speed_rad_s: float
-    twist_rad: float = 0.0
-    load_speed_rad_s: float = 0.0
-    middle_twist_rad: float = 0.0
-    middle_speed_rad_s: float = 0.0
-    preload_nm: float = 0.0
+    load_torque_nm: float  # constant over the recording [Nm]
+    angle_rad: float  # of the motor [rad]
+    speed_rad_s: float  # of the motor [rad/s]
+    twist_rad: float = 0.0  # of the first shaft [rad]
+    load_speed_rad_s: float = 0.0  # of the load [rad/s]
+    middle_twist_rad: float = 0.0  # of the second shaft [rad]; three masses
+    middle_speed_rad_s: float = 0.0  # of the mass between the shafts [rad/s]; three masses
+    preload_nm: float = 0.0  # torque in a joint before it is twisted [Nm]
 
 
 @dataclass(frozen=True, slots=True)
@@ -245,5 +246,5 @@ class Case:
     """One simulation of a recording."""
 
     p: FloatArray  # (layout.SIZE,): parameters of the superset model, the recording's own among them
-    start: Start
+    start: Start  # of this simulation
     extra_load_nm: FloatArray | None = None  # (N,): load torque over time, next to the constant one

@@ -1,7 +1,7 @@
 """What an entry of the catalogue is: a law that can be released from its null, and what is known of it.
 
 A missing effect is a constraint of the superset model to release: at ``null`` its law does nothing. A law
-that acts at one of the places of ``estimator.physics.effect`` is taken into the one kernel from its entry; one that
+that acts at a `Place` is taken into the one kernel from its entry; one that
 changes the line itself is written into the kernel. Everything else about it stands in its entry.
 """
 
@@ -35,8 +35,8 @@ class Place(Enum):
 class Acting:
     """A law at a place: it takes all parameters of its entry, in their order, behind what the place gives."""
 
-    place: Place
-    law: Callable[..., Any]
+    place: Place  # where along the line
+    law: Callable[..., Any]  # compiled; returns a torque [Nm] or what the place says
 
 
 class Element(Enum):
@@ -64,13 +64,13 @@ class EffectParameter:
     """One parameter of an effect's law."""
 
     name: str  # as in the model file, for example ``gap_rad``
-    dimension: str
+    dimension: str  # such as "torque": its unit follows from the kind of motion
     null: float  # the value at which the law does nothing
-    low: float
-    high: float
+    low: float  # bounds of a fit, in the parameter's scale
+    high: float  # inf where there is none
     meaning: str  # one line for people
     optional: bool = False  # true where a model file may leave it out
-    own: bool = False
+    own: bool = False  # true where each recording has its own value, which no model file holds
     most: float = math.inf  # largest value that makes sense in a model, whatever the data
     form: str = ""  # name of the law's form where this parameter shapes it
 
@@ -83,16 +83,16 @@ class EffectParameter:
 class Held:
     """A start value that the fit keeps: a discrete choice, such as the order of a ripple."""
 
-    value: float
+    value: float  # in the parameter's scale
 
 
 @dataclass(frozen=True, slots=True)
 class Within:
     """A start value with bounds of its own, in scales: of a variant of the law that can't be followed everywhere."""
 
-    value: float
-    low: float
-    high: float
+    value: float  # start, in the parameter's scale
+    low: float  # lowest value of the fit
+    high: float  # highest
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,8 +102,8 @@ class Untestable:
     ``needs`` is what must be given next to any test; without it no recording can tell.
     """
 
-    reason: str
-    suggested_test: str
+    reason: str  # why not, as part of a sentence
+    suggested_test: str  # kind of experiment that would show it
     needs: str = ""
 
 
@@ -135,6 +135,7 @@ MOMENTS = (
 
 
 def long_enough(key: str) -> Callable[[Driveline, Sequence[Record], Mapping[str, float]], str]:
+    """Return the objection to a time constant or delay below a tenth of the sampling period."""
 
     def check(_model: Driveline, records: Sequence[Record], values: Mapping[str, float]) -> str:
         least = 0.1 * min(record.sample_time_s for record in records)
@@ -150,7 +151,7 @@ class Step:
     """Which nominal parameter an event changes, and how: by its size, or by its size as a share."""
 
     of: Callable[[Driveline], str]  # model to the parameter's name
-    relative: bool = False
+    relative: bool = False  # true where the size is a share of the nominal value
     lasting: bool = False  # true where it does not go back within a recording
 
     def turned(self, nominal: float, size: float) -> tuple[float, float]:
@@ -164,12 +165,12 @@ class Effect:
     """An entry of the catalogue."""
 
     name: str  # as in the contract
-    element: Element
+    element: Element  # where along the chain from torque command to recorded sample
     title: str  # A few words for tables
     law: str  # the equation, as text
     source: str  # where the law is from
     excited_by: str  # what a test must do to show it
-    parameters: tuple[EffectParameter, ...]
+    parameters: tuple[EffectParameter, ...]  # in the order in which the law takes them; the first one is the size
     structures: frozenset[Structure]  # where it makes sense
     resembles: tuple[str, ...]  # rivals that look alike in part
     text: str | Callable[[Mapping[str, float], Motion], str]  # the statement a driveline engineer would write
@@ -177,29 +178,41 @@ class Effect:
     contains: tuple[str, ...] = ()  # effects that are special cases of this one
     acting: Acting | None = None  # the law and where it acts
     example: Mapping[str, float] = field(default_factory=dict)
+    """Values for `hil sim` and pictures, in the parameters' units."""
     scales: Scales = lambda _model, _records: (1.0,)
-    starts: Starts = lambda _model, _records: []
-    testable: Testable = lambda _model, _records: None
+    """Typical size of the parameters in these recordings, in their units."""
+    starts: Starts = lambda _model, _records: []  # where fits start, in scales; none: at one scale each
+    testable: Testable = lambda _model, _records: None  # None, or why these recordings cannot show it
     kinds: frozenset[OutputKind] = frozenset(OutputKind)  # measured outputs it makes sense with
     profile: bool = False
-    event: bool = False
+    """True where the law is a curve over time, its knots estimated in each recording, without parameters."""
+    event: bool = False  # true where it acts from a moment to another: has the parameters of MOMENTS
     step: Step | None = None  # where the event is a step of a nominal parameter
     permanent: str = ""  # the effect that the event is where it acts all along, if that is one
     phases: Mapping[str, str] = field(default_factory=dict)
+    """Of a periodic law: parameter that is a phase, and the one that is its amplitude."""
     widens: frozenset[str] = frozenset()  # nominal parameters that it moves beyond what they are trusted to
     described: Spans = lambda _model, _values, _line: {}
+    """A nominal parameter's values with the effect: one span, or one before and one after."""
     implausible: Objection = lambda _model, _records, _values: ""
+    """Why values that were found are no such physics; "" where they may be."""
     unresolved: Objection = lambda _model, _records, _values: ""
+    """Why values that were found are too small for these recordings to show; "" where they are not."""
     rescaled: Callable[[Mapping[str, float]], Mapping[str, float]] = lambda _values: {}
+    """By dimension: factor on the line's parameters in an equally good explanation that puts the fault elsewhere."""
     completed: Callable[[Mapping[str, float]], Mapping[str, float]] = lambda values: values
+    """Values as a file or `hil sim` gives them, with what was left out filled in."""
     reparametrised: OtherForms = lambda _model, _records, _values, _line: []
+    """Starts for the same law with the line's parameters changed, where a fit may be in a side minimum."""
     derived: Callable[[Mapping[str, float], Mapping[str, float]], Mapping[str, float]] = lambda _values, _nominal: {}
-    linear: bool = False
-    waving: bool = False
+    """Quantities that follow from the values and are reported with them."""
+    linear: bool = False  # true where the line stays linear with it, so that steps have a closed form
+    waving: bool = False  # true where it changes all the time, so that the conditions are worked out at every sub-step
     timed: bool = False  # true where the simulated line depends on the time since its recording began
     swinging: bool = False
+    """True where it ties the load to a place, as gravity does: makes no sense where the load turns round and round."""
     shows_start: frozenset[str] = frozenset()  # what else of a joint's start matters with it
-    recognised: bool = False
+    recognised: bool = False  # true where it is read off the samples (repeated, lost, rounded, late) and not fitted
 
     @property
     def lasting(self) -> bool:
@@ -220,8 +233,10 @@ class Effect:
 
     @property
     def shared_parameters(self) -> tuple[EffectParameter, ...]:
+        """Those with one value in all recordings."""
         return tuple(parameter for parameter in self.parameters if not parameter.own)
 
     @property
     def own_parameters(self) -> tuple[EffectParameter, ...]:
+        """Those with a value of each recording."""
         return tuple(parameter for parameter in self.parameters if parameter.own)

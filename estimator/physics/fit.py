@@ -17,12 +17,12 @@ from estimator.physics.problem import (
     Problem,
     bounds,
     local_part,
+    make_problem as make_problem,  # where users have always found it
     outputs_at,
     parameters,
     residual_at,
     start_vector,
 )
-from estimator.physics.problem import make_problem as make_problem  # where users have always found it
 from estimator.signals.record import BoolArray, FloatArray, IntArray
 
 ITERATIONS = 50  # jacobians at most; a fit that needs more is not converged
@@ -49,7 +49,7 @@ class FitResult:
         False where the iteration limit ended the fit.
     """
 
-    problem: Problem
+    problem: Problem  # what was fitted
     x: FloatArray
     outputs: tuple[FloatArray, ...]
     residual: FloatArray
@@ -112,6 +112,7 @@ class FitResult:
         return float(self.p[next(s.slot for s in self.problem.shared if (s.effect, s.name) == (effect, name))])
 
     def values_of(self, effect: str) -> dict[str, float]:
+        """Return the fitted values of an effect, in its parameters' units."""
         return {
             s.name: float(x) * s.scale for s, x in zip(self.problem.shared, self.x, strict=False) if s.effect == effect
         }
@@ -186,12 +187,12 @@ CLOSE = 1.1  # squared error, over the best start's, up to which a start continu
 Name = tuple[object, ...]
 
 
-def best_fit(problems: Sequence[Problem], previous: FitResult | None = None, iterations: int = ITERATIONS) -> FitResult:
+def best_fit(problems: Sequence[Problem], previous: FitResult | None = None) -> FitResult:
     """Fit from several starts and return the best; what a fit ``warm`` has in common starts where that one ended."""
     if len(problems) == 1:
-        return _initial_fit(problems[0], previous, iterations)
-    heat = initial_fits(problems, previous, min(HEAT, iterations))
-    finals = concurrently(partial(converge, iterations=iterations), [heat[i] for i in close(heat)])
+        return _initial_fit(problems[0], previous, ITERATIONS)
+    heat = initial_fits(problems, previous, HEAT)
+    finals = concurrently(converge, [heat[i] for i in close(heat)])
     return min(finals, key=lambda result: result.squares)
 
 
@@ -209,9 +210,9 @@ def close(heat: Sequence[FitResult]) -> list[int]:
     return [i for i in order if heat[i].squares <= CLOSE * least]
 
 
-def converge(result: FitResult, iterations: int = ITERATIONS) -> FitResult:
+def converge(result: FitResult) -> FitResult:
     """Continue with a fit that its iteration limit ended."""
-    return result if result.converged or iterations <= HEAT else fit(result.problem, result.x, iterations)
+    return result if result.converged else fit(result.problem, result.x)
 
 
 def _initial_fit(problem: Problem, previous: FitResult | None, iterations: int) -> FitResult:
@@ -249,6 +250,7 @@ def _scales(problem: Problem) -> FloatArray:
 
 
 def rates(result: FitResult) -> list[FloatArray]:
+    """Return the rate of each recording's output at its samples [output unit / s]."""
     if result.problem.grid.structure is Structure.JOINT:
         pairs = zip(result.outputs, result.problem.records, strict=True)
         return [_secants(output, record.sample_time_s) for output, record in pairs]

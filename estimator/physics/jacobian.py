@@ -63,8 +63,8 @@ ROOM = 2**20  # values of simulations that are made at a time, where they are mo
 class _Moved:
     """K simulations with one unknown moved each."""
 
-    of: IntArray
-    columns: IntArray
+    of: IntArray  # (K,), recording of each simulation
+    columns: IntArray  # (K,), unknown that was moved
 
     def part(self, rows: slice) -> _Moved:
         """Return some of them."""

@@ -34,16 +34,17 @@ class Uncertainty:
 class Shaft:
     """The numbers of a two-mass model, at the motor shaft: kg m^2, Nm/rad, Nm s/rad; and where they are from."""
 
-    J_M: float
-    J_L: float
-    k: float
-    c: float
-    b_M: float
-    b_L: float
-    source: str
+    J_M: float  # inertia of the motor [kg m^2]
+    J_L: float  # of the load [kg m^2]
+    k: float  # stiffness [Nm/rad]
+    c: float  # damping [Nm s/rad]
+    b_M: float  # viscous friction at the motor [Nm s/rad]
+    b_L: float  # at the load [Nm s/rad]
+    source: str  # file that they are from
 
     @classmethod
     def of_model(cls, model: DrivelineModel, source: str) -> Shaft | None:
+        """Take the numbers of a model of two rotating masses; None for any other."""
         if model.structure is not Structure.TWO_MASS or model.motion is not Motion.ROTATION:
             return None
         values = model.values()
@@ -128,11 +129,12 @@ FARTHEST = 100.0
 class Imposed(NamedTuple):
     """The imposed motion of a recording at every sample: its twist since the first one [rad], its rate [rad/s]."""
 
-    twist: FloatArray
-    rate: FloatArray
+    twist: FloatArray  # (N,) [rad]
+    rate: FloatArray  # (N,) [rad/s]
 
 
 def imposed_in(record: Record) -> Imposed:
+    """Return the imposed motion of a recording of a joint."""
     if record.imposed is None:
         raise ValueError(f"recording {record.name}: a joint is simulated from an imposed motion, got none")
     return Imposed(record.imposed - record.imposed[0], _rate(record))
@@ -147,6 +149,7 @@ def simulate(
     preload_nm: float,
     output: int = TORQUE,
 ) -> FloatArray:
+    """Simulate a joint under an imposed motion: its output at every sample, shape (N,)."""
     twist, rate = imposed.twist + twist_rad, imposed.rate
     motion: dict[int, FloatArray] = {
         state_vector.TWIST: twist,

@@ -1,4 +1,4 @@
-"""How finely a line is integrated on a set of recordings."""
+"""How finely a line is integrated on a set of recordings, and where each parameter stands in the kernel's vector."""
 
 from __future__ import annotations
 
@@ -41,10 +41,10 @@ class Grid:
     One with a ``plant`` is simulated by that.
     """
 
-    structure: Structure
-    substeps: int
-    sign_width: float
-    laws: tuple[LawName, ...] = ()
+    structure: Structure  # how many masses, or a joint
+    substeps: int  # in a sampling period
+    sign_width: float  # speed over which dry friction changes its sign [rad/s]
+    laws: tuple[LawName, ...] = ()  # the user's, by name
     plant: Plant | None = None
 
     def active(self, p: FloatArray) -> list[LawName]:
@@ -62,6 +62,7 @@ class Grid:
 
 
 def substeps_for(values: Mapping[str, float], period_s: float) -> int:
+    """Return the sub-steps of a sampling period that the fastest mode needs; BadModel if it can't be sampled."""
     if "J_M" not in values:
         return 1
     motor = (values["b_M"] + values.get("c", 0.0)) / values["J_M"]

@@ -3,7 +3,7 @@
 ``scipy.optimize.least_squares`` decomposes the whole Jacobian at every step; with ten thousand errors and twenty
 unknowns that costs more than the simulations that made it. Here the step comes from the normal equations, with
 Marquardt's scaling (SIAM J. Appl. Math. 11, 1963), and is the least of the damped quadratic inside the bounds
-(``estimator.physics.least_squares``). Near the end, where steps keep what they promise, the Jacobian is carried on by
+(`damped_step`). Near the end, where steps keep what they promise, the Jacobian is carried on by
 Broyden's update (Math. Comp. 19, 1965; with Marquardt's method: Madsen, Nielsen and Tingleff, Methods for Non-Linear
 Least Squares Problems, DTU 2004, 3.5): it costs a simulation per unknown, a step one. A fit ends a last small step from
 a Jacobian found anew.
@@ -143,11 +143,11 @@ LEAST_DAMPING, MOST_DAMPING = 1e-10, 1e9
 class Solution:
     """Where a fit ended: unknowns (U,), errors (R,), Jacobian there, or one last small step before (R, U)."""
 
-    x: FloatArray
-    residual: FloatArray
-    jacobian: FloatArray | None
-    converged: bool
-    stuck: bool = False
+    x: FloatArray  # scaled, at the minimum
+    residual: FloatArray  # errors there
+    jacobian: FloatArray | None  # None where none was made
+    converged: bool  # whether the last step promised too little to matter
+    stuck: bool = False  # whether no step, however short, made the error smaller
 
 
 def minimise(
@@ -226,6 +226,7 @@ def damped_step(
     low: FloatArray,
     high: FloatArray,
 ) -> FloatArray:
+    """Return the step (U,) that minimises the damped quadratic inside the bounds."""
     free = unbounded_first(low, high, low < high)
     diagonal = np.diag(curvature)
     damped = curvature + np.diag(damping * np.maximum(diagonal, 1e-12 * diagonal.max()))

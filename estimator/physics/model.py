@@ -86,9 +86,9 @@ class DrivelineModel:
         With every fault of the model, one per line.
     """
 
-    structure: Structure
+    structure: Structure  # how many masses, or a joint
     parameters: Mapping[str, Parameter]
-    motion: Motion = Motion.ROTATION
+    motion: Motion = Motion.ROTATION  # rotation or translation: the units
     effects: Mapping[str, Mapping[str, EffectValue]] = field(default_factory=dict)
     gear_ratio: float | None = None
     load: Load | float = Load.OWN

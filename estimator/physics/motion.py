@@ -84,6 +84,7 @@ def torque_reverses(record: Record) -> bool:
 
 
 def largest_torque(records: Sequence[Record]) -> float:
+    """Return the typical size of the largest torque of an inverter [Nm]."""
     return max(_typical(column) for record in records for column in record.torque_nm.T)
 
 
@@ -141,6 +142,7 @@ MOST_TURNS = 100.0
 
 
 def range_of(records: Sequence[Record]) -> float:
+    """Return the largest range of the motor's angle in a recording [rad]."""
     return max(float(np.ptp(motor_angle(record))) for record in records)
 
 

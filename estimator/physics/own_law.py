@@ -40,12 +40,12 @@ TRIAL = np.array([[0.0, 0.5, 1.0], [-2.0, 0.0, 3.0], [-1.0, 0.0, 2.0], [-0.01, 0
 class OwnParameter:
     """A parameter of a user's law, in its unit: where it does nothing, its bounds, and where a fit starts."""
 
-    name: str
-    unit: str
-    null: float
-    low: float
-    high: float
-    start: float
+    name: str  # as the function has it
+    unit: str  # as text, for tables
+    null: float  # value at which the law does nothing
+    low: float  # bounds of a fit
+    high: float  # inf where there is none
+    start: float  # of a fit
 
     @property
     def scale(self) -> float:
@@ -58,12 +58,12 @@ class OwnLaw:
     """A law by its function."""
 
     name: str  # of its own
-    function: Callable[..., object]
+    function: Callable[..., object]  # of ARGUMENTS, then its parameters by name; returns a torque [Nm]
     element: Element  # motor or load
     parameters: tuple[OwnParameter, ...]  # the first one decides
     label: str = ""  # how it was named, for messages
-    takes_arrays: bool = field(init=False, default=False)
-    compiled: Callable[..., float] | None = field(init=False, default=None)
+    takes_arrays: bool = field(init=False, default=False)  # whether it can be called with arrays
+    compiled: Callable[..., float] | None = field(init=False, default=None)  # by numba; None where that is not possible
 
     def __post_init__(self) -> None:
         problems = self._problems()
@@ -143,6 +143,7 @@ class OwnLaw:
 
     @property
     def taken(self) -> list[str]:
+        """Names of the function's own parameters."""
         return list(inspect.signature(self.function).parameters)[len(ARGUMENTS) :]
 
     def at(
@@ -217,6 +218,7 @@ class LawName(str):
     compiled: dict[tuple[LawName, ...], Forces]
 
     def is_active(self, p: FloatArray) -> bool:
+        """Tell whether the law's first parameter is off its null in the kernel's vector."""
         first = self.law.parameters[0]
         return bool(p[self.places[first.name]] != first.null)
 

@@ -39,6 +39,7 @@ class Projector:
         self.error = self.rest(result.residual)
 
     def rest(self, signals: FloatArray) -> FloatArray:
+        """Return signals (K, R) without what the unknowns that are free can imitate."""
         return signals - (signals @ self._free) @ self._free.T
 
     def products(self, answers: FloatArray, index: int) -> tuple[FloatArray, FloatArray]:
@@ -90,9 +91,9 @@ def cell_s(record: Record) -> float:
 class Wave:
     """Answers to one amplitude of a periodic effect at phase 0 and a quarter turn on, per unit of it; shape (2, R)."""
 
-    phase: str
-    amplitude: str
-    answers: FloatArray
+    phase: str  # name of the parameter that is the phase
+    amplitude: str  # name of its amplitude
+    answers: FloatArray  # at phase 0 and a quarter turn later, per unit of the amplitude
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,6 +125,7 @@ def small_waves(entry: Effect, p: FloatArray, sizes: Mapping[str, float]) -> lis
 
 
 def answers_to(entry: Effect, sizes: Mapping[str, float], outputs: FloatArray, still: FloatArray) -> list[Wave]:
+    """Return the answers of the outputs to each amplitude of a periodic effect that is not 0."""
     return [
         Wave(phase, amplitude, (outputs[2 * i : 2 * i + 2] - still) / (SMALL * sizes[amplitude]))
         for i, (phase, amplitude) in enumerate(_acting(entry, sizes))
@@ -155,11 +157,11 @@ def cells(entry: Effect, p: FloatArray, own: tuple[Shared, ...], sizes: Mapping[
 class Stretch:
     """The best interval for an event in one recording: rows of the grid, and what an event takes away there."""
 
-    first: int
-    last: int
-    taken: float
-    match: float
-    power: float
+    first: int  # row of the grid
+    last: int  # row of the grid
+    taken: float  # squared error that an event there takes away
+    match: float  # product of its answer and the error
+    power: float  # squared answer
 
 
 @dataclass(frozen=True, slots=True)

@@ -64,6 +64,7 @@ def counted(work: Work) -> Iterator[Work]:
 
 
 def count_samples(samples: int) -> None:
+    """Add simulated samples to the work of the present diagnosis."""
     work = _work.get()
     if work is not None:
         work.add(samples)

@@ -29,10 +29,10 @@ Rows = slice | IntArray
 class Problem:
     """What is fitted to what."""
 
-    grid: Grid
-    records: tuple[Record, ...]
+    grid: Grid  # how it is integrated
+    records: tuple[Record, ...]  # what the model has to follow
     p: FloatArray  # (layout.SIZE,): parameter vector
-    shared: tuple[Shared, ...]
+    shared: tuple[Shared, ...]  # unknowns that all recordings share
     local: tuple[LocalBasis, ...]  # what each recording has of its own
     use: tuple[BoolArray, ...]  # per recording, which samples count
     leads: tuple[int, ...] = ()  # which recording's own unknowns each recording has
@@ -162,6 +162,7 @@ def simulated_each(
 def simulated_cases(
     problem: Problem, cases: Sequence[Case], index: int, alike_s: FloatArray | None = None
 ) -> FloatArray:
+    """Simulate the recordings of one drive in several cases at once; their used samples, shape (C, R)."""
     drive = problem.drives[index]
     records = [problem.records[i] for i in drive]
     outputs = simulate_outputs(problem.grid, records, cases, alike_s)

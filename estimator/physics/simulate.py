@@ -17,7 +17,6 @@ from estimator.physics.effect import Element
 from estimator.physics.effects.timing import TRANSPORT_DELAY
 from estimator.physics.inputs import initial_state, inputs_of, load_of, shaft_torque_from
 from estimator.physics.kernel import integration, sensing, side_by_side, state_vector
-from estimator.physics.kernel import side_by_side as many
 from estimator.physics.kernel.integration import Masses
 from estimator.physics.layout import OBSERVER, Grid, flat, slot, substeps_for
 from estimator.physics.model import DrivelineModel, Structure
@@ -49,6 +48,7 @@ _SENSED = (state_vector.SPEED, state_vector.LOAD_SPEED)  # what the effects of a
 
 
 def output_state(record: Record, structure: Structure) -> int:
+    """Return the entry of the state that a recording measures; BadModel where recording and structure do not fit."""
     if (record.imposed is not None) != (structure is Structure.JOINT):
         got = "an imposed motion" if record.imposed is not None else f"{record.kind.value} as the output"
         raise BadModel(
@@ -150,7 +150,7 @@ def _simulated(
     rows, samples = len(cases), record.time_s.size
     slopes = np.zeros((rows, 2, samples if recorded and is_steep(record) else 0))
     out = np.empty((rows, wanted.size, samples))
-    many.integrate_each(
+    side_by_side.integrate_each(
         MASSES[grid.structure],
         own,
         record.sample_time_s,
@@ -198,6 +198,10 @@ def _samples_alike(record: Record, count: int, alike_s: FloatArray | None) -> In
         alike[:] = np.searchsorted(record.since_start_s, alike_s - record.sample_time_s)
     alike[0] = record.time_s.size
     return alike
+
+
+PERIODIC = np.array([slot(e.name, size) for e in catalogue.KERNEL.values() for size in e.phases.values()])
+"""Amplitudes of the laws that are periodic in the motor's angle."""
 
 
 def _angle(record: Record, p: FloatArray) -> FloatArray:
@@ -248,9 +252,6 @@ def _misread(grid: Grid, record: Record, case: Case) -> FloatArray | float:
 
 TIMED = np.array([slot(e.name, e.parameters[0].name) for e in catalogue.BUILT_IN.values() if e.event or e.timed])
 """Sizes of the laws that depend on the time since a recording began."""
-
-PERIODIC = np.array([slot(e.name, size) for e in catalogue.KERNEL.values() for size in e.phases.values()])
-"""Amplitudes of the laws that are periodic in the motor's angle."""
 
 
 LENGTHS_DIFFER = 1.1
@@ -312,7 +313,7 @@ def simulate_together(grid: Grid, drives: Sequence[Outputs], of: Sequence[int], 
     given = inputs_of(records, of, cases)
     count_samples(len(cases) * given.torque.shape[1])
     out = np.empty((len(cases), wanted.size, given.torque.shape[1]))
-    many.integrate_each(
+    side_by_side.integrate_each(
         MASSES[grid.structure],
         (),
         first.sample_time_s,

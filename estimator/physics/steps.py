@@ -45,6 +45,7 @@ def moments_of(result: FitResult, name: str) -> list[Moments]:
 
 
 def inside(record: Record, moment_s: float) -> bool:
+    """Tell whether a moment [s] is far enough from both ends of a recording to be an event in it."""
     first, last = (float(end) for end in record.since_start_s[[0, -1]])
     return first + EDGE_S <= moment_s <= last - EDGE_S
 

@@ -35,11 +35,11 @@ class Shared:
     """
 
     effect: str
-    name: str
-    scale: float
-    low: float
-    high: float
-    start: float
+    name: str  # of the parameter
+    scale: float  # in the parameter's unit
+    low: float  # smallest x
+    high: float  # largest x
+    start: float  # x where the fit starts
 
     @property
     def slot(self) -> int:
@@ -82,8 +82,8 @@ def _known_roughly(model: DrivelineModel) -> Iterable[Shared]:
 class Release:
     """One start point of one effect: what all recordings share, and what each has of its own."""
 
-    shared: tuple[Shared, ...]
-    own: tuple[tuple[Shared, ...], ...]
+    shared: tuple[Shared, ...]  # unknowns of all recordings
+    own: tuple[tuple[Shared, ...], ...]  # unknowns of each recording
 
 
 def effect_unknowns(name: str, model: DrivelineModel, records: Sequence[Record]) -> list[Release]:
@@ -115,6 +115,7 @@ def released(
 
 
 def own_unknowns(names: Iterable[str], record: Record) -> tuple[Shared, ...]:
+    """Return the unknowns that effects have in each recording, at their starts in this one."""
     return tuple(unknown for name in sorted(names) for unknown in _own_unknowns(EFFECTS[name], record))
 
 
@@ -145,8 +146,8 @@ LOAD_TORQUE, TWIST, PRELOAD = 0, 1, 2
 class LocalBasis:
     """The unknowns of one recording: load torque, initial state, own parameters of effects, a load profile."""
 
-    structure: Structure
-    has_angle: bool
+    structure: Structure  # how many masses, or a joint
+    has_angle: bool  # whether the motor's angle at the start is unknown, too
     scale: FloatArray  # (L,): size of each unknown, in its unit
     guess: FloatArray  # (L,): where a fit starts, in units of ``scale``
     own: tuple[Shared, ...]  # own parameters of effects, O of them
@@ -178,6 +179,7 @@ class LocalBasis:
 
     @property
     def profile_rows(self) -> slice:
+        """Where the unknowns of the load profile stand."""
         return slice(self.guess.size - self.profile.shape[0], self.guess.size)
 
     def start(self, x: FloatArray) -> Start:
@@ -272,6 +274,7 @@ def _not_settable(model: DrivelineModel, has_angle: bool, count: int) -> tuple[i
 
 
 def shared_load(model: DrivelineModel, records: Sequence[Record]) -> Shared:
+    """Return the load torque that is one for all recordings as an unknown."""
     scale = 0.1 * torque_scale(records)
     guesses = (
         0.0 if record.imposed is not None else _mean_load(model, record, measured_speed(record)) for record in records

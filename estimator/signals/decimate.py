@@ -138,6 +138,7 @@ def low_pass_length(factor: float) -> float:
 
 
 def low_pass_taps(factor: int) -> FloatArray:
+    """Return the taps of the low-pass for a decimation: windowed sinc (Hamming), gain 1 at 0 Hz."""
     if factor == 1:
         return np.ones(1)
     length = round(low_pass_length(factor))
@@ -187,6 +188,7 @@ class Decimator:
 
     @property
     def delay_samples(self) -> int:
+        """Kept samples by which the output is late."""
         return HALF_LENGTH if self._factor > 1 else 0
 
     def run(self, u: FloatArray, y: FloatArray, okay: BoolArray) -> Decimated:
@@ -214,6 +216,7 @@ class Decimator:
         return Decimated(out[0, :n].copy(), out[1, :n].copy(), out_okay[:n].copy())
 
     def state(self) -> dict[str, FloatArray | IntArray]:
+        """Return what it remembers, by name: arrays that `restore` takes."""
         return {"counters": self._counters.copy(), "level": self._level.copy(), "window": self._window.copy()}
 
     def restore(self, state: Mapping[str, Any]) -> None:
@@ -270,6 +273,7 @@ a longer recording is of a driveline that warms meanwhile. Each costs 6 kilobyte
 
 
 def first_part(record: Record) -> Record:
+    """Return the recording, or its first MOST blocks where it is longer."""
     most = MOST * block_of(record.sample_time_s)
     return record if record.time_s.shape[0] <= most else sliced(record, slice(0, most))
 
@@ -289,6 +293,7 @@ class Blocks:
         """Blocks of which half or more was measured, shape (n,)."""
 
     def mean(self, x: FloatArray) -> FloatArray:
+        """Return the mean of each block's good samples; 0 for a block without enough of them."""
         good = self._good.reshape(self._n, self._size, *(1,) * (x.ndim - 1))
         parts = x[: self._n * self._size].reshape(self._n, self._size, *x.shape[1:])
         count = np.maximum(good.sum(axis=1), 1)

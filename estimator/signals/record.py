@@ -71,7 +71,7 @@ class Channel:
     """A further measured output of a recording."""
 
     kind: OutputKind  # what it is, and where it is measured
-    location: Location
+    location: Location  # motor or load
     label: str  # the column it was read from
     output: FloatArray  # (N,): its readings [rad/s, rad, Nm, rad/s^2; translation m/s, m, N, m/s^2]
     okay: BoolArray  # (N,): false where a reading must not be used
@@ -128,8 +128,8 @@ class Record:
     torque_nm: FloatArray
     output: FloatArray
     okay: BoolArray
-    kind: OutputKind = OutputKind.SPEED
-    location: Location = Location.MOTOR
+    kind: OutputKind = OutputKind.SPEED  # of the output
+    location: Location = Location.MOTOR  # where it was measured
     began_s: float | None = None
     torque_okay: BoolArray | None = None
     offset_s: FloatArray | None = None
@@ -198,6 +198,7 @@ class Record:
 
     @property
     def read(self) -> BoolArray | None:
+        """Whether every torque was read, shape (N,); None where all were."""
         return None if self.torque_okay is None else np.asarray(self.torque_trusted.all(axis=1), dtype=np.bool_)
 
     @property
@@ -220,6 +221,7 @@ class Record:
 
 
 def sliced(record: Record, rows: slice, name: str | None = None) -> Record:
+    """Return some rows of a recording, with all that belongs to them, under another name if one is given."""
     parts: dict[str, Any] = {
         field.name: values[rows]
         for field in fields(record)
@@ -257,6 +259,7 @@ Noise = Callable[[Sequence[Record]], float]
 
 
 def separated_outputs(records: Sequence[Record], noise_of: Noise) -> list[Record]:
+    """Return a recording for each measured output, the further ones weighed by their noise as the first is by its."""
     alone = [replace(record, channels=()) for record in records]
     first = noise_of(alone) if any(record.channels for record in records) else 1.0
     further: list[Record] = []
@@ -284,6 +287,7 @@ def leads(records: Sequence[Record]) -> tuple[int, ...]:
 
 
 def by_output(records: Sequence[Record]) -> list[slice]:
+    """Return where the recordings of each output stand in a list that has one output after the other."""
     names = [record.label for record in records]
     firsts = [i for i, name in enumerate(names) if i == 0 or name != names[i - 1]]
     return [slice(first, end) for first, end in pairwise([*firsts, len(names)])]

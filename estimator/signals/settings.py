@@ -17,10 +17,10 @@ from estimator.errors import BadSetting
 class Requirement:
     """One row: the setting's name (unit included), its value, whether it fits, and what would."""
 
-    name: str
-    value: float
-    fits: bool
-    expected: str
+    name: str  # as a message names it
+    value: float  # that was given
+    fits: bool  # whether it is allowed
+    expected: str  # what is, as part of a sentence
 
 
 def require(where: str, rows: Iterable[Requirement]) -> None:

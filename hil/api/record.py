@@ -13,8 +13,7 @@ from estimator.signals import record as base
 from hil.api.models import Model, Signals, signals_as_table, signals_of
 from hil.recording import columns
 from hil.recording.channels import column_of, understood
-from hil.recording.look import CHANNEL_HEADINGS, Look, channel_rows
-from hil.recording.look import look as look_into
+from hil.recording.look import CHANNEL_HEADINGS, Look, channel_rows, look as look_into
 from hil.recording.signals import read_record, to_record, under_imposed_motion
 from hil.recording.survey import survey_of
 from hil.recording.table import Table

@@ -15,7 +15,7 @@ from hil.cli.printing import new_console, say
 from hil.errors import InputError, UsageError
 
 if TYPE_CHECKING:
-    from rich.table import Table as RichTable
+    from rich.table import Table
 
     from drivers.eds_check import EdsReport
     from drivers.plc.named_registers import Reading
@@ -157,7 +157,7 @@ def _details(finding: Finding) -> Iterator[str]:
     yield from (f"if the host fails, {each}" for each in finding.protections)
 
 
-def _register_table(finding: Finding) -> RichTable:
+def _register_table(finding: Finding) -> Table:
     """Lay out what each register holds, in its unit."""
     from rich.table import Table
 
@@ -173,7 +173,7 @@ def _register_table(finding: Finding) -> RichTable:
     return table
 
 
-def _channel_table(findings: tuple[Finding, ...]) -> RichTable:
+def _channel_table(findings: tuple[Finding, ...]) -> Table:
     """Lay out what each further channel reads."""
     from rich.table import Table
 

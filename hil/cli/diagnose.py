@@ -160,8 +160,7 @@ def _why_minutes() -> Progress:
 def progress_bar() -> Iterator[Progress]:
     """Show stage and share done on standard error, where that is a terminal; else only why it takes minutes, once."""
     from rich.console import Console
-    from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
-    from rich.progress import Progress as Bar
+    from rich.progress import BarColumn, Progress as Bar, TextColumn, TimeElapsedColumn
 
     console = Console(stderr=True)
     if not console.is_terminal:

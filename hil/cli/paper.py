@@ -114,8 +114,7 @@ def _drive(workshop: Path, seed: int, duration_s: float) -> list[Driven]:
 @contextmanager
 def _bar(count: int, duration_s: float) -> Iterator[Callable[[int], Progress]]:
     """Show seconds driven on standard error, where that is a terminal."""
-    from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
-    from rich.progress import Progress as Bar
+    from rich.progress import BarColumn, Progress as Bar, TextColumn, TimeRemainingColumn
 
     from hil.rig.experiments.base import Phase
 

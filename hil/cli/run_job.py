@@ -19,8 +19,7 @@ from hil.errors import HilError, UsageError
 from hil.recording.writer import RecordingWriter
 from hil.result_folder import publish
 from hil.rig.build import open_devices
-from hil.rig.drive import Progress as ShowCycle
-from hil.rig.drive import RunSummary
+from hil.rig.drive import Progress as ShowCycle, RunSummary
 from hil.rig.experiments.base import Phase
 from hil.rig.live_course import course_path, statement
 from hil.rig.pacing import Pacer, device_patience_s, disk_patience_s

@@ -11,8 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from tomlkit.items import Array, InlineTable, Table
 
 from estimator.physics.model import DrivelineModel, Load, Motion, Parameter, Structure, parameter_unit, unit
-from estimator.physics.tables import PLACES, TABLES, table_of
-from estimator.physics.tables import Table as LawAsTable
+from estimator.physics.tables import PLACES, TABLES, Table as LawAsTable, table_of
 from hil.config.laws import LawTable
 from hil.config.table import FileKind, schema_line
 from hil.problems import Fault, refuse

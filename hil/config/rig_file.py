@@ -31,11 +31,14 @@ from drivers.resources import data_file
 from drivers.torque_guard import GuardLimits
 from estimator.signals.multisine import FEWEST_LINES
 from hil.config.channel_table import ChannelTable
-from hil.config.device_tables import InvertersTable, NodeId, SimulatedPlcSecurityTable
-from hil.config.device_tables import InverterTable as InverterTable
-from hil.config.device_tables import PlcTable as PlcTable
-from hil.config.experiment_tables import EVEN_SHARE, AnyExperiment, PrbsTable
-from hil.config.experiment_tables import PrbsTarget as PrbsTarget
+from hil.config.device_tables import (
+    InvertersTable,
+    InverterTable as InverterTable,
+    NodeId,
+    PlcTable as PlcTable,
+    SimulatedPlcSecurityTable,
+)
+from hil.config.experiment_tables import EVEN_SHARE, AnyExperiment, PrbsTable, PrbsTarget as PrbsTarget
 from hil.config.guard_table import GuardTable
 from hil.config.table import ExistingFile, NotNegative, Positive, Table, Text
 from hil.errors import RigFileError

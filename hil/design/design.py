@@ -189,6 +189,10 @@ def _widths(known: Open, planned: Planned) -> tuple[Width, ...]:
     return tuple(widths(known.candidates[0], known.line, planned.record))
 
 
+SPEED_ROOM = 1.2
+"""Part of the fastest speed that may be reached: a hold of it swings by some per cent."""
+
+
 def on_paper(source: RigSource, name: str, table: Table, model: DrivelineModel, limits: Limits) -> Planned:
     """Drive an experiment on paper, through the torque guard and within the limits."""
     rig, _ = source.ordered(Order("next", table))
@@ -200,10 +204,6 @@ def on_paper(source: RigSource, name: str, table: Table, model: DrivelineModel, 
     if planned.angle_rad > limits.angle_rad:
         raise UsageError(f"it turns the shaft by {planned.angle_rad:.3g} rad, allowed are {limits.angle_rad:.3g}")
     return planned
-
-
-SPEED_ROOM = 1.2
-"""Part of the fastest speed that may be reached: a hold of it swings by some per cent."""
 
 
 def _record(name: str, period_s: float, prediction: Prediction) -> Record:

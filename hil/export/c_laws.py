@@ -1,4 +1,4 @@
-"""What a value of a compiled law is, and what it is called in C."""
+"""Compiled laws of the catalogue, translated from their Python source to C: types, expressions, functions."""
 
 from __future__ import annotations
 

@@ -11,8 +11,7 @@ from typing import Any, Final
 
 from estimator.errors import BadModel, BadSetting
 from estimator.identification.chain import OnlineChain, oefo
-from estimator.identification.online.adaptation import PROFILES as KINDS
-from estimator.identification.online.adaptation import Adaptation
+from estimator.identification.online.adaptation import PROFILES as KINDS, Adaptation
 from estimator.identification.online.estimators import Oefo
 from estimator.identification.settings import Settings
 from estimator.signals.decimate import Decimator, low_pass_length

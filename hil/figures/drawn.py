@@ -57,7 +57,7 @@ SETTINGS: Final[Mapping[Any, Any]] = {
 def require_matplotlib() -> None:
     """Refuse before anything is driven where there is nothing to draw with."""
     try:
-        import matplotlib  # noqa: F401
+        import matplotlib as mpl  # noqa: F401
     except ModuleNotFoundError as error:
         raise UsageError(
             "figures: expected matplotlib to draw them with, it is not installed. Install it: pip install matplotlib"

@@ -180,7 +180,7 @@ def fleet_page(folder: Path, made: Provenance) -> str:
         html.section("Not computed", _failures(failures)) if failures else None,
         made_section(made),
     ]
-    return html.page(f"fleet: {title}", blocks, f"hil {made.version}")
+    return html.page(f"fleet: {title}", blocks, made.program)
 
 
 def _day(started: str) -> str:

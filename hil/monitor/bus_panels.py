@@ -138,6 +138,9 @@ def full(snapshot: Snapshot, width: int, height: int) -> list[str]:
     return [line[:width] for line in lines][:height]
 
 
+_LABELS = ("node", "power stage", "NMT state", "heartbeat", "TPDO age", "EMCY", "EMCY so far")
+
+
 def _node_table(health: Health) -> list[str]:
     rows = zip(_LABELS, _rows(health.m1), _rows(health.m2), strict=True)
     return [
@@ -185,9 +188,6 @@ def _node_line(name: str, node: NodeHealth, period_s: float) -> str:
     age = "--" if node.tpdo_age_s is None else f"{1e3 * node.tpdo_age_s:.0f}"
     state = "EMCY" if node.emergency else "STALE" if is_stale(node, period_s) else node.power or "--"
     return f"{name} {state} TPDO {age} ms"
-
-
-_LABELS = ("node", "power stage", "NMT state", "heartbeat", "TPDO age", "EMCY", "EMCY so far")
 
 
 def _rows(node: NodeHealth) -> tuple[str, ...]:

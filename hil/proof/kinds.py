@@ -10,6 +10,8 @@ import numpy as np
 from hil.proof.truth.bus import NOMINAL_ERROR
 from hil.proof.truth.specimen import EFFECTS, NOTHING, PAIR_SIGN, find
 
+OFF = "off"
+
 
 class Group(Enum):
     """What the right verdict is the same for."""
@@ -20,8 +22,6 @@ class Group(Enum):
     OFF = "off"
     OUTSIDE = "outside"
 
-
-OFF = "off"
 
 PAIRS = (
     "backlash+coulomb_friction_motor",

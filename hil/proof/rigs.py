@@ -156,7 +156,7 @@ def rig_text(sealed: SealedProcess) -> str:
     return tomlkit.dumps(document)
 
 
-def drive(name: str, concealed: Concealed, seed: int, out: Path, limit_s: float) -> Row:
+def drive(name: str, concealed: Concealed, seed: int, out: Path) -> Row:
     """Drive one rig and judge what the tool makes of it."""
     arguments = ["--seed", str(seed), "--effect", concealed.effect]
     for fault in concealed.faults:
@@ -166,7 +166,7 @@ def drive(name: str, concealed: Concealed, seed: int, out: Path, limit_s: float)
         place.mkdir()
         with sealed_process(*arguments, "--model", str(place / "nominal.toml")) as sealed:
             (place / "rig.toml").write_text(rig_text(sealed), encoding="utf-8")
-            answer = _work(place, limit_s)
+            answer = _work(place)
             truth = _truth(sealed, concealed)
         replace_own(out / name, place)
     about = {"case": name, "where": concealed.where, "said": answer.fault or ""}
@@ -175,15 +175,15 @@ def drive(name: str, concealed: Concealed, seed: int, out: Path, limit_s: float)
     return {**score(kind(str(truth["effect"])), seed, truth, answer), **about}
 
 
-def _work(place: Path, limit_s: float) -> Answer:
+def _work(place: Path) -> Answer:
     """Do what an engineer would do with a rig."""
     began = time.perf_counter()
     try:
-        run_hil(["check", "rig.toml"], place, limit_s)
+        run_hil(["check", "rig.toml"], place, LIMIT_S)
         for name in EXPERIMENTS:
-            run_hil(["run", "rig.toml", name, "--pace", "fast", "--out", f"{name}.csv"], place, limit_s)
+            run_hil(["run", "rig.toml", name, "--pace", "fast", "--out", f"{name}.csv"], place, LIMIT_S)
         recordings = [f"{name}.csv" for name in EXPERIMENTS]
-        run_hil(["diagnose", *recordings, "--model", "nominal.toml", "--out", "."], place, limit_s)
+        run_hil(["diagnose", *recordings, "--model", "nominal.toml", "--out", "."], place, LIMIT_S)
     except CommandFailed as failure:
         return Answer(None, diagnose_s=time.perf_counter() - began, fault=str(failure))
     diagnosis = json.loads(read_regular_text(place / "diagnosis.json"))
@@ -207,7 +207,7 @@ def _refusal(concealed: Concealed, seed: int, answer: Answer) -> Row:
     }
 
 
-def run_wire(out: Path, seed: int, names: Sequence[str], progress: Progress, limit_s: float = LIMIT_S) -> list[Row]:
+def run_wire(out: Path, seed: int, names: Sequence[str], progress: Progress) -> list[Row]:
     """Drive rigs, one after the other; returns their rows, also written to ``out/wire.json``."""
     for name in names:
         if name not in WIRED:
@@ -216,7 +216,7 @@ def run_wire(out: Path, seed: int, names: Sequence[str], progress: Progress, lim
     known = {name: row for name, row in kept.items() if row["seed"] == seed and not row["fault"]}
     rows = work_on(
         names,
-        lambda name: drive(name, WIRED[name], seed, out, limit_s),
+        lambda name: drive(name, WIRED[name], seed, out),
         progress,
         known=known,
         keep=lambda done: write_entries(out / RESULTS, SCHEMA, "rigs", list({**known, **done}.values())),

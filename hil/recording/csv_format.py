@@ -96,6 +96,9 @@ def read(path: Path, request: Request) -> Table:
     return table_of_text(path, text, request.form, encoding, said)
 
 
+LONG_FORM: Final = frozenset({"_time", "_field", "_value"})
+"""Columns of a text of InfluxDB, with a row for each value of each series."""
+
 UNPACKED_PER_BYTE: Final = 200  # text of numbers packs to a tenth: beyond, it was made to fill the memory
 
 
@@ -149,10 +152,6 @@ def table_of_text(
         },
     )
     return pivoted(table) if LONG_FORM <= columns.keys() else table
-
-
-LONG_FORM: Final = frozenset({"_time", "_field", "_value"})
-"""Columns of a text of InfluxDB, with a row for each value of each series."""
 
 
 def pivoted(table: Table) -> Table:

@@ -37,6 +37,9 @@ def description_of(table: Table, stored_as: Mapping[str, str]) -> str:
     return json.dumps({"schema": SCHEMA, "columns": columns, "metadata": dict(table.metadata)})
 
 
+_DAMAGED = (ValueError, KeyError, TypeError, AttributeError)
+
+
 def described_table(path: Path, text: str, column: Callable[[str, Kind], Column]) -> Table:
     document = _document(path, text)
     try:
@@ -68,9 +71,6 @@ def _document(path: Path, text: str) -> dict[str, Any]:
         return {**document, "metadata": {str(key): str(value) for key, value in document["metadata"].items()}}
     except _DAMAGED as error:
         raise _damaged(path, error) from error
-
-
-_DAMAGED = (ValueError, KeyError, TypeError, AttributeError)
 
 
 def _damaged(path: Path, error: Exception) -> RecordingError:

@@ -38,6 +38,10 @@ DAMAGED = (ValueError, TypeError, IndexError, KeyError, OSError, NotImplementedE
 """What scipy raises, besides its own, on a file that is cut or no .mat file."""
 
 
+OBJECTS: Final = "__function_workspace__"
+"""Variable in which MATLAB keeps what its objects hold (versions 5 to 7)."""
+
+
 def read(path: Path, request: Request) -> Table:
     import scipy.io
     from scipy.io.matlab import MatReadError
@@ -73,6 +77,9 @@ def read_metadata(path: Path) -> Mapping[str, str]:
         return metadata_of(path, _text(file[DESCRIPTION])) if DESCRIPTION in file else _foreign_metadata(file)
 
 
+TITLE = b"MATLAB 7.3 MAT-file"
+
+
 def is_version_73(path: Path) -> bool:
     """Whether a .mat file is HDF5 inside; its header says so (MAT-File Format, version 7.3: version 0x0200)."""
     with open_regular(path) as file:
@@ -80,7 +87,6 @@ def is_version_73(path: Path) -> bool:
     return header.startswith(TITLE) or header[124:] in (b"\x00\x02IM", b"\x02\x00MI")
 
 
-TITLE = b"MATLAB 7.3 MAT-file"
 HEADER = (
     (TITLE + b", Platform: hil, HDF5 schema 1.00 .").ljust(116) + bytes(8) + b"\x00\x02IM"
 )  # text, no subsystem data, version 2.0, little-endian
@@ -235,10 +241,6 @@ def _text(dataset: Dataset) -> str:
 
 def _class_of(dataset: Dataset) -> str:
     return bytes(dataset.attrs.get("MATLAB_class", b"")).decode("ascii", "replace")
-
-
-OBJECTS: Final = "__function_workspace__"
-"""Variable in which MATLAB keeps what its objects hold (versions 5 to 7)."""
 
 
 def with_tables(path: Path) -> dict[str, Any]:

@@ -233,6 +233,19 @@ def _message(message: Any, frames: list[tuple[float, bytes]], start: float) -> G
     return group
 
 
+EVENT: Final = re.compile(r"\s*\(?\d")
+"""What a line of a text log begins with that is a frame, or should be one."""
+
+
+HEAD_LINES: Final = 40  # lines among which a log says in which form it is
+
+
+HEADS: Final = (";", "date", "base", "internal", "//")
+
+
+FEW_ODD_LINES: Final = 3  # lines that may be odd in a log of any length: its beginning is often cut
+
+
 class _Log:
     """The frames of a log by python-can; lines of a text log that it can't read are skipped and counted."""
 
@@ -273,14 +286,6 @@ class _Log:
             if self.path.suffix.lower() == ".blf":
                 raise damaged(self.path, "a whole log of a bus", error) from error
             raise
-
-
-EVENT: Final = re.compile(r"\s*\(?\d")
-"""What a line of a text log begins with that is a frame, or should be one."""
-
-HEAD_LINES: Final = 40  # lines among which a log says in which form it is
-HEADS: Final = (";", "date", "base", "internal", "//")
-FEW_ODD_LINES: Final = 3  # lines that may be odd in a log of any length: its beginning is often cut
 
 
 class _Lines(io.StringIO):  # typeshed has its lines as bytes

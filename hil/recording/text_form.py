@@ -1,4 +1,4 @@
-"""Cells of a text file: what one alone may be."""
+"""The form of a text file, recognised from its lines: separator, decimal sign, comments, names, units, rows."""
 
 from __future__ import annotations
 

@@ -30,8 +30,7 @@ from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Element
 from estimator.signals.record import FloatArray
 from hil.provenance import Provenance
-from hil.report import page as html
-from hil.report import table_figure
+from hil.report import page as html, table_figure
 from hil.report.discrepancy_figures import course_figure, error_spectrum_figure, law_figure, response_figure
 from hil.report.figures import (
     Line,

@@ -45,6 +45,10 @@ ADVICE = {
 """What each verdict says of a recording, and what to do."""
 
 
+LEAST_BAND_HZ = 25.0
+"""Driveline resonances are common up to here; of a recording that can't show them the page says so."""
+
+
 def verdict(each: Study) -> str:
     """Return one sentence: whether to believe the linear model of a recording, and what to do."""
     best = each.best
@@ -104,10 +108,6 @@ def joint_statement(together: Together) -> str:
     if joint.doubtful:
         text += f" The model is not a good one of {listed(joint.doubtful)} by itself: the intervals may be too narrow."
     return text
-
-
-LEAST_BAND_HZ = 25.0
-"""Driveline resonances are common up to here; of a recording that can't show them the page says so."""
 
 
 def headline(studies: Sequence[Study]) -> str:

@@ -23,7 +23,7 @@ def facts(made: Provenance | None) -> Iterator[tuple[str, str]]:
     yield "model", ", ".join(Path(each.file).name for each in made.models)
     yield "recordings", ", ".join(names[:MOST_NAMED]) + more
     yield "date", moment(made.date)
-    yield "program", f"hil {made.version}"
+    yield "program", made.program
 
 
 def made_section(made: Provenance | None) -> html.Section | None:
@@ -31,7 +31,7 @@ def made_section(made: Provenance | None) -> html.Section | None:
     if made is None:
         return None
     rows = [("rig", made.rig)] if made.rig else []
-    rows += [("program", f"hil {made.version}"), ("date", made.date), ("command", made.command or "from Python")]
+    rows += [("program", made.program), ("date", made.date), ("command", made.command or "from Python")]
     for kind, sources in (("model", made.models), ("recording", made.recordings)):
         rows += [(kind, f"{each.file}, SHA-256 {each.sha256}") for each in sources]
     return html.section("How this was made", html.table(("", ""), rows))

@@ -50,7 +50,6 @@ class BusTrace:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self.n_frames = 0
         self._frames: deque[tuple[can.Message, int]] = deque()
         self._ending = threading.Event()
         self._failed: OSError | None = None
@@ -107,7 +106,6 @@ class BusTrace:
             message.timestamp = (t_ns + self._shift_ns) / NS_PER_S
             message.channel = None  # one bus: its name here is this program's own affair
             self._writer.on_message_received(message)
-            self.n_frames += 1
 
 
 def is_trace(path: Path) -> bool:

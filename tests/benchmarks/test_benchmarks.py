@@ -12,8 +12,7 @@ from estimator.identification.online.estimators import Rls
 from estimator.physics.fit import fit
 from estimator.physics.problem import Problem
 from hil.rig.pacing import FreePacer, period_ns
-from tests.benchmarks import fieldbus as raw_can
-from tests.benchmarks import recursive, recursive_c
+from tests.benchmarks import fieldbus as raw_can, recursive, recursive_c
 from tests.benchmarks.cases import NOTHING, make
 from tests.benchmarks.fieldbus import DEFAULT_PERIOD_S, armed, compiled, example_rig, lateness_ns, served_here
 from tests.benchmarks.fit import ScipyFit, agreement, compare_simulations, fit_by_scipy, problem_of

@@ -23,7 +23,13 @@ PHONE, DESK = 360, 1600
 A4_HEIGHT_PX = 96 * 297 / 25.4
 
 
-MADE = Provenance("0.2.0", "2026-11-27T10:00:00+00:00", "", (Source("model.toml", "0"),), (Source("run_1.csv", "1"),))
+MADE = Provenance(
+    "hil 0.3.0 (0123456789ab)",
+    "2026-11-27T10:00:00+00:00",
+    "",
+    (Source("model.toml", "0"),),
+    (Source("run_1.csv", "1"),),
+)
 
 PAGES: dict[str, Callable[[], str]] = {
     "identification": lambda: identification_page(*identified()),

@@ -20,14 +20,13 @@ from itertools import product
 from pathlib import Path
 
 import numpy as np
+from estimator.diagnosis.inference.judge import Score, probability_of
 from scipy.optimize import minimize_scalar
 from threadpoolctl import threadpool_limits
 
 from estimator.diagnosis.acquisition.chain import mechanical, read_through
-from estimator.diagnosis.inference.answer import LEVELS
-from estimator.diagnosis.inference.answer import searched as searched_for
+from estimator.diagnosis.inference.answer import LEVELS, searched as searched_for
 from estimator.diagnosis.inference.checks import COLUMNS, LEAST_SHARE, TEST_LIMITS, THRESHOLDS_FILE, chance
-from estimator.diagnosis.inference.judge import Score, probability_of
 from estimator.diagnosis.inference.rivals import rivals_of
 from estimator.diagnosis.preconditions.prepare import prepare
 from estimator.errors import EstimatorError
@@ -43,7 +42,7 @@ MOST_REFUSED = 0.01
 
 OTHER_FORMS = {"most_predictable": 0.03, "most_dependent": 0.015}
 """Shares of the innovations' variance that machines leave by the form of their laws alone: simulated worlds are nearer
-to the model than any real one. Set by hand, from the real recordings in docs/real-recordings.md."""
+to the model than any real one. Set by hand, from the real recordings in docs/how-good.md."""
 
 BELIEVED = 0.9
 """Probability below which nothing is reported as found, however well it went in simulated worlds."""

@@ -15,8 +15,7 @@ from tests.campaigns.faults.clock import Clock, compiler
 from tests.campaigns.faults.disk import can_mount, disk
 from tests.campaigns.faults.kinds import KINDS, UNTOUCHED
 from tests.campaigns.faults.one_run import Outcome, run_with
-from tests.campaigns.faults.processes import KINDS as PROCESS_KINDS
-from tests.campaigns.faults.processes import possible, run_one
+from tests.campaigns.faults.processes import KINDS as PROCESS_KINDS, possible, run_one
 from tests.campaigns.faults.rig import campaign_rig
 from tests.campaigns.faults.runs import report
 from tests.chosen import one_in

@@ -40,8 +40,7 @@ from hil.proof.work import work_on
 from hil.recording import read_records
 from hil.report.diagnosis_json import diagnosis_json
 from tests.campaigns.dirty import Known, make_dirty
-from tests.campaigns.engine import ROLE as ENGINE_ROLE
-from tests.campaigns.engine import make_engine
+from tests.campaigns.engine import ROLE as ENGINE_ROLE, make_engine
 from tests.campaigns.forms import FORMS, Role, make_form
 
 KINDS = [name for name, effect in EFFECTS.items() if effect.catalogued and name != NOTHING]

@@ -11,8 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from hil.cli.main import run
 from hil.config.new_rig import QUESTIONS, answers, rig_text
@@ -146,3 +145,13 @@ def test_a_person_at_a_terminal(terminal: tuple[subprocess.Popen[bytes], int, Pa
     assert "written" in read_until(end, "hil check")
     assert process.wait(timeout=60) == 0
     assert read_rig(path).inverters.m2.torque_limit_nm == 90.0
+
+
+def test_bus_nodes_period_and_mode_are_as_given(tmp_path: Path) -> None:
+    path = tmp_path / "rig.toml"
+    given = {"can": "socketcan:can1", "period_s": "0.02", "node_m1": "11", "node_m2": "12", "mode": "profile_torque"}
+    assert run(["rig", "new", str(path), "--yes", *options(VEHICLE | given)]) == 0
+    rig = read_rig(path)
+    assert (rig.can.interface, rig.can.channel, rig.period_s) == ("socketcan", "can1", 0.02)
+    assert (rig.inverters.m1.node_id, rig.inverters.m2.node_id) == (11, 12)
+    assert {rig.inverters.m1.mode, rig.inverters.m2.mode} == {"profile_torque"}

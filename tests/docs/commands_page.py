@@ -19,8 +19,8 @@ from tests.cli.command_lines import command, examples
 PAGE = Path(__file__).parents[2] / "docs" / "reference-commands.md"
 
 READ_MORE = {
-    "demo": "proof",
-    "prove": "proof",
+    "demo": "how-good",
+    "prove": "how-good",
     "sim": "get-started",
     "check": "first-time-on-a-vehicle",
     "commission": "commissioning",

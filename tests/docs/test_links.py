@@ -153,15 +153,3 @@ def test_it_runs_and_names_the_friction(tmp_path: Path, monkeypatch: pytest.Monk
     assert [value for value in values if isinstance(value, list)] == [
         ["augmented.toml", "diagnosis.json", "report.html"]
     ]
-
-
-ROW = re.compile(r"^\| (?P<seconds>\d+) \| `(?P<file>\S+)` \| `(?P<test>\w+)`[^|]* \| (?P<why>\w[^|]+) \|$", re.M)
-
-
-def test_each_of_the_slowest_is_there_and_justified() -> None:
-    rows = list(ROW.finditer((DOCS / "testing.md").read_text(encoding="utf-8")))
-    assert len(rows) >= 9
-    for row in rows:
-        assert f"def {row['test']}(" in (ROOT / "tests" / row["file"]).read_text(encoding="utf-8")
-    seconds = [int(row["seconds"]) for row in rows]
-    assert seconds == sorted(seconds, reverse=True)

@@ -9,8 +9,7 @@ from pydantic import BaseModel
 
 from drivers.inverter.drive_settings import OPTION_CODES
 from drivers.plc.register_map import USED
-from estimator.diagnosis.inference import checks
-from estimator.diagnosis.inference import figures as holdout
+from estimator.diagnosis.inference import checks, figures as holdout
 from estimator.diagnosis.inference.search import STARTS
 from estimator.diagnosis.where import locate
 from hil.cli.main import ExitStatus
@@ -94,7 +93,7 @@ def test_the_thresholds_of_a_verdict_are_those_of_the_code() -> None:
 
 
 def test_every_concealed_effect_is_listed() -> None:
-    assert set(CONCEALED) <= names_in_code("proof.md")
+    assert set(CONCEALED) <= names_in_code("how-good.md")
 
 
 MODELS = [
@@ -128,14 +127,14 @@ def test_the_shown_signals_are_read(tmp_path: Path) -> None:
 def test_the_shown_check_of_a_seal_runs(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    (script,) = (block.text for block in blocks(DOCS / "proof.md") if block.language == "python")
+    (script,) = (block.text for block in blocks(DOCS / "how-good.md") if block.language == "python")
     sealed = seal({"effect": "backlash", "hidden": {"backlash": {"gap_rad": 0.02}}})
     folder = tmp_path / "out" / "demo"
     folder.mkdir(parents=True)
     content = {"commitment": sealed.commitment, "opened": sealed.opened()}
     (folder / "seal.json").write_text(json.dumps(content), encoding="utf-8")
     monkeypatch.chdir(tmp_path)
-    exec(compile(script, "proof.md", "exec"), {})
+    exec(compile(script, "how-good.md", "exec"), {})
     assert capsys.readouterr().out.startswith("backlash {")
 
 

@@ -7,8 +7,7 @@ from typing import Any
 import pytest
 from canopen import import_od
 from canopen.objectdictionary import ObjectDictionary
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from drivers.capability.carrier import TPDO
 from drivers.capability.plan import plan_drive

@@ -6,8 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from drivers.canopen.can_link import CanLink
 from drivers.canopen.pdo_map import MappedObject, PdoCodec, PdoLayout, read_layout

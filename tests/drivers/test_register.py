@@ -4,8 +4,7 @@ import math
 import struct
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from drivers.errors import ConfigMismatch, ProtocolViolation
 from drivers.plc.register import Access, Register, RegisterKind, Value, ValueType, WordOrder

@@ -4,8 +4,7 @@ import dataclasses
 import math
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from drivers.errors import CommandRefused, ConfigMismatch
 from drivers.scaling import IntegerType, TorqueScale, VelocityScale

@@ -8,10 +8,19 @@ import numpy as np
 import pytest
 from estimator.diagnosis.inference.judge import grounds
 
-from estimator.design import Candidate, Open, as_model, distance, expected, name_of, shown, widths
-from estimator.design import _on_paper as on_paper
-from estimator.design import _precision as precision
-from estimator.design import _supposed as supposed
+from estimator.design import (
+    Candidate,
+    Open,
+    _on_paper as on_paper,
+    _precision as precision,
+    _supposed as supposed,
+    as_model,
+    distance,
+    expected,
+    name_of,
+    shown,
+    widths,
+)
 from estimator.diagnosis.inference.descent import descended
 from estimator.diagnosis.inference.disturbances import whitener_of
 from estimator.diagnosis.inference.hypotheses import THOROUGH

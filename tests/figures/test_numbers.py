@@ -10,8 +10,7 @@ import pytest
 from estimator.identification.identify import identify
 from hil.figures.local_model import LocalModel, Reference, TwoMassLine, row_of
 from hil.figures.palette import BLACK, BLUE, GREEN, GREY, PURPLE, SERIES, VERMILION
-from tests.estimator.identification.driveline import B_L, B_M, J_L, J_M, C, K, cruise, true_resonance
-from tests.estimator.identification.driveline import LINE as TRUTH
+from tests.estimator.identification.driveline import B_L, B_M, J_L, J_M, LINE as TRUTH, C, K, cruise, true_resonance
 
 LINE = TwoMassLine(J_M, J_L, K, C, B_M, B_L)
 

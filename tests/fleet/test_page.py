@@ -7,8 +7,7 @@ from typing import Any
 import pytest
 
 from hil.fleet.dataset import Writer
-from hil.fleet.page import _current as current
-from hil.fleet.page import courses_of, fleet_page, usual_parameters
+from hil.fleet.page import _current as current, courses_of, fleet_page, usual_parameters
 from hil.provenance import Provenance
 from tests.browser.conftest import browser, opened
 from tests.fleet import made_up
@@ -16,7 +15,7 @@ from tests.fleet.made_up import CHANGED, OUTLIER, write_fleet
 
 __all__ = ["browser"]
 
-MADE = Provenance("0.2.0", "2026-11-27T10:00:00+00:00", "", (), ())
+MADE = Provenance("hil 0.3.0 (0123456789ab)", "2026-11-27T10:00:00+00:00", "", (), ())
 VEHICLES, DRIVES = 200, 50
 MANUAL = Path(__file__).parents[2] / "docs" / "fleet.md"
 

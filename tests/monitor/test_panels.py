@@ -6,14 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from drivers.plc.types import ClutchState, DriveMode, PlcStatus, PrbsSettings, PrbsSource
 from estimator.identification.tracking.alarm import Alarm, Level, TrackingState
-from hil.monitor import bus_panels, model_panels, signal_panels
-from hil.monitor import panel as head_panels
-from hil.monitor import panel as log_panel
+from hil.monitor import bus_panels, model_panels, panel as head_panels, panel as log_panel, signal_panels
 from hil.monitor.app import MonitorApp
 from hil.monitor.messages import Began, Kind, NodeHealth, Notice, PlcHealth, Ready, Samples
 from hil.monitor.panel import LEAST_WIDTH, Draw, LogPanel, drawn, log, log_lines

@@ -1,6 +1,6 @@
 """Real recordings, asked by the public command and judged by what is known of them; minutes each.
 
-Figures are the requirement's or hold what was measured against getting worse (docs/real-recordings.md has it): each
+Figures are the requirement's or hold what was measured against getting worse (docs/how-good.md has it): each
 test says which.
 """
 

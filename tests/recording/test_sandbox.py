@@ -19,8 +19,7 @@ import pytest
 
 from hil.child import python
 from hil.errors import RecordingError
-from hil.recording import Table, read_table, write_table
-from hil.recording import sandbox as apart
+from hil.recording import Table, read_table, sandbox as apart, write_table
 from hil.recording.bounds import CELLS, MEMORY_BYTES
 from hil.recording.formats import FORMATS, read_metadata
 from hil.recording.request import Request

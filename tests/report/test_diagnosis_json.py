@@ -6,8 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from estimator.diagnosis.result import Diagnosis, Mismatch, OffNominal, UnnamedLaw, Verdict
 from estimator.physics.effect import Element

@@ -5,8 +5,7 @@ from pathlib import Path
 import pytest
 
 from drivers.errors import ConfigMismatch
-from drivers.inverter.cia402 import PowerState, state_of
-from drivers.inverter.cia402 import PowerState as S
+from drivers.inverter.cia402 import PowerState, PowerState as S, state_of
 from hil.errors import UsageError
 from hil.rig.build import open_devices
 from hil.rig.check import check_rig

@@ -21,8 +21,7 @@ from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult
 from estimator.physics.layout import slot
-from estimator.physics.model import Motion as Kind
-from estimator.physics.model import unit
+from estimator.physics.model import Motion as Kind, unit
 from estimator.physics.problem import outputs_at
 from estimator.signals.record import BoolArray, FloatArray
 

@@ -112,6 +112,7 @@ def two_mass_resonance(J_M: float, J_L: float, k: float, c: float, b_M: float, b
 
 
 CONFIDENCE = 0.95  # of every interval and ellipse that does not say otherwise
+OUTLINE = 73  # points of an ellipse: every 5 degrees, the first one twice
 
 QUANTILE = NormalDist().inv_cdf(0.5 + CONFIDENCE / 2.0)
 """Half width of such an interval in standard deviations: 1.96."""
@@ -124,8 +125,8 @@ STEP = 0.01  # of the difference quotient, in standard deviations
 class Uncertain:
     """A number and its standard deviation; infinite where the data say nothing of it."""
 
-    value: float
-    std: float
+    value: float  # the estimate
+    std: float  # standard deviation, in the unit of the value
     interval: tuple[float, float] | None = None  # interval of 95 %, where it is not that of a normal distribution
 
     @property
@@ -154,6 +155,7 @@ def square_root(covariance: FloatArray) -> FloatArray:
 def propagate(
     function: Callable[[FloatArray], FloatArray], parameters: FloatArray, covariance: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
+    """Return a function's values (M,) and their covariance (M, M), linearised along the axes of the covariance."""
     axes = square_root(covariance).T
     value = function(parameters)
     slopes = [(function(parameters + STEP * axis) - function(parameters - STEP * axis)) / (2.0 * STEP) for axis in axes]
@@ -165,8 +167,8 @@ def propagate(
 class Roots:
     """Roots, shape (n,), and their derivatives by theta, shape (n, na + nb), complex."""
 
-    values: ComplexArray
-    slopes: ComplexArray
+    values: ComplexArray  # in the z plane
+    slopes: ComplexArray  # d root / d theta
 
 
 def _roots(coefficients: FloatArray, first: int, place: int, n_parameters: int) -> Roots:
@@ -182,10 +184,12 @@ def _roots(coefficients: FloatArray, first: int, place: int, n_parameters: int) 
 
 
 def pole_roots(model: LinearModel) -> Roots:
+    """Return the poles of a model and their derivatives."""
     return _roots(model.A, 1, 0, model.orders.n_parameters)
 
 
 def zero_roots(model: LinearModel) -> Roots:
+    """Return the zeros of a model and their derivatives."""
     return _roots(np.array(model.b), 0, len(model.a), model.orders.n_parameters)
 
 
@@ -206,7 +210,7 @@ class Cancellation:
     """A pole and a zero that the data can't distinguish."""
 
     pole: complex  # in z
-    zero: complex
+    zero: complex  # in the z plane
     p_value: float  # probability of a distance at least this large if they were one
 
     @property
@@ -255,16 +259,16 @@ def _distance(poles: Roots, i: int, zeros: Roots, j: int, P: FloatArray, freedom
 class UncertainRoot:
     """A pole or zero in z."""
 
-    value: complex
+    value: complex  # in the z plane
     covariance: FloatArray  # of its real and imaginary part
 
-    def ellipse(self, confidence: float = CONFIDENCE, points: int = 73) -> ComplexArray:
-        """Return the outline of the confidence region, closed, shape (points,); a segment for a real root."""
+    def ellipse(self) -> ComplexArray:
+        """Return the outline of the 95 % region, closed, shape (OUTLINE,); a segment for a real root."""
         freedom = 2 if self.value.imag != 0.0 else 1
         from scipy.special import chdtri  # see above
 
-        radius = np.sqrt(chdtri(freedom, 1.0 - confidence))
-        around = np.linspace(0.0, 2.0 * np.pi, points)
+        radius = np.sqrt(chdtri(freedom, 1.0 - CONFIDENCE))
+        around = np.linspace(0.0, 2.0 * np.pi, OUTLINE)
         offset = radius * square_root(self.covariance) @ np.array([np.cos(around), np.sin(around)])
         return np.asarray(self.value + offset[0] + 1j * offset[1], dtype=np.complex128)
 
@@ -273,17 +277,17 @@ class UncertainRoot:
 class PoleZeroMap:
     """Every pole and zero of a model with its ellipse, and what cancels."""
 
-    poles: tuple[UncertainRoot, ...]
-    zeros: tuple[UncertainRoot, ...]
-    cancellations: tuple[Cancellation, ...]
+    poles: tuple[UncertainRoot, ...]  # of A
+    zeros: tuple[UncertainRoot, ...]  # of B
+    cancellations: tuple[Cancellation, ...]  # pairs of both
 
 
 @dataclass(frozen=True, slots=True)
 class UncertainMode:
     """Natural frequency [Hz] and damping ratio with their standard deviations and 95 % intervals."""
 
-    frequency_hz: Uncertain
-    damping: Uncertain
+    frequency_hz: Uncertain  # undamped natural frequency [Hz]
+    damping: Uncertain  # damping ratio
 
     @property
     def mode(self) -> Mode:

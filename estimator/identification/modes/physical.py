@@ -74,8 +74,8 @@ CURES = MappingProxyType(
 class PhysicalParameter:
     """One parameter with its unit and uncertainty."""
 
-    name: str
-    unit: str
+    name: str  # J_M, J_L, k, c, b_M, b_L, or a sum of two
+    unit: str  # SI
     estimate: Uncertain  # value, standard deviation and 95 % interval
     statement: str  # what the data say of it, and what would tell where they don't
 
@@ -167,17 +167,19 @@ def two_mass_start(model: LinearModel) -> FloatArray:
 class _Likelihood:
     """The deviance over ``z = [ln J_M, ln J_L, ln k, c, b_M, b_L]``, the last three in units of the start's damping."""
 
-    model: LinearModel
-    whitening: FloatArray
-    known: Mapping[int, Uncertain]
-    unit: float
-    least: FloatArray
-    most: FloatArray
+    model: LinearModel  # the discrete model whose coefficients are to be met
+    whitening: FloatArray  # square root of the inverse covariance of theta
+    known: Mapping[int, Uncertain]  # parameters known beforehand, by their place
+    unit: float  # of the last three entries of z [Nm s/rad]
+    least: FloatArray  # (6,), smallest z
+    most: FloatArray  # (6,), largest z
 
     def parameters(self, z: FloatArray) -> FloatArray:
+        """Return J_M, J_L, k, c, b_M, b_L in SI of z, shape (..., 6)."""
         return np.concatenate([np.exp(z[..., :POSITIVE]), self.unit * z[..., POSITIVE:]], axis=-1)
 
     def residual(self, z: FloatArray) -> FloatArray:
+        """Return the whitened differences of coefficients and known values, shape (Z, n + known), of z (Z, 6)."""
         x = self.parameters(z)
         off = (coefficients_of(x, self.model.sample_time_s) - self.model.theta) @ self.whitening.T
         prior = [(x[:, i] - one.value) / one.std for i, one in self.known.items()]
@@ -234,14 +236,16 @@ class _Likelihood:
 class _Held:
     """A parameter, or the sum of two, kept at a value by a spring far stiffer than the data."""
 
-    places: tuple[int, ...]
-    value: float
-    width: float
+    places: tuple[int, ...]  # of the parameters whose sum is held
+    value: float  # that it is held at
+    width: float  # deviation that counts as one standard deviation
 
     def off(self, x: FloatArray) -> float:
+        """Return how far the sum is from the value, in standard deviations."""
         return float((x[list(self.places)].sum() - self.value) / self.width)
 
     def slope(self, of: _Likelihood, z: FloatArray) -> FloatArray:
+        """Return its derivative by z, shape (6,)."""
         slope = np.zeros(6)
         x = of.parameters(z)
         for i in self.places:

@@ -29,8 +29,8 @@ from estimator.signals.record import FloatArray
 class ContinuousModel:
     """``numerator(s) / denominator(s)``, highest power first, leading 1 in the denominator."""
 
-    numerator: FloatArray
-    denominator: FloatArray
+    numerator: FloatArray  # (m,) [output unit per input unit]
+    denominator: FloatArray  # (n,)
 
     @property
     def poles(self) -> ComplexArray:
@@ -95,11 +95,12 @@ class Reduced:
 
     model: LinearModel  # of the order asked for, or of the original one where that is no higher
     covariance: FloatArray | None  # of its theta
-    hankel: FloatArray
-    largest_error: float
+    hankel: FloatArray  # Hankel singular values of the model before, the largest first
+    largest_error: float  # bound of the difference of the responses at any frequency [output unit per input unit]
 
 
 def third_order(model: LinearModel, covariance: FloatArray | None = None) -> Reduced:
+    """Return a model reduced to third order: the rigid line and one resonance."""
     return reduce_order(model, THIRD, covariance)
 
 

@@ -1,8 +1,9 @@
-"""The residual's own dynamics: an autoregression ``D(q^-1) e(t) = w(t)``, w white.
+"""The off-line fits, output error and Box-Jenkins, the noise model that both need, and the free run of what they find.
 
-An output-error model explains y by u alone. What it leaves is coloured: the load's slow changes, shaped by the drive.
-Burg's method (J. P. Burg, 1967; S. M. Kay, Modern Spectral Estimation, chapter 7) finds D one reflection coefficient
-at a time from the forward error f and the backward error g::
+The noise is an autoregression ``D(q^-1) e(t) = w(t)``, w white. An output-error model explains y by u alone. What it
+leaves is coloured: the load's slow changes, shaped by the drive. Burg's method (J. P. Burg, 1967; S. M. Kay, Modern
+Spectral Estimation, chapter 7) finds D one reflection coefficient at a time from the forward error f and the backward
+error g::
 
     k_m = - 2 sum f_(m-1)(t) g_(m-1)(t-1) / sum (f_(m-1)(t)^2 + g_(m-1)(t-1)^2)
 
@@ -12,8 +13,7 @@ account. Box-Jenkins: ``y = B / A u + 1 / D w``, w white. The sum of w^2 over A,
 maximum-likelihood estimate (Box and Jenkins, Time Series Analysis, chapter 11; Ljung, System Identification, 2nd ed.,
 section 7.4). D is long, a second: road, grade and the driver's slow changes are the noise's, and no pole of the
 driveline has to follow them. The covariance is that of the joint estimate, so that what feedback correlates, plant and
-noise, widens the intervals. On 200 buses on a road, with a driver, the errors of frequency and damping were 0.24 and
-0.38 times those of the output-error fit (``python -m tests.benchmarks.identification``).
+noise, widens the intervals. What that gains on 200 buses on a road is in docs/benchmarks.md.
 """
 
 from __future__ import annotations
@@ -122,6 +122,7 @@ PERIOD_TOLERANCE = 0.02
 
 
 def require_identifiable(record: Record, orders: Orders) -> None:
+    """Refuse a recording that can't determine a model of these orders: wrong period, too short, no excitation."""
     stamped_s = float(np.median(np.diff(record.time_s))) if record.time_s.shape[0] > 1 else record.sample_time_s
     if abs(stamped_s - record.sample_time_s) > PERIOD_TOLERANCE * record.sample_time_s:
         raise BadSetting(
@@ -149,7 +150,7 @@ class LinearFit:
     state: FloatArray  # (n_states + 1,): ``[c, h]``
     first: int  # first good sample
     rms: float  # RMS of the free-run simulation error [output unit]
-    fit_percent: float
+    fit_percent: float  # 100 (1 - NRMSE) of the free run [%]
     one_step_fit_percent: float  # the same for the prediction one step ahead
     noise: NoiseModel  # of the free-run residual
     n_samples: int  # good samples used
@@ -261,6 +262,7 @@ def summarised(
 
 
 def fit_output_error(record: Record, orders: Orders | None = None) -> LinearFit:
+    """Fit B / A by the least error of its free run (output error), with standard deviations for coloured noise."""
     problem, first = problem_of(record, orders)
     x = problem.solve(starts(problem))
     noise = fit_noise(problem.blocks.mean(problem.error(x)), problem.blocks.okay, reach(problem.period_s))
@@ -315,10 +317,11 @@ class FreeRun:
     error: FloatArray  # (N,): measured less simulated output [output unit]; NaN where there is none
     rms: float  # of the good samples [output unit]
     fit_percent: float  # in free run, and one step ahead with the noise model given
-    one_step_fit_percent: float
+    one_step_fit_percent: float  # the same of the one-step prediction [%]
 
 
 def free_run(model: LinearModel, record: Record, noise: NoiseModel) -> FreeRun:
+    """Simulate a model over a recording from the best start; BadModel for another period or an unstable model."""
     period_s = record.sample_time_s
     if not np.isclose(period_s, model.sample_time_s, rtol=1e-3) or not model.is_stable:
         raise BadModel(

@@ -44,7 +44,7 @@ class Linearity:
 
     p_value: float  # probability of an F at least this large on a linear drive
     by_torque: float  # the same for functions of the shaft's torque alone, and of the speed alone
-    by_speed: float
+    by_speed: float  # ... of functions of the speed alone
     effect: float = 1.0  # what the functions explain of the innovations beyond chance, RMS over RMS
 
     @property
@@ -127,14 +127,15 @@ MOST_EVALUATIONS = 30
 class RegionalMode:
     """The resonance where a signal is between two values; None where the drive does not resonate there."""
 
-    low: float
-    high: float
-    mode: Mode | None
+    low: float  # smallest value of the signal in the region, in its unit
+    high: float  # largest
+    mode: Mode | None  # frequency and damping ratio there
 
 
 def modes_by_region(
     problem: Problem, x: FloatArray, signal: FloatArray, band_hz: tuple[float, float]
 ) -> tuple[RegionalMode, ...]:
+    """Return the resonance in each of REGIONS regions of a signal (N,), looked for in a band [Hz]."""
     value = problem.blocks.mean(signal)[problem.noise_order :]
     edges = np.quantile(value, np.linspace(0.0, 1.0, REGIONS + 1))
     found = []

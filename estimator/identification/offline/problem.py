@@ -167,6 +167,7 @@ class UnreadTorque:
         return columns
 
     def added_to(self, u: FloatArray, values: FloatArray) -> FloatArray:
+        """Return a copy of u (N,) with the estimated values of what was not read added."""
         filled = u.copy()
         inputs = np.array(self.is_input, dtype=np.bool_)
         filled[np.array(self.at, dtype=np.int64)[inputs]] += values[inputs]
@@ -204,12 +205,12 @@ def simulated(model: LinearModel, u: FloatArray, state: FloatArray) -> FloatArra
 class _Point:
     """What is known at one x: signals with what is missing at its best values, and what eliminates it."""
 
-    x: FloatArray
-    u: FloatArray
-    y_hat: FloatArray
-    e: FloatArray
-    w: FloatArray
-    elimination: Elimination
+    x: FloatArray  # the unknowns
+    u: FloatArray  # (N,), input, with what was not read estimated
+    y_hat: FloatArray  # (N,), free run
+    e: FloatArray  # (N,), measured minus free run
+    w: FloatArray  # innovations: e through D
+    elimination: Elimination  # how what was not read follows from x
 
 
 @dataclass(frozen=True, eq=False)
@@ -217,8 +218,8 @@ class Problem:
     """The least-squares problem in ``x = [A's parameters, b, c, h, d]``; u, y, okay and read of shape (N,)."""
 
     u: FloatArray  # input, output, and whether the output was measured
-    y: FloatArray
-    okay: BoolArray
+    y: FloatArray  # measured output
+    okay: BoolArray  # whether it was measured
     orders: Orders  # of B / A
     sample_time_s: float  # sampling period [s]
     read: BoolArray | None = None  # whether the input was read
@@ -402,8 +403,8 @@ class Problem:
 class _Projected:
     """The best D for A, B, C and h, and what projects w onto what no D explains."""
 
-    plant: FloatArray
-    x: FloatArray
+    plant: FloatArray  # A, B, C and h
+    x: FloatArray  # the same with the best D
     E: FloatArray  # d w / d D
     inverse: FloatArray  # of E^T E
 

@@ -48,21 +48,22 @@ pole would be taken to explain."""
 class Candidate:
     """One structure and how it did."""
 
-    orders: Orders
+    orders: Orders  # of the structure
     criterion: float  # BIC less that of the best
     rms: float  # of the whitened simulation error [output unit]
     unseen_fit_percent: float  # free-run fit over all recordings held out
-    model: LinearModel
+    model: LinearModel  # as fitted
 
 
 @dataclass(frozen=True, slots=True)
 class OrderChoice:
     """Every candidate, the best by the criterion first."""
 
-    candidates: tuple[Candidate, ...]
+    candidates: tuple[Candidate, ...]  # all that were tried
 
     @property
     def chosen(self) -> Orders:
+        """The orders with the least criterion."""
         return self.candidates[0].orders
 
     @property
@@ -86,6 +87,7 @@ class OrderChoice:
 
 
 def select_orders(record: Record, among: Sequence[Orders] = DEFAULT, unseen: Sequence[Record] = ()) -> OrderChoice:
+    """Fit all candidates and rank them by BIC; on unseen recordings each is only simulated."""
     if not among:
         raise BadSetting("order selection: 0 candidates, expected one or more. Give the orders to choose from.")
     prepared, *others = (_prepared(one) for one in (record, *unseen))
@@ -175,6 +177,7 @@ class Validation:
 
 
 def validate(fit: LinearFit, record: Record, unseen: Sequence[Record] = (), lags: int = LAGS) -> Validation:
+    """Test a fit: free runs on its own and on unseen recordings, and whether its innovations are independent."""
     own = free_run(fit.model, record, fit.noise)
     tests = residual_tests(own.error, record, fit.block, min(fit.model.nk, LEAST_DELAY), lags)
     return Validation(own, tuple(free_run(fit.model, other, fit.noise) for other in unseen), *tests)
@@ -255,9 +258,9 @@ SIGNIFICANCE = 0.01  # false alarms of the detection, on recordings in open loop
 class Feedback:
     """Whether there was feedback and what it means."""
 
-    detected: bool
-    p_value: float
-    statement: str
+    detected: bool  # whether the torque depends on the past speed
+    p_value: float  # probability of so much dependence by chance
+    statement: str  # one sentence for people
 
 
 def judge_feedback(validation: Validation) -> Feedback:

@@ -82,10 +82,11 @@ class Adaptation(Protocol):
 class DecreasingGain:
     """lambda_1 = lambda_2 = 1: every sample weighs the same. For a system that does not change."""
 
-    initial_gain: float = 1000.0
+    initial_gain: float = 1000.0  # F(0) = initial_gain I
 
     @property
     def law(self) -> GainLaw:
+        """The profile in the form the loops carry out."""
         return GainLaw(self.initial_gain)
 
 
@@ -93,11 +94,12 @@ class DecreasingGain:
 class ConstantForgetting:
     """lambda_1 constant below 1, lambda_2 = 1: a sample t cycles old weighs lambda_1^t. For slow change."""
 
-    lambda1: float = 0.99
-    initial_gain: float = 1000.0
+    lambda1: float = 0.99  # forgetting factor, 0 to 1
+    initial_gain: float = 1000.0  # F(0) = initial_gain I
 
     @property
     def law(self) -> GainLaw:
+        """The profile in the form the loops carry out."""
         return GainLaw(self.initial_gain, lambda1=self.lambda1)
 
 
@@ -105,12 +107,13 @@ class ConstantForgetting:
 class VariableForgetting:
     """lambda_1 rises to 1 as ``lambda0 lambda_1 + 1 - lambda0``: only the start-up is forgotten."""
 
-    lambda1: float = 0.97
-    lambda0: float = 0.97
-    initial_gain: float = 1000.0
+    lambda1: float = 0.97  # first forgetting factor, 0 to 1
+    lambda0: float = 0.97  # how slowly it rises, 0 to 1
+    initial_gain: float = 1000.0  # F(0) = initial_gain I
 
     @property
     def law(self) -> GainLaw:
+        """The profile in the form the loops carry out."""
         return GainLaw(self.initial_gain, lambda1=self.lambda1, lambda0=self.lambda0)
 
 
@@ -123,12 +126,13 @@ class DecreasingThenConstantTrace:
     is fixed by the trace, its number is taken as the ratio (lambda_1 for lambda_2 = 1).
     """
 
-    lambda1: float = 0.993
+    lambda1: float = 0.993  # lambda_1 / lambda_2 once the trace is held
     trace: float = 0.01
-    initial_gain: float = 1000.0
+    initial_gain: float = 1000.0  # F(0) = initial_gain I
 
     @property
     def law(self) -> GainLaw:
+        """The profile in the form the loops carry out."""
         return GainLaw(self.initial_gain, trace=self.trace, alpha=self.lambda1)
 
 
@@ -136,14 +140,15 @@ class DecreasingThenConstantTrace:
 class VariableForgettingThenConstantTrace:
     """The start-up is forgotten while tr F falls to ``trace``, which is then held: from a bad start to tracking."""
 
-    lambda1: float = 0.97
-    lambda0: float = 0.97
-    alpha: float = 0.993
+    lambda1: float = 0.97  # first forgetting factor, 0 to 1
+    lambda0: float = 0.97  # how slowly it rises, 0 to 1
+    alpha: float = 0.993  # lambda_1 / lambda_2 once the trace is held
     trace: float = 0.01
-    initial_gain: float = 1000.0
+    initial_gain: float = 1000.0  # F(0) = initial_gain I
 
     @property
     def law(self) -> GainLaw:
+        """The profile in the form the loops carry out."""
         return GainLaw(self.initial_gain, self.lambda1, self.lambda0, self.trace, self.alpha)
 
 
@@ -154,11 +159,12 @@ class ConstantTrace:
     Landau and Zito name GI = 0.1 to 4 for signals of about one; the gain scales with the inverse square of theirs.
     """
 
-    initial_gain: float = 0.1
-    lambda1: float = 0.993
+    initial_gain: float = 0.1  # GI: the trace held is n GI
+    lambda1: float = 0.993  # lambda_1 / lambda_2
 
     @property
     def law(self) -> GainLaw:
+        """The profile in the form the loops carry out."""
         return GainLaw(self.initial_gain, alpha=self.lambda1, holds_at_once=True)
 
 
@@ -166,10 +172,11 @@ class ConstantTrace:
 class ConstantGain:
     """lambda_1 = 1, lambda_2 = 0: F stays F(0) ("improved gradient"). For few parameters and little noise."""
 
-    initial_gain: float = 0.1
+    initial_gain: float = 0.1  # F = initial_gain I, always
 
     @property
     def law(self) -> GainLaw:
+        """The profile in the form the loops carry out."""
         return GainLaw(self.initial_gain, lambda2=0.0)
 
 

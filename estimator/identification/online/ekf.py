@@ -57,11 +57,11 @@ class TwoMass:
     """Parameters reflected to the motor shaft."""
 
     J_M: float  # inertia of motor and load [kg m^2]
-    J_L: float
+    J_L: float  # of the load
     k: float  # stiffness [Nm/rad] and damping [Nm s/rad] of the shaft
-    c: float
+    c: float  # damping
     b_M: float = 0.0  # viscous friction at motor and load [Nm s/rad]
-    b_L: float = 0.0
+    b_L: float = 0.0  # at the load
 
     def __post_init__(self) -> None:
         rows = [
@@ -82,13 +82,13 @@ class EkfNoise:
     """
 
     output_rad_s: float = 0.1  # noise of a speed reading [rad/s]
-    torque_nm: float = 10.0
+    torque_nm: float = 10.0  # noise of a torque reading [Nm]
     load_nm_per_sqrt_s: float = 10.0  # how far the load torque wanders in a second [Nm]
     log_per_sqrt_s: float = 1e-4  # how far a parameter wanders in a second, relative to itself
     start_log: float = 0.7  # how far a start value may be off, relative to itself
     start_speed_rad_s: float = 1.0  # the same of the motion
-    start_twist_rad: float = 0.2
-    start_load_nm: float = 1000.0
+    start_twist_rad: float = 0.2  # ... of the twist [rad]
+    start_load_nm: float = 1000.0  # ... of the load torque [Nm]
 
     def __post_init__(self) -> None:
         values = {each.name: getattr(self, each.name) for each in fields(self)}
@@ -215,7 +215,6 @@ PERIOD, VARIANCE = 0, 1
 NOISE = 2  # variance each state gains per sample
 START = NOISE + N_STATES  # variance of each state before the first sample
 ORIGIN = START + N_STATES  # value of each state before the first sample
-N_LAW = ORIGIN + N_STATES
 
 # Places in `live` besides those of all estimators, where theirs have the gain.
 STARTED = 0  # 1 once an output has set the speeds

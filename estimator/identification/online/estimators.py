@@ -1,6 +1,8 @@
-"""Recursive output error with filtered observations (OEFO), the paper's algorithm.
+"""The recursive estimators, each as the step that its loop compiles, and the table that they are chosen from.
 
-Nevaranta, Montonen, Lindh, "Online Estimation of a Mechanical Driveline Parameters of a Hybrid Bus", EPE'18
+OEFO, recursive output error with filtered observations, is the paper's algorithm. Recursive least squares, the
+instrumental variable method and the output error method with extended prediction model stand below it, each with its
+equations. Nevaranta, Montonen, Lindh, "Online Estimation of a Mechanical Driveline Parameters of a Hybrid Bus", EPE'18
 ECCE Europe, equations (1) to (7); I. D. Landau and G. Zito, Digital Control Systems (Springer, 2006),
 chapters 3 and 5. With t for the paper's k + 1 and the total delay nk (its d = 1 is nk = 1, see
 ``linear_model``)::
@@ -165,6 +167,7 @@ def _of_length(L: FloatArray, length: int) -> FloatArray:
 
 
 def rls_past(of: Orders) -> Shapes:
+    """Return how many past values recursive least squares keeps of each signal."""
     return {"outputs": (of.na,), "inputs": (of.nk + of.nb,)}
 
 
@@ -201,6 +204,7 @@ class Rls(RegressionEstimator):
 
 
 def riv_past(of: Orders, n_L: int) -> Shapes:
+    """Return how many past values the instrumental variable method keeps of each signal; n_L is the filter's length."""
     outputs_f, inputs_f = (max(of.na, n_L - 1),), (max(of.nk + of.nb, n_L - 1),)
     filtered_rows = {"auxiliary_f": outputs_f, "outputs_f": outputs_f, "inputs_f": inputs_f}
     return {"outputs": (of.na,), "inputs": (of.nk + of.nb,), **filtered_rows, "auxiliary": (of.n_parameters,)}
@@ -265,6 +269,7 @@ class Riv(RegressionEstimator):
 
 
 def oeepm_past(of: Orders) -> Shapes:
+    """Return how many past values the output error method with extended prediction model keeps of each signal."""
     return {"outputs": (of.na,), "inputs": (of.nk + of.nb,), "errors": (of.na,)}
 
 

@@ -52,6 +52,7 @@ class Memory:
 
     @property
     def settings(self) -> dict[str, FloatArray]:
+        """What was set up and does not change, by name."""
         return {name: self[name].copy() for name in self._settings}
 
     @property
@@ -71,6 +72,7 @@ def saved(estimator: str, memory: Memory) -> State:
 
 
 def restored(state: Mapping[str, Any], estimator: str, memory: Memory) -> None:
+    """Put a kept state back into a memory; BadSetting if it is another estimator's, version's or setup's."""
     for name, expected in (("estimator", estimator), ("version", VERSION)):
         _require(str(np.asarray(_part(state, name))) == str(expected), name, state[name], repr(expected))
     for name, setting in memory.settings.items():
@@ -183,8 +185,8 @@ class Estimate:
     reason: Reason
     used: bool
     y_hat: float
-    e_prior: float
-    e_post: float
+    e_prior: float  # y - y_hat before theta took the sample [output unit]
+    e_post: float  # y - y_hat after it [output unit]
 
     @property
     def status(self) -> Status:
@@ -337,7 +339,7 @@ class RecursiveEstimator:
         return bool(live[TORQUE_MOVES] == 0.0 or live[OUTPUT_MOVES] == 0.0)
 
     def state(self) -> State:
-        """Return everything it remembers, as plain arrays; see :mod:`estimator.identification.online.recursive`."""
+        """Return everything it remembers, as plain arrays; how they are kept is at the head of this file."""
         return saved(self._name, self._memory)
 
     def restore(self, state: Mapping[str, Any]) -> None:

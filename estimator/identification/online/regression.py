@@ -205,6 +205,7 @@ def verdict(stable: bool, m: Parts, row: Parts) -> int:
 
 @inlined
 def fill_row(y_hat: float, e_prior: float, e_post: float, used: bool, stable: bool, m: Parts, row: Parts) -> None:
+    """Write the estimate after one sample into a row of the trajectory."""
     n = row.theta.shape[0]
     for i in range(n):
         row.theta[i] = m.theta[i]
@@ -273,6 +274,7 @@ class RegressionEstimator(RecursiveEstimator):
 
 
 def checked_filter(name: str, L: FloatArray) -> FloatArray:
+    """Return a filter's coefficients 1, l_1 ...; BadModel if not finite or a root is not inside the unit circle."""
     own = np.array(L, dtype=np.float64)
     if own.ndim != 1 or own.shape[0] == 0 or not np.isfinite(own).all() or own[0] != 1.0:
         raise BadModel(f"{name}: L is {L}, expected finite coefficients 1, l_1, l_2 .. of a polynomial in q^-1.")

@@ -30,8 +30,8 @@ NORMAL_95 = 1.959963984540054  # standard deviations that hold 95 % of a normal 
 class Level:
     """A value with the interval that holds the truth in 95 of 100 cases; unit as the quantity's name says."""
 
-    value: float
-    ci95: tuple[float, float]
+    value: float  # mean over the blocks it was learnt from
+    ci95: tuple[float, float]  # lower and upper end
 
     @classmethod
     def of(cls, value: float, std: float) -> Level:
@@ -63,14 +63,14 @@ class Level:
 class Alarm:
     """One change that was found."""
 
-    time_s: float
+    time_s: float  # when it was raised [s]
     changed_between_s: tuple[float, float]  # the change lies between these two moments [s]
     quantity: str  # what changed, its unit at the end
     before: Level  # value before and since
-    after: Level
+    after: Level  # the level since
     settled: bool  # false while the estimate is on its way
     statistic: float  # the evidence, and what it had to exceed
-    threshold: float
+    threshold: float  # that the statistic went beyond, in standard deviations
     false_alarms_per_hour: float  # what the threshold was made for
 
     @property
@@ -156,6 +156,7 @@ def false_pairs(threshold: float, n: int, freedom: int) -> float:
 
 @cache
 def threshold_for(false_alarms_per_hour: float, statistics_per_hour: float, n: int, freedom: int) -> float:
+    """Return the threshold [standard deviations] for a rate of false alarms, the level learnt from n blocks."""
     wanted = false_alarms_per_hour / statistics_per_hour
     if not 0.0 < wanted < false_pairs(0.0, n, freedom):
         raise BadSetting(

@@ -64,6 +64,10 @@ CLOSES = 1.0
 """The same, below which it is none any more: the torque moves the output less than everything else does."""
 
 
+# Verdicts, as in estimator.identification.tracking.follow.Excitation.
+_, EXCITED, LACKING, DROWNED = 0, 1, 2, 3
+
+
 class Excitation(IntEnum):
     """Verdict on a block; the numbers are those of the compiled loop."""
 
@@ -93,9 +97,6 @@ USUAL = 3  # mean of TORQUE while excited; 0 before it ever was
 IN_A_ROW = 4  # excited blocks without another in between
 N_LASTING = 5
 
-# Verdicts, as in estimator.identification.tracking.follow.Excitation.
-_, EXCITED, LACKING, DROWNED = 0, 1, 2, 3
-
 
 @compiled
 def keep_mode(frequency_hz: float, damping: float, pole: complex, rho: complex, mode: FloatArray) -> None:
@@ -108,6 +109,7 @@ def keep_mode(frequency_hz: float, damping: float, pole: complex, rho: complex, 
 def take_torque(
     u: float, okay: bool, density: float, sample_time_s: float, mode: FloatArray, through: FloatArray, block: FloatArray
 ) -> None:
+    """Add a sample's torque, as the resonance weighs it, to the sums of the present block."""
     pole = complex(mode[POLE_RE], mode[POLE_IM])
     block[SAMPLES] += 1.0
     if okay and mode[MODE_HZ] > 0.0:
@@ -122,6 +124,7 @@ def take_torque(
 
 @compiled
 def judge(memory: float, opens: float, closes: float, block: FloatArray, lasting: FloatArray) -> int:
+    """Return the verdict on the excitation at the end of a block: EXCITED, LACKING or weak, with hysteresis."""
     ratio, torque = block[OUTPUT] / block[GOOD], block[TORQUE] / block[GOOD]
     take_mean(torque, block[SAMPLES] / memory, WITHIN, lasting)
     was_excited, was_weak = lasting[VERDICT] == EXCITED, lasting[WEAK] == 1.0
@@ -231,6 +234,7 @@ def fill_gradient(structure: IntArray, gain: float, outputs: FloatArray, inputs:
 
 @compiled
 def spread(P: FloatArray, psi: FloatArray, K: FloatArray, density: float, v: FloatArray) -> None:
+    """Bring the covariance of theta (n, n) forward by one sample with gain K and noise of this density."""
     n = psi.shape[0]
     c = density
     reach = 0.0
@@ -341,6 +345,7 @@ def follow_block(
     roots: ComplexArray,
     out: FloatArray,
 ) -> None:
+    """Follow the resonance of every estimate of a block, with its standard deviation and the excitation's verdict."""
     na, n = structure[NA], theta.shape[1]
     step, frequency, damping, mode = work[3, :n], work[4, :na], work[5, :na], work[6, :3]
     band = numbers[LOWEST_HZ : LARGEST_DAMPING + 1]
@@ -388,11 +393,11 @@ FEWEST = 240  # samples of a usable estimate before a standard deviation is give
 class Followed:
     """The resonance of every estimate of a block, each array of shape (n,); NaN where there is none."""
 
-    frequency_hz: FloatArray
-    damping: FloatArray
-    height: FloatArray
-    frequency_std_hz: FloatArray
-    damping_std: FloatArray
+    frequency_hz: FloatArray  # of the dominant pole pair in the band [Hz]
+    damping: FloatArray  # damping ratio
+    height: FloatArray  # magnitude of the response there [output unit per input unit]
+    frequency_std_hz: FloatArray  # standard deviation [Hz]
+    damping_std: FloatArray  # standard deviation of the ratio
 
 
 class Follower:
@@ -420,6 +425,7 @@ class Follower:
 
     @property
     def excitation(self) -> Excitation:
+        """Verdict on the excitation of the last block."""
         return Excitation(int(self._live["lasting"][VERDICT]))
 
     @property
@@ -466,6 +472,7 @@ class Follower:
         return Followed(*(np.ascontiguousarray(column) for column in out.T))
 
     def state(self) -> dict[str, FloatArray]:
+        """Return what it remembers, by name: arrays that `restore` takes."""
         return {name: values.copy() for name, values in self._live.items()} | {"roots": self._roots.view(float).copy()}
 
     def restore(self, state: Mapping[str, Any]) -> None:

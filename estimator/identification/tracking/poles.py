@@ -181,6 +181,7 @@ N_THROUGH = 5
 
 @compiled
 def pass_torque(u: float, pole: complex, through: FloatArray) -> None:
+    """Pass a torque's step through the resonance's pole, once and twice, as its sensitivity needs it."""
     once = pole * complex(through[ONCE_RE], through[ONCE_IM]) + (u - through[LAST])
     twice = pole * complex(through[TWICE_RE], through[TWICE_IM]) + once
     through[ONCE_RE], through[ONCE_IM], through[TWICE_RE], through[TWICE_IM] = (

@@ -24,11 +24,11 @@ from estimator.signals.record import BoolArray, FloatArray, IntArray
 class Tracked:
     """What came of samples: the estimates, the resonance in them, what the tracking was doing, and the alarms."""
 
-    estimates: Trajectory
-    found: Followed
-    state: IntArray
-    alarms: tuple[Alarm, ...] = ()
-    alarm_at: tuple[int, ...] = ()
+    estimates: Trajectory  # of every sample
+    found: Followed  # the resonance in them
+    state: IntArray  # (n,), values of `TrackingState`
+    alarms: tuple[Alarm, ...] = ()  # raised within these samples
+    alarm_at: tuple[int, ...] = ()  # sample of each alarm
 
 
 class Tracker:

@@ -98,12 +98,12 @@ HOUR_S = 3600.0
 class WatchSettings:
     """How a change is watched for."""
 
-    false_alarms_per_hour: float = 0.1
+    false_alarms_per_hour: float = 0.1  # of a drive that does not change
     smallest_change: float = 0.01  # A change up to this share of the resonance counts as none
-    block_s: float = 1.0
+    block_s: float = 1.0  # length of a block, whose mean is one value of the statistic [s]
     reference_blocks: int = 21  # blocks that level and spread are learnt from
     baseline_blocks: int = 7  # blocks that the level is learnt from after an alarm
-    settling_s: float = 16.0
+    settling_s: float = 16.0  # excited time from a start or alarm until the reference is taken [s]
     fewest_share: float = 0.8  # A block with a smaller share of usable samples is left out
 
     def __post_init__(self) -> None:
@@ -158,6 +158,7 @@ def take_reference(
     mode: FloatArray,
     through: FloatArray,
 ) -> None:
+    """Take an estimate as the reference: its resonance and how the error answers a change of it; none without one."""
     na = structure[NA]
     mode[:] = 0.0
     mode[ERROR] = np.nan
@@ -173,6 +174,7 @@ def take_reference(
 
 @compiled
 def reference_output(structure: IntArray, theta: FloatArray, past: FloatArray) -> float:
+    """Return the reference's free-run output of the next sample [output unit]."""
     na = structure[NA]
     value = 0.0
     for i in range(na):
@@ -184,6 +186,7 @@ def reference_output(structure: IntArray, theta: FloatArray, past: FloatArray) -
 
 @compiled
 def take_error(error: float, y: float, mode: FloatArray, through: FloatArray, score: FloatArray) -> None:
+    """Add the score of one sample's error to the block's sums; NaN where the sample was not good."""
     psi = sensitivity(complex(mode[WEIGHT_RE], mode[WEIGHT_IM]), through)
     step, y_step = error - mode[ERROR], y - mode[OUTPUT_THEN]
     mode[ERROR], mode[OUTPUT_THEN] = error, y
@@ -228,24 +231,24 @@ poles passes by the resonance."""
 class _Memory:
     """What the watch remembers of the blocks before, all numbers."""
 
-    state: float = TrackingState.STARTING
+    state: float = TrackingState.STARTING  # of the tracking
     unsettled: float = 0.0  # 1 from an alarm until the value after is reported
     waited: float = 0.0  # excited blocks since the estimate was left to settle
     number: float = 0.0  # blocks since the reference was taken
     learnt: float = 0.0  # ... that the level was learnt from
     error_2: float = 0.0  # ... the squared steps of error and output in them
-    output_2: float = 0.0
+    output_2: float = 0.0  # squared steps of the output
     side: float = 0.0  # of the last block, if it was beyond the threshold: -1, 0, 1
-    level_hz: float = 0.0
-    information: float = 0.0
+    level_hz: float = 0.0  # the level [Hz]
+    information: float = 0.0  # sum of the information of the blocks in it
     spread_of_x: float = 0.0  # 0 before it is known
-    usual: float = 0.0
+    usual: float = 0.0  # mean information of the blocks that the spread is known from
     before_s: float = 0.0  # begin of the last block that was within the threshold, as was the one before
     before_hz: float = 0.0  # the last alarm: the level before
-    before_std_hz: float = 0.0
-    found_s: float = 0.0
-    statistic: float = 0.0
-    threshold: float = 0.0
+    before_std_hz: float = 0.0  # its standard deviation [Hz]
+    found_s: float = 0.0  # when it was raised [s]
+    statistic: float = 0.0  # its statistic, in standard deviations
+    threshold: float = 0.0  # what that went beyond
 
 
 class ChangeWatch:
@@ -300,6 +303,7 @@ class ChangeWatch:
     def end_block(
         self, time_s: float, theta: FloatArray, frequency: Level | None, damping: float, excited: bool
     ) -> Alarm | None:
+        """Judge the block that ends at ``time_s``; return the alarm that it raises, if it does."""
         score = self._live["score"].tolist()
         self._live["score"][:] = 0.0
         self.statistic = np.nan
@@ -418,6 +422,7 @@ class ChangeWatch:
         )
 
     def state(self) -> dict[str, FloatArray]:
+        """Return what it remembers, by name: arrays that `restore` takes."""
         kept = {name: values.copy() for name, values in self._live.items()}
         return kept | {"memory": np.array(astuple(self._memory), dtype=np.float64)}
 

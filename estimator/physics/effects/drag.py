@@ -59,6 +59,7 @@ def quadratic_law(speed: float, drag: float, exponent: float, at: float) -> floa
 
 
 def quadratic_scales(model: Driveline, records: Sequence[Record]) -> tuple[float, ...]:
+    """Return a drag of a twentieth of the torque in use at top speed [Nm s²/rad²], 1, and the top speed."""
     top = speed_scale(records)
     return (0.05 * torque_scale(records) / top**2, 1.0, top)
 
@@ -165,17 +166,20 @@ def eddy_law(speed: float, peak: float, peak_speed: float) -> float:
 
 
 def speed_of(record: Record) -> FloatArray:
+    """Return the measured speed [rad/s] where there is one."""
     speed = measured_speed(record)
     return speed[np.isfinite(speed)]
 
 
 def eddy_testable(model: Driveline, records: Sequence[Record]) -> Untestable | None:
+    """Need a speed that varies: at one speed it is viscous friction and a constant load."""
     if any(float(np.ptp(speed_of(record))) >= LEAST_RANGE * speed_scale([record]) for record in records):
         return None
     return Untestable("the speed hardly varies: not separable from viscous friction and the constant load", "reversal")
 
 
 def eddy_implausible(model: Driveline, records: Sequence[Record], values: Mapping[str, float]) -> str:
+    """Object to a peak beyond the speeds in use: below it the drag is viscous friction."""
     top = speed_scale(records)
     if values["peak_rad_s"] < STRAIGHT * top:
         return ""
@@ -220,6 +224,7 @@ def by_direction_law(speed: float, difference: float) -> float:
 
 
 def by_direction_testable(model: Driveline, records: Sequence[Record]) -> Untestable | None:
+    """Need both directions, and places that are passed at more than one speed."""
     both = [record for record in records if reverses(record)]
     if not both:
         return Untestable("the speed never changes sign: not separable from viscous friction", "reversal")
@@ -229,6 +234,7 @@ def by_direction_testable(model: Driveline, records: Sequence[Record]) -> Untest
 
 
 def by_direction_sentence(values: Mapping[str, float], motion: Motion) -> str:
+    """State the difference of viscous friction by direction."""
     size = f"{abs(values['difference_nm_s']):.3g} {unit('damping', motion)}"
     more, less = ("forward", "backward") if values["difference_nm_s"] > 0.0 else ("backward", "forward")
     return f"friction at the motor depends on the direction: {size} more {more} and as much less {less}"
@@ -267,6 +273,7 @@ def cold_part(time_s: float, cold: float, time_constant_s: float) -> float:
 def warming_described(
     model: Driveline, values: Mapping[str, float], line: Mapping[str, float]
 ) -> Mapping[str, tuple[Span, ...]]:
+    """Return the friction it warms: from cold to warm."""
     name = "b_L" if "b_L" in line else "b_M"
     return {name: ((line[name], line[name] + values["cold_nm_s"]),)}
 

@@ -43,6 +43,7 @@ CREEP = EffectParameter(
 
 
 def motor_scales(model: Driveline, records: Sequence[Record]) -> tuple[float, ...]:
+    """Return a twentieth of the torque in use [Nm], the twist [rad] at which bristles hold it, a speed of creep."""
     friction = 0.05 * torque_scale(records)
     presliding = friction / (model.parameters["J_M"].value * (2.0 * math.pi * HELD_HZ) ** 2)
     return (friction, presliding, CREEPS_OVER * speed_scale(records))
@@ -66,6 +67,7 @@ def forms_near_rest(
 
 
 def motor_testable(model: Driveline, records: Sequence[Record]) -> Untestable | None:
+    """Need a speed that changes its sign: else it is a constant load torque."""
     if turns(model, records):
         return None
     return Untestable("the speed never changes sign: not separable from the constant load torque", "reversal")
@@ -130,6 +132,7 @@ def bending(size: str, model: Driveline, records: Sequence[Record], values: Mapp
 
 
 def load_testable(model: Driveline, records: Sequence[Record]) -> Untestable | None:
+    """Need a speed that changes its sign, as at the motor."""
     return motor_testable(model, records)
 
 
@@ -188,10 +191,12 @@ def stribeck_reparametrised(
 
 
 def stribeck_testable(model: Driveline, records: Sequence[Record]) -> Untestable | None:
+    """Need a speed that changes its sign, as dry friction does."""
     return motor_testable(model, records)
 
 
 def stribeck_sentence(values: Mapping[str, float], motion: Motion) -> str:
+    """State the torque at breakaway, what it falls to, and over which speed."""
     torque, speed = unit("torque", motion), unit("speed", motion)
     breakaway = values["coulomb_nm"] + values["excess_nm"]
     return (

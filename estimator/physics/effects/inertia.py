@@ -55,6 +55,7 @@ GENERATOR_COUPLED = Effect(
 def payload_described(
     model: Driveline, values: Mapping[str, float], line: Mapping[str, float]
 ) -> Mapping[str, tuple[Span, ...]]:
+    """Return the load's inertia before and after the change."""
     name = load_inertia(model)
     before, after = line[name], line[name] + values["change_kg_m2"]
     return {name: ((before, before), (after, after))}
@@ -191,6 +192,7 @@ def mode_described(
 
 
 def mode_sentence(values: Mapping[str, float], motion: Motion) -> str:
+    """State inertia, place and frequency of the further mode."""
     place = f"{mode_within(values) or values['inertia_kg_m2']:.3g} {unit('inertia', motion)} on a spring"
     if values.get("between_kg_m2"):
         place += " between motor and shaft"

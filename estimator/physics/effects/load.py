@@ -49,6 +49,7 @@ def grade_basis(time_s: FloatArray, at_s: FloatArray | None = None) -> FloatArra
 
 
 def grade_testable(model: Driveline, records: Sequence[Record]) -> Untestable | None:
+    """Need a recording that is long enough for a slow profile to differ from a constant load."""
     if any(record.time_s[-1] - record.time_s[0] >= SHORTEST_S for record in records):
         return None
     return Untestable(
@@ -86,6 +87,7 @@ ROAD_GRADE = Effect(
 
 
 def imbalance_testable(model: Driveline, records: Sequence[Record]) -> Untestable | None:
+    """Need a known gear ratio, and a load that makes more than a whole turn."""
     if model.gear_ratio is None:
         reason = "the model file has no [geometry] gear_ratio: the wheel's angle is unknown"
         return Untestable(reason, "reversal", needs="gear_ratio in the model file's [geometry]")
@@ -147,6 +149,7 @@ def gravity_starts(model: Driveline, records: Sequence[Record]) -> list[Start]:
 
 
 def gravity_implausible(model: Driveline, records: Sequence[Record], values: Mapping[str, float]) -> str:
+    """Object to a moment that is more than all torque that was applied."""
     swing = min(range_of(records) / values["motor_turns_per_turn"], 2.0 * math.pi)
     most = max(float(np.abs(record.total_torque_nm).max()) for record in records)
     if values["moment_nm"] * (1.0 - math.cos(0.5 * swing)) <= 2.0 * most:
@@ -155,6 +158,7 @@ def gravity_implausible(model: Driveline, records: Sequence[Record], values: Map
 
 
 def gravity_sentence(values: Mapping[str, float], motion: Motion) -> str:
+    """State the moment, and the gear ratio where it is not 1."""
     turns = values["motor_turns_per_turn"]
     geared = f", {turns:.3g} motor turns to one turn of the load" if turns != 1.0 else ""
     return f"gravity pulls at the load with up to {values['moment_nm']:.3g} {unit('torque', motion)}{geared}"
@@ -197,6 +201,7 @@ def ground_law(angle: float, stiffness: float) -> float:
 
 
 def ground_sentence(values: Mapping[str, float], motion: Motion) -> str:
+    """State the stiffness to the ground."""
     size = f"{values['stiffness_nm_per_rad']:.3g} {unit('stiffness', motion)}"
     return f"a spring of {size} holds the load against the ground"
 

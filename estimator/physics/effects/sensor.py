@@ -50,6 +50,7 @@ def true_angle(read: float, once: float, once_phase: float, twice: float, twice_
 
 
 def resolver_sentence(values: Mapping[str, float], motion: Motion) -> str:
+    """State the angle errors once and twice per turn."""
     return (
         f"the resolver's angle is off by {1e3 * values['once_rad']:.3g} mrad once and "
         f"{1e3 * values['twice_rad']:.3g} mrad twice per turn"
@@ -88,6 +89,7 @@ LEAST_SHARE = 0.5  # share of the magnitude from which a sensor's own motion has
 
 
 def blind_testable(model: Driveline, records: Sequence[Record]) -> Untestable | None:
+    """Need a speed near standstill, where the sign could be lost."""
     if any(float(np.nanmin(np.abs(measured_speed(record)))) < STANDSTILL * speed_scale([record]) for record in records):
         return None
     return Untestable("the speed stays clear of standstill: it has no other sign that could be lost", "reversal")
@@ -148,6 +150,7 @@ SPEED_QUANTISATION = Effect(
 
 
 def stale_sentence(values: Mapping[str, float], motion: Motion) -> str:
+    """State the share of repeated samples."""
     return f"{100.0 * values['share']:.3g}% of the samples are stale: they repeat the value before without a flag"
 
 
@@ -172,6 +175,7 @@ STALE_SAMPLES = Effect(
 
 
 def lost_sentence(values: Mapping[str, float], motion: Motion) -> str:
+    """State the share of lost samples."""
     return f"{100.0 * values['share']:.3g}% of the samples were lost: missing, flagged or recorded as zero"
 
 

@@ -178,6 +178,7 @@ def stiffness_reparametrised(
 
 
 def stiffness_sentence(values: Mapping[str, float], motion: Motion) -> str:
+    """State the stages, or at which twist the stiffness has changed by a tenth."""
     if stage := values.get("stage_share", 0.0):
         side, at = ("stiffer", values["stage_rad"]) if stage > 0 else ("softer", values["stage_rad"])
         return f"the shaft has two stages: {abs(stage):.0%} {side} beyond a twist of {at:.3g} {unit('angle', motion)}"
@@ -217,6 +218,7 @@ STIFFNESS_NONLINEARITY = Effect(
 def stiffness_step_described(
     model: Driveline, values: Mapping[str, float], line: Mapping[str, float]
 ) -> Mapping[str, tuple[Span, ...]]:
+    """Return the stiffness before and after the change."""
     before, after = line["k"], line["k"] * (1.0 + values["change"])
     return {"k": ((before, before), (after, after))}
 
@@ -264,6 +266,7 @@ def slider_scales(model: Driveline, records: Sequence[Record]) -> tuple[float, .
 
 
 def slider_starts(model: Driveline, records: Sequence[Record]) -> list[Start]:
+    """Return two starts: a slider that yields early and one that yields late."""
     early, late = (Held(0.0), Held(0.0)) if model.structure is Structure.JOINT else (0.2, 0.5)
     return [(0.5, 0.5, 1.0, 0.7, early), (1.0, 4.0, 1.0, 0.7, late)]
 
@@ -353,6 +356,7 @@ def cardan_starts(model: Driveline, records: Sequence[Record]) -> list[Start]:
 
 
 def cardan_testable(model: Driveline, records: Sequence[Record]) -> Untestable | None:
+    """Need half a turn of the motor, and a speed that sweeps."""
     if not goes_round(records, 0.5):
         return Untestable("the motor makes less than half a turn: nothing recurs with its angle", "reversal")
     if any(speed_sweeps(record) for record in records):
@@ -361,6 +365,7 @@ def cardan_testable(model: Driveline, records: Sequence[Record]) -> Untestable |
 
 
 def cardan_sentence(values: Mapping[str, float], motion: Motion) -> str:
+    """State the torque twice per turn, or the angle or the share it stands for."""
     size = f"{values['amplitude_nm']:.3g} {unit('torque', motion)}"
     if values["angle_rad"]:
         size = f"the torque of an angle of {values['angle_rad']:.3g} {unit('angle', motion)}"

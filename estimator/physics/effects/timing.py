@@ -42,12 +42,12 @@ class LowPass(NamedTuple):
     """A low-pass over steps of one length: what is left, behind a step, of its output and of its rate times ``tau``."""
 
     time_constant: float  # ``tau`` [s] and ``s``
-    shape: float
+    shape: float  # ``s``: 0 for first order
     turns: float  # length of a step in ``tau``
     output_of_output: float  # what is left of a unit of each in each, without an input
-    output_of_rise: float
-    rise_of_output: float
-    rise_of_rise: float
+    output_of_rise: float  # ... of a unit of the rate in the output
+    rise_of_output: float  # ... of the output in the rate
+    rise_of_rise: float  # ... of the rate in the rate
 
 
 @compiled
@@ -254,6 +254,7 @@ further off ends where another of its periods matches."""
 
 
 def drift_unresolved(model: Driveline, records: Sequence[Record], values: Mapping[str, float]) -> str:
+    """Object to clocks that part by less than a tenth of the sampling period over the longest recording."""
     least_s = 0.1 * min(record.sample_time_s for record in records)
     parted_s = abs(values["rate"]) * longest_s(records)
     if parted_s >= least_s:
@@ -268,6 +269,7 @@ def drift_rescaled(values: Mapping[str, float]) -> Mapping[str, float]:
 
 
 def drift_sentence(values: Mapping[str, float], motion: Motion) -> str:
+    """State the rate in ppm."""
     return f"the torque's clock runs {1e6 * values['rate']:+.0f} ppm off the speed's"
 
 

@@ -57,6 +57,7 @@ def gain_rescaled(values: Mapping[str, float]) -> Mapping[str, float]:
 
 
 def gain_sentence(values: Mapping[str, float], motion: Motion) -> str:
+    """State the gain of either inverter: the recordings determine only the ratio."""
     wrong, right = ("m1", "m2") if values["gain_m1"] != 1.0 else ("m2", "m1")
     gain = values[f"gain_{wrong}"]
     return (
@@ -110,6 +111,7 @@ def derating_reparametrised(
 
 
 def derating_sentence(values: Mapping[str, float], motion: Motion) -> str:
+    """State the depth, the lasting torque it needs, and the time constant."""
     by = "by up to"
     if values["heating_nm"] > 0.0:
         by = f"under a lasting torque of {values['heating_nm']:.3g} {unit('torque', motion)} by"
@@ -120,6 +122,7 @@ def derating_sentence(values: Mapping[str, float], motion: Motion) -> str:
 
 
 def derating_implausible(model: Driveline, records: Sequence[Record], values: Mapping[str, float]) -> str:
+    """Object to a time constant too short for warming."""
     least_s = QUICKEST * derating_scales(model, records)[1]
     if values["time_constant_s"] > least_s:
         return ""
@@ -171,6 +174,7 @@ def saturation_starts(model: Driveline, records: Sequence[Record]) -> list[Start
 
 
 def saturation_sentence(values: Mapping[str, float], motion: Motion) -> str:
+    """State each limit that was found."""
     torque = unit("torque", motion)
     found = [
         f"{limit:.3g} {torque} {of}"
@@ -224,6 +228,7 @@ def nonlinearity_scales(model: Driveline, records: Sequence[Record]) -> tuple[fl
 
 
 def nonlinearity_testable(model: Driveline, records: Sequence[Record]) -> Untestable | None:
+    """Need torques of different sizes and both signs: one size is a gain."""
     sizes = np.concatenate([np.abs(record.total_torque_nm) for record in records])
     low, high = np.percentile(sizes, [10, 95])
     if high - low > SPREAD * high and any(torque_reverses(record) for record in records):
@@ -232,6 +237,7 @@ def nonlinearity_testable(model: Driveline, records: Sequence[Record]) -> Untest
 
 
 def nonlinearity_sentence(values: Mapping[str, float], motion: Motion) -> str:
+    """State how far the torque is off at 100 Nm either way."""
     loss, tilt = values["curvature_per_nm"], values["asymmetry_per_nm"]
     torque = unit("torque", motion)
     if tilt == 0.0:
@@ -284,11 +290,13 @@ def is_load_known(model: Driveline) -> bool:
 
 
 def bias_starts(model: Driveline, records: Sequence[Record]) -> list[Start]:
+    """Return starts that drift, and one that does not where the load is known."""
     drifting: list[Start] = [(0.5, 0.3), (1.0, 2.0)]
     return [(0.5, Held(0.0)), *drifting] if is_load_known(model) else drifting
 
 
 def bias_testable(model: Driveline, records: Sequence[Record]) -> Untestable | None:
+    """Need a long recording or a known load: a constant bias is a constant load torque."""
     if is_load_known(model) or longest_s(records) >= LEAST_S:
         return None
     reason = f"every recording is shorter than {LEAST_S:g} s and the constant load torque is unknown"
@@ -296,6 +304,7 @@ def bias_testable(model: Driveline, records: Sequence[Record]) -> Untestable | N
 
 
 def bias_sentence(values: Mapping[str, float], motion: Motion) -> str:
+    """State the offset, and the time constant where it drifts."""
     side = "above" if values["offset_nm"] > 0.0 else "below"
     offset = f"{abs(values['offset_nm']):.3g} {unit('torque', motion)} {side} its reading"
     if values["time_constant_s"] <= 0.0:
@@ -350,6 +359,7 @@ def ripple_starts(model: Driveline, records: Sequence[Record]) -> list[Start]:
 
 
 def ripple_testable(model: Driveline, records: Sequence[Record]) -> Untestable | None:
+    """Need part of a turn, and a speed that sweeps."""
     if not goes_round(records, 1.0 / ORDERS[-1]):
         return Untestable("the motor makes too little of a turn: nothing recurs with its angle", "reversal")
     if any(speed_sweeps(record) for record in records):
@@ -358,6 +368,7 @@ def ripple_testable(model: Driveline, records: Sequence[Record]) -> Untestable |
 
 
 def ripple_sentence(values: Mapping[str, float], motion: Motion) -> str:
+    """State size and order of the ripple."""
     torque = unit("torque", motion)
     size = f"{values['amplitude_nm']:.3g} {torque}" if values["amplitude_nm"] else f"{values['share']:.2%} of itself"
     return f"the torque ripples by {size} at {values['order']:.0f} times per motor turn"

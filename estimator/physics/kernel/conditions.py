@@ -29,7 +29,7 @@ class Line(NamedTuple):
     elastic: bool  # whether the first shaft is a spring and a damper, and no law next to them
     sliding: bool  # whether there may be a slider inside that shaft
     extended: bool  # whether it has states beyond those of its masses and a slider
-    own: tuple[Any, ...]
+    own: tuple[Any, ...]  # the user's laws: compiled functions and the places of their parameters; () without
 
 
 @inlined
@@ -83,9 +83,9 @@ Term = tuple[Callable[..., float], tuple[int, ...]]
 class Sum(NamedTuple):
     """What a function that is put together adds up: laws of a place, which are given one quantity or two."""
 
-    place: Place
-    given: int
-    terms: tuple[Term, ...]
+    place: Place  # where the laws act
+    given: int  # quantities that each law gets: 1 or 2
+    terms: tuple[Term, ...]  # each law and its parameters' places
 
 
 SUMS: dict[Total, Sum] = {}
@@ -109,6 +109,7 @@ def with_law(before: Total, law: Callable[..., float], values: Callable[..., Any
 
 
 def total(place: Place, given: int = 1) -> Total:
+    """Put together the sum of the catalogue's laws at a place, as one compiled function of one quantity or two."""
     if given == 1:
         summed: Total = assembled(lambda x, p: like(0.0, x))
     else:
@@ -121,6 +122,7 @@ def total(place: Place, given: int = 1) -> Total:
 
 
 def terms_of(place: Place) -> tuple[Term, ...]:
+    """Return the laws of a place, each with the places of its parameters in the kernel's vector."""
     return tuple(
         (entry.acting.law, tuple(slot(entry.name, parameter.name) for parameter in entry.parameters))
         for entry in BUILT_IN.values()
@@ -170,6 +172,7 @@ def is_waving(p: FloatArray) -> bool:
 
 @inlined
 def is_changing(begin_s: float, end_s: float, p: FloatArray) -> bool:
+    """Tell whether an event begins or ends within a step [s]."""
     for i in range(EVENTS.shape[0]):
         if some(p[EVENTS[i, 0]] != 0.0) and is_edge(begin_s, end_s, p[EVENTS[i, 1]], p[EVENTS[i, 2]]):
             return True
@@ -381,6 +384,7 @@ def at_motor(torque: float, x: State, now: Conditions, p: FloatArray, time_s: fl
 
 @inlined
 def at_load(line: Line, torque: float, x: State, now: Conditions, p: FloatArray, time_s: float) -> float:
+    """Return the torque of the bristles at the load behind a sub-step [Nm]."""
     speed, inverse_inertia = x.load_speed, now.inverse_load
     if line.masses == 1:
         speed, inverse_inertia = x.speed, now.inverse_motor
@@ -394,6 +398,7 @@ def at_load(line: Line, torque: float, x: State, now: Conditions, p: FloatArray,
 
 @inlined
 def bent(line: Line, held: Bristles, x: State, now: Conditions, p: FloatArray, time_s: float) -> Bristles:
+    """Return the bristles' torques behind a sub-step."""
     motor, load = held.motor, held.load
     if is_bristled_at_motor(p):
         motor = at_motor(motor, x, now, p, time_s)
@@ -404,6 +409,7 @@ def bent(line: Line, held: Bristles, x: State, now: Conditions, p: FloatArray, t
 
 @inlined
 def rubbed(now: Conditions, held: Bristles, p: FloatArray) -> Conditions:
+    """Return the conditions with the bristles' torques in them, in place of dry friction by the sign of the speed."""
     torque, dry_motor, dry_load, rubbing = now.torque, now.dry_motor, now.dry_load, now.rubbing
     if is_bristled_at_motor(p):
         torque, dry_motor = torque - held.motor, like(0.0, dry_motor)

@@ -50,7 +50,7 @@ class Feed(NamedTuple):
 
     shifted: bool  # whether it is delayed, or its clock another
     delay: float  # the delay, and the time at sample 0 [samples]
-    begun: float
+    begun: float  # time at sample 0 [samples]
     before_all: float  # the torque before the first sample [Nm]
     lag: LowPass  # what it lags behind
 

@@ -35,17 +35,17 @@ class Answers(NamedTuple):
     """The state to which a unit of each entry of the state, and of each torque, leads a line at rest."""
 
     angle: State  # to one unit of the entry of that name [unit of the state / unit of the entry]
-    speed: State
-    twist: State
-    load_speed: State
-    branch_twist: State
-    branch_speed: State
-    middle_twist: State
-    middle_speed: State
-    relaxing: State
-    torque: State
-    rise: State
-    load: State
+    speed: State  # to a unit of the motor's speed
+    twist: State  # ... of the first shaft's twist
+    load_speed: State  # ... of the load's speed
+    branch_twist: State  # ... of the extra mode's twist
+    branch_speed: State  # ... and speed
+    middle_twist: State  # ... of the second shaft's twist
+    middle_speed: State  # ... of the middle mass's speed
+    relaxing: State  # ... of the relaxing torque
+    torque: State  # to 1 Nm at the motor over the whole step
+    rise: State  # to a torque that rises from 0 to 1 Nm over the step
+    load: State  # to 1 Nm at the load over the whole step
 
 
 @inlined
@@ -65,6 +65,7 @@ def is_linear(line: Line, p: FloatArray) -> bool:
 
 @inlined
 def has_dry_friction(p: FloatArray) -> bool:
+    """Tell whether a parameter of dry friction is not at its null."""
     return bool(is_bristled(p) or p[slots.COULOMB] != 0.0 or p[slots.COULOMB_LOAD] != 0.0 or p[slots.BRAKE] != 0.0)
 
 
@@ -86,6 +87,7 @@ def is_beyond(begun: float, ended: float, limit: float) -> bool:
 
 @inlined
 def unit(entry: int) -> State:
+    """Return the state whose entry of this number is 1 and whose others are 0."""
     return State(
         1.0 if entry == 0 else 0.0,
         1.0 if entry == 1 else 0.0,

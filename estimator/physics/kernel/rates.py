@@ -45,6 +45,7 @@ def _at_moment(line: Any, time_s: Any, k: Any) -> Any:
 
 
 def under_own(now: Conditions, line: Line, x: State, p: FloatArray) -> Conditions:
+    """Return the conditions with the torques of the user's own laws added."""
     if len(line.own) == 0:
         return now
     if line.masses == 1:

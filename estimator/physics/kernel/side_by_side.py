@@ -53,6 +53,7 @@ FEEDING = np.array([slots.DELAY, slots.DELAYED_BEFORE, slots.DRIFT, slots.LAG, s
 
 @compiled
 def go_side_by_side(masses: Masses, p: FloatArray, rows: IntArray) -> bool:
+    """Tell whether simulations can share SIMD lanes: compiled, not linear, the same effects and sub-steps."""
     first = p[rows[0]]
     if rows.size == 1 or not IS_COMPILED:
         return False

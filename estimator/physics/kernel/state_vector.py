@@ -25,21 +25,22 @@ class State(NamedTuple):
     """Mechanical state."""
 
     angle: float  # of the motor [rad, rad/s]
-    speed: float
+    speed: float  # of the motor [rad/s]
     twist: float  # of the (first) shaft [rad]
     load_speed: float  # of the load, or of the wheels where the tyre slips [rad/s]
     loading: float  # of the shaft's slider, from -1 to 1
-    vehicle_speed: float
+    vehicle_speed: float  # of the vehicle behind a tyre that slips, at the motor shaft [rad/s]
     branch_twist: float  # of the extra mode
-    branch_speed: float
+    branch_speed: float  # of its inertia [rad/s]
     middle_twist: float  # twist of the second shaft [rad] and speed of the mass before it [rad/s]
-    middle_speed: float
-    traction: float
+    middle_speed: float  # of the mass between the shafts [rad/s]
+    traction: float  # of the tyre [Nm]
     relaxing: float  # torque of the branch in the first shaft that relaxes [Nm]
 
 
 @inlined
 def unpacked(state: FloatArray) -> State:
+    """Return the kernel's state vector as a named tuple."""
     return State(
         state[0], state[1], state[2], state[3], state[4], state[5],
         state[6], state[7], state[8], state[9], state[10], state[11],
@@ -75,20 +76,20 @@ def corrected(x: State, error: float, output: int) -> State:
 class Bristles(NamedTuple):
     """Torques that the bent bristles of dry friction hold at the motor and at the load [Nm]."""
 
-    motor: float
-    load: float
+    motor: float  # at the motor [Nm]
+    load: float  # at the load, or at the wheels of a tyre that slips [Nm]
 
 
 class Tyre(NamedTuple):
     """What the law of a tyre takes from its parameters; inverses, because a division takes as long as a law."""
 
     tread: float  # torque per slip [Nm]
-    least_relaxation: float
-    winding: float
-    inverse_creep: float
-    inverse_grip: float
-    inverse_wheel: float
-    inverse_vehicle: float
+    least_relaxation: float  # shortest angle of relaxation that the step can follow [rad]
+    winding: float  # torque per rate at which the carcass winds up, no more than the step can follow [Nm s/rad]
+    inverse_creep: float  # of the speed that a slip is at least a share of [s/rad]
+    inverse_grip: float  # of the largest traction [1/Nm]
+    inverse_wheel: float  # of the wheels' inertia [1/(kg m^2)]
+    inverse_vehicle: float  # of the vehicle's [1/(kg m^2)]
 
 
 class Conditions(NamedTuple):
@@ -99,25 +100,25 @@ class Conditions(NamedTuple):
     shaft yields.
     """
 
-    torque: float
-    load: float
+    torque: float  # at the motor [Nm]
+    load: float  # at the load [Nm]
     rubbing: float
-    torque_factor: float
-    shaft_extra: float
-    shaft_factor: float
-    joint_angle: float
-    joint_rate: float
-    inverse_motor: float
-    inertia_load: float
-    inverse_load: float
-    stiffness: float
-    viscous_load: float
-    dry_motor: float
-    dry_load: float
-    width_motor: float
-    width_load: float
-    branch_inertia: float
-    branch_frequency: float
-    fastest: float
-    inverse_yield: float
-    tyre: Tyre
+    torque_factor: float  # on the torque at the motor
+    shaft_extra: float  # torque added to the shaft's [Nm]
+    shaft_factor: float  # on the shaft's torque
+    joint_angle: float  # imposed twist of a joint [rad]
+    joint_rate: float  # its rate [rad/s]
+    inverse_motor: float  # of the motor's inertia [1/(kg m^2)]
+    inertia_load: float  # of the load [kg m^2]
+    inverse_load: float  # its inverse
+    stiffness: float  # of the first shaft [Nm/rad]
+    viscous_load: float  # friction at the load [Nm s/rad]
+    dry_motor: float  # dry friction at the motor [Nm]
+    dry_load: float  # at the load [Nm]
+    width_motor: float  # speed over which its sign changes [rad/s]
+    width_load: float  # the same at the load [rad/s]
+    branch_inertia: float  # of the extra mode [kg m^2]; 0 without
+    branch_frequency: float  # its own [rad/s]
+    fastest: float  # decay that the step has to follow [1/s]
+    inverse_yield: float  # of the twist over which friction in the shaft yields [1/rad]
+    tyre: Tyre  # its numbers

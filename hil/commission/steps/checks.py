@@ -18,8 +18,7 @@ from hil.config.rig_file import Rig
 from hil.orders.order import Order
 from hil.orders.runner import rigid_model
 from hil.rig.build import open_devices
-from hil.rig.check import Finding as Found
-from hil.rig.check import Verdict, check_rig
+from hil.rig.check import Finding as Found, Verdict, check_rig
 from hil.rig.excitation import NO_TORQUE
 from hil.rig.plan import plan_run
 from hil.rig.plc_watch import max_speed_rad_s, plc_limits

@@ -51,6 +51,17 @@ class Driveline:
         return len(MASSES[self.structure])
 
 
+_START = {
+    "angle_rad": "START_ANGLE",
+    "speed_rad_s": "START_SPEED",
+    "twist_rad": "START_TWIST",
+    "load_speed_rad_s": "START_LOAD_SPEED",
+    "middle_twist_rad": "START_MIDDLE_TWIST",
+    "middle_speed_rad_s": "START_MIDDLE_SPEED",
+    "load_torque_nm": "START_TRACTION",
+}
+
+
 def driveline(name: str, model: DrivelineModel, period_s: float, sensor_at: Location = Location.MOTOR) -> Driveline:
     """Return what of a model can be exported, at rest without a load."""
     if model.structure is Structure.JOINT:
@@ -80,15 +91,7 @@ def driveline(name: str, model: DrivelineModel, period_s: float, sensor_at: Loca
     )
 
 
-_START = {
-    "angle_rad": "START_ANGLE",
-    "speed_rad_s": "START_SPEED",
-    "twist_rad": "START_TWIST",
-    "load_speed_rad_s": "START_LOAD_SPEED",
-    "middle_twist_rad": "START_MIDDLE_TWIST",
-    "middle_speed_rad_s": "START_MIDDLE_SPEED",
-    "load_torque_nm": "START_TRACTION",
-}
+_QUANTISATION = slot("speed_quantisation", "step_rad_s")
 
 
 def begun(d: Driveline, model: DrivelineModel, record: Record) -> tuple[Driveline, FloatArray]:
@@ -104,9 +107,6 @@ def begun(d: Driveline, model: DrivelineModel, record: Record) -> tuple[Drivelin
     case = case_of(result.problem.local[0], result.problem.p, local_part(result.problem, result.x, 0))
     case.p[_QUANTISATION] = d.p[_QUANTISATION]  # left out of fits, but the sensor's own
     return started(d, result.problem.grid, case, record)
-
-
-_QUANTISATION = slot("speed_quantisation", "step_rad_s")
 
 
 def started(d: Driveline, grid: Grid, case: Case, record: Record) -> tuple[Driveline, FloatArray]:

@@ -24,8 +24,7 @@ from estimator.identification.offline.fits import fit_box_jenkins
 from estimator.identification.spectral import SpectralEstimate, spectral_estimate
 from estimator.signals.decimate import decimate
 from estimator.signals.record import Record
-from hil.figures.road import draw_conditions
-from hil.figures.road import drive as drive_paper
+from hil.figures.road import draw_conditions, drive as drive_paper
 from hil.proof.truth.bus import NOMINAL_ERROR
 from hil.proof.truth.case import record as drive
 from hil.proof.truth.specimen import draw_specimen

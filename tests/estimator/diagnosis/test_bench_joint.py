@@ -54,7 +54,7 @@ def test_what_was_planted_is_named_and_nothing_else(joint: Joint, named: set[str
 def test_a_gap_behind_a_slider_is_found_and_sized_whatever_constant_there_is(preload: float, zero_error: float) -> None:
     """A preload moves the slider's two torques, the zero of the load cell what an open gap shows.
 
-    Half this gap is a twentieth of what the slider explains, and isn't named in addition to it (docs/campaign.md).
+    Half this gap is a twentieth of what the slider explains, and isn't named in addition to it (docs/how-good.md).
     """
     joint = Joint(k=3e4, gap=0.02, friction=5000.0, preload=preload, zero_error=zero_error)
     effects = {effect.name: effect.parameters for effect in diagnosed(joint).effects}

@@ -24,8 +24,7 @@ from estimator.physics.model import DrivelineModel, Parameter, Structure
 from estimator.signals.record import Record
 from hil.proof.truth.bus import NOMINAL_ERROR
 from hil.proof.truth.case import TESTS, TruthRecording, record
-from hil.proof.truth.specimen import EFFECTS as HIDDEN
-from hil.proof.truth.specimen import Specimen, draw_specimen
+from hil.proof.truth.specimen import EFFECTS as HIDDEN, Specimen, draw_specimen
 from hil.recording.signals import to_record
 from hil.recording.signals_config import SignalsConfig
 from hil.recording.table import Table

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from estimator.lanes import LANES
-from estimator.physics import simulate as simulate_module
-from estimator.physics import simulate as together_module
+from estimator.physics import simulate as simulate_module, simulate as together_module
 from estimator.physics.jacobian import fill_differences, jacobian_at
 from estimator.physics.layout import Grid
 from estimator.physics.model import DrivelineModel

@@ -13,8 +13,7 @@ from estimator.physics.parallel import available_cores, work_on
 from hil.report.diagnosis_json import diagnosis_json
 from tests.estimator.diagnosis.one_effect import bench_with
 from tests.estimator.diagnosis.planted import SIGMA, TIGHT, recordings
-from tests.estimator.physics.bench import TWO_MASS
-from tests.estimator.physics.bench import model as line_of
+from tests.estimator.physics.bench import TWO_MASS, model as line_of
 
 
 def test_a_named_effect_has_its_share_and_probability_and_the_model_has_it() -> None:

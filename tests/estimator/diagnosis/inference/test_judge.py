@@ -10,11 +10,6 @@ from dataclasses import dataclass, field, replace
 from typing import cast
 
 import pytest
-
-from estimator.diagnosis.inference import checks
-from estimator.diagnosis.inference.checks import LOOSE, is_plausible, widened
-from estimator.diagnosis.inference.disturbances import Limits, limits_for
-from estimator.diagnosis.inference.hypotheses import Hypothesis
 from estimator.diagnosis.inference.judge import (
     Score,
     error_falls,
@@ -24,6 +19,11 @@ from estimator.diagnosis.inference.judge import (
     tempered_by,
     verdict_of,
 )
+
+from estimator.diagnosis.inference import checks
+from estimator.diagnosis.inference.checks import LOOSE, is_plausible, widened
+from estimator.diagnosis.inference.disturbances import Limits, limits_for
+from estimator.diagnosis.inference.hypotheses import Hypothesis
 from estimator.diagnosis.inference.wording import Context, statement
 from estimator.diagnosis.result import Effort, Evidence, Fit, FoundEffect, Remainder, Verdict
 from estimator.physics.effect import Element

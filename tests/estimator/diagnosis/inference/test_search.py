@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from estimator.diagnosis.inference.judge import Decision, decide, grounds
 
 from estimator.diagnosis.inference.hypotheses import everything, open_hypotheses
-from estimator.diagnosis.inference.judge import Decision, decide, grounds
 from estimator.diagnosis.inference.search import Search
 from estimator.physics.model import EffectValue
 from estimator.signals.record import Record

@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 import pytest
+from estimator.diagnosis.inference.judge import Grounds, decide, grounds
 
 from estimator.diagnosis.inference.hypotheses import everything, open_hypotheses
-from estimator.diagnosis.inference.judge import Grounds, decide, grounds
 from estimator.diagnosis.inference.rivals import Law, best_law, rival_laws, searches_around
 from estimator.diagnosis.inference.search import Search
 from estimator.diagnosis.unnamed.scene import scene
