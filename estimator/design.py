@@ -7,7 +7,7 @@ expected difference of scores (T-optimality: Atkinson and Fedorov, Biometrika 62
 Payne, Dynamic System Identification, 1977).
 
 An effect that the recordings so far can neither show nor exclude is supposed in the size at which a fit of it begins,
-the other unknowns fitted to these recordings. How far that moves the values that are told is what may be wrong with
+the other unknowns fitted to these recordings. How far that moves the values that are reported is what may be wrong with
 them; an experiment shows the effect if the recordings and it together can, and tell the supposed line from the one
 without.
 """
@@ -91,7 +91,7 @@ class Untested:
     name: str
     size: Mapping[str, float]  # values of its parameters, where they are not those at which the law does nothing
     supposed: Candidate  # the most probable hypothesis with it, its other unknowns fitted to the recordings
-    moves: Mapping[str, float]  # values told that leave their 95 % intervals with it: by what share of themselves
+    moves: Mapping[str, float]  # values reported that leave their 95 % intervals with it: by what share of themselves
 
 
 @dataclass(frozen=True, slots=True)

@@ -312,6 +312,7 @@ class Supervision:
         )
 
     def raise_if_ended(self) -> None:
+        """Raise what a rule has ended the run with; nothing where none has."""
         if self.ended is not None:
             raise self.ended
 

@@ -22,7 +22,7 @@ LEAST_RESPONSE_S: Final = 0.01
 
 
 class WithoutDamper(Enum):
-    """How a run goes on whose damper was switched off."""
+    """How a run continues whose damper was switched off."""
 
     CONTINUE = "continue"  # with its reference alone
     END = "end"  # at zero torque

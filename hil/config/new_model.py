@@ -93,7 +93,7 @@ def parameters(
             missing.append(f"--value {name}=NUMBER | expected {MEANINGS[name]} | got nothing")
         elif value == 0.0 < tolerance:
             missing.append(
-                f"--value {name}=0 | expected --tolerance {name}=0 beside it where there is none, or a value | got "
+                f"--value {name}=0 | expected --tolerance {name}=0 next to it where there is none, or a value | got "
                 f"{100.0 * tolerance:g} % of 0, which is 0: in the file, ci95 = [0.0, 0.5] says where it may lie"
             )
         else:

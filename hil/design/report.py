@@ -48,7 +48,7 @@ def question_lines(known: Open) -> Iterator[str]:
 
 
 def conditions(known: Open) -> Iterator[str]:
-    """Say what the values told take for granted: that what was not tested is not there."""
+    """Say what the values reported take for granted: that what was not tested is not there."""
     for name, each in known.supposed.items():
         if each.moves:
             size = ", ".join(f"{parameter} = {value:.3g}" for parameter, value in each.size.items())

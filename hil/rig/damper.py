@@ -4,7 +4,7 @@ Its torque goes with the PRBS, in the torque offset, through the one guard and u
 measured part alone, on the speed of the cycle before. Where that was not read, or is in doubt, its torque is zero, and
 it starts anew with the next good one. It goes off for the rest of the run in the cycle after the shaft has swung more
 than it would without it (`hil.rig.swing_watch`), the on-line estimate has left the region of the design by more than it
-can be wrong, or its own torque has stood at the limit for a period of the resonance. The run then goes on with its
+can be wrong, or its own torque has stood at the limit for a period of the resonance. The run then continues with its
 reference alone, or ends, as ``[guard] without_damper`` of the rig file has it.
 """
 

@@ -132,7 +132,7 @@ def test_an_identification_gives_values_with_their_intervals(tmp_path: Path) -> 
         (["--tolerance", "wide"], "--tolerance wide | expected a number, or NAME=NUMBER"),
         (["--value", "J_M=1"], "--value J_L=NUMBER | expected inertia of the load"),
         ([*VALUES, "--value", "k=-5"], "parameters.k"),
-        ([*VALUES, "--value", "b_M=0"], "expected --tolerance b_M=0 beside it"),
+        ([*VALUES, "--value", "b_M=0"], "expected --tolerance b_M=0 next to it"),
         (["--from", "gone.json"], "gone.json"),
         (["--recording", "gone.csv"], "gone.csv"),
     ],

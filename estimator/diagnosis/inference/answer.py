@@ -16,7 +16,7 @@ from estimator.diagnosis.inference.figures import Unseen, on_recordings
 from estimator.diagnosis.inference.free_forms import free_form
 from estimator.diagnosis.inference.hypotheses import Progress, everything, open_hypotheses, silent
 from estimator.diagnosis.inference.rivals import laws_around
-from estimator.diagnosis.inference.say import Told, said, undecided
+from estimator.diagnosis.inference.say import Basis, said, undecided
 from estimator.diagnosis.inference.search import Search
 from estimator.diagnosis.noise import noise_floor
 from estimator.diagnosis.preconditions.prepare import Prepared, as_slow_as_needed
@@ -89,8 +89,8 @@ def answer(
             keep(Found(read, search, decision))
             progress("simulating what was found", 0.9)
             laws = laws_around(decision.judged)
-            told = Told(decision, laws, search, model, _effort(search, level, decision), _warnings(search, level))
-            diagnosis = said(told)
+            basis = Basis(decision, laws, search, model, _effort(search, level, decision), _warnings(search, level))
+            diagnosis = said(basis)
             if decision.judged.failed and not decision.judged.off_nominal:
                 diagnosis = with_law(diagnosis, decision.judged.believed.hypothesis, decision.runs)
         except TimeIsUp:

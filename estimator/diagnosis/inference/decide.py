@@ -65,7 +65,7 @@ class Judged:
 
     nothing: Trial  # the nominal model, re-tuned
     best: Trial  # the most probable set
-    believed: Trial  # with what is established alone: the model that is told
+    believed: Trial  # with what is established alone: the model that is reported
     named: tuple[Standing, ...] = ()  # effects that are established, the weightiest first
     traces: tuple[Standing, ...] = ()  # established, and too small to matter
     refinements: tuple[Standing, ...] = ()  # of the most probable set or a larger one, and not established
@@ -81,7 +81,7 @@ class Judged:
 
 @dataclass(frozen=True, slots=True)
 class Decision:
-    """What is believed, and what its free runs leave: everything that is told is made from this record."""
+    """What is believed, and what its free runs leave: everything that is said is made from this record."""
 
     judged: Judged
     runs: FreeRuns
@@ -182,8 +182,8 @@ def _judged(search: Search, rival: Rival) -> Judged:
         weak[weakest.name] = weakest
         believed = trials.one(search.without(believed.hypothesis, weakest.name))
     standings.sort(key=lambda each: -each.share)
-    beside = {other for each in standings for other in each.alike} | believed.effects | {*weak}
-    possible = (_standing(name, search, trials, likely, noise, rival) for name in sorted(likely.effects - beside))
+    close = {other for each in standings for other in each.alike} | believed.effects | {*weak}
+    possible = (_standing(name, search, trials, likely, noise, rival) for name in sorted(likely.effects - close))
     return Judged(
         nothing,
         likely,
@@ -243,8 +243,8 @@ def _from_its_moment(search: Search, hypothesis: Hypothesis) -> Hypothesis:
     if turned is hypothesis.result:
         return hypothesis
     initial = not_fitted(turned.problem, turned.x)
-    names, before = len(search.names), hypothesis.minus_twice_log
-    found = fitted(hypothesis.effects, initial, hypothesis.sizes, hypothesis.limits, names, before)
+    sizes, limits, before = hypothesis.sizes, hypothesis.limits, hypothesis.minus_twice_log
+    found = fitted(hypothesis.effects, initial, sizes, limits, search.catalogue, before)
     return found if found.score <= hypothesis.score + SAME else hypothesis
 
 

@@ -140,7 +140,7 @@ class Unseen:
 
 
 def found_effect(standing: Standing, runs: FreeRuns) -> FoundEffect:
-    """Return an effect of the believed set with its values, from the fit that is told."""
+    """Return an effect of the believed set with its values, from the fit that is reported."""
     entry, model, best = EFFECTS[standing.name], runs.unseen.line, runs.believed.result
     nulls = {parameter.name: parameter.null for parameter in entry.parameters}
     profiles = {}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -252,7 +252,7 @@ class Hypothesis:
     sizes: FloatArray  # (S,): logarithms of the disturbances' sizes and times (`whitener.Size`)
     limits: Limits
     minus_twice_log: float  # minus twice the log-likelihood of the recordings, and of the disturbances' prior
-    choices: float  # logarithm of the number of sets of effects of this size it was chosen among
+    choices: float  # minus the logarithm of its prior probability (`Catalogue.choices`)
 
     @property
     def outputs(self) -> int:
@@ -286,10 +286,23 @@ class Hypothesis:
         return replace(result, residual=self.filter(result.residual), derivative=self.filter(derivative))
 
 
-def choices_of(effects: Effects, hypotheses: int) -> float:
-    """Return the logarithm of the number of sets of so many effects among so many."""
-    count = len(effects)
-    return math.lgamma(hypotheses + 1) - math.lgamma(count + 1) - math.lgamma(max(hypotheses - count, 0) + 1)
+@dataclass(frozen=True, slots=True)
+class Catalogue:
+    """What a set of effects is chosen among, and what is known of it before any recording is seen."""
+
+    effects: int  # how many these recordings can show
+    odds: Mapping[str, float] = field(default_factory=dict)  # of those that the user has given odds, p / (1 - p)
+
+    def choices(self, effects: Effects) -> float:
+        """Return minus the logarithm of a set's prior probability, up to what all sets have in common.
+
+        Sets of a size are as probable as each other, and so are all sizes together (Scott and Berger, Ann. Statist. 38,
+        2010), but for the effects that have odds of their own.
+        """
+        given = [name for name in effects if name in self.odds]
+        count, among = len(effects) - len(given), self.effects - len(given)
+        usual = math.lgamma(among + 1) - math.lgamma(count + 1) - math.lgamma(max(among - count, 0) + 1)
+        return usual - sum(math.log(max(self.odds[name], 1e-300)) for name in given)
 
 
 def fitted(
@@ -297,7 +310,7 @@ def fitted(
     initial: FitResult,
     sizes: FloatArray,
     limits: Limits,
-    hypotheses: int,
+    catalogue: Catalogue,
     rival: float = math.nan,
 ) -> Hypothesis:
     """Fit a hypothesis from a free run and disturbances ``sizes``.
@@ -305,7 +318,7 @@ def fitted(
     ``rival`` is minus twice the log-likelihood of the hypothesis it will be compared with: the farther from it, the
     less the last digits matter. Without one it is fitted to its end.
     """
-    result, choices, sizes = initial, choices_of(effects, hypotheses), np.clip(sizes, limits.low, limits.high)
+    result, choices, sizes = initial, catalogue.choices(effects), np.clip(sizes, limits.low, limits.high)
     best: Hypothesis | None = None
     passes: list[float] = []
     while best is None or len(passes) < MOST_PASSES:
@@ -324,7 +337,9 @@ def fitted(
     return replace(best, result=light(best.result))
 
 
-def compared(effects: Effects, initial: FitResult, parent: Hypothesis, limits: Limits, hypotheses: int) -> Hypothesis:
+def compared(
+    effects: Effects, initial: FitResult, parent: Hypothesis, limits: Limits, catalogue: Catalogue
+) -> Hypothesis:
     """Fit a hypothesis a few steps from another's disturbances, to be compared with others like it."""
     sizes, best = np.clip(parent.sizes, limits.low, limits.high), parent.minus_twice_log
     result, now = initial, math.inf
@@ -334,7 +349,7 @@ def compared(effects: Effects, initial: FitResult, parent: Hypothesis, limits: L
         if now > best - MUCH * result.residual.size:
             break
         best = now
-    return Hypothesis(effects, result, sizes, limits, now, choices_of(effects, hypotheses))
+    return Hypothesis(effects, result, sizes, limits, now, catalogue.choices(effects))
 
 
 def refitted(hypothesis: Hypothesis, problem: Problem) -> FitResult:

@@ -89,7 +89,7 @@ def _rms(search: ElementSearch) -> float:
 class Laws:
     """Laws without a name around a decision."""
 
-    alone: Law | None = None  # the best one beside the re-tuned model
+    alone: Law | None = None  # the best one next to the re-tuned model
     left: Law | None = None  # the best one for what is left
     searches: Sequence[ElementSearch] = ()  # for the one alone, element by element
 

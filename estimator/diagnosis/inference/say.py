@@ -46,7 +46,7 @@ from estimator.signals.record import FloatArray
 
 
 @dataclass(frozen=True, slots=True)
-class Told:
+class Basis:
     """What a result is made from: the decision, the laws without a name around it, and what the search did."""
 
     decision: Decision
@@ -57,19 +57,19 @@ class Told:
     warnings: tuple[str, ...] = ()
 
 
-def said(told: Told) -> Diagnosis:
+def said(basis: Basis) -> Diagnosis:
     """Return the diagnosis."""
-    decision, search = told.decision, told.search
+    decision, search = basis.decision, basis.search
     judged, runs, verdict = decision.judged, decision.runs, decision.verdict
     is_explained = verdict is not Verdict.UNEXPLAINED
     named = [found_effect(each, runs) for each in judged.named]
     effects = (*named, *decision.acquired) if is_explained else ()
     traces = judged.traces if is_explained else ()
     added = [*effects, *(found_effect(each, runs) for each in traces)]
-    mismatch, remainder = _mismatch(told), _remainder(told)
+    mismatch, remainder = _mismatch(basis), _remainder(basis)
     untestable = untestable_effects(open_hypotheses(search.model, runs.chain.records)[1])
     line = search.model
-    slight = tuple(_slight(each, told) for each in traces)
+    slight = tuple(_slight(each, basis) for each in traces)
     context = Context(
         remainder,
         slight,
@@ -80,20 +80,20 @@ def said(told: Told) -> Diagnosis:
     )
     return Diagnosis(
         verdict=verdict,
-        statement=statement(verdict, decision.figures, effects, told.effort, context),
+        statement=statement(verdict, decision.figures, effects, basis.effort, context),
         mismatch=mismatch,
         effects=effects,
-        rejected=_rejected(told),
+        rejected=_rejected(basis),
         untestable=untestable,
-        unnamed=_unnamed(told),
+        unnamed=_unnamed(basis),
         fit=decision.figures,
         parameters=retuned_parameters(runs.estimate, line, is_explained),
         load_torque=load_torques(runs.estimate, line),
         timing_s={},
-        augmented=augmented_model(runs.estimate, told.model, added),
+        augmented=augmented_model(runs.estimate, basis.model, added),
         traces=courses_of(runs),
-        warnings=told.warnings,
-        discrepancy=_discrepancy(told) if mismatch.detected and line.plant is None else None,
+        warnings=basis.warnings,
+        discrepancy=_discrepancy(basis) if mismatch.detected and line.plant is None else None,
         remainder=remainder,
         off_nominal=judged.off_nominal,
         slight=slight,
@@ -101,7 +101,7 @@ def said(told: Told) -> Diagnosis:
             Refinement(each.name, each.objection, each.necessity.value, _values(judged.best, each))
             for each in judged.refinements
         ),
-        effort=told.effort,
+        effort=basis.effort,
     )
 
 
@@ -152,10 +152,10 @@ def untestable_effects(blind: Mapping[str, Untestable]) -> tuple[UntestableEffec
     return tuple(UntestableEffect(n, u.reason, u.suggested_test, u.needs) for n, u in blind.items())
 
 
-def _slight(trace: Standing, told: Told) -> Slight:
+def _slight(trace: Standing, basis: Basis) -> Slight:
     """Return a trace; without it some values are others, though the error hardly is."""
-    believed = told.decision.judged.believed
-    without = told.search.without(believed.hypothesis, trace.name)
+    believed = basis.decision.judged.believed
+    without = basis.search.without(believed.hypothesis, trace.name)
     return Slight(trace.name, trace.share, _values(believed, trace), moved_values(believed.hypothesis, without.result))
 
 
@@ -176,9 +176,9 @@ def _band_hz(hypothesis: Hypothesis, noise: float) -> Interval | None:
     return locate.band_hz(errors, [hypothesis.result.problem.records[0].sample_time_s] * len(errors), noise)
 
 
-def _place(told: Told) -> Element | None:
+def _place(basis: Basis) -> Element | None:
     """Return where the mismatch is: of what is named, of values off their sheet, of all that is possible, of a law."""
-    decision, laws = told.decision, told.laws
+    decision, laws = basis.decision, basis.laws
     if decision.verdict is not Verdict.UNEXPLAINED and (decision.judged.named or decision.acquired):
         names = [each.name for each in decision.judged.named] + [each.name for each in decision.acquired]
         return EFFECTS[names[0]].element
@@ -191,12 +191,12 @@ def _place(told: Told) -> Element | None:
     return None if law is None else law.element
 
 
-def _mismatch(told: Told) -> Mismatch:
-    judged, noise = told.decision.judged, told.decision.judged.noise
-    if told.decision.verdict is Verdict.NO_MISMATCH:
+def _mismatch(basis: Basis) -> Mismatch:
+    judged, noise = basis.decision.judged, basis.decision.judged.noise
+    if basis.decision.verdict is Verdict.NO_MISMATCH:
         return Mismatch(False, None, {}, None, None, 1.0)
     nothing = judged.nothing.hypothesis
-    result, element = nothing.result.first_outputs(), _place(told)
+    result, element = nothing.result.first_outputs(), _place(basis)
     gained = max(nothing.score - judged.best.hypothesis.score, 0.0)
     return Mismatch(
         detected=True,
@@ -208,18 +208,18 @@ def _mismatch(told: Told) -> Mismatch:
     )
 
 
-def _discrepancy(told: Told) -> Discrepancy:
+def _discrepancy(basis: Basis) -> Discrepancy:
     """Return the mismatch as the report draws it."""
-    judged = told.decision.judged
+    judged = basis.decision.judged
     nothing, believed = of_first_outputs(judged.nothing.hypothesis), judged.believed.hypothesis.result.first_outputs()
-    motion, searches = told.search.model.motion, told.laws.searches
+    motion, searches = basis.search.model.motion, basis.laws.searches
     return discrepancy(
         nothing.result, believed, judged.noise, motion, rounds=1, initial=searches, whitening=nothing.filter
     )
 
 
-def _remainder(told: Told) -> Remainder | None:
-    judged, law = told.decision.judged, told.laws.left
+def _remainder(basis: Basis) -> Remainder | None:
+    judged, law = basis.decision.judged, basis.laws.left
     if not judged.failed:
         return None
     noise, left, failed = judged.noise, judged.believed.rms, tests_in_words(judged.failed)
@@ -233,24 +233,24 @@ def _remainder(told: Told) -> Remainder | None:
     )
 
 
-def _unnamed(told: Told) -> UnnamedLaw | None:
-    law, decision = told.laws.alone, told.decision
+def _unnamed(basis: Basis) -> UnnamedLaw | None:
+    law, decision = basis.laws.alone, basis.decision
     if decision.verdict is not Verdict.UNEXPLAINED or law is None:
         return None
     return UnnamedLaw(law.element, law.terms, decision.figures.retuned, law.rms)
 
 
-def _rejected(told: Told) -> tuple[RejectedEffect, ...]:
+def _rejected(basis: Basis) -> tuple[RejectedEffect, ...]:
     """Return the rivals that lost, the nearest first, each with what was done and by how much it is worse.
 
     ``delta_bic`` is by how much the best set with a rival is less probable than the best of all: fitted, or as a score
     test foresees it at most.
     """
-    search, judged = told.search, told.decision.judged
+    search, judged = basis.search, basis.decision.judged
     best = judged.believed.hypothesis.score
     standings = (*judged.named, *judged.traces, *judged.refinements)
     known = {each.name for each in standings} | {other for each in standings for other in each.alike}
-    known |= {each.name for each in told.decision.acquired} | {*told.effort.untried}
+    known |= {each.name for each in basis.decision.acquired} | {*basis.effort.untried}
     found = {each.name: RejectedEffect(each.name, each.objection, 0.0) for each in judged.refinements}
     for scores, reason in (
         (_fitted(search), "fitted: the best set with it is {} in minus twice the log-probability"),
@@ -275,7 +275,7 @@ def _simulates_worse(name: str, tried: Iterable[Trial], believed: Trial) -> str:
         return ""
     best = min(holding, key=lambda each: each.rms)
     return (
-        f"tried: it leaves {best.rms:.3g} on samples not used for the fit, with {best.size} effects; what is told "
+        f"tried: it leaves {best.rms:.3g} on samples not used for the fit, with {best.size} effects; what is believed "
         f"leaves {believed.rms:.3g} with {believed.size}"
     )
 

@@ -17,6 +17,7 @@ from estimator.diagnosis.inference.disturbances import Limits, limits_of
 from estimator.diagnosis.inference.hypotheses import (
     GRADE,
     NOTHING,
+    Catalogue,
     Effects,
     Hypothesis,
     Progress,
@@ -62,7 +63,7 @@ FINISHED = 2  # best of these that are fitted to their end
 STARTS = 5  # effects from each of which a search begins, the most promising
 
 WORTH_ADDING = 0.15
-"""Share of the squared free-run error beyond the noise that a further law must take for a search to go on from it."""
+"""Share of the squared free-run error beyond the noise that a law must take for a search to continue from it."""
 
 MOST_EFFECTS = 8
 
@@ -167,6 +168,12 @@ class Search:
         return necessity(its, mine, noise_of(best)).least >= LEAST_NECESSITY
 
     @cached_property
+    def catalogue(self) -> Catalogue:
+        """What sets are chosen among, with the odds that the model file gives."""
+        odds = {name: prior.odds for name, prior in self.model.priors.items() if prior.odds is not None}
+        return Catalogue(len(self.names), {name: value for name, value in odds.items() if name in self.names})
+
+    @cached_property
     def trials(self) -> Trials:
         """The sets that were tried in free simulation."""
         return Trials(self.model)
@@ -181,7 +188,7 @@ class Search:
             own = tuple(own_unknowns(self.model.effects, record) for record in self.records)
             problem = self._problem(NOTHING, Release(nominal_unknowns(self.model), own))
             initial = not_fitted(problem, start_vector(problem))
-            self._keep(fitted(NOTHING, initial, self.limits.usual, self.limits, len(self.names)))
+            self._keep(fitted(NOTHING, initial, self.limits.usual, self.limits, self.catalogue))
         return self.visited[NOTHING]
 
     def _best_addition(self, current: Hypothesis) -> Hypothesis | None:
@@ -362,7 +369,7 @@ class Search:
         return best if is_plausible else None
 
     def _compared(self, effects: Effects, initial: FitResult, rival: Hypothesis) -> Hypothesis:
-        return compared(effects, initial, rival, self._limits_of(effects), len(self.names))
+        return compared(effects, initial, rival, self._limits_of(effects), self.catalogue)
 
     def _limits_of(self, effects: Effects) -> Limits:
         return self.limits.freed() if GRADE in effects else self.limits
@@ -385,7 +392,7 @@ class Search:
         return self.visited[rough.effects]
 
     def _fitted(self, of: Hypothesis, initial: FitResult, rival: Hypothesis) -> Hypothesis:
-        return fitted(of.effects, initial, of.sizes, of.limits, len(self.names), rival.minus_twice_log)
+        return fitted(of.effects, initial, of.sizes, of.limits, self.catalogue, rival.minus_twice_log)
 
     def _more_plausible(self, one: Hypothesis, other: Hypothesis) -> Hypothesis:
         """Return the better of two fits of a set, where both are plausible; else the one that is."""
@@ -415,7 +422,7 @@ class Search:
                 problem = self._problem(effects, release)
                 result = extended(problem, warm_start(problem, forgetting(result, name)), result)
             limits = self._limits_of(effects)
-            found = fitted(effects, result, current.sizes, limits, len(self.names), current.minus_twice_log)
+            found = fitted(effects, result, current.sizes, limits, self.catalogue, current.minus_twice_log)
             if known is None or found.score < known.score:
                 self._keep(found)
         return self.visited[effects]

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from estimator.diagnosis.inference.checks import tests
-from estimator.diagnosis.inference.hypotheses import NOTHING, Hypothesis, choices_of, covariance, fitted
+from estimator.diagnosis.inference.hypotheses import NOTHING, Catalogue, Hypothesis, covariance, fitted
 from estimator.diagnosis.inference.search import Search
 from estimator.diagnosis.inference.trials import Trial, tried
 from estimator.diagnosis.result import OffNominal
@@ -47,13 +47,13 @@ def free_line(search: Search) -> FreeLine | None:
         for s, free in zip(shared, trusted, strict=True)
     )
     problem = replace(nothing.problem, shared=freed)
-    sizes, hypotheses = search.nothing().sizes, len(search.names)
+    sizes = search.nothing().sizes
     initial = not_fitted(problem, nothing.x)
-    found = fitted(NOTHING, initial, sizes, search.limits, hypotheses, search.nothing().minus_twice_log)
+    found = fitted(NOTHING, initial, sizes, search.limits, search.catalogue, search.nothing().minus_twice_log)
     off_nominal = _off_nominal(search, found)
     if not off_nominal:
         return None
-    chosen = choices_of(frozenset(value.name for value in off_nominal), hypotheses + sum(trusted))
+    chosen = Catalogue(len(search.names) + sum(trusted)).choices(frozenset(each.name for each in off_nominal))
     return FreeLine(found, found.score + 2.0 * chosen, not any(test.failed for test in tests(found)), off_nominal)
 
 

@@ -2,7 +2,7 @@
 
 The likelihood, which guides the search, asks how well each sample is predicted from those before it. A law of a wrong
 form that costs little there may still simulate badly, and noise, drift and random walk whiten what it leaves. So what
-is told is judged in the currency that a user sees: the error of a free run, on samples that no fit has seen.
+is reported is judged in the currency that a user sees: the error of a free run, on samples that no fit has seen.
 
 Each recording is cut into blocks of 0.6 s every 2 s. A set is tuned for the free run between the blocks, and judged by
 its squared error inside each block. Two sets are compared block by block; the scatter of the blocks says how sure the

@@ -142,7 +142,7 @@ def statement(
 
 
 def _moving(trace: Slight) -> str:
-    """Say what a trace does to the values that are told, though it hardly moves the error."""
+    """Say what a trace does to the values that are reported, though it hardly moves the error."""
     moved = ", ".join(f"{name} by {100.0 * share:+.2g} %" for name, share in trace.moves.items())
     return f"The values are those with {trace.name}: without it, {moved}."
 
