@@ -79,6 +79,7 @@ AROUND_THE_FILES = {
     "hil.report.page._text": OURS,
     "hil.report.paper_page._figures": MADE,
     "hil.rig.realtime._has_capability": SYSTEM,
+    "hil.version._commit": OURS,
 }
 """Where a file is opened for reading by another way than the rule, and why that is right."""
 
@@ -87,6 +88,7 @@ AROUND_THE_PROCESSES = {
     "hil.fleet.run._own_cluster": "Dask's own, with safe_path",
     "hil.monitor.live_estimation._run": "this program's own, with safe_path",
     "hil.monitor.source.__init__": "this program's own, with safe_path",
+    "hil.version._git": "git, asked of this program's own checkout",
 }
 
 
