@@ -51,14 +51,17 @@ AROUND_THE_FILES = {
     "hil.export.fmu.ssp.augmented_ssp": MADE,
     "hil.export.structured_text.filled": OURS,
     "hil.figures.road._metadata": OURS,
+    "hil.fleet.dataset._table": "what the rule has opened",
     "hil.plants.fmu_process.unpack": "what the rule has opened",
     "hil.proof.command.fresh_over_floor": MADE,
     "hil.proof.rigs.rig_text": OURS,
     "hil.proof.sealed_set._fresh": MADE,
     "hil.proof.truth.compiled._cache_folder": OURS,
+    "hil.recording.array_formats.read_ods": BEHIND_FORMAT,
     "hil.recording.array_formats.read_xlsx": BEHIND_FORMAT,
     "hil.recording.bus_database.database_of": "the rule has looked at it a line before",
     "hil.recording.csv_format._is_recognised": MADE,
+    "hil.recording.csv_format.read_packed": BEHIND_FORMAT,
     "hil.recording.hdf5_format.reading": BEHIND_FORMAT,
     "hil.recording.mat_format.read": BEHIND_FORMAT,
     "hil.recording.mat_format.with_tables": BEHIND_FORMAT,
@@ -70,18 +73,22 @@ AROUND_THE_FILES = {
     "hil.recording.parquet_format.read_json_lines": BEHIND_FORMAT,
     "hil.recording.parquet_format.read_metadata": BEHIND_FORMAT,
     "hil.recording.sandbox._address_space": SYSTEM,
-    "hil.report.page._plotly": OURS,
+    "hil.recording.wpilib_formats.data_log": BEHIND_FORMAT,
+    "hil.recording.wpilib_formats.sysid": BEHIND_FORMAT,
+    "hil.report.page.plotly_bundle": OURS,
     "hil.report.page._text": OURS,
     "hil.report.paper_page._figures": MADE,
     "hil.rig.realtime._has_capability": SYSTEM,
+    "hil.version._commit": OURS,
 }
 """Where a file is opened for reading by another way than the rule, and why that is right."""
 
 AROUND_THE_PROCESSES = {
     "hil.child.start": "the rule",
-    "hil.fleet.run.client_of": "Dask's own, with safe_path",
+    "hil.fleet.run._own_cluster": "Dask's own, with safe_path",
     "hil.monitor.live_estimation._run": "this program's own, with safe_path",
     "hil.monitor.source.__init__": "this program's own, with safe_path",
+    "hil.version._git": "git, asked of this program's own checkout",
 }
 
 
