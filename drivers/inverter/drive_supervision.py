@@ -82,6 +82,7 @@ class Excess:
         return self._sum >= self._limit
 
     def clear(self) -> None:
+        """Forget what was summed."""
         self._sum = 0.0
 
 

@@ -309,6 +309,7 @@ class Supervision:
         )
 
     def raise_if_ended(self) -> None:
+        """Raise what has ended the run, if anything has."""
         if self.ended is not None:
             raise self.ended
 
