@@ -19,8 +19,8 @@ COB_ID_BITS = 0x7FF
 
 def shared_cob_ids(one: InspectedInverter, other: InspectedInverter) -> Iterator[Difference]:
     """List what both drives use, or would use while one of them is not set up; reads objects, writes none."""
-    for mine, others in ((one, other), (other, one)):
-        theirs = _present(others) | dict(_used(others))
+    taken = [_present(each) | dict(_used(each)) for each in (one, other)]
+    for mine, others, theirs in ((one, other, taken[1]), (other, one, taken[0])):
         for cob_id, role in _used(mine):
             if cob_id in theirs:
                 yield Difference(

@@ -59,8 +59,8 @@ torque 0x6077 of a drive | its command by slope and `torque_response_s`, of the 
 | `torque_error_nm` | tolerance × `torque_error_time_s` | flag, end
 torques of both | the two predictions | `torque_error_sum_nm`, of both distances | tolerance × `torque_error_time_s` \
 | flag, end
-torques with the PLC's PRBS | the same and one of its levels, the same one on both; nothing while it is off | as above \
-| as above; the opposite of the level reported: {TURNED_LOOKS} reports | flag, end
+torques with the PLC's PRBS | the same and one of its levels, the one it reports; nothing while it is off | as above \
+| as above, and while it is switched; the opposite of the level reported: {TURNED_LOOKS} reports | flag, end
 reading that repeats to the last bit | the command of its first | `torque_error_nm` | tolerance × `feedback_timeout_s` \
 | end
 speeds 0x606C of both, low-passed | one speed | {SPEED_NOISE_RAD_S:g} rad/s, a count of each, {100 * SPEED_SHARE:g} % \
@@ -241,10 +241,7 @@ class Supervision:
 
     def _compare_sum(self, record: CycleRecord, one: InverterFeedback, other: InverterFeedback) -> str:
         """Compare both together, by how far each reading is from its own prediction, whatever cycle it is of."""
-        pairs = zip(
-            self._m1.off_nm, self._m2.off_nm, strict=False
-        )  # one may have answered before the PLC's last change
-        off_nm = min([abs(a + b) for a, b in pairs])
+        off_nm = abs(min(self._m1.off_nm, key=abs) + min(self._m2.off_nm, key=abs))
         if len(record.plc.levels) > 1:
             off_nm, self._before_nm = min(off_nm, self._before_nm), off_nm
         if off_nm <= self._both.tolerance:
@@ -312,7 +309,7 @@ class Supervision:
         )
 
     def raise_if_ended(self) -> None:
-        """Raise what a rule has ended the run with; nothing where none has."""
+        """Raise what has ended the run, if anything has."""
         if self.ended is not None:
             raise self.ended
 

@@ -49,19 +49,19 @@ def test_a_drive_has_one_period_and_ten_milliseconds_at_least(
     assert error_of(tmp_path, ("period_s = 0.01 ", f"period_s = {period_s} ")).response_s == response_s
 
 
-def test_a_slope_of_the_drives_own_counts_in_profile_torque_mode_alone(tmp_path: Path) -> None:
-    slope = ("# torque_slope_nm_per_s = 5000.0 ", "torque_slope_nm_per_s = 2400.0 ")
-    assert error_of(tmp_path, slope).response_s == 0.01
-    profile = ('mode = "cyclic_synchronous_torque" ', 'mode = "profile_torque" ')
-    assert error_of(tmp_path, profile).response_s == 0.01
-    assert error_of(tmp_path, slope, profile).response_s == pytest.approx(0.01 + 2 * 120.0 / 2400.0)
-
-
-def test_what_the_plc_adds_by_itself_is_no_error(tmp_path: Path) -> None:
-    source, shared = ('source = "host"', 'source = "plc"'), ('target = "both" ', 'target = "shared"\nshare_m1 = 0.25 ')
-    error = error_of(tmp_path, source, shared, ("share_m1 = 0.35 ", "share_m1 = 0.5 "))
-    assert (error.m1_nm, error.m2_nm) == (30.0 + 30.0, 30.0 + 90.0)
-    assert error.sum_nm == math.hypot(30.0, 30.0) + 120.0
+@pytest.mark.parametrize(
+    "change",
+    [
+        (
+            ("# torque_slope_nm_per_s = 5000.0 ", "torque_slope_nm_per_s = 2400.0 "),
+            ('mode = "cyclic_synchronous_torque" ', 'mode = "profile_torque" '),
+        ),
+        (('source = "host"', 'source = "plc"'),),
+    ],
+    ids=["slow slope", "PRBS by the PLC"],
+)
+def test_what_is_predicted_widens_no_limit(tmp_path: Path, change: tuple[tuple[str, str], ...]) -> None:
+    assert error_of(tmp_path, *change) == error_of(tmp_path)
 
 
 @pytest.mark.parametrize(

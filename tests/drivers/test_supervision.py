@@ -17,6 +17,7 @@ from drivers.inverter.settings import InverterSettings
 from drivers.inverter.supervision import (
     SPEED_NOISE_RAD_S,
     CycleRecord,
+    PlcPart,
     Supervision,
     SupervisionLimits,
     rules_table,
@@ -372,3 +373,35 @@ def test_the_first_end_is_kept() -> None:
 def test_the_table_of_the_documentation_is_that_of_the_rules() -> None:
     page = (Path(__file__).parents[2] / "docs" / "reliability.md").read_text("utf-8")
     assert rules_table() in page
+
+
+def with_plc(
+    m1: Callable[[float], float], m2: Callable[[float], float], divider: int, levels: tuple[float, ...] = (1.0, -1.0)
+) -> str:
+    """Drives with 100 Nm each and 60 Nm of the PLC, of which each makes something; what ends 20 s of it."""
+    made, generator = supervised(), Prbs(1.0, 10, divider, 1)
+    course = [generator.next() for _ in range(2000)]
+    for k, level in enumerate(course):
+        drives = [DriveRecord(100.0, answer(100.0 + 60.0 * of(level))) for of in (m1, m2)]
+        made.take(CycleRecord(k * PERIOD_NS, *drives, PlcPart(60.0, 60.0, levels, 0.0 if k % 10 else level)))
+    return str(made.ended)
+
+
+@pytest.mark.parametrize("divider", [1, 2, 5])
+def test_the_prbs_of_the_plc_is_one_of_two_levels_on_each_drive(divider: int) -> None:
+    late = [0.0]
+
+    def one_cycle_late(level: float) -> float:
+        late.append(level)
+        return late[-2]
+
+    assert with_plc(lambda level: level, lambda level: level, divider) == "None"
+    assert with_plc(lambda level: level, one_cycle_late, divider) == "None"
+    assert "expected 100 Nm as commanded and one of 60, -60 Nm" in with_plc(
+        lambda level: 0.0, lambda level: level, divider
+    )
+    assert "inverter m2: its torque 0x6077 goes down" in with_plc(lambda level: level, lambda level: -level, divider)
+
+
+def test_a_prbs_of_the_plc_that_is_confirmed_off_widens_nothing() -> None:
+    assert "expected 200 Nm as commanded, within 42" in with_plc(lambda level: 1.0, lambda level: 1.0, 2, levels=(0.0,))

@@ -34,6 +34,7 @@ from hil.config.rig_file import Rig
 from hil.recording import RecordingWriter, read_table
 from hil.rig import build
 from hil.rig.build import Devices, open_devices
+from hil.rig.excitation import SETTLED_S
 from hil.rig.experiments.base import Phase
 from hil.rig.pacing import FreePacer, period_ns
 from hil.rig.plan import plan_run
@@ -282,7 +283,13 @@ def _also(fault: Fault, server: RigServer, stack: ExitStack) -> Callable[[], Non
 def _judge_shaft(rig: Rig, man: Man, shaft: Shaft, fastest_rad_s: float, outcome: Outcome) -> None:
     """Sum up how far each torque was outside what the host asked for: beyond the stated impulse nothing may follow."""
     error = rig.guard_limits.error
-    own = {"limit bit, no torque": NO_TORQUE_S, "stuck and frozen": rig.guard_limits.feedback_timeout_s}
+    own = {
+        "limit bit, no torque": NO_TORQUE_S,
+        "limit bit, some counts": NO_TORQUE_S,
+        "stuck and frozen": rig.guard_limits.feedback_timeout_s,
+        "PLC's PRBS ignored": error.time_s + 2.0 * SETTLED_S,  # while it is switched any level is right
+        "PLC's PRBS turned": 2.0,  # until two reports of the PLC, ten a second, come amidst levels that last
+    }
     time_s = own.get(man.kind, error.time_s)  # a drive that shows nothing of it is judged by another row of the table
     for drive, limit_nm in ((0, error.m1_nm), (1, error.m2_nm)):
         impulse = length = 0.0

@@ -26,7 +26,8 @@ TARGETS: dict[str, Target] = {
         },
     ),
     "drivers.guard_limits": Target(("tests/drivers/test_torque_guard.py", "tests/drivers/test_supervision.py")),
-    "drivers.inverter.supervision": Target(("tests/drivers/test_supervision.py",)),
+    "drivers.inverter.supervision": Target(("tests/drivers/test_supervision.py", "tests/drivers/test_observer.py")),
+    "drivers.inverter.drive_supervision": Target(("tests/drivers/test_supervision.py",)),
     "drivers.scaling": Target(("tests/drivers/test_scaling.py",)),
     "drivers.inverter.cia402": Target(
         ("tests/drivers/test_cia402.py",), {"0 -> 1 #3": "a previous controlword of which bit 7 alone counts"}
