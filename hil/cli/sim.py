@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -10,6 +11,7 @@ import typer
 
 from hil.cli.completion import effect_names
 from hil.cli.options import TrustLaws
+from hil.cli.printing import say
 from hil.rig.stop import StopRequest, stop_on_signals
 from hil.simulator.fault_table import known_faults
 
@@ -69,7 +71,8 @@ def sim(
 ) -> None:
     """Serve two inverters, the PLC and the driveline to other programs on this machine.
 
-    Prints one line, `ready bus=... modbus=...`, and runs until SIGINT or SIGTERM. Port 0 takes a free one.
+    Prints one line, `ready bus=... modbus=...`, and runs until SIGINT or SIGTERM. Port 0 takes a free one. Its time
+    passes with the host's SYNC alone: between two runs the vehicle stands still where, and as fast as, it was.
     """
     from hil.config.rig_file import read_rig
     from hil.simulator.driveline import EffectSpec, plant_for
@@ -100,5 +103,7 @@ def _serve(server: RigServer) -> None:
     stop = StopRequest()
     with stop_on_signals(stop), server:
         print(f"ready bus={server.bus_url} modbus={server.modbus}", flush=True)  # noqa: T201 - the contract's line
+        if sys.stderr.isatty():
+            say("its time passes with a host's SYNC: between two runs the vehicle stays as it is", err=True)
         while not stop.requested:
             time.sleep(LOOK_EVERY_S)

@@ -83,7 +83,8 @@ FORMATS: Mapping[str, Format] = MappingProxyType(
         ".xlsx": Format(_of("array_formats.read_xlsx")),
         ".ods": Format(_of("array_formats.read_ods")),
         ".json": Format(_of("wpilib_formats.sysid")),
-        **dict.fromkeys((".wpilog", ".tdms", ".mcap", ".blf", ".asc", ".log", ".trc"), _MEASURED),
+        ".wpilog": Format(_of("wpilib_formats.read"), tables=_of("wpilib_formats.read_all")),
+        **dict.fromkeys((".tdms", ".mcap", ".blf", ".asc", ".log", ".trc"), _MEASURED),
         ".mat": Format(_of("mat_format.read"), _of("mat_format.write"), _of("mat_format.read_metadata")),
     }
 )

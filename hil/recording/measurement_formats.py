@@ -44,14 +44,22 @@ class Group:
 
 def read(path: Path, request: Request) -> Table:
     """Read the channels asked for, or those that share the time of most."""
-    groups, remarks = _groups(path, request)
-    table = foreign_table(path, _as_mdf(groups), replace(request, dbc=None))
-    return replace(table, remarks=(*remarks, *table.remarks), metadata={})
+    return table_of(path, *_groups(path, request), request)
 
 
 def read_all(path: Path, request: Request) -> list[Table]:
     """Read all channels, a table for each time."""
-    groups, remarks = _groups(path, request)
+    return tables_of(path, *_groups(path, request), request)
+
+
+def table_of(path: Path, groups: Iterable[Group], remarks: Iterable[str], request: Request) -> Table:
+    """Return the channels asked for among groups, or those that share the time of most."""
+    table = foreign_table(path, _as_mdf(groups), replace(request, dbc=None))
+    return replace(table, remarks=(*remarks, *table.remarks), metadata={})
+
+
+def tables_of(path: Path, groups: Iterable[Group], remarks: Iterable[str], request: Request) -> list[Table]:
+    """Return all channels of groups, a table for each time."""
     tables = foreign_tables(path, _as_mdf(groups), replace(request, dbc=None))
     return [replace(table, remarks=(*remarks, *table.remarks)) for table in tables]
 
@@ -63,10 +71,6 @@ def _groups(path: Path, request: Request) -> tuple[list[Group], list[str]]:
             return _tdms(path), []
         case ".mcap":
             return _mcap(path), []
-        case ".wpilog":
-            from hil.recording.wpilib_formats import data_log
-
-            return data_log(path), []
         case _:
             return _bus_log(path, request)
 

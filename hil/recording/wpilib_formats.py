@@ -18,7 +18,7 @@ import numpy as np
 
 from hil.errors import RecordingError
 from hil.recording.bounds import damaged, require_cells
-from hil.recording.measurement_formats import Group
+from hil.recording.measurement_formats import Group, table_of, tables_of
 from hil.recording.request import Request
 from hil.recording.table import Table, as_column, as_text
 
@@ -39,6 +39,16 @@ COLUMNS: Final = {
 """What the numbers of a row of SysId are, by how many there are."""
 
 UNITS: Final = {"rotations": "rev", "radians": "rad", "degrees": "deg", "meters": "m", "feet": "ft", "inches": "in"}
+
+
+def read(path: Path, request: Request) -> Table:
+    """Read the entries of a data log asked for, or those that share the time of most."""
+    return table_of(path, data_log(path), (), request)
+
+
+def read_all(path: Path, request: Request) -> list[Table]:
+    """Read all entries of a data log, a table for each time."""
+    return tables_of(path, data_log(path), (), request)
 
 
 def data_log(path: Path) -> list[Group]:

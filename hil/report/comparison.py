@@ -79,7 +79,14 @@ def _from_its_zero(record: Record, simulated: FloatArray) -> FloatArray:
 def _compared(plant: Plant, record: Record, simulated: FloatArray, load_torque: float) -> Comparison:
     okay = record.okay
     error = record.output - simulated
-    past_input, _, itself = residual_tests(error, record, block_of(record.sample_time_s))
+    block = block_of(record.sample_time_s)
+    if okay.size < block:
+        raise UsageError(
+            f"recording {record.name}: expected {block * record.sample_time_s:g} s at least, got "
+            f"{okay.size * record.sample_time_s:.3g} s, a row every {record.sample_time_s:.3g} s. Is its time in "
+            "another unit? In [signals], time = { column = ..., scale = 86400.0 } reads days."
+        )
+    past_input, _, itself = residual_tests(error, record, block)
     spread = float(np.std(record.output[okay]))
     rms = float(np.sqrt(np.mean(error[okay] ** 2)))
     return Comparison(

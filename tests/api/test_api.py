@@ -65,6 +65,11 @@ def test_a_look_shows_channels_and_the_table_that_reads_them(recording: Path) ->
     frame.to_csv(recording, index=False)
     assert '"n [1/min]"' in hil.look(recording).signals
     assert "read times 0.10472" in hil.look(recording)._repr_html_()
+    assert hil.read(recording, signals=hil.look(recording).signals).output[0] == pytest.approx(
+        0.104719755 * frame["n [1/min]"][0]
+    )
+    with pytest.raises(UsageError, match=r"lines of a \[signals\] table such as hil.look\(FILE\).signals, got str"):
+        hil.read(recording, signals="n [1/min]")
 
 
 def test_an_identification_shows_and_saves_itself(model: Path, recording: Path, tmp_path: Path) -> None:
@@ -88,6 +93,13 @@ def test_foreign_columns_by_signals(recording: Path) -> None:
         hil.Record.from_pandas(frame, signals={"sped": {}})
     with pytest.raises(RecordingError, match="speed_rad_s"):
         hil.Record.from_pandas(frame)
+
+
+def test_a_picture_brings_what_draws_it(recording: Path) -> None:
+    shown = hil.read(recording).plot()._repr_mimebundle_()
+    assert "plotly.js" in shown["text/html"]
+    assert "Plotly.newPlot" in shown["text/html"]
+    assert len(shown["application/vnd.plotly.v1+json"]["data"]) == 3
 
 
 def test_a_recording_as_a_table_and_a_picture(recording: Path) -> None:

@@ -21,7 +21,7 @@ from tests.bad_input.conftest import Refused
         ("identify", "Missing argument 'REC'. See: hil identify --help"),
         ("diagnose run.csv --out out", "Missing option '--model'. See: hil diagnose --help"),
         ("simulate", "Missing option '--model'. See: hil simulate --help"),
-        ("compare", "Missing argument 'MODEL'. See: hil compare --help"),
+        ("compare", "Missing argument 'MODEL... REC...'. See: hil compare --help"),
         ("effects a b", "Got unexpected extra argument(s) (b). See: hil effects --help"),
         ("demo --seed many", "'--seed'"),
     ],

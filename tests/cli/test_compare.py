@@ -35,6 +35,27 @@ def test_the_right_model_is_off_by_the_noise(inputs: list[str], capsys: pytest.C
         assert (figures["samples_used"], figures["samples"]) == (1500, 1500)
 
 
+def test_a_time_in_days_is_refused_with_what_to_write(
+    inputs: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    head, *rows = Path(inputs[1]).read_text().splitlines()
+    days = [
+        f"{739678.0 + float(first) / 86400.0:.12f},{rest}" for first, _, rest in (row.partition(",") for row in rows)
+    ]
+    Path(inputs[1]).write_text("\n".join([head, *days]) + "\n")
+    assert run(["compare", *inputs[:2]]) == 2
+    assert "time = { column = ..., scale = 86400.0 } reads days" in capsys.readouterr().err
+
+
+def test_models_stand_side_by_side_as_they_are_given(inputs: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    other = Path(inputs[0]).with_name("other.toml")
+    other.write_text(Path(inputs[0]).read_text())
+    assert run(["compare", inputs[0], str(other), inputs[1]]) == 0
+    assert {"drive.toml", "other.toml"} <= set(capsys.readouterr().out.split())
+    assert run(["compare", inputs[0], str(other)]) == 2
+    assert "expected at least one model (.toml or .fmu) and one recording, got 2 and 0" in capsys.readouterr().err
+
+
 def test_figures_and_plots_are_written(inputs: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["compare", *inputs, "--out", str(tmp_path / "result")]) == 0
     out = capsys.readouterr().out

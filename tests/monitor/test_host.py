@@ -8,13 +8,16 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from multiprocessing.connection import Connection
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
 from drivers.canopen.can_link import CanLink
+from drivers.canopen.emcy import EMCY_COB_ID, RPDO_TIMEOUT, Emergency
 from drivers.canopen.heartbeat import HEARTBEAT_COB_ID
 from hil.config.rig_file import read_rig
-from hil.monitor.host import Job, SessionStop
+from hil.monitor.host import Job, NodeWatch, SessionStop
 from hil.monitor.messages import Ended, Health, Kind, Lost, Notice, Over, Ready, Report, Reset, Samples, Start
 from hil.monitor.opening import open_rig
 from hil.monitor.outbox import Outbox
@@ -48,6 +51,21 @@ def await_report(source: RigSource, seen: list[Report], kind: type[Report]) -> R
             return found[-1]
         time.sleep(0.02)
     raise AssertionError(f"no {kind} in {[type(report).__name__ for report in seen]}")
+
+
+@pytest.mark.parametrize(("armed", "kinds"), [(True, [Kind.EMCY, Kind.EMCY]), (False, [Kind.INFO])])
+def test_a_drive_that_notices_the_end_of_the_commands_is_no_emergency(armed: bool, kinds: list[Kind]) -> None:
+    told: list[Notice] = []
+    heard: dict[int, Any] = {}
+    link: Any = SimpleNamespace(subscribe=heard.__setitem__)
+    settings = SimpleNamespace(name="m1", node_id=1, heartbeat_timeout_ms=300)
+    inverter: Any = SimpleNamespace(settings=settings, latest=None, is_armed=armed)
+    watch = NodeWatch(link, inverter, told.append)
+    heard[EMCY_COB_ID + 1](Emergency(RPDO_TIMEOUT, 0x10, bytes(5)).encode(), 0)
+    assert watch.look(0, None).n_emergencies == armed
+    assert (watch.look(0, None).emergency is not None) == armed
+    heard[EMCY_COB_ID + 1](bytes(8), 1)
+    assert [notice.kind for notice in told] == kinds
 
 
 @pytest.mark.campaign

@@ -39,6 +39,16 @@ def test_a_run_from_order_to_end() -> None:
     assert "3000 samples, 2 flagged, run 7, runs/cruise.parquet" in live.snapshot().headline.message
 
 
+def test_what_was_refused_while_connecting_is_no_news_once_the_rig_is_there() -> None:
+    live = state()
+    live.say("only a rig that is listened to can be started")
+    live.take(Ready())
+    assert live.snapshot().headline.message == ""
+    live.take(DONE)
+    live.take(Ready())
+    assert "3000 samples" in live.snapshot().headline.message
+
+
 def test_a_flagged_sample_is_a_gap_and_not_a_value() -> None:
     live = state()
     rows = ((sample(0, 10.0, 1.0), None), (sample(1, 999.0, 9.0, flags=SampleFlag.M1_STALE), None))
