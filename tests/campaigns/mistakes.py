@@ -25,7 +25,7 @@ from estimator.physics.driveline import Start
 from estimator.physics.model import DrivelineModel, Motion
 from estimator.signals.record import FloatArray, OutputKind, Record
 from hil.errors import HilError
-from hil.plants.scales import tell_scales
+from hil.plants.scales import tell_doubts
 from hil.recording import SignalsConfig, read_record
 from tests.estimator.physics.bench import exact_states, model
 
@@ -266,7 +266,7 @@ def said_of(path: Path, signals: Mapping[str, Any], line: DrivelineModel) -> tup
         record = read_record(path, config, tell=said.append)
     except HilError as error:
         return "\n".join([*said, str(error)]), None
-    tell_scales([record], [path], line, config, None, said.append)
+    tell_doubts([record], [path], line, config, None, said.append)
     return "\n".join(said), record
 
 
