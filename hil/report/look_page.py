@@ -9,8 +9,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from estimator.signals.record import FloatArray
 from estimator.diagnosis.preconditions.channels import clipped
+from estimator.signals.record import FloatArray
 from hil.figures.palette import GREY, ORANGE, PURPLE
 from hil.printable import printable
 from hil.recording.formats import read_table

@@ -13,7 +13,8 @@ from enum import Enum
 
 import numpy as np
 
-from estimator.diagnosis.preconditions.inertia import lag_of, separate_gains
+from estimator.diagnosis.preconditions.channels import dead_rows
+from estimator.diagnosis.preconditions.inertia import lag_of
 from estimator.errors import Cure
 from estimator.physics.model import DrivelineModel, Motion, Structure
 from estimator.signals.record import FloatArray, OutputKind, Record
@@ -58,6 +59,7 @@ _ANY, _LINE, _BOTH = tuple(OutputKind), (Motion.TRANSLATION,), (Motion.ROTATION,
 GEARS = (3.0, 16.0)  # ratios of the gears behind traction motors
 _T, _O, _M = Part.TORQUE, Part.OUTPUT, Part.MODEL
 _KP_N = 9.80665
+_CENT = "per cent of a rated torque of about {2} Nm"
 _MILLE = "per mille of a rated torque of about {3} Nm"
 
 ROWS: tuple[Row, ...] = (
@@ -78,7 +80,7 @@ ROWS: tuple[Row, ...] = (
     Row("is the torque in Ncm, expected Nm", _T, 1e-2, 1e-2, 0.01),
     Row("was a force in N scaled as if it were in kp", _T, 1.0 / _KP_N, 1.0 / _KP_N, 0.01, _ANY, _LINE),
     Row("is the force in kp, expected N", _T, _KP_N, _KP_N, 0.01, _ANY, _LINE),
-    Row("is the torque in per cent of a rated torque of about {2} Nm", _T, 0.2, 30.0, 0.2, _MOVES, _BOTH, (10.0, 200.0)),
+    Row(f"is the torque in {_CENT}", _T, 0.2, 30.0, 0.2, _MOVES, _BOTH, (10.0, 200.0)),
     Row(
         f"is the torque in whole {_MILLE}, as drives send it",
         _T, 0.02, 5.0, 3.0, _MOVES, _BOTH, (20.0, 3000.0), whole=True,
@@ -170,25 +172,26 @@ DEPTHS, TIMES = (0.5, 0.8, 0.95), (0.05, 0.3, 1.0)
 """Losses of a torque over time that are tried, and their time constants in the recording's length."""
 
 LEAST_SHIFT_S = 0.05  # a shift that no filter and no bus makes
-LEAST_UNLIKE = 1.5  # factor between the gains of two inputs from which on one of them is in another unit
-DEAD_S = 0.5  # time for which a torque that does not change at all is dead, where it moves elsewhere [s]
+MOST_GAIN = 3.5  # factor by which an inverter's gain may be off and is no unit
+STEPS = 60  # values that a factor may have, evenly in its logarithm
 
 
-def changes_of(records: Sequence[Record], line: Line) -> Iterator[Change]:
-    """Yield nothing, then all that may be wrong beyond a factor."""
+def changes_of(records: Sequence[Record], line: Line, ratio: float = 1.0) -> Iterator[Change]:
+    """Yield nothing, then all that may be wrong beyond a factor; ``ratio`` is that of the inertia that is off."""
     period_s = records[0].sample_time_s
     yield Change(prior=1.0 if FASTEST_S <= period_s <= SLOWEST_S else UNLIKELY, factors=2)
-    yield from _of_columns(records[0], line)
+    if records[0].imposed is None:
+        yield from _of_inputs(records[0], line, ratio)
+        yield from _of_columns(records[0])
     yield from _of_time(records[0])
     if line is not None:
         yield from _of_shifts(records, line)
-        yield from _of_model(line)
+        yield from _of_model(line, ratio)
         yield from _of_physics(records, line)
 
 
-def _of_columns(record: Record, line: Line) -> Iterator[Change]:
-    if record.imposed is not None:
-        return
+def _of_inputs(record: Record, line: Line, ratio: float) -> Iterator[Change]:
+    """Yield what may be wrong with one of several inputs."""
     count, name = record.torque_nm.shape[1], record.name
     for i in range(count if count > 1 else 0):
         turned = _scaled(np.where(np.arange(count) == i, -1.0, 1.0))
@@ -198,10 +201,15 @@ def _of_columns(record: Record, line: Line) -> Iterator[Change]:
             kept = _scaled(np.where(np.arange(count) == i, 0.0, 1.0))
             question = f"does {record.input(i)} count twice, in the others, too"
             yield Change(question, 0.05, kept, cure=Cure(name, dropped=i))
-            yield from _of_one_unit(record, i)
+            yield from of_one_unit(record, i, ratio)
         if line is not None and np.ptp(record.torque_nm[:, i]) == 0.0:
             question = f"is {record.input(i)} dead, while its inverter drives as the others do"
             yield Change(question, 0.3, lambda each, i=i: _as_others(each, i))
+
+
+def _of_columns(record: Record) -> Iterator[Change]:
+    """Yield that a column has another's role, or none, or is dead for a while."""
+    count, name = record.torque_nm.shape[1], record.name
     for i in range(count):
         question = f"are the columns of {record.input(i)} and of the output swapped"
         yield Change(question, 0.05, lambda each, i=i: _swapped(each, i), cure=Cure(name, swapped=i))
@@ -224,26 +232,25 @@ def _of_columns(record: Record, line: Line) -> Iterator[Change]:
     elif record.kind is OutputKind.POSITION:
         cure = Cure(name, kind=OutputKind.SPEED.value)
         yield Change("is the position a speed", 0.05, _summed, cure=cure, factors=1)
-    dead = np.logical_or.reduce([_dead(record.torque_nm[:, i], record.sample_time_s) for i in range(count)])
+    dead = np.logical_or.reduce([dead_rows(record.torque_nm[:, i], record.sample_time_s) for i in range(count)])
     if dead.any():
         ends = f"from {record.time_s[dead][0]:.4g} to {record.time_s[dead][-1]:.4g} s"
         yield Change(f"is a torque dead {ends}, where its reading stands still", 0.1, _without_dead)
 
 
-def _of_one_unit(record: Record, i: int) -> Iterator[Change]:
-    """Yield that one of several inputs is in a unit of its own, as the motion that follows from each of them tells."""
-    gains = separate_gains(record)
-    others = np.delete(gains, i)
-    if gains[i] == 0.0 or not (others > 0.0).all():
-        return
-    factor = float(f"{gains[i] / np.median(others):.2g}")
-    if factor > 0.0 and not 1.0 / LEAST_UNLIKE < factor < LEAST_UNLIKE:
-        at = np.where(np.arange(gains.size) == i, factor, 1.0)
+def of_one_unit(record: Record, i: int, ratio: float) -> Iterator[Change]:
+    """Yield that one of several inputs is in a unit of its own, by the factor that makes the inertia the nominal."""
+    total = record.total_torque_nm
+    share = float(record.torque_nm[:, i] @ total) / (float(total @ total) or 1.0)
+    factor = float(f"{(1.0 / ratio - 1.0 + share) / (share or 1.0):.2g}") if record.torque_nm.shape[1] > 1 else 0.0
+    if factor > 0.0 and ratio != 1.0:
+        at = np.where(np.arange(record.torque_nm.shape[1]) == i, factor, 1.0)
         question = (
             f"is {record.input(i)} in a unit of its own, to be multiplied by about {factor:g} (per cent of "
             f"{100 * factor:.2g} Nm), or is its inverter's gain that far off"
         )
-        yield Change(question, 0.05, _scaled(at), cure=Cure(record.name, torque=factor, inputs=(i,)), is_open=True)
+        cure = Cure(record.name, torque=factor, inputs=(i,))
+        yield Change(question, 0.05, _scaled(at), cure=cure, is_open=1.0 / MOST_GAIN < factor < MOST_GAIN)
 
 
 def _of_time(record: Record) -> Iterator[Change]:
@@ -264,21 +271,22 @@ def _of_time(record: Record) -> Iterator[Change]:
 
 def _of_shifts(records: Sequence[Record], line: DrivelineModel) -> Iterator[Change]:
     """Yield that the output lags behind, or leads, the torque, by what the recordings show."""
-    lags = [lag for record in records if (lag := lag_of(record, line)) is not None]
-    lag_s = float(np.median(lags)) if lags else 0.0
-    if abs(lag_s) >= LEAST_SHIFT_S:
+    lags = {lag for record in records if (lag := lag_of(record, line)) is not None}
+    for lag_s in sorted(lag for lag in lags if abs(lag) >= LEAST_SHIFT_S):
         side = "late" if lag_s > 0.0 else "early"
         question = (
             f"is the {records[0].kind.value} {abs(lag_s):.3g} s {side} against the torque: a shift between columns, or "
             "a delay of that length"
         )
-        yield Change(question, 0.1, lambda each: _shifted(each, lag_s), is_open=True)
+        yield Change(question, 0.1, lambda each, by=lag_s: _shifted(each, by), is_open=True)
 
 
-def _of_model(line: DrivelineModel) -> Iterator[Change]:
+def _of_model(line: DrivelineModel, ratio: float) -> Iterator[Change]:
     if line.structure is Structure.TWO_MASS:
         swapped = lambda each: _with_inertias(each, J_M=each.parameters["J_L"], J_L=each.parameters["J_M"])  # noqa: E731
         yield Change("are J_M and J_L exchanged in the model file", 0.1, of_line=swapped)
+        question = f"is J_L in the model file that of another vehicle or in another unit, about {ratio:.2g} times it"
+        yield Change(question, 0.1 / STEPS, of_line=lambda each: _with_one(each, "J_L", ratio))
     for name in [each for each in line.parameters if each.startswith("J")] if line.structure in MASSES else ():
         for factor, unit in ((1e-3, "g m^2"), (1e-4, "kg cm^2"), (1e-7, "g cm^2"), (0.25, "GD^2, which is 4 J")):
             question = f"is {name} in the model file in {unit}, the others in kg m^2"
@@ -351,17 +359,8 @@ def _summed(record: Record) -> Record:
     return replace(record, output=np.cumsum(_bridged(record)) * record.sample_time_s)
 
 
-def _dead(torque: FloatArray, sample_time_s: float) -> np.ndarray:
-    """Tell where a torque stands still for long, of one that elsewhere hardly ever does."""
-    ends = np.flatnonzero(np.diff(torque) != 0.0) + 1
-    spans = np.diff([0, *ends.tolist(), torque.size])
-    long = spans * sample_time_s >= DEAD_S
-    dead = np.repeat(long, spans)
-    return dead if np.count_nonzero(long) == 1 and not dead.all() else np.zeros(torque.size, dtype=np.bool_)
-
-
 def _without_dead(record: Record) -> Record:
-    dead = np.logical_or.reduce([_dead(torque, record.sample_time_s) for torque in record.torque_nm.T])
+    dead = np.logical_or.reduce([dead_rows(torque, record.sample_time_s) for torque in record.torque_nm.T])
     return replace(record, okay=record.okay & ~dead)
 
 

@@ -137,6 +137,15 @@ def _torques(record: Record) -> list[str]:
     ]
 
 
+def dead_rows(torque: FloatArray, sample_time_s: float) -> BoolArray:
+    """Tell where a torque stands still for long, of one that elsewhere hardly ever does."""
+    ends = np.flatnonzero(np.diff(torque) != 0.0) + 1
+    spans = np.diff([0, *ends.tolist(), torque.size])
+    long = spans * sample_time_s >= DEAD_S
+    dead = np.repeat(long, spans)
+    return dead if np.count_nonzero(long) == 1 and not dead.all() else np.zeros(torque.size, dtype=np.bool_)
+
+
 def dead_torques(record: Record) -> list[str]:
     """Say which of several torques never changes, and which are one channel twice."""
     inputs = record.torque_nm.T if record.torque_nm.shape[1] > 1 else ()
@@ -146,6 +155,13 @@ def dead_torques(record: Record) -> list[str]:
         for i, k in combinations(range(len(inputs)), 2)
         if record.inputs and np.ptp(inputs[i]) > 0.0 and np.array_equal(inputs[i], inputs[k])
     ]
+    for i, torque in enumerate(record.torque_nm.T):
+        if (rows := dead_rows(torque, record.sample_time_s)).any():
+            twice.append(
+                f"recording {record.name}: {record.input(i)} stands still at {torque[rows][0]:g} from "
+                f"{record.time_s[rows][0]:.4g} to {record.time_s[rows][-1]:.4g} s. If its inverter was off there, that "
+                "is right; if the channel was dead, leave that stretch out ([signals] from_s, to_s or stretches)."
+            )
     return twice + [
         f"recording {record.name}: {record.input(i)} stays at {values[0]:g}. If its inverter did not work, that is "
         "right; if the channel is dead, noise, values and verdict can't be trusted: what was not read counts as noise "
@@ -161,7 +177,8 @@ def standstill(record: Record) -> str:
     if record.imposed is not None or not seen.size or np.ptp(seen) > 0.0:
         return ""
     what = f"recording {record.name}: the {record.kind.value} is constant at {seen[0]:g}, expected it to vary"
-    if record.kind is OutputKind.SPEED and seen[0] != 0.0 or not np.ptp(torque) > 0.0:
+    turns = record.kind is OutputKind.SPEED and seen[0] != 0.0
+    if turns or not np.ptp(torque) > 0.0:
         return f"{what}: is its sensor dead? Excite the driveline (PRBS, reversal, tip-in) and check the channel."
     return (
         f"{what}: under torques of up to {np.abs(torque).max():.3g} Nm the line is held (brake, parking lock) by at "

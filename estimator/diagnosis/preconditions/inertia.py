@@ -81,7 +81,7 @@ FEWEST_STRETCHES = 10  # stretches that a recording must hold to say anything: t
 
 TELLS = 0.25
 """Share of the motion that may be left unexplained by torque and line where they tell an inertia. Where a road or a
-brake moves the line and a control sets the torque it is above 0.4, in tip-ins, reversals and under a PRBS below 0.15."""
+brake moves the line and a control sets the torque it is above 0.4, in tip-ins and under a PRBS below 0.2."""
 
 ONE_WAY = 0.8
 """Share of the cross-spectrum that must have one sign: where the output is late by more, its direction is not told."""
@@ -125,8 +125,10 @@ def fitted_inertia(record: Record, line: DrivelineModel) -> Inertia:
         above = by_band(record, line, grid, ABOVE[0] * first_hz, ABOVE[1] * first_hz)
         if max(below.rest, above.rest) <= 1.0 - BANDS_TELL:
             log_ratio = math.log(abs(below.ratio / above.ratio))
+            mean = math.copysign(math.sqrt(abs(below.ratio * above.ratio)), below.ratio)
+            if found.tells and abs(math.log(abs(found.ratio / mean))) > math.log(AGREE):
+                return replace(found, log_ratio=math.log(abs(found.ratio / above.ratio)))  # a load too heavy to show
             if abs(log_ratio) <= math.log(AGREE):
-                mean = math.copysign(math.sqrt(abs(below.ratio * above.ratio)), below.ratio)
                 return Inertia(mean, min(below.rest, found.rest), log_ratio)  # comparable with that of one body alone
     return replace(found, log_ratio=log_ratio)
 
@@ -169,18 +171,6 @@ def lag_of(record: Record, line: DrivelineModel) -> float | None:
     lags = np.arange(-most, most + 1)
     best = int(lags[np.argmax(together[lags])])
     return best * record.sample_time_s if abs(best) < most else None
-
-
-def separate_gains(record: Record) -> FloatArray:
-    """Return by how much the speed changes with the impulse of each input alone, shape (M,)."""
-    step = max(round(STRETCH_S / record.sample_time_s), FEWEST_STEPS)
-    speed, _, angle = _integrals(record)
-    impulses = np.cumsum(record.torque_nm, axis=0) * record.sample_time_s
-    signals = np.column_stack([impulses, angle, np.arange(speed.size)])
-    design, change = signals[step:] - signals[:-step], speed[step:] - speed[:-step]
-    both = record.okay[step:] & record.okay[:-step]
-    gains: FloatArray = np.linalg.lstsq(design[both], change[both], rcond=None)[0]
-    return gains[: record.torque_nm.shape[1]]
 
 
 def _bridged(record: Record) -> FloatArray:

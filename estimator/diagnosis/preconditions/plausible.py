@@ -1,13 +1,13 @@
-"""Do recordings and model fit together? One table of candidates, asked once of all recordings before anything is fitted.
+"""Do recordings and model fit together? One table of candidates, asked once of all recordings before any fit.
 
 Every candidate is undone, in all recordings or in one alone, and weighed by how well torque and line then explain the
 motion: with R_i the share that stays unexplained in recording i, and r_i the inertia that it fits over the nominal one,
 
     w = prior * product over i of  R_i^-4 * p(r_i) * p(sizes)
 
-Against it stands "something else", which leaves a share R_0 unexplained and says nothing of the inertia: a candidate that
-explains less is no explanation, however far it is ahead of the others. A line that cures is handed out only where the
-table, asked again with the line applied, finds nothing.
+Against it stands "something else", which leaves a share R_0 unexplained and says nothing of the inertia: a candidate
+that explains less is no explanation, however far it is ahead of the others. A line that cures is handed out only where
+the table, asked again with the line applied, finds nothing.
 """
 
 from __future__ import annotations
@@ -19,7 +19,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from estimator.diagnosis.inference.wording import times as multiple
-from estimator.diagnosis.preconditions.candidates import Change, Line, Part, Row, changes_of, rows_for, times
+from estimator.diagnosis.preconditions.candidates import (
+    STEPS,
+    Change,
+    Line,
+    Part,
+    Row,
+    changes_of,
+    of_one_unit,
+    rows_for,
+    times,
+)
 from estimator.diagnosis.preconditions.inertia import BODY, TELLS, Inertia, fitted_inertia
 from estimator.diagnosis.result import Doubt
 from estimator.errors import Cure, Implausible
@@ -52,7 +62,7 @@ MOST_LOAD = 10.0
 
 # --- how well a candidate fits
 
-CLOSE = 0.6, 0.12
+CLOSE = 0.6, 0.1
 """Spread of the logarithm of the inertia's ratio: this share of the tolerance, and the error of its fit."""
 
 PHYSICS, PHYSICS_SHARE = math.log(2.0), 0.08
@@ -75,7 +85,6 @@ WHOLE, FEWEST_VALUES = 1e-6, 5
 
 STRANGE = 0.02  # share of the recordings in which something else is, too, or physics that is in no other
 OFFSETS = np.linspace(-2.0, 2.0, 81)  # of the logarithm of the nominal inertia that are tried
-STEPS = 60  # values of a factor out of a range that are tried, evenly in its logarithm
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,7 +141,7 @@ class Candidate:
     def question(self, records: Sequence[Record], falls: str) -> str:
         """Say it as a question."""
         if self.is_else:
-            return "something else"
+            return "something else?"
         asked = [self.change.question] if self.change.question else []
         asked += [falls] if self.is_turned else []
         asked += [row.question.format(*map(_rough, (f, 1.0 / f, 100.0 * f, 1e3 * f))) for row, f in self.rows]
@@ -183,7 +192,7 @@ def _judged(records: Sequence[Record], line: Line, is_tried: bool = False) -> tu
     cure = None
     if is_clear and not is_tried and odds >= OVER_THE_NEXT * max((each for _, each in others), default=0.0):
         cure = best.cure(records[0])
-        if cure is not None and _judged(best.undone(records), line, is_tried=True)[0] is not None:
+        if cure is not None and not _passes(best, records, line, found):
             cure = None
     is_wrong = 1.0 - is_right - math.fsum(each for candidate, each in ranked if candidate.is_else)
     is_one_of_all = best.only is None and not best.change.is_open
@@ -192,6 +201,26 @@ def _judged(records: Sequence[Record], line: Line, is_tried: bool = False) -> tu
         return None, False
     about = ", ".join(record.name for record in _blamed(records, found, line, best))
     return Doubt(about, _text(records, line, found, ranked), 1.0 - is_right, cure=cure), is_refused
+
+
+def _ratio(found: Sequence[Inertia], line: Line) -> float:
+    """Return the ratio of the inertias that can't be; 1 where there are none."""
+    off = [each.ratio for each in found if each.tells and line is not None and not _is_plausible(each, line)]
+    return float(np.median(off)) if off else 1.0
+
+
+def _passes(best: Candidate, records: Sequence[Record], line: Line, found: Sequence[Inertia]) -> bool:
+    """Tell whether with a candidate undone the table finds nothing, and no input alone in a unit explains more."""
+    undone = best.undone(records)
+    if _judged(undone, line, is_tried=True)[0] is not None:
+        return False
+    if line is None or not best.is_a_factor or all(row.low == row.high for row, _ in best.rows):
+        return True
+    rest = sum(fitted_inertia(record, line).rest for record in undone)
+    of_one = (
+        each for i in range(records[0].torque_nm.shape[1]) for each in of_one_unit(records[0], i, _ratio(found, line))
+    )
+    return all(sum(fitted_inertia(_changed(record, each), line).rest for record in records) > rest for each in of_one)
 
 
 def _is_suspicious(found: Sequence[Inertia], line: DrivelineModel) -> bool:
@@ -217,7 +246,7 @@ def _ranked(records: Sequence[Record], line: Line, found: Sequence[Inertia]) -> 
     is_whole = all(are_whole_numbers(record) for record in records)
     rows = rows_for(line, records[0].kind, is_whole)
     spread = 0.0 if line is None else CLOSE[0] * math.log1p(_tolerance(line))
-    off = _log_near(OFFSETS, max(spread, CLOSE[1]), PHYSICS_SHARE)
+    off = _log_near(OFFSETS, max(spread, 0.5 * CLOSE[1]), PHYSICS_SHARE)
     off = off - np.logaddexp.reduce(off)
     nothing = [
         _log_fits(each, size, record, (), np.zeros(1), line)[0]
@@ -228,7 +257,7 @@ def _ranked(records: Sequence[Record], line: Line, found: Sequence[Inertia]) -> 
         for size, record in zip(sizes, records, strict=True)
     ]
     all_of = [Candidate(Change(), log_weight=math.log(ELSE) + sum(unknown), is_else=True)]
-    for change in changes_of(records, line):
+    for change in changes_of(records, line, _ratio(found, line)):
         changed = [_changed(record, change) for record in records]
         its_line = line if line is None or change.of_line is None else change.of_line(line)
         fits = found if not change.question else [fitted_inertia(each, its_line or BODY) for each in changed]
