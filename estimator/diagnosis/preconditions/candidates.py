@@ -186,7 +186,7 @@ def changes_of(records: Sequence[Record], line: Line, ratio: float = 1.0) -> Ite
     yield from _of_time(records[0])
     if line is not None:
         yield from _of_shifts(records, line)
-        yield from _of_model(line, ratio)
+        yield from _of_model(line, abs(ratio))
         yield from _of_physics(records, line)
 
 

@@ -204,8 +204,8 @@ def _judged(records: Sequence[Record], line: Line, is_tried: bool = False) -> tu
 
 
 def _ratio(found: Sequence[Inertia], line: Line) -> float:
-    """Return the ratio of the inertias that can't be; 1 where there are none."""
-    off = [each.ratio for each in found if each.tells and line is not None and not _is_plausible(each, line)]
+    """Return the ratio of the inertias that are beyond their tolerance; 1 where there are none."""
+    off = [each.ratio for each in found if each.tells and line is not None and not _is_within_tolerance(each, line)]
     return float(np.median(off)) if off else 1.0
 
 
