@@ -10,13 +10,14 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
+from functools import partial
 
 import numpy as np
 
 from estimator.diagnosis.preconditions.channels import dead_rows
 from estimator.diagnosis.preconditions.inertia import lag_of
 from estimator.errors import Cure
-from estimator.physics.model import DrivelineModel, Motion, Structure
+from estimator.physics.model import DrivelineModel, Motion, Parameter, Structure
 from estimator.signals.record import FloatArray, OutputKind, Record
 
 # --- factors
@@ -204,7 +205,7 @@ def _of_inputs(record: Record, line: Line, ratio: float) -> Iterator[Change]:
             yield from of_one_unit(record, i, ratio)
         if line is not None and np.ptp(record.torque_nm[:, i]) == 0.0:
             question = f"is {record.input(i)} dead, while its inverter drives as the others do"
-            yield Change(question, 0.3, lambda each, i=i: _as_others(each, i))
+            yield Change(question, 0.3, partial(_as_others, i=i))
 
 
 def _of_columns(record: Record) -> Iterator[Change]:
@@ -212,15 +213,15 @@ def _of_columns(record: Record) -> Iterator[Change]:
     count, name = record.torque_nm.shape[1], record.name
     for i in range(count):
         question = f"are the columns of {record.input(i)} and of the output swapped"
-        yield Change(question, 0.05, lambda each, i=i: _swapped(each, i), cure=Cure(name, swapped=i))
+        yield Change(question, 0.05, partial(_swapped, i=i), cure=Cure(name, swapped=i))
     for unused in record.unused:
         added = f"{unused.label} looks like a torque and is not used: is it another inverter's"
         yield Change(
-            added, 0.3, lambda each, of=unused.label: _with(each, of, True), cure=Cure(name, columns=(unused.label,))
+            added, 0.3, partial(_with, label=unused.label, is_added=True), cure=Cure(name, columns=(unused.label,))
         )
         instead = f"{unused.label} looks like a torque and is not used: is it the one that drives"
         cure = Cure(name, columns=(unused.label,), is_instead=True)
-        yield Change(instead, 0.1, lambda each, of=unused.label: _with(each, of, False), cure=cure)
+        yield Change(instead, 0.1, partial(_with, label=unused.label, is_added=False), cure=cure)
     if len(record.unused) > 1:
         labels = tuple(unused.label for unused in record.unused)
         question = f"{' and '.join(labels)} look like torques and are not used: do they drive"
@@ -278,7 +279,7 @@ def _of_shifts(records: Sequence[Record], line: DrivelineModel) -> Iterator[Chan
             f"is the {records[0].kind.value} {abs(lag_s):.3g} s {side} against the torque: a shift between columns, or "
             "a delay of that length"
         )
-        yield Change(question, 0.1, lambda each, by=lag_s: _shifted(each, by), is_open=True)
+        yield Change(question, 0.1, partial(_shifted, lag_s=lag_s), is_open=True)
 
 
 def _of_model(line: DrivelineModel, ratio: float) -> Iterator[Change]:
@@ -290,7 +291,7 @@ def _of_model(line: DrivelineModel, ratio: float) -> Iterator[Change]:
     for name in [each for each in line.parameters if each.startswith("J")] if line.structure in MASSES else ():
         for factor, unit in ((1e-3, "g m^2"), (1e-4, "kg cm^2"), (1e-7, "g cm^2"), (0.25, "GD^2, which is 4 J")):
             question = f"is {name} in the model file in {unit}, the others in kg m^2"
-            yield Change(question, 0.02, of_line=lambda each, of=name, by=factor: _with_one(each, of, by))
+            yield Change(question, 0.02, of_line=partial(_with_one, name=name, factor=factor))
 
 
 MASSES = (Structure.TWO_MASS, Structure.THREE_MASS)
@@ -309,7 +310,7 @@ def _of_physics(records: Sequence[Record], line: DrivelineModel) -> Iterator[Cha
             yield Change(question, 0.005, clipped, is_physics=True)
     for depth in DEPTHS:
         for time in TIMES:
-            yield Change(question, 0.005, lambda each, d=depth, t=time: _fading(each, d, t), is_physics=True)
+            yield Change(question, 0.005, partial(_fading, depth=depth, time=time), is_physics=True)
     if line.structure in MASSES:
         alone = lambda each: _with_one(each, "J_L", 1e-3)  # noqa: E731
         yield Change("does a clutch slip, or is the shaft broken, so that the motor turns alone", 0.1, of_line=alone,
@@ -376,8 +377,8 @@ def _fading(record: Record, depth: float, time: float) -> Record:
     return replace(record, torque_nm=record.torque_nm * (1.0 - depth * (1.0 - np.exp(-since / (time * since[-1])))))
 
 
-def _with_inertias(line: DrivelineModel, **inertias: object) -> DrivelineModel:
-    return replace(line, parameters={**line.parameters, **inertias})  # type: ignore[arg-type]
+def _with_inertias(line: DrivelineModel, **inertias: Parameter) -> DrivelineModel:
+    return replace(line, parameters={**line.parameters, **inertias})
 
 
 def _with_one(line: DrivelineModel, name: str, factor: float) -> DrivelineModel:

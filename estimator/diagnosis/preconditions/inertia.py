@@ -166,10 +166,10 @@ def lag_of(record: Record, line: DrivelineModel) -> float | None:
     together = Y * M.conj()
     if first_hz > 0.0:  # where the mode rings, any whole period of it fits
         together[np.fft.rfftfreq(2 * record.okay.size - 2, record.sample_time_s) > BELOW[1] * first_hz] = 0.0
-    together = np.fft.irfft(together)
-    most = min(round(LONGEST_LAG_S / record.sample_time_s), together.size // 4)
+    likeness = np.fft.irfft(together)
+    most = min(round(LONGEST_LAG_S / record.sample_time_s), likeness.size // 4)
     lags = np.arange(-most, most + 1)
-    best = int(lags[np.argmax(together[lags])])
+    best = int(lags[np.argmax(likeness[lags])])
     return best * record.sample_time_s if abs(best) < most else None
 
 
