@@ -93,6 +93,10 @@ class Cure:
         The torque input that is swapped with the output.
     kind : str or None
         What the output is instead: a position, or a speed.
+    dropped : int or None
+        The torque input that does not count.
+    columns, is_instead : tuple of str, bool
+        Columns that are torques, too, and whether they are it in the place of those named.
     """
 
     recording: str
@@ -102,6 +106,9 @@ class Cure:
     time: float = 1.0  # factor on the time stamps
     swapped: int | None = None
     kind: str | None = None
+    dropped: int | None = None
+    columns: tuple[str, ...] = ()
+    is_instead: bool = False
 
 
 class Implausible(EstimatorError, ValueError):

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 
+from estimator.errors import Cure
 from estimator.identification.linear_model import ComplexArray
 from estimator.physics.effect import Element
 from estimator.physics.model import DrivelineModel
@@ -22,6 +23,21 @@ class Verdict(Enum):
     PARTLY_EXPLAINED = "partly_explained"
     UNEXPLAINED = "unexplained"
     NO_MISMATCH = "no_mismatch"
+
+
+@dataclass(frozen=True, slots=True)
+class Doubt:
+    """What the input itself makes doubtful, before anything is fitted; while there is one, nothing is sure.
+
+    ``odds`` are those that something is wrong; ``line`` is what to write in ``[signals]``, from ``cure``, where it is
+    known and was tried.
+    """
+
+    about: str  # the recordings
+    statement: str
+    odds: float
+    line: str = ""
+    cure: Cure | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -421,3 +437,4 @@ class Diagnosis:
     refinements: tuple[Refinement, ...] = ()
     table: UnnamedTable | None = None
     effort: Effort = field(default_factory=Effort)
+    doubts: tuple[Doubt, ...] = ()

@@ -120,6 +120,10 @@ class Record:
         Names the further output; empty for the first one.
     unit : float
         What ``output`` is given in, in SI units.
+    inputs : tuple of str
+        The columns that the torques were read from; empty where they have none.
+    unused : tuple of Channel
+        Columns that look like torques and are not used; empty in what is fitted.
     """
 
     name: str
@@ -140,6 +144,8 @@ class Record:
     lead: Record | None = None
     label: str = ""
     unit: float = 1.0
+    inputs: tuple[str, ...] = ()
+    unused: tuple[Channel, ...] = ()
 
     def __post_init__(self) -> None:
         n = self.time_s.shape[0]
@@ -188,6 +194,11 @@ class Record:
                 f"recording {self.name}: offset_s holds NaN or infinity. Give 0 where the instant is not known."
             )
 
+    def input(self, number: int) -> str:
+        """Name a torque input, from 0: by its column, where it has one."""
+        column = f" ({self.inputs[number]})" if number < len(self.inputs) else ""
+        return f"torque input {number + 1}{column}"
+
     @property
     def torque_trusted(self) -> BoolArray:
         """Where each torque was read and is to be trusted; shape (N, M)."""
@@ -227,9 +238,13 @@ def sliced(record: Record, rows: slice, name: str | None = None) -> Record:
         for field in fields(record)
         if isinstance(values := getattr(record, field.name), np.ndarray)  # each has a row per sample
     }
-    channels = tuple(replace(each, output=each.output[rows], okay=each.okay[rows]) for each in record.channels)
+    channels, unused = (
+        tuple(replace(each, output=each.output[rows], okay=each.okay[rows]) for each in several)
+        for several in (record.channels, record.unused)
+    )
     began_s = float(record.time_s[0]) if record.began_s is None else record.began_s
-    return replace(record, name=record.name if name is None else name, began_s=began_s, channels=channels, **parts)
+    name = record.name if name is None else name
+    return replace(record, name=name, began_s=began_s, channels=channels, unused=unused, **parts)
 
 
 DIGITS = 9  # digits a period is rounded to at most, so that 0.01 s is 0.01 s in every recording of a rig

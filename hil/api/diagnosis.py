@@ -14,13 +14,14 @@ from hil.api.models import Model, as_file
 from hil.api.record import DRAWN, Record, read
 from hil.config.model_file import ModelFile
 from hil.errors import InputError, RecordingError, UsageError
+from hil.plants.scales import with_lines, with_the_line_to_write
 from hil.provenance import Provenance, provenance
 from hil.report import page as html
 from hil.report.diagnosis_files import publish_diagnosis
 from hil.report.diagnosis_html import course_panels
 from hil.report.figures import time_panels
 from hil.report.numbers import shown, shown_interval
-from hil.report.wording import BADGES, headline
+from hil.report.wording import badge, doubt_lines, headline
 
 if TYPE_CHECKING:
     import pandas
@@ -94,8 +95,10 @@ class DiagnosisResult:
             for name, each in effect.parameters.items()
         ]
         found = html.table(("effect", "parameter", "value", "95 % interval"), rows, numbers=(2, 3)) if rows else None
-        title = html.Heading(f"{BADGES[self.diagnosis.verdict]}: {headline(self.diagnosis)}")
-        return html.fragment(title, html.paragraph(self.diagnosis.statement), found)
+        title = html.Heading(f"{badge(self.diagnosis)}: {headline(self.diagnosis)}")
+        return html.fragment(
+            title, *map(html.warning, doubt_lines(self.diagnosis)), html.paragraph(self.diagnosis.statement), found
+        )
 
 
 def diagnose(
@@ -123,8 +126,10 @@ def diagnose(
     """
     file = as_file(model)
     training, kept_back = records_of(recordings, file), records_of(holdout, file)
-    found = diagnose_records(training, file.model, kept_back, budget_s=budget_s)
     records = (*training, *kept_back)
+    with with_the_line_to_write(sources_of(records), file.signals):
+        found = diagnose_records(training, file.model, kept_back, budget_s=budget_s)
+        found = with_lines(found, sources_of(records), file.signals)
     made = provenance([Path(model)] if isinstance(model, Path | str) else [], sources_of(records))
     return DiagnosisResult(found, file, records, made)
 

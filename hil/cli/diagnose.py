@@ -97,7 +97,7 @@ def diagnose(
     from hil.errors import UsageError
     from hil.plants.plant import Trust
     from hil.plants.questioned import Asked, questioned
-    from hil.plants.scales import with_the_line_to_write
+    from hil.plants.scales import with_lines, with_the_line_to_write
     from hil.provenance import provenance
     from hil.recording.recordings import rig_of
     from hil.report.diagnosis_files import publish_diagnosis
@@ -115,6 +115,7 @@ def diagnose(
         training, kept_back = records[: len(recordings)], records[len(recordings) :]
         with with_the_line_to_write(every, file.signals, dbc), progress_bar() as progress:
             diagnosis = diagnose_records(training, file.model, kept_back, progress, budget_s, effort.value)
+            diagnosis = with_lines(diagnosis, every, file.signals, dbc)
     more = {}
     if found.fmu is not None:
         from hil.export.fmu.ssp import augmented_ssp

@@ -93,18 +93,20 @@ def _read(
 ) -> tuple[Sequence[Record], DrivelineModel | None]:
     """Read the recordings, as a model file says where there is one, and that."""
     from hil.config.model_file import read_model_for_recordings
-    from hil.plants.scales import tell_scales
+    from hil.plants.scales import tell_doubts
     from hil.recording import read_records
 
     if model is None:
-        return read_records(recordings, None, dbc=dbc, tell=tell), None
+        records = read_records(recordings, None, dbc=dbc, tell=tell)
+        tell_doubts(records, recordings, None, None, dbc, tell)
+        return records, None
     file = read_model_for_recordings(model, trust_laws)
     if file.on_bench:
         raise ModelFileError(
             model, "structure | expected a driveline, which torque moves | got 'joint': diagnose or simulate it"
         )
     records = read_records(recordings, file.signals, dbc=dbc, tell=tell)
-    tell_scales(records, recordings, file.model, file.signals, dbc, tell)
+    tell_doubts(records, recordings, file.model, file.signals, dbc, tell)
     _tell_unused(records[0])
     return records, file.model
 

@@ -62,9 +62,9 @@ def look(
     for line in found.signals:
         say(line)
     if model is not None:
-        _tell_scales(file, model, dbc)
+        _tell_doubts(file, model, dbc)
     elif found.roles.torques and found.roles.output is not None:
-        _tell_scales_alone(found, dbc)
+        _tell_doubts_alone(found, dbc)
 
 
 def _look_into_fmu(file: Path, as_json: bool) -> None:
@@ -114,21 +114,21 @@ def _plot(found: Look, model: Path | None, dbc: Path | None) -> None:
         webbrowser.open(page.absolute().as_uri())
 
 
-def _tell_scales(file: Path, model: Path, dbc: Path | None) -> None:
-    """Read a recording by a model file and tell which scale does not fit the model, with the line that cures it."""
+def _tell_doubts(file: Path, model: Path, dbc: Path | None) -> None:
+    """Read a recording by a model file and tell what is doubtful of both, with the line that cures it."""
     from hil.config.model_file import read_model_for_recordings
-    from hil.plants.scales import tell_scales
+    from hil.plants.scales import tell_doubts
     from hil.recording import read_record
 
     known = read_model_for_recordings(model)
     record = read_record(file, known.signals, known.on_bench, dbc, tell)
-    tell_scales([record], [file], known.model, known.signals, dbc, tell)
+    tell_doubts([record], [file], known.model, known.signals, dbc, tell)
 
 
-def _tell_scales_alone(found: Look, dbc: Path | None) -> None:
-    """Read a recording by the lines that were found and tell which scale can't be, with the line that cures it."""
+def _tell_doubts_alone(found: Look, dbc: Path | None) -> None:
+    """Read a recording by the lines that were found and tell what of it is doubtful, with the line that cures it."""
     from hil.config.model_file import signals_of
-    from hil.plants.scales import tell_scales_alone
+    from hil.plants.scales import tell_doubts
     from hil.recording import read_record
 
     signals = signals_of("\n".join(found.signals)) if found.signals else None
@@ -137,7 +137,7 @@ def _tell_scales_alone(found: Look, dbc: Path | None) -> None:
     except RecordingError as error:
         tell(f"by these lines the file can't be read yet: {error}")
         return
-    tell_scales_alone(record, found.path, signals, dbc, tell)
+    tell_doubts([record], [found.path], None, signals, dbc, tell)
 
 
 def _size(found: Look) -> str:

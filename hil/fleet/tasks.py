@@ -10,6 +10,7 @@ import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
+from pathlib import Path
 
 from threadpoolctl import threadpool_limits
 
@@ -24,7 +25,7 @@ from hil.config.model_file import ModelFile
 from hil.errors import HilError
 from hil.fleet.dataset import Row
 from hil.fleet.sources import Found, Seen, seen, side_by_side
-from hil.plants.scales import with_the_line_to_write
+from hil.plants.scales import with_lines, with_the_line_to_write
 from hil.recording import read_records
 from hil.report.diagnosis_json import diagnosis_json
 from hil.report.identification_files import identify_all
@@ -94,7 +95,7 @@ def analyse(recordings: Sequence[Found], job: Job) -> Outcome:
                 made = _identified(records)
             else:
                 with with_the_line_to_write(paths, signals):
-                    made = _diagnosed(records, job.file, job)
+                    made = _diagnosed(records, job.file, job, paths)
     except (HilError, EstimatorError) as error:
         return Outcome({}, "", " ".join((str(error), *getattr(error, "__notes__", ()))))
     head, effects, parameters, verdict = made
@@ -151,8 +152,9 @@ Made = tuple[Row, list[Row], list[Row], str]
 TWO_MASS = ("J_M", "J_L", "k", "c", "b_M", "b_L")
 
 
-def _diagnosed(records: Sequence[Record], file: ModelFile, job: Job) -> Made:
+def _diagnosed(records: Sequence[Record], file: ModelFile, job: Job, paths: Sequence[Path]) -> Made:
     found = diagnose(records, file.model, (), budget_s=job.budget_s, effort=job.effort)
+    found = with_lines(found, paths, file.signals)
     if not found.effort.finished:
         raise HilError(f"expected a diagnosis within {job.budget_s:g} s (--budget-s), got none. Give it more time.")
     content = diagnosis_json(found) | {"timing_s": {}}  # the same on every machine, to the last bit

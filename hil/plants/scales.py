@@ -1,4 +1,4 @@
-"""Scales that do not fit a model, or that a recording shows by itself, named with the line that cures them.
+"""What recordings and model leave doubtful, in the same words for every command, with the line that cures it.
 
 The line is one of ``[signals]``: the factor that was found, times the scale that counts.
 """
@@ -8,13 +8,14 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from estimator.diagnosis.acquisition.chain import as_if_not_lost
-from estimator.diagnosis.preconditions.explanations import are_whole_numbers
-from estimator.diagnosis.preconditions.prepare import require_plausible
-from estimator.diagnosis.preconditions.units import require_plausible_alone
+from estimator.diagnosis.preconditions.channels import standstill
+from estimator.diagnosis.preconditions.plausible import are_whole_numbers
+from estimator.diagnosis.preconditions.prepare import as_moved, doubtful
+from estimator.diagnosis.result import Diagnosis, Doubt
 from estimator.errors import Cure, EstimatorError, Implausible
 from estimator.physics.model import DrivelineModel
 from estimator.signals.record import OutputKind, Record
@@ -26,39 +27,31 @@ from hil.recording.signals_config import OutputSignal, SignalsConfig, TorqueSign
 from hil.recording.table import Table
 
 
-def tell_scales(
+def tell_doubts(
     records: Sequence[Record],
     paths: Sequence[Path],
-    model: DrivelineModel,
+    model: DrivelineModel | None,
     signals: SignalsConfig | None,
     dbc: Path | None,
     tell: Tell,
 ) -> None:
-    """Tell of torque, output or time that is off by a factor or in sign, as ``hil diagnose`` refuses it."""
+    """Tell what is doubtful of recordings, and of their model where there is one, as ``hil diagnose`` has it."""
+    for note in (*as_moved(records)[1], *filter(None, map(standstill, records))):
+        tell(note)
     try:
-        implausible = require_plausible(records, model)
+        doubts = doubtful(records, model)
     except Implausible as error:
-        implausible = [error]
+        doubts = [Doubt("", str(error), 1.0, cure=error.cure)]
     except EstimatorError:
         return  # whatever else is wrong with a recording, who uses it says so
-    for each in implausible:
-        add_the_line_to_write(each, paths, signals, dbc)
-        tell(" ".join((str(each), *getattr(each, "__notes__", ()))))
-
-
-def tell_scales_alone(record: Record, path: Path, signals: SignalsConfig | None, dbc: Path | None, tell: Tell) -> None:
-    """Tell of columns that are swapped, or off in sign or by a unit, as a recording shows it by itself."""
-    try:
-        with with_the_line_to_write([path], signals, dbc):
-            require_plausible_alone(*as_if_not_lost([record]))
-    except Implausible as error:
-        tell(" ".join((str(error), *getattr(error, "__notes__", ()))))
-    if are_whole_numbers(record):
+    for doubt in doubts:
+        tell(_with_line(doubt.statement, doubt.cure, paths, signals, dbc))
+    if model is None and not doubts and are_whole_numbers(records[0]):
         known = signals or SignalsConfig()
-        lines = cure_lines(Cure(record.name, torque=1e-3), known, read_table(path, known.request(dbc)))
+        lines = cure_lines(Cure(records[0].name, torque=1e-3), known, read_table(paths[0], known.request(dbc)))
         tell(
-            f"recording {record.name}: the torques are whole numbers. If they are per mille of the rated torque, as "
-            f"drives send them, write in [signals], each scale times the rated torque in Nm: {'  '.join(lines)}"
+            f"recording {records[0].name}: the torques are whole numbers. If they are per mille of the rated torque, "
+            f"as drives send them, write in [signals], each scale times the rated torque in Nm: {'  '.join(lines)}"
         )
 
 
@@ -70,21 +63,36 @@ def with_the_line_to_write(
     try:
         yield
     except Implausible as error:
-        add_the_line_to_write(error, paths, signals, dbc)
+        if line := line_to_write(error.cure, paths, signals, dbc):
+            error.add_note(f"In [signals] write: {line}")
         raise
 
 
-def add_the_line_to_write(
-    error: Implausible, paths: Sequence[Path], signals: SignalsConfig | None, dbc: Path | None
-) -> None:
-    """Add the lines of ``[signals]`` that cure a recording, where that is known, as a note."""
-    cure = error.cure
+def with_lines(
+    diagnosis: Diagnosis, paths: Sequence[Path], signals: SignalsConfig | None, dbc: Path | None = None
+) -> Diagnosis:
+    """Return a diagnosis whose doubts have the lines that cure them."""
+    doubts = [replace(each, line=line_to_write(each.cure, paths, signals, dbc)) for each in diagnosis.doubts]
+    return replace(diagnosis, doubts=tuple(doubts))
+
+
+def _with_line(
+    text: str, cure: Cure | None, paths: Sequence[Path], signals: SignalsConfig | None, dbc: Path | None
+) -> str:
+    line = line_to_write(cure, paths, signals, dbc)
+    return f"{text} In [signals] write: {line}" if line else text
+
+
+def line_to_write(
+    cure: Cure | None, paths: Sequence[Path], signals: SignalsConfig | None, dbc: Path | None = None
+) -> str:
+    """Return the lines of ``[signals]`` that cure a recording; empty where none are known."""
     path = None if cure is None else next((path for path in paths if path.stem == cure.recording), None)
     if cure is not None and path is not None:
         known = signals or SignalsConfig()
         with suppress(RecordingError):  # the file has changed since it was read
-            table = read_table(path, known.request(dbc))
-            error.add_note("In [signals] write: " + "  ".join(cure_lines(cure, known, table)))
+            return "  ".join(cure_lines(cure, known, read_table(path, known.request(dbc))))
+    return ""
 
 
 def cure_lines(cure: Cure, signals: SignalsConfig, table: Table) -> list[str]:
@@ -95,8 +103,13 @@ def cure_lines(cure: Cure, signals: SignalsConfig, table: Table) -> list[str]:
     if cure.swapped is not None:
         swapped = torques[cure.swapped]
         torques = [*torques[: cure.swapped], TorqueSignal(column=output.column), *torques[cure.swapped + 1 :]]
-        lines = [_torque_line(torques, [None] * len(torques))]
+        lines = [_torque_line(torques, None)]
         return [*lines, f"{kind.value} = {_entry(swapped.column, None, f', at = {_quoted(output.at.value)}')}"]
+    if cure.columns:
+        added = [TorqueSignal(column=each) for each in cure.columns]
+        return [_torque_line([*([] if cure.is_instead else torques), *added], None)]
+    if cure.dropped is not None:
+        return [_torque_line([each for k, each in enumerate(torques) if k != cure.dropped], None)]
     lines = []
     if cure.torque != 1.0:
         inputs = cure.inputs or tuple(range(len(torques)))
@@ -117,8 +130,10 @@ def _scale(table: Table, signal: TorqueSignal | OutputSignal, role: Role) -> flo
     return scale_of(table, signal.column, role, signal.given_scale)
 
 
-def _torque_line(torques: Sequence[TorqueSignal], scales: Sequence[float | None]) -> str:
-    entries = [_entry(torque.column, scale) for torque, scale in zip(torques, scales, strict=True)]
+def _torque_line(torques: Sequence[TorqueSignal], scales: Sequence[float] | None) -> str:
+    """Return the line of the inputs with these scales; without any, each with that which it was given."""
+    given = [torque.given_scale for torque in torques] if scales is None else scales
+    entries = [_entry(torque.column, scale) for torque, scale in zip(torques, given, strict=True)]
     return f"torque = [ {', '.join(entries)} ]"
 
 

@@ -8,8 +8,8 @@ that the model does not hold there, not that the torque was misread; the torque 
 ``torque_okay`` tells only what the acquisition lost (NaN, flagged). Rows that a mask takes out are the choice of
 whoever wrote the model file, and no fault of the acquisition that a diagnosis could find.
 
-What a channel alone says against its role comes last: dead, clipped, named twice, turned against another; row numbers
-as time. `hil look` and `hil diagnose` say the same words, for both read here.
+Inputs of which one counts twice, or that take one another away, are refused last. What else a channel says against its
+role is asked of the `Record`, by ``estimator.diagnosis.preconditions``.
 """
 
 from __future__ import annotations
@@ -17,19 +17,18 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from itertools import combinations
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from estimator.signals.record import Channel, OutputKind, Record
+from estimator.signals.record import Channel, Location, OutputKind, Record
 from hil.errors import RecordingError
 from hil.recording import columns
 from hil.recording.formats import read_table
 from hil.recording.resample import Series, resampled, time_base
-from hil.recording.scales import Role, scale_of, with_sign, wrapped_at
+from hil.recording.scales import Role, scale_of, unit_of, with_sign, wrapped_at
 from hil.recording.signals_config import (
     LoadSignal,
     MaskRange,
@@ -39,6 +38,7 @@ from hil.recording.signals_config import (
     TimeSignal,
     TorqueSignal,
 )
+from hil.recording.survey import looks_like_torque
 from hil.recording.table import FloatArray, Table
 
 SMALLEST, GREATEST = 1e-15, 1e15
@@ -113,8 +113,7 @@ def to_record(table: Table, signals: SignalsConfig, tell: Tell | None = None) ->
     speed = math.copysign(1.0, scale) * numbers[output.column] if kind is OutputKind.SPEED else None
     require_plausible_torques(table, names, acting, speed)
     if tell is not None:
-        doubtful = [*doubts(names, output.column, numbers), *_equal([] if signals.is_own_recording else names, numbers)]
-        for line in (*table.recognised, *remark, *_units_used(table, signals), *doubtful):
+        for line in (*table.recognised, *remark, *_units_used(table, signals)):
             tell(f"{table.path}: {line}")
     masks = {mask: in_mask(numbers[mask.column], mask) for mask in signals.mask}
     flagged = _flagged(table, signals)
@@ -146,7 +145,22 @@ def to_record(table: Table, signals: SignalsConfig, tell: Tell | None = None) ->
         reference_nm=_reference(table, signals),
         load_nm=load_nm,
         channels=tuple(channels),
+        inputs=() if signals.is_own_recording else tuple(names),
+        unused=() if signals.is_own_recording else tuple(_unused(table, signals)),
     )
+
+
+def _unused(table: Table, signals: SignalsConfig) -> Iterator[Channel]:
+    """Yield the columns that look like torques, that move, and that no signal names."""
+    named = {*signals.columns(), signals.time.column}
+    for name, column in table.columns.items():
+        unit = table.units.get(name, "")
+        if name not in named and looks_like_torque(name, column, unit):
+            known = unit_of(unit)
+            values = table.numeric([name])[name] * (1.0 if known is None else known.factor)
+            read = np.isfinite(values)
+            held = _held(values[:, np.newaxis], read[:, np.newaxis])[:, 0]
+            yield Channel(OutputKind.TORQUE, Location.MOTOR, name, held, read)
 
 
 def _cut(table: Table, signals: SignalsConfig) -> tuple[Table, NDArray[np.bool_]]:
@@ -338,13 +352,6 @@ CANCELS: Final = 0.01
 FOLLOWS: Final = 0.3
 """Correlation of a torque's impulse with the change of the speed from which on one follows the other."""
 
-CLIPPED_SHARE: Final = 0.01
-CLIPPED_RUN: Final = 3
-"""A reading is clipped where its greatest or least value stands that often in a row, in that share of the rows."""
-
-DISTINCT: Final = 50
-"""Fewer values are steps of a coarse reading or of a square wave, and their greatest stands for long by itself."""
-
 
 def require_plausible_torques(
     table: Table, names: Sequence[str], values: Mapping[str, FloatArray], speed: FloatArray | None = None
@@ -382,46 +389,3 @@ def _drives(torque: FloatArray, speed: FloatArray) -> float:
     pair = pair[read] - rubs @ np.linalg.lstsq(rubs, pair[read], rcond=None)[0]
     size = float(np.prod(np.linalg.norm(pair, axis=0)))
     return float(pair[:, 0] @ pair[:, 1]) / size if size else 0.0
-
-
-def doubts(torques: Sequence[str], output: str, values: Mapping[str, FloatArray]) -> Iterator[str]:
-    """Say what is odd about the channels that are read; a line each."""
-    for name in (*torques, output):
-        seen = values[name][np.isfinite(values[name])]
-        if seen.size and np.ptp(seen) == 0.0:
-            off = "Was that inverter off, or is the channel dead" if name != output else "Is the sensor dead"
-            yield f"{name}: {seen[0]:g} in every row. {off}?"
-        elif bound := clipped_at(seen):
-            share, value = bound
-            yield f"{name}: {share:.0%} of the rows stand at {value:g}, as a reading that is clipped does"
-
-
-def _equal(torques: Sequence[str], values: Mapping[str, FloatArray]) -> Iterator[str]:
-    """Say which torques are the same; those of a rig of ours are two readings whatever they are."""
-    for first, second in combinations(torques, 2):
-        if np.ptp(values[first]) > 0.0 and np.array_equal(values[first], values[second], equal_nan=True):
-            yield f"{first} and {second}: equal in every row. Is it one channel, logged twice?"
-
-
-def clipped_at(values: FloatArray) -> tuple[float, float] | None:
-    """Return which share of the rows stands at the greatest or least value, and that; else None."""
-    seen = values[np.isfinite(values)]
-    rows = clipped_rows(seen)
-    return (float(rows.mean()), float(seen[rows][0])) if rows.any() else None
-
-
-def clipped_rows(values: FloatArray) -> NDArray[np.bool_]:
-    """Tell which rows stand at the greatest value, or else the least, as a reading that is clipped does; shape (N,)."""
-    clipped = np.zeros(values.size, dtype=np.bool_)
-    seen = values[np.isfinite(values)]
-    if np.unique(seen).size < DISTINCT:
-        return clipped
-    for bound in (float(seen.max()), float(seen.min())):
-        edges = np.diff(np.concatenate([[0], (values == bound).astype(np.int8), [0]]))
-        runs = zip(np.flatnonzero(edges == 1).tolist(), np.flatnonzero(edges == -1).tolist(), strict=True)
-        for first, end in runs:
-            clipped[first:end] = end - first >= CLIPPED_RUN
-        if clipped.sum() > CLIPPED_SHARE * seen.size:
-            return clipped
-        clipped[:] = False
-    return clipped

@@ -92,7 +92,7 @@ def survey_of(tables: Sequence[Table]) -> Survey:
 
 
 def _group(table: Table) -> Group:
-    channels = tuple(_channel(name, column, table.units.get(name, "")) for name, column in table.columns.items())
+    channels = tuple(channel_of(name, column, table.units.get(name, "")) for name, column in table.columns.items())
     time = _time(table, channels)
     if time is None:
         return Group(None, None, False, 0, channels)
@@ -106,7 +106,8 @@ def _group(table: Table) -> Group:
     return Group(time.name, period, even, int((steps > GAP * period).sum()) if straight is None else 0, channels)
 
 
-def _channel(name: str, column: Column, unit: str) -> Channel:
+def channel_of(name: str, column: Column, unit: str) -> Channel:
+    """Return a column in figures."""
     if Kind.of(column) is Kind.TEXT:
         empty = sum(cell in MISSING for cell in column.tolist())
         return Channel(name, unit, "text", int(column.size), empty, None, None, False, None)
@@ -212,6 +213,11 @@ def guesses(channel: Channel) -> list[Guess]:
     if not found and re.fullmatch(ANY_OUTPUT, last) and unit is None:
         found.append(Guess(channel, Role.SPEED, BY_CHANCE))
     return found
+
+
+def looks_like_torque(name: str, column: Column, unit: str) -> bool:
+    """Tell whether a column moves and has the name or the unit of a torque that was read."""
+    return any(guess.role is Role.TORQUE for guess in guesses(channel_of(name, column, unit)))
 
 
 def roles_of(groups: Sequence[Group]) -> Roles:

@@ -21,7 +21,7 @@ from hil.errors import UsageError
 from hil.plants.fmu_plant import FmuPlant, is_fmu
 from hil.plants.plant import ModelPlant, Plant, Trust
 from hil.plants.prepared import known_events, prepare_again
-from hil.plants.scales import tell_scales
+from hil.plants.scales import tell_doubts
 from hil.provenance import Provenance
 from hil.recording import read_records
 from hil.recording.signals import Tell
@@ -185,9 +185,9 @@ def compared(
     prepared: Prepared | None = next((file.prepared for file in files.values() if file.prepared is not None), None)
     read = read_records(recordings, signals, on_bench, dbc, tell)
     if reads is not None:
-        tell_scales(read, recordings, reads.model, signals, dbc, tell)
+        tell_doubts(read, recordings, reads.model, signals, dbc, tell)
     records, unusable = with_usable_channels(prepare_again(read, prepared, tell))
-    for line in unusable:
+    for line in () if reads is not None else unusable:
         tell(line)
     by_model = [_of_model(path, files.get(path), records, recordings, mapped, trust) for path in models]
     return [list(of_recording) for of_recording in zip(*by_model, strict=True)]

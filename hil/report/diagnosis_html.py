@@ -47,11 +47,12 @@ from hil.report.made import facts, made_section
 from hil.report.numbers import listed, p_statement, shown, shown_interval, shown_p, shown_ratio, shown_times
 from hil.report.terminal import rendered
 from hil.report.wording import (
-    BADGES,
     CHECKS,
     ELEMENTS,
     PLACES,
+    badge,
     belief,
+    doubt_lines,
     headline,
     location_rows,
     quantity,
@@ -92,8 +93,8 @@ def diagnosis_page(diagnosis: Diagnosis, made: Provenance | None = None, one_in:
         f"Diagnosis: {headline(diagnosis)}",
         [
             html.header(
-                headline(diagnosis), *_statement(diagnosis, one_in), _tiles(diagnosis), kind=diagnosis.verdict.value,
-                badge=BADGES[diagnosis.verdict], facts=facts(made),
+                headline(diagnosis), *_statement(diagnosis, one_in), _tiles(diagnosis), kind=_kind(diagnosis),
+                badge=badge(diagnosis), facts=facts(made),
             ),
             html.section("Fit", _fit(diagnosis.fit), _further_outputs(diagnosis.fit)),
             _acquired(diagnosis),
@@ -124,8 +125,9 @@ def diagnosis_summary(diagnosis: Diagnosis) -> RenderableType:
     return rendered(
         [
             html.header(
-                headline(diagnosis), html.paragraph(f"Recordings: {names}."), html.paragraph(diagnosis.statement),
-                kind=diagnosis.verdict.value, badge=BADGES[diagnosis.verdict],
+                headline(diagnosis), html.paragraph(f"Recordings: {names}."),
+                *map(html.warning, doubt_lines(diagnosis)), html.paragraph(diagnosis.statement),
+                kind=_kind(diagnosis), badge=badge(diagnosis),
             ),
             _fit(diagnosis.fit),
             _further_outputs(diagnosis.fit),
@@ -139,7 +141,13 @@ def diagnosis_summary(diagnosis: Diagnosis) -> RenderableType:
     )  # fmt: skip
 
 
+def _kind(diagnosis: Diagnosis) -> str:
+    """Return what the head of a page looks like: no verdict's colour while the input is in doubt."""
+    return "unexplained" if diagnosis.doubts else diagnosis.verdict.value
+
+
 def _statement(diagnosis: Diagnosis, one_in: int) -> Iterator[html.Paragraph]:
+    yield from map(html.warning, doubt_lines(diagnosis))
     yield html.paragraph(diagnosis.statement, kind="statement")
     for text in diagnosis.warnings:
         yield html.warning(f"Note: {text}")

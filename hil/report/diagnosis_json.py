@@ -39,6 +39,7 @@ def diagnosis_json(diagnosis: Diagnosis) -> Json:
     unnamed, seen, remainder = diagnosis.unnamed, diagnosis.discrepancy, diagnosis.remainder
     return {
         "schema": SCHEMA,
+        "doubts": [fields_as_json(each, "about", "statement", "odds", "line") for each in diagnosis.doubts],
         **fields_as_json(diagnosis, "verdict", "statement", "mismatch"),
         "effects": [_effect(effect) for effect in diagnosis.effects],
         "rejected": as_json(diagnosis.rejected),

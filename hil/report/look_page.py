@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from estimator.diagnosis.preconditions.channels import clipped
 from estimator.signals.record import FloatArray
 from hil.figures.palette import GREY, ORANGE, PURPLE
 from hil.printable import printable
@@ -16,7 +17,7 @@ from hil.recording.formats import read_table
 from hil.recording.look import Look
 from hil.recording.request import Request
 from hil.recording.scales import Role, scale_of
-from hil.recording.signals import clipped_rows, in_mask
+from hil.recording.signals import in_mask
 from hil.recording.signals_config import MaskRange, SignalsConfig
 from hil.recording.survey import Group
 from hil.recording.table import Table
@@ -95,7 +96,8 @@ def _marks(time_s: FloatArray, values: dict[str, FloatArray], masks: list[MaskRa
     """Mark where a value is missing, stands at the end of its range, or is outside a mask's."""
     for name, each in values.items():
         yield from _spans(time_s, ~np.isfinite(each), ORANGE)
-        yield from _spans(time_s, clipped_rows(each), PURPLE)
+        for found in clipped(name, each, np.isfinite(each)):
+            yield from _spans(time_s, found.rows, PURPLE)
         for mask in masks:
             if mask.column == name:
                 yield from _spans(time_s, ~in_mask(each, mask), GREY)

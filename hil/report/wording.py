@@ -16,6 +16,21 @@ BADGES = {
     Verdict.NO_MISMATCH: "= no mismatch",
 }
 
+DOUBTFUL = "? the input is in doubt"
+
+
+def badge(diagnosis: Diagnosis) -> str:
+    """Return the mark of a verdict; while the input is in doubt, that."""
+    return DOUBTFUL if diagnosis.doubts else BADGES[diagnosis.verdict]
+
+
+def doubt_lines(diagnosis: Diagnosis) -> list[str]:
+    """Return what is doubtful about the input, a text each, with the line that cures it."""
+    return [
+        doubt.statement + (f" In [signals] write: {doubt.line}" if doubt.line else "") for doubt in diagnosis.doubts
+    ]
+
+
 ELEMENTS = {each: each.value.replace("_", " ") for each in Element}
 
 PLACES = {"motor": "motor", "shaft": "shaft", "load": "load", "sensor": "reading"}
@@ -70,6 +85,8 @@ def torque_axis(motion: Motion) -> str:
 
 def headline(diagnosis: Diagnosis) -> str:
     """Say the verdict in one line."""
+    if diagnosis.doubts:
+        return f"Doubtful before all else: {listed([doubt.about for doubt in diagnosis.doubts])}"
     if not diagnosis.effort.finished:
         return f"Not decided: the search was ended after {diagnosis.effort.limit_s:.3g} s"
     found = [f"{_with_look_alikes(effect)}{_sure(effect)}" for effect in diagnosis.effects]

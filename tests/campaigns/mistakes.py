@@ -25,7 +25,7 @@ from estimator.physics.driveline import Start
 from estimator.physics.model import DrivelineModel, Motion
 from estimator.signals.record import FloatArray, OutputKind, Record
 from hil.errors import HilError
-from hil.plants.scales import tell_scales
+from hil.plants.scales import tell_doubts
 from hil.recording import SignalsConfig, read_record
 from tests.estimator.physics.bench import exact_states, model
 
@@ -177,11 +177,11 @@ MISTAKES: dict[str, Mistake] = {
     "period of 5 ms for 10 ms": Mistake("sampling period", signals={"time": {"sample_time_s": 0.005}}),
     "first torque and speed swapped": Mistake("swapped", put(T1=lambda read: read["n"], n=lambda read: read["T1"])),
     "second torque and speed swapped": Mistake("swapped", put(T2=lambda read: read["n"], n=lambda read: read["T2"])),
-    "a dead torque": Mistake("T2: 0 in every row", times(T2=0.0), by_hand=True),
-    "a dead torque, the first": Mistake("T1: 0 in every row", times(T1=0.0), by_hand=True),
-    "a constant torque": Mistake("T2: 42 in every row", put(T2=lambda read: np.full(ROWS, 42.0)), by_hand=True),
-    "a constant speed": Mistake("n: 45 in every row", put(n=lambda read: np.full(ROWS, 45.0)), by_hand=True),
-    "a dead speed": Mistake("n: 0 in every row", times(n=0.0), by_hand=True),
+    "a dead torque": Mistake(r"\(T2\) stays at 0", times(T2=0.0), by_hand=True),
+    "a dead torque, the first": Mistake(r"\(T1\) stays at 0", times(T1=0.0), by_hand=True),
+    "a constant torque": Mistake(r"\(T2\) stays at 42", put(T2=lambda read: np.full(ROWS, 42.0)), by_hand=True),
+    "a constant speed": Mistake("speed is constant at 45", put(n=lambda read: np.full(ROWS, 45.0)), by_hand=True),
+    "a dead speed": Mistake("speed is constant at 0", times(n=0.0), by_hand=True),
     "one column named twice": Mistake("twice", signals={"torque": [{"column": "T1"}, {"column": "T1"}]}, by_hand=True),
     "one channel logged twice": Mistake("equal in every row", put(T2=lambda read: read["T1"]), by_hand=True),
     "a clipped speed": Mistake("clipped|cut off", put(n=lambda read: np.minimum(read["n"], 50.0)), by_hand=True),
@@ -266,7 +266,7 @@ def said_of(path: Path, signals: Mapping[str, Any], line: DrivelineModel) -> tup
         record = read_record(path, config, tell=said.append)
     except HilError as error:
         return "\n".join([*said, str(error)]), None
-    tell_scales([record], [path], line, config, None, said.append)
+    tell_doubts([record], [path], line, config, None, said.append)
     return "\n".join(said), record
 
 

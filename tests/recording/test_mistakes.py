@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from hil.plants.scales import tell_scales
+from hil.plants.scales import tell_doubts
 from hil.recording import SignalsConfig, read_record
 from tests.campaigns.mistakes import BUS_NOMINAL, MISTAKES, RIG_NOMINAL, SIGNALS, csv, driven, judge
 from tests.estimator.physics.bench import model, scaled
@@ -32,7 +32,7 @@ def test_of_a_recording_that_is_right_nothing_is_said(of: str, tmp_path: Path) -
     signals = SignalsConfig.model_validate(SIGNALS)
     record = read_record(path, signals, tell=said.append)
     nominal = RIG_NOMINAL if of == "rig" else BUS_NOMINAL
-    tell_scales([record], [path], model(nominal), signals, None, said.append)
+    tell_doubts([record], [path], model(nominal), signals, None, said.append)
     assert said == []
 
 
@@ -41,5 +41,5 @@ def test_a_payload_of_the_vehicle_again_is_no_mistake(tmp_path: Path) -> None:
     path.write_text(csv({name: driven("tip")[name] for name in ("t", "T1", "T2", "n")}), "utf-8")
     said: list[str] = []
     signals = SignalsConfig.model_validate(SIGNALS)
-    tell_scales([read_record(path, signals)], [path], model(scaled(BUS_NOMINAL, J_L=0.5)), signals, None, said.append)
+    tell_doubts([read_record(path, signals)], [path], model(scaled(BUS_NOMINAL, J_L=0.5)), signals, None, said.append)
     assert said == []

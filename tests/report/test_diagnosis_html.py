@@ -6,7 +6,7 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from estimator.diagnosis.result import Diagnosis, Mismatch, OffNominal, Trace, UnnamedLaw, Verdict
+from estimator.diagnosis.result import Diagnosis, Doubt, Mismatch, OffNominal, Trace, UnnamedLaw, Verdict
 from estimator.physics.effect import Element
 from hil.report.diagnosis_html import MOST_DRAWN, diagnosis_page, interval_bar
 from hil.report.page import IntervalBar
@@ -210,3 +210,14 @@ def test_share_and_probability_of_an_effect_are_shown(diagnosis: Diagnosis) -> N
     page = diagnosis_page(diagnosis)
     assert page.count("% of the squared error explained") == 1
     assert "94% of the squared error explained; probability 99.9 % that it or a look-alike is there. Evidence:" in page
+
+
+def test_an_open_doubt_comes_first_without_tick_or_percentage(diagnosis: Diagnosis) -> None:
+    doubt = Doubt("tip", "recording tip is implausible: it fits an inertia 1.53 times the nominal", 0.7, "scale = 2")
+    effects = tuple(replace(effect, probability=float("nan")) for effect in diagnosis.effects)
+    page = diagnosis_page(replace(diagnosis, doubts=(doubt,), effects=effects))
+    text = page[page.index("<body") :]
+    assert "✓" not in text.split("<h2")[0]
+    assert "% sure" not in text
+    assert text.index("1.53 times the nominal") < text.index(diagnosis.statement[:20])
+    assert "In [signals] write: scale = 2" in text

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from itertools import combinations, pairwise
 
 import numpy as np
 
@@ -133,20 +133,57 @@ def _torques(record: Record) -> list[str]:
         "the rows. If the drive limited it, the reading is right; if the reading is cut off, the verdict can't be "
         "trusted: mask these rows ([signals] mask) or widen the range."
         for i in range(record.torque_nm.shape[1])
-        for found in clipped(f"torque input {i + 1}", record.torque_nm[:, i], trusted[:, i])
+        for found in clipped(record.input(i), record.torque_nm[:, i], trusted[:, i])
     ]
 
 
+def dead_rows(torque: FloatArray, sample_time_s: float) -> BoolArray:
+    """Tell where a torque stands still for long, of one that elsewhere hardly ever does."""
+    ends = np.flatnonzero(np.diff(torque) != 0.0) + 1
+    spans = np.diff([0, *ends.tolist(), torque.size])
+    long = spans * sample_time_s >= DEAD_S
+    dead = np.repeat(long, spans)
+    return dead if np.count_nonzero(long) == 1 and not dead.all() else np.zeros(torque.size, dtype=np.bool_)
+
+
 def dead_torques(record: Record) -> list[str]:
-    """Say which of several torques never changes."""
+    """Say which of several torques never changes, and which are one channel twice."""
     inputs = record.torque_nm.T if record.torque_nm.shape[1] > 1 else ()
-    return [
-        f"recording {record.name}: torque input {i + 1} stays at {values[0]:g}. If its inverter did not work, that is "
+    twice = [
+        f"recording {record.name}: {record.input(i)} and {record.input(k)} are equal in every row. Is it one channel, "
+        "logged twice?"
+        for i, k in combinations(range(len(inputs)), 2)
+        if record.inputs and np.ptp(inputs[i]) > 0.0 and np.array_equal(inputs[i], inputs[k])
+    ]
+    for i, torque in enumerate(record.torque_nm.T):
+        if (rows := dead_rows(torque, record.sample_time_s)).any():
+            twice.append(
+                f"recording {record.name}: {record.input(i)} stands still at {torque[rows][0]:g} from "
+                f"{record.time_s[rows][0]:.4g} to {record.time_s[rows][-1]:.4g} s. If its inverter was off there, that "
+                "is right; if the channel was dead, leave that stretch out ([signals] from_s, to_s or stretches)."
+            )
+    return twice + [
+        f"recording {record.name}: {record.input(i)} stays at {values[0]:g}. If its inverter did not work, that is "
         "right; if the channel is dead, noise, values and verdict can't be trusted: what was not read counts as noise "
         "and as missing physics."
         for i, values in enumerate(inputs)
         if np.ptp(values) == 0.0
     ]
+
+
+def standstill(record: Record) -> str:
+    """Say of a recording whose output never changes what that means; empty for any other."""
+    seen, torque = record.output[record.okay], record.total_torque_nm[record.okay]
+    if record.imposed is not None or not seen.size or np.ptp(seen) > 0.0:
+        return ""
+    what = f"recording {record.name}: the {record.kind.value} is constant at {seen[0]:g}, expected it to vary"
+    turns = record.kind is OutputKind.SPEED and seen[0] != 0.0
+    if turns or not np.ptp(torque) > 0.0:
+        return f"{what}: is its sensor dead? Excite the driveline (PRBS, reversal, tip-in) and check the channel."
+    return (
+        f"{what}: under torques of up to {np.abs(torque).max():.3g} Nm the line is held (brake, parking lock) by at "
+        "least that much, or the sensor is dead. Release what holds it, and check the channel."
+    )
 
 
 FEWEST_GOOD = 0.5  # share of the recording's good rows that a channel must have read

@@ -10,9 +10,10 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 from scipy.signal import detrend
 
+from estimator.errors import BadModel
 from estimator.physics.driveline import Start
-from estimator.physics.layout import Grid, flat
-from estimator.physics.model import DrivelineModel, Structure, natural_frequencies_rad_s
+from estimator.physics.layout import Grid, flat, grid_for
+from estimator.physics.model import DrivelineModel, Parameter, Structure, natural_frequencies_rad_s
 from estimator.physics.motion import measured_speed
 from estimator.physics.simulate import simulate
 from estimator.signals.record import FloatArray, Record
@@ -78,41 +79,114 @@ STRETCH_S = 1.0  # over which the change of speed is looked at
 FEWEST_STEPS = 10  # samples of a stretch at least
 FEWEST_STRETCHES = 10  # stretches that a recording must hold to say anything: the regression has three unknowns
 
-BODY_TELLS = 0.9
-"""Share of the speed's changes that the torque must account for. Where a road or a brake moves the line and a control
-sets the torque it is below 0.6, in tip-ins and reversals above."""
+TELLS = 0.25
+"""Share of the motion that may be left unexplained by torque and line where they tell an inertia. Where a road or a
+brake moves the line and a control sets the torque it is above 0.4, in tip-ins and under a PRBS below 0.2."""
+
+ONE_WAY = 0.8
+"""Share of the cross-spectrum that must have one sign: where the output is late by more, its direction is not told."""
+
+JOINT = 0.5  # no inertia makes a joint linear: what stiffens and rubs leaves twice as much
+LONGEST_LAG_S = 2.0  # that is looked for between torque and output
 
 
 @dataclass(frozen=True, slots=True)
 class Inertia:
-    """The inertia that a recording fits over the nominal one, negative where the speed falls with the torque."""
+    """The inertia that a recording fits over the nominal one, negative where the speed falls with the torque.
+
+    ``rest`` is the share of the motion that does not follow from the torque, ``log_ratio`` the logarithm of the ratio
+    of the inertias seen below and above the first mode. Of a joint it is the torque that the motion takes.
+    """
 
     ratio: float
-    share: float
+    rest: float
     log_ratio: float = math.nan
 
+    @property
+    def tells(self) -> bool:
+        """Whether enough of the motion follows from the torque for the ratio to mean anything."""
+        return self.rest <= TELLS and self.ratio != 0.0
 
-NOTHING = Inertia(math.nan, 0.0)
+
+NOTHING = Inertia(math.nan, 1.0)
+
+BODY = DrivelineModel(Structure.ONE_MASS, {"J_M": Parameter(1.0, 0.0), "b_M": Parameter(0.0, 0.0)})
+"""What any line is as a whole, where no model is known; its inertia says nothing."""
 
 
-def fitted_inertia(record: Record, line: DrivelineModel, grid: Grid | None) -> Inertia | None:
+def fitted_inertia(record: Record, line: DrivelineModel) -> Inertia:
+    """Return the inertia that a recording fits: by both bands of a line with a mode, and as one body."""
+    if record.imposed is not None:
+        return _of_joint(record, line)
     first_hz = float(natural_frequencies_rad_s(line.values())[0]) / (2.0 * math.pi)
-    log_ratio, found = math.nan, as_one_body(record, line, first_hz)
+    log_ratio, found, grid = math.nan, as_one_body(record, line, first_hz), _grid_or_none(record, line)
     if grid is not None and 0.0 < ABOVE[0] * first_hz < 0.5 / record.sample_time_s:
-        below, above = (by_band(record, line, grid, low * first_hz, high * first_hz) for low, high in (BELOW, ABOVE))
-        if min(below.share, above.share) >= BANDS_TELL:
+        below = by_band(record, line, grid, BELOW[0] * first_hz, BELOW[1] * first_hz, ONE_WAY)
+        above = by_band(record, line, grid, ABOVE[0] * first_hz, ABOVE[1] * first_hz)
+        if max(below.rest, above.rest) <= 1.0 - BANDS_TELL:
             log_ratio = math.log(abs(below.ratio / above.ratio))
+            mean = math.copysign(math.sqrt(abs(below.ratio * above.ratio)), below.ratio)
+            if found.tells and abs(math.log(abs(found.ratio / mean))) > math.log(AGREE):
+                return replace(found, log_ratio=math.log(abs(found.ratio / above.ratio)))  # a load too heavy to show
             if abs(log_ratio) <= math.log(AGREE):
-                mean = math.copysign(math.sqrt(abs(below.ratio * above.ratio)), below.ratio)
-                return Inertia(mean, max(below.share, found.share), log_ratio)  # comparable with that of one body alone
-    return replace(found, log_ratio=log_ratio) if found.share >= BODY_TELLS else None
+                return Inertia(mean, min(below.rest, found.rest), log_ratio)  # comparable with that of one body alone
+    return replace(found, log_ratio=log_ratio)
 
 
-def by_band(record: Record, line: DrivelineModel, grid: Grid, low_hz: float, high_hz: float) -> Inertia:
-    """Return the ratio of inertias by which the nominal answer to the torque is too large in a band."""
-    model = driven(record, line, grid, 0.5 * low_hz, 2.0 * high_hz)
+def _of_joint(record: Record, line: DrivelineModel) -> Inertia:
+    """Return the torque that an imposed motion takes over what the nominal stiffness and damping make of it."""
+    values, twist = line.values(), record.imposed
+    assert twist is not None  # noqa: S101 - the caller asks of joints alone
+    parts = twist, np.gradient(twist, record.sample_time_s)
+    nominal = values["k"] * parts[0] + values["c"] * parts[1]
+    nominal, taken = (each[record.okay] - each[record.okay].mean() for each in (nominal, record.output))
+    power, both = float(nominal @ nominal), float(nominal @ taken)
+    rest = _rest(
+        taken, np.column_stack([each[record.okay] for each in (*parts, np.sign(parts[1]), np.ones(twist.size))])
+    )
+    return Inertia(both / power, JOINT * float(rest @ rest) / float(taken @ taken)) if both != 0.0 else NOTHING
+
+
+def _grid_or_none(record: Record, line: DrivelineModel) -> Grid | None:
+    """Return how a line is simulated; None where its modes can't be with the recording: then it is one body."""
+    try:
+        return grid_for(line, [record])
+    except BadModel:
+        return None
+
+
+def lag_of(record: Record, line: DrivelineModel) -> float | None:
+    """Return by how much the output is late against the nominal answer to the torque [s]; None where nothing tells."""
+    grid = _grid_or_none(record, line)
+    if grid is None or record.imposed is not None:
+        return None
+    signals = (np.diff(each) for each in (_bridged(record), driven(record, line, grid)))
+    Y, M = (np.fft.rfft(detrend(each) * np.hanning(each.size), 2 * each.size) for each in signals)
+    first_hz = float(natural_frequencies_rad_s(line.values())[0]) / (2.0 * math.pi)
+    together = Y * M.conj()
+    if first_hz > 0.0:  # where the mode rings, any whole period of it fits
+        together[np.fft.rfftfreq(2 * record.okay.size - 2, record.sample_time_s) > BELOW[1] * first_hz] = 0.0
+    likeness = np.fft.irfft(together)
+    most = min(round(LONGEST_LAG_S / record.sample_time_s), likeness.size // 4)
+    lags = np.arange(-most, most + 1)
+    best = int(lags[np.argmax(likeness[lags])])
+    return best * record.sample_time_s if abs(best) < most else None
+
+
+def _bridged(record: Record) -> FloatArray:
     good = np.flatnonzero(record.okay)
-    output = np.interp(np.arange(model.size), good, record.output[good])
+    return np.interp(np.arange(record.okay.size), good, record.output[good])
+
+
+def by_band(
+    record: Record, line: DrivelineModel, grid: Grid, low_hz: float, high_hz: float, least: float = 0.0
+) -> Inertia:
+    """Return the ratio of inertias by which the nominal answer to the torque is too large in a band.
+
+    Nothing, where less than a share of the cross-spectrum has one sign.
+    """
+    model = driven(record, line, grid, 0.5 * low_hz, 2.0 * high_hz)
+    output = _bridged(record)
     frequency = np.fft.rfftfreq(model.size, record.sample_time_s)
     band = (frequency >= low_hz) & (frequency < high_hz)
     Y, M = (np.fft.rfft(detrend(signal) * np.hanning(signal.size))[band] for signal in (output, model))
@@ -125,8 +199,9 @@ def by_band(record: Record, line: DrivelineModel, grid: Grid, low_hz: float, hig
     total = float((np.abs(Y) ** 2).sum())
     if not (power > 0.0).all() or total == 0.0:
         return NOTHING
-    ratio = float(power.sum() / np.abs(cross).sum())
-    return Inertia(math.copysign(ratio, float(cross.real.sum())), float((np.abs(cross) ** 2 / power).sum()) / total)
+    ratio, one_way = float(power.sum() / np.abs(cross).sum()), float(cross.real.sum() / np.abs(cross).sum())
+    share = float((np.abs(cross) ** 2 / power).sum()) / total
+    return Inertia(math.copysign(ratio, one_way), 1.0 - share if abs(one_way) >= least else 1.0)
 
 
 def as_one_body(record: Record, line: DrivelineModel, first_hz: float) -> Inertia:
@@ -148,7 +223,7 @@ def as_one_body(record: Record, line: DrivelineModel, first_hz: float) -> Inerti
     if inverse == 0.0 or not without @ without > 0.0:
         return NOTHING
     total = sum(value for name, value in line.values().items() if name.startswith("J"))
-    return Inertia(1.0 / (inverse * total), 1.0 - float(rest @ rest) / float(without @ without))
+    return Inertia(1.0 / (inverse * total), float(rest @ rest) / float(without @ without))
 
 
 def _integrals(record: Record) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -15,17 +15,17 @@ from scipy.signal import detrend
 from estimator.diagnosis.acquisition.chain import as_if_not_lost
 from estimator.diagnosis.acquisition.finding import runs
 from estimator.diagnosis.noise import noise_floor, share_of
-from estimator.diagnosis.preconditions.channels import unwrapped, with_usable_channels, without_clipped
+from estimator.diagnosis.preconditions.channels import standstill, unwrapped, with_usable_channels, without_clipped
 from estimator.diagnosis.preconditions.inertia import driven, model_warnings
-from estimator.diagnosis.preconditions.units import require_plausible_units
-from estimator.diagnosis.result import Diagnosis
-from estimator.diagnosis.segments import Cut, cut, joined
-from estimator.errors import BadShape, Implausible, NotExciting, made_of_each
+from estimator.diagnosis.preconditions.plausible import doubts_about
+from estimator.diagnosis.result import Diagnosis, Doubt
+from estimator.diagnosis.segments import Cut, cut, joined, segments
+from estimator.errors import BadShape, NotExciting, made_of_each
 from estimator.physics.layout import Grid, grid_for
 from estimator.physics.model import DrivelineModel, Structure, natural_frequencies_rad_s
 from estimator.physics.parallel import TimeIsUp
 from estimator.physics.simulate import output_state
-from estimator.signals.record import BoolArray, FloatArray, OutputKind, Record, separated_outputs
+from estimator.signals.record import BoolArray, Channel, FloatArray, OutputKind, Record, separated_outputs, sliced
 
 FEWEST_IN_A_ROW = 20
 """Samples in a row that count: by chance two in three of the steps between them would have to be alike."""
@@ -199,8 +199,13 @@ def thin(record: Record, factor: int) -> Record:
         imposed=None if record.imposed is None else record.imposed[kept],
         reference_nm=None if record.reference_nm is None else _blocks(record.reference_nm, factor).mean(axis=1),
         load_nm=None if record.load_nm is None else _blocks(record.load_nm, factor).mean(axis=1),
-        channels=tuple(replace(each, output=each.output[kept], okay=each.okay[kept]) for each in record.channels),
+        channels=_kept(record.channels, kept),
+        unused=_kept(record.unused, kept),
     )
+
+
+def _kept(channels: Sequence[Channel], rows: slice) -> tuple[Channel, ...]:
+    return tuple(replace(each, output=each.output[rows], okay=each.okay[rows]) for each in channels)
 
 
 def _blocks(values: NDArray[Any], factor: int) -> NDArray[Any]:
@@ -227,14 +232,16 @@ def require_signals(record: Record) -> None:
             (record.name,),
         )
     driven_by = ("torque", record.total_torque_nm) if record.imposed is None else ("imposed motion", record.imposed)
+    still = standstill(record)
     for what, values in (driven_by, ("output", record.output)):
         seen = values[record.okay]
-        if float(np.ptp(seen)) == 0.0:
-            raise NotExciting(
+        if not still and float(np.ptp(seen)) == 0.0:
+            still = (
                 f"recording {record.name}: the {what} is constant at {seen[0]:g}, expected it to vary. "
-                "Excite the driveline (PRBS, reversal, tip-in) and check the channel.",
-                (record.name,),
+                "Excite the driveline (PRBS, reversal, tip-in) and check the channel."
             )
+    if still:
+        raise NotExciting(still, (record.name,))
 
 
 def require_excitation(records: Sequence[Record], model: DrivelineModel) -> list[str]:
@@ -334,11 +341,24 @@ class Prepared:
     holdout: tuple[Record, ...]
     warnings: tuple[str, ...]
     segments: Cut
+    doubts: tuple[Doubt, ...] = ()
 
     def finished(self, diagnosis: Diagnosis) -> Diagnosis:
-        """Return a diagnosis of these records under the recordings' own names, with the warnings."""
+        """Return a diagnosis of these records under the recordings' own names, with doubts and warnings.
+
+        The one place that decides what a doubt does: it comes first, and with one open no probability is given.
+        """
         whole = joined(diagnosis, self.segments)
-        return replace(whole, warnings=(*self.warnings, *whole.warnings))
+        whole = replace(whole, warnings=(*self.warnings, *whole.warnings))
+        if not self.doubts:
+            return whole
+        about = ", ".join(doubt.about for doubt in self.doubts)
+        return replace(
+            whole,
+            doubts=self.doubts,
+            statement=f"The input is in doubt (recordings: {about}). If it is right all the same: {whole.statement}",
+            effects=tuple(replace(effect, probability=math.nan) for effect in whole.effects),
+        )
 
 
 def as_moved(records: Sequence[Record]) -> tuple[list[Record], list[str]]:
@@ -350,23 +370,18 @@ def as_moved(records: Sequence[Record]) -> tuple[list[Record], list[str]]:
     return mended, warnings
 
 
-def require_plausible(records: Sequence[Record], model: DrivelineModel) -> list[Implausible]:
-    """Refuse recordings that can't be of a model, as a diagnosis does, and return what is doubtful."""
+def doubtful(records: Sequence[Record], model: DrivelineModel | None) -> list[Doubt]:
+    """Ask of recordings as they were read whether they can be of one drive, and of a model where there is one.
+
+    The longest stretch of each is asked. Raises `Implausible` where they can't be.
+    """
     mended, _ = as_moved(records)
-    return _plausible(cut(thinned(mended, model)), model)
+    thin_ones = mended if model is None else thinned(mended, model)
+    return doubts_about(as_if_not_lost([_longest(record) for record in thin_ones]), model)
 
 
-def _plausible(segments: Cut, model: DrivelineModel) -> list[Implausible]:
-    """Refuse segments that can't be of a model by their recordings' names, and return what is doubtful."""
-
-    def of_recording(found: Implausible) -> Implausible:
-        cure = found.cure
-        return Implausible(str(found), cure and replace(cure, recording=segments.origin[cure.recording]))
-
-    try:
-        return [of_recording(doubt) for doubt in require_plausible_units(as_if_not_lost(segments.records), model)]
-    except Implausible as error:
-        raise of_recording(error) from None
+def _longest(record: Record) -> Record:
+    return sliced(record, max(segments(record), key=lambda rows: int(record.okay[rows].sum())))
 
 
 def prepare(records: Sequence[Record], model: DrivelineModel, holdout: Sequence[Record] = ()) -> Prepared:
@@ -378,15 +393,15 @@ def prepare(records: Sequence[Record], model: DrivelineModel, holdout: Sequence[
             output_state(each, model.structure)
     made_of_each(mended, require_signals, NotExciting, NotExciting)
     names = [record.name for record in records]
-    segments, few = with_room(cut(thinned(mended, model)), names)
-    training = segments.of(names)
+    pieces, few = with_room(cut(thinned(mended, model)), names)
+    training = pieces.of(names)
     if not training:
-        raise NotExciting(" ".join(segments.warnings), tuple(names))
+        raise NotExciting(" ".join(pieces.warnings), tuple(names))
     try:
-        doubts = [str(doubt) for doubt in _plausible(segments, model)]
+        doubts = doubtful([*records, *holdout], model)
         unexcited = require_excitation(as_if_not_lost(training), model)
     except TimeIsUp:  # nothing will be decided in any case
         doubts, unexcited = [], ["whether units and excitation are plausible was not looked at: the time was up"]
-    warnings += [*doubts, *model_warnings(model), *segments.warnings, *few, *unexcited]
-    unseen = segments.of(record.name for record in holdout)
-    return Prepared(training, unseen, tuple(warnings), segments)
+    warnings += [*model_warnings(model), *pieces.warnings, *few, *unexcited]
+    unseen = pieces.of(record.name for record in holdout)
+    return Prepared(training, unseen, tuple(warnings), pieces, tuple(doubts))

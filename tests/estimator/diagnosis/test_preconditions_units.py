@@ -9,10 +9,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.diagnosis.preconditions.units import BEYOND, require_plausible_units
+from estimator.diagnosis.preconditions.plausible import BEYOND, doubts_about
 from estimator.errors import Implausible
 from estimator.physics.driveline import Start
 from estimator.physics.effect import Element
+from estimator.physics.model import DrivelineModel
 from estimator.signals.record import FloatArray, OutputKind, Record
 from tests.estimator.diagnosis.planted import Moved, recordings
 from tests.estimator.physics.bench import ONE_MASS, TWO_MASS, linear_record, model, random_steps, scaled
@@ -62,7 +63,7 @@ WRONG: dict[str, tuple[Change, str]] = {
 def test_a_factor_is_refused_by_name(fault: str, values: dict[str, float]) -> None:
     change, said = WRONG[fault]
     with pytest.raises(Implausible) as refusal:
-        require_plausible_units([change(drive(values))], model(values))
+        doubts_about([change(drive(values))], model(values))
     assert str(refusal.value).startswith("recording run is implausible: ")
     assert said in str(refusal.value)
 
@@ -71,19 +72,19 @@ def test_a_factor_is_refused_by_name(fault: str, values: dict[str, float]) -> No
 def test_a_position_in_other_units(direction: float) -> None:
     wrong = output(1e3**direction)(drive(kind=OutputKind.POSITION))
     with pytest.raises(Implausible, match=r"is the (output in thousandths|torque in mNm)"):
-        require_plausible_units([wrong], model(TWO_MASS))
+        doubts_about([wrong], model(TWO_MASS))
 
 
 @pytest.mark.parametrize("values", [TWO_MASS, ONE_MASS], ids=["two masses", "one mass"])
 @pytest.mark.parametrize("kind", [OutputKind.SPEED, OutputKind.POSITION])
 def test_right_units_pass(values: dict[str, float], kind: OutputKind) -> None:
-    require_plausible_units([drive(values, kind)], model(values))
+    doubts_about([drive(values, kind)], model(values))
 
 
 @pytest.mark.parametrize("name", sorted(TWO_MASS))
 @pytest.mark.parametrize("factor", [0.8, 1.0 / 0.8])
 def test_nominal_values_that_are_off_pass(name: str, factor: float) -> None:
-    require_plausible_units([drive()], model(scaled(TWO_MASS, **{name: factor})))
+    doubts_about([drive()], model(scaled(TWO_MASS, **{name: factor})))
 
 
 LAWS: dict[str, tuple[Element, Callable[[Moved], FloatArray], float]] = {
@@ -97,7 +98,7 @@ LAWS: dict[str, tuple[Element, Callable[[Moved], FloatArray], float]] = {
 
 @pytest.mark.parametrize("law", LAWS)
 def test_missing_physics_passes(law: str) -> None:
-    assert require_plausible_units(recordings(*LAWS[law]), model(TWO_MASS)) == []
+    assert doubts_about(recordings(*LAWS[law]), model(TWO_MASS)) == []
 
 
 @pytest.mark.parametrize(("factor", "refused"), [(0.95, False), (1.05, True)])
@@ -106,9 +107,9 @@ def test_the_tolerance_widens_what_is_plausible(factor: float, refused: bool) ->
     wrong = output(1.0 / (1.5 * BEYOND * factor))(drive(ONE_MASS))
     if refused:
         with pytest.raises(Implausible):
-            require_plausible_units([wrong], model(ONE_MASS, 0.5))
+            doubts_about([wrong], model(ONE_MASS, 0.5))
     else:
-        require_plausible_units([wrong], model(ONE_MASS, 0.5))
+        doubts_about([wrong], model(ONE_MASS, 0.5))
 
 
 def lessened(change: Callable[[FloatArray], FloatArray], values: dict[str, float]) -> Record:
@@ -128,10 +129,16 @@ OF_THE_TORQUE_PATH: dict[str, Callable[[FloatArray], FloatArray]] = {
 @pytest.mark.parametrize("name", OF_THE_TORQUE_PATH)
 def test_what_a_torque_path_does_is_not_refused_as_a_unit(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     line, record = model(TWO_MASS), lessened(OF_THE_TORQUE_PATH[name], TWO_MASS)
-    require_plausible_units([record], line)
-    monkeypatch.setattr("estimator.diagnosis.preconditions.units._of_the_torque_path", lambda record: ())
-    with pytest.raises(Implausible):
-        require_plausible_units([record], line)
+    assert doubts_about([record], line) == []
+    monkeypatch.setattr("estimator.diagnosis.preconditions.candidates._of_physics", lambda records, line: ())
+    assert is_doubted(record, line)
+
+
+def is_doubted(record: Record, line: DrivelineModel) -> bool:
+    try:
+        return bool(doubts_about([record], line))
+    except Implausible:
+        return True
 
 
 def in_per_mille(rated_nm: float) -> Change:
@@ -168,7 +175,7 @@ CURES: dict[str, tuple[Change, dict[str, object]]] = {
 def test_a_refusal_says_what_to_correct(fault: str) -> None:
     change, expected = CURES[fault]
     with pytest.raises(Implausible) as refusal:
-        require_plausible_units([change(drive())], model(TWO_MASS))
+        doubts_about([change(drive())], model(TWO_MASS))
     cure = refusal.value.cure
     assert cure is not None
     wanted = {
@@ -189,7 +196,7 @@ def test_a_refusal_says_what_to_correct(fault: str) -> None:
 @pytest.mark.parametrize("values", [TWO_MASS, ONE_MASS], ids=["two masses", "one mass"])
 def test_per_mille_of_a_rated_torque_are_reported_with_their_scale(rated_nm: float, values: dict[str, float]) -> None:
     with pytest.raises(Implausible, match="whole per mille of a rated torque") as refusal:
-        require_plausible_units([in_per_mille(rated_nm)(drive(values))], model(values))
+        doubts_about([in_per_mille(rated_nm)(drive(values))], model(values))
     assert refusal.value.cure is not None
     assert refusal.value.cure.torque == pytest.approx(rated_nm / 1e3, rel=0.2)
 
@@ -202,4 +209,4 @@ def test_a_torque_turned_round_is_reported_where_the_inertia_is_hardly_off() -> 
     moved = linear_record(TWO_MASS, acting.sum(axis=1), Start(0.0, 0.0, 0.0, 0.0, 0.0), sigma=0.02)
     read = replace(record, torque_nm=acting * np.array([1.0, -1.0]), output=moved.output)
     with pytest.raises(Implausible, match="sign of torque input 2"):
-        require_plausible_units([read], model(TWO_MASS))
+        doubts_about([read], model(TWO_MASS))
