@@ -91,12 +91,12 @@ def looks_like(table: Table, slope: float) -> str:
         shapes.append((f"a limit of {top:.3g} Nm", _limited(top, total, x)))
     best, text = 1.0, ""
     for name, shape in shapes:
-        column = shape(x)
+        column = shape(x) / room
         weight = float(column @ column)
         if weight <= 0.0:
             continue
-        factor = float(column @ total) / weight if "limit" not in name else 1.0
-        worst = float(np.max(np.abs(factor * column - total) / room))
+        factor = float(column @ (total / room)) / weight if "limit" not in name else 1.0
+        worst = float(np.max(np.abs(factor * column - total / room)))
         if worst <= best:
             best, text = worst, name
     return text
@@ -122,7 +122,7 @@ def _drag(x: FloatArray, total: FloatArray, room: FloatArray) -> str:
     best, text = 1.0, ""
     for name, function in known.items():
         columns = np.column_stack([function(x), np.ones_like(x)])  # a constant is the load's
-        found = np.linalg.lstsq(columns, total, rcond=None)[0]
+        found = np.linalg.lstsq(columns / room[:, None], total / room, rcond=None)[0]
         worst = float(np.max(np.abs(columns @ found - total) / room))
         if worst <= best and not math.isclose(float(found[0]), 0.0, abs_tol=1e-12):
             best, text = worst, f"{name} of {found[0]:.3g} Nm" if name == "dry friction" else name
