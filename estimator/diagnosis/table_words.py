@@ -18,6 +18,9 @@ WITHIN = 0.02
 SIZES = np.linspace(0.01, 0.9, 90)
 """Halves of a dead band that are tried, as shares of the knots' reach."""
 
+RETUNED = 0.2
+"""How far the slope behind a dead band may be from the line's own: a steeper one would make the band wider."""
+
 AT_LIMIT, FEWEST_AT_LIMIT = 0.95, 3
 """Share of the largest torque from which a knot is at a limit, and how many knots have to be."""
 
@@ -95,7 +98,8 @@ def looks_like(table: Table, slope: float) -> str:
         weight = float(column @ column)
         if weight <= 0.0:
             continue
-        factor = float(column @ (total / room)) / weight if "limit" not in name else 1.0
+        factor = float(column @ (total / room)) / weight
+        factor = 1.0 if "limit" in name else min(max(factor, (1.0 - RETUNED) * slope), (1.0 + RETUNED) * slope)
         worst = float(np.max(np.abs(factor * column - total / room)))
         if worst <= best:
             best, text = worst, name
