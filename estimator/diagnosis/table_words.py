@@ -15,6 +15,8 @@ from estimator.signals.record import FloatArray
 WITHIN = 0.02
 """How far off its values a curve may be described, as a share of the torque it spans, where its band is narrower."""
 
+WIDEST = 0.1  # the same where the band is wider: any law lies within one that is as wide as the curve
+
 SIZES = np.linspace(0.01, 0.9, 90)
 """Halves of a dead band that are tried, as shares of the knots' reach."""
 
@@ -49,7 +51,8 @@ def _total(table: Table, slope: float) -> tuple[FloatArray, FloatArray, FloatArr
     half = np.zeros(x.size)
     if table.ci95 is not None:
         half = 0.5 * np.array([high - low for low, high in table.ci95])
-    return x, total, np.maximum(half, WITHIN * float(np.ptp(total)))
+    span = float(np.ptp(total))
+    return x, total, np.clip(half, WITHIN * span, WIDEST * span)
 
 
 def shortest_formula(table: Table, slope: float) -> str:
