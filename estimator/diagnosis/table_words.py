@@ -15,8 +15,13 @@ from estimator.signals.record import FloatArray
 WITHIN = 0.02
 """How far off its values a curve may be described, as a share of the torque it spans, where its band is narrower."""
 
+WIDEST = 0.1  # the same where the band is wider: any law lies within one that is as wide as the curve
+
 SIZES = np.linspace(0.01, 0.9, 90)
 """Halves of a dead band that are tried, as shares of the knots' reach."""
+
+RETUNED = 0.2
+"""How far the slope behind a dead band may be from the line's own: a steeper one would make the band wider."""
 
 AT_LIMIT, FEWEST_AT_LIMIT = 0.95, 3
 """Share of the largest torque from which a knot is at a limit, and how many knots have to be."""
@@ -46,7 +51,8 @@ def _total(table: Table, slope: float) -> tuple[FloatArray, FloatArray, FloatArr
     half = np.zeros(x.size)
     if table.ci95 is not None:
         half = 0.5 * np.array([high - low for low, high in table.ci95])
-    return x, total, np.maximum(half, WITHIN * float(np.ptp(total)))
+    span = float(np.ptp(total))
+    return x, total, np.clip(half, WITHIN * span, WIDEST * span)
 
 
 def shortest_formula(table: Table, slope: float) -> str:
@@ -91,12 +97,13 @@ def looks_like(table: Table, slope: float) -> str:
         shapes.append((f"a limit of {top:.3g} Nm", _limited(top, total, x)))
     best, text = 1.0, ""
     for name, shape in shapes:
-        column = shape(x)
+        column = shape(x) / room
         weight = float(column @ column)
         if weight <= 0.0:
             continue
-        factor = float(column @ total) / weight if "limit" not in name else 1.0
-        worst = float(np.max(np.abs(factor * column - total) / room))
+        factor = float(column @ (total / room)) / weight
+        factor = 1.0 if "limit" in name else min(max(factor, (1.0 - RETUNED) * slope), (1.0 + RETUNED) * slope)
+        worst = float(np.max(np.abs(factor * column - total / room)))
         if worst <= best:
             best, text = worst, name
     return text
@@ -122,7 +129,7 @@ def _drag(x: FloatArray, total: FloatArray, room: FloatArray) -> str:
     best, text = 1.0, ""
     for name, function in known.items():
         columns = np.column_stack([function(x), np.ones_like(x)])  # a constant is the load's
-        found = np.linalg.lstsq(columns, total, rcond=None)[0]
+        found = np.linalg.lstsq(columns / room[:, None], total / room, rcond=None)[0]
         worst = float(np.max(np.abs(columns @ found - total) / room))
         if worst <= best and not math.isclose(float(found[0]), 0.0, abs_tol=1e-12):
             best, text = worst, f"{name} of {found[0]:.3g} Nm" if name == "dry friction" else name

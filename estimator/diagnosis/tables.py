@@ -54,11 +54,11 @@ ALIKE = 1.1  # the same of a second place over the first, up to which both are t
 GAINS = (0.3, 0.1, 0.03, 0.01, 0.0)
 """Gains of the observer, one after the other."""
 
-SCOUTS, SCOUT_STEPS, STEPS, LAST_STEPS = 2, 4, 5, 12
-"""Gains after which only the best shapes continue; Jacobians at each gain there, behind, and at the end."""
+SCOUTS, SCOUT_STEPS, STEPS, LAST_STEPS = 2, 3, 4, 10
+"""Gains after which only the best shapes and places continue; Jacobians at each gain there, behind, and at the end."""
 
-CONTINUED = 2  # shapes that continue
-SMOOTHNESS = (1.0, 0.1, 0.01)
+CONTINUED = 2  # shapes of a place, and places, that continue
+SMOOTHNESS = (1.0, 0.05)
 """Weights of the curve's bending that are tried: what its slope changes by from one piece to the next, squared, counts
 as so many thousandths of the squared error before."""
 
@@ -327,22 +327,42 @@ class Candidate:
     chosen_by: float  # RMS over the samples that choose
 
 
-def _best_curve(curve: Curve, retuned: FitResult, fitting: Masks, choosing: Masks) -> Candidate:
-    """Fit a curve from each of its shapes and with each smoothness, and return what the choosing samples prefer."""
-    descent, scouts = _Descent(curve, retuned, fitting), []
+@dataclass(frozen=True)
+class Scouted:
+    """A place after the first gains: what its shapes leave there, the best of them first."""
+
+    descent: _Descent
+    left: list[tuple[float, FloatArray]]  # squared error and unknowns
+
+    @property
+    def least(self) -> float:
+        """Squared error that the best shape leaves at the last of the first gains."""
+        return self.left[0][0]
+
+
+def _scouted(curve: Curve, retuned: FitResult, fitting: Masks) -> Scouted:
+    """Begin the fit of a curve from each of its shapes."""
+    descent, left = _Descent(curve, retuned, fitting), []
     for slopes in _shapes(curve).values():
-        z = descent.start(slopes)
+        z, squares = descent.start(slopes), np.inf
         for gain in GAINS[:SCOUTS]:
-            z, squares = descent.fitted(z, gain, SMOOTHNESS[1], SCOUT_STEPS)
-        scouts.append((squares, z))
-    found: list[Candidate] = []
-    for _, z in sorted(scouts, key=lambda each: each[0])[:CONTINUED]:
+            z, squares = descent.fitted(z, gain, SMOOTHNESS[0], SCOUT_STEPS)
+        left.append((squares, z))
+    return Scouted(descent, sorted(left, key=lambda each: each[0]))
+
+
+def _best_curve(scouted: Scouted, choosing: Masks) -> Candidate:
+    """Let the observer's gain down from the best shapes, and return what the choosing samples prefer."""
+    descent, found = scouted.descent, list[Candidate]()
+    for _, z in scouted.left[:CONTINUED]:
         for gain in GAINS[SCOUTS:]:
-            z, _ = descent.fitted(z, gain, SMOOTHNESS[1], STEPS)
-        for smooth in SMOOTHNESS:
-            z, _ = descent.fitted(z, 0.0, smooth, STEPS)
-            found.append(Candidate(descent, z, smooth, descent.error(z, choosing)))
-    return min(found, key=lambda each: each.chosen_by)
+            z, _ = descent.fitted(z, gain, SMOOTHNESS[0], STEPS)
+        found.append(Candidate(descent, z, SMOOTHNESS[0], descent.error(z, choosing)))
+    best = min(found, key=lambda each: each.chosen_by)
+    for smooth in SMOOTHNESS[1:]:
+        z, _ = descent.fitted(best.z, 0.0, smooth, STEPS)
+        best = min(best, Candidate(descent, z, smooth, descent.error(z, choosing)), key=lambda each: each.chosen_by)
+    return best
 
 
 def table_at(hypothesis: Hypothesis, place: str) -> Candidate | None:
@@ -352,7 +372,7 @@ def table_at(hypothesis: Hypothesis, place: str) -> Candidate | None:
     if curve is None:
         return None
     use = result.problem.use
-    return _best_curve(curve, result, use, use)
+    return _best_curve(_scouted(curve, result, use), use)
 
 
 def best_table(
@@ -371,15 +391,18 @@ def best_table(
     fitting = tuple(u & ~a & ~b for u, a, b in zip(use, unseen, choosing, strict=True))
     retuned = fit(replace(whole.problem, use=fitting), whole.x, STEPS)
     curves = [_curve(place, retuned, GAINS[0]) for place in SEARCHED[whole.problem.grid.structure]]
-    found = [_best_curve(curve, retuned, fitting, choosing) for curve in curves if curve is not None]
-    if not found:
+    places = [_scouted(curve, retuned, fitting) for curve in curves if curve is not None]
+    if not places:
         return None
+    continued = sorted(places, key=lambda each: each.least)[:CONTINUED]
+    found = [_best_curve(each, choosing) for each in continued]
     seen = tuple(u & ~a for u, a in zip(use, unseen, strict=True))
     known = fit(replace(whole.problem, use=seen), whole.x, ITERATIONS)
     before = min(rms_over(known.problem, each.outputs, unseen) for each in (known, retuned))
     best, *others = sorted(found, key=lambda each: each.chosen_by)
     judged, z = _refitted(best, known, seen)
-    after = judged.error(z, unseen)
+    of_law = _errors(judged.problem, outputs_at(judged.at(0.0), judged.x(z)), unseen)
+    after = float(np.sqrt(np.mean(np.concatenate(of_law) ** 2)))
     if after > BETTER * before:
         return None
     last, z = _refitted(replace(best, descent=judged, z=z), whole, use)
@@ -387,9 +410,7 @@ def best_table(
     if holdout and line is not None and not _carries_to(result, whole, line, holdout):
         return None
     rival = others[0] if others and others[0].chosen_by < ALIKE * best.chosen_by else None
-    base = _errors(known.problem, known.outputs, unseen)
-    outputs = outputs_at(judged.at(0.0), judged.x(_refitted(best, known, seen)[1]))
-    pairs = zip(base, _errors(judged.problem, outputs, unseen), strict=True)
+    pairs = zip(_errors(known.problem, known.outputs, unseen), of_law, strict=True)
     worse = [float(b @ b) > float(a @ a) for a, b in pairs]
     firsts = [record.name for record in records if record.lead is None]
     line_slope = last.curve.own * last.curve.base
@@ -404,7 +425,7 @@ def best_table(
         looks_like(table, line_slope),
         shortest_formula(table, line_slope),
         tuple(name for name, is_worse in zip(firsts, worse, strict=True) if is_worse),
-        sum(each.descent.simulations for each in found),
+        sum(each.descent.simulations for each in places) + judged.simulations + last.simulations,
     )
 
 

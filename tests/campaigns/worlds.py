@@ -7,6 +7,8 @@ Each world is answered by the public ``diagnose``, and what it names is compared
   effect among small imperfections and coloured disturbances), ``quiet`` (the same with nothing strong) and ``outside``
   (what the catalogue has no entry for: every name is false) come from the proof's truth simulator;
 - the forms of `tests.campaigns.forms` have laws of other forms, one each;
+- ``engine_outside`` (`tests.campaigns.engine_outside`) has laws that the catalogue has no entry for, and recordings
+  that no fit has seen: a row has the error on these, of the re-tuned and of the augmented model, and the place;
 - ``engine`` is a rigid-body engine (`tests.campaigns.engine`), left out where MuJoCo is not installed.
 
 ``DIR/worlds.jsonl`` has a line for each world; called again, it continues where it was interrupted. The tables count
@@ -21,19 +23,23 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise, product
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from estimator.diagnosis.diagnose import diagnose
+from estimator.diagnosis.result import Diagnosis
 from estimator.errors import EstimatorError
+from estimator.physics.free_run import free_run
 from estimator.physics.model import DrivelineModel
 from estimator.signals.record import Record
 from hil.config.model_file import read_model_for_recordings
 from hil.proof.make_case import write_shown
 from hil.proof.truth.bus import NOMINAL_TOLERANCE
-from hil.proof.truth.case import Case, make_case
+from hil.proof.truth.case import Case, TruthRecording, make_case
 from hil.proof.truth.hidden import same_recording
 from hil.proof.truth.specimen import EFFECTS, NOTHING
 from hil.proof.work import work_on
@@ -41,6 +47,7 @@ from hil.recording import read_records
 from hil.report.diagnosis_json import diagnosis_json
 from tests.campaigns.dirty import Known, make_dirty
 from tests.campaigns.engine import ROLE as ENGINE_ROLE, make_engine
+from tests.campaigns.engine_outside import LAWS, PLACES, ROLE as OUTSIDE_ROLE, make_outside
 from tests.campaigns.forms import FORMS, Role, make_form
 
 KINDS = [name for name, effect in EFFECTS.items() if effect.catalogued and name != NOTHING]
@@ -48,13 +55,14 @@ OUTSIDE = [name for name, effect in EFFECTS.items() if not effect.catalogued]
 STRONG = [name for name in KINDS if EFFECTS[name].corrupt is same_recording]
 """Effects that can be the strong one of a dirty world: what happens to a recording alone is recognised by itself."""
 
-ENGINE = "engine"
+ENGINE, ENGINE_OUTSIDE = "engine", "engine_outside"
 ALL: Mapping[str, Role] = {
     "clean": Role.CALIBRATE,
     "dirty": Role.CALIBRATE,
     "quiet": Role.CALIBRATE,
     "outside": Role.JUDGE,
     **{name: form.role for name, form in FORMS.items()},
+    ENGINE_OUTSIDE: OUTSIDE_ROLE,
     ENGINE: ENGINE_ROLE,
 }
 """Every form of world, and what it is for. What thresholds are fitted on does not judge them."""
@@ -87,6 +95,9 @@ def _case(form: str, seed: int) -> tuple[Case, dict[str, dict[str, float]], str]
         return make_case(strong, seed), {}, strong
     if form == "outside":
         return make_case(OUTSIDE[seed % len(OUTSIDE)], seed), {}, OUTSIDE[seed % len(OUTSIDE)]
+    if form == ENGINE_OUTSIDE:
+        case = make_outside(seed)
+        return case, {}, case.specimen.effect
     if form in ("dirty", "quiet"):
         strong = NOTHING if form == "quiet" else STRONG[seed % len(STRONG)]
         return *make_dirty(strong, seed, knows(seed)), strong
@@ -131,9 +142,12 @@ def answered(form: str, seed: int, at_the_load: bool = False, **options: Any) ->
     }
     began, worked = time.perf_counter(), time.process_time()
     try:
-        answer = diagnosis_json(diagnose(world.records, world.model, **options))
+        diagnosis = diagnose(world.records, world.model, **options)
     except EstimatorError as error:
         return row | {"verdict": "refused", "names": [], "fault": str(error)}
+    answer = diagnosis_json(diagnosis)
+    if form == ENGINE_OUTSIDE:
+        row |= on_fresh(world, diagnosis)
     return row | {
         "verdict": answer["verdict"],
         "names": [_name(effect, hidden, world.strong) for effect in answer["effects"]],
@@ -142,6 +156,39 @@ def answered(form: str, seed: int, at_the_load: bool = False, **options: Any) ->
         "time_s": round(time.perf_counter() - began, 2),
         "cpu_s": round(time.process_time() - worked, 2),
     }
+
+
+def on_fresh(world: World, diagnosis: Diagnosis) -> Row:
+    """Return what a world outside of the catalogue is judged by: place, table, and errors on fresh recordings."""
+    shown = {name: each for name, each in world.case.named_recordings().items() if name.startswith("fresh")}
+    fresh = [_read(name, each, world.records[0]) for name, each in shown.items()]
+    values = {name: each.value for name, each in diagnosis.parameters.items()}
+    retuned = replace(
+        world.model,
+        parameters={name: replace(p, value=values.get(name, p.value)) for name, p in world.model.parameters.items()},
+    )
+    table, found = diagnosis.table, diagnosis.mismatch.element
+    return {
+        "place": None if table is None else table.place,
+        "place_is_right": (table.element if table is not None else found) is not None
+        and (table.element.value if table is not None else found.value if found else "") in PLACES[world.strong],
+        "fresh_retuned": _fresh_rms(retuned, fresh),
+        "fresh_augmented": _fresh_rms(diagnosis.augmented, fresh),
+        "unseen": None if table is None else [table.rms_before, table.rms_after],
+    }
+
+
+def _read(name: str, recording: TruthRecording, like: Record) -> Record:
+    torque = np.column_stack([recording.torque_m1_nm, recording.torque_m2_nm])
+    okay = np.ones(recording.time_s.size, dtype=np.bool_)
+    return replace(
+        like, name=name, time_s=recording.time_s, torque_nm=torque, output=recording.speed_rad_s, okay=okay,
+        torque_okay=None, offset_s=None, reference_nm=None, load_nm=None,
+    )  # fmt: skip
+
+
+def _fresh_rms(model: DrivelineModel, fresh: Sequence[Record]) -> float:
+    return float(np.sqrt(np.mean([free_run(model, record).rms ** 2 for record in fresh])))
 
 
 def _name(effect: Mapping[str, Any], hidden: set[str], strong: str) -> Row:
@@ -177,7 +224,7 @@ def table(rows: Sequence[Row]) -> str:
 
 
 def _cells(title: str, rows: Sequence[Row]) -> str:
-    strong = [row for row in rows if row["strong"] not in (NOTHING, *OUTSIDE)]
+    strong = [row for row in rows if row["strong"] not in (NOTHING, *OUTSIDE, *LAWS)]
     names = [name for row in rows for name in row["names"]]
     false = sum(not name["is_there"] for name in names)
     clean = sum(all(name["is_there"] for name in row["names"]) for row in rows)

@@ -25,9 +25,9 @@ def vector(*tables: Table, **line: float) -> FloatArray:
     return flat_values({**TWO_MASS, **line}, effects)
 
 
-def straight(place: str, slope: float, **more: float) -> Table:
+def straight(place: str, slope: float, damping: float = 0.0) -> Table:
     knots = (-0.5, -0.1, 0.2, 0.5)
-    return Table(place, knots, tuple(slope * knot for knot in knots), **more)
+    return Table(place, knots, tuple(slope * knot for knot in knots), None, damping)
 
 
 def run(p: FloatArray) -> FloatArray:

@@ -36,7 +36,7 @@ def retuned(records: list[Record]) -> Hypothesis:
     """Return the line alone, fitted to recordings."""
     result = Bench(model(TWO_MASS, tolerance=0.1), records, [each.okay for each in records]).fit(NOTHING)
     nothing = np.zeros(0)
-    return Hypothesis(NOTHING, result, nothing, Limits(nothing, nothing, nothing), 0.0, 0.0)  # type: ignore[call-arg]
+    return Hypothesis(NOTHING, result, nothing, Limits(nothing, nothing, nothing), 0.0, 0.0)
 
 
 def test_a_gap_is_found_as_a_curve_over_the_twist_without_the_catalogue() -> None:
