@@ -26,6 +26,9 @@ if TYPE_CHECKING:
     from hil.rig.realtime import RealTimeGrants
 
 
+_HELD: ContextVar[tuple[ExitStack, set[Path]]] = ContextVar("held")
+
+
 def hold(folder: Path) -> None:
     """Hold the folder of the results until the command ends: no other command writes there, nor computes for nothing.
 
@@ -37,9 +40,6 @@ def hold(folder: Path) -> None:
     if folder.resolve() not in held:  # a command may be made of others
         stack.enter_context(sole_use(folder))
         held.add(folder.resolve())
-
-
-_HELD: ContextVar[tuple[ExitStack, set[Path]]] = ContextVar("held")
 
 
 @contextmanager

@@ -152,6 +152,6 @@ def test_bus_nodes_period_and_mode_are_as_given(tmp_path: Path) -> None:
     given = {"can": "socketcan:can1", "period_s": "0.02", "node_m1": "11", "node_m2": "12", "mode": "profile_torque"}
     assert run(["rig", "new", str(path), "--yes", *options(VEHICLE | given)]) == 0
     rig = read_rig(path)
-    assert (rig.can.interface, rig.can.channel, rig.period_s) == ("socketcan", "can1", 0.02)
+    assert (rig.can.url, rig.period_s) == ("socketcan:can1", 0.02)
     assert (rig.inverters.m1.node_id, rig.inverters.m2.node_id) == (11, 12)
-    assert {rig.inverters.m1.mode, rig.inverters.m2.mode} == {"profile_torque"}
+    assert {rig.inverters.m1.mode.name, rig.inverters.m2.mode.name} == {"PROFILE_TORQUE"}

@@ -77,7 +77,7 @@ def test_runs_are_listed_with_what_tells_them_apart(folder: Path, capsys: Captur
     ("wanted", "found"),
     [
         (("--experiment", "tip"), [3]),
-        (("--until", "2026-11-22"), [1]),
+        (("--until", "2026-11-22"), [1, 2]),
         (("--since", "2026-11-22"), [2, 3]),
         (("--verdict", "explained"), [1]),
         (("--experiment", "cruise", "--verdict", "explained"), [1]),
@@ -87,7 +87,7 @@ def test_runs_are_listed_with_what_tells_them_apart(folder: Path, capsys: Captur
 def test_runs_are_found_by_experiment_date_and_verdict(
     folder: Path, capsys: Capture, wanted: tuple[str, ...], found: list[int]
 ) -> None:
-    assert [each["run"] for each in documents(capsys, *wanted)["runs"]] == found
+    assert [each["id"] for each in documents(capsys, *wanted)["runs"]] == found
 
 
 def test_one_run_is_shown_with_the_state_of_its_recording(folder: Path, capsys: Capture) -> None:
