@@ -1,7 +1,7 @@
 """Laws without a name as tables: at each place the curve with which the free run fits best, if any is better.
 
 A curve's unknowns are the slopes between its knots, which are laid by the data. A fit from a straight curve stays near
-it where the law bends strongly, as a gap or a freewheel does: so each place is begun from several shapes, under an
+it where the law is strongly nonlinear, as a gap or a freewheel is: so each place is begun from several shapes, under an
 observer whose gain is let down to 0 (``layout.OBSERVER``). With a large one every sample is a fresh start, and no
 simulation runs away.
 
@@ -49,7 +49,7 @@ are fitted. The last one judges: what has run away by then is no law."""
 BETTER = 0.97
 """Error on the unseen blocks, over that of the re-tuned model, up to which a curve is a law."""
 
-ALIKE = 1.1  # the same of a second place over the first, up to which both are told
+ALIKE = 1.1  # the same of a second place over the first, up to which both are reported
 
 GAINS = (0.3, 0.1, 0.03, 0.01, 0.0)
 """Gains of the observer, one after the other."""
@@ -62,7 +62,7 @@ SMOOTHNESS = (1.0, 0.05)
 """Weights of the curve's bending that are tried: what its slope changes by from one piece to the next, squared, counts
 as so many thousandths of the squared error before."""
 
-REACH = 1.5  # knots go on to so many times what the re-tuned model reaches
+REACH = 1.5  # knots reach to so many times what the re-tuned model reaches
 FRACTIONS = (1 / 16, 1 / 8, 1 / 4, 1 / 2, 1.0)  # of that, where they stand on both sides of zero
 EVEN_KNOTS = 7  # knots of a signal of one sign, equally far apart
 FEWEST_SAMPLES = 40  # samples between two knots at least
@@ -406,7 +406,7 @@ def best_table(
     if after > BETTER * before:
         return None
     last, z = _refitted(replace(best, descent=judged, z=z), whole, use)
-    result, table = _told(last, z)
+    result, table = _reported(last, z)
     if holdout and line is not None and not _carries_to(result, whole, line, holdout):
         return None
     rival = others[0] if others and others[0].chosen_by < ALIKE * best.chosen_by else None
@@ -436,7 +436,7 @@ def _refitted(best: Candidate, result: FitResult, use: Masks) -> tuple[_Descent,
     return descent, z
 
 
-def _told(descent: _Descent, z: FloatArray) -> tuple[FitResult, Table]:
+def _reported(descent: _Descent, z: FloatArray) -> tuple[FitResult, Table]:
     """Return the fit with the curve among what is given, and the curve with its intervals."""
     problem, x, curve = descent.at(0.0), descent.x(z), descent.curve
     outputs = outputs_at(problem, x)

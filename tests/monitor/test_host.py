@@ -55,17 +55,17 @@ def await_report(source: RigSource, seen: list[Report], kind: type[Report]) -> R
 
 @pytest.mark.parametrize(("armed", "kinds"), [(True, [Kind.EMCY, Kind.EMCY]), (False, [Kind.INFO])])
 def test_a_drive_that_notices_the_end_of_the_commands_is_no_emergency(armed: bool, kinds: list[Kind]) -> None:
-    told: list[Notice] = []
+    noticed: list[Notice] = []
     heard: dict[int, Any] = {}
     link: Any = SimpleNamespace(subscribe=heard.__setitem__)
     settings = SimpleNamespace(name="m1", node_id=1, heartbeat_timeout_ms=300)
     inverter: Any = SimpleNamespace(settings=settings, latest=None, is_armed=armed)
-    watch = NodeWatch(link, inverter, told.append)
+    watch = NodeWatch(link, inverter, noticed.append)
     heard[EMCY_COB_ID + 1](Emergency(RPDO_TIMEOUT, 0x10, bytes(5)).encode(), 0)
     assert watch.look(0, None).n_emergencies == armed
     assert (watch.look(0, None).emergency is not None) == armed
     heard[EMCY_COB_ID + 1](bytes(8), 1)
-    assert [notice.kind for notice in told] == kinds
+    assert [notice.kind for notice in noticed] == kinds
 
 
 @pytest.mark.campaign

@@ -84,7 +84,7 @@ TELLS = 0.25
 brake moves the line and a control sets the torque it is above 0.4, in tip-ins and under a PRBS below 0.2."""
 
 ONE_WAY = 0.8
-"""Share of the cross-spectrum that must have one sign: where the output is late by more, its direction is not told."""
+"""Share of the cross-spectrum that must have one sign: where the output is late by more, its direction is not known."""
 
 JOINT = 0.5  # no inertia makes a joint linear: what stiffens and rubs leaves twice as much
 LONGEST_LAG_S = 2.0  # that is looked for between torque and output

@@ -224,11 +224,11 @@ def _passes(best: Candidate, records: Sequence[Record], line: Line, found: Seque
 
 
 def _is_suspicious(found: Sequence[Inertia], line: DrivelineModel) -> bool:
-    told = [math.log(abs(each.ratio)) for each in found if each.tells]
+    counted = [math.log(abs(each.ratio)) for each in found if each.tells]
     return (
         any(not each.tells or not _is_within_tolerance(each, line) for each in found)
         or any(abs(each.log_ratio) > BANDS_BEYOND for each in found)
-        or (bool(told) and max(told) - min(told) > APART)
+        or (bool(counted) and max(counted) - min(counted) > APART)
     )
 
 
@@ -314,8 +314,8 @@ def _candidates(
         np.logaddexp(_log_fits(each, largest(record), record, chosen, logs, line), math.log(STRANGE) + other)
         for each, record, other in zip(fits, changed, unknown, strict=True)
     ]
-    told = [each.ratio for each in fits if each.tells]
-    is_turned = sum(each < 0.0 for each in told) > 0.5 * len(told)
+    counted = [each.ratio for each in fits if each.tells]
+    is_turned = sum(each < 0.0 for each in counted) > 0.5 * len(counted)
 
     def made(total: FloatArray, log_prior: float, only: int | None) -> Candidate:
         by_factor = np.logaddexp.reduce(total + off, axis=-1)
@@ -435,17 +435,17 @@ def _text(
 
 def _misfit(records: Sequence[Record], line: Line, shown: Sequence[Inertia]) -> str:
     """Say what does not fit."""
-    told = [each for each in shown if each.tells]
-    if line is None or not told:
+    counted = [each for each in shown if each.tells]
+    if line is None or not counted:
         return "the motion does not follow from the torque as read"
     torque = "torque" if line.motion is Motion.ROTATION else "force"
-    ratios = ", ".join(multiple(each.ratio) for each in told)
+    ratios = ", ".join(multiple(each.ratio) for each in counted)
     if records[0].imposed is not None:
         return f"its {torque} is {ratios} times what the nominal k and c make of the motion, expected 1"
-    falls = f"the {records[0].kind.value} falls where the {torque} rises, and " if told[0].ratio < 0.0 else ""
-    bands = [math.exp(each.log_ratio) for each in told if abs(each.log_ratio) > BANDS_BEYOND]
+    falls = f"the {records[0].kind.value} falls where the {torque} rises, and " if counted[0].ratio < 0.0 else ""
+    bands = [math.exp(each.log_ratio) for each in counted if abs(each.log_ratio) > BANDS_BEYOND]
     above = f"; above the first mode it fits {multiple(1.0 / bands[0])} times that" if bands else ""
-    fits = "it fits an inertia" if len(told) == 1 else "they fit inertias"
+    fits = "it fits an inertia" if len(counted) == 1 else "they fit inertias"
     expected = f"expected 1 within its tolerance and a factor of {BEYOND:g}"
     return f"{falls}{fits} {ratios} times the nominal {_nominal(line)}, {expected}{above}"
 
