@@ -13,7 +13,6 @@ from estimator.design import _precision as precision
 from estimator.diagnosis.inference.descent import descended
 from estimator.diagnosis.inference.disturbances import whitener_of
 from estimator.diagnosis.inference.hypotheses import THOROUGH
-from estimator.diagnosis.inference.judge import grounds
 from estimator.diagnosis.inference.search import Search
 from estimator.physics.driveline import Start
 from estimator.physics.fit import not_fitted
@@ -33,17 +32,17 @@ def known() -> Open:
     """Dry friction at the motor or at the load, as if either were as probable; and what none of them showed."""
     bench = bench_with(NAMES[0], {"friction_nm": 8.0})
     search = Search(bench.model, bench.records, bench.use, NAMES)
-    best = grounds(search).best
+    best = search.run()
     other = search.exchanged(best, *NAMES)
     assert other is not None
     candidates = tuple(Candidate(name_of(fit.effects), 0.5, fit, precision(fit)) for fit in (best, other))
-    return Open(search.model, candidates, {}, 1.0, ("speed_sign_blind", "coulomb_friction_motor"))
+    return Open(search.model, candidates, {}, ("speed_sign_blind", "coulomb_friction_motor"))
 
 
 def test_a_limit_that_is_not_there_is_left_out_of_the_model() -> None:
     bench = bench_with("torque_saturation", {"limit_m1_nm": 30.0, "limit_m2_nm": 30.0})
     search = Search(bench.model, bench.records, bench.use, ["torque_saturation"])
-    best = grounds(search).best
+    best = search.run()
     assert not np.isfinite(list(best.result.values_of("torque_saturation").values())).all()
     model = as_model(Candidate(name_of(best.effects), 1.0, best, precision(best)), search.model)
     assert "torque_saturation" in model.effects
