@@ -149,7 +149,8 @@ def answered(form: str, seed: int, at_the_load: bool = False, **options: Any) ->
 def _name(effect: Mapping[str, Any], hidden: set[str], strong: str) -> Row:
     """Return a name with its probability and how much it is needed, in the middle and at least.
 
-    It is there if it, or what it says it resembles, is in the world. What the model file knows is there, too: its sizes may be off, and to name it again is no invention.
+    It is there if it, or what it says it resembles, is in the world. What the model file knows is there, too: its sizes
+    may be off, and to name it again is no invention.
     """
     claim = {effect["name"], *effect["indistinguishable_from"]}
     return {
