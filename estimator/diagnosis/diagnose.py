@@ -44,7 +44,7 @@ def diagnose(
         Nominal model with the tolerances its parameters are trusted to; effects it has stay as they are.
     holdout : sequence of Record, optional
         Recordings that are simulated with what was found, which no fit has seen; without them blocks of ``records``
-        are kept out of one more fit. They take no part in the decision: the likelihood counts each unknown's price.
+        are kept out of one more fit. Nothing is named with which their error does not fall.
     progress : callable, optional
         Called with a message and the share of work done; an exception it raises cancels the diagnosis.
     budget_s : float, optional

@@ -130,9 +130,8 @@ class FoundEffect:
     share: float = math.nan
     probability: float = math.nan
     form: str = ""
-    necessity: float = (
-        math.nan
-    )  # share of the squared error beyond the noise that comes back without it, on unseen data
+    necessity: float = math.nan  # share of the squared error beyond the noise that comes back without it, unseen data
+    least_necessity: float = math.nan  # lower end of its one-sided 95 % interval, by which such names were counted
     counted: Counted | None = None
 
 

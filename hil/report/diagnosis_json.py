@@ -67,7 +67,7 @@ def _effect(effect: FoundEffect) -> Json:
         **({"form": effect.form} if effect.form else {}),
         **fields_as_json(
             effect, "element", "statement", "parameters", "time_s", "indistinguishable_from", "alternatives", "share",
-            "probability", "evidence", "necessity",
+            "probability", "evidence", "necessity", "least_necessity",
         ),
         "counted": None if effect.counted is None else fields_as_json(effect.counted, "right", "of"),
         **({"profiles": as_json(effect.profiles)} if effect.profiles else {}),

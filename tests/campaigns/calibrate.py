@@ -1,41 +1,37 @@
-"""``python -m tests.campaigns.calibrate --seeds A..B --judge C..D --out DIR``: thresholds of a verdict, by simulation.
+"""``python -m tests.campaigns.calibrate --seeds A..B --out DIR``: what a verdict counts by, from simulated worlds.
 
-Every world is searched once; what its decision rests on is kept in ``DIR/searched.jsonl``: scores of all sets of
-effects that were fitted, shares, tests of what is left. The thresholds follow from these, again and again without
-another search: limits of the tests from worlds of which all is explained, the divisor of scores by likelihood of what
-is there, the least probability from the share of names that may be false. Other forms of world judge them
-(`tests.campaigns.worlds.ALL`). ``--write`` puts them where the decision reads them, with this command.
+Every world is decided once; what the decision rests on is kept in ``DIR/decided.jsonl``. From worlds of which all is
+explained follow the limits of the noise tests, from all of them the divisor of scores by which experiments are
+designed. ``--names worlds.jsonl``, rows of ``tests.campaigns.worlds``, counts how many names were there, by the lower
+end of their necessity. ``--write`` puts all of that where the decision reads it.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import math
-import shlex
+import re
 import sys
-import time
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from itertools import product
+from itertools import pairwise, product
 from pathlib import Path
 
 import numpy as np
-from estimator.diagnosis.inference.judge import Score, probability_of
 from scipy.optimize import minimize_scalar
 from threadpoolctl import threadpool_limits
 
-from estimator.diagnosis.acquisition.chain import mechanical, read_through
-from estimator.diagnosis.inference.answer import LEVELS, searched as searched_for
-from estimator.diagnosis.inference.checks import COLUMNS, LEAST_SHARE, TEST_LIMITS, THRESHOLDS_FILE, chance
-from estimator.diagnosis.inference.rivals import rivals_of
+from estimator.diagnosis.inference.answer import Found, answer
+from estimator.diagnosis.inference.checks import TEST_LIMITS, THRESHOLDS_FILE, chance, tests
+from estimator.diagnosis.inference.hypotheses import silent
 from estimator.diagnosis.preconditions.prepare import prepare
+from estimator.diagnosis.result import Counted
 from estimator.errors import EstimatorError
+from estimator.physics.parallel import Work
 from hil.proof.truth.specimen import NOTHING
 from tests.campaigns.forms import Role
 from tests.campaigns.worlds import ALL, Row, continued, parse_forms, parse_seeds, world_of
-
-MOST_FALSE = 0.01
-"""Share of named effects that may not be there."""
 
 MOST_REFUSED = 0.01
 """Share of worlds of which all is explained that one test may refuse."""
@@ -44,225 +40,159 @@ OTHER_FORMS = {"most_predictable": 0.03, "most_dependent": 0.015}
 """Shares of the innovations' variance that machines leave by the form of their laws alone: simulated worlds are nearer
 to the model than any real one. Set by hand, from the real recordings in docs/how-good.md."""
 
-BELIEVED = 0.9
-"""Probability below which nothing is reported as found, however well it went in simulated worlds."""
-
 USUAL_DIVISOR, DIVISOR_SPREAD, MOST_DIVISOR = 4.0, 0.5, 100.0
 """Prior of the divisor of scores, log-normal, and its bound: a few hundred worlds of one simulator with hardly a false
 effect among them do not tell how far other worlds are from the laws."""
 
+NECESSITIES = (0.0, 0.7, 0.9, math.inf)
+"""Lower ends of necessity between which names are counted together."""
 
-@dataclass(frozen=True, slots=True)
-class Claim:
-    """An effect of the best set: the names it stands for, and its share of the re-tuned model's squared error."""
-
-    name: str
-    names: list[str]
-    share: float
+FEWEST_NAMES = 20  # names of a count of its own; fewer are counted with those that are needed less
 
 
 @dataclass(frozen=True, slots=True)
 class World:
-    """A world that was searched: what is in it, and what its decision rests on."""
+    """A world that was decided: what is in it, what was claimed, and what other sets are worth."""
 
     form: str
     seed: int
     strong: str
     there: list[str]
-    claims: list[Claim]
-    scores: list[tuple[list[str], float, bool]]
-    tests: dict[str, float]
-    samples: int
-    cpu_s: float
+    claims: list[tuple[list[str], bool]]  # an effect with its look-alikes, and whether it is established
+    scores: list[tuple[list[str], float]]  # of each plausible set
+    tests: dict[str, float]  # what each test finds, beyond what it finds in noise by chance
 
-    def is_there(self, claim: Claim) -> bool:
-        """Tell whether an effect, or one it can't be distinguished from, is in the world or known to the model file."""
-        return bool({*claim.names} & {*self.there})
+    def is_there(self, names: Sequence[str]) -> bool:
+        """Tell whether one of some look-alikes is in the world or known to the model file."""
+        return bool({*names} & {*self.there})
 
     @property
     def is_explained(self) -> bool:
-        """Whether the best set holds what is strong, and nothing that is not there."""
-        strong = self.strong == NOTHING or any(self.strong in claim.names for claim in self.claims)
-        return strong and all(map(self.is_there, self.claims))
+        """Whether what is strong is established, and nothing that is not there."""
+        established = [names for names, is_established in self.claims if is_established]
+        strong = self.strong == NOTHING or any(self.strong in names for names in established)
+        return strong and all(map(self.is_there, established))
 
-    @property
-    def weighty(self) -> list[Claim]:
-        """The claims with a share that is no trace."""
-        return [claim for claim in self.claims if claim.share >= LEAST_SHARE]
-
-    def beyond_chance(self, key: str) -> float:
-        """Return what a test found, less what it finds in noise by chance."""
-        return self.tests[key] - chance(key, self.samples)
-
-    def probability(self, claim: Claim, thresholds: Thresholds) -> float:
-        """Return the probability of an effect under some thresholds."""
-        lost = max(0.0, *(self.beyond_chance(key) - thresholds.limits[key] for key in COLUMNS))
-        scores = [Score(frozenset(effects), score, plausible) for effects, score, plausible in self.scores]
-        return probability_of(claim.names, scores, thresholds.divisor + self.samples * lost)
-
-    def named(self, thresholds: Thresholds) -> list[Claim]:
-        """Return the effects that are named under some thresholds."""
-        least = thresholds.least_probability
-        return [claim for claim in self.weighty if self.probability(claim, thresholds) >= least]
+    def probability(self, names: Sequence[str], divisor: float) -> float:
+        """Return the probability of one of some look-alikes over all sets, their differences divided by a number."""
+        values = np.array([score for _, score in self.scores])
+        holds = np.array([bool({*names} & {*effects}) for effects, _ in self.scores])
+        weights = np.exp(-0.5 * (values - values.min()) / divisor)
+        return float(weights[holds].sum() / weights.sum())
 
 
-@dataclass(frozen=True, slots=True)
-class Thresholds:
-    """What a decision is made by: limits of the tests, divisor of scores, least probability."""
-
-    limits: dict[str, float]
-    divisor: float = 1.0
-    least_probability: float = 0.0
-
-
-def searched(form: str, seed: int) -> Row | None:
-    """Search a world; None where its recordings are refused."""
-    began = time.process_time()
-    world = world_of(form, seed)
+def decided(form: str, seed: int) -> Row | None:
+    """Decide a world; None where its recordings are refused."""
+    world, kept = world_of(form, seed), list[Found]()
     try:
         ready = prepare(world.records, world.model)
     except EstimatorError:
         return None
-    line, chain = mechanical(world.model), read_through(ready.records)
     with threadpool_limits(1, user_api="blas"):  # as a diagnosis does
-        whole = searched_for(chain, line, most=LEVELS["normal"])
-        rivals = rivals_of(whole.search, whole.grounds).scores
-    found, recognised = whole.grounds, {finding.name for finding in whole.chain.findings}
+        answer(ready, world.model, silent, "normal", Work(), kept.append)
+    search, judged = kept[0].search, kept[0].decision.judged
+    recognised = {finding.name for finding in kept[0].chain.findings}
     there = {name for name in world.case.specimen.sizes if name != NOTHING} - recognised
+    established = (*judged.named, *judged.traces)
+    samples = judged.believed.hypothesis.result.residual.size
     return asdict(
         World(
             form,
             seed,
             NOTHING if world.strong in recognised else world.strong,
             sorted(there | {*world.known}),
-            [Claim(each.name, sorted(each.names), each.share) for each in found.beliefs],
-            [(sorted(each.effects), each.score, each.is_plausible) for each in (*found.scores, *rivals)],
-            {test.key: test.value for test in found.tests if test.key},
-            found.best.result.residual.size,
-            round(time.process_time() - began, 2),
+            [([each.name, *each.alike], each in established) for each in (*established, *judged.refinements)],
+            [(sorted(each.effects), each.score) for each in search.visited.values() if search.is_plausible(each)],
+            {t.key: t.value - chance(t.key, samples) for t in tests(judged.believed.hypothesis) if t.key},
         )
     )
 
 
-def searched_worlds(out: Path, forms: Sequence[str], seeds: range) -> list[World]:
-    """Return the worlds of some forms and seeds that were not refused; each is searched once."""
+def decided_worlds(out: Path, forms: Sequence[str], seeds: range) -> list[World]:
+    """Return the worlds of some forms and seeds that were not refused; each is decided once."""
     wanted = {f"{form} {seed}": (form, seed) for seed, form in product(seeds, forms)}
-    rows = continued(out / "searched.jsonl", list(wanted), lambda name: {"world": searched(*wanted[name])})
-    found = [row["world"] for row in rows if row["world"] is not None]
-    return [World(**{**entry, "claims": [Claim(**claim) for claim in entry["claims"]]}) for entry in found]
+    rows = continued(out / "decided.jsonl", list(wanted), lambda name: {"world": decided(*wanted[name])})
+    return [World(**row["world"]) for row in rows if row["world"] is not None]
 
 
-def calibrated(worlds: Sequence[World]) -> Thresholds:
-    """Return the thresholds that follow from some worlds."""
+def limits_of(worlds: Sequence[World]) -> dict[str, float]:
+    """Return how far an error may be from noise, by the worlds of which all is explained."""
     explained = [world for world in worlds if world.is_explained]
-    limits = {
-        key: max(
-            float(np.quantile([world.beyond_chance(key) for world in explained], 1.0 - MOST_REFUSED)),
-            OTHER_FORMS.get(key, 0.0),
-        )
-        for key in TEST_LIMITS
+    found = {
+        key: float(np.quantile([world.tests[key] for world in explained], 1.0 - MOST_REFUSED)) for key in TEST_LIMITS
     }
-    divisor = _most_probable(lambda divisor: _surprise(worlds, Thresholds(limits, divisor)))
-    least = _least_probability(worlds, Thresholds(limits, divisor))
-    return Thresholds(limits, divisor, least)
+    return {key: max(limit, OTHER_FORMS.get(key, 0.0)) for key, limit in found.items()}
 
 
-def _most_probable(surprise: Callable[[float], float]) -> float:
-    def posterior(log: float) -> float:
-        return surprise(math.exp(log)) + 0.5 * ((log - math.log(USUAL_DIVISOR)) / DIVISOR_SPREAD) ** 2
+def divisor_of(worlds: Sequence[World]) -> float:
+    """Return the divisor of scores that makes what is there, and what is not, most probable."""
 
-    return math.exp(minimize_scalar(posterior, bounds=(0.0, math.log(MOST_DIVISOR))).x)
+    def surprise(log: float) -> float:
+        total = 0.5 * ((log - math.log(USUAL_DIVISOR)) / DIVISOR_SPREAD) ** 2
+        for world in worlds:
+            for names, _ in world.claims:
+                p = min(max(world.probability(names, math.exp(log)), 1e-6), 1.0 - 1e-6)
+                total -= math.log(p if world.is_there(names) else 1.0 - p)
+        return total
 
-
-def _surprise(worlds: Sequence[World], thresholds: Thresholds) -> float:
-    """Return minus the log-likelihood of what is there and what is not, by the probabilities that are stated.
-
-    Those are of effects that can be named; of traces no probability is stated.
-    """
-    total = 0.0
-    for world in worlds:
-        for claim in world.weighty:
-            p = min(max(world.probability(claim, thresholds), 1e-6), 1.0 - 1e-6)
-            total -= float(np.log(p if world.is_there(claim) else 1.0 - p))
-    return total
+    return math.exp(minimize_scalar(surprise, bounds=(0.0, math.log(MOST_DIVISOR))).x)
 
 
-def _least_probability(worlds: Sequence[World], thresholds: Thresholds) -> float:
-    """Return the least probability above which no more names are false than may be; not below `BELIEVED`."""
-    weighty = [(world, claim) for world in worlds for claim in world.weighty]
-    stated = sorted(((w.probability(c, thresholds), w.is_there(c)) for w, c in weighty), reverse=True)
-    false = np.cumsum([not there for _, there in stated])
-    allowed = np.flatnonzero(false <= MOST_FALSE * np.arange(1, false.size + 1))
-    if not allowed.size:
-        return 1.0
-    return BELIEVED if allowed[-1] == false.size - 1 else max(BELIEVED, stated[int(allowed[-1])][0])
+def counted(rows: Sequence[Row]) -> list[tuple[float, Counted]]:
+    """Return how many names were there, by the lower end of their necessity; faults of readings have none."""
+    names = [name for row in rows for name in row["names"] if name["least"] is not None]
+    found: list[tuple[float, Counted]] = []
+    for low, high in pairwise(NECESSITIES):
+        inside = [name["is_there"] for name in names if low <= name["least"] < high]
+        new = Counted(sum(inside), len(inside))
+        if found and new.of < FEWEST_NAMES:
+            before, last = found.pop()
+            found.append((before, Counted(last.right + new.right, last.of + new.of)))
+        else:
+            found.append((low, new))
+    return found
 
 
-def table(worlds: Sequence[World], thresholds: Thresholds) -> str:
-    """Return what thresholds lead to, as a table in Markdown."""
-    lines = [
-        "| form | worlds | strong named | names | of them false | worlds without a false name |",
-        "| --- | --- | --- | --- | --- | --- |",
-    ]
-    for form in dict.fromkeys(world.form for world in worlds):
-        mine = [(world, world.named(thresholds)) for world in worlds if world.form == form]
-        strong = [(w, named) for w, named in mine if w.strong != NOTHING]
-        right = sum(any(w.strong in claim.names for claim in named) for w, named in strong)
-        false = [sum(not w.is_there(claim) for claim in named) for w, named in mine]
-        lines.append(
-            f"| {form} | {len(mine)} | {right} of {len(strong)} | {sum(len(named) for _, named in mine)} | "
-            f"{sum(false)} | {sum(not count for count in false)} |"
-        )
-    return "\n".join(lines) + "\n"
-
-
-def written(thresholds: Thresholds, command: str) -> str:
-    """Return the thresholds as the file that the decision reads."""
-    lines = [
-        "# Thresholds of a verdict by likelihood, from simulated worlds (docs/diagnosis.md); written by",
-        f"# {command}",
-        f"tempered = {thresholds.divisor:.3g}",
-        f"least_probability = {thresholds.least_probability:.4g}{_choice(thresholds.least_probability == BELIEVED)}",
-        *(f"{key} = {limit:.3g}{_choice(limit == OTHER_FORMS.get(key))}" for key, limit in thresholds.limits.items()),
-    ]
-    return "\n".join(lines) + "\n"
-
-
-def _choice(is_one: bool) -> str:
-    """Return what marks a threshold that worlds would let be lower: its floor is a choice."""
-    return "  # a choice, with its reason in tests/campaigns/calibrate.py" if is_one else ""
+def written(text: str, values: Mapping[str, float], counts: Sequence[tuple[float, Counted]] = ()) -> str:
+    """Return the text of the thresholds with some of its values, and with other counts, if any; comments stay."""
+    for key, value in values.items():
+        text = re.sub(rf"^{key} = \S+", f"{key} = {value:.3g}", text, flags=re.MULTILINE)
+    if counts:
+        tables = [f"necessity_from = {low:g}\nright = {each.right}\nof = {each.of}\n" for low, each in counts]
+        head = re.search(r"^\[\[counted\]\].*\n", text, re.MULTILINE)
+        assert head is not None
+        among = re.compile(r"(?:^\[\[counted\]\].*\n(?:\w.*\n)+\n?)+", re.MULTILINE)
+        text = among.sub(lambda _: "".join(f"{head.group()}{table}\n" for table in tables), text)
+    return text
 
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog="python -m tests.campaigns.calibrate",
-        description="Calibrate the thresholds of a verdict on some forms of worlds, and judge them on others.",
+        prog="python -m tests.campaigns.calibrate", description="Count what a verdict goes by, in simulated worlds."
     )
     parser.add_argument("--forms", default=parse_forms("calibrate"), type=parse_forms, help="forms that calibrate")
     parser.add_argument("--seeds", required=True, type=parse_seeds, help="A..B: the worlds that calibrate")
-    parser.add_argument("--judge", type=parse_seeds, help="C..D: worlds of the forms that judge")
-    parser.add_argument("--out", required=True, type=Path, help="folder for what was found in each world")
-    parser.add_argument("--write", action="store_true", help="put the thresholds where the decision reads them")
+    parser.add_argument("--names", type=Path, help="worlds.jsonl of tests.campaigns.worlds: the names to count")
+    parser.add_argument("--out", required=True, type=Path, help="folder for what was decided in each world")
+    parser.add_argument("--write", action="store_true", help="put the values where the decision reads them")
     return parser
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Search what worlds have not been searched, calibrate and judge; return the exit status."""
-    given = list(sys.argv[1:] if arguments is None else arguments)
+    """Decide what worlds have not been decided, and calibrate; return the exit status."""
     parser = _parser()
-    options = parser.parse_args(given)
+    options = parser.parse_args(arguments)
     if judging := [form for form in options.forms if ALL[form] is not Role.CALIBRATE]:
         parser.error(f"--forms: expected forms that calibrate, got {', '.join(judging)}: those judge")
     options.out.mkdir(parents=True, exist_ok=True)
-    worlds = searched_worlds(options.out, options.forms, options.seeds)
-    thresholds = calibrated(worlds)
-    text = written(thresholds, shlex.join(["python", "-m", "tests.campaigns.calibrate", *given]))
+    worlds = decided_worlds(options.out, options.forms, options.seeds)
+    lines = options.names.read_text(encoding="utf-8").splitlines() if options.names else []
+    counts = counted([json.loads(line)["row"] for line in lines])
+    values = limits_of(worlds) | {"tempered": divisor_of(worlds)}
+    text = written(THRESHOLDS_FILE.read_text(encoding="utf-8"), values, counts if options.names else ())
     sys.stdout.write(text)
     if options.write:
         THRESHOLDS_FILE.write_text(text, encoding="utf-8")
-    sys.stdout.write(table(worlds, thresholds))
-    if options.judge is not None:
-        sys.stdout.write(table(searched_worlds(options.out, parse_forms("judge"), options.judge), thresholds))
     return 0
 
 

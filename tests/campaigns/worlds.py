@@ -152,6 +152,7 @@ def answered(form: str, seed: int, at_the_load: bool = False, **options: Any) ->
         "verdict": answer["verdict"],
         "names": [_name(effect, hidden, world.strong) for effect in answer["effects"]],
         "traces": [trace["name"] for trace in answer["traces"]],
+        "refinements": [each["name"] for each in answer["refinements"]],
         "fit": answer["fit"],
         "time_s": round(time.perf_counter() - began, 2),
         "cpu_s": round(time.process_time() - worked, 2),
@@ -192,14 +193,17 @@ def _fresh_rms(model: DrivelineModel, fresh: Sequence[Record]) -> float:
 
 
 def _name(effect: Mapping[str, Any], hidden: set[str], strong: str) -> Row:
-    """Return a name with its probability; it is there if it, or what it says it resembles, is in the world.
+    """Return a name with its probability and how much it is needed, in the middle and at least.
 
-    What the model file knows is there, too: its sizes may be off, and to name it again is no invention.
+    It is there if it, or what it says it resembles, is in the world. What the model file knows is there, too: its sizes
+    may be off, and to name it again is no invention.
     """
     claim = {effect["name"], *effect["indistinguishable_from"]}
     return {
         "name": effect["name"],
         "probability": effect["probability"],
+        "necessity": effect["necessity"],
+        "least": effect["least_necessity"],
         "alike": sorted(claim - {effect["name"]}),
         "is_there": bool(claim & hidden),
         "is_strong": strong in claim,

@@ -9,7 +9,7 @@ from pydantic import BaseModel
 
 from drivers.inverter.drive_settings import OPTION_CODES
 from drivers.plc.register_map import USED
-from estimator.diagnosis.inference import checks, figures as holdout
+from estimator.diagnosis.inference import checks, standing, trials
 from estimator.diagnosis.inference.search import STARTS
 from estimator.diagnosis.where import locate
 from hil.cli.main import ExitStatus
@@ -80,10 +80,10 @@ def test_every_object_that_is_configured_is_listed(index: int) -> None:
 def test_the_thresholds_of_a_verdict_are_those_of_the_code() -> None:
     page = re.sub(r"\s+", " ", text("diagnosis.md"))
     for said in (
-        f"blocks of {holdout.BLOCK_S:g} s every {holdout.EVERY_S:g} s",
+        f"blocks of {trials.BLOCK_S:g} s every {trials.EVERY_S:g} s",
         f"over {locate.WINDOW_S:g} s",
         f"central {locate.CENTRAL:.0%}".replace("%", " %"),
-        f"whose share is below {checks.LEAST_SHARE:g}",
+        f"whose share is below {standing.LEAST_SHARE:g}",
     ):
         assert said in page
     assert checks.LEAST_THROUGH == 0.2

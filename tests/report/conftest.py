@@ -9,6 +9,7 @@ import pytest
 
 from estimator.diagnosis.result import (
     BandTest,
+    Counted,
     Course,
     Diagnosis,
     Discrepancy,
@@ -56,7 +57,10 @@ BACKLASH = FoundEffect(
     indistinguishable_from=("shaft_hysteresis",),
     evidence=Evidence(5321.0, 0.41, 0.052, 1e-12),
     share=0.94,
-    probability=0.999,
+    probability=0.95,
+    necessity=0.97,
+    least_necessity=0.9,
+    counted=Counted(18, 18),
 )
 
 PARAMETERS = {

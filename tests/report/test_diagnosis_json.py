@@ -39,6 +39,7 @@ def test_the_text_is_strict_json_of_the_contract(diagnosis: Diagnosis) -> None:
         "strays",
         "remainder",
         "traces",
+        "refinements",
         "effort",
     ]
     assert content["schema"] == "hil.diagnosis/1"
@@ -68,7 +69,10 @@ def test_where_the_mismatch_is_and_what_it_was_found_to_be_is_written(diagnosis:
         "indistinguishable_from": ["shaft_hysteresis"],
         "alternatives": {},
         "share": 0.94,
-        "probability": 0.999,
+        "probability": 0.95,
+        "necessity": 0.97,
+        "least_necessity": 0.9,
+        "counted": {"right": 18, "of": 18},
         "evidence": {"delta_bic": 5321.0, "holdout_rms_before": 0.41, "holdout_rms_after": 0.052, "p_value": 1e-12},
     }
 

@@ -183,6 +183,7 @@ def _judged(search: Search, rival: Rival) -> Judged:
         believed = trials.one(search.without(believed.hypothesis, weakest.name))
     standings.sort(key=lambda each: -each.share)
     close = {other for each in standings for other in each.alike} | believed.effects | {*weak}
+    close |= {name for name in likely.effects if close & {*EFFECTS[name].contains}}  # its special case stands for it
     possible = (_standing(name, search, trials, likely, noise, rival) for name in sorted(likely.effects - close))
     return Judged(
         nothing,

@@ -167,6 +167,7 @@ def found_effect(standing: Standing, runs: FreeRuns) -> FoundEffect:
         probability=standing.probability,
         form=entry.form({name: p.value for name, p in parameters.items()}),
         necessity=standing.necessity.value,
+        least_necessity=standing.necessity.least,
         counted=standing.counted,
     )
 

@@ -253,12 +253,9 @@ def _rejected(basis: Basis) -> tuple[RejectedEffect, ...]:
     known |= {each.name for each in basis.decision.acquired} | {*basis.effort.untried}
     found = {each.name: RejectedEffect(each.name, each.objection, 0.0) for each in judged.refinements}
     for scores, reason in (
-        (_fitted(search), "fitted: the best set with it is {} in minus twice the log-probability"),
-        (
-            search.implausible,
-            "fitted, and ended at values that are no case of it: {} in minus twice the log-probability",
-        ),
-        (search.foreseen, "not fitted: a score test foresees that on top of what was found it makes that {} at best"),
+        (_fitted(search), "fitted: the best set with it is {}"),
+        (search.implausible, "fitted, and ended at values that are no case of it"),
+        (search.foreseen, "not fitted: a score test foresees that the best set with it is {} at best"),
     ):
         for name, score in sorted(scores.items(), key=lambda item: item[::-1]):  # not as cores came to their end
             if name not in found and name not in known:
@@ -290,7 +287,11 @@ def _fitted(search: Search) -> dict[str, float]:
 
 
 def _compared(worse: float) -> str:
-    """Say by how much a score is worse than that of the best set; as good where it differs by less than a tenth."""
+    """Say by how much a score is worse than that of what is believed; one that is better is no ground to reject it."""
     if abs(worse) < 0.1:
         return "as good as without"
-    return f"{'worse' if worse > 0.0 else 'better'} by {abs(worse):.3g}"
+    if worse < 0.0:
+        return (
+            "more probable than what is believed, less than sets of as many effects that were tried and not established"
+        )
+    return f"worse by {worse:.3g} in minus twice the log-probability"

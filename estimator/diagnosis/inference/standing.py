@@ -43,7 +43,7 @@ class Necessity:
 COUNTED: Sequence[tuple[float, Counted]] = [
     (row["necessity_from"], Counted(row["right"], row["of"])) for row in THRESHOLDS["counted"]
 ]
-"""Of names whose necessity is at least so much (its lower end): the count. Rising; the last one reached holds."""
+"""Of names whose necessity (its lower end) is from so much up to that of the next row: the count."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -172,7 +172,7 @@ def _headline(verdict: Verdict, fit: Fit, effects: Sequence[FoundEffect], effort
         also = f" Found in the acquisition, and not the cause: {found}." if effects else ""
         return f"Something is missing in the model, and no effect of the catalogue explains it: {left}.{also}"
     part = "the mismatch" if verdict is Verdict.EXPLAINED else "part of the mismatch"
-    return f"Missing in the model{_sure(effects)}: {found}. This explains {part}: {_fall(fit)}."
+    return f"Missing in the model{how_sure(effects)}: {found}. This explains {part}: {_fall(fit)}."
 
 
 def _fall(fit: Fit) -> str:
@@ -206,7 +206,7 @@ def _noise(fit: Fit) -> str:
     return f"free-run error {fit.retuned:.3g} {fit.unit}, noise {fit.noise_floor:.3g} {fit.unit}"
 
 
-def _sure(effects: Sequence[FoundEffect]) -> str:
+def how_sure(effects: Sequence[FoundEffect]) -> str:
     """Say how often names of such a standing were right, of the least sure of them; nothing of faults of readings."""
     counts = [each.counted for each in effects if each.counted is not None]
     if not counts:

@@ -14,6 +14,7 @@ from scipy.signal import detrend
 
 from estimator.diagnosis.acquisition.chain import as_if_not_lost
 from estimator.diagnosis.acquisition.finding import runs
+from estimator.diagnosis.inference.wording import how_sure
 from estimator.diagnosis.noise import noise_floor, share_of
 from estimator.diagnosis.preconditions.channels import standstill, unwrapped, with_usable_channels, without_clipped
 from estimator.diagnosis.preconditions.inertia import driven, model_warnings
@@ -346,18 +347,19 @@ class Prepared:
     def finished(self, diagnosis: Diagnosis) -> Diagnosis:
         """Return a diagnosis of these records under the recordings' own names, with doubts and warnings.
 
-        The one place that decides what a doubt does: it comes first, and with one open no probability is given.
+        The one place that decides what a doubt does: it comes first, and with one open no name is given as sure.
         """
         whole = joined(diagnosis, self.segments)
         whole = replace(whole, warnings=(*self.warnings, *whole.warnings))
         if not self.doubts:
             return whole
         about = ", ".join(doubt.about for doubt in self.doubts)
+        statement = whole.statement.replace(how_sure(whole.effects), "")
         return replace(
             whole,
             doubts=self.doubts,
-            statement=f"The input is in doubt (recordings: {about}). If it is right all the same: {whole.statement}",
-            effects=tuple(replace(effect, probability=math.nan) for effect in whole.effects),
+            statement=f"The input is in doubt (recordings: {about}). If it is right all the same: {statement}",
+            effects=tuple(replace(effect, probability=math.nan, counted=None) for effect in whole.effects),
         )
 
 

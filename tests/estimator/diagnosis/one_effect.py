@@ -1,4 +1,4 @@
-"""Two noisy recordings of a line of two masses with one effect, to be fitted from the line without it."""
+"""Two noisy recordings of a line of two masses with one effect: fitted from the line without it, and decided."""
 
 from __future__ import annotations
 
@@ -7,7 +7,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from estimator.diagnosis.inference.hypotheses import everything
+from estimator.diagnosis.acquisition.chain import read_through
+from estimator.diagnosis.inference.decide import Decision, Rival, decide, no_rival
+from estimator.diagnosis.inference.figures import Unseen
+from estimator.diagnosis.inference.hypotheses import everything, open_hypotheses
+from estimator.diagnosis.inference.rivals import laws_around
+from estimator.diagnosis.inference.say import Basis, said
+from estimator.diagnosis.inference.search import Search
+from estimator.diagnosis.result import Diagnosis, Effort
 from estimator.physics.driveline import Start
 from estimator.physics.layout import flat_values, grid_for
 from estimator.physics.model import DrivelineModel
@@ -42,3 +49,21 @@ def bench_with(name: str, values: Mapping[str, float], torques_nm: Sequence[Floa
         noise = SIGMA * np.random.default_rng(seed).standard_normal(output.size)
         records.append(replace(silent, output=output + noise))
     return Bench(line, records)
+
+
+def searched(bench: Bench, names: Sequence[str] = ()) -> Search:
+    """Search some effects, or all that the recordings can tell."""
+    records = list(bench.records)
+    search = Search(bench.model, records, everything(records), names or open_hypotheses(bench.model, records)[0])
+    search.run()
+    return search
+
+
+def decided(search: Search, unseen: Sequence[Record] = (), rival: Rival = no_rival) -> Decision:
+    """Decide on what was found; ``unseen`` are recordings that no fit has seen."""
+    return decide(search, read_through(search.records), Unseen(search.model, read_through(unseen)), rival)
+
+
+def diagnosed(search: Search, decision: Decision) -> Diagnosis:
+    """Return what is said of a decision."""
+    return said(Basis(decision, laws_around(decision.judged), search, search.model, Effort()))

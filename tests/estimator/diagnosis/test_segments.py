@@ -11,14 +11,13 @@ import pytest
 
 from estimator.diagnosis import diagnose
 from estimator.diagnosis.acquisition.chain import replay
-from estimator.diagnosis.inference.figures import BLOCK_S, EVERY_S, blocks, foreign_outputs
+from estimator.diagnosis.inference.figures import foreign_outputs
 from estimator.diagnosis.inference.hypotheses import NOTHING, Effects, everything
 from estimator.diagnosis.noise import LONGEST_S, MOST_SAMPLES, noise_floor, share_of, stretches
 from estimator.diagnosis.result import Course, Discrepancy, Equivalent, Estimated, Profile, Response, Verdict
 from estimator.diagnosis.segments import FEWEST_SAMPLES, LONG_S, cut, joined, segments
 from estimator.errors import NotExciting
 from estimator.physics.driveline import Start
-from estimator.physics.effects.load import KNOT_SPACING_S
 from estimator.physics.fit import FitResult
 from estimator.signals.record import Record, sliced
 from tests.estimator.diagnosis.plain import Bench
@@ -216,17 +215,6 @@ def with_friction(seeds: tuple[int, ...] = (1, 2)) -> list[Record]:
 def fits(records: list[Record], effects: Effects) -> tuple[FitResult, FitResult]:
     bench = Bench(LINE, records, everything(records))
     return bench.fit(NOTHING), bench.fit(effects, bench.fit(NOTHING))
-
-
-class TestBlocks:
-    def test_they_are_kept_out_all_along_and_not_at_the_ends(self) -> None:
-        out = blocks(record(np.zeros(2000), np.zeros(2000)))
-        assert out.mean() == pytest.approx(BLOCK_S / EVERY_S, abs=0.01)
-        assert not out[:50].any()
-        assert not out[-50:].any()
-        short = blocks(record(np.zeros(100), np.zeros(100)))
-        assert short.mean() == pytest.approx(BLOCK_S / EVERY_S, abs=0.05)
-        assert BLOCK_S < KNOT_SPACING_S  # so that the profile on both sides can predict it
 
 
 def test_foreign_recordings_get_their_own_load_and_start_and_nothing_else() -> None:

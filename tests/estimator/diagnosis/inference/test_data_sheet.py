@@ -9,8 +9,8 @@ import pytest
 
 from estimator.diagnosis.diagnose import diagnose
 from estimator.diagnosis.inference.hypotheses import everything, open_hypotheses
-from estimator.diagnosis.inference.rivals import free_line
 from estimator.diagnosis.inference.search import Search
+from estimator.diagnosis.inference.sheet import free_line
 from estimator.diagnosis.inference.wording import Context, statement
 from estimator.diagnosis.result import Effort, Fit, OffNominal, Verdict
 from estimator.physics.effect import Element

@@ -1,4 +1,4 @@
-"""The whole answer by likelihood: what the contract's file says of it."""
+"""The whole answer: what the contract's file says of it."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tests.estimator.diagnosis.planted import SIGMA, TIGHT, recordings
 from tests.estimator.physics.bench import TWO_MASS, model as line_of
 
 
-def test_a_named_effect_has_its_share_and_probability_and_the_model_has_it() -> None:
+def test_a_named_effect_has_its_share_and_necessity_and_the_model_has_it() -> None:
     bench = bench_with("coulomb_friction_motor", {"friction_nm": 8.0})
     answer = diagnose(bench.records, bench.model)
     assert answer.verdict is Verdict.EXPLAINED
@@ -28,9 +28,11 @@ def test_a_named_effect_has_its_share_and_probability_and_the_model_has_it() -> 
     assert answer.fit.retuned > 2.0 * answer.fit.augmented
     content = diagnosis_json(answer)
     assert content["effects"][0]["share"] == pytest.approx(1.0, abs=0.1)
-    assert content["effects"][0]["probability"] > 0.99
+    assert 0.9 < content["effects"][0]["least_necessity"] <= content["effects"][0]["necessity"] <= 1.0
+    counted = content["effects"][0]["counted"]
+    assert 0.5 < content["effects"][0]["probability"] <= counted["right"] / counted["of"]
     assert content["remainder"] is None
-    assert content["traces"] == []
+    assert content["traces"] == content["refinements"] == []
     assert content["mismatch"]["element"] == "motor"
     rejected = [rival["name"] for rival in content["rejected"]]
     left = [*(entry["name"] for entry in content["untestable"]), *content["effort"]["untried"]]

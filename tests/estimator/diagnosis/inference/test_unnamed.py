@@ -1,4 +1,4 @@
-"""A law without a name pays as an effect does, and stands against the names that act elsewhere."""
+"""A law without a name pays as an effect does, and is sought only where something is left, or was."""
 
 from __future__ import annotations
 
@@ -6,15 +6,14 @@ import math
 
 import numpy as np
 import pytest
-from estimator.diagnosis.inference.judge import Grounds, decide, grounds
 
 from estimator.diagnosis.inference.hypotheses import everything, open_hypotheses
-from estimator.diagnosis.inference.rivals import Law, best_law, rival_laws, searches_around
+from estimator.diagnosis.inference.rivals import best_law, laws_around, searches_around
 from estimator.diagnosis.inference.search import Search
 from estimator.diagnosis.unnamed.scene import scene
 from estimator.physics.effect import Element
 from estimator.signals.record import Record
-from tests.estimator.diagnosis.one_effect import bench_with
+from tests.estimator.diagnosis.one_effect import bench_with, decided, searched as searched_on
 from tests.estimator.diagnosis.planted import SIGMA, TIGHT, quiet, recordings
 from tests.estimator.physics.bench import TWO_MASS, model
 
@@ -46,34 +45,21 @@ def test_laws_are_weighed_by_the_innovations() -> None:
     assert float(np.mean(errors**2)) == pytest.approx(1.0, abs=0.1)
 
 
-@pytest.fixture(scope="module")
-def friction() -> tuple[Search, Grounds]:
+def test_a_law_is_sought_where_something_is_left_or_was() -> None:
+    """Next to the re-tuned model and, with a name, for what that leaves: nothing here."""
+    names = ["coulomb_friction_motor", "quadratic_friction"]
+    explained = decided(searched_on(bench_with(names[0], {"friction_nm": 8.0}), names)).judged
+    laws = laws_around(explained)
+    assert laws.alone is not None
+    assert laws.left is None
+    plain = decided(searched_on(bench_with(names[1], {"quadratic_nm_s2": 1e-9}), names)).judged
+    assert laws_around(plain).alone is None
+
+
+def test_where_nothing_is_named_the_law_for_what_is_left_is_the_one_alone() -> None:
     bench = bench_with("coulomb_friction_motor", {"friction_nm": 8.0})
-    names = ["coulomb_friction_motor", "coulomb_friction_load"]
-    search = Search(bench.model, bench.records, bench.use, names)
-    return search, grounds(search)
-
-
-def law(ground: Grounds, better: float) -> Law:
-    """A law that is so much more probable than the best set of names."""
-    return Law(Element.SHAFT, (("T", 1.0),), ground.best.score - better, 0.1)
-
-
-def named(friction: tuple[Search, Grounds], alone: Law | None, added: Law | None) -> list[str]:
-    search, ground = friction
-    decision = decide(search, ground, rival_laws(ground, alone, added))
-    assert {each.name for each in (*decision.named, *decision.doubted)} == {"coulomb_friction_motor"}
-    return [each.name for each in decision.named]
-
-
-def test_a_name_falls_to_a_law_without_one_that_is_more_probable(friction: tuple[Search, Grounds]) -> None:
-    assert named(friction, law(friction[1], 100.0), None) == []
-
-
-def test_a_name_stands_where_a_law_added_to_it_is_more_probable_still(friction: tuple[Search, Grounds]) -> None:
-    """A law of many terms follows the form of what is there; with the name it needs fewer of them."""
-    ground = friction[1]
-    assert named(friction, None, None) == ["coulomb_friction_motor"]
-    assert named(friction, law(ground, -100.0), None) == ["coulomb_friction_motor"]
-    assert named(friction, law(ground, 100.0), law(ground, 150.0)) == ["coulomb_friction_motor"]
-    assert named(friction, law(ground, 150.0), law(ground, 100.0)) == []
+    judged = decided(searched_on(bench, ["torque_bias"])).judged
+    assert not judged.named
+    laws = laws_around(judged)
+    assert laws.alone is not None
+    assert laws.left is laws.alone
