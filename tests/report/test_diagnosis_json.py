@@ -23,6 +23,7 @@ def test_the_text_is_strict_json_of_the_contract(diagnosis: Diagnosis) -> None:
     assert content == diagnosis_json(diagnosis)
     assert list(content) == [
         "schema",
+        "doubts",
         "verdict",
         "statement",
         "mismatch",
@@ -38,6 +39,7 @@ def test_the_text_is_strict_json_of_the_contract(diagnosis: Diagnosis) -> None:
         "discrepancy",
         "strays",
         "remainder",
+        "tables",
         "traces",
         "refinements",
         "effort",
