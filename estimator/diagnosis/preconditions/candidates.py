@@ -236,7 +236,8 @@ def _of_columns(record: Record) -> Iterator[Change]:
     dead = np.logical_or.reduce([dead_rows(record.torque_nm[:, i], record.sample_time_s) for i in range(count)])
     if dead.any():
         ends = f"from {record.time_s[dead][0]:.4g} to {record.time_s[dead][-1]:.4g} s"
-        yield Change(f"is a torque dead {ends}, where its reading stands still", 0.1, _without_dead)
+        question = f"is a torque dead {ends}, where its reading stands still"
+        yield Change(question, 0.1, _without_dead, is_open=True)  # a vehicle that rolls has no torque either
 
 
 def of_one_unit(record: Record, i: int, ratio: float) -> Iterator[Change]:

@@ -174,9 +174,12 @@ def doubts_about(records: Sequence[Record], model: DrivelineModel | None) -> lis
 
 def _judged(records: Sequence[Record], line: Line, is_tried: bool = False) -> tuple[Doubt | None, bool]:
     """Return what is doubtful, if anything, and whether recordings are refused for it."""
-    if not records:
+    fits = [(record, fitted_inertia(record, line or BODY)) for record in records]
+    # one that is too short for its line says nothing: a period that makes it longer would explain more of nothing
+    long = [(record, each) for record, each in fits if not math.isnan(each.ratio)]
+    if not long:
         return None, False
-    found = [fitted_inertia(record, line or BODY) for record in records]
+    records, found = [record for record, _ in long], [each for _, each in long]
     if line is not None and not _is_suspicious(found, line):
         return None, False
     ranked = _ranked(records, line, found)
@@ -196,7 +199,10 @@ def _judged(records: Sequence[Record], line: Line, is_tried: bool = False) -> tu
             cure = None
     is_wrong = 1.0 - is_right - math.fsum(each for candidate, each in ranked if candidate.is_else)
     is_one_of_all = best.only is None and not best.change.is_open
-    is_refused = is_one_of_all and (is_wrong >= SURELY if is_off else is_clear and not may_be_physics)
+    # a gear ratio or a scale of any size may be physics as well, such as gravity: it is doubted
+    is_of_any_size = any(row.low < row.high and not row.whole and row.part is not Part.MODEL for row, _ in best.rows)
+    may_be_refused = is_one_of_all and not is_of_any_size
+    is_refused = may_be_refused and (is_wrong >= SURELY if is_off else is_clear and not may_be_physics)
     if line is None and best.is_a_factor and not is_clear:
         return None, False
     about = ", ".join(record.name for record in _blamed(records, found, line, best))
