@@ -40,7 +40,7 @@ _TUPLE: Any = types.UniTuple
 _JOINED: Any = types.Tuple
 _NOTHING: Any = _JOINED(())
 _NUDGES = _fields((_INDICES, _ROW, float64), Nudges)
-_EACH = (_ROWS, _ROWS, _INDICES, _INDICES, _ROW, _ROWS, _ROWS, _INDICES, boolean, _STACK)
+_EACH = (_ROWS, _ROWS, _INDICES, _INDICES, _ROW, _ROW, _ROWS, _ROWS, _INDICES, boolean, _STACK)
 _CHAIN = _fields((_STACK, _ROWS, _ROWS, _ROW, float64, float64), Chain)
 _FILTERED = _fields((_ROWS, _STACK, _ROWS, _ROW, _ROW), Filtered)
 
@@ -53,7 +53,7 @@ def signatures(masses: int) -> dict[Any, tuple[Any, ...]]:
     return {
         integrate: (
             *(inertias, own, *steps, int64, int64, float64),
-            *(_ROW, _ROW, _ROW, _ROW, _ROW, _INDICES, boolean, _ROWS, _ROWS),
+            *(_ROW, _ROW, _ROW, _ROW, _ROW, _ROW, _INDICES, boolean, _ROWS, _ROWS),
         ),
         integrate_side_by_side: (inertias, *steps, int64, float64, _INDICES, *_EACH),
         integrate_each: (inertias, own, *steps, float64, *_EACH, _STACK, _INDICES),
