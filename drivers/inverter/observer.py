@@ -26,7 +26,7 @@ FloatArray = npt.NDArray[np.float64]
 SAMPLED_CYCLES: Final = 2
 """A drive may take its command, and sample its torque, each a cycle later than another."""
 
-SPEED_AND_LOAD: Final = np.array([1.0, 1.0, 0.0, 0.0])  # what is learnt where friction may turn
+SPEED_AND_LOAD: Final = np.array([1.0, 1.0, 0.0, 0.0])  # what is learnt where friction or the shaft may turn
 
 SWING_S: Final = 0.15
 """Each of two low-pass filters in series [s]: a swing of 5 Hz is left at 1/23, one of 8 Hz at 1/58."""
@@ -43,6 +43,10 @@ WIND_RAD_S2: Final = 0.15  # how far the rest of the load goes in a second [rad/
 UNKNOWN_LOAD_RAD_S2: Final = 2.0  # deviation of the first load [rad/s²]: a grade of 1.7 %
 GAIN_WALK: Final = 0.02  # how far the gain goes in a second
 STILL_RAD_S: Final = 0.15  # ten times the noise of a resolver's low-passed speed: nearer to zero a vehicle may stand
+UNWINDS_S: Final = 0.6
+"""After a turn of the torque the shaft unwinds and winds up again: the motor's speed is not the vehicle's for so long,
+two time constants of the filter included."""
+
 SLOW_RAD_S: Final = 0.5  # nearer to zero dry friction may turn at any time, so that a torque's gain is not to be had
 
 
@@ -128,6 +132,8 @@ class VehicleObserver:
         self._count = 0
         self._swing = self._pushed = self._last_u = 0.0
         self._reading_rad_s = math.nan
+        self._last_nm = 0.0
+        self._since_turn_s = math.inf
         self._changed = True
         self._x = np.array([math.nan, 0.0, 1.0, TWIST_S2])
         self._p = np.diag([0.01, UNKNOWN_LOAD_RAD_S2**2, 1.0, TWIST_S2**2])
@@ -136,6 +142,8 @@ class VehicleObserver:
 
     def take(self, torque_nm: float, speed_rad_s: float, reading_rad_s: float, cycles: int) -> Motion | None:
         """Take the torque of both drives, the low-passed speed, and the last reading; give the motion once a block."""
+        self._since_turn_s = 0.0 if torque_nm * self._last_nm < 0.0 else self._since_turn_s + cycles * self._period_s
+        self._last_nm = torque_nm or self._last_nm
         u = self._torque.take(torque_nm, cycles) / self._vehicle.inertia_kg_m2
         self._pushed += 0.5 * cycles * (u + self._last_u)
         self._last_u = u
@@ -169,7 +177,7 @@ class VehicleObserver:
         else:
             self._held_rad_s = 0.0
             off = speed_rad_s - predicted
-            if abs(speed_rad_s) < SLOW_RAD_S:
+            if abs(speed_rad_s) < SLOW_RAD_S or self._since_turn_s < UNWINDS_S:
                 self._learn(k * SPEED_AND_LOAD, h, off, s)
             else:
                 self._learn(k, h, off, s)
