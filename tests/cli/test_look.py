@@ -178,10 +178,6 @@ def output_turned(columns: Columns) -> Columns:
     return {**columns, "w": -columns["w"]}
 
 
-def in_rpm(columns: Columns) -> Columns:
-    return {**columns, "w": columns["w"] * 200.0 * 30.0 / np.pi, "T_1": columns["T_1"] * 200.0}
-
-
 def per_mille(columns: Columns) -> Columns:
     return {**columns, "T_1": np.round(columns["T_1"] * 5.0), "T_2": np.round(columns["T_2"] * 5.0)}
 
@@ -218,14 +214,13 @@ def looked(tmp_path: Path, columns: Columns, capsys: pytest.CaptureFixture[str])
     [
         (
             one_turned,
-            "sign of torque input 2 turned round",
+            "sign of torque input 2 (T_2) turned round",
             'torque = [ { column = "T_1" }, { column = "T_2", scale = -1 } ]',
         ),
-        (output_turned, "fall where the torque rises", 'speed = { column = "w", scale = -1, at = "motor" }'),
-        (in_rpm, "Is it in rpm?", 'speed = { column = "w", scale = 0.10472, at = "motor" }'),
+        (output_turned, "sign of torque or output turned round", 'speed = { column = "w", scale = -1, at = "motor" }'),
         (in_ms, "Is time in ms, expected s?", 'time = { column = "time_s", scale = 0.001 }'),
         (in_days, "Is time in days, expected s?", 'time = { column = "time_s", scale = 86400 }'),
-        (one_dead, "0 in every row", "Was that inverter off, or is the channel dead?"),
+        (one_dead, "torque input 2 stays at 0", "if the channel is dead"),
         (per_mille, "per mille of the rated torque", 'torque = [ { column = "T_1", scale = 0.001 }, '),
     ],
 )

@@ -130,7 +130,7 @@ def test_state_is_whole_or_as_it_was(world: World, monkeypatch: pytest.MonkeyPat
     world.call()
     state = world.state()
     before = state.path.read_bytes()
-    monkeypatch.setattr("hil.commission.state.os.fsync", _full_disk)
+    monkeypatch.setattr("os.fsync", _full_disk)
     state.steps["first"].because = "changed"
     with pytest.raises(UsageError, match=r"commission\.json: expected room .* No space left"):
         state.save()

@@ -176,7 +176,7 @@ def _judged(records: Sequence[Record], line: Line, is_tried: bool = False) -> tu
     """Return what is doubtful, if anything, and whether recordings are refused for it."""
     fits = [(record, fitted_inertia(record, line or BODY)) for record in records]
     # one that is too short for its line says nothing: a period that makes it longer would explain more of nothing
-    long = [(record, each) for record, each in fits if not math.isnan(each.ratio)]
+    long = [(record, each) for record, each in fits if line is None or not math.isnan(each.ratio)]
     if not long:
         return None, False
     records, found = [record for record, _ in long], [each for _, each in long]

@@ -38,7 +38,7 @@ class TestOpenHypotheses:
         Of torques of one size any law is a gain.
         """
         _, untestable = open_hypotheses(model(ONE_MASS), [self.REVERSAL])
-        assert set(untestable) == {"inverter_gain_mismatch", "load_imbalance", "torque_nonlinearity"}
+        assert set(untestable) == {"load_imbalance", "torque_nonlinearity"}
 
     def test_what_the_model_has_is_no_hypothesis(self) -> None:
         having = model(ONE_MASS, effects={"coulomb_friction_motor": {"friction_nm": 3.0}})

@@ -29,7 +29,7 @@ def model(
     structure = Structure.TWO_MASS if "k" in values else Structure.ONE_MASS
     return DrivelineModel(
         structure,
-        {name: Parameter(value, tolerance) for name, value in values.items()},
+        {name: Parameter(value, tolerance if value else 0.0) for name, value in values.items()},
         motion,
         {name: {key: EffectValue(v) for key, v in e.items()} for name, e in (effects or {}).items()},
     )

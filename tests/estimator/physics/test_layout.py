@@ -10,8 +10,8 @@ from numba.core.dispatcher import Dispatcher
 
 from estimator import compiled as module
 from estimator.compiled import compiled
-from estimator.physics.catalogue import EFFECTS
-from estimator.physics.layout import LOAD, NOMINAL, SIZE, flat, slot
+from estimator.physics.catalogue import KERNEL
+from estimator.physics.layout import LOAD, NOMINAL, OBSERVER, SIZE, flat, slot
 from tests.estimator.physics.bench import TWO_MASS, model
 
 
@@ -70,8 +70,8 @@ def test_compiled_code_divides_as_arrays_do() -> None:
 
 class TestLayout:
     def test_every_parameter_has_a_slot_of_its_own(self) -> None:
-        slots = [slot("", name) for name in (*NOMINAL, LOAD)]
-        slots += [slot(entry.name, p.name) for entry in EFFECTS.values() for p in entry.parameters]
+        slots = [slot("", name) for name in (*NOMINAL, LOAD, OBSERVER)]
+        slots += [slot(entry.name, p.name) for entry in KERNEL.values() for p in entry.parameters]
         assert sorted(slots) == list(range(SIZE))
 
     def test_effects_are_at_their_null_unless_the_model_has_them(self) -> None:

@@ -91,7 +91,6 @@ def test_every_fault_is_reported_at_once() -> None:
         "parameters.b_M",
         "parameters.c",
         "parameters.J_M.value",
-        "parameters.J_M.tolerance",
         "effects.slipping_clutch",
     ]
 
