@@ -109,7 +109,7 @@ def test_what_can_not_be_damped_is_refused_with_what_is_in_the_way(
         ({"J_M": 1e300}, "values too far apart for it: J_M = 1e\\+300"),
         ({"b_M": 1e100}, "values too far apart|no resonance that oscillates"),
         ({"k": 1e300, "J_M": 1e-300}, "values too far apart"),
-        ({"J_M": 1e-300, "J_L": 1e-300}, "values too far apart|has a resonance of"),
+        ({"J_M": 1e-300, "J_L": 1e-300}, "values too far apart|has a resonance of|no resonance that oscillates"),
     ],
 )
 def test_a_line_that_no_sampled_damper_can_be_designed_for_is_refused(changed: dict[str, float], said: str) -> None:

@@ -17,6 +17,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.stats import t
 
 from estimator.diagnosis.inference.checks import THRESHOLDS
 from estimator.diagnosis.inference.descent import Effort, descended
@@ -37,11 +38,15 @@ FEWEST_BLOCKS = 3  # blocks of a recording at least: it may be shorter than one 
 COURSE: int = THRESHOLDS["course"]
 """Laws that a free course of the load counts for."""
 
-ONE_SIDED_95 = 1.645
-"""Standard errors beyond which a normal variable lies by chance once in twenty times, on one side."""
+SURE = 0.95  # one-sided probability with which a comparison of blocks is sure
 
 TUNED = Effort(derivatives=2, steps=6)
 """What tuning a set for the free run may cost, from where the likelihood is greatest."""
+
+
+def quantile(count: int) -> float:
+    """Return Student's quantile of so many blocks: how many standard errors a sum of theirs may be off by chance."""
+    return float(t.ppf(SURE, max(count - 1, 1)))
 
 
 def blocks(record: Record) -> BoolArray:
@@ -100,8 +105,8 @@ class Trial:
     def clearly_beats(self, other: Trial) -> bool:
         """Tell whether it leaves less error than another, by more than the scatter of the blocks, at 95 %."""
         gained = other.squares - self.squares
-        scatter = math.sqrt(gained.size) * float(np.std(gained))
-        return float(gained.sum()) > ONE_SIDED_95 * scatter
+        scatter = math.sqrt(gained.size) * float(np.std(gained, ddof=1)) if gained.size > 1 else math.inf
+        return float(gained.sum()) > quantile(gained.size) * scatter
 
     def beats(self, other: Trial) -> bool:
         """Tell whether another set need not be considered: one of as few laws, or of fewer, simulates better.
@@ -124,8 +129,8 @@ def necessity(whole: Trial, without: Trial, noise: float) -> Necessity:
     if total <= 0.0 or float(left.sum()) >= total:
         return Necessity(0.0, 0.0)
     ratio = max(float(left.sum()), 0.0) / total
-    scatter = math.sqrt(left.size) * float(np.std(left - ratio * before)) / total
-    return Necessity(1.0 - ratio, max(1.0 - ratio - ONE_SIDED_95 * scatter, 0.0))
+    scatter = math.sqrt(left.size) * float(np.std(left - ratio * before, ddof=1)) / total if left.size > 1 else math.inf
+    return Necessity(1.0 - ratio, max(1.0 - ratio - quantile(left.size) * scatter, 0.0))
 
 
 @dataclass

@@ -18,10 +18,10 @@ from estimator.diagnosis.inference.trials import (
     COURSE,
     EVERY_S,
     FEWEST_BLOCKS,
-    ONE_SIDED_95,
     Trial,
     blocks,
     necessity,
+    quantile,
     size_of,
 )
 from estimator.physics.effects.load import KNOT_SPACING_S
@@ -51,9 +51,9 @@ def test_the_free_run_error_is_that_of_all_blocks() -> None:
 
 
 def test_a_set_is_clearly_better_that_gains_more_than_its_blocks_scatter() -> None:
-    """Gains of 1 and 3 in four blocks: their sum is 8, its standard error sqrt(4) * 1."""
+    """Gains of 1 and 3 in four blocks: their sum is 8, its standard error sqrt(4) * sqrt(4 / 3)."""
     before, sure = trial("", [5.0, 5.0, 5.0, 5.0]), trial("lag", [4.0, 2.0, 4.0, 2.0])
-    assert 8.0 > ONE_SIDED_95 * 2.0
+    assert 8.0 > quantile(4) * math.sqrt(4.0 * 4.0 / 3.0)
     assert sure.clearly_beats(before)
     by_one_block = trial("lag", [9.0, 5.0, 5.0, -7.0])  # 8 in all, scattered by sqrt(4) * sqrt(36)
     assert not by_one_block.clearly_beats(before)
@@ -78,11 +78,11 @@ def test_a_set_needs_what_brings_the_error_beyond_the_noise_back() -> None:
     """Blocks of 10 samples at a noise of 0.5 hold 2.5: of 10 and 10 beyond it are left 1 and 3.
 
     The ratio is 4 / 20 = 0.2; the residuals of the blocks are 1 - 2 and 3 - 2, their sum has a standard error of
-    sqrt(2) * 1, the ratio one of that over 20.
+    sqrt(2) * sqrt(2), the ratio one of that over 20.
     """
     found = necessity(trial("lag", [3.5, 5.5]), trial("", [12.5, 12.5]), 0.5)
     assert found.value == pytest.approx(0.8)
-    assert found.least == pytest.approx(0.8 - ONE_SIDED_95 * math.sqrt(2.0) / 20.0)
+    assert found.least == pytest.approx(0.8 - quantile(2) * 2.0 / 20.0)
 
 
 @pytest.mark.parametrize(
