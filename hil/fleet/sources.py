@@ -148,7 +148,9 @@ def _is_recording(path: str, root: str) -> bool:
     """Whether a file in a folder that was given is one; a file given by its name is, whatever it is called."""
     inside = PurePosixPath(path[len(root) :])
     hidden = any(part.startswith((".", "_", RESULTS)) for part in inside.parts)
-    return inside.suffix.lower() in FORMATS and not hidden and inside.name not in (FAILURES, SURVEY)
+    is_sidecar = inside.suffix.lower() == ".json" and PurePosixPath(inside.stem).suffix.lower() in FORMATS
+    is_of_fleet = inside.name in (FAILURES, SURVEY)
+    return inside.suffix.lower() in FORMATS and not (hidden or is_sidecar or is_of_fleet)
 
 
 def _placed(url: str, pattern: re.Pattern[str] | None) -> Found:
