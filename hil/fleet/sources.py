@@ -25,7 +25,7 @@ from hil.fleet.dataset import FAILURES, RESULTS, SURVEY
 from hil.provenance import Source
 from hil.recording.checksum import RIG_TEXT
 from hil.recording.description import sidecar_of
-from hil.recording.formats import FORMATS, read_metadata
+from hil.recording.formats import is_named_as_recording, read_metadata
 
 REMOTE, CHAIN = "://", "::"
 
@@ -148,9 +148,7 @@ def _is_recording(path: str, root: str) -> bool:
     """Whether a file in a folder that was given is one; a file given by its name is, whatever it is called."""
     inside = PurePosixPath(path[len(root) :])
     hidden = any(part.startswith((".", "_", RESULTS)) for part in inside.parts)
-    is_sidecar = inside.suffix.lower() == ".json" and PurePosixPath(inside.stem).suffix.lower() in FORMATS
-    is_of_fleet = inside.name in (FAILURES, SURVEY)
-    return inside.suffix.lower() in FORMATS and not (hidden or is_sidecar or is_of_fleet)
+    return is_named_as_recording(inside) and not hidden and inside.name not in (FAILURES, SURVEY)
 
 
 def _placed(url: str, pattern: re.Pattern[str] | None) -> Found:

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from importlib import import_module
-from pathlib import Path
+from pathlib import Path, PurePath
 from types import MappingProxyType
 from typing import Any
 
@@ -137,6 +137,12 @@ def writer_for(path: Path, replace: bool = False) -> Callable[[Table, Path], Non
     if not path.parent.is_dir():
         raise RecordingError(path, f"expected an existing folder, got {path.parent}. Make it first.")
     return known.write
+
+
+def is_named_as_recording(path: PurePath) -> bool:
+    """Tell whether a file in a folder is a recording by its name: run.csv is, its sidecar run.csv.json is not."""
+    suffix, inner = path.suffix.lower(), PurePath(path.stem).suffix.lower()
+    return suffix in FORMATS and not (suffix == ".json" and inner in FORMATS)
 
 
 def format_of(path: Path) -> Format:

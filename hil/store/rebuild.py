@@ -10,7 +10,7 @@ from typing import Any
 from drivers.foreign_file import read_regular_text
 from hil.errors import HilError, RecordingError
 from hil.files import read_json, remove_abandoned
-from hil.recording.formats import FORMATS, read_metadata
+from hil.recording.formats import is_named_as_recording, read_metadata
 from hil.recording.writer import is_written
 from hil.store.entry import COMPLETE, DIAGNOSIS, IDENTIFICATION, ONLINE, Attachment, entry_at, is_run
 from hil.store.run_store import DAMAGED, STORE_NAME, RunStore, store_of
@@ -111,7 +111,7 @@ def _recordings_in(folder: Path) -> Iterator[Path]:
     """Give every file of a recording's suffix in a folder and those in it; not hidden ones, nor one being written."""
     for path in sorted(folder.rglob("*")):
         inside = path.relative_to(folder).parts
-        if path.suffix.lower() not in FORMATS or any(part.startswith(".") or part == STORE_NAME for part in inside):
+        if not is_named_as_recording(path) or any(part.startswith(".") or part == STORE_NAME for part in inside):
             continue
         if path.is_file() and not is_written(path):
             yield path
