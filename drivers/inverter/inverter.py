@@ -101,6 +101,18 @@ class Inverter(InspectedInverter):
         """
         return self._power.fault()
 
+    def wake(self) -> None:
+        """Bring the node to where it answers SDO requests, whatever state another host has left it in.
+
+        Raises
+        ------
+        ForeignController
+            If the drive is enabled, which this program has not done.
+        """
+        self._monitor.expect(None)
+        self._power.require_disabled()
+        self._send_nmt(NmtCommand.ENTER_PRE_OPERATIONAL)
+
     def configure(self) -> None:
         """Give the device its PDO layout, option codes and what it watches the host by; start NMT operation.
 

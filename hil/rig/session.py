@@ -97,8 +97,9 @@ def _fit(devices: Devices, plan: Plan) -> PlcStatus:
 
 def _configure(devices: Devices, stop: StopRequest) -> None:
     for inverter in (devices.m1, devices.m2):
-        stop.raise_if_requested()
-        inverter.configure()
-    # asked here, where none is stopped any more and so each answers; armed is none yet
+        inverter.wake()
     if shared := tuple(shared_cob_ids(devices.m1, devices.m2)):
         raise ConfigMismatch(f"{'; '.join(map(str, shared))}. Give each drive a data sheet with COB-IDs of its own.")
+    for inverter in (devices.m1, devices.m2):
+        stop.raise_if_requested()
+        inverter.configure()
