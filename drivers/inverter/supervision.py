@@ -38,12 +38,13 @@ SPEED_SHARE: Final = 0.05  # of the greater reading: filters, and the ripple of 
 DEVIATIONS: Final = 5.0  # of an estimate, beyond which it has passed a bound
 
 MOST_SURPRISE: Final = 15.0
-"""Of the predicted speed: a difference of 16 deviations at once, or of four in each of five blocks. Of 180 vehicles
-drawn as in tests/campaigns/healthy.py the worst came to 10; a speed reversed, halved or zero at once to 50 and more."""
+"""Of the predicted speed: a difference of 16 deviations at once, or of four in each of five blocks. Chosen on 180
+vehicles drawn as in tests/campaigns/healthy.py, of which the worst came to 10; a speed that is reversed, halved or zero
+comes at once to 50 and more."""
 
 GAIN_SHARE: Final = 1.15
 """By so much acceleration over torque may be beyond what the inertias have: torque readings are 5 % off, and friction
-that changes with the torque is taken for inertia. Beyond it the same 180 came to 3.7 deviations."""
+that changes with the torque is taken for inertia. Chosen on the last 100 of the same: they came to 3.7 deviations."""
 
 MOST_HELD_RAD_S: Final = 2.0  # that a speed which stands should have changed by [rad/s]
 
