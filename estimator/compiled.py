@@ -137,6 +137,6 @@ def assembled(function: Function) -> Function:
     return cast(Function, numba.njit(nogil=True, error_model="numpy", forceinline=True)(function))
 
 
-def brief(function: Function) -> Function:
+def compiled_with_lock(function: Function) -> Function:
     """Compile a function that is over in microseconds and is called all the time: it keeps the interpreter lock."""
     return cast(Function, numba.njit(cache=True, error_model="numpy")(function))

@@ -26,7 +26,7 @@ from estimator.identification.linear_model import ComplexArray
 from estimator.identification.modes.modes import Mode, two_mass_resonance
 from estimator.signals.record import FloatArray
 
-Line = Mapping[str, float]
+LineValues = Mapping[str, float]
 """Values of a two-mass line: J_M, J_L, k, c, b_M, b_L."""
 
 PARAMETERS = ("J_M", "J_L", "k", "c", "b_M", "b_L")
@@ -43,17 +43,17 @@ KEEPS_WITHIN = 0.01
 class Region:
     """Lines that are possible: each parameter's value, and its lowest and highest."""
 
-    value: Line  # the nominal line
-    low: Line  # the smallest value of each parameter that is still possible
-    high: Line  # the largest
+    value: LineValues  # the nominal line
+    low: LineValues  # the smallest value of each parameter that is still possible
+    high: LineValues  # the largest
 
-    def corners(self) -> Iterator[Line]:
+    def corners(self) -> Iterator[LineValues]:
         """Yield the nominal line, then every combination of the ends of J_M, J_L, k and c, at the least friction."""
         yield self.value
         ends = [sorted({self.low[name], self.high[name]}) for name in PARAMETERS[:4]]
         yield from (dict(self.low) | dict(zip(PARAMETERS, values, strict=False)) for values in product(*ends))
 
-    def random(self, count: int) -> Iterator[Line]:
+    def random(self, count: int) -> Iterator[LineValues]:
         """Yield lines from anywhere in it."""
         for draw in np.random.default_rng(1).random((count, len(PARAMETERS))).tolist():
             yield {n: self.low[n] + x * (self.high[n] - self.low[n]) for n, x in zip(PARAMETERS, draw, strict=True)}
@@ -100,7 +100,7 @@ class Damper:
 
     filter: Filter  # K(z)
     timing: Timing  # what it was designed for
-    line: Line  # the nominal line
+    line: LineValues  # the nominal line
     least_damping: float  # of the lines that were tried: the smallest damping ratio
     sensitivity: float  # ... the largest peak of the sensitivity function
     region_hz: tuple[float, float]  # ... the lowest and highest resonance [Hz]
@@ -108,7 +108,7 @@ class Damper:
     n_lines: int  # how many lines were tried
 
 
-def sampled_line(line: Line, timing: Timing) -> tuple[FloatArray, FloatArray, FloatArray]:
+def sampled_line(line: LineValues, timing: Timing) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return (A, B, C) of torque asked to speed, sampled; torques that wait are states of their own, oldest first."""
     J_M, J_L, k, c, b_M, b_L = (line[name] for name in PARAMETERS)
     drift = np.array([[-(c + b_M) / J_M, c / J_M, -k / J_M], [c / J_L, -(c + b_L) / J_L, k / J_L], [1.0, -1.0, 0.0]])
@@ -144,7 +144,7 @@ def points(period_s: float, count: int = 160) -> ComplexArray:
 class Loop:
     """Sampled lines, stacked, that one filter is closed around."""
 
-    def __init__(self, lines: list[Line], timing: Timing) -> None:
+    def __init__(self, lines: list[LineValues], timing: Timing) -> None:
         A, B, C = zip(*(sampled_line(line, timing) for line in lines), strict=True)
         self.A, self.B, self.C, self.period_s = np.array(A), np.array(B), C[0], timing.period_s
         self.near_hz = open_mode(lines[0]).frequency_hz
@@ -209,7 +209,7 @@ def filter_of(settings: FloatArray, at_hz: float, period_s: float) -> Filter:
 class _Search:
     """What a filter comes to at some lines, the nominal one first."""
 
-    def __init__(self, lines: list[Line], timing: Timing, demand: Demand) -> None:
+    def __init__(self, lines: list[LineValues], timing: Timing, demand: Demand) -> None:
         self.loop, self.demand, self.lines = Loop(lines, timing), demand, lines
         count = demand.excitation_nm.shape[0]
         self._turn = np.exp(2j * np.pi * np.arange(1, count // 2 + 1) / count)
@@ -257,7 +257,7 @@ class _Search:
         return self.filter(min(tried, key=lambda each: each.fun).x)
 
 
-def open_mode(line: Line) -> Mode:
+def open_mode(line: LineValues) -> Mode:
     """Return a line's own resonance."""
     mode = two_mass_resonance(**line)
     if mode is None:
@@ -306,7 +306,7 @@ def _designed(region: Region, timing: Timing, demand: Demand) -> Damper:
     )
 
 
-def _require_seen(lines: list[Line], timing: Timing) -> None:
+def _require_seen(lines: list[LineValues], timing: Timing) -> None:
     """Refuse a region with a resonance at or beyond half the sampling rate, where a sampled speed shows another one."""
     highest_hz, most_hz = max(open_mode(line).frequency_hz for line in lines), 0.5 / timing.period_s
     if not highest_hz < most_hz:

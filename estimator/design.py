@@ -23,7 +23,7 @@ from threadpoolctl import threadpool_limits
 
 from estimator.diagnosis.assemble import Z95, moved_values
 from estimator.diagnosis.first_use import compile_kernels, is_first_use
-from estimator.diagnosis.inference.answer import Found, answer
+from estimator.diagnosis.inference.answer import SearchResult, answer
 from estimator.diagnosis.inference.checks import THRESHOLDS
 from estimator.diagnosis.inference.descent import Effort, descended, extended
 from estimator.diagnosis.inference.disturbances import whitener_of
@@ -33,10 +33,10 @@ from estimator.diagnosis.inference.hypotheses import (
     Hypothesis,
     Progress,
     covariance,
-    kept,
     line_values,
     of_first_outputs,
     silent,
+    unknowns_of,
 )
 from estimator.diagnosis.inference.standing import ALIKE_WITHIN
 from estimator.diagnosis.preconditions.prepare import prepare
@@ -135,7 +135,7 @@ def left_open(
     if masses and is_first_use(masses):
         progress("preparing", 0.0)
         compile_kernels(masses)
-    kept_of: list[Found] = []
+    kept_of: list[SearchResult] = []
     with threadpool_limits(1, user_api="blas"):
         ready = prepare(records, model)
         diagnosis = ready.finished(answer(ready, model, progress, effort, Work(), kept_of.append))
@@ -145,7 +145,7 @@ def left_open(
     return replace(known, supposed={name: each for name, each in each_supposed.items() if each}), diagnosis
 
 
-def _open(found: Found, untested: tuple[str, ...], diagnosis: Diagnosis) -> Open:
+def _open(found: SearchResult, untested: tuple[str, ...], diagnosis: Diagnosis) -> Open:
     """Return the verdict's set and those as probable that do not simulate worse; none counts for more than it does."""
     search, judged = found.search, found.decision.judged
     best = judged.believed.hypothesis
@@ -191,7 +191,7 @@ def _supposed(known: Open, name: str) -> Untested | None:
     if not release.shared or GRADE in first.effects:
         return None
     held = tuple(replace(each, low=each.start, high=each.start) for each in release.shared)
-    before = kept(result, first.effects | set(line.effects))
+    before = unknowns_of(result, first.effects | set(line.effects))
     own = [
         (*old, *(_throughout(each, record) for each in mine))
         for old, mine, record in zip(before.own, release.own, known.records, strict=True)

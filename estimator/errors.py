@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 Item = TypeVar("Item")
-Made = TypeVar("Made")
+Result = TypeVar("Result")
 
 
 class EstimatorError(Exception):
@@ -57,10 +57,10 @@ class NotExciting(EstimatorError):
 
 
 def made_of_each(
-    items: Iterable[Item], make: Callable[[Item], Made], fault: type[Exception], joined: Callable[[str], Exception]
-) -> list[Made]:
+    items: Iterable[Item], make: Callable[[Item], Result], fault: type[Exception], joined: Callable[[str], Exception]
+) -> list[Result]:
     """Return what is made of each of several recordings; refuse all that are at fault together."""
-    made: list[Made] = []
+    made: list[Result] = []
     faults: list[Exception] = []
     for item in items:
         try:

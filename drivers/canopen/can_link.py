@@ -21,10 +21,10 @@ from urllib.parse import parse_qsl, urlsplit
 import can
 import canopen
 
+from drivers.canopen.foreign_controllers import Strangers
 from drivers.canopen.heartbeat import HEARTBEAT_COB_ID, HOST_NODE_ID, NMT_COB_ID, HeartbeatProducer, NmtState
 from drivers.canopen.inline_bus import InlineBus
 from drivers.canopen.remote_bus import BoundedRemoteBus
-from drivers.canopen.strangers import Strangers
 from drivers.errors import BusDown, ProtocolViolation
 
 logging.getLogger("canopen").addHandler(logging.NullHandler())  # our errors say it; canopen would print it too
@@ -99,7 +99,7 @@ class CanLink:
         self._violation: ProtocolViolation | None = None
         self._producer: HeartbeatProducer | None = None
         self.network = _Network(bus, self._raise_if_down)
-        self.strangers = Strangers(self.subscribe)
+        self.pdos_to_disable = Strangers(self.subscribe)
         self._thread: threading.Thread | None = None
         if isinstance(bus, InlineBus):
             bus.receive_by(self._take)
@@ -133,10 +133,10 @@ class CanLink:
 
     def watch_strangers(self, host_node_id: int) -> None:
         """Look out, from now on, for another controller: its SYNC, NMT commands, or this host's heartbeat."""
-        self.strangers.claim(SYNC_COB_ID, "SYNC")
-        self.strangers.claim(NMT_COB_ID, "an NMT command")
-        self.strangers.claim(HEARTBEAT_COB_ID + host_node_id, f"the heartbeat of the host, node {host_node_id}")
-        self.strangers.watch()
+        self.pdos_to_disable.claim(SYNC_COB_ID, "SYNC")
+        self.pdos_to_disable.claim(NMT_COB_ID, "an NMT command")
+        self.pdos_to_disable.claim(HEARTBEAT_COB_ID + host_node_id, f"the heartbeat of the host, node {host_node_id}")
+        self.pdos_to_disable.watch()
 
     def produce_heartbeat(self, period_s: float, node_id: int = HOST_NODE_ID) -> None:
         """Send the host's own heartbeat from now on, so that drives notice when the host is gone.

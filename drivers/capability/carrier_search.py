@@ -64,7 +64,7 @@ def find_further(sheet: DataSheet, wanted: Sequence[ObjectId], used: Sequence[Ca
     return CarrierSearch(_several(sheet, TPDO, left, used), others)
 
 
-def strangers(sheet: DataSheet, carriers: Sequence[Carrier]) -> Iterator[int]:
+def interfering_pdos(sheet: DataSheet, carriers: Sequence[Carrier]) -> Iterator[int]:
     """Find other PDOs that would disturb, by the index of their communication parameter.
 
     These are PDOs that are on with the identifier of one in use, and TPDOs with a constant one: two drives with the

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from drivers.capability.carrier import RPDO, TPDO, Carrier, Direction, ObjectId, object_name
-from drivers.capability.carrier_search import CarrierSearch, find_carriers, find_further, strangers
+from drivers.capability.carrier_search import CarrierSearch, find_carriers, find_further, interfering_pdos
 from drivers.capability.table import EVENT_TIMER, TABLE, Capability, Function, Part, Without
 from drivers.datasheet.file import DataSheet
 from drivers.datasheet.objects import EdsEntry
@@ -122,9 +122,9 @@ class DrivePlan:
         return (*self.command.carriers, *self.feedback.carriers, *self.further.carriers)
 
     @property
-    def strangers(self) -> tuple[int, ...]:
+    def pdos_to_disable(self) -> tuple[int, ...]:
         """Communication parameters of PDOs that are to be switched off."""
-        return tuple(strangers(self.sheet, self.carriers))
+        return tuple(interfering_pdos(self.sheet, self.carriers))
 
     @property
     def used(self) -> frozenset[int]:

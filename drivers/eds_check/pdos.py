@@ -146,7 +146,7 @@ def check_carriers(context: EdsContext) -> Iterator[EdsFinding]:
     plan = context.plan
     yield from _search(context, RPDO, COMMAND, plan.command)
     yield from _search(context, TPDO, FEEDBACK, plan.feedback)
-    for index in plan.strangers:
+    for index in plan.pdos_to_disable:
         entry = context.entry(index, 1)
         if entry is not None:
             expected = "an identifier by the node id ($NODEID+0x...), for two drives with this file send the same"

@@ -62,8 +62,8 @@ class Inverter(InspectedInverter):
         link.subscribe(HEARTBEAT_COB_ID + settings.node_id, self._monitor.on_heartbeat)
         link.subscribe(emcy_cob_id(self._plan), self._monitor.on_emergency)
         for cob_id in self._pdos.rpdos:
-            link.strangers.claim(cob_id, f"{settings.where}: an RPDO")
-        link.strangers.claim(SDO_REQUEST_COB_ID + settings.node_id, f"{settings.where}: an SDO request")
+            link.pdos_to_disable.claim(cob_id, f"{settings.where}: an RPDO")
+        link.pdos_to_disable.claim(SDO_REQUEST_COB_ID + settings.node_id, f"{settings.where}: an SDO request")
         self._power = PowerControl(self._sdo, settings, self._torque_objects(), self._error_code)
         self._before_arming: InverterFeedback | None = None
         self._armed = False
@@ -318,7 +318,7 @@ class Inverter(InspectedInverter):
             If somebody else commands the drives, while the link is watched for that.
         """
         self._link.raise_if_failed()
-        self._link.strangers.raise_if_seen()
+        self._link.pdos_to_disable.raise_if_seen()
         self._monitor.raise_if_unwell(time.monotonic_ns())
         latest = self.latest
         if latest is not None:

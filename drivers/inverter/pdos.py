@@ -121,7 +121,7 @@ class TorqueOnBus:
 
 def set_up_pdos(sdo: SdoChannel, plan: DrivePlan, where: str) -> None:
     """Switch off the PDOs that would disturb, and give those of the plan their layouts."""
-    for index in plan.strangers:
+    for index in plan.pdos_to_disable:
         _switch_off(sdo, index)
     for carrier in plan.carriers:
         _write(sdo, carrier)

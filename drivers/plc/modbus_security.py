@@ -105,12 +105,12 @@ def _role(certificate: x509.Certificate) -> str | None:
 def tls_failure(place: str, cause: Exception | None) -> ConfigMismatch:
     """Put into words for a person at the rig why a TLS connection did not come about, or not for long."""
     return ConfigMismatch(
-        f"{place}: expected a TLS connection with certificates that both sides accept, got: {_said(cause)}. "
+        f"{place}: expected a TLS connection with certificates that both sides accept, got: {_cause_text(cause)}. "
         "Look at [plc.security] of the rig file and at the PLC's own settings."
     )
 
 
-def _said(cause: Exception | None) -> str:
+def _cause_text(cause: Exception | None) -> str:
     if isinstance(cause, ssl.SSLError):
         reason = getattr(cause, "reason", None)  # there only where OpenSSL itself raised it
         text = _VERIFY_TEXT.get(getattr(cause, "verify_code", 0)) or _REASON_TEXT.get(reason or "")

@@ -26,7 +26,7 @@ import numpy as np
 
 from estimator.diagnosis.flange import FREE, slots_of, with_only
 from estimator.physics.catalogue import BUILT_IN
-from estimator.physics.driveline import Case, Start
+from estimator.physics.driveline import Case, InitialCondition
 from estimator.physics.effect import Effect, Element
 from estimator.physics.fit import FitResult, fit, make_problem
 from estimator.physics.inputs import load_of
@@ -40,18 +40,18 @@ from estimator.signals.record import FloatArray, OutputKind, Record, once
 
 
 @dataclass(frozen=True, slots=True)
-class Around:
+class PlantSetting:
     """What a plant is simulated with."""
 
     torque_nm: FloatArray  # (N, M): of its inputs
     load_nm: FloatArray  # (N,)
-    start: Start
+    start: InitialCondition
     tuned: Mapping[str, float]  # factor on those of its parameters that act as the line's of these names
     laws: FloatArray | None  # (layout.SIZE,): parameters of laws at its shafts (``flange``), where there are any
     sign_width: float  # speed within which their dry friction changes sign [rad/s]
 
 
-Simulated = Callable[[Record, Around], FloatArray]
+Simulated = Callable[[Record, PlantSetting], FloatArray]
 """Recording, and what it is simulated with, to the true output (N,)."""
 
 FINER = 4  # steps to a sample where a torque is late by parts of one, or the output filtered within one
@@ -77,7 +77,7 @@ _INPUT, _SENSOR = _slots((Element.TORQUE_PATH, Element.ACQUISITION)), _slots((El
 _EFFECT_AT = {
     slot(name, parameter.name): name for name, entry in BUILT_IN.items() for parameter in entry.parameters
 } | {slot("", name): "" for name in (*NOMINAL, LOAD)}
-_STATE = tuple(each.name for each in fields(Start))
+_STATE = tuple(each.name for each in fields(InitialCondition))
 _WITHIN = [
     slot(name, key)
     for name, key in (
@@ -152,7 +152,7 @@ class BlackBox:
             return output[::steps]
         rising = np.append(np.diff(output), 0.0) / fine.sample_time_s
         moved = replace(fine, torque_nm=rising[:, np.newaxis], load_nm=None)
-        initial = Case(with_only(case.p, _SENSOR), Start(0.0, 0.0, float(output[0])))
+        initial = Case(with_only(case.p, _SENSOR), InitialCondition(0.0, 0.0, float(output[0])))
         found: FloatArray = simulate_each(_GRID, moved, [initial])[0]
         return found[::steps]
 
@@ -177,7 +177,7 @@ class BlackBox:
         if known is not None:
             return known.result()
         try:
-            mine.set_result(self.run(record, Around(torque, load, case.start, tuned, acting, width)))
+            mine.set_result(self.run(record, PlantSetting(torque, load, case.start, tuned, acting, width)))
         except BaseException as error:
             with self._lock:
                 self._known.pop(key, None)
@@ -198,7 +198,9 @@ def _applied(record: Record, p: FloatArray) -> FloatArray:
     path = with_only(p, _INPUT)
     if (path == flat(FREE)).all():
         return record.torque_nm
-    speed = simulate(_GRID, replace(record, load_nm=None), path, Start(0.0, 0.0, 0.0), output=state_vector.SPEED)
+    speed = simulate(
+        _GRID, replace(record, load_nm=None), path, InitialCondition(0.0, 0.0, 0.0), output=state_vector.SPEED
+    )
     mean = np.diff(speed) / record.sample_time_s
     applied = record.torque_nm.copy()
     applied[:-1, 0] += mean - record.total_torque_nm[:-1]
@@ -225,7 +227,7 @@ def _finer(record: Record) -> Record:
     )
 
 
-WIDE = 30.0  # factor, either way, within which values are looked for
+SEARCH_FACTOR = 30.0  # factor, either way, within which values are looked for
 SHARES = (0.05, 0.3)  # share of the motor in the whole inertia, where a fit starts
 FREQUENCIES = 5  # natural frequencies at which one starts, up to `HIGHEST_HZ` or a quarter of the sampling rate
 
@@ -284,5 +286,7 @@ def _two_masses(inertia: float, viscous: float, share: float, hz: float) -> dict
 
 def _fitted(structure: Structure, start: Mapping[str, float], records: Sequence[Record]) -> FitResult:
     model = DrivelineModel(structure, {name: Parameter(start[name], 0.0) for name in structure.parameter_names})
-    shared = [Shared("", name, start[name], 1.0 / WIDE, WIDE, 1.0) for name in structure.parameter_names]
+    shared = [
+        Shared("", name, start[name], 1.0 / SEARCH_FACTOR, SEARCH_FACTOR, 1.0) for name in structure.parameter_names
+    ]
     return fit(make_problem(model, records, shared), iterations=ITERATIONS)

@@ -23,7 +23,7 @@ from numba.core.types import boolean, float64, int64
 from estimator.compiled import IS_COMPILED, ROOT
 from estimator.diagnosis.line.equivalent import Chain, Filtered, run_filter, run_smoother
 from estimator.diagnosis.line.tangent import Nudges, Setting, linearise
-from estimator.physics.driveline import Start
+from estimator.physics.driveline import InitialCondition
 from estimator.physics.kernel.integration import integrate
 from estimator.physics.kernel.side_by_side import integrate_each, integrate_side_by_side
 from estimator.physics.layout import Grid, flat
@@ -99,7 +99,7 @@ def compile_laws(model: DrivelineModel, sample_time_s: float) -> None:
     time_s = np.array([0.0, sample_time_s])
     record = Record("compiled", sample_time_s, time_s, nothing[:, None], nothing, nothing == 0.0)
     if model.laws:
-        simulate(Grid(model.structure, 1, 1.0, model.laws), record, p, Start(0.0, 0.0, 0.0))
+        simulate(Grid(model.structure, 1, 1.0, model.laws), record, p, InitialCondition(0.0, 0.0, 0.0))
 
 
 def compile_named(masses: int, *names: str) -> None:

@@ -12,7 +12,7 @@ from collections.abc import Collection
 import numpy as np
 
 from estimator.physics.catalogue import BUILT_IN
-from estimator.physics.driveline import Start
+from estimator.physics.driveline import InitialCondition
 from estimator.physics.effect import Element
 from estimator.physics.inputs import initial_state
 from estimator.physics.kernel import integration, state_vector
@@ -72,7 +72,7 @@ class Flange:
         """
         drive = input_nm
         if self._state is None:
-            self._state = initial_state(Start(0.0, 0.0, speed), 0.0, angle, self._p)
+            self._state = initial_state(InitialCondition(0.0, 0.0, speed), 0.0, angle, self._p)
         else:
             rest = self._inertia * (speed - self._before) / step_s + self._against - self._input
             drive = input_nm + rest + (0.0 if self._rest is None else rest - self._rest)

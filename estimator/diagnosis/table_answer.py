@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from estimator.diagnosis.inference.figures import FreeRuns, Unseen, foreign_outputs, on_recordings
-from estimator.diagnosis.inference.hypotheses import Hypothesis, everything
+from estimator.diagnosis.inference.hypotheses import Hypothesis, all_good_samples
 from estimator.diagnosis.result import Diagnosis, Trace, UnnamedTable, Verdict
 from estimator.diagnosis.tables import TableFit, best_table
 from estimator.physics.fit import FitResult
@@ -32,7 +32,7 @@ def with_law(diagnosis: Diagnosis, believed: Hypothesis, runs: FreeRuns) -> Diag
     final = after.first_outputs()
     if final.rms >= diagnosis.fit.augmented or held >= diagnosis.fit.holdout_augmented:
         return diagnosis
-    table = _said(law, diagnosis.augmented.motion)
+    table = _diagnosis_of(law, diagnosis.augmented.motion)
     fit = replace(diagnosis.fit, augmented=final.rms, holdout_augmented=held)
     return replace(
         diagnosis,
@@ -73,11 +73,11 @@ def _drawn(
     kept_out = runs.unseen.chain.records
     outputs = [*final.outputs]
     if kept_out:
-        outputs += foreign_outputs(final, tabled, kept_out, everything(kept_out), believed.effects)
+        outputs += foreign_outputs(final, tabled, kept_out, all_good_samples(kept_out), believed.effects)
     return tuple(replace(trace, augmented=out) for trace, out in zip(traces, outputs, strict=True))
 
 
-def _said(law: TableFit, motion: Motion) -> UnnamedTable:
+def _diagnosis_of(law: TableFit, motion: Motion) -> UnnamedTable:
     at = PLACES[law.place]
     return UnnamedTable(
         place=law.place,

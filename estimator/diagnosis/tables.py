@@ -49,7 +49,7 @@ are fitted. The last one judges: what has run away by then is no law."""
 BETTER = 0.97
 """Error on the unseen blocks, over that of the re-tuned model, up to which a curve is a law."""
 
-ALIKE = 1.1  # the same of a second place over the first, up to which both are reported
+LOOK_ALIKE_SHARE = 1.1  # the same of a second place over the first, up to which both are reported
 
 GAINS = (0.3, 0.1, 0.03, 0.01, 0.0)
 """Gains of the observer, one after the other."""
@@ -409,7 +409,7 @@ def best_table(
     result, table = _reported(last, z)
     if holdout and line is not None and not _carries_to(result, whole, line, holdout):
         return None
-    rival = others[0] if others and others[0].chosen_by < ALIKE * best.chosen_by else None
+    rival = others[0] if others and others[0].chosen_by < LOOK_ALIKE_SHARE * best.chosen_by else None
     pairs = zip(_errors(known.problem, known.outputs, unseen), of_law, strict=True)
     worse = [float(b @ b) > float(a @ a) for a, b in pairs]
     firsts = [record.name for record in records if record.lead is None]

@@ -50,7 +50,7 @@ ONE_MASS_DOES = "one mass explains the recording as well: the data do not need a
 """The reason for no pole pair that is a finding about the drive."""
 
 
-class Verdict(Enum):
+class ModelVerdict(Enum):
     """What a reader may do with the linear model; the value is its name in files."""
 
     GOOD = "model_good"
@@ -76,7 +76,7 @@ class BestEstimate:
     feedback: Feedback  # whether the torque followed the speed
     linearity: Linearity  # whether a linear model is enough
     regions: tuple[RegionalMode, ...]  # the resonance by region of the shaft's torque [Nm]; empty where linear
-    verdict: Verdict  # whether it may be believed, and if not, why
+    verdict: ModelVerdict  # whether it may be believed, and if not, why
 
     @property
     def too_slow(self) -> bool:
@@ -184,12 +184,12 @@ def _half_width(mode: UncertainMode) -> float:
 
 def _verdict(
     mode: UncertainMode | None, reason: str, validation: Validation, feedback: Feedback, linearity: Linearity
-) -> Verdict:
+) -> ModelVerdict:
     """Name what matters most; a nonlinear drive also looks like feedback, so that it comes first."""
     if mode is None:
-        return Verdict.ONE_MASS if reason == ONE_MASS_DOES else Verdict.NOT_EXCITED
+        return ModelVerdict.ONE_MASS if reason == ONE_MASS_DOES else ModelVerdict.NOT_EXCITED
     if not linearity.is_linear:
-        return Verdict.NOT_LINEAR
+        return ModelVerdict.NOT_LINEAR
     if not validation.independence.is_independent:
-        return Verdict.INCOMPLETE
-    return Verdict.CLOSED_LOOP if feedback.detected else Verdict.GOOD
+        return ModelVerdict.INCOMPLETE
+    return ModelVerdict.CLOSED_LOOP if feedback.detected else ModelVerdict.GOOD

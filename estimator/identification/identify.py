@@ -22,7 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from estimator.errors import BadModel, NotExciting
-from estimator.identification.best import BestEstimate, Verdict, best_estimate
+from estimator.identification.best import BestEstimate, ModelVerdict, best_estimate
 from estimator.identification.chain import OnlineChain, OnlineTrajectory
 from estimator.identification.linear_model import LinearModel
 from estimator.identification.modes.modes import Mode, PoleZeroMap, UncertainMode, continuous, pole_zero_map, resonance
@@ -282,7 +282,7 @@ def study(record: Record, found: Identification, settings: Settings, others: Seq
 
 
 def _physical(best: BestEstimate) -> tuple[PhysicalEstimate | None, str]:
-    if best.verdict is Verdict.ONE_MASS:
+    if best.verdict is ModelVerdict.ONE_MASS:
         return None, best.reason
     try:
         return physical_parameters(best.two_mass.model, best.two_mass.covariance), ""

@@ -24,7 +24,7 @@ from scipy.stats import chi2
 from threadpoolctl import threadpool_limits
 
 from estimator.errors import BadModel
-from estimator.identification.best import BestEstimate, Verdict, known_pair
+from estimator.identification.best import BestEstimate, ModelVerdict, known_pair
 from estimator.identification.linear_model import LinearModel
 from estimator.identification.modes.modes import UncertainMode
 from estimator.identification.modes.physical import PhysicalEstimate, physical_parameters
@@ -158,7 +158,10 @@ def joint_estimate(names: Sequence[str], estimates: Sequence[BestEstimate]) -> T
 
 
 def _is_good(best: BestEstimate) -> bool:
-    return best.verdict in (Verdict.GOOD, Verdict.CLOSED_LOOP) and best.fit.model.orders == best.two_mass.model.orders
+    return (
+        best.verdict in (ModelVerdict.GOOD, ModelVerdict.CLOSED_LOOP)
+        and best.fit.model.orders == best.two_mass.model.orders
+    )
 
 
 def _disagreeing(experiments: Sequence[_Experiment], ratio: FloatArray) -> int | None:

@@ -57,7 +57,7 @@ FEWEST_PERIODS = 4
 SHORTEST_PERIOD = 32
 """Samples: fewer lines than 15 say little of a response."""
 
-SAME = 0.9
+PERIODIC_CORRELATION = 0.9
 """Correlation of a torque with itself a period later from which on it is called periodic."""
 
 EXCITED = 0.05
@@ -264,10 +264,10 @@ def _period(u: FloatArray) -> int | None:
     overlap = np.fft.irfft(np.abs(np.fft.rfft(x, 2 * n)) ** 2)[: lags.size]
     size = np.sqrt(power[n - lags] * (power[n] - power[lags]))
     correlation = overlap / np.maximum(size, np.finfo(np.float64).tiny)
-    below = np.flatnonzero(correlation < 0.5 * SAME)
+    below = np.flatnonzero(correlation < 0.5 * PERIODIC_CORRELATION)
     if not below.size or below[0] >= lags.size - 1:
         return None
-    again = np.flatnonzero(correlation[below[0] :] >= SAME) + below[0]
+    again = np.flatnonzero(correlation[below[0] :] >= PERIODIC_CORRELATION) + below[0]
     if not again.size:
         return None
     period = again[0] + int(np.argmax(correlation[again[0] : again[0] + below[0]]))

@@ -47,7 +47,7 @@ def some(condition: bool) -> bool:
     return condition
 
 
-def like(value: float, other: float) -> float:
+def broadcast_as(value: float, other: float) -> float:
     """Return a single number, in every lane where ``other`` has lanes."""
     return value
 
@@ -109,7 +109,7 @@ def _some_of(condition: Any) -> Any:
     return lambda condition: condition
 
 
-@overload(like, strict=False)
+@overload(broadcast_as, strict=False)
 def _like(value: Any, other: Any) -> Any:
     if other is lanes:
         return lambda value, other: _in_lanes(value)

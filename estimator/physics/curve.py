@@ -16,7 +16,7 @@ import math
 import numpy as np
 
 from estimator.compiled import compiled
-from estimator.lanes import choose, every, like
+from estimator.lanes import broadcast_as, choose, every
 from estimator.signals.record import FloatArray
 
 MOST_KNOTS = 16
@@ -57,7 +57,7 @@ def curve(x: float, p: FloatArray, at: int, wraps: bool) -> tuple[float, float]:
     last = 0
     while last < MOST_KNOTS - 1 and every(p[at + KNOTS + last + 1] < INFINITE):
         last += 1
-    value = like(p[at + VALUES], x)
+    value = broadcast_as(p[at + VALUES], x)
     slope = slope_at_knot(p, at, 0, last, wraps)
     value += slope * min(x - p[at + KNOTS], 0.0)
     i = 0

@@ -225,7 +225,7 @@ def load_inertia(model: Driveline) -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class Start:
+class InitialCondition:
     """What is unknown in every recording: constant load torque [Nm] and initial state [rad, rad/s].
 
     Of a joint also the preload behind its gap [Nm].
@@ -246,5 +246,5 @@ class Case:
     """One simulation of a recording."""
 
     p: FloatArray  # (layout.SIZE,): parameters of the superset model, the recording's own among them
-    start: Start  # of this simulation
+    start: InitialCondition  # of this simulation
     extra_load_nm: FloatArray | None = None  # (N,): load torque over time, next to the constant one

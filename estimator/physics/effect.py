@@ -108,21 +108,21 @@ class Untestable:
 
 
 Scales = Callable[[Driveline, Sequence[Record]], tuple[float, ...]]
-Start = tuple[float | Held | Within, ...]
+FitStart = tuple[float | Held | Within, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class OtherForm:
     """Where a fit of a law that is written another way starts."""
 
-    start: Start  # of the law's own parameters, in scales
+    start: FitStart  # of the law's own parameters, in scales
     line: Mapping[str, float]  # of the line's own that change with it, by name, in their units
 
 
 OtherForms = Callable[[Driveline, Sequence[Record], Mapping[str, float], Mapping[str, float]], list[OtherForm]]
 Span = tuple[float, float]
 Spans = Callable[[Driveline, Mapping[str, float], Mapping[str, float]], Mapping[str, tuple[Span, ...]]]
-Starts = Callable[[Driveline, Sequence[Record]], list[Start]]
+Starts = Callable[[Driveline, Sequence[Record]], list[FitStart]]
 Testable = Callable[[Driveline, Sequence[Record]], Untestable | None]
 Objection = Callable[[Driveline, Sequence[Record], Mapping[str, float]], str]
 

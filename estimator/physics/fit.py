@@ -63,7 +63,7 @@ class FitResult:
             return jacobian_at(self.problem, self.x, self.outputs)
         return self.derivative
 
-    def light(self) -> FitResult:
+    def without_derivative(self) -> FitResult:
         """Return this fit without its derivative, which of long recordings takes most of its room."""
         return replace(self, derivative=None)
 
@@ -182,7 +182,7 @@ def fit(problem: Problem, x0: FloatArray | None = None, iterations: int = ITERAT
 
 
 HEAT = 3  # jacobians that each of several starts gets before only the best ones continue
-CLOSE = 1.1  # squared error, over the best start's, up to which a start continues
+CONTINUED_RATIO = 1.1  # squared error, over the best start's, up to which a start continues
 
 Name = tuple[object, ...]
 
@@ -207,7 +207,7 @@ def close(heat: Sequence[FitResult]) -> list[int]:
     """Return which of several fits are close to the best, that first; the others were tried in vain."""
     least = min(result.squares for result in heat)
     order = sorted(range(len(heat)), key=lambda i: heat[i].squares)
-    return [i for i in order if heat[i].squares <= CLOSE * least]
+    return [i for i in order if heat[i].squares <= CONTINUED_RATIO * least]
 
 
 def converge(result: FitResult) -> FitResult:

@@ -10,7 +10,7 @@ import numpy as np
 
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.curve import span
-from estimator.physics.driveline import Case, Start
+from estimator.physics.driveline import Case, InitialCondition
 from estimator.physics.fit import FitResult, fit
 from estimator.physics.layout import LOAD, Grid, slot
 from estimator.physics.model import DrivelineModel
@@ -36,7 +36,7 @@ class FreeRun:
 
     output: FloatArray  # (N,): simulated output, in the unit of the recording's
     rms: float  # RMS of its error over the good samples
-    start: Start  # load torque and initial state that were estimated
+    start: InitialCondition  # load torque and initial state that were estimated
     further: tuple[FloatArray, ...] = ()  # (N,)
     beyond: tuple[str, ...] = ()  # sentences on curves of the model beyond whose knots it went
 

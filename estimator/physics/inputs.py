@@ -12,7 +12,7 @@ import numpy as np
 from estimator.compiled import compiled, inlined
 from estimator.physics.catalogue import BUILT_IN
 from estimator.physics.curve import MOST_KNOTS, VALUES, curve_over
-from estimator.physics.driveline import Case, Start
+from estimator.physics.driveline import Case, InitialCondition
 from estimator.physics.effect import Place
 from estimator.physics.effects.torque import EDGE
 from estimator.physics.kernel import conditions, sensing, slots, state_vector
@@ -203,12 +203,14 @@ class _Rows(Generic[Key]):
         return rows, np.array(self._chosen)
 
 
-def initial_state(start: Start, torque_nm: float, angle_rad: float, p: FloatArray) -> FloatArray:
+def initial_state(start: InitialCondition, torque_nm: float, angle_rad: float, p: FloatArray) -> FloatArray:
     """Return the kernel's state at the start: what is not unknown follows from the rest as if it were steady."""
     return initial_states([start], np.array([torque_nm]), angle_rad, p[np.newaxis])[0]
 
 
-def initial_states(starts: Sequence[Start], torque_nm: FloatArray, angle_rad: float, p: FloatArray) -> FloatArray:
+def initial_states(
+    starts: Sequence[InitialCondition], torque_nm: FloatArray, angle_rad: float, p: FloatArray
+) -> FloatArray:
     """Return ``initial_state`` of K simulations with these torques, (K,), and parameters, (K, layout.SIZE)."""
     states = np.zeros((len(starts), state_vector.STATES))
     for row, start in zip(states, starts, strict=True):

@@ -10,7 +10,7 @@ import numpy as np
 
 from estimator.errors import BadModel
 from estimator.physics.catalogue import BUILT_IN, KERNEL
-from estimator.physics.model import DrivelineModel, Load, Plant, Structure, natural_frequencies_rad_s
+from estimator.physics.model import DrivelineModel, ExternalPlant, Load, Structure, natural_frequencies_rad_s
 from estimator.physics.motion import reverses, speed_scale
 from estimator.physics.own_law import Forces, LawName, OwnLaw
 from estimator.signals.record import FloatArray, Record
@@ -45,7 +45,7 @@ class Grid:
     substeps: int  # in a sampling period
     sign_width: float  # speed over which dry friction changes its sign [rad/s]
     laws: tuple[LawName, ...] = ()  # the user's, by name
-    plant: Plant | None = None
+    plant: ExternalPlant | None = None
 
     def active(self, p: FloatArray) -> list[LawName]:
         """Return the user's laws that a parameter vector switches on."""

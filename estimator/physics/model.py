@@ -31,10 +31,10 @@ __all__ = [
     "STRICTLY_POSITIVE",
     "DrivelineModel",
     "EffectValue",
+    "ExternalPlant",
     "Load",
     "Motion",
     "Parameter",
-    "Plant",
     "Prior",
     "Structure",
     "load_inertia",
@@ -45,7 +45,7 @@ __all__ = [
 ]
 
 
-class Plant(Protocol):
+class ExternalPlant(Protocol):
     """A line that is simulated elsewhere, as by another program: its structure and values are not known here."""
 
     @property
@@ -93,7 +93,7 @@ class DrivelineModel:
     gear_ratio: float | None = None
     load: Load | float = Load.OWN
     laws: tuple[LawName, ...] = ()
-    plant: Plant | None = None
+    plant: ExternalPlant | None = None
     has: frozenset[str] | None = None
     priors: Mapping[str, Prior] = field(default_factory=dict)
 

@@ -142,7 +142,7 @@ class OwnLaw:
         return together.shape in ((), TRIAL.shape[1:]) and bool(np.all(together == self._one_by_one(TRIAL, values)))
 
     @property
-    def taken(self) -> list[str]:
+    def parameter_names(self) -> list[str]:
         """Names of the function's own parameters."""
         return list(inspect.signature(self.function).parameters)[len(ARGUMENTS) :]
 
@@ -162,7 +162,9 @@ class OwnLaw:
             if any(each.opname == "RAISE_VARARGS" for each in dis.get_instructions(self.function)):
                 return None
             law: Any = numba.njit(error_model="numpy")(self.function)
-            found = [law(*column, *(float(values[name]) for name in self.taken)) for column in TRIAL.T.tolist()]
+            found = [
+                law(*column, *(float(values[name]) for name in self.parameter_names)) for column in TRIAL.T.tolist()
+            ]
         except Exception:  # noqa: BLE001  # a compiler refuses a function in any way: it is called as it is
             return None
         return law if np.array_equal(found, self._one_by_one(TRIAL, values)) else None
@@ -224,7 +226,7 @@ class LawName(str):
 
     def ordered_places(self) -> list[int]:
         """Return where the parameters stand in the order in which the law's function takes them."""
-        return [self.places[name] for name in self.law.taken]
+        return [self.places[name] for name in self.law.parameter_names]
 
     def values(self, p: FloatArray) -> dict[str, float]:
         """Return the law's parameters from the parameter vector."""

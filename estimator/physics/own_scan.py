@@ -159,7 +159,7 @@ class Stretch:
 
     first: int  # row of the grid
     last: int  # row of the grid
-    taken: float  # squared error that an event there takes away
+    error_reduction: float  # squared error that an event there takes away
     match: float  # product of its answer and the error
     power: float  # squared answer
 

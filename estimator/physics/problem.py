@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from estimator.physics.driveline import Case, Start
+from estimator.physics.driveline import Case, InitialCondition
 from estimator.physics.layout import LOAD, Grid, flat, grid_for, slot
 from estimator.physics.model import DrivelineModel, Load
 from estimator.physics.simulate import simulate_outputs, simulate_records
@@ -142,7 +142,7 @@ def outputs_at(problem: Problem, x: FloatArray) -> tuple[FloatArray, ...]:
     return tuple(_within_reason(found[i], record) for i, record in enumerate(problem.records))
 
 
-def start_of(problem: Problem, x: FloatArray, index: int) -> Start:
+def start_of(problem: Problem, x: FloatArray, index: int) -> InitialCondition:
     """Return load torque, as far as it is its own, and initial state of one recording."""
     return problem.local[index].start(local_part(problem, x, index))
 

@@ -12,7 +12,7 @@ import numpy as np
 from estimator.errors import BadModel
 from estimator.lanes import LANES
 from estimator.physics import catalogue, joint
-from estimator.physics.driveline import Case, Start
+from estimator.physics.driveline import Case, InitialCondition
 from estimator.physics.effect import Element
 from estimator.physics.effects.timing import TRANSPORT_DELAY
 from estimator.physics.inputs import initial_state, inputs_of, load_of, shaft_torque_from
@@ -75,7 +75,7 @@ def simulate(
     grid: Grid,
     record: Record,
     p: FloatArray,
-    start: Start,
+    start: InitialCondition,
     extra_load_nm: FloatArray | None = None,
     output: int | None = None,
 ) -> FloatArray:
@@ -298,7 +298,7 @@ def go_together(grid: Grid, drives: Sequence[Outputs], lines: Sequence[FloatArra
     begin_alike = len({outputs[0].since_start_s[0] for outputs in drives}) == 1
     if acts[PERIODIC].any() or acts[slot("", OBSERVER)] or not (begin_alike or not acts[TIMED].any()):
         return False
-    return side_by_side.go_side_by_side(MASSES[grid.structure], p, np.arange(len(lines)))
+    return side_by_side.can_share_lanes(MASSES[grid.structure], p, np.arange(len(lines)))
 
 
 def _make(outputs: Outputs) -> tuple[object, ...]:
@@ -367,7 +367,9 @@ class Stepper:
         self._angle = np.zeros(history)
         self._outputs, self._out = np.array([state_vector.SPEED]), np.zeros((1, history))
         self._slopes = np.zeros((2, 0))
-        start = Start(load_torque_nm, 0.0, speed_rad_s, load_speed_rad_s=speed_rad_s, middle_speed_rad_s=speed_rad_s)
+        start = InitialCondition(
+            load_torque_nm, 0.0, speed_rad_s, load_speed_rad_s=speed_rad_s, middle_speed_rad_s=speed_rad_s
+        )
         self._state = initial_state(start, 0.0, 0.0, self._p)
 
     @property

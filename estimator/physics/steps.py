@@ -20,7 +20,7 @@ from estimator.signals.record import FloatArray, Record
 
 EDGE_S = 0.5  # an event's moment nearer to a recording's end is none: any start-up error looks like one
 
-SAME = 1.001
+EQUIVALENT_RATIO = 1.001
 """Squared error expressed the other way round, over the one before, up to which it is the same explanation."""
 
 Moments = tuple[float, float]
@@ -75,7 +75,7 @@ def _turned(result: FitResult, model: DrivelineModel, name: str, step: Step) -> 
         for from_the_start in ((False, True) if came_and_went else (False,))
     ]
     best = min(tries, key=lambda expressed: expressed.squares)
-    return best if best.squares <= SAME * result.squares else result
+    return best if best.squares <= EQUIVALENT_RATIO * result.squares else result
 
 
 def _expressed(

@@ -12,7 +12,7 @@ import numpy as np
 
 from estimator.physics import effect
 from estimator.physics.catalogue import EFFECTS
-from estimator.physics.driveline import Start
+from estimator.physics.driveline import InitialCondition
 from estimator.physics.effect import Effect, EffectParameter, Held, Within
 from estimator.physics.effects.load import grade_basis
 from estimator.physics.layout import LOAD, slot
@@ -96,7 +96,7 @@ def effect_unknowns(name: str, model: DrivelineModel, records: Sequence[Record])
 
 
 def released(
-    name: str, model: DrivelineModel, records: Sequence[Record], starts: Sequence[effect.Start]
+    name: str, model: DrivelineModel, records: Sequence[Record], starts: Sequence[effect.FitStart]
 ) -> list[Release]:
     """Return an effect's parameters as unknowns from start points in units of its scales."""
     entry = EFFECTS[name]
@@ -182,17 +182,17 @@ class LocalBasis:
         """Where the unknowns of the load profile stand."""
         return slice(self.guess.size - self.profile.shape[0], self.guess.size)
 
-    def start(self, x: FloatArray) -> Start:
+    def start(self, x: FloatArray) -> InitialCondition:
         """Return the start state of scaled unknowns ``x``, shape (L,)."""
         values = x * self.scale
         if self.structure is Structure.JOINT:
-            return Start(float(values[0]), 0.0, 0.0, float(values[1]), preload_nm=float(values[PRELOAD]))
+            return InitialCondition(float(values[0]), 0.0, 0.0, float(values[1]), preload_nm=float(values[PRELOAD]))
         angle = float(values[2]) if self.has_angle else 0.0
         i = self.twist_index
         state = () if i is None else (float(value) for value in values[i : self.own_rows.start])
-        return Start(float(values[0]), angle, float(values[1]), *state)
+        return InitialCondition(float(values[0]), angle, float(values[1]), *state)
 
-    def entered(self, x: FloatArray, start: Start) -> FloatArray:
+    def entered(self, x: FloatArray, start: InitialCondition) -> FloatArray:
         """Return scaled unknowns ``x`` of a line in motion with another start state, shape (L,)."""
         angle = (start.angle_rad,) if self.has_angle else ()
         shafts = (start.twist_rad, start.load_speed_rad_s, start.middle_twist_rad, start.middle_speed_rad_s)

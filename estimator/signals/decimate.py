@@ -267,14 +267,14 @@ RASTER_S = 0.01
 """Longest block [s]: its means see up to 50 Hz, the upper end of the paper's band for driveline resonances."""
 
 
-MOST = 60_000
+MOST_BLOCKS = 60_000
 """Blocks that off-line models are fitted to, ten minutes at 10 ms: they know a resonance to a few parts in 100,000, and
 a longer recording is of a driveline that warms meanwhile. Each costs 6 kilobytes."""
 
 
 def first_part(record: Record) -> Record:
     """Return the recording, or its first MOST blocks where it is longer."""
-    most = MOST * block_of(record.sample_time_s)
+    most = MOST_BLOCKS * block_of(record.sample_time_s)
     return record if record.time_s.shape[0] <= most else sliced(record, slice(0, most))
 
 

@@ -250,7 +250,7 @@ def sliced(record: Record, rows: slice, name: str | None = None) -> Record:
 DIGITS = 9  # digits a period is rounded to at most, so that 0.01 s is 0.01 s in every recording of a rig
 ALLOWED = 3.0  # the roundest period within so many standard errors is taken
 
-MOST = 0.005
+MOST_JITTER = 0.005
 """... but not beyond this share of the period: a few wild stamps determine nothing."""
 
 
@@ -262,7 +262,7 @@ def uniform_period_s(time_s: FloatArray) -> float:
     slope = float(rows @ since) / power
     left = since - slope * rows
     error = float(np.sqrt(left @ left / max(time_s.size - 2, 1) / power))
-    allowed = min(ALLOWED * error, MOST * slope)
+    allowed = min(ALLOWED * error, MOST_JITTER * slope)
     for digits in range(1, DIGITS):
         rounded = float(f"{slope:.{digits}g}")
         if abs(rounded - slope) <= allowed:

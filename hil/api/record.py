@@ -18,7 +18,7 @@ from hil.recording.signals import read_record, to_record, under_imposed_motion
 from hil.recording.survey import survey_of
 from hil.recording.table import Table
 from hil.report import page as html
-from hil.report.figures import Line, Panel, Style, input_lines, time_panels
+from hil.report.figures import Curve, Panel, Style, input_lines, time_panels
 from hil.report.wording import quantity
 
 if TYPE_CHECKING:
@@ -107,7 +107,7 @@ class Record(base.Record):
     def plot(self) -> go.Figure:
         """Draw torques and output over time."""
         unit = UNITS[self.kind]
-        measured = Line("measured", np.where(self.okay, self.output, np.nan), Style.AFTER)
+        measured = Curve("measured", np.where(self.okay, self.output, np.nan), Style.AFTER)
         panels = (
             Panel("torque [Nm]", input_lines(self.torque_nm)),
             Panel(f"{quantity(unit)} [{unit}]", (measured,)),

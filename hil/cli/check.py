@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from drivers.eds_check import EdsReport
     from drivers.plc.named_registers import Reading
     from hil.config.rig_file import Rig
-    from hil.rig.check import ChannelReading, Finding
+    from hil.rig.check import ChannelReading, DeviceFinding
 
 app = typer.Typer(add_completion=False)
 
@@ -100,17 +100,17 @@ def _keep(proof: Path, document: dict[str, Any], rig: Path) -> None:
     say(f"proof: {proof}", err=True)
 
 
-def _refuse(reports: tuple[EdsReport, ...], rig: Rig | None, findings: tuple[Finding, ...]) -> None:
+def _refuse(reports: tuple[EdsReport, ...], rig: Rig | None, findings: tuple[DeviceFinding, ...]) -> None:
     from drivers.errors import ConfigMismatch
     from hil.report.eds_findings import verdict
-    from hil.rig.check import Verdict
+    from hil.rig.check import DeviceVerdict
 
     if unusable := [each for each in reports if not each.usable]:
         raise InputError(
             f"{'; '.join(f'EDS {each.path} is {verdict(each)}' for each in unusable)}: see above. "
             "Fix a copy of the file, or take the one of the drive's firmware version."
         )
-    bad = [finding.device for finding in findings if finding.verdict is not Verdict.AGREES]
+    bad = [finding.device for finding in findings if finding.verdict is not DeviceVerdict.AGREES]
     if rig is not None and bad:
         raise ConfigMismatch(
             f"rig {rig.name!r}: {', '.join(bad)}: expected all there and as described, see above. "
@@ -126,7 +126,7 @@ def _print_eds(reports: tuple[EdsReport, ...]) -> None:
             say(line)
 
 
-def _print(name: str, findings: tuple[Finding, ...]) -> None:
+def _print(name: str, findings: tuple[DeviceFinding, ...]) -> None:
     from rich.markup import escape
     from rich.table import Table
 
@@ -149,7 +149,7 @@ def _print(name: str, findings: tuple[Finding, ...]) -> None:
             console.print(f"{finding.device}: {line}", markup=False, highlight=False, soft_wrap=True)
 
 
-def _details(finding: Finding) -> Iterator[str]:
+def _details(finding: DeviceFinding) -> Iterator[str]:
     """Say what is no difference: what a run sets, where the DCF is of another mind, what stops a dead host's torque."""
     yield from finding.questions
     yield from finding.remarks
@@ -157,7 +157,7 @@ def _details(finding: Finding) -> Iterator[str]:
     yield from (f"if the host fails, {each}" for each in finding.protections)
 
 
-def _register_table(finding: Finding) -> Table:
+def _register_table(finding: DeviceFinding) -> Table:
     """Lay out what each register holds, in its unit."""
     from rich.table import Table
 
@@ -173,7 +173,7 @@ def _register_table(finding: Finding) -> Table:
     return table
 
 
-def _channel_table(findings: tuple[Finding, ...]) -> Table:
+def _channel_table(findings: tuple[DeviceFinding, ...]) -> Table:
     """Lay out what each further channel reads."""
     from rich.table import Table
 
@@ -188,7 +188,7 @@ def _channel_table(findings: tuple[Finding, ...]) -> Table:
     return table
 
 
-def _document(rig: Rig | None, findings: tuple[Finding, ...], reports: tuple[EdsReport, ...]) -> dict[str, Any]:
+def _document(rig: Rig | None, findings: tuple[DeviceFinding, ...], reports: tuple[EdsReport, ...]) -> dict[str, Any]:
     from hil.report.eds_findings import eds_section
 
     files = [eds_section(report) for report in reports]
@@ -198,7 +198,7 @@ def _document(rig: Rig | None, findings: tuple[Finding, ...], reports: tuple[Eds
     return {"schema": "hil.check/1", "rig": rig.name, "devices": devices} | ({"eds": files} if files else {})
 
 
-def _device(finding: Finding) -> dict[str, Any]:
+def _device(finding: DeviceFinding) -> dict[str, Any]:
     return {
         "name": finding.device,
         "address": finding.address,

@@ -49,7 +49,7 @@ def module_of(command: str) -> str:
     return f"hil.cli.{command.replace(' ', '_')}"
 
 
-SPEAKERS = frozenset(
+NEVER_QUIET = frozenset(
     {"bugreport", "commission", "completion", "effects", "look", "model", "monitor", "rig", "runs", "sim", "solve"}
 )
 """Commands that ask, or whose output is what they are called for: ``--quiet`` does not silence them."""
@@ -64,7 +64,7 @@ def common_options(line: Sequence[str]) -> tuple[list[str], bool, str | None]:
         common, own = parser.parse_known_args(line)
     except argparse.ArgumentError as error:
         raise UsageError(f"{error}. See: hil --help") from error
-    silent = common.quiet and "--json" not in own and not SPEAKERS.intersection(own[:1])
+    silent = common.quiet and "--json" not in own and not NEVER_QUIET.intersection(own[:1])
     return own, silent, common.log_level
 
 

@@ -15,8 +15,8 @@ from hil.errors import UsageError
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from hil.commission.engine import Asked
-    from hil.commission.step import Job
+    from hil.commission.engine import StepRequests
+    from hil.commission.step import StepContext
     from hil.orders.operator import Talk
 
 app = typer.Typer(add_completion=False)
@@ -97,7 +97,7 @@ def commission(
     _to_its_report(job, who_answers(console, yes, keep_results), asked, console, as_json)
 
 
-def _to_its_report(job: Job, talk: Talk, asked: Asked, console: Console, as_json: bool) -> None:
+def _to_its_report(job: StepContext, talk: Talk, asked: StepRequests, console: Console, as_json: bool) -> None:
     """Go through the steps, and report however they end."""
     from hil.cli.commission_job import print_result, write_report
 
@@ -116,7 +116,7 @@ def _to_its_report(job: Job, talk: Talk, asked: Asked, console: Console, as_json
     print_result(job.state, console, as_json, reported=True)
 
 
-def _commission(job: Job, talk: Talk, asked: Asked, console: Console) -> None:
+def _commission(job: StepContext, talk: Talk, asked: StepRequests, console: Console) -> None:
     from hil.cli.commission_job import Bar
     from hil.commission.engine import Commissioning
     from hil.commission.talk import findings_table

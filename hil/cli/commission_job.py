@@ -13,10 +13,10 @@ from hil.cli.diagnose import progress_bar
 from hil.cli.options import Pace, pacer_for, scheduling
 from hil.cli.printing import say
 from hil.cli.run_job import run_progress
-from hil.commission.engine import NAMES, STEPS, Asked, plan_document
+from hil.commission.engine import NAMES, STEPS, StepRequests, plan_document
 from hil.commission.prbs_design import DEFAULT_TRAVEL_M_PER_RAD
-from hil.commission.state import State, StepRecord, load_state
-from hil.commission.step import Job
+from hil.commission.state import CommissioningState, StepRecord, load_state
+from hil.commission.step import StepContext
 from hil.commission.talk import plan_lines, result_document, result_lines
 from hil.config.model_file import read_model
 from hil.errors import UsageError
@@ -38,14 +38,14 @@ def job_in(
     travel_m_per_rad: float | None,
     pace: Pace,
     console: Console,
-) -> Job:
+) -> StepContext:
     """Make the job of a folder, with the state an earlier call has left there."""
     rig = source.rig()
-    state = load_state(folder, NAMES) or State(
+    state = load_state(folder, NAMES) or CommissioningState(
         folder, rig.name, str(source.path), source.text, {name: StepRecord() for name in NAMES}
     )
     conditions = Conditions(pace.value, lambda rig: pacer_for(rig, pace), lambda: scheduling(pace), run_progress)
-    return Job(
+    return StepContext(
         source=source,
         rig=rig,
         state=state,
@@ -58,7 +58,7 @@ def job_in(
     )
 
 
-def asked_of_steps(skip: Sequence[str], because: Sequence[str], repeat: Sequence[str]) -> Asked:
+def asked_of_steps(skip: Sequence[str], because: Sequence[str], repeat: Sequence[str]) -> StepRequests:
     """Put together what is asked of single steps."""
     for name in (*skip, *repeat):
         if name not in NAMES:
@@ -71,7 +71,7 @@ def asked_of_steps(skip: Sequence[str], because: Sequence[str], repeat: Sequence
             f"got {len(because)}. A skipped step is recorded with its reason."
         )
     reasons = list(because) * (len(skip) if len(because) == 1 else 1)
-    return Asked(dict(zip(skip, reasons, strict=True)), frozenset(repeat))
+    return StepRequests(dict(zip(skip, reasons, strict=True)), frozenset(repeat))
 
 
 def who_answers(console: Console, yes: bool, keep: str) -> Talk:
@@ -109,7 +109,7 @@ class Bar:
 REPORT, MODEL = "commissioning.html", "model.toml"
 
 
-def write_report(state: State) -> None:
+def write_report(state: CommissioningState) -> None:
     """Write the commissioning report into the folder of the job, and into the state what it was made from."""
     from hil.report.commission_html import commission_page  # brings the plotting library along
 
@@ -123,7 +123,7 @@ def write_report(state: State) -> None:
     state.save()
 
 
-def print_plan(job: Job, console: Console, as_json: bool) -> None:
+def print_plan(job: StepContext, console: Console, as_json: bool) -> None:
     """Print what the job would do."""
     document = plan_document(job)
     if as_json:
@@ -133,7 +133,7 @@ def print_plan(job: Job, console: Console, as_json: bool) -> None:
         console.print(line, markup=False, soft_wrap=not console.is_terminal)
 
 
-def print_result(state: State, console: Console, as_json: bool, reported: bool) -> None:
+def print_result(state: CommissioningState, console: Console, as_json: bool, reported: bool) -> None:
     """Print what has come of the job so far; ``reported`` tells whether its report could be written."""
     document = result_document(state.document(), str(state.folder), REPORT if reported else None)
     if as_json:

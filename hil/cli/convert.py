@@ -123,7 +123,7 @@ def _trace(source: Path, rig: Path | None, every: bool, channel: str | None) -> 
 
 def _document(source: Path, target: Path, table: Table, lost: list[str]) -> dict[str, Any]:
     from hil.recording.formats import read_metadata
-    from hil.recording.table import Kind
+    from hil.recording.table import ColumnKind
 
     return {
         "schema": "hil.convert/1",
@@ -131,7 +131,7 @@ def _document(source: Path, target: Path, table: Table, lost: list[str]) -> dict
         "output": str(target),
         "rows": table.n_rows,
         "columns": [
-            {"name": name, "kind": Kind.of(column).value, "unit": table.units.get(name)}
+            {"name": name, "kind": ColumnKind.of(column).value, "unit": table.units.get(name)}
             for name, column in table.columns.items()
         ],
         "metadata": dict(read_metadata(target)),

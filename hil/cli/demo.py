@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from hil.config.rig_file import Rig
     from hil.proof.judge import Judgement
     from hil.proof.rigs import SealedProcess
-    from hil.rig.check import Finding
+    from hil.rig.check import DeviceFinding
 
 SEEDS = 1_000_000
 """Seeds the demo draws from by itself: short enough to be typed again."""
@@ -101,11 +101,11 @@ class _Demo:
 
     def _check(self, rig: Rig) -> None:
         from drivers.errors import ConfigMismatch
-        from hil.rig.check import Verdict, check_rig
+        from hil.rig.check import DeviceVerdict, check_rig
 
         for finding in check_rig(rig):
             self._say(f"    {finding.device} at {finding.address}: {finding.verdict.value}")
-            if finding.verdict is not Verdict.AGREES:
+            if finding.verdict is not DeviceVerdict.AGREES:
                 raise ConfigMismatch(f"{finding.device}: {_faults(finding)}. The rig file is {self._rig_path}.")
 
     def _record(self, rig: Rig, name: str) -> Path:
@@ -195,7 +195,7 @@ class _Demo:
         self._console.print(line, markup=False, highlight=False, soft_wrap=True)
 
 
-def _faults(finding: Finding) -> str:
+def _faults(finding: DeviceFinding) -> str:
     differences = (f"{each.what}: expected {each.expected}, found {each.found}" for each in finding.differences)
     return "; ".join((*differences, *finding.notes))
 

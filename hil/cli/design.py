@@ -17,7 +17,7 @@ from hil.cli.printing import say
 app = typer.Typer(add_completion=False)
 
 
-class For(Enum):
+class DesignFor(Enum):
     """What the next experiment is for."""
 
     DECIDE = "decide"
@@ -33,8 +33,8 @@ def design(
         Path, typer.Option("--out", metavar="TOML", help="File for the experiment; its picture goes next to it, .png.")
     ],
     aim: Annotated[
-        For, typer.Option("--for", help="Decide between explanations, or make the values better known.")
-    ] = For.DECIDE,
+        DesignFor, typer.Option("--for", help="Decide between explanations, or make the values better known.")
+    ] = DesignFor.DECIDE,
     effort: Annotated[
         Effort, typer.Option("--effort", help="Work the search may cost, the same on every machine.")
     ] = Effort.NORMAL,

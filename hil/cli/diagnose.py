@@ -96,7 +96,7 @@ def diagnose(
     from estimator.diagnosis.diagnose import diagnose as diagnose_records
     from hil.errors import UsageError
     from hil.plants.plant import Trust
-    from hil.plants.questioned import Asked, questioned
+    from hil.plants.questioned import GivenInput, questioned
     from hil.plants.scales import with_lines, with_the_line_to_write
     from hil.provenance import provenance
     from hil.recording.recordings import rig_of
@@ -109,7 +109,7 @@ def diagnose(
 
     hold(out)
     every = [*recordings, *(holdout or ())]
-    asked = Asked(model, signals, mapped or (), Trust(trust_laws, trust_fmu), tuned or (), budget_s)
+    asked = GivenInput(model, signals, mapped or (), Trust(trust_laws, trust_fmu), tuned or (), budget_s)
     with questioned(asked, every, dbc, tell) as found:
         file, records = found.file, found.records
         training, kept_back = records[: len(recordings)], records[len(recordings) :]

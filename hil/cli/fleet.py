@@ -14,7 +14,7 @@ from hil.cli.printing import progress_bar, say
 
 if TYPE_CHECKING:
     from hil.fleet.run import Done, Engine
-    from hil.fleet.tasks import Job
+    from hil.fleet.tasks import FleetJob
 
 app = typer.Typer(add_completion=False, no_args_is_help=True)
 
@@ -24,7 +24,7 @@ def fleet() -> None:
     """Diagnose or identify many recordings, on this machine's cores or a Dask cluster."""
 
 
-class By(Enum):
+class GroupBy(Enum):
     """What is explained together."""
 
     RECORDING = "recording"
@@ -63,8 +63,8 @@ def diagnose(
     model: Annotated[Path, typer.Option("--model", metavar="MODEL", help="Model file, nominal or augmented.")],
     out: Out,
     by: Annotated[
-        By, typer.Option(help="Each recording alone, or all of a vehicle together: its parameters shared.")
-    ] = By.RECORDING,
+        GroupBy, typer.Option(help="Each recording alone, or all of a vehicle together: its parameters shared.")
+    ] = GroupBy.RECORDING,
     prior: Annotated[
         Path | None,
         typer.Option(metavar="DATASET", help="Results of this fleet: what is usual there replaces the nominal values."),
@@ -91,7 +91,7 @@ def diagnose(
     from hil.fleet.dataset import require_dataset
     from hil.fleet.page import usual_parameters
     from hil.fleet.pooling import with_prior
-    from hil.fleet.tasks import DIAGNOSE, Job
+    from hil.fleet.tasks import DIAGNOSE, FleetJob
     from hil.provenance import Source
 
     file = read_model_for_recordings(model, False)
@@ -101,9 +101,9 @@ def diagnose(
         prior_model, named = with_prior(file.model, usual_parameters(prior))
         file = replace(file, model=prior_model)
         tell(f"from the fleet: {', '.join(named) or 'nothing, it has too few vehicles'}")
-    job = Job(DIAGNOSE, file, model.name, Source.of(model).sha256, named, effort.value, budget_s)
+    job = FleetJob(DIAGNOSE, file, model.name, Source.of(model).sha256, named, effort.value, budget_s)
     engine = _engine(scheduler, jobs, memory, retries, dashboard)
-    _carry_out(sources, out, job, by is By.VEHICLE, pattern, engine, as_json)
+    _carry_out(sources, out, job, by is GroupBy.VEHICLE, pattern, engine, as_json)
 
 
 @app.command(epilog="Example: hil fleet identify 's3://drives/2026-11/*.parquet' --out results")
@@ -125,14 +125,14 @@ def identify(
     """Identify the driveline from every recording: resonance, damping, physical parameters."""
     require_dask()
     from hil.config.model_file import read_model_for_recordings
-    from hil.fleet.tasks import IDENTIFY, Job
+    from hil.fleet.tasks import IDENTIFY, FleetJob
     from hil.provenance import Source
 
     if model is None:
-        job = Job(IDENTIFY, None, budget_s=budget_s)
+        job = FleetJob(IDENTIFY, None, budget_s=budget_s)
     else:
         file = read_model_for_recordings(model, False)
-        job = Job(IDENTIFY, file, model.name, Source.of(model).sha256, budget_s=budget_s)
+        job = FleetJob(IDENTIFY, file, model.name, Source.of(model).sha256, budget_s=budget_s)
     _carry_out(sources, out, job, False, pattern, _engine(scheduler, jobs, memory, retries, dashboard), as_json)
 
 
@@ -161,7 +161,7 @@ def _engine(scheduler: str | None, jobs: int | None, memory: str, retries: int, 
 
 
 def _carry_out(
-    sources: list[str], out: Path, job: Job, by_vehicle: bool, pattern: str | None, engine: Engine, as_json: bool
+    sources: list[str], out: Path, job: FleetJob, by_vehicle: bool, pattern: str | None, engine: Engine, as_json: bool
 ) -> None:
     import json
     from dataclasses import asdict

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 USUAL = "two_mass"
 
-Kind = TypeVar("Kind", bound=Enum)
+Choice = TypeVar("Choice", bound=Enum)
 
 app = typer.Typer(add_completion=False, no_args_is_help=True)
 
@@ -93,7 +93,7 @@ def new(
     say(f"{file}: written. Go through it, then: hil diagnose REC --model {file} --out report")
 
 
-def _member(kind: type[Kind], option: str, text: str) -> Kind:
+def _member(kind: type[Choice], option: str, text: str) -> Choice:
     """Return the member of that value."""
     found = next((member for member in kind if member.value == text), None)
     if found is None:

@@ -16,10 +16,10 @@ from hil.errors import UsageError
 
 if TYPE_CHECKING:
     from estimator.identification.settings import Settings
-    from hil.figures.local_model import LocalModel, Row
+    from hil.figures.local_model import ExperimentRow, LocalModel
     from hil.figures.road import Driven
     from hil.provenance import Provenance
-    from hil.rig.drive import Progress
+    from hil.rig.drive import CycleProgress
 
 PAGE, DATA = "report.html", "paper.json"
 
@@ -112,7 +112,7 @@ def _drive(workshop: Path, seed: int, duration_s: float) -> list[Driven]:
 
 
 @contextmanager
-def _bar(count: int, duration_s: float) -> Iterator[Callable[[int], Progress]]:
+def _bar(count: int, duration_s: float) -> Iterator[Callable[[int], CycleProgress]]:
     """Show seconds driven on standard error, where that is a terminal."""
     from rich.progress import BarColumn, Progress as Bar, TextColumn, TimeRemainingColumn
 
@@ -123,7 +123,7 @@ def _bar(count: int, duration_s: float) -> Iterator[Callable[[int], Progress]]:
     with Bar(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task("driving", total=count * duration_s)
 
-        def experiment(number: int) -> Progress:
+        def experiment(number: int) -> CycleProgress:
             bar.update(task, description=f"experiment {number + 1} of {count}")
 
             def show(phase: Phase, time_s: float) -> None:
@@ -195,7 +195,7 @@ def _kept(driven: list[Driven]) -> dict[str, Callable[[Path], object]]:
     return {name: partial(shutil.copyfile, path) for name, path in kept.items()}
 
 
-def _summary(rows: list[Row]) -> object:
+def _summary(rows: list[ExperimentRow]) -> object:
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
 

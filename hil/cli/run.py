@@ -74,7 +74,7 @@ def run(
         return
     if out is None:
         raise UsageError("hil run: expected --out REC, a recording to write, or --dry-run; got neither.")
-    from hil.cli.run_job import Job, damping, live_estimate, print_result, record
+    from hil.cli.run_job import RunJob, damping, live_estimate, print_result, record
     from hil.rig.metadata import run_metadata
 
     metadata = {**run_metadata(rig, experiment, rig_text), "pace": pace.value}
@@ -82,7 +82,7 @@ def run(
     closed = None if damper is None else damping(damper, live)
     if damper is not None:
         metadata["damper"] = damper.name
-    job = Job(rig_file, experiment, out, trace, pacer_for(rig_file, pace), metadata, live, closed)
+    job = RunJob(rig_file, experiment, out, trace, pacer_for(rig_file, pace), metadata, live, closed)
     with scheduling(pace) as grants:
         summary = record(job, grants)
     print_result(job, summary, grants, as_json)

@@ -19,7 +19,7 @@ from hil.errors import HilError, UsageError
 from hil.recording.writer import RecordingWriter
 from hil.result_folder import publish
 from hil.rig.build import open_devices
-from hil.rig.drive import Progress as ShowCycle, RunSummary
+from hil.rig.drive import CycleProgress as ShowCycle, RunSummary
 from hil.rig.experiments.base import Phase
 from hil.rig.live_course import course_path, statement
 from hil.rig.pacing import Pacer, device_patience_s, disk_patience_s
@@ -76,7 +76,7 @@ def damping(path: Path, live: LiveEstimate | None) -> Damping:
 
 
 @dataclass(frozen=True, slots=True)
-class Job:
+class RunJob:
     """One run as it was asked for."""
 
     rig: Rig
@@ -89,7 +89,7 @@ class Job:
     damper: Damping | None = None
 
 
-def record(job: Job, grants: RealTimeGrants) -> RunSummary:
+def record(job: RunJob, grants: RealTimeGrants) -> RunSummary:
     """Drive the experiment and record it; what was measured is kept and entered on every way out."""
     plan = plan_run(job.rig, job.experiment, job.damper)
     stop, timing = StopRequest(), RunTiming(job.pacer.period_ns)
@@ -119,18 +119,18 @@ def record(job: Job, grants: RealTimeGrants) -> RunSummary:
             return run_plan(devices, plan, job.pacer, recorder, stop, show, timing, observers)
     except BaseException as error:
         ended_by = "interrupted" if isinstance(error, KeyboardInterrupt) else str(error) or type(error).__name__
-        if recorder.kept is not None:
-            say(f"{recorder.kept} holds the {recorder.n_samples} samples up to there", err=True)
+        if recorder.written_file is not None:
+            say(f"{recorder.written_file} holds the {recorder.n_samples} samples up to there", err=True)
         raise
     finally:
-        if job.live is not None and recorder.kept is not None:
+        if job.live is not None and recorder.written_file is not None:
             keep_course(job.live, course_path(job.out))
         _register(job, recorder, ended_by)
 
 
-def _register(job: Job, recorder: RecordingWriter, ended_by: str) -> None:
+def _register(job: RunJob, recorder: RecordingWriter, ended_by: str) -> None:
     """Enter the run into the store next to its recording, which stays whole where that can't be done."""
-    if recorder.kept != job.out:
+    if recorder.written_file != job.out:
         return
     results = {ONLINE: course_path(job.out)} if course_path(job.out).exists() else {}
     try:
@@ -186,7 +186,7 @@ def predict(rig: Rig, experiment: str, as_json: bool, trust_laws: bool) -> None:
     say(f"  predicted with {prediction.vehicle.source}; the torque guard lets every cycle through")
 
 
-def print_result(job: Job, summary: RunSummary, grants: RealTimeGrants, as_json: bool) -> None:
+def print_result(job: RunJob, summary: RunSummary, grants: RealTimeGrants, as_json: bool) -> None:
     """Print how a run went: samples, how evenly it ran, what the on-line estimate made of it."""
     if as_json:
         say(json.dumps(_document(job, summary, grants)))
@@ -214,7 +214,7 @@ def print_result(job: Job, summary: RunSummary, grants: RealTimeGrants, as_json:
             say(f"  alarm: {statement}")
 
 
-def _document(job: Job, summary: RunSummary, grants: RealTimeGrants) -> dict[str, Any]:
+def _document(job: RunJob, summary: RunSummary, grants: RealTimeGrants) -> dict[str, Any]:
     return {
         "schema": "hil.run/1",
         "recording": str(job.out),

@@ -301,7 +301,7 @@ def rebuild(store: Folder = HERE, as_json: AsJson = False) -> None:
         return
     for path in result.removed:
         say(f"removed {path}, unfinished by a process that was killed")
-    say(f"{store_of(store)}: {_said(result)}")
+    say(f"{store_of(store)}: {_rebuilt_text(result)}")
 
 
 def _document(result: Rebuilt) -> dict[str, Any]:
@@ -319,7 +319,7 @@ def _document(result: Rebuilt) -> dict[str, Any]:
     }
 
 
-def _said(result: Rebuilt) -> str:
+def _rebuilt_text(result: Rebuilt) -> str:
     counts = (
         (result.before, "runs kept"),
         (result.found, "entered"),

@@ -34,7 +34,7 @@ def simulate(
     """
     from estimator.physics.model import unit
     from hil.plants.plant import Trust
-    from hil.plants.questioned import Asked, simulated_by
+    from hil.plants.questioned import GivenInput, simulated_by
     from hil.provenance import provenance
     from hil.recording import Table, csv_format
     from hil.report.numbers import json_number, shown
@@ -46,7 +46,7 @@ def simulate(
     if out.exists() and recording.exists() and out.samefile(recording):
         raise UsageError(f"--out {out}: expected another file than the recording itself. Choose another name.")
     require_folder(out.parent)
-    asked = Asked(model, signals, mapped or (), Trust(trust_laws, trust_fmu))
+    asked = GivenInput(model, signals, mapped or (), Trust(trust_laws, trust_fmu))
     plant, record = simulated_by(asked, recording, dbc, tell)
     run = plant.run(record)
     for sentence in run.beyond:

@@ -7,8 +7,8 @@ from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from hil.commission.responses import json_safe
-from hil.commission.state import Finding, Note, Status
-from hil.commission.step import Job, Outcome, Step
+from hil.commission.state import Note, Status, StepFinding
+from hil.commission.step import Outcome, Step, StepContext
 from hil.commission.steps.checks import DEVICES, LIMITS
 from hil.commission.steps.experiments import EXPERIMENTS, IDENTIFICATION
 from hil.commission.steps.models import DIAGNOSIS, VALIDATION
@@ -17,7 +17,7 @@ from hil.commission.steps.noise_friction import FRICTION, NOISE
 from hil.commission.steps.prbs import PRBS
 from hil.commission.steps.signs_scales import SCALES, SIGNS
 from hil.errors import RunAborted, UsageError
-from hil.orders.operator import Answer, Talk, What
+from hil.orders.operator import Answer, StepChoice, Talk
 from hil.orders.order import changed_keys, rig_digest
 from hil.orders.runner import Prediction, now_utc
 from hil.report.numbers import moment
@@ -66,7 +66,7 @@ class PlannedRun:
         return cls(name, prediction.seconds, (m1.low, m1.high), (m2.low, m2.high), (speed.low, speed.high))
 
 
-def plan_of(job: Job, step: Step) -> list[PlannedRun]:
+def plan_of(job: StepContext, step: Step) -> list[PlannedRun]:
     """Predict the runs of a step; none where it commands no torque."""
     runs, speed_rad_s = [], job.rolling_rad_s()
     for order in step.orders(job):
@@ -81,7 +81,7 @@ def vehicle_seconds(runs: Sequence[PlannedRun]) -> float:
     return sum(run.seconds + CONNECT_S for run in runs) + (QUESTION_S if runs else 0.0)
 
 
-def announcement(job: Job, step: Step, runs: Sequence[PlannedRun]) -> list[str]:
+def announcement(job: StepContext, step: Step, runs: Sequence[PlannedRun]) -> list[str]:
     number = [each.name for each in STEPS].index(step.name) + 1
     lines = ["", f"{number}/{len(STEPS)} {step.title} ({step.name})", f"  It {step.about(job)}"]
     if not runs:
@@ -102,7 +102,7 @@ def _range(values: tuple[float, float], digits: int = 0) -> str:
     return f"{low:{6 + digits}.{digits}f} to {high:{4 + digits}.{digits}f}"
 
 
-def plan_document(job: Job) -> dict[str, Any]:
+def plan_document(job: StepContext) -> dict[str, Any]:
     """Return the whole plan (schema ``hil.commission_plan/1``), as far as it can be known before."""
     steps: list[dict[str, Any]] = []
     total_s = 0.0
@@ -129,7 +129,7 @@ def plan_document(job: Job) -> dict[str, Any]:
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
+class StepRequests:
     """What the command line asks of single steps: reasons to skip by name, and names to repeat."""
 
     skip: Mapping[str, str] = field(default_factory=dict)
@@ -140,10 +140,10 @@ class Asked:
 class Commissioning:
     """One call: from where the last one ended to the end, or to what keeps it from there."""
 
-    job: Job  # What the steps work with
+    job: StepContext  # What the steps work with
     talk: Talk  # Who is asked
-    asked: Asked  # What the command line asks of single steps
-    show: Callable[[Step, list[Finding]], None]  # Called with the findings of each step
+    asked: StepRequests  # What the command line asks of single steps
+    show: Callable[[Step, list[StepFinding]], None]  # Called with the findings of each step
     _redone: set[str] = field(default_factory=set)
 
     def run(self) -> None:
@@ -170,11 +170,11 @@ class Commissioning:
     def _settle_outdated(self, outdated: list[str], answer: Answer, digest: str, changes: list[str]) -> None:
         for name in outdated:
             record = self.job.state.steps[name]
-            if answer.what is What.GO:
+            if answer.what is StepChoice.GO:
                 record.rig_digest = digest
             elif record.status is not Status.SKIPPED:
                 record.end(Status.PENDING, "the rig file was changed")
-        decided = f"kept: {answer.because}" if answer.what is What.GO else "repeated"
+        decided = f"kept: {answer.because}" if answer.what is StepChoice.GO else "repeated"
         self.job.state.notes.append(Note(now_utc(), "the rig file was changed", "; ".join(changes), decided))
 
     def _through(self, step: Step) -> None:
@@ -187,9 +187,9 @@ class Commissioning:
             return
         is_anew = record.status.is_settled or record.status is Status.PENDING or step.name in self.asked.repeat
         answer = self._do(step, keep_runs=not is_anew)
-        while answer.what is What.REPEAT:
+        while answer.what is StepChoice.REPEAT:
             answer = self._do(step, keep_runs=False)
-        if answer.what is What.SKIP:
+        if answer.what is StepChoice.SKIP:
             self._skip(step, answer.because)
 
     def _is_due(self, step: Step) -> bool:
@@ -225,7 +225,7 @@ class Commissioning:
             self.job.say(line)
         if plan:
             answer = self._may_command(step.name)
-            if answer.what is What.SKIP:
+            if answer.what is StepChoice.SKIP:
                 return answer
         outcome = self._attempt(step, keep_runs)
         return self._after(step, outcome)
@@ -269,7 +269,7 @@ class Commissioning:
         outside = sum(finding.within is False for finding in findings)
         answer = self.talk.after(step.name, outside, bool(stops))
         _quit_if_asked(answer)
-        if stops and answer.what is What.GO:
+        if stops and answer.what is StepChoice.GO:
             first = stops[0]
             raise RunAborted(
                 f"step {step.name}: {first.what}: expected {first.expected}, got {first.measured}. {first.advice}. "
@@ -279,7 +279,7 @@ class Commissioning:
 
     def _confirm(self, step: Step, question: str) -> None:
         self.job.say(f"  {question}")
-        if self.talk.confirm(question).what is not What.GO:
+        if self.talk.confirm(question).what is not StepChoice.GO:
             step.record(self.job).end(Status.BLOCKED, f"answered no: {question}")
             self.job.state.save()
             raise RunAborted(
@@ -289,7 +289,7 @@ class Commissioning:
 
 
 def _quit_if_asked(answer: Answer) -> None:
-    if answer.what is What.QUIT:
+    if answer.what is StepChoice.QUIT:
         raise KeyboardInterrupt
 
 

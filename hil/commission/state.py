@@ -21,7 +21,7 @@ from hil.version import __version__
 
 
 @dataclass(frozen=True, slots=True)
-class Finding:
+class StepFinding:
     """One line of a step's verdict."""
 
     what: str  # The quantity, in a few words
@@ -37,9 +37,9 @@ class Finding:
         return self.blocking and self.within is not True
 
 
-def stated(what: str, measured: str) -> Finding:
+def stated(what: str, measured: str) -> StepFinding:
     """State a value that has no limit."""
-    return Finding(what, "–", measured, None)
+    return StepFinding(what, "–", measured, None)
 
 
 class Status(Enum):
@@ -67,7 +67,7 @@ class Attempt:
     because: str
     ended_utc: Utc
     recordings: list[str]
-    findings: list[Finding]
+    findings: list[StepFinding]
 
 
 @dataclass(slots=True)
@@ -80,7 +80,7 @@ class StepRecord:
     rig_digest: str = ""
     started_utc: Utc = ""
     ended_utc: Utc = ""
-    findings: list[Finding] = field(default_factory=list)
+    findings: list[StepFinding] = field(default_factory=list)
     evidence: dict[str, Any] = field(default_factory=dict)
     runs: list[RunRecord] = field(default_factory=list)
     history: list[Attempt] = field(default_factory=list)
@@ -121,7 +121,7 @@ class Note:
 
 
 @dataclass(slots=True)
-class State:
+class CommissioningState:
     """A commissioning as far as it is."""
 
     folder: Path  # Where the file and everything next to it is
@@ -154,10 +154,10 @@ class State:
             ) from error
 
 
-_STATE: Final = TypeAdapter(State)
+_STATE: Final = TypeAdapter(CommissioningState)
 
 
-def load_state(folder: Path, names: Iterable[str]) -> State | None:
+def load_state(folder: Path, names: Iterable[str]) -> CommissioningState | None:
     """Read the state of a folder; None where there is none. A step that is new to it is pending."""
     path = folder / FILE_NAME
     if not path.exists():

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from estimator.physics.model import DrivelineModel
-from hil.commission.state import Finding, State, StepRecord, model_from_json
+from hil.commission.state import CommissioningState, StepFinding, StepRecord, model_from_json
 from hil.config.rig_file import Rig
 from hil.orders.operator import Answer, Talk
 from hil.orders.order import Order, RigSource
@@ -22,19 +22,19 @@ MODEL_STEPS = ("validation", "scales")
 class Outcome:
     """What a step came to: findings and questions for people, evidence for the steps after it and for the report."""
 
-    findings: Sequence[Finding]
+    findings: Sequence[StepFinding]
     evidence: Mapping[str, Any] = field(default_factory=dict)
     questions: Sequence[str] = ()
     needless: str = ""  # Why there was nothing to do: the step is skipped
 
 
 @dataclass(slots=True)
-class Job:
+class StepContext:
     """What the steps work with."""
 
     source: RigSource  # The user's rig file, and what it says
     rig: Rig  # The user's rig file, and what it says
-    state: State  # Everything known so far
+    state: CommissioningState  # Everything known so far
     runner: Runner  # Drives runs
     nominal: DrivelineModel | None  # The user's own model of the driveline, where there is one
     travel_m_per_rad: float  # Way the vehicle makes per radian of the motor shaft [m]
@@ -90,7 +90,7 @@ class Job:
         return [run for run in self.state.steps[step].runs if run.whole]
 
 
-def _no_orders(job: Job) -> Sequence[Order]:
+def _no_orders(job: StepContext) -> Sequence[Order]:
     return ()
 
 
@@ -100,10 +100,12 @@ class Step:
 
     name: str  # As on the command line
     title: str  # As in headings
-    about: Callable[[Job], str]  # Says what it is about to do
-    do: Callable[[Job], Outcome]  # Does it
-    orders: Callable[[Job], Sequence[Order]] = _no_orders  # The runs it will drive; none where it commands no torque
+    about: Callable[[StepContext], str]  # Says what it is about to do
+    do: Callable[[StepContext], Outcome]  # Does it
+    orders: Callable[[StepContext], Sequence[Order]] = (
+        _no_orders  # The runs it will drive; none where it commands no torque
+    )
     needs: tuple[str, ...] = ()  # Steps it builds on
 
-    def record(self, job: Job) -> StepRecord:
+    def record(self, job: StepContext) -> StepRecord:
         return job.state.steps[self.name]

@@ -10,7 +10,7 @@ from typing import Any
 from rich.table import Table
 from rich.text import Text
 
-from hil.commission.state import Finding
+from hil.commission.state import StepFinding
 
 RESULT_SCHEMA = "hil.commission_result/1"
 
@@ -18,7 +18,7 @@ MARKS = MappingProxyType({True: ("within", "green"), False: ("OUTSIDE", "bold re
 """What stands for within, outside, and no limit or not known; the word says it, not the colour."""
 
 
-def findings_table(title: str, findings: Sequence[Finding]) -> Table:
+def findings_table(title: str, findings: Sequence[StepFinding]) -> Table:
     """Return the findings of a step as a table, and what to do where one is outside."""
     table = Table(title=title, title_justify="left", pad_edge=False, expand=False)
     for column in ("what", "expected", "measured", "within?"):

@@ -15,7 +15,7 @@ from pydantic import Field, model_validator
 from drivers.capability.carrier import ObjectId, object_name
 from drivers.plc.register_map import IN_SI, NUMBER, RegisterMap
 from estimator.signals.record import Location, OutputKind
-from hil.config.table import Table, Text
+from hil.config.table import FileTable, Text
 from hil.problems import Fault, refuse
 from hil.recording import columns
 
@@ -34,7 +34,7 @@ LEAST_SCALE, MOST_SCALE = 1e-12, 1e12
 """Sizes of a scale: any unit of an integer has one between them, and a cell beyond 1e30 can't be read back."""
 
 
-class ChannelTable(Table):
+class ChannelTable(FileTable):
     """One channel; its values are in SI units, reflected to the motor shaft.
 
     The key ``register`` is `register_name` here: pydantic has a use of its own for that name.

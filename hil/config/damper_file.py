@@ -17,7 +17,7 @@ from pydantic import Field, model_validator
 from estimator.damper import MOST_SENSITIVE, PARAMETERS, Filter, Loop, Timing, open_mode
 from estimator.identification.modes.modes import Mode, two_mass_resonance
 from hil.config.rig_file import Rig
-from hil.config.table import NotNegative, Positive, Table, Text
+from hil.config.table import FileTable, NotNegative, Positive, Text
 from hil.errors import FileProblem
 from hil.problems import Fault, read_toml, refuse, validate
 
@@ -27,14 +27,14 @@ Two = Annotated[list[NotNegative], Field(min_length=2, max_length=2)]
 Three = Annotated[list[float], Field(min_length=3, max_length=3)]
 
 
-class FilterTable(Table):
+class FilterTable(FileTable):
     """Torque = -b(z) / a(z) speed, limited; the first of a is 1."""
 
     b: Three
     a: Three
 
 
-class DesignedFor(Table):
+class DesignedFor(FileTable):
     """The rig, its limits, and the torque of both inverters together that the damper never exceeds there."""
 
     name: Text
@@ -51,7 +51,7 @@ class DesignedFor(Table):
         return cls.model_validate(dict(zip(cls.model_fields, values, strict=True)))
 
 
-class DamperFile(Table):
+class DamperFile(FileTable):
     """The file; ``least_damping``, ``sensitivity`` and ``region_hz`` are of all lines, ``torque_nm`` under the PRBS."""
 
     schema_id: Annotated[Literal["hil.damper/1"], Field(alias="schema")]

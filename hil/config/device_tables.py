@@ -22,11 +22,11 @@ from drivers.inverter.drive_settings import ABORT_CONNECTION
 from drivers.inverter.settings import Acceptance
 from drivers.plc.modbus_security import ClientSecurity, Credentials
 from drivers.plc.register import Access
-from hil.config.table import ExistingFile, Positive, Table, TcpPort, Text, Unsigned32
+from hil.config.table import ExistingFile, FileTable, Positive, TcpPort, Text, Unsigned32
 from hil.problems import Fault, refuse
 
 
-class SpeedUnitTable(Table):
+class SpeedUnitTable(FileTable):
     """Unit of the velocity actual value 0x606C, from the drive's manual; over what its data sheet says."""
 
     unit: Annotated[SpeedUnitName, Field(strict=False)]
@@ -62,7 +62,7 @@ class RatedTorqueUnit(Enum):
         return {RatedTorqueUnit.MILLI: 1e-3, RatedTorqueUnit.MICRO: 1e-6}[self]
 
 
-class AcceptanceTable(Table):
+class AcceptanceTable(FileTable):
     """Who accepted that it is missing, and why."""
 
     by: Text
@@ -74,7 +74,7 @@ class AcceptanceTable(Table):
         return Acceptance(self.by, self.why)
 
 
-class AcceptedTable(Table):
+class AcceptedTable(FileTable):
     """What a drive lacks, by name; see `drivers.inverter.stop_proof`."""
 
     heartbeat_consumer: AcceptanceTable | None = None
@@ -121,7 +121,7 @@ _OBJECTS: Final[Mapping[str, int]] = MappingProxyType(
 )
 
 
-class OptionCodesTable(Table):
+class OptionCodesTable(FileTable):
     """What the drive does by itself when something ends (CiA 402-2): a DCF's choice or its own, unless given here."""
 
     abort_connection: Annotated[int, Field(ge=1, le=3)] | None = None
@@ -142,7 +142,7 @@ _NODE_GUARDING: Final = ("guard_time_ms", "life_time_factor", "node_guarding")
 """What a person might call it who comes from another master."""
 
 
-class InverterTable(Table):
+class InverterTable(FileTable):
     """One inverter: where it is, what it must identify as, and what it may give.
 
     ``eds`` is relative to the rig file; without it the shipped ``inverter.eds`` counts. ``rpdo_deadline_ms`` is by
@@ -197,7 +197,7 @@ class InverterTable(Table):
         return self
 
 
-class InvertersTable(Table):
+class InvertersTable(FileTable):
     """The two inverters on the motor shaft."""
 
     m1: InverterTable
@@ -210,7 +210,7 @@ class InvertersTable(Table):
         return self
 
 
-class CredentialsTable(Table):
+class CredentialsTable(FileTable):
     """What one side trusts and shows; ``key`` without a password."""
 
     ca: ExistingFile
@@ -234,7 +234,7 @@ class PlcSecurityTable(CredentialsTable):
         return ClientSecurity(self.credentials, self.server_name)
 
 
-class PlcTable(Table):
+class PlcTable(FileTable):
     """The PLC. ``map`` is relative to the rig file; without it the shipped ``plc.toml`` counts."""
 
     host: Text

@@ -25,7 +25,7 @@ from pydantic import Field, model_validator
 from drivers.plc.types import PrbsSource
 from estimator.signals.multisine import Lines, excited_lines, multisine_nm
 from estimator.signals.record import FloatArray, IntArray
-from hil.config.table import NotNegative, Positive, Table
+from hil.config.table import FileTable, NotNegative, Positive
 from hil.problems import Fault, refuse
 
 APPROACH_TIMEOUT_S = 60.0
@@ -35,7 +35,7 @@ EVEN_SHARE = 0.5
 """Both inverters give half: they drive one shaft, and equal currents heat them equally."""
 
 
-class MultisineTable(Table):
+class MultisineTable(FileTable):
     """A multi-sine of ``period_s``, with power from ``lowest_hz`` to ``highest_hz``, never above ``amplitude_nm``.
 
     ``lines`` are ``"full"``, ``"odd"``, or ``"odd_random"`` with one odd line in four left out, by which distortion is
@@ -59,7 +59,7 @@ class MultisineTable(Table):
         return multisine_nm(round(self.period_s / sample_time_s), self.excited(sample_time_s), self.amplitude_nm)
 
 
-class ExperimentTable(Table):
+class ExperimentTable(FileTable):
     """What every kind of experiment has; see the module's text."""
 
     duration_s: Positive
@@ -174,7 +174,7 @@ class PrbsTarget(Enum):
 _PARTS_M1 = {PrbsTarget.BOTH: 0.5, PrbsTarget.M1: 1.0, PrbsTarget.M2: 0.0}
 
 
-class PrbsTable(Table):
+class PrbsTable(FileTable):
     """The pseudo-random binary torque; ``amplitude_nm`` is that of both inverters together."""
 
     amplitude_nm: Positive

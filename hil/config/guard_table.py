@@ -10,7 +10,7 @@ from pydantic import Field
 
 from drivers.torque_guard import ErrorLimits
 from hil.config.device_tables import InvertersTable
-from hil.config.table import Positive, Table
+from hil.config.table import FileTable, Positive
 
 ERROR_SHARE: Final = 0.05
 """Of the rated torque: how far a torque reading may be from its command where the rig file says nothing. A torque
@@ -28,7 +28,7 @@ class WithoutDamper(Enum):
     END = "end"  # at zero torque
 
 
-class GuardTable(Table):
+class GuardTable(FileTable):
     """Limits of the torque guard besides the torque limit of each inverter; see `drivers.torque_guard`.
 
     ``torque_error_nm`` is that of one inverter, by default 5 % of its rated torque; ``torque_error_sum_nm`` that of

@@ -22,14 +22,14 @@ from estimator.errors import BadModel
 from estimator.physics.effect import Element
 from estimator.physics.layout import named
 from estimator.physics.own_law import LawName, OwnLaw, OwnParameter
-from hil.config.table import Table, Text
+from hil.config.table import FileTable, Text
 from hil.errors import ModelFileError
 
 GROUP = "hil.laws"
 """Entry points that installed packages offer laws by; each names an ``OwnLaw``."""
 
 
-class LawParameter(Table):
+class LawParameter(FileTable):
     """A parameter of a law: its unit, where it does nothing, its bounds and where a fit starts."""
 
     unit: str = ""
@@ -39,7 +39,7 @@ class LawParameter(Table):
     start: float
 
 
-class LawTable(Table):
+class LawTable(FileTable):
     """A law: its function as ``module:function``, where it acts, its parameters, and the folder of the module.
 
     ``folder`` is relative to the file; by default it is the file's own.
@@ -71,7 +71,7 @@ def laws_of(path: Path, tables: Mapping[str, LawTable], trust_laws: bool) -> tup
     return names
 
 
-def moved(tables: Mapping[str, LawTable], path: Path) -> dict[str, LawTable]:
+def with_absolute_folders(tables: Mapping[str, LawTable], path: Path) -> dict[str, LawTable]:
     """Return the laws of a model file with folders that hold wherever the model is written to."""
     return {
         name: table.model_copy(update={"folder": str((path.parent / table.folder).resolve())})

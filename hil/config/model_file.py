@@ -21,7 +21,7 @@ from estimator.errors import BadModel
 from estimator.physics.model import DrivelineModel, EffectValue, Load, Motion, Parameter, Prior, Structure
 from estimator.physics.own_law import LawName
 from estimator.physics.tables import PLACES, PREFIX, TABLES, table_faults
-from hil.config.laws import LawTable, laws_of, moved
+from hil.config.laws import LawTable, laws_of, with_absolute_folders
 from hil.config.model_tables import ModelDocument, Prepared, TableEntry, as_toml
 from hil.errors import ModelFileError
 from hil.files import write_whole
@@ -29,7 +29,7 @@ from hil.problems import problem_lines, read_toml
 from hil.recording import columns
 from hil.recording.signals_config import SignalsConfig
 
-Kind = TypeVar("Kind", bound=Enum)
+EnumKind = TypeVar("EnumKind", bound=Enum)
 Default = TypeVar("Default", float, None)
 
 NEUTRAL = 1.0
@@ -93,7 +93,7 @@ def read_model(path: Path | str, trust_laws: bool = False) -> ModelFile:
         problems += str(error).splitlines()
     if document is None or model is None or problems:
         raise ModelFileError(path, *problems)
-    return ModelFile(model, document.signals, moved(document.laws, path), document.prepared)
+    return ModelFile(model, document.signals, with_absolute_folders(document.laws, path), document.prepared)
 
 
 class _SignalsDocument(BaseModel):
@@ -242,7 +242,7 @@ def _load(table: object) -> Load | float:
     return _member(Load, _table(table).get("constant")) or Load.OWN if given is None else given
 
 
-def _member(kind: type[Kind], value: object) -> Kind | None:
+def _member(kind: type[EnumKind], value: object) -> EnumKind | None:
     return next((member for member in kind if member.value == value), None)
 
 

@@ -34,7 +34,7 @@ from hil.errors import InputError, RigFileError, UsageError
 from hil.problems import validate
 
 Value = str | int | float
-Answers = Mapping[str, Value]
+GivenValues = Mapping[str, Value]
 
 MODES: Final = tuple(mode.name.lower() for mode in TorqueMode)
 USUAL_MODE: Final = TorqueMode.CYCLIC_SYNCHRONOUS_TORQUE.name.lower()
@@ -45,7 +45,7 @@ class NotAnAnswer(Exception):
 
 
 @dataclass(frozen=True, slots=True)
-class Kind:
+class AnswerKind:
     """What an answer has to be: its type, as pydantic reads it from text, and the same in words."""
 
     type: Any
@@ -59,14 +59,14 @@ class Kind:
         return value
 
 
-def _whole(low: int, high: int) -> Kind:
+def _whole(low: int, high: int) -> AnswerKind:
     any_base = BeforeValidator(lambda text: int(text, 0))
     fits = f"a whole number from {low} to {high}; 0x makes it hexadecimal"
-    return Kind(Annotated[int, any_base, Field(ge=low, le=high)], fits)
+    return AnswerKind(Annotated[int, any_base, Field(ge=low, le=high)], fits)
 
 
-def _positive(unit: str) -> Kind:
-    return Kind(Annotated[float, Field(gt=0.0, le=1e9)], f"a number above 0 [{unit}]")
+def _positive(unit: str) -> AnswerKind:
+    return AnswerKind(Annotated[float, Field(gt=0.0, le=1e9)], f"a number above 0 [{unit}]")
 
 
 def _with_port(text: str) -> str:
@@ -76,18 +76,18 @@ def _with_port(text: str) -> str:
     return text
 
 
-TEXT: Final = Kind(Text, "a text that is not empty")
-URL: Final = Kind(
+TEXT: Final = AnswerKind(Text, "a text that is not empty")
+URL: Final = AnswerKind(
     Annotated[str, Field(pattern=r"^[^\W\d]\w*:.")],
     "INTERFACE:CHANNEL, such as socketcan:can0, pcan:PCAN_USBBUS1 or ws://127.0.0.1:54701/",
 )
-HOST_PORT: Final = Kind(
+HOST_PORT: Final = AnswerKind(
     Annotated[str, AfterValidator(_with_port)], "HOST:PORT with a port from 1 to 65535, such as 192.168.0.10:502"
 )
-PERIOD: Final = Kind(Annotated[float, Field(ge=0.001, le=1.0)], "a period from 0.001 to 1 s")
+PERIOD: Final = AnswerKind(Annotated[float, Field(ge=0.001, le=1.0)], "a period from 0.001 to 1 s")
 NODE: Final = _whole(1, 127)
 UNSIGNED32: Final = _whole(0, 0xFFFF_FFFF)
-MODE: Final = Kind(Literal[MODES], " or ".join(MODES))
+MODE: Final = AnswerKind(Literal[MODES], " or ".join(MODES))
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,7 +96,7 @@ class Question:
 
     name: str  # key among the answers, and the option's name
     asks: str  # what is asked, unit included
-    kind: Kind
+    kind: AnswerKind
     simulated: str  # answer for the simulated rig of ``hil sim``
     vehicle: str = ""  # default on a vehicle
 
@@ -109,7 +109,7 @@ class Question:
         """Return the answer that stands if none is given."""
         return self.simulated if simulated else self.vehicle
 
-    def read(self, text: str, before: Answers) -> Value:
+    def read(self, text: str, before: GivenValues) -> Value:
         """Return the value, given the answers before it."""
         value, rated_nm = self.kind.read(text), before.get("rated_torque_nm")
         if self.name == "node_m2" and value == before.get("node_m1"):
@@ -145,7 +145,7 @@ Ask = Callable[[str, str, str], str]
 
 def answers(
     given: Mapping[str, str], simulated: bool, ask: Ask | None = None, known: Mapping[str, str] | None = None
-) -> Answers:
+) -> GivenValues:
     """Return an answer to every question."""
     found: dict[str, Value] = {}
     faults: list[str] = []
@@ -168,7 +168,7 @@ def answers(
     return found
 
 
-def _asked(question: Question, default: str, found: Answers, ask: Ask) -> Value:
+def _asked(question: Question, default: str, found: GivenValues, ask: Ask) -> Value:
     wrong = ""
     while True:
         text = ask(question.asks, default, wrong).strip() or default
@@ -295,7 +295,7 @@ HEARTBEAT: Final = "heartbeat_ms ="
 """Beginning of the template's line of each inverter that what its data sheet makes necessary comes after."""
 
 
-def rig_text(answers: Answers, file: Path, simulated: bool, drive_lines: Sequence[str] = ()) -> str:
+def rig_text(answers: GivenValues, file: Path, simulated: bool, drive_lines: Sequence[str] = ()) -> str:
     """Return the file, checked as any rig file is."""
     template = (files("hil.config") / "new_rig.toml").read_text(encoding="utf-8")
     if not simulated:
@@ -317,7 +317,7 @@ def _with_drive(lines: Sequence[str], drive_lines: Sequence[str]) -> Iterator[st
             yield from drive_lines
 
 
-def _filled(answers: Answers, file_name: str) -> dict[str, str]:
+def _filled(answers: GivenValues, file_name: str) -> dict[str, str]:
     host, _, port = str(answers["plc"]).rpartition(":")
     limit_nm = float(answers["torque_limit_nm"])
     values: dict[str, Value] = {

@@ -40,12 +40,12 @@ from hil.config.device_tables import (
 )
 from hil.config.experiment_tables import EVEN_SHARE, AnyExperiment, PrbsTable, PrbsTarget as PrbsTarget
 from hil.config.guard_table import GuardTable
-from hil.config.table import ExistingFile, NotNegative, Positive, Table, Text
+from hil.config.table import ExistingFile, FileTable, NotNegative, Positive, Text
 from hil.errors import RigFileError
 from hil.problems import Fault, read_toml, refuse, validate
 
 
-class CanTable(Table):
+class CanTable(FileTable):
     """The CAN bus: ``url`` as the drivers read it.
 
     ``host_node_id`` is that of this program's own heartbeat, ``monitor_node_id`` that of `hil monitor`: by default the
@@ -57,7 +57,7 @@ class CanTable(Table):
     monitor_node_id: NodeId | None = None
 
 
-class VehicleTable(Table):
+class VehicleTable(FileTable):
     """What is known of the vehicle beforehand; ``inertia_kg_m2`` is the total at the motor shaft.
 
     Empty it has half of it and full one and a half times as much, where the file does not say. ``most_grade`` is the
@@ -86,7 +86,7 @@ class VehicleTable(Table):
         return self
 
 
-class SimulationTable(Table):
+class SimulationTable(FileTable):
     """What the simulated rig is, where `hil sim` and `hil demo` stand in for the real one.
 
     ``model`` is a model file relative to the rig file; without it the default two-mass bus counts. ``channel_noise``
@@ -101,7 +101,7 @@ class SimulationTable(Table):
     plc_security: SimulatedPlcSecurityTable | None = None
 
 
-class DesignTable(Table):
+class DesignTable(FileTable):
     """What an experiment that the program designs may ask of the vehicle, at the motor shaft.
 
     Torque is the base torque of both inverters together. What is left out is as the file's own experiments go; the
@@ -114,7 +114,7 @@ class DesignTable(Table):
     most_angle_rad: Positive | None = None
 
 
-class Rig(Table):
+class Rig(FileTable):
     """One rig file. The key ``schema`` is `schema_id` here: pydantic has a use of its own for that name."""
 
     schema_id: Annotated[Literal["hil.rig/1"], Field(alias="schema")]

@@ -10,7 +10,7 @@ from typing import Annotated
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo
 
 
-class Table(BaseModel):
+class FileTable(BaseModel):
     """A table of a file: a number is no text, an unknown key is a fault, nothing changes after reading."""
 
     model_config = ConfigDict(frozen=True, strict=True, extra="forbid", allow_inf_nan=False)

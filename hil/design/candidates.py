@@ -20,7 +20,7 @@ from hil.config.experiment_tables import (
 from hil.config.rig_file import Rig
 from hil.errors import UsageError
 
-Table = Mapping[str, Any]
+ExperimentDict = Mapping[str, Any]
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,7 +79,7 @@ ONE_ALONE = (0.5, 0.0, 1.0)
 """Parts of inverter m1: half, and each inverter by itself."""
 
 
-def candidates(rig: Rig, limits: Limits) -> Iterator[tuple[str, Table]]:
+def candidates(rig: Rig, limits: Limits) -> Iterator[tuple[str, ExperimentDict]]:
     """Yield what may be driven, each with a name that says what it is; not all pass the guard."""
     common = {
         "duration_s": limits.duration_s,

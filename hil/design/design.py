@@ -14,7 +14,7 @@ from drivers.errors import CommandRefused
 from estimator.design import Expected, Open, Width, as_model, expected, shown, widths
 from estimator.physics.model import DrivelineModel
 from estimator.signals.record import Record
-from hil.design.candidates import Limits, Table, candidates
+from hil.design.candidates import ExperimentDict, Limits, candidates
 from hil.errors import InputError, RunAborted, UsageError
 from hil.orders.order import Order, RigSource
 from hil.orders.runner import Prediction, predict
@@ -27,7 +27,7 @@ WORTH = 3.0
 NEARLY = 0.02
 """Probability by which an experiment may tell less than another and be preferred for its shorter drive."""
 
-WIDE = 0.1
+WIDE_INTERVAL = 0.1
 """Half of a 95 % interval over its value from which a parameter is not well known."""
 
 
@@ -47,7 +47,7 @@ class Planned:
     """An experiment as the most probable hypothesis drives it on paper."""
 
     name: str
-    table: Table
+    table: ExperimentDict
     record: Record
     prediction: Prediction
 
@@ -97,7 +97,7 @@ class Design:
             return True
         if self.aim is Aim.DECIDE and self.decides is None:
             return False
-        return self.factor >= (WORTH if self.decides is not None else 1.0 + WIDE)
+        return self.factor >= (WORTH if self.decides is not None else 1.0 + WIDE_INTERVAL)
 
 
 def designed(source: RigSource, known: Open, aim: Aim, progress: Progress) -> Design:
@@ -193,7 +193,7 @@ SPEED_ROOM = 1.2
 """Part of the fastest speed that may be reached: a hold of it swings by some per cent."""
 
 
-def on_paper(source: RigSource, name: str, table: Table, model: DrivelineModel, limits: Limits) -> Planned:
+def on_paper(source: RigSource, name: str, table: ExperimentDict, model: DrivelineModel, limits: Limits) -> Planned:
     """Drive an experiment on paper, through the torque guard and within the limits."""
     rig, _ = source.ordered(Order("next", table))
     prediction = predict(rig, "next", model)
@@ -214,7 +214,7 @@ def _record(name: str, period_s: float, prediction: Prediction) -> Record:
 
 def _shortened(values: Sequence[Width]) -> float:
     """Return the mean factor by which the intervals that are wide become shorter; all, where none is."""
-    wide = [each for each in values if each.now > WIDE * abs(each.value)] or list(values)
+    wide = [each for each in values if each.now > WIDE_INTERVAL * abs(each.value)] or list(values)
     return math.exp(float(np.mean([math.log(max(each.now, 1e-300) / max(each.after, 1e-300)) for each in wide])))
 
 

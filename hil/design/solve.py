@@ -15,9 +15,9 @@ from hil.config.model_file import ModelFile
 from hil.config.rig_file import Rig
 from hil.design.design import Aim, Design, NothingAllowed, designed, is_needed
 from hil.design.report import conditions, design_lines, obstacle, question_lines
-from hil.design.solve_state import STATE, Driven, End, Odds, State
+from hil.design.solve_state import STATE, Driven, End, Odds, SolveState
 from hil.errors import UsageError
-from hil.orders.operator import Answer, What
+from hil.orders.operator import Answer, StepChoice
 from hil.orders.order import Order, RigSource, as_table
 from hil.orders.runner import Runner, RunRecord, now_utc
 from hil.provenance import provenance
@@ -42,7 +42,7 @@ class Solving:
     model: Path
     runner: Runner
     may_command: Callable[[str], Answer]  # asks the operator
-    state: State
+    state: SolveState
     given: Sequence[Path]  # recordings of the rig from before
     effort: str
     most_vehicle_s: float  # time that the vehicle may be needed for in all [s]
@@ -135,7 +135,7 @@ class Solving:
             f"{m2.high:.0f} Nm, speed {speed.low:.1f} to {speed.high:.1f} rad/s, through the torque guard"
         )
         answer = self.may_command(name)
-        if answer.what is not What.GO:
+        if answer.what is not StepChoice.GO:
             self.state.because = answer.because
             return End.DECLINED
         run = self.runner.run(STEP, order, self.file.model, self.rolling_rad_s, self.note)

@@ -53,7 +53,7 @@ class Odds:
 
 
 @dataclass(slots=True)
-class State:
+class SolveState:
     """A search for a verdict as far as it is."""
 
     schema: Literal["hil.solve/1"]
@@ -74,15 +74,15 @@ class State:
         return sum(each.seconds for each in self.driven)
 
 
-STATE: Final = TypeAdapter(State)
+STATE: Final = TypeAdapter(SolveState)
 
 
-def fresh_state(source: RigSource, model: Path) -> State:
+def fresh_state(source: RigSource, model: Path) -> SolveState:
     """Begin a state."""
-    return State(SCHEMA, rig_digest(source.text), text_sha256(read_regular_text(model)))
+    return SolveState(SCHEMA, rig_digest(source.text), text_sha256(read_regular_text(model)))
 
 
-def load_state(folder: Path, source: RigSource, model: Path) -> State:
+def load_state(folder: Path, source: RigSource, model: Path) -> SolveState:
     """Read the state of a folder, or begin one; refuse one of another rig or model."""
     path = folder / FILE_NAME
     fresh = fresh_state(source, model)

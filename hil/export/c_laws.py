@@ -249,7 +249,7 @@ _FUNCTIONS: dict[Any, str] = {
     **dict.fromkeys((min, np.minimum), "lesser"),
     **dict.fromkeys((max, np.maximum), "greater"),
 }
-_TRANSPARENT = (lanes.every, lanes.some, lanes.like, lanes.borrowed, np.asarray, under_own)
+_TRANSPARENT = (lanes.every, lanes.some, lanes.broadcast_as, lanes.borrowed, np.asarray, under_own)
 """Functions that return their first argument where there is one number only, and no law of a user's own."""
 
 

@@ -199,7 +199,7 @@ class _Filling:
             "lowest": literal(lowest),
             "highest": literal(highest),
             "light": literal(LIGHTLY_DAMPED),
-            "fewest": literal(follow.FEWEST),
+            "fewest": literal(follow.SAMPLES_BEFORE_STD),
             "memory": literal(follow.MEMORY),
             "share_of_block": literal(samples / follow.MEMORY),
             "opens": literal(follow.OPENS),

@@ -182,7 +182,7 @@ AGREEMENT_DB = 3.0
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class ExperimentRow:
     """One experiment; NaN where there is no such value."""
 
     name: str  # the recording
@@ -205,14 +205,14 @@ class Row:
         return getattr(self, f"{how}_{what}") / reference - 1.0 if reference else NOT_KNOWN
 
 
-def row_of(model: LocalModel) -> Row:
+def row_of(model: LocalModel) -> ExperimentRow:
     """Return the figures of one experiment."""
     found = model.found
     online_hz, online_damping = _of(found.online_resonance)
     offline_hz, offline_damping = _of(found.batch_resonance)
     reference_hz, reference_damping = _of(model.reference_mode)
     offline_db, spectral_db, reference_db = _differences_db(model)
-    return Row(
+    return ExperimentRow(
         name=model.name,
         online_hz=online_hz,
         offline_hz=offline_hz,

@@ -23,7 +23,7 @@ from hil.figures.local_model import TRUTH, LocalModel, Reference, TwoMassLine
 from hil.recording import read_record
 from hil.recording.writer import RecordingWriter
 from hil.rig.build import open_devices
-from hil.rig.drive import Progress
+from hil.rig.drive import CycleProgress
 from hil.rig.experiments.laws import Cruise
 from hil.rig.experiments.registry import experiment_table
 from hil.rig.experiments.staged import Approach, LowPass, StagedExperiment, TorqueBounds
@@ -229,7 +229,7 @@ def drive(
     conditions: Conditions,
     duration_s: float,
     stop: StopRequest,
-    progress: Progress = lambda phase, time_s: None,
+    progress: CycleProgress = lambda phase, time_s: None,
 ) -> Driven:
     rig = read_rig(RIG_FILE)
     bus, line = _loaded(rig, conditions)
@@ -287,7 +287,7 @@ def drive_all(
     count: int,
     duration_s: float,
     stop: StopRequest,
-    progress: Callable[[int], Progress] = lambda number: lambda phase, time_s: None,
+    progress: Callable[[int], CycleProgress] = lambda number: lambda phase, time_s: None,
 ) -> list[Driven]:
     """Drive ``count`` experiments of one seed, ``run_1.csv`` and on."""
     conditions = draw_conditions(seed, count)

@@ -34,7 +34,7 @@ from hil.errors import RecordingError, StoreError, UsageError
 from hil.files import remove_abandoned, whole, write_whole
 from hil.recording.bounds import require_cells
 
-Row = dict[str, Any]
+DatasetRow = dict[str, Any]
 
 VERDICTS = "verdicts"
 FAILURES = "failures.parquet"
@@ -81,8 +81,8 @@ class Writer:
 
     def __init__(self, folder: Path, command: str) -> None:
         self.folder, self._command = folder, command
-        self._rows: dict[str, list[Row]] = {name: [] for name in TABLES}
-        self._failures: list[Row] = []
+        self._rows: dict[str, list[DatasetRow]] = {name: [] for name in TABLES}
+        self._failures: list[DatasetRow] = []
         self._written = time.monotonic()
         with room(folder):
             for name in (*TABLES, VERDICTS):
@@ -106,28 +106,28 @@ class Writer:
         """Return the keys of what is in the dataset."""
         return set().union(*_keys_of_parts(self.folder).values())
 
-    def settle(self, place_of: Callable[[Sequence[str]], Row | None]) -> None:
+    def settle(self, place_of: Callable[[Sequence[str]], DatasetRow | None]) -> None:
         """Have one row for each key, the last, and say of each where it belongs now.
 
         ``place_of`` returns the columns `PLACE` for the checksums of a row's recordings, None where nothing is known.
         """
         keys = _keys_of_parts(self.folder)
         for path in _parts(self.folder, "recordings"):
-            places: dict[str, Row] = {}
+            places: dict[str, DatasetRow] = {}
             for row in _table(path, TABLES["recordings"]).to_pylist():
                 if row["key"] in keys[path.parent.name, path.name]:
                     places[row["key"]] = place_of(row["sha256"].split()) or {name: row[name] for name in PLACE}
             with room(self.folder):
                 self._settle_part(path, places)
 
-    def _settle_part(self, of_recordings: Path, places: Mapping[str, Row]) -> None:
+    def _settle_part(self, of_recordings: Path, places: Mapping[str, DatasetRow]) -> None:
         """Write a part of all tables again where it changes."""
         command = of_recordings.parent.name
         for table in ("effects", "parameters", "recordings"):
             path = self.folder / table / command / of_recordings.name
             schema = TABLES[table]
             before = _table(path, schema).to_pylist() if path.is_file() else []
-            after: list[Row] = []
+            after: list[DatasetRow] = []
             kept: set[str] = set()
             for row in before:
                 if row["key"] in places and (table != "recordings" or row["key"] not in kept):
@@ -137,7 +137,7 @@ class Writer:
             if after != before:
                 _write(path, after, schema, keep_age=True)
 
-    def add(self, rows: Mapping[str, Sequence[Row]], verdict: str) -> None:
+    def add(self, rows: Mapping[str, Sequence[DatasetRow]], verdict: str) -> None:
         """Take the rows of one recording, and its verdict's text."""
         with room(self.folder):
             write_whole(self.folder / VERDICTS / f"{rows['recordings'][0]['key']}.json", verdict)
@@ -147,7 +147,7 @@ class Writer:
         if is_due or len(self._rows["recordings"]) >= MOST_ROWS:
             self.flush()
 
-    def fail(self, row: Row) -> None:
+    def fail(self, row: DatasetRow) -> None:
         """Take what was not computed, and why."""
         self._failures.append({**row, "command": self._command})
 
@@ -162,7 +162,7 @@ class Writer:
                     self._rows[table] = []
         self._written = time.monotonic()
 
-    def survey(self, rows: Sequence[Row]) -> None:
+    def survey(self, rows: Sequence[DatasetRow]) -> None:
         """Keep what is known of every recording."""
         with room(self.folder):
             _write(self.folder / SURVEY, rows, _FILES["survey"])
@@ -174,7 +174,7 @@ class Writer:
             _write(self.folder / FAILURES, self._failures, _FILES["failures"])
 
 
-def _write(path: Path, rows: Sequence[Row], schema: pa.Schema, keep_age: bool = False) -> None:
+def _write(path: Path, rows: Sequence[DatasetRow], schema: pa.Schema, keep_age: bool = False) -> None:
     """Write a part; one that is written again keeps its time, by which the last result is found."""
     times = (path.stat().st_atime_ns, path.stat().st_mtime_ns) if keep_age else None
     with whole(path) as part:
@@ -215,7 +215,7 @@ def _keys_of_parts(folder: Path) -> dict[tuple[str, str], set[str]]:
     return found
 
 
-def read(folder: Path, table: str) -> list[Row]:
+def read(folder: Path, table: str) -> list[DatasetRow]:
     """Read the rows of a table of a dataset, the oldest parts first, or of one of its single files.
 
     Of what was computed twice the last counts: a key comes once in ``recordings``. A text is never missing.
@@ -229,7 +229,7 @@ def read(folder: Path, table: str) -> list[Row]:
         path = folder / f"{table}.parquet"
         return _table(path, _FILES[table]).to_pylist() if path.exists() else []
     keys = _keys_of_parts(folder)
-    rows: list[Row] = []
+    rows: list[DatasetRow] = []
     for path in _parts(folder, table):
         own = keys.get((path.parent.name, path.name), set())
         command = {"command": path.parent.name.removeprefix(RESULTS)}

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from drivers.foreign_file import open_regular, require_regular
-from hil.fleet.dataset import SURVEY, Row, read
+from hil.fleet.dataset import SURVEY, DatasetRow, read
 from hil.fleet.sources import REMOTE, Seen, remote_sidecar
 from hil.recording.description import sidecar_of
 
@@ -27,8 +27,8 @@ _TIMES = ("lastmodified", "last_modified", "mtime", "updated", "modified", "crea
 class Survey:
     """What is known of recordings, by their paths and addresses."""
 
-    def __init__(self, rows: list[Row]) -> None:
-        self._rows: dict[str, Row] = {row["url"]: row for row in rows}
+    def __init__(self, rows: list[DatasetRow]) -> None:
+        self._rows: dict[str, DatasetRow] = {row["url"]: row for row in rows}
 
     @classmethod
     def of(cls, folder: Path) -> Survey:
@@ -49,7 +49,7 @@ class Survey:
             f"said_{name}": text for name, text in said.items()
         }
 
-    def rows(self) -> list[Row]:
+    def rows(self) -> list[DatasetRow]:
         """Return all of it, as the dataset keeps it."""
         return list(self._rows.values())
 

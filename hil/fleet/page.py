@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from hil.fleet.dataset import VERDICTS, Row, read
+from hil.fleet.dataset import VERDICTS, DatasetRow, read
 from hil.fleet.pooling import (
     FALSE_RATE,
     FEWEST_VEHICLES,
@@ -69,10 +69,10 @@ class Course:
     change: Change | None
 
 
-def _current(folder: Path) -> dict[str, Row]:
+def _current(folder: Path) -> dict[str, DatasetRow]:
     """Return the recordings' rows by their keys, of several results that share a content the last."""
     known: set[tuple[str, bool, str]] = set()
-    last: list[Row] = []
+    last: list[DatasetRow] = []
     for row in reversed(read(folder, "recordings")):
         contents = {(row["command"], row["n_recordings"] > 1, sha256) for sha256 in row["sha256"].split()}
         if not contents & known:
@@ -81,12 +81,12 @@ def _current(folder: Path) -> dict[str, Row]:
     return {row["key"]: row for row in sorted(last, key=lambda row: (row["started"], row["url"]))}
 
 
-def _values(folder: Path, rows: Mapping[str, Row]) -> dict[tuple[str, Of], dict[Vehicle, list[Row]]]:
+def _values(folder: Path, rows: Mapping[str, DatasetRow]) -> dict[tuple[str, Of], dict[Vehicle, list[DatasetRow]]]:
     """Return what was estimated, by model and parameter, then by vehicle in the order of time."""
     order = {key: place for place, key in enumerate(rows)}
-    found: dict[tuple[str, Of], dict[Vehicle, list[Row]]] = defaultdict(lambda: defaultdict(list))
+    found: dict[tuple[str, Of], dict[Vehicle, list[DatasetRow]]] = defaultdict(lambda: defaultdict(list))
 
-    def take(key: str, effect: str, of: Row) -> None:
+    def take(key: str, effect: str, of: DatasetRow) -> None:
         row = rows[key]
         found[row["model_sha256"], (effect, of["parameter"])][row["vehicle"], row["rig"]].append({**of, "of": row})
 
@@ -105,19 +105,19 @@ def _values(folder: Path, rows: Mapping[str, Row]) -> dict[tuple[str, Of], dict[
     return found
 
 
-def _is_known(row: Row) -> bool:
+def _is_known(row: DatasetRow) -> bool:
     """Whether an interval is shorter than its value: with wider ones nothing is followed."""
     return row["low"] is not None and row["high"] is not None and row["high"] - row["low"] < 2.0 * abs(row["value"])
 
 
-def _seen(rows: Sequence[Row]) -> Seen:
+def _seen(rows: Sequence[DatasetRow]) -> Seen:
     std = [0.0 if each["low"] is None else (each["high"] - each["low"]) / (2.0 * QUANTILE) for each in rows]
     return Seen(np.array([each["value"] for each in rows]), np.array(std))
 
 
 def usual_parameters(folder: Path) -> dict[str, Usual]:
     """Return what is usual of the line's own parameters, over all vehicles of a dataset."""
-    vehicles: dict[str, dict[Vehicle, list[Row]]] = defaultdict(lambda: defaultdict(list))
+    vehicles: dict[str, dict[Vehicle, list[DatasetRow]]] = defaultdict(lambda: defaultdict(list))
     for (_, (effect, name)), of_vehicles in _values(folder, _current(folder)).items():
         for vehicle, rows in of_vehicles.items():
             vehicles[name][vehicle] += [] if effect else rows
@@ -125,7 +125,7 @@ def usual_parameters(folder: Path) -> dict[str, Usual]:
     return {name: usual(seen) for name, seen in known.items() if len(seen) > 1}
 
 
-def courses_of(folder: Path, rows: Mapping[str, Row]) -> dict[Vehicle, list[Course]]:
+def courses_of(folder: Path, rows: Mapping[str, DatasetRow]) -> dict[Vehicle, list[Course]]:
     """Follow what is followed of every vehicle."""
     found: dict[Vehicle, list[Course]] = defaultdict(list)
     for (_, of), vehicles in _values(folder, rows).items():
@@ -198,11 +198,11 @@ def _name(vehicle: Vehicle) -> str:
 
 def _vehicles(
     vehicles: Sequence[Vehicle],
-    rows: Mapping[str, Row],
-    effects: Sequence[Row],
+    rows: Mapping[str, DatasetRow],
+    effects: Sequence[DatasetRow],
     courses: Courses,
 ) -> html.Register:
-    of_vehicle: dict[Vehicle, list[Row]] = defaultdict(list)
+    of_vehicle: dict[Vehicle, list[DatasetRow]] = defaultdict(list)
     for row in rows.values():
         of_vehicle[row["vehicle"], row["rig"]].append(row)
     named = {(each["vehicle"], each["rig"], effect): text for each, effect, text in _since(effects, rows)}
@@ -225,10 +225,10 @@ def _vehicles(
     return html.Register("vehicles", headings, lines, choose=True)
 
 
-def _since(effects: Sequence[Row], rows: Mapping[str, Row]) -> Iterator[tuple[Row, str, str]]:
+def _since(effects: Sequence[DatasetRow], rows: Mapping[str, DatasetRow]) -> Iterator[tuple[DatasetRow, str, str]]:
     """Yield of each vehicle and effect: its first row, the effect, and since when it is there and how often."""
     order = {key: place for place, key in enumerate(rows)}
-    grouped: dict[tuple[str, str, str], list[Row]] = defaultdict(list)
+    grouped: dict[tuple[str, str, str], list[DatasetRow]] = defaultdict(list)
     for each in sorted(effects, key=lambda each: order[each["key"]]):
         grouped[each["vehicle"], each["rig"], each["effect"]].append(each)
     for (_, _, effect), found in grouped.items():
@@ -236,7 +236,7 @@ def _since(effects: Sequence[Row], rows: Mapping[str, Row]) -> Iterator[tuple[Ro
         yield found[0], effect, f"{since}({len(found)} times)"
 
 
-def _effects(effects: Sequence[Row], rows: Mapping[str, Row]) -> html.Register:
+def _effects(effects: Sequence[DatasetRow], rows: Mapping[str, DatasetRow]) -> html.Register:
     order = {key: place for place, key in enumerate(rows)}
     names = ("effect", "element", "started", "probability", "share", "indistinguishable_from", "key")
     lines = [
@@ -247,11 +247,11 @@ def _effects(effects: Sequence[Row], rows: Mapping[str, Row]) -> html.Register:
     return html.Register("effects", headings, lines, VERDICTS)
 
 
-def _cell(row: Row, name: str) -> Any:
+def _cell(row: DatasetRow, name: str) -> Any:
     return _day(row[name]) if name == "started" else row[name]
 
 
-def _recordings(rows: Mapping[str, Row], effects: Sequence[Row]) -> html.Register:
+def _recordings(rows: Mapping[str, DatasetRow], effects: Sequence[DatasetRow]) -> html.Register:
     names = ("name", "started", "command", "verdict", "effects", "frequency_hz", "damping", "statement", "key")
     lines = [[_name((row["vehicle"], row["rig"])), *(_cell(row, name) for name in names)] for row in rows.values()]
     headings = (
@@ -261,7 +261,7 @@ def _recordings(rows: Mapping[str, Row], effects: Sequence[Row]) -> html.Registe
     return html.Register("recordings", headings, lines, VERDICTS)
 
 
-def _failures(failures: Sequence[Row]) -> html.Register:
+def _failures(failures: Sequence[DatasetRow]) -> html.Register:
     lines = [[each["vehicle"], each["url"], each["command"], each["error"]] for each in failures]
     return html.Register("not computed", ("vehicle", "recording", "by", "why"), lines)
 
@@ -281,7 +281,7 @@ def _usual(courses: Courses) -> list[Any]:
     return [html.note(text), html.table(headings, lines, numbers=(1, 2, 3, 4))] if lines else []
 
 
-def _priors(rows: Mapping[str, Row]) -> html.Paragraph | None:
+def _priors(rows: Mapping[str, DatasetRow]) -> html.Paragraph | None:
     with_prior = [row for row in rows.values() if row["from_fleet"]]
     if not with_prior:
         return None

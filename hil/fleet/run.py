@@ -22,10 +22,10 @@ from distributed.comm.core import CommClosedError
 
 from hil.child import safe_path
 from hil.errors import UsageError
-from hil.fleet.dataset import Row, Writer
+from hil.fleet.dataset import DatasetRow, Writer
 from hil.fleet.known import Survey, stamp
-from hil.fleet.sources import Found, Seen, in_order
-from hil.fleet.tasks import PATIENCE, Job, Outcome, analyse, describe, place, row_of
+from hil.fleet.sources import FleetRecording, Seen, in_order
+from hil.fleet.tasks import PATIENCE, FleetJob, Outcome, analyse, describe, place, row_of
 
 OF_DASK: tuple[str, ...] = ("python", "dask", "distributed", "cloudpickle")
 """What client, scheduler and workers must have alike to understand one another."""
@@ -37,7 +37,7 @@ HANDSHAKE_S = 10.0
 
 Item = TypeVar("Item")
 
-Progress = Callable[[str, int, int], None]
+StageProgress = Callable[[str, int, int], None]
 """Called with the stage, how much of it is done, and how much there is."""
 
 
@@ -199,11 +199,11 @@ def hand_out(
 class Fleet:
     """The recordings of a fleet, described, and what is wrong with the others."""
 
-    recordings: list[Found] = field(default_factory=list)
-    failed: list[tuple[Found, str]] = field(default_factory=list)
-    duplicates: list[tuple[Found, Found]] = field(default_factory=list)
+    recordings: list[FleetRecording] = field(default_factory=list)
+    failed: list[tuple[FleetRecording, str]] = field(default_factory=list)
+    duplicates: list[tuple[FleetRecording, FleetRecording]] = field(default_factory=list)
 
-    def pieces(self, by_vehicle: bool) -> list[tuple[Found, ...]]:
+    def pieces(self, by_vehicle: bool) -> list[tuple[FleetRecording, ...]]:
         """Return what is computed together, in an order of its own: every recording, or a vehicle's on one rig."""
         ordered = sorted(
             self.recordings, key=lambda each: (in_order(each.vehicle), in_order(each.rig), each.started, each.url)
@@ -225,11 +225,11 @@ class Fleet:
         ]
         return lines
 
-    def place_of(self) -> Callable[[Sequence[str]], Row | None]:
+    def place_of(self) -> Callable[[Sequence[str]], DatasetRow | None]:
         """Return what says where recordings with these checksums belong; None where they are of no one vehicle."""
         by_content = {each.sha256: each for each in self.recordings}
 
-        def found(sums: Sequence[str]) -> Row | None:
+        def found(sums: Sequence[str]) -> DatasetRow | None:
             recordings = [by_content[each] for each in sums if each in by_content]
             is_one = len({(each.vehicle, each.rig) for each in recordings}) == 1
             return place(recordings) if is_one and len(recordings) == len(sums) else None
@@ -238,7 +238,12 @@ class Fleet:
 
 
 def survey(
-    connect: Connect, found: Sequence[Found], known: Survey, job: Job, engine: Engine, progress: Progress
+    connect: Connect,
+    found: Sequence[FleetRecording],
+    known: Survey,
+    job: FleetJob,
+    engine: Engine,
+    progress: StageProgress,
 ) -> Fleet:
     """Take the checksum and the metadata of every recording that is not known, or has changed since."""
     fleet = Fleet()
@@ -246,7 +251,7 @@ def survey(
     described = {each.url: seen for each in found if (seen := known.seen(each.url, stamps[each.url]))}
     unknown = [each for each in found if each.url not in described]
 
-    def submit(each: Found) -> Future[Any]:
+    def submit(each: FleetRecording) -> Future[Any]:
         return connect().submit(describe, each, PATIENCE * job.budget_s, pure=False, retries=engine.retries)
 
     for number, (each, result, error) in enumerate(hand_out(connect, unknown, submit), start=1):
@@ -256,7 +261,7 @@ def survey(
         else:
             fleet.failed.append((each, error or result))
         progress("reading", number, len(unknown))
-    first: dict[str, Found] = {}
+    first: dict[str, FleetRecording] = {}
     for each in found:  # in their order, whichever worker was faster
         if (seen := described.get(each.url)) is None:
             continue
@@ -279,7 +284,13 @@ class Done:
 
 
 def carry_out(
-    connect: Connect, fleet: Fleet, job: Job, writer: Writer, engine: Engine, by_vehicle: bool, progress: Progress
+    connect: Connect,
+    fleet: Fleet,
+    job: FleetJob,
+    writer: Writer,
+    engine: Engine,
+    by_vehicle: bool,
+    progress: StageProgress,
 ) -> Done:
     """Compute what is not in the dataset yet, and keep it as it comes; what fails costs itself alone.
 
@@ -290,11 +301,11 @@ def carry_out(
     todo = [piece for piece in pieces if job.key(piece) not in known]
     done = Done(known=len(pieces) - len(todo))
 
-    def fail(piece: Sequence[Found], error: str) -> None:
+    def fail(piece: Sequence[FleetRecording], error: str) -> None:
         done.failed += 1
         writer.fail({**row_of(piece, job), "error": error})
 
-    def submit(piece: tuple[Found, ...]) -> Future[Any]:
+    def submit(piece: tuple[FleetRecording, ...]) -> Future[Any]:
         return connect().submit(analyse, piece, job, pure=False, retries=engine.retries)
 
     try:

@@ -46,7 +46,7 @@ class Seen:
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
+class FleetRecording:
     """A recording of the fleet, by its path or its address of fsspec; the rest is empty where nothing says it."""
 
     url: str
@@ -60,7 +60,7 @@ class Found:
         """The name of the file."""
         return PurePosixPath(self.url).name
 
-    def seen_as(self, seen: Seen) -> Found:
+    def seen_as(self, seen: Seen) -> FleetRecording:
         """Return it with what its file says, where the path has not said it."""
         rig = self.rig or seen.rig
         vehicle = self.vehicle or seen.vehicle or rig or PurePosixPath(self.url).parent.name
@@ -87,15 +87,15 @@ def pattern_of(text: str | None) -> re.Pattern[str] | None:
     return pattern
 
 
-def find(sources: Sequence[str], pattern: re.Pattern[str] | None) -> tuple[list[Found], list[str]]:
+def find(sources: Sequence[str], pattern: re.Pattern[str] | None) -> tuple[list[FleetRecording], list[str]]:
     """Return the recordings that sources name, in their order, and what is wrong with the other sources."""
-    found: dict[str, Found] = {}
+    found: dict[str, FleetRecording] = {}
     complaints: list[str] = []
     for source in sources:
         try:
             urls = _elsewhere(source) if REMOTE in source else _here(source)
         except Exception as error:  # noqa: BLE001 - each file system of fsspec has errors of its own
-            complaints.append(f"{source}: expected files that can be listed, got: {_said(error)}")
+            complaints.append(f"{source}: expected files that can be listed, got: {_error_text(error)}")
             continue
         if not urls:
             complaints.append(f"{source}: expected recordings, got none")
@@ -151,14 +151,14 @@ def _is_recording(path: str, root: str) -> bool:
     return is_named_as_recording(inside) and not hidden and inside.name not in (FAILURES, SURVEY)
 
 
-def _placed(url: str, pattern: re.Pattern[str] | None) -> Found:
+def _placed(url: str, pattern: re.Pattern[str] | None) -> FleetRecording:
     said = dict(_FOLDER.findall(url))
     if pattern is not None and (match := pattern.search(url)):
         said |= {name: text for name, text in match.groupdict().items() if text}
-    return Found(url, **said)
+    return FleetRecording(url, **said)
 
 
-def _said(error: Exception) -> str:
+def _error_text(error: Exception) -> str:
     return str(error) or type(error).__name__
 
 
@@ -188,7 +188,7 @@ def remote_sidecar(path: str) -> str:
 
 
 @contextmanager
-def side_by_side(found: Sequence[Found]) -> Iterator[list[Path]]:
+def side_by_side(found: Sequence[FleetRecording]) -> Iterator[list[Path]]:
     """Give the files of several recordings, each under a name of its own: many a folder has its own ``run_1.csv``."""
     with ExitStack() as stack:
         paths = [stack.enter_context(at_hand(each.url)) for each in found]

@@ -23,8 +23,8 @@ from estimator.physics.parallel import work_on
 from estimator.signals.record import Record
 from hil.config.model_file import ModelFile
 from hil.errors import HilError
-from hil.fleet.dataset import Row
-from hil.fleet.sources import Found, Seen, seen, side_by_side
+from hil.fleet.dataset import DatasetRow
+from hil.fleet.sources import FleetRecording, Seen, seen, side_by_side
 from hil.plants.scales import with_lines, with_the_line_to_write
 from hil.recording import read_records
 from hil.report.diagnosis_json import diagnosis_json
@@ -39,7 +39,7 @@ PATIENCE = 3.0
 
 
 @dataclass(frozen=True, slots=True)
-class Job:
+class FleetJob:
     """What is done to every recording; ``file`` is None where they are identified as they are."""
 
     command: str
@@ -51,7 +51,7 @@ class Job:
     budget_s: float = 3600.0
     version: str = __version__
 
-    def key(self, recordings: Sequence[Found]) -> str:
+    def key(self, recordings: Sequence[FleetRecording]) -> str:
         """Return what a result is known by: the content of the recordings, the model's, the effort and the version."""
         parameters = {} if self.file is None else {k: asdict(v) for k, v in self.file.model.parameters.items()}
         contents = sorted(each.sha256 for each in recordings)
@@ -63,12 +63,12 @@ class Job:
 class Outcome:
     """Rows and verdict of one piece of work; what was wrong with its input, or empty."""
 
-    rows: dict[str, list[Row]]
+    rows: dict[str, list[DatasetRow]]
     verdict: str
     error: str = ""
 
 
-def describe(found: Found, limit_s: float) -> Seen | str:
+def describe(found: FleetRecording, limit_s: float) -> Seen | str:
     """Return what a recording's file says, or what is wrong with it; the worker ends where that takes too long."""
     try:
         with _ended_after(limit_s):
@@ -77,7 +77,7 @@ def describe(found: Found, limit_s: float) -> Seen | str:
         return str(error)
 
 
-def analyse(recordings: Sequence[Found], job: Job) -> Outcome:
+def analyse(recordings: Sequence[FleetRecording], job: FleetJob) -> Outcome:
     """Diagnose or identify recordings of one vehicle, on one core."""
     if job.version != __version__:
         return Outcome({}, "", f"expected a worker of hil {job.version}, got one of hil {__version__}")
@@ -109,7 +109,7 @@ def analyse(recordings: Sequence[Found], job: Job) -> Outcome:
     return Outcome({name: [of | row for row in rows] for name, rows in tables.items()}, verdict)
 
 
-def row_of(recordings: Sequence[Found], job: Job) -> Row:
+def row_of(recordings: Sequence[FleetRecording], job: FleetJob) -> DatasetRow:
     """Return the columns that say of what and by what a row is."""
     return {
         "key": job.key(recordings),
@@ -122,7 +122,7 @@ def row_of(recordings: Sequence[Found], job: Job) -> Row:
     }
 
 
-def place(recordings: Sequence[Found]) -> Row:
+def place(recordings: Sequence[FleetRecording]) -> DatasetRow:
     """Return the columns that say where what was found belongs."""
     first = min(recordings, key=lambda each: (each.started, each.url))
     return {
@@ -146,13 +146,13 @@ def _ended_after(limit_s: float) -> Iterator[None]:
         timer.cancel()
 
 
-Made = tuple[Row, list[Row], list[Row], str]
+ResultRows = tuple[DatasetRow, list[DatasetRow], list[DatasetRow], str]
 """Columns of the recording, rows of its effects and of parameters, and the verdict."""
 
 TWO_MASS = ("J_M", "J_L", "k", "c", "b_M", "b_L")
 
 
-def _diagnosed(records: Sequence[Record], file: ModelFile, job: Job, paths: Sequence[Path]) -> Made:
+def _diagnosed(records: Sequence[Record], file: ModelFile, job: FleetJob, paths: Sequence[Path]) -> ResultRows:
     found = diagnose(records, file.model, (), budget_s=job.budget_s, effort=job.effort)
     found = with_lines(found, paths, file.signals)
     if not found.effort.finished:
@@ -178,7 +178,7 @@ def _diagnosed(records: Sequence[Record], file: ModelFile, job: Job, paths: Sequ
     return head, [_effect(each) for each in effects], parameters, text
 
 
-def _effect(each: Row) -> Row:
+def _effect(each: DatasetRow) -> DatasetRow:
     return {
         "effect": each["name"],
         "form": each.get("form", ""),
@@ -188,7 +188,7 @@ def _effect(each: Row) -> Row:
     }
 
 
-def _parameters(effect: str, parameters: Mapping[str, Row]) -> Iterator[Row]:
+def _parameters(effect: str, parameters: Mapping[str, DatasetRow]) -> Iterator[DatasetRow]:
     """Yield a row for each parameter as the JSON files have it."""
     for name, each in parameters.items():
         low, high = each["ci95"] or (None, None)
@@ -196,7 +196,7 @@ def _parameters(effect: str, parameters: Mapping[str, Row]) -> Iterator[Row]:
         yield {"effect": effect, "parameter": name, "low": low, "high": high, **known}
 
 
-def _identified(records: Sequence[Record]) -> Made:
+def _identified(records: Sequence[Record]) -> ResultRows:
     settings = Settings()
     studies = identify_all(records, settings)
     text = identification_text([each.found for each in studies], settings, None, studies)

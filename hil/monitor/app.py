@@ -22,7 +22,7 @@ from textual.widgets import Static
 from hil.monitor import panel as head_panels
 from hil.monitor.dialogs import HELP, HelpDialog, MarkDialog, StartDialog, key_line
 from hil.monitor.layout import CSS, LEAST_COLUMNS, LEAST_ROWS, PAGES, WIDE_COLUMNS, WIDE_ROWS, pages
-from hil.monitor.messages import Choice, Kind, Mark, Notice, Quit, Reset, Start, Stop
+from hil.monitor.messages import Choice, LogTopic, Mark, Notice, Quit, Reset, StartExperiment, Stop
 from hil.monitor.panel import LogPanel, Panel
 from hil.monitor.snapshot import Activity
 from hil.monitor.source import Source
@@ -186,7 +186,7 @@ class MonitorApp(App[None]):
         if name is None or self._state.activity is not Activity.LISTENING:
             return
         self._state.starting(name)
-        self._source.send(Start(name))
+        self._source.send(StartExperiment(name))
 
     def action_stop(self) -> None:
         self._source.send(Stop())
@@ -201,7 +201,7 @@ class MonitorApp(App[None]):
     def action_reset(self) -> None:
         if self._refuse(self._state.activity is Activity.LISTENING, "stop first: faults are reset at rest"):
             return
-        self._state.take(Notice(time.monotonic_ns(), Kind.INFO, "reset of the drives' faults asked for"))
+        self._state.take(Notice(time.monotonic_ns(), LogTopic.INFO, "reset of the drives' faults asked for"))
         self._source.send(Reset())
 
     def action_help(self) -> None:

@@ -84,7 +84,7 @@ UNKNOWN = (Activity.LOST, Activity.STARTING)
 """When what was known of the bus is known no more: while the drives are being armed there is no cycle."""
 
 
-def brief(snapshot: Snapshot, width: int, height: int) -> list[str]:
+def health_summary(snapshot: Snapshot, width: int, height: int) -> list[str]:
     """Health in a few lines; what is wrong before figures, and how much of it has no room here."""
     health = snapshot.health
     if health is None or snapshot.headline.activity in UNKNOWN:

@@ -35,7 +35,7 @@ from hil.monitor.live_estimation import run_once
 from hil.monitor.messages import (
     Ended,
     Health,
-    Kind,
+    LogTopic,
     Lost,
     Mark,
     NodeHealth,
@@ -45,7 +45,7 @@ from hil.monitor.messages import (
     Quit,
     Ready,
     Reset,
-    Start,
+    StartExperiment,
     Stop,
     TimingHealth,
 )
@@ -104,17 +104,17 @@ class NodeWatch:
             text = (
                 f"{self._name}: has noticed that no command follows, as it is set up to (EMCY 0x{emergency.code:04X})"
             )
-            self._tell(Notice(t_ns, Kind.INFO, text))
+            self._tell(Notice(t_ns, LogTopic.INFO, text))
             return
         if emergency.is_reset:
             if self._emergency is None:
                 return  # of what was none
             self._emergency = None
-            self._tell(Notice(t_ns, Kind.EMCY, f"{self._name}: reset"))
+            self._tell(Notice(t_ns, LogTopic.EMCY, f"{self._name}: reset"))
             return
         self._emergency = emergency
         self._n_emergencies += 1
-        self._tell(Notice(t_ns, Kind.EMCY, f"{self._name}: {emergency}"))
+        self._tell(Notice(t_ns, LogTopic.EMCY, f"{self._name}: {emergency}"))
 
 
 class HealthWatch:
@@ -170,7 +170,7 @@ TRY_AGAIN_S = 1.0
 
 
 @dataclass(frozen=True, slots=True)
-class Job:
+class HostJob:
     """What the rig's process is for."""
 
     rig_path: Path  # the rig file, and what it says with the addresses of the command line
@@ -212,7 +212,7 @@ class SessionStop(StopRequest):
             self._run = None
 
 
-def serve(job: Job, connection: Connection) -> None:
+def serve(job: HostJob, connection: Connection) -> None:
     """Serve one rig to one view, until that ends; the entry point of the rig's process."""
     stop = SessionStop()
     with stop_on_signals(stop), Outbox(connection) as outbox:
@@ -227,12 +227,12 @@ def serve(job: Job, connection: Connection) -> None:
 
 
 class _Host:
-    def __init__(self, job: Job, connection: Connection, outbox: Outbox, stop: SessionStop) -> None:
+    def __init__(self, job: HostJob, connection: Connection, outbox: Outbox, stop: SessionStop) -> None:
         self._job = job
         self._connection = connection
         self._outbox = outbox
         self._stop = stop
-        self._orders: queue.SimpleQueue[Start | Reset] = queue.SimpleQueue()
+        self._orders: queue.SimpleQueue[StartExperiment | Reset] = queue.SimpleQueue()
         self._run: RecordedRun | None = None
         self._was_there = False
 
@@ -271,7 +271,7 @@ class _Host:
                 case Mark():
                     if self._run is not None:
                         self._run.mark(order)
-                case Start() | Reset():
+                case StartExperiment() | Reset():
                     self._orders.put(order)
 
     def _attend(self, rig: Rig, devices: Devices) -> None:
@@ -284,13 +284,13 @@ class _Host:
             self._was_there = True
             order = self._listen(devices, listening, health)
             listening.plc.finish()
-            if isinstance(order, Start):
+            if isinstance(order, StartExperiment):
                 self._run_experiment(rig, devices, health, order.experiment)
             elif isinstance(order, Reset):
                 for failure in listening.reset_faults():
-                    self._outbox.tell(Notice(time.monotonic_ns(), Kind.FAULT, failure))
+                    self._outbox.tell(Notice(time.monotonic_ns(), LogTopic.FAULT, failure))
 
-    def _listen(self, devices: Devices, listening: Listening, health: HealthWatch) -> Start | Reset | None:
+    def _listen(self, devices: Devices, listening: Listening, health: HealthWatch) -> StartExperiment | Reset | None:
         """Cycle with the drives disarmed until something is to be done; None at the end of the session."""
         sent_ns = 0
         while not self._stop.requested:
@@ -326,7 +326,7 @@ class _Host:
 
 
 @contextmanager
-def _rig(job: Job) -> Iterator[Rig]:
+def _rig(job: HostJob) -> Iterator[Rig]:
     """Give the rig to open; simulated, it is served for the time of the block."""
     if not job.simulate:
         yield job.rig

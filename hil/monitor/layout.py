@@ -91,7 +91,7 @@ def pages(channels: int = 0) -> ComposeResult:
                     classes="wide-only",
                 ),
                 Panel(model_panels.figures, "figures"),
-                Panel(bus_panels.brief, "brief"),
+                Panel(bus_panels.health_summary, "brief"),
                 classes="right",
             ),
         ),

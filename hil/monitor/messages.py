@@ -72,7 +72,7 @@ class Health:
     timing: TimingHealth
 
 
-class Kind(Enum):
+class LogTopic(Enum):
     """What a line of the log is about; the value is what stands before it."""
 
     INFO = "info"
@@ -88,7 +88,7 @@ class Notice:
     """One thing that happened, on the host's monotonic clock [ns]."""
 
     t_ns: int
-    kind: Kind
+    kind: LogTopic
     text: str
 
 
@@ -138,7 +138,7 @@ class Ended:
 
 
 @dataclass(frozen=True, slots=True)
-class Start:
+class StartExperiment:
     """Start an experiment of the rig file."""
 
     experiment: str
@@ -168,7 +168,7 @@ class Quit:
 
 
 Report = Samples | Health | Notice | Ready | Began | Over | Lost | Ended
-Order = Start | Stop | Mark | Reset | Quit
+Order = StartExperiment | Stop | Mark | Reset | Quit
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,7 +14,7 @@ from estimator.physics.joint import Shaft
 from hil.config.model_file import read_model
 from hil.config.rig_file import Rig
 from hil.errors import HilError, RecordingError, UsageError
-from hil.monitor.host import Job
+from hil.monitor.host import HostJob
 from hil.monitor.live_estimation import WarmUp
 from hil.monitor.messages import Choice
 from hil.monitor.source import ReplaySource, RigSource, Source, recorded_samples
@@ -54,7 +54,7 @@ def open_rig(
     _require_chain(rig.period_s, setup)
     warm, shaft = WarmUp(rig.period_s, setup), _shaft(model, rig, trust_laws)
     state = LiveState(rig.name, rig.period_s, shaft, True, warm.is_done, setup, rig.channel_units)
-    source = RigSource(Job(rig_path.absolute(), rig.of_monitor, out.absolute(), simulate, trust_laws, setup))
+    source = RigSource(HostJob(rig_path.absolute(), rig.of_monitor, out.absolute(), simulate, trust_laws, setup))
     return Opening(source, state, tuple(Choice(name, _summary(rig, name, trust_laws)) for name in rig.experiments))
 
 

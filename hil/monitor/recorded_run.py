@@ -12,7 +12,7 @@ from drivers.errors import DriverError
 from estimator.errors import EstimatorError
 from hil.config.rig_file import Rig
 from hil.errors import HilError, UsageError
-from hil.monitor.messages import Began, Kind, Mark, Notice, Over
+from hil.monitor.messages import Began, LogTopic, Mark, Notice, Over
 from hil.monitor.outbox import Outbox
 from hil.recording.writer import RecordingWriter
 from hil.result_folder import publish
@@ -61,7 +61,7 @@ class RecordedRun:
         time_s, phase = self._place(mark.t_ns)
         self._events.append({"time_s": time_s, "phase": phase, "text": mark.text})
         where = f"at {time_s:.2f} s of the recording" if time_s is not None else f"outside the recorded part ({phase})"
-        self._outbox.tell(Notice(mark.t_ns, Kind.MARK, f"{mark.text} ({where})"))
+        self._outbox.tell(Notice(mark.t_ns, LogTopic.MARK, f"{mark.text} ({where})"))
 
     def drive(
         self,
@@ -127,7 +127,7 @@ class RecordedRun:
         return (max(0.0, time_s) if phase is Phase.MEASURE else None), phase.value
 
     def _tell_end(self, recorder: RecordingWriter, timing: RunTiming, stopped: bool, reason: str | None) -> None:
-        kept = recorder.kept
+        kept = recorder.written_file
         run_id = None if kept is None else self._registered(kept, STOPPED if stopped else reason or COMPLETE)
         n_alarms = 0 if self._live is None else len(found_changes(self._live.course.summary()))
         recording = None if kept is None else str(kept)
@@ -157,7 +157,7 @@ class RecordedRun:
         return path
 
     def _complain(self, text: str) -> None:
-        self._outbox.tell(Notice(time.monotonic_ns(), Kind.FAULT, text))
+        self._outbox.tell(Notice(time.monotonic_ns(), LogTopic.FAULT, text))
 
 
 def recording_path(folder: Path, name: str, now: datetime) -> Path:

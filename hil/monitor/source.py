@@ -15,11 +15,11 @@ import numpy as np
 
 from hil.child import safe_path
 from hil.errors import RecordingError
-from hil.monitor.host import Job, serve
+from hil.monitor.host import HostJob, serve
 from hil.monitor.messages import Began, Ended, Order, Over, Quit, Report, Samples
 from hil.recording import columns
 from hil.recording.formats import read_table
-from hil.recording.table import Kind, Table
+from hil.recording.table import ColumnKind, Table
 from hil.rig.experiments.base import Phase
 from hil.rig.pacing import NS_PER_S
 from hil.sample import Sample, SampleFlag
@@ -42,7 +42,7 @@ class RigSource:
     can_drive = True
     """Whether there is a rig that takes orders."""
 
-    def __init__(self, job: Job) -> None:
+    def __init__(self, job: HostJob) -> None:
         context = multiprocessing.get_context("spawn")  # a fork would share this program's terminal and threads
         self._connection, self._far_end = context.Pipe()
         self._process = context.Process(target=serve, args=(job, self._far_end), name="hil rig")
@@ -199,7 +199,7 @@ def recorded_samples(path: Path) -> tuple[list[Sample], dict[str, str]]:
 
 
 def _is_read(table: Table, name: str) -> bool:
-    return name in table.columns and Kind.of(table.columns[name]) is not Kind.TEXT
+    return name in table.columns and ColumnKind.of(table.columns[name]) is not ColumnKind.TEXT
 
 
 def _samples(rows: Iterator[tuple[float, ...]]) -> Iterator[Sample]:

@@ -15,7 +15,7 @@ from hil.monitor.messages import (
     Began,
     Ended,
     Health,
-    Kind,
+    LogTopic,
     Lost,
     Notice,
     Over,
@@ -136,12 +136,12 @@ class LiveState:
 
     def _take_samples(self, report: Samples) -> None:
         if report.lost:
-            self._tell(Kind.INFO, f"{report.lost} samples not shown: this terminal did not take them in time")
+            self._tell(LogTopic.INFO, f"{report.lost} samples not shown: this terminal did not take them in time")
         measured = [sample for sample, phase in report.rows if phase is Phase.MEASURE]
         for sample, _ in report.rows:
             self._keep(sample)
         for alarm in self._estimation.take(measured):
-            self._note(Notice(self._now_ns, Kind.ALARM, alarm.statement))
+            self._note(Notice(self._now_ns, LogTopic.ALARM, alarm.statement))
         self._retune()
         sample, phase = report.rows[-1]
         self._latest = sample
@@ -213,7 +213,7 @@ class LiveState:
             message="",
         )
         if self._can_drive:
-            self._tell(Kind.RUN, f"{report.experiment} begins, recorded as {as_known(report.recording)}")
+            self._tell(LogTopic.RUN, f"{report.experiment} begins, recorded as {as_known(report.recording)}")
 
     def _end(self, report: Over) -> None:
         self._estimation.end()
@@ -226,7 +226,7 @@ class LiveState:
         text = (
             outcome(report) if self._can_drive else f"{report.samples} samples played, {report.flagged} of them flagged"
         )
-        self._tell(Kind.FAULT if report.reason else Kind.RUN, text)
+        self._tell(LogTopic.FAULT if report.reason else LogTopic.RUN, text)
         self.say(text)
 
     def _turn(self, report: Ready | Lost | Ended) -> None:
@@ -234,14 +234,14 @@ class LiveState:
         match report:
             case Ready():
                 if self.activity is Activity.LOST:
-                    self._tell(Kind.INFO, "the bus is there again")
+                    self._tell(LogTopic.INFO, "the bus is there again")
                 self._quality.begin()
                 waited = self.activity in (Activity.CONNECTING, Activity.LOST)  # and what was said then is over
                 message = "" if waited else self._headline.message
                 self._headline = replace(self._headline, activity=Activity.LISTENING, message=message)
             case Lost():
                 if self.activity is not Activity.LOST:
-                    self._tell(Kind.FAULT, report.reason)
+                    self._tell(LogTopic.FAULT, report.reason)
                 self._headline = replace(self._headline, activity=Activity.LOST, message=report.reason)
             case Ended():
                 self.ended = report
@@ -249,8 +249,8 @@ class LiveState:
 
     def _note(self, notice: Notice) -> None:
         self._log.append(notice)
-        if notice.kind is not Kind.INFO:
+        if notice.kind is not LogTopic.INFO:
             self.say(f"{notice.kind.value}: {notice.text}")
 
-    def _tell(self, kind: Kind, text: str) -> None:
+    def _tell(self, kind: LogTopic, text: str) -> None:
         self._log.append(Notice(self._now_ns, kind, text))

@@ -9,7 +9,7 @@ from enum import Enum
 from hil.errors import UsageError
 
 
-class What(Enum):
+class StepChoice(Enum):
     """What to do with a step."""
 
     GO = "go"
@@ -22,11 +22,11 @@ class What(Enum):
 class Answer:
     """What to do, and for a skip the reason."""
 
-    what: What
+    what: StepChoice
     because: str = ""
 
 
-GO = Answer(What.GO)
+GO = Answer(StepChoice.GO)
 
 
 Ask = Callable[[str], str]
@@ -58,8 +58,10 @@ class Talk:
                 "  From here on the drives are armed. Is the vehicle where it may move, someone at the emergency stop, "
                 "nobody near the shaft?\n  Go? [y]es, [s]kip, [q]uit: "
             )
-        answer = _answer(self.ask, question, {"y": What.GO, "yes": What.GO, "s": What.SKIP, "q": What.QUIT})
-        self._is_armed |= answer.what is What.GO
+        answer = _answer(
+            self.ask, question, {"y": StepChoice.GO, "yes": StepChoice.GO, "s": StepChoice.SKIP, "q": StepChoice.QUIT}
+        )
+        self._is_armed |= answer.what is StepChoice.GO
         return answer
 
     def after(self, step: str, outside: int, blocked: bool) -> Answer:
@@ -68,10 +70,12 @@ class Talk:
             return GO
         if blocked:
             question = "  This has to be fixed first. [r]epeat, [s]kip with a reason, [q]uit: "
-            words = {"r": What.REPEAT, "s": What.SKIP, "q": What.QUIT, "": What.QUIT}
+            words = {"r": StepChoice.REPEAT, "s": StepChoice.SKIP, "q": StepChoice.QUIT, "": StepChoice.QUIT}
             return _answer(self.ask, question, words)
         question = "  Go [o]n, [r]epeat, [q]uit: "
-        return _answer(self.ask, question, {"o": What.GO, "": What.GO, "r": What.REPEAT, "q": What.QUIT})
+        return _answer(
+            self.ask, question, {"o": StepChoice.GO, "": StepChoice.GO, "r": StepChoice.REPEAT, "q": StepChoice.QUIT}
+        )
 
     def confirm(self, question: str) -> Answer:
         """Ask whether something read is right, also where torque was agreed to: nobody has seen the value before.
@@ -80,28 +84,32 @@ class Talk:
         """
         if self.ask is None:
             return GO
-        words = {"y": What.GO, "yes": What.GO, "n": What.QUIT, "no": What.QUIT}
+        words = {"y": StepChoice.GO, "yes": StepChoice.GO, "n": StepChoice.QUIT, "no": StepChoice.QUIT}
         return _answer(self.ask, f"  {question} [y]es, [n]o: ", words)
 
     def keep_results(self, changes: Sequence[str]) -> Answer:
         """Ask whether results from before the rig file was changed are kept (`GO`, with the reason) or repeated."""
         if self.keep:
-            return Answer(What.GO, self.keep)
+            return Answer(StepChoice.GO, self.keep)
         if self.ask is None:
-            return Answer(What.REPEAT)
+            return Answer(StepChoice.REPEAT)
         question = "  [r]epeat the steps done before, [k]eep their results with a reason, [q]uit: "
-        answer = _answer(self.ask, question, {"r": What.REPEAT, "": What.REPEAT, "k": What.SKIP, "q": What.QUIT})
-        return Answer(What.GO, answer.because) if answer.what is What.SKIP else answer
+        answer = _answer(
+            self.ask,
+            question,
+            {"r": StepChoice.REPEAT, "": StepChoice.REPEAT, "k": StepChoice.SKIP, "q": StepChoice.QUIT},
+        )
+        return Answer(StepChoice.GO, answer.because) if answer.what is StepChoice.SKIP else answer
 
 
-def _answer(ask: Ask, question: str, words: dict[str, What]) -> Answer:
+def _answer(ask: Ask, question: str, words: dict[str, StepChoice]) -> Answer:
     """Ask until one of the words comes; `SKIP` asks for a reason until there is one."""
     expected = " or ".join(word for word in words if word)
     while (word := ask(question).strip().lower()) not in words:
         question = f"  expected {expected}, got {word or 'nothing'}\n{question.splitlines()[-1]}"
-    if words[word] is not What.SKIP:
+    if words[word] is not StepChoice.SKIP:
         return Answer(words[word])
     question = "  Because: "
     while not (reason := ask(question).strip()):
         question = "  A reason is needed, it is recorded. Because: "
-    return Answer(What.SKIP, reason)
+    return Answer(StepChoice.SKIP, reason)

@@ -96,13 +96,13 @@ def _shown(leaves: dict[str, Any], key: str) -> str:
     return repr(leaves[key]) if key in leaves else "not there"
 
 
-Kind = TypeVar("Kind", bound=AnyExperiment)
+ExperimentKind = TypeVar("ExperimentKind", bound=AnyExperiment)
 
 HALT_S = 1.0
 """Recorded part of coming to a stand [s]."""
 
 
-def first_of(rig: Rig, kind: type[Kind]) -> Kind | None:
+def first_of(rig: Rig, kind: type[ExperimentKind]) -> ExperimentKind | None:
     """Return the first experiment of a kind in a rig file; None without one."""
     return next((table for table in rig.experiments.values() if isinstance(table, kind)), None)
 

@@ -22,7 +22,7 @@ from hil.orders.order import Order, RigSource
 from hil.recording.checksum import RIG_CHECKSUM, RIG_TEXT, text_sha256
 from hil.recording.writer import RecordingWriter
 from hil.rig.build import open_devices
-from hil.rig.drive import Progress
+from hil.rig.drive import CycleProgress
 from hil.rig.dry_run import Ranges, on_paper
 from hil.rig.experiments.base import BaseTorque, Experiment, Phase
 from hil.rig.experiments.staged import LowPass
@@ -177,11 +177,11 @@ class Conditions:
     pace: str  # Its name, for the recording
     pacer: Callable[[Rig], Pacer]  # Makes a fresh pacer
     scheduling: Callable[[], AbstractContextManager[RealTimeGrants]]
-    progress: Callable[[Plan], AbstractContextManager[Progress]]  # Shows a run for the time of a block
+    progress: Callable[[Plan], AbstractContextManager[CycleProgress]]  # Shows a run for the time of a block
 
 
 @dataclass(slots=True)
-class _Seen(Ranges):
+class _Measured(Ranges):
     """What was measured over a whole run."""
 
     last_rad_s: float = 0.0
@@ -226,7 +226,7 @@ class Runner:
     ) -> RunRecord:
         rig, text = self.source.ordered(order)
         prediction = self.predict(order, model, speed_rad_s)
-        path, seen = self._free_path(step, order), _Seen()
+        path, seen = self._free_path(step, order), _Measured()
 
         def record(whole: bool) -> RunRecord:
             return RunRecord(
@@ -254,7 +254,7 @@ class Runner:
         return run
 
     def _drive(
-        self, rig: Rig, text: str, order: Order, prediction: Prediction, path: Path, seen: _Seen, step: str
+        self, rig: Rig, text: str, order: Order, prediction: Prediction, path: Path, seen: _Measured, step: str
     ) -> None:
         pacer, stop = self.conditions.pacer(rig), StopRequest()
         timing = RunTiming(pacer.period_ns)

@@ -14,7 +14,7 @@ from functools import partial
 import numpy as np
 
 from estimator.diagnosis.acquisition.chain import replay
-from estimator.diagnosis.black_box import Around, BlackBox, equivalent_line
+from estimator.diagnosis.black_box import BlackBox, PlantSetting, equivalent_line
 from estimator.diagnosis.flange import AT_LOAD, AT_MOTOR, FREE, slots_of, with_only
 from estimator.diagnosis.noise import noise_floor
 from estimator.diagnosis.preconditions.prepare import thin
@@ -36,7 +36,7 @@ STARTS = ("speed_rad_s", "twist_rad", "load_speed_rad_s")
 FAST_ENOUGH_S = 1.0 / 240.0
 """Sampling period at which the line that answers as the plant does is fitted, at least."""
 
-ALIKE = 0.1
+EQUIVALENT_SHARE = 0.1
 """Share of the noise of the readings within which a line answers as the FMU: a hundredth of its square."""
 
 NOTHING = 1e-3
@@ -60,7 +60,7 @@ class FmuLine:
     @property
     def is_alike(self) -> bool:
         """Tell whether the line answers as the FMU to within what is recorded."""
-        return self.error <= ALIKE * self.noise
+        return self.error <= EQUIVALENT_SHARE * self.noise
 
 
 def fmu_line(fmu: FmuPlant, records: Sequence[Record], tolerances: Mapping[str, float]) -> FmuLine:
@@ -109,7 +109,7 @@ def _around(record: Record, found: FmuLine) -> DrivelineModel:
     states = ("angle_rad", *STARTS) if kind is OutputKind.POSITION else STARTS
     starts = dict(zip(named.start, states, strict=False))
 
-    def run(record: Record, around: Around) -> FloatArray:
+    def run(record: Record, around: PlantSetting) -> FloatArray:
         values: dict[str, FloatArray | float] = {name: getattr(around.start, state) for name, state in starts.items()}
         values |= {each.name: each.value_of(around.tuned[name]) for name, each in found.tuned.items()}
         if named.load:

@@ -21,7 +21,7 @@ from types import MappingProxyType
 import numpy as np
 
 from estimator.diagnosis.segments import tiles
-from estimator.physics.driveline import Start
+from estimator.physics.driveline import InitialCondition
 from estimator.physics.free_run import FreeRun
 from estimator.physics.model import Motion
 from estimator.physics.parallel import TimeIsUp, check_time, concurrently, time_left_s
@@ -176,7 +176,7 @@ class FmuPlant:
         self._settled[record.name, float(record.time_s[0])] = x
         error = (output - record.output)[record.okay]
         load = float(x[0] * unknown.scale[0]) if named.load else float("nan")
-        return FreeRun(output, float(np.sqrt(np.mean(error**2))), Start(load, 0.0, float("nan")))
+        return FreeRun(output, float(np.sqrt(np.mean(error**2))), InitialCondition(load, 0.0, float("nan")))
 
     def settled(self, record: Record, named: Names) -> dict[str, FloatArray | float]:
         """Return load and initial state that were found of a recording, where it was `run`, by the FMU's names."""

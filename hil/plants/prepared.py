@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from estimator.diagnosis.preconditions.prepare import as_moved, thin
+from estimator.diagnosis.preconditions.prepare import thin, with_motion_corrected
 from estimator.diagnosis.result import Diagnosis
 from estimator.physics.catalogue import EFFECTS
 from estimator.signals.record import Record
@@ -72,7 +72,7 @@ def prepare_again(
     if prepared is None:
         return tuple(records)
     if prepared.mended:
-        mended, said = as_moved(records)
+        mended, said = with_motion_corrected(records)
         for line in said:
             tell(line)
         records = mended

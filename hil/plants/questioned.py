@@ -24,7 +24,7 @@ from hil.recording.signals_config import SignalsConfig
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
+class GivenInput:
     """What was given on the command line."""
 
     model: Path
@@ -36,7 +36,7 @@ class Asked:
 
 
 @dataclass(frozen=True, slots=True)
-class Questioned:
+class DiagnosisInput:
     """A model and recordings; of an FMU, what is questioned in its place."""
 
     file: ModelFile
@@ -45,10 +45,10 @@ class Questioned:
 
 
 @contextmanager
-def questioned(asked: Asked, recordings: Sequence[Path], dbc: Path | None, tell: Tell) -> Iterator[Questioned]:
+def questioned(asked: GivenInput, recordings: Sequence[Path], dbc: Path | None, tell: Tell) -> Iterator[DiagnosisInput]:
     """Read a model and recordings, and find what is questioned in the place of an FMU, which its budget ends."""
     if not is_fmu(asked.model):
-        yield Questioned(*_of_model_file(asked, recordings, dbc, tell))
+        yield DiagnosisInput(*_of_model_file(asked, recordings, dbc, tell))
         return
     tuned = tolerances(asked.tuned)
     fmu, signals, records = _of_fmu(asked, recordings, dbc, tell)
@@ -59,7 +59,7 @@ def questioned(asked: Asked, recordings: Sequence[Path], dbc: Path | None, tell:
     try:
         with counted(Work(math.inf if asked.budget_s is None else asked.budget_s)):
             line = fmu_line(fmu, records, tuned)
-            yield Questioned(ModelFile(line.model, signals), records, line)
+            yield DiagnosisInput(ModelFile(line.model, signals), records, line)
     except TimeIsUp:
         raise UsageError(
             f"{asked.model}: expected an FMU of which load and initial state are found in {asked.budget_s:g} s "
@@ -68,7 +68,7 @@ def questioned(asked: Asked, recordings: Sequence[Path], dbc: Path | None, tell:
         ) from None
 
 
-def simulated_by(asked: Asked, recording: Path, dbc: Path | None, tell: Tell) -> tuple[Plant, Record]:
+def simulated_by(asked: GivenInput, recording: Path, dbc: Path | None, tell: Tell) -> tuple[Plant, Record]:
     """Read what simulates a recording, and the recording with all its rows."""
     if is_fmu(asked.model):
         fmu, _, (record,) = _of_fmu(asked, [recording], dbc, tell)
@@ -79,7 +79,7 @@ def simulated_by(asked: Asked, recording: Path, dbc: Path | None, tell: Tell) ->
 
 
 def _of_fmu(
-    asked: Asked, recordings: Sequence[Path], dbc: Path | None, tell: Tell
+    asked: GivenInput, recordings: Sequence[Path], dbc: Path | None, tell: Tell
 ) -> tuple[FmuPlant, SignalsConfig | None, tuple[Record, ...]]:
     fmu = FmuPlant(asked.model, asked.mapped, asked.trust.fmu)
     signals = None if asked.signals is None else read_signals(asked.signals)
@@ -90,7 +90,7 @@ def _of_fmu(
 
 
 def _of_model_file(
-    asked: Asked, recordings: Sequence[Path], dbc: Path | None, tell: Tell
+    asked: GivenInput, recordings: Sequence[Path], dbc: Path | None, tell: Tell
 ) -> tuple[ModelFile, tuple[Record, ...]]:
     if asked.signals is not None:
         raise UsageError(f"--signals {asked.signals}: expected with an FMU; a model file has its own [signals]")

@@ -14,7 +14,7 @@ from typing import Any
 
 from estimator.diagnosis.preconditions.channels import standstill
 from estimator.diagnosis.preconditions.plausible import are_whole_numbers
-from estimator.diagnosis.preconditions.prepare import as_moved, doubtful
+from estimator.diagnosis.preconditions.prepare import doubtful, with_motion_corrected
 from estimator.diagnosis.result import Diagnosis, Doubt
 from estimator.errors import Cure, EstimatorError, Implausible
 from estimator.physics.model import DrivelineModel
@@ -36,7 +36,7 @@ def tell_doubts(
     tell: Tell,
 ) -> None:
     """Tell what is doubtful of recordings, and of their model where there is one, as ``hil diagnose`` has it."""
-    for note in (*as_moved(records)[1], *filter(None, map(standstill, records))):
+    for note in (*with_motion_corrected(records)[1], *filter(None, map(standstill, records))):
         tell(note)
     try:
         doubts = doubtful(records, model)

@@ -32,7 +32,7 @@ from hil.proof.sealed_set import (
     require_unchanged,
     write_list,
 )
-from hil.proof.work import Progress, work_on
+from hil.proof.work import WorkProgress, work_on
 
 Row = dict[str, Any]
 
@@ -44,7 +44,9 @@ LARGEST_TRUTH_BYTES = 1 << 28
 """What is unpacked of a sealed truth at most; with its fresh recordings one has a few million bytes."""
 
 
-def answer(folder: Path, jobs: int, progress: Progress, limit_s: float = LIMIT_S, pool: Executor | None = None) -> str:
+def answer(
+    folder: Path, jobs: int, progress: WorkProgress, limit_s: float = LIMIT_S, pool: Executor | None = None
+) -> str:
     """Answer every case of a set that has no answer yet; return one digest of all answers."""
     cases = read_commitments(folder)
     answered = work_on(
@@ -94,7 +96,7 @@ def _answer_one(folder: Path, name: str, shown: Shown, limit_s: float) -> dict[s
     return {"case": digest_of(dict(shown.files)), "files": files, "diagnose_s": round(took_s, 2)}
 
 
-def judge_set(folder: Path, key: bytes, jobs: int, progress: Progress, verdicts: str | None = None) -> list[Row]:
+def judge_set(folder: Path, key: bytes, jobs: int, progress: WorkProgress, verdicts: str | None = None) -> list[Row]:
     """Open a set and score its verdicts."""
     cases = read_commitments(folder)
     answered = read_list(folder / VERDICTS_LIST, "hil prove run DIR writes it")

@@ -62,7 +62,7 @@ records it. Left out are those that no recording of torque and speed tells from 
 
 
 @dataclass(frozen=True, slots=True)
-class Kind:
+class CaseKind:
     """One row of a campaign."""
 
     name: str  # ``none``, ``off``, an effect, or a pair
@@ -75,15 +75,15 @@ def _singles(catalogued: bool) -> list[str]:
     return [name for name, effect in EFFECTS.items() if effect.catalogued is catalogued and name != NOTHING]
 
 
-def kind(name: str) -> Kind:
+def kind(name: str) -> CaseKind:
     if name == NOTHING:
-        return Kind(NOTHING, Group.NONE, NOTHING, nominal_error=0.0)
+        return CaseKind(NOTHING, Group.NONE, NOTHING, nominal_error=0.0)
     if name == OFF:
-        return Kind(OFF, Group.OFF, NOTHING)
+        return CaseKind(OFF, Group.OFF, NOTHING)
     effects = find(name)
     if not all(effect.catalogued for effect in effects):
-        return Kind(name, Group.OUTSIDE, name)
-    return Kind(name, Group.PAIR if PAIR_SIGN in name else Group.SINGLE, name)
+        return CaseKind(name, Group.OUTSIDE, name)
+    return CaseKind(name, Group.PAIR if PAIR_SIGN in name else Group.SINGLE, name)
 
 
 SHARES = {Group.SINGLE: 0.5, Group.PAIR: 0.2, Group.OUTSIDE: 0.15, Group.OFF: 0.1, Group.NONE: 0.05}
@@ -105,7 +105,7 @@ class Drawn:
     """What one case hides, and what its bus and sizes are drawn from."""
 
     name: str
-    kind: Kind
+    kind: CaseKind
     seed: int
 
 

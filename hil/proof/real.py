@@ -32,7 +32,7 @@ from hil.proof.real_files import (
     require_recording,
     write_shown,
 )
-from hil.proof.work import Progress, read_entries, silent, work_on, write_entries
+from hil.proof.work import WorkProgress, read_entries, silent, work_on, write_entries
 
 SCHEMA = "hil.real/2"
 FILE_NAME = "real.json"
@@ -61,7 +61,7 @@ def run_real(
     out: Path,
     names: Sequence[str] = (),
     jobs: int = 1,
-    progress: Progress = silent,
+    progress: WorkProgress = silent,
     room: Path = ROOM,
     pool: Executor | None = None,
 ) -> list[Json]:

@@ -21,7 +21,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from drivers.foreign_file import open_regular
-from hil.config.table import Positive, Table, Text
+from hil.config.table import FileTable, Positive, Text
 from hil.errors import FileProblem, UsageError
 from hil.files import PLAIN
 from hil.problems import Fault, read_toml, refuse, validate
@@ -51,7 +51,7 @@ class Conversion(Enum):
     FRICTION_DAMPER = "friction_damper"
 
 
-class Origin(Table):
+class Origin(FileTable):
     """Where a recording comes from: the page that a person opens; the file that a program can fetch, if there is one.
 
     ``member`` is a file inside the archive that is fetched, ``convert`` what turns it into the recording.
@@ -63,7 +63,7 @@ class Origin(Table):
     convert: Annotated[Conversion, Field(strict=False)] = Conversion.NONE
 
 
-class RecordingEntry(Table):
+class RecordingEntry(FileTable):
     """One recording: its place in the data folder, its checksum, its origin; ``rows`` cuts it, first and end."""
 
     path: Relative
@@ -72,7 +72,7 @@ class RecordingEntry(Table):
     rows: Annotated[list[int], Field(min_length=2, max_length=2)] | None = None
 
 
-class RunEntry(Table):
+class RunEntry(FileTable):
     """One diagnosis: the recordings that are fitted, and those that are held out."""
 
     name: Name
@@ -80,7 +80,7 @@ class RunEntry(Table):
     held_out: list[Text] = Field(default_factory=list)
 
 
-class CaseFile(Table):
+class CaseFile(FileTable):
     """Everything about a case but the truth."""
 
     schema_: Literal["hil.real-case/1"] = Field(alias="schema")
@@ -114,7 +114,7 @@ class CaseFile(Table):
             yield Fault("runs", "a name of its own for each", names)
 
 
-class KnownValue(Table):
+class KnownValue(FileTable):
     """A quantity that somebody else has measured or identified."""
 
     what: Text
@@ -124,7 +124,7 @@ class KnownValue(Table):
     within: Positive  # relative difference up to which the two agree
 
 
-class TruthFile(Table):
+class TruthFile(FileTable):
     """What is known of a machine next to its recordings."""
 
     schema_: Literal["hil.real-truth/1"] = Field(alias="schema")

@@ -27,7 +27,7 @@ from hil.proof.kinds import kind
 from hil.proof.score import Answer, score
 from hil.proof.seal import verify
 from hil.proof.sealed_rig import OPEN, RIG_FILE
-from hil.proof.work import Progress, read_entries, work_on, write_entries
+from hil.proof.work import WorkProgress, read_entries, work_on, write_entries
 
 Row = dict[str, Any]
 
@@ -207,7 +207,7 @@ def _refusal(concealed: Concealed, seed: int, answer: Answer) -> Row:
     }
 
 
-def run_wire(out: Path, seed: int, names: Sequence[str], progress: Progress) -> list[Row]:
+def run_wire(out: Path, seed: int, names: Sequence[str], progress: WorkProgress) -> list[Row]:
     """Drive rigs, one after the other; returns their rows, also written to ``out/wire.json``."""
     for name in names:
         if name not in WIRED:

@@ -13,14 +13,14 @@ from scipy.stats import binomtest
 
 from estimator.physics.catalogue import EFFECTS as CATALOGUE
 from hil.proof.judge import Judgement, Outcome, judge
-from hil.proof.kinds import Group, Kind
+from hil.proof.kinds import CaseKind, Group
 from hil.proof.truth.specimen import NOTHING
 
 Json = Mapping[str, Any]
 Row = Mapping[str, Any]
 Intervals = Sequence[Sequence[float]]
 
-ALIKE = "alike"
+LOOK_ALIKE = "alike"
 """Outcome besides those of `Outcome`: right, by way of an effect declared to be the same to torque and speed."""
 
 FAILED = "failed"  # outcome besides those of `Outcome`: a command gave no result
@@ -39,7 +39,7 @@ class Answer:
     fault: str | None = None  # why a command did not do its job
 
 
-def score(kind: Kind, seed: int, truth: Json, answer: Answer) -> dict[str, Any]:
+def score(kind: CaseKind, seed: int, truth: Json, answer: Answer) -> dict[str, Any]:
     """Return the row of one case in ``results.jsonl``; JSON types only."""
     row: dict[str, Any] = {
         "kind": kind.name,
@@ -75,7 +75,7 @@ def is_success(group: Group, outcome: str) -> bool:
     """Say whether an outcome is what a group's cases should end in."""
     if group is Group.OUTSIDE:
         return outcome == _name(Outcome.ABSTAINED)
-    return outcome in (_name(Outcome.RIGHT), ALIKE)
+    return outcome in (_name(Outcome.RIGHT), LOOK_ALIKE)
 
 
 def _name(outcome: Outcome) -> str:
@@ -95,7 +95,7 @@ def _with_all_equivalents(diagnosis: Json) -> dict[str, Any]:
 
 def _outcome(judgement: Judgement) -> str:
     if judgement.outcome is Outcome.RIGHT and set(judgement.named) != set(judgement.hidden):
-        return ALIKE
+        return LOOK_ALIKE
     return _name(judgement.outcome)
 
 

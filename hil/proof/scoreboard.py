@@ -149,7 +149,7 @@ def _tiles(rows: Sequence[Row]) -> list[tuple[str, str, str]]:
     ]
 
 
-def _groups(rows: Sequence[Row]) -> html.Table:
+def _groups(rows: Sequence[Row]) -> html.HtmlTable:
     lines = []
     for group, (title, wanted) in GROUPS.items():
         members = [row for row in rows if row["group"] == group.value]
@@ -166,7 +166,7 @@ def _named(rows: Sequence[Row]) -> list[tuple[str, str]]:
     ]
 
 
-def _cases(rows: Sequence[Row]) -> html.Table:
+def _cases(rows: Sequence[Row]) -> html.HtmlTable:
     """Return a line for each case, with a link to its report; the page stands next to the folder of verdicts."""
     return html.table(CASE_HEADINGS, [_case(row) for row in rows], numbers=(4, 5, 6, 7))
 

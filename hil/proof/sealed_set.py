@@ -27,7 +27,7 @@ from hil.proof.kinds import Drawn, draw
 from hil.proof.make_case import write_recording, write_shown
 from hil.proof.seal import SealBroken, canonical_json, lock, seal
 from hil.proof.truth.case import Case, make_case
-from hil.proof.work import Progress, read_entries, work_on, write_entries
+from hil.proof.work import WorkProgress, read_entries, work_on, write_entries
 from hil.result_folder import LOCK
 
 CASES, SEALED, VERDICTS = "cases", "sealed", "verdicts"
@@ -39,7 +39,7 @@ _SHOWN = 80  # characters of a wrong name that a message shows
 Digests = Mapping[str, str]  # file name to SHA-256
 
 
-def make(folder: Path, cases: int, seed: int, key: bytes, jobs: int, progress: Progress) -> None:
+def make(folder: Path, cases: int, seed: int, key: bytes, jobs: int, progress: WorkProgress) -> None:
     """Make and seal a set of cases; the folder appears when all of it is there."""
     if folder.exists() and (not folder.is_dir() or any(path.name != LOCK for path in folder.iterdir())):
         raise UsageError(f"{folder}: expected a folder that is not there yet or is empty. Choose another.")

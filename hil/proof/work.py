@@ -13,7 +13,7 @@ from hil.files import read_json, write_whole
 
 Result = TypeVar("Result")
 
-Progress = Callable[[str, int, int], None]
+WorkProgress = Callable[[str, int, int], None]
 """Called with what has been done, how many of it, and how many there are in all; what it raises ends the work."""
 
 
@@ -24,7 +24,7 @@ def silent(what: str, done: int, total: int) -> None:
 def work_on(
     names: Sequence[str],
     work: Callable[[str], Result],
-    progress: Progress = silent,
+    progress: WorkProgress = silent,
     *,
     jobs: int = 1,
     pool: Executor | None = None,

@@ -16,7 +16,7 @@ from typing import Final
 import numpy as np
 
 from hil.recording.scales import Quantity, unit_in, unit_of
-from hil.recording.table import Column, FloatArray, Kind, Table, as_column
+from hil.recording.table import Column, ColumnKind, FloatArray, Table, as_column
 
 DAY_S: Final = 86_400.0
 
@@ -46,7 +46,7 @@ def understood(table: Table) -> Table:
     columns, units = dict(table.columns), dict(table.units)
     remarks = list(table.remarks)
     for name, column in table.columns.items():
-        if Kind.of(column) is Kind.TEXT and (read := numbers_of_texts(column)) is not None:
+        if ColumnKind.of(column) is ColumnKind.TEXT and (read := numbers_of_texts(column)) is not None:
             columns[name], unit, remark = read
             remarks.append(f"{name}: {remark}")
             units.update({name: unit} if unit else {})
@@ -209,7 +209,7 @@ def _over_midnight(seconds: FloatArray) -> FloatArray:
 
 def are_day_numbers(column: Column) -> bool:
     """Tell whether a column is a time in days, as spreadsheets keep it: by size, and a step too short in seconds."""
-    if Kind.of(column) is not Kind.FLOAT or column.size < 3 or not np.isfinite(column).all():
+    if ColumnKind.of(column) is not ColumnKind.FLOAT or column.size < 3 or not np.isfinite(column).all():
         return False
     step = float(np.median(np.diff(column)))
     low, high = DAY_NUMBERS
@@ -219,7 +219,7 @@ def are_day_numbers(column: Column) -> bool:
 
 def is_even_time(column: Column) -> bool:
     """Tell whether numbers rise as times do: always, by equal steps, and not as the numbers of rows."""
-    if Kind.of(column) in (Kind.TEXT, Kind.BOOLEAN) or column.size < 3:
+    if ColumnKind.of(column) in (ColumnKind.TEXT, ColumnKind.BOOLEAN) or column.size < 3:
         return False
     numbers = column.astype(np.float64)
     steps = np.diff(numbers)

@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from hil.errors import RecordingError
-from hil.recording.table import Column, Kind, Table
+from hil.recording.table import Column, ColumnKind, Table
 
 CHECKSUM = "data_sha256"  # key of the metadata it is kept under
 SAID = "metadata_sha256"  # key of the checksum of units and metadata
@@ -56,12 +56,12 @@ class DataDigest:
 
     def begin(self, name: str, dtype: np.dtype[Any], size: int) -> None:
         """Begin a column of so many cells."""
-        for text in (name, Kind.of_dtype(dtype).value):
+        for text in (name, ColumnKind.of_dtype(dtype).value):
             self._digest.update(_counted(text))
         self._digest.update(_length(size))
 
     def take(self, cells: Column) -> None:
-        self._digest.update(_cells(cells, Kind.of(cells)))
+        self._digest.update(_cells(cells, ColumnKind.of(cells)))
 
     def hexdigest(self) -> str:
         return self._digest.hexdigest()
@@ -126,12 +126,12 @@ def require_unchanged(path: Path, said: Mapping[str, str], units: Mapping[str, s
         raise RecordingError(path, *problems)
 
 
-def _cells(column: Column, kind: Kind) -> bytes:
-    if kind is Kind.FLOAT:
+def _cells(column: Column, kind: ColumnKind) -> bytes:
+    if kind is ColumnKind.FLOAT:
         return np.where(np.isnan(column), np.nan, column).astype("<f8").tobytes()
-    if kind is Kind.INTEGER:
+    if kind is ColumnKind.INTEGER:
         return column.astype("<i8").tobytes()
-    if kind is Kind.BOOLEAN:
+    if kind is ColumnKind.BOOLEAN:
         return column.astype("u1").tobytes()
     return b"".join(_counted(cell) for cell in column.tolist())
 

@@ -34,18 +34,18 @@ from hil.recording.bounds import CELLS, damaged, require_columns
 from hil.recording.channels import numbers_of_texts
 from hil.recording.description import NO_SIDECAR, Sidecar, as_metadata, read_sidecar, write_sidecar
 from hil.recording.request import FormatHints, Request
-from hil.recording.table import Column, Kind, Table, as_text, line_of
+from hil.recording.table import Column, ColumnKind, Table, as_text, line_of
 from hil.recording.text_form import BLANKS, MISSING, SAMPLE_LINES, TextForm, recognise, split
 
 
-def as_column(cells: pa.ChunkedArray, kind: Kind | None = None, decimal: str = ".") -> Column:
+def as_column(cells: pa.ChunkedArray, kind: ColumnKind | None = None, decimal: str = ".") -> Column:
     """Turn text into the kind it is said to be; unsaid into int64, float64 or text, whichever first fits every cell.
 
     In a column with a number in it, a missing cell is NaN.
     """
-    if kind is Kind.TEXT:
+    if kind is ColumnKind.TEXT:
         return as_text(cells.to_pylist())
-    if kind is Kind.BOOLEAN and pa.compute.all(pa.compute.is_in(cells, pa.array(["True", "False"]))).as_py():
+    if kind is ColumnKind.BOOLEAN and pa.compute.all(pa.compute.is_in(cells, pa.array(["True", "False"]))).as_py():
         return np.asarray(pa.compute.equal(cells, "True").to_numpy())
     trimmed = pa.compute.utf8_trim_whitespace(cells)
     present = pa.compute.if_else(pa.compute.is_in(trimmed, pa.array(MISSING)), pa.scalar(None, pa.string()), trimmed)
@@ -157,7 +157,7 @@ def table_of_text(
 def pivoted(table: Table) -> Table:
     """Return a table with a column for each series of one that has a row for each value."""
     stamps, fields, values = (table.columns[name] for name in ("_time", "_field", "_value"))
-    if Kind.of(values) is Kind.TEXT or Kind.of(fields) is not Kind.TEXT:
+    if ColumnKind.of(values) is ColumnKind.TEXT or ColumnKind.of(fields) is not ColumnKind.TEXT:
         return table
     times = np.unique(stamps)
     columns: dict[str, Column] = {"_time": times}
@@ -212,7 +212,7 @@ def _is_recognised(path: Path, table: Table) -> bool:
 
 def description_of(table: Table) -> Sidecar:
     """Return what has to stand next to a table that is written as CSV."""
-    types = {name: Kind.of(column) for name, column in table.columns.items() if not _tells_its_kind(column)}
+    types = {name: ColumnKind.of(column) for name, column in table.columns.items() if not _tells_its_kind(column)}
     return Sidecar(as_metadata(table.metadata), table.units, types)
 
 
@@ -305,12 +305,12 @@ def _are_digits(line: str) -> bool:
 
 def _tells_its_kind(column: Column) -> bool:
     """Whether the cells alone lead a reader to the same column."""
-    if Kind.of(column) is not Kind.TEXT:
-        return Kind.of(column) is not Kind.BOOLEAN
+    if ColumnKind.of(column) is not ColumnKind.TEXT:
+        return ColumnKind.of(column) is not ColumnKind.BOOLEAN
     read = as_column(pa.chunked_array([pa.array(column, type=pa.string())]))
-    if Kind.of(read) is Kind.TEXT and numbers_of_texts(read) is not None:
+    if ColumnKind.of(read) is ColumnKind.TEXT and numbers_of_texts(read) is not None:
         return False
-    return Kind.of(read) is Kind.TEXT and bool(np.all(read == column))
+    return ColumnKind.of(read) is ColumnKind.TEXT and bool(np.all(read == column))
 
 
 def _cells(table: Table, path: Path, name: str) -> Iterable[str]:

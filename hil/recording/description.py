@@ -21,7 +21,7 @@ from typing import Any
 from hil.errors import RecordingError
 from hil.files import parse_json, read_json, write_whole
 from hil.recording.bounds import no_room
-from hil.recording.table import Column, Kind, Table
+from hil.recording.table import Column, ColumnKind, Table
 
 SCHEMA = "hil.recording/1"
 
@@ -31,7 +31,7 @@ OUTCOME = "outcome"  # key of the metadata of a run that did not come to its end
 def description_of(table: Table, stored_as: Mapping[str, str]) -> str:
     """Describe a table whose columns are stored under other names."""
     columns = [
-        {"name": name, "stored_as": stored_as[name], "unit": table.units.get(name), "kind": Kind.of(column).value}
+        {"name": name, "stored_as": stored_as[name], "unit": table.units.get(name), "kind": ColumnKind.of(column).value}
         for name, column in table.columns.items()
     ]
     return json.dumps({"schema": SCHEMA, "columns": columns, "metadata": dict(table.metadata)})
@@ -40,10 +40,10 @@ def description_of(table: Table, stored_as: Mapping[str, str]) -> str:
 _DAMAGED = (ValueError, KeyError, TypeError, AttributeError)
 
 
-def described_table(path: Path, text: str, column: Callable[[str, Kind], Column]) -> Table:
+def described_table(path: Path, text: str, column: Callable[[str, ColumnKind], Column]) -> Table:
     document = _document(path, text)
     try:
-        entries = [(str(e["name"]), str(e["stored_as"]), e["unit"], Kind(e["kind"])) for e in document["columns"]]
+        entries = [(str(e["name"]), str(e["stored_as"]), e["unit"], ColumnKind(e["kind"])) for e in document["columns"]]
     except _DAMAGED as error:
         raise _damaged(path, error) from error
     columns, units = {}, {}
@@ -88,7 +88,7 @@ class Sidecar:
 
     metadata: Mapping[str, str] = field(default_factory=dict)
     units: Mapping[str, str] = field(default_factory=dict)
-    types: Mapping[str, Kind] = field(default_factory=dict)
+    types: Mapping[str, ColumnKind] = field(default_factory=dict)
     found: bool = False
 
     @property
@@ -144,7 +144,7 @@ def read_sidecar(recording: Path) -> Sidecar:
         content = read_json(path)
         if not _is_ours(content):
             return Sidecar()
-        types = {name: Kind(kind) for name, kind in _texts(content.get(TYPES_KEY)).items()}
+        types = {name: ColumnKind(kind) for name, kind in _texts(content.get(TYPES_KEY)).items()}
     except (OSError, ValueError) as error:
         raise RecordingError(
             path, f"expected the description of {recording.name}, got: {error}. Fix it, or move it away."

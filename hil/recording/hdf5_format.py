@@ -21,7 +21,7 @@ from hil.errors import RecordingError
 from hil.recording.bounds import damaged, require_cells
 from hil.recording.description import SCHEMA, described_table, description_of, metadata_of
 from hil.recording.request import Request, under_names, vectors_of
-from hil.recording.table import Column, Kind, Table, as_column, columns_of_shared_length, is_column
+from hil.recording.table import Column, ColumnKind, Table, as_column, columns_of_shared_length, is_column
 
 CELL_BYTES = 8  # of the widest number; a longer element, such as a table's row, counts as several cells
 
@@ -130,7 +130,7 @@ def write(table: Table, path: Path) -> None:
 def _write_column(group: File, name: str, column: Column, unit: str | None) -> None:
     import h5py
 
-    if Kind.of(column) is Kind.TEXT:  # HDF5 has no checksum for texts of any length
+    if ColumnKind.of(column) is ColumnKind.TEXT:  # HDF5 has no checksum for texts of any length
         dataset = group.create_dataset(name, data=column, compression="gzip", dtype=h5py.string_dtype())
     else:
         dataset = group.create_dataset(name, data=column, compression="gzip", fletcher32=True)
@@ -139,7 +139,11 @@ def _write_column(group: File, name: str, column: Column, unit: str | None) -> N
 
 
 def _require_no_nul(path: Path, name: str, column: Column) -> None:
-    row = next((k for k, cell in enumerate(column) if "\0" in cell), None) if Kind.of(column) is Kind.TEXT else None
+    row = (
+        next((k for k, cell in enumerate(column) if "\0" in cell), None)
+        if ColumnKind.of(column) is ColumnKind.TEXT
+        else None
+    )
     if row is not None:
         raise RecordingError(
             path, f"column {name}, row {row + 1}: expected a text without NUL, which ends one in HDF5. Write Parquet."

@@ -32,7 +32,7 @@ from hil.recording.channels import seconds_since_first
 from hil.recording.description import described_table, description_of, metadata_of
 from hil.recording.hdf5_format import DESCRIPTION, Dataset, File, reading, text_of, write_whole
 from hil.recording.request import Request, under_names, vectors_of
-from hil.recording.table import Column, Kind, Table, as_column, as_text, columns_of_shared_length
+from hil.recording.table import Column, ColumnKind, Table, as_column, as_text, columns_of_shared_length
 
 DAMAGED = (ValueError, TypeError, IndexError, KeyError, OSError, NotImplementedError, zlib.error)
 """What scipy raises, besides its own, on a file that is cut or no .mat file."""
@@ -102,7 +102,7 @@ def write(table: Table, path: Path) -> None:
 
     def fill(file: File) -> None:
         for name, column in table.columns.items():
-            if Kind.of(column) is Kind.TEXT:
+            if ColumnKind.of(column) is ColumnKind.TEXT:
                 _write_cells(file, stored_as[name], column.tolist())
             else:
                 _write_numbers(file, stored_as[name], column)
@@ -125,7 +125,9 @@ def variable_names(names: Iterable[str]) -> dict[str, str]:
 
 
 def _write_numbers(file: File, name: str, column: Column) -> None:
-    matlab_class = {Kind.FLOAT: "double", Kind.INTEGER: "int64", Kind.BOOLEAN: "logical"}[Kind.of(column)]
+    matlab_class = {ColumnKind.FLOAT: "double", ColumnKind.INTEGER: "int64", ColumnKind.BOOLEAN: "logical"}[
+        ColumnKind.of(column)
+    ]
     cells = column.astype(np.uint8) if matlab_class == "logical" else column
     dataset = file.create_dataset(name, data=cells[np.newaxis, :], compression="gzip", fletcher32=True)
     _classify(dataset, matlab_class, 1 if matlab_class == "logical" else 0)
@@ -161,9 +163,9 @@ def _classify(dataset: Dataset, matlab_class: str, decode: int = 0) -> None:
 
 
 def _own(path: Path, file: File) -> Table:
-    def column(stored_as: str, kind: Kind) -> Column:
+    def column(stored_as: str, kind: ColumnKind) -> Column:
         cells = _cells(file, file[stored_as])
-        return cells.astype(np.bool_) if kind is Kind.BOOLEAN else cells
+        return cells.astype(np.bool_) if kind is ColumnKind.BOOLEAN else cells
 
     return described_table(path, _text(file[DESCRIPTION]), column)
 

@@ -25,7 +25,7 @@ from hil.recording.bounds import damaged, require_columns
 from hil.recording.bus_database import DATA_SHEETS, database_of
 from hil.recording.request import Request
 from hil.recording.resample import Series, resampled
-from hil.recording.table import Column, Kind, Table, as_column, is_column
+from hil.recording.table import Column, ColumnKind, Table, as_column, is_column
 
 if TYPE_CHECKING:
     from asammdf import MDF
@@ -133,7 +133,7 @@ def decoded(path: Path, mdf: MDF, dbc: Path) -> MDF:
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class ChannelPlace:
     """Where a channel is in a file."""
 
     group: int
@@ -147,7 +147,7 @@ class Raster:
     times: Column
     master: str
     unit: str
-    places: dict[str, Place] = field(default_factory=dict)
+    places: dict[str, ChannelPlace] = field(default_factory=dict)
 
     @property
     def said(self) -> str:
@@ -222,7 +222,7 @@ def rasters_of(path: Path, mdf: MDF) -> tuple[list[Raster], list[str]]:
             called = name if count[name] == 1 else f"{name} ({count[name]})"
             if called != name:
                 remarks.append(f"{name}: another channel has that name, that of group {group + 1} is {called!r} here")
-            raster.places[called] = Place(group, index)
+            raster.places[called] = ChannelPlace(group, index)
     require_columns(path, sum(len(raster.places) for raster in rasters))
     return rasters, remarks
 
@@ -272,14 +272,14 @@ def _fits(raster: Raster, request: Request) -> tuple[int, int, int]:
     return asked, len(raster.places), raster.times.size
 
 
-def _found(rasters: Sequence[Raster], request: Request) -> dict[str, tuple[Raster, Place]]:
+def _found(rasters: Sequence[Raster], request: Request) -> dict[str, tuple[Raster, ChannelPlace]]:
     """Return where the channels that are asked for are."""
     places = {name: (raster, place) for raster in rasters for name, place in raster.places.items()}
     return {name: places[name] for name in request.columns if name in places}
 
 
 def _brought_together(
-    path: Path, mdf: MDF, found: dict[str, tuple[Raster, Place]], request: Request, period_s: float
+    path: Path, mdf: MDF, found: dict[str, tuple[Raster, ChannelPlace]], request: Request, period_s: float
 ) -> Table:
     """Read the channels that are asked for, at one period."""
     series: dict[str, Series] = {}
@@ -287,7 +287,7 @@ def _brought_together(
     for name, (raster, place) in found.items():
         signal = _signal(mdf, place)
         column = _valid(as_column(signal.samples), signal.invalidation_bits) if signal.samples.ndim == 1 else None
-        if column is None or Kind.of(column) is Kind.TEXT:
+        if column is None or ColumnKind.of(column) is ColumnKind.TEXT:
             raise RecordingError(path, f"column {name}: expected a channel of numbers for resample_s, got another")
         series[name] = Series(raster.times.astype(np.float64), column.astype(np.float64), name in request.held)
         units[name] = str(signal.unit or "")
@@ -298,12 +298,12 @@ def _brought_together(
     return Table(path, {master: time, **columns}, said, foreign_metadata(mdf), remarks=tuple(remarks), master=master)
 
 
-def _signal(mdf: MDF, place: Place) -> Any:
+def _signal(mdf: MDF, place: ChannelPlace) -> Any:
     return mdf.get(group=place.group, index=place.index, ignore_invalidation_bits=True)  # else it drops rows
 
 
 def _valid(column: Column, invalid: Column | None) -> Column:
     """Mark the samples that the file itself calls invalid as missing."""
-    if invalid is None or not np.any(invalid) or Kind.of(column) is Kind.TEXT:
+    if invalid is None or not np.any(invalid) or ColumnKind.of(column) is ColumnKind.TEXT:
         return column
     return np.where(np.asarray(invalid, dtype=np.bool_), np.nan, column.astype(np.float64))

@@ -24,7 +24,7 @@ from hil.recording.checksum import RIG_TEXT
 from hil.recording.description import described_table, description_of, metadata_of
 from hil.recording.mdf_file import channels_of, foreign_metadata, foreign_table, foreign_tables, is_unfinished, opened
 from hil.recording.request import Request
-from hil.recording.table import Column, Kind, Table, as_column
+from hil.recording.table import Column, ColumnKind, Table, as_column
 from hil.version import __version__
 
 if TYPE_CHECKING:
@@ -49,9 +49,9 @@ def _description(mdf: MDF) -> str | None:
 def _own(path: Path, mdf: MDF, text: str) -> Table:
     places = {channel.name: number for number, channel in enumerate(channels_of(mdf, 0))}
 
-    def column(stored_as: str, kind: Kind) -> Column:
+    def column(stored_as: str, kind: ColumnKind) -> Column:
         cells = as_column(mdf.get(group=0, index=places[stored_as]).samples)
-        return cells.astype(np.bool_) if kind is Kind.BOOLEAN else cells
+        return cells.astype(np.bool_) if kind is ColumnKind.BOOLEAN else cells
 
     return described_table(path, text, column)
 
@@ -103,11 +103,13 @@ def write(table: Table, path: Path) -> None:
     with MDF(version=VERSION) as mdf:
         # A master channel alone is no group for asammdf: then the row's number goes with it.
         mdf.append(
-            signals or [_numbers(row_numbers, times, metadata)], "hil", comment=_plain(_said(table, "experiment"))
+            signals or [_numbers(row_numbers, times, metadata)],
+            "hil",
+            comment=_plain(_metadata_of(table, "experiment")),
         )
         _describe(mdf, table)
         mdf.attach(description_of(table, stored_as).encode(), DESCRIPTION, mime="application/json")
-        if rig := _said(table, RIG_TEXT):
+        if rig := _metadata_of(table, RIG_TEXT):
             mdf.attach(rig.encode("utf-8"), RIG_NAME, comment="rig file of the run", mime="text/plain")
         mdf.save(content)
     path.write_bytes(content.getvalue())
@@ -119,7 +121,7 @@ def _channel_name(number: int, name: str) -> str:
 
 
 def _can_be_master(column: Column | None) -> bool:
-    if column is None or Kind.of(column) is not Kind.FLOAT:
+    if column is None or ColumnKind.of(column) is not ColumnKind.FLOAT:
         return False
     return bool(np.isfinite(column).all() and (np.diff(column) > 0).all())
 
@@ -127,15 +129,15 @@ def _can_be_master(column: Column | None) -> bool:
 def _signal(table: Table, name: str, stored_as: str, times: Column, master: tuple[str, int]) -> Signal:
     from asammdf import Signal
 
-    column, kind = table.columns[name], Kind.of(table.columns[name])
-    samples = np.char.encode(column.astype(str), "utf-8") if kind is Kind.TEXT else column
+    column, kind = table.columns[name], ColumnKind.of(table.columns[name])
+    samples = np.char.encode(column.astype(str), "utf-8") if kind is ColumnKind.TEXT else column
     return Signal(
-        samples=samples.astype(np.uint8) if kind is Kind.BOOLEAN else samples,
+        samples=samples.astype(np.uint8) if kind is ColumnKind.BOOLEAN else samples,
         timestamps=times,
         name=stored_as,
         unit=_plain(table.units.get(name, "")),
         comment=columns.COMMENTS.get(name, ""),
-        encoding="utf-8" if kind is Kind.TEXT else None,
+        encoding="utf-8" if kind is ColumnKind.TEXT else None,
         master_metadata=master,
     )
 
@@ -149,8 +151,8 @@ def _numbers(row_numbers: Column, times: Column, master: tuple[str, int]) -> Sig
 def _describe(mdf: MDF, table: Table) -> None:
     header: Any = mdf.header
     header.description = _plain(f"{table.path.stem}: written by hil {__version__}")
-    header.author, header.subject = "hil", _plain(_said(table, "experiment"))
-    started = _said(table, "started_utc")
+    header.author, header.subject = "hil", _plain(_metadata_of(table, "experiment"))
+    started = _metadata_of(table, "started_utc")
     try:
         header.start_time = datetime.fromisoformat(started)
     except ValueError:  # it does not say when: the file is as old as the epoch, rather than as its conversion
@@ -166,5 +168,5 @@ def _plain(text: str) -> str:
     return text if text.isprintable() else ""
 
 
-def _said(table: Table, key: str) -> str:
+def _metadata_of(table: Table, key: str) -> str:
     return table.metadata.get(key, "")

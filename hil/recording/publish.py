@@ -19,7 +19,7 @@ from hil.recording.bounds import no_room
 from hil.recording.checksum import CHECKSUMS, sealed
 from hil.recording.formats import FORMATS, Format, writer_for
 from hil.recording.request import Request
-from hil.recording.table import Column, Kind, Table
+from hil.recording.table import Column, ColumnKind, Table
 
 _SHOWN = 40
 
@@ -47,7 +47,7 @@ def _columns(before: Table, after: Table) -> list[str]:
 def _cells(before: Column, after: Column) -> str:
     if before.shape != after.shape:
         return f"expected {before.size} cells, got {after.size}"
-    kinds = Kind.of(before), Kind.of(after)
+    kinds = ColumnKind.of(before), ColumnKind.of(after)
     changed = np.flatnonzero(~_same(before, after))
     if kinds[0] is not kinds[1]:
         return f"{kinds[0].value} becomes {kinds[1].value}"
@@ -61,7 +61,7 @@ def _cells(before: Column, after: Column) -> str:
 def _same(before: Column, after: Column) -> Column:
     if before.dtype != after.dtype:
         return np.zeros(before.shape, dtype=np.bool_)
-    if Kind.of(before) is Kind.FLOAT:
+    if ColumnKind.of(before) is ColumnKind.FLOAT:
         same_bits = before.view(np.int64) == after.view(np.int64)  # tells 0.0 from -0.0
         return np.asarray(same_bits | (np.isnan(before) & np.isnan(after)))
     return np.asarray(before == after, dtype=np.bool_)

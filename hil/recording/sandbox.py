@@ -29,14 +29,14 @@ from hil.errors import RecordingError
 from hil.recording.bounds import memory_bytes, processor_s
 from hil.recording.request import Request
 from hil.recording.survey import Survey
-from hil.recording.table import Column, Kind, Table, as_text
+from hil.recording.table import Column, ColumnKind, Table, as_text
 
 _LENGTH_BYTES: Final = 8
 
-_DTYPES: Final[Mapping[Kind, type[np.generic]]] = {
-    Kind.FLOAT: np.float64,
-    Kind.INTEGER: np.int64,
-    Kind.BOOLEAN: np.bool_,
+_DTYPES: Final[Mapping[ColumnKind, type[np.generic]]] = {
+    ColumnKind.FLOAT: np.float64,
+    ColumnKind.INTEGER: np.int64,
+    ColumnKind.BOOLEAN: np.bool_,
 }
 
 Document = dict[str, Any]
@@ -45,10 +45,10 @@ Document = dict[str, Any]
 def send(stream: IO[bytes], document: Document, columns: Mapping[str, Column] | None = None) -> None:
     """Write a document, and the columns it is about."""
     named = columns or {}
-    kinds = [[name, Kind.of(column).value, int(column.size)] for name, column in named.items()]
+    kinds = [[name, ColumnKind.of(column).value, int(column.size)] for name, column in named.items()]
     _send_text(stream, json.dumps({**document, "columns": kinds}))
     for column in named.values():
-        if Kind.of(column) is Kind.TEXT:
+        if ColumnKind.of(column) is ColumnKind.TEXT:
             _send_text(stream, json.dumps(column.tolist()))
         else:
             stream.write(np.ascontiguousarray(column).data)
@@ -58,7 +58,7 @@ def send(stream: IO[bytes], document: Document, columns: Mapping[str, Column] | 
 def receive(stream: IO[bytes]) -> tuple[Document, dict[str, Column]]:
     """Read what `send` has written."""
     document: Document = json.loads(_receive_text(stream))
-    return document, {name: _column(stream, Kind(kind), size) for name, kind, size in document["columns"]}
+    return document, {name: _column(stream, ColumnKind(kind), size) for name, kind, size in document["columns"]}
 
 
 _SAID: Final = ("units", "metadata", "remarks", "master", "elsewhere")
@@ -75,8 +75,8 @@ def table_of(path: Path, document: Document, columns: Mapping[str, Column]) -> T
     return Table(path, columns, **{**said, "remarks": tuple(said["remarks"])})
 
 
-def _column(stream: IO[bytes], kind: Kind, size: int) -> Column:
-    if kind is Kind.TEXT:
+def _column(stream: IO[bytes], kind: ColumnKind, size: int) -> Column:
+    if kind is ColumnKind.TEXT:
         return as_text(json.loads(_receive_text(stream)))
     column = np.empty(size, dtype=_DTYPES[kind])
     _fill(stream, column.data.cast("B"))
@@ -187,7 +187,7 @@ ENVIRONMENT: Final = {
 }
 """Threads and allocators that reserve address space, which is what is bounded, are left out."""
 
-What = Literal["table", "metadata", "survey"]
+ReadPart = Literal["table", "metadata", "survey"]
 
 
 class Gone(Exception):
@@ -253,7 +253,7 @@ class Reader:
         with self._lock:
             self._end()
 
-    def _read(self, path: Path, what: What, request: Request) -> tuple[Document, dict[str, Column]]:
+    def _read(self, path: Path, what: ReadPart, request: Request) -> tuple[Document, dict[str, Column]]:
         size = path.stat().st_size
         with self._lock:
             self._process = process = self._process or Sandbox(PROCESS)

@@ -188,7 +188,7 @@ EXPECTED: Final = {
 
 WRAPS_BITS: Final = (8, 16, 32)  # lengths of the whole numbers that loggers store
 
-ALIKE: Final = 4.0
+STEP_RATIO: Final = 4.0
 """How much larger a step may be where the reading begins anew, put right, than the largest other step."""
 
 
@@ -237,7 +237,7 @@ def wrapped_at(values: FloatArray) -> float | None:
         end = resolution * 2.0**bits
         halfway = (seen > 0.25 * end) & (seen < 0.75 * end)
         put_right = np.abs(np.diff(with_sign(seen, end)))
-        if 0.75 * end <= seen.max() <= end and not halfway.any() and put_right.max() <= ALIKE * usual:
+        if 0.75 * end <= seen.max() <= end and not halfway.any() and put_right.max() <= STEP_RATIO * usual:
             return end
     return None
 

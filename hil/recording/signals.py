@@ -165,7 +165,7 @@ def _unused(table: Table, signals: SignalsConfig) -> Iterator[Channel]:
 
 def _cut(table: Table, signals: SignalsConfig) -> tuple[Table, NDArray[np.bool_]]:
     """Return a table from the first to the last row of the stretches that are to be read, and which rows are in one."""
-    kept = signals.kept()
+    kept = signals.stretches_read()
     if not kept:
         return table, np.ones(table.n_rows, dtype=np.bool_)
     time_s, _, _ = time_base(table, signals.time)

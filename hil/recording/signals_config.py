@@ -150,13 +150,13 @@ class SignalsConfig(_Strict):
     def _stretches_are_stretches(self) -> Self:
         if self.stretches and (self.from_s, self.to_s) != (None, None):
             refuse([Fault("stretches", "either from_s and to_s, or stretches", "both")])
-        for number, (start_s, end_s) in enumerate(self.kept()):
+        for number, (start_s, end_s) in enumerate(self.stretches_read()):
             if not start_s < end_s:
                 where = f"stretches.{number}" if self.stretches else "to_s"
                 refuse([Fault(where, f"an end after {start_s:g} s", end_s)])
         return self
 
-    def kept(self) -> list[tuple[float, float]]:
+    def stretches_read(self) -> list[tuple[float, float]]:
         """Return the stretches that are read [s]; none where all is."""
         if (self.from_s, self.to_s) == (None, None):
             return [(start_s, end_s) for start_s, end_s in self.stretches]

@@ -14,7 +14,7 @@ from pydantic import TypeAdapter
 from hil.recording.channels import are_row_numbers, is_even_time, time_quantity
 from hil.recording.resample import GAP, straightened
 from hil.recording.scales import EXPECTED, Quantity, Role, called, unit_of, without_unit, wrapped_at
-from hil.recording.table import LARGEST, Column, Kind, Table
+from hil.recording.table import LARGEST, Column, ColumnKind, Table
 from hil.recording.text_form import MISSING
 
 TIME_NAMES: Final = ("time", "zeit", "t", "timestamp", "timestamps", "stamp")
@@ -108,7 +108,7 @@ def _group(table: Table) -> Group:
 
 def channel_of(name: str, column: Column, unit: str) -> Channel:
     """Return a column in figures."""
-    if Kind.of(column) is Kind.TEXT:
+    if ColumnKind.of(column) is ColumnKind.TEXT:
         empty = sum(cell in MISSING for cell in column.tolist())
         return Channel(name, unit, "text", int(column.size), empty, None, None, False, None)
     numbers = column.astype(np.float64)

@@ -24,7 +24,7 @@ Column = NDArray[Any]
 _LARGEST_INTEGER = np.iinfo(np.int64).max
 
 
-class Kind(Enum):
+class ColumnKind(Enum):
     """What the cells of a column are; the value is the word that files use for it."""
 
     FLOAT = "float"  # float64
@@ -33,16 +33,16 @@ class Kind(Enum):
     TEXT = "text"  # object, every cell a str
 
     @staticmethod
-    def of(column: Column) -> Kind:
-        return Kind.of_dtype(column.dtype)
+    def of(column: Column) -> ColumnKind:
+        return ColumnKind.of_dtype(column.dtype)
 
     @staticmethod
-    def of_dtype(dtype: np.dtype[Any]) -> Kind:
+    def of_dtype(dtype: np.dtype[Any]) -> ColumnKind:
         """Tell the kind of a column by the type of its cells."""
-        return _KINDS.get(dtype.kind, Kind.TEXT)
+        return _KINDS.get(dtype.kind, ColumnKind.TEXT)
 
 
-_KINDS = {"f": Kind.FLOAT, "i": Kind.INTEGER, "b": Kind.BOOLEAN}
+_KINDS = {"f": ColumnKind.FLOAT, "i": ColumnKind.INTEGER, "b": ColumnKind.BOOLEAN}
 
 
 def is_column(values: Column) -> bool:

@@ -307,7 +307,7 @@ class RecordingWriter:
             header = header[file.write(header) :]
 
     @property
-    def kept(self) -> Path | None:
+    def written_file(self) -> Path | None:
         """The file that holds what was appended, once the writer is closed; None where nothing was."""
         return next((path for path in (self.path, self.part_path) if self.n_samples and path.exists()), None)
 

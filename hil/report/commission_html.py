@@ -16,12 +16,12 @@ from plotly.subplots import make_subplots
 from hil.figures.palette import BLUE, GREY, VERMILION, series_colour
 from hil.provenance import Provenance
 from hil.report import page as html
-from hil.report.figures import DECADES, LEGEND_PX, PANEL_PX, Line, Panel, Style, figure_block, time_figure
+from hil.report.figures import DECADES, LEGEND_PX, PANEL_PX, Curve, Panel, Style, figure_block, time_figure
 from hil.report.identification_figures import PoleSet, pole_figure
 from hil.report.made import made_section
 from hil.report.numbers import moment, shown
 
-State = Mapping[str, Any]
+StateDocument = Mapping[str, Any]
 Evidence = Mapping[str, Any]
 
 MOST_NAMED = 4
@@ -43,7 +43,7 @@ COURSES = 4
 """Figures over time that share the page."""
 
 
-def commission_page(state: State, titles: Mapping[str, str], made: Provenance | None = None) -> str:
+def commission_page(state: StateDocument, titles: Mapping[str, str], made: Provenance | None = None) -> str:
     steps = state["steps"]
     begun, updated = moment(state["started_utc"]), moment(state["updated_utc"])
     return html.page(
@@ -65,7 +65,7 @@ def commission_page(state: State, titles: Mapping[str, str], made: Provenance | 
     )
 
 
-def _top(state: State, updated: str) -> html.Header:
+def _top(state: StateDocument, updated: str) -> html.Header:
     records = state["steps"].values()
     outside = sum(finding["within"] is False for record in records for finding in record["findings"])
     to_do = [name for name, record in state["steps"].items() if record["status"] not in ("done", "skipped")]
@@ -85,7 +85,7 @@ def _top(state: State, updated: str) -> html.Header:
     )
 
 
-def _statements(state: State) -> Iterator[str]:
+def _statements(state: StateDocument) -> Iterator[str]:
     found = [state["steps"][name]["evidence"].get("statement") for name in ("solve", "diagnosis")]
     if statement := next(filter(None, found), None):
         yield statement
@@ -100,7 +100,7 @@ def _statements(state: State) -> Iterator[str]:
         yield f"Outside their limits: {'; '.join(outside[:MOST_NAMED])}{more}."
 
 
-def _tiles(state: State) -> Iterator[tuple[str, str, str]]:
+def _tiles(state: StateDocument) -> Iterator[tuple[str, str, str]]:
     evidence = {name: record["evidence"] for name, record in state["steps"].items()}
     resonances = [run["best"]["resonance"] for run in evidence["identification"].get("runs", [])]
     known = [resonance for resonance in resonances if resonance is not None]
@@ -129,7 +129,7 @@ def _overview(steps: Mapping[str, Any], titles: Mapping[str, str]) -> html.Secti
         outside = sum(finding["within"] is False for finding in record["findings"])
         counted = f"{within} within" + (f", {outside} outside" if outside else "") if record["findings"] else "–"
         cells = (f"{number} {title}", _badge(record), counted, record["because"] or "–")
-        rows.append(html.Row(cells, "outside" if outside else ""))
+        rows.append(html.HtmlRow(cells, "outside" if outside else ""))
     return html.section("Steps", html.table(("step", "status", "findings", "because"), rows))
 
 
@@ -160,7 +160,7 @@ def _status(record: Mapping[str, Any]) -> html.Paragraph:
     return html.paragraph(_badge(record), f" {when}{attempt}{because}")
 
 
-def _finding(finding: Mapping[str, Any]) -> html.Row:
+def _finding(finding: Mapping[str, Any]) -> html.HtmlRow:
     within = finding["within"]
     kind, words = MARKS[within]
     if within is None and finding["expected"] != "–":
@@ -169,10 +169,10 @@ def _finding(finding: Mapping[str, Any]) -> html.Row:
     measured = html.Advised(finding["measured"], finding["advice"]) if has_advice else finding["measured"]
     verdict = html.Badge(words, kind) if within is not None else words
     cells = (finding["what"], finding["expected"], measured, verdict)
-    return html.Row(cells, "outside" if within is False else "")
+    return html.HtmlRow(cells, "outside" if within is False else "")
 
 
-def _runs(runs: Sequence[Mapping[str, Any]]) -> html.Table:
+def _runs(runs: Sequence[Mapping[str, Any]]) -> html.HtmlTable:
     columns = (
         ("run", lambda run: run["name"] + ("" if run["whole"] else " (ended early)")),
         ("recording", lambda run: run["recording"] or "none"),
@@ -191,7 +191,7 @@ def _range(ranges: Mapping[str, Any], key: str, digits: int) -> str:
     return f"{ranges[key][0]:z.{digits}f} … {ranges[key][1]:z.{digits}f}" if key in ranges else "–"
 
 
-def _history(history: Sequence[Mapping[str, Any]]) -> html.Table:
+def _history(history: Sequence[Mapping[str, Any]]) -> html.HtmlTable:
     columns = (
         ("attempt", lambda each: each["attempt"]),
         ("ended as", lambda each: each["status"]),
@@ -203,7 +203,7 @@ def _history(history: Sequence[Mapping[str, Any]]) -> html.Table:
     return html.table_of(history, columns)
 
 
-def _decisions(state: State) -> html.Section:
+def _decisions(state: StateDocument) -> html.Section:
     rows = [(moment(note["at_utc"]), note["what"], note["changes"], note["steps"]) for note in state["notes"]]
     return html.section("Decisions on the way", html.table(("at", "what", "changes", "steps done before"), rows))
 
@@ -215,7 +215,7 @@ def _array(values: Sequence[float | None]) -> np.ndarray:
 def _course(name: str, course: Mapping[str, Any], *panels: tuple[str, Sequence[tuple[str, str, Style]]]) -> list[Any]:
     """Draw a course: for each panel its axis, and its lines as (name, key of the course, style)."""
     drawn = [
-        Panel(axis, tuple(Line(line, _array(course[key]), style) for line, key, style in lines))
+        Panel(axis, tuple(Curve(line, _array(course[key]), style) for line, key, style in lines))
         for axis, lines in panels
     ]
     return list(time_figure(name, _array(course["time_s"]), drawn, COURSES))

@@ -12,14 +12,14 @@ from estimator.physics.model import unit
 from hil.provenance import Provenance
 from hil.report import page as html
 from hil.report.comparison import Comparison, by_output, shown_error, together
-from hil.report.figures import MODEL_STYLES, Line, Panel, Style, input_lines, spectrum_figure, time_figure
+from hil.report.figures import MODEL_STYLES, Curve, Panel, Style, input_lines, spectrum_figure, time_figure
 from hil.report.identification_figures import correlation_figure
 from hil.report.made import facts, made_section
 from hil.report.numbers import listed, shown, shown_p
 from hil.report.terminal import rendered
 from hil.report.wording import quantity, torque_axis
 
-ALIKE = 0.02
+SHOWN_DIFFERENCE = 0.02
 """Share by which errors must differ for one model to be called the better: two digits of what is shown."""
 
 RESIDUALS = (
@@ -63,14 +63,14 @@ def better(comparisons: Compared) -> str:
     (best, least), (second, more), *_ = sorted(errors.items(), key=lambda item: item[1])
     unit_of = comparisons[0][0].unit
     figures = f"{shown(least, unit_of)} against {shown(more, unit_of)} of {second} (RMS of the free-run error)"
-    if not more > least * (1.0 + ALIKE):
+    if not more > least * (1.0 + SHOWN_DIFFERENCE):
         return f"{best} and {second} follow the recordings alike: {figures}."
     won = sum(min(of_recording, key=lambda each: each.rms).model == best for of_recording in comparisons)
     where = "in every recording" if won == len(comparisons) else f"smallest in {won} of {len(comparisons)} recordings"
     return f"{best} follows the recordings better: {figures}, {where}."
 
 
-def _figures(comparisons: Compared) -> html.Table:
+def _figures(comparisons: Compared) -> html.HtmlTable:
     """Return a row per recording, model and output, and one of all recordings for each model and output."""
     first, several = comparisons[0][0], len(comparisons[0]) > 1
     rows = [
@@ -134,11 +134,11 @@ def _output_panels(of_output: Sequence[Comparison]) -> tuple[Panel, Panel]:
     first = of_output[0]
     record = first.record
     name = f"{record.label}: " if record.label else ""
-    measured = Line("measured", np.where(record.okay, record.output, np.nan), Style.MEASURED)
+    measured = Curve("measured", np.where(record.okay, record.output, np.nan), Style.MEASURED)
     styles = [MODEL_STYLES[i % len(MODEL_STYLES)] for i in range(len(of_output))]
     pairs = list(zip(of_output, styles, strict=True))
-    simulated = [Line(each.model, each.simulated, style) for each, style in pairs]
-    errors = [Line(each.model, each.error, style) for each, style in pairs]
+    simulated = [Curve(each.model, each.simulated, style) for each, style in pairs]
+    errors = [Curve(each.model, each.error, style) for each, style in pairs]
     return (
         Panel(f"{name}{quantity(first.unit)} [{first.unit}]", (measured, *simulated)),
         Panel(f"{name}error [{first.unit}]", tuple(errors)),

@@ -33,7 +33,7 @@ from hil.provenance import Provenance
 from hil.report import page as html, table_figure
 from hil.report.discrepancy_figures import course_figure, error_spectrum_figure, law_figure, response_figure
 from hil.report.figures import (
-    Line,
+    Curve,
     Mark,
     Panel,
     Style,
@@ -174,7 +174,7 @@ def _tiles(diagnosis: Diagnosis) -> html.Tiles:
     )
 
 
-def _fit(fit: Fit) -> html.Table:
+def _fit(fit: Fit) -> html.HtmlTable:
     rows = (
         ("nominal, as given", fit.nominal, float("nan"), ""),
         ("nominal, re-tuned", fit.retuned, fit.holdout_retuned, "before"),
@@ -196,7 +196,7 @@ def _fit(fit: Fit) -> html.Table:
     return html.table(headings, cells, numbers=(1, 2, 3))
 
 
-def _further_outputs(fit: Fit) -> html.Table | None:
+def _further_outputs(fit: Fit) -> html.HtmlTable | None:
     columns = (
         ("further output", lambda each: each.name),
         ("where", lambda each: f"{each.kind} at the {each.at}"),
@@ -217,7 +217,7 @@ def is_main(effect: FoundEffect, name: str) -> bool:
 
 def _effects(
     effects: Sequence[FoundEffect], shown_if: Callable[[FoundEffect, str], bool] = lambda _effect, _name: True
-) -> html.Table | None:
+) -> html.HtmlTable | None:
     """Return the values of effects, a row each; what is not determined is grey."""
     rows = [
         _determined(
@@ -231,9 +231,9 @@ def _effects(
     return html.table(("found", "element", "parameter", "value", "95 % interval"), rows, (3, 4)) if rows else None
 
 
-def _determined(ci95: Interval, *cells: Any) -> html.Row:
+def _determined(ci95: Interval, *cells: Any) -> html.HtmlRow:
     """Return a row, grey where the interval has no end."""
-    return html.Row(cells, "" if all(map(math.isfinite, ci95)) else "undetermined")
+    return html.HtmlRow(cells, "" if all(map(math.isfinite, ci95)) else "undetermined")
 
 
 def _acquired(diagnosis: Diagnosis) -> html.Section | None:
@@ -466,13 +466,13 @@ def course_panels(diagnosis: Diagnosis, trace: Trace) -> tuple[Panel, ...]:
     """Return torques, measured and simulated outputs, and the errors of a recording."""
     fit = diagnosis.fit
     measured = np.where(trace.okay, trace.measured, np.nan)
-    errors = [Line(RETUNED, measured - trace.retuned, Style.BEFORE)]
-    models = [Line(RETUNED, trace.retuned, Style.BEFORE)]
+    errors = [Curve(RETUNED, measured - trace.retuned, Style.BEFORE)]
+    models = [Curve(RETUNED, trace.retuned, Style.BEFORE)]
     if not np.array_equal(trace.retuned, trace.augmented):
-        errors.append(Line(AUGMENTED, measured - trace.augmented, Style.AFTER))
-        models.append(Line(AUGMENTED, trace.augmented, Style.AFTER))
-    seen = Line("measured", measured, Style.MEASURED)
-    given = Line("nominal as given", trace.nominal, Style.NOMINAL, hidden=True)
+        errors.append(Curve(AUGMENTED, measured - trace.augmented, Style.AFTER))
+        models.append(Curve(AUGMENTED, trace.augmented, Style.AFTER))
+    seen = Curve("measured", measured, Style.MEASURED)
+    given = Curve("nominal as given", trace.nominal, Style.NOMINAL, hidden=True)
     return (
         Panel(torque_axis(diagnosis.augmented.motion), input_lines(trace.torque_nm)),
         Panel(f"{quantity(fit.unit)} [{fit.unit}]", (seen, given, *models)),
@@ -487,7 +487,7 @@ def _rejected_section(diagnosis: Diagnosis) -> html.Section:
     return html.section("Rejected effects", short, everyone if len(short.rows) < len(rows) else None)
 
 
-def _rejected(diagnosis: Diagnosis) -> html.Table:
+def _rejected(diagnosis: Diagnosis) -> html.HtmlTable:
     """Return why effects were rejected; many with one reason share a line, and those that were not fitted one."""
     reasons = [UNFITTED if each.reason.startswith(UNFITTED) else each.reason for each in diagnosis.rejected]
     counts = Counter(reasons)
@@ -498,12 +498,12 @@ def _rejected(diagnosis: Diagnosis) -> html.Table:
     return html.table(REJECTED, rows, numbers=(2,))
 
 
-def _untestable(diagnosis: Diagnosis) -> html.Table:
+def _untestable(diagnosis: Diagnosis) -> html.HtmlTable:
     rows = [(title_of(entry.name), entry.reason, entry.cure) for entry in diagnosis.untestable]
     return html.table(("neither found nor excluded", "why", "what would show it"), rows)
 
 
-def _parameters(diagnosis: Diagnosis) -> html.Table:
+def _parameters(diagnosis: Diagnosis) -> html.HtmlTable:
     rows = []
     for name, p in diagnosis.parameters.items():
         known = diagnosis.augmented.parameters.get(name)

@@ -144,7 +144,7 @@ TORQUE_NAMES = ("T_M1", "T_M2")
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class Curve:
     """One line of a panel; ``y`` has shape (N,), NaN is a gap.
 
     A ``hidden`` one waits in the legend; one that is ``held`` keeps each value until the next: drawn in steps.
@@ -162,7 +162,7 @@ class Panel:
     """Lines that share an axis; ``band`` draws a pair of limits at plus and minus this value."""
 
     axis: str
-    lines: tuple[Line, ...]
+    lines: tuple[Curve, ...]
     band: float | None = None
 
 
@@ -171,12 +171,12 @@ def stretches_for(recordings: int) -> int:
     return min(LONGEST_STRETCHES, DRAWN_STRETCHES // max(1, recordings))
 
 
-def input_lines(torque_nm: FloatArray) -> tuple[Line, ...]:
+def input_lines(torque_nm: FloatArray) -> tuple[Curve, ...]:
     """Name and style the inputs of a recording, which are held over each period; ``torque_nm`` has shape (N, M)."""
     count = torque_nm.shape[1]
     names = TORQUE_NAMES if count == len(TORQUE_NAMES) else [f"input {i + 1}" for i in range(count)]
     return tuple(
-        Line("input" if count == 1 else name, torque_nm[:, i], INPUT_STYLES[i % len(INPUT_STYLES)], held=True)
+        Curve("input" if count == 1 else name, torque_nm[:, i], INPUT_STYLES[i % len(INPUT_STYLES)], held=True)
         for i, name in enumerate(names)
     )
 
@@ -226,7 +226,7 @@ def time_panels(time_s: FloatArray, panels: Sequence[Panel], stretches: int, sha
 
 
 def spectrum_figure(
-    name: str, sample_time_s: float, lines: Sequence[Line], unit: str, floor: float | None = None
+    name: str, sample_time_s: float, lines: Sequence[Curve], unit: str, floor: float | None = None
 ) -> Figure:
     """Draw amplitude spectral densities (Welch, Hann window); a gap counts as zero error.
 
@@ -273,7 +273,7 @@ def compact(values: FloatArray) -> NDArray[np.float32]:
     return values.astype(np.float32)
 
 
-def _scatter(line: Line, x: FloatArray, y: FloatArray, *, first: bool) -> go.Scatter:
+def _scatter(line: Curve, x: FloatArray, y: FloatArray, *, first: bool) -> go.Scatter:
     colour, width, dash = line.style.value
     return go.Scatter(
         x=x.astype(np.float32) if x.size > 1 and np.ptp(x) < 1e3 else x,

@@ -23,7 +23,7 @@ from hil.figures.palette import BLACK, BLUE, GREEN, VERMILION, series_colour
 from hil.provenance import Provenance
 from hil.report import page as html
 from hil.report.bode import response_figure, responses_figure
-from hil.report.figures import Line, Panel, Style, time_figure
+from hil.report.figures import Curve, Panel, Style, time_figure
 from hil.report.identification_figures import PoleSet, course_figure, known_sets, pole_figure, residual_figure
 from hil.report.identification_wording import (
     best_statement,
@@ -159,14 +159,14 @@ def _free_run(study: Study, number: int) -> list[Any]:
     panels = (
         Panel(
             f"{data.kind.value}, high-passed",
-            (Line("measured", measured, Style.MEASURED), Line("output-error model", measured - error, Style.AFTER)),
+            (Curve("measured", measured, Style.MEASURED), Curve("output-error model", measured - error, Style.AFTER)),
         ),
-        Panel("error", (Line("error", error, Style.BEFORE),)),
+        Panel("error", (Curve("error", error, Style.BEFORE),)),
     )
     return time_figure(f"free-run-{number}", data.time_s, panels, MOST_DRAWN)
 
 
-def _tests(study: Study) -> html.Table:
+def _tests(study: Study) -> html.HtmlTable:
     tests = study.validation
     best, linearity = study.best, study.best.linearity
     past = best.validation.independence
@@ -259,7 +259,7 @@ def physical_tables(studies: Sequence[Study], together: Together | None = None) 
             continue
         both = {**physical.parameters, **physical.sums}
         rows += [
-            html.Row(
+            html.HtmlRow(
                 (
                     recording,
                     name,

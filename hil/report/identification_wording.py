@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from estimator.diagnosis.preconditions.channels import dead_torques
-from estimator.identification.best import SEEN, Verdict
+from estimator.identification.best import SEEN, ModelVerdict
 from estimator.identification.identify import Study
 from estimator.identification.joint import Together
 from estimator.identification.modes.modes import Uncertain
@@ -25,22 +25,22 @@ LITTLE_PERCENT = 50.0
 """Free-run fit below which most of the output comes from elsewhere than from the torque."""
 
 ADVICE = {
-    Verdict.GOOD: ("the linear model is good", ""),
-    Verdict.NOT_LINEAR: (
+    ModelVerdict.GOOD: ("the linear model is good", ""),
+    ModelVerdict.NOT_LINEAR: (
         "the drive is not linear, and its damping depends on {depends}",
         " Take frequency and damping for this torque only; hil diagnose names the cause.",
     ),
-    Verdict.CLOSED_LOOP: (
+    ModelVerdict.CLOSED_LOOP: (
         "the torque follows the speed (closed loop); the Box-Jenkins model allows for that, the output-error, "
         "recursive and spectral estimates may be biased",
         " Hold the torque constant except for the PRBS, or use the Box-Jenkins model.",
     ),
-    Verdict.NOT_EXCITED: ("no pole pair: {reason}", " Raise the PRBS, record longer or faster; or there is none."),
-    Verdict.INCOMPLETE: (
+    ModelVerdict.NOT_EXCITED: ("no pole pair: {reason}", " Raise the PRBS, record longer or faster; or there is none."),
+    ModelVerdict.INCOMPLETE: (
         "the model misses a part of the response to past torque",
         " Look at the residual tests; try --order auto, or diagnose the recording.",
     ),
-    Verdict.ONE_MASS: ("one mass: {reason}", " If the shaft is soft, raise the PRBS, record longer or faster."),
+    ModelVerdict.ONE_MASS: ("one mass: {reason}", " If the shaft is soft, raise the PRBS, record longer or faster."),
 }
 """What each verdict says of a recording, and what to do."""
 

@@ -22,7 +22,7 @@ from hil.recording.signals_config import MaskRange, SignalsConfig
 from hil.recording.survey import Group
 from hil.recording.table import Table
 from hil.report import page as html
-from hil.report.figures import Line, Mark, Panel, Style, time_figure
+from hil.report.figures import Curve, Mark, Panel, Style, time_figure
 
 MOST_DRAWN: Final = 24
 """Panels of a group: what could be a torque or an output comes first."""
@@ -63,7 +63,7 @@ def _group(found: Look, group: Group, number: int, signals: SignalsConfig, reque
     values = table.numeric(names)
     units = {each.name: f" [{each.unit}]" for each in group.channels if each.unit and each.unit not in each.name}
     panels = [
-        Panel(printable(f"{name}{units.get(name, '')}"), (Line(printable(name), values[name], Style.FIRST_INPUT),))
+        Panel(printable(f"{name}{units.get(name, '')}"), (Curve(printable(name), values[name], Style.FIRST_INPUT),))
         for name in names
     ]
     marks = [*_gaps(time_s), *_marks(time_s, values, signals.mask)]

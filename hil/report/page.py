@@ -107,7 +107,7 @@ class IntervalBar:
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class HtmlRow:
     """A row of a table; ``kind`` is a class of the style sheet (outside, undetermined)."""
 
     cells: tuple[Any, ...]
@@ -138,11 +138,11 @@ class Preformatted:
 
 
 @dataclass(frozen=True, slots=True)
-class Table:
+class HtmlTable:
     """A table; columns in ``numbers`` (from 0) are flush right, one with sentences in it is prose."""
 
     headings: tuple[str, ...]
-    rows: tuple[Row, ...]
+    rows: tuple[HtmlRow, ...]
     numbers: frozenset[int] = frozenset()
 
     @property
@@ -291,15 +291,15 @@ def details(summary: str, *blocks: Any) -> Details:
     return Details(summary, _kept(blocks))
 
 
-def table(headings: Sequence[str], rows: Iterable[Sequence[Any] | Row], numbers: Iterable[int] = ()) -> Table:
+def table(headings: Sequence[str], rows: Iterable[Sequence[Any] | HtmlRow], numbers: Iterable[int] = ()) -> HtmlTable:
     """Make a table of texts and inline pieces; no headings, no head."""
-    made = tuple(row if isinstance(row, Row) else Row(tuple(row)) for row in rows)
-    return Table(tuple(headings), made, frozenset(numbers))
+    made = tuple(row if isinstance(row, HtmlRow) else HtmlRow(tuple(row)) for row in rows)
+    return HtmlTable(tuple(headings), made, frozenset(numbers))
 
 
 def table_of(
     items: Iterable[Any], columns: Sequence[tuple[str, Callable[[Any], Any]]], numbers: Iterable[int] = ()
-) -> Table:
+) -> HtmlTable:
     """Make a table with a row for each item; a column has its heading and what gives a cell."""
     rows = [tuple(cell(item) for _, cell in columns) for item in items]
     return table([heading for heading, _ in columns], rows, numbers)

@@ -11,7 +11,7 @@ from typing import Any, Final
 import numpy as np
 
 from estimator.identification.settings import Settings
-from hil.figures.local_model import LocalModel, Row
+from hil.figures.local_model import ExperimentRow, LocalModel
 from hil.figures.road import Conditions
 from hil.provenance import Provenance
 from hil.report import page as html
@@ -26,7 +26,7 @@ SOURCE = (
 
 def paper_page(
     models: Sequence[LocalModel],
-    rows: Sequence[Row],
+    rows: Sequence[ExperimentRow],
     driven: Sequence[Conditions],
     folder: Path,
     made: Provenance | None = None,
@@ -43,7 +43,7 @@ def paper_page(
 
 
 def _top(
-    models: Sequence[LocalModel], rows: Sequence[Row], driven: Sequence[Conditions], made: Provenance | None
+    models: Sequence[LocalModel], rows: Sequence[ExperimentRow], driven: Sequence[Conditions], made: Provenance | None
 ) -> html.Header:
     count = f"{len(models)} experiment{'s' if len(models) > 1 else ''}"
     first = models[0].found
@@ -68,14 +68,14 @@ def _top(
     return html.header(f"The driveline of the paper, from {count}", said, html.tiles(tiles), facts=facts(made))
 
 
-def _worst(rows: Sequence[Row], what: str) -> str:
+def _worst(rows: Sequence[ExperimentRow], what: str) -> str:
     errors = np.array([row.error(what, "online") for row in rows])
     missing = int(np.isnan(errors).sum())
     text = f"{100.0 * float(np.nanmax(np.abs(errors))):.2g} %" if missing < errors.size else "–"
     return f"{text}, {missing} without" if missing else text
 
 
-def _numbers(rows: Sequence[Row]) -> list[Any]:
+def _numbers(rows: Sequence[ExperimentRow]) -> list[Any]:
     columns = (
         ("experiment", lambda row: row.name),
         ("on line [Hz]", lambda row: shown(row.online_hz)),
@@ -161,7 +161,7 @@ SCHEMA: Final = "hil.paper/1"
 
 
 def paper_text(
-    rows: Sequence[Row],
+    rows: Sequence[ExperimentRow],
     settings: Settings,
     driven: Sequence[Conditions],
     seed: int | None,

@@ -36,7 +36,7 @@ def _rendered(block: Any) -> Iterator[RenderableType]:
             yield rendered(block.blocks)
         case html.Paragraph():
             yield Text(_words(block))
-        case html.Table():
+        case html.HtmlTable():
             yield _table(block)
 
 
@@ -44,7 +44,7 @@ def _words(block: html.Paragraph) -> str:
     return "".join(str(piece) for piece in block.pieces)
 
 
-def _table(block: html.Table) -> Table:
+def _table(block: html.HtmlTable) -> Table:
     """Make a table of the columns that hold text; numbers are never cut."""
     columns = [i for i, _ in enumerate(block.headings) if any(str(row.cells[i]) for row in block.rows)]
     table = Table(box=None, pad_edge=False, show_header=any(block.headings))

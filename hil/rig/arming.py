@@ -41,7 +41,7 @@ class ArmedDrives:
 
     def _disarm_all(self, error: BaseException | None) -> None:
         self._devices.guard.disable()
-        self._devices.link.strangers.end()
+        self._devices.link.pdos_to_disable.end()
         # A head start only: what counts is that each drive then confirms it is disarmed.
         not_zeroed = _failures(self._zero_both)
         not_disarmed = self._disarm({"m1": self._devices.m1, "m2": self._devices.m2})

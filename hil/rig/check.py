@@ -40,7 +40,7 @@ MAP = "register map"
 """Where it stands what a register should hold."""
 
 
-class Verdict(Enum):
+class DeviceVerdict(Enum):
     """What came of looking for one device."""
 
     AGREES = "agrees"
@@ -57,12 +57,12 @@ class ChannelReading:
 
 
 @dataclass(frozen=True, slots=True)
-class Finding:
+class DeviceFinding:
     """One device."""
 
     device: str  # its name in the rig file
     address: str  # where it was looked for
-    verdict: Verdict  # what came of it
+    verdict: DeviceVerdict  # what came of it
     differences: tuple[Difference, ...] = ()  # what does not agree
     notes: tuple[str, ...] = ()  # why it failed, or what would keep it from a run at present
     remarks: tuple[str, ...] = ()  # what a run will set by itself, and what the drive keeps of its own
@@ -74,27 +74,27 @@ class Finding:
     questions: tuple[str, ...] = ()  # what only someone who knows the vehicle can confirm
 
 
-def check_rig(rig: Rig, prove_stop: bool = False) -> tuple[Finding, ...]:
+def check_rig(rig: Rig, prove_stop: bool = False) -> tuple[DeviceFinding, ...]:
     """Look for the CAN bus, both inverters and the PLC; each, whatever is wrong with the others."""
     drives = _can(rig, prove_stop)
     speeds = [each.max_speed_rad_s for each in drives if each.max_speed_rad_s is not None]
     return (*drives, _plc(rig, min(speeds, default=None)))
 
 
-def _can(rig: Rig, prove_stop: bool) -> tuple[Finding, ...]:
+def _can(rig: Rig, prove_stop: bool) -> tuple[DeviceFinding, ...]:
     tables = {"m1": rig.inverters.m1, "m2": rig.inverters.m2}
     try:
         link = CanLink.open(rig.can.url)
     except DriverError as error:
-        bus = Finding("can", rig.can.url, Verdict.FAILED, notes=(str(error),))
+        bus = DeviceFinding("can", rig.can.url, DeviceVerdict.FAILED, notes=(str(error),))
         lost = ("its bus is not there",)
         return (
             bus,
-            *(Finding(name, _node(table), Verdict.FAILED, notes=lost) for name, table in tables.items()),
+            *(DeviceFinding(name, _node(table), DeviceVerdict.FAILED, notes=lost) for name, table in tables.items()),
         )
     with link:
         require_sole_host(link, rig, inverter_settings("m1", rig).host_heartbeat_s if prove_stop else None)
-        bus = Finding("can", rig.can.url, Verdict.AGREES)
+        bus = DeviceFinding("can", rig.can.url, DeviceVerdict.AGREES)
         made: dict[str, Inverter] = {}
         m1, m2 = (_inverter(link, name, rig, prove_stop, made) for name in tables)
         if len(made) == len(tables):
@@ -103,14 +103,14 @@ def _can(rig: Rig, prove_stop: bool) -> tuple[Finding, ...]:
         return bus, m1, m2
 
 
-def _one_bus(finding: Finding, m1: Inverter, m2: Inverter) -> Finding:
+def _one_bus(finding: DeviceFinding, m1: Inverter, m2: Inverter) -> DeviceFinding:
     """See that each COB-ID is used once."""
     if shared := tuple(shared_cob_ids(m1, m2)):
-        return replace(finding, verdict=Verdict.DIFFERS, differences=(*finding.differences, *shared))
+        return replace(finding, verdict=DeviceVerdict.DIFFERS, differences=(*finding.differences, *shared))
     return finding
 
 
-def _one_shaft(finding: Finding, m1: Inverter, m2: Inverter) -> Finding:
+def _one_shaft(finding: DeviceFinding, m1: Inverter, m2: Inverter) -> DeviceFinding:
     """Compare the speeds that both read of their one shaft, at rest or coasting."""
     one, other = m1.read_speed_rad_s(), m2.read_speed_rad_s()
     if abs(one - other) <= speed_tolerance_rad_s(one, other, m1.count_rad_s + m2.count_rad_s):
@@ -122,21 +122,21 @@ def _one_shaft(finding: Finding, m1: Inverter, m2: Inverter) -> Finding:
         f"{other:.3g} rad/s",
         "m1",
     )
-    return replace(finding, verdict=Verdict.DIFFERS, differences=(*finding.differences, difference))
+    return replace(finding, verdict=DeviceVerdict.DIFFERS, differences=(*finding.differences, difference))
 
 
-def _inverter(link: CanLink, name: str, rig: Rig, prove_stop: bool, made: dict[str, Inverter]) -> Finding:
+def _inverter(link: CanLink, name: str, rig: Rig, prove_stop: bool, made: dict[str, Inverter]) -> DeviceFinding:
     table: InverterTable = getattr(rig.inverters, name)
 
-    def compare() -> Finding:
+    def compare() -> DeviceFinding:
         inverter = Inverter(link, inverter_settings(name, rig))
         differences, fault = inverter.check(), inverter.fault()
         if prove_stop and not differences and fault is None:
             differences = inverter.prove_stop(rig.period_s)
         made[name] = inverter
-        verdict = Verdict.DIFFERS if differences else Verdict.AGREES
+        verdict = DeviceVerdict.DIFFERS if differences else DeviceVerdict.AGREES
         notes = (*_eds_note(table.eds), *(() if fault is None else (fault,)))
-        return Finding(
+        return DeviceFinding(
             name,
             address,
             verdict,
@@ -190,8 +190,8 @@ def _node(table: InverterTable) -> str:
     return f"node {table.node_id}"
 
 
-def _plc(rig: Rig, drives_rad_s: float | None) -> Finding:
-    def compare() -> Finding:
+def _plc(rig: Rig, drives_rad_s: float | None) -> DeviceFinding:
+    def compare() -> DeviceFinding:
         registers, status, refusals = asyncio.run(_asked(rig.plc))
         differences = tuple(
             Difference(
@@ -211,10 +211,10 @@ def _plc(rig: Rig, drives_rad_s: float | None) -> Finding:
             if not each.believed
         )
         notes = (*refusals, *(() if status is None else reasons_against(status, NO_NEEDS)))
-        return Finding(
+        return DeviceFinding(
             "plc",
             address,
-            Verdict.DIFFERS if differences else Verdict.AGREES,
+            DeviceVerdict.DIFFERS if differences else DeviceVerdict.AGREES,
             differences,
             notes,
             registers=registers,
@@ -242,8 +242,8 @@ async def _asked(table: PlcTable) -> tuple[tuple[Reading, ...], PlcStatus | None
             return registers, status, (f"the host's beat is not taken, so that no run is possible: {refusal}",)
 
 
-def _or_failed(device: str, address: str, compare: Callable[[], Finding]) -> Finding:
+def _or_failed(device: str, address: str, compare: Callable[[], DeviceFinding]) -> DeviceFinding:
     try:
         return compare()
     except DriverError as error:
-        return Finding(device, address, Verdict.FAILED, notes=(str(error),))
+        return DeviceFinding(device, address, DeviceVerdict.FAILED, notes=(str(error),))

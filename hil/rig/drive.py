@@ -37,7 +37,7 @@ class Recorder(Protocol):
         ...
 
 
-Progress = Callable[[Phase, float], None]
+CycleProgress = Callable[[Phase, float], None]
 """Called once per cycle with the phase and the time since it began [s]."""
 
 Observer = Callable[[Sample, Phase], None]
@@ -70,7 +70,7 @@ class Drive:
     pacer: Pacer  # when each cycle begins
     recorder: Recorder  # where samples go
     stop: StopRequest  # ends the run at the next cycle when requested
-    progress: Progress  # called with every cycle
+    progress: CycleProgress  # called with every cycle
     observers: Sequence[Observer] = ()  # given every sample
     _summary: RunSummary = field(init=False)
     _catch_up: CatchUp = field(init=False)

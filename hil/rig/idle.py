@@ -28,7 +28,7 @@ PLC_BACKOFF = Backoff(first_s=0.2, longest_s=2.0, attempts=8)
 
 
 @dataclass(slots=True)
-class _Ear:
+class _IdleInverter:
     """One inverter, listened to: its last answer and when that came."""
 
     inverter: Inverter
@@ -112,8 +112,8 @@ class Listening:
         self._link = devices.link
         self._channels = devices.channels
         self._pacer = pacer
-        self._m1 = _Ear(devices.m1, SampleFlag.M1_STALE)
-        self._m2 = _Ear(devices.m2, SampleFlag.M2_STALE)
+        self._m1 = _IdleInverter(devices.m1, SampleFlag.M1_STALE)
+        self._m2 = _IdleInverter(devices.m2, SampleFlag.M2_STALE)
         self._first: int | None = None
         self.timing = timing
         self.plc = PlcPoll(devices.plc_loop, devices.plc)
@@ -176,6 +176,6 @@ class Listening:
             channels=channels,
         )
 
-    def _answered_ns(self, ear: _Ear, sync_ns: int) -> int:
+    def _answered_ns(self, ear: _IdleInverter, sync_ns: int) -> int:
         """Host time of its last answer [ns], at most that of the SYNC: what has answered it has no age."""
         return sync_ns if ear.latest is None else min(sync_ns, ear.latest.t_ns)

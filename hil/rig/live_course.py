@@ -24,7 +24,7 @@ SCHEMA = "hil.online/1"
 COLUMNS = ("time_s", "resonance_hz", "resonance_std_hz", "damping", "damping_std")
 """What is kept of an estimate: 40 bytes."""
 
-MOST = 1 << 17
+MOST_ESTIMATES = 1 << 17
 """Estimates that are kept: 44 minutes at 20 ms, and a file of 14 MB at most."""
 
 
@@ -76,7 +76,7 @@ class Course:
     def _count(self, estimates: int) -> None:
         """Count estimates that were taken; keep every second one where they have become too many."""
         self._estimates += estimates
-        while len(self._columns["time_s"]) >= MOST:
+        while len(self._columns["time_s"]) >= MOST_ESTIMATES:
             self._columns = {name: column[::2] for name, column in self._columns.items()}
             self._every *= 2
 

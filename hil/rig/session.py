@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
-from drivers.canopen.strangers import Strangers, foreign
+from drivers.canopen.foreign_controllers import Strangers, foreign
 from drivers.errors import ConfigMismatch, DriverError, ForeignController
 from drivers.inverter.cob_ids import shared_cob_ids
 from drivers.plc.types import PlcStatus
@@ -23,7 +23,7 @@ from hil.errors import RunAborted
 from hil.rig.arming import ArmedDrives
 from hil.rig.build import Devices
 from hil.rig.cycle import Cycle
-from hil.rig.drive import Drive, Observer, Progress, Recorder, RunSummary
+from hil.rig.drive import CycleProgress, Drive, Observer, Recorder, RunSummary
 from hil.rig.excitation import PlcPrbs
 from hil.rig.pacing import Pacer
 from hil.rig.plan import Plan
@@ -39,13 +39,13 @@ def run_plan(
     pacer: Pacer,
     recorder: Recorder,
     stop: StopRequest,
-    progress: Progress,
+    progress: CycleProgress,
     timing: RunTiming | None = None,
     observers: Sequence[Observer] = (),
 ) -> RunSummary:
     """Run a plan on an opened rig."""
     before = _fit(devices, plan)
-    with HostBeat(devices.plc_loop, devices.plc) as beat, _blaming_strangers(devices.link.strangers):
+    with HostBeat(devices.plc_loop, devices.plc) as beat, _blaming_strangers(devices.link.pdos_to_disable):
         _configure(devices, stop)
         prbs = PlcPrbs(devices.plc_loop, devices.plc, plan.plc_prbs, pacer.poll_patience_s)
         with prbs, ArmedDrives(devices, stop):

@@ -47,7 +47,7 @@ _EXPEDITED: Final = (b"\x4b", b"\x43", b"\x42")
 _MULTIPLEXER: Final = slice(1, 4)
 
 
-class _Ear:
+class _HostListener:
     """What a bus carries of another host, from now on."""
 
     def __init__(self, link: CanLink, rig: Rig) -> None:
@@ -82,7 +82,7 @@ def listening_s(rig: Rig) -> float:
 def require_sole_host(link: CanLink, rig: Rig, heartbeat_s: float | None) -> None:
     """See that nobody else drives, before the first command; on a bus inside this process there is nobody else."""
     alone = rig.can.url.startswith(IN_PROCESS)
-    ear = _Ear(link, rig)
+    ear = _HostListener(link, rig)
     if not alone:
         ear.wait(0.0 if rig.takes_over else listening_s(rig) + random.uniform(0.0, APART_S))
         link.raise_if_failed()
@@ -114,7 +114,7 @@ def _nodes(rig: Rig) -> dict[str, int]:
     return {"m1": rig.inverters.m1.node_id, "m2": rig.inverters.m2.node_id}
 
 
-def _require_silence(ear: _Ear, rig: Rig) -> None:
+def _require_silence(ear: _HostListener, rig: Rig) -> None:
     if ear.heard is None or rig.takes_over:
         return
     raise ForeignController(

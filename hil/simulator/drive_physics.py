@@ -122,7 +122,7 @@ def _normal(random: np.random.Generator) -> Iterator[float]:
     """Draw standard normal numbers for ever.
 
     Many at once: for every array it fills numpy gives the interpreter lock away and takes it back, and a thread that
-    waits for the lock would hardly ever get it (see ``estimator.compiled.brief``).
+    waits for the lock would hardly ever get it (see ``estimator.compiled.compiled_with_lock``).
     """
     while True:
         yield from random.standard_normal(DRAWN_AT_ONCE).tolist()

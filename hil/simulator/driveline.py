@@ -18,7 +18,7 @@ from hil.config.rig_file import Rig, SimulationTable
 from hil.errors import ModelFileError, UsageError
 from hil.simulator.plc_device import PlcSetup
 from hil.simulator.rig_server import required_simulation
-from hil.simulator.simulated_rig import Plant
+from hil.simulator.simulated_rig import SimulatedPlant
 
 FINER = 16
 """An acceleration is the slope over an integration step: this many times shorter than those of the simulation."""
@@ -167,7 +167,7 @@ def _widest_record(rig: Rig) -> Record:
     )
 
 
-def plant_for(rig: Rig, effects: Sequence[EffectSpec] = (), trust_laws: bool = False) -> Plant:
+def plant_for(rig: Rig, effects: Sequence[EffectSpec] = (), trust_laws: bool = False) -> SimulatedPlant:
     """Build the driveline of a rig file."""
     model = simulation_model(required_simulation(rig), trust_laws)
     if model.motion is not Motion.ROTATION:

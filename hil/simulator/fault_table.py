@@ -20,7 +20,7 @@ from typing import Any, Final
 
 from drivers.inverter.cia402 import PowerState
 from hil.errors import UsageError
-from hil.simulator.faults import Answers, AtStep, Frames, RigFaults
+from hil.simulator.faults import AtStep, Frames, PlcAnswers, RigFaults
 
 OVERCURRENT: Final = 0x2310  # EMCY error code of CiA 402: continuous over current at the output
 NOBODY: Final = (0xBAD, 0xBAD)  # vendor-ID and product code of no device
@@ -56,7 +56,7 @@ class Size:
 
 
 @dataclass(frozen=True, slots=True)
-class Kind:
+class FaultKind:
     """One kind of fault: a row of the table; what it sets in its device's faults, a value or what makes it."""
 
     fields: Mapping[str, Any]
@@ -148,8 +148,8 @@ def _at_step(when: Moment) -> AtStep[Any]:
     return AtStep(when.step, when.size)
 
 
-def _answers(answers: Answers) -> Kind:
-    return Kind({"answers_at_s": lambda when: (when.at_s, answers)}, timed=True)
+def _answers(answers: PlcAnswers) -> FaultKind:
+    return FaultKind({"answers_at_s": lambda when: (when.at_s, answers)}, timed=True)
 
 
 _STATE = Size("STATE", f"a state: {', '.join(_STATES)}", _state, PowerState.SWITCHED_ON)
@@ -161,63 +161,68 @@ _INDEX = _code("INDEX", "an object")
 _COOLING = _number("PERMILLE", 1.0, 1e3, "of rated torque")
 _COARSE = _number("PERMILLE", 1.0, 100.0, "of rated torque")
 
-_INVERTER: Final[Mapping[str, Kind]] = MappingProxyType(
+_INVERTER: Final[Mapping[str, FaultKind]] = MappingProxyType(
     {
-        "absent": Kind({"absent": True}),
-        "wrong_identity": Kind({"identity": NOBODY}),
-        "refuse_mode": Kind({"ignored_writes": 0x6060}),
-        "stuck": Kind({"ignored_writes": 0x6040}),
-        "hang": Kind({"hang_at_step": _step}, timed=True),
-        "reset": Kind({"reset_at_step": _step}, timed=True),
-        "bus_off": Kind({"bus_off_at_step": _step}, timed=True),
-        "stale_pdo": Kind({"stale_from_step": _step}, timed=True),
-        "ignores_target": Kind({"ignores_target_from_step": _step}, timed=True),
-        "leaves_operation": Kind({"leaves_operation": _at_step}, _STATE, True),
-        "torque_gain": Kind({"wrong_torque.step": _step, "wrong_torque.gain": _size}, _FACTOR, True),
-        "torque_offset": Kind({"wrong_torque.step": _step, "wrong_torque.offset_permille": _size}, _PERMILLE, True),
-        "speed_gain": Kind({"wrong_speed.gain_from_step": _step, "wrong_speed.gain": _size}, _SPEED_FACTOR, True),
-        "speed_stuck": Kind({"wrong_speed.stuck_from_step": _step}, timed=True),
-        "second_tpdo": Kind({"second_tpdo": _at_step}, _EVERY, True),
-        "stale_share": Kind({"stale_share": _size}, _number("SHARE", 0.0, 1.0, "of the PDOs")),
-        "fault": Kind({"fault": _at_step}, _code("CODE", "an error code", OVERCURRENT), True),
-        "emcy": Kind({"emcy": _at_step}, _code("CODE", "an error code"), True),
-        "brown_out": Kind({"brown_out_at_step": _step}, timed=True),
-        "clock_drift": Kind({"clock_drift_ppm": _size}, _number("PPM", -1e5, 1e5, "parts per million")),
-        "forgets": Kind({"ignored_writes": _size}, _INDEX),
-        "lacks": Kind({"missing_objects": _size}, _INDEX),
-        "locks": Kind({"locked_objects": _size}, _INDEX),
-        "field_weakening": Kind({"limits.base_speed_rad_s": _size}, _number("RAD_S", 1.0, 1e4, "rad/s")),
-        "weak_cooling": Kind({"limits.continuous_permille": _size}, _COOLING),
-        "coarse_torque": Kind({"limits.torque_step_permille": lambda when: round(when.size)}, _COARSE),
+        "absent": FaultKind({"absent": True}),
+        "wrong_identity": FaultKind({"identity": NOBODY}),
+        "refuse_mode": FaultKind({"ignored_writes": 0x6060}),
+        "stuck": FaultKind({"ignored_writes": 0x6040}),
+        "hang": FaultKind({"hang_at_step": _step}, timed=True),
+        "reset": FaultKind({"reset_at_step": _step}, timed=True),
+        "bus_off": FaultKind({"bus_off_at_step": _step}, timed=True),
+        "stale_pdo": FaultKind({"stale_from_step": _step}, timed=True),
+        "ignores_target": FaultKind({"ignores_target_from_step": _step}, timed=True),
+        "leaves_operation": FaultKind({"leaves_operation": _at_step}, _STATE, True),
+        "torque_gain": FaultKind({"wrong_torque.step": _step, "wrong_torque.gain": _size}, _FACTOR, True),
+        "torque_offset": FaultKind(
+            {"wrong_torque.step": _step, "wrong_torque.offset_permille": _size}, _PERMILLE, True
+        ),
+        "speed_gain": FaultKind({"wrong_speed.gain_from_step": _step, "wrong_speed.gain": _size}, _SPEED_FACTOR, True),
+        "speed_stuck": FaultKind({"wrong_speed.stuck_from_step": _step}, timed=True),
+        "second_tpdo": FaultKind({"second_tpdo": _at_step}, _EVERY, True),
+        "stale_share": FaultKind({"stale_share": _size}, _number("SHARE", 0.0, 1.0, "of the PDOs")),
+        "fault": FaultKind({"fault": _at_step}, _code("CODE", "an error code", OVERCURRENT), True),
+        "emcy": FaultKind({"emcy": _at_step}, _code("CODE", "an error code"), True),
+        "brown_out": FaultKind({"brown_out_at_step": _step}, timed=True),
+        "clock_drift": FaultKind({"clock_drift_ppm": _size}, _number("PPM", -1e5, 1e5, "parts per million")),
+        "forgets": FaultKind({"ignored_writes": _size}, _INDEX),
+        "lacks": FaultKind({"missing_objects": _size}, _INDEX),
+        "locks": FaultKind({"locked_objects": _size}, _INDEX),
+        "field_weakening": FaultKind({"limits.base_speed_rad_s": _size}, _number("RAD_S", 1.0, 1e4, "rad/s")),
+        "weak_cooling": FaultKind({"limits.continuous_permille": _size}, _COOLING),
+        "coarse_torque": FaultKind({"limits.torque_step_permille": lambda when: round(when.size)}, _COARSE),
     }
 )
 
-DEVICES: Final[Mapping[str, Mapping[str, Kind]]] = MappingProxyType(
+DEVICES: Final[Mapping[str, Mapping[str, FaultKind]]] = MappingProxyType(
     {
         "m1": _INVERTER,
         "m2": _INVERTER,
         "bus": {
             **{
-                name: Kind({name: _at_step}, _frames("SHARE", 1.0, "of all"), True, True)
+                name: FaultKind({name: _at_step}, _frames("SHARE", 1.0, "of all"), True, True)
                 for name in ("lose", "corrupt", "repeat", "reorder")
             },
-            **{name: Kind({name: _at_step}, _frames("SECONDS", 10.0, "s"), True, True) for name in ("delay", "jitter")},
-            "off": Kind({"off_at_step": _step}, timed=True),
-            "swapped_nodes": Kind({"swapped_nodes": True}),
+            **{
+                name: FaultKind({name: _at_step}, _frames("SECONDS", 10.0, "s"), True, True)
+                for name in ("delay", "jitter")
+            },
+            "off": FaultKind({"off_at_step": _step}, timed=True),
+            "swapped_nodes": FaultKind({"swapped_nodes": True}),
         },
         "plc": {
-            "clutch_closes": Kind({"clutch_closes_at_s": _at_s}, timed=True),
-            "permissive_withdrawn": Kind({"permissive_withdrawn_at_s": _at_s}, timed=True),
-            "mode_changes": Kind({"mode_changes_at_s": _at_s}, timed=True),
-            "hang": _answers(Answers.NOT),
-            "exception": _answers(Answers.EXCEPTION),
-            "slow": _answers(Answers.LATE),
-            "half_answer": _answers(Answers.HALF),
-            "reset": _answers(Answers.RESET),
-            "wrong_unit": _answers(Answers.WRONG_UNIT),
-            "wrong_transaction": _answers(Answers.WRONG_TRANSACTION),
-            "swapped_floats": Kind({"swaps_floats": True}),
-            "wrong_width": _answers(Answers.TOO_FEW),
+            "clutch_closes": FaultKind({"clutch_closes_at_s": _at_s}, timed=True),
+            "permissive_withdrawn": FaultKind({"permissive_withdrawn_at_s": _at_s}, timed=True),
+            "mode_changes": FaultKind({"mode_changes_at_s": _at_s}, timed=True),
+            "hang": _answers(PlcAnswers.NOT),
+            "exception": _answers(PlcAnswers.EXCEPTION),
+            "slow": _answers(PlcAnswers.LATE),
+            "half_answer": _answers(PlcAnswers.HALF),
+            "reset": _answers(PlcAnswers.RESET),
+            "wrong_unit": _answers(PlcAnswers.WRONG_UNIT),
+            "wrong_transaction": _answers(PlcAnswers.WRONG_TRANSACTION),
+            "swapped_floats": FaultKind({"swaps_floats": True}),
+            "wrong_width": _answers(PlcAnswers.TOO_FEW),
         },
     }
 )
@@ -254,7 +259,7 @@ def rig_faults(texts: Iterable[str], period_s: float) -> RigFaults:
     return faults
 
 
-def _seconds(text: str, kind: Kind, at_s: str | None) -> float:
+def _seconds(text: str, kind: FaultKind, at_s: str | None) -> float:
     if at_s is None:
         if kind.timed and not kind.since_start:
             name = text.strip().partition("=")[0]
@@ -271,7 +276,7 @@ def _seconds(text: str, kind: Kind, at_s: str | None) -> float:
     return value
 
 
-def _asked_size(text: str, kind: Kind, given: str | None) -> Any:
+def _asked_size(text: str, kind: FaultKind, given: str | None) -> Any:
     size = kind.size
     if size is None:
         if given is not None:

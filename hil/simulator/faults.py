@@ -136,7 +136,7 @@ LATE_BY_S: Final = 1.5
 """How late a slow PLC answers [s of the wall clock]: beyond the second that a client waits."""
 
 
-class Answers(Enum):
+class PlcAnswers(Enum):
     """How a PLC answers a request: well, or in one of the ways in which a real one fails."""
 
     WELL = "well"
@@ -161,13 +161,13 @@ class PlcFaults:
     clutch_closes_at_s: float = math.inf
     permissive_withdrawn_at_s: float = math.inf
     mode_changes_at_s: float = math.inf
-    answers_at_s: frozenset[tuple[float, Answers]] = frozenset()
+    answers_at_s: frozenset[tuple[float, PlcAnswers]] = frozenset()
     swaps_floats: bool = False
 
-    def answers(self, time_s: float) -> Answers:
+    def answers(self, time_s: float) -> PlcAnswers:
         """Tell how the PLC answers at a simulated time [s]."""
         active = [each for each in self.answers_at_s if each[0] <= time_s]
-        return max(active, key=itemgetter(0))[1] if active else Answers.WELL
+        return max(active, key=itemgetter(0))[1] if active else PlcAnswers.WELL
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,7 @@ from typing import Final
 
 from drivers.plc.register import Value
 from drivers.plc.types import ClutchState, DriveMode, PrbsSource
-from hil.simulator.faults import Answers, PlcFaults
+from hil.simulator.faults import PlcAnswers, PlcFaults
 
 CELLS: Final = 10
 TAPS: Final = (10, 7)
@@ -115,7 +115,7 @@ class PlcDevice:
             return self._prbs_nm()
 
     @property
-    def answers(self) -> Answers:
+    def answers(self) -> PlcAnswers:
         """How the PLC answers now; for whoever serves it."""
         with self._lock:
             return self._faults.answers(self._time_s)

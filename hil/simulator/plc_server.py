@@ -27,7 +27,7 @@ from drivers.errors import BusDown, ConfigMismatch, ProtocolViolation
 from drivers.plc.modbus_security import Credentials, role_of, server_context
 from drivers.plc.register import Access, Register, RegisterKind, Value, ValueType, WordOrder
 from drivers.plc.register_map import RegisterMap
-from hil.simulator.faults import LATE_BY_S, Answers
+from hil.simulator.faults import LATE_BY_S, PlcAnswers
 from hil.simulator.plc_device import PlcDevice, ValueRefusedError
 
 KIND: Final = {
@@ -160,7 +160,7 @@ class PlcTcpServer(ModbusTcpServer):
         registers: PlcRegisters,  # What it answers from
         host: str,  # Address to listen on
         port: int,  # Address to listen on
-        answers: Callable[[], Answers],  # How the PLC answers at the moment of asking
+        answers: Callable[[], PlcAnswers],  # How the PLC answers at the moment of asking
         security: PlcSecurity | None,
     ) -> None:
         if security is not None:
@@ -212,34 +212,34 @@ class PlcSession(ServerRequestHandler):
             self._send_exception(request, ExcCodes.ILLEGAL_FUNCTION)
             return
         match self._plc.answers():
-            case Answers.NOT:  # a program that hangs does not do what it is asked either
+            case PlcAnswers.NOT:  # a program that hangs does not do what it is asked either
                 return
-            case Answers.EXCEPTION:
+            case PlcAnswers.EXCEPTION:
                 self._send_exception(request, ExcCodes.DEVICE_FAILURE)
                 return
-            case Answers.RESET:
+            case PlcAnswers.RESET:
                 self._reset()
                 return
-            case Answers.LATE:
+            case PlcAnswers.LATE:
                 await asyncio.sleep(LATE_BY_S)
                 self.last_pdu, self.last_addr = request, sender  # another may have come meanwhile
         await super().handle_request()  # type: ignore[no-untyped-call]
 
     def server_send(self, pdu: ModbusPDU, addr: Any) -> None:
         """Send an answer, one register short if that is how the PLC answers."""
-        if self._plc.answers() is Answers.TOO_FEW and isinstance(pdu, REGISTERS):
+        if self._plc.answers() is PlcAnswers.TOO_FEW and isinstance(pdu, REGISTERS):
             pdu.registers = pdu.registers[:-1]
         super().server_send(pdu, addr)  # type: ignore[no-untyped-call]
 
     def _pass_packet(self, sending: bool, packet: bytes) -> bytes:
         """Stand in every packet's way (pymodbus's ``trace_packet``)."""
-        if sending and self._plc.answers() is Answers.NOT:
+        if sending and self._plc.answers() is PlcAnswers.NOT:
             return b""
-        if sending and self._plc.answers() is Answers.HALF:
+        if sending and self._plc.answers() is PlcAnswers.HALF:
             return packet[: len(packet) // 2]
-        if sending and self._plc.answers() is Answers.WRONG_UNIT:
+        if sending and self._plc.answers() is PlcAnswers.WRONG_UNIT:
             return packet[:6] + bytes((packet[6] ^ 0x80,)) + packet[7:]
-        if sending and self._plc.answers() is Answers.WRONG_TRANSACTION:
+        if sending and self._plc.answers() is PlcAnswers.WRONG_TRANSACTION:
             return bytes((packet[0] ^ 0x80,)) + packet[1:]
         return packet
 
@@ -329,9 +329,9 @@ class PlcServer:
     def resume(self) -> None:
         self._paused = False
 
-    def _answers(self) -> Answers:
+    def _answers(self) -> PlcAnswers:
         """Tell how the PLC answers now: as its faults say, or not at all while it is paused."""
-        return Answers.NOT if self._paused else self._device.answers
+        return PlcAnswers.NOT if self._paused else self._device.answers
 
     def _run(self) -> None:
         try:

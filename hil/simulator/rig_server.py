@@ -26,7 +26,7 @@ from hil.simulator.faults import InverterFaults, RigFaults
 from hil.simulator.faulty_wire import FaultyWire
 from hil.simulator.plc_device import PlcDevice, PlcSetup
 from hil.simulator.plc_server import PlcSecurity, PlcServer
-from hil.simulator.simulated_rig import Plant, SensedPlant, SimulatedRig
+from hil.simulator.simulated_rig import SensedPlant, SimulatedPlant, SimulatedRig
 
 _OF_SENSORS = 2  # of a rig's random numbers: those of its nodes have streams of their own
 
@@ -41,7 +41,7 @@ _RANGES = {
 class ChannelSensors:
     """The channels of one rig file on one plant."""
 
-    def __init__(self, rig: Rig, plant: Plant, seed: int) -> None:
+    def __init__(self, rig: Rig, plant: SimulatedPlant, seed: int) -> None:
         self._tables = tuple(rig.channels)
         self._plant = _sensed(rig, plant) if self._tables else None
         self._map = rig.register_map
@@ -75,7 +75,7 @@ class ChannelSensors:
         return _converted(register, self._read[table.column] / table.factor(self._map))
 
 
-def _sensed(rig: Rig, plant: Plant) -> SensedPlant:
+def _sensed(rig: Rig, plant: SimulatedPlant) -> SensedPlant:
     if not isinstance(plant, SensedPlant):
         listed = ", ".join(rig.channel_units)
         raise UsageError(
@@ -106,7 +106,7 @@ class RigServer:
 
     def __init__(
         self,
-        plant: Plant,  # The driveline
+        plant: SimulatedPlant,  # The driveline
         rig: Rig,  # The rig file the simulated rig agrees with; it must have a table ``[simulation]``
         bus_url: str,
         modbus: Address,  # Where the PLC is served. Port 0 takes a free one, here as in ``bus_url``

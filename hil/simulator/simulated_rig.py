@@ -12,7 +12,7 @@ from hil.simulator.drive_physics import SimulatedInverter
 from hil.simulator.inverter_node import InverterNode
 
 
-class Plant(Protocol):
+class SimulatedPlant(Protocol):
     """A driveline as the simulated rig sees it; all values reflected to the motor shaft."""
 
     @property
@@ -24,7 +24,7 @@ class Plant(Protocol):
 
 
 @runtime_checkable
-class SensedPlant(Plant, Protocol):
+class SensedPlant(SimulatedPlant, Protocol):
     """A driveline with further places to measure at."""
 
     def measured(self, kind: OutputKind, at: Location) -> float:
@@ -48,7 +48,7 @@ class SimulatedRig:
     def __init__(
         self,
         bus: can.BusABC,  # An open ``python-can`` bus; it belongs to the rig from now on
-        plant: Plant,  # What the inverters drive
+        plant: SimulatedPlant,  # What the inverters drive
         inverters: tuple[SimulatedInverter, SimulatedInverter],  # Inverters m1 and m2
         period_s: float = 0.01,  # Simulated time of one SYNC [s]
         seed: int = 0,  # Of all reading noise

@@ -257,7 +257,7 @@ _NOT_COMPARED = frozenset({"notes", "attachments", "settings", "eds_sha256", "id
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class Difference:
     """One fact of both runs; None where a run does not have it."""
 
     what: str
@@ -273,14 +273,14 @@ class Row:
 class Comparison:
     """Two runs alongside each other; `rig_changes` are the lines of a unified diff of the rig files."""
 
-    rows: tuple[Row, ...]
+    rows: tuple[Difference, ...]
     rig_changes: tuple[str, ...]
 
 
 def compare_runs(a: Run, b: Run) -> Comparison:
     """Set two runs alongside each other."""
     left, right = _flat(a), _flat(b)
-    rows = tuple(Row(what, left.get(what), right.get(what)) for what in dict.fromkeys([*left, *right]))
+    rows = tuple(Difference(what, left.get(what), right.get(what)) for what in dict.fromkeys([*left, *right]))
     names = (f"run {a.run_id}", f"run {b.run_id}")
     changes = difflib.unified_diff(
         a.entry.rig_text.splitlines(), b.entry.rig_text.splitlines(), *names, lineterm="", n=1

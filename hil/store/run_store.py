@@ -46,7 +46,7 @@ _RESULT: Final = TypeAdapter(Attachment)
 
 T = TypeVar("T")
 
-What = Literal["note", "result"]
+AttachmentOf = Literal["note", "result"]
 
 
 def store_of(folder: Path | str) -> Path:

@@ -53,7 +53,7 @@ VARIABLE: Final = "HIL_LOG"
 BYTES: Final = 1_000_000
 """A log is rotated here; an ordinary command writes about 300 bytes."""
 
-KEPT: Final = 4
+OLDER_LOGS: Final = 4
 """Older logs next to the newest."""
 
 LOGGER: Final = logging.getLogger("hil")
@@ -141,7 +141,7 @@ def _opened(level: str) -> logging.Handler | None:
     path = log_file()
     try:
         path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
-        handler = _OwnFile(path, maxBytes=BYTES, backupCount=KEPT, encoding="utf-8")
+        handler = _OwnFile(path, maxBytes=BYTES, backupCount=OLDER_LOGS, encoding="utf-8")
     except OSError as error:
         sys.stderr.write(f"note: no log is kept, {path}: {error.strerror}. Set {VARIABLE}=off to go without.\n")
         return None

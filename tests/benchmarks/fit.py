@@ -12,7 +12,7 @@ from scipy.linalg import expm
 from scipy.optimize import least_squares
 from threadpoolctl import threadpool_limits
 
-from estimator.physics.driveline import Start
+from estimator.physics.driveline import InitialCondition
 from estimator.physics.fit import FitResult, fit
 from estimator.physics.layout import slot
 from estimator.physics.least_squares import CONVERGED
@@ -40,7 +40,7 @@ RELATIVE, ABSOLUTE = 1e-4, 1e-3
 Values = Mapping[str, float]
 
 
-def by_solve_ivp(values: Values, record: Record, start: Start) -> FloatArray:
+def by_solve_ivp(values: Values, record: Record, start: InitialCondition) -> FloatArray:
     """Simulate the motor speed of a two-mass line from the recorded torque with ``solve_ivp``, shape (N,) [rad/s]."""
     J_M, J_L, k, c, b_M, b_L = (values[name] for name in Structure.TWO_MASS.parameter_names)
     load_nm = start.load_torque_nm
@@ -66,7 +66,7 @@ def by_solve_ivp(values: Values, record: Record, start: Start) -> FloatArray:
     return speed
 
 
-def exact(values: Values, record: Record, start: Start) -> FloatArray:
+def exact(values: Values, record: Record, start: InitialCondition) -> FloatArray:
     """Return the motor speed of the same line without any error of integration, shape (N,) [rad/s].
 
     The line is linear and the torque is held: its state at the end of a period is a matrix exponential away.

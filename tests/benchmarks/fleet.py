@@ -20,7 +20,7 @@ from hil.fleet.dataset import Writer, read
 from hil.fleet.known import Survey
 from hil.fleet.run import Engine, carry_out, client_of, survey
 from hil.fleet.sources import find
-from hil.fleet.tasks import IDENTIFY, Job
+from hil.fleet.tasks import IDENTIFY, FleetJob
 from tests.benchmarks.buses import draw_bus, drive
 from tests.benchmarks.ratios import table
 
@@ -47,7 +47,7 @@ def identified(drives: Path, workers: int) -> tuple[float, float]:
     with tempfile.TemporaryDirectory() as place, client_of(Engine(workers=workers)) as client:
         warm_up, out = Path(place) / "warm_up", Path(place) / "results"
         for folder, some in ((warm_up, found[:workers]), (out, found[workers:])):
-            job = Job(IDENTIFY, None)
+            job = FleetJob(IDENTIFY, None)
             fleet = survey(lambda: client, some, Survey([]), job, Engine(), _no_progress)
             started_s = time.perf_counter()
             carry_out(lambda: client, fleet, job, Writer(folder, job.command), Engine(), False, _no_progress)
@@ -63,7 +63,7 @@ def surveyed(client: Client, folder: Path, count: int) -> tuple[str, str, str, s
         (drives / f"{number}.csv").write_text(f"time_s,torque_m1_nm,torque_m2_nm,speed_rad_s\n0,{number},1,1\n")
     found, _ = find([str(drives)], None)
     started_s = time.perf_counter()
-    survey(lambda: client, found, Survey([]), Job(IDENTIFY, None), Engine(), _no_progress)
+    survey(lambda: client, found, Survey([]), FleetJob(IDENTIFY, None), Engine(), _no_progress)
     each_ms = 1e3 * (time.perf_counter() - started_s) / count
     (worker,) = client.run(resident_mib).values()
     return f"{count:,}", f"{each_ms:.1f} ms", f"{resident_mib():.0f} MiB", f"{worker:.0f} MiB"

@@ -8,7 +8,7 @@ import pytest
 
 from hil.cli.main import run
 from hil.report import page as html
-from hil.report.figures import Line, Panel, Style, input_lines, time_figure
+from hil.report.figures import Curve, Panel, Style, input_lines, time_figure
 from hil.report.page import Figure
 from tests.browser.conftest import opened
 
@@ -27,7 +27,7 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
     speed[GAP] = np.nan
     panels = (
         Panel("torque [Nm]", input_lines(TORQUE[:, np.newaxis])),
-        Panel("speed [rad/s]", (Line("measured", speed, Style.MEASURED),)),
+        Panel("speed [rad/s]", (Curve("measured", speed, Style.MEASURED),)),
     )
     text = html.page("zoom", [html.section("Run", time_figure("run", TIME_S, panels, 1))], "")
     path = tmp_path_factory.mktemp("zoom") / "zoom.html"
@@ -77,7 +77,7 @@ def test_five_minutes_at_a_kilohertz_are_a_page_of_fifteen_megabytes() -> None:
     time_s = 1e-3 * np.arange(samples)
     rng = np.random.default_rng(1)
     panels = tuple(
-        Panel(axis, tuple(Line(f"{axis} {i}", rng.normal(size=samples), Style.AFTER) for i in range(count)))
+        Panel(axis, tuple(Curve(f"{axis} {i}", rng.normal(size=samples), Style.AFTER) for i in range(count)))
         for axis, count in (("torque", 2), ("speed", 4), ("error", 2))
     )
     text = html.page("long", [html.section("Run", time_figure("run", time_s, panels, 1))], "")

@@ -22,7 +22,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 from threadpoolctl import threadpool_limits
 
-from estimator.diagnosis.inference.answer import Found, answer
+from estimator.diagnosis.inference.answer import SearchResult, answer
 from estimator.diagnosis.inference.checks import TEST_LIMITS, THRESHOLDS_FILE, chance, tests
 from estimator.diagnosis.inference.hypotheses import silent
 from estimator.diagnosis.preconditions.prepare import prepare
@@ -83,7 +83,7 @@ class World:
 
 def decided(form: str, seed: int) -> Row | None:
     """Decide a world; None where its recordings are refused."""
-    world, kept = world_of(form, seed), list[Found]()
+    world, kept = world_of(form, seed), list[SearchResult]()
     try:
         ready = prepare(world.records, world.model)
     except EstimatorError:

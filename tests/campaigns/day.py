@@ -14,7 +14,7 @@ from pathlib import Path
 from unittest import mock
 
 from drivers.plc.plc import Plc
-from hil.cli.run_job import Job, record
+from hil.cli.run_job import RunJob, record
 from hil.recording.recordings import read_facts
 from hil.rig.experiments.base import Phase
 from hil.rig.live import LiveEstimate, tracking_chain
@@ -75,7 +75,7 @@ def run(hours: float, out: Path) -> tuple[list[float], float]:
     plc = partial(Plc, timeout_s=PATIENCE_S, beat_timeout_s=PATIENCE_S)
     with served(rig) as (_, at), mock.patch("hil.rig.build.Plc", plc):
         pacer = FreePacer(period_ns(rig.period_s), PATIENCE_S)
-        record(Job(at, "cruise", out, None, pacer, run_metadata(EXAMPLE, "cruise"), live), NOT_ASKED)
+        record(RunJob(at, "cruise", out, None, pacer, run_metadata(EXAMPLE, "cruise"), live), NOT_ASKED)
     most_mib = most_memory_mib()
     live.show(f"published, {read_facts(out).extent.n_rows} rows: at most", most_mib)
     return live.memory_mib, most_mib - max(live.memory_mib, default=most_mib)

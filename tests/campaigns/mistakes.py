@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from estimator.physics.driveline import Start
+from estimator.physics.driveline import InitialCondition
 from estimator.physics.model import DrivelineModel, Motion
 from estimator.signals.record import FloatArray, OutputKind, Record
 from hil.errors import HilError
@@ -51,7 +51,9 @@ def driven(kind: str) -> Mapping[str, FloatArray]:
     T1, T2 = (np.round(each, 2) for each in (half * torque + own, (1.0 - half) * torque - own))
     course = course - 0.7 if kind == "back" else course
     speed = {"rig": 30.0, "back": 5.0}.get(kind, 45.0)
-    states = exact_states(values, T1 + T2, Start(0.0, speed, values.get("b_L", 0.05) * speed / 4200.0, 0.0, speed))
+    states = exact_states(
+        values, T1 + T2, InitialCondition(0.0, speed, values.get("b_L", 0.05) * speed / 4200.0, 0.0, speed)
+    )
     return {
         "t": PERIOD_S * np.arange(ROWS),
         "T1": T1,

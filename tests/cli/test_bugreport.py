@@ -230,7 +230,7 @@ def test_it_rotates_and_keeps_a_few(monkeypatch: pytest.MonkeyPatch) -> None:
     for _ in range(12):
         assert run(["effects", "backlash"], keep_log=True) == 0
     kept = sorted(log_file().parent.iterdir())
-    assert [path.name for path in kept] == ["hil.log", *(f"hil.log.{n}" for n in range(1, command_log.KEPT + 1))]
+    assert [path.name for path in kept] == ["hil.log", *(f"hil.log.{n}" for n in range(1, command_log.OLDER_LOGS + 1))]
     assert all(path.stat().st_size <= 500 for path in kept)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from estimator.physics.driveline import Start
+from estimator.physics.driveline import InitialCondition
 from estimator.physics.layout import Grid, flat
 from estimator.physics.simulate import simulate
 from hil.cli.effects import app
@@ -40,7 +40,7 @@ def test_the_law_does_what_the_table_does(tmp_path: Path) -> None:
     assert "TODO" in (tmp_path / "rubbing.py").read_text()
     model = tmp_path / "next.toml"
     model.write_text(LINE + (tmp_path / "rubbing.toml").read_text() + "[effects.rubbing]\nsize = { value = 1.0 }\n")
-    rec, start = record(random_steps(120, seed=7), np.ones(120)), Start(2.0, 0.0, 1.0, 0.0, 1.0)
+    rec, start = record(random_steps(120, seed=7), np.ones(120)), InitialCondition(2.0, 0.0, 1.0, 0.0, 1.0)
     runs = []
     for each in (read_model(source).model, read_model(model, trust_laws=True).model):
         runs.append(simulate(Grid(each.structure, 6, 0.02, each.laws), rec, flat(each), start))

@@ -6,9 +6,9 @@ from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from hil.commission.engine import NAMES, Asked, Commissioning
-from hil.commission.state import Finding, State, StepRecord, load_state
-from hil.commission.step import Job, Step
+from hil.commission.engine import NAMES, Commissioning, StepRequests
+from hil.commission.state import CommissioningState, StepFinding, StepRecord, load_state
+from hil.commission.step import Step, StepContext
 from hil.config.rig_file import read_rig
 from hil.orders.operator import Talk
 from hil.orders.order import RigSource
@@ -19,7 +19,7 @@ from hil.simulator.addresses import Address
 from hil.simulator.driveline import EffectSpec, plant_for
 from hil.simulator.fault_table import rig_faults
 from hil.simulator.rig_server import RigServer
-from hil.simulator.simulated_rig import Plant
+from hil.simulator.simulated_rig import SimulatedPlant
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "rig.toml"
 
@@ -28,7 +28,7 @@ EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "rig.toml"
 class Miswired:
     """A driveline on which inverter m2 turns the other way."""
 
-    plant: Plant
+    plant: SimulatedPlant
 
     @property
     def speed_rad_s(self) -> float:
@@ -46,11 +46,11 @@ class Bench:
     source: RigSource
     folder: Path
     said: list[str] = field(default_factory=list)
-    shown: list[Finding] = field(default_factory=list)
+    shown: list[StepFinding] = field(default_factory=list)
 
-    def job(self) -> Job:
+    def job(self) -> StepContext:
         rig = self.source.rig()
-        state = load_state(self.folder, NAMES) or State(
+        state = load_state(self.folder, NAMES) or CommissioningState(
             self.folder, rig.name, str(self.source.path), self.source.text, {name: StepRecord() for name in NAMES}
         )
         conditions = Conditions(
@@ -60,20 +60,22 @@ class Bench:
             lambda plan: nullcontext(lambda phase, time_s: None),
         )
         runner = Runner(self.source, self.folder, conditions)
-        return Job(self.source, rig, state, runner, None, 0.0857, False, self.said.append, lambda stage, share: None)
+        return StepContext(
+            self.source, rig, state, runner, None, 0.0857, False, self.said.append, lambda stage, share: None
+        )
 
-    def call(self, *steps: str, talk: Talk | None = None, repeat: Sequence[str] = ()) -> State:
+    def call(self, *steps: str, talk: Talk | None = None, repeat: Sequence[str] = ()) -> CommissioningState:
         """Do these steps; the others are skipped."""
         skip = {name: "not under test" for name in NAMES if name not in steps}
         job = self.job()
 
-        def show(step: Step, findings: list[Finding]) -> None:
+        def show(step: Step, findings: list[StepFinding]) -> None:
             self.shown += findings
 
-        Commissioning(job, talk or Talk(None, True), Asked(skip, frozenset(repeat)), show).run()
+        Commissioning(job, talk or Talk(None, True), StepRequests(skip, frozenset(repeat)), show).run()
         return job.state
 
-    def finding(self, what: str) -> Finding:
+    def finding(self, what: str) -> StepFinding:
         """Return the latest finding of this name."""
         return next(finding for finding in reversed(self.shown) if finding.what == what)
 
@@ -94,7 +96,7 @@ def bench(
     path = folder / "rig.toml"
     path.write_text(text, encoding="utf-8")
     rig = read_rig(path)
-    plant: Plant = plant_for(rig, [EffectSpec.parse(effect) for effect in effects])
+    plant: SimulatedPlant = plant_for(rig, [EffectSpec.parse(effect) for effect in effects])
     plant = Miswired(plant) if miswired else plant
     faulty = rig_faults(faults, rig.period_s)
     with RigServer(plant, rig, f"virtual:{uuid.uuid4()}", Address("127.0.0.1", 0), faulty) as server:

@@ -5,9 +5,9 @@ from pathlib import Path
 import pytest
 
 from hil.commission import engine
-from hil.commission.engine import Asked, Commissioning
-from hil.commission.state import Finding, State, Status, StepRecord, load_state
-from hil.commission.step import Job, Outcome, Step
+from hil.commission.engine import Commissioning, StepRequests
+from hil.commission.state import CommissioningState, Status, StepFinding, StepRecord, load_state
+from hil.commission.step import Outcome, Step, StepContext
 from hil.errors import RunAborted, UsageError
 from hil.orders.operator import Talk
 from hil.orders.order import RigSource
@@ -24,7 +24,7 @@ class World:
         self.done: list[str] = []
         self.said: list[str] = []
         self.fails: dict[str, BaseException] = {}
-        self.findings: dict[str, list[Finding]] = {}
+        self.findings: dict[str, list[StepFinding]] = {}
         self.text = EXAMPLE.read_text(encoding="utf-8")
         needs: dict[str, tuple[str, ...]] = {"first": (), "second": ("first",), "third": ("second",)}
         steps = tuple(Step(name, name, lambda job: "acts.", self._doer(name), needs=needs[name]) for name in NAMES)
@@ -33,7 +33,7 @@ class World:
         monkeypatch.setattr(engine, "plan_of", lambda job, step: [run] if step.name == "second" else [])
 
     def _doer(self, name: str):  # type: ignore[no-untyped-def]
-        def do(job: Job) -> Outcome:
+        def do(job: StepContext) -> Outcome:
             self.done.append(name)
             if name in self.fails:
                 raise self.fails.pop(name)
@@ -41,17 +41,19 @@ class World:
 
         return do
 
-    def state(self) -> State:
+    def state(self) -> CommissioningState:
         source = RigSource(EXAMPLE, self.text)
-        return load_state(self.folder, NAMES) or State(
+        return load_state(self.folder, NAMES) or CommissioningState(
             self.folder, "rig", str(source.path), self.text, {name: StepRecord() for name in NAMES}
         )
 
     def call(self, talk: Talk | None = None, **asked: object) -> list[str]:
         self.done.clear()
         source = RigSource(EXAMPLE, self.text)
-        job = Job(source, source.rig(), self.state(), None, None, 0.1, True, self.said.append, lambda a, b: None)  # type: ignore[arg-type]
-        Commissioning(job, talk or Talk(None, True), Asked(**asked), lambda step, findings: None).run()  # type: ignore[arg-type]
+        job = StepContext(
+            source, source.rig(), self.state(), None, None, 0.1, True, self.said.append, lambda a, b: None
+        )  # type: ignore[arg-type]
+        Commissioning(job, talk or Talk(None, True), StepRequests(**asked), lambda step, findings: None).run()  # type: ignore[arg-type]
         return list(self.done)
 
 
@@ -98,7 +100,7 @@ def test_repeated_and_what_is_computed_from_it(world: World) -> None:
 
 
 def test_blocking_finding_ends_it_and_is_done_again(world: World) -> None:
-    world.findings["first"] = [Finding("sign", "forward", "backward", False, "Swap two phases", blocking=True)]
+    world.findings["first"] = [StepFinding("sign", "forward", "backward", False, "Swap two phases", blocking=True)]
     with pytest.raises(RunAborted, match=r"step first: sign: expected forward, got backward\. Swap two phases"):
         world.call()
     assert world.state().steps["first"].status is Status.BLOCKED
@@ -141,14 +143,14 @@ def test_state_is_whole_or_as_it_was(world: World, monkeypatch: pytest.MonkeyPat
 def test_what_ended_a_step_is_reported_where_the_state_can_not_be_kept(
     world: World, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    save = State.save
+    save = CommissioningState.save
 
-    def save_while_there_is_room(state: State) -> None:
+    def save_while_there_is_room(state: CommissioningState) -> None:
         if any(record.status is Status.INTERRUPTED for record in state.steps.values()):
             raise UsageError("no room")
         save(state)
 
-    monkeypatch.setattr(State, "save", save_while_there_is_room)
+    monkeypatch.setattr(CommissioningState, "save", save_while_there_is_room)
     world.fails["second"] = RunAborted("the bus is gone")
     with pytest.raises(RunAborted, match="the bus is gone") as ended:
         world.call()

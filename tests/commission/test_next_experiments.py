@@ -10,9 +10,9 @@ from typing import Any
 import pytest
 
 from estimator.diagnosis.result import Verdict
-from hil.commission.engine import NAMES, Asked, Commissioning
-from hil.commission.state import State, Status, StepRecord, load_state
-from hil.commission.step import Job
+from hil.commission.engine import NAMES, Commissioning, StepRequests
+from hil.commission.state import CommissioningState, Status, StepRecord, load_state
+from hil.commission.step import StepContext
 from hil.config.model_file import write_model
 from hil.design import solve
 from hil.design.design import Aim
@@ -49,7 +49,7 @@ class World:
 
     def diagnosed(self, verdict: str, *alike: str) -> None:
         """Leave the state of a commissioning whose diagnosis came to this."""
-        state = State(self.folder, "bus", "rig.toml", SOURCE.text, {name: StepRecord() for name in NAMES})
+        state = CommissioningState(self.folder, "bus", "rig.toml", SOURCE.text, {name: StepRecord() for name in NAMES})
         for record in list(state.steps.values())[:-1]:
             record.begin(rig_digest(SOURCE.text), keep_runs=False)
             record.end(Status.DONE)
@@ -60,11 +60,11 @@ class World:
 
     def call(self, talk: Talk = YES, **asked: Any) -> StepRecord:
         self.asked.clear()
-        Commissioning(self._job(), talk, Asked(**asked), lambda *_: None).run()
+        Commissioning(self._job(), talk, StepRequests(**asked), lambda *_: None).run()
         return self.record
 
     @property
-    def state(self) -> State:
+    def state(self) -> CommissioningState:
         state = load_state(self.folder, NAMES)
         assert state is not None
         return state
@@ -82,9 +82,9 @@ class World:
 
         return Talk(ask)
 
-    def _job(self) -> Job:
+    def _job(self) -> StepContext:
         runner: Any = SimpleNamespace(folder=self.folder, predict=self._predict, run=self._run)
-        return Job(SOURCE, SOURCE.rig(), self.state, runner, None, 0.1, True, self.said.append, lambda *_: None)
+        return StepContext(SOURCE, SOURCE.rig(), self.state, runner, None, 0.1, True, self.said.append, lambda *_: None)
 
     def _recorded(self, step: str, name: str, measured: dict[str, Any], whole: bool = True) -> RunRecord:
         path = self.folder / "runs" / f"{step}-{name}.csv"
@@ -217,7 +217,7 @@ def _with_a_diagnosis_that_does_nothing() -> Any:
     from hil.commission.engine import STEPS
     from hil.commission.step import Outcome
 
-    def same(job: Job) -> Outcome:
+    def same(job: StepContext) -> Outcome:
         return Outcome((), dict(job.evidence("diagnosis")))
 
     return tuple(replace(step, do=same) if step.name == "diagnosis" else step for step in STEPS)

@@ -10,21 +10,23 @@ import pytest
 from rich.console import Console
 
 from hil.commission.engine import STEPS
-from hil.commission.state import Finding, State, Status, StepRecord, stated
+from hil.commission.state import CommissioningState, Status, StepFinding, StepRecord, stated
 from hil.commission.talk import findings_table, result_document, result_lines
 from hil.orders.runner import RunRecord
 from hil.report.commission_html import commission_page
 
 TITLES = {step.name: step.title for step in STEPS}
-OUTSIDE = Finding("gain <m2>", "equal within ±2 %", "3.1 ± 0.4 %", False, "Calibrate one")
-OPEN = Finding("size", "0.5 to 2", "0.6 ± 0.2", None, "Repeat")
+OUTSIDE = StepFinding("gain <m2>", "equal within ±2 %", "3.1 ± 0.4 %", False, "Calibrate one")
+OPEN = StepFinding("size", "0.5 to 2", "0.6 ± 0.2", None, "Repeat")
 FLAT = [0.0, 0.0]
 
 
 @pytest.fixture
 def state(tmp_path: Path) -> dict[str, Any]:
     """Two steps done, one skipped, one interrupted twice, the rest to do."""
-    made = State(tmp_path, "bus & trailer", "rig.toml", 'name = "<bus>"', {name: StepRecord() for name in TITLES})
+    made = CommissioningState(
+        tmp_path, "bus & trailer", "rig.toml", 'name = "<bus>"', {name: StepRecord() for name in TITLES}
+    )
     made.steps["devices"].end(Status.SKIPPED, "checked <yesterday>")
     signs = made.steps["signs"]
     signs.begin("d", keep_runs=False)
@@ -38,7 +40,7 @@ def state(tmp_path: Path) -> dict[str, Any]:
     noise = made.steps["noise"]
     noise.begin("d", keep_runs=False)
     noise.evidence = {"course": {"time_s": [0.0, 1.0], "speed_rad_s": FLAT}}
-    noise.findings = [Finding("noise", "little", "less", True)]
+    noise.findings = [StepFinding("noise", "little", "less", True)]
     noise.end(Status.DONE)
     return made.document()
 

@@ -11,7 +11,7 @@ import pytest
 
 from hil.cli.main import run
 from hil.commission.engine import NAMES
-from hil.commission.state import FILE_NAME, State, Status, StepRecord, load_state
+from hil.commission.state import FILE_NAME, CommissioningState, Status, StepRecord, load_state
 from hil.errors import UsageError
 from hil.orders.runner import RunRecord
 from hil.report.commission_html import commission_page
@@ -22,7 +22,7 @@ from tests.commission.whole_state import whole_state
 
 def saved(folder: Path, recording: str) -> None:
     run = RunRecord("cruise", recording, whole=True, seconds=1.0, predicted={}, measured={})
-    State(folder, "bench", "rig.toml", "", {"noise": StepRecord(Status.DONE, runs=[run])}).save()
+    CommissioningState(folder, "bench", "rig.toml", "", {"noise": StepRecord(Status.DONE, runs=[run])}).save()
 
 
 def test_a_recording_next_to_the_state_is_taken(tmp_path: Path) -> None:

@@ -7,11 +7,11 @@ import pytest
 
 from drivers.errors import DriverError
 from hil.commission.state import Status
-from hil.commission.step import Job
+from hil.commission.step import StepContext
 from hil.errors import RunAborted
 from hil.orders import runner
 from hil.recording import read_table
-from hil.rig.drive import Progress
+from hil.rig.drive import CycleProgress
 from hil.rig.experiments.base import Phase
 from hil.rig.stop import StopRequest
 from tests.chosen import campaign
@@ -22,7 +22,7 @@ SHORT = (("duration_s = 30.0", "duration_s = 6.0"), ("speed_rad_s = 60.0", "spee
 DRIVEN = ("noise", "signs", "scales", "friction", "prbs", "experiments")
 
 
-def stops_at(stop: StopRequest, at_s: float) -> Progress:
+def stops_at(stop: StopRequest, at_s: float) -> CycleProgress:
     """Press Ctrl-C when the measured part of a run is so old [s]."""
 
     def show(phase: Phase, time_s: float) -> None:
@@ -44,7 +44,7 @@ def press(monkeypatch: pytest.MonkeyPatch) -> Callable[[Bench], None]:
             stops.append(StopRequest())
             return stops[-1]
 
-        def job() -> Job:
+        def job() -> StepContext:
             made = make_job()
             from contextlib import nullcontext
 

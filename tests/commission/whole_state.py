@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any
 
 from hil.commission.engine import STEPS
-from hil.commission.state import Finding, Note, State, Status, StepRecord, stated
+from hil.commission.state import CommissioningState, Note, Status, StepFinding, StepRecord, stated
 from hil.orders.runner import RunRecord
 
 COURSE = {"time_s": [0.0, 0.1, 0.2], "speed_rad_s": [0.0, None, 0.2]}
@@ -100,14 +100,14 @@ EVIDENCE: dict[str, Any] = {
 }
 
 
-def whole_state(folder: Path) -> State:
-    state = State(folder, "bus", "rig.toml", 'name = "bus"', {step.name: StepRecord() for step in STEPS})
+def whole_state(folder: Path) -> CommissioningState:
+    state = CommissioningState(folder, "bus", "rig.toml", 'name = "bus"', {step.name: StepRecord() for step in STEPS})
     state.notes = [Note(state.started_utc, "kept", "period_s", "noise")]
     ranges = {name: [-1.0, 1.0] for name in ("torque_m1_nm", "torque_m2_nm", "speed_rad_s", "speed_measured_rad_s")}
     for name, step in state.steps.items():
         for attempt in (Status.INTERRUPTED, Status.DONE):
             step.begin("digest", keep_runs=False)
-            step.findings = [Finding("gain", "1 ± 2 %", "3.1 %", False, "Calibrate"), stated("torque", "20 Nm")]
+            step.findings = [StepFinding("gain", "1 ± 2 %", "3.1 %", False, "Calibrate"), stated("torque", "20 Nm")]
             step.evidence = EVIDENCE.get(name, {})
             step.runs = [RunRecord(f"{name}-1", f"runs/{name}.csv", True, 3.5, ranges, ranges, 1, 300, 20.0, 0.1)]
             step.end(attempt, "for a reason")

@@ -6,31 +6,31 @@ from typing import Annotated, Literal, Self
 import pytest
 from pydantic import Field, model_validator
 
-from hil.config.table import Table
+from hil.config.table import FileTable
 from hil.errors import FileProblem, ModelFileError, RigFileError
 from hil.problems import Fault, read_toml, refuse, validate
 
 
-class Column(Table):
+class Column(FileTable):
     column: str
     scale: float = 1.0
 
 
-class Rate(Table):
+class Rate(FileTable):
     sample_time_s: float
 
 
-class Cat(Table):
+class Cat(FileTable):
     kind: Literal["cat"]
     lives: int
 
 
-class Dog(Table):
+class Dog(FileTable):
     kind: Literal["dog"]
     legs: int
 
 
-class Limits(Table):
+class Limits(FileTable):
     low: float
     high: float
 
@@ -43,7 +43,7 @@ class Limits(Table):
         return self
 
 
-class Whole(Table):
+class Whole(FileTable):
     schema_id: Annotated[str, Field(alias="schema")] = "x"
     time: Column | Rate | None = None
     inputs: list[Column] = Field(default_factory=list)

@@ -9,7 +9,7 @@ from typing import Any, cast
 import pytest
 
 from hil.design.solve import Solving
-from hil.design.solve_state import Driven, End, State
+from hil.design.solve_state import Driven, End, SolveState
 from tests.design.test_candidates import SOURCE
 
 OWN = list(SOURCE.rig().experiments)
@@ -17,7 +17,7 @@ OWN = list(SOURCE.rig().experiments)
 
 def solving(driven: list[str], given: list[Path], most_vehicle_s: float = 600.0) -> Solving:
     """A search that has driven so much and neither runner nor operator."""
-    state = State("hil.solve/1", "", "", [Driven(name, {}, "x.csv", 40.0, 0.0, None, None) for name in driven])
+    state = SolveState("hil.solve/1", "", "", [Driven(name, {}, "x.csv", 40.0, 0.0, None, None) for name in driven])
     nobody: Any = SimpleNamespace()
     return Solving(
         *(Path(), SOURCE, nobody, Path(), nobody, nobody, state, given, "quick", most_vehicle_s, 0.0),

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from estimator.physics.catalogue import EFFECTS
-from estimator.physics.driveline import Start
+from estimator.physics.driveline import InitialCondition
 from estimator.physics.effect import Place
 from estimator.physics.free_run import free_run
 from estimator.physics.layout import Grid, flat_values, grid_for
@@ -69,19 +69,21 @@ def signature(name: str) -> Signature:
     return Signature(TIME_S, recorded, free_run(LINE, rec).output, shown.curve(shown.values))
 
 
-def _driven(drive: Drive) -> tuple[Record, Start]:
+def _driven(drive: Drive) -> tuple[Record, InitialCondition]:
     """Return the recording of a test without any effect, and its start."""
-    start = Start(LOAD_NM, 0.0, drive.speed_rad_s, drive.torque_nm[0].sum() / BUS["k"], drive.speed_rad_s)
+    start = InitialCondition(LOAD_NM, 0.0, drive.speed_rad_s, drive.torque_nm[0].sum() / BUS["k"], drive.speed_rad_s)
     rec = Record("run", PERIOD_S, TIME_S, drive.torque_nm, np.ones(TIME_S.size), np.ones(TIME_S.size, dtype=bool))
     return replace(rec, output=_simulated({}, rec, start)), start
 
 
-def _simulated(effects: Mapping[str, Values], rec: Record, start: Start, load: FloatArray | None = None) -> FloatArray:
+def _simulated(
+    effects: Mapping[str, Values], rec: Record, start: InitialCondition, load: FloatArray | None = None
+) -> FloatArray:
     grid = Grid(LINE.structure, grid_for(LINE, [rec]).substeps, 0.2)
     return simulate(grid, rec, flat_values(BUS, effects), start, load)
 
 
-def _recorded(name: str, values: Values, rec: Record, start: Start) -> FloatArray:
+def _recorded(name: str, values: Values, rec: Record, start: InitialCondition) -> FloatArray:
     """Return the speed as it would be recorded; what arises behind the simulation is put on top of it."""
     rng = np.random.default_rng(3)
     clean = rec.output

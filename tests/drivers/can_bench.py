@@ -14,7 +14,7 @@ from drivers.inverter.inverter import Inverter, InverterFeedback, InverterSettin
 from drivers.torque_guard import ErrorLimits, Evidence, GuardedTorque, GuardLimits, TorqueGuard, TorqueRequest
 from hil.simulator.drive_physics import SimulatedInverter
 from hil.simulator.faults import InverterFaults
-from hil.simulator.simulated_rig import Plant, SimulatedRig
+from hil.simulator.simulated_rig import SimulatedPlant, SimulatedRig
 from tests.simulator.rigid_plant import RigidPlant
 
 _channels = itertools.count()
@@ -105,7 +105,7 @@ def bench(
     *,
     settings: InverterSettings = M1,
     simulated: SimulatedInverter = SIMULATED_M1,
-    plant: Plant | None = None,
+    plant: SimulatedPlant | None = None,
     seed: int = 1,
 ) -> Iterator[Bench]:
     channel = new_channel()

@@ -13,7 +13,7 @@ from drivers.plc.reader import Backoff, PlcReader
 from drivers.plc.register import Register, WordOrder
 from drivers.plc.register_map import USED, RegisterMap, load_register_map
 from drivers.resources import data_file
-from hil.simulator.faults import Answers, PlcFaults
+from hil.simulator.faults import PlcAnswers, PlcFaults
 from hil.simulator.plc_device import PlcDevice
 from hil.simulator.plc_server import PlcServer
 from tests.drivers.modbus_peers import free_port
@@ -126,8 +126,8 @@ def test_a_plc_that_comes_back_is_read_again() -> None:
     assert pauses == [0.5, 1.0, 0.5]
 
 
-@pytest.mark.parametrize(("answers", "error"), [(Answers.NOT, DeviceTimeout), (Answers.RESET, BusDown)])
-def test_it_gives_up_with_the_last_reason(answers: Answers, error: type[Exception]) -> None:
+@pytest.mark.parametrize(("answers", "error"), [(PlcAnswers.NOT, DeviceTimeout), (PlcAnswers.RESET, BusDown)])
+def test_it_gives_up_with_the_last_reason(answers: PlcAnswers, error: type[Exception]) -> None:
     pauses: list[float] = []
 
     async def sleep(pause_s: float) -> None:

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import pytest
 
-from drivers.canopen.strangers import Strangers
+from drivers.canopen.foreign_controllers import Strangers
 from drivers.errors import ForeignController
 
 

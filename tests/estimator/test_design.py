@@ -24,7 +24,7 @@ from estimator.diagnosis.inference.descent import descended
 from estimator.diagnosis.inference.disturbances import whitener_of
 from estimator.diagnosis.inference.hypotheses import THOROUGH
 from estimator.diagnosis.inference.search import Search
-from estimator.physics.driveline import Start
+from estimator.physics.driveline import InitialCondition
 from estimator.physics.fit import not_fitted
 from estimator.physics.layout import flat, grid_for
 from estimator.physics.problem import make_problem
@@ -63,7 +63,7 @@ def driven(known: Open, torque_nm: float, cycles: int = 400) -> Record:
     model = as_model(known.candidates[0], known.line)
     turns = np.where(np.arange(cycles) // 100 % 2 == 0, torque_nm, -torque_nm)
     silent = record(turns, np.zeros(cycles), name="paper")
-    output = simulate(grid_for(model, [silent]), silent, flat(model), Start(0.0, 0.0, 0.0))
+    output = simulate(grid_for(model, [silent]), silent, flat(model), InitialCondition(0.0, 0.0, 0.0))
     return record(turns, output, name="paper")
 
 

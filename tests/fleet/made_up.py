@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hil.fleet.dataset import Row, Writer
+from hil.fleet.dataset import DatasetRow, Writer
 
 RESONANCE_HZ, BETWEEN_HZ, WITHIN_HZ = 8.2, 0.08, 0.12
 OUTLIER, CHANGED = 3, 7
@@ -26,7 +26,7 @@ def write_fleet(folder: Path, vehicles: int, drives: int, seed: int = 57) -> Non
     writer.finish()
 
 
-def _rows(vehicle: int, drive: int, hz: float, has_gap: bool, gap_rad: float) -> dict[str, list[Row]]:
+def _rows(vehicle: int, drive: int, hz: float, has_gap: bool, gap_rad: float) -> dict[str, list[DatasetRow]]:
     key = f"{vehicle:06d}{drive:06d}"
     started = f"2026-{1 + drive // 28 % 12:02d}-{1 + drive % 28:02d}T08:00:00+00:00"
     of = {"key": key, "vehicle": f"bus_{vehicle}", "rig": "", "started": started, "name": f"drive_{drive}.parquet"}
@@ -49,8 +49,8 @@ def _rows(vehicle: int, drive: int, hz: float, has_gap: bool, gap_rad: float) ->
         "seconds": 1.0 + drive,
         "version": "0",
     }
-    parameters: list[Row] = []
-    effects: list[Row] = []
+    parameters: list[DatasetRow] = []
+    effects: list[DatasetRow] = []
     if has_gap:
         effects = [{**of, "effect": "backlash", "form": "", "element": "shaft", "probability": 0.999, "share": 0.94}]
         low, high = 0.95 * gap_rad, 1.05 * gap_rad

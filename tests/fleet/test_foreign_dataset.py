@@ -12,7 +12,7 @@ from hil.errors import StoreError
 from hil.fleet.dataset import TABLES, Writer, read
 from hil.fleet.page import fleet_page
 from hil.fleet.run import Fleet
-from hil.fleet.sources import Found
+from hil.fleet.sources import FleetRecording
 from hil.provenance import provenance
 from tests.fleet.made_up import write_fleet
 
@@ -21,7 +21,7 @@ def test_a_corrected_pattern_rewrites_where_results_belong_without_computing(tmp
     write_fleet(tmp_path, vehicles=10, drives=5)
     before = {name: read(tmp_path, name) for name in TABLES}
     places = {
-        row["sha256"]: Found(row["url"], f"tram_{row['vehicle'][4:]}", "b", "2025", row["sha256"])
+        row["sha256"]: FleetRecording(row["url"], f"tram_{row['vehicle'][4:]}", "b", "2025", row["sha256"])
         for row in before["recordings"]
     }
     age = {path: path.stat().st_mtime_ns for path in tmp_path.rglob("part-*.parquet")}

@@ -8,7 +8,7 @@ import pytest
 
 from hil.fleet.known import Survey, stamp
 from hil.fleet.run import Fleet
-from hil.fleet.sources import Found, Seen, at_hand, find, in_order, seen
+from hil.fleet.sources import FleetRecording, Seen, at_hand, find, in_order, seen
 
 ROWS = "time_s,torque_m1_nm,torque_m2_nm,speed_rad_s\n0,1,1,1\n0.01,1,1,1\n"
 
@@ -62,5 +62,5 @@ def test_what_has_not_changed_is_known_and_what_has_is_read(tmp_path: Path) -> N
 def test_vehicles_come_as_people_count() -> None:
     names = ["bus_10", "bus_2", "bus_02b", "bus_1", "", "9" * 5000]
     assert sorted(names, key=in_order) == ["", "9" * 5000, "bus_1", "bus_2", "bus_02b", "bus_10"]
-    fleet = Fleet([Found("x", "bus_10", sha256="1"), Found("y", "bus_9", sha256="2")])
+    fleet = Fleet([FleetRecording("x", "bus_10", sha256="1"), FleetRecording("y", "bus_9", sha256="2")])
     assert [piece[0].vehicle for piece in fleet.pieces(by_vehicle=True)] == ["bus_9", "bus_10"]

@@ -18,7 +18,7 @@ from hil.cli.prove import _pool
 from hil.errors import UsageError
 from hil.fleet.dataset import TABLES, read
 from hil.fleet.run import OF_DASK, OF_RESULTS, Engine, _require_alike, client_of
-from hil.fleet.tasks import IDENTIFY, Job, analyse
+from hil.fleet.tasks import IDENTIFY, FleetJob, analyse
 from hil.proof.work import work_on
 from tests.benchmarks.buses import draw_bus, drive
 
@@ -295,6 +295,6 @@ def test_a_cluster_of_other_versions_is_refused_before_any_work(cluster: Any, me
 
 
 def test_a_worker_that_joined_later_with_another_version_computes_nothing() -> None:
-    outcome = analyse((), Job(IDENTIFY, None, version="0.0"))
+    outcome = analyse((), FleetJob(IDENTIFY, None, version="0.0"))
     assert outcome.error.startswith("expected a worker of hil 0.0, got one of hil ")
     assert not outcome.rows

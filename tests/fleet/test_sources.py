@@ -10,12 +10,12 @@ import pytest
 
 from hil.errors import HilError, UsageError
 from hil.fleet.run import Fleet
-from hil.fleet.sources import Found, at_hand, find, pattern_of, seen, side_by_side
+from hil.fleet.sources import FleetRecording, at_hand, find, pattern_of, seen, side_by_side
 
 ROWS = "time_s,torque_m1_nm,torque_m2_nm,speed_rad_s\n0,1,1,1\n0.01,1,1,1\n"
 
 
-def described(found: Found) -> Found:
+def described(found: FleetRecording) -> FleetRecording:
     return found.seen_as(seen(found.url))
 
 
@@ -70,32 +70,34 @@ def test_a_pattern_that_takes_nothing_is_refused(text: str) -> None:
 
 def test_a_recording_says_whose_it_is_or_its_folder_does(drives: Path) -> None:
     path = drives / "bus_1" / "run_1.csv"
-    assert described(Found(str(path))).vehicle == "bus_1"
-    plain = described(Found(str(path))).sha256
+    assert described(FleetRecording(str(path))).vehicle == "bus_1"
+    plain = described(FleetRecording(str(path))).sha256
     assert plain == hashlib.sha256(ROWS.encode()).hexdigest()
     said = {"schema": "hil.recording/1", "started_utc": "2026-01-02T03:04:05+00:00", "rig_file": 'name = "bench 2"'}
     path.with_name("run_1.csv.json").write_text(json.dumps(said))
-    found = described(Found(str(path)))
+    found = described(FleetRecording(str(path)))
     assert (found.vehicle, found.rig, found.started) == ("bench 2", "bench 2", "2026-01-02T03:04:05+00:00")
     assert found.sha256 != plain
     path.with_name("run_1.csv.json").write_text(json.dumps({**said, "vehicle": "bus 9"}))
-    assert described(Found(str(path))).vehicle == "bus 9"
+    assert described(FleetRecording(str(path))).vehicle == "bus 9"
     with pytest.raises(HilError, match="expected a recording"):
-        described(Found(str(drives / "bus_1" / "notes.md")))
+        described(FleetRecording(str(drives / "bus_1" / "notes.md")))
 
 
 def test_recordings_of_one_name_stand_side_by_side(drives: Path) -> None:
-    both = [described(Found(str(drives / name / "run_1.csv"))) for name in ("bus_1", "bus_2")]
+    both = [described(FleetRecording(str(drives / name / "run_1.csv"))) for name in ("bus_1", "bus_2")]
     (drives / "bus_2" / "run_1.csv").write_text(ROWS.replace("0.01", "0.02"))
-    both[1] = described(Found(both[1].url))
+    both[1] = described(FleetRecording(both[1].url))
     with side_by_side(both) as paths:
         assert len({path.stem for path in paths}) == 2
         assert [path.read_text() for path in paths] == [ROWS, ROWS.replace("0.01", "0.02")]
 
 
 def test_vehicles_of_two_rigs_are_kept_apart_and_duplicates_named() -> None:
-    fleet = Fleet([Found("a", "bus_1", "x"), Found("b", "bus_1", "y"), Found("c", "bus_2", "x")])
-    fleet.duplicates.append((Found("d"), Found("a")))
+    fleet = Fleet(
+        [FleetRecording("a", "bus_1", "x"), FleetRecording("b", "bus_1", "y"), FleetRecording("c", "bus_2", "x")]
+    )
+    fleet.duplicates.append((FleetRecording("d"), FleetRecording("a")))
     assert len(fleet.pieces(by_vehicle=True)) == 3
     assert len(fleet.pieces(by_vehicle=False)) == 3
     assert fleet.remarks() == [

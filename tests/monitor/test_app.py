@@ -8,7 +8,7 @@ from textual.pilot import Pilot
 
 from hil.monitor.app import MonitorApp
 from hil.monitor.layout import PAGES
-from hil.monitor.messages import Began, Choice, Ended, Quit, Ready, Start, Stop
+from hil.monitor.messages import Began, Choice, Ended, Quit, Ready, StartExperiment, Stop
 from hil.monitor.snapshot import Activity
 from hil.monitor.state import LiveState
 from tests.monitor.fake_source import PERIOD_S, FakeSource, ended, settled
@@ -46,7 +46,7 @@ def test_nothing_starts_without_the_second_key() -> None:
         await pilot.press("enter", "escape")
         assert source.sent == []
         await pilot.press("e", "down", "enter", "y")
-        assert source.sent == [Start("tip")]
+        assert source.sent == [StartExperiment("tip")]
         assert activity(app) is Activity.STARTING
 
     play(script)
@@ -96,7 +96,7 @@ def test_nothing_to_start_while_the_rig_is_not_there() -> None:
         source.coming = [Ready()]
         await settled(pilot)
         await pilot.press("e", "enter", "y")
-        assert source.sent == [Start("cruise")]
+        assert source.sent == [StartExperiment("cruise")]
 
     play(script, FakeSource(coming=[]))
 

@@ -7,7 +7,7 @@ import re
 import pytest
 
 from hil.monitor.app import MonitorApp
-from hil.monitor.messages import Began, Choice, Kind, Mark, Notice, Ready
+from hil.monitor.messages import Began, Choice, LogTopic, Mark, Notice, Ready
 from hil.monitor.panel import printable
 from hil.monitor.state import LiveState
 from tests.chosen import campaign
@@ -63,5 +63,5 @@ def test_a_mark_is_sent_as_it_was_typed() -> None:
 
 def test_what_would_steer_the_terminal_is_a_dot() -> None:
     assert printable("a\x1b[2J\x07\tb ü ±") == "a·[2J··b ü ±"
-    assert "\x1b" not in shown(coming=(Notice(0, Kind.EMCY, "a\x1b[2Jb"),))
-    assert "a·[2Jb" in shown(coming=(Notice(0, Kind.EMCY, "a\x1b[2Jb"),))
+    assert "\x1b" not in shown(coming=(Notice(0, LogTopic.EMCY, "a\x1b[2Jb"),))
+    assert "a·[2Jb" in shown(coming=(Notice(0, LogTopic.EMCY, "a\x1b[2Jb"),))

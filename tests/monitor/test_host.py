@@ -17,8 +17,20 @@ from drivers.canopen.can_link import CanLink
 from drivers.canopen.emcy import EMCY_COB_ID, RPDO_TIMEOUT, Emergency
 from drivers.canopen.heartbeat import HEARTBEAT_COB_ID
 from hil.config.rig_file import read_rig
-from hil.monitor.host import Job, NodeWatch, SessionStop
-from hil.monitor.messages import Ended, Health, Kind, Lost, Notice, Over, Ready, Report, Reset, Samples, Start
+from hil.monitor.host import HostJob, NodeWatch, SessionStop
+from hil.monitor.messages import (
+    Ended,
+    Health,
+    LogTopic,
+    Lost,
+    Notice,
+    Over,
+    Ready,
+    Report,
+    Reset,
+    Samples,
+    StartExperiment,
+)
 from hil.monitor.opening import open_rig
 from hil.monitor.outbox import Outbox
 from hil.monitor.source import RigSource
@@ -37,7 +49,7 @@ OPERATIONAL = b"\x05"
 def hosted(rig_path: Path, out: Path) -> Iterator[tuple[RigSource, list[Report]]]:
     """Run the rig's process against a rig served here; reports gather in the list by `await_report`."""
     with served(read_rig(rig_path), bus_url="ws://127.0.0.1:0/") as (server, rig):
-        job = Job(rig_path, with_addresses(rig, server.bus_url, str(server.modbus)), out)
+        job = HostJob(rig_path, with_addresses(rig, server.bus_url, str(server.modbus)), out)
         with RigSource(job) as source:
             yield source, []
 
@@ -53,8 +65,8 @@ def await_report(source: RigSource, seen: list[Report], kind: type[Report]) -> R
     raise AssertionError(f"no {kind} in {[type(report).__name__ for report in seen]}")
 
 
-@pytest.mark.parametrize(("armed", "kinds"), [(True, [Kind.EMCY, Kind.EMCY]), (False, [Kind.INFO])])
-def test_a_drive_that_notices_the_end_of_the_commands_is_no_emergency(armed: bool, kinds: list[Kind]) -> None:
+@pytest.mark.parametrize(("armed", "kinds"), [(True, [LogTopic.EMCY, LogTopic.EMCY]), (False, [LogTopic.INFO])])
+def test_a_drive_that_notices_the_end_of_the_commands_is_no_emergency(armed: bool, kinds: list[LogTopic]) -> None:
     noticed: list[Notice] = []
     heard: dict[int, Any] = {}
     link: Any = SimpleNamespace(subscribe=heard.__setitem__)
@@ -100,7 +112,7 @@ def test_it_listens_tells_its_health_and_resets(rig_path: Path, tmp_path: Path) 
         seen.clear()
         source.send(Reset())
         assert await_report(source, seen, Ready) == Ready()
-        source.send(Start("no such experiment"))
+        source.send(StartExperiment("no such experiment"))
         over = await_report(source, seen, Over)
         assert isinstance(over, Over)
         assert "cruise, reversal, tip" in str(over.reason)
@@ -114,7 +126,7 @@ def test_a_store_that_can_not_be_used_costs_no_recording(rig_path: Path, tmp_pat
     (out / "hil_runs").write_bytes(b"no database" * 1000)
     with hosted(rig_path, out) as (source, seen):
         await_report(source, seen, Ready)
-        source.send(Start("cruise"))
+        source.send(StartExperiment("cruise"))
         until = time.monotonic() + PATIENCE_S
         while len(measured_samples(seen)) < 20:
             assert time.monotonic() < until
@@ -126,7 +138,7 @@ def test_a_store_that_can_not_be_used_costs_no_recording(rig_path: Path, tmp_pat
     assert over.recording is not None
     assert Path(over.recording).exists()
     assert over.run_id is None
-    assert any(isinstance(report, Notice) and report.kind is Kind.FAULT for report in seen)
+    assert any(isinstance(report, Notice) and report.kind is LogTopic.FAULT for report in seen)
 
 
 @pytest.mark.campaign
@@ -134,7 +146,7 @@ def test_a_bus_that_is_lost_is_named_as_a_person_knows_it(rig_path: Path, tmp_pa
     seen: list[Report] = []
     with ExitStack() as stack:
         with served(read_rig(rig_path), bus_url="ws://127.0.0.1:0/") as (server, rig):
-            job = Job(rig_path, with_addresses(rig, server.bus_url, str(server.modbus)), tmp_path)
+            job = HostJob(rig_path, with_addresses(rig, server.bus_url, str(server.modbus)), tmp_path)
             source = stack.enter_context(RigSource(job))
             await_report(source, seen, Samples)
         lost = await_report(source, seen, Lost)

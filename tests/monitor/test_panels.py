@@ -12,7 +12,7 @@ from drivers.plc.types import ClutchState, DriveMode, PlcStatus, PrbsSettings, P
 from estimator.identification.tracking.alarm import Alarm, Level, TrackingState
 from hil.monitor import bus_panels, model_panels, panel as head_panels, panel as log_panel, signal_panels
 from hil.monitor.app import MonitorApp
-from hil.monitor.messages import Began, Kind, NodeHealth, Notice, PlcHealth, Ready, Samples
+from hil.monitor.messages import Began, LogTopic, NodeHealth, Notice, PlcHealth, Ready, Samples
 from hil.monitor.panel import LEAST_WIDTH, Draw, LogPanel, drawn, log, log_lines
 from hil.monitor.plot import Canvas, Ring, envelope, nice_range
 from hil.monitor.snapshot import History, Model, Snapshot
@@ -33,7 +33,7 @@ DRAWN: tuple[Draw, ...] = (
     model_panels.damping,
     model_panels.figures,
     model_panels.alarms,
-    bus_panels.brief,
+    bus_panels.health_summary,
     bus_panels.full,
     head_panels.headline,
     head_panels.message,
@@ -76,7 +76,7 @@ def snapshot(m1: NodeHealth | None = None, plc: PlcHealth | None = None) -> Snap
     live.take(
         Samples(tuple((replace(row, channels=(1.5 * row.cycle, *[math.nan] * 4)), Phase.MEASURE) for row in rows))
     )
-    live.take(Notice(0, Kind.MARK, "a very long note " * 20))
+    live.take(Notice(0, LogTopic.MARK, "a very long note " * 20))
     live.take(health(m1, plc or PlcHealth(STATUS, 0.05, None)))
     shown = live.snapshot()
     pole = 0.93 * np.exp(2j * math.pi * 8.0 * 0.02)
@@ -184,7 +184,7 @@ def test_an_alarm_says_what_changed_and_on_what_evidence() -> None:
 )
 def test_what_is_wrong_is_said_in_words(m1: NodeHealth | None, plc: PlcHealth | None, words: str) -> None:
     shown = snapshot(m1, plc)
-    for draw in (bus_panels.brief, bus_panels.full):
+    for draw in (bus_panels.health_summary, bus_panels.full):
         text = "\n".join(draw(shown, 120, 30))
         assert words in text
         assert "TROUBLE" in text
@@ -255,7 +255,7 @@ LONG = " ".join(f"word{k}" for k in range(200))
 def state(*texts: str) -> LiveState:
     live = LiveState("bus", PERIOD_S, None, can_drive=True)
     for text in texts:
-        live.take(Notice(0, Kind.FAULT, text))
+        live.take(Notice(0, LogTopic.FAULT, text))
     return live
 
 
@@ -279,7 +279,7 @@ def shown_after(*keys: str, then: str = "") -> list[str]:
             await settled(pilot)
             await pilot.press(*keys)
             if then:
-                live.take(Notice(0, Kind.FAULT, then))
+                live.take(Notice(0, LogTopic.FAULT, then))
             await settled(pilot)
             lines.extend(app.query_one(LogPanel).render().plain.splitlines())
 

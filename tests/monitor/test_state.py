@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from estimator.physics.joint import Shaft
-from hil.monitor.messages import Began, Kind, Lost, Notice, Over, Ready, Samples
+from hil.monitor.messages import Began, LogTopic, Lost, Notice, Over, Ready, Samples
 from hil.monitor.snapshot import NO_VALUE, STANDS_STILL_S, Activity, Quality, QualityWatch
 from hil.monitor.state import LiveState
 from hil.rig.experiments.base import Phase
@@ -67,8 +67,8 @@ def test_a_lost_bus_is_reported_once_and_its_return_too() -> None:
     assert live.activity is Activity.LISTENING
 
 
-@pytest.mark.parametrize("kind", [kind for kind in Kind if kind is not Kind.INFO])
-def test_what_matters_stands_in_the_message_with_its_kind(kind: Kind) -> None:
+@pytest.mark.parametrize("kind", [kind for kind in LogTopic if kind is not LogTopic.INFO])
+def test_what_matters_stands_in_the_message_with_its_kind(kind: LogTopic) -> None:
     live = state()
     live.take(Notice(0, kind, "text"))
     assert live.snapshot().headline.message == f"{kind.value}: text"

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from estimator.physics.driveline import Case, Start
+from estimator.physics.driveline import Case, InitialCondition
 from estimator.physics.layout import flat, grid_for
 from estimator.physics.model import DrivelineModel
 from estimator.physics.simulate import simulate
@@ -52,7 +52,7 @@ def test_a_law_at_a_shaft_moves_it_as_the_line(around: Any, name: str, values: d
     torque = bench.random_steps(400, 3, 60.0, hold=20)
     record = bench.record(torque[:, None] / 2 @ np.ones((1, 2)))
     own = bench.model(bench.TWO_MASS, effects={name: values})
-    start = Start(0.0, 0.0, 2.0, load_speed_rad_s=2.0)
+    start = InitialCondition(0.0, 0.0, 2.0, load_speed_rad_s=2.0)
     fine = bench.record(np.repeat(record.torque_nm, FINER, axis=0), sample_time_s=record.sample_time_s / FINER)
     wanted = simulate(grid_for(own, [fine]), fine, flat(own), start)[::FINER]
     without = simulate(grid_for(own, [record]), record, flat(bench.model(bench.TWO_MASS)), start)

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from estimator.physics.driveline import Start
+from estimator.physics.driveline import InitialCondition
 from estimator.physics.layout import flat_values, grid_for
 from estimator.physics.model import DrivelineModel, Parameter, Structure
 from estimator.physics.simulate import simulate
 from estimator.signals.record import Record
 from hil.proof.truth.driveline import bring_to_speed
-from hil.proof.truth.physics import Physics, State
+from hil.proof.truth.physics import Physics, StateIndex
 
 NOMINAL = {"J_M": 1.7, "J_L": 95.0, "k": 4200.0, "c": 11.0, "b_M": 0.35, "b_L": 0.9}
 LOAD_NM = 50.0
@@ -61,12 +61,12 @@ def test_the_model_that_is_fitted_and_the_truth_agree(changes, effects, rms_rad_
     model = DrivelineModel(Structure.TWO_MASS, {name: Parameter(value, 0.2) for name, value in NOMINAL.items()})
     time_s = np.arange(torque.size) * 0.01
     record = Record("truth", 0.01, time_s, torque[:, None], speed, np.ones(torque.size, dtype=bool))
-    started = Start(
+    started = InitialCondition(
         load_torque_nm=LOAD_NM,
         angle_rad=0.0,
-        speed_rad_s=start[State.SPEED_M],
-        twist_rad=start[State.ANGLE_M] - start[State.ANGLE_L],
-        load_speed_rad_s=start[State.SPEED_L],
+        speed_rad_s=start[StateIndex.SPEED_M],
+        twist_rad=start[StateIndex.ANGLE_M] - start[StateIndex.ANGLE_L],
+        load_speed_rad_s=start[StateIndex.SPEED_L],
     )
     simulated = simulate(grid_for(model, [record]), record, flat_values(NOMINAL, effects), started)
     assert np.sqrt(np.mean((simulated - speed) ** 2)) < rms_rad_s

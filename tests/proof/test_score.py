@@ -5,7 +5,7 @@ import pytest
 from estimator.physics.catalogue import EFFECTS as CATALOGUE
 from hil.proof.judge import compare
 from hil.proof.kinds import kind
-from hil.proof.score import ALIKE, FAILED, Answer, iou, score
+from hil.proof.score import FAILED, LOOK_ALIKE, Answer, iou, score
 from hil.proof.truth.specimen import EFFECTS, draw_specimen
 
 
@@ -46,7 +46,7 @@ def _scored(name, answer, **events):
         ("backlash", _answer("explained", _entry("stiffness_nonlinearity")), "wrong", False),
         ("backlash", _answer("unexplained", element="shaft"), "abstained", False),
         ("backlash", _answer("no_mismatch"), "missed", False),
-        ("speed_filter", _answer("explained", _entry("actuator_lag", alike=["speed_filter"])), ALIKE, True),
+        ("speed_filter", _answer("explained", _entry("actuator_lag", alike=["speed_filter"])), LOOK_ALIKE, True),
         ("backlash+road_grade", _answer("explained", _entry("backlash")), "incomplete", False),
         ("backlash", _answer("explained", _entry("backlash"), _entry("road_grade", "load")), "false_claim", False),
         ("none", _answer("no_mismatch"), "right", True),

@@ -9,7 +9,7 @@ from typing import Any
 
 from hil.config.rig_file import Rig, read_rig
 from hil.rig.build import Devices, open_devices
-from hil.rig.drive import Progress, RunSummary
+from hil.rig.drive import CycleProgress, RunSummary
 from hil.rig.pacing import FREE_PATIENCE_S, FreePacer, Pacer, device_patience_s, period_ns
 from hil.rig.plan import plan_run
 from hil.rig.session import run_plan
@@ -99,7 +99,7 @@ def run(
     experiment: str = "cruise",
     pacer: Pacer | None = None,
     stop: StopRequest | None = None,
-    progress: Progress = lambda phase, time_s: None,
+    progress: CycleProgress = lambda phase, time_s: None,
 ) -> RunSummary:
     """Run an experiment into memory, as fast as the simulated rig answers."""
     plan = plan_run(rig, experiment)

@@ -9,7 +9,7 @@ from drivers.inverter.cia402 import PowerState
 from drivers.inverter.settings import Acceptance
 from drivers.plc.types import ClutchState
 from drivers.resources import data_file
-from hil.rig.check import Verdict, check_rig
+from hil.rig.check import DeviceVerdict, check_rig
 from hil.simulator.addresses import is_simulated_bus
 from hil.simulator.fault_table import rig_faults
 from hil.simulator.faults import InverterFaults, RigFaults
@@ -22,7 +22,7 @@ def test_rig_as_described_agrees_and_stays_as_it_is() -> None:
         findings = check_rig(rig)
         states = {power_state(server.bus_url, node_id) for node_id in (1, 2)}
     assert [finding.device for finding in findings] == ["can", "m1", "m2", "plc"]
-    assert {finding.verdict for finding in findings} == {Verdict.AGREES}
+    assert {finding.verdict for finding in findings} == {DeviceVerdict.AGREES}
     assert not any(finding.notes for finding in findings)
     assert states == {PowerState.SWITCH_ON_DISABLED}
 
@@ -36,7 +36,7 @@ def test_cob_ids_that_both_drives_would_use_are_named_before_anything_is_armed(t
         with pytest.raises(ConfigMismatch, match=r"COB-ID of its TPDO 0x1800 is 0x182, which m1 uses for its TPDO"):
             run_once(rig, Samples())
         assert_disarmed(server.bus_url, 1, 2)
-    assert m2.verdict is Verdict.DIFFERS
+    assert m2.verdict is DeviceVerdict.DIFFERS
     assert "0x182, which m1 uses" in str(m2.differences[-1])
 
 
@@ -44,7 +44,7 @@ def test_missing_bus_is_one_fault_and_the_plc_is_still_checked() -> None:
     with served() as (_, rig):
         findings = check_rig(changed(rig, {"can": {"url": "ws://127.0.0.1:9/"}}))
     verdicts = [finding.verdict for finding in findings]
-    assert verdicts == [Verdict.FAILED, Verdict.FAILED, Verdict.FAILED, Verdict.AGREES]
+    assert verdicts == [DeviceVerdict.FAILED, DeviceVerdict.FAILED, DeviceVerdict.FAILED, DeviceVerdict.AGREES]
     assert "ws://127.0.0.1:9/" in findings[0].notes[0]
     assert findings[1].notes == ("its bus is not there",)
 
@@ -53,7 +53,7 @@ def test_missing_bus_is_one_fault_and_the_plc_is_still_checked() -> None:
 def test_plc_that_answers_with_other_identifiers_is_reported_as_such(fault: str) -> None:
     with served(faults=rig_faults([f"plc.{fault}@0"], 0.01)) as (_, rig):
         plc = check_rig(rig)[-1]
-    assert plc.verdict is Verdict.FAILED
+    assert plc.verdict is DeviceVerdict.FAILED
     assert "expected an answer with transaction id 1, unit id 1, got transaction id" in plc.notes[0]
 
 
@@ -61,7 +61,7 @@ def test_vehicle_that_is_not_fit_is_a_note_not_a_fault() -> None:
     with served() as (server, rig):
         server.plc._clutch = ClutchState.CLOSED
         plc = check_rig(rig)[-1]
-    assert plc.verdict is Verdict.AGREES
+    assert plc.verdict is DeviceVerdict.AGREES
     assert plc.notes == ("clutch is closed, expected open",)
 
 
@@ -72,7 +72,7 @@ def test_both_drives_prove_it_and_are_disabled_after_it() -> None:
     with served(changed(small_rig(), QUICK)) as (server, rig):
         findings = check_rig(rig, prove_stop=True)
         assert_disarmed(server.bus_url, 1, 2)
-    assert {finding.verdict for finding in findings} == {Verdict.AGREES}
+    assert {finding.verdict for finding in findings} == {DeviceVerdict.AGREES}
 
 
 def test_a_drive_that_ignores_what_watches_its_host_fails_and_the_other_is_still_proved() -> None:
@@ -80,9 +80,9 @@ def test_a_drive_that_ignores_what_watches_its_host_fails_and_the_other_is_still
     with served(changed(small_rig(), QUICK), faults) as (server, rig):
         findings = {finding.device: finding for finding in check_rig(rig, prove_stop=True)}
         assert_disarmed(server.bus_url, 1, 2)
-    assert findings["m1"].verdict is Verdict.FAILED
+    assert findings["m1"].verdict is DeviceVerdict.FAILED
     assert "object 0x1016:01 reads 0" in findings["m1"].notes[0]
-    assert findings["m2"].verdict is Verdict.AGREES
+    assert findings["m2"].verdict is DeviceVerdict.AGREES
 
 
 FILLED_IN = ("A. Nyone", "a relay of its own")

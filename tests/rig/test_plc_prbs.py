@@ -11,7 +11,7 @@ from drivers.plc.register import Value
 from drivers.plc.types import PrbsSource
 from hil.config.rig_file import PrbsTarget, Rig
 from hil.errors import RunAborted
-from hil.rig.drive import Progress
+from hil.rig.drive import CycleProgress
 from hil.rig.experiments.base import Phase
 from hil.rig.plan import plan_run
 from hil.simulator.plc_device import PlcPrbs as Generator
@@ -37,7 +37,7 @@ def generator_of(server: RigServer) -> dict[str, Value]:
 OFF: dict[str, Value] = {"prbs_enable": False, "prbs_source": "host", "prbs_amplitude": 0.0, "prbs_torque": 0.0}
 
 
-def half_way(action: Callable[[], object]) -> Progress:
+def half_way(action: Callable[[], object]) -> CycleProgress:
     def show(phase: Phase, time_s: float) -> None:
         if phase is Phase.MEASURE and time_s == 0.5:
             action()

@@ -8,7 +8,7 @@ import pytest
 
 from drivers.errors import ConfigMismatch, ProtocolViolation
 from hil.config.rig_file import Rig, read_rig
-from hil.rig.check import Verdict, check_rig
+from hil.rig.check import DeviceVerdict, check_rig
 from hil.simulator.rig_server import RigServer
 from tests.rig.observer import assert_disarmed
 from tests.rig.serving import CHANGES, EXAMPLE, Samples, changed, run_once, served
@@ -54,7 +54,7 @@ def test_an_operator_drives(tmp_path: Path) -> None:
 def test_a_viewer_checks_and_can_t_drive(tmp_path: Path) -> None:
     with secure(tmp_path, "viewer") as (server, rig):
         (plc,) = (finding for finding in check_rig(rig) if finding.device == "plc")
-        assert plc.verdict is Verdict.AGREES
+        assert plc.verdict is DeviceVerdict.AGREES
         with pytest.raises(ProtocolViolation, match=r"writing .* exception 1 .* of role 'viewer'"):
             run_once(rig, Samples())
         assert_disarmed(server.bus_url, 1, 2)
@@ -63,7 +63,7 @@ def test_a_viewer_checks_and_can_t_drive(tmp_path: Path) -> None:
 def test_a_host_of_another_authority_is_not_connected(tmp_path: Path) -> None:
     with secure(tmp_path, "operator", signed_by="stranger") as (server, rig):
         (plc,) = (finding for finding in check_rig(rig) if finding.device == "plc")
-        assert plc.verdict is Verdict.FAILED
+        assert plc.verdict is DeviceVerdict.FAILED
         with pytest.raises(ConfigMismatch, match="does not accept this client's certificate"):
             run_once(rig, Samples())
         assert_disarmed(server.bus_url, 1, 2)

@@ -8,7 +8,7 @@ from drivers.errors import DeviceTimeout
 from drivers.plc.types import DriveMode
 from hil.errors import RunAborted
 from hil.rig.build import open_devices
-from hil.rig.drive import Progress
+from hil.rig.drive import CycleProgress
 from hil.rig.experiments.base import Phase
 from hil.rig.stop import StopRequest
 from hil.simulator.faults import InverterFaults, RigFaults
@@ -20,7 +20,7 @@ STEP_WITHIN = 250
 """A SYNC inside the measured part of the small rig's reversal, which is SYNC 200 to 300 or so."""
 
 
-def in_the_middle(action: Callable[[], None]) -> Progress:
+def in_the_middle(action: Callable[[], None]) -> CycleProgress:
     """Do something half a second into the measured part."""
 
     def show(phase: Phase, time_s: float) -> None:

@@ -12,12 +12,12 @@ from hil.rig.check import check_rig
 from hil.simulator.addresses import with_addresses
 from hil.simulator.fault_table import DEVICES, NOBODY, OVERCURRENT, known_faults, rig_faults
 from hil.simulator.faults import (
-    Answers,
     AtStep,
     BusFaults,
     DriveLimits,
     Frames,
     InverterFaults,
+    PlcAnswers,
     PlcFaults,
     RigFaults,
     WrongSpeed,
@@ -75,7 +75,7 @@ PERIOD_S = 0.01
         ("m2.speed_stuck@1", RigFaults(m2=InverterFaults(wrong_speed=WrongSpeed(stuck_from_step=100)))),
         ("m1.second_tpdo@1=2", RigFaults(m1=InverterFaults(second_tpdo=AtStep(100, 2)))),
         ("bus.swapped_nodes", RigFaults(bus=BusFaults(swapped_nodes=True))),
-        (" plc.hang@1e1 ", RigFaults(plc=PlcFaults(answers_at_s=frozenset({(10.0, Answers.NOT)})))),
+        (" plc.hang@1e1 ", RigFaults(plc=PlcFaults(answers_at_s=frozenset({(10.0, PlcAnswers.NOT)})))),
     ],
 )
 def test_each_fault_is_put_into_its_device(text: str, faults: RigFaults) -> None:

@@ -5,7 +5,7 @@ import pytest
 from drivers.plc.register import Value
 from drivers.plc.types import ClutchState, DriveMode
 from estimator.signals.prbs import Prbs
-from hil.simulator.faults import Answers, PlcFaults
+from hil.simulator.faults import PlcAnswers, PlcFaults
 from hil.simulator.plc_device import PlcDevice, PlcSetup
 
 RUNNING: dict[str, Value] = {
@@ -137,11 +137,15 @@ class TestPrbs:
 
 @pytest.mark.parametrize(
     "faults",
-    [{(0.5, Answers.NOT)}, {(0.2, Answers.WELL), (0.5, Answers.NOT)}, {(0.5, Answers.NOT), (0.9, Answers.HALF)}],
+    [
+        {(0.5, PlcAnswers.NOT)},
+        {(0.2, PlcAnswers.WELL), (0.5, PlcAnswers.NOT)},
+        {(0.5, PlcAnswers.NOT), (0.9, PlcAnswers.HALF)},
+    ],
 )
-def test_it_answers_well_until_a_fault_begins(faults: set[tuple[float, Answers]]) -> None:
+def test_it_answers_well_until_a_fault_begins(faults: set[tuple[float, PlcAnswers]]) -> None:
     device = PlcDevice(faults=PlcFaults(answers_at_s=frozenset(faults)))
     device.step(0.49)
-    assert device.answers is Answers.WELL
+    assert device.answers is PlcAnswers.WELL
     device.step(0.01)
-    assert device.answers is Answers.NOT
+    assert device.answers is PlcAnswers.NOT

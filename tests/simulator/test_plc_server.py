@@ -17,7 +17,7 @@ from drivers.plc.modbus_security import Credentials
 from drivers.plc.register import Access
 from drivers.plc.register_map import load_register_map
 from drivers.resources import data_file
-from hil.simulator.faults import Answers, PlcFaults
+from hil.simulator.faults import PlcAnswers, PlcFaults
 from hil.simulator.plc_device import PlcDevice
 from hil.simulator.plc_server import PlcSecurity, PlcServer
 
@@ -201,7 +201,7 @@ ONE = bytes.fromhex("0001 0000 0005 01 04 02 2024")
 DEVICE_FAILURE = bytes.fromhex("0001 0000 0003 01 84 04")
 
 
-def answer_of(answers: Answers, timeout_s: float) -> bytes:
+def answer_of(answers: PlcAnswers, timeout_s: float) -> bytes:
     device = PlcDevice(faults=PlcFaults(answers_at_s=frozenset({(0.0, answers)})))
     with PlcServer(device, MAP) as server:
         with socket.create_connection((server.host, server.port), timeout=timeout_s) as client:
@@ -212,19 +212,19 @@ def answer_of(answers: Answers, timeout_s: float) -> bytes:
 @pytest.mark.parametrize(
     ("answers", "answer"),
     [
-        (Answers.WELL, TWO),
-        (Answers.EXCEPTION, DEVICE_FAILURE),
-        (Answers.HALF, TWO[: len(TWO) // 2]),
-        (Answers.TOO_FEW, ONE),
-        (Answers.LATE, TWO),
-        (Answers.WRONG_UNIT, TWO[:6] + b"\x81" + TWO[7:]),
-        (Answers.WRONG_TRANSACTION, b"\x80" + TWO[1:]),
+        (PlcAnswers.WELL, TWO),
+        (PlcAnswers.EXCEPTION, DEVICE_FAILURE),
+        (PlcAnswers.HALF, TWO[: len(TWO) // 2]),
+        (PlcAnswers.TOO_FEW, ONE),
+        (PlcAnswers.LATE, TWO),
+        (PlcAnswers.WRONG_UNIT, TWO[:6] + b"\x81" + TWO[7:]),
+        (PlcAnswers.WRONG_TRANSACTION, b"\x80" + TWO[1:]),
     ],
 )
-def test_what_comes_back(answers: Answers, answer: bytes) -> None:
+def test_what_comes_back(answers: PlcAnswers, answer: bytes) -> None:
     assert answer_of(answers, timeout_s=10.0) == answer
 
 
 def test_a_reset_is_a_reset_and_no_end() -> None:
     with pytest.raises(ConnectionResetError):
-        answer_of(Answers.RESET, timeout_s=10.0)
+        answer_of(PlcAnswers.RESET, timeout_s=10.0)

@@ -9,7 +9,7 @@ import pytest
 
 from drivers.plc.register_map import load_register_map
 from drivers.resources import data_file
-from hil.simulator.faults import Answers, PlcFaults
+from hil.simulator.faults import PlcAnswers, PlcFaults
 from hil.simulator.plc_device import IDENTITY, PlcDevice, PlcSetup
 from hil.simulator.plc_server import PlcServer
 
@@ -115,13 +115,13 @@ def test_a_refused_write_shows_the_exception_and_changes_nothing(
 @pytest.mark.parametrize(
     ("answers", "shown"),
     [
-        (Answers.EXCEPTION, "Slave device or server failure"),
-        (Answers.HALF, "Connection timed out"),
-        (Answers.RESET, "Connection reset by peer"),
-        (Answers.TOO_FEW, "Invalid data"),
+        (PlcAnswers.EXCEPTION, "Slave device or server failure"),
+        (PlcAnswers.HALF, "Connection timed out"),
+        (PlcAnswers.RESET, "Connection reset by peer"),
+        (PlcAnswers.TOO_FEW, "Invalid data"),
     ],
 )
-def test_a_plc_that_fails_fails_for_it_too(answers: Answers, shown: str) -> None:
+def test_a_plc_that_fails_fails_for_it_too(answers: PlcAnswers, shown: str) -> None:
     device = PlcDevice(faults=PlcFaults(answers_at_s=frozenset({(0.0, answers)})))
     with PlcServer(device, MAP) as server:
         assert shown in mbpoll(server, INPUT, 0, "-c", "4", timeout_s=1.0)

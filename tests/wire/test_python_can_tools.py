@@ -28,7 +28,7 @@ from drivers.errors import BusDown
 from hil.config.rig_file import read_rig
 from hil.errors import UsageError
 from hil.rig.build import open_devices
-from hil.rig.check import Verdict, check_rig
+from hil.rig.check import DeviceVerdict, check_rig
 from hil.rig.trace import BusTrace
 from hil.simulator.addresses import Address, with_addresses
 from hil.simulator.can_bridge import CanBridge
@@ -221,7 +221,7 @@ def test_a_simulated_rig_is_driven_over_socketcan() -> None:
     with rig_server(f"socketcan:{INTERFACE}") as server:
         rig = with_addresses(read_rig(EXAMPLE), server.bus_url, str(server.modbus))
         findings = check_rig(rig)
-    assert [finding.verdict for finding in findings] == [Verdict.AGREES] * 4
+    assert [finding.verdict for finding in findings] == [DeviceVerdict.AGREES] * 4
 
 
 def rig_server(bus_url: str, faults: RigFaults | None = None) -> RigServer:

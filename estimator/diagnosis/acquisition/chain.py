@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from estimator.diagnosis.acquisition.finding import OUTPUT, Finding, flagged, no_cells
+from estimator.diagnosis.acquisition.finding import OUTPUT, AcquisitionFinding, flagged, no_cells
 from estimator.diagnosis.acquisition.jitter import hidden_jitter, mean_shift, stamp_offsets_s, stamped_jitter
 from estimator.diagnosis.acquisition.quantised import lost_samples, speed_quantisation
 from estimator.diagnosis.acquisition.stale import fill, repeated, stale_samples
@@ -23,12 +23,12 @@ UNREAD = frozenset({"stale_samples", "lost_samples"})
 """Findings whose readings are not what was measured in that row."""
 
 
-def compensate(records: Sequence[Record], findings: Sequence[Finding]) -> tuple[Record, ...]:
+def compensate(records: Sequence[Record], findings: Sequence[AcquisitionFinding]) -> tuple[Record, ...]:
     """Return the records as they would be without what was found."""
     return tuple(_compensated(record, findings) for record in records)
 
 
-def _compensated(record: Record, findings: Sequence[Finding]) -> Record:
+def _compensated(record: Record, findings: Sequence[AcquisitionFinding]) -> Record:
     unread = no_cells(record)
     for finding in findings:
         if finding.name in UNREAD:
@@ -40,7 +40,7 @@ def _compensated(record: Record, findings: Sequence[Finding]) -> Record:
     return record
 
 
-def blanked(record: Record, finding: Finding | None) -> Record:
+def blanked(record: Record, finding: AcquisitionFinding | None) -> Record:
     """Return a record in which the readings a finding touches were not read, for what is looked for next."""
     if finding is None:
         return record
@@ -89,7 +89,7 @@ AMONG_READ = (stale_samples, speed_quantisation, stamped_jitter)
 """What is looked for among the readings that were not lost."""
 
 
-def recognise(records: Sequence[Record]) -> tuple[Finding, ...]:
+def recognise(records: Sequence[Record]) -> tuple[AcquisitionFinding, ...]:
     """Return what is recognised in a set of recordings of one acquisition chain; none in healthy ones."""
     lost = lost_samples(records)
     read = [blanked(record, lost) for record in records]
@@ -97,7 +97,7 @@ def recognise(records: Sequence[Record]) -> tuple[Finding, ...]:
     return tuple(finding for finding in found if finding is not None)
 
 
-def as_if_not_lost(records: Sequence[Record]) -> tuple[Record, ...]:
+def without_lost_samples(records: Sequence[Record]) -> tuple[Record, ...]:
     """Return records without the readings that were lost: zeros without a flag are neither noise nor motion."""
     lost = lost_samples(records)
     return tuple(records) if lost is None else compensate(records, [lost])
@@ -109,7 +109,7 @@ class Chain:
 
     raw: tuple[Record, ...]  # as read
     records: tuple[Record, ...]  # with the faults compensated, and without what jitter adds in the mean, for fits
-    findings: tuple[Finding, ...]  # what was recognised
+    findings: tuple[AcquisitionFinding, ...]  # what was recognised
     shifts: tuple[FloatArray, ...] = ()  # (N,)
 
     @property
@@ -147,13 +147,13 @@ class Chain:
         return [(each - record.output)[good] for each, record, good in zip(shifted, self.raw, rows, strict=True)]
 
 
-def read_through(records: Sequence[Record]) -> Chain:
+def with_faults_compensated(records: Sequence[Record]) -> Chain:
     """Recognise the faults of a set of recordings and compensate them."""
     findings = recognise(records) if records else ()
     return Chain(tuple(records), compensate(records, findings), findings)
 
 
-def _read_rows(record: Record, findings: Iterable[Finding]) -> BoolArray:
+def _read_rows(record: Record, findings: Iterable[AcquisitionFinding]) -> BoolArray:
     rows = record.okay
     for finding in findings:
         if finding.name == "lost_samples":
@@ -161,7 +161,7 @@ def _read_rows(record: Record, findings: Iterable[Finding]) -> BoolArray:
     return rows
 
 
-def mechanical(model: DrivelineModel) -> DrivelineModel:
+def without_acquisition_effects(model: DrivelineModel) -> DrivelineModel:
     return replace(model, effects={name: v for name, v in model.effects.items() if not EFFECTS[name].recognised})
 
 
@@ -188,5 +188,5 @@ def _replay(model: DrivelineModel, record: Record, known: Own) -> tuple[FreeRun,
     if not acquired:
         return free_run(model, record, known), record.okay
     found = tuple(finding for finding in recognise([record]) if finding.name in acquired)
-    run = free_run(mechanical(model), compensate([record], found)[0], known)
+    run = free_run(without_acquisition_effects(model), compensate([record], found)[0], known)
     return replace(run, output=as_read(run.output, record, acquired)), _read_rows(record, found)

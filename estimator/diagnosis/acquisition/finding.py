@@ -72,7 +72,7 @@ class Sized(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class Finding:
+class AcquisitionFinding:
     """One effect of the acquisition or of the sensor's resolution."""
 
     name: str  # as in the catalogue

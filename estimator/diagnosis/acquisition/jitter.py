@@ -12,7 +12,7 @@ from scipy import optimize, stats
 from estimator.diagnosis.acquisition.finding import (
     LEVEL,
     OUTPUT,
-    Finding,
+    AcquisitionFinding,
     Sized,
     no_cells,
     predict,
@@ -36,7 +36,7 @@ def stamp_offsets_s(record: Record) -> FloatArray:
     return offset if float(np.std(offset)) > smallest else np.zeros_like(offset)
 
 
-def stamped_jitter(records: Sequence[Record]) -> Finding | None:
+def stamped_jitter(records: Sequence[Record]) -> AcquisitionFinding | None:
     """Recognise jitter that stamps tell and the output confirms; None otherwise."""
     offsets = {record.name: stamp_offsets_s(record) for record in records}
     stamped = [record for record in records if offsets[record.name].any()]
@@ -53,7 +53,7 @@ def stamped_jitter(records: Sequence[Record]) -> Finding | None:
     cells = {record.name: no_cells(record) for record in records}
     for record in stamped:
         cells[record.name][:, OUTPUT] = True
-    return Finding(
+    return AcquisitionFinding(
         name="sample_jitter",
         parameters={"jitter_s": Sized(jitter_s, (low, high), "s")},
         cells=cells,
@@ -120,7 +120,7 @@ class _Rest:
 
 def hidden_jitter(
     records: Sequence[Record], errors: Sequence[FloatArray], slopes: Sequence[FloatArray], okay: Sequence[BoolArray]
-) -> Finding | None:
+) -> AcquisitionFinding | None:
     """Recognise jitter in the errors of a simulation that explains everything else."""
     rest = _rests(errors, slopes, okay)
     within = _rests(errors, slopes, okay, BLOCK)
@@ -136,7 +136,7 @@ def hidden_jitter(
     if found.jitter_s**2 * np.mean(rest.steepness**2) < MOST_OF_IT * (np.mean(whole**2) - found.noise**2):
         return None
     jitter_s, ci95 = found.jitter_s, found.ci95
-    return Finding(
+    return AcquisitionFinding(
         name="sample_jitter",
         parameters={"jitter_s": Sized(jitter_s, ci95, "s")},
         cells=_outputs(records, okay),

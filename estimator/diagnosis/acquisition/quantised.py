@@ -13,7 +13,7 @@ from estimator.diagnosis.acquisition.finding import (
     LEVEL,
     OUTPUT,
     SMALLEST_SHARE,
-    Finding,
+    AcquisitionFinding,
     Sized,
     all_of,
     any_of,
@@ -136,7 +136,7 @@ ABOVE_LUMPS = 3.0  # R of the readings must be this many times that of their mov
 MOST_BINS = 2**22  # bins of a spectrum of levels: a finer noise in a wider range shows no lattice that matters
 
 
-def speed_quantisation(records: Sequence[Record]) -> Finding | None:
+def speed_quantisation(records: Sequence[Record]) -> AcquisitionFinding | None:
     """Recognise a speed lattice that is not small against the noise; None where there is none."""
     records = [record for record in records if record.kind is OutputKind.SPEED]
     noise = [_one_step_error(record) for record in records]
@@ -153,7 +153,7 @@ def speed_quantisation(records: Sequence[Record]) -> Finding | None:
     for record in records:
         cells[record.name] = no_cells(record)
         cells[record.name][:, OUTPUT] = np.isfinite(record.output)
-    return Finding(
+    return AcquisitionFinding(
         name="speed_quantisation",
         parameters={"step_rad_s": Sized(step.value, step.ci95, "rad/s")},
         cells=cells,
@@ -366,7 +366,7 @@ def _visits(series: Sequence[FloatArray], near: float) -> int:
 LONGEST_BURST = 50  # more missing rows than this in a row are a gap
 
 
-def lost_samples(records: Sequence[Record]) -> Finding | None:
+def lost_samples(records: Sequence[Record]) -> AcquisitionFinding | None:
     """Recognise lost readings; None where they are too few to matter."""
     zeros, p_value = lost_zeros(records)
     missing = [_missing(record) for record in records]
@@ -382,7 +382,7 @@ def lost_samples(records: Sequence[Record]) -> Finding | None:
         if silent and not any(lost.any() for lost in missing)
         else "missing or flagged"
     )
-    return Finding(
+    return AcquisitionFinding(
         name="lost_samples",
         parameters={"share": Sized(share, share_interval(count, total, mean_run(rows)), "")},
         cells={record.name: lost for record, lost in zip(records, cells, strict=True)},

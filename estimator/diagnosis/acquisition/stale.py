@@ -13,7 +13,7 @@ from estimator.diagnosis.acquisition.finding import (
     LEVEL,
     OUTPUT,
     SMALLEST_SHARE,
-    Finding,
+    AcquisitionFinding,
     Sized,
     all_of,
     channels,
@@ -321,7 +321,7 @@ Size = tuple[float, tuple[float, float], float]
 """Share of stale samples, its 95 % interval, and the probability of as many by chance."""
 
 
-def stale_samples(records: Sequence[Record]) -> Finding | None:
+def stale_samples(records: Sequence[Record]) -> AcquisitionFinding | None:
     """Recognise readings that repeat the one before, in any channel; None where chance explains the repeats."""
     cells = {record.name: no_cells(record) for record in records}
     sizes: dict[str, Size] = {}
@@ -332,7 +332,7 @@ def stale_samples(records: Sequence[Record]) -> Finding | None:
     if not sizes:
         return None
     value, ci95, _ = max(sizes.values())
-    return Finding(
+    return AcquisitionFinding(
         name="stale_samples",
         parameters={"share": Sized(value, ci95, "")},
         cells=cells,

@@ -1,6 +1,7 @@
 """The answer: from recordings that are fit for a diagnosis to what is said of them.
 
-acquire (`read_through`), search (`searched`), decide (`decide`), say (`said`): one record each, and nothing goes back.
+acquire (`with_faults_compensated`), search (`searched`), decide (`decide`), say (`said`): one record each, and nothing
+goes back.
 """
 
 from __future__ import annotations
@@ -10,11 +11,11 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
-from estimator.diagnosis.acquisition.chain import Chain, mechanical, read_through
+from estimator.diagnosis.acquisition.chain import Chain, with_faults_compensated, without_acquisition_effects
 from estimator.diagnosis.inference.decide import Decision, decide
 from estimator.diagnosis.inference.figures import Unseen, on_recordings
 from estimator.diagnosis.inference.free_forms import free_form
-from estimator.diagnosis.inference.hypotheses import Progress, everything, open_hypotheses, silent
+from estimator.diagnosis.inference.hypotheses import Progress, all_good_samples, open_hypotheses, silent
 from estimator.diagnosis.inference.rivals import laws_around
 from estimator.diagnosis.inference.say import Basis, said, undecided
 from estimator.diagnosis.inference.search import Search
@@ -31,7 +32,7 @@ LEVELS: Mapping[str, int] = {"quick": 3_000, "normal": 10_000, "thorough": 100_0
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
+class SearchResult:
     """What a search found, the recordings as they were read for it, and what was decided."""
 
     chain: Chain
@@ -52,7 +53,7 @@ def searched(
     def search_of(of: Chain) -> Search:
         fitted_to = separated_outputs(as_slow_as_needed(of.records, line), noise_floor)
         names = open_hypotheses(line, of.records)[0]
-        search = Search(line, fitted_to, everything(fitted_to), names, work=work or Work(), most=most)
+        search = Search(line, fitted_to, all_good_samples(fitted_to), names, work=work or Work(), most=most)
         search.progress = progress
         watch(search)
         search.run()
@@ -72,21 +73,21 @@ def answer(
     progress: Progress,
     level: str,
     work: Work,
-    keep: Callable[[Found], None] = lambda _found: None,
+    keep: Callable[[SearchResult], None] = lambda _found: None,
 ) -> Diagnosis:
     """Return the diagnosis of recordings that are fit for one; undecided where the limit of time ends it.
 
     ``keep`` is given what was found and decided, for those who continue with it.
     """
     began = time.perf_counter()
-    line, chain = mechanical(model), read_through(ready.records)
+    line, chain = without_acquisition_effects(model), with_faults_compensated(ready.records)
     started: list[Search] = []
     with counted(work):
         try:
             read, search = searched(chain, line, work, LEVELS[level], started.append, progress)
             progress("weighing what was found", 0.8)
-            decision = decide(search, read, Unseen(line, read_through(ready.holdout)), free_form)
-            keep(Found(read, search, decision))
+            decision = decide(search, read, Unseen(line, with_faults_compensated(ready.holdout)), free_form)
+            keep(SearchResult(read, search, decision))
             progress("simulating what was found", 0.9)
             laws = laws_around(decision.judged)
             basis = Basis(decision, laws, search, model, _effort(search, level, decision), _warnings(search, level))

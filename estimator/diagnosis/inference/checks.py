@@ -150,7 +150,7 @@ BINS = 12  # bins of torque and of speed, of equal count
 COLUMNS = {"most_predictable": PREDICTOR_ORDER, "most_dependent": 2 * BINS + 3}
 """How many signals a share of the innovations is sought in: past samples; bins, waves in the angle, and a mean."""
 
-FEWEST = 50
+MIN_SAMPLES = 50
 
 CHANCE = 4.0  # standard deviations of what noise shows by chance that a share may be beyond its limit
 FEWEST_PERIODS = 5  # times that a wave repeats in a recording to be a line: what is slower is drift
@@ -253,7 +253,7 @@ def _change(errors: Sequence[FloatArray], records: Sequence[Record], power: floa
     """Return the largest mean square over a second, or 50 samples, less the mean of all, in standard deviations."""
     found = 0.0
     for error, record in zip(errors, records, strict=True):
-        length = max(1, min(max(round(CHANGE_S / record.sample_time_s), FEWEST), error.size))
+        length = max(1, min(max(round(CHANGE_S / record.sample_time_s), MIN_SAMPLES), error.size))
         squares = (error[: error.size // length * length] ** 2).reshape(-1, length).mean(axis=1)
         found = max(found, (float(squares.max()) / power - 1.0) * math.sqrt(0.5 * length))
     return found

@@ -25,7 +25,7 @@ import numpy as np
 from estimator.diagnosis.acquisition.chain import Chain
 from estimator.diagnosis.inference.checks import Test, is_possible, tests
 from estimator.diagnosis.inference.figures import FreeRuns, Unseen, acquired, figures_of, free_runs
-from estimator.diagnosis.inference.hypotheses import SAME, Effects, Hypothesis, fitted
+from estimator.diagnosis.inference.hypotheses import SETTLED_DEVIANCE, Effects, Hypothesis, fitted
 from estimator.diagnosis.inference.search import Search
 from estimator.diagnosis.inference.sheet import free_line
 from estimator.diagnosis.inference.standing import (
@@ -246,7 +246,7 @@ def _from_its_moment(search: Search, hypothesis: Hypothesis) -> Hypothesis:
     initial = not_fitted(turned.problem, turned.x)
     sizes, limits, before = hypothesis.sizes, hypothesis.limits, hypothesis.minus_twice_log
     found = fitted(hypothesis.effects, initial, sizes, limits, search.catalogue, before)
-    return found if found.score <= hypothesis.score + SAME else hypothesis
+    return found if found.score <= hypothesis.score + SETTLED_DEVIANCE else hypothesis
 
 
 def _standing(name: str, search: Search, trials: Trials, whole: Trial, noise: float, rival: Rival) -> Standing:

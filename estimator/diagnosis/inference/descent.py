@@ -23,7 +23,7 @@ from estimator.signals.record import FloatArray
 Weigh = Callable[[FloatArray], FloatArray]
 
 LITTLE = 0.2  # fall of the squared innovations, of variance 1, that changes no conclusion
-KEPT = 0.5  # share of a step's promise that it must keep for the derivative to be carried on
+LEAST_SHARE_OF_PROMISE = 0.5  # share of a step's promise that it must keep for the derivative to be carried on
 
 NEAR = 10.0
 """Fall of the squared innovations over a step behind which a derivative that was found anew still holds."""
@@ -65,9 +65,9 @@ def extended(problem: Problem, x: FloatArray, previous: FitResult, anew: str = "
     return replace(initial, derivative=derivative)
 
 
-def light(fit: FitResult) -> FitResult:
+def without_derivative(fit: FitResult) -> FitResult:
     """Return a fit that is over, without a derivative that takes much room."""
-    return fit if fit.derivative is None or fit.derivative.nbytes <= MUCH_BYTES else fit.light()
+    return fit if fit.derivative is None or fit.derivative.nbytes <= MUCH_BYTES else fit.without_derivative()
 
 
 def descended(initial: FitResult, weigh: Weigh, effort: Effort) -> FitResult:
@@ -111,8 +111,8 @@ class _Descent:
             gained = self._try(moved)
             if gained > 0.0:
                 self._damping = max(self._damping * EASE, LEAST_DAMPING)
-                self._fresh = self._fresh and KEPT * promise <= gained < NEAR
-                return gained >= KEPT * promise or self._left == 0 or self._find_derivative()
+                self._fresh = self._fresh and LEAST_SHARE_OF_PROMISE * promise <= gained < NEAR
+                return gained >= LEAST_SHARE_OF_PROMISE * promise or self._left == 0 or self._find_derivative()
             if not self._fresh:
                 return self._find_derivative()
             self._damping *= STIFFEN

@@ -24,7 +24,7 @@ from estimator.signals.record import BoolArray, FloatArray, Location, OutputKind
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class LinearLine:
     """The linear line as disturbances see it, sampled."""
 
     f: FloatArray
@@ -35,7 +35,7 @@ class Line:
     shaft: FloatArray = field(default_factory=lambda: np.zeros(0))  # (n,)
 
 
-def line_of(result: FitResult) -> Line:
+def line_of(result: FitResult) -> LinearLine:
     """Return the linear line with a fit's values, as the recordings' outputs show it.
 
     Effects beyond it do not change how disturbances spread.
@@ -44,7 +44,7 @@ def line_of(result: FitResult) -> Line:
     outputs = [records[part.start] for part in by_output(records)]
     if structure is Structure.JOINT:
         nothing = np.zeros(0)
-        return Line(np.zeros((0, 0)), nothing, nothing, np.zeros((len(outputs), 0)), 1.0)
+        return LinearLine(np.zeros((0, 0)), nothing, nothing, np.zeros((len(outputs), 0)), 1.0)
     values = {name: float(result.p[slot("", name)]) for name in structure.parameter_names}
     a, at_motor, at_load = _continuous(values)
     n = a.shape[0]
@@ -53,7 +53,9 @@ def line_of(result: FitResult) -> Line:
     joined[:n, :n], joined[:n, n], joined[:n, n + 1], joined[:n, n + 2] = a, at_motor, at_load, _in_shaft(values)
     moved = expm(joined * outputs[0].sample_time_s)
     keep = list(range(n if h[:, -1].any() else n - 1))  # the angle stands last
-    return Line(moved[np.ix_(keep, keep)], moved[keep, n], moved[keep, n + 1], h[:, keep], 0.0, moved[keep, n + 2])
+    return LinearLine(
+        moved[np.ix_(keep, keep)], moved[keep, n], moved[keep, n + 1], h[:, keep], 0.0, moved[keep, n + 2]
+    )
 
 
 def _seen(record: Record, a: FloatArray, values: Mapping[str, float]) -> FloatArray:
@@ -190,7 +192,7 @@ def changes_of(result: FitResult) -> tuple[FloatArray, ...]:
 
 
 def whitener(
-    line: Line,
+    line: LinearLine,
     period_s: float,
     use: Sequence[BoolArray],
     unread: Sequence[FloatArray],

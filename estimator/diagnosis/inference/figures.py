@@ -27,8 +27,8 @@ from estimator.diagnosis.inference.hypotheses import (
     THOROUGH,
     Effects,
     Hypothesis,
+    all_good_samples,
     covariance,
-    everything,
     refitted,
 )
 from estimator.diagnosis.inference.standing import LEAST_SHARE, Standing
@@ -76,7 +76,7 @@ def on_recordings(
     if is_whole:
         return own_alone
     rms = own_alone.rms
-    return descended(own_alone, lambda errors: errors / rms, THOROUGH).light()
+    return descended(own_alone, lambda errors: errors / rms, THOROUGH).without_derivative()
 
 
 def _with_own(problem: Problem, x: FloatArray) -> FitResult:
@@ -241,7 +241,7 @@ def _least(retuned: FitResult, line: DrivelineModel) -> FitResult:
     if nominal.squares >= retuned.squares:
         return retuned
     initial = not_fitted(problem, nominal.x)
-    return descended(initial, lambda errors: errors / initial.rms, THOROUGH).light()
+    return descended(initial, lambda errors: errors / initial.rms, THOROUGH).without_derivative()
 
 
 def _held_at_start(unknown: Shared) -> Shared:
@@ -320,7 +320,7 @@ def courses_of(runs: FreeRuns) -> tuple[Trace, ...]:
     outputs = (nominal(runs.chain.records), runs.retuned.outputs, runs.final.outputs)
     traces = [_trace(record, each, False) for record, *each in zip(runs.chain.raw, *outputs, strict=True)]
     if kept_out:
-        use = everything(kept_out)
+        use = all_good_samples(kept_out)
         outputs = (
             nominal(kept_out),
             foreign_outputs(runs.retuned, line, kept_out, use, NOTHING),

@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from estimator.diagnosis.black_box import acts_around
-from estimator.diagnosis.inference.descent import Effort, descended, extended, light
+from estimator.diagnosis.inference.descent import Effort, descended, extended, without_derivative
 from estimator.diagnosis.inference.disturbances import (
     Limits,
     Whitener,
@@ -76,12 +76,12 @@ def open_hypotheses(model: DrivelineModel, records: Sequence[Record]) -> tuple[t
     return tuple(testable), untestable
 
 
-def everything(records: Sequence[Record]) -> list[BoolArray]:
+def all_good_samples(records: Sequence[Record]) -> list[BoolArray]:
     """Return masks that use every good sample."""
     return [np.asarray(record.okay) for record in records]
 
 
-def kept(previous: FitResult, effects: Collection[str]) -> Release:
+def unknowns_of(previous: FitResult, effects: Collection[str]) -> Release:
     """Return the unknowns of a fit that belong to the line itself or to some effects."""
     wanted = {"", *effects}
     return Release(
@@ -124,7 +124,7 @@ def line_values(result: FitResult) -> dict[str, float]:
     return {name: float(result.p[slot("", name)]) for name in result.problem.grid.structure.parameter_names}
 
 
-def placed(result: FitResult, line: Mapping[str, float]) -> FitResult:
+def with_line_values(result: FitResult, line: Mapping[str, float]) -> FitResult:
     """Return a fit with some of the line's own parameters elsewhere, within what they are trusted to."""
     x = result.x.copy()
     for i, shared in enumerate(result.problem.shared):
@@ -142,7 +142,7 @@ WORTH_MOVING = 2.0  # fall of the squared innovations that moments elsewhere mus
 MOVES = 4
 
 
-def moved(result: FitResult, filtered: Whitener) -> tuple[Problem, FloatArray] | None:
+def with_better_moments(result: FitResult, filtered: Whitener) -> tuple[Problem, FloatArray] | None:
     """Return a problem and its unknowns with moments where the innovations are less; None where they are nowhere.
 
     A fit may move them from there as far as it could before.
@@ -225,7 +225,7 @@ def _squares(
     return (errors**2).sum(axis=1) - ((errors @ taken_up) ** 2).sum(axis=1)
 
 
-SAME = 1.0
+SETTLED_DEVIANCE = 1.0
 """Fall of minus twice the log-likelihood below which another pass over unknowns and disturbances is not made."""
 
 DIGITS = 0.02  # the same over the difference from a rival that the fit is for
@@ -327,14 +327,14 @@ def fitted(
             result = _with_moments(result, sizes)
         is_anew = not passes and math.isnan(rival)  # with a rival they begin where its own ended
         sizes, now = estimated(result, result.residual, sizes, limits, ROUNDS, is_anew)
-        enough = SAME if math.isnan(rival) else max(SAME, DIGITS * abs(now - rival))
+        enough = SETTLED_DEVIANCE if math.isnan(rival) else max(SETTLED_DEVIANCE, DIGITS * abs(now - rival))
         last = best is not None and now > best.minus_twice_log - enough
         if best is None or now < best.minus_twice_log:
             best = Hypothesis(effects, result, sizes, limits, now, choices)
         if last:
             break
         passes.append(now)
-    return replace(best, result=light(best.result))
+    return replace(best, result=without_derivative(best.result))
 
 
 def compared(
@@ -379,7 +379,7 @@ def _with_moments(result: FitResult, sizes: FloatArray) -> FitResult:
     if not _has_moments(result.problem):
         return result
     for _ in range(2):
-        found = moved(result, whitener_of(result, sizes))
+        found = with_better_moments(result, whitener_of(result, sizes))
         if found is None:
             break
         result = descended(extended(*found, result), whitener_of(result, sizes), THOROUGH)

@@ -258,7 +258,7 @@ class Screen:
         scans = [scanned(*self._projector.products(grid.answers, i), entry.lasting) for i, grid in enumerate(grids)]
         tried = [value for value in SIZES * size.scale * abs(size.start) if self._may_be(size, value)]
         tried += [-value for value in tried if self._may_be(size, -value)]
-        best = max(tried, key=lambda value: sum(each.best(value).taken for each in scans))
+        best = max(tried, key=lambda value: sum(each.best(value).error_reduction for each in scans))
         for _ in range(ROUNDS):
             stretches = [each.best(best) for each in scans]
             power = sum(stretch.power for stretch in stretches)
@@ -375,7 +375,7 @@ ROOM_BYTES = 2**27  # room that answers may take
 
 
 @dataclass
-class Answers:
+class OutputChanges:
     """Changes of the output, by what was changed, around some motions."""
 
     around: list[tuple[FitResult, list[dict[bytes, FloatArray]]]] = field(default_factory=list)
@@ -423,10 +423,10 @@ class _Weighted(Projector):
         return super().promise(white, low, high) if np.isfinite(white @ white) else (0.0, 0.0)
 
 
-class Remembering(Screen):
+class CachedScoreTests(Screen):
     """Looks at effects around a hypothesis with answers found around others where these will do."""
 
-    def __init__(self, hypothesis: Hypothesis, model: DrivelineModel, answers: Answers) -> None:
+    def __init__(self, hypothesis: Hypothesis, model: DrivelineModel, answers: OutputChanges) -> None:
         super().__init__(hypothesis.white, model, _Weighted(hypothesis))
         self._known = answers.near(hypothesis.result)
         self.found: list[dict[bytes, FloatArray]] = [{} for _ in self._known]

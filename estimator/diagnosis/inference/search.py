@@ -25,14 +25,14 @@ from estimator.diagnosis.inference.hypotheses import (
     fitted,
     forgetting,
     inheriting,
-    kept,
     line_values,
     open_hypotheses,
-    placed,
     silent,
+    unknowns_of,
     with_effect,
+    with_line_values,
 )
-from estimator.diagnosis.inference.score_tests import Answers, Remembering, ScoredStart, promising
+from estimator.diagnosis.inference.score_tests import CachedScoreTests, OutputChanges, ScoredStart, promising
 from estimator.diagnosis.inference.standing import LEAST_NECESSITY
 from estimator.diagnosis.inference.trials import Trials, necessity, noise_of
 from estimator.physics.catalogue import EFFECTS
@@ -99,7 +99,7 @@ class Search:
     most: float = math.inf
     progress: Progress = silent
     stopped: bool = False
-    answers: Answers = field(default_factory=Answers)
+    answers: OutputChanges = field(default_factory=OutputChanges)
     _lessened: set[tuple[Effects, str]] = field(default_factory=set)
     _restarted: defaultdict[Effects, set[str]] = field(default_factory=lambda: defaultdict(set))
     _moments: dict[tuple[Effects, str], list[Moments]] = field(default_factory=dict)
@@ -229,7 +229,7 @@ class Search:
         for other in EFFECTS[name].reparametrised(
             self.model, self.records, result.values_of(name), line_values(result)
         ):
-            initial = placed(forgetting(result, name), other.line)
+            initial = with_line_values(forgetting(result, name), other.line)
             (release,) = released(name, self.model, self.records, [other.start])
             alone = replace(release, own=((),) * len(self.records))
             problem = self._extended(initial, current.effects, alone)
@@ -240,7 +240,7 @@ class Search:
     def _elsewhere(self, current: Hypothesis, name: str) -> Hypothesis | None:
         """Fit an event where a look at the same hypothesis without it, the rest as it is, sees it."""
         result, effects = current.result, current.effects - {name}
-        problem = self._problem(effects, kept(result, (effects - {GRADE}) | set(self.model.effects)))
+        problem = self._problem(effects, unknowns_of(result, (effects - {GRADE}) | set(self.model.effects)))
         without = extended(problem, warm_start(problem, forgetting(result, name)), result)
         reduced = replace(current, effects=effects, result=replace(without, converged=without.derivative is not None))
         return self._added(reduced, name, self._score(reduced, name), current)
@@ -270,22 +270,22 @@ class Search:
         return min(better, key=lambda each: each.score, default=None)
 
     def _score(self, reduced: Hypothesis, name: str) -> list[ScoredStart]:
-        view = Remembering(reduced, self.model, self.answers)
+        view = CachedScoreTests(reduced, self.model, self.answers)
         starts = promising(view.starts(name))
         self._learn(reduced, view)
         return starts
 
-    def _learn(self, around: Hypothesis, view: Remembering) -> None:
+    def _learn(self, around: Hypothesis, view: CachedScoreTests) -> None:
         self.answers.learn(around.result, view.found)
 
     def _scores(
         self, current: Hypothesis, names: Sequence[str], rival: str = ""
-    ) -> tuple[dict[str, list[ScoredStart]], Remembering]:
+    ) -> tuple[dict[str, list[ScoredStart]], CachedScoreTests]:
         """Return the starts of the effects that are worth a fit, the most promising effect first.
 
         With a ``rival`` those are worth it that promise nearly as much.
         """
-        view = Remembering(current, self.model, self.answers)
+        view = CachedScoreTests(current, self.model, self.answers)
         contained = {special for have in current.effects for special in EFFECTS[have].contains}
         tried = [name for name in names if name != GRADE and name not in contained]
         starts = dict(zip(tried, concurrently(view.starts, tried), strict=True))
@@ -312,7 +312,7 @@ class Search:
         names: Sequence[str],
         starts: Mapping[str, Sequence[ScoredStart]],
         instead: str,
-        view: Remembering,
+        view: CachedScoreTests,
     ) -> dict[str, list[ScoredStart]]:
         """Return the starts of the events among some effects at moments that are known, next to those of their own.
 
@@ -418,7 +418,7 @@ class Search:
             self._lessened.add(place)
             result = current.result
             if name != GRADE:
-                release = kept(result, (effects - {GRADE}) | set(self.model.effects))
+                release = unknowns_of(result, (effects - {GRADE}) | set(self.model.effects))
                 problem = self._problem(effects, release)
                 result = extended(problem, warm_start(problem, forgetting(result, name)), result)
             limits = self._limits_of(effects)
@@ -461,7 +461,7 @@ class Search:
             self._learn(reduced, view)
         return self._better([each for each, _, _ in nearest if each is not None], current)
 
-    def _nearest(self, current: Hypothesis, name: str) -> tuple[Hypothesis | None, Hypothesis, Remembering]:
+    def _nearest(self, current: Hypothesis, name: str) -> tuple[Hypothesis | None, Hypothesis, CachedScoreTests]:
         """Fit the look-alike that explains most in an effect's place to its end; None where none comes near.
 
         A load that walks far has no law for a first look to judge it by: it is fitted to its end.
@@ -480,7 +480,7 @@ class Search:
         return min(best, key=lambda each: each.score, default=None), reduced, view
 
     def _extended(self, previous: FitResult, effects: Effects, release: Release) -> Problem:
-        common = kept(previous, (effects - {GRADE}) | set(self.model.effects))
+        common = unknowns_of(previous, (effects - {GRADE}) | set(self.model.effects))
         own = tuple((*old, *mine) for old, mine in zip(common.own, release.own, strict=True))
         return self._problem(effects, Release((*common.shared, *release.shared), own))
 

@@ -187,7 +187,7 @@ def tried(hypothesis: Hypothesis, model: DrivelineModel, size: int, subsets: Seq
     fits = [_descended(problem, x) for x in (likely, *(_continued(problem, likely, subset) for subset in subsets))]
     best = min(fits, key=lambda each: each.squares)
     squares, samples = inside_blocks(best)
-    return Trial(hypothesis, size, best.light(), squares, samples)
+    return Trial(hypothesis, size, best.without_derivative(), squares, samples)
 
 
 def _descended(problem: Problem, x: FloatArray) -> FitResult:

@@ -172,7 +172,7 @@ def block_mean_of(values: FloatArray, use: BoolArray, length: int) -> tuple[Floa
     return total / np.maximum(weight, 1.0), weight
 
 
-class Place(Enum):
+class InputPlace(Enum):
     """Where an unknown input may act: on the motor, in the shaft, against the load, on the reading."""
 
     MOTOR = "motor"
@@ -181,16 +181,21 @@ class Place(Enum):
     SENSOR = "sensor"
 
 
-FORCES = {Place.MOTOR: (1.0, 0.0), Place.SHAFT: (-1.0, -1.0), Place.LOAD: (0.0, 1.0), Place.SENSOR: (0.0, 0.0)}
+FORCES = {
+    InputPlace.MOTOR: (1.0, 0.0),
+    InputPlace.SHAFT: (-1.0, -1.0),
+    InputPlace.LOAD: (0.0, 1.0),
+    InputPlace.SENSOR: (0.0, 0.0),
+}
 """Torque on the motor and torque against the load per unit of the input."""
 
 PLACES = {
-    Element.TORQUE_PATH: Place.MOTOR,
-    Element.MOTOR: Place.MOTOR,
-    Element.SHAFT: Place.SHAFT,
-    Element.LOAD: Place.LOAD,
-    Element.SPEED_SENSOR: Place.SENSOR,
-    Element.ACQUISITION: Place.SENSOR,
+    Element.TORQUE_PATH: InputPlace.MOTOR,
+    Element.MOTOR: InputPlace.MOTOR,
+    Element.SHAFT: InputPlace.SHAFT,
+    Element.LOAD: InputPlace.LOAD,
+    Element.SPEED_SENSOR: InputPlace.SENSOR,
+    Element.ACQUISITION: InputPlace.SENSOR,
 }
 """Where a law of an element acts."""
 
@@ -198,17 +203,17 @@ DRIVES = {Element.TORQUE_PATH: 1.0, Element.MOTOR: -1.0, Element.SHAFT: 1.0, Ele
 """Sign of a law at its place: the torque path drives the motor, friction at the motor brakes it."""
 
 
-def places(result: FitResult) -> tuple[Place, ...]:
+def places(result: FitResult) -> tuple[InputPlace, ...]:
     if result.problem.grid.structure is Structure.JOINT:
-        return (Place.SHAFT,)
+        return (InputPlace.SHAFT,)
     if result.problem.grid.structure is Structure.ONE_MASS:
-        return (Place.MOTOR, Place.SENSOR)
-    return tuple(Place)
+        return (InputPlace.MOTOR, InputPlace.SENSOR)
+    return tuple(InputPlace)
 
 
-def size_at(result: FitResult, place: Place) -> float:
+def size_at(result: FitResult, place: InputPlace) -> float:
     records = result.problem.records
-    return speed_scale(records) if place is Place.SENSOR else torque_scale(records)
+    return speed_scale(records) if place is InputPlace.SENSOR else torque_scale(records)
 
 
 MOST_ROWS = 20_000
@@ -218,7 +223,7 @@ STRETCH = 3000  # blocks of a stretch of a long recording
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class BlockedRecording:
     """One recording of a fit, in blocks."""
 
     record: Record
@@ -256,7 +261,9 @@ class Line:
         return int(self.error.size)
 
 
-def lines(result: FitResult, forces: Sequence[Force] | None = None, length: int | None = None) -> tuple[Line, ...]:
+def lines(
+    result: FitResult, forces: Sequence[Force] | None = None, length: int | None = None
+) -> tuple[BlockedRecording, ...]:
     """Return the recordings of a fit in blocks, under further torques where there are any."""
     length = length or block_length(result)
     count = len(result.problem.records)
@@ -264,12 +271,12 @@ def lines(result: FitResult, forces: Sequence[Force] | None = None, length: int 
     return tuple(concurrently(lambda i: _line(result, i, length, every[i]), range(count)))
 
 
-def _line(result: FitResult, index: int, length: int, force: Force) -> Line:
+def _line(result: FitResult, index: int, length: int, force: Force) -> BlockedRecording:
     record = result.problem.records[index]
     use = result.problem.use[index]
     error, weight = block_mean_of(record.output - result.outputs[index], use, length)
     states = states_of(result, index, force)
-    return Line(
+    return BlockedRecording(
         record,
         length,
         tangent(result, index, length),

@@ -18,7 +18,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from estimator.compiled import compiled
-from estimator.diagnosis.line.blocks import FORCES, Line, Motion, Place, places, size_at
+from estimator.diagnosis.line.blocks import FORCES, BlockedRecording, InputPlace, Motion, places, size_at
 from estimator.diagnosis.line.tangent import LOAD, MOTOR
 from estimator.physics.fit import FitResult
 from estimator.physics.kernel import state_vector
@@ -188,7 +188,7 @@ def run_smoother(chain: Chain, kept: Filtered, estimates: FloatArray, variance: 
 SLOWEST, FASTEST = 1e-3, 1e2
 """Range of the walk's rate, as a share of the torque or speed in use, per root second."""
 
-WIDE = 10.0
+INITIAL_SPREAD = 10.0
 """Before the first sample a state may be off by this many times its size in use; the input by its size in use."""
 
 FORGETS_S = 1.0
@@ -210,13 +210,13 @@ class Input:
 class Explanation:
     """The inputs at one place, one per recording."""
 
-    place: Place
+    place: InputPlace
     inputs: tuple[Input, ...]
     rate: float  # standard deviation of the walk's change in one second [unit of the input]
     log_likelihood: float  # of the error, at the best rate
 
 
-def explain(result: FitResult, cut: Sequence[Line], place: Place, floor: float) -> Explanation:
+def explain(result: FitResult, cut: Sequence[BlockedRecording], place: InputPlace, floor: float) -> Explanation:
     """Estimate the input at one place that explains a fit's error."""
     size = size_at(result, place)
 
@@ -235,7 +235,7 @@ def explain(result: FitResult, cut: Sequence[Line], place: Place, floor: float) 
     return Explanation(place, tuple(smooth(line, place, rate, size, floor) for line in cut), rate, -float(best.fun))
 
 
-def explain_all(result: FitResult, cut: Sequence[Line], floor: float) -> dict[Place, Explanation]:
+def explain_all(result: FitResult, cut: Sequence[BlockedRecording], floor: float) -> dict[InputPlace, Explanation]:
     """Estimate the input at every place; the compiled passes hold no interpreter lock and run side by side."""
     wanted = places(result)
     with ThreadPoolExecutor(2) as pool:
@@ -243,11 +243,11 @@ def explain_all(result: FitResult, cut: Sequence[Line], floor: float) -> dict[Pl
     return dict(zip(wanted, found, strict=True))
 
 
-def _explain_at(result: FitResult, cut: Sequence[Line], floor: float, place: Place) -> Explanation:
+def _explain_at(result: FitResult, cut: Sequence[BlockedRecording], floor: float, place: InputPlace) -> Explanation:
     return explain(result, cut, place, floor)
 
 
-def smooth(line: Line, place: Place, rate: float, size: float, floor: float) -> Input:
+def smooth(line: BlockedRecording, place: InputPlace, rate: float, size: float, floor: float) -> Input:
     """Estimate the input at one place of one recording, its walk's rate given."""
     chain = _chain(line, place, rate)
     m = line.tangent.scale.size + 1
@@ -267,18 +267,20 @@ def smooth(line: Line, place: Place, rate: float, size: float, floor: float) -> 
     return Input(estimates[:, -1], np.sqrt(np.maximum(variance, 0.0)), replace(line.motion, **moved))
 
 
-def _chain(line: Line, place: Place, rate: float) -> Chain:
+def _chain(line: BlockedRecording, place: InputPlace, rate: float) -> Chain:
     tangent = line.tangent
     motor, load = FORCES[place]
-    direct = tangent.d[:, MOTOR] * motor + tangent.d[:, LOAD] * load + (1.0 if place is Place.SENSOR else 0.0)
+    direct = tangent.d[:, MOTOR] * motor + tangent.d[:, LOAD] * load + (1.0 if place is InputPlace.SENSOR else 0.0)
     drive = np.ascontiguousarray(tangent.gamma[:, :, MOTOR] * motor + tangent.gamma[:, :, LOAD] * load)
-    memory = float(np.exp(-line.period_s / FORGETS_S)) if place is Place.SHAFT else 1.0
+    memory = float(np.exp(-line.period_s / FORGETS_S)) if place is InputPlace.SHAFT else 1.0
     return Chain(tangent.phi, drive, tangent.c, direct, memory, rate**2 * line.period_s)
 
 
-def _filter(line: Line, place: Place, chain: Chain, size: float, floor: float, kept: Filtered) -> float:
+def _filter(
+    line: BlockedRecording, place: InputPlace, chain: Chain, size: float, floor: float, kept: Filtered
+) -> float:
     """Run the filter over one recording and return the log-likelihood of its error."""
-    states = np.zeros_like(line.tangent.scale) if place is Place.SENSOR else WIDE * line.tangent.scale
+    states = np.zeros_like(line.tangent.scale) if place is InputPlace.SENSOR else INITIAL_SPREAD * line.tangent.scale
     prior = np.diag(np.append(states, size) ** 2)  # with an error of the reading the line itself is as simulated
     return run_filter(chain, line.error, np.where(line.okay, line.weight, 0.0), floor**2, prior, kept)
 

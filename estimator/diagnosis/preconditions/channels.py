@@ -187,13 +187,13 @@ def standstill(record: Record) -> str:
 
 
 FEWEST_GOOD = 0.5  # share of the recording's good rows that a channel must have read
-ALIKE = 0.5  # correlation with what a channel should go like from which it goes like that, or the other way
+LEAST_CORRELATION = 0.5  # correlation with what a channel should go like from which it goes like that, or the other way
 
 MOST_RATIO = 2.0
 """Factor by which a speed may be larger or smaller than the motor's: the shaft's twist is no part of its spread."""
 
 CHANCE = 3.0  # standard deviations of the correlation of two signals that have nothing to do with each other
-SAME = 1e-9  # difference over the spread up to which two channels are one signal
+IDENTICAL_SHARE = 1e-9  # difference over the spread up to which two channels are one signal
 
 SMOOTH_S = 0.2
 """Width of the mean over which channels are compared: below a driveline's first mode both ends move as one."""
@@ -250,10 +250,10 @@ def _fault(record: Record, channel: Channel, others: Sequence[Channel]) -> str:
         return f"{good.sum()} of {record.okay.sum()} good rows hold a reading of it. Record it at the others' rate."
     values = channel.output[good]
     spread = float(np.std(values))
-    if spread <= SAME * (float(np.abs(values).max()) or 1.0):
+    if spread <= IDENTICAL_SHARE * (float(np.abs(values).max()) or 1.0):
         return f"it stays at {values[0]:g}: its sensor is dead, or not the column that was meant."
     for label, other in (("the recording's first output", record.output), *((o.label, o.output) for o in others)):
-        if np.nanmax(np.abs(other[good] - values)) <= SAME * spread:
+        if np.nanmax(np.abs(other[good] - values)) <= IDENTICAL_SHARE * spread:
             return f"it is the same signal as {label}. Name each sensor once."
     like = _goes_like(record, channel)
     seen = good & np.isfinite(like)
@@ -269,9 +269,9 @@ def _turned(channel: Channel, mine: FloatArray, its: FloatArray, independent: fl
     if channel.kind is not OutputKind.TORQUE or channel.location is not Location.LOAD:
         if abs(alike) < CHANCE / np.sqrt(independent):
             return "it does not follow the motor at all: it is another signal, or the sensor shows only noise."
-    if alike < -ALIKE:
+    if alike < -LEAST_CORRELATION:
         return "it moves opposite to the motor: its sign is turned. Give it a negative scale."
-    if channel.kind is OutputKind.SPEED and alike > ALIKE:
+    if channel.kind is OutputKind.SPEED and alike > LEAST_CORRELATION:
         ratio = float(np.linalg.norm(mine) / np.linalg.norm(its))
         if not 1.0 / MOST_RATIO < ratio < MOST_RATIO:
             return (

@@ -11,7 +11,7 @@ from scipy.ndimage import uniform_filter1d
 from scipy.signal import detrend
 
 from estimator.errors import BadModel
-from estimator.physics.driveline import Start
+from estimator.physics.driveline import InitialCondition
 from estimator.physics.layout import Grid, flat, grid_for
 from estimator.physics.model import DrivelineModel, Parameter, Structure, natural_frequencies_rad_s
 from estimator.physics.motion import measured_speed
@@ -31,7 +31,7 @@ def driven(record: Record, line: DrivelineModel, grid: Grid, from_hz: float = 0.
         spectrum[(frequency < from_hz) | (frequency > to_hz)] = 0.0
         torque = np.fft.irfft(spectrum, torque.size)
     alone = replace(record, torque_nm=torque[:, np.newaxis], load_nm=None, torque_okay=None, offset_s=None)
-    return simulate(grid, alone, flat(line), Start(0.0, 0.0, 0.0))
+    return simulate(grid, alone, flat(line), InitialCondition(0.0, 0.0, 0.0))
 
 
 UNEQUAL = 1000.0

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import detrend
 
-from estimator.diagnosis.acquisition.chain import as_if_not_lost
+from estimator.diagnosis.acquisition.chain import without_lost_samples
 from estimator.diagnosis.acquisition.finding import runs
 from estimator.diagnosis.inference.wording import how_sure
 from estimator.diagnosis.noise import noise_floor, share_of
@@ -99,18 +99,18 @@ def without_not_read(records: Sequence[Record]) -> tuple[list[Record], list[str]
     return mended, warnings
 
 
-MOST = 500_000
+MOST_SAMPLES_TIMES_RECORDINGS = 500_000
 """Samples of all recordings, counted once for each recording: 12 of 3000 samples. A fit takes some 1.4 kB for each."""
 
 SEED = 1
 
 
-def with_room(segments: Cut, training: Iterable[str]) -> tuple[Cut, list[str]]:
+def shortened_to_memory(segments: Cut, training: Iterable[str]) -> tuple[Cut, list[str]]:
     """Leave out pieces of the recordings that are fitted, as many as a fit can't hold; say which are used."""
     pieces = segments.of(training)
     used = list(pieces)
-    while (size := _size(used)) > MOST and len(used) > 1:
-        used = _some(pieces, min(int(len(used) * sqrt(MOST / size)), len(used) - 1))
+    while (size := _size(used)) > MOST_SAMPLES_TIMES_RECORDINGS and len(used) > 1:
+        used = _some(pieces, min(int(len(used) * sqrt(MOST_SAMPLES_TIMES_RECORDINGS / size)), len(used) - 1))
     if len(used) == len(pieces):
         return segments, []
     left_out = {piece.name for piece in pieces} - {piece.name for piece in used}
@@ -363,7 +363,7 @@ class Prepared:
         )
 
 
-def as_moved(records: Sequence[Record]) -> tuple[list[Record], list[str]]:
+def with_motion_corrected(records: Sequence[Record]) -> tuple[list[Record], list[str]]:
     warnings: list[str] = []
     mended = list(records)
     for mend in (unwrapped, without_clipped, without_not_read, with_usable_channels):
@@ -377,9 +377,9 @@ def doubtful(records: Sequence[Record], model: DrivelineModel | None) -> list[Do
 
     The longest stretch of each is asked. Raises `Implausible` where they can't be.
     """
-    mended, _ = as_moved(records)
+    mended, _ = with_motion_corrected(records)
     thin_ones = mended if model is None else thinned(mended, model)
-    return doubts_about(as_if_not_lost([_longest(record) for record in thin_ones]), model)
+    return doubts_about(without_lost_samples([_longest(record) for record in thin_ones]), model)
 
 
 def _longest(record: Record) -> Record:
@@ -389,19 +389,19 @@ def _longest(record: Record) -> Record:
 def prepare(records: Sequence[Record], model: DrivelineModel, holdout: Sequence[Record] = ()) -> Prepared:
     """Check and mend recordings before anything is fitted."""
     require_together([*records, *holdout] if records else records)
-    mended, warnings = as_moved([*records, *holdout])
+    mended, warnings = with_motion_corrected([*records, *holdout])
     for record in mended:
         for each in separated_outputs([record], lambda _: 1.0):
             output_state(each, model.structure)
     made_of_each(mended, require_signals, NotExciting, NotExciting)
     names = [record.name for record in records]
-    pieces, few = with_room(cut(thinned(mended, model)), names)
+    pieces, few = shortened_to_memory(cut(thinned(mended, model)), names)
     training = pieces.of(names)
     if not training:
         raise NotExciting(" ".join(pieces.warnings), tuple(names))
     try:
         doubts = doubtful([*records, *holdout], model)
-        unexcited = require_excitation(as_if_not_lost(training), model)
+        unexcited = require_excitation(without_lost_samples(training), model)
     except TimeIsUp:  # nothing will be decided in any case
         doubts, unexcited = [], ["whether units and excitation are plausible was not looked at: the time was up"]
     warnings += [*model_warnings(model), *pieces.warnings, *few, *unexcited]

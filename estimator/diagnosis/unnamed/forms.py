@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import find_peaks
 
-from estimator.diagnosis.line.blocks import DRIVES, FORCES, PLACES, Line, Motion, Place
+from estimator.diagnosis.line.blocks import DRIVES, FORCES, PLACES, BlockedRecording, InputPlace, Motion
 from estimator.diagnosis.unnamed.laws import CHANGING, FREE, LAWS, MODULATIONS, Law, hats, knots_of, one, top_of
 from estimator.diagnosis.unnamed.scene import Ground, Scene
 from estimator.physics.effect import Element
@@ -297,9 +297,9 @@ def answers(view: Scene, element: Element, laws: Sequence[Sequence[Columns]]) ->
     return np.hstack(concurrently(part, range(len(view.cut))))
 
 
-def _answers_of(line: Line, element: Element, functions: FloatArray) -> FloatArray:
+def _answers_of(line: BlockedRecording, element: Element, functions: FloatArray) -> FloatArray:
     """Return the output's answers to functions of time in one recording, a row each."""
-    if PLACES[element] is Place.SENSOR:
+    if PLACES[element] is InputPlace.SENSOR:
         return functions
     motor, load = FORCES[PLACES[element]]
     sign = DRIVES[element]
@@ -310,7 +310,9 @@ MOST_TERMS = 9  # three load steps per recording in a set of three, or as many t
 
 MOST_COEFFICIENTS = 45
 
-ALIKE = 1e-6  # a candidate that re-tuning reproduces to this share of its power can't be distinguished from it
+INDISTINGUISHABLE_SHARE = (
+    1e-6  # a candidate that re-tuning reproduces to this share of its power can't be distinguished from it
+)
 CHUNK = 2048  # rows that are worked on at a time
 TOO_ALIKE = 1e-8  # share of a column's power below which it is a combination of others
 
@@ -393,7 +395,7 @@ def _products(pool: Pool, ground: Ground) -> tuple[FloatArray, FloatArray, Float
     parts = concurrently(lambda firsts: _summed(pool, ground, seen, firsts), shares)
     before, gram, match = (np.sum(each, axis=0) for each in zip(*parts, strict=True))
     after = np.diag(gram)
-    alive = after > ALIKE * np.maximum(before, np.finfo(float).tiny)
+    alive = after > INDISTINGUISHABLE_SHARE * np.maximum(before, np.finfo(float).tiny)
     scale = np.where(alive, 1.0 / np.sqrt(np.where(alive, after, 1.0)), 0.0)
     return scale, gram * np.outer(scale, scale), match * scale
 

@@ -16,10 +16,10 @@ from estimator.diagnosis.line.blocks import (
     FORCES,
     NO_FORCE,
     PLACES,
+    BlockedRecording,
     Force,
-    Line,
+    InputPlace,
     Motion,
-    Place,
     block_mean_of,
     lines,
     simulated_each,
@@ -47,13 +47,13 @@ class Scene:
     """
 
     result: FitResult
-    cut: tuple[Line, ...]
-    explanations: Mapping[Place, Explanation]
+    cut: tuple[BlockedRecording, ...]
+    explanations: Mapping[InputPlace, Explanation]
     filter: Filter | None = None
 
     def motions(self, element: Element) -> list[Motion]:
         """Return what happens in each recording: when its output is read, or between, where torques act."""
-        at_reading = PLACES[element] is Place.SENSOR
+        at_reading = PLACES[element] is InputPlace.SENSOR
         return [line.reading if at_reading else line.motion for line in self.cut]
 
     def rows(self, index: int, columns: FloatArray) -> FloatArray:
@@ -94,7 +94,9 @@ def elements(result: FitResult) -> tuple[Element, ...]:
 class Ground:
     """What the free unknowns of a fit could explain, to first order; rows are the blocks in use of all recordings."""
 
-    def __init__(self, cut: Sequence[Line], jacobian: FloatArray, error: FloatArray, pinned: BoolArray) -> None:
+    def __init__(
+        self, cut: Sequence[BlockedRecording], jacobian: FloatArray, error: FloatArray, pinned: BoolArray
+    ) -> None:
         self.jacobian, self.raw, self.unknowns = jacobian, error, jacobian.shape[1]
         self.basis = np.linalg.qr(jacobian[:, ~pinned])[0]
         self._sizes = np.cumsum([int(line.rows.sum()) for line in cut])[:-1]
@@ -138,7 +140,7 @@ class Extra:
 def extra_of(view: Scene, element: Element, weights: Sequence[FloatArray]) -> Extra:
     """Return a law at an element, given per recording as a function of time of shape (B,), over the samples."""
     samples = [line.samples(w) for line, w in zip(view.cut, weights, strict=True)]
-    if PLACES[element] is Place.SENSOR:
+    if PLACES[element] is InputPlace.SENSOR:
         return Extra([NO_FORCE] * len(samples), samples)
     motor, load = (DRIVES[element] * force for force in FORCES[PLACES[element]])
     return Extra([(motor * w, load * w) for w in samples], [np.zeros_like(w) for w in samples])

@@ -12,7 +12,7 @@ import numpy as np
 from scipy import stats
 from scipy.ndimage import maximum_filter1d, median_filter
 
-from estimator.diagnosis.line.blocks import PLACES, Place, block_mean_of, lines, simulated
+from estimator.diagnosis.line.blocks import PLACES, InputPlace, block_mean_of, lines, simulated
 from estimator.diagnosis.noise import SMALLEST_P
 from estimator.diagnosis.result import RankedLaw
 from estimator.diagnosis.unnamed.forms import (
@@ -44,7 +44,7 @@ small thing left out but a way to cancel what is there."""
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
+class ScoredLaw:
     """A law and what it costs."""
 
     terms: tuple[tuple[str, float], ...]
@@ -56,7 +56,7 @@ class Found:
         return n * math.log(before / after) - self.coefficients * math.log(n) - 2.0 * self.choices
 
 
-NO_LAW = Found((), 0, 0.0)
+NO_LAW = ScoredLaw((), 0, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +70,7 @@ class ElementSearch:
     forms: list[Form]  # those that further rounds choose from
     path: Path
     weights: list[FloatArray]  # (B,): the law that ``view`` is simulated with, per recording
-    law: Found  # that law
+    law: ScoredLaw  # that law
     mean_square: float  # what it leaves of the error
     errors: list[FloatArray]  # that error, per recording
     stuck: bool  # true where no step made the simulation better
@@ -93,8 +93,8 @@ def worthwhile(state: ElementSearch) -> int:
     return terms
 
 
-def cost(state: ElementSearch, terms: int, named: tuple[tuple[str, float], ...] = ()) -> Found:
-    return Found(named, state.path.coefficients[terms], terms * math.log(state.pool))
+def cost(state: ElementSearch, terms: int, named: tuple[tuple[str, float], ...] = ()) -> ScoredLaw:
+    return ScoredLaw(named, state.path.coefficients[terms], terms * math.log(state.pool))
 
 
 def weights_of(state: ElementSearch, terms: int, coefficients: FloatArray) -> list[FloatArray]:
@@ -105,7 +105,7 @@ def weights_of(state: ElementSearch, terms: int, coefficients: FloatArray) -> li
 
 
 def terms_of(state: ElementSearch, terms: int, coefficients: FloatArray) -> tuple[tuple[str, float], ...]:
-    """Return the first terms of a path by name, with their coefficients; see ``Found``."""
+    """Return the first terms of a path by name, with their coefficients; see ``ScoredLaw``."""
     motions = state.view.motions(state.element)
     term = state.path.term[state.path.term < terms]
     found = []
@@ -118,7 +118,7 @@ def terms_of(state: ElementSearch, terms: int, coefficients: FloatArray) -> tupl
 
 
 def _in_use(state: ElementSearch) -> float:
-    at_sensor = PLACES[state.element] is Place.SENSOR
+    at_sensor = PLACES[state.element] is InputPlace.SENSOR
     return rms([line.reading.speed if at_sensor else line.motion.torque for line in state.view.cut])
 
 
@@ -155,7 +155,7 @@ def near(off: BoolArray) -> BoolArray:
     return maximum_filter1d(off.astype(np.int8), NEIGHBOURS, mode="constant").astype(np.bool_)
 
 
-KEPT = 40  # forms that by themselves explain most, which further rounds choose from
+MOST_FORMS = 40  # forms that by themselves explain most, which further rounds choose from
 
 PARAMETER_LAWS: Mapping[str, tuple[Element, Law]] = {
     "J_M": (Element.MOTOR, lambda m: np.gradient(m.speed, m.time_s)),
@@ -190,7 +190,7 @@ def first_along_motion(view: Scene, reduced_ground: Ground, element: Element) ->
 def _from(view: Scene, element: Element, ground: Ground) -> ElementSearch:
     tried = forms(view, element)
     path = pursue(candidates(view, element, tried), ground)
-    strongest = np.argsort(-path.alone)[:KEPT].tolist()
+    strongest = np.argsort(-path.alone)[:MOST_FORMS].tolist()
     kept = list(dict.fromkeys([*path.chosen, *strongest]))
     path = replace(path, chosen=list(range(len(path.chosen))))
     chosen = [tried[i] for i in kept]
@@ -213,7 +213,7 @@ def _without_outliers(state: ElementSearch) -> ElementSearch:
     before, after = state.path.squares[0], sum(float(each @ each) for each in rest)
     aside = [distance_from_neighbours(each) for each in rest]
     n = effective_samples(aside)
-    law = Found((), count, count * math.log(rows))
+    law = ScoredLaw((), count, count * math.log(rows))
     known = state.law.information(before, state.mean_square * rows, n)
     if count == 0 or law.information(before, after, n) <= max(0.0, known):
         return state
@@ -260,7 +260,7 @@ def without_law(state: ElementSearch) -> FitResult:
 
 
 def _looked(
-    state: ElementSearch, moved: FitResult, extra: Extra, weights: list[FloatArray], law: Found
+    state: ElementSearch, moved: FitResult, extra: Extra, weights: list[FloatArray], law: ScoredLaw
 ) -> ElementSearch:
     """Look at the error of a simulation with a law, and choose among the forms again."""
     cut = lines(moved, extra.forces, state.view.cut[0].length)  # in which the law found is written
@@ -389,7 +389,7 @@ def searches_at(view: Scene, rounds: int = 1, initial: Sequence[ElementSearch] =
 def _tried(view: Scene, initial: ElementSearch) -> ElementSearch:
     """Look again from the fit alone, and along the motion of an unknown input; return what simulates better."""
     starts = [initial]
-    if PLACES[initial.element] is not Place.SENSOR:
+    if PLACES[initial.element] is not InputPlace.SENSOR:
         starts.append(first_along_motion(view, initial.ground, initial.element))
     return min((again(start) for start in starts), key=lambda state: (state.stuck, state.mean_square))
 

@@ -9,7 +9,16 @@ import numpy as np
 from scipy import stats
 
 from estimator.diagnosis.assemble import Z95
-from estimator.diagnosis.line.blocks import DRIVES, PLACES, Line, Motion, Place, block_mean_of, lines, size_at
+from estimator.diagnosis.line.blocks import (
+    DRIVES,
+    PLACES,
+    BlockedRecording,
+    InputPlace,
+    Motion,
+    block_mean_of,
+    lines,
+    size_at,
+)
 from estimator.diagnosis.line.equivalent import Explanation, Input, explain, smooth
 from estimator.diagnosis.noise import VERY_STRONG
 from estimator.diagnosis.result import Course, Discrepancy, Equivalent, LawPicture, RankedLaw
@@ -78,8 +87,8 @@ def signal_unit(dimension: str, kind: Kind) -> str:
     return f"{unit('speed', kind)}/s" if dimension == "speed/s" else unit(dimension, kind)
 
 
-def input_unit(place: Place, result: FitResult, kind: Kind) -> str:
-    if place is not Place.SENSOR:
+def input_unit(place: InputPlace, result: FitResult, kind: Kind) -> str:
+    if place is not InputPlace.SENSOR:
         return unit("torque", kind)
     names = {"speed": "speed", "position": "angle", "force": "torque"}
     return unit(names[result.problem.records[0].kind.value], kind)
@@ -189,7 +198,7 @@ def _sums(first: Sequence[FloatArray], second: Sequence[FloatArray]) -> list[Flo
     return [a + b for a, b in zip(first, second, strict=True)]
 
 
-def _as_error(line: Line, difference: FloatArray) -> Line:
+def _as_error(line: BlockedRecording, difference: FloatArray) -> BlockedRecording:
     good = np.ones(difference.size, dtype=np.bool_)
     return replace(line, error=block_mean_of(difference, good, line.length)[0])
 
@@ -244,11 +253,11 @@ def _equivalents(view: Scene, motion: model.Motion) -> tuple[Equivalent, ...]:
     )
 
 
-def _courses(cut: Sequence[Line], explanation: Explanation) -> Mapping[str, Course]:
+def _courses(cut: Sequence[BlockedRecording], explanation: Explanation) -> Mapping[str, Course]:
     return {line.record.name: _course(line, found) for line, found in zip(cut, explanation.inputs, strict=True)}
 
 
-def _course(line: Line, found: Input) -> Course:
+def _course(line: BlockedRecording, found: Input) -> Course:
     spread = Z95 * found.std
     return Course(line.reading.time_s, found.value, found.value - spread, found.value + spread)
 
@@ -262,7 +271,7 @@ def _pictures_of_effects(
 
 
 def _picture_of_effect(
-    name: str, final: FitResult, cut: Sequence[Line], floor: float, motion: model.Motion
+    name: str, final: FitResult, cut: Sequence[BlockedRecording], floor: float, motion: model.Motion
 ) -> LawPicture | None:
     without, motions = without_effect(final, name), [line.motion for line in cut]
     return picture(name, EFFECTS[name].element, without, final.outputs, motions, floor, motion, cut[0].length)

@@ -228,7 +228,7 @@ WIDEST = 4.6  # ln 100: how far a parameter may go from where it started
 WIDTH = 2 * N_STATES  # W = [Phi U, I]
 
 
-def kept(of: Orders) -> Shapes:
+def memory_parts(of: Orders) -> Shapes:
     """Return the parts the filter keeps; ``inputs`` are the torques on their way, newest first."""
     vectors = dict.fromkeys(("x", "D", "diagonal"), (N_STATES,))
     own = {"theta": (of.n_parameters,), "physical": (6,), "inputs": (of.nk,), "U": (N_STATES, N_STATES)}
@@ -412,7 +412,7 @@ class Ekf(RecursiveEstimator):
         n = N_STATES
         law = noise.law(start, sample_time_s)
         structure = np.array([orders.na, orders.nb, nk], dtype=np.float64)
-        memory = Memory(kept(orders), {"structure": structure, "law": law}, room())
+        memory = Memory(memory_parts(orders), {"structure": structure, "law": law}, room())
         memory["x"][:] = law[ORIGIN:]
         memory["U"][...] = np.eye(n)
         memory["D"][:] = memory["diagonal"][:] = law[START:ORIGIN]

@@ -56,19 +56,19 @@ class Memory:
         return {name: self[name].copy() for name in self._settings}
 
     @property
-    def kept(self) -> dict[str, FloatArray]:
+    def snapshot(self) -> dict[str, FloatArray]:
         """Copies of what the next sample needs, by name."""
         return {name: self[name].copy() for name in self._kept}
 
 
 VERSION = 2  # goes up when a part changes its meaning; states of another version are refused
 
-State = dict[str, Any]
+SavedState = dict[str, Any]
 
 
-def saved(estimator: str, memory: Memory) -> State:
+def saved(estimator: str, memory: Memory) -> SavedState:
     """Return the state of an estimator: its name, what it was set up with, and what it has learnt."""
-    return {"estimator": estimator, "version": VERSION, **memory.settings, **memory.kept}
+    return {"estimator": estimator, "version": VERSION, **memory.settings, **memory.snapshot}
 
 
 def restored(state: Mapping[str, Any], estimator: str, memory: Memory) -> None:
@@ -79,7 +79,7 @@ def restored(state: Mapping[str, Any], estimator: str, memory: Memory) -> None:
         _require(
             np.array_equal(_numbers(state, name), setting), name, state[name], f"{setting.tolist()}, as set up here"
         )
-    new = {name: _numbers(state, name) for name in memory.kept}
+    new = {name: _numbers(state, name) for name in memory.snapshot}
     for name, values in new.items():
         _require(values.shape == memory[name].shape, name, f"of shape {values.shape}", f"shape {memory[name].shape}")
         _require(bool(np.isfinite(values).all()), name, "not finite", "finite numbers only")
@@ -338,7 +338,7 @@ class RecursiveEstimator:
         live = self._memory["live"]
         return bool(live[TORQUE_MOVES] == 0.0 or live[OUTPUT_MOVES] == 0.0)
 
-    def state(self) -> State:
+    def state(self) -> SavedState:
         """Return everything it remembers, as plain arrays; how they are kept is at the head of this file."""
         return saved(self._name, self._memory)
 

@@ -52,7 +52,7 @@ LARGEST = 1e30  # beyond it a value is no measurement; below it nothing here can
 RUNAWAY = 1e3  # times the largest output, beyond which a predicted output is given up
 
 
-def kept(n: int) -> Shapes:
+def memory_parts(n: int) -> Shapes:
     """Return the parts that every estimator of n parameters keeps, next to its past values and L."""
     vectors = dict.fromkeys(("theta", "D", "known_D", "diagonal"), (n,))
     return {"live": (N_LIVE,), **vectors, "U": (n, n), "known_U": (n, n)}
@@ -240,7 +240,7 @@ class RegressionEstimator(RecursiveEstimator):
         n = orders.n_parameters + len(extra_names)
         own_L = np.ones(1) if L is None else checked_filter(name, L)
         structure = np.array([orders.na, orders.nb, orders.nk, adapts_filter, start_up_samples], dtype=np.float64)
-        shapes = {**kept(n), "L": own_L.shape, **past}
+        shapes = {**memory_parts(n), "L": own_L.shape, **past}
         memory = Memory(shapes, {"structure": structure, "law": law.as_array(n)}, room(n))
         _begin(memory, own_L, law)
         if theta is not None:

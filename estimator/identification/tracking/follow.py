@@ -386,7 +386,7 @@ TRUSTED = 26
 """Excited blocks in a row after which an estimate that had to begin anew counts as settled: as many as the watch takes
 to know what is usual."""
 
-FEWEST = 240  # samples of a usable estimate before a standard deviation is given
+SAMPLES_BEFORE_STD = 240  # samples of a usable estimate before a standard deviation is given
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -407,7 +407,9 @@ class Follower:
         n = orders.n_parameters
         self._block = block
         self._structure = np.array([orders.na, orders.nb, orders.nk])
-        self._numbers = np.array([sample_time_s, *band_hz, LIGHTLY_DAMPED, MEMORY, FEWEST, block, OPENS, CLOSES])
+        self._numbers = np.array(
+            [sample_time_s, *band_hz, LIGHTLY_DAMPED, MEMORY, SAMPLES_BEFORE_STD, block, OPENS, CLOSES]
+        )
         depth = max(orders.na, orders.nk + orders.nb, 2)
         self._live = {
             "before": np.zeros(n),

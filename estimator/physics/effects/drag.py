@@ -17,11 +17,11 @@ from estimator.physics.effect import (
     Effect,
     EffectParameter,
     Element,
+    FitStart,
     Held,
     OtherForm,
     Place,
     Span,
-    Start,
     Untestable,
 )
 from estimator.physics.laws import power
@@ -64,7 +64,7 @@ def quadratic_scales(model: Driveline, records: Sequence[Record]) -> tuple[float
     return (0.05 * torque_scale(records) / top**2, 1.0, top)
 
 
-def quadratic_starts(model: Driveline, records: Sequence[Record]) -> list[Start]:
+def quadratic_starts(model: Driveline, records: Sequence[Record]) -> list[FitStart]:
     """Return one start: the problem is convex in the drag. Its exponent waits for it."""
     return [(0.5, Held(SQUARE), Held(1.0))]
 

@@ -16,10 +16,10 @@ from estimator.physics.effect import (
     Effect,
     EffectParameter,
     Element,
+    FitStart,
     Held,
     OtherForm,
     Span,
-    Start,
     Step,
     Within,
 )
@@ -95,7 +95,7 @@ LIGHTEST, STIFFEST = 0.03, 0.95
 """Inertia within the line, over the motor's, and share of the twist on the shaft behind it, beyond which it
 would take too many steps to follow them."""
 
-MOST = 50.0  # most inertia, in tenths of the motor's
+MOST_INERTIA = 50.0  # most inertia, in tenths of the motor's
 
 SOFTEST = 0.4
 """Share of the twist on the shaft below which the shaft would be the stiffer of both springs by far."""
@@ -134,7 +134,7 @@ def mode_scales(model: Driveline, records: Sequence[Record]) -> tuple[float, ...
     return (tenth, frequency, 1.0, 0.05, tenth, tenth)
 
 
-def mode_starts(model: Driveline, records: Sequence[Record]) -> list[Start]:
+def mode_starts(model: Driveline, records: Sequence[Record]) -> list[FitStart]:
     """Return heavy modes far above the first resonance, and light ones below, around and above it.
 
     The heavy ones come first: where only what their spring does to the line shows, nothing else distinguishes them. An
@@ -173,7 +173,7 @@ def mode_reparametrised(
 
     def reparametrisation(omega: float, at_motor: bool) -> OtherForm:
         inertia = stiffness / ((1.0 - share) * omega**2)
-        size = Within(min(max(inertia / tenth, 10.0 * LIGHTEST), MOST), 10.0 * LIGHTEST, MOST)
+        size = Within(min(max(inertia / tenth, 10.0 * LIGHTEST), MOST_INERTIA), 10.0 * LIGHTEST, MOST_INERTIA)
         of_motor, of_load = (share, 1.0 - share) if at_motor else (1.0 - share, share)
         lighter = {"J_M": motor - of_motor**2 * inertia, "J_L": load - of_load**2 * inertia}
         return OtherForm((*shaped, *((size, none) if at_motor else (none, size))), {"k": stiffness / share, **lighter})
@@ -236,16 +236,18 @@ EXTRA_TORSIONAL_MODE = Effect(
     source="an inertia on a spring next to the main one: Den Hartog, Mechanical Vibrations, 4th ed., 1956",
     excited_by="PRBS that reaches the mode's frequency",
     parameters=(
-        EffectParameter("inertia_kg_m2", "inertia", 0.0, 0.0, MOST, "inertia next to the line: J_X", True),
+        EffectParameter("inertia_kg_m2", "inertia", 0.0, 0.0, MOST_INERTIA, "inertia next to the line: J_X", True),
         EffectParameter("frequency_hz", "Hz", 1.0, 0.05, 8.0, "its frequency with the motor held: f"),
         EffectParameter(
             "line_share", "", 1.0, SOFTEST, 1.0, "share of the twist that the main shaft has: s", True, most=1.0
         ),
         EffectParameter("damping_ratio", "", 0.05, 0.02, 8.0, "its damping ratio: c_X / (2 sqrt(k_X J_X))"),
         EffectParameter(
-            "between_kg_m2", "inertia", 0.0, 0.0, MOST, "inertia between motor and shaft instead: J_X", True
+            "between_kg_m2", "inertia", 0.0, 0.0, MOST_INERTIA, "inertia between motor and shaft instead: J_X", True
         ),
-        EffectParameter("behind_kg_m2", "inertia", 0.0, 0.0, MOST, "inertia between shaft and load instead: J_X", True),
+        EffectParameter(
+            "behind_kg_m2", "inertia", 0.0, 0.0, MOST_INERTIA, "inertia between shaft and load instead: J_X", True
+        ),
     ),
     structures=WITH_SHAFT,
     resembles=("actuator_lag", "stiffness_nonlinearity", "tyre_slip", "speed_filter"),

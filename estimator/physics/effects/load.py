@@ -17,9 +17,9 @@ from estimator.physics.effect import (
     Effect,
     EffectParameter,
     Element,
+    FitStart,
     Held,
     Place,
-    Start,
     Untestable,
 )
 from estimator.physics.laws import hyperbolic_tangent
@@ -141,7 +141,7 @@ def gravity_scales(model: Driveline, records: Sequence[Record]) -> tuple[float, 
     return (0.2 * torque_scale(records), model.gear_ratio or max(range_of(records), 1.0))
 
 
-def gravity_starts(model: Driveline, records: Sequence[Record]) -> list[Start]:
+def gravity_starts(model: Driveline, records: Sequence[Record]) -> list[FitStart]:
     """Return one start for each gear ratio that may be; the problem is linear in moment and phase together."""
     if model.gear_ratio is not None:
         return [(1.0, Held(1.0))]
@@ -273,7 +273,7 @@ def tyre_scales(model: Driveline, records: Sequence[Record]) -> tuple[float, ...
     return (0.01 / torque, 1.0, 0.1 * speed_scale(records), 1.0, 0.01, torque)
 
 
-def tyre_starts(model: Driveline, records: Sequence[Record]) -> list[Start]:
+def tyre_starts(model: Driveline, records: Sequence[Record]) -> list[FitStart]:
     """Return creep from small to large, at once or after rolling, for a light and a heavy wheel, far from its grip."""
     return [
         (slip, wheel, creep, relaxation, damping, 4.0)

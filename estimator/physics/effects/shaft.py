@@ -15,10 +15,10 @@ from estimator.physics.effect import (
     Effect,
     EffectParameter,
     Element,
+    FitStart,
     Held,
     OtherForm,
     Span,
-    Start,
     Step,
     Untestable,
     long_enough,
@@ -56,7 +56,7 @@ def gap_scales(model: Driveline, records: Sequence[Record]) -> tuple[float, ...]
     return (0.2 * twist, 0.01 * twist, 1.0, 1.0)
 
 
-def gap_starts(model: Driveline, records: Sequence[Record]) -> list[Start]:
+def gap_starts(model: Driveline, records: Sequence[Record]) -> list[FitStart]:
     """Return a ladder of gap sizes: a gap that is too large or too small is a local optimum."""
     contact: float | Held = Held(0.0) if model.structure is Structure.JOINT else 1.0
     pull: float | Held = Held(0.0) if model.structure is Structure.JOINT else 0.5
@@ -161,7 +161,7 @@ def stiffness_scales(model: Driveline, records: Sequence[Record]) -> tuple[float
     return (0.2 / twist**2, 1.0, 1.0, twist)
 
 
-def stiffness_starts(model: Driveline, records: Sequence[Record]) -> list[Start]:
+def stiffness_starts(model: Driveline, records: Sequence[Record]) -> list[FitStart]:
     """Return a hardening and a softening start, without a second stage."""
     one = Held(0.0), Held(0.0)
     return [(0.5, 1.0, *one), (-0.5, 0.5, *one)]
@@ -265,7 +265,7 @@ def slider_scales(model: Driveline, records: Sequence[Record]) -> tuple[float, .
     return (0.05 * torque, 0.02 * torque / model.parameters["k"].value, 1.0, 1.0, 1.0)
 
 
-def slider_starts(model: Driveline, records: Sequence[Record]) -> list[Start]:
+def slider_starts(model: Driveline, records: Sequence[Record]) -> list[FitStart]:
     """Return two starts: a slider that yields early and one that yields late."""
     early, late = (Held(0.0), Held(0.0)) if model.structure is Structure.JOINT else (0.2, 0.5)
     return [(0.5, 0.5, 1.0, 0.7, early), (1.0, 4.0, 1.0, 0.7, late)]
@@ -349,7 +349,7 @@ def cardan_scales(model: Driveline, records: Sequence[Record]) -> tuple[float, .
     return (torque, torque / model.parameters["k"].value, 0.05)
 
 
-def cardan_starts(model: Driveline, records: Sequence[Record]) -> list[Start]:
+def cardan_starts(model: Driveline, records: Sequence[Record]) -> list[FitStart]:
     """Return one start per cause; each is linear in amplitude and phase together."""
     off = Held(0.0)
     return [(off, 0.5, off), (0.5, off, off), (off, off, 0.5)]

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from estimator.compiled import compiled
 from estimator.physics.driveline import Driveline, Motion
-from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, Start, long_enough
+from estimator.physics.effect import EVERY_LINE, Effect, EffectParameter, Element, FitStart, long_enough
 from estimator.physics.motion import longest_s
 from estimator.signals.record import FloatArray, OutputKind, Record
 
@@ -84,7 +84,7 @@ def low_pass_scales(model: Driveline, records: Sequence[Record]) -> tuple[float,
     return (min(record.sample_time_s for record in records), 1.0)
 
 
-def low_pass_starts(model: Driveline, records: Sequence[Record]) -> list[Start]:
+def low_pass_starts(model: Driveline, records: Sequence[Record]) -> list[FitStart]:
     """Return a start below and one above a sampling period, with two equal poles."""
     return [(0.3, 0.25), (2.0, 0.25)]
 

@@ -14,10 +14,10 @@ from estimator.physics.effect import (
     Effect,
     EffectParameter,
     Element,
+    FitStart,
     Held,
     OtherForm,
     Place,
-    Start,
     Untestable,
 )
 from estimator.physics.motion import (
@@ -165,7 +165,7 @@ def saturation_scales(model: Driveline, records: Sequence[Record]) -> tuple[floa
     return (each, each, torque_scale(records), 1.0)
 
 
-def saturation_starts(model: Driveline, records: Sequence[Record]) -> list[Start]:
+def saturation_starts(model: Driveline, records: Sequence[Record]) -> list[FitStart]:
     """Return limits of both inverters, of one of them, and of their sum."""
     off = Held(math.inf)
     return [
@@ -289,9 +289,9 @@ def is_load_known(model: Driveline) -> bool:
     return not isinstance(model.load, Load)
 
 
-def bias_starts(model: Driveline, records: Sequence[Record]) -> list[Start]:
+def bias_starts(model: Driveline, records: Sequence[Record]) -> list[FitStart]:
     """Return starts that drift, and one that does not where the load is known."""
-    drifting: list[Start] = [(0.5, 0.3), (1.0, 2.0)]
+    drifting: list[FitStart] = [(0.5, 0.3), (1.0, 2.0)]
     return [(0.5, Held(0.0)), *drifting] if is_load_known(model) else drifting
 
 
@@ -342,7 +342,7 @@ ORDERS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 18, 20, 24, 30, 36, 48)
 """Periods per motor turn that are tried: pole pairs and slots of usual machines, and their small multiples."""
 
 
-def ripple_starts(model: Driveline, records: Sequence[Record]) -> list[Start]:
+def ripple_starts(model: Driveline, records: Sequence[Record]) -> list[FitStart]:
     """Return two starts per order that machines show, one per cause; the order is a whole number and not fitted.
 
     One whose period the motor does not pass through once is any law of the angle, such as gravity.

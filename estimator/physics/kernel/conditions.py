@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from estimator.compiled import assembled, inlined
-from estimator.lanes import choose, every, like, some
+from estimator.lanes import broadcast_as, choose, every, some
 from estimator.physics.catalogue import BUILT_IN, KERNEL
 from estimator.physics.curve import curve, wrapped
 from estimator.physics.effect import Place
@@ -92,12 +92,12 @@ SUMS: dict[Total, Sum] = {}
 """Of each function that is put together here, for who has to write it in another language."""
 
 
-def taken(places: Sequence[int]) -> Callable[..., Any]:
+def parameters_at(places: Sequence[int]) -> Callable[..., Any]:
     """Return the compiled function that takes these places out of the parameters, as a tuple."""
     first, rest = places[0], places[1:]
     if not rest:
         return assembled(lambda p: (p[first],))
-    others = taken(rest)
+    others = parameters_at(rest)
     return assembled(lambda p: (p[first], *others(p)))
 
 
@@ -111,12 +111,12 @@ def with_law(before: Total, law: Callable[..., float], values: Callable[..., Any
 def total(place: Place, given: int = 1) -> Total:
     """Put together the sum of the catalogue's laws at a place, as one compiled function of one quantity or two."""
     if given == 1:
-        summed: Total = assembled(lambda x, p: like(0.0, x))
+        summed: Total = assembled(lambda x, p: broadcast_as(0.0, x))
     else:
-        summed = assembled(lambda x, y, p: like(0.0, x))
+        summed = assembled(lambda x, y, p: broadcast_as(0.0, x))
     terms = terms_of(place)
     for law, places in terms:
-        summed = with_law(summed, law, taken(places), given)
+        summed = with_law(summed, law, parameters_at(places), given)
     SUMS[summed] = Sum(place, given, terms)
     return summed
 
@@ -248,7 +248,7 @@ def conditions(
     return Conditions(
         ripple,
         load,
-        like(0.0, load),
+        broadcast_as(0.0, load),
         torque_factor,
         cardan,
         shaft_factor,
@@ -287,7 +287,7 @@ def changing_sign(width: float, creep: float, other: float) -> float:
 def tyre(inertia: float, fastest: float, p: FloatArray) -> Tyre:
     """Return what a tyre's law takes from its parameters, the load's inertia and the fastest decay; 0 without slip."""
     if every(p[slots.SLIP] <= 0.0):
-        none = like(0.0, inertia)
+        none = broadcast_as(0.0, inertia)
         return Tyre(none, none, none, none, none, none, none)
     wheel, vehicle = p[slots.SLIP_WHEEL] * inertia, (1.0 - p[slots.SLIP_WHEEL]) * inertia
     tread = 1.0 / p[slots.SLIP]
@@ -412,7 +412,7 @@ def rubbed(now: Conditions, held: Bristles, p: FloatArray) -> Conditions:
     """Return the conditions with the bristles' torques in them, in place of dry friction by the sign of the speed."""
     torque, dry_motor, dry_load, rubbing = now.torque, now.dry_motor, now.dry_load, now.rubbing
     if is_bristled_at_motor(p):
-        torque, dry_motor = torque - held.motor, like(0.0, dry_motor)
+        torque, dry_motor = torque - held.motor, broadcast_as(0.0, dry_motor)
     if is_bristled_at_load(p):
-        rubbing, dry_load = held.load, like(0.0, dry_load)
+        rubbing, dry_load = held.load, broadcast_as(0.0, dry_load)
     return with_friction(now, torque, now.load, dry_motor, dry_load, rubbing)

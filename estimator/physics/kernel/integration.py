@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from estimator.compiled import brief, compiled, inlined, ir_inlined
+from estimator.compiled import compiled, compiled_with_lock, inlined, ir_inlined
 from estimator.lanes import borrowed
 from estimator.physics.curve import steepest
 from estimator.physics.effects.timing import LowPass, delayed, lag_step, low_pass
@@ -26,7 +26,14 @@ from estimator.physics.kernel.conditions import (
     rubbed,
     with_torques,
 )
-from estimator.physics.kernel.linear import WORTHWHILE_SAMPLES, Answers, answers, has_dry_friction, is_linear, led_on
+from estimator.physics.kernel.linear import (
+    WORTHWHILE_SAMPLES,
+    StepResponses,
+    answers,
+    has_dry_friction,
+    is_linear,
+    next_linear_state,
+)
 from estimator.physics.kernel.rates import at_moment, read_out
 from estimator.physics.kernel.sensing import entry, reading, shown, smoothed
 from estimator.physics.kernel.state_vector import (
@@ -89,14 +96,16 @@ def fed(
     return lag_step(supplied, rise, lagged, lag_rise, feed.lag)
 
 
-Made = Callable[..., None]
+CompiledIntegrator = Callable[..., None]
 
 Masses = tuple[int, ...]
 """An entry for each mass. Its length is a part of its type, so that only makes of so many masses are compiled."""
 
 
 @ir_inlined
-def call_specialised(masses: int, own: tuple[Any, ...], made: Made, p: FloatArray, given: tuple[Any, ...]) -> None:
+def call_specialised(
+    masses: int, own: tuple[Any, ...], made: CompiledIntegrator, p: FloatArray, given: tuple[Any, ...]
+) -> None:
     """Call what is compiled for the make of the line that has these parameters, of 1, 2 or 3 masses."""
     if masses == 1:
         _for_its_states(1, True, own, made, p, given)
@@ -107,7 +116,9 @@ def call_specialised(masses: int, own: tuple[Any, ...], made: Made, p: FloatArra
 
 
 @ir_inlined
-def _for_its_shaft(masses: int, own: tuple[Any, ...], made: Made, p: FloatArray, given: tuple[Any, ...]) -> None:
+def _for_its_shaft(
+    masses: int, own: tuple[Any, ...], made: CompiledIntegrator, p: FloatArray, given: tuple[Any, ...]
+) -> None:
     if is_elastic(p):
         _for_its_states(masses, True, own, made, p, given)
     else:
@@ -116,7 +127,7 @@ def _for_its_shaft(masses: int, own: tuple[Any, ...], made: Made, p: FloatArray,
 
 @ir_inlined
 def _for_its_states(
-    masses: int, elastic: bool, own: tuple[Any, ...], made: Made, p: FloatArray, given: tuple[Any, ...]
+    masses: int, elastic: bool, own: tuple[Any, ...], made: CompiledIntegrator, p: FloatArray, given: tuple[Any, ...]
 ) -> None:
     if is_extended(p):
         made(Line(masses, elastic, not elastic, True, own), *given)
@@ -179,10 +190,10 @@ def leave_slope(k: int, slope: float, slopes: FloatArray) -> None:
 
 
 @inlined
-def rubbed_on(
+def next_state_with_friction(
     line: Line,
     summing: bool,
-    to: Answers,
+    to: StepResponses,
     now: Conditions,
     torque: float,
     rise: float,
@@ -196,7 +207,7 @@ def rubbed_on(
     if bristled:
         bristles = bent(line, bristles, x, now, p, 0.5 * h)
         felt = rubbed(now, bristles, p)
-    after = led_on(line, summing, to, felt, torque, rise, x, p, h)
+    after = next_linear_state(line, summing, to, felt, torque, rise, x, p, h)
     if bristled:
         bristles = bent(line, bristles, after, now, p, 0.5 * h)
     return after, bristles
@@ -264,7 +275,9 @@ def integrate_made(  # noqa: C901  # one question more than usual, and a change 
             mean, rise, lagged, lag_rise = fed(torque, feed, k, j * length, length, lagged, lag_rise, p)
             before = x
             moment_s = start_s + (k + (j + 0.5) * length) * sample_time_s
-            x, bristles = rubbed_on(at_moment(line, moment_s, k), summing, to, now, mean, rise, before, bristles, p, h)
+            x, bristles = next_state_with_friction(
+                at_moment(line, moment_s, k), summing, to, now, mean, rise, before, bristles, p, h
+            )
             slope = (entry(x, output, p) - entry(before, output, p)) / h
             if filtering:
                 turned, turns = angle[k] + turn * j * length, angle[k] + turn * (j + 1) * length
@@ -321,7 +334,7 @@ def integrate(
     call_specialised(len(masses), own, integrate_made, borrowed(p), (*given, *given_back))
 
 
-@brief
+@compiled_with_lock
 def integrate_period(*given: Any) -> None:
     """Do what ``integrate`` does, with its arguments, for a rig that is stepped period by period."""
     integrate(*given)

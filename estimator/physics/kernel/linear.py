@@ -10,7 +10,7 @@ from estimator.compiled import compiled, inlined
 from estimator.physics.catalogue import BUILT_IN
 from estimator.physics.kernel import slots
 from estimator.physics.kernel.conditions import Line, is_bristled, is_bristled_at_motor, with_friction, with_torques
-from estimator.physics.kernel.rates import dry_at_load, moved, runge_kutta, stepped
+from estimator.physics.kernel.rates import advanced, dry_at_load, runge_kutta, stepped
 from estimator.physics.kernel.state_vector import Conditions, State
 from estimator.physics.laws import BEYOND, dry_friction
 from estimator.physics.layout import slot
@@ -28,10 +28,10 @@ NULLS = np.array([parameter.null for _, parameter in _OTHERS])
 """Where the parameters of all effects stand that leave no line linear, and what each is where its effect is not there:
 with one of them a line takes its sub-steps."""
 
-REST = State(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+AT_REST = State(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
-class Answers(NamedTuple):
+class StepResponses(NamedTuple):
     """The state to which a unit of each entry of the state, and of each torque, leads a line at rest."""
 
     angle: State  # to one unit of the entry of that name [unit of the state / unit of the entry]
@@ -105,11 +105,11 @@ def unit(entry: int) -> State:
 
 
 @compiled
-def answers(line: Line, now: Conditions, p: FloatArray, h: float, steps: int) -> Answers:
+def answers(line: Line, now: Conditions, p: FloatArray, h: float, steps: int) -> StepResponses:
     """Return what ``steps`` sub-steps of ``h`` [s] make of each unit of a state and a torque, without dry friction."""
     now = with_friction(now, 0.0, 0.0, 0.0, 0.0, 0.0)
     pulled = with_torques(now, 0.0, 1.0)
-    return Answers(
+    return StepResponses(
         after(line, now, 0.0, 0.0, unit(0), p, h, steps),
         after(line, now, 0.0, 0.0, unit(1), p, h, steps),
         after(line, now, 0.0, 0.0, unit(2), p, h, steps),
@@ -119,9 +119,9 @@ def answers(line: Line, now: Conditions, p: FloatArray, h: float, steps: int) ->
         after(line, now, 0.0, 0.0, unit(8), p, h, steps),
         after(line, now, 0.0, 0.0, unit(9), p, h, steps),
         after(line, now, 0.0, 0.0, unit(11), p, h, steps),
-        after(line, now, 1.0, 0.0, REST, p, h, steps),
-        after(line, now, 0.0, 1.0, REST, p, h, steps),
-        after(line, pulled, 0.0, 0.0, REST, p, h, steps),
+        after(line, now, 1.0, 0.0, AT_REST, p, h, steps),
+        after(line, now, 0.0, 1.0, AT_REST, p, h, steps),
+        after(line, pulled, 0.0, 0.0, AT_REST, p, h, steps),
     )
 
 
@@ -136,10 +136,10 @@ def after(
 
 
 @inlined
-def led_on(
+def next_linear_state(
     line: Line,
     summing: bool,
-    to: Answers,
+    to: StepResponses,
     now: Conditions,
     torque: float,
     rise: float,
@@ -156,7 +156,9 @@ def led_on(
 
 
 @inlined
-def answered(line: Line, to: Answers, now: Conditions, torque: float, rise: float, x: State, p: FloatArray) -> State:
+def answered(
+    line: Line, to: StepResponses, now: Conditions, torque: float, rise: float, x: State, p: FloatArray
+) -> State:
     """Return the state that follows on ``x`` under a torque of this mean and rise [Nm] and full dry friction."""
     carried = x.speed if line.masses == 1 else x.load_speed
     torque += now.torque
@@ -164,20 +166,20 @@ def answered(line: Line, to: Answers, now: Conditions, torque: float, rise: floa
         torque -= dry_friction(x.speed, p[slots.COULOMB], now.width_motor)
     load = now.load + dry_at_load(carried, now)
     after = State(0.0, 0.0, 0.0, 0.0, x.loading, x.vehicle_speed, 0.0, 0.0, 0.0, 0.0, x.traction, 0.0)
-    after = moved(line, after, to.torque, torque)
-    after = moved(line, after, to.load, load)
+    after = advanced(line, after, to.torque, torque)
+    after = advanced(line, after, to.load, load)
     if rise != 0.0:
-        after = moved(line, after, to.rise, rise)
-    after = moved(line, after, to.angle, x.angle)
-    after = moved(line, after, to.speed, x.speed)
+        after = advanced(line, after, to.rise, rise)
+    after = advanced(line, after, to.angle, x.angle)
+    after = advanced(line, after, to.speed, x.speed)
     if line.masses > 1:
-        after = moved(line, after, to.twist, x.twist)
-        after = moved(line, after, to.load_speed, x.load_speed)
+        after = advanced(line, after, to.twist, x.twist)
+        after = advanced(line, after, to.load_speed, x.load_speed)
     if line.masses == 3:
-        after = moved(line, after, to.middle_twist, x.middle_twist)
-        after = moved(line, after, to.middle_speed, x.middle_speed)
+        after = advanced(line, after, to.middle_twist, x.middle_twist)
+        after = advanced(line, after, to.middle_speed, x.middle_speed)
     if line.extended:
-        after = moved(line, after, to.branch_twist, x.branch_twist)
-        after = moved(line, after, to.branch_speed, x.branch_speed)
-        after = moved(line, after, to.relaxing, x.relaxing)
+        after = advanced(line, after, to.branch_twist, x.branch_twist)
+        after = advanced(line, after, to.branch_speed, x.branch_speed)
+        after = advanced(line, after, to.relaxing, x.relaxing)
     return after

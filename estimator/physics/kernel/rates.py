@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from estimator.compiled import inlined
-from estimator.lanes import choose, every, like, some
+from estimator.lanes import broadcast_as, choose, every, some
 from estimator.lanes.types import overload
 from estimator.physics.curve import curve
 from estimator.physics.effects.dry_friction import stribeck_law
@@ -87,8 +87,8 @@ def damping_torque(rate: float, p: FloatArray) -> float:
 def shaft_torque(twist: float, rate: float, loading: float, p: FloatArray, stiffness: float) -> float:
     """Return the torque the shaft carries [Nm] at a twist [rad], its rate [rad/s] and the hysteresis' loading [-]."""
     damping = damping_torque(rate, p)
-    across = like(0.0, damping)
-    held = like(0.0, damping)
+    across = broadcast_as(0.0, damping)
+    held = broadcast_as(0.0, damping)
     if some(p[slots.TABLE_TWIST] > 0.0):
         held, slope = curve(twist, p, slots.TABLE_TWIST, False)
         damping = damping * max(1.0 + slope / p[slots.K], 0.0) + p[slots.TABLE_DAMPING] * rate
@@ -154,7 +154,7 @@ def rates(line: Line, now: Conditions, x: State, p: FloatArray) -> State:
         drag = load_friction(x.speed, x.speed, now, p) + now.load + held_by_angle(x.angle, p)
         branch = branch_rate(x.branch_twist, x.speed - x.branch_speed, now, p) if line.extended else 0.0
         acceleration = (drive - now.branch_inertia * branch - drag) * now.inverse_motor
-        still = like(0.0, x.speed)
+        still = broadcast_as(0.0, x.speed)
         own_rate = x.speed - x.branch_speed
         return State(
             x.speed,
@@ -164,7 +164,7 @@ def rates(line: Line, now: Conditions, x: State, p: FloatArray) -> State:
             still,
             still,
             own_rate,
-            like(branch, x.speed),
+            broadcast_as(branch, x.speed),
             still,
             still,
             still,
@@ -174,7 +174,7 @@ def rates(line: Line, now: Conditions, x: State, p: FloatArray) -> State:
     own_rate = x.branch_speed - driven(line, x) if behind else x.speed - x.branch_speed
     rate = twist_rate(line, x, p)
     shaft, reaction = shaft_torques(line, rate, now, x, p)
-    branch, relaxing = like(0.0, x.speed), like(0.0, x.speed)
+    branch, relaxing = broadcast_as(0.0, x.speed), broadcast_as(0.0, x.speed)
     if line.extended and some(p[slots.RELAXING] > 0.0):
         shaft, reaction = shaft + x.relaxing, reaction + x.relaxing
         stiffness = p[slots.RELAXING] * p[slots.K]
@@ -188,8 +188,8 @@ def rates(line: Line, now: Conditions, x: State, p: FloatArray) -> State:
         else:
             drive -= own
         if between:
-            branch, reaction = branch - reaction / now.branch_inertia, like(0.0, x.speed)
-    middle_twist, middle_speed = like(0.0, x.speed), like(0.0, x.speed)
+            branch, reaction = branch - reaction / now.branch_inertia, broadcast_as(0.0, x.speed)
+    middle_twist, middle_speed = broadcast_as(0.0, x.speed), broadcast_as(0.0, x.speed)
     if line.masses == 3:
         carried = pull
         middle_twist = x.middle_speed - x.load_speed
@@ -201,7 +201,7 @@ def rates(line: Line, now: Conditions, x: State, p: FloatArray) -> State:
         (drive - reaction) * now.inverse_motor,
         rate,
         load,
-        like(sliding(x.loading, rate, now, p) if line.sliding else 0.0, x.speed),
+        broadcast_as(sliding(x.loading, rate, now, p) if line.sliding else 0.0, x.speed),
         vehicle,
         own_rate,
         branch,
@@ -258,7 +258,7 @@ def load_angle(line: Line, x: State, p: FloatArray) -> float:
 def load_rates(line: Line, pull: float, now: Conditions, x: State, p: FloatArray) -> tuple[float, float, float]:
     """Return the accelerations of the load and, where the tyre slips, of the vehicle [rad/s^2]; the traction's rate."""
     wheel = x.load_speed
-    still = like(0.0, wheel)
+    still = broadcast_as(0.0, wheel)
     pull -= shaft_loss(pull, smooth_sign(wheel, now.width_load), p)
     load = now.load + held_by_angle(load_angle(line, x, p), p)
     if not line.extended or every(p[slots.SLIP] <= 0.0):
@@ -283,7 +283,7 @@ def load_rates(line: Line, pull: float, now: Conditions, x: State, p: FloatArray
 
 
 @inlined
-def moved(line: Line, x: State, dx: State, h: float) -> State:
+def advanced(line: Line, x: State, dx: State, h: float) -> State:
     """Return a state moved along its derivative for a time [s]; what a line lacks stays where it is, at no cost."""
     twist, load_speed, middle_twist, middle_speed = x.twist, x.load_speed, x.middle_twist, x.middle_speed
     if line.masses > 1:
@@ -321,13 +321,13 @@ def runge_kutta(line: Line, now: Conditions, torque: float, rise: float, x: Stat
     middle = with_torque(now, torque)
     end = with_torque(now, torque + 0.5 * rise)
     first = rates(line, begin, x, p)
-    second = rates(line, middle, moved(line, x, first, 0.5 * h), p)
-    third = rates(line, middle, moved(line, x, second, 0.5 * h), p)
-    fourth = rates(line, end, moved(line, x, third, h), p)
-    x = moved(line, x, first, h / 6.0)
-    x = moved(line, x, second, h / 3.0)
-    x = moved(line, x, third, h / 3.0)
-    return moved(line, x, fourth, h / 6.0)
+    second = rates(line, middle, advanced(line, x, first, 0.5 * h), p)
+    third = rates(line, middle, advanced(line, x, second, 0.5 * h), p)
+    fourth = rates(line, end, advanced(line, x, third, h), p)
+    x = advanced(line, x, first, h / 6.0)
+    x = advanced(line, x, second, h / 3.0)
+    x = advanced(line, x, third, h / 3.0)
+    return advanced(line, x, fourth, h / 6.0)
 
 
 PARTS = 8  # steps that are taken in place of one
@@ -356,8 +356,8 @@ def stepped(line: Line, now: Conditions, torque: float, rise: float, x: State, p
     if line.elastic:
         return runge_kutta(line, now, torque, rise, x, p, h)
     closed = every(p[slots.GAP] <= 0.0)
-    parts, done, length = 1, 0, like(h, x.speed)
-    rest, share = length, like(1.0, x.speed)
+    parts, done, length = 1, 0, broadcast_as(h, x.speed)
+    rest, share = length, broadcast_as(1.0, x.speed)
     while done < parts:
         along = rise * ((done + 0.5) * share - 0.5)
         ahead = runge_kutta(line, now, torque + along, rise * share, x, p, length)

@@ -52,7 +52,7 @@ FEEDING = np.array([slots.DELAY, slots.DELAYED_BEFORE, slots.DRIFT, slots.LAG, s
 
 
 @compiled
-def go_side_by_side(masses: Masses, p: FloatArray, rows: IntArray) -> bool:
+def can_share_lanes(masses: Masses, p: FloatArray, rows: IntArray) -> bool:
     """Tell whether simulations can share SIMD lanes: compiled, not linear, the same effects and sub-steps."""
     first = p[rows[0]]
     if rows.size == 1 or not IS_COMPILED:
@@ -303,7 +303,7 @@ def integrate_each(
     while i < order.size:
         rows = order[i : i + LANES]
         rows = rows[: leading_compatible(p, rows)]
-        together = len(own) == 0 and slopes.shape[2] == 0 and go_side_by_side(masses, p, rows)
+        together = len(own) == 0 and slopes.shape[2] == 0 and can_share_lanes(masses, p, rows)
         if not together:
             rows = rows[:1]
         i += rows.size

@@ -11,14 +11,14 @@ from drivers.errors import CommandRefused, DriverError
 from drivers.guard_limits import NS_PER_S
 from drivers.plc.types import PlcStatus
 from drivers.torque_guard import Evidence, GuardLimits, TorqueGuard, TorqueRequest
-from hil.commission.state import Finding, stated
-from hil.commission.step import Job, Outcome, Step
+from hil.commission.state import StepFinding, stated
+from hil.commission.step import Outcome, Step, StepContext
 from hil.commission.steps import experiments
 from hil.config.rig_file import Rig
 from hil.orders.order import Order
 from hil.orders.runner import rigid_model
 from hil.rig.build import open_devices
-from hil.rig.check import Finding as Found, Verdict, check_rig
+from hil.rig.check import DeviceFinding as Found, DeviceVerdict, check_rig
 from hil.rig.excitation import NO_TORQUE
 from hil.rig.plan import plan_run
 from hil.rig.plc_watch import max_speed_rad_s, plc_limits
@@ -26,17 +26,17 @@ from hil.rig.plc_watch import max_speed_rad_s, plc_limits
 MENDING = "Correct the rig file, or fix or connect the device it describes; see: hil check RIG"
 
 
-def _about_devices(job: Job) -> str:
+def _about_devices(job: StepContext) -> str:
     return (
         "looks for both inverters and the PLC, compares identity, PDO map, scales and limits with rig file and EDS, "
         "and has each drive show that it stops when its host falls silent. Configures the drives; commands no torque."
     )
 
 
-def _do_devices(job: Job) -> Outcome:
+def _do_devices(job: StepContext) -> Outcome:
     found = check_rig(job.rig, prove_stop=True)
     written = 0
-    if any(each.verdict is Verdict.DIFFERS for each in found):
+    if any(each.verdict is DeviceVerdict.DIFFERS for each in found):
         before = sum(len(each.differences) for each in found)
         _configure(job.rig)
         found = check_rig(job.rig, prove_stop=True)
@@ -54,7 +54,7 @@ def _configure(rig: Rig) -> None:
         devices.m2.configure()
 
 
-def _protections(found: Found) -> list[Finding]:
+def _protections(found: Found) -> list[StepFinding]:
     """Keep what stands between a dead host and torque, and who accepted what is missing."""
     return [
         stated(f"{found.device} if the host fails: {each.name}", str(each).partition(": ")[2])
@@ -62,19 +62,19 @@ def _protections(found: Found) -> list[Finding]:
     ]
 
 
-def _findings(found: Found) -> list[Finding]:
+def _findings(found: Found) -> list[StepFinding]:
     expected = "there, and as rig file and EDS describe it"
     name = f"{found.device} at {found.address}"
     if found.differences:
         return [
-            Finding(f"{name}: {each.what}", f"{each.expected} ({each.source})", each.found, False, MENDING, True)
+            StepFinding(f"{name}: {each.what}", f"{each.expected} ({each.source})", each.found, False, MENDING, True)
             for each in found.differences
         ]
-    agrees = found.verdict is Verdict.AGREES
+    agrees = found.verdict is DeviceVerdict.AGREES
     unfit = [note for note in found.notes if not note.startswith("EDS ")]
     advice = "" if agrees and not unfit else "Bring the vehicle into that state" if agrees else MENDING
     measured = "; ".join((found.verdict.value, *found.notes))
-    return [Finding(name, expected, measured, agrees and not unfit, advice, True)]
+    return [StepFinding(name, expected, measured, agrees and not unfit, advice, True)]
 
 
 DEVICES = Step("devices", "Devices", _about_devices, _do_devices)
@@ -103,14 +103,14 @@ class Probe:
     evidence_beyond: Evidence = FRESH
 
 
-def _about_limits(job: Job) -> str:
+def _about_limits(job: StepContext) -> str:
     return (
         "asks the torque guard for a little more than each limit of the rig file and checks that it refuses; compares "
         "the PLC's limits with what the runs need. Commands no torque."
     )
 
 
-def _do_limits(job: Job) -> Outcome:
+def _do_limits(job: StepContext) -> Outcome:
     limits = job.rig.guard_limits
     findings = [_probed(limits, probe) for probe in _probes(limits)]
     with open_devices(job.rig) as devices:
@@ -118,7 +118,7 @@ def _do_limits(job: Job) -> Outcome:
         speeds = [speed for each in (devices.m1, devices.m2) if (speed := max_speed_rad_s(each)) is not None]
     read = tuple(plc_limits(status, job.rig, min(speeds, default=None)))
     believed = [
-        Finding(f"PLC: {each.what}", f"at most {each.most}", each.found, each.believed, MAP, True)
+        StepFinding(f"PLC: {each.what}", f"at most {each.most}", each.found, each.believed, MAP, True)
         for each in read
         if each.most is not None
     ]
@@ -167,12 +167,12 @@ def _prbs(name: str, torque_nm: float) -> TorqueRequest:
     return TorqueRequest(0.0, torque_nm, 0.0, 0.0) if name == "m1" else TorqueRequest(0.0, 0.0, 0.0, torque_nm)
 
 
-def _probed(limits: GuardLimits, probe: Probe) -> Finding:
+def _probed(limits: GuardLimits, probe: Probe) -> StepFinding:
     passes = _passes(limits, probe.at, probe.evidence_at)
     refuses = not _passes(limits, probe.beyond, probe.evidence_beyond)
     measured = f"{'passes' if passes else 'refused'} at it, {'refused' if refuses else 'passes'} 0.1 % beyond"
     expected = f"passes at {probe.limit}, refused beyond"
-    return Finding(f"guard: {probe.what}", expected, measured, passes and refuses, DEFECT, True)
+    return StepFinding(f"guard: {probe.what}", expected, measured, passes and refuses, DEFECT, True)
 
 
 def _passes(limits: GuardLimits, request: TorqueRequest, evidence: Evidence) -> bool:
@@ -192,7 +192,7 @@ def _passes(limits: GuardLimits, request: TorqueRequest, evidence: Evidence) -> 
     return True
 
 
-def _rate(limits: GuardLimits) -> Finding:
+def _rate(limits: GuardLimits) -> StepFinding:
     """See that a base torque one period after zero passes as far as the rate limit allows, and no further."""
     allowed_nm = limits.rate_limit_nm_per_s * limits.period_s
 
@@ -209,10 +209,10 @@ def _rate(limits: GuardLimits) -> Finding:
     passes, refuses = jumps(allowed_nm), not jumps(BEYOND * allowed_nm)
     measured = f"{'passes' if passes else 'refused'} at it, {'refused' if refuses else 'passes'} 0.1 % beyond"
     expected = f"passes at {limits.rate_limit_nm_per_s:g} Nm/s, refused beyond"
-    return Finding("guard: rate of the base torque", expected, measured, passes and refuses, DEFECT, True)
+    return StepFinding("guard: rate of the base torque", expected, measured, passes and refuses, DEFECT, True)
 
 
-def _silent(limits: GuardLimits) -> Finding:
+def _silent(limits: GuardLimits) -> StepFinding:
     guard = TorqueGuard(limits)
     try:
         guard.check(_base("m1", 1.0), 0, FRESH)
@@ -220,16 +220,16 @@ def _silent(limits: GuardLimits) -> Finding:
         measured, within = "refused", True
     else:
         measured, within = "passes", False
-    return Finding("guard: any torque before it is enabled", "refused", measured, within, DEFECT, True)
+    return StepFinding("guard: any torque before it is enabled", "refused", measured, within, DEFECT, True)
 
 
-def _needed(job: Job, status: PlcStatus) -> Iterator[Finding]:
+def _needed(job: StepContext, status: PlcStatus) -> Iterator[StepFinding]:
     """Compare what the PLC permits with what the largest of the runs to come need."""
     orders = experiments.orders(job)
     if not orders:
         return
     needed_nm = max(plan_run(job.source.ordered(order)[0], order.name).needs.torque_of_one_nm for order in orders)
-    yield Finding(
+    yield StepFinding(
         "PLC: torque limit of one inverter",
         f"at least {needed_nm:g} Nm",
         f"{status.torque_limit_nm:g} Nm",
@@ -238,7 +238,7 @@ def _needed(job: Job, status: PlcStatus) -> Iterator[Finding]:
         True,
     )
     fastest = max(_fastest_rad_s(job, order) for order in _fastest_of_each_kind(orders))
-    yield Finding(
+    yield StepFinding(
         "PLC: speed limit",
         f"at least {fastest:.1f} rad/s",
         f"{status.speed_limit_rad_s:g} rad/s",
@@ -256,7 +256,7 @@ def _fastest_of_each_kind(orders: Sequence[Order]) -> list[Order]:
     return list(by_kind.values())
 
 
-def _fastest_rad_s(job: Job, order: Order) -> float:
+def _fastest_rad_s(job: StepContext, order: Order) -> float:
     speed = job.runner.predict(order, rigid_model(job.rig), 0.0).speed_rad_s
     return max(abs(speed.low), abs(speed.high))
 

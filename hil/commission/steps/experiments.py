@@ -10,8 +10,8 @@ from estimator.identification.modes.modes import Mode
 from estimator.identification.online.recursive import Status as OnlineStatus
 from estimator.identification.settings import Settings
 from hil.commission.responses import of_repeats, record_of, rounded
-from hil.commission.state import Finding
-from hil.commission.step import Job, Outcome, Step
+from hil.commission.state import StepFinding
+from hil.commission.step import Outcome, Step, StepContext
 from hil.commission.steps.noise_friction import samples_lost
 from hil.config.experiment_tables import ReversalTable, TipTable
 from hil.errors import UsageError
@@ -38,7 +38,7 @@ def _speed_parts() -> list[float]:
     return [*up, *reversed(up)]
 
 
-def orders(job: Job) -> list[Order]:
+def orders(job: StepContext) -> list[Order]:
     cruise = cruise_of(job.rig)
     amplitude_nm = job.evidence("prbs").get("amplitude_nm", job.rig.prbs.amplitude_nm)
     seeds = 2**job.rig.prbs.cells - 1
@@ -56,12 +56,12 @@ def orders(job: Job) -> list[Order]:
     return [*runs, halt(job.rig)]
 
 
-def _others(job: Job) -> list[tuple[str, TipTable | ReversalTable | None]]:
+def _others(job: StepContext) -> list[tuple[str, TipTable | ReversalTable | None]]:
     """Return what is driven next to the runs at constant speed; None where the rig file has none of its kind."""
     return [("tip", first_of(job.rig, TipTable)), ("reversal", first_of(job.rig, ReversalTable))]
 
 
-def _about_experiments(job: Job) -> str:
+def _about_experiments(job: StepContext) -> str:
     amplitude_nm = job.evidence("prbs").get("amplitude_nm", job.rig.prbs.amplitude_nm)
     speed = cruise_of(job.rig).speed_rad_s
     return (
@@ -71,7 +71,7 @@ def _about_experiments(job: Job) -> str:
     )
 
 
-def _do_experiments(job: Job) -> Outcome:
+def _do_experiments(job: StepContext) -> Outcome:
     asked = orders(job)
     for number, order in enumerate(asked, start=1):
         job.say(f"  {number} of {len(asked)}: {order.name}")
@@ -79,10 +79,12 @@ def _do_experiments(job: Job) -> Outcome:
     runs = job.runs_of("experiments")
     missing = [name for name, table in _others(job) if table is None]
     findings = [
-        Finding("runs recorded", str(len(asked)), str(len(runs)), len(runs) == len(asked)),
+        StepFinding("runs recorded", str(len(asked)), str(len(runs)), len(runs) == len(asked)),
         samples_lost(runs),
         *(
-            Finding(name, f"an experiment of kind {name!r} in the rig file", "none", None, f"Add [experiments.{name}]")
+            StepFinding(
+                name, f"an experiment of kind {name!r} in the rig file", "none", None, f"Add [experiments.{name}]"
+            )
             for name in missing
         ),
     ]
@@ -104,11 +106,11 @@ LEAST_FIT_PERCENT = 70.0
 DRAWN_HZ = (0.5, 25.0)
 
 
-Found: TypeAlias = "tuple[Identification, BestEstimate]"
+IdentifiedRun: TypeAlias = "tuple[Identification, BestEstimate]"
 """What one run gave."""
 
 
-def cruises(job: Job) -> list[Any]:
+def cruises(job: StepContext) -> list[Any]:
     """Return the PRBS runs at constant speed."""
     runs = [run for run in job.runs_of("experiments") if run.name.startswith("cruise")]
     if len(runs) < 2:
@@ -119,20 +121,20 @@ def cruises(job: Job) -> list[Any]:
     return runs
 
 
-def _settings(job: Job) -> Settings:
+def _settings(job: StepContext) -> Settings:
     return Settings(sample_time_s=2.0 * job.rig.period_s)
 
 
-def _about_identification(job: Job) -> str:
+def _about_identification(job: StepContext) -> str:
     return "identifies the driveline from each PRBS run, on line and off line. Computes; commands no torque."
 
 
-def _do_identification(job: Job) -> Outcome:
+def _do_identification(job: StepContext) -> Outcome:
     from estimator.identification.best import best_estimate  # a second, and the bus comes first
     from estimator.identification.identify import identify as identify_record
 
     runs = cruises(job)
-    found: list[Found] = []
+    found: list[IdentifiedRun] = []
     for i, run in enumerate(runs):
         job.progress(f"identifying {run.name}", i / len(runs))
         record, settings = record_of(job.recording(run)), _settings(job)
@@ -143,10 +145,10 @@ def _do_identification(job: Job) -> Outcome:
     return Outcome([*_resonance_findings(modes), *_quality_findings(found)], evidence)
 
 
-def _resonance_findings(modes: list[Mode | None]) -> list[Finding]:
+def _resonance_findings(modes: list[Mode | None]) -> list[StepFinding]:
     known = [mode for mode in modes if mode is not None]
     look = "Look at the coherence in the report; raise the amplitude, or repeat on a better road"
-    findings = [Finding("runs with a resonance", str(len(modes)), str(len(known)), len(known) == len(modes), look)]
+    findings = [StepFinding("runs with a resonance", str(len(modes)), str(len(known)), len(known) == len(modes), look)]
     if len(known) < 2:
         return findings
     frequency = np.array([mode.frequency_hz for mode in known])
@@ -154,43 +156,43 @@ def _resonance_findings(modes: list[Mode | None]) -> list[Finding]:
     spread = float(np.std(frequency, ddof=1) / np.mean(frequency))
     return [
         *findings,
-        Finding(
+        StepFinding(
             "resonance, mean of the runs",
             f"the same within {100.0 * SPREAD:g} % (standard deviation)",
             f"{of_repeats(frequency).shown('Hz')}; between runs {100.0 * spread:.2f} %",
             spread <= SPREAD,
             "See whether it depends on speed or time; the diagnosis looks for the cause",
         ),
-        Finding("damping, mean of the runs", "–", of_repeats(damping).shown(), None),
+        StepFinding("damping, mean of the runs", "–", of_repeats(damping).shown(), None),
     ]
 
 
-def _quality_findings(found: list[Found]) -> list[Finding]:
-    from estimator.identification.best import Verdict
+def _quality_findings(found: list[IdentifiedRun]) -> list[StepFinding]:
+    from estimator.identification.best import ModelVerdict
 
     pairs = [(each.online_resonance, best.mode) for each, best in found]
     both = [(a.frequency_hz, b.frequency_hz.value) for a, b in pairs if a is not None and b is not None]
     worst = max((abs(a / b - 1.0) for a, b in both), default=float("nan"))
     estimated = sum(each.estimate.status is OnlineStatus.ESTIMATED for each, _ in found)
     fits = [best.fit.fit_percent for _, best in found]
-    good = sum(best.verdict in (Verdict.GOOD, Verdict.CLOSED_LOOP) for _, best in found)
+    good = sum(best.verdict in (ModelVerdict.GOOD, ModelVerdict.CLOSED_LOOP) for _, best in found)
     return [
-        Finding(
+        StepFinding(
             "on line against off line, resonance",
             f"within {100.0 * AGREEMENT:g} % in every run",
             f"{100.0 * worst:.2f} % at worst" if both else "nothing to compare",
             bool(both) and len(both) == len(found) and worst <= AGREEMENT,
             "The on-line estimate needs more excitation, or longer runs",
         ),
-        Finding("runs whose on-line estimate stands", str(len(found)), str(estimated), estimated == len(found)),
-        Finding(
+        StepFinding("runs whose on-line estimate stands", str(len(found)), str(estimated), estimated == len(found)),
+        StepFinding(
             "runs a linear model is enough for",
             str(len(found)),
             str(good),
             good == len(found),
             "The drive is not linear, or has more than two masses: see the diagnosis",
         ),
-        Finding(
+        StepFinding(
             "free-run fit of the off-line models",
             f"at least {LEAST_FIT_PERCENT:g} %",
             f"{min(fits):.1f} to {max(fits):.1f} %",

@@ -10,8 +10,8 @@ import numpy as np
 from estimator.identification.modes.modes import Mode, two_mass_resonance
 from estimator.physics.model import DrivelineModel, parameter_unit
 from hil.commission.responses import TRUSTED, record_of, thinned
-from hil.commission.state import Finding, model_from_json, model_json, stated
-from hil.commission.step import Job, Outcome, Step
+from hil.commission.state import StepFinding, model_from_json, model_json, stated
+from hil.commission.step import Outcome, Step, StepContext
 from hil.commission.steps.experiments import cruises
 from hil.config.model_file import write_model
 from hil.errors import UsageError
@@ -37,14 +37,14 @@ RESONANCE = 0.03
 MODEL_FILE = "nominal.toml"
 
 
-def _about_validation(job: Job) -> str:
+def _about_validation(job: StepContext) -> str:
     return (
         "fits motor inertia, load inertia, shaft stiffness, damping and friction to every other PRBS run and simulates "
         f"the others. Writes {MODEL_FILE}. Computes; commands no torque."
     )
 
 
-def _do_validation(job: Job) -> Outcome:
+def _do_validation(job: StepContext) -> Outcome:
     from hil.commission.physical_fit import fit_two_mass  # a second, and the bus comes first
     from hil.plants import ModelPlant
     from hil.report.comparison import compare_record
@@ -62,7 +62,7 @@ def _do_validation(job: Job) -> Outcome:
     return Outcome(_findings_validation(job, fit, mode, compared), _evidence_validation(fit, compared))
 
 
-def _mode(job: Job) -> Mode:
+def _mode(job: StepContext) -> Mode:
     """Return the resonance of the runs, or of the first look."""
     found = [run["best"]["resonance"] for run in job.evidence("identification").get("runs", [])]
     known = [resonance for resonance in found if resonance is not None]
@@ -77,13 +77,15 @@ def _mode(job: Job) -> Mode:
     )
 
 
-def _findings_validation(job: Job, fit: PhysicalFit, mode: Mode, compared: list[Comparison]) -> list[Finding]:
+def _findings_validation(
+    job: StepContext, fit: PhysicalFit, mode: Mode, compared: list[Comparison]
+) -> list[StepFinding]:
     unseen = float(np.sqrt(np.mean([each.rms**2 for each in compared])))
     noise = job.evidence("noise").get("speed_std_rad_s")
     physical = two_mass_resonance(**fit.model.values())
     percent = [each.fit_percent for each in compared]
     findings = [
-        Finding(
+        StepFinding(
             "error on unseen runs (free run, RMS)",
             f"at most {UNSEEN:g} times the {shown(fit.rms, 'rad/s')} on the runs of the fit",
             f"{shown(unseen, 'rad/s')}, {unseen / fit.rms:.2f} times",
@@ -94,7 +96,7 @@ def _findings_validation(job: Job, fit: PhysicalFit, mode: Mode, compared: list[
     ]
     if noise:
         findings.append(
-            Finding(
+            StepFinding(
                 "error against the standstill noise",
                 f"at most {NOISE:g} times",
                 f"{unseen / noise:.2f} times {shown(noise, 'rad/s')}",
@@ -105,7 +107,7 @@ def _findings_validation(job: Job, fit: PhysicalFit, mode: Mode, compared: list[
     if physical is not None:
         off = physical.frequency_hz / mode.frequency_hz - 1.0
         findings.append(
-            Finding(
+            StepFinding(
                 "resonance of the physical model",
                 f"that of the runs, {shown(mode.frequency_hz, 'Hz')}, within {100.0 * RESONANCE:g} %",
                 f"{shown(physical.frequency_hz, 'Hz')}, {100.0 * off:+.2f} %",
@@ -116,9 +118,9 @@ def _findings_validation(job: Job, fit: PhysicalFit, mode: Mode, compared: list[
     return [*findings, *_parameter_findings(fit)]
 
 
-def _parameter_findings(fit: PhysicalFit) -> list[Finding]:
+def _parameter_findings(fit: PhysicalFit) -> list[StepFinding]:
     return [
-        Finding(
+        StepFinding(
             name,
             f"known within ±{100.0 * TRUSTED:g} %",
             value.shown(parameter_unit(name, fit.model.motion)),
@@ -165,14 +167,14 @@ ALONE = ("m1", "m2")
 """Explained, too: each inverter by itself, from the scales step. Nothing tells a wrong gain of one as well."""
 
 
-def _about_diagnosis(job: Job) -> str:
+def _about_diagnosis(job: StepContext) -> str:
     return (
         "questions the model with the slowest and the fastest PRBS run, tip, reversal and the runs of one inverter "
         f"alone, and judges on stretches kept back. Writes {AUGMENTED} and {FOLDER}/report.html. Commands no torque."
     )
 
 
-def _do_diagnosis(job: Job) -> Outcome:
+def _do_diagnosis(job: StepContext) -> Outcome:
     from estimator.diagnosis.diagnose import diagnose  # a second, and the bus comes first; so do those below
 
     nominal, paths = nominal_of(job), explained(job)
@@ -181,7 +183,7 @@ def _do_diagnosis(job: Job) -> Outcome:
     return Outcome(_findings_diagnosis(result), _evidence_diagnosis(result))
 
 
-def explained(job: Job) -> list[Path]:
+def explained(job: StepContext) -> list[Path]:
     """Return the recordings that are diagnosed together."""
     runs = {run.name: run for run in cruises(job)}
     slow_to_fast = sorted(runs.values(), key=lambda run: run.measured["speed_measured_rad_s"][0])
@@ -190,7 +192,7 @@ def explained(job: Job) -> list[Path]:
     return [job.recording(run) for run in (slow_to_fast[0], slow_to_fast[-1], *others)]
 
 
-def nominal_of(job: Job) -> DrivelineModel:
+def nominal_of(job: StepContext) -> DrivelineModel:
     if job.nominal is not None:
         return job.nominal
     document = job.evidence("validation").get("model")
@@ -202,7 +204,7 @@ def nominal_of(job: Job) -> DrivelineModel:
     return model_from_json(document)
 
 
-def _publish(job: Job, result: Diagnosis, nominal: DrivelineModel, made: Provenance) -> None:
+def _publish(job: StepContext, result: Diagnosis, nominal: DrivelineModel, made: Provenance) -> None:
     from hil.report.diagnosis_html import diagnosis_page
     from hil.report.diagnosis_json import diagnosis_text
 
@@ -222,7 +224,7 @@ def _publish(job: Job, result: Diagnosis, nominal: DrivelineModel, made: Provena
     )
 
 
-def _findings_diagnosis(result: Diagnosis) -> list[Finding]:
+def _findings_diagnosis(result: Diagnosis) -> list[StepFinding]:
     from estimator.diagnosis.result import Verdict
     from hil.report.wording import headline, title_of
 
@@ -234,7 +236,7 @@ def _findings_diagnosis(result: Diagnosis) -> list[Finding]:
         Verdict.UNEXPLAINED: "See where it is in the diagnosis, and what to look at there",
     }[result.verdict]
     findings = [
-        Finding(
+        StepFinding(
             "verdict",
             "the model, re-tuned, explains the recordings",
             headline(result),
@@ -249,7 +251,9 @@ def _findings_diagnosis(result: Diagnosis) -> list[Finding]:
     ]
     findings += [stated(f"found: {title_of(effect.name)}", effect.statement) for effect in result.effects]
     findings += [
-        Finding(f"can't tell: {title_of(each.name)}", "–", each.reason, None, f"{each.cure[0].upper()}{each.cure[1:]}.")
+        StepFinding(
+            f"can't tell: {title_of(each.name)}", "–", each.reason, None, f"{each.cure[0].upper()}{each.cure[1:]}."
+        )
         for each in result.untestable
     ]
     return findings

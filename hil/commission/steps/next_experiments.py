@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 from drivers.foreign_file import read_regular
-from hil.commission.state import Finding, stated
-from hil.commission.step import Job, Outcome, Step
+from hil.commission.state import StepFinding, stated
+from hil.commission.step import Outcome, Step, StepContext
 from hil.commission.steps.models import AUGMENTED, NOMINAL_FILE, explained, nominal_of
 from hil.config.model_file import ModelFile
-from hil.design.solve_state import SCHEMA, STATE, End, State, fresh_state
+from hil.design.solve_state import SCHEMA, STATE, End, SolveState, fresh_state
 from hil.result_folder import publish
 
 NAME = "solve"
@@ -19,7 +19,7 @@ MOST_VEHICLE_S = 600.0
 """Time that the vehicle may be needed for in all [s]: as ``hil solve`` without ``--vehicle-s``."""
 
 
-def _about(job: Job) -> str:
+def _about(job: StepContext) -> str:
     return (
         "designs the experiment that would decide what the diagnosis leaves open, shows it, asks, drives it and "
         f"diagnoses again, until it is decided: {MOST_VEHICLE_S / 60.0:g} min of driving at most, none where the "
@@ -27,10 +27,10 @@ def _about(job: Job) -> str:
     )
 
 
-def _do(job: Job) -> Outcome:
+def _do(job: StepContext) -> Outcome:
     record = job.state.steps[NAME]
     if because := _needless(job):
-        state = State(SCHEMA, record.rig_digest, "", because=because)
+        state = SolveState(SCHEMA, record.rig_digest, "", because=because)
         return Outcome((), STATE.dump_python(state, mode="json"), needless=because)
     from hil.design.solve import Solving  # a second, and the bus comes first
 
@@ -66,7 +66,7 @@ def _do(job: Job) -> Outcome:
     return Outcome(_findings(state), record.evidence)
 
 
-def _needless(job: Job) -> str:
+def _needless(job: StepContext) -> str:
     """Say why no experiment is needed; "" where the diagnosis abstains or names look-alikes."""
     found = job.evidence("diagnosis")
     if not found:
@@ -76,7 +76,7 @@ def _needless(job: Job) -> str:
     return ""
 
 
-def _findings(state: State) -> list[Finding]:
+def _findings(state: SolveState) -> list[StepFinding]:
     odds = [", ".join(f"{name} {p:.3f}" for name, p in each.probabilities.items()) for each in state.odds]
     findings = [
         stated(f"driven: {run.name}", f"odds before: {before}. After: {after}")
@@ -86,7 +86,9 @@ def _findings(state: State) -> list[Finding]:
     ended = "" if state.end in (None, End.DECIDED) else f", ended because {state.end.value}"
     return [
         *findings,
-        Finding(f"verdict{ended}", "decided", f"{state.verdict}: {odds[-1]}", state.end is End.DECIDED or None, advice),
+        StepFinding(
+            f"verdict{ended}", "decided", f"{state.verdict}: {odds[-1]}", state.end is End.DECIDED or None, advice
+        ),
     ]
 
 

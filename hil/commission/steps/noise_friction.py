@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from hil.commission.responses import READING, Measured, columns_of, record_of, thinned
-from hil.commission.state import Finding, stated
-from hil.commission.step import Job, Outcome, Step
+from hil.commission.state import StepFinding, stated
+from hil.commission.step import Outcome, Step, StepContext
 from hil.config.experiment_tables import ReversalTable
 from hil.orders.order import Order, as_table, first_of
 from hil.orders.runner import RunRecord
@@ -30,32 +30,32 @@ LOST_SHARE = 0.01
 """Largest share of samples that are stale or late."""
 
 
-def _orders_noise(job: Job) -> list[Order]:
+def _orders_noise(job: StepContext) -> list[Order]:
     return [Order("rest", {"kind": "rest", "duration_s": DURATION_S})]
 
 
-def _about_noise(job: Job) -> str:
+def _about_noise(job: StepContext) -> str:
     return (
         f"records {DURATION_S:g} s at standstill with the drives armed at zero torque. Nothing is asked for but zero; "
         "the brakes may stay on."
     )
 
 
-def _do_noise(job: Job) -> Outcome:
+def _do_noise(job: StepContext) -> Outcome:
     run = job.run("noise", _orders_noise(job)[0])
     columns = columns_of(job.recording(run))
     good = columns[FLAGS] == 0
     speed = columns[SPEED][good]
     mean, std = float(np.mean(speed)), float(np.std(speed))
     findings = [
-        Finding(
+        StepFinding(
             "speed noise (RMS)",
             f"at most {SPEED_NOISE_RAD_S:g} rad/s",
             shown(std, "rad/s"),
             std <= SPEED_NOISE_RAD_S,
             "Look at the resolver's cable and shield, and at the drive's speed filter; a larger PRBS makes up for it",
         ),
-        Finding(
+        StepFinding(
             "mean speed",
             f"within ±{OFFSET_RAD_S:g} rad/s",
             shown(mean, "rad/s"),
@@ -73,10 +73,10 @@ def _do_noise(job: Job) -> Outcome:
     return Outcome(findings, evidence)
 
 
-def _torque_finding(job: Job, name: str, reading: np.ndarray) -> Finding:
+def _torque_finding(job: StepContext, name: str, reading: np.ndarray) -> StepFinding:
     rated = getattr(job.rig.inverters, name).rated_torque_nm
     mean, std = (1000.0 * float(f(reading)) / rated for f in (np.mean, np.std))
-    return Finding(
+    return StepFinding(
         f"torque reading of {name}",
         f"mean within ±{TORQUE_PERMILLE:g} ‰ of rated, noise at most {TORQUE_PERMILLE:g} ‰",
         f"mean {mean:z.2f} ‰, noise {std:.2f} ‰",
@@ -85,11 +85,11 @@ def _torque_finding(job: Job, name: str, reading: np.ndarray) -> Finding:
     )
 
 
-def samples_lost(runs: Sequence[RunRecord]) -> Finding:
+def samples_lost(runs: Sequence[RunRecord]) -> StepFinding:
     """Hold what was stale or late in some runs against its limit."""
     recorded = sum(run.recorded for run in runs)
     share = sum(run.flagged for run in runs) / max(1, recorded)
-    return Finding(
+    return StepFinding(
         "samples stale or late",
         f"at most {100.0 * LOST_SHARE:g} %",
         f"{100.0 * share:.2f} % of {recorded}",
@@ -111,14 +111,14 @@ LOAD_SHARE = 0.2
 """Largest constant load (grade), in parts of that torque."""
 
 
-def _orders_friction(job: Job) -> list[Order]:
+def _orders_friction(job: StepContext) -> list[Order]:
     table = first_of(job.rig, ReversalTable)
     if table is None:
         return []
     return [Order("reversal", as_table(table, prbs=False), least_margin_rad_s=4.0)]
 
 
-def _about_friction(job: Job) -> str:
+def _about_friction(job: StepContext) -> str:
     table = first_of(job.rig, ReversalTable)
     if table is None:
         return "needs an experiment of kind 'reversal' in the rig file, there is none: nothing is driven."
@@ -128,7 +128,7 @@ def _about_friction(job: Job) -> str:
     )
 
 
-def _do_friction(job: Job) -> Outcome:
+def _do_friction(job: StepContext) -> Outcome:
     table, orders = first_of(job.rig, ReversalTable), _orders_friction(job)
     if table is None:
         return Outcome([_missing()])
@@ -142,14 +142,14 @@ def _do_friction(job: Job) -> Outcome:
     relative = Measured(inertia.value / assumed, inertia.ci95 / assumed)
     swing = table.swing_nm
     findings = [
-        Finding(
+        StepFinding(
             "total inertia at the motor shaft",
             f"{assumed:g} kg m² as in the rig file, within {INERTIA[0] - 1:+.0%} to {INERTIA[1] - 1:+.0%}",
             inertia.shown("kg m²"),
             relative.is_within(*INERTIA),
             f"Set [vehicle] inertia_kg_m2 = {inertia.value:.3g}: it tunes the speed holds",
         ),
-        Finding(
+        StepFinding(
             "dry friction",
             f"at most {FRICTION_SHARE * swing:g} Nm, half of the swing",
             dry.shown("Nm"),
@@ -157,7 +157,7 @@ def _do_friction(job: Job) -> Outcome:
             "Look for a brake that drags, or raise swing_nm of the reversal",
         ),
         stated("viscous friction", viscous.shown("Nm s/rad")),
-        Finding(
+        StepFinding(
             "constant load (grade)",
             f"within ±{LOAD_SHARE * swing:g} Nm, a fifth of the swing",
             load.shown("Nm"),
@@ -177,8 +177,8 @@ def _do_friction(job: Job) -> Outcome:
     return Outcome(findings, evidence)
 
 
-def _missing() -> Finding:
-    return Finding(
+def _missing() -> StepFinding:
+    return StepFinding(
         "reversal",
         "an experiment of kind 'reversal' in the rig file",
         "none",

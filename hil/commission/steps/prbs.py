@@ -31,8 +31,8 @@ from hil.commission.prbs_design import (
     vibration_m_s2,
 )
 from hil.commission.responses import HIGH_PASS_HZ, RINGING_S, averaged, record_of
-from hil.commission.state import Finding
-from hil.commission.step import Job, Outcome, Step
+from hil.commission.state import StepFinding
+from hil.commission.step import Outcome, Step, StepContext
 from hil.orders.order import Order, as_table, cruise_of, halt
 from hil.orders.runner import RunRecord
 from hil.report.numbers import shown
@@ -46,7 +46,7 @@ TRIES = 3
 
 
 @dataclass(frozen=True, slots=True)
-class _Seen:
+class _TrialResult:
     """What a trial showed, or is predicted to show."""
 
     spread: ResonanceSpread | None
@@ -55,16 +55,16 @@ class _Seen:
     high_rad_s: float
 
 
-def _order(job: Job, amplitude_nm: float, number: int = 1) -> Order:
+def _order(job: StepContext, amplitude_nm: float, number: int = 1) -> Order:
     table = as_table(cruise_of(job.rig), prbs=True)
     return Order(f"trial{number}", table, {"amplitude_nm": amplitude_nm})
 
 
-def _orders(job: Job) -> list[Order]:
+def _orders(job: StepContext) -> list[Order]:
     return [_order(job, _choice(job).amplitude_nm), halt(job.rig)]
 
 
-def _about(job: Job) -> str:
+def _about(job: StepContext) -> str:
     choice = _choice(job)
     return (
         f"drives at {cruise_of(job.rig).speed_rad_s:g} rad/s with a PRBS of ±{choice.amplitude_nm:g} Nm of both "
@@ -72,7 +72,7 @@ def _about(job: Job) -> str:
     )
 
 
-def _choice(job: Job) -> Choice:
+def _choice(job: StepContext) -> Choice:
     """Choose the amplitude from what is known before it was driven."""
     caps = [*amplitude.torque_caps(job.rig), *_comfort_cap(job)]
     known = _known_spread(job)
@@ -80,11 +80,11 @@ def _choice(job: Job) -> Choice:
     return amplitude.choose(job.rig.prbs.amplitude_nm, needed, caps, _resolution_nm(job))
 
 
-def _needed(job: Job, known: ResonanceSpread) -> float:
+def _needed(job: StepContext, known: ResonanceSpread) -> float:
     return amplitude.needed_nm(known, _test_amplitude_nm(job))
 
 
-def _test_amplitude_nm(job: Job) -> float:
+def _test_amplitude_nm(job: StepContext) -> float:
     """Return the amplitude of the scales step, were its test as long as the runs to come [Nm].
 
     Spreads are inverse to the amplitude and to the root of the length.
@@ -93,19 +93,19 @@ def _test_amplitude_nm(job: Job) -> float:
     return float(scales["amplitude_nm"] / math.sqrt(cruise_of(job.rig).duration_s / scales["duration_s"]))
 
 
-def _known_spread(job: Job) -> ResonanceSpread | None:
+def _known_spread(job: StepContext) -> ResonanceSpread | None:
     scales = job.evidence("scales")
     if "spread" not in scales:
         return None
     return ResonanceSpread(Mode(*scales["resonance"]), *scales["spread"])
 
 
-def _resolution_nm(job: Job) -> float:
+def _resolution_nm(job: StepContext) -> float:
     """Return the step of the drives' torque, of both together [Nm]: one per mille of rated torque each."""
     return 1e-3 * (job.rig.inverters.m1.rated_torque_nm + job.rig.inverters.m2.rated_torque_nm)
 
 
-def _comfort_cap(job: Job) -> Iterator[Cap]:
+def _comfort_cap(job: StepContext) -> Iterator[Cap]:
     """Predict the vibration with the rig file's amplitude; it grows with it."""
     if not job.evidence("scales").get("model") and job.nominal is None:
         return
@@ -114,7 +114,7 @@ def _comfort_cap(job: Job) -> Iterator[Cap]:
         yield Cap(job.rig.prbs.amplitude_nm * COMFORT_LIMIT_M_S2 / seen.vibration_m_s2, "the comfort of those on board")
 
 
-def _predicted(job: Job, amplitude_nm: float) -> _Seen:
+def _predicted(job: StepContext, amplitude_nm: float) -> _TrialResult:
     prediction = job.predict(_order(job, amplitude_nm))
     vibration = vibration_m_s2(
         prediction.torque_nm, prediction.course_rad_s, job.model(), job.rig.period_s, job.travel_m_per_rad
@@ -122,10 +122,10 @@ def _predicted(job: Job, amplitude_nm: float) -> _Seen:
     known = _known_spread(job)
     if known is not None:
         known = known.scaled(_test_amplitude_nm(job) / amplitude_nm)
-    return _Seen(known, vibration, *_course(prediction.course_rad_s, job.rig.period_s))
+    return _TrialResult(known, vibration, *_course(prediction.course_rad_s, job.rig.period_s))
 
 
-def _do(job: Job) -> Outcome:
+def _do(job: StepContext) -> Outcome:
     choice = _choice(job)
     tries: list[dict[str, Any]] = []
     for number in range(1, TRIES + 1):
@@ -143,11 +143,11 @@ def _do(job: Job) -> Outcome:
     return Outcome(_findings(job, choice, predicted, seen, run), evidence)
 
 
-def _measured(job: Job, run: RunRecord) -> _Seen:
+def _measured(job: StepContext, run: RunRecord) -> _TrialResult:
     record = record_of(job.recording(run))
     speed = np.interp(record.time_s, record.time_s[record.okay], record.output[record.okay])
     vibration = vibration_m_s2(record.total_torque_nm, speed, job.model(), record.sample_time_s, job.travel_m_per_rad)
-    return _Seen(_spread(job, record), vibration, *_course(speed, record.sample_time_s))
+    return _TrialResult(_spread(job, record), vibration, *_course(speed, record.sample_time_s))
 
 
 def _course(speed_rad_s: FloatArray, period_s: float) -> tuple[float, float]:
@@ -156,7 +156,7 @@ def _course(speed_rad_s: FloatArray, period_s: float) -> tuple[float, float]:
     return float(smooth.min()), float(smooth.max())
 
 
-def _spread(job: Job, record: Record) -> ResonanceSpread | None:
+def _spread(job: StepContext, record: Record) -> ResonanceSpread | None:
     from estimator.identification.offline.fits import fit_output_error  # half a second, and the bus comes first
 
     extra = int(job.evidence("scales").get("extra_samples") or 0)
@@ -167,7 +167,7 @@ def _spread(job: Job, record: Record) -> ResonanceSpread | None:
     return resonance_spread(fit, Settings().band_hz)
 
 
-def _better(job: Job, choice: Choice, seen: _Seen) -> Choice | None:
+def _better(job: StepContext, choice: Choice, seen: _TrialResult) -> Choice | None:
     """Return another amplitude where what was measured asks for one."""
     step_nm = _resolution_nm(job)
     if seen.vibration_m_s2 > COMFORT_LIMIT_M_S2:
@@ -185,14 +185,16 @@ def _better(job: Job, choice: Choice, seen: _Seen) -> Choice | None:
     return replace(higher, reason="too little for the resonance")
 
 
-def _findings(job: Job, choice: Choice, predicted: _Seen, seen: _Seen, run: RunRecord) -> list[Finding]:
+def _findings(
+    job: StepContext, choice: Choice, predicted: _TrialResult, seen: _TrialResult, run: RunRecord
+) -> list[StepFinding]:
     speed = cruise_of(job.rig).speed_rad_s
     band = max(LEAST_BAND_RAD_S, SPEED_BAND * abs(speed))
     inside = speed - band <= seen.low_rad_s and seen.high_rad_s <= speed + band
     travel = "" if job.travel_is_given else f" (with {job.travel_m_per_rad:.3g} m per motor radian, assumed)"
     weaker = f"The cap is {choice.cap.amplitude_nm:g} Nm, set by {choice.cap.reason}: raise it, or drive longer runs"
     return [
-        Finding(
+        StepFinding(
             "amplitude of the PRBS",
             f"at least {choice.needed_nm:.0f} Nm, at most {choice.cap.amplitude_nm:.0f} Nm ({choice.cap.reason})",
             f"±{choice.amplitude_nm:g} Nm, {choice.reason}",
@@ -200,14 +202,14 @@ def _findings(job: Job, choice: Choice, predicted: _Seen, seen: _Seen, run: RunR
             weaker,
         ),
         *_spread_findings(predicted.spread, seen.spread, weaker),
-        Finding(
+        StepFinding(
             "vibration of the vehicle (RMS)",
             f"at most {COMFORT_LIMIT_M_S2:g} m/s² (ISO 2631-1){travel}",
             f"{seen.vibration_m_s2:.3f} m/s², predicted {predicted.vibration_m_s2:.3f}",
             seen.vibration_m_s2 <= COMFORT_LIMIT_M_S2,
             "Lower [prbs] amplitude_nm; give the vehicle's own way per motor radian by --travel",
         ),
-        Finding(
+        StepFinding(
             "speed while measured",
             f"{speed - band:g} to {speed + band:g} rad/s",
             f"{seen.low_rad_s:.1f} to {seen.high_rad_s:.1f}, predicted {predicted.low_rad_s:.1f} to "
@@ -219,14 +221,16 @@ def _findings(job: Job, choice: Choice, predicted: _Seen, seen: _Seen, run: RunR
     ]
 
 
-def _spread_findings(predicted: ResonanceSpread | None, seen: ResonanceSpread | None, advice: str) -> Iterator[Finding]:
+def _spread_findings(
+    predicted: ResonanceSpread | None, seen: ResonanceSpread | None, advice: str
+) -> Iterator[StepFinding]:
     def written(value: float | None) -> str:
         return "" if value is None else f", predicted {shown(100.0 * value, '%')}"
 
     if seen is None:
-        yield Finding("resonance in one run", "a lightly damped mode", "none found", False, advice)
+        yield StepFinding("resonance in one run", "a lightly damped mode", "none found", False, advice)
         return
-    yield Finding(
+    yield StepFinding(
         "standard deviation of the resonance's frequency, one run",
         f"at most {100.0 * FREQUENCY_STD:g} %",
         f"{shown(100.0 * seen.frequency_std, '%')} of {shown(seen.mode.frequency_hz, 'Hz')}"
@@ -234,7 +238,7 @@ def _spread_findings(predicted: ResonanceSpread | None, seen: ResonanceSpread | 
         seen.frequency_std <= FREQUENCY_STD,
         advice,
     )
-    yield Finding(
+    yield StepFinding(
         "standard deviation of its damping, one run",
         f"at most {100.0 * DAMPING_STD:g} %",
         f"{shown(100.0 * seen.damping_std, '%')} of {seen.mode.damping:.3f}"
@@ -244,11 +248,11 @@ def _spread_findings(predicted: ResonanceSpread | None, seen: ResonanceSpread | 
     )
 
 
-def _room(job: Job, run: RunRecord) -> Finding:
+def _room(job: StepContext, run: RunRecord) -> StepFinding:
     """Hold the largest torque that was measured against the limits of the rig file."""
     largest = {name: max(map(abs, run.measured[f"torque_{name}_nm"])) for name in ("m1", "m2")}
     limits = {name: getattr(job.rig.inverters, name).torque_limit_nm for name in largest}
-    return Finding(
+    return StepFinding(
         "largest torque of each inverter",
         " and ".join(f"{name} at most {limit:g} Nm" for name, limit in limits.items()),
         " and ".join(f"{name} {shown(value, 'Nm')}" for name, value in largest.items()),
@@ -257,7 +261,7 @@ def _room(job: Job, run: RunRecord) -> Finding:
     )
 
 
-def _json(seen: _Seen) -> dict[str, Any]:
+def _json(seen: _TrialResult) -> dict[str, Any]:
     spread = seen.spread
     return {
         "frequency_std": None if spread is None else spread.frequency_std,

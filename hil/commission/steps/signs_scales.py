@@ -25,8 +25,8 @@ from hil.commission.responses import (
     response_ratio,
     thinned,
 )
-from hil.commission.state import Finding, model_json, stated
-from hil.commission.step import Job, Outcome, Step
+from hil.commission.state import StepFinding, model_json, stated
+from hil.commission.step import Outcome, Step, StepContext
 from hil.orders.order import Order, as_table, cruise_of, halt
 from hil.recording.columns import SPEED, TIME
 from hil.report.numbers import shown
@@ -66,7 +66,7 @@ class _Answer:
         return self.response.speed.is_seen
 
 
-def _order_signs(job: Job, name: str, level: int) -> Order:
+def _order_signs(job: StepContext, name: str, level: int) -> Order:
     limit_nm = min(getattr(job.rig.inverters, name).torque_limit_nm, job.rig.guard.sum_limit_nm)
     resolution_nm = 1e-3 * getattr(job.rig.inverters, name).rated_torque_nm
     step_nm = max(1, round(LEVELS[level] * limit_nm / resolution_nm)) * resolution_nm  # else its rounding is an error
@@ -86,11 +86,11 @@ def _order_signs(job: Job, name: str, level: int) -> Order:
     )
 
 
-def _orders_signs(job: Job) -> list[Order]:
+def _orders_signs(job: StepContext) -> list[Order]:
     return [_order_signs(job, name, 0) for name in SHARES_M1]
 
 
-def _about_signs(job: Job) -> str:
+def _about_signs(job: StepContext) -> str:
     largest = [f"{_order_signs(job, name, len(LEVELS) - 1).table['step_nm']:g} Nm" for name in SHARES_M1]
     return (
         "gives pulses of torque from standstill, both ways, with m1 alone and then with m2 alone; no speed controller "
@@ -99,8 +99,8 @@ def _about_signs(job: Job) -> str:
     )
 
 
-def _do_signs(job: Job) -> Outcome:
-    findings: list[Finding] = []
+def _do_signs(job: StepContext) -> Outcome:
+    findings: list[StepFinding] = []
     evidence = {}
     for name in SHARES_M1:
         answer = _ask(job, name)
@@ -114,7 +114,7 @@ def _do_signs(job: Job) -> Outcome:
     return Outcome(findings, evidence)
 
 
-def _ask(job: Job, name: str) -> _Answer:
+def _ask(job: StepContext, name: str) -> _Answer:
     answer = _pulses(job, name, 0)
     for level in range(1, len(LEVELS)):
         if answer.seen:
@@ -126,7 +126,7 @@ def _ask(job: Job, name: str) -> _Answer:
     return answer
 
 
-def _pulses(job: Job, name: str, level: int) -> _Answer:
+def _pulses(job: StepContext, name: str, level: int) -> _Answer:
     order = _order_signs(job, name, level)
     columns = columns_of(job.recording(job.run("signs", order)))
     period_s = job.rig.period_s
@@ -146,11 +146,11 @@ def _pulses(job: Job, name: str, level: int) -> _Answer:
     return _Answer(order.table["step_nm"], response, course)
 
 
-def _findings(name: str, answer: _Answer) -> list[Finding]:
+def _findings(name: str, answer: _Answer) -> list[StepFinding]:
     speed, reading = answer.response.speed, answer.response.reading
     moves = "does not move" if not answer.seen else "forward" if speed.value > 0.0 else "backward"
     found = [
-        Finding(
+        StepFinding(
             f"{name}: torque reading over reference",
             f"{READING_SCALE[0]:g} to {READING_SCALE[1]:g}",
             reading.shown(),
@@ -158,7 +158,7 @@ def _findings(name: str, answer: _Answer) -> list[Finding]:
             f"Compare rated torque (0x6076) and the sign of the current of {name} with the rig file",
             blocking=reading.value < 0.0,
         ),
-        Finding(
+        StepFinding(
             f"{name}: sign",
             "positive torque turns the motor forward (positive speed)",
             moves,
@@ -171,7 +171,7 @@ def _findings(name: str, answer: _Answer) -> list[Finding]:
     ]
     if not answer.seen:
         return found
-    size = Finding(
+    size = StepFinding(
         f"{name}: size of the response",
         f"{SIZE[0]:g} to {SIZE[1]:g} of what the rig file's inertia says",
         speed.shown(),
@@ -213,12 +213,12 @@ class _Test:
     spread: ResonanceSpread | None
 
 
-def _amplitude_nm(job: Job, name: str) -> float:
+def _amplitude_nm(job: StepContext, name: str) -> float:
     limit_nm = getattr(job.rig.inverters, name).torque_limit_nm
     return float(min(PRBS_SHARE * limit_nm, 0.5 * job.rig.guard.prbs_limit_nm))
 
 
-def _order_scales(job: Job, name: str) -> Order:
+def _order_scales(job: StepContext, name: str) -> Order:
     cruise = cruise_of(job.rig)
     limit_nm = min(getattr(job.rig.inverters, name).torque_limit_nm, job.rig.guard.sum_limit_nm)
     table = as_table(
@@ -234,11 +234,11 @@ def _order_scales(job: Job, name: str) -> Order:
     return Order(name, table, prbs)
 
 
-def _orders_scales(job: Job) -> list[Order]:
+def _orders_scales(job: StepContext) -> list[Order]:
     return [*(_order_scales(job, name) for name in SHARES_M1), halt(job.rig)]
 
 
-def _about_scales(job: Job) -> str:
+def _about_scales(job: StepContext) -> str:
     speed = CRAWL * cruise_of(job.rig).speed_rad_s
     return (
         f"brings the vehicle to {speed:g} rad/s with m1 alone and gives it a small PRBS, then the same with m2 alone, "
@@ -247,7 +247,7 @@ def _about_scales(job: Job) -> str:
     )
 
 
-def _do_scales(job: Job) -> Outcome:
+def _do_scales(job: StepContext) -> Outcome:
     runs = [job.run("scales", order) for order in _orders_scales(job)]
     tests = {run.name: _test(job, run.name) for run in runs if run.name in SHARES_M1}
     first, second = tests["m1"], tests["m2"]
@@ -274,7 +274,7 @@ def _do_scales(job: Job) -> Outcome:
         evidence["model"] = model_json(rough.model)
     else:
         findings.append(
-            Finding(
+            StepFinding(
                 "resonance, a first look",
                 f"a lightly damped mode between {Settings().band_hz[0]:g} and {Settings().band_hz[1]:g} Hz",
                 "none",
@@ -285,7 +285,7 @@ def _do_scales(job: Job) -> Outcome:
     return Outcome(findings, evidence)
 
 
-def _test(job: Job, name: str) -> _Test:
+def _test(job: StepContext, name: str) -> _Test:
     run = job.state.steps["scales"].run(name)
     if run is None:
         raise ValueError(f"step scales: run {name} was ordered and is not there")
@@ -303,18 +303,18 @@ def _test(job: Job, name: str) -> _Test:
     return _Test(record, gain, lag, delay, resonance_spread(delay.fit, Settings().band_hz))
 
 
-def _own_findings(name: str, test: _Test) -> list[Finding]:
+def _own_findings(name: str, test: _Test) -> list[StepFinding]:
     extra = test.delay.extra_samples
     period_ms = 1e3 * test.record.sample_time_s
     return [
-        Finding(
+        StepFinding(
             f"{name}: torque reading over reference",
             f"{GAIN[0]:g} to {GAIN[1]:g}",
             f"{test.reading_gain:.4f}, {test.lag} samples behind",
             GAIN[0] <= test.reading_gain <= GAIN[1],
             f"Compare rated torque (0x6076) and torque limits of {name} with the rig file",
         ),
-        Finding(
+        StepFinding(
             f"{name}: delay from torque reading to speed",
             "the one sample that sampling makes",
             f"{extra + NATURAL_DELAY} samples, {extra} more ({extra * period_ms:g} ms)" if extra else "that one",
@@ -324,12 +324,12 @@ def _own_findings(name: str, test: _Test) -> list[Finding]:
     ]
 
 
-def _mutual_findings(ratio: ResponseRatio, period_s: float) -> list[Finding]:
+def _mutual_findings(ratio: ResponseRatio, period_s: float) -> list[StepFinding]:
     gain, delay = ratio.gain, ratio.delay_s
     limit_ms = 1e3 * DELAY_PERIODS * period_s
     difference = Measured(gain.value - 1.0, gain.ci95)
     return [
-        Finding(
+        StepFinding(
             "m2 against m1: gain, for the same reading",
             f"equal within ±{100.0 * (GAIN[1] - 1.0):g} %",
             f"m2 gives {difference.shown_as('more', 'less', '%', 100.0)}",
@@ -337,7 +337,7 @@ def _mutual_findings(ratio: ResponseRatio, period_s: float) -> list[Finding]:
             "Calibrate one against a torque transducer or a known inertia: no test here shows which is right",
             blocking=gain.value < 0.0,
         ),
-        Finding(
+        StepFinding(
             "m2 against m1: delay",
             f"equal within ±{limit_ms:g} ms",
             f"m2 acts {delay.shown_as('later', 'earlier', 'ms', 1e3)}",

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
-from estimator.diagnosis.acquisition.chain import mechanical
+from estimator.diagnosis.acquisition.chain import without_acquisition_effects
 from estimator.diagnosis.segments import tiles
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.driveline import Case
@@ -101,7 +101,9 @@ def begun(d: Driveline, model: DrivelineModel, record: Record) -> tuple[Drivelin
     gaps those of its first stretch.
     """
     record = tiles(record)[0]
-    model = mechanical(replace(model, effects={each: v for each, v in model.effects.items() if each != "clock_drift"}))
+    model = without_acquisition_effects(
+        replace(model, effects={each: v for each, v in model.effects.items() if each != "clock_drift"})
+    )
     problem = make_problem(model, [record], (), profile=any(EFFECTS[each].profile for each in model.effects))
     result = settle(problem)
     case = case_of(result.problem.local[0], result.problem.p, local_part(result.problem, result.x, 0))

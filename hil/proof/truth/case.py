@@ -10,7 +10,7 @@ import numpy as np
 from hil.proof.truth.bus import NOMINAL_ERROR, PERIOD_S, Plan, Test, draw_plan, sample_times_s
 from hil.proof.truth.driveline import TruthDriveline, bring_to_speed, observed
 from hil.proof.truth.hidden import Interval
-from hil.proof.truth.physics import FloatArray, Physics, State
+from hil.proof.truth.physics import FloatArray, Physics, StateIndex
 from hil.proof.truth.recording import (
     USUAL,
     Acquisition,
@@ -154,4 +154,4 @@ def _sample(
     held = np.searchsorted(switches_s, moments_s[:-1], side="right")
     states = np.vstack([bus.state, bus.course(m1_nm[held], m2_nm[held], np.diff(moments_s))])
     seen = states[np.searchsorted(moments_s, instants_s)]
-    return *observed(bus.physics, seen), seen[:, State.SPEED_L]
+    return *observed(bus.physics, seen), seen[:, StateIndex.SPEED_L]

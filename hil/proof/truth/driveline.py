@@ -11,7 +11,7 @@ import numpy as np
 from hil.proof.truth import kernel, laws
 from hil.proof.truth.compiled import compiled
 from hil.proof.truth.laws import brake_torque, eddy_torque, gravity_torque, resolver_speed, torque_by_direction
-from hil.proof.truth.physics import FLAT_ROAD, SPEEDS, STATES, FloatArray, Physics, State
+from hil.proof.truth.physics import FLAT_ROAD, SPEEDS, STATES, FloatArray, Physics, StateIndex
 
 
 @compiled
@@ -88,8 +88,8 @@ class DelayLine:
 def speed_as_sensed(p: Physics, state: FloatArray) -> float:
     """Return the motor speed as the resolver gives it, behind its filter where it has one [rad/s]."""
     if p.filter_time_s > 0.0 or p.filter_rad_s > 0.0:
-        return float(state[State.FILTERED])
-    return float(resolver_speed(p, state[State.ANGLE_M], state[State.SPEED_M]))
+        return float(state[StateIndex.FILTERED])
+    return float(resolver_speed(p, state[StateIndex.ANGLE_M], state[StateIndex.SPEED_M]))
 
 
 @compiled
@@ -98,12 +98,14 @@ def observed(p: Physics, states: FloatArray) -> tuple[FloatArray, FloatArray]:
     speed, disturbance = np.empty(states.shape[0]), np.empty(states.shape[0])
     for i in range(states.shape[0]):
         speed[i] = speed_as_sensed(p, states[i])
-        disturbance[i] = gravity_torque(p, states[i, State.ANGLE_L]) + brake_torque(p, states[i, State.TIME_S])
+        disturbance[i] = gravity_torque(p, states[i, StateIndex.ANGLE_L]) + brake_torque(
+            p, states[i, StateIndex.TIME_S]
+        )
     return speed, disturbance
 
 
 class TruthDriveline:
-    """A driveline with all it hides; has the shape of ``hil.simulator.simulated_rig.Plant``."""
+    """A driveline with all it hides; has the shape of ``hil.simulator.simulated_rig.SimulatedPlant``."""
 
     def __init__(self, physics: Physics, speed_rad_s: float = 0.0) -> None:
         self._physics = physics
@@ -113,13 +115,13 @@ class TruthDriveline:
 
     def advance(self, torque_nm: tuple[float, float], duration_s: float) -> None:
         """Hold both inverters' torque [Nm] for a time [s]."""
-        total_nm = true_torque(self._physics, torque_nm, float(self._state[State.TIME_S]))
+        total_nm = true_torque(self._physics, torque_nm, float(self._state[StateIndex.TIME_S]))
         for piece in self._delay.push(total_nm, duration_s):
             kernel.advance(self._state, self._physics, piece.torque_nm, piece.duration_s)
 
     def course(self, m1_nm: FloatArray, m2_nm: FloatArray, durations_s: FloatArray) -> FloatArray:
         """Hold torques for their times, shapes (N,), one after the other; return the states after each, (N, STATES)."""
-        begins_s = self._state[State.TIME_S] + np.cumsum(durations_s) - durations_s
+        begins_s = self._state[StateIndex.TIME_S] + np.cumsum(durations_s) - durations_s
         pieces = [
             self._delay.push(total_nm, duration_s)
             for total_nm, duration_s in zip(
@@ -135,16 +137,16 @@ class TruthDriveline:
     def continue_with(self, physics: Physics) -> None:
         """Change the physics under way: motion and twist continue, clock and distance start again at zero."""
         self._physics = physics
-        self._state[[State.ANGLE_M, State.ANGLE_X]] -= self._state[State.ANGLE_L]
-        self._state[[State.TIME_S, State.ANGLE_L]] = 0.0
+        self._state[[StateIndex.ANGLE_M, StateIndex.ANGLE_X]] -= self._state[StateIndex.ANGLE_L]
+        self._state[[StateIndex.TIME_S, StateIndex.ANGLE_L]] = 0.0
 
-    def quantity(self, which: State) -> float:
+    def quantity(self, which: StateIndex) -> float:
         """Return one of the true quantities, which no sensor shows."""
         return float(self._state[which])
 
     @property
     def state(self) -> FloatArray:
-        """Copy of the true state, shape (STATES,), in the order of `State`."""
+        """Copy of the true state, shape (STATES,), in the order of `StateIndex`."""
         return self._state.copy()
 
     @property

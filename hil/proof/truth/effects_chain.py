@@ -10,8 +10,8 @@ import numpy as np
 
 from hil.proof.truth.bus import Bus
 from hil.proof.truth.hidden import (
+    ConcealedAt,
     HiddenEffect,
-    Place,
     Sizes,
     corrupts,
     draws,
@@ -27,12 +27,12 @@ from hil.proof.truth.physics import Physics
 
 FULL_TURN_RAD = 2.0 * np.pi
 
-_acquisition = partial(HiddenEffect, place=Place.ACQUISITION)
-_load = partial(HiddenEffect, place=Place.LOAD)
-_motor = partial(HiddenEffect, place=Place.MOTOR)
-_shaft = partial(HiddenEffect, place=Place.SHAFT)
-_speed_sensor = partial(HiddenEffect, place=Place.SPEED_SENSOR)
-_torque_path = partial(HiddenEffect, place=Place.TORQUE_PATH)
+_acquisition = partial(HiddenEffect, place=ConcealedAt.ACQUISITION)
+_load = partial(HiddenEffect, place=ConcealedAt.LOAD)
+_motor = partial(HiddenEffect, place=ConcealedAt.MOTOR)
+_shaft = partial(HiddenEffect, place=ConcealedAt.SHAFT)
+_speed_sensor = partial(HiddenEffect, place=ConcealedAt.SPEED_SENSOR)
+_torque_path = partial(HiddenEffect, place=ConcealedAt.TORQUE_PATH)
 
 LIMITS_NM = {("m1",): (180.0, 310.0), ("m2",): (130.0, 220.0), ("m1", "m2"): (150.0, 280.0), ("sum",): (300.0, 480.0)}
 """What is limited, and to what: where the strongest of the three tests asks for somewhat more."""

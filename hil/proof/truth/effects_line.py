@@ -10,8 +10,8 @@ import numpy as np
 
 from hil.proof.truth.bus import DURATION_S, Bus
 from hil.proof.truth.hidden import (
+    ConcealedAt,
     HiddenEffect,
-    Place,
     Sizes,
     draw_absence,
     draw_presence,
@@ -28,9 +28,9 @@ from hil.proof.truth.physics import ELEMENTS, FloatArray, Physics
 
 FULL_TURN_RAD = 2.0 * np.pi
 
-_load = partial(HiddenEffect, place=Place.LOAD)
-_motor = partial(HiddenEffect, place=Place.MOTOR)
-_shaft = partial(HiddenEffect, place=Place.SHAFT)
+_load = partial(HiddenEffect, place=ConcealedAt.LOAD)
+_motor = partial(HiddenEffect, place=ConcealedAt.MOTOR)
+_shaft = partial(HiddenEffect, place=ConcealedAt.SHAFT)
 
 
 def _draw_stribeck(rng: np.random.Generator, bus: Bus) -> Sizes:

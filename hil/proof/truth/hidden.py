@@ -39,7 +39,7 @@ def same_recording(acquisition: Acquisition, sizes: Sizes) -> Acquisition:
     return acquisition
 
 
-class Place(Enum):
+class ConcealedAt(Enum):
     """The element an effect belongs to (CONTRACT); ``NOWHERE`` where nothing is hidden."""
 
     TORQUE_PATH = "torque_path"
@@ -61,7 +61,7 @@ class HiddenEffect:
     corrupt: Corrupt = same_recording  # acquisition and sizes to the acquisition with the effect
     when: When | None = None
     fitted: Mapping[str, str | Convert] = field(default_factory=dict)
-    place: Place = Place.NOWHERE  # the element it belongs to
+    place: ConcealedAt = ConcealedAt.NOWHERE  # the element it belongs to
     catalogued: bool = True  # false for what no entry of the contract's catalogue describes
 
     def happens_in(self, test: int, sizes: Sizes) -> bool:

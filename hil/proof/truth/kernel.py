@@ -17,7 +17,7 @@ import numpy as np
 
 from hil.proof.truth import laws
 from hil.proof.truth.compiled import compiled
-from hil.proof.truth.physics import STATES, FloatArray, Physics, State
+from hil.proof.truth.physics import STATES, FloatArray, Physics, StateIndex
 
 Speeds = tuple[float, float, float, float]
 """Of motor, extra inertia, load (wheels), vehicle [rad/s]; also used for accelerations."""
@@ -25,7 +25,7 @@ Speeds = tuple[float, float, float, float]
 
 @compiled
 def speeds_of(state: FloatArray) -> Speeds:
-    return state[State.SPEED_M], state[State.SPEED_X], state[State.SPEED_L], state[State.SPEED_V]
+    return state[StateIndex.SPEED_M], state[StateIndex.SPEED_X], state[StateIndex.SPEED_L], state[StateIndex.SPEED_V]
 
 
 @compiled
@@ -39,7 +39,7 @@ def shaft_ends(p: Physics, motor: float, extra: float, load: float) -> tuple[flo
 @compiled
 def shaft_twist(state: FloatArray, p: Physics) -> tuple[float, float]:
     """Return the shaft's twist behind its Cardan joint [rad], and that joint's slope."""
-    driving, driven = shaft_ends(p, state[State.ANGLE_M], state[State.ANGLE_X], state[State.ANGLE_L])
+    driving, driven = shaft_ends(p, state[StateIndex.ANGLE_M], state[StateIndex.ANGLE_X], state[StateIndex.ANGLE_L])
     behind, slope = laws.through_joint(p, driving)
     return behind - driven, slope
 
@@ -56,7 +56,7 @@ def breakaway_limit(p: Physics, speed: float) -> float:
 @compiled
 def disturbance(state: FloatArray, p: Physics) -> float:
     """Return the torque against the vehicle that depends on place and time alone [Nm]."""
-    hill = laws.gravity_torque(p, state[State.ANGLE_L]) * laws.mass_over_empty(p, state[State.TIME_S])
+    hill = laws.gravity_torque(p, state[StateIndex.ANGLE_L]) * laws.mass_over_empty(p, state[StateIndex.TIME_S])
     disturbance_nm: float = p.load_torque_nm + hill
     return disturbance_nm
 
@@ -64,24 +64,24 @@ def disturbance(state: FloatArray, p: Physics) -> float:
 @compiled
 def _on_motor(state: FloatArray, p: Physics, speed: float) -> float:
     """Torque on the motor inertia without the line's."""
-    given = state[State.INVERTER_NM]
+    given = state[StateIndex.INVERTER_NM]
     torque: float = given - p.b_M * speed - p.quadratic_motor * speed * abs(speed) - laws.eddy_torque(p, speed)
     torque -= laws.torque_by_direction(p, speed)
-    torque += laws.ripple_torque(p, state[State.ANGLE_M], given)
+    torque += laws.ripple_torque(p, state[StateIndex.ANGLE_M], given)
     if p.friction_motor_nm > 0.0:
         limit = breakaway_limit(p, speed)
-        torque -= laws.friction_torque(p.friction_motor_nm, limit, state[State.BRISTLE_M], speed)
+        torque -= laws.friction_torque(p.friction_motor_nm, limit, state[StateIndex.BRISTLE_M], speed)
     return torque
 
 
 @compiled
 def _on_load(state: FloatArray, p: Physics, speed: float) -> float:
     """Torque of wheels, axle, bearings and brake on the load inertia."""
-    torque = -p.b_L * laws.viscosity_over_warm(p, state[State.TIME_S]) * speed
-    torque -= laws.imbalance_torque(p, state[State.ANGLE_L])
-    held = p.friction_load_nm + laws.brake_torque(p, state[State.TIME_S])
+    torque = -p.b_L * laws.viscosity_over_warm(p, state[StateIndex.TIME_S]) * speed
+    torque -= laws.imbalance_torque(p, state[StateIndex.ANGLE_L])
+    held = p.friction_load_nm + laws.brake_torque(p, state[StateIndex.TIME_S])
     if held > 0.0:
-        torque -= laws.friction_torque(held, 1.0, state[State.BRISTLE_L], speed)
+        torque -= laws.friction_torque(held, 1.0, state[StateIndex.BRISTLE_L], speed)
     return torque
 
 
@@ -91,10 +91,10 @@ def _through_shaft(state: FloatArray, p: Physics, speeds: Speeds) -> tuple[float
     motor, extra, load, _ = speeds
     twist, slope = shaft_twist(state, p)
     driving, driven = shaft_ends(p, motor, extra, load)
-    stiffness = laws.stiffness_over_k(p, state[State.TIME_S], driving)
-    slider_nm = laws.slider_torque(state[State.SLIDERS : STATES], p) if p.hysteresis_stiffness > 0.0 else 0.0
+    stiffness = laws.stiffness_over_k(p, state[StateIndex.TIME_S], driving)
+    slider_nm = laws.slider_torque(state[StateIndex.SLIDERS : STATES], p) if p.hysteresis_stiffness > 0.0 else 0.0
     torque: float = laws.shaft_torque(p, twist, slope * driving - driven, stiffness, slider_nm)
-    torque += state[State.MAXWELL_NM] + state[State.MAXWELL_FAST_NM]
+    torque += state[StateIndex.MAXWELL_NM] + state[StateIndex.MAXWELL_FAST_NM]
     return slope * torque, laws.behind_gears(p, torque, driven)
 
 
@@ -104,11 +104,11 @@ def _of_wheels_and_vehicle(
 ) -> tuple[float, float]:
     """Accelerations of the wheels and of the vehicle, which are one where the tyre can't slip."""
     _, _, wheels, vehicle = speeds
-    inertia = p.J_L * laws.mass_over_empty(p, state[State.TIME_S])
+    inertia = p.J_L * laws.mass_over_empty(p, state[StateIndex.TIME_S])
     if p.wheel_inertia <= 0.0:
         both = (wheels_nm + vehicle_nm) / inertia
         return both, both
-    tyre_nm = laws.tyre_torque(p, state[State.SLIP], wheels, vehicle)
+    tyre_nm = laws.tyre_torque(p, state[StateIndex.SLIP], wheels, vehicle)
     return (wheels_nm - tyre_nm) / p.wheel_inertia, (tyre_nm + vehicle_nm) / (inertia - p.wheel_inertia)
 
 
@@ -117,9 +117,9 @@ def _through_link(state: FloatArray, p: Physics, speeds: Speeds) -> float:
     """Torque through the spring between the extra inertia and the motor, or the load."""
     motor, extra, load, _ = speeds
     if p.extra_at_motor:
-        twist, rate = state[State.ANGLE_M] - state[State.ANGLE_X], motor - extra
+        twist, rate = state[StateIndex.ANGLE_M] - state[StateIndex.ANGLE_X], motor - extra
     else:
-        twist, rate = state[State.ANGLE_X] - state[State.ANGLE_L], extra - load
+        twist, rate = state[StateIndex.ANGLE_X] - state[StateIndex.ANGLE_L], extra - load
     torque: float = p.extra_stiffness * twist + p.extra_damping * rate
     return torque
 
@@ -155,48 +155,50 @@ FASTER = 6.0  # by how much the smaller branch of a viscoelastic shaft relaxes f
 def _turn(state: FloatArray, p: Physics, h: float) -> None:
     """Move the angles, and what follows them directly."""
     before, _ = shaft_twist(state, p)
-    state[State.ANGLE_M] += state[State.SPEED_M] * h
-    state[State.ANGLE_X] += state[State.SPEED_X] * h
-    state[State.ANGLE_L] += state[State.SPEED_L] * h
+    state[StateIndex.ANGLE_M] += state[StateIndex.SPEED_M] * h
+    state[StateIndex.ANGLE_X] += state[StateIndex.SPEED_X] * h
+    state[StateIndex.ANGLE_L] += state[StateIndex.SPEED_L] * h
     if p.hysteresis_stiffness > 0.0:
         behind, _ = shaft_twist(state, p)
         change = laws.beyond_gap(p, behind) - laws.beyond_gap(p, before)
-        laws.follow_twist(state[State.SLIDERS : STATES], p, change)
+        laws.follow_twist(state[StateIndex.SLIDERS : STATES], p, change)
 
 
 @compiled
 def _relax(state: FloatArray, p: Physics, h: float) -> None:
     """Move what approaches a value that the speeds set."""
-    speed_m, speed_l = state[State.SPEED_M], state[State.SPEED_L]
+    speed_m, speed_l = state[StateIndex.SPEED_M], state[StateIndex.SPEED_L]
     if p.friction_motor_nm > 0.0:
         limit = breakaway_limit(p, speed_m)
-        state[State.BRISTLE_M] = laws.bristle_after(state[State.BRISTLE_M], speed_m, limit, h)
+        state[StateIndex.BRISTLE_M] = laws.bristle_after(state[StateIndex.BRISTLE_M], speed_m, limit, h)
     if p.brake_nm > 0.0 or p.friction_load_nm > 0.0:
-        state[State.BRISTLE_L] = laws.bristle_after(state[State.BRISTLE_L], speed_l, 1.0, h)
+        state[StateIndex.BRISTLE_L] = laws.bristle_after(state[StateIndex.BRISTLE_L], speed_l, 1.0, h)
     if p.maxwell_stiffness > 0.0:
-        driving, driven = shaft_ends(p, speed_m, state[State.SPEED_X], speed_l)
+        driving, driven = shaft_ends(p, speed_m, state[StateIndex.SPEED_X], speed_l)
         steady = p.maxwell_stiffness * p.maxwell_time_s * (driving - driven)
-        state[State.MAXWELL_NM] = steady + (state[State.MAXWELL_NM] - steady) * math.exp(-h / p.maxwell_time_s)
+        state[StateIndex.MAXWELL_NM] = steady + (state[StateIndex.MAXWELL_NM] - steady) * math.exp(
+            -h / p.maxwell_time_s
+        )
         quick = p.maxwell_fast_share * steady / FASTER
         left = math.exp(-h * FASTER / p.maxwell_time_s)
-        state[State.MAXWELL_FAST_NM] = quick + (state[State.MAXWELL_FAST_NM] - quick) * left
+        state[StateIndex.MAXWELL_FAST_NM] = quick + (state[StateIndex.MAXWELL_FAST_NM] - quick) * left
     if p.wheel_inertia > 0.0:
-        state[State.SLIP] = laws.slip_after(state[State.SLIP], p, speed_l, state[State.SPEED_V], h)
+        state[StateIndex.SLIP] = laws.slip_after(state[StateIndex.SLIP], p, speed_l, state[StateIndex.SPEED_V], h)
 
 
 @compiled
 def _drift(state: FloatArray, p: Physics, command_nm: float, h: float) -> None:
     _turn(state, p, h)
     _relax(state, p, h)
-    state[State.TIME_S] += h
+    state[StateIndex.TIME_S] += h
     if p.current_loop_time_s > 0.0:
-        error = state[State.INVERTER_NM] - command_nm
-        state[State.INVERTER_NM] = command_nm + error * math.exp(-h / p.current_loop_time_s)
+        error = state[StateIndex.INVERTER_NM] - command_nm
+        state[StateIndex.INVERTER_NM] = command_nm + error * math.exp(-h / p.current_loop_time_s)
     elif p.slew_nm_s > 0.0:
-        change = command_nm - state[State.INVERTER_NM]
-        state[State.INVERTER_NM] += min(p.slew_nm_s * h, max(-p.slew_nm_s * h, change))
+        change = command_nm - state[StateIndex.INVERTER_NM]
+        state[StateIndex.INVERTER_NM] += min(p.slew_nm_s * h, max(-p.slew_nm_s * h, change))
     else:
-        state[State.INVERTER_NM] = command_nm
+        state[StateIndex.INVERTER_NM] = command_nm
 
 
 @compiled
@@ -207,10 +209,10 @@ def _kick(state: FloatArray, p: Physics, h: float) -> None:
     of_m, of_x, of_l, of_v = accelerations(state, p, outer, (motor, extra, load, vehicle))
     middle = (motor + half * of_m, extra + half * of_x, load + half * of_l, vehicle + half * of_v)
     of_m, of_x, of_l, of_v = accelerations(state, p, outer, middle)
-    state[State.SPEED_M] = motor + h * of_m
-    state[State.SPEED_X] = extra + h * of_x
-    state[State.SPEED_L] = load + h * of_l
-    state[State.SPEED_V] = vehicle + h * of_v
+    state[StateIndex.SPEED_M] = motor + h * of_m
+    state[StateIndex.SPEED_X] = extra + h * of_x
+    state[StateIndex.SPEED_L] = load + h * of_l
+    state[StateIndex.SPEED_V] = vehicle + h * of_v
 
 
 @compiled
@@ -219,27 +221,27 @@ def _couple_generator(state: FloatArray, p: Physics, h: float) -> None:
 
     With the clutch open the generator is kept near the motor's speed by its own control.
     """
-    clutch_nm = laws.clutch_torque(p, state[State.TIME_S])
-    motor, generator = state[State.SPEED_M], state[State.SPEED_G]
+    clutch_nm = laws.clutch_torque(p, state[StateIndex.TIME_S])
+    motor, generator = state[StateIndex.SPEED_M], state[StateIndex.SPEED_G]
     if clutch_nm <= 0.0:
-        state[State.SPEED_G] = (1.0 - p.generator_lag) * motor
+        state[StateIndex.SPEED_G] = (1.0 - p.generator_lag) * motor
         return
     together = (motor - generator) * p.J_M * p.generator_inertia / (p.J_M + p.generator_inertia)
     impulse = min(clutch_nm * h, max(-clutch_nm * h, together))
-    state[State.SPEED_M] = motor - impulse / p.J_M
-    state[State.SPEED_G] = generator + impulse / p.generator_inertia
+    state[StateIndex.SPEED_M] = motor - impulse / p.J_M
+    state[StateIndex.SPEED_G] = generator + impulse / p.generator_inertia
 
 
 @compiled
 def _filter_speed(state: FloatArray, p: Physics, h: float) -> None:
     """One cycle of the speed filter: backward Euler (first order), semi-implicit Euler (second order)."""
-    speed = laws.resolver_speed(p, state[State.ANGLE_M], state[State.SPEED_M])
+    speed = laws.resolver_speed(p, state[StateIndex.ANGLE_M], state[StateIndex.SPEED_M])
     if p.filter_time_s > 0.0:
-        state[State.FILTERED] += h / (p.filter_time_s + h) * (speed - state[State.FILTERED])
+        state[StateIndex.FILTERED] += h / (p.filter_time_s + h) * (speed - state[StateIndex.FILTERED])
     else:
-        pull = speed - state[State.FILTERED] - 2.0 * p.filter_damping * state[State.FILTERED_RATE]
-        state[State.FILTERED_RATE] += h * p.filter_rad_s * pull
-        state[State.FILTERED] += h * p.filter_rad_s * state[State.FILTERED_RATE]
+        pull = speed - state[StateIndex.FILTERED] - 2.0 * p.filter_damping * state[StateIndex.FILTERED_RATE]
+        state[StateIndex.FILTERED_RATE] += h * p.filter_rad_s * pull
+        state[StateIndex.FILTERED] += h * p.filter_rad_s * state[StateIndex.FILTERED_RATE]
 
 
 @compiled

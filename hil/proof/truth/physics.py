@@ -120,7 +120,7 @@ class Physics(NamedTuple):
 ELEMENTS = 8  # Jenkins elements of a shaft with hysteresis
 
 
-class State(IntEnum):
+class StateIndex(IntEnum):
     """Index of each quantity: M motor, X extra inertia, L load (wheels), V vehicle, G generator.
 
     What is not there (CONTRACT's two masses are M and L) has its place all the same and nothing reads it. The Jenkins
@@ -147,7 +147,14 @@ class State(IntEnum):
     SLIDERS = 17
 
 
-SPEEDS = (State.SPEED_M, State.SPEED_X, State.SPEED_L, State.SPEED_V, State.SPEED_G, State.FILTERED)
+SPEEDS = (
+    StateIndex.SPEED_M,
+    StateIndex.SPEED_X,
+    StateIndex.SPEED_L,
+    StateIndex.SPEED_V,
+    StateIndex.SPEED_G,
+    StateIndex.FILTERED,
+)
 """All that has the speed of the whole line when it rolls as one."""
 
-STATES = State.SLIDERS + ELEMENTS  # length of the state array
+STATES = StateIndex.SLIDERS + ELEMENTS  # length of the state array

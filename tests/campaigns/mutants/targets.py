@@ -50,7 +50,7 @@ TARGETS: dict[str, Target] = {
     "drivers.canopen.silence": Target(
         ("tests/drivers/test_silence.py",), {"0 -> 1": "a value before the first look, which sets it"}
     ),
-    "drivers.canopen.strangers": Target(("tests/drivers/test_strangers.py",)),
+    "drivers.canopen.foreign_controllers": Target(("tests/drivers/test_strangers.py",)),
     "hil.rig.catch_up": Target(
         ("tests/rig/test_catch_up.py",), {"0.0 -> 1.0": "what is held before the first cycle, which sets it"}
     ),

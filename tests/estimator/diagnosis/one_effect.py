@@ -7,15 +7,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from estimator.diagnosis.acquisition.chain import read_through
+from estimator.diagnosis.acquisition.chain import with_faults_compensated
 from estimator.diagnosis.inference.decide import Decision, Rival, decide, no_rival
 from estimator.diagnosis.inference.figures import Unseen
-from estimator.diagnosis.inference.hypotheses import everything, open_hypotheses
+from estimator.diagnosis.inference.hypotheses import all_good_samples, open_hypotheses
 from estimator.diagnosis.inference.rivals import laws_around
 from estimator.diagnosis.inference.say import Basis, said
 from estimator.diagnosis.inference.search import Search
 from estimator.diagnosis.result import Diagnosis, Effort
-from estimator.physics.driveline import Start
+from estimator.physics.driveline import InitialCondition
 from estimator.physics.layout import flat_values, grid_for
 from estimator.physics.model import DrivelineModel
 from estimator.physics.simulate import simulate
@@ -37,7 +37,7 @@ class Bench:
     @property
     def use(self) -> list[BoolArray]:
         """Every good sample."""
-        return everything(self.records)
+        return all_good_samples(self.records)
 
 
 def bench_with(name: str, values: Mapping[str, float], torques_nm: Sequence[FloatArray] = DRIVES) -> Bench:
@@ -45,7 +45,7 @@ def bench_with(name: str, values: Mapping[str, float], torques_nm: Sequence[Floa
     line, true, records = model(TWO_MASS), flat_values(TWO_MASS, {name: values}), []
     for seed, torque_nm in zip(SEEDS, torques_nm, strict=True):
         silent = record(torque_nm, np.zeros(torque_nm.size), name=f"run_{seed}")
-        output = simulate(grid_for(line, [silent]), silent, true, Start(5.0, 0.0, 2.0))
+        output = simulate(grid_for(line, [silent]), silent, true, InitialCondition(5.0, 0.0, 2.0))
         noise = SIGMA * np.random.default_rng(seed).standard_normal(output.size)
         records.append(replace(silent, output=output + noise))
     return Bench(line, records)
@@ -54,14 +54,16 @@ def bench_with(name: str, values: Mapping[str, float], torques_nm: Sequence[Floa
 def searched(bench: Bench, names: Sequence[str] = ()) -> Search:
     """Search some effects, or all that the recordings can tell."""
     records = list(bench.records)
-    search = Search(bench.model, records, everything(records), names or open_hypotheses(bench.model, records)[0])
+    search = Search(bench.model, records, all_good_samples(records), names or open_hypotheses(bench.model, records)[0])
     search.run()
     return search
 
 
 def decided(search: Search, unseen: Sequence[Record] = (), rival: Rival = no_rival) -> Decision:
     """Decide on what was found; ``unseen`` are recordings that no fit has seen."""
-    return decide(search, read_through(search.records), Unseen(search.model, read_through(unseen)), rival)
+    return decide(
+        search, with_faults_compensated(search.records), Unseen(search.model, with_faults_compensated(unseen)), rival
+    )
 
 
 def diagnosed(search: Search, decision: Decision) -> Diagnosis:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from estimator.diagnosis.inference.hypotheses import NOTHING, Effects, kept
+from estimator.diagnosis.inference.hypotheses import NOTHING, Effects, unknowns_of
 from estimator.diagnosis.inference.score_tests import Screen, promising
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import FitResult, best_fit, fit, make_problem
@@ -33,9 +33,9 @@ class Bench:
         had = {unknown.effect for unknown in warm.problem.shared}
         (new,) = effects - had
         if EFFECTS[new].profile:
-            return best_fit([self._problem(effects, kept(warm, effects), True)], warm)
+            return best_fit([self._problem(effects, unknowns_of(warm, effects), True)], warm)
         looked = releases or [each.release for each in promising(Screen(warm, self.model).starts(new))]
-        return best_fit([self._problem(effects, _joined(kept(warm, effects), each)) for each in looked], warm)
+        return best_fit([self._problem(effects, _joined(unknowns_of(warm, effects), each)) for each in looked], warm)
 
     def _problem(self, effects: Effects, release: Release, profile: bool = False) -> Problem:
         return make_problem(

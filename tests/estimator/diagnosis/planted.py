@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from estimator.physics.driveline import Start
+from estimator.physics.driveline import InitialCondition
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult, fit
 from estimator.physics.problem import make_problem
@@ -64,7 +64,7 @@ def disturbed(
     law: Law,
     coefficient: float,
     torque: FloatArray,
-    start: Start,
+    start: InitialCondition,
     values: Mapping[str, float] = TWO_MASS,
 ) -> FloatArray:
     """Motor speed under ``coefficient * law`` at an element: friction at the motor, torque carried by the shaft,
@@ -104,7 +104,7 @@ def recordings(
     found = []
     for seed in seeds:
         torque = drive_torque(seed, samples)
-        speed = disturbed(element, law, coefficient, torque, Start(5.0, 0.0, 2.0, 0.0, 2.0), values)
+        speed = disturbed(element, law, coefficient, torque, InitialCondition(5.0, 0.0, 2.0, 0.0, 2.0), values)
         noise = SIGMA * np.random.default_rng(seed).standard_normal(samples)
         found.append(record(torque, speed + noise, name=f"run_{seed}"))
     return found
@@ -123,7 +123,7 @@ def nothing(moved: Moved) -> FloatArray:
     return np.zeros_like(moved.speed)
 
 
-def rubbing_speed(friction: Friction, torque: FloatArray, start: Start, substeps: int = 20) -> FloatArray:
+def rubbing_speed(friction: Friction, torque: FloatArray, start: InitialCondition, substeps: int = 20) -> FloatArray:
     """Speed of one mass under dry friction of ``friction(speed)`` Nm, by time stepping with an impulse (Moreau).
 
     Each sub-step moves freely, exactly; then friction takes off what it can, and all of it where the mass sticks.
@@ -150,7 +150,7 @@ def rubbing(
     for seed in seeds:
         torque = drive_torque(seed, samples)
         noise = sigma * np.random.default_rng(seed).standard_normal(samples)
-        speed = rubbing_speed(friction, torque, Start(5.0, 0.0, 2.0))
+        speed = rubbing_speed(friction, torque, InitialCondition(5.0, 0.0, 2.0))
         found.append(record(torque, speed + noise, name=f"run_{seed}"))
     return found
 

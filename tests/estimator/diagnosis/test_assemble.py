@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from estimator.diagnosis.acquisition.chain import Chain
-from estimator.diagnosis.acquisition.finding import Finding, Sized
+from estimator.diagnosis.acquisition.finding import AcquisitionFinding, Sized
 from estimator.diagnosis.assemble import (
     acquired_effects,
     augmented_model,
@@ -19,10 +19,10 @@ from estimator.diagnosis.assemble import (
     retuned_parameters,
 )
 from estimator.diagnosis.diagnose import diagnose
-from estimator.diagnosis.inference.hypotheses import NOTHING, everything
+from estimator.diagnosis.inference.hypotheses import NOTHING, all_good_samples
 from estimator.diagnosis.result import Evidence, FoundEffect
 from estimator.physics.catalogue import EFFECTS, effect_problems
-from estimator.physics.driveline import Start
+from estimator.physics.driveline import InitialCondition
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult
 from estimator.physics.free_run import free_run
@@ -51,7 +51,7 @@ def hilly() -> list[Record]:
         linear_record(
             ONE_MASS,
             drive_torque(seed, 1200),
-            Start(5.0, 0.0, 2.0),
+            InitialCondition(5.0, 0.0, 2.0),
             sigma=SIGMA,
             seed=seed,
             name=f"run_{seed}",
@@ -63,7 +63,7 @@ def hilly() -> list[Record]:
 
 def assembled(records: list[Record], *names: str) -> FitResult:
     """A fit of these effects, one after the other."""
-    bench = Bench(LINE, records, everything(records))
+    bench = Bench(LINE, records, all_good_samples(records))
     result = bench.fit(NOTHING)
     for count in range(1, len(names) + 1):
         result = bench.fit(frozenset(names[:count]), result)
@@ -97,7 +97,9 @@ def test_whichever_inverter_is_wrong_the_intervals_hold_the_line(wrong: str) -> 
         torque, other = drive_torque(seed, 1200), random_steps(1200, seed + 20, size_nm=20.0, hold=7)
         read = np.column_stack([share * torque + other, (1.0 - share) * torque - other])
         true = read @ np.where(np.array(["gain_m1", "gain_m2"]) == wrong, gain, 1.0)
-        record = linear_record(ONE_MASS, true, Start(5.0, 0.0, 2.0), sigma=SIGMA, seed=seed, name=f"run_{seed}")
+        record = linear_record(
+            ONE_MASS, true, InitialCondition(5.0, 0.0, 2.0), sigma=SIGMA, seed=seed, name=f"run_{seed}"
+        )
         records.append(replace(record, torque_nm=read))
     result = assembled(records, "inverter_gain_mismatch")
     found = effect_of("inverter_gain_mismatch", result)
@@ -149,7 +151,7 @@ def brake() -> FoundEffect:
     time_s, records = np.arange(1200) * 0.01, []
     for seed, (name, (begin, end)) in enumerate(BRAKED_S.items(), start=1):
         load = np.where((time_s >= begin) & (time_s < end), FRICTION_NM, 0.0)
-        torque, start = random_steps(1200, seed, mean_nm=90.0), Start(5.0, 0.0, 20.0)
+        torque, start = random_steps(1200, seed, mean_nm=90.0), InitialCondition(5.0, 0.0, 20.0)
         rec = linear_record(ONE_MASS, torque, start, sigma=SIGMA, seed=seed, name=name, extra_load_nm=load)
         records.append(replace(rec, time_s=rec.time_s + 100.0))
     return next(each for each in diagnose(records, LINE).effects if each.name == "brake_drag")
@@ -170,7 +172,7 @@ class TestAcquired:
 
     RNG = np.random.default_rng(1)
     BEFORE = (RNG.standard_normal(1000), RNG.standard_normal(500))
-    FOUND = Finding("stale_samples", {"share": Sized(0.1, (0.09, 0.11), "")}, {}, 1e-12, "a tenth is stale")
+    FOUND = AcquisitionFinding("stale_samples", {"share": Sized(0.1, (0.09, 0.11), "")}, {}, 1e-12, "a tenth is stale")
 
     @pytest.fixture
     def acquired(self) -> FoundEffect:

@@ -7,7 +7,7 @@ from estimator.diagnosis.inference.disturbances import Limits
 from estimator.diagnosis.inference.hypotheses import NOTHING, Hypothesis
 from estimator.diagnosis.table_words import looks_like, shortest_formula
 from estimator.diagnosis.tables import best_table, table_at
-from estimator.physics.driveline import Start
+from estimator.physics.driveline import InitialCondition
 from estimator.physics.layout import flat_values, grid_for
 from estimator.physics.simulate import simulate
 from estimator.physics.tables import Table
@@ -16,7 +16,7 @@ from tests.estimator.diagnosis.plain import Bench
 from tests.estimator.physics.bench import TWO_MASS, model, random_steps, record
 
 NOISE_RAD_S = 0.02
-START = Start(5.0, 0.0, 2.0, 0.003, 2.0)
+START = InitialCondition(5.0, 0.0, 2.0, 0.003, 2.0)
 KNOTS = np.array([-0.08, -0.04, -0.02, -0.01, -0.005, 0.0, 0.005, 0.01, 0.02, 0.04, 0.08])
 
 

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.diagnosis.black_box import Around, BlackBox, equivalent_line
+from estimator.diagnosis.black_box import BlackBox, PlantSetting, equivalent_line
 from estimator.diagnosis.diagnose import diagnose
 from estimator.diagnosis.inference.hypotheses import open_hypotheses
-from estimator.physics.driveline import Case, Start
+from estimator.physics.driveline import Case, InitialCondition
 from estimator.physics.free_run import free_run
 from estimator.physics.layout import flat, grid_for, slot
 from estimator.physics.model import DrivelineModel, Parameter, Structure
@@ -19,7 +19,7 @@ from estimator.physics.simulate import simulate, simulate_each
 from estimator.signals.record import FloatArray, Record
 from tests.estimator.physics.bench import ONE_MASS, TWO_MASS, random_steps, record
 
-START = Start(12.0, 0.0, 5.0, 0.01, 4.0)
+START = InitialCondition(12.0, 0.0, 5.0, 0.01, 4.0)
 STATES = ("speed_rad_s", "twist_rad", "load_speed_rad_s")
 
 EXACT, IN_PARTS = 1e-7, 2e-3
@@ -47,7 +47,7 @@ def line_of(values: dict[str, float], structure: Structure) -> DrivelineModel:
 def boxed(line: DrivelineModel) -> DrivelineModel:
     """Return a model whose plant is a line, simulated as another program would."""
 
-    def run(on: Record, around: Around) -> FloatArray:
+    def run(on: Record, around: PlantSetting) -> FloatArray:
         driven = replace(on, torque_nm=around.torque_nm)
         alone = replace(around.start, load_torque_nm=0.0)
         return simulate(grid_for(line, [on]), driven, flat(line), alone, around.load_nm)
@@ -114,7 +114,7 @@ def test_nothing_inside_is_a_hypothesis(driven: Record) -> None:
 def test_when_a_plant_answers_no_more_nothing_is_decided(driven: Record) -> None:
     """Its process was ended with the limit of time: the last words do without it."""
 
-    def ended(_on: Record, _around: Around) -> FloatArray:
+    def ended(_on: Record, _around: PlantSetting) -> FloatArray:
         raise TimeIsUp
 
     line = line_of(TWO_MASS, Structure.TWO_MASS)

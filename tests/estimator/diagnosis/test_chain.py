@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.diagnosis.acquisition.chain import mechanical, read_through, replay
-from estimator.diagnosis.inference.hypotheses import NOTHING, everything
+from estimator.diagnosis.acquisition.chain import replay, with_faults_compensated, without_acquisition_effects
+from estimator.diagnosis.inference.hypotheses import NOTHING, all_good_samples
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.layout import slot
 from estimator.physics.model import DrivelineModel, EffectValue, Parameter, Structure
@@ -43,7 +43,7 @@ def with_stale_speed() -> Record:
 
 class TestHealthy:
     def test_nothing_is_found_and_nothing_changed(self) -> None:
-        chain = read_through([HEALTHY])
+        chain = with_faults_compensated([HEALTHY])
         assert chain.findings == ()
         assert chain.effects() == {}
         assert chain.records[0] is chain.raw[0] is HEALTHY
@@ -52,7 +52,7 @@ class TestHealthy:
 class TestStale:
     def test_it_is_masked_for_fits_and_kept_as_read(self) -> None:
         read = with_stale_speed()
-        chain = read_through([read])
+        chain = with_faults_compensated([read])
         assert [finding.name for finding in chain.findings] == ["stale_samples"]
         assert not chain.records[0].okay[STALE].any()
         assert chain.raw[0].okay.all()
@@ -61,7 +61,7 @@ class TestStale:
     def test_errors_are_those_of_the_simulation_as_this_chain_would_have_read_it(self) -> None:
         """Where the recording repeats, so does the simulation: what is left is the noise, in every row."""
         read, true = with_stale_speed(), TRUTH.speed()
-        (errors,) = read_through([read]).errors([true])
+        (errors,) = with_faults_compensated([read]).errors([true])
         renewed = np.maximum.accumulate(np.where(STALE, 0, np.arange(SAMPLES)))
         np.testing.assert_allclose(errors, true[renewed] - read.output)
         assert np.std(errors) == pytest.approx(NOISE, rel=0.05)
@@ -75,7 +75,7 @@ class TestLostZeros:
 
     def test_they_are_no_errors(self) -> None:
         true = TRUTH.speed()
-        (errors,) = read_through([self.READ]).errors([true])
+        (errors,) = with_faults_compensated([self.READ]).errors([true])
         np.testing.assert_allclose(errors, (true - HEALTHY.output)[~LOST])
 
 
@@ -85,7 +85,7 @@ class TestHiddenJitter:
 
     def test_it_is_found_in_the_errors_of_a_converged_fit(self) -> None:
         records = [self.jittered()]
-        chain, result = read_through(records), Bench(MODEL, records, everything(records)).fit(NOTHING)
+        chain, result = with_faults_compensated(records), Bench(MODEL, records, all_good_samples(records)).fit(NOTHING)
         found = chain.with_jitter_in(result)
         assert [finding.name for finding in found.findings] == ["sample_jitter"]
         assert found.effects()["sample_jitter"]["jitter_s"] == pytest.approx(1.5e-3, rel=0.1)
@@ -97,9 +97,9 @@ class TestHiddenJitter:
         for seed in range(4):
             offset_s = 2.2e-3 * np.random.default_rng(seed).standard_normal(SAMPLES)
             records = [TRUTH.record("cruise", speed=TRUTH.speed(offset_s))]
-            as_read = Bench(MODEL, records, everything(records)).fit(NOTHING)
-            steady = read_through(records).with_jitter_in(as_read).records
-            without = Bench(MODEL, steady, everything(steady)).fit(NOTHING, as_read)
+            as_read = Bench(MODEL, records, all_good_samples(records)).fit(NOTHING)
+            steady = with_faults_compensated(records).with_jitter_in(as_read).records
+            without = Bench(MODEL, steady, all_good_samples(steady)).fit(NOTHING, as_read)
             heavier.append([fit.p[slot("", "J_M")] / TRUTH.line.j_m - 1.0 for fit in (as_read, without)])
         before, after = np.mean(heavier, axis=0)
         assert before > 0.008
@@ -128,4 +128,4 @@ class TestMechanical:
         recognised = {name: {entry.parameters[0].name: 0.1} for name, entry in EFFECTS.items() if entry.recognised}
         whole = line_of(TRUTH.line, mechanics | recognised)
         assert set(recognised) == {"speed_quantisation", "stale_samples", "lost_samples", "sample_jitter"}
-        assert mechanical(whole) == line_of(TRUTH.line, mechanics)
+        assert without_acquisition_effects(whole) == line_of(TRUTH.line, mechanics)

@@ -9,7 +9,7 @@ import pytest
 
 from estimator.diagnosis.preconditions.plausible import doubts_about
 from estimator.errors import Implausible
-from estimator.physics.driveline import Start
+from estimator.physics.driveline import InitialCondition
 from estimator.physics.model import DrivelineModel, Parameter, Structure
 from estimator.signals.record import Channel, FloatArray, Location, OutputKind, Record
 from tests.estimator.physics.bench import TWO_MASS, linear_record, model, random_steps, record, scaled
@@ -20,7 +20,7 @@ LINE = model(TWO_MASS)
 
 def drive(values: dict[str, float] = TWO_MASS, seed: int = 3, name: str = "run", hold: int = 10) -> Record:
     torque = random_steps(SAMPLES, seed=seed, hold=hold)
-    found = linear_record(values, torque, Start(10.0, 0.0, 20.0, 0.0, 20.0), sigma=0.02, name=name)
+    found = linear_record(values, torque, InitialCondition(10.0, 0.0, 20.0, 0.0, 20.0), sigma=0.02, name=name)
     own = 10.0 * np.sin(np.arange(SAMPLES) / 7.0)
     return replace(found, torque_nm=np.column_stack([0.6 * torque + own, 0.4 * torque - own]), inputs=("T1", "T2"))
 

@@ -17,7 +17,7 @@ import pyarrow.parquet
 import pytest
 
 from estimator.diagnosis.diagnose import diagnose
-from estimator.physics.driveline import Start
+from estimator.physics.driveline import InitialCondition
 from estimator.physics.layout import flat_values, grid_for
 from estimator.physics.model import Structure
 from estimator.physics.simulate import simulate
@@ -92,7 +92,9 @@ def driven(structure: Structure, output: str, period_s: float, seed: int) -> tup
         location = Location.LOAD if "load" in output else Location.MOTOR
         silent = record(torque, sample_time_s=period_s, kind=kind, location=location)
         line = three_masses(values) if structure is Structure.THREE_MASS else model(values)
-        clean = simulate(grid_for(line, [silent]), silent, flat_values(values, {}), Start(5.0, 0.0, 2.0, 0.0, 2.0))
+        clean = simulate(
+            grid_for(line, [silent]), silent, flat_values(values, {}), InitialCondition(5.0, 0.0, 2.0, 0.0, 2.0)
+        )
         twist = torque
     return twist, clean + 2e-3 * float(np.ptp(clean)) * noise
 

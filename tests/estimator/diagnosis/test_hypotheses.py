@@ -8,7 +8,7 @@ import numpy as np
 
 from estimator.diagnosis.inference.hypotheses import open_hypotheses, with_effect
 from estimator.physics.catalogue import EFFECTS
-from estimator.physics.driveline import Start
+from estimator.physics.driveline import InitialCondition
 from tests.estimator.physics.bench import ONE_MASS, TWO_MASS, linear_record, model, random_steps
 
 COULOMB = frozenset({"coulomb_friction_motor"})
@@ -23,8 +23,8 @@ def test_an_effect_replaces_its_special_cases() -> None:
 
 
 class TestOpenHypotheses:
-    REVERSAL = linear_record(ONE_MASS, random_steps(1000, 1, hold=50), Start(0.0, 0.0, 0.5), sigma=0.01)
-    FORWARD = linear_record(ONE_MASS, random_steps(1000, 2), Start(0.0, 0.0, 50.0), sigma=0.01)
+    REVERSAL = linear_record(ONE_MASS, random_steps(1000, 1, hold=50), InitialCondition(0.0, 0.0, 0.5), sigma=0.01)
+    FORWARD = linear_record(ONE_MASS, random_steps(1000, 2), InitialCondition(0.0, 0.0, 50.0), sigma=0.01)
 
     def test_what_can_not_be_tested_is_given_with_its_reason(self) -> None:
         testable, untestable = open_hypotheses(model(ONE_MASS), [self.FORWARD])
@@ -47,7 +47,7 @@ class TestOpenHypotheses:
 
     def test_two_masses_with_two_torques_have_all_that_is_fitted(self) -> None:
         """What is recognised in the readings is no hypothesis about the line."""
-        rec = linear_record(TWO_MASS, random_steps(1000, 3, hold=50), Start(0.0, 0.0, 0.5, 0.0, 0.5))
+        rec = linear_record(TWO_MASS, random_steps(1000, 3, hold=50), InitialCondition(0.0, 0.0, 0.5, 0.0, 0.5))
         other = random_steps(1000, 4, size_nm=30.0)
         shared = replace(rec, torque_nm=np.column_stack([rec.total_torque_nm - other, other]))
         testable, untestable = open_hypotheses(replace(model(TWO_MASS), gear_ratio=5.6), [shared])

@@ -22,7 +22,7 @@ from estimator.diagnosis.noise import (
     noise_floor,
     unpredictable,
 )
-from estimator.physics.driveline import Start
+from estimator.physics.driveline import InitialCondition
 from estimator.physics.fit import FitResult
 from estimator.signals.correlation import effective_samples
 from estimator.signals.record import FloatArray, Record
@@ -171,7 +171,7 @@ def test_the_interval_of_what_follows_stays_on_its_side_of_zero() -> None:
     assert interval_that_follows(result, cov, lambda fit: -abs(float(fit.x[0])))[1] == 0.0
 
 
-START = Start(20.0, 0.0, 10.0, 0.005, 10.0)
+START = InitialCondition(20.0, 0.0, 10.0, 0.005, 10.0)
 SIGMA = 0.05
 
 

@@ -19,7 +19,7 @@ from estimator.diagnosis.preconditions.prepare import (
 )
 from estimator.diagnosis.result import Verdict
 from estimator.errors import BadShape, NotExciting
-from estimator.physics.driveline import Start
+from estimator.physics.driveline import InitialCondition
 from estimator.signals.record import FloatArray, OutputKind, Record
 from tests.estimator.physics.bench import ONE_MASS, TWO_MASS, linear_record, model, random_steps, record, scaled
 
@@ -27,7 +27,9 @@ LINE = model(ONE_MASS)
 
 
 def drive(name: str = "run_1", samples: int = 400) -> Record:
-    return linear_record(ONE_MASS, random_steps(samples, seed=1), Start(0.0, 0.0, 3.0), sigma=0.01, name=name)
+    return linear_record(
+        ONE_MASS, random_steps(samples, seed=1), InitialCondition(0.0, 0.0, 3.0), sigma=0.01, name=name
+    )
 
 
 @pytest.mark.parametrize("holdout", [False, True])
@@ -119,7 +121,7 @@ SEEN = np.ones(N, dtype=bool)
 
 
 def drive_cut_off() -> Record:
-    return linear_record(ONE_MASS, random_steps(N, seed=1), Start(0.0, 0.0, 3.0), sigma=0.02)
+    return linear_record(ONE_MASS, random_steps(N, seed=1), InitialCondition(0.0, 0.0, 3.0), sigma=0.02)
 
 
 @pytest.mark.parametrize(("limit", "sign"), [(8.0, 1.0), (8.0, -1.0), (9.9, 1.0)])
@@ -185,7 +187,7 @@ def noise(size: float, seed: int) -> np.ndarray:
 
 
 def excited_drive(torque_nm: np.ndarray, name: str = "run") -> Record:
-    return linear_record(TWO_MASS, torque_nm, Start(10.0, 0.0, 20.0, 0.0, 20.0), sigma=SIGMA, name=name)
+    return linear_record(TWO_MASS, torque_nm, InitialCondition(10.0, 0.0, 20.0, 0.0, 20.0), sigma=SIGMA, name=name)
 
 
 def test_noise_alone_is_refused() -> None:
@@ -198,7 +200,7 @@ def test_noise_alone_is_refused() -> None:
 
 def test_zeros_of_lost_readings_are_no_noise() -> None:
     """At 84 rad/s every lost reading is a spike, and 3 % of them are more than all that the torque moves."""
-    run = linear_record(TWO_MASS, random_steps(N, 1), Start(84.0, 0.0, 84.0, 0.0, 84.0), sigma=SIGMA)
+    run = linear_record(TWO_MASS, random_steps(N, 1), InitialCondition(84.0, 0.0, 84.0, 0.0, 84.0), sigma=SIGMA)
     lost = np.random.default_rng(3).random(N) < 0.03
     read = replace(run, output=np.where(lost, 0.0, np.round(run.output, 5)))
     with pytest.raises(NotExciting):
@@ -261,7 +263,7 @@ GAP = slice(1000, 1400)
 
 
 def drive_not_read(kind: OutputKind = OutputKind.SPEED, sigma: float = 0.02) -> Record:
-    return linear_record(ONE_MASS, random_steps(N, seed=1), Start(0.0, 0.0, 3.0), sigma=sigma, kind=kind)
+    return linear_record(ONE_MASS, random_steps(N, seed=1), InitialCondition(0.0, 0.0, 3.0), sigma=sigma, kind=kind)
 
 
 def interpolated(values: FloatArray, gap: slice = GAP) -> FloatArray:

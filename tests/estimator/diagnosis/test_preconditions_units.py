@@ -11,7 +11,7 @@ import pytest
 
 from estimator.diagnosis.preconditions.plausible import BEYOND, doubts_about
 from estimator.errors import Cure, Implausible
-from estimator.physics.driveline import Start
+from estimator.physics.driveline import InitialCondition
 from estimator.physics.effect import Element
 from estimator.physics.model import DrivelineModel
 from estimator.signals.record import FloatArray, OutputKind, Record
@@ -27,7 +27,7 @@ def drive(values: dict[str, float] = TWO_MASS, kind: OutputKind = OutputKind.SPE
     """Twenty seconds of random steps, shared by two inverters, one of them with a part of its own."""
     torque = random_steps(SAMPLES, seed=3)
     sigma = 1e-4 if kind is OutputKind.POSITION else 0.02
-    record = linear_record(values, torque, Start(10.0, 0.0, 20.0, 0.0, 20.0), sigma=sigma, kind=kind)
+    record = linear_record(values, torque, InitialCondition(10.0, 0.0, 20.0, 0.0, 20.0), sigma=sigma, kind=kind)
     own = 10.0 * np.sin(np.arange(SAMPLES) / 7.0)
     return replace(record, torque_nm=np.column_stack([0.6 * torque + own, 0.4 * torque - own]))
 
@@ -123,7 +123,7 @@ def test_the_tolerance_widens_what_is_plausible(factor: float, refused: bool) ->
 def lessened(change: Callable[[FloatArray], FloatArray], values: dict[str, float]) -> Record:
     """A recording whose torque is read in full, and acts as changed."""
     read = 3.0 * random_steps(SAMPLES, seed=3) * np.abs(np.sin(np.arange(SAMPLES) / 300.0))
-    record = linear_record(values, change(read), Start(0.0, 0.0, 3.0, 0.0, 3.0), sigma=0.02)
+    record = linear_record(values, change(read), InitialCondition(0.0, 0.0, 3.0, 0.0, 3.0), sigma=0.02)
     return replace(record, torque_nm=read[:, np.newaxis])
 
 
@@ -210,7 +210,7 @@ def test_a_torque_turned_round_is_reported_where_the_inertia_is_hardly_off() -> 
     record = drive()
     own = np.cumsum(rng.normal(size=(SAMPLES, 2)), axis=0)
     acting = np.column_stack([3.0 * own[:, 0], own[:, 1]])
-    moved = linear_record(TWO_MASS, acting.sum(axis=1), Start(0.0, 0.0, 0.0, 0.0, 0.0), sigma=0.02)
+    moved = linear_record(TWO_MASS, acting.sum(axis=1), InitialCondition(0.0, 0.0, 0.0, 0.0, 0.0), sigma=0.02)
     read = replace(record, torque_nm=acting * np.array([1.0, -1.0]), output=moved.output)
     with pytest.raises(Implausible, match="sign of torque input 2"):
         doubts_about([read], model(TWO_MASS))

@@ -9,9 +9,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from estimator.diagnosis.inference.hypotheses import NOTHING, everything
+from estimator.diagnosis.inference.hypotheses import NOTHING, all_good_samples
 from estimator.diagnosis.inference.score_tests import ScoredStart, Screen, promising
-from estimator.physics.driveline import Start
+from estimator.physics.driveline import InitialCondition
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult
 from estimator.physics.model import DrivelineModel
@@ -37,7 +37,7 @@ Looked = tuple[list[ScoredStart], FitResult, FitResult]
 
 
 def looked_at(line: DrivelineModel, records: Sequence[Record], name: str) -> Looked:
-    bench = Bench(line, records, everything(records))
+    bench = Bench(line, records, all_good_samples(records))
     retuned = bench.fit(NOTHING)
     return Screen(retuned, line).starts(name), retuned, bench.fit(frozenset({name}), retuned)
 
@@ -56,7 +56,7 @@ def with_gain(gain: float) -> list[Record]:
         torque = drive_torque(seed, SAMPLES)
         other = random_steps(SAMPLES, seed + 20, size_nm=20.0, hold=7)
         m1, m2 = share * torque + other, (1.0 - share) * torque - other
-        rec = linear_record(ONE_MASS, m1 + gain * m2, Start(5.0, 0.0, 2.0), sigma=SIGMA, seed=seed)
+        rec = linear_record(ONE_MASS, m1 + gain * m2, InitialCondition(5.0, 0.0, 2.0), sigma=SIGMA, seed=seed)
         found.append(replace(rec, name=f"run_{seed}", torque_nm=np.column_stack([m1, m2])))
     return found
 
@@ -84,7 +84,7 @@ AMPLITUDE_NM, RATIO, PHASES = 8.0, 5.6, (0.5, -2.0)
 
 
 def unbalanced(seed: int, phase_rad: float) -> Record:
-    torque, start = drive_torque(seed, SAMPLES) + 120.0, Start(5.0, 0.0, 20.0, 0.0, 20.0)
+    torque, start = drive_torque(seed, SAMPLES) + 120.0, InitialCondition(5.0, 0.0, 20.0, 0.0, 20.0)
     speed = disturbed(Element.LOAD, lambda moved: np.cos(moved.angle / RATIO + phase_rad), AMPLITUDE_NM, torque, start)
     noise = SIGMA * np.random.default_rng(seed).standard_normal(SAMPLES)
     return record(torque, speed + noise, name=f"run_{seed}")
@@ -114,7 +114,7 @@ INERTIA, CLOSED_S = 5.0, ((2.0, 5.0), (6.0, 9.5), None)
 
 def with_clutch(seed: int, closed_s: tuple[float, float] | None) -> Record:
     """One mass with a generator for a while, piece by piece: its speed continues as it was, on both sides the same."""
-    torque, pieces, start = drive_torque(seed, SAMPLES), [], Start(5.0, 0.0, 2.0)
+    torque, pieces, start = drive_torque(seed, SAMPLES), [], InitialCondition(5.0, 0.0, 2.0)
     cuts = [0, *(round(100 * moment) for moment in closed_s or ()), SAMPLES]
     for number, (first, last) in enumerate(pairwise(cuts)):
         values = ONE_MASS | {"J_M": ONE_MASS["J_M"] + (INERTIA if number == 1 else 0.0)}

@@ -12,12 +12,12 @@ import pytest
 from estimator.diagnosis import diagnose
 from estimator.diagnosis.acquisition.chain import replay
 from estimator.diagnosis.inference.figures import foreign_outputs
-from estimator.diagnosis.inference.hypotheses import NOTHING, Effects, everything
+from estimator.diagnosis.inference.hypotheses import NOTHING, Effects, all_good_samples
 from estimator.diagnosis.noise import LONGEST_S, MOST_SAMPLES, noise_floor, share_of, stretches
 from estimator.diagnosis.result import Course, Discrepancy, Equivalent, Estimated, Profile, Response, Verdict
 from estimator.diagnosis.segments import FEWEST_SAMPLES, LONG_S, cut, joined, segments
 from estimator.errors import NotExciting
-from estimator.physics.driveline import Start
+from estimator.physics.driveline import InitialCondition
 from estimator.physics.fit import FitResult
 from estimator.signals.record import Record, sliced
 from tests.estimator.diagnosis.plain import Bench
@@ -30,7 +30,7 @@ LONG = round(LONG_S / SAMPLE_TIME_S)
 
 
 def drive(samples: int = 3000, bad: Rows = (), name: str = "run", load_nm: float = 5.0) -> Record:
-    start = Start(load_nm, 0.0, 3.0)
+    start = InitialCondition(load_nm, 0.0, 3.0)
     record = linear_record(ONE_MASS, random_steps(samples, seed=1), start, sigma=0.02, name=name)
     okay = np.ones(samples, dtype=bool)
     for first, end in bad:
@@ -213,7 +213,7 @@ def with_friction(seeds: tuple[int, ...] = (1, 2)) -> list[Record]:
 
 
 def fits(records: list[Record], effects: Effects) -> tuple[FitResult, FitResult]:
-    bench = Bench(LINE, records, everything(records))
+    bench = Bench(LINE, records, all_good_samples(records))
     return bench.fit(NOTHING), bench.fit(effects, bench.fit(NOTHING))
 
 
@@ -221,7 +221,7 @@ def test_foreign_recordings_get_their_own_load_and_start_and_nothing_else() -> N
     records = with_friction()
     _, fitted = fits(records, COULOMB)
     torque = drive_torque(11, SAMPLES)
-    elsewhere = linear_record(ONE_MASS, torque, Start(8.0, 0.0, -4.0), sigma=SIGMA, name="elsewhere")
+    elsewhere = linear_record(ONE_MASS, torque, InitialCondition(8.0, 0.0, -4.0), sigma=SIGMA, name="elsewhere")
     (output,) = foreign_outputs(fitted, LINE, [elsewhere], [elsewhere.okay], COULOMB)
     (again,) = foreign_outputs(fitted, model(ONE_MASS, 0.9), [elsewhere], [elsewhere.okay], COULOMB)
     np.testing.assert_array_equal(output, again)

@@ -13,7 +13,7 @@ from estimator.diagnosis.noise import noise_floor
 from estimator.diagnosis.preconditions.channels import with_usable_channels
 from estimator.diagnosis.preconditions.prepare import as_slow_as_needed
 from estimator.diagnosis.result import Verdict
-from estimator.physics.driveline import Start
+from estimator.physics.driveline import InitialCondition
 from estimator.physics.fit import fit
 from estimator.physics.layout import flat_values, grid_for
 from estimator.physics.problem import make_problem
@@ -23,7 +23,7 @@ from estimator.signals.record import Channel, FloatArray, Location, OutputKind, 
 from tests.estimator.diagnosis.one_effect import Bench, bench_with
 from tests.estimator.physics.bench import TWO_MASS
 
-START = Start(5.0, 0.0, 2.0)
+START = InitialCondition(5.0, 0.0, 2.0)
 DRY = ("coulomb_friction_motor", {"friction_nm": 8.0})
 
 Output = tuple[OutputKind, Location]

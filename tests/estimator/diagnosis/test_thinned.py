@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.diagnosis.inference.hypotheses import NOTHING, everything
+from estimator.diagnosis.inference.hypotheses import NOTHING, all_good_samples
 from estimator.diagnosis.noise import MOST_SAMPLES
 from estimator.diagnosis.preconditions.prepare import (
     LONGEST_OF_RIGID_S,
@@ -16,7 +16,7 @@ from estimator.diagnosis.preconditions.prepare import (
     factor_for,
     thinned,
 )
-from estimator.physics.driveline import Start
+from estimator.physics.driveline import InitialCondition
 from estimator.physics.layout import flat, grid_for
 from estimator.physics.model import DrivelineModel, Parameter, Structure
 from estimator.physics.simulate import simulate
@@ -67,13 +67,13 @@ def test_the_line_found_is_the_same() -> None:
     torque = np.repeat(random_steps(MOST_SAMPLES // 10 + 1, 1, mean_nm=20.0), 10)
     time_s = 0.001 * np.arange(torque.size)
     blank = replace(record(torque, np.zeros(torque.size)), sample_time_s=0.001, time_s=time_s)
-    clean = simulate(grid_for(LINE, [blank]), blank, flat(LINE), Start(5.0, 0.0, 5.0, 0.001, 5.0))
+    clean = simulate(grid_for(LINE, [blank]), blank, flat(LINE), InitialCondition(5.0, 0.0, 5.0, 0.001, 5.0))
     fast = replace(blank, output=clean + 0.02 * np.random.default_rng(1).standard_normal(torque.size))
     (thin,) = thinned([fast], LINE)
     assert thin.sample_time_s == pytest.approx(0.01)
     assert thin.output.size == fast.output.size // 10
     short = replace(fast, **{name: getattr(fast, name)[:9000] for name in ("time_s", "torque_nm", "output", "okay")})
     assert thinned([short], LINE) == [short]
-    found = Bench(LINE, [thin], everything([thin])).fit(NOTHING)
+    found = Bench(LINE, [thin], all_good_samples([thin])).fit(NOTHING)
     assert found.rms == pytest.approx(0.02, rel=0.05)
     assert found.value("", "k") == pytest.approx(TWO_MASS["k"], rel=0.01)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.identification.best import BestEstimate, Verdict, best_estimate
+from estimator.identification.best import BestEstimate, ModelVerdict, best_estimate
 from estimator.identification.linear_model import Orders
 from estimator.identification.modes.modes import Uncertain
 from estimator.identification.modes.physical import NAMES, two_mass_model
@@ -63,7 +63,7 @@ def pair(best: BestEstimate) -> tuple[float, float]:
 @pytest.mark.parametrize("seed", [1, *(pytest.param(seed, marks=pytest.mark.campaign) for seed in (2, 3))])
 def test_with_a_gap_the_damping_is_near_the_linear_one_and_what_it_depends_on_is_shown(seed: int) -> None:
     best = best_estimate(with_gap(seed))
-    assert best.verdict is Verdict.NOT_LINEAR
+    assert best.verdict is ModelVerdict.NOT_LINEAR
     assert best.band_hz == (2.0, 40.0)
     assert best.linearity.depends_on == "the torque in the shaft"
     assert pair(best)[1] == pytest.approx(DAMPING, rel=0.15)
@@ -92,7 +92,7 @@ def test_healthy_recordings_pass_their_own_residual_tests(buses: int, independen
     """A test at 95 % fails on one in twenty: on both of 2 with a probability of 0.25 %, on 3 of 10 with 1.2 %."""
     found = [best_estimate(drive(draw_bus(seed), world=CLEAN)) for seed in range(5000, 5000 + buses)]
     assert sum(best.validation.independence.is_independent for best in found) >= independent
-    assert sum(best.verdict is Verdict.GOOD for best in found) >= good  # tests of linearity and feedback fail, too
+    assert sum(best.verdict is ModelVerdict.GOOD for best in found) >= good  # tests of linearity and feedback fail, too
     assert all(best.linearity.is_linear for best in found)
 
 

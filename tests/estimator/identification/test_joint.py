@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.identification.best import BestEstimate, Verdict, best_estimate
+from estimator.identification.best import BestEstimate, ModelVerdict, best_estimate
 from estimator.identification.joint import joint_estimate
 from estimator.signals.record import sliced
 from tests.estimator.identification.driveline import J_L, LINE, Line, cruise
@@ -48,7 +48,7 @@ def test_a_recording_of_another_line_is_left_out_and_named(four: list[BestEstima
 
 def test_a_recording_that_the_model_is_not_good_for_is_named(four: list[BestEstimate]) -> None:
     """Its intervals can't be trusted, nor those of the joint estimate."""
-    joint, _ = joint_estimate("ab", [four[0], replace(four[1], verdict=Verdict.NOT_LINEAR)])
+    joint, _ = joint_estimate("ab", [four[0], replace(four[1], verdict=ModelVerdict.NOT_LINEAR)])
     assert joint is not None
     assert joint.doubtful == ("b",)
 

@@ -8,7 +8,7 @@ import numba
 import numpy as np
 import pytest
 
-from estimator.lanes import choose, every, like, some
+from estimator.lanes import broadcast_as, choose, every, some
 from tests.chosen import campaign
 from tests.estimator.lanes.bench import in_both_ways
 
@@ -42,7 +42,7 @@ def test_operations_are_those_of_one_number(function: Callable[..., Any]) -> Non
 
 def test_every_and_some_ask_all_lanes() -> None:
     """Of one number they are its own answer, of eight a common one."""
-    asked = compiled(lambda x: like(1.0 if every(x > 0.0) else 2.0 if some(x > 0.0) else 3.0, x))
+    asked = compiled(lambda x: broadcast_as(1.0 if every(x > 0.0) else 2.0 if some(x > 0.0) else 3.0, x))
     for values, answer in ((np.ones(8), 1.0), (np.arange(8.0), 2.0), (-np.ones(8), 3.0)):
         together, alone = in_both_ways(asked, (values,))
         assert np.all(together == answer)

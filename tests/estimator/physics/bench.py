@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 from scipy.signal import cont2discrete
 
-from estimator.physics.driveline import Start
+from estimator.physics.driveline import InitialCondition
 from estimator.physics.model import DrivelineModel, EffectValue, Motion, Parameter, Structure
 from estimator.signals.record import BoolArray, FloatArray, Location, OutputKind, Record
 
@@ -96,7 +96,7 @@ def matrices(values: Mapping[str, float]) -> tuple[FloatArray, FloatArray]:
 def exact_states(
     values: Mapping[str, float],
     torque_nm: FloatArray,
-    start: Start,
+    start: InitialCondition,
     sample_time_s: float = SAMPLE_TIME_S,
     extra_load_nm: FloatArray | None = None,
 ) -> FloatArray:
@@ -115,7 +115,7 @@ def exact_states(
 def linear_record(
     values: Mapping[str, float],
     torque_nm: FloatArray,
-    start: Start,
+    start: InitialCondition,
     *,
     sigma: float = 0.0,
     seed: int = 0,

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from estimator.physics.driveline import Start
+from estimator.physics.driveline import InitialCondition
 from estimator.physics.fit import FitResult, fit
 from estimator.physics.layout import flat, grid_for, slot
 from estimator.physics.model import DrivelineModel
@@ -27,7 +27,7 @@ def cracking(seed: int, from_s: float, to_s: float) -> Record:
     blank = record(torque, np.ones(SAMPLES), name=f"run_{seed}")
     p = flat(line)
     p[slot(CRACK, "from_s")], p[slot(CRACK, "to_s")] = from_s, to_s
-    clean = simulate(grid_for(line, [blank]), blank, p, Start(10.0, 0.0, 20.0, 0.005, 20.0))
+    clean = simulate(grid_for(line, [blank]), blank, p, InitialCondition(10.0, 0.0, 20.0, 0.005, 20.0))
     return replace(blank, output=clean + SIGMA * np.random.default_rng(seed).standard_normal(SAMPLES))
 
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from estimator.physics.driveline import Start
+from estimator.physics.driveline import InitialCondition
 from estimator.physics.layout import Grid, flat_values
 from estimator.physics.simulate import simulate
 from estimator.signals.record import FloatArray, Record
@@ -20,7 +20,7 @@ SIGN_WIDTH = 0.05
 TOLERANCE = 1e-4
 """Of the output's range: events and angles are reported to within a fraction of an integration step of 0.5 ms."""
 
-START = Start(load_torque_nm=12.0, angle_rad=0.0, speed_rad_s=1.5, twist_rad=0.004, load_speed_rad_s=1.4)
+START = InitialCondition(load_torque_nm=12.0, angle_rad=0.0, speed_rad_s=1.5, twist_rad=0.004, load_speed_rad_s=1.4)
 TORQUE = random_steps(SAMPLES, seed=1, hold=10)
 TIME_S = np.arange(SAMPLES) * SAMPLE_TIME_S
 
@@ -38,7 +38,7 @@ def kernel_output(effects: Effects, rec: Record, values: Mapping[str, float] = T
     return simulate(grid, rec, flat_values(values, effects), START)
 
 
-def start_vector(start: Start = START) -> FloatArray:
+def start_vector(start: InitialCondition = START) -> FloatArray:
     """Return the start as the reference's state."""
     return np.array([start.angle_rad, start.speed_rad_s, start.twist_rad, start.load_speed_rad_s])
 

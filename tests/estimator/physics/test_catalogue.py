@@ -10,7 +10,7 @@ import pytest
 from estimator.diagnosis.inference.hypotheses import open_hypotheses
 from estimator.physics import inputs as torque_path
 from estimator.physics.catalogue import EFFECTS
-from estimator.physics.driveline import Start
+from estimator.physics.driveline import InitialCondition
 from estimator.physics.effect import Effect, Element, Held
 from estimator.physics.kernel import slots
 from estimator.physics.layout import flat, flat_values, grid_for, slot
@@ -50,7 +50,7 @@ GEARED = replace(model(TWO_MASS), gear_ratio=3.0)
 def reversal() -> Record:
     """Both signs of torque and speed from two inverters that share it in turns, long enough for a road."""
     torque = random_steps(1000, seed=1, hold=40)
-    rec = linear_record(TWO_MASS, torque, Start(0.0, 0.0, 0.5, 0.0, 0.5), sigma=0.02)
+    rec = linear_record(TWO_MASS, torque, InitialCondition(0.0, 0.0, 0.5, 0.0, 0.5), sigma=0.02)
     share = np.where(np.arange(1000) < 500, 0.5, 0.7)
     return replace(rec, torque_nm=np.column_stack([share * torque, (1.0 - share) * torque]))
 
@@ -59,7 +59,7 @@ def reversal() -> Record:
 def forward() -> Record:
     """Torque of one sign and a speed that hardly changes, too short for a road."""
     torque = random_steps(500, seed=2, size_nm=20.0, mean_nm=60.0)
-    return linear_record(TWO_MASS, torque, Start(10.0, 0.0, 40.0, 0.0, 40.0))
+    return linear_record(TWO_MASS, torque, InitialCondition(10.0, 0.0, 40.0, 0.0, 40.0))
 
 
 EXPERIMENTS = frozenset({"cruise", "reversal", "tip"})
@@ -68,7 +68,7 @@ EXPERIMENTS = frozenset({"cruise", "reversal", "tip"})
 
 def output_with(entry: Effect, values: Mapping[str, float], rec: Record) -> FloatArray:
     p = flat_values(TWO_MASS, {entry.name: values})
-    return simulate(grid_for(model(TWO_MASS), [rec]), rec, p, Start(5.0, 0.0, 0.5, 0.0, 0.5))
+    return simulate(grid_for(model(TWO_MASS), [rec]), rec, p, InitialCondition(5.0, 0.0, 0.5, 0.0, 0.5))
 
 
 def start_values(entry: Effect, records: list[Record]) -> list[dict[str, float]]:
@@ -98,7 +98,10 @@ def test_it_names_only_effects_of_the_catalogue(entry: Effect) -> None:
 @laws
 def test_null_parameters_leave_the_simulation_bit_equal(entry: Effect, reversal: Record) -> None:
     nominal = simulate(
-        grid_for(model(TWO_MASS), [reversal]), reversal, flat(model(TWO_MASS)), Start(5.0, 0.0, 0.5, 0.0, 0.5)
+        grid_for(model(TWO_MASS), [reversal]),
+        reversal,
+        flat(model(TWO_MASS)),
+        InitialCondition(5.0, 0.0, 0.5, 0.0, 0.5),
     )
     nulls = {parameter.name: parameter.null for parameter in entry.parameters}
     np.testing.assert_array_equal(output_with(entry, nulls, reversal), nominal)

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.physics.driveline import Start
+from estimator.physics.driveline import InitialCondition
 from estimator.physics.fit import FitResult, fit, rates, warm_start
 from estimator.physics.jacobian import jacobian_at
 from estimator.physics.layout import slot
@@ -28,7 +28,10 @@ from estimator.signals.record import Location, OutputKind, Record
 from tests.estimator.physics.bench import ONE_MASS, TWO_MASS, linear_record, model, random_steps, scaled
 
 SIGMA = 0.05
-STARTS = {"first": Start(30.0, 0.0, 10.0, 0.01, 9.0), "second": Start(-20.0, 0.0, -4.0, -0.005, -4.0)}
+STARTS = {
+    "first": InitialCondition(30.0, 0.0, 10.0, 0.01, 9.0),
+    "second": InitialCondition(-20.0, 0.0, -4.0, -0.005, -4.0),
+}
 TRUE = scaled(TWO_MASS, J_M=1.08, J_L=0.93, k=1.07, c=0.9, b_M=1.1, b_L=0.95)
 
 
@@ -88,7 +91,7 @@ class TestJacobian:
 
     def test_at_the_upper_bound_the_difference_is_taken_inwards(self) -> None:
         """Within a period the output is linear in a delay but for the decay; in the next with another slope."""
-        rec = linear_record(ONE_MASS, random_steps(300, 8, hold=2), Start(0.0, 0.0, 0.0))
+        rec = linear_record(ONE_MASS, random_steps(300, 8, hold=2), InitialCondition(0.0, 0.0, 0.0))
         delay = (Shared("transport_delay", "delay_s", 0.01, 0.0, 1.0, 1.0),)
         problem = make_problem(model(ONE_MASS), [rec], delay)
         at_bound = start_vector(problem)
@@ -170,7 +173,7 @@ def test_a_warm_start_begins_where_the_last_fit_ended() -> None:
 
 
 TORQUE_NM = random_steps(400, 1)
-START = Start(5.0, 0.0, 20.0)
+START = InitialCondition(5.0, 0.0, 20.0)
 
 
 def fitted(record: Record, line: DrivelineModel) -> FitResult:

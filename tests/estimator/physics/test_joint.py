@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from estimator.physics.driveline import Start
+from estimator.physics.driveline import InitialCondition
 from estimator.physics.fit import fit
 from estimator.physics.layout import flat_values, grid_for
 from estimator.physics.model import DrivelineModel, Parameter, Structure
@@ -17,7 +17,7 @@ from estimator.signals.record import FloatArray, OutputKind, Record
 
 STIFFNESS, DAMPING = 1000.0, 5.0
 PERIOD_S = 0.001
-REST = Start(0.0, 0.0, 0.0)
+REST = InitialCondition(0.0, 0.0, 0.0)
 MODEL = DrivelineModel(Structure.JOINT, {"k": Parameter(STIFFNESS, 0.5), "c": Parameter(DAMPING, 0.5)})
 
 
@@ -36,7 +36,7 @@ def up_and_down(amplitude: float, rows: int = 4001, rounds: int = 2) -> FloatArr
 
 
 def torque(
-    twist: FloatArray, effects: dict[str, dict[str, float]], damping: float = 0.0, start: Start = REST
+    twist: FloatArray, effects: dict[str, dict[str, float]], damping: float = 0.0, start: InitialCondition = REST
 ) -> FloatArray:
     record = recording(twist)
     p = flat_values({"k": STIFFNESS, "c": damping}, effects)
@@ -82,7 +82,9 @@ def test_an_open_gap_shows_the_zero_of_the_load_cell_and_no_preload(offset: floa
     slider = {"friction_nm": friction, "yield_rad": 1e-3}
     record = recording(up_and_down(0.1, 20001))
     p = flat_values({"k": 1e-3, "c": 0.0}, {"backlash": {"gap_rad": gap}, "shaft_hysteresis": slider})
-    found = simulate(grid_for(MODEL, [record]), record, p, Start(offset, 0.0, 0.0, preload_nm=preload)) + offset
+    found = (
+        simulate(grid_for(MODEL, [record]), record, p, InitialCondition(offset, 0.0, 0.0, preload_nm=preload)) + offset
+    )
     assert found.max() == pytest.approx(friction - preload, rel=1e-3)
     assert found.min() == pytest.approx(-friction - preload, rel=1e-3)
     assert record.imposed is not None
@@ -98,7 +100,7 @@ def test_a_gap_in_series_with_a_slider_moves_with_it() -> None:
         {"k": 1e-3, "c": 0.0},
         {"backlash": {"gap_rad": gap}, "shaft_hysteresis": {"friction_nm": friction, "yield_rad": yield_rad}},
     )
-    found = simulate(grid_for(MODEL, [record]), record, p, Start(0.0, 0.0, 0.0))
+    found = simulate(grid_for(MODEL, [record]), record, p, InitialCondition(0.0, 0.0, 0.0))
     assert record.imposed is not None
     travelled = np.abs(np.diff(record.imposed, prepend=record.imposed[0]))
     silent = np.abs(found) < 1e-3 * friction
@@ -114,7 +116,10 @@ def test_a_fit_finds_spring_damper_gap_and_offset_again() -> None:
     twist = 0.1 * np.sin(2.0 * np.pi * phase) * (1.0 + phase) / 4.0
     true = DrivelineModel(Structure.JOINT, {"k": Parameter(1200.0, 0.0), "c": Parameter(6.0, 0.0)})
     clean = simulate(
-        grid_for(true, [recording(twist)]), recording(twist), flat_values(true.values(), {}), Start(7.0, 0.0, 0.0, 0.0)
+        grid_for(true, [recording(twist)]),
+        recording(twist),
+        flat_values(true.values(), {}),
+        InitialCondition(7.0, 0.0, 0.0, 0.0),
     )
     noise = 0.1 * np.random.default_rng(5).standard_normal(clean.size)
     found = fit(make_problem(MODEL, [recording(twist, clean + noise)], nominal_unknowns(MODEL)))

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.physics.driveline import Start
+from estimator.physics.driveline import InitialCondition
 from estimator.physics.kernel import state_vector
 from estimator.physics.kernel.rates import met
 from estimator.physics.laws import BEYOND, hyperbolic_tangent, power
@@ -46,7 +46,7 @@ def test_faces_meet(name: str) -> None:
     assert met(-begun, -ended, GAP, CONTACT) == there
 
 
-START = Start(load_torque_nm=12.0, angle_rad=0.3, speed_rad_s=5.0, twist_rad=0.01, load_speed_rad_s=4.0)
+START = InitialCondition(load_torque_nm=12.0, angle_rad=0.3, speed_rad_s=5.0, twist_rad=0.01, load_speed_rad_s=4.0)
 OUTPUTS = [(OutputKind.SPEED, Location.MOTOR), (OutputKind.SPEED, Location.LOAD), (OutputKind.POSITION, Location.MOTOR)]
 
 
@@ -84,11 +84,11 @@ class TestDryFriction:
     LINE = model({"J_M": J, "b_M": 0.0}, effects={"coulomb_friction_motor": {"friction_nm": T_C}})
     GRID = Grid(LINE.structure, substeps=10, sign_width=1e-3)
 
-    def run(self, torque: FloatArray, start: Start, state: int) -> FloatArray:
+    def run(self, torque: FloatArray, start: InitialCondition, state: int) -> FloatArray:
         return simulate(self.GRID, record(torque), flat(self.LINE), start, output=state)
 
     def test_coasting_stops_at_the_time_of_the_closed_formula(self) -> None:
-        speed = self.run(np.zeros(700), Start(0.0, 0.0, self.W_0), state_vector.SPEED)
+        speed = self.run(np.zeros(700), InitialCondition(0.0, 0.0, self.W_0), state_vector.SPEED)
         time_s = np.arange(700) * SAMPLE_TIME_S
         stop_s = self.J * self.W_0 / self.T_C
         expected = np.maximum(self.W_0 - self.T_C / self.J * time_s, 0.0)
@@ -104,7 +104,7 @@ class TestBacklash:
     VALUES = TWO_MASS | {"b_M": 0.0, "b_L": 0.0}
     LINE = model(VALUES, effects={"backlash": {"gap_rad": GAP, "contact_rad": 1e-3}})
 
-    def run(self, torque: FloatArray, start: Start, state: int) -> FloatArray:
+    def run(self, torque: FloatArray, start: InitialCondition, state: int) -> FloatArray:
         rec = record(torque, np.ones(torque.size))
         return simulate(grid_for(self.LINE, [rec]), rec, flat(self.LINE), start, output=state)
 
@@ -115,7 +115,7 @@ class TestBacklash:
         rec = record(torque, np.ones(torque.size))
         load = np.repeat([0.0, -100.0], 2500)  # with the constant 50 Nm, always the torque's own opposite
         grid = replace(grid_for(line, [rec]), substeps=20)
-        twist = simulate(grid, rec, flat(line), Start(50.0, 0.0, 0.0), load, output=state_vector.TWIST)
+        twist = simulate(grid, rec, flat(line), InitialCondition(50.0, 0.0, 0.0), load, output=state_vector.TWIST)
         edge = 50.0 / still["k"] + 0.5 * self.GAP
         assert twist[2499] == pytest.approx(edge, rel=1e-3)
         assert twist[-1] == pytest.approx(-edge, rel=1e-3)
@@ -124,7 +124,7 @@ class TestBacklash:
 def test_exact_states_agree_with_the_matrix_exponential_of_a_single_mass() -> None:
     """The yardstick itself: w(t) = T/b (1 - exp(-b t/J))."""
     torque = np.full(200, 8.0)
-    speed = exact_states(ONE_MASS, torque, Start(0.0, 0.0, 0.0))[:, 1]
+    speed = exact_states(ONE_MASS, torque, InitialCondition(0.0, 0.0, 0.0))[:, 1]
     time_s = np.arange(200) * SAMPLE_TIME_S
     np.testing.assert_allclose(speed, 2.0 * (1.0 - np.exp(-0.2 * time_s)), atol=1e-12)
 

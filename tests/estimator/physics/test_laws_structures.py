@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from estimator.physics.driveline import Start
+from estimator.physics.driveline import InitialCondition
 from estimator.physics.kernel import state_vector
 from estimator.physics.layout import Grid, flat_values
 from estimator.physics.model import Structure
@@ -16,7 +16,7 @@ from tests.estimator.physics.bench import ONE_MASS, SAMPLE_TIME_S, THREE_MASS
 from tests.estimator.physics.law_bench import SIGN_WIDTH, SUBSTEPS, TIME_S, TORQUE, assert_same, measured
 from tests.estimator.physics.reference import Held, lasting
 
-START = Start(12.0, 0.0, 1.5, 0.004, 1.4, 0.003, 1.45)
+START = InitialCondition(12.0, 0.0, 1.5, 0.004, 1.4, 0.003, 1.45)
 Law = Callable[[float, float], float]
 
 
@@ -75,7 +75,7 @@ def test_the_first_shaft_of_three_masses_may_have_a_gap() -> None:
 
 def one_mass_output(effects: dict[str, dict[str, float]], turning: FloatArray) -> FloatArray:
     grid = Grid(Structure.ONE_MASS, SUBSTEPS, SIGN_WIDTH)
-    return simulate(grid, measured(turning), flat_values(ONE_MASS, effects), Start(12.0, 0.0, 1.5))
+    return simulate(grid, measured(turning), flat_values(ONE_MASS, effects), InitialCondition(12.0, 0.0, 1.5))
 
 
 ONE_MASS_EFFECTS: dict[str, tuple[dict[str, dict[str, float]], Law, Law]] = {

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 
-from estimator.physics.driveline import Start
+from estimator.physics.driveline import InitialCondition
 from estimator.physics.kernel import linear, state_vector
 from estimator.physics.kernel.conditions import Line
 from estimator.physics.layout import Grid, flat, slot
@@ -22,7 +22,7 @@ from tests.estimator.physics.bench import (
     record,
 )
 
-START = Start(12.0, 0.3, 5.0, 0.01, 4.0, 0.004, 4.5)
+START = InitialCondition(12.0, 0.3, 5.0, 0.01, 4.0, 0.004, 4.5)
 SUBSTEPS = 5
 NO_TORQUE_NM_S2 = 1e-300
 """A drag that adds nothing to any number, and is none of a linear line: it takes the sub-steps themselves."""

@@ -10,7 +10,7 @@ import pytest
 
 from estimator.diagnosis.inference.hypotheses import open_hypotheses
 from estimator.errors import BadModel
-from estimator.physics.driveline import Start
+from estimator.physics.driveline import InitialCondition
 from estimator.physics.effect import Element
 from estimator.physics.layout import Grid, flat, flat_values, grid_for, named
 from estimator.physics.model import EffectValue, Structure
@@ -19,7 +19,7 @@ from estimator.physics.simulate import simulate
 from estimator.signals.record import FloatArray
 from tests.estimator.physics import bench
 
-START = Start(0.0, 0.0, 30.0, 0.0, 30.0)
+START = InitialCondition(0.0, 0.0, 30.0, 0.0, 30.0)
 SIZE_OF_IT = (OwnParameter("size", "", 0.0, 0.0, 1e4, 1.0),)
 
 

@@ -101,7 +101,7 @@ class TestBestStretch:
         found = scan(answers, error).best(size)
         taken, *rows = self.by_trying(answers, error, size)
         assert [found.first, found.last] == rows == [first, last]
-        assert found.taken == pytest.approx(taken)
+        assert found.error_reduction == pytest.approx(taken)
 
     @pytest.mark.parametrize("seed", range(8))
     def test_what_is_lasting_begins_or_ends_with_the_recording(self, seed: int) -> None:
@@ -114,7 +114,7 @@ class TestBestStretch:
         )
         found = scan(answers, error, lasting=True).best(0.7)
         assert (found.first, found.last) == (first, last)
-        assert found.taken == pytest.approx(taken)
+        assert found.error_reduction == pytest.approx(taken)
 
 
 class TestCells:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from estimator.physics.catalogue import EFFECTS
-from estimator.physics.driveline import Start
+from estimator.physics.driveline import InitialCondition
 from estimator.physics.fit import FitResult, fit
 from estimator.physics.layout import Grid, flat_values, grid_for
 from estimator.physics.model import Parameter
@@ -127,7 +127,9 @@ def effect_of(case: str) -> str:
 def recordings(name: str, plant: Plant) -> list[Record]:
     """Two recordings of a line with the effect; periodic laws run on the angle of their own output."""
     records = []
-    for i, start in enumerate((Start(20.0, 0.0, 3.0, 0.01, 2.9), Start(-10.0, 0.0, -2.0, 0.0, -2.0))):
+    for i, start in enumerate(
+        (InitialCondition(20.0, 0.0, 3.0, 0.01, 2.9), InitialCondition(-10.0, 0.0, -2.0, 0.0, -2.0))
+    ):
         torque = torque_of(name, 10 + i)
         share = 0.5 + 0.1 * i
         rec = record(np.column_stack([share * torque, (1.0 - share) * torque]), np.ones(SAMPLES), name=f"run_{i}")

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 
-from estimator.physics.driveline import Case, Start
+from estimator.physics.driveline import Case, InitialCondition
 from estimator.physics.layout import Grid, flat, slot
 from estimator.physics.model import DrivelineModel, EffectValue, Parameter, Structure
 from estimator.physics.simulate import simulate_each
@@ -20,7 +20,7 @@ from tests.estimator.physics.bench import (
     record,
 )
 
-START = Start(12.0, 0.3, 5.0, 0.01, 4.0, 0.004, 4.5)
+START = InitialCondition(12.0, 0.3, 5.0, 0.01, 4.0, 0.004, 4.5)
 SUBSTEPS = 5
 ROWS = 11
 

@@ -9,7 +9,7 @@ import pytest
 from estimator.diagnosis.assemble import load_torques
 from estimator.diagnosis.inference.hypotheses import open_hypotheses
 from estimator.errors import BadModel
-from estimator.physics.driveline import Case, Start
+from estimator.physics.driveline import Case, InitialCondition
 from estimator.physics.fit import FitResult, fit, make_problem
 from estimator.physics.free_run import free_run
 from estimator.physics.layout import flat, flat_values, grid_for, slot, substeps_for
@@ -37,7 +37,7 @@ def one_way(direction: float, seed: int, load_nm: float) -> Record:
     """A cruise in one direction; dry friction of 6 Nm at the motor is a constant torque there."""
     friction = 6.0 * direction
     torque = random_steps(1500, seed, size_nm=40.0, mean_nm=direction * 60.0 + load_nm + friction)
-    start = Start(load_nm, 0.0, direction * 60.0, 0.0, direction * 60.0)
+    start = InitialCondition(load_nm, 0.0, direction * 60.0, 0.0, direction * 60.0)
     plain = linear_record(TWO_MASS, torque - friction, start, sigma=SIGMA, seed=seed, name=f"run_{seed}")
     return replace(plain, torque_nm=torque[:, np.newaxis])
 
@@ -89,7 +89,7 @@ def test_dry_friction_is_reported_in_one_direction_where_the_load_is_known_or_sh
     assert tells(20.0, FORWARD)
 
 
-START = Start(5.0, 0.0, 2.0)
+START = InitialCondition(5.0, 0.0, 2.0)
 TORQUE, LOAD = random_steps(400, 1), random_steps(400, 2, size_nm=60.0, hold=25)
 
 
@@ -150,7 +150,7 @@ def test_a_mode_too_fast_for_the_sample_time_is_refused_with_its_parameter(
 )
 def test_a_fast_decay_is_integrated_as_well_as_a_fast_oscillation(values: dict[str, float]) -> None:
     torque = random_steps(200, seed=1)
-    start = Start(5.0, 0.0, 0.0)
+    start = InitialCondition(5.0, 0.0, 0.0)
     line, rec = model(values), record(torque, np.ones(200))
     speed = simulate(grid_for(line, [rec]), rec, flat(line), start)
     exact = exact_states(values, torque, start)[:, 1]
@@ -180,7 +180,7 @@ def test_inputs_are_summed_and_row_k_is_the_state_before_torque_k_acts() -> None
     torque = np.array([[3.0, 1.0], [0.0, 0.0], [0.0, 0.0]])
     rec = record(torque, np.ones(3))
     line = model({"J_M": 2.0, "b_M": 0.0})
-    speed = simulate(grid_for(line, [rec]), rec, flat(line), Start(0.0, 0.0, 1.0))
+    speed = simulate(grid_for(line, [rec]), rec, flat(line), InitialCondition(0.0, 0.0, 1.0))
     np.testing.assert_allclose(speed, [1.0, 1.0 + 2.0 * SAMPLE_TIME_S, 1.0 + 2.0 * SAMPLE_TIME_S])
 
 
@@ -201,7 +201,7 @@ def test_what_is_alike_up_to_a_moment_is_simulated_from_there(effects: Mapping[s
     brake = {"brake_nm": 8.0, "from_s": 0.5, "to_s": 0.5}
     still = flat_values(bus.values(), {**effects, "speed_filter": {"time_constant_s": 0.03}, "brake_drag": brake})
     begins_s = np.array([0.5, 2.5, 0.0, 1.003, 3.99, 1.0])
-    cases = [Case(still.copy(), Start(5.0, 0.0, 20.0, load_speed_rad_s=20.0)) for _ in begins_s]
+    cases = [Case(still.copy(), InitialCondition(5.0, 0.0, 20.0, load_speed_rad_s=20.0)) for _ in begins_s]
     for case, begin in zip(cases[1:], begins_s[1:], strict=True):
         case.p[slot("brake_drag", "from_s")], case.p[slot("brake_drag", "to_s")] = begin, begin + 0.7
     grid = grid_for(bus, [recording])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from estimator.physics.catalogue import EFFECTS as CATALOGUE
-from estimator.physics.driveline import Start
+from estimator.physics.driveline import InitialCondition
 from estimator.physics.kernel import state_vector
 from estimator.physics.layout import flat, grid_for
 from estimator.physics.model import DrivelineModel, Parameter, Structure
@@ -111,7 +111,7 @@ def stepped(line: DrivelineModel) -> tuple[FloatArray, FloatArray]:
 def simulated(line: DrivelineModel, rec: Record, output: int | None = None) -> FloatArray:
     coarse = grid_for(line, [rec])
     grid = replace(coarse, substeps=FINER * coarse.substeps, sign_width=SIGN_WIDTH_RAD_S)
-    return simulate(grid, rec, flat(line), Start(15.0, 0.0, 0.0), output=output)
+    return simulate(grid, rec, flat(line), InitialCondition(15.0, 0.0, 0.0), output=output)
 
 
 @pytest.mark.parametrize("name", LINES)

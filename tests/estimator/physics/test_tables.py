@@ -6,7 +6,7 @@ from scipy.interpolate import PchipInterpolator
 
 from estimator.errors import BadModel
 from estimator.physics.curve import curve, curve_over
-from estimator.physics.driveline import Case, Start
+from estimator.physics.driveline import Case, InitialCondition
 from estimator.physics.free_run import free_run
 from estimator.physics.layout import Grid, flat, flat_values, slot
 from estimator.physics.model import DrivelineModel, Structure
@@ -16,7 +16,7 @@ from estimator.signals.record import FloatArray
 from tests.estimator.physics.bench import ONE_MASS, TWO_MASS, assert_same_to_rounding, model, random_steps, record
 
 KNOTS, VALUES = (-3.0, -1.0, 0.0, 2.0, 5.0), (-4.0, -1.0, 0.0, 3.0, 3.5)
-START = Start(12.0, 0.3, 5.0, 0.01, 4.0)
+START = InitialCondition(12.0, 0.3, 5.0, 0.01, 4.0)
 REC = record(random_steps(400, seed=7), np.ones(400))
 
 
@@ -106,7 +106,7 @@ def test_steep_curves_are_followed_in_smaller_steps() -> None:
 def test_one_mass_has_a_curve_over_its_speed() -> None:
     table = straight("motor_speed", 0.7)
     effects = {table.name: {key: each.value for key, each in table.effect().items()}}
-    grid, start = Grid(Structure.ONE_MASS, 5, 0.02), Start(1.0, 0.0, 5.0)
+    grid, start = Grid(Structure.ONE_MASS, 5, 0.02), InitialCondition(1.0, 0.0, 5.0)
     found = simulate(grid, REC, flat_values(ONE_MASS, effects), start)
     expected = simulate(grid, REC, flat_values({**ONE_MASS, "b_M": ONE_MASS["b_M"] + 0.7}, {}), start)
     np.testing.assert_allclose(found, expected, atol=1e-8)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from estimator.physics.driveline import Start
+from estimator.physics.driveline import InitialCondition
 from estimator.physics.effects import timing
 from estimator.physics.effects.timing import lag_step, low_pass
 from estimator.physics.layout import Grid, flat
@@ -13,7 +13,7 @@ from estimator.signals.record import FloatArray
 from tests.chosen import campaign
 from tests.estimator.physics.bench import SAMPLE_TIME_S, model, random_steps, record
 
-REST = Start(0.0, 0.0, 0.0)
+REST = InitialCondition(0.0, 0.0, 0.0)
 INTEGRATOR = {"J_M": 2.0, "b_M": 0.0}
 
 

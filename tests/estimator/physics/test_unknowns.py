@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.physics.driveline import Start
+from estimator.physics.driveline import InitialCondition
 from estimator.physics.effect import Held, Within
 from estimator.physics.effects.torque import ORDERS
 from estimator.physics.fit import fit
@@ -18,7 +18,7 @@ from estimator.physics.unknowns import effect_unknowns, local_basis, nominal_unk
 from estimator.signals.record import OutputKind
 from tests.estimator.physics.bench import ONE_MASS, TWO_MASS, linear_record, model, random_steps, record
 
-CRUISE = Start(40.0, 2.0, 30.0, 40.0 / TWO_MASS["k"], 30.0)
+CRUISE = InitialCondition(40.0, 2.0, 30.0, 40.0 / TWO_MASS["k"], 30.0)
 
 
 def test_nominal_unknowns_stay_within_their_tolerance() -> None:
@@ -134,7 +134,7 @@ def test_the_guess_is_read_off_a_steady_recording() -> None:
     """At constant speed the load torque is the mean torque less viscous friction, whatever the model's inertia."""
     torque = np.full(500, 0.0) + random_steps(500, seed=3, size_nm=1.0)
     load = -(TWO_MASS["b_M"] + TWO_MASS["b_L"]) * 30.0
-    rec = linear_record(TWO_MASS, torque, Start(load, 0.0, 30.0, 0.0, 30.0))
+    rec = linear_record(TWO_MASS, torque, InitialCondition(load, 0.0, 30.0, 0.0, 30.0))
     basis = local_basis(model(TWO_MASS), rec, profile=False)
     start = basis.start(basis.guess)
     assert start.speed_rad_s == pytest.approx(30.0, abs=0.1)
@@ -142,7 +142,7 @@ def test_the_guess_is_read_off_a_steady_recording() -> None:
     assert start.load_torque_nm == pytest.approx(load, abs=0.5)
 
 
-START = Start(25.0, 0.0, 8.0, 0.01, 7.5)
+START = InitialCondition(25.0, 0.0, 8.0, 0.01, 7.5)
 
 
 def test_with_the_true_model_only_the_noise_is_left() -> None:
@@ -179,7 +179,7 @@ def test_a_recording_may_begin_on_either_flank_of_a_gap(seed: int, twist_rad: fl
     geared = model(TWO_MASS, effects={"backlash": {"gap_rad": 0.1, "contact_rad": 1e-3}})
     torque = random_steps(400, seed, size_nm=60.0, hold=40)
     blank = record(torque, np.ones(400))
-    start = Start(0.0, 0.0, speed_rad_s, twist_rad, speed_rad_s)
+    start = InitialCondition(0.0, 0.0, speed_rad_s, twist_rad, speed_rad_s)
     clean = simulate(grid_for(geared, [blank]), blank, flat(geared), start)
     noise = 0.02 * np.random.default_rng(9).standard_normal(400)
     rec = record(torque, clean + noise)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.diagnosis.preconditions.prepare import MOST, with_room
+from estimator.diagnosis.preconditions.prepare import MOST_SAMPLES_TIMES_RECORDINGS, shortened_to_memory
 from estimator.diagnosis.segments import cut
 from estimator.diagnosis.unnamed.forms import LONGEST_TRAVEL, peaks
 from estimator.errors import BadSetting
@@ -152,10 +152,10 @@ def named(count: int, samples: int = N) -> list[Record]:
 def test_of_more_recordings_than_a_fit_can_hold_some_of_every_part_are_used(count: int, samples: int) -> None:
     """Fifty of 3000 rows took 7 GiB: each has unknowns of its own, and a fit every sample for every unknown."""
     records = named(count, samples)
-    segments, (warning,) = with_room(cut(records), [each.name for each in records])
+    segments, (warning,) = shortened_to_memory(cut(records), [each.name for each in records])
     used = [int(each.name.removeprefix("run_")) for each in segments.records]
     assert used == sorted(set(used))
-    assert MOST / 2 < len(used) ** 2 * samples <= MOST
+    assert MOST_SAMPLES_TIMES_RECORDINGS / 2 < len(used) ** 2 * samples <= MOST_SAMPLES_TIMES_RECORDINGS
     assert max(np.diff([-1, *used, count])) <= 2 * math.ceil(count / len(used))
     assert warning.startswith(f"{len(used)} of {count} recordings are used")
     assert len({i % 2 for i in used}) == len({i % 3 for i in used}) - 1 == 2  # kinds that take turns are all there

@@ -15,7 +15,7 @@ from fmpy import read_model_description, simulate_fmu
 from fmpy.validation import validate_fmu
 
 from estimator.physics.catalogue import BUILT_IN
-from estimator.physics.driveline import Case, Start
+from estimator.physics.driveline import Case, InitialCondition
 from estimator.physics.layout import Grid, flat_values
 from estimator.physics.model import DrivelineModel, EffectValue, Parameter, Structure
 from estimator.physics.simulate import motor_angle, simulate
@@ -29,7 +29,7 @@ from tests.estimator.physics.test_recovery import PLANTS, effect_of
 from tests.estimator.physics.test_side_by_side import EVERYWHERE, ON_THE_SHAFT
 
 PERIOD_S, SAMPLES, SIGN_WIDTH = 0.01, 300, 0.05
-START = Start(12.0, 0.0, 5.0, 0.01, 4.0, 0.004, 4.5)
+START = InitialCondition(12.0, 0.0, 5.0, 0.01, 4.0, 0.004, 4.5)
 AGREES = 1e-6
 """Of the output's range: the issue's figure. What there is comes to 1e-10 and less."""
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from estimator.physics.driveline import Start
+from estimator.physics.driveline import InitialCondition
 from estimator.physics.layout import flat, grid_for
 from estimator.physics.simulate import simulate
 from estimator.signals.record import FloatArray, Record
@@ -68,7 +68,7 @@ def test_the_two_move_as_the_line_with_the_effects(name: str, tmp_path: Path) ->
     assert ssp is not None
     parts = round(PERIOD_S / STEP_S)
     fine = bench.record(np.repeat(torques, parts, axis=0), sample_time_s=STEP_S)
-    augmented, start = bench.model(bench.TWO_MASS, effects=EFFECTS[name]), Start(0.0, 0.0, 0.0)
+    augmented, start = bench.model(bench.TWO_MASS, effects=EFFECTS[name]), InitialCondition(0.0, 0.0, 0.0)
     wanted = simulate(grid_for(augmented, [fine]), fine, flat(augmented), start)[::parts]
     allowed = AGREES * float(np.ptp(wanted))
     without = simulate(grid_for(augmented, [fine]), fine, flat(bench.model(bench.TWO_MASS)), start)[::parts]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hil.proof.truth.driveline import TruthDriveline
-from hil.proof.truth.physics import Physics, State
+from hil.proof.truth.physics import Physics, StateIndex
 
 
 @pytest.fixture
@@ -39,6 +39,6 @@ def twist():
     """Twist of the shaft in each row of a trace [rad]."""
 
     def of(states):
-        return states[:, State.ANGLE_M] - states[:, State.ANGLE_L]
+        return states[:, StateIndex.ANGLE_M] - states[:, StateIndex.ANGLE_L]
 
     return of

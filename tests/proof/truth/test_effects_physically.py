@@ -5,13 +5,13 @@ import pytest
 
 from hil.proof.truth import laws
 from hil.proof.truth.driveline import TruthDriveline
-from hil.proof.truth.physics import State
+from hil.proof.truth.physics import StateIndex
 
 
 def test_stribeck_friction_breaks_away_higher_than_it_slides(plain, trace):
     p = plain._replace(friction_motor_nm=15.0, breakaway_motor_nm=40.0, stribeck_speed_rad_s=1.0)
     states = trace(p, np.concatenate([np.arange(0.0, 60.0, 0.05), np.full(1500, 60.0)]))
-    held = p.friction_motor_nm * states[:, State.BRISTLE_M]
+    held = p.friction_motor_nm * states[:, StateIndex.BRISTLE_M]
     assert held.max() == pytest.approx(40.0, rel=0.03)
     assert held[-1] == pytest.approx(15.0, rel=0.05)
     assert laws.sliding_torque(15.0, 40.0, 1.0, 10.0) == pytest.approx(15.0)
@@ -23,7 +23,7 @@ def test_the_play_is_traversed_without_torque(plain, trace, twist):
     p = plain._replace(gap_rad=gap, b_M=0.0, b_L=0.0)
     states = trace(p, [100.0] * 600 + [-100.0] * 100, period_s=0.001)
     across = np.abs(twist(states)) < 0.5 * gap - 1e-4
-    acceleration = np.diff(states[:, State.SPEED_M]) / 0.001
+    acceleration = np.diff(states[:, StateIndex.SPEED_M]) / 0.001
     inside = across[:-1] & across[1:]
     late = np.arange(inside.size) >= 600
     np.testing.assert_allclose(acceleration[inside & late], -100.0 / p.J_M, rtol=1e-6)
@@ -57,7 +57,7 @@ def test_a_nonlinear_shaft_is_conservative(lossless, trace, twist, field, potent
 def test_the_brake_takes_its_torque_in_its_time_alone(plain, trace):
     p = plain._replace(b_M=0.0, b_L=0.0, brake_nm=100.0, brake_from_s=2.0, brake_to_s=5.0)
     states = trace(p, [0.0] * 800, speed_rad_s=60.0)
-    momentum = p.J_M * states[:, State.SPEED_M] + p.J_L * states[:, State.SPEED_L]
+    momentum = p.J_M * states[:, StateIndex.SPEED_M] + p.J_L * states[:, StateIndex.SPEED_L]
     np.testing.assert_allclose(momentum[:201], momentum[0], rtol=1e-9)
     np.testing.assert_allclose(momentum[501:], momentum[-1], rtol=1e-9)
     assert momentum[0] - momentum[-1] == pytest.approx(100.0 * (3.0 - laws.BRAKE_RISE_S), rel=1e-3)
@@ -67,7 +67,7 @@ def test_a_hill_gives_back_what_it_took(lossless, trace):
     road = np.array([[0.8, 2 * np.pi / 90.0, 0.3], [0.3, 2 * np.pi / 50.0, 1.0]])
     p = lossless._replace(road=road, metres_per_rad=0.0857, gravity_nm=8000.0)
     states = trace(p, [0.0] * 2000, speed_rad_s=60.0)
-    x = p.metres_per_rad * states[:, State.ANGLE_L]
+    x = p.metres_per_rad * states[:, StateIndex.ANGLE_L]
     height = (road[:, 0] * np.sin(np.outer(x, road[:, 1]) + road[:, 2])).sum(axis=1)
     twist = states[:, 0] - states[:, 1]
     energy = 0.5 * (p.J_M * states[:, 2] ** 2 + p.J_L * states[:, 3] ** 2 + p.k * twist**2)
@@ -94,11 +94,11 @@ def test_the_resolver_error_returns_after_a_turn_and_has_its_amplitude(plain):
 def test_a_maxwell_branch_is_stiff_when_fast_and_gone_when_slow(plain, trace, twist):
     p = plain._replace(maxwell_stiffness=2000.0, maxwell_time_s=0.02, b_M=0.0, b_L=0.0)
     still = trace(p, [0.0] + [p.k * 0.02 * (p.J_M + p.J_L) / p.J_L] * 1500)
-    assert still[-1, State.MAXWELL_NM] == pytest.approx(0.0, abs=0.5)
+    assert still[-1, StateIndex.MAXWELL_NM] == pytest.approx(0.0, abs=0.5)
     assert twist(still)[-1] == pytest.approx(0.02, rel=0.02)
     fast = p._replace(maxwell_time_s=1e3, c=0.0)
     states = trace(fast, [400.0] * 5 + [0.0] * 2000, period_s=0.001)[5:]
-    speed = states[:, State.SPEED_M] - states[:, State.SPEED_L]
+    speed = states[:, StateIndex.SPEED_M] - states[:, StateIndex.SPEED_L]
     up = np.flatnonzero((speed[:-1] < 0) & (speed[1:] >= 0))
     frequency = 2 * np.pi * (up.size - 1) / ((up[-1] - up[0]) * 0.001)
     assert frequency == pytest.approx(np.sqrt(6200.0 * (1 / p.J_M + 1 / p.J_L)), rel=2e-3)

@@ -7,7 +7,7 @@ from scipy.linalg import expm
 
 from hil.proof.truth import laws
 from hil.proof.truth.driveline import TruthDriveline
-from hil.proof.truth.physics import State
+from hil.proof.truth.physics import StateIndex
 
 
 def _system(p):
@@ -88,7 +88,7 @@ def test_agrees_with_a_stiff_integration_of_two_masses_and_all_their_laws(plain,
         y = solve_ivp(_rates, (0.0, 0.01), y, method="LSODA", args=(p, torque), rtol=1e-8, atol=1e-10).y[:, -1]
         speeds.append(y[2])
     assert np.any(np.diff(np.sign(speeds)))  # the friction did reverse
-    np.testing.assert_allclose(states[1:, State.SPEED_M], speeds, atol=0.002)  # noise is 0.05 rad/s
+    np.testing.assert_allclose(states[1:, StateIndex.SPEED_M], speeds, atol=0.002)  # noise is 0.05 rad/s
 
 
 def _longer_rates(time_s, y, p, torque):
@@ -164,7 +164,7 @@ def test_agrees_with_a_stiff_integration_of_four_masses_and_their_laws(plain, tr
         span = (0.01 * row, 0.01 * (row + 1))
         y = solve_ivp(_longer_rates, span, y, method="LSODA", args=(p, torque), rtol=1e-7, atol=1e-9).y[:, -1]
         followed.append([y[3], y[6], y[9]])
-    read = states[1:, [State.SPEED_M, State.SPEED_V, State.FILTERED]]
+    read = states[1:, [StateIndex.SPEED_M, StateIndex.SPEED_V, StateIndex.FILTERED]]
     assert np.any(np.diff(np.sign(read[:, 1])))  # the vehicle did reverse
     np.testing.assert_allclose(read[:, :2], np.array(followed)[:, :2], atol=0.004)  # noise is 0.05 rad/s
     np.testing.assert_allclose(read[:, 2], np.array(followed)[:, 2], atol=0.03)  # 0.1 ms of 250 rad/s^2

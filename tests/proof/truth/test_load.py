@@ -5,7 +5,7 @@ import pytest
 
 from hil.proof.truth import laws
 from hil.proof.truth.driveline import TruthDriveline, bring_to_speed
-from hil.proof.truth.physics import State
+from hil.proof.truth.physics import StateIndex
 
 
 @pytest.fixture
@@ -37,7 +37,7 @@ def test_a_tyre_gives_no_more_than_its_grip(slipping):
 def test_a_slipping_tyre_keeps_the_momentum(slipping, trace):
     states = trace(slipping, [300.0] * 100 + [0.0] * 200)[100:]
     inertia = [slipping.J_M, slipping.wheel_inertia, slipping.J_L - slipping.wheel_inertia]
-    momentum = states[:, [State.SPEED_M, State.SPEED_L, State.SPEED_V]] @ inertia
+    momentum = states[:, [StateIndex.SPEED_M, StateIndex.SPEED_L, StateIndex.SPEED_V]] @ inertia
     np.testing.assert_allclose(momentum, momentum[0], rtol=1e-9)
 
 
@@ -47,7 +47,7 @@ def test_a_heavy_spot_returns_with_each_turn_of_the_wheel(plain):
     n, turn_s = 2000, 2 * np.pi * 5.6 / 40.0
     speed = np.empty(n)
     for i in range(n):
-        speed[i] = driveline.quantity(State.SPEED_L)
+        speed[i] = driveline.quantity(StateIndex.SPEED_L)
         driveline.advance((0.0, 0.0), turn_s / n)
     amplitude = 2 * np.abs(np.fft.rfft(speed - np.linspace(speed[0], speed[-1], n))) / n
     per_turn = 40.0 / 5.6
@@ -58,9 +58,9 @@ def test_a_heavy_spot_returns_with_each_turn_of_the_wheel(plain):
 def test_a_payload_that_goes_leaves_the_speed_and_quickens_the_bus(lossless, trace):
     p = lossless._replace(payload_share=-0.3, payload_at_s=2.0, payload_rise_s=0.2)
     coasting = trace(p, [0.0] * 400, speed_rad_s=40.0)
-    np.testing.assert_allclose(coasting[:, State.SPEED_M], 40.0, rtol=1e-9)
+    np.testing.assert_allclose(coasting[:, StateIndex.SPEED_M], 40.0, rtol=1e-9)
     driven = trace(p._replace(c=60.0), [100.0] * 600)
-    momentum_m, momentum_l = p.J_M * driven[:, State.SPEED_M], driven[:, State.SPEED_L]
+    momentum_m, momentum_l = p.J_M * driven[:, StateIndex.SPEED_M], driven[:, StateIndex.SPEED_L]
     first, last = slice(100, 200), slice(400, 600)
     for part, share in ((first, 1.0), (last, 0.7)):
         rate = np.gradient(momentum_m[part] + share * p.J_L * momentum_l[part], 0.01)
@@ -81,16 +81,16 @@ EFFECTS = {
 @pytest.mark.parametrize("changes", EFFECTS.values(), ids=EFFECTS)
 def test_a_held_pedal_holds_the_speed(plain, changes, speed):
     rolling = bring_to_speed(plain._replace(load_torque_nm=50.0, **changes), speed, share_m1=0.4)
-    start = rolling.driveline.quantity(State.SPEED_L)
+    start = rolling.driveline.quantity(StateIndex.SPEED_L)
     rolling.driveline.advance((0.4 * rolling.torque_nm, 0.6 * rolling.torque_nm), 10.0)
     assert start == pytest.approx(speed, abs=0.4)
-    assert rolling.driveline.quantity(State.SPEED_L) == pytest.approx(start, abs=0.05)
+    assert rolling.driveline.quantity(StateIndex.SPEED_L) == pytest.approx(start, abs=0.05)
 
 
 def test_hills_and_brake_begin_with_the_recording(plain):
     p = plain._replace(brake_nm=50.0, brake_from_s=0.0, brake_to_s=10.0)
     driveline = bring_to_speed(p, 60.0, 0.5).driveline
-    assert driveline.quantity(State.SPEED_L) == pytest.approx(60.0, abs=0.4)
-    assert driveline.quantity(State.TIME_S) == 0.0
-    assert driveline.quantity(State.ANGLE_L) == 0.0
+    assert driveline.quantity(StateIndex.SPEED_L) == pytest.approx(60.0, abs=0.4)
+    assert driveline.quantity(StateIndex.TIME_S) == 0.0
+    assert driveline.quantity(StateIndex.ANGLE_L) == 0.0
     assert driveline.physics == p

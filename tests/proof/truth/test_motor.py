@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hil.proof.truth import laws
-from hil.proof.truth.physics import State
+from hil.proof.truth.physics import StateIndex
 
 
 @pytest.fixture
@@ -25,7 +25,7 @@ def alone(plain):
 
 def test_a_closed_clutch_adds_its_inertia_and_an_open_one_none(alone, trace):
     states = trace(alone, [40.0] * 300, speed_rad_s=20.0)
-    acceleration = np.diff(states[:, State.SPEED_M]) / 0.01
+    acceleration = np.diff(states[:, StateIndex.SPEED_M]) / 0.01
     np.testing.assert_allclose(acceleration[:100], 40.0 / 1.6, rtol=1e-6)
     np.testing.assert_allclose(acceleration[140:200], 40.0 / 2.4, rtol=1e-6)
     np.testing.assert_allclose(acceleration[210:], 40.0 / 1.6, rtol=1e-6)
@@ -33,7 +33,7 @@ def test_a_closed_clutch_adds_its_inertia_and_an_open_one_none(alone, trace):
 
 def test_a_closing_clutch_conserves_the_momentum_and_ends_in_one_speed(alone, trace):
     states = trace(alone, [0.0] * 180, speed_rad_s=50.0)
-    motor, generator = states[:, State.SPEED_M], states[:, State.SPEED_G]
+    motor, generator = states[:, StateIndex.SPEED_M], states[:, StateIndex.SPEED_G]
     assert generator[99] == pytest.approx(45.0)
     momentum = 1.6 * motor[100:] + 0.8 * generator[100:]
     np.testing.assert_allclose(momentum, momentum[0], rtol=1e-9)
@@ -44,9 +44,9 @@ def test_a_closing_clutch_conserves_the_momentum_and_ends_in_one_speed(alone, tr
 
 def test_a_clutch_that_is_too_weak_continues_slipping(alone, trace):
     states = trace(alone._replace(clutch_nm=20.0), [300.0] * 190)
-    slip = states[:, State.SPEED_M] - states[:, State.SPEED_G]
+    slip = states[:, StateIndex.SPEED_M] - states[:, StateIndex.SPEED_G]
     assert np.all(np.diff(slip[121:]) > 0.0)
-    np.testing.assert_allclose(np.diff(states[121:, State.SPEED_G]) / 0.01, 20.0 / 0.8, rtol=1e-6)
+    np.testing.assert_allclose(np.diff(states[121:, StateIndex.SPEED_G]) / 0.01, 20.0 / 0.8, rtol=1e-6)
 
 
 def test_eddy_drag_is_greatest_at_its_speed_and_odd(plain):

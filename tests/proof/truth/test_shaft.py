@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from hil.proof.truth import laws
-from hil.proof.truth.physics import State
+from hil.proof.truth.physics import StateIndex
 
 
 def _ringing_rad_s(states, period_s):
     """Angular frequency at which motor and load swing against each other."""
-    speed = states[:, State.SPEED_M] - states[:, State.SPEED_L]
+    speed = states[:, StateIndex.SPEED_M] - states[:, StateIndex.SPEED_L]
     up = np.flatnonzero((speed[:-1] < 0) & (speed[1:] >= 0))
     crossing = (up - speed[up] / (speed[up + 1] - speed[up])) * period_s
     return 2 * np.pi * (up.size - 1) / (crossing[-1] - crossing[0])

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from estimator.diagnosis.acquisition.chain import compensate, recognise
-from estimator.diagnosis.acquisition.finding import OUTPUT, Finding
+from estimator.diagnosis.acquisition.finding import OUTPUT, AcquisitionFinding
 from estimator.diagnosis.acquisition.jitter import hidden_jitter
 from estimator.signals.record import FloatArray, Record
 from tests.estimator.diagnosis.acquisition.bench import (
@@ -66,7 +66,7 @@ def slopes_of(truth: Truth) -> FloatArray:
     return np.stack([np.where(early < 0.0, (now - truth.speed(early)) / h, after), after])
 
 
-def seen(seed: int, jitter_s: float, gaussian: bool = True, **mistaken: float) -> Finding | None:
+def seen(seed: int, jitter_s: float, gaussian: bool = True, **mistaken: float) -> AcquisitionFinding | None:
     """Judge the errors of a line that differs by the given factors, a slow drift taken off as a fit would."""
     records, errors, slopes = [], [], []
     drift = np.vander(np.linspace(-1.0, 1.0, SAMPLES), 5)

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from estimator.diagnosis.acquisition.chain import recognise
-from estimator.diagnosis.acquisition.finding import Finding
+from estimator.diagnosis.acquisition.finding import AcquisitionFinding
 from estimator.signals.record import BoolArray, Record
 from tests.estimator.diagnosis.acquisition.bench import SAMPLES, healthy, random_rows
 
 
-def only(records: list[Record]) -> Finding:
+def only(records: list[Record]) -> AcquisitionFinding:
     (finding,) = recognise(records)
     assert finding.name == "lost_samples"
     return finding

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from estimator.diagnosis.acquisition.chain import recognise
-from estimator.diagnosis.acquisition.finding import OUTPUT, Finding
+from estimator.diagnosis.acquisition.finding import OUTPUT, AcquisitionFinding
 from estimator.diagnosis.acquisition.quantised import chance_repeats, lattice_step
 from estimator.signals.record import BoolArray, Record
 from tests.estimator.diagnosis.acquisition.bench import healthy, random_rows, stale
@@ -16,7 +16,7 @@ from tests.estimator.diagnosis.acquisition.bench import healthy, random_rows, st
 SPEED, TORQUES, M1, M1_AND_SPEED, ROWS = (0,), (1, 2), (1,), (0, 1), (0, 1, 2)
 
 
-def only(records: list[Record]) -> Finding:
+def only(records: list[Record]) -> AcquisitionFinding:
     (finding,) = recognise(records)
     assert finding.name == "stale_samples"
     return finding

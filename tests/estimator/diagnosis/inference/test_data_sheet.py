@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import pytest
 
 from estimator.diagnosis.diagnose import diagnose
-from estimator.diagnosis.inference.hypotheses import everything, open_hypotheses
+from estimator.diagnosis.inference.hypotheses import all_good_samples, open_hypotheses
 from estimator.diagnosis.inference.search import Search
 from estimator.diagnosis.inference.sheet import free_line
 from estimator.diagnosis.inference.wording import Context, statement
@@ -26,7 +26,7 @@ def off_by(factors: Mapping[str, float], tolerance: float) -> DrivelineModel:
 
 def searched(factors: Mapping[str, float], tolerance: float = 0.1) -> Search:
     line, records = off_by(factors, tolerance), quiet()
-    return Search(line, records, everything(records), open_hypotheses(line, records)[0])
+    return Search(line, records, all_good_samples(records), open_hypotheses(line, records)[0])
 
 
 @pytest.mark.parametrize(

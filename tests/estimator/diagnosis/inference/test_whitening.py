@@ -13,7 +13,7 @@ from scipy.linalg import block_diag, cholesky, solve_triangular
 
 from estimator.diagnosis.inference.disturbances import (
     Limits,
-    Line,
+    LinearLine,
     Size,
     Whitener,
     estimate,
@@ -24,7 +24,7 @@ from estimator.diagnosis.inference.disturbances import (
     whitener,
 )
 from estimator.diagnosis.line.blocks import LASTS
-from estimator.physics.driveline import Start
+from estimator.physics.driveline import InitialCondition
 from estimator.physics.fit import FitResult, fit
 from estimator.physics.problem import make_problem
 from estimator.signals.record import BoolArray, FloatArray
@@ -38,12 +38,12 @@ SIZES = np.log([0.05, 0.03, 0.04, 2.0, 1.5, 0.8, 3.0, 0.1])
 
 @pytest.fixture(scope="module")
 def result() -> FitResult:
-    record = linear_record(TWO_MASS, drive_torque(1), Start(5.0, 0.0, 2.0, 0.0, 2.0))
+    record = linear_record(TWO_MASS, drive_torque(1), InitialCondition(5.0, 0.0, 2.0, 0.0, 2.0))
     return fit(make_problem(model(TWO_MASS), [record], ()))
 
 
 def of_one_output(
-    line: Line, uses: Sequence[BoolArray], unread: Sequence[FloatArray] | None = None
+    line: LinearLine, uses: Sequence[BoolArray], unread: Sequence[FloatArray] | None = None
 ) -> Callable[[FloatArray], Whitener]:
     """Return the filters of recordings of one output, by their noise model; all torques were read by default."""
     ends = np.cumsum([0, *(int(use.sum()) for use in uses)])
@@ -53,7 +53,7 @@ def of_one_output(
 
 
 def covariance(
-    line: Line, sizes: FloatArray, count: int, unread: FloatArray | float = 0.0, changes: FloatArray | None = None
+    line: LinearLine, sizes: FloatArray, count: int, unread: FloatArray | float = 0.0, changes: FloatArray | None = None
 ) -> FloatArray:
     """Covariance of the error over so many samples: what each disturbance of each sample does to all later ones.
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.linalg import block_diag
 
-from estimator.diagnosis.line.blocks import Place, lines
+from estimator.diagnosis.line.blocks import InputPlace, lines
 from estimator.diagnosis.line.equivalent import Chain, Filtered, explain, run_filter, run_smoother
-from estimator.physics.driveline import Start
+from estimator.physics.driveline import InitialCondition
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult, fit
 from estimator.physics.problem import make_problem
@@ -71,15 +71,15 @@ def nominal(element: Element, size: float) -> FitResult:
 
 
 PLANTED = [
-    (Element.TORQUE_PATH, Place.MOTOR, 20.0),
-    (Element.SHAFT, Place.SHAFT, 40.0),
-    (Element.LOAD, Place.LOAD, 20.0),
-    (Element.SPEED_SENSOR, Place.SENSOR, 0.3),
+    (Element.TORQUE_PATH, InputPlace.MOTOR, 20.0),
+    (Element.SHAFT, InputPlace.SHAFT, 40.0),
+    (Element.LOAD, InputPlace.LOAD, 20.0),
+    (Element.SPEED_SENSOR, InputPlace.SENSOR, 0.3),
 ]
 
 
 @pytest.mark.parametrize(("element", "place", "size"), PLANTED, ids=[p.value for _, p, _ in PLANTED])
-def test_a_planted_input_is_found_within_its_band(element: Element, place: Place, size: float) -> None:
+def test_a_planted_input_is_found_within_its_band(element: Element, place: InputPlace, size: float) -> None:
     """But for its mean: a constant torque is the constant load's, a constant twist is invisible."""
     result = nominal(element, size)
     (first, _) = explain(result, lines(result), place, SIGMA).inputs
@@ -88,18 +88,18 @@ def test_a_planted_input_is_found_within_its_band(element: Element, place: Place
     apart = first.value - planted
     apart -= np.median(apart)
     assert np.mean(np.abs(apart) <= 1.96 * first.std) > 0.9
-    assert np.std(apart) < (0.6 if place is Place.SHAFT else 0.4) * np.std(
+    assert np.std(apart) < (0.6 if place is InputPlace.SHAFT else 0.4) * np.std(
         planted
     )  # the shaft's slow part is invisible
 
 
 def test_the_motion_that_goes_with_the_input_is_the_true_one() -> None:
     """A load step: the twist that the nominal simulation lacks is in the motion of the load's input."""
-    torque, start = drive_torque(1), Start(5.0, 0.0, 2.0, 0.0, 2.0)
+    torque, start = drive_torque(1), InitialCondition(5.0, 0.0, 2.0, 0.0, 2.0)
     extra = np.where(np.arange(torque.size) >= 700, 40.0, 0.0)
     rec = linear_record(TWO_MASS, torque, start, sigma=SIGMA, seed=1, extra_load_nm=extra)
     result = fit(make_problem(model(TWO_MASS), [rec], ()))
-    (found,) = explain(result, lines(result), Place.LOAD, SIGMA).inputs
+    (found,) = explain(result, lines(result), InputPlace.LOAD, SIGMA).inputs
     twist = exact_states(TWO_MASS, torque, start, extra_load_nm=extra)[:, TWIST]
     middle = 0.5 * (twist + np.append(twist[1:], twist[-1]))
     assert np.std(found.motion.twist - middle) < 0.03 * np.std(middle)

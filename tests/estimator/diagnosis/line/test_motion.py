@@ -17,7 +17,7 @@ from estimator.diagnosis.line.blocks import (
     spread_stretches,
 )
 from estimator.diagnosis.line.tangent import block_length, tangent
-from estimator.physics.driveline import Start
+from estimator.physics.driveline import InitialCondition
 from estimator.physics.fit import FitResult, fit, not_fitted
 from estimator.physics.model import EffectValue
 from estimator.physics.problem import make_problem, start_vector
@@ -36,7 +36,7 @@ from tests.estimator.physics.bench import (
     record,
 )
 
-START = Start(5.0, 0.0, 2.0, 0.0, 2.0)
+START = InitialCondition(5.0, 0.0, 2.0, 0.0, 2.0)
 
 
 def test_the_motion_of_a_fit_is_the_motion_of_the_line() -> None:
@@ -57,7 +57,7 @@ TORQUE_NM = 200.0 * np.sin(2.0 * np.pi * TIME_S / 3.0)
 
 def changes(**effects: dict[str, float]) -> FloatArray:
     """Return the changes of the laws of a line that swings there and back twice."""
-    record = linear_record(TWO_MASS, TORQUE_NM, Start(0.0, 0.0, -3.0, 0.0, -3.0))
+    record = linear_record(TWO_MASS, TORQUE_NM, InitialCondition(0.0, 0.0, -3.0, 0.0, -3.0))
     problem = make_problem(model(TWO_MASS, effects=effects), [record], ())
     return form_changes(not_fitted(problem, start_vector(problem)), 0)
 
@@ -98,7 +98,7 @@ def test_a_linear_line_answers_exactly(at_load: bool) -> None:
     assert line.phi.shape == (1, 3, 3)
     torque, nothing = walk(3), np.zeros(SAMPLES)
     motor, load = (nothing, torque) if at_load else (torque, nothing)
-    exact = exact_states(TWO_MASS, motor, Start(0.0, 0.0, 0.0), extra_load_nm=load)[:, SPEED]
+    exact = exact_states(TWO_MASS, motor, InitialCondition(0.0, 0.0, 0.0), extra_load_nm=load)[:, SPEED]
     assert np.max(np.abs(line.answer(motor, load) - exact)) < 1e-5 * np.ptp(exact)
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from estimator.diagnosis.unnamed.forms import STEP_EVERY_S, candidates
 from estimator.diagnosis.unnamed.scene import Scene, elements, scene
-from estimator.physics.driveline import Start
+from estimator.physics.driveline import InitialCondition
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult, fit
 from estimator.physics.problem import make_problem
@@ -25,8 +25,8 @@ from tests.estimator.physics.bench import (
     model,
 )
 
-START = Start(5.0, 0.0, 2.0, 0.0, 2.0)
-REST = Start(0.0, 0.0, 0.0)
+START = InitialCondition(5.0, 0.0, 2.0, 0.0, 2.0)
+REST = InitialCondition(0.0, 0.0, 0.0)
 
 
 @pytest.fixture(scope="module")

@@ -19,7 +19,7 @@ from estimator.diagnosis.unnamed.search import (
     outliers,
     searches_at,
 )
-from estimator.physics.driveline import Start
+from estimator.physics.driveline import InitialCondition
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult
 from tests.estimator.diagnosis.planted import SIGMA, Law, nominal_fit, quiet, recordings
@@ -86,7 +86,7 @@ def test_a_wave_over_the_angle_is_found_in_the_reading(order: float) -> None:
 def test_a_step_of_the_load_is_found_in_its_recording_at_its_moment() -> None:
     records = quiet()
     load = np.where(records[1].time_s >= 6.0, 8.0, 0.0)
-    start = Start(5.0, 0.0, 2.0, 0.0, 2.0)
+    start = InitialCondition(5.0, 0.0, 2.0, 0.0, 2.0)
     records[1] = linear_record(
         TWO_MASS, records[1].total_torque_nm, start, sigma=SIGMA, seed=2, name="run_2", extra_load_nm=load
     )

@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.diagnosis.inference.hypotheses import NOTHING, everything
+from estimator.diagnosis.inference.hypotheses import NOTHING, all_good_samples
 from estimator.diagnosis.unnamed.scene import scene
 from estimator.diagnosis.unnamed.search import ROUNDS, searches_at
 from estimator.diagnosis.where.discrepancy import _pictures_of_effects, discrepancy, effects_added, without_effect
 from estimator.diagnosis.where.locate import error_spectrum, responses
-from estimator.physics.driveline import Start
+from estimator.physics.driveline import InitialCondition
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult, fit
 from estimator.physics.layout import flat_values, grid_for
@@ -31,7 +31,7 @@ FRICTION_NM = 6.0
 def rubbed() -> tuple[FitResult, FitResult]:
     """One mass with dry friction, by time stepping: re-tuned, and with the law fitted."""
     records = rubbing(lambda speed: FRICTION_NM, seeds=(1, 2, 3))
-    bench = Bench(model(ONE_MASS, 0.2), records, everything(records))
+    bench = Bench(model(ONE_MASS, 0.2), records, all_good_samples(records))
     retuned = bench.fit(NOTHING)
     return retuned, bench.fit(frozenset({"coulomb_friction_motor"}), retuned)
 
@@ -115,7 +115,7 @@ def test_what_a_first_look_has_found_is_not_looked_for_again(rounds: int, monkey
     assert discrepancy(result, result, SIGMA, rounds=rounds, initial=begun).laws == plain.laws
 
 
-START = Start(5.0, 0.0, 2.0, 0.0, 2.0)
+START = InitialCondition(5.0, 0.0, 2.0, 0.0, 2.0)
 
 
 def test_a_softer_shaft_is_seen_in_the_response_and_the_true_one_is_not() -> None:

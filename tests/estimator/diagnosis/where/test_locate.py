@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from estimator.diagnosis.where.locate import WINDOW_S, band_hz, intervals, region
-from estimator.physics.driveline import Start
+from estimator.physics.driveline import InitialCondition
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult, fit
 from estimator.physics.problem import make_problem
@@ -18,7 +18,7 @@ from tests.estimator.physics.bench import SPEED, TWIST, TWO_MASS, exact_states, 
 SIGMA = 0.02
 TIME_S = np.arange(2000) * 0.01
 SWELL = 120.0 * np.sin(2 * np.pi * TIME_S / 10.0)
-START = Start(0.0, 0.0, -6.0, 0.0, -6.0)
+START = InitialCondition(0.0, 0.0, -6.0, 0.0, -6.0)
 
 
 def drive(error: FloatArray, name: str = "run_1", seed: int = 1) -> Record:

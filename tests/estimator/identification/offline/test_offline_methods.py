@@ -10,7 +10,7 @@ from estimator.errors import BadSetting, NotExciting
 from estimator.identification.linear_model import Orders
 from estimator.identification.modes.modes import UncertainMode
 from estimator.identification.offline.fits import LinearFit, Method, fit_box_jenkins, fit_output_error
-from estimator.signals.decimate import MOST, block_of, decimate, first_part, high_passed
+from estimator.signals.decimate import MOST_BLOCKS, block_of, decimate, first_part, high_passed
 from estimator.signals.record import Record
 from tests.benchmarks.buses import draw_bus, drive
 from tests.estimator.identification.closed_loop import controlled
@@ -135,7 +135,7 @@ def test_a_period_that_is_not_that_of_the_time_stamps_is_refused(method: Method,
 
 @pytest.mark.parametrize("sample_time_s", [0.001, 0.01, 0.02])
 def test_of_a_long_recording_the_first_part_is_taken(sample_time_s: float) -> None:
-    most = MOST * block_of(sample_time_s)
+    most = MOST_BLOCKS * block_of(sample_time_s)
     n = most + 1000
     time_s = sample_time_s * np.arange(n)
     record = Record("long", sample_time_s, time_s, np.ones((n, 1)), time_s, np.ones(n, dtype=bool))

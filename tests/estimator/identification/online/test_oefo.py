@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from estimator.compiled import brief
+from estimator.compiled import compiled_with_lock
 from estimator.errors import BadModel
 from estimator.identification.linear_model import LinearModel, Orders
 from estimator.identification.online.adaptation import ConstantForgetting, DecreasingGain
@@ -110,7 +110,7 @@ def test_an_unstable_estimate_is_invalid_and_the_prediction_does_not_run_away() 
     assert np.abs(block.y_hat).max() <= 1e3 * np.abs(y).max()
 
 
-@brief
+@compiled_with_lock
 def judge(a: FloatArray, n: int, room: FloatArray) -> bool:
     return is_stable(a, n, room)
 

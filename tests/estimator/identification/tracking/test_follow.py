@@ -8,7 +8,7 @@ import pytest
 from estimator.identification.chain import OnlineChain
 from estimator.identification.online.adaptation import ConstantForgetting
 from estimator.identification.settings import Settings
-from estimator.identification.tracking.follow import FEWEST
+from estimator.identification.tracking.follow import SAMPLES_BEFORE_STD
 from tests.estimator.identification.tracking.drives import SAMPLE_TIME_S, Line, drives
 
 RUNS = 24
@@ -38,7 +38,7 @@ def test_intervals_hold_the_truth(settings: Settings, conditions: dict[str, floa
 def test_nothing_is_claimed_before_the_first_samples() -> None:
     course = OnlineChain(Settings(), SAMPLE_TIME_S).run(drives(1, 1, 12.0)[0])
     known = np.flatnonzero(np.isfinite(course.frequency_std_hz))
-    assert known[0] >= FEWEST
+    assert known[0] >= SAMPLES_BEFORE_STD
     assert np.isfinite(course.frequency_hz[known]).all()
     assert (course.frequency_std_hz[known] > 0).all()
 
