@@ -152,8 +152,8 @@ def _open(found: SearchResult, untested: tuple[str, ...], diagnosis: Diagnosis) 
     within = max(ALIKE_WITHIN, 2.0 * TEMPERED * math.log(1.0 / (1.0 - LEAST_PROBABILITY)))
     near = {
         each.effects: each
-        for each in search.visited.values()
-        if search.is_plausible(each)
+        for each in search.fits.ended.values()
+        if search.fits.is_plausible(each)
         and each.score - best.score < within
         and not _holds(each.effects, best.effects)
         and not (each.effects in judged.tried and judged.believed.beats(judged.tried[each.effects]))
@@ -175,7 +175,7 @@ def _open(found: SearchResult, untested: tuple[str, ...], diagnosis: Diagnosis) 
     names = sorted({name for each in candidates for name in each.effects})
     twins = {name: tuple(EFFECTS[name].equivalent) for name in names if EFFECTS[name].equivalent}
     return Open(
-        search.model,
+        search.fits.model,
         candidates,
         twins if best.outputs == 1 else {},
         untested,

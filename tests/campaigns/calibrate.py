@@ -90,7 +90,7 @@ def decided(form: str, seed: int) -> Row | None:
         return None
     with threadpool_limits(1, user_api="blas"):  # as a diagnosis does
         answer(ready, world.model, silent, "normal", Work(), kept.append)
-    search, judged = kept[0].search, kept[0].decision.judged
+    fits, judged = kept[0].search.fits, kept[0].decision.judged
     recognised = {finding.name for finding in kept[0].chain.findings}
     there = {name for name in world.case.specimen.sizes if name != NOTHING} - recognised
     established = (*judged.named, *judged.traces)
@@ -102,7 +102,7 @@ def decided(form: str, seed: int) -> Row | None:
             NOTHING if world.strong in recognised else world.strong,
             sorted(there | {*world.known}),
             [([each.name, *each.alike], each in established) for each in (*established, *judged.refinements)],
-            [(sorted(each.effects), each.score) for each in search.visited.values() if search.is_plausible(each)],
+            [(sorted(each.effects), each.score) for each in fits.ended.values() if fits.is_plausible(each)],
             {t.key: t.value - chance(t.key, samples) for t in tests(judged.believed.hypothesis) if t.key},
         )
     )

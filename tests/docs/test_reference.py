@@ -10,7 +10,7 @@ from pydantic import BaseModel
 from drivers.inverter.drive_settings import OPTION_CODES
 from drivers.plc.register_map import USED
 from estimator.diagnosis.inference import checks, standing, trials
-from estimator.diagnosis.inference.search import STARTS
+from estimator.diagnosis.inference.moves import STARTS
 from estimator.diagnosis.where import locate
 from hil.cli.main import ExitStatus
 from hil.config.experiment_tables import AnyExperiment

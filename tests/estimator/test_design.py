@@ -22,8 +22,9 @@ from estimator.design import (
 )
 from estimator.diagnosis.inference.descent import descended
 from estimator.diagnosis.inference.disturbances import whitener_of
+from estimator.diagnosis.inference.fits import Fits
 from estimator.diagnosis.inference.hypotheses import THOROUGH
-from estimator.diagnosis.inference.search import Search
+from estimator.diagnosis.inference.search import search_from_nothing
 from estimator.physics.driveline import InitialCondition
 from estimator.physics.fit import not_fitted
 from estimator.physics.layout import flat, grid_for
@@ -41,20 +42,20 @@ NAMES = ["coulomb_friction_motor", "coulomb_friction_load"]
 def known() -> Open:
     """Dry friction at the motor or at the load, as if either were as probable; and what none of them showed."""
     bench = bench_with(NAMES[0], {"friction_nm": 8.0})
-    search = Search(bench.model, bench.records, bench.use, NAMES)
-    best = search.run()
-    other = search.exchanged(best, *NAMES)
+    fits = Fits(bench.model, bench.records, bench.use, NAMES)
+    best = search_from_nothing(fits).best
+    other = fits.exchanged(best, *NAMES)
     assert other is not None
     candidates = tuple(Candidate(name_of(fit.effects), 0.5, fit, precision(fit)) for fit in (best, other))
-    return Open(search.model, candidates, {}, ("speed_sign_blind", "coulomb_friction_motor"))
+    return Open(fits.model, candidates, {}, ("speed_sign_blind", "coulomb_friction_motor"))
 
 
 def test_a_limit_that_is_not_there_is_left_out_of_the_model() -> None:
     bench = bench_with("torque_saturation", {"limit_m1_nm": 30.0, "limit_m2_nm": 30.0})
-    search = Search(bench.model, bench.records, bench.use, ["torque_saturation"])
-    best = search.run()
+    fits = Fits(bench.model, bench.records, bench.use, ["torque_saturation"])
+    best = search_from_nothing(fits).best
     assert not np.isfinite(list(best.result.values_of("torque_saturation").values())).all()
-    model = as_model(Candidate(name_of(best.effects), 1.0, best, precision(best)), search.model)
+    model = as_model(Candidate(name_of(best.effects), 1.0, best, precision(best)), fits.model)
     assert "torque_saturation" in model.effects
 
 

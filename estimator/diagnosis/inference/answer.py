@@ -14,11 +14,12 @@ from dataclasses import dataclass, replace
 from estimator.diagnosis.acquisition.chain import Chain, with_faults_compensated, without_acquisition_effects
 from estimator.diagnosis.inference.decide import Decision, decide
 from estimator.diagnosis.inference.figures import Unseen, on_recordings
+from estimator.diagnosis.inference.fits import Fits
 from estimator.diagnosis.inference.free_forms import free_form
 from estimator.diagnosis.inference.hypotheses import Progress, all_good_samples, open_hypotheses, silent
 from estimator.diagnosis.inference.rivals import laws_around
 from estimator.diagnosis.inference.say import Basis, said, undecided
-from estimator.diagnosis.inference.search import Search
+from estimator.diagnosis.inference.search import Search, search_from_nothing
 from estimator.diagnosis.noise import noise_floor
 from estimator.diagnosis.preconditions.prepare import Prepared, as_slow_as_needed
 from estimator.diagnosis.result import Diagnosis, Effort
@@ -45,7 +46,7 @@ def searched(
     line: DrivelineModel,
     work: Work | None = None,
     most: float = math.inf,
-    watch: Callable[[Search], None] = lambda _search: None,
+    watch: Callable[[Fits], None] = lambda _fits: None,
     progress: Progress = silent,
 ) -> tuple[Chain, Search]:
     """Search for what is missing; once more, on readings put right, where the errors of what is found show jitter."""
@@ -53,16 +54,14 @@ def searched(
     def search_of(of: Chain) -> Search:
         fitted_to = separated_outputs(as_slow_as_needed(of.records, line), noise_floor)
         names = open_hypotheses(line, of.records)[0]
-        search = Search(line, fitted_to, all_good_samples(fitted_to), names, work=work or Work(), most=most)
-        search.progress = progress
-        watch(search)
-        search.run()
-        return search
+        fits = Fits(line, fitted_to, all_good_samples(fitted_to), names, work=work or Work())
+        watch(fits)
+        return search_from_nothing(fits, most, progress)
 
     search = search_of(chain)
-    if search.stopped:
+    if search.is_cut_short:
         return chain, search
-    free = on_recordings(search.path[-1], line, chain.separated, is_whole=True)
+    free = on_recordings(search.best, line, chain.separated, is_whole=True)
     steady = chain.with_jitter_in(free.first_outputs())
     return (chain, search) if steady is chain else (steady, search_of(steady))
 
@@ -81,7 +80,7 @@ def answer(
     """
     began = time.perf_counter()
     line, chain = without_acquisition_effects(model), with_faults_compensated(ready.records)
-    started: list[Search] = []
+    started: list[Fits] = []
     with counted(work):
         try:
             read, search = searched(chain, line, work, LEVELS[level], started.append, progress)
@@ -102,16 +101,14 @@ def answer(
 
 def _effort(search: Search, level: str, decision: Decision) -> Effort:
     """Return what the search cost; ``untried`` is what looked worth a fit and had none."""
-    settled = {*search.rivals, *search.implausible, *(name for effects in search.visited for name in effects)}
-    best = decision.judged.believed.hypothesis.score
-    untried = tuple(
-        name for name in search.names if name not in settled and search.foreseen.get(name, -math.inf) < best
-    )
-    return Effort(level, search.simulations, True, untried, len(search.names))
+    fits, best = search.fits, decision.judged.believed.hypothesis.score
+    settled = {*fits.implausible, *(name for effects in (*fits.ended, *fits.rough) for name in effects)}
+    untried = tuple(name for name in fits.names if name not in settled and fits.foreseen.get(name, -math.inf) < best)
+    return Effort(level, fits.simulations, True, untried, len(fits.names))
 
 
 def _warnings(search: Search, level: str) -> tuple[str, ...]:
-    if not search.stopped:
+    if not search.is_cut_short:
         return ()
     return (
         f"the search ended with the best set of effects so far, after the {LEVELS[level]:,} simulations of its effort "

@@ -25,7 +25,9 @@ import numpy as np
 from estimator.diagnosis.acquisition.chain import Chain
 from estimator.diagnosis.inference.checks import Test, is_possible, tests
 from estimator.diagnosis.inference.figures import FreeRuns, Unseen, acquired, figures_of, free_runs
+from estimator.diagnosis.inference.fits import Fits
 from estimator.diagnosis.inference.hypotheses import SETTLED_DEVIANCE, Effects, Hypothesis, fitted
+from estimator.diagnosis.inference.moves import fit_look_alikes
 from estimator.diagnosis.inference.search import Search
 from estimator.diagnosis.inference.sheet import free_line
 from estimator.diagnosis.inference.standing import (
@@ -37,7 +39,7 @@ from estimator.diagnosis.inference.standing import (
     LEAST_SHARE,
     Standing,
 )
-from estimator.diagnosis.inference.trials import Trial, Trials, necessity, noise_of
+from estimator.diagnosis.inference.trials import Trial, necessity, noise_of
 from estimator.diagnosis.result import Fit, FoundEffect, OffNominal, Verdict
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import not_fitted
@@ -157,34 +159,34 @@ def _failed(hypothesis: Hypothesis) -> tuple[Test, ...]:
 
 
 def _judged(search: Search, rival: Rival) -> Judged:
-    trials = search.trials
-    nothing = trials.one(search.nothing())
+    fits, trials = search.fits, search.fits.trials
+    nothing = trials.one(fits.nothing())
     failed = _failed(nothing.hypothesis)
-    if not failed and not search.path[-1].effects:
+    if not failed and not search.best.effects:
         return Judged(nothing, nothing, nothing, tried=trials.all)
-    sheet = free_line(search)
-    likely, tried = _candidates(search, trials)
+    sheet = free_line(fits)
+    likely, tried = _candidates(search)
     noise = noise_of(likely.hypothesis)
     chosen = nothing
     while (larger := _needed_beyond(chosen, tried, noise)) is not None:
         chosen = larger
-    if sheet is not None and sheet.tried(search.model).beats(chosen):
+    if sheet is not None and sheet.tried(fits.model).beats(chosen):
         off_nominal = sheet.off_nominal if sheet.leaves_noise else ()
         return Judged(nothing, likely, nothing, off_nominal=off_nominal, tried=trials.all, failed=failed)
     believed, weak = chosen, dict[str, Standing]()
     while True:
-        believed = _no_more_general_than_needed(search, trials, believed, noise)
-        standings = [_standing(name, search, trials, believed, noise, rival) for name in sorted(believed.effects)]
+        believed = _no_more_general_than_needed(fits, believed, noise)
+        standings = [_standing(name, fits, believed, noise, rival) for name in sorted(believed.effects)]
         doubted = [each for each in standings if each.objection]
         if not doubted:
             break
         weakest = min(doubted, key=lambda each: (each.necessity.least, each.evidence))
         weak[weakest.name] = weakest
-        believed = trials.one(search.without(believed.hypothesis, weakest.name))
+        believed = trials.one(fits.without(believed.hypothesis, weakest.name))
     standings.sort(key=lambda each: -each.share)
     close = {other for each in standings for other in each.alike} | believed.effects | {*weak}
     close |= {name for name in likely.effects if close & {*EFFECTS[name].contains}}  # its special case stands for it
-    possible = (_standing(name, search, trials, likely, noise, rival) for name in sorted(likely.effects - close))
+    possible = (_standing(name, fits, likely, noise, rival) for name in sorted(likely.effects - close))
     return Judged(
         nothing,
         likely,
@@ -200,13 +202,13 @@ def _judged(search: Search, rival: Rival) -> Judged:
     )
 
 
-def _candidates(search: Search, trials: Trials) -> tuple[Trial, list[Trial]]:
+def _candidates(search: Search) -> tuple[Trial, list[Trial]]:
     """Return the most probable set that a search has found, and the sets that are judged, each tried."""
-    found = search.path[-1]
+    fits, found = search.fits, search.best
     for name in sorted(found.effects):
-        search.without(found, name)
-    search.fit_look_alikes(found)
-    tried = trials.of([_from_its_moment(search, each) for each in _nearest(search, found)])
+        fits.without(found, name)
+    fit_look_alikes(fits, found)
+    tried = fits.trials.of([_from_its_moment(fits, each) for each in _nearest(fits, found)])
     return next(trial for trial in tried if trial.effects == found.effects), tried
 
 
@@ -227,48 +229,48 @@ def _needed_beyond(chosen: Trial, tried: Sequence[Trial], noise: float) -> Trial
     return min(better, key=lambda each: (each.size, each.hypothesis.score, sorted(each.effects)), default=None)
 
 
-def _nearest(search: Search, found: Hypothesis) -> list[Hypothesis]:
+def _nearest(fits: Fits, found: Hypothesis) -> list[Hypothesis]:
     """Return the sets worth a trial: of each size the most probable, and those that simulate best as fitted."""
-    possible = [each for each in search.visited.values() if search.is_plausible(each)]
-    chosen: dict[Effects, Hypothesis] = {each.effects: each for each in (search.nothing(), found)}
+    possible = [each for each in fits.ended.values() if fits.is_plausible(each)]
+    chosen: dict[Effects, Hypothesis] = {each.effects: each for each in (fits.nothing(), found)}
     for size in range(1, len(found.effects) + 1):
         same = [each for each in possible if len(each.effects) == size]
         chosen |= {each.effects: each for each in sorted(same, key=lambda each: each.score)[:NEAREST]}
         chosen |= {each.effects: each for each in sorted(same, key=lambda each: each.result.squares)[:NEAREST]}
-    return [each for each in chosen.values() if is_possible(each, search.records)]
+    return [each for each in chosen.values() if is_possible(each, fits.records)]
 
 
-def _from_its_moment(search: Search, hypothesis: Hypothesis) -> Hypothesis:
+def _from_its_moment(fits: Fits, hypothesis: Hypothesis) -> Hypothesis:
     """Return a set with steps of payload or stiffness that begin inside recordings, where that is as probable."""
-    turned = from_their_moment(hypothesis.result, search.model)
+    turned = from_their_moment(hypothesis.result, fits.model)
     if turned is hypothesis.result:
         return hypothesis
     initial = not_fitted(turned.problem, turned.x)
     sizes, limits, before = hypothesis.sizes, hypothesis.limits, hypothesis.minus_twice_log
-    found = fitted(hypothesis.effects, initial, sizes, limits, search.catalogue, before)
+    found = fitted(hypothesis.effects, initial, sizes, limits, fits.catalogue, before)
     return found if found.score <= hypothesis.score + SETTLED_DEVIANCE else hypothesis
 
 
-def _standing(name: str, search: Search, trials: Trials, whole: Trial, noise: float, rival: Rival) -> Standing:
+def _standing(name: str, fits: Fits, whole: Trial, noise: float, rival: Rival) -> Standing:
     """Return what speaks for an effect of a set, and the first thing that speaks against it."""
-    without = trials.one(search.without(whole.hypothesis, name))
-    total = float(trials.one(search.nothing()).squares.sum())
+    without = fits.trials.one(fits.without(whole.hypothesis, name))
+    total = float(fits.trials.one(fits.nothing()).squares.sum())
     share = min(max(float(without.squares.sum() - whole.squares.sum()) / total, 0.0), 1.0)
     needed = necessity(whole, without, noise)
     evidence = without.hypothesis.score - whole.hypothesis.score
-    alike = _alike(name, search, trials, whole, evidence)
+    alike = _alike(name, fits, whole, evidence)
     standing = Standing(name, needed, share, evidence, alike)
-    return replace(standing, objection=_against(standing, search, whole, without, rival))
+    return replace(standing, objection=_against(standing, fits, whole, without, rival))
 
 
-def _against(standing: Standing, search: Search, whole: Trial, without: Trial, rival: Rival) -> str:
+def _against(standing: Standing, fits: Fits, whole: Trial, without: Trial, rival: Rival) -> str:
     """Return what speaks against a name, as the end of a sentence; "" where nothing does."""
     back = f"{standing.necessity.value:.0%}".replace("%", " %")
     if standing.necessity.least < LEAST_NECESSITY:
         return f"without it {back} of the error beyond the noise comes back, which is too little to be sure"
     if standing.evidence < LEAST_EVIDENCE:
         return f"minus twice the log-probability rises by {standing.evidence:.3g} only without it"
-    if not search.is_resolved(whole.hypothesis, standing.name):
+    if not fits.is_resolved(whole.hypothesis, standing.name):
         return "it is too small to be distinguished from another way of sampling"
     free = rival(without, standing.name)
     if free is not None and not whole.clearly_beats(free):
@@ -276,17 +278,17 @@ def _against(standing: Standing, search: Search, whole: Trial, without: Trial, r
     return ""
 
 
-def _alike(name: str, search: Search, trials: Trials, whole: Trial, evidence: float) -> dict[str, Mapping[str, float]]:
+def _alike(name: str, fits: Fits, whole: Trial, evidence: float) -> dict[str, Mapping[str, float]]:
     """Return the effects that are as probable in an effect's place and simulate as well, with their values there."""
     best, others = whole.hypothesis, whole.effects - {name}
     within = max(ALIKE_WITHIN, ALIKE_SHARE * evidence)
     exchanged = [
         each
-        for effects, each in sorted(search.visited.items(), key=lambda item: sorted(item[0]))
+        for effects, each in sorted(fits.ended.items(), key=lambda item: sorted(item[0]))
         if others <= effects and len(effects - others) == 1 and name not in effects
     ]
-    near = [each for each in exchanged if each.score - best.score < within and search.is_plausible(each)]
-    as_good = [each for each in near if not whole.clearly_beats(trials.one(each))]
+    near = [each for each in exchanged if each.score - best.score < within and fits.is_plausible(each)]
+    as_good = [each for each in near if not whole.clearly_beats(fits.trials.one(each))]
     found = {next(iter(each.effects - others)): each for each in as_good} | {name: best}
     values = {other: each.result.values_of(other) for other, each in found.items()}
     for other in found:
@@ -295,16 +297,16 @@ def _alike(name: str, search: Search, trials: Trials, whole: Trial, evidence: fl
     return {other: values[other] for other in sorted({*values} - best.effects)}
 
 
-def _no_more_general_than_needed(search: Search, trials: Trials, whole: Trial, noise: float) -> Trial:
+def _no_more_general_than_needed(fits: Fits, whole: Trial, noise: float) -> Trial:
     """Return a set with special cases in the place of general laws whose generality it does not need."""
-    total = float(trials.one(search.nothing()).squares.sum())
+    total = float(fits.trials.one(fits.nothing()).squares.sum())
     for name in sorted(whole.effects):
         for special in EFFECTS[name].contains:
-            simpler = search.exchanged(whole.hypothesis, name, special)
+            simpler = fits.exchanged(whole.hypothesis, name, special)
             if simpler is None:
                 continue
-            trial = trials.one(simpler)
+            trial = fits.trials.one(simpler)
             beyond = float(trial.squares.sum() - whole.squares.sum()) / total
             if necessity(whole, trial, noise).least < LEAST_NECESSITY or beyond < LEAST_SHARE:
-                return _no_more_general_than_needed(search, trials, trial, noise)
+                return _no_more_general_than_needed(fits, trial, noise)
     return whole

@@ -13,6 +13,7 @@ from estimator.diagnosis.assemble import augmented_model, load_torques, moved_va
 from estimator.diagnosis.inference.checks import tests_in_words
 from estimator.diagnosis.inference.decide import Decision
 from estimator.diagnosis.inference.figures import courses_of, figures_without, first_figures, found_effect
+from estimator.diagnosis.inference.fits import Fits
 from estimator.diagnosis.inference.hypotheses import Hypothesis, of_first_outputs, open_hypotheses
 from estimator.diagnosis.inference.rivals import Laws
 from estimator.diagnosis.inference.search import Search
@@ -59,7 +60,7 @@ class Basis:
 
 def said(basis: Basis) -> Diagnosis:
     """Return the diagnosis."""
-    decision, search = basis.decision, basis.search
+    decision, line = basis.decision, basis.search.fits.model
     judged, runs, verdict = decision.judged, decision.runs, decision.verdict
     is_explained = verdict is not Verdict.UNEXPLAINED
     named = [found_effect(each, runs) for each in judged.named]
@@ -67,8 +68,7 @@ def said(basis: Basis) -> Diagnosis:
     traces = judged.traces if is_explained else ()
     added = [*effects, *(found_effect(each, runs) for each in traces)]
     mismatch, remainder = _mismatch(basis), _remainder(basis)
-    untestable = untestable_effects(open_hypotheses(search.model, runs.chain.records)[1])
-    line = search.model
+    untestable = untestable_effects(open_hypotheses(line, runs.chain.records)[1])
     slight = tuple(_slight(each, basis) for each in traces)
     context = Context(
         remainder,
@@ -106,11 +106,11 @@ def said(basis: Basis) -> Diagnosis:
 
 
 def undecided(
-    search: Search | None, chain: Chain, line: DrivelineModel, model: DrivelineModel, work: Work, level: str
+    fits: Fits | None, chain: Chain, line: DrivelineModel, model: DrivelineModel, work: Work, level: str
 ) -> Diagnosis:
     """Return the answer of a search that the limit of time has ended: nothing is decided, and nothing rejected."""
     names, blind = open_hypotheses(line, chain.records)
-    nothing = None if search is None else search.visited.get(frozenset())
+    nothing = None if fits is None else fits.ended.get(frozenset())
     parameters, loads, augmented = dict[str, Retuned](), dict[str, Estimated](), model
     try:
         fit, estimate = first_figures(chain, line, nothing)
@@ -118,9 +118,9 @@ def undecided(
         parameters, loads = retuned_parameters(estimate, line, False), load_torques(estimate, line)
     except TimeIsUp:  # the whole limit, after which another program simulates no more
         fit = figures_without(chain, line, nothing)
-    tried = set() if search is None else {*search.rivals, *search.implausible}
+    tried = set() if fits is None else {*fits.scores(), *fits.implausible}
     untried = tuple(name for name in names if name not in tried)
-    simulations = 0 if search is None else search.simulations
+    simulations = 0 if fits is None else fits.simulations
     effort = Effort(level, simulations, False, untried, len(names), work.limit_s)
     untestable = untestable_effects(blind)
     context = Context(untestable=untestable, can_be_retuned=can_be_retuned(line))
@@ -155,7 +155,7 @@ def untestable_effects(blind: Mapping[str, Untestable]) -> tuple[UntestableEffec
 def _slight(trace: Standing, basis: Basis) -> Slight:
     """Return a trace; without it some values are others, though the error hardly is."""
     believed = basis.decision.judged.believed
-    without = basis.search.without(believed.hypothesis, trace.name)
+    without = basis.search.fits.without(believed.hypothesis, trace.name)
     return Slight(trace.name, trace.share, _values(believed, trace), moved_values(believed.hypothesis, without.result))
 
 
@@ -212,7 +212,7 @@ def _discrepancy(basis: Basis) -> Discrepancy:
     """Return the mismatch as the report draws it."""
     judged = basis.decision.judged
     nothing, believed = of_first_outputs(judged.nothing.hypothesis), judged.believed.hypothesis.result.first_outputs()
-    motion, searches = basis.search.model.motion, basis.laws.searches
+    motion, searches = basis.search.fits.model.motion, basis.laws.searches
     return discrepancy(
         nothing.result, believed, judged.noise, motion, rounds=1, initial=searches, whitening=nothing.filter
     )
@@ -246,16 +246,16 @@ def _rejected(basis: Basis) -> tuple[RejectedEffect, ...]:
     ``delta_bic`` is by how much the best set with a rival is less probable than the best of all: fitted, or as a score
     test foresees it at most.
     """
-    search, judged = basis.search, basis.decision.judged
+    fits, judged = basis.search.fits, basis.decision.judged
     best = judged.believed.hypothesis.score
     standings = (*judged.named, *judged.traces, *judged.refinements)
     known = {each.name for each in standings} | {other for each in standings for other in each.alike}
     known |= {each.name for each in basis.decision.acquired} | {*basis.effort.untried}
     found = {each.name: RejectedEffect(each.name, each.objection, 0.0) for each in judged.refinements}
     for scores, reason in (
-        (_fitted(search), "fitted: the best set with it is {}"),
-        (search.implausible, "fitted, and ended at values that are no case of it"),
-        (search.foreseen, "not fitted: a score test foresees that the best set with it is {} at best"),
+        (fits.scores(), "fitted: the best set with it is {}"),
+        (fits.implausible, "fitted, and ended at values that are no case of it"),
+        (fits.foreseen, "not fitted: a score test foresees that the best set with it is {} at best"),
     ):
         for name, score in sorted(scores.items(), key=lambda item: item[::-1]):  # not as cores came to their end
             if name not in found and name not in known:
@@ -275,15 +275,6 @@ def _simulates_worse(name: str, tried: Iterable[Trial], believed: Trial) -> str:
         f"tried: it leaves {best.rms:.3g} on samples not used for the fit, with {best.size} effects; what is believed "
         f"leaves {believed.rms:.3g} with {believed.size}"
     )
-
-
-def _fitted(search: Search) -> dict[str, float]:
-    """Return the best score of a set with each effect that was fitted, to its end or a few steps."""
-    scores = dict(search.rivals)
-    for effects, each in search.visited.items():
-        for name in effects if search.is_plausible(each) else ():
-            scores[name] = min(each.score, scores.get(name, math.inf))
-    return scores
 
 
 def _compared(worse: float) -> str:

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from estimator.diagnosis.inference.checks import tests
+from estimator.diagnosis.inference.fits import Fits
 from estimator.diagnosis.inference.hypotheses import NOTHING, Catalogue, Hypothesis, covariance, fitted
-from estimator.diagnosis.inference.search import Search
 from estimator.diagnosis.inference.trials import Trial, tried
 from estimator.diagnosis.result import OffNominal
 from estimator.physics.fit import not_fitted
@@ -35,9 +35,9 @@ class FreeLine:
         return tried(self.hypothesis, model, len(self.off_nominal))
 
 
-def free_line(search: Search) -> FreeLine | None:
+def free_line(fits: Fits) -> FreeLine | None:
     """Fit the nominal line beyond its tolerances; None where these hold nothing back."""
-    nothing = search.nothing().result
+    nothing = fits.nothing().result
     shared = nothing.problem.shared
     trusted = [not s.effect and np.isfinite(s.low) and s.low < s.high for s in shared]
     if not any(free and at_bound for free, at_bound in zip(trusted, nothing.pinned, strict=False)):
@@ -47,24 +47,24 @@ def free_line(search: Search) -> FreeLine | None:
         for s, free in zip(shared, trusted, strict=True)
     )
     problem = replace(nothing.problem, shared=freed)
-    sizes = search.nothing().sizes
+    sizes = fits.nothing().sizes
     initial = not_fitted(problem, nothing.x)
-    found = fitted(NOTHING, initial, sizes, search.limits, search.catalogue, search.nothing().minus_twice_log)
-    off_nominal = _off_nominal(search, found)
+    found = fitted(NOTHING, initial, sizes, fits.limits, fits.catalogue, fits.nothing().minus_twice_log)
+    off_nominal = _off_nominal(fits, found)
     if not off_nominal:
         return None
-    chosen = Catalogue(len(search.names) + sum(trusted)).choices(frozenset(each.name for each in off_nominal))
+    chosen = Catalogue(len(fits.names) + sum(trusted)).choices(frozenset(each.name for each in off_nominal))
     return FreeLine(found, found.score + 2.0 * chosen, not any(test.failed for test in tests(found)), off_nominal)
 
 
-def _off_nominal(search: Search, found: Hypothesis) -> tuple[OffNominal, ...]:
+def _off_nominal(fits: Fits, found: Hypothesis) -> tuple[OffNominal, ...]:
     spread = np.sqrt(np.maximum(np.diag(covariance(found)), 0.0))
     clear = []
-    for i, trusted in enumerate(search.nothing().result.problem.shared):
+    for i, trusted in enumerate(fits.nothing().result.problem.shared):
         ratio = float(found.result.x[i])
         by = max(trusted.low - ratio, ratio - trusted.high)
         if not trusted.effect and trusted.low < trusted.high and by > CLEARLY * spread[i]:
             sureness = by / max(float(spread[i]), np.finfo(float).tiny)
-            given, unit = search.model.parameters[trusted.name], parameter_unit(trusted.name, search.model.motion)
+            given, unit = fits.model.parameters[trusted.name], parameter_unit(trusted.name, fits.model.motion)
             clear.append((sureness, OffNominal(trusted.name, ratio, trusted.high - 1.0, given.value, unit)))
     return tuple(value for _, value in sorted(clear, key=lambda each: -each[0]))

@@ -10,10 +10,11 @@ import numpy as np
 from estimator.diagnosis.acquisition.chain import with_faults_compensated
 from estimator.diagnosis.inference.decide import Decision, Rival, decide, no_rival
 from estimator.diagnosis.inference.figures import Unseen
+from estimator.diagnosis.inference.fits import Fits
 from estimator.diagnosis.inference.hypotheses import all_good_samples, open_hypotheses
 from estimator.diagnosis.inference.rivals import laws_around
 from estimator.diagnosis.inference.say import Basis, said
-from estimator.diagnosis.inference.search import Search
+from estimator.diagnosis.inference.search import Search, search_from_nothing
 from estimator.diagnosis.result import Diagnosis, Effort
 from estimator.physics.driveline import InitialCondition
 from estimator.physics.layout import flat_values, grid_for
@@ -54,18 +55,17 @@ def bench_with(name: str, values: Mapping[str, float], torques_nm: Sequence[Floa
 def searched(bench: Bench, names: Sequence[str] = ()) -> Search:
     """Search some effects, or all that the recordings can tell."""
     records = list(bench.records)
-    search = Search(bench.model, records, all_good_samples(records), names or open_hypotheses(bench.model, records)[0])
-    search.run()
-    return search
+    names = names or open_hypotheses(bench.model, records)[0]
+    return search_from_nothing(Fits(bench.model, records, all_good_samples(records), names))
 
 
 def decided(search: Search, unseen: Sequence[Record] = (), rival: Rival = no_rival) -> Decision:
     """Decide on what was found; ``unseen`` are recordings that no fit has seen."""
-    return decide(
-        search, with_faults_compensated(search.records), Unseen(search.model, with_faults_compensated(unseen)), rival
-    )
+    fits = search.fits
+    chain, never_fitted = with_faults_compensated(fits.records), with_faults_compensated(unseen)
+    return decide(search, chain, Unseen(fits.model, never_fitted), rival)
 
 
 def diagnosed(search: Search, decision: Decision) -> Diagnosis:
     """Return what is said of a decision."""
-    return said(Basis(decision, laws_around(decision.judged), search, search.model, Effort()))
+    return said(Basis(decision, laws_around(decision.judged), search, search.fits.model, Effort()))

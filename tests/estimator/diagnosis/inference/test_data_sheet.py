@@ -8,8 +8,8 @@ from collections.abc import Mapping
 import pytest
 
 from estimator.diagnosis.diagnose import diagnose
+from estimator.diagnosis.inference.fits import Fits
 from estimator.diagnosis.inference.hypotheses import all_good_samples, open_hypotheses
-from estimator.diagnosis.inference.search import Search
 from estimator.diagnosis.inference.sheet import free_line
 from estimator.diagnosis.inference.wording import Context, statement
 from estimator.diagnosis.result import Effort, Fit, OffNominal, Verdict
@@ -24,9 +24,9 @@ def off_by(factors: Mapping[str, float], tolerance: float) -> DrivelineModel:
     return model({name: value / factors.get(name, 1.0) for name, value in TWO_MASS.items()}, tolerance)
 
 
-def searched(factors: Mapping[str, float], tolerance: float = 0.1) -> Search:
+def searched(factors: Mapping[str, float], tolerance: float = 0.1) -> Fits:
     line, records = off_by(factors, tolerance), quiet()
-    return Search(line, records, all_good_samples(records), open_hypotheses(line, records)[0])
+    return Fits(line, records, all_good_samples(records), open_hypotheses(line, records)[0])
 
 
 @pytest.mark.parametrize(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from estimator.diagnosis.inference.decide import verdict_of
+from estimator.diagnosis.inference.fits import Fits
 from estimator.diagnosis.inference.hypotheses import Hypothesis
 from estimator.diagnosis.inference.search import Search
 from estimator.diagnosis.result import Verdict
@@ -39,17 +40,16 @@ def friction() -> Search:
 
 def with_one_more(search: Search, name: str, instead: str = "") -> Search:
     """The same search, as if it had ended on a set with one law more, or with a more general one."""
-    best = search.path[-1]
+    best, fits = search.best, search.fits
     larger: Hypothesis | None
     if instead:
-        larger = search.exchanged(best, instead, name)
+        larger = fits.exchanged(best, instead, name)
     else:
-        rough = search._added(best, name, search._score(best, name))
-        larger = None if rough is None else search.finish(rough, best)
+        rough = fits.added(best, name, fits.starts(best, name))
+        larger = None if rough is None else fits.finish(rough, best)
     assert larger is not None
-    other = Search(search.model, search.records, search.use, search.names, visited=dict(search.visited))
-    other.path = [*search.path, larger]
-    return other
+    other = Fits(fits.model, fits.records, fits.use, fits.names, ended=dict(fits.ended))
+    return Search(other, (*search.path, larger))
 
 
 def test_what_the_free_run_needs_is_named_with_what_speaks_for_it(friction: Search) -> None:

@@ -61,11 +61,11 @@ def test_a_shaft_that_is_softer_for_a_while_is_no_generator_that_is_coupled() ->
 
 def test_every_set_is_fitted_once() -> None:
     search = searched(bench_with("coulomb_friction_motor", {"friction_nm": 8.0}))
-    best = search.path[-1]
-    assert search.nothing() is search.visited[frozenset()]
-    assert best is search.visited[best.effects]
-    assert best.score == min(each.score for each in search.visited.values() if len(each.effects) <= len(best.effects))
-    assert search.without(best, next(iter(best.effects))) is search.visited[frozenset()]
+    best, fits = search.best, search.fits
+    assert fits.nothing() is fits.ended[frozenset()]
+    assert best is fits.ended[best.effects]
+    assert best.score == min(each.score for each in fits.ended.values() if len(each.effects) <= len(best.effects))
+    assert fits.without(best, next(iter(best.effects))) is fits.ended[frozenset()]
 
 
 @pytest.mark.parametrize("wave_hz", [3.5, 11.0])
@@ -99,4 +99,4 @@ def test_an_effect_that_is_known_roughly_is_tuned_and_no_finding() -> None:
 def test_an_effect_that_is_known_wrongly_and_held_is_a_mismatch() -> None:
     bench = bench_with("coulomb_friction_motor", {"friction_nm": 8.0})
     held = knowing(bench, "coulomb_friction_motor", "friction_nm", 5.0, 0.0)
-    assert searched(held, ["quadratic_friction"]).nothing().result.rms > 1.5 * SIGMA
+    assert searched(held, ["quadratic_friction"]).fits.nothing().result.rms > 1.5 * SIGMA

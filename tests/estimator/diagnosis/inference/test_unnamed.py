@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
+from estimator.diagnosis.inference.fits import Fits
 from estimator.diagnosis.inference.hypotheses import all_good_samples, open_hypotheses
 from estimator.diagnosis.inference.rivals import best_law, laws_around, searches_around
-from estimator.diagnosis.inference.search import Search
 from estimator.diagnosis.unnamed.scene import scene
 from estimator.physics.effect import Element
 from estimator.signals.record import Record
@@ -18,9 +18,9 @@ from tests.estimator.diagnosis.planted import SIGMA, TIGHT, quiet, recordings
 from tests.estimator.physics.bench import TWO_MASS, model
 
 
-def searched(records: list[Record]) -> Search:
+def searched(records: list[Record]) -> Fits:
     line = model(TWO_MASS, TIGHT)
-    return Search(line, records, all_good_samples(records), open_hypotheses(line, records)[0])
+    return Fits(line, records, all_good_samples(records), open_hypotheses(line, records)[0])
 
 
 def test_a_planted_law_is_scored_by_the_likelihood_it_gains() -> None:

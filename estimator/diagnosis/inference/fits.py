@@ -1,0 +1,274 @@
+"""Fits: the sets of effects that were fitted to some recordings, each once; all that a search remembers.
+
+A set is fitted in two depths. A *rough* fit takes a few steps, from where another set was fitted, and is compared with
+others like it; a fit *to its end* decides. Both begin from known values: a fit of a set in which one effect is new, is
+gone, or is written another way begins where the rest of it was fitted before.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from threading import Lock
+
+from estimator.diagnosis.inference.checks import is_plausible, may_be_loose, widened
+from estimator.diagnosis.inference.descent import extended
+from estimator.diagnosis.inference.disturbances import Limits, limits_of
+from estimator.diagnosis.inference.hypotheses import (
+    GRADE,
+    NOTHING,
+    Catalogue,
+    Effects,
+    Hypothesis,
+    compared,
+    fitted,
+    forgetting,
+    inheriting,
+    line_values,
+    unknowns_of,
+    with_effect,
+    with_line_values,
+)
+from estimator.diagnosis.inference.score_tests import CachedScoreTests, OutputChanges, ScoredStart, promising
+from estimator.diagnosis.inference.trials import Trials
+from estimator.physics.catalogue import EFFECTS
+from estimator.physics.fit import FitResult, not_fitted, warm_start
+from estimator.physics.layout import Grid, grid_for
+from estimator.physics.model import DrivelineModel
+from estimator.physics.parallel import Work
+from estimator.physics.problem import Problem, make_problem, start_vector
+from estimator.physics.unknowns import Release, nominal_unknowns, own_unknowns, released
+from estimator.signals.record import BoolArray, Record
+
+
+@dataclass
+class Fits:
+    """Sets of effects fitted to recordings of a model's line.
+
+    Attributes
+    ----------
+    use : sequence of ndarray, shape (N,) each
+        Which samples of each recording count.
+    names : sequence of str
+        The effects that sets are made of.
+    ended, rough : dict
+        The best fit of each set: to its end, and of a few steps where its values are a case of it.
+    implausible, foreseen : dict
+        The best score of a set with an effect whose values are no case of it, and as a score test foresees it.
+    """
+
+    model: DrivelineModel
+    records: Sequence[Record]
+    use: Sequence[BoolArray]
+    names: Sequence[str]
+    grid: Grid | None = None
+    work: Work = field(default_factory=Work)  # what was simulated so far
+    ended: dict[Effects, Hypothesis] = field(default_factory=dict)
+    rough: dict[Effects, Hypothesis] = field(default_factory=dict)
+    implausible: dict[str, float] = field(default_factory=dict)
+    foreseen: dict[str, float] = field(default_factory=dict)
+    _changes: OutputChanges = field(default_factory=OutputChanges)
+    _done: set[tuple[str, Effects, str]] = field(default_factory=set)
+    _lock: Lock = field(default_factory=Lock)
+
+    @cached_property
+    def limits(self) -> Limits:
+        """Usual disturbances of these recordings and their bounds."""
+        return limits_of(self.records)
+
+    @cached_property
+    def catalogue(self) -> Catalogue:
+        """What sets are chosen among, with the odds that the model file gives."""
+        odds = {name: prior.odds for name, prior in self.model.priors.items() if prior.odds is not None}
+        return Catalogue(len(self.names), {name: value for name, value in odds.items() if name in self.names})
+
+    @cached_property
+    def trials(self) -> Trials:
+        """The sets that were tried in free simulation."""
+        return Trials(self.model)
+
+    @property
+    def simulations(self) -> int:
+        """Free runs of all recordings so far."""
+        return round(self.work.samples / sum(r.time_s.size for r in self.records if r.lead is None))
+
+    def scores(self) -> dict[str, float]:
+        """Return the best score of a plausible set with each effect that was fitted, to its end or a few steps."""
+        found: dict[str, float] = {}
+        for each in (*self.ended.values(), *self.rough.values()):
+            for name in each.effects if self.is_plausible(each) else ():
+                found[name] = min(each.score, found.get(name, math.inf))
+        return found
+
+    def is_first(self, what: str, effects: Effects, name: str) -> bool:
+        """Tell whether something is done for a set and one of its effects for the first time."""
+        key = (what, effects, name)
+        with self._lock:
+            is_new = key not in self._done
+            self._done.add(key)
+        return is_new
+
+    def nothing(self) -> Hypothesis:
+        """Return the fit of the nominal line alone."""
+        if NOTHING not in self.ended:
+            own = tuple(own_unknowns(self.model.effects, record) for record in self.records)
+            problem = self._problem(NOTHING, Release(nominal_unknowns(self.model), own))
+            initial = not_fitted(problem, start_vector(problem))
+            self._keep(fitted(NOTHING, initial, self.limits.usual, self.limits, self.catalogue))
+        return self.ended[NOTHING]
+
+    def without(self, current: Hypothesis, name: str) -> Hypothesis:
+        """Fit a set without one of its effects, the others begun where they are, once from each set.
+
+        The smaller set may be known: from where it was begun before it may have ended in a poorer optimum.
+        """
+        effects = current.effects - {name}
+        if self.is_first("without", current.effects, name) or effects not in self.ended:
+            result = self._reduced(current, name) if name != GRADE else current.result
+            limits = self.limits_of(effects)
+            self._keep(fitted(effects, result, current.sizes, limits, self.catalogue, current.minus_twice_log))
+        return self.ended[effects]
+
+    def exchanged(self, current: Hypothesis, name: str, other: str) -> Hypothesis | None:
+        """Fit another effect in the place of one; None where no value is one."""
+        reduced = self.without(current, name)
+        rough = self.added(reduced, other, self.starts(reduced, other), current)
+        return None if rough is None else self.finish(rough, current)
+
+    def added(
+        self, current: Hypothesis, name: str, starts: Sequence[ScoredStart], instead: Hypothesis | None = None
+    ) -> Hypothesis | None:
+        """Fit an effect on top of a set a few steps, from each of its starts; None where no value is a case of it.
+
+        Where it takes the place of another effect, it is begun and weighted as the set with that one: ``instead``. So
+        is an effect of that set that is begun elsewhere.
+        """
+        effects = with_effect(current.effects, name)
+        is_again = instead is not None and name in instead.effects
+        if effects in self.ended and not is_again:
+            return self.ended[effects]
+        rival = instead or current
+        previous = current.result if is_again else rival.result
+        for gone in rival.effects - effects - {GRADE}:
+            previous = forgetting(previous, gone)
+        fits = []
+        for scored in starts:
+            problem = self._extended(previous, effects, inheriting(name, scored.release, previous))
+            initial = extended(problem, warm_start(problem, previous), current.result if is_again else rival.result)
+            fits.append(self._compared(effects, initial, rival))
+        best = min([each for each in fits if self.is_plausible(each)] or fits, key=lambda each: each.score)
+        loose = widened(best, self.model)
+        if loose is not None:
+            best = self._more_plausible(best, self._compared(effects, loose, rival))
+        is_case = self.is_plausible(best)
+        with self._lock:
+            if not is_case:
+                self.implausible[name] = min(best.score, self.implausible.get(name, math.inf))
+            elif effects not in self.rough or best.score < self.rough[effects].score:
+                self.rough[effects] = best
+        return best if is_case else None
+
+    def rewritten(self, current: Hypothesis, name: str) -> list[Hypothesis]:
+        """Fit a set a few steps with one of its laws written other ways."""
+        fits, result = [], current.result
+        for other in EFFECTS[name].reparametrised(
+            self.model, self.records, result.values_of(name), line_values(result)
+        ):
+            initial = with_line_values(forgetting(result, name), other.line)
+            (release,) = released(name, self.model, self.records, [other.start])
+            problem = self._extended(initial, current.effects, replace(release, own=((),) * len(self.records)))
+            started = extended(problem, warm_start(problem, initial), result, anew=name)
+            fits.append(self._compared(current.effects, started, current))
+        return fits
+
+    def elsewhere(self, current: Hypothesis, name: str) -> Hypothesis | None:
+        """Fit an event a few steps where a look at the set without it, the rest as it is, sees it."""
+        without = self._reduced(current, name)
+        reduced = replace(
+            current,
+            effects=current.effects - {name},
+            result=replace(without, converged=without.derivative is not None),
+        )
+        return self.added(reduced, name, self.starts(reduced, name), current)
+
+    def with_grade(self, current: Hypothesis) -> Hypothesis:
+        """Fit a set with a load that walks far, which follows whatever is slow."""
+        effects = current.effects | {GRADE}
+        return self.finish(replace(current, effects=effects, limits=self.limits_of(effects)), current)
+
+    def finish(self, rough: Hypothesis, rival: Hypothesis) -> Hypothesis:
+        """Take a fit as far as a comparison with a rival needs; kept where it is the best of its set so far."""
+        known = self.ended.get(rough.effects)
+        if known is None or rough.score < known.score:
+            whole = self._fitted(rough, rough.result, rival)
+            loose = widened(whole, self.model)
+            if loose is not None:
+                whole = self._more_plausible(whole, self._fitted(whole, loose, rival))
+            self._keep(whole if self.is_plausible(whole) else rough)
+        return self.ended[rough.effects]
+
+    def view(self, around: Hypothesis) -> CachedScoreTests:
+        """Return the score tests around a fit, which know what was simulated around others like it."""
+        return CachedScoreTests(around, self.model, self._changes)
+
+    def learn(self, around: Hypothesis, view: CachedScoreTests) -> None:
+        """Keep what score tests simulated, for others like them."""
+        self._changes.learn(around.result, view.found)
+
+    def starts(self, reduced: Hypothesis, name: str) -> list[ScoredStart]:
+        """Return the starts of an effect that are worth a fit, next to a set without it."""
+        view = self.view(reduced)
+        found = promising(view.starts(name))
+        self.learn(reduced, view)
+        return found
+
+    def is_plausible(self, hypothesis: Hypothesis) -> bool:
+        """Tell whether the values of every effect are a case of it."""
+        return is_plausible(hypothesis, self.model, self.records)
+
+    def is_resolved(self, hypothesis: Hypothesis, name: str) -> bool:
+        """Tell whether an effect is large enough to be distinguished from another way of sampling."""
+        values = hypothesis.result.values_of(name)
+        return name == GRADE or not EFFECTS[name].unresolved(self.model, self.records, values)
+
+    def limits_of(self, effects: Effects) -> Limits:
+        """Return the bounds of the disturbances under a set: a free course of the load has none."""
+        return self.limits.freed() if GRADE in effects else self.limits
+
+    def _reduced(self, current: Hypothesis, name: str) -> FitResult:
+        """Return the free run of a set without one of its effects, the rest as it is."""
+        effects, result = current.effects - {name}, current.result
+        problem = self._problem(effects, unknowns_of(result, (effects - {GRADE}) | set(self.model.effects)))
+        return extended(problem, warm_start(problem, forgetting(result, name)), result)
+
+    def _compared(self, effects: Effects, initial: FitResult, rival: Hypothesis) -> Hypothesis:
+        return compared(effects, initial, rival, self.limits_of(effects), self.catalogue)
+
+    def _fitted(self, of: Hypothesis, initial: FitResult, rival: Hypothesis) -> Hypothesis:
+        return fitted(of.effects, initial, of.sizes, of.limits, self.catalogue, rival.minus_twice_log)
+
+    def _more_plausible(self, one: Hypothesis, other: Hypothesis) -> Hypothesis:
+        """Return the better of two fits of a set, where both are plausible; else the one that is."""
+        return other if self.is_plausible(other) and (other.score < one.score or not self.is_plausible(one)) else one
+
+    def _extended(self, previous: FitResult, effects: Effects, release: Release) -> Problem:
+        common = unknowns_of(previous, (effects - {GRADE}) | set(self.model.effects))
+        own = tuple((*old, *mine) for old, mine in zip(common.own, release.own, strict=True))
+        return self._problem(effects, Release((*common.shared, *release.shared), own))
+
+    def _problem(self, effects: Effects, release: Release) -> Problem:
+        nominal = {each.name: each for each in nominal_unknowns(self.model) if not each.effect}
+        shared = [  # what an effect that is gone has loosened is tight again
+            nominal.get(each.name, each) if not each.effect and not may_be_loose(each, effects, self.model) else each
+            for each in release.shared
+        ]
+        grid = self.grid or grid_for(self.model, self.records)
+        return make_problem(self.model, self.records, shared, own=release.own, use=self.use, grid=grid)
+
+    def _keep(self, hypothesis: Hypothesis) -> None:
+        with self._lock:
+            known = self.ended.get(hypothesis.effects)
+            if known is None or hypothesis.score < known.score:
+                self.ended[hypothesis.effects] = hypothesis
