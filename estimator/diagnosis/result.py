@@ -155,12 +155,13 @@ class Remainder:
 
 @dataclass(frozen=True, slots=True)
 class Slight:
-    """An effect that the data show but that hardly moves the error (a trace in the contract)."""
+    """An effect that the data show but that is no name: it hardly moves the error (a trace in the contract)."""
 
     name: str
     share: float
     parameters: Mapping[str, float]
     moves: Mapping[str, float] = field(default_factory=dict)  # values that leave their intervals without it: share
+    reason: str = "too small to matter"  # why it is no name
 
 
 @dataclass(frozen=True, slots=True)

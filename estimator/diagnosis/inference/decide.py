@@ -53,6 +53,10 @@ Rival = Callable[[Trial, str], Trial | None]
 """A set without a name, and the name, to that set with a free form of one of its own laws; None where it has none."""
 
 
+TOO_SMALL = "too small to matter"
+TOO_SHORT = "too short to be distinguished from another way of sampling"
+"""Why what is established is a trace: it is in the model, since the rest is judged with it, and it is no name."""
+
 NOT_NEEDED = "the most probable set has it, and the free run does without it as well"
 
 
@@ -69,7 +73,7 @@ class Judged:
     best: Trial  # the most probable set
     believed: Trial  # with what is established alone: the model that is reported
     named: tuple[Standing, ...] = ()  # effects that are established, the weightiest first
-    traces: tuple[Standing, ...] = ()  # established, and too small to matter
+    traces: tuple[Standing, ...] = ()  # established, and too small to matter or to be a name of its own
     refinements: tuple[Standing, ...] = ()  # of the most probable set or a larger one, and not established
     off_nominal: tuple[OffNominal, ...] = ()  # nominal values off their sheet, which leave nothing but noise
     tried: Mapping[Effects, Trial] = field(default_factory=dict)  # all sets that were tried in free simulation
@@ -191,8 +195,8 @@ def _judged(search: Search, rival: Rival) -> Judged:
         nothing,
         likely,
         believed,
-        named=tuple(each for each in standings if each.share >= LEAST_SHARE),
-        traces=tuple(each for each in standings if each.share < LEAST_SHARE),
+        named=tuple(each for each in standings if not each.slight),
+        traces=tuple(each for each in standings if each.slight),
         refinements=(
             *reversed(weak.values()),
             *(replace(each, objection=each.objection or NOT_NEEDED) for each in possible),
@@ -259,19 +263,18 @@ def _standing(name: str, fits: Fits, whole: Trial, noise: float, rival: Rival) -
     needed = necessity(whole, without, noise)
     evidence = without.hypothesis.score - whole.hypothesis.score
     alike = _alike(name, fits, whole, evidence)
-    standing = Standing(name, needed, share, evidence, alike)
-    return replace(standing, objection=_against(standing, fits, whole, without, rival))
+    slight = TOO_SMALL if share < LEAST_SHARE else "" if fits.is_resolved(whole.hypothesis, name) else TOO_SHORT
+    standing = Standing(name, needed, share, evidence, alike, slight=slight)
+    return replace(standing, objection=_against(standing, whole, without, rival))
 
 
-def _against(standing: Standing, fits: Fits, whole: Trial, without: Trial, rival: Rival) -> str:
+def _against(standing: Standing, whole: Trial, without: Trial, rival: Rival) -> str:
     """Return what speaks against a name, as the end of a sentence; "" where nothing does."""
     back = f"{standing.necessity.value:.0%}".replace("%", " %")
     if standing.necessity.least < LEAST_NECESSITY:
         return f"without it {back} of the error beyond the noise comes back, which is too little to be sure"
     if standing.evidence < LEAST_EVIDENCE:
         return f"minus twice the log-probability rises by {standing.evidence:.3g} only without it"
-    if not fits.is_resolved(whole.hypothesis, standing.name):
-        return "it is too small to be distinguished from another way of sampling"
     free = rival(without, standing.name)
     if free is not None and not whole.clearly_beats(free):
         return "another form of a law that is there already does as well"

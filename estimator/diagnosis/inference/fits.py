@@ -33,6 +33,7 @@ from estimator.diagnosis.inference.hypotheses import (
 )
 from estimator.diagnosis.inference.score_tests import CachedScoreTests, OutputChanges, ScoredStart, promising
 from estimator.diagnosis.inference.trials import Trials
+from estimator.diagnosis.noise import noise_floor
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import FitResult, not_fitted, warm_start
 from estimator.physics.layout import Grid, grid_for
@@ -88,6 +89,11 @@ class Fits:
     def trials(self) -> Trials:
         """The sets that were tried in free simulation."""
         return Trials(self.model)
+
+    @cached_property
+    def noise(self) -> float:
+        """The noise of the reading, as its own past predicts it: no law is in it [unit of the output]."""
+        return noise_floor(self.records)
 
     @property
     def simulations(self) -> int:
@@ -196,12 +202,16 @@ class Fits:
     def with_grade(self, current: Hypothesis) -> Hypothesis:
         """Fit a set with a load that walks far, which follows whatever is slow."""
         effects = current.effects | {GRADE}
+        if not self.is_first("with a free load", current.effects, GRADE):
+            return self.ended[effects]
         return self.finish(replace(current, effects=effects, limits=self.limits_of(effects)), current)
 
     def finish(self, rough: Hypothesis, rival: Hypothesis) -> Hypothesis:
-        """Take a fit as far as a comparison with a rival needs; kept where it is the best of its set so far."""
-        known = self.ended.get(rough.effects)
-        if known is None or rough.score < known.score:
+        """Take a fit as far as a comparison with a rival needs; kept where it is the best of its set so far.
+
+        One that is worse than what is known of its set may yet end elsewhere: a few steps do not tell.
+        """
+        if self.ended.get(rough.effects) is not rough:
             whole = self._fitted(rough, rough.result, rival)
             loose = widened(whole, self.model)
             if loose is not None:

@@ -133,7 +133,7 @@ def with_line_values(result: FitResult, line: Mapping[str, float]) -> FitResult:
     return replace(result, x=x)
 
 
-OFFSETS_S = np.array([0.01, 0.02, 0.04, 0.08, 0.15, 0.3, 0.6, 1.2, 2.4])
+OFFSETS_S = np.array([0.01, 0.02, 0.04, 0.08, 0.15, 0.3, 0.6, 1.2, 2.4, 5.0, 10.0])
 OFFSETS_S = np.concatenate([-OFFSETS_S[::-1], OFFSETS_S])
 """Where else the likelihood is looked at, around the moment a fit ended at; and at the recording's own ends."""
 

@@ -1,4 +1,4 @@
-"""Moves: from one set of effects to the next, by an effect added, dropped or exchanged for a look-alike.
+"""Moves: from one set of effects to the next, by an effect added, dropped, begun elsewhere or exchanged.
 
 Each move returns the sets that it leads to, fitted; which of them is taken is the search's (`search.py`). Effects are
 not fitted in turn: a score test around the present fit says what each one promises, and the most promising are fitted a
@@ -14,9 +14,10 @@ import numpy as np
 
 from estimator.diagnosis.inference.fits import Fits
 from estimator.diagnosis.inference.hypotheses import GRADE, Hypothesis, open_hypotheses
-from estimator.diagnosis.inference.score_tests import CachedScoreTests, ScoredStart, promising
+from estimator.diagnosis.inference.score_tests import CachedScoreTests, ScoredStart, Screen, promising
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Element
+from estimator.physics.jacobian import jacobian_at
 from estimator.physics.layout import slot
 from estimator.physics.parallel import concurrently
 from estimator.physics.problem import start_of
@@ -56,22 +57,38 @@ Starts = Mapping[str, Sequence[ScoredStart]]
 
 
 def additions(fits: Fits, current: Hypothesis) -> list[Hypothesis]:
-    """Return sets with one effect more, and the same set begun elsewhere, the best few fitted to their end."""
+    """Return sets with one effect more, the best few fitted to their end."""
     view = fits.view(current)
     looked = _looked(view, [name for name in _open(fits, current) if name not in current.effects], current)
     price = _price(current)
     fits.foreseen.update({name: current.score - starts[0].promise + price for name, starts in looked.items()})
     starts = {**_worth_fitting(current, looked), **_at_moments(view, looked, _promised_moments(looked), price)}
     fits.learn(current, view)
-    rough = concurrently(lambda name: fits.added(current, name, starts[name]), list(starts))
-    found = [each for each in rough if each is not None] + _begun_elsewhere(fits, current)
-    found.sort(key=lambda each: each.score)
+    missed = [each for each in _most_missed(fits, current, list(looked)) if _is_elsewhere(*each, starts)]
+    tried = [*starts.items(), *((name, [start]) for name, start in missed)]
+    rough = concurrently(lambda each: fits.added(current, *each), tried)
     most = FINISHED if current.effects else STARTS
+    found = sorted((each for each in rough[: len(starts)] if each is not None), key=lambda each: each.score)
     near = [each for each in found[:most] if _may_be_best(each, found[0], current)]
-    near = list({each.effects: each for each in reversed(near)}.values())  # of one set the best
+    near += [each for each in rough[len(starts) :] if each is not None]
     finished = concurrently(lambda each: fits.finish(each, current), near)
     is_event = any(_is_event_of_load(name) for each in near for name in each.effects - current.effects)
     return finished + (with_free_load(fits, current) if is_event else [])
+
+
+def begun_elsewhere(fits: Fits, current: Hypothesis) -> list[Hypothesis]:
+    """Return the same set from the best other start, once for each of its effects.
+
+    Laws are written other ways, events looked for in other stretches of the recordings.
+    """
+    found: list[Hypothesis | None] = []
+    for name in sorted(current.effects - {GRADE}):
+        if fits.is_first("begun elsewhere", current.effects, name):
+            found += fits.rewritten(current, name)
+            if EFFECTS[name].event:
+                found.append(fits.elsewhere(current, name))
+    better = [each for each in found if each is not None and fits.is_plausible(each)]
+    return [fits.finish(min(better, key=lambda each: each.score), current)] if better else []
 
 
 def with_free_load(fits: Fits, current: Hypothesis) -> list[Hypothesis]:
@@ -102,7 +119,7 @@ def fit_look_alikes(fits: Fits, best: Hypothesis) -> None:
                 fits.finish(rough, best)
 
 
-def _looked(view: CachedScoreTests, names: Sequence[str], around: Hypothesis) -> dict[str, list[ScoredStart]]:
+def _looked(view: Screen, names: Sequence[str], around: Hypothesis) -> dict[str, list[ScoredStart]]:
     """Return what a score test promises of each start of some effects; what a more general law has is not asked."""
     contained = {special for have in around.effects for special in EFFECTS[have].contains}
     tried = [name for name in names if name != GRADE and name not in contained]
@@ -121,6 +138,27 @@ def _worth_fitting(current: Hypothesis, looked: Starts, least: float = 0.0, some
     if some and not current.effects:
         worth += [name for name in order if EFFECTS[name].widens] + [name for name in COMMON if name in looked]
     return {name: promising(looked[name]) for name in dict.fromkeys(worth)}
+
+
+def _most_missed(fits: Fits, current: Hypothesis, names: Sequence[str]) -> list[tuple[str, ScoredStart]]:
+    """Return the effects that promise most of the free run's error, as the set is tuned for that run, with a start.
+
+    What is likely is not what a simulation lacks: a joint's wave at a tenth of a radian per second is worth thousands
+    of units of likelihood next to a friction that leaves two, slowly.
+    """
+    fit = fits.trials.one(current).fit
+    view = Screen(replace(fit, derivative=jacobian_at(fit.problem, fit.x, fit.outputs)), fits.model)
+    looked = _looked(view, names, current)
+    order = sorted(looked, key=lambda name: -looked[name][0].promise)[:FEWEST_FITS]
+    return [(name, looked[name][0]) for name in order if looked[name][0].promise > 0.0]
+
+
+def _is_elsewhere(name: str, start: ScoredStart, starts: Starts) -> bool:
+    """Tell whether an effect would begin elsewhere than from other starts: none, or an event at other moments."""
+    others = starts.get(name, ())
+    return not others or (
+        EFFECTS[name].event and all(_moments_of(start.release) != _moments_of(other.release) for other in others)
+    )
 
 
 def _promised_moments(looked: Starts) -> Sequence[Moments]:
@@ -147,20 +185,6 @@ def _may_be_best(each: Hypothesis, best: Hypothesis, current: Hypothesis) -> boo
     """Tell whether a fit of a few steps may end as the best: near it, or an event whose moments are not found."""
     is_event = any(EFFECTS[name].event for name in each.effects - current.effects)
     return each.score <= best.score + NEARLY * _gain(best, current) or (is_event and not current.effects)
-
-
-def _begun_elsewhere(fits: Fits, current: Hypothesis) -> list[Hypothesis]:
-    """Return fits of a set from other starts, once for each of its effects.
-
-    Laws are written other ways, events looked for in other stretches of the recordings.
-    """
-    found: list[Hypothesis | None] = []
-    for name in sorted(current.effects - {GRADE}):
-        if fits.is_first("begun elsewhere", current.effects, name):
-            found += fits.rewritten(current, name)
-            if EFFECTS[name].event:
-                found.append(fits.elsewhere(current, name))
-    return [each for each in found if each is not None and fits.is_plausible(each)]
 
 
 def _open(fits: Fits, current: Hypothesis) -> Sequence[str]:

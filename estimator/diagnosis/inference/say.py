@@ -156,7 +156,13 @@ def _slight(trace: Standing, basis: Basis) -> Slight:
     """Return a trace; without it some values are others, though the error hardly is."""
     believed = basis.decision.judged.believed
     without = basis.search.fits.without(believed.hypothesis, trace.name)
-    return Slight(trace.name, trace.share, _values(believed, trace), moved_values(believed.hypothesis, without.result))
+    return Slight(
+        trace.name,
+        trace.share,
+        _values(believed, trace),
+        moved_values(believed.hypothesis, without.result),
+        trace.slight,
+    )
 
 
 def _values(trial: Trial, standing: Standing) -> Mapping[str, float]:

@@ -10,11 +10,12 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from estimator.diagnosis.inference.checks import tests
 from estimator.diagnosis.inference.fits import Fits
 from estimator.diagnosis.inference.hypotheses import Hypothesis, Progress, silent
-from estimator.diagnosis.inference.moves import STARTS, additions, drops, exchanges, with_free_load
-from estimator.diagnosis.inference.standing import LEAST_NECESSITY
-from estimator.diagnosis.inference.trials import necessity, noise_of
+from estimator.diagnosis.inference.moves import STARTS, additions, begun_elsewhere, drops, exchanges, with_free_load
+from estimator.diagnosis.inference.standing import LEAST_NECESSITY, LEAST_SHARE
+from estimator.diagnosis.inference.trials import Trial, necessity, noise_of
 
 WORTH_ADDING = 0.15
 """Share of the squared free-run error beyond the noise that a law must take for a search to continue from it."""
@@ -37,24 +38,24 @@ class Search:
 
 
 def search_from_nothing(fits: Fits, most: float = math.inf, progress: Progress = silent) -> Search:
-    """Search from nothing, and from each of the most promising first effects; after ``most`` simulations no further.
+    """Search from nothing; where that way leaves more than noise, from each of the most promising first effects too.
 
-    A later way replaces the first one where it ends at a more probable set.
+    A later way replaces the first one where it ends at a more probable set. After ``most`` simulations none goes on.
     """
     found = _climbed(Search(fits, (fits.nothing(),)), most, progress)
-    firsts = sorted((each for effects, each in fits.ended.items() if len(effects) == 1), key=lambda h: h.score)
-    for first in firsts[:STARTS]:
-        if len(found.best.effects) < 2:
-            break
-        if (
-            first.effects <= found.best.effects
-            or not fits.is_plausible(first)
-            or _is_far_behind(first, firsts[0], fits)
-        ):
+    alone = [each for effects, each in fits.ended.items() if len(effects) == 1 and fits.is_plausible(each)]
+    if len(found.best.effects) < 2 or not alone or not any(test.failed for test in tests(found.best)):
+        return found
+    nearest = fits.trials.of(sorted(alone, key=lambda each: each.score)[:STARTS])
+    best = min(nearest, key=lambda each: each.rms)
+    for first in nearest:
+        if first.effects <= found.best.effects or _is_far_behind(first, best):
             continue
-        other = _climbed(Search(fits, (fits.nothing(), first)), most, progress, found.path)
+        other = _climbed(Search(fits, (fits.nothing(), first.hypothesis)), most, progress, found.path)
         better = other if other.best.score < found.best.score else found
         found = replace(better, is_cut_short=found.is_cut_short or other.is_cut_short)
+        if len(found.best.effects) < 2:
+            break
     return found
 
 
@@ -80,9 +81,13 @@ def _climbed(start: Search, most: float, progress: Progress, rival: Sequence[Hyp
 
 def _better(fits: Fits, current: Hypothesis) -> Hypothesis | None:
     """Return the set that a search goes to from one; None where no move leads to a better one."""
-    larger = _most_probable(fits, additions(fits, current), current) if len(current.effects) < MOST_EFFECTS else None
-    if larger is not None and _simulates_better(fits, larger, current):
-        return larger
+    again = _most_probable(fits, begun_elsewhere(fits, current), current)
+    if again is not None:
+        return again
+    may_grow = len(current.effects) < MOST_EFFECTS and not _leaves_a_trace_at_most(fits, current)
+    larger = [each for each in additions(fits, current) if _simulates_better(fits, each, current)] if may_grow else []
+    if (grown := _most_probable(fits, larger, current)) is not None:
+        return grown
     smaller = drops(fits, current)
     return (
         _most_probable(fits, smaller, current)
@@ -90,6 +95,14 @@ def _better(fits: Fits, current: Hypothesis) -> Hypothesis | None:
         or _most_probable(fits, exchanges(fits, current), current)
         or _most_probable(fits, with_free_load(fits, current), current)
     )
+
+
+def _leaves_a_trace_at_most(fits: Fits, current: Hypothesis) -> bool:
+    """Tell whether what a set leaves beyond the noise is so little that no further law could be more than a trace."""
+    if not current.effects:
+        return False
+    nothing, its = fits.trials.of([fits.nothing(), current])
+    return float(its.excess(fits.noise).sum()) < LEAST_SHARE * float(nothing.excess(fits.noise).sum())
 
 
 def _most_probable(fits: Fits, found: Sequence[Hypothesis], current: Hypothesis) -> Hypothesis | None:
@@ -107,7 +120,7 @@ def _as_good(fits: Fits, smaller: Sequence[Hypothesis], current: Hypothesis) -> 
 
 
 def _simulates_better(fits: Fits, larger: Hypothesis, smaller: Hypothesis) -> bool:
-    """Tell whether a law that makes a set more probable also makes its free run better, by more than a little.
+    """Tell whether a law that makes a set more probable surely makes its free run better, and by more than a little.
 
     What the form of a law leaves is predicted a little better by nearly every further law; a search that follows the
     likelihood alone wanders among sets of these.
@@ -115,10 +128,10 @@ def _simulates_better(fits: Fits, larger: Hypothesis, smaller: Hypothesis) -> bo
     if larger.effects <= smaller.effects:  # of the same laws, or fewer, a better fit
         return True
     one, other = fits.trials.of([smaller, larger])
-    return necessity(other, one, noise_of(larger)).value >= WORTH_ADDING
+    needed = necessity(other, one, noise_of(larger))
+    return needed.value >= WORTH_ADDING and needed.least > 0.0
 
 
-def _is_far_behind(one: Hypothesis, best: Hypothesis, fits: Fits) -> bool:
+def _is_far_behind(one: Trial, best: Trial) -> bool:
     """Tell whether another first effect clearly leaves so much less that no search need begin from this one."""
-    mine, its = fits.trials.of([one, best])
-    return necessity(its, mine, noise_of(best)).least >= LEAST_NECESSITY
+    return necessity(best, one, noise_of(best.hypothesis)).least >= LEAST_NECESSITY

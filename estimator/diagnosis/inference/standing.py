@@ -56,6 +56,7 @@ class Standing:
     evidence: float  # by which the score rises without it
     alike: Mapping[str, Mapping[str, float]]  # effects that explain as much in its place, with their values there
     objection: str = ""  # why it is not established; "" where it is
+    slight: str = ""  # why it is a trace though established; "" where it is a name
 
     @property
     def counted(self) -> Counted:

@@ -123,7 +123,8 @@ def statement(
     if context.remainder is not None and not context.off_nominal:
         parts.append(_left(verdict, context.remainder))
     if context.traces:
-        parts.append(f"Seen, but too small to matter: {', '.join(each.name for each in context.traces)}.")
+        for reason in dict.fromkeys(each.reason for each in context.traces):
+            parts.append(f"Seen, but {reason}: {', '.join(t.name for t in context.traces if t.reason == reason)}.")
         parts += [_moving(each) for each in context.traces if each.moves]
     if context.refinements:
         parts.append(f"Not established, and not in the model: {', '.join(context.refinements)}.")
