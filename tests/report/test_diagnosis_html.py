@@ -81,7 +81,6 @@ def test_the_page_says_everything_from_the_verdict_down(diagnosis: Diagnosis) ->
         "0.02 … 0.022",
         "could as well be explained by hysteresis of the shaft",
         "Over shaft torque k·twist: the line is the law",
-        "a function of twist + twist^2 d twist/dt",
         "6.25 to 12.5 Hz (218 ×)",
         "p = 1e-20",
         "explains 48 % of what backlash explains",
