@@ -137,20 +137,13 @@ class FoundEffect:
 
 @dataclass(frozen=True, slots=True)
 class Remainder:
-    """What is left beyond noise and drift: its share of the re-tuned model's squared error, and of what kind it is."""
+    """What names leave beyond noise and drift: its share of the re-tuned model's squared error, and what it is like."""
 
     share: float
     times_noise: float
-    element: Element | None
+    element: Element | None  # of the law without a name that it follows, where one is in the augmented model
     band_hz: Interval | None
-    law: str
-    tests: str = ""
-
-    @property
-    def says(self) -> str:
-        """What it does that noise does not, and the law it follows; the end of a sentence that begins with "it"."""
-        law = self.law if self.element is not None else ""
-        return "; it ".join(text for text in (self.tests or self.law, law) if text)
+    law: str  # what it does that noise does not, and the law it follows; the end of a sentence that begins with "it"
 
 
 @dataclass(frozen=True, slots=True)
@@ -208,16 +201,6 @@ class UntestableEffect:
     def cure(self) -> str:
         """What to do, in a few words."""
         return f"give {self.needs}" if self.needs else f"drive a {self.suggested_test} test"
-
-
-@dataclass(frozen=True, slots=True)
-class UnnamedLaw:
-    """A law without a name for a mismatch that no entry explains."""
-
-    element: Element
-    terms: tuple[tuple[str, float], ...]  # functions of what happens in the line, each with its coefficient
-    rms_before: float  # free-run error without it, and what it would leave to first order
-    rms_after: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -346,7 +329,7 @@ class Response:
 class LawPicture:
     """A law over the signal it depends on, with the data: both are averages over bins; arrays of shape (K,)."""
 
-    name: str  # the effect, or the law without a name
+    name: str  # of the effect
     element: Element
     signal: str  # what it is drawn over, and the unit of torque or reading
     signal_unit: str
@@ -360,22 +343,10 @@ class LawPicture:
 
 
 @dataclass(frozen=True, slots=True)
-class RankedLaw:
-    """The best law without a name at one element, and what it gains over the re-tuned model."""
-
-    element: Element
-    terms: tuple[tuple[str, float], ...]
-    rms: float
-    delta_bic: float
-    p_value: float
-
-
-@dataclass(frozen=True, slots=True)
 class Discrepancy:
     """What the re-tuned model lacks: as an input at every place, over time, frequency and operating region."""
 
-    element: Element | None  # where the best law without a name acts
-    laws: tuple[RankedLaw, ...]  # best law of each element, strongest first
+    element: Element  # where an input alone would make the error most probable
     equivalents: tuple[Equivalent, ...]
     spectrum: ErrorSpectrum
     responses: Mapping[str, Response]
@@ -411,9 +382,9 @@ class OffNominal:
 class Diagnosis:
     """The whole answer.
 
-    ``unnamed`` is given where there is a mismatch that no effect explains; ``load_torque`` is the constant load torque
-    of each recording, by name; ``discrepancy`` is what the report draws of the mismatch; ``strays`` are nominal values
-    that alone, beyond what they are trusted to, would explain it to the noise.
+    ``load_torque`` is the constant load torque of each recording, by name; ``discrepancy`` is what the report draws of
+    the mismatch; ``off_nominal`` are nominal values that alone, beyond what they are trusted to, would explain it to
+    the noise; ``table`` is the law without a name in the augmented model, where one is.
     """
 
     verdict: Verdict
@@ -422,7 +393,6 @@ class Diagnosis:
     effects: tuple[FoundEffect, ...]
     rejected: tuple[RejectedEffect, ...]
     untestable: tuple[UntestableEffect, ...]
-    unnamed: UnnamedLaw | None
     fit: Fit
     parameters: Mapping[str, Retuned]
     load_torque: Mapping[str, Estimated]

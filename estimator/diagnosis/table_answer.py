@@ -1,62 +1,80 @@
-"""A law without a name in the answer: in the augmented model, figures and statement, where it makes these better.
+"""A law without a name next to what is decided: tried for the augmented model, and in it where that is better.
 
-It is called with a finished diagnosis, and changes nothing in it but what the law changes.
+It is part of the answer only where the error of the augmented model falls with it, on what was fitted and on data that
+no fit has seen.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
+from estimator.diagnosis.inference.decide import Decision
 from estimator.diagnosis.inference.figures import FreeRuns, Unseen, foreign_outputs, on_recordings
 from estimator.diagnosis.inference.hypotheses import Hypothesis, all_good_samples
-from estimator.diagnosis.result import Diagnosis, Trace, UnnamedTable, Verdict
+from estimator.diagnosis.result import Fit, Trace, UnnamedTable
 from estimator.diagnosis.tables import TableFit, best_table
 from estimator.physics.fit import FitResult
 from estimator.physics.model import DrivelineModel, EffectValue, Motion, unit
 from estimator.physics.tables import PLACES
 
 
-def with_law(diagnosis: Diagnosis, believed: Hypothesis, runs: FreeRuns) -> Diagnosis:
-    """Return a diagnosis with the best law without a name next to what is believed; as it is where none is better."""
-    if diagnosis.verdict not in (Verdict.UNEXPLAINED, Verdict.PARTLY_EXPLAINED) or not diagnosis.effort.finished:
-        return diagnosis
-    line, kept_out = runs.unseen.line, runs.unseen.chain.records
-    law = best_table(believed, line, kept_out)
-    if law is None:
-        return diagnosis
-    tabled = _with_table(line, law)
-    with_it = replace(believed, result=law.result)
+@dataclass(frozen=True, slots=True)
+class Law:
+    """A law without a name that is in the augmented model."""
+
+    table: UnnamedTable
+    fit: Fit  # the decision's figures, those of the augmented model with the law
+    found: TableFit
+    final: FitResult  # the free runs of all recordings with it
+    line: DrivelineModel  # the line with the law among its effects
+
+    @property
+    def says(self) -> str:
+        """What the rest follows: the end of a sentence that begins with "it"."""
+        return f"follows a torque over {self.table.over}"
+
+    def augmented(self, model: DrivelineModel) -> DrivelineModel:
+        """Return a model with the law, and the line and its effects as they are next to it."""
+        of_line = self.final.values_of("")
+        parameters = {name: replace(p, value=of_line.get(name, p.value)) for name, p in model.parameters.items()}
+        effects: dict[str, Mapping[str, EffectValue]] = {}
+        for name, values in model.effects.items():
+            found = self.final.values_of(name)
+            effects[name] = {key: _moved(value, found.get(key, value.value)) for key, value in values.items()}
+        return _with_table(replace(model, parameters=parameters, effects=effects), self.found)
+
+    def drawn(self, traces: tuple[Trace, ...], believed: Hypothesis, runs: FreeRuns) -> tuple[Trace, ...]:
+        """Return the simulations for plots, the augmented ones with the law."""
+        kept_out = runs.unseen.chain.records
+        outputs = [*self.final.outputs]
+        if kept_out:
+            outputs += foreign_outputs(self.final, self.line, kept_out, all_good_samples(kept_out), believed.effects)
+        return tuple(replace(trace, augmented=out) for trace, out in zip(traces, outputs, strict=True))
+
+
+def unnamed_law(decision: Decision) -> Law | None:
+    """Return the best law without a name next to what is believed; None where nothing is left, or none is better."""
+    judged, runs, figures = decision.judged, decision.runs, decision.figures
+    if not judged.failed or judged.off_nominal:
+        return None
+    believed, line = judged.believed.hypothesis, runs.unseen.line
+    found = best_table(believed, line, runs.unseen.chain.records)
+    if found is None:
+        return None
+    tabled = _with_table(line, found)
+    with_it = replace(believed, result=found.result)
     after = on_recordings(with_it, tabled, runs.chain.separated, is_whole=False)
     held = Unseen(tabled, runs.unseen.chain).rms(with_it, after, False, runs.chain, is_as_read=True)
     final = after.first_outputs()
-    if final.rms >= diagnosis.fit.augmented or held >= diagnosis.fit.holdout_augmented:
-        return diagnosis
-    table = _diagnosis_of(law, diagnosis.augmented.motion)
-    fit = replace(diagnosis.fit, augmented=final.rms, holdout_augmented=held)
-    return replace(
-        diagnosis,
-        fit=fit,
-        statement=f"{diagnosis.statement} {_sentences(table, fit.unit)}",
-        augmented=_augmented(diagnosis.augmented, law, final),
-        traces=_drawn(diagnosis.traces, believed, runs, tabled, final),
-        table=table,
-    )
+    if final.rms >= figures.augmented or held >= figures.holdout_augmented:
+        return None
+    fit = replace(figures, augmented=final.rms, holdout_augmented=held)
+    return Law(_reported(found, line.motion), fit, found, final, tabled)
 
 
 def _with_table(model: DrivelineModel, law: TableFit) -> DrivelineModel:
     return replace(model, effects={**model.effects, law.table.name: law.table.effect()})
-
-
-def _augmented(model: DrivelineModel, law: TableFit, final: FitResult) -> DrivelineModel:
-    """Return the model with the law, and the line and its effects as they are next to it."""
-    of_line = final.values_of("")
-    parameters = {name: replace(p, value=of_line.get(name, p.value)) for name, p in model.parameters.items()}
-    effects: dict[str, Mapping[str, EffectValue]] = {}
-    for name, values in model.effects.items():
-        found = final.values_of(name)
-        effects[name] = {key: _moved(value, found.get(key, value.value)) for key, value in values.items()}
-    return _with_table(replace(model, parameters=parameters, effects=effects), law)
 
 
 def _moved(entry: EffectValue, value: float) -> EffectValue:
@@ -66,18 +84,7 @@ def _moved(entry: EffectValue, value: float) -> EffectValue:
     return replace(entry, value=value, ci95=ci95)
 
 
-def _drawn(
-    traces: tuple[Trace, ...], believed: Hypothesis, runs: FreeRuns, tabled: DrivelineModel, final: FitResult
-) -> tuple[Trace, ...]:
-    """Return the simulations for plots, the augmented ones with the law."""
-    kept_out = runs.unseen.chain.records
-    outputs = [*final.outputs]
-    if kept_out:
-        outputs += foreign_outputs(final, tabled, kept_out, all_good_samples(kept_out), believed.effects)
-    return tuple(replace(trace, augmented=out) for trace, out in zip(traces, outputs, strict=True))
-
-
-def _diagnosis_of(law: TableFit, motion: Motion) -> UnnamedTable:
+def _reported(law: TableFit, motion: Motion) -> UnnamedTable:
     at = PLACES[law.place]
     return UnnamedTable(
         place=law.place,
@@ -98,7 +105,7 @@ def _diagnosis_of(law: TableFit, motion: Motion) -> UnnamedTable:
     )
 
 
-def _sentences(table: UnnamedTable, of: str) -> str:
+def sentences(table: UnnamedTable, of: str) -> str:
     """Return what is said of the law, for the end of a statement."""
     parts = [
         f"A law without a name is in the augmented model: a torque over {table.over}, through {len(table.knots)} "

@@ -23,7 +23,6 @@ from estimator.diagnosis.result import (
     FoundEffect,
     Interval,
     Trace,
-    UnnamedLaw,
     Verdict,
 )
 from estimator.physics.catalogue import EFFECTS
@@ -44,7 +43,7 @@ from hil.report.figures import (
     time_figure,
 )
 from hil.report.made import facts, made_section
-from hil.report.numbers import listed, p_statement, shown, shown_interval, shown_p, shown_ratio, shown_times
+from hil.report.numbers import listed, p_statement, shown, shown_interval, shown_ratio, shown_times
 from hil.report.terminal import rendered
 from hil.report.wording import (
     CHECKS,
@@ -248,27 +247,8 @@ def _is_acquired(effect: FoundEffect) -> bool:
 
 
 def _found(diagnosis: Diagnosis) -> html.Section | None:
-    if diagnosis.unnamed is not None:
-        return _unnamed(diagnosis, diagnosis.unnamed)
     effects = [effect for effect in diagnosis.effects if not _is_acquired(effect)]
     return html.section("The physics found", *(_effect(diagnosis, effect) for effect in effects)) if effects else None
-
-
-def _unnamed(diagnosis: Diagnosis, law: UnnamedLaw) -> html.Section:
-    unit = diagnosis.fit.unit
-    seen = diagnosis.discrepancy
-    names = [picture.name for picture in seen.pictures if picture.element is law.element] if seen is not None else []
-    return html.section(
-        "A law without a name",
-        html.paragraph(
-            f"At the {ELEMENTS[law.element]} these terms follow the mismatch best; with them the error falls from "
-            f"{shown(law.rms_before, unit)} to {shown(law.rms_after, unit)}. It is a description, not a cause."
-        ),
-        html.table(
-            ("term", "coefficient, or RMS where it has several"), [(name, shown(c)) for name, c in law.terms], (1,)
-        ),
-        *(_law_pictures(diagnosis, name) for name in names),
-    )
 
 
 def _effect(diagnosis: Diagnosis, effect: FoundEffect) -> Iterator[Any]:
@@ -332,7 +312,7 @@ def _location(diagnosis: Diagnosis, drawn: Sequence[Trace]) -> html.Section | No
         "Where simulation and recording differ",
         html.table(("", ""), location_rows(mismatch)),
         check,
-        [] if seen is None else [_places(diagnosis, seen, drawn), _laws(seen, diagnosis.fit.unit)],
+        None if seen is None else _places(diagnosis, seen, drawn),
     )
 
 
@@ -372,20 +352,6 @@ def _places(diagnosis: Diagnosis, seen: Discrepancy, drawn: Sequence[Trace]) -> 
 def _size(equivalent: Equivalent) -> float:
     values = np.concatenate([course.value for course in equivalent.courses.values()])
     return float(np.sqrt(np.mean(values**2)))
-
-
-def _laws(seen: Discrepancy, unit: str) -> list[Any]:
-    if not seen.laws:
-        return []
-    columns = (
-        ("element", lambda law: ELEMENTS[law.element]),
-        ("best law without a name there", lambda law: " + ".join(name for name, _ in law.terms)),
-        ("RMS error with it", lambda law: shown(law.rms, unit)),
-        ("ΔBIC", lambda law: shown(law.delta_bic)),
-        ("p", lambda law: shown_p(law.p_value)),
-    )
-    table = html.table_of(seen.laws, columns, numbers=(2, 3, 4))
-    return [html.Heading("Laws without a name, element by element"), table]
 
 
 def _frequency(diagnosis: Diagnosis) -> html.Section | None:

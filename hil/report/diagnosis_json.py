@@ -1,9 +1,9 @@
 """``diagnosis.json`` (CONTRACT, schema ``hil.diagnosis/1``): a Diagnosis for scripts.
 
 Keys beyond the contract: ``warnings``, ``load_torque`` per recording, ``unnamed`` (the law without a name where nothing
-explains the mismatch), ``profiles`` in an effect that was found as a course over time, and ``discrepancy``: the best
-law without a name at each element, the likelihood of each place, and the tests over frequency; ``strays``: nominal
-values that alone would explain the mismatch, beyond what they are trusted to.
+explains the mismatch, in short), ``profiles`` in an effect that was found as a course over time, and ``discrepancy``:
+the law without a name, the likelihood of each place, and the tests over frequency; ``strays``: nominal values that
+alone would explain the mismatch, beyond what they are trusted to.
 """
 
 from __future__ import annotations
@@ -16,10 +16,9 @@ from estimator.diagnosis.result import (
     Discrepancy,
     Fit,
     FoundEffect,
-    RankedLaw,
-    UnnamedLaw,
     UnnamedTable,
     UntestableEffect,
+    Verdict,
 )
 from hil.provenance import Provenance
 from hil.report.numbers import as_json, fields_as_json, json_number
@@ -36,7 +35,7 @@ def diagnosis_text(diagnosis: Diagnosis, made: Provenance | None = None) -> str:
 
 def diagnosis_json(diagnosis: Diagnosis) -> Json:
     """Return the content of the file; a number that is not finite is None."""
-    unnamed, seen, remainder = diagnosis.unnamed, diagnosis.discrepancy, diagnosis.remainder
+    seen, remainder, law = diagnosis.discrepancy, diagnosis.remainder, _law(diagnosis.table)
     return {
         "schema": SCHEMA,
         "doubts": [fields_as_json(each, "about", "statement", "odds", "line") for each in diagnosis.doubts],
@@ -44,10 +43,10 @@ def diagnosis_json(diagnosis: Diagnosis) -> Json:
         "effects": [_effect(effect) for effect in diagnosis.effects],
         "rejected": as_json(diagnosis.rejected),
         "untestable": [_untestable(entry) for entry in diagnosis.untestable],
-        "unnamed": None if unnamed is None else _unnamed(unnamed),
+        "unnamed": law if diagnosis.verdict is Verdict.UNEXPLAINED else None,
         "fit": _fit(diagnosis.fit),
         **fields_as_json(diagnosis, "parameters", "load_torque", "timing_s", "warnings"),
-        "discrepancy": None if seen is None else _discrepancy(seen),
+        "discrepancy": None if seen is None else _discrepancy(seen, law),
         "strays": [
             {"parameter": value.name} | fields_as_json(value, "ratio", "tolerance") for value in diagnosis.off_nominal
         ],
@@ -78,12 +77,12 @@ def _untestable(entry: UntestableEffect) -> Json:
     return fields_as_json(entry, "name", "reason", "suggested_test", *(["needs"] if entry.needs else []))
 
 
-def _unnamed(law: UnnamedLaw) -> Json:
-    return {
-        "element": law.element.value,
-        "terms": _terms(law),
-        **fields_as_json(law, "rms_before", "rms_after"),
-    }
+def _law(table: UnnamedTable | None) -> Json | None:
+    """Return a law without a name in short: its one term is the curve, its coefficient the largest torque in it."""
+    if table is None:
+        return None
+    term = {"law": f"a curve over {table.over}", "coefficient": json_number(max(map(abs, table.values)))}
+    return {"element": table.element.value, "terms": [term], **fields_as_json(table, "rms_before", "rms_after")}
 
 
 def _table(table: UnnamedTable) -> Json:
@@ -93,10 +92,6 @@ def _table(table: UnnamedTable) -> Json:
     )  # fmt: skip
 
 
-def _terms(law: UnnamedLaw | RankedLaw) -> list[Json]:
-    return [{"law": name, "coefficient": json_number(value)} for name, value in law.terms]
-
-
 def _fit(fit: Fit) -> Json:
     figures = ("nominal", "retuned", "augmented", "holdout_retuned", "holdout_augmented", "noise_floor")
     of_output = ("kind", "at", "unit", "retuned", "augmented", "noise")
@@ -104,19 +99,11 @@ def _fit(fit: Fit) -> Json:
     return fields_as_json(fit, "unit", *figures) | {"outputs": outputs}
 
 
-def _discrepancy(seen: Discrepancy) -> Json:
+def _discrepancy(seen: Discrepancy, law: Json | None) -> Json:
     """Return what a script may want of the report's pictures: tests and laws, not courses over time."""
     return {
         "element": as_json(seen.element),
-        "laws": [
-            {
-                "element": law.element.value,
-                "terms": _terms(law),
-                "rms_after": json_number(law.rms),
-                **fields_as_json(law, "delta_bic", "p_value"),
-            }
-            for law in seen.laws
-        ],
+        "laws": [] if law is None else [law],
         "places": [fields_as_json(each, "place", "unit", "log_likelihood", "plausible") for each in seen.equivalents],
         "bands": [
             {

@@ -368,6 +368,10 @@ def is_allowed(href: str) -> bool:
     return scheme.lower() in SCHEMES and rest.startswith("//")
 
 
+def _refused(block: Any) -> str:
+    raise TypeError(f"expected a block that the templates have, got {type(block).__name__}")
+
+
 @cache
 def _environment() -> Environment:
     environment = Environment(
@@ -375,6 +379,7 @@ def _environment() -> Environment:
         lstrip_blocks=True, keep_trailing_newline=True,
     )  # fmt: skip
     environment.filters["kind"] = lambda block: type(block).__name__
+    environment.filters["refused"] = _refused
     environment.tests["allowed"] = is_allowed
     return environment
 

@@ -22,12 +22,12 @@ from estimator.diagnosis.result import (
     LawPicture,
     Mismatch,
     Profile,
-    RankedLaw,
     Region,
     RejectedEffect,
     Response,
     Retuned,
     Trace,
+    UnnamedTable,
     UntestableEffect,
     Verdict,
 )
@@ -108,6 +108,28 @@ def trace(name: str, holdout: bool, seed: int, n: int = 3000) -> Trace:
     )
 
 
+def unnamed_table() -> UnnamedTable:
+    """Return a law without a name: a dead band over the twist, beyond which one recording never went."""
+    values = (40.0, 20.0, 0.0, -20.0, -40.0)
+    return UnnamedTable(
+        place="shaft_twist",
+        element=Element.SHAFT,
+        over="the twist of the shaft",
+        unit="rad",
+        torque_unit="Nm",
+        knots=(-0.04, -0.02, 0.0, 0.02, 0.04),
+        values=values,
+        ci95=tuple((value - 2.0, value + 2.0) for value in values),
+        reached=(-0.03, 0.025),
+        rms_before=0.41,
+        rms_after=0.12,
+        looks_like="a dead band of 0.02 rad",
+        formula="torque = -1e+03 x",
+        rival="the torque that is read",
+        not_carried=("run_2",),
+    )
+
+
 def discrepancy() -> Discrepancy:
     t, f = np.arange(0, 30, 0.01), np.linspace(0.4, 50, 128)
     x = np.linspace(-400.0, 600.0, 20)
@@ -119,12 +141,6 @@ def discrepancy() -> Discrepancy:
     law = -30 * np.tanh(x / 50)
     return Discrepancy(
         element=Element.SHAFT,
-        laws=(
-            RankedLaw(
-                Element.SHAFT, (("a function of twist", 27.0), ("twist^2 d twist/dt", 700.0)), 0.14, 815.0, 1e-30
-            ),
-            RankedLaw(Element.MOTOR, (("w_M |w_M|", 0.01),), 0.6, 35.0, 2.8e-10),
-        ),
         equivalents=tuple(
             Equivalent(place, unit, {"run_1": course, "run_2": course}, likelihood, place == "shaft")
             for place, unit, likelihood in places
@@ -159,7 +175,6 @@ def diagnosis() -> Diagnosis:
                 "reversal",
             ),
         ),
-        unnamed=None,
         fit=Fit("rad/s", 1.72, 1.41, 0.0521, 1.38, 0.0533, 0.0502),
         parameters=PARAMETERS,
         load_torque={"run_1": Estimated(58.3, (57.9, 58.7), "Nm")},

@@ -8,10 +8,10 @@ from typing import Any
 import pytest
 from hypothesis import given, strategies as st
 
-from estimator.diagnosis.result import Diagnosis, Mismatch, OffNominal, UnnamedLaw, Verdict
-from estimator.physics.effect import Element
+from estimator.diagnosis.result import Diagnosis, Mismatch, OffNominal, Verdict
 from hil.report.diagnosis_json import diagnosis_json, diagnosis_text
 from hil.report.numbers import json_number
+from tests.report.conftest import unnamed_table
 
 
 def refuse_constant(name: str) -> Any:
@@ -122,15 +122,20 @@ def test_rounding_keeps_nine_digits(value: float) -> None:
     assert math.isclose(rounded, value, rel_tol=1e-9)
 
 
-def test_a_law_without_a_name_is_written(diagnosis):
-    law = UnnamedLaw(Element.LOAD, (("w_L |w_L|", 0.0021), ("sign(w_L)", float("nan"))), 0.12, 0.051)
-    content = diagnosis_json(replace(diagnosis, unnamed=law))
+def test_a_law_without_a_name_is_written(diagnosis: Diagnosis) -> None:
+    content = diagnosis_json(replace(diagnosis, table=unnamed_table(), verdict=Verdict.UNEXPLAINED))
+    written = content["tables"]["shaft_twist"]
+    assert written["element"] == "shaft"
+    assert (written["knots"], written["values"]) == ([-0.04, -0.02, 0.0, 0.02, 0.04], [40.0, 20.0, 0.0, -20.0, -40.0])
+    assert written["reached"] == [-0.03, 0.025]
     assert content["unnamed"] == {
-        "element": "load",
-        "terms": [{"law": "w_L |w_L|", "coefficient": 0.0021}, {"law": "sign(w_L)", "coefficient": None}],
-        "rms_before": 0.12,
-        "rms_after": 0.051,
+        "element": "shaft",
+        "terms": [{"law": "a curve over the twist of the shaft", "coefficient": 40.0}],
+        "rms_before": 0.41,
+        "rms_after": 0.12,
     }
+    assert content["discrepancy"]["laws"] == [content["unnamed"]]
+    assert diagnosis_json(replace(diagnosis, table=unnamed_table()))["unnamed"] is None
 
 
 def test_nominal_values_that_are_off_are_given_as_a_ratio(diagnosis: Diagnosis) -> None:

@@ -17,13 +17,12 @@ from estimator.diagnosis.inference.figures import Unseen, on_recordings
 from estimator.diagnosis.inference.fits import Fits
 from estimator.diagnosis.inference.free_forms import free_form
 from estimator.diagnosis.inference.hypotheses import Progress, all_good_samples, open_hypotheses, silent
-from estimator.diagnosis.inference.rivals import laws_around
 from estimator.diagnosis.inference.say import Basis, said, undecided
 from estimator.diagnosis.inference.search import Search, search_from_nothing
 from estimator.diagnosis.noise import noise_floor
 from estimator.diagnosis.preconditions.prepare import Prepared, as_slow_as_needed
 from estimator.diagnosis.result import Diagnosis, Effort
-from estimator.diagnosis.table_answer import with_law
+from estimator.diagnosis.table_answer import unnamed_law
 from estimator.physics.model import DrivelineModel
 from estimator.physics.parallel import TimeIsUp, Work, counted
 from estimator.signals.record import separated_outputs
@@ -88,11 +87,8 @@ def answer(
             decision = decide(search, read, Unseen(line, with_faults_compensated(ready.holdout)), free_form)
             keep(SearchResult(read, search, decision))
             progress("simulating what was found", 0.9)
-            laws = laws_around(decision.judged)
-            basis = Basis(decision, laws, search, model, _effort(search, level, decision), _warnings(search, level))
-            diagnosis = said(basis)
-            if decision.judged.failed and not decision.judged.off_nominal:
-                diagnosis = with_law(diagnosis, decision.judged.believed.hypothesis, decision.runs)
+            effort, law = _effort(search, level, decision), unnamed_law(decision)
+            diagnosis = said(Basis(decision, search, model, effort, _warnings(search, level), law))
         except TimeIsUp:
             diagnosis = undecided(started[-1] if started else None, chain, line, model, work, level)
     progress("done", 1.0)

@@ -11,15 +11,14 @@ import numpy as np
 from estimator.diagnosis.acquisition.chain import Chain
 from estimator.diagnosis.assemble import augmented_model, load_torques, moved_values, retuned_parameters
 from estimator.diagnosis.inference.checks import tests_in_words
-from estimator.diagnosis.inference.decide import Decision
+from estimator.diagnosis.inference.decide import Decision, Judged
 from estimator.diagnosis.inference.figures import courses_of, figures_without, first_figures, found_effect
 from estimator.diagnosis.inference.fits import Fits
 from estimator.diagnosis.inference.hypotheses import Hypothesis, of_first_outputs, open_hypotheses
-from estimator.diagnosis.inference.rivals import Laws
 from estimator.diagnosis.inference.search import Search
 from estimator.diagnosis.inference.standing import Standing
 from estimator.diagnosis.inference.trials import Trial
-from estimator.diagnosis.inference.wording import Context, law_in_words, statement
+from estimator.diagnosis.inference.wording import Context, statement
 from estimator.diagnosis.noise import SMALLEST_P
 from estimator.diagnosis.result import (
     Diagnosis,
@@ -33,10 +32,10 @@ from estimator.diagnosis.result import (
     Remainder,
     Retuned,
     Slight,
-    UnnamedLaw,
     UntestableEffect,
     Verdict,
 )
+from estimator.diagnosis.table_answer import Law, sentences
 from estimator.diagnosis.where import locate
 from estimator.diagnosis.where.discrepancy import discrepancy
 from estimator.physics.catalogue import EFFECTS
@@ -48,14 +47,14 @@ from estimator.signals.record import FloatArray
 
 @dataclass(frozen=True, slots=True)
 class Basis:
-    """What a result is made from: the decision, the laws without a name around it, and what the search did."""
+    """What a result is made from: the decision, and what the search did."""
 
     decision: Decision
-    laws: Laws
     search: Search
     model: DrivelineModel  # as it was given, with what the line reads through
     effort: Effort
     warnings: tuple[str, ...] = ()
+    law: Law | None = None  # without a name, next to what is decided
 
 
 def said(basis: Basis) -> Diagnosis:
@@ -67,7 +66,9 @@ def said(basis: Basis) -> Diagnosis:
     effects = (*named, *decision.acquired) if is_explained else ()
     traces = judged.traces if is_explained else ()
     added = [*effects, *(found_effect(each, runs) for each in traces)]
-    mismatch, remainder = _mismatch(basis), _remainder(basis)
+    law, figures = basis.law, decision.figures
+    seen = _discrepancy(basis) if verdict is not Verdict.NO_MISMATCH and line.plant is None else None
+    mismatch, remainder = _mismatch(basis, seen), _remainder(judged, law)
     untestable = untestable_effects(open_hypotheses(line, runs.chain.records)[1])
     slight = tuple(_slight(each, basis) for each in traces)
     context = Context(
@@ -77,23 +78,25 @@ def said(basis: Basis) -> Diagnosis:
         judged.off_nominal,
         untestable,
         can_be_retuned(line),
+        mismatch.element,
     )
+    augmented, courses = augmented_model(runs.estimate, basis.model, added), courses_of(runs)
+    said_of_law = "" if law is None else f" {sentences(law.table, figures.unit)}"
     return Diagnosis(
         verdict=verdict,
-        statement=statement(verdict, decision.figures, effects, basis.effort, context),
+        statement=statement(verdict, figures, effects, basis.effort, context) + said_of_law,
         mismatch=mismatch,
         effects=effects,
         rejected=_rejected(basis),
         untestable=untestable,
-        unnamed=_unnamed(basis),
-        fit=decision.figures,
+        fit=figures if law is None else law.fit,
         parameters=retuned_parameters(runs.estimate, line, is_explained),
         load_torque=load_torques(runs.estimate, line),
         timing_s={},
-        augmented=augmented_model(runs.estimate, basis.model, added),
-        traces=courses_of(runs),
+        augmented=augmented if law is None else law.augmented(augmented),
+        traces=courses if law is None else law.drawn(courses, judged.believed.hypothesis, runs),
         warnings=basis.warnings,
-        discrepancy=_discrepancy(basis) if mismatch.detected and line.plant is None else None,
+        discrepancy=seen,
         remainder=remainder,
         off_nominal=judged.off_nominal,
         slight=slight,
@@ -101,6 +104,7 @@ def said(basis: Basis) -> Diagnosis:
             Refinement(each.name, each.objection, each.necessity.value, _values(judged.best, each))
             for each in judged.refinements
         ),
+        table=None if law is None else law.table,
         effort=basis.effort,
     )
 
@@ -131,7 +135,6 @@ def undecided(
         effects=(),
         rejected=(),
         untestable=untestable,
-        unnamed=None,
         fit=fit,
         parameters=parameters,
         load_torque=loads,
@@ -182,27 +185,32 @@ def _band_hz(hypothesis: Hypothesis, noise: float) -> Interval | None:
     return locate.band_hz(errors, [hypothesis.result.problem.records[0].sample_time_s] * len(errors), noise)
 
 
-def _place(basis: Basis) -> Element | None:
-    """Return where the mismatch is: of what is named, of values off their sheet, of all that is possible, of a law."""
-    decision, laws = basis.decision, basis.laws
+def _place(basis: Basis, seen: Discrepancy | None) -> Element | None:
+    """Return where the mismatch is.
+
+    At what is named, at the law without a name, at values off their sheet, at all that is possible, or else where an
+    input alone would make the error most probable.
+    """
+    decision = basis.decision
     if decision.verdict is not Verdict.UNEXPLAINED and (decision.judged.named or decision.acquired):
         names = [each.name for each in decision.judged.named] + [each.name for each in decision.acquired]
         return EFFECTS[names[0]].element
+    if basis.law is not None:
+        return basis.law.table.element
     if decision.judged.off_nominal:
         return decision.judged.off_nominal[0].element
     possible = {EFFECTS[each.name].element for each in decision.judged.refinements}
     if len(possible) == 1:
         return possible.pop()
-    law = laws.alone if laws.left is None else laws.left
-    return None if law is None else law.element
+    return None if seen is None else seen.element
 
 
-def _mismatch(basis: Basis) -> Mismatch:
+def _mismatch(basis: Basis, seen: Discrepancy | None) -> Mismatch:
     judged, noise = basis.decision.judged, basis.decision.judged.noise
     if basis.decision.verdict is Verdict.NO_MISMATCH:
         return Mismatch(False, None, {}, None, None, 1.0)
     nothing = judged.nothing.hypothesis
-    result, element = nothing.result.first_outputs(), _place(basis)
+    result, element = nothing.result.first_outputs(), _place(basis, seen)
     gained = max(nothing.score - judged.best.hypothesis.score, 0.0)
     return Mismatch(
         detected=True,
@@ -218,32 +226,20 @@ def _discrepancy(basis: Basis) -> Discrepancy:
     """Return the mismatch as the report draws it."""
     judged = basis.decision.judged
     nothing, believed = of_first_outputs(judged.nothing.hypothesis), judged.believed.hypothesis.result.first_outputs()
-    motion, searches = basis.search.fits.model.motion, basis.laws.searches
-    return discrepancy(
-        nothing.result, believed, judged.noise, motion, rounds=1, initial=searches, whitening=nothing.filter
-    )
+    return discrepancy(nothing.result, believed, judged.noise, basis.search.fits.model.motion)
 
 
-def _remainder(basis: Basis) -> Remainder | None:
-    judged, law = basis.decision.judged, basis.laws.left
+def _remainder(judged: Judged, law: Law | None) -> Remainder | None:
     if not judged.failed:
         return None
-    noise, left, failed = judged.noise, judged.believed.rms, tests_in_words(judged.failed)
+    noise, left = judged.noise, judged.believed.rms
     return Remainder(
         share=min(max(left**2 - noise**2, 0.0) / judged.nothing.rms**2, 1.0),
         times_noise=left / noise,
-        element=None if law is None else law.element,
+        element=None if law is None else law.table.element,
         band_hz=_band_hz(judged.believed.hypothesis, noise),
-        law=failed if law is None else law_in_words(law.element, law.terms),
-        tests=failed,
+        law="; it ".join([tests_in_words(judged.failed), *([] if law is None else [law.says])]),
     )
-
-
-def _unnamed(basis: Basis) -> UnnamedLaw | None:
-    law, decision = basis.laws.alone, basis.decision
-    if decision.verdict is not Verdict.UNEXPLAINED or law is None:
-        return None
-    return UnnamedLaw(law.element, law.terms, decision.figures.retuned, law.rms)
 
 
 def _rejected(basis: Basis) -> tuple[RejectedEffect, ...]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -20,7 +19,7 @@ from estimator.diagnosis.result import (
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Element
 
-PLACE_NAMES: Mapping[Element, str] = {
+PLACES: Mapping[Element, str] = {
     Element.TORQUE_PATH: "in the torque path",
     Element.MOTOR: "at the motor",
     Element.SHAFT: "in the shaft",
@@ -28,70 +27,6 @@ PLACE_NAMES: Mapping[Element, str] = {
     Element.SPEED_SENSOR: "in the reading",
     Element.ACQUISITION: "in the acquisition",
 }
-
-MOST_TERMS = 3  # at most so many terms of a law are said
-ARTICLES = ("a ", "the ")  # with one of these a term begins that is a phrase; all others are formulas
-
-FUNCTION = "a function of "
-
-_SIGNALS: Mapping[str, str] = {
-    "d twist/dt": "how fast the twist changes",
-    "dw_M/dt": "the motor's acceleration",
-    "dw_L/dt": "the load's acceleration",
-    "dw/dt": "the acceleration",
-    "twist": "the twist",
-    "w_M": "the motor speed",
-    "w_L": "the load speed",
-    "w": "the speed",
-    "T": "the torque",
-    "t": "the time",
-}
-_INPUT = re.compile(r"T_(\d+)")
-_SIGNAL = re.compile("|".join([_INPUT.pattern, *(rf"(?<!\w){re.escape(name)}(?!\w)" for name in _SIGNALS)]))
-
-
-def is_phrase(name: str) -> bool:
-    """Tell whether a term's name is a phrase and no formula."""
-    return name.startswith(ARTICLES)
-
-
-def law_in_words(element: Element, terms: Sequence[tuple[str, float]]) -> str:
-    """Say a law by what it depends on, as the end of a sentence that begins with "it".
-
-    One that is a wrong scale, or a reading that is late, is said as such.
-    """
-    alike = _as_if(element, *terms[0]) if len(terms) == 1 else ""
-    if alike:
-        return alike
-    signals = list(dict.fromkeys(word for name, _ in terms[:MOST_TERMS] for word in _signals_of(name)))
-    others = [name for name, _ in terms[:MOST_TERMS] if not _signals_of(name)]
-    parts = [f"depends on {_listed(signals)}"] if signals else []
-    parts += [f"looks like {_listed(others)}"] if others else []
-    return f"{' and '.join(parts)}, {PLACE_NAMES[element]}"
-
-
-def _as_if(element: Element, name: str, coefficient: float) -> str:
-    """Say a single term as what it would be; "" where it is nothing that has a name."""
-    size = f"{100.0 * abs(coefficient):.3g} %"
-    if (element, name) == (Element.SPEED_SENSOR, "w"):
-        return f"looks as if the speed read {size} {'high' if coefficient > 0.0 else 'low'}"
-    if (element, name) == (Element.SPEED_SENSOR, "dw/dt"):
-        side = "late" if coefficient < 0.0 else "early"
-        return f"looks as if the speed were read {1e3 * abs(coefficient):.3g} ms {side}"
-    if (element, name) == (Element.TORQUE_PATH, "T"):
-        return f"looks as if the torque were {size} {'above' if coefficient > 0.0 else 'below'} its reading"
-    return ""
-
-
-def _signals_of(name: str) -> list[str]:
-    if is_phrase(name) and not name.startswith(FUNCTION):
-        return []
-    found = (match.group() for match in _SIGNAL.finditer(name.removeprefix(FUNCTION)))
-    return [_INPUT.sub(r"the torque of input \1", word) if _INPUT.match(word) else _SIGNALS[word] for word in found]
-
-
-def _listed(words: Sequence[str]) -> str:
-    return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
 
 
 def times(ratio: float) -> str:
@@ -112,6 +47,7 @@ class Context:
     off_nominal: Sequence[OffNominal] = ()
     untestable: Sequence[UntestableEffect] = ()
     can_be_retuned: bool = True  # false for a plant whose parameters are not fitted
+    element: Element | None = None  # where the mismatch most likely is
 
 
 def statement(
@@ -121,7 +57,7 @@ def statement(
     parts = [] if effort.finished else [_not_decided(effort)]
     parts.append(_headline(verdict, fit, effects, effort, context))
     if context.remainder is not None and not context.off_nominal:
-        parts.append(_left(verdict, context.remainder))
+        parts.append(_left(verdict, context.remainder, context.element))
     if context.traces:
         for reason in dict.fromkeys(each.reason for each in context.traces):
             parts.append(f"Seen, but {reason}: {', '.join(t.name for t in context.traces if t.reason == reason)}.")
@@ -255,11 +191,12 @@ def off_the_sheet(off_nominal: Sequence[OffNominal]) -> str:
     return " and ".join(parts)
 
 
-def _left(verdict: Verdict, remainder: Remainder) -> str:
+def _left(verdict: Verdict, remainder: Remainder, element: Element | None) -> str:
     noise = times(remainder.times_noise)
     if verdict is Verdict.PARTLY_EXPLAINED:
         share = f"{remainder.share:.0%}".replace("%", " %")
         return (
-            f"{share} of the squared error is left, {noise} times the noise, and it is not noise: it {remainder.says}."
+            f"{share} of the squared error is left, {noise} times the noise, and it is not noise: it {remainder.law}."
         )
-    return f"What is left is {noise} times the noise, and it is not noise: it {remainder.says}."
+    where = "" if element is None else f" Most likely it acts {PLACES[element]}."
+    return f"What is left is {noise} times the noise, and it is not noise: it {remainder.law}.{where}"

@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import Enum, IntEnum
 
 import numpy as np
 
-from estimator.diagnosis.line.tangent import LOAD, MOTOR, Tangent, block_length, tangent
-from estimator.physics.driveline import Case
+from estimator.diagnosis.line.tangent import Tangent, block_length, tangent
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult
 from estimator.physics.kernel import slots, state_vector
 from estimator.physics.model import Structure
 from estimator.physics.motion import motor_angle, speed_scale, torque_scale
 from estimator.physics.parallel import concurrently
-from estimator.physics.problem import Problem, local_part, parameters
+from estimator.physics.problem import case_of
 from estimator.physics.simulate import simulate_each
 from estimator.signals.record import BoolArray, FloatArray, Record
 
@@ -25,55 +23,31 @@ from estimator.signals.record import BoolArray, FloatArray, Record
 class Motion:
     """What happens in one recording, for laws to be functions of; arrays of shape (B,), one value per block.
 
-    ``angle`` is by the recording's own output; ``inputs`` has shape (B, M).
+    ``angle`` is by the recording's own output.
     """
 
     time_s: FloatArray
     torque: FloatArray
-    inputs: FloatArray
     angle: FloatArray
     speed: FloatArray
     twist: FloatArray
     load_speed: FloatArray
 
 
-Force = tuple[FloatArray | float, FloatArray | float]
-"""Torque on the motor and torque against the load, in addition to the model's, shape (N,) each [Nm]."""
-
-NO_FORCE: Force = (0.0, 0.0)
-
-
-def simulated(result: FitResult, index: int, force: Force = NO_FORCE, state: int | None = None) -> FloatArray:
-    """Simulate a recording at a fit's unknowns under further torques: its output, or a state; shape (N,)."""
-    return simulated_each(result, [result.x], index, force, state)[0]
-
-
-def simulated_each(
-    result: FitResult, points: Sequence[FloatArray], index: int, force: Force = NO_FORCE, state: int | None = None
-) -> FloatArray:
-    """Simulate a recording at K vectors of a fit's unknowns under further torques, shape (K, N); see ``simulated``."""
+def simulated(result: FitResult, index: int, state: int | None = None) -> FloatArray:
+    """Simulate a recording at a fit's unknowns: its output, or a state; shape (N,)."""
     problem = result.problem
-    torque = problem.records[index].torque_nm.copy()
-    torque[:, 0] += force[MOTOR]
-    record = replace(problem.records[index], torque_nm=torque)
-    cases = [_case(problem, x, index, force[LOAD] + np.zeros(torque.shape[0])) for x in points]
-    return simulate_each(problem.grid, record, cases, state)
-
-
-def _case(problem: Problem, x: FloatArray, index: int, load_nm: FloatArray) -> Case:
-    basis, local = problem.local[index], local_part(problem, x, index)
-    profile = basis.extra_load(local)
-    loaded = load_nm if profile is None else load_nm + profile
-    return Case(basis.parameters(parameters(problem, x), local), basis.start(local), loaded)
+    case = case_of(problem.local[index], result.p, result.local_of(index))
+    return simulate_each(problem.grid, problem.records[index], [case], state)[0]
 
 
 def motion_of(result: FitResult, index: int) -> Motion:
     return motion_in_blocks(result.problem.records[index], states_of(result, index), 1)
 
 
-def states_of(result: FitResult, index: int, force: Force = NO_FORCE) -> dict[str, FloatArray]:
+def states_of(result: FitResult, index: int) -> dict[str, FloatArray]:
     wanted = (state_vector.SPEED, state_vector.TWIST, state_vector.LOAD_SPEED)
-    speed, twist, load_speed = (simulated(result, index, force, state) for state in wanted)
+    speed, twist, load_speed = (simulated(result, index, state) for state in wanted)
     if result.problem.grid.structure is Structure.ONE_MASS:
         load_speed = speed
     angle = motor_angle(result.problem.records[index])
@@ -84,7 +58,6 @@ def motion_in_blocks(record: Record, states: dict[str, FloatArray], length: int)
     return Motion(
         block_mean(record.time_s, length),
         block_mean(record.total_torque_nm, length),
-        block_mean(record.torque_nm, length),
         **{name: block_mean(values, length) for name, values in states.items()},
     )
 
@@ -199,6 +172,14 @@ PLACES = {
 }
 """Where a law of an element acts."""
 
+ELEMENTS = {
+    InputPlace.MOTOR: Element.MOTOR,
+    InputPlace.SHAFT: Element.SHAFT,
+    InputPlace.LOAD: Element.LOAD,
+    InputPlace.SENSOR: Element.SPEED_SENSOR,
+}
+"""The element that a place is reported as: an input alone does not distinguish those that act there."""
+
 DRIVES = {Element.TORQUE_PATH: 1.0, Element.MOTOR: -1.0, Element.SHAFT: 1.0, Element.LOAD: 1.0}
 """Sign of a law at its place: the torque path drives the motor, friction at the motor brakes it."""
 
@@ -216,12 +197,6 @@ def size_at(result: FitResult, place: InputPlace) -> float:
     return speed_scale(records) if place is InputPlace.SENSOR else torque_scale(records)
 
 
-MOST_ROWS = 20_000
-"""Blocks that laws are fitted to, all recordings together: over three minutes at 10 ms. They bound memory."""
-
-STRETCH = 3000  # blocks of a stretch of a long recording
-
-
 @dataclass(frozen=True, slots=True)
 class BlockedRecording:
     """One recording of a fit, in blocks."""
@@ -233,7 +208,6 @@ class BlockedRecording:
     weight: FloatArray  # (B,): how many samples of the block count
     motion: Motion  # as the fit has it, in the middle of each block
     reading: Motion  # the same at the moments at which the output was read
-    stretches: BoolArray  # (B,): where laws are fitted
 
     @property
     def okay(self) -> BoolArray:
@@ -241,19 +215,9 @@ class BlockedRecording:
         return np.asarray(2 * self.weight >= self.length)
 
     @property
-    def rows(self) -> BoolArray:
-        """Blocks that laws are fitted to, shape (B,)."""
-        return self.okay & self.stretches
-
-    @property
     def period_s(self) -> float:
         """Length of a block [s]."""
         return self.length * self.record.sample_time_s
-
-    def samples(self, values: FloatArray) -> FloatArray:
-        """Hold a signal of shape (B,) over the samples of each block, the last to the end; shape (N,)."""
-        held = np.repeat(values, self.length)
-        return np.concatenate([held, np.full(self.record.time_s.size - held.size, held[-1])])
 
     @property
     def size(self) -> int:
@@ -261,21 +225,16 @@ class BlockedRecording:
         return int(self.error.size)
 
 
-def lines(
-    result: FitResult, forces: Sequence[Force] | None = None, length: int | None = None
-) -> tuple[BlockedRecording, ...]:
-    """Return the recordings of a fit in blocks, under further torques where there are any."""
+def lines(result: FitResult, length: int | None = None) -> tuple[BlockedRecording, ...]:
+    """Return the recordings of a fit in blocks."""
     length = length or block_length(result)
-    count = len(result.problem.records)
-    every = [NO_FORCE] * count if forces is None else forces
-    return tuple(concurrently(lambda i: _line(result, i, length, every[i]), range(count)))
+    return tuple(concurrently(lambda i: _line(result, i, length), range(len(result.problem.records))))
 
 
-def _line(result: FitResult, index: int, length: int, force: Force) -> BlockedRecording:
+def _line(result: FitResult, index: int, length: int) -> BlockedRecording:
     record = result.problem.records[index]
-    use = result.problem.use[index]
-    error, weight = block_mean_of(record.output - result.outputs[index], use, length)
-    states = states_of(result, index, force)
+    error, weight = block_mean_of(record.output - result.outputs[index], result.problem.use[index], length)
+    states = states_of(result, index)
     return BlockedRecording(
         record,
         length,
@@ -284,17 +243,4 @@ def _line(result: FitResult, index: int, length: int, force: Force) -> BlockedRe
         weight,
         motion_in_blocks(record, {name: between(values) for name, values in states.items()}, length),
         motion_in_blocks(record, states, length),
-        spread_stretches(error.size, MOST_ROWS // len(result.problem.records)),
     )
-
-
-def spread_stretches(blocks: int, most: int) -> BoolArray:
-    used = np.ones(blocks, dtype=np.bool_)
-    if blocks <= most:
-        return used
-    length = min(STRETCH, most)
-    starts = np.linspace(0, blocks - length, max(most // length, 1)).astype(int)
-    used[:] = False
-    for start in starts:
-        used[start : start + length] = True
-    return used

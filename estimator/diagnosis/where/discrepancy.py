@@ -11,6 +11,7 @@ from scipy import stats
 from estimator.diagnosis.assemble import Z95
 from estimator.diagnosis.line.blocks import (
     DRIVES,
+    ELEMENTS,
     PLACES,
     BlockedRecording,
     InputPlace,
@@ -19,11 +20,9 @@ from estimator.diagnosis.line.blocks import (
     lines,
     size_at,
 )
-from estimator.diagnosis.line.equivalent import Explanation, Input, explain, smooth
+from estimator.diagnosis.line.equivalent import Explanation, Input, explain, explain_all, smooth
 from estimator.diagnosis.noise import VERY_STRONG
-from estimator.diagnosis.result import Course, Discrepancy, Equivalent, LawPicture, RankedLaw
-from estimator.diagnosis.unnamed.scene import Filter, Scene, scene
-from estimator.diagnosis.unnamed.search import ROUNDS, ElementSearch, judged, searches_at, without_law
+from estimator.diagnosis.result import Course, Discrepancy, Equivalent, LawPicture
 from estimator.diagnosis.where.locate import error_spectrum, responses
 from estimator.physics import model
 from estimator.physics.catalogue import EFFECTS
@@ -204,31 +203,18 @@ def _as_error(line: BlockedRecording, difference: FloatArray) -> BlockedRecordin
 
 
 def discrepancy(
-    retuned: FitResult,
-    final: FitResult,
-    floor: float,
-    motion: model.Motion = model.Motion.ROTATION,
-    rounds: int | None = None,
-    initial: Sequence[ElementSearch] = (),
-    whitening: Filter | None = None,
+    retuned: FitResult, final: FitResult, floor: float, motion: model.Motion = model.Motion.ROTATION
 ) -> Discrepancy:
-    """Look at what a re-tuned model lacks, with the effects found or, without any, with laws without a name."""
-    view = scene(retuned, floor, whitening)
-    named = effects_added(retuned, final)
-    searches = searches_at(view, rounds or (1 if named else ROUNDS), initial)
-    laws = sorted(judged(view, searches), key=lambda law: -law.delta_bic)
-    best = laws[0] if laws and laws[0].delta_bic > 0.0 else None
-    if named:
-        pictures = _pictures_of_effects(named, final, floor, motion)
-    else:
-        pictures = _picture_of_law(best, searches, floor, motion)
+    """Look at what a re-tuned model lacks, with the effects found."""
+    cut = lines(retuned)
+    inputs = explain_all(retuned, cut, floor)
+    likeliest = max(inputs.values(), key=lambda each: each.log_likelihood)
     return Discrepancy(
-        element=None if best is None else best.element,
-        laws=tuple(law for law in laws if law.terms),
-        equivalents=_equivalents(view, motion),
+        element=ELEMENTS[likeliest.place],
+        equivalents=_equivalents(retuned, cut, inputs, likeliest.log_likelihood, motion),
         spectrum=error_spectrum(retuned, final, floor),
         responses=responses(retuned, final),
-        pictures=pictures,
+        pictures=_pictures_of_effects(effects_added(retuned, final), final, floor, motion),
     )
 
 
@@ -239,17 +225,22 @@ def effects_added(retuned: FitResult, final: FitResult) -> tuple[str, ...]:
     return tuple(name for name in (*EFFECTS, *final.problem.grid.laws) if name in after - before)
 
 
-def _equivalents(view: Scene, motion: model.Motion) -> tuple[Equivalent, ...]:
-    most = max(each.log_likelihood for each in view.explanations.values())
+def _equivalents(
+    retuned: FitResult,
+    cut: Sequence[BlockedRecording],
+    inputs: Mapping[InputPlace, Explanation],
+    most: float,
+    motion: model.Motion,
+) -> tuple[Equivalent, ...]:
     return tuple(
         Equivalent(
             place.value,
-            input_unit(place, view.result, motion),
-            _courses(view.cut, explanation),
+            input_unit(place, retuned, motion),
+            _courses(cut, explanation),
             explanation.log_likelihood,
             2.0 * (most - explanation.log_likelihood) <= VERY_STRONG,
         )
-        for place, explanation in view.explanations.items()
+        for place, explanation in inputs.items()
     )
 
 
@@ -290,26 +281,3 @@ def without_effect(result: FitResult, name: str) -> FitResult:
     problem = replace(result.problem, p=p, shared=tuple(result.problem.shared[j] for j in kept))
     columns = [*kept, *range(count, result.x.size)]
     return replace(result, problem=problem, x=x, derivative=result.jacobian[:, columns], outputs=outputs_at(problem, x))
-
-
-def _picture_of_law(
-    best: RankedLaw | None, searches: Sequence[ElementSearch], floor: float, motion: model.Motion
-) -> tuple[LawPicture, ...]:
-    if best is None:
-        return ()
-    state = next(each for each in searches if each.element is best.element)
-    if not any(weights.any() for weights in state.weights):
-        return ()
-    motions = state.view.motions(state.element)
-    outputs = state.view.result.outputs
-    drawn = picture(
-        " + ".join(name for name, _ in best.terms[:3]),
-        best.element,
-        without_law(state),
-        outputs,
-        motions,
-        floor,
-        motion,
-        state.view.cut[0].length,
-    )
-    return () if drawn is None else (drawn,)

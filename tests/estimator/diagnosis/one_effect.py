@@ -12,10 +12,10 @@ from estimator.diagnosis.inference.decide import Decision, Rival, decide, no_riv
 from estimator.diagnosis.inference.figures import Unseen
 from estimator.diagnosis.inference.fits import Fits
 from estimator.diagnosis.inference.hypotheses import all_good_samples, open_hypotheses
-from estimator.diagnosis.inference.rivals import laws_around
 from estimator.diagnosis.inference.say import Basis, said
 from estimator.diagnosis.inference.search import Search, search_from_nothing
 from estimator.diagnosis.result import Diagnosis, Effort
+from estimator.diagnosis.table_answer import unnamed_law
 from estimator.physics.driveline import InitialCondition
 from estimator.physics.layout import flat_values, grid_for
 from estimator.physics.model import DrivelineModel
@@ -68,4 +68,4 @@ def decided(search: Search, unseen: Sequence[Record] = (), rival: Rival = no_riv
 
 def diagnosed(search: Search, decision: Decision) -> Diagnosis:
     """Return what is said of a decision."""
-    return said(Basis(decision, laws_around(decision.judged), search, search.fits.model, Effort()))
+    return said(Basis(decision, search, search.fits.model, Effort(), law=unnamed_law(decision)))

@@ -9,7 +9,6 @@ import pytest
 
 from estimator.diagnosis.preconditions.prepare import MOST_SAMPLES_TIMES_RECORDINGS, shortened_to_memory
 from estimator.diagnosis.segments import cut
-from estimator.diagnosis.unnamed.forms import LONGEST_TRAVEL, peaks
 from estimator.errors import BadSetting
 from estimator.identification.identify import identify
 from estimator.signals.decimate import HALF_LENGTH, MOST_FACTOR, Decimated, Decimator, decimate, low_pass_taps
@@ -159,19 +158,3 @@ def test_of_more_recordings_than_a_fit_can_hold_some_of_every_part_are_used(coun
     assert max(np.diff([-1, *used, count])) <= 2 * math.ceil(count / len(used))
     assert warning.startswith(f"{len(used)} of {count} recordings are used")
     assert len({i % 2 for i in used}) == len({i % 3 for i in used}) - 1 == 2  # kinds that take turns are all there
-
-
-@pytest.mark.parametrize("travel_rad", [1e6, 1e9, 1e12])
-def test_an_angle_in_a_wrong_unit_makes_no_grid_as_long_as_it(travel_rad: float) -> None:
-    angle = np.linspace(0.0, travel_rad, N)
-    tracemalloc.start()
-    assert peaks([RNG.normal(size=N)], [angle]).size == 0
-    assert tracemalloc.get_traced_memory()[1] < 1 << 26
-    tracemalloc.stop()
-
-
-@pytest.mark.campaign
-def test_the_order_of_a_long_drive_is_found_in_its_pieces() -> None:
-    angle = np.linspace(0.0, 4.0 * LONGEST_TRAVEL, 400_000)
-    found = peaks([np.sin(7.0 * angle) + RNG.normal(size=angle.size)], [angle])
-    assert found[0] == pytest.approx(7.0, abs=0.01)

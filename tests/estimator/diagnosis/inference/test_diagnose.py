@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 
 from estimator.diagnosis.diagnose import diagnose
@@ -61,23 +60,22 @@ def test_without_recordings_kept_out_blocks_of_the_others_are() -> None:
     assert answer.fit.holdout_augmented == pytest.approx(SIGMA, rel=0.1)
 
 
-def test_a_law_of_no_entry_is_located_and_described_without_a_name() -> None:
-    """A shaft that stiffens with speed: no entry of the catalogue does."""
-    stiffening = recordings(Element.SHAFT, lambda m: m.twist * np.abs(m.speed), 60.0)
-    answer = diagnose(stiffening, line_of(TWO_MASS, TIGHT))
+def test_a_law_of_no_entry_is_located_and_in_the_model_without_a_name() -> None:
+    """A shaft that is stiffer one way than the other: no entry of the catalogue is."""
+    uneven = recordings(Element.SHAFT, lambda m: m.twist**2, 4e4, seeds=(1, 2, 3))
+    answer = diagnose(uneven, line_of(TWO_MASS, TIGHT))
     assert answer.verdict is Verdict.UNEXPLAINED
-    assert answer.unnamed is not None
-    assert answer.unnamed.element is answer.mismatch.element is Element.SHAFT
-    name, coefficient = answer.unnamed.terms[0]
-    assert (name, coefficient) == ("twist |w_M|", pytest.approx(60.0, rel=0.15))
-    assert answer.unnamed.rms_before == answer.fit.retuned
-    assert answer.unnamed.rms_after < 0.5 * answer.unnamed.rms_before
+    assert answer.table is not None
+    assert answer.table.element is answer.mismatch.element is Element.SHAFT
+    assert answer.fit.holdout_augmented < 0.5 * answer.fit.holdout_retuned
+    assert f"table_{answer.table.place}" in answer.augmented.effects
     assert answer.remainder is not None
     assert answer.remainder.element is Element.SHAFT
-    said = answer.remainder.law
-    assert said.startswith("depends on the twist")
-    assert said.endswith("in the shaft")
-    assert f"; it {said}." in answer.statement
+    assert answer.remainder.law.endswith(f"it follows a torque over {answer.table.over}")
+    assert "Most likely it acts in the shaft." in answer.statement
+    content = diagnosis_json(answer)
+    assert content["unnamed"]["element"] == "shaft"
+    assert content["discrepancy"]["laws"] == [content["unnamed"]]
 
 
 def test_when_its_time_is_up_nothing_is_decided_and_nothing_rejected() -> None:

@@ -8,8 +8,6 @@ import numpy as np
 import pytest
 
 from estimator.diagnosis.inference.hypotheses import NOTHING, all_good_samples
-from estimator.diagnosis.unnamed.scene import scene
-from estimator.diagnosis.unnamed.search import ROUNDS, searches_at
 from estimator.diagnosis.where.discrepancy import _pictures_of_effects, discrepancy, effects_added, without_effect
 from estimator.diagnosis.where.locate import error_spectrum, responses
 from estimator.physics.driveline import InitialCondition
@@ -53,16 +51,6 @@ class TestPicture:
         assert inside.mean() > 0.6
         assert picture.explained > 0.8
 
-    def test_a_law_without_a_name_is_drawn_where_nothing_is_named(self) -> None:
-        result = nominal_fit(recordings(Element.MOTOR, lambda m: m.speed * np.abs(m.speed), 0.1))
-        seen = discrepancy(result, result, SIGMA, Motion.TRANSLATION)
-        assert seen.element is Element.MOTOR
-        (picture,) = seen.pictures
-        assert (picture.signal, picture.unit) == ("motor speed", "N")
-        shape = picture.x * np.abs(picture.x)
-        bent = [y - np.polyval(np.polyfit(picture.x, y, 1), picture.x) for y in (picture.data, shape)]
-        assert np.corrcoef(bent[0], bent[1])[0, 1] > 0.9
-
 
 def test_a_gap_is_drawn_as_the_torque_of_the_shaft_over_its_twist_with_its_dead_zone() -> None:
     gap_rad, line = 0.02, model(TWO_MASS)
@@ -104,15 +92,7 @@ class TestPlaces:
             for course in equivalent.courses.values():
                 assert ((course.low < course.value) & (course.value < course.high)).all()
         assert any(e.plausible for e in seen.equivalents)
-        assert seen.laws[0].delta_bic == max(law.delta_bic for law in seen.laws)
-
-
-@pytest.mark.parametrize("rounds", [1, ROUNDS])
-def test_what_a_first_look_has_found_is_not_looked_for_again(rounds: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    result = nominal_fit(recordings(Element.SHAFT, lambda m: np.tanh(m.twist / 1e-3), 5.0))
-    plain, begun = discrepancy(result, result, SIGMA, rounds=rounds), searches_at(scene(result, SIGMA))
-    monkeypatch.setattr("estimator.diagnosis.unnamed.search.first", None)
-    assert discrepancy(result, result, SIGMA, rounds=rounds, initial=begun).laws == plain.laws
+        assert seen.element is Element.SHAFT
 
 
 START = InitialCondition(5.0, 0.0, 2.0, 0.0, 2.0)
