@@ -31,8 +31,9 @@ from estimator.diagnosis.inference.hypotheses import (
     with_effect,
     with_line_values,
 )
-from estimator.diagnosis.inference.score_tests import CachedScoreTests, OutputChanges, ScoredStart, promising
+from estimator.diagnosis.inference.score_tests import ScoredStart, promising
 from estimator.diagnosis.inference.trials import Trials
+from estimator.diagnosis.inference.weighted_score_tests import OutputChanges, WeightedScoreTests
 from estimator.diagnosis.noise import noise_floor
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import FitResult, not_fitted, warm_start
@@ -219,11 +220,11 @@ class Fits:
             self._keep(whole if self.is_plausible(whole) else rough)
         return self.ended[rough.effects]
 
-    def view(self, around: Hypothesis) -> CachedScoreTests:
+    def view(self, around: Hypothesis) -> WeightedScoreTests:
         """Return the score tests around a fit, which know what was simulated around others like it."""
-        return CachedScoreTests(around, self.model, self._changes)
+        return WeightedScoreTests(around, self.model, self._changes)
 
-    def learn(self, around: Hypothesis, view: CachedScoreTests) -> None:
+    def learn(self, around: Hypothesis, view: WeightedScoreTests) -> None:
         """Keep what score tests simulated, for others like them."""
         self._changes.learn(around.result, view.found)
 

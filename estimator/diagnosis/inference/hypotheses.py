@@ -20,16 +20,17 @@ from estimator.diagnosis.inference.disturbances import (
     readings,
     whitener_of,
 )
+from estimator.diagnosis.inference.moments import has_moments, idle_moments, with_better_moments
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Untestable
-from estimator.physics.fit import MOMENT_NAMES, FitResult, not_fitted
-from estimator.physics.jacobian import changes, jacobian_at
+from estimator.physics.fit import FitResult, not_fitted
+from estimator.physics.jacobian import jacobian_at
 from estimator.physics.layout import slot
 from estimator.physics.machine import out_of_question
 from estimator.physics.model import DrivelineModel, Motion
 from estimator.physics.motion import turns_on
-from estimator.physics.problem import Problem, bounds, own_part, simulated_each
-from estimator.physics.unknowns import LocalBasis, Release, Shared
+from estimator.physics.problem import Problem, bounds
+from estimator.physics.unknowns import Release, Shared
 from estimator.signals.record import BoolArray, FloatArray, Record, by_output
 
 Effects = frozenset[str]
@@ -133,98 +134,6 @@ def with_line_values(result: FitResult, line: Mapping[str, float]) -> FitResult:
     return replace(result, x=x)
 
 
-OFFSETS_S = np.array([0.01, 0.02, 0.04, 0.08, 0.15, 0.3, 0.6, 1.2, 2.4, 5.0, 10.0])
-OFFSETS_S = np.concatenate([-OFFSETS_S[::-1], OFFSETS_S])
-"""Where else the likelihood is looked at, around the moment a fit ended at; and at the recording's own ends."""
-
-WORTH_MOVING = 2.0  # fall of the squared innovations that moments elsewhere must bring
-
-MOVES = 4
-
-
-def with_better_moments(result: FitResult, filtered: Whitener) -> tuple[Problem, FloatArray] | None:
-    """Return a problem and its unknowns with moments where the innovations are less; None where they are nowhere.
-
-    A fit may move them from there as far as it could before.
-    """
-    problem, x, better = result.problem, result.x.copy(), False
-    bases = list(problem.local)
-    for i, basis in enumerate(problem.bases):
-        local = _moved_in(result, filtered, i)
-        if local is not None:
-            x[own_part(problem, i)], better = local, True
-            bases[i] = _around(basis, local, problem.records[i])
-    return (replace(problem, local=tuple(bases[lead] for lead in problem.leads)), x) if better else None
-
-
-def _around(basis: LocalBasis, local: FloatArray, record: Record) -> LocalBasis:
-    """Return a basis with the bounds of movable moments as wide as before, around where they are."""
-    first, last = (float(each) for each in record.since_start_s[[0, -1]])
-    last += record.sample_time_s
-    own = []
-    for row, unknown in enumerate(basis.own, start=basis.own_rows.start):
-        if EFFECTS[unknown.effect].event and unknown.low < unknown.high:
-            at, reach = float(local[row]), 0.5 * (unknown.high - unknown.low)
-            unknown = replace(unknown, start=at, low=max(first, at - reach), high=min(last, at + reach))
-        own.append(unknown)
-    return replace(basis, own=tuple(own))
-
-
-def _moved_in(result: FitResult, filtered: Whitener, index: int) -> FloatArray | None:
-    basis, local = result.problem.local[index], result.local_of(index).copy()
-    ends = _ends(basis)
-    if not ends:
-        return None
-    taken_up = _initial_state(result, filtered, index)
-    began = best = float(_squares(result, filtered, index, taken_up, [local])[0])
-    first, last = (float(each) for each in result.problem.records[index].since_start_s[[0, -1]])
-    for begin, end in ends:
-        may_move = [row for row in (begin, end) if basis.low[row] < basis.high[row]]
-        sets = [[row] for row in may_move] + ([may_move] if len(may_move) > 1 else [])
-        for _ in range(MOVES):
-            tried = [_shifted(local, rows, offset) for rows in sets for offset in OFFSETS_S]
-            tried += [_shifted(local, [row], {begin: first, end: last}[row] - local[row]) for row in may_move]
-            tried = [each for each in tried if first <= each[begin] <= each[end] <= max(last, local[end])]
-            if not tried:
-                break
-            squares = _squares(result, filtered, index, taken_up, tried)
-            if squares.min() >= best:
-                break
-            best, local = float(squares.min()), tried[int(squares.argmin())]
-    return local if best < began - WORTH_MOVING else None
-
-
-def _shifted(local: FloatArray, rows: list[int], offset_s: float) -> FloatArray:
-    x = local.copy()
-    x[rows] += offset_s
-    return x
-
-
-def _ends(basis: LocalBasis) -> list[tuple[int, int]]:
-    """Return where beginning and end of each event stand among a recording's unknowns."""
-    place = {(u.effect, u.name): row for row, u in enumerate(basis.own, start=basis.own_rows.start)}
-    movable = {u.effect for u in basis.own if EFFECTS[u.effect].event and u.low < u.high}
-    return [(place[effect, "from_s"], place[effect, "to_s"]) for effect in sorted(movable)]
-
-
-def _initial_state(result: FitResult, filtered: Whitener, index: int) -> FloatArray:
-    """Return an orthonormal basis of what load torque and initial state do to the innovations."""
-    first = own_part(result.problem, index).start
-    columns = np.arange(first, first + result.problem.local[index].own_rows.start)
-    return np.linalg.qr(filtered.part(index, changes(result.problem, result.x, index, columns, result.outputs)))[0]
-
-
-def _squares(
-    result: FitResult, filtered: Whitener, index: int, taken_up: FloatArray, tried: list[FloatArray]
-) -> FloatArray:
-    """Return the squared innovations for each of several vectors that differ in moments, shape (K,)."""
-    problem = result.problem
-    measured = np.concatenate([problem.records[i].output[problem.use[i]] for i in problem.drives[index]])
-    outputs = simulated_each(problem, [(result.p, x) for x in tried], index)
-    errors = filtered.part(index, (outputs - measured).T).T
-    return (errors**2).sum(axis=1) - ((errors @ taken_up) ** 2).sum(axis=1)
-
-
 SETTLED_DEVIANCE = 1.0
 """Fall of minus twice the log-likelihood below which another pass over unknowns and disturbances is not made."""
 
@@ -263,7 +172,7 @@ class Hypothesis:
     def unknowns(self) -> int:
         """How many unknowns were fitted; moments of events only where these act."""
         low, high = bounds(self.result.problem)
-        return int(np.sum(low < high)) - _idle_moments(self.result)
+        return int(np.sum(low < high)) - idle_moments(self.result)
 
     @property
     def score(self) -> float:
@@ -376,7 +285,7 @@ def of_first_outputs(hypothesis: Hypothesis) -> Hypothesis:
 
 def _with_moments(result: FitResult, sizes: FloatArray) -> FitResult:
     """Return a fit with moments of events where the innovations are least, and fitted from there."""
-    if not _has_moments(result.problem):
+    if not has_moments(result.problem):
         return result
     for _ in range(2):
         found = with_better_moments(result, whitener_of(result, sizes))
@@ -384,27 +293,6 @@ def _with_moments(result: FitResult, sizes: FloatArray) -> FitResult:
             break
         result = descended(extended(*found, result), whitener_of(result, sizes), THOROUGH)
     return result
-
-
-def _has_moments(problem: Problem) -> bool:
-    return any(u.name in MOMENT_NAMES and u.low < u.high for basis in problem.bases for u in basis.own)
-
-
-def _idle_moments(result: FitResult) -> int:
-    """Return how many moments are of events that do not take place in their recording."""
-    count = 0
-    for i, basis in enumerate(result.problem.bases):
-        values = result.local_of(i)[basis.own_rows]
-        own = {(u.effect, u.name): (u, float(v)) for u, v in zip(basis.own, values, strict=True)}
-        for name in {u.effect for u in basis.own if EFFECTS[u.effect].event}:
-            (begin, from_s), (end, to_s) = own[name, "from_s"], own[name, "to_s"]
-            movable = (begin.low < begin.high) + (end.low < end.high)
-            if to_s <= from_s:
-                count += movable
-            else:  # one that begins or ends with the recording has no moment there
-                first, last = (float(t) for t in result.problem.records[i].since_start_s[[0, -1]])
-                count += (begin.low < begin.high and from_s <= first) + (end.low < end.high and to_s >= last)
-    return count
 
 
 def covariance(hypothesis: Hypothesis) -> FloatArray:

@@ -14,7 +14,8 @@ import numpy as np
 
 from estimator.diagnosis.inference.fits import Fits
 from estimator.diagnosis.inference.hypotheses import GRADE, Hypothesis, open_hypotheses
-from estimator.diagnosis.inference.score_tests import CachedScoreTests, ScoredStart, Screen, promising
+from estimator.diagnosis.inference.score_tests import ScoredStart, Screen, promising
+from estimator.diagnosis.inference.weighted_score_tests import WeightedScoreTests
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Element
 from estimator.physics.jacobian import jacobian_at
@@ -171,7 +172,7 @@ def _promised_moments(looked: Starts) -> Sequence[Moments]:
     return _moments_of(looked[best][0].release) if best and looked[best][0].promise > 0.0 else ()
 
 
-def _at_moments(view: CachedScoreTests, looked: Starts, moments: Sequence[Moments], price: float) -> Starts:
+def _at_moments(view: WeightedScoreTests, looked: Starts, moments: Sequence[Moments], price: float) -> Starts:
     """Return the starts of the events among some effects at moments that are known, next to those of their own."""
     if not any(begin < end for begin, end in moments):
         return {}
@@ -201,7 +202,7 @@ def _open(fits: Fits, current: Hypothesis) -> Sequence[str]:
     return list(dict.fromkeys([*fits.names, *open_hypotheses(fits.model, seeing)[0]]))
 
 
-def _nearest(fits: Fits, current: Hypothesis, name: str) -> tuple[Hypothesis | None, Hypothesis, CachedScoreTests]:
+def _nearest(fits: Fits, current: Hypothesis, name: str) -> tuple[Hypothesis | None, Hypothesis, WeightedScoreTests]:
     """Fit the look-alike that explains most in an effect's place to its end; None where none comes near.
 
     An event's moments are handed over to the events in its place. A load that walks far has no law for a first look to
