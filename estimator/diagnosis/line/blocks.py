@@ -20,6 +20,23 @@ from estimator.physics.problem import Problem, local_part, parameters
 from estimator.physics.simulate import simulate_each
 from estimator.signals.record import BoolArray, FloatArray, Record
 
+NO_FORCE: Force = (0.0, 0.0)
+
+AROUND = 2  # samples before and behind a moment between which a law's change counts
+LASTS = 3.0  # samples over which such an error is correlated: about as long as a change counts
+
+_MOTOR = (slots.COULOMB, slots.STRIBECK, slots.STRIBECK_COULOMB)
+_LOAD = (slots.COULOMB_LOAD, slots.BRAKE)
+_SHAFT = (slots.GAP, slots.STAGE)
+
+DRIVES = {Element.TORQUE_PATH: 1.0, Element.MOTOR: -1.0, Element.SHAFT: 1.0, Element.LOAD: 1.0}
+"""Sign of a law at its place: the torque path drives the motor, friction at the motor brakes it."""
+
+MOST_ROWS = 20_000
+"""Blocks that laws are fitted to, all recordings together: over three minutes at 10 ms. They bound memory."""
+
+STRETCH = 3000  # blocks of a stretch of a long recording
+
 
 @dataclass(frozen=True, slots=True)
 class Motion:
@@ -39,8 +56,6 @@ class Motion:
 
 Force = tuple[FloatArray | float, FloatArray | float]
 """Torque on the motor and torque against the load, in addition to the model's, shape (N,) each [Nm]."""
-
-NO_FORCE: Force = (0.0, 0.0)
 
 
 def simulated(result: FitResult, index: int, force: Force = NO_FORCE, state: int | None = None) -> FloatArray:
@@ -95,21 +110,12 @@ def between(values: FloatArray) -> FloatArray:
     return 0.5 * (values + later)
 
 
-AROUND = 2  # samples before and behind a moment between which a law's change counts
-LASTS = 3.0  # samples over which such an error is correlated: about as long as a change counts
-
-
 class FormPlace(IntEnum):
     """Where a law whose form is in error acts: on the motor, against the load, in the shaft."""
 
     MOTOR = 0
     LOAD = 1
     SHAFT = 2
-
-
-_MOTOR = (slots.COULOMB, slots.STRIBECK, slots.STRIBECK_COULOMB)
-_LOAD = (slots.COULOMB_LOAD, slots.BRAKE)
-_SHAFT = (slots.GAP, slots.STAGE)
 
 
 def form_changes(result: FitResult, index: int) -> FloatArray:
@@ -199,9 +205,6 @@ PLACES = {
 }
 """Where a law of an element acts."""
 
-DRIVES = {Element.TORQUE_PATH: 1.0, Element.MOTOR: -1.0, Element.SHAFT: 1.0, Element.LOAD: 1.0}
-"""Sign of a law at its place: the torque path drives the motor, friction at the motor brakes it."""
-
 
 def places(result: FitResult) -> tuple[InputPlace, ...]:
     if result.problem.grid.structure is Structure.JOINT:
@@ -214,12 +217,6 @@ def places(result: FitResult) -> tuple[InputPlace, ...]:
 def size_at(result: FitResult, place: InputPlace) -> float:
     records = result.problem.records
     return speed_scale(records) if place is InputPlace.SENSOR else torque_scale(records)
-
-
-MOST_ROWS = 20_000
-"""Blocks that laws are fitted to, all recordings together: over three minutes at 10 ms. They bound memory."""
-
-STRETCH = 3000  # blocks of a stretch of a long recording
 
 
 @dataclass(frozen=True, slots=True)

@@ -36,6 +36,25 @@ BINS_PER_WAVE = 4.0
 LONGEST_TRAVEL = 30_000.0  # angle of one spectrum [rad], some 5000 turns: its grid has a million places
 FEWEST_SAMPLES = 1024  # samples in such a piece; with fewer its waves are not seen
 
+STEP_EVERY_S = 0.5  # grid of the moments at which a load torque may step
+CHANGE_EVERY_S = 1.0  # grid of the moments at which an inertia, a stiffness or a drag may change
+MOST_MOMENTS = 180  # moments in all recordings together; longer ones have a coarser grid
+USUAL_ORDERS = (1.0, 2.0)  # waves per motor turn that are tried in any case: imbalance, and joints at an angle
+COURSE_KNOTS = 11  # of a slow course of the load over one recording
+
+BATCH = 2**18
+"""Values of functions of time that are built and answered at once: enough for compiled code, and no more room."""
+
+MOST_TERMS = 9  # three load steps per recording in a set of three, or as many terms of another kind
+
+MOST_COEFFICIENTS = 45
+
+INDISTINGUISHABLE_SHARE = (
+    1e-6  # a candidate that re-tuning reproduces to this share of its power can't be distinguished from it
+)
+CHUNK = 2048  # rows that are worked on at a time
+TOO_ALIKE = 1e-8  # share of a column's power below which it is a combination of others
+
 
 def peaks(signals: Sequence[FloatArray], angles: Sequence[FloatArray]) -> FloatArray:
     """Return the orders at which signals of recordings have most power over the angle, strongest first."""
@@ -95,12 +114,6 @@ def _differences(signal: FloatArray) -> FloatArray:
     """Return a signal's change from sample to sample: a slow drift is no longer the largest part."""
     return np.diff(signal, prepend=signal[0])
 
-
-STEP_EVERY_S = 0.5  # grid of the moments at which a load torque may step
-CHANGE_EVERY_S = 1.0  # grid of the moments at which an inertia, a stiffness or a drag may change
-MOST_MOMENTS = 180  # moments in all recordings together; longer ones have a coarser grid
-USUAL_ORDERS = (1.0, 2.0)  # waves per motor turn that are tried in any case: imbalance, and joints at an angle
-COURSE_KNOTS = 11  # of a slow course of the load over one recording
 
 Columns = FloatArray
 """One or several functions of time of one recording, shape (B, q)."""
@@ -248,10 +261,6 @@ def moments(motion: Motion, every_s: float, recordings: int) -> FloatArray:
     return motion.time_s[0] + every_s * np.arange(1, max(int(length_s / every_s), 2))
 
 
-BATCH = 2**18
-"""Values of functions of time that are built and answered at once: enough for compiled code, and no more room."""
-
-
 @dataclass(frozen=True, slots=True)
 class Pool:
     """Laws without a name at one element: functions with a coefficient each, and the output's answers to them."""
@@ -305,16 +314,6 @@ def _answers_of(line: BlockedRecording, element: Element, functions: FloatArray)
     sign = DRIVES[element]
     return line.tangent.answers(sign * motor, sign * load, functions)
 
-
-MOST_TERMS = 9  # three load steps per recording in a set of three, or as many terms of another kind
-
-MOST_COEFFICIENTS = 45
-
-INDISTINGUISHABLE_SHARE = (
-    1e-6  # a candidate that re-tuning reproduces to this share of its power can't be distinguished from it
-)
-CHUNK = 2048  # rows that are worked on at a time
-TOO_ALIKE = 1e-8  # share of a column's power below which it is a combination of others
 
 Indices = NDArray[np.intp]
 

@@ -42,6 +42,30 @@ MOST_FORCE = 0.8
 """Largest RMS of a law, in RMS of the torque (or reading) in use: a law that takes more than the line carries is no
 small thing left out but a way to cancel what is there."""
 
+NEIGHBOURS = 7  # a reading is held against the median of so many around it: a swing of the line lasts longer
+FALSE_ALARM = 0.01  # probability that normal noise makes one outlier in all recordings
+
+WITHIN = 0.9
+"""Share of the values from which their spread is estimated: few are their neighbours' median, none an outlier."""
+
+MOST_FORMS = 40  # forms that by themselves explain most, which further rounds choose from
+
+STEPS = (1.0, 0.5, 0.2, 0.05)  # shares of a step that are tried until the error falls
+
+ROUNDS = 20  # rounds that locate, at most: the first promises, the others try what it promised
+
+LEAST_ROUNDS = 5
+WORTH_A_ROUND = 0.005
+"""Rounds that are made in any case, and the share of the squared error that a further one must have taken away at an
+element for its next: where the line's own parameters are far off, as next to a shaft that relaxes, law and line come to
+each other in many steps."""
+
+MOST_AT_ONCE = 20_000
+"""Samples up to which several searches are made at a time: functions and answers take some 4 kB a sample each."""
+
+IN_REACH = 3.0
+"""Elements whose law leaves more than this many times the RMS of the best are not looked at again."""
+
 
 @dataclass(frozen=True, slots=True)
 class ScoredLaw:
@@ -127,13 +151,6 @@ def rms(parts: Sequence[FloatArray]) -> float:
     return float(np.sqrt(np.mean(np.concatenate(list(parts)) ** 2)))
 
 
-NEIGHBOURS = 7  # a reading is held against the median of so many around it: a swing of the line lasts longer
-FALSE_ALARM = 0.01  # probability that normal noise makes one outlier in all recordings
-
-WITHIN = 0.9
-"""Share of the values from which their spread is estimated: few are their neighbours' median, none an outlier."""
-
-
 def outliers(errors: Sequence[FloatArray]) -> list[BoolArray]:
     """Tell which values of an error stand out of their neighbours, per recording; shapes (B_i,)."""
     distance = [distance_from_neighbours(error) for error in errors]
@@ -154,8 +171,6 @@ def near(off: BoolArray) -> BoolArray:
     """Tell which values stand next to one that is off, shape (B,): a filter answers to it for some samples."""
     return maximum_filter1d(off.astype(np.int8), NEIGHBOURS, mode="constant").astype(np.bool_)
 
-
-MOST_FORMS = 40  # forms that by themselves explain most, which further rounds choose from
 
 PARAMETER_LAWS: Mapping[str, tuple[Element, Law]] = {
     "J_M": (Element.MOTOR, lambda m: np.gradient(m.speed, m.time_s)),
@@ -220,9 +235,6 @@ def _without_outliers(state: ElementSearch) -> ElementSearch:
     size = rms([error[each] for each, error in zip(off, errors, strict=True)])
     law = replace(law, terms=(("the single readings that are off", size),))
     return replace(state, law=law, mean_square=after / rows, errors=aside, stuck=True)
-
-
-STEPS = (1.0, 0.5, 0.2, 0.05)  # shares of a step that are tried until the error falls
 
 
 def again(state: ElementSearch) -> ElementSearch:
@@ -336,20 +348,6 @@ def _solution(state: ElementSearch, terms: int) -> tuple[FloatArray, FloatArray]
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
-
-ROUNDS = 20  # rounds that locate, at most: the first promises, the others try what it promised
-
-LEAST_ROUNDS = 5
-WORTH_A_ROUND = 0.005
-"""Rounds that are made in any case, and the share of the squared error that a further one must have taken away at an
-element for its next: where the line's own parameters are far off, as next to a shaft that relaxes, law and line come to
-each other in many steps."""
-
-MOST_AT_ONCE = 20_000
-"""Samples up to which several searches are made at a time: functions and answers take some 4 kB a sample each."""
-
-IN_REACH = 3.0
-"""Elements whose law leaves more than this many times the RMS of the best are not looked at again."""
 
 
 def each_of(result: FitResult, search: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
