@@ -17,6 +17,10 @@ from enum import IntEnum
 
 from drivers.errors import CommandRefused, ConfigMismatch
 
+_RADIANS_OF_UNIT = {0x10: 1.0, 0x41: math.pi / 180.0, 0xB4: 2.0 * math.pi}  # radian, degree, revolution
+_SECONDS_OF_UNIT = {0x03: 1.0, 0x47: 60.0}  # second, minute
+_PREFIX_LIMIT = 9  # 10^-9 to 10^9
+
 
 class IntegerType(IntEnum):
     """Integer data types of CiA 301 by their code in the EDS (``DataType``)."""
@@ -113,11 +117,6 @@ class TorqueScale:
                 "Nothing was sent; lower the torque."
             )
         return count
-
-
-_RADIANS_OF_UNIT = {0x10: 1.0, 0x41: math.pi / 180.0, 0xB4: 2.0 * math.pi}  # radian, degree, revolution
-_SECONDS_OF_UNIT = {0x03: 1.0, 0x47: 60.0}  # second, minute
-_PREFIX_LIMIT = 9  # 10^-9 to 10^9
 
 
 @dataclass(frozen=True, slots=True)

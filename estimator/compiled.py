@@ -36,6 +36,9 @@ _IMPORT = re.compile(
 _NO_CODE = re.compile(r'^[ \t]*r?"""[\s\S]*?"""[ \t]*$|^[ \t]*#.*$|(?<=\S)  # .*$', re.M)
 """Docstrings and comments: what is compiled is the same without them."""
 
+IS_COMPILED = not vars(numba_config)["DISABLE_JIT"]
+"""Whether code is compiled, and not run by Python, for a debugger, because of ``NUMBA_DISABLE_JIT``."""
+
 
 @cache
 def _code(path: Path) -> str:
@@ -108,9 +111,6 @@ class SourceLocator(_CacheLocator):
 vars(numba_config)["CACHE_LOCATOR_CLASSES"] = f"{SourceLocator.__module__}.{SourceLocator.__name__}"
 
 compile_undisturbed()
-
-IS_COMPILED = not vars(numba_config)["DISABLE_JIT"]
-"""Whether code is compiled, and not run by Python, for a debugger, because of ``NUMBA_DISABLE_JIT``."""
 
 
 def compiled(function: Function) -> Function:

@@ -20,6 +20,12 @@ PLAIN: Final = r"[A-Za-z0-9_][A-Za-z0-9_.+-]*"
 
 _PLAIN_NAME: Final = re.compile(PLAIN)
 
+LARGEST_BYTES: Final = 32 << 20
+"""Longest file that is read: empty lists alone then take 0.7 GiB."""
+
+_HOST: Final = f"{zlib.crc32(platform.node().encode()):08x}"
+_PART: Final = re.compile(r"\..+\.(?P<host>[0-9a-f]{8})-(?P<process>[0-9]+)\.part(\.json)?")
+
 
 def is_plain(name: object) -> bool:
     """Whether something is the name of a file or folder of one part, without a leading dot."""
@@ -44,10 +50,6 @@ def inside(folder: Path, name: str) -> Path:
     return path
 
 
-LARGEST_BYTES: Final = 32 << 20
-"""Longest file that is read: empty lists alone then take 0.7 GiB."""
-
-
 def read_json(path: Path) -> Any:
     """Return what a JSON file says."""
     return parse_json(read_regular(path, LARGEST_BYTES).decode("utf-8"))
@@ -67,10 +69,6 @@ def _of_64_bit(digits: str) -> int:
     if not -(1 << 63) <= value < 1 << 63:
         raise ValueError(f"a whole number of {len(digits)} digits, expected at most 64 bit")
     return value
-
-
-_HOST: Final = f"{zlib.crc32(platform.node().encode()):08x}"
-_PART: Final = re.compile(r"\..+\.(?P<host>[0-9a-f]{8})-(?P<process>[0-9]+)\.part(\.json)?")
 
 
 def part_of(path: Path) -> Path:

@@ -16,6 +16,11 @@ from typing import IO, Final
 
 from hil.errors import UsageError
 
+LOCK: Final = ".hil.lock"
+"""Name of the file in a folder that says who holds it; a folder with nothing else in it is empty."""
+
+_BEHIND_THE_TEXT: Final = 1 << 20
+
 
 def require_folder(folder: Path) -> None:
     """Refuse a folder that can't be written to, before anything is computed."""
@@ -27,12 +32,6 @@ def require_folder(folder: Path) -> None:
             pass  # permissions alone don't tell: the disk may be full, or mounted read-only
     except OSError as error:
         raise _unwritable(folder, error) from error
-
-
-LOCK: Final = ".hil.lock"
-"""Name of the file in a folder that says who holds it; a folder with nothing else in it is empty."""
-
-_BEHIND_THE_TEXT: Final = 1 << 20
 
 
 @contextmanager

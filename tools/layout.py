@@ -1,12 +1,13 @@
 """``python tools/layout.py``: what of a file's order a program can check, in the product and in the tools.
 
 A module is imported by one statement and under one name; no file imports or mentions itself, as files that were joined
-do; a constant stands above what uses it. That the docstring names the whole file is for a reader to see.
+do; constants stand above the first definition. That the docstring names the whole file is for a reader to see.
 """
 
 from __future__ import annotations
 
 import ast
+import builtins
 import sys
 from collections import Counter
 from collections.abc import Iterator
@@ -14,7 +15,8 @@ from pathlib import Path
 
 ROOT = Path(__file__).parent.parent
 ROOMS = ("hil", "drivers", "estimator", "tools")
-UNDER_WORK = "estimator/diagnosis/"  # constants stay where they are until its rewriting is done; then this line goes
+UNDER_WORK = ("drivers/inverter/",)  # constants stay where they are until these are done
+DEFINITIONS = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
 
 Finding = tuple[int, str]
 """Line, and what is wrong there."""
@@ -38,8 +40,9 @@ def findings(path: Path) -> Iterator[Finding]:
     tree = ast.parse(text)
     name = ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
     yield from _imports(tree, name, path.name == "__init__.py")
-    if UNDER_WORK not in path.as_posix():
-        yield from _late_constants(tree)
+    if not any(room in path.as_posix() for room in UNDER_WORK):
+        for node in late_constants(tree):
+            yield node.lineno, f"{_targets(node)[0]} stands below the first definition: move it above"
     if path.name != "__init__.py":
         for number, line in enumerate(text.splitlines(), start=1):
             if f"`{name}`" in line or f"`{path.relative_to(ROOT)}`" in line:
@@ -69,26 +72,45 @@ def _names(node: ast.AST) -> Iterator[tuple[str, str]]:
         yield from ((f"{node.module}.{alias.name}", alias.asname or alias.name) for alias in node.names)
 
 
-def _late_constants(tree: ast.Module) -> Iterator[Finding]:
-    """Yield constants that are used in a function or class above them, and that could stand there."""
-    used_at: dict[str, int] = {}
-    bound_at: dict[str, int] = {}
-    for node in tree.body:
-        needs = max((bound_at.get(each.id, 0) for each in ast.walk(node) if isinstance(each, ast.Name)), default=0)
-        bound_at |= dict.fromkeys([*_targets(node), getattr(node, "name", "")], node.lineno)
-        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
-            for each in ast.walk(node):
-                if isinstance(each, ast.Name):
-                    used_at.setdefault(each.id, node.lineno)
-        for target in _targets(node):
-            if target.lstrip("_").isupper() and target in used_at and needs < used_at[target]:
-                yield node.lineno, f"{target} stands below what uses it (line {used_at[target]}): move it up"
+def late_constants(tree: ast.Module) -> Iterator[ast.Assign | ast.AnnAssign]:
+    """Yield constants below the first function or class that could stand above it: they need nothing from below it."""
+    first = next((i for i, node in enumerate(tree.body) if isinstance(node, DEFINITIONS)), len(tree.body))
+    filled = {each for node in tree.body[first:] for each in _filled(node)}
+    known = ({each for node in tree.body[:first] for each in _bound(node)} | set(dir(builtins))) - filled
+    for node in tree.body[first:]:
+        targets = _targets(node)
+        if targets and all(map(_is_constant, targets)) and isinstance(node, ast.Assign | ast.AnnAssign) and node.value:
+            names = [each for each in ast.walk(node.value) if isinstance(each, ast.Name)]
+            own = {each.id for each in names if isinstance(each.ctx, ast.Store)}  # of a comprehension
+            if {each.id for each in names} - own <= known:
+                known.update(set(targets) - filled)
+                yield node
+
+
+def _bound(node: ast.stmt) -> Iterator[str]:
+    """Yield the names that a statement of the head binds: imports, assignments, also those behind a condition."""
+    for each in ast.walk(node):
+        if isinstance(each, ast.Import | ast.ImportFrom):
+            yield from ((alias.asname or alias.name).partition(".")[0] for alias in each.names)
+        if isinstance(each, ast.Name) and isinstance(each.ctx, ast.Store):
+            yield each.id
+
+
+def _filled(node: ast.stmt) -> Iterator[str]:
+    """Yield the names that a loop or a call at the end of a file changes: what is made of them has to stay below it."""
+    if not isinstance(node, (*DEFINITIONS, ast.AnnAssign)) and not _targets(node):
+        yield from (each.id for each in ast.walk(node) if isinstance(each, ast.Name))
+
+
+def _is_constant(name: str) -> bool:
+    return name.lstrip("_").isupper()
 
 
 def _targets(node: ast.stmt) -> list[str]:
     """Return the names that an assignment binds."""
     targets = node.targets if isinstance(node, ast.Assign) else [node.target] if isinstance(node, ast.AnnAssign) else []
-    return [each.id for target in targets for each in ast.walk(target) if isinstance(each, ast.Name)]
+    names = [each for target in targets for each in ast.walk(target) if isinstance(each, ast.Name)]
+    return [each.id for each in names if isinstance(each.ctx, ast.Store)]
 
 
 if __name__ == "__main__":

@@ -27,18 +27,17 @@ CAUSES: Final[Mapping[int, str]] = MappingProxyType(
 
 _MASKS: Final = (0xFFFF, 0xFFF0, 0xFF00, 0xF000)  # from one code to its whole range
 
-
-def cause_of(code: int) -> str:
-    """Cause of an EMCY error code or of object 0x603F, in words."""
-    known = (CAUSES[code & mask] for mask in _MASKS if code & mask in CAUSES)
-    return next(known, "a code outside CiA 301 and CiA 402")
-
-
 EMCY_COB_ID = 0x080  # plus the node id
 
 RPDO_TIMEOUT: Final = 0x8250  # no command within the deadline: also what a drive says of a host that has ended its run
 
 _FRAME = struct.Struct("<HB5s")
+
+
+def cause_of(code: int) -> str:
+    """Cause of an EMCY error code or of object 0x603F, in words."""
+    known = (CAUSES[code & mask] for mask in _MASKS if code & mask in CAUSES)
+    return next(known, "a code outside CiA 301 and CiA 402")
 
 
 @dataclass(frozen=True, slots=True)

@@ -33,6 +33,9 @@ TOKEN_BYTES: Final = 24
 
 LOOPBACK: Final = frozenset({"127.0.0.1", "::1", "localhost"})
 
+_SUBPROTOCOLS = ("can.binary+json.v1", "can.json.v1")
+_TIMEOUT_S = 3.0
+
 
 def new_token() -> str:
     """Draw a token; letters, digits, ``-`` and ``_``."""
@@ -68,10 +71,6 @@ def kept_token(port: int) -> str | None:
         return token_file(port).read_text(encoding="ascii")
     except (OSError, ValueError):
         return None
-
-
-_SUBPROTOCOLS = ("can.binary+json.v1", "can.json.v1")
-_TIMEOUT_S = 3.0
 
 
 class _BoundedWebSocket(WebSocket):  # type: ignore[misc]  # the library has no types

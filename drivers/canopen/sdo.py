@@ -48,6 +48,8 @@ MOST_SEGMENTS = 1024
 
 _OUT_OF_MEMORY = 0x05040005  # abort code for a transfer that is longer than this client takes
 
+T = TypeVar("T")
+
 
 class SdoSilence(SdoCommunicationError):
     """The node has not answered in time."""
@@ -153,9 +155,6 @@ class SdoNode(canopen.RemoteNode):
         client = MatchingSdoClient(rx_cobid, tx_cobid, self.object_dictionary)
         self.sdo_channels.append(client)
         return client
-
-
-T = TypeVar("T")
 
 
 def object_name(index: int, subindex: int = 0) -> str:

@@ -54,6 +54,9 @@ RESERVED_COB_IDS: Final = (
 
 ObjectId = tuple[int, int]  # index and subindex of an object
 
+EVERY_SYNC: Final = 1
+EVENT_DRIVEN: Final = (254, 255)  # transmission types (CiA 301, 7.5.2.35)
+
 
 def object_name(index: int, subindex: int) -> str:
     """Name an object: ``0x6077``, or ``0x1018:01``."""
@@ -84,9 +87,6 @@ class Direction:
 RPDO: Final = Direction("RPDO", RPDO_COMMUNICATION, RPDO_MAPPING, ("wo", "rw", "rww"), 0x200, range(241))
 TPDO: Final = Direction("TPDO", TPDO_COMMUNICATION, TPDO_MAPPING, ("ro", "rw", "rwr", "const"), 0x180, range(1, 2))
 """A command may take effect at any SYNC; feedback has to come at every one."""
-
-EVERY_SYNC: Final = 1
-EVENT_DRIVEN: Final = (254, 255)  # transmission types (CiA 301, 7.5.2.35)
 
 
 @dataclass(frozen=True, slots=True)

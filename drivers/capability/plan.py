@@ -13,6 +13,10 @@ from drivers.datasheet.objects import EdsEntry
 from drivers.errors import ConfigMismatch
 from drivers.scaling import IntegerType
 
+COMMAND = (Function.CONTROLWORD, Function.TORQUE_TARGET, Function.TORQUE_OFFSET)
+FEEDBACK = (Function.STATUSWORD, Function.TORQUE_ACTUAL, Function.SPEED_ACTUAL)
+"""What the PDOs of each direction carry, in the order in which this program maps it."""
+
 
 @dataclass(frozen=True, slots=True)
 class Shortcoming:
@@ -88,11 +92,6 @@ def _access(sheet: DataSheet, part: Part, entry: EdsEntry) -> Iterator[Shortcomi
     elif not part.written and not entry.readable:
         found = "no access type" if entry.access is None else f"access type {entry.access}"
         yield Shortcoming(part, entry, "AccessType", "one that can be read", found)
-
-
-COMMAND = (Function.CONTROLWORD, Function.TORQUE_TARGET, Function.TORQUE_OFFSET)
-FEEDBACK = (Function.STATUSWORD, Function.TORQUE_ACTUAL, Function.SPEED_ACTUAL)
-"""What the PDOs of each direction carry, in the order in which this program maps it."""
 
 
 @dataclass(frozen=True, slots=True)

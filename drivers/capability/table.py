@@ -15,6 +15,16 @@ from typing import Final
 
 from drivers.scaling import IntegerType
 
+_I8, _I16, _I32 = IntegerType.INTEGER8, IntegerType.INTEGER16, IntegerType.INTEGER32
+_U8, _U16, _U32 = IntegerType.UNSIGNED8, IntegerType.UNSIGNED16, IntegerType.UNSIGNED32
+
+SYNC_COB_ID: Final = 0x080  # identifier of the host's SYNC
+EVENT_TIMER: Final = 5  # sub-index of a PDO's communication parameter; of an RPDO it is the deadline [ms]
+
+NEVER_WITHOUT: Final = "the drive can't be used"
+
+_OWN_REACTION: Final = "the drive does what its maker has set"
+
 
 class Function(Enum):
     """What this program wants of a drive; the value is its name for people."""
@@ -90,12 +100,7 @@ class Capability:
     key: str = ""  # key of the rig file that says it or by which it is accepted
 
 
-_I8, _I16, _I32 = IntegerType.INTEGER8, IntegerType.INTEGER16, IntegerType.INTEGER32
-_U8, _U16, _U32 = IntegerType.UNSIGNED8, IntegerType.UNSIGNED16, IntegerType.UNSIGNED32
 _F, _W = Function, Without
-
-SYNC_COB_ID: Final = 0x080  # identifier of the host's SYNC
-EVENT_TIMER: Final = 5  # sub-index of a PDO's communication parameter; of an RPDO it is the deadline [ms]
 
 
 def _one(
@@ -104,10 +109,6 @@ def _one(
     """Write a single way of a single part."""
     return ((Part(index, subindex, kinds, written, read_back),),)
 
-
-NEVER_WITHOUT: Final = "the drive can't be used"
-
-_OWN_REACTION: Final = "the drive does what its maker has set"
 
 _ROWS: Final = (
     Capability(_F.CONTROLWORD, _one(0x6040, _U16, written=True), _W.REFUSED, NEVER_WITHOUT),

@@ -28,6 +28,12 @@ from drivers.scaling import IntegerType
 NODE_IDS: Final = range(1, 128)
 BIT_RATES_KBIT_S: Final = range(10, 1001)
 
+DUMMY_TYPES = range(1, 8)  # data types that a PDO may carry as a filler, where ``[DummyUsage]`` allows it
+
+_INTEGER_CODES = {kind.value for kind in IntegerType}
+
+_MANDATORY_SECTION = "DeviceInfo"  # without it, it is another kind of file
+
 
 @dataclass(frozen=True, slots=True)
 class Commissioning:
@@ -83,9 +89,6 @@ def read_commissioning(text: EdsText) -> Commissioning | None:
     return Commissioning(
         node_id=node_id if node_id in NODE_IDS else None, bit_rate_kbit_s=rate if rate in BIT_RATES_KBIT_S else None
     )
-
-
-DUMMY_TYPES = range(1, 8)  # data types that a PDO may carry as a filler, where ``[DummyUsage]`` allows it
 
 
 def build_dictionary(text: EdsText, objects: Mapping[int, EdsObject], node_id: int) -> ObjectDictionary:
@@ -162,11 +165,6 @@ def _dummy(code: int) -> ODVariable:
     variable.data_type = code
     variable.access_type = "const"
     return variable
-
-
-_INTEGER_CODES = {kind.value for kind in IntegerType}
-
-_MANDATORY_SECTION = "DeviceInfo"  # without it, it is another kind of file
 
 
 class EdsFile:

@@ -16,6 +16,23 @@ from pathlib import Path
 from drivers.errors import ConfigMismatch
 from drivers.foreign_file import read_regular
 
+ADVICE = "Take the file from the drive's maker."
+NO_EDS = f"Expected an EDS as CiA 306 has it. {ADVICE}"
+MAX_BYTES = 16 << 20  # a drive's EDS has some 100 kB; a wrong file shall not fill the memory
+MAX_LINE_LENGTH = 255  # characters in a line of an EDS (CiA 306)
+
+_DCF_SUFFIX = ".dcf"
+COMMISSIONING = ("DeviceComissioning", "DeviceCommissioning")
+"""Section of a DCF; CiA 306 spells it the first way."""
+
+_UTF_16_MARKS = (b"\xff\xfe", b"\xfe\xff")
+_UTF_8_MARK = b"\xef\xbb\xbf"
+_LINE_ENDS = re.compile(r"\r\n|\n|\r")
+_MANUFACTURER = re.compile(r"[2-5][0-9a-f]{3}(sub[0-9a-f]+)?$", re.IGNORECASE)
+"""Sections of the maker's own objects, which this program does not use."""
+
+_INLINE_COMMENT = re.compile(r"\s;")
+
 
 class Severity(Enum):
     """How bad a remark is."""
@@ -43,24 +60,6 @@ class EdsFinding:
 
     def __str__(self) -> str:
         return f"{self.place}: expected {self.expected}, found {self.found}. {self.advice}"
-
-
-ADVICE = "Take the file from the drive's maker."
-NO_EDS = f"Expected an EDS as CiA 306 has it. {ADVICE}"
-MAX_BYTES = 16 << 20  # a drive's EDS has some 100 kB; a wrong file shall not fill the memory
-MAX_LINE_LENGTH = 255  # characters in a line of an EDS (CiA 306)
-
-_DCF_SUFFIX = ".dcf"
-COMMISSIONING = ("DeviceComissioning", "DeviceCommissioning")
-"""Section of a DCF; CiA 306 spells it the first way."""
-
-_UTF_16_MARKS = (b"\xff\xfe", b"\xfe\xff")
-_UTF_8_MARK = b"\xef\xbb\xbf"
-_LINE_ENDS = re.compile(r"\r\n|\n|\r")
-_MANUFACTURER = re.compile(r"[2-5][0-9a-f]{3}(sub[0-9a-f]+)?$", re.IGNORECASE)
-"""Sections of the maker's own objects, which this program does not use."""
-
-_INLINE_COMMENT = re.compile(r"\s;")
 
 
 class EdsUnreadable(ConfigMismatch):

@@ -16,6 +16,10 @@ _OCTAL = re.compile(r"[+-]?0[0-9]+")
 _LONGEST = 100  # characters of a number: those of 64 bit have at most 66
 _NODE_ID = "$NODEID"
 
+OCTET_STRING = 0x0A
+DOMAIN = 0x0F
+UNSIGNED8 = 0x05
+
 
 def read_number(text: str) -> int | None:
     """Read an integer as CiA 306 writes it (decimal, 0x hexadecimal, leading 0 octal); None for what is none."""
@@ -126,7 +130,3 @@ DATA_TYPES: dict[int, DataType] = {
     )
 }
 """Simple data types, CiA 301 table 44; 0x0E and 0x17 are reserved."""
-
-OCTET_STRING = 0x0A
-DOMAIN = 0x0F
-UNSIGNED8 = 0x05

@@ -36,6 +36,12 @@ DRIVE_PROFILE = 402
 ALWAYS_USED = frozenset(index for index, _ in GUARDING)
 """What counts of every drive, besides what the plan uses."""
 
+SUPPORTED_MODES = 0x6502
+
+_TORQUE_MODES = TorqueMode.PROFILE_TORQUE.support_bit | TorqueMode.CYCLIC_SYNCHRONOUS_TORQUE.support_bit
+
+USUAL_HEARTBEAT_MS = 100
+
 
 def check_needs(context: EdsContext) -> Iterator[EdsFinding]:
     """Check that the drive an EDS describes can be driven."""
@@ -149,11 +155,6 @@ def _emcy(context: EdsContext) -> Iterator[EdsFinding]:
         yield at_key(Severity.WARNING, emcy.section, emcy.value_key, expected, "", advice)
 
 
-SUPPORTED_MODES = 0x6502
-
-_TORQUE_MODES = TorqueMode.PROFILE_TORQUE.support_bit | TorqueMode.CYCLIC_SYNCHRONOUS_TORQUE.support_bit
-
-
 def check_modes(context: EdsContext) -> Iterator[EdsFinding]:
     """Check that the drive has a torque mode, as far as the file says, and takes a SYNC without a counter."""
     yield from _torque_mode(context)
@@ -179,9 +180,6 @@ def _sync_counter(context: EdsContext) -> Iterator[EdsFinding]:
     expected = "0: a SYNC without a counter, as the host sends it"
     advice = "The drive would take no SYNC." if fixed else "It is set to 0 when the drive is configured."
     yield at_key(Severity.ERROR if fixed else Severity.WARNING, entry.section, entry.value_key, expected, "", advice)
-
-
-USUAL_HEARTBEAT_MS = 100
 
 
 @dataclass(frozen=True, slots=True)

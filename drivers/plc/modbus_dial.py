@@ -25,6 +25,11 @@ from pymodbus.pdu import DecodePDU
 from drivers.errors import BusDown, DriverError
 from drivers.plc.modbus_security import ClientSecurity, client_context, tls_failure
 
+NO_RECONNECT: Final = 0  # pymodbus would reconnect behind the caller's back: a lost PLC must be seen
+
+HANDSHAKE_S: Final = 5.0
+"""Least time for connecting with TLS [s]: a small PLC computes for a second or two on a handshake, and once only."""
+
 
 @dataclass(frozen=True, slots=True)
 class AnswerIds:
@@ -54,12 +59,6 @@ class MbapFramer(FramerSocket):
         if length:
             self.got.append(AnswerIds(transaction, unit))
         return length, unit, transaction, pdu
-
-
-NO_RECONNECT: Final = 0  # pymodbus would reconnect behind the caller's back: a lost PLC must be seen
-
-HANDSHAKE_S: Final = 5.0
-"""Least time for connecting with TLS [s]: a small PLC computes for a second or two on a handshake, and once only."""
 
 
 class Dial:

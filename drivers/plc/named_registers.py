@@ -32,6 +32,10 @@ PLAUSIBLE: Final[Mapping[str, tuple[float, float]]] = MappingProxyType(
 
 LEAST_TORQUE_NM: Final = 1e-6  # a torque below this and not zero is no torque but a misread number [Nm]
 
+COUNTS: Final = 65536  # the count starts over here, so that it fits 16 bits
+
+NS_PER_S: Final = 1_000_000_000
+
 
 @dataclass(frozen=True, slots=True)
 class Reading:
@@ -164,11 +168,6 @@ class NamedRegisters:
             offset = register.address - block.address
             readings[name] = reading(name, register, words[offset : offset + register.size])
         return readings
-
-
-COUNTS: Final = 65536  # the count starts over here, so that it fits 16 bits
-
-NS_PER_S: Final = 1_000_000_000
 
 
 class HostWatchdog:

@@ -50,6 +50,38 @@ MOST_REGISTERS: Final = 125
 
 MOST_BITS: Final = 2000  # coils or discrete inputs that one request may read; ibid., 6.1 and 6.2
 
+WHOLE: Final = frozenset({ValueType.UINT16, ValueType.UINT32})
+NUMBER: Final = frozenset(ValueType) - {ValueType.BOOL, ValueType.ENUM}
+BOOL: Final = frozenset({ValueType.BOOL})
+ENUM: Final = frozenset({ValueType.ENUM})
+
+USED: Final[Mapping[str, tuple[frozenset[ValueType], str, Access]]] = {
+    "permissive": (BOOL, "1", Access.READ),
+    "drive_mode": (ENUM, "1", Access.READ),
+    "clutch": (ENUM, "1", Access.READ),
+    "speed_limit": (NUMBER, "rad/s", Access.READ),
+    "torque_limit": (NUMBER, "Nm", Access.READ),
+    "plc_count": (WHOLE, "1", Access.READ),
+    "host_count_seen": (WHOLE, "1", Access.READ),
+    "prbs_torque": (NUMBER, "Nm", Access.READ),
+    "host_count": (WHOLE, "1", Access.READ_WRITE),
+    "drive_mode_request": (ENUM, "1", Access.READ_WRITE),
+    "prbs_enable": (BOOL, "1", Access.READ_WRITE),
+    "prbs_amplitude": (NUMBER, "Nm", Access.READ_WRITE),
+    "prbs_divider": (WHOLE, "1", Access.READ_WRITE),
+    "prbs_seed": (WHOLE, "1", Access.READ_WRITE),
+    "prbs_source": (ENUM, "1", Access.READ_WRITE),
+}
+"""What this driver needs of a map: the name, the types it can make sense of, the unit it works in, the least access."""
+
+ENUMS: Final[Mapping[str, type[Enum]]] = {
+    "drive_mode": DriveMode,
+    "drive_mode_request": DriveMode,
+    "clutch": ClutchState,
+    "prbs_source": PrbsSource,
+}
+"""Enum registers, and the enumeration that holds every name the map may give them."""
+
 
 class RegisterMapError(ConfigMismatch):
     """A map file is wrong: whoever wrote it is at fault."""
@@ -166,39 +198,6 @@ def _value_faults(key: str, register: Register, value: int) -> Iterator[str]:
         register.encode(value)
     except ConfigMismatch:
         yield f"{key} | expected a value that {register.type.value} holds | got {value}"
-
-
-WHOLE: Final = frozenset({ValueType.UINT16, ValueType.UINT32})
-NUMBER: Final = frozenset(ValueType) - {ValueType.BOOL, ValueType.ENUM}
-BOOL: Final = frozenset({ValueType.BOOL})
-ENUM: Final = frozenset({ValueType.ENUM})
-
-USED: Final[Mapping[str, tuple[frozenset[ValueType], str, Access]]] = {
-    "permissive": (BOOL, "1", Access.READ),
-    "drive_mode": (ENUM, "1", Access.READ),
-    "clutch": (ENUM, "1", Access.READ),
-    "speed_limit": (NUMBER, "rad/s", Access.READ),
-    "torque_limit": (NUMBER, "Nm", Access.READ),
-    "plc_count": (WHOLE, "1", Access.READ),
-    "host_count_seen": (WHOLE, "1", Access.READ),
-    "prbs_torque": (NUMBER, "Nm", Access.READ),
-    "host_count": (WHOLE, "1", Access.READ_WRITE),
-    "drive_mode_request": (ENUM, "1", Access.READ_WRITE),
-    "prbs_enable": (BOOL, "1", Access.READ_WRITE),
-    "prbs_amplitude": (NUMBER, "Nm", Access.READ_WRITE),
-    "prbs_divider": (WHOLE, "1", Access.READ_WRITE),
-    "prbs_seed": (WHOLE, "1", Access.READ_WRITE),
-    "prbs_source": (ENUM, "1", Access.READ_WRITE),
-}
-"""What this driver needs of a map: the name, the types it can make sense of, the unit it works in, the least access."""
-
-ENUMS: Final[Mapping[str, type[Enum]]] = {
-    "drive_mode": DriveMode,
-    "drive_mode_request": DriveMode,
-    "clutch": ClutchState,
-    "prbs_source": PrbsSource,
-}
-"""Enum registers, and the enumeration that holds every name the map may give them."""
 
 
 def require_usable(register_map: RegisterMap) -> None:

@@ -34,6 +34,8 @@ Z95 = 1.959963984540054  # 97.5 % point of the normal distribution
 COHERENT_S = 1.0
 """How long an error that is no noise keeps its value: the pace at which a test changes what it excites."""
 
+PROFILE_POINTS_S = 1.0  # a profile is reported every second
+
 
 def covariance(result: FitResult) -> FloatArray:
     """Return the covariance of the scaled unknowns, shape (U, U), by the sandwich formula.
@@ -169,9 +171,6 @@ def _rescaled(result: FitResult, x: FloatArray, dimension: str) -> float:
         if values:
             factor *= entry.rescaled(values).get(dimension, 1.0)
     return factor
-
-
-PROFILE_POINTS_S = 1.0  # a profile is reported every second
 
 
 def moments_in(name: str, result: FitResult) -> dict[str, tuple[Interval, ...]]:

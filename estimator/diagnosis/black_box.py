@@ -38,6 +38,37 @@ from estimator.physics.simulate import simulate, simulate_each
 from estimator.physics.unknowns import Shared
 from estimator.signals.record import FloatArray, OutputKind, Record, once
 
+FINER = 4  # steps to a sample where a torque is late by parts of one, or the output filtered within one
+FEWEST_KEPT, MOST_KEPT = 4, 512  # outputs that are kept, and of each recording that changes are added to
+KEPT_BYTES = 64 << 20  # memory that those of long recordings may take
+
+_GRID = Grid(Structure.ONE_MASS, 1, 0.0)
+
+_EFFECT_AT = {
+    slot(name, parameter.name): name for name, entry in BUILT_IN.items() for parameter in entry.parameters
+} | {slot("", name): "" for name in (*NOMINAL, LOAD)}
+_STATE = tuple(each.name for each in fields(InitialCondition))
+_WITHIN = [
+    slot(name, key)
+    for name, key in (
+        ("transport_delay", "delay_s"),
+        ("actuator_lag", "time_constant_s"),
+        ("clock_drift", "rate"),
+        ("speed_filter", "time_constant_s"),
+    )
+]
+"""What acts within a sample."""
+
+SEARCH_FACTOR = 30.0  # factor, either way, within which values are looked for
+SHARES = (0.05, 0.3)  # share of the motor in the whole inertia, where a fit starts
+FREQUENCIES = 5  # natural frequencies at which one starts, up to `HIGHEST_HZ` or a quarter of the sampling rate
+
+LOWEST_HZ, HIGHEST_HZ = 1.0, 60.0
+DAMPING = 0.05
+
+BETTER = 0.7  # share of a rigid line's error that one with a shaft leaves at most to be taken
+ITERATIONS = 12  # of the fit from each start; the best goes to its end
+
 
 @dataclass(frozen=True, slots=True)
 class PlantSetting:
@@ -54,12 +85,6 @@ class PlantSetting:
 Simulated = Callable[[Record, PlantSetting], FloatArray]
 """Recording, and what it is simulated with, to the true output (N,)."""
 
-FINER = 4  # steps to a sample where a torque is late by parts of one, or the output filtered within one
-FEWEST_KEPT, MOST_KEPT = 4, 512  # outputs that are kept, and of each recording that changes are added to
-KEPT_BYTES = 64 << 20  # memory that those of long recordings may take
-
-_GRID = Grid(Structure.ONE_MASS, 1, 0.0)
-
 
 def acts_around(entry: Effect, plant: object) -> bool:
     """Tell whether an effect acts at the inputs, shafts or outputs of a plant, whatever is inside it."""
@@ -74,20 +99,6 @@ def _slots(elements: Collection[Element]) -> list[int]:
 
 
 _INPUT, _SENSOR = _slots((Element.TORQUE_PATH, Element.ACQUISITION)), _slots((Element.SPEED_SENSOR,))
-_EFFECT_AT = {
-    slot(name, parameter.name): name for name, entry in BUILT_IN.items() for parameter in entry.parameters
-} | {slot("", name): "" for name in (*NOMINAL, LOAD)}
-_STATE = tuple(each.name for each in fields(InitialCondition))
-_WITHIN = [
-    slot(name, key)
-    for name, key in (
-        ("transport_delay", "delay_s"),
-        ("actuator_lag", "time_constant_s"),
-        ("clock_drift", "rate"),
-        ("speed_filter", "time_constant_s"),
-    )
-]
-"""What acts within a sample."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -225,17 +236,6 @@ def _finer(record: Record) -> Record:
         load_nm=None,
         channels=(),
     )
-
-
-SEARCH_FACTOR = 30.0  # factor, either way, within which values are looked for
-SHARES = (0.05, 0.3)  # share of the motor in the whole inertia, where a fit starts
-FREQUENCIES = 5  # natural frequencies at which one starts, up to `HIGHEST_HZ` or a quarter of the sampling rate
-
-LOWEST_HZ, HIGHEST_HZ = 1.0, 60.0
-DAMPING = 0.05
-
-BETTER = 0.7  # share of a rigid line's error that one with a shaft leaves at most to be taken
-ITERATIONS = 12  # of the fit from each start; the best goes to its end
 
 
 def equivalent_line(records: Sequence[Record]) -> DrivelineModel:

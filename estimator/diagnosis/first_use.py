@@ -44,6 +44,12 @@ _EACH = (_ROWS, _ROWS, _INDICES, _INDICES, _ROW, _ROW, _ROWS, _ROWS, _INDICES, b
 _CHAIN = _fields((_STACK, _ROWS, _ROWS, _ROW, float64, float64), Chain)
 _FILTERED = _fields((_ROWS, _STACK, _ROWS, _ROW, _ROW), Filtered)
 
+SIDE_BY_SIDE: tuple[tuple[tuple[Any, ...], tuple[Any, ...]], ...] = (
+    ((integrate,), (integrate_side_by_side, least)),
+    ((integrate_each,), (linearise, run_filter, run_smoother)),
+)
+"""What one process compiles while the other does, callers last."""
+
 
 def signatures(masses: int) -> dict[Any, tuple[Any, ...]]:
     """Return the types that a diagnosis calls the largest kernels with."""
@@ -62,13 +68,6 @@ def signatures(masses: int) -> dict[Any, tuple[Any, ...]]:
         run_filter: (_CHAIN, _ROW, _ROW, float64, _ROWS, _FILTERED),
         run_smoother: (_CHAIN, _FILTERED, _ROWS, _ROW),
     }
-
-
-SIDE_BY_SIDE: tuple[tuple[tuple[Any, ...], tuple[Any, ...]], ...] = (
-    ((integrate,), (integrate_side_by_side, least)),
-    ((integrate_each,), (linearise, run_filter, run_smoother)),
-)
-"""What one process compiles while the other does, callers last."""
 
 
 def is_first_use(masses: int) -> bool:

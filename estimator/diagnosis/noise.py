@@ -22,6 +22,16 @@ MOSTLY_GOOD = 0.75  # share of good samples that a predictor's past must hold; t
 FEWEST_PREDICTED = 2 * (2 * PREDICTOR_ORDER + 1)
 """Samples that a predictor is fitted to at least: two per coefficient."""
 
+VERY_STRONG = 10.0  # a difference in BIC above this is very strong evidence (Kass and Raftery, JASA 90, 1995)
+
+SMALLEST_P = 1e-300  # stands for any smaller probability, so that logarithms stay finite
+
+LONGEST_S = 60.0
+"""Length of a stretch at most: hundreds of periods of a driveline's first mode, and a dozen speed changes."""
+
+MOST_SAMPLES = 30_000
+"""Samples that are fitted, of all recordings together: five minutes at 10 ms. Every array of a fit is in proportion."""
+
 
 def noise_floor(records: Sequence[Record]) -> float:
     """Estimate the noise of the reading, from the data alone."""
@@ -70,11 +80,6 @@ def unpredictable(errors: Sequence[FloatArray]) -> float:
     return float(np.sqrt(left @ left / max(left.size - n, 1)))
 
 
-VERY_STRONG = 10.0  # a difference in BIC above this is very strong evidence (Kass and Raftery, JASA 90, 1995)
-
-SMALLEST_P = 1e-300  # stands for any smaller probability, so that logarithms stay finite
-
-
 @dataclass(frozen=True, slots=True)
 class Gain:
     """What a larger model gains over a smaller one."""
@@ -102,13 +107,6 @@ def gain_from_squares(before: float, after: float, added: int, unknowns: int, er
     f_value = (ratio - 1.0) * (n - unknowns) / added
     p_value = max(float(stats.f.sf(f_value, added, n - unknowns)), SMALLEST_P)
     return Gain(n * math.log(ratio) - added * math.log(n), p_value, n)
-
-
-LONGEST_S = 60.0
-"""Length of a stretch at most: hundreds of periods of a driveline's first mode, and a dozen speed changes."""
-
-MOST_SAMPLES = 30_000
-"""Samples that are fitted, of all recordings together: five minutes at 10 ms. Every array of a fit is in proportion."""
 
 
 def stretches(record: Record, parts: Sequence[slice], share: float) -> list[slice]:

@@ -15,6 +15,14 @@ from estimator.signals.record import BoolArray, FloatArray
 
 Interval = tuple[float, float]
 
+_AT: dict[str, Element] = {
+    "J_M": Element.MOTOR,
+    "b_M": Element.MOTOR,
+    "J_L": Element.LOAD,
+    "b_L": Element.LOAD,
+}
+"""Where a nominal parameter is; the others are a shaft's, or of what is between two."""
+
 
 class Verdict(Enum):
     """The honest answers."""
@@ -351,15 +359,6 @@ class Discrepancy:
     spectrum: ErrorSpectrum
     responses: Mapping[str, Response]
     pictures: tuple[LawPicture, ...]
-
-
-_AT: dict[str, Element] = {
-    "J_M": Element.MOTOR,
-    "b_M": Element.MOTOR,
-    "J_L": Element.LOAD,
-    "b_L": Element.LOAD,
-}
-"""Where a nominal parameter is; the others are a shaft's, or of what is between two."""
 
 
 @dataclass(frozen=True, slots=True)

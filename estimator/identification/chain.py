@@ -28,6 +28,8 @@ from estimator.signals.record import BoolArray, FloatArray, IntArray, Record
 NOT_EXCITED = "at the resonance the torque moves the output less than the noise does; switch the PRBS on or raise it"
 """What is wrong where the torque says nothing of the resonance, and what to do."""
 
+VERSION = 3  # of a saved state; goes up when a part changes its meaning
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OnlineEstimate:
@@ -93,8 +95,6 @@ class OnlineTrajectory:
     def __iter__(self) -> Iterator[OnlineEstimate]:
         return (self[k] for k in range(len(self)))
 
-
-VERSION = 3  # of a saved state; goes up when a part changes its meaning
 
 EstimatorFactory = Callable[[Settings, FloatArray | None], RecursiveEstimator]
 """Makes a recursive estimator from the settings and L (None: there is no batch model yet)."""

@@ -65,6 +65,9 @@ EXCITED = 0.05
 
 Z95 = 1.959963984540054
 
+SMOOTHED = 5
+"""Neighbouring lines whose noise is averaged: it is smooth in frequency."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Distortion:
@@ -273,10 +276,6 @@ def _period(u: FloatArray) -> int | None:
     period = again[0] + int(np.argmax(correlation[again[0] : again[0] + below[0]]))
     period *= -(-SHORTEST_PERIOD // period)  # of a shorter one, several make one
     return int(period) if period * FEWEST_PERIODS <= n else None
-
-
-SMOOTHED = 5
-"""Neighbouring lines whose noise is averaged: it is smooth in frequency."""
 
 
 def _periodic(u: FloatArray, y: FloatArray, period: int, period_s: float, block: int, bridged: int) -> SpectralEstimate:

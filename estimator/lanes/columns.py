@@ -23,6 +23,8 @@ from estimator.lanes.types import (
 
 Borrowed = TypeVar("Borrowed")
 
+BYTES = 8
+
 
 def borrowed(array: Borrowed) -> Borrowed:
     """Return an array without its owner, who keeps it until compiled code is done with it; of Python, the array."""
@@ -44,9 +46,6 @@ def _borrowed(array: Any) -> Any:
     if isinstance(array, types.Array):
         return lambda array: _without_owner(array)
     return None
-
-
-BYTES = 8
 
 
 @intrinsic

@@ -31,6 +31,26 @@ from estimator.lanes.types import (
     types,
 )
 
+FUSED = ("contract",)  # a product and the sum it goes into may be one instruction, rounded once
+
+NUMBER = (LanesType, types.Number)
+ANSWER = (MaskType, types.Boolean)
+
+LARGEST = 708.0  # beyond this the exponential leaves the range of a number; it stays at its end
+
+LOG2_E = 1.4426950408889634
+LN_2, LN_2_HIGH, LN_2_LOW = 0.6931471805599453, 6.93147180369123816490e-01, 1.90821492927058770002e-10
+WHOLE = 6755399441055744.0  # added to a number, ``1.5 * 2**52`` leaves its whole part in the last bits
+
+TWO_BY_PI = 0.6366197723675814
+QUARTER_HIGH, QUARTER_MIDDLE = 1.57079632673412561417e00, 6.07710050630396597660e-11
+QUARTER_LOW = 2.02226624879595063154e-21
+"""Parts of a quarter turn; times a whole number up to a million the first two are exact."""
+
+_BITS_OF_WHOLE = 0x4338000000000000
+_BITS_OF_HALF_OCTAVE = 0x3FE6A09E667F3BCD
+_MANTISSA_BITS, _EXPONENT_OF_1 = 52, 1023
+
 
 def choose(condition: bool, value: float, other: float) -> float:
     """Return ``value`` where a condition holds, ``other`` where not."""
@@ -119,11 +139,6 @@ def _like(value: Any, other: Any) -> Any:
 Make = Callable[..., Any]
 """From an instruction builder and the arguments' values to the result's."""
 
-FUSED = ("contract",)  # a product and the sum it goes into may be one instruction, rounded once
-
-NUMBER = (LanesType, types.Number)
-ANSWER = (MaskType, types.Boolean)
-
 
 def define(function: Any, kinds: tuple[type, ...], wanted: Any, result: Any, make: Make) -> None:
     """Define a function of one or two arguments, of which one at least is ``wanted`` and all are of some ``kinds``."""
@@ -191,22 +206,6 @@ for _function, _sign in (
 define(operator.ne, NUMBER, lanes, mask, lambda builder, x, y: builder.fcmp_unordered("!=", x, y))
 define(operator.and_, ANSWER, mask, mask, lambda builder, x, y: builder.and_(x, y))
 define(operator.or_, ANSWER, mask, mask, lambda builder, x, y: builder.or_(x, y))
-
-
-LARGEST = 708.0  # beyond this the exponential leaves the range of a number; it stays at its end
-
-LOG2_E = 1.4426950408889634
-LN_2, LN_2_HIGH, LN_2_LOW = 0.6931471805599453, 6.93147180369123816490e-01, 1.90821492927058770002e-10
-WHOLE = 6755399441055744.0  # added to a number, ``1.5 * 2**52`` leaves its whole part in the last bits
-
-TWO_BY_PI = 0.6366197723675814
-QUARTER_HIGH, QUARTER_MIDDLE = 1.57079632673412561417e00, 6.07710050630396597660e-11
-QUARTER_LOW = 2.02226624879595063154e-21
-"""Parts of a quarter turn; times a whole number up to a million the first two are exact."""
-
-_BITS_OF_WHOLE = 0x4338000000000000
-_BITS_OF_HALF_OCTAVE = 0x3FE6A09E667F3BCD
-_MANTISSA_BITS, _EXPONENT_OF_1 = 52, 1023
 
 
 def _bits(value: int) -> Any:

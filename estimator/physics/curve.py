@@ -26,6 +26,8 @@ KNOTS, VALUES = 1, 1 + MOST_KNOTS
 
 INFINITE = math.inf
 
+WHOLE = 1.5 * 2.0**52  # a number that is added and taken away again rounds to whole ones, in lanes, too
+
 
 @compiled
 def secant(p: FloatArray, at: int, i: int) -> float:
@@ -83,9 +85,6 @@ def span(p: FloatArray, at: int) -> tuple[float, float]:
     """Return the first and the last knot of a curve."""
     knots = p[at + KNOTS : at + KNOTS + round(float(p[at]))]
     return float(knots[0]), float(knots[-1])
-
-
-WHOLE = 1.5 * 2.0**52  # a number that is added and taken away again rounds to whole ones, in lanes, too
 
 
 @compiled

@@ -21,6 +21,25 @@ import numpy as np
 
 from estimator.signals.record import FloatArray
 
+STRICTLY_POSITIVE = frozenset({"J_M", "J_2", "J_L", "k", "k_2"})
+"""Parameters that can't be zero; the others can't be negative."""
+
+_DIMENSIONS = {
+    "J_M": "inertia",
+    "J_2": "inertia",
+    "J_L": "inertia",
+    "k": "stiffness",
+    "c": "damping",
+    "k_2": "stiffness",
+    "c_2": "damping",
+    "b_M": "damping",
+    "b_L": "damping",
+}
+
+UNKNOWN_WITHIN = 10.0
+"""Factor beyond its interval's ends within which an unknown parameter is fitted: the integration, whose steps suit the
+values as they are given, still follows a spring ten times as stiff (0.6 rad of its mode in a step)."""
+
 
 class Structure(Enum):
     """How many inertias the driveline has, a joint none; the value is the name in the model file."""
@@ -42,9 +61,6 @@ _PARAMETER_NAMES = {
     Structure.THREE_MASS: ("J_M", "J_2", "J_L", "k", "c", "k_2", "c_2", "b_M", "b_L"),
     Structure.JOINT: ("k", "c"),
 }
-
-STRICTLY_POSITIVE = frozenset({"J_M", "J_2", "J_L", "k", "k_2"})
-"""Parameters that can't be zero; the others can't be negative."""
 
 
 class Motion(Enum):
@@ -81,18 +97,6 @@ UNITS = {
     },
 }
 
-_DIMENSIONS = {
-    "J_M": "inertia",
-    "J_2": "inertia",
-    "J_L": "inertia",
-    "k": "stiffness",
-    "c": "damping",
-    "k_2": "stiffness",
-    "c_2": "damping",
-    "b_M": "damping",
-    "b_L": "damping",
-}
-
 
 def unit(dimension: str, motion: Motion) -> str:
     """Return the unit of a quantity; a dimension that is not mechanical, such as ``"s"``, is its own unit."""
@@ -114,11 +118,6 @@ class Load(Enum):
 
     OWN = "own"
     SHARED = "shared"
-
-
-UNKNOWN_WITHIN = 10.0
-"""Factor beyond its interval's ends within which an unknown parameter is fitted: the integration, whose steps suit the
-values as they are given, still follows a spring ten times as stiff (0.6 rad of its mode in a step)."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,6 +16,14 @@ from typing import Any
 from estimator.physics.driveline import UNITS, Driveline, Motion, Structure, unit
 from estimator.signals.record import OutputKind, Record
 
+EVERY_LINE = frozenset({Structure.ONE_MASS, Structure.TWO_MASS, Structure.THREE_MASS})
+"""Structures with at least one inertia: every driveline."""
+
+EVERY_STRUCTURE = frozenset(Structure)
+
+WITH_SHAFT = frozenset({Structure.TWO_MASS, Structure.THREE_MASS})  # structures with a shaft between inertias
+WITH_SPRING = WITH_SHAFT | {Structure.JOINT}  # structures with a shaft, between inertias or alone on a bench
+
 
 class Place(Enum):
     """Where a law acts, and so what it is given before its parameters, and what it returns.
@@ -48,15 +56,6 @@ class Element(Enum):
     LOAD = "load"
     SPEED_SENSOR = "speed_sensor"
     ACQUISITION = "acquisition"
-
-
-EVERY_LINE = frozenset({Structure.ONE_MASS, Structure.TWO_MASS, Structure.THREE_MASS})
-"""Structures with at least one inertia: every driveline."""
-
-EVERY_STRUCTURE = frozenset(Structure)
-
-WITH_SHAFT = frozenset({Structure.TWO_MASS, Structure.THREE_MASS})  # structures with a shaft between inertias
-WITH_SPRING = WITH_SHAFT | {Structure.JOINT}  # structures with a shaft, between inertias or alone on a bench
 
 
 @dataclass(frozen=True, slots=True)

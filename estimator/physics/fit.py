@@ -30,6 +30,9 @@ ITERATIONS = 50  # jacobians at most; a fit that needs more is not converged
 MOMENT_NAMES = frozenset(moment.name for moment in MOMENTS)
 """Names of an event's own unknowns: the error over them has a kink at every sample's edge."""
 
+HEAT = 3  # jacobians that each of several starts gets before only the best ones continue
+CONTINUED_RATIO = 1.1  # squared error, over the best start's, up to which a start continues
+
 
 @dataclass(frozen=True, slots=True)
 class FitResult:
@@ -180,9 +183,6 @@ def fit(problem: Problem, x0: FloatArray | None = None, iterations: int = ITERAT
         solution = least(x, low, high)
     return FitResult(problem, solution.x, outputs(solution.x), solution.residual, solution.jacobian, solution.converged)
 
-
-HEAT = 3  # jacobians that each of several starts gets before only the best ones continue
-CONTINUED_RATIO = 1.1  # squared error, over the best start's, up to which a start continues
 
 Name = tuple[object, ...]
 

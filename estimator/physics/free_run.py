@@ -29,6 +29,8 @@ ANGLE = f"{PREFIX}load_angle"
 
 NOTHING_KNOWN: Own = MappingProxyType({})
 
+TURNS = 8  # places of a period from which the phase of a curve over the angle is fitted
+
 
 @dataclass(frozen=True, slots=True)
 class FreeRun:
@@ -67,9 +69,6 @@ def settle(problem: Problem, known: Own = NOTHING_KNOWN) -> FitResult:
     starts = [turned for start in starts for turned in _turned(problem, start)]
     results = [fit(problem, x0) for x0 in starts]
     return min(results, key=lambda result: result.rms)
-
-
-TURNS = 8  # places of a period from which the phase of a curve over the angle is fitted
 
 
 def _turned(problem: Problem, x: FloatArray) -> list[FloatArray]:

@@ -41,6 +41,8 @@ _TABLE = range(slots.TABLE_TORQUE, slots.TABLE_TORQUE + VALUES + MOST_KNOTS)
 _PATH = np.array([*_WRITTEN, *(place for _, places, _ in DECLARED for place in places), *_TABLE])
 """Where all stands that ``shaft_torque`` depends on."""
 
+MOST_KEPT = 2  # torques that are kept: that of a fit, and one with something moved
+
 
 def limited(torque: FloatArray, limit: float, sharpness: float) -> FloatArray:
     """Return a torque that stops at a limit [Nm], at an edge or in a knee: ``T / (1 + |T/L|^n)^(1/n)``."""
@@ -111,9 +113,6 @@ class _Kept:
 
     def __init__(self) -> None:
         self.torques: tuple[tuple[bytes, FloatArray], ...] = ()
-
-
-MOST_KEPT = 2  # torques that are kept: that of a fit, and one with something moved
 
 
 @once

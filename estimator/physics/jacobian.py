@@ -21,6 +21,14 @@ from estimator.physics.simulate import are_of_a_length, go_together, lanes_fille
 from estimator.physics.unknowns import Shared
 from estimator.signals.record import BoolArray, FloatArray, IntArray
 
+STEP = 1e-5  # finite-difference step in scaled unknowns: the simulation is smooth to about 1e-10 of its size
+
+ROUNDING = 1e-13
+"""Change of the output, over its size, that is none: simulations side by side round otherwise than one by itself, and
+an unknown that does nothing, such as the phase of an amplitude that is 0, has a column of zeros."""
+
+ROOM = 2**20  # values of simulations that are made at a time, where they are more than fill the lanes
+
 
 @compiled
 def fill_differences(
@@ -48,15 +56,6 @@ def fill_differences(
                 row += 1
         if largest <= least[i]:
             found[columns[k], firsts[i] : row] = 0.0
-
-
-STEP = 1e-5  # finite-difference step in scaled unknowns: the simulation is smooth to about 1e-10 of its size
-
-ROUNDING = 1e-13
-"""Change of the output, over its size, that is none: simulations side by side round otherwise than one by itself, and
-an unknown that does nothing, such as the phase of an amplitude that is 0, has a column of zeros."""
-
-ROOM = 2**20  # values of simulations that are made at a time, where they are more than fill the lanes
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,6 +20,17 @@ from estimator.signals.record import FloatArray, Record
 
 TWIST = 2  # place of phi in the state [w_M, w_L, phi, T_L]
 
+TORQUE = -1  # the output that a joint has next to the kernel's states: the torque it carries
+
+PART_OF_TORQUE, MOST_SECANTS = 1e-12, 100
+"""How near the balance inside an open gap is found, as part of the torques at its ends, and by how many secants."""
+
+PART_OF_YIELD = 0.5
+"""Longest step over a slider's twist, in multiples of that over which it yields and its sharpness: errors near 1e-4."""
+
+FARTHEST = 100.0
+"""Beyond so many times the twist over which it yields a slider has forgotten where it came from."""
+
 
 @dataclass(frozen=True, slots=True)
 class Uncertainty:
@@ -112,18 +123,6 @@ def _discrete(shaft: Shaft, period_s: float) -> tuple[FloatArray, FloatArray]:
     A[0, 4] = 1.0 / s.J_M
     moved = expm(A * period_s)
     return np.asarray(moved[:4, :4], dtype=np.float64), np.asarray(moved[:4, 4], dtype=np.float64)
-
-
-TORQUE = -1  # the output that a joint has next to the kernel's states: the torque it carries
-
-PART_OF_TORQUE, MOST_SECANTS = 1e-12, 100
-"""How near the balance inside an open gap is found, as part of the torques at its ends, and by how many secants."""
-
-PART_OF_YIELD = 0.5
-"""Longest step over a slider's twist, in multiples of that over which it yields and its sharpness: errors near 1e-4."""
-
-FARTHEST = 100.0
-"""Beyond so many times the twist over which it yields a slider has forgotten where it came from."""
 
 
 class Imposed(NamedTuple):

@@ -33,6 +33,28 @@ Real contacts give way a little before they slip; and a sharper edge makes the e
 parameters: on a real drive fits from different starts then ended up to 10 % apart in friction, with this width not.
 """
 
+NOMINAL = Structure.THREE_MASS.parameter_names
+"""The largest structure's parameters; a smaller structure leaves the rest at zero."""
+
+LOAD = "load"
+"""Name of the constant load torque that is not a recording's own, next to the nominal parameters; last of all, since no
+kernel reads it (``inputs``)."""
+
+OBSERVER = "observer"
+"""Name of the share of the reading's error by which each sample corrects a simulation that follows the reading: 0 of a
+free run, and of every model. A fit from afar begins with more and ends with none."""
+
+_SLOTS: dict[tuple[str, str], int] = {}
+for _name in NOMINAL:
+    _SLOTS["", _name] = len(_SLOTS)
+for _entry in KERNEL.values():
+    for _parameter in _entry.parameters:
+        _SLOTS[_entry.name, _parameter.name] = len(_SLOTS)
+_SLOTS["", LOAD] = len(_SLOTS)
+_SLOTS["", OBSERVER] = len(_SLOTS)
+
+SIZE = len(_SLOTS)  # length of the flat vector, without a user's own laws
+
 
 @dataclass(frozen=True, slots=True)
 class Grid:
@@ -101,31 +123,6 @@ def grid_for(model: DrivelineModel, records: Sequence[Record]) -> Grid:
 def _slow_scale(records: Sequence[Record]) -> float:
     """Return the top speed of the recordings that reverse, or of all where none does [rad/s]."""
     return speed_scale([record for record in records if reverses(record)] or records)
-
-
-NOMINAL = Structure.THREE_MASS.parameter_names
-"""The largest structure's parameters; a smaller structure leaves the rest at zero."""
-
-_SLOTS: dict[tuple[str, str], int] = {}
-for _name in NOMINAL:
-    _SLOTS["", _name] = len(_SLOTS)
-for _entry in KERNEL.values():
-    for _parameter in _entry.parameters:
-        _SLOTS[_entry.name, _parameter.name] = len(_SLOTS)
-
-LOAD = "load"
-"""Name of the constant load torque that is not a recording's own, next to the nominal parameters; last of all, since no
-kernel reads it (``inputs``)."""
-
-_SLOTS["", LOAD] = len(_SLOTS)
-
-OBSERVER = "observer"
-"""Name of the share of the reading's error by which each sample corrects a simulation that follows the reading: 0 of a
-free run, and of every model. A fit from afar begins with more and ends with none."""
-
-_SLOTS["", OBSERVER] = len(_SLOTS)
-
-SIZE = len(_SLOTS)  # length of the flat vector, without a user's own laws
 
 
 def slot(effect: str, parameter: str) -> int:

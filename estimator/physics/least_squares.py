@@ -24,6 +24,26 @@ from estimator.signals.record import BoolArray, FloatArray, IntArray
 TINY = 1e-12  # room that a bound always leaves: an interval of no length is none
 EXCHANGES = 10  # exchanges after which pivoting is taken to go round in circles
 
+CONVERGED = 0.1
+"""A step that promises less than this in log-likelihood ratio, ``n dS/S``, changes no conclusion: it is the last."""
+
+MOST_AS_ONE = 30.0
+"""Correlated errors of which one counts in n, at most.
+
+What a wrong law leaves keeps its sign for long. Along a valley that leads nowhere its fit would continue for a part of
+the error that chance alone moves further. But where all of the error is such, a plateau on the way looks like the end.
+"""
+
+RELIABLE = 0.75
+"""Share of a step's promise that it must keep for the derivative to be carried on to the next and not found again."""
+
+FAR = 0.2
+"""Share of the squared error that such a step takes away at most: far from the end the derivative is soon another."""
+
+FIRST_DAMPING = 1e-3
+EASE, STIFFEN = 0.2, 5.0
+LEAST_DAMPING, MOST_DAMPING = 1e-10, 1e9
+
 
 def unbounded_first(low: FloatArray, high: FloatArray, among: BoolArray) -> IntArray:
     """Return the indices of some unknowns, those without any bound first; otherwise in order."""
@@ -116,27 +136,6 @@ def _one_by_one(triangle: FloatArray, target: FloatArray, low: FloatArray, high:
 
 def _bounded(low: FloatArray, high: FloatArray) -> BoolArray:
     return np.isfinite(low) | np.isfinite(high)
-
-
-CONVERGED = 0.1
-"""A step that promises less than this in log-likelihood ratio, ``n dS/S``, changes no conclusion: it is the last."""
-
-MOST_AS_ONE = 30.0
-"""Correlated errors of which one counts in n, at most.
-
-What a wrong law leaves keeps its sign for long. Along a valley that leads nowhere its fit would continue for a part of
-the error that chance alone moves further. But where all of the error is such, a plateau on the way looks like the end.
-"""
-
-RELIABLE = 0.75
-"""Share of a step's promise that it must keep for the derivative to be carried on to the next and not found again."""
-
-FAR = 0.2
-"""Share of the squared error that such a step takes away at most: far from the end the derivative is soon another."""
-
-FIRST_DAMPING = 1e-3
-EASE, STIFFEN = 0.2, 5.0
-LEAST_DAMPING, MOST_DAMPING = 1e-10, 1e9
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,6 +12,15 @@ from estimator.signals.record import FloatArray, OutputKind, Record, once
 SPEED_WINDOW_S = 0.02
 """Positions are differentiated over this window, so that encoder steps do not pass for speed."""
 
+SHARES_DIFFER = 0.03
+"""Least spread of the first input's share of the torque between recordings that distinguishes the inputs."""
+
+MOST_TURNS = 100.0
+"""Turns of the motor beyond which what it drives is taken to turn on and on, whatever its gear ratio."""
+
+PLACES, FEWEST_PASSES = 50, 4.0
+"""Places that the range of an angle is divided into, and how often it must be passed for them to be compared."""
+
 
 @once
 def measured_speed(record: Record) -> FloatArray:
@@ -88,10 +97,6 @@ def largest_torque(records: Sequence[Record]) -> float:
     return max(_typical(column) for record in records for column in record.torque_nm.T)
 
 
-SHARES_DIFFER = 0.03
-"""Least spread of the first input's share of the torque between recordings that distinguishes the inputs."""
-
-
 def shares_differ(records: Sequence[Record]) -> bool:
     """Tell whether the first torque input's share of the sum differs between recordings, or within one."""
     shares = []
@@ -137,10 +142,6 @@ def motor_angle(record: Record) -> FloatArray:
     return np.concatenate([[0.0], np.cumsum(step)])
 
 
-MOST_TURNS = 100.0
-"""Turns of the motor beyond which what it drives is taken to turn on and on, whatever its gear ratio."""
-
-
 def range_of(records: Sequence[Record]) -> float:
     """Return the largest range of the motor's angle in a recording [rad]."""
     return max(float(np.ptp(motor_angle(record))) for record in records)
@@ -154,10 +155,6 @@ def turns_on(records: Sequence[Record]) -> bool:
 def goes_round(records: Sequence[Record], motor_turns: float) -> bool:
     """Tell whether the motor makes so many turns at least: over less nothing can be seen to recur."""
     return range_of(records) >= 2.0 * np.pi * motor_turns
-
-
-PLACES, FEWEST_PASSES = 50, 4.0
-"""Places that the range of an angle is divided into, and how often it must be passed for them to be compared."""
 
 
 def speed_by_place(record: Record) -> float:

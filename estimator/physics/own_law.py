@@ -35,6 +35,16 @@ STRUCTURES = {
 TRIAL = np.array([[0.0, 0.5, 1.0], [-2.0, 0.0, 3.0], [-1.0, 0.0, 2.0], [-0.01, 0.0, 0.02], [-5.0, 0.0, 7.0]])
 """Arguments on which a law is tried before it is used: both signs and standstill; shape (5, 3)."""
 
+SIGNATURE = types.UniTuple(types.float64, 2)(
+    types.float64, types.float64, types.float64, types.float64, types.float64, types.Array(types.float64, 1, "C")
+)
+"""Arguments of every law and the parameter vector to the torque on the motor and the one against the load."""
+
+BACK = ctypes.CFUNCTYPE(ctypes.c_double, *[ctypes.c_double] * 5, ctypes.c_void_p)
+
+FORCES = {Element.MOTOR: (-1.0, 0.0), Element.SHAFT: (-1.0, -1.0), Element.LOAD: (0.0, 1.0)}
+"""Torque on the motor and torque against the load per unit of a law's torque; other laws act on the reading."""
+
 
 @dataclass(frozen=True, slots=True)
 class OwnParameter:
@@ -232,16 +242,6 @@ class LawName(str):
         """Return the law's parameters from the parameter vector."""
         return {name: float(p[place]) for name, place in self.places.items()}
 
-
-SIGNATURE = types.UniTuple(types.float64, 2)(
-    types.float64, types.float64, types.float64, types.float64, types.float64, types.Array(types.float64, 1, "C")
-)
-"""Arguments of every law and the parameter vector to the torque on the motor and the one against the load."""
-
-BACK = ctypes.CFUNCTYPE(ctypes.c_double, *[ctypes.c_double] * 5, ctypes.c_void_p)
-
-FORCES = {Element.MOTOR: (-1.0, 0.0), Element.SHAFT: (-1.0, -1.0), Element.LOAD: (0.0, 1.0)}
-"""Torque on the motor and torque against the load per unit of a law's torque; other laws act on the reading."""
 
 Function = Callable[..., Any]
 

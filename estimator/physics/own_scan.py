@@ -23,6 +23,12 @@ from estimator.physics.problem import bounds
 from estimator.physics.unknowns import Shared
 from estimator.signals.record import FloatArray, Record
 
+MOST_CELLS = 40
+SHORTEST_CELL_S = 0.5
+"""Grid of the moments of an event: half a second, or a fortieth of a longer recording; a fit moves them from there."""
+
+SMALL = 0.1  # answers are taken at this share of an effect's size, where they are in proportion to it
+
 
 class Projector:
     """Takes out of stacked signals what the unknowns of a fit could explain, to first order."""
@@ -72,13 +78,6 @@ class Simulate(Protocol):
 
     def __call__(self, parameters: Sequence[FloatArray], alike_s: FloatArray | None = None) -> FloatArray:
         """Return the simulated samples."""
-
-
-MOST_CELLS = 40
-SHORTEST_CELL_S = 0.5
-"""Grid of the moments of an event: half a second, or a fortieth of a longer recording; a fit moves them from there."""
-
-SMALL = 0.1  # answers are taken at this share of an effect's size, where they are in proportion to it
 
 
 def cell_s(record: Record) -> float:

@@ -14,6 +14,9 @@ from contextvars import ContextVar, copy_context
 from itertools import takewhile
 from typing import TypeVar
 
+PARTS = 4  # parts into which sums and lanes are cut where the cut shows in the last bits
+THREADS_PER_CORE = 4  # threads that may exist: one works per core, the others wait for what they shared out
+
 
 class TimeIsUp(Exception):
     """The limit of time of a computation has passed."""
@@ -82,9 +85,6 @@ def check_time() -> None:
     if work is not None:
         work.check()
 
-
-PARTS = 4  # parts into which sums and lanes are cut where the cut shows in the last bits
-THREADS_PER_CORE = 4  # threads that may exist: one works per core, the others wait for what they shared out
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")

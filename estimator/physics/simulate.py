@@ -46,6 +46,21 @@ _OUTPUT_STATE = {
 
 _SENSED = (state_vector.SPEED, state_vector.LOAD_SPEED)  # what the effects of a speed sensor act on
 
+PERIODIC = np.array([slot(e.name, size) for e in catalogue.KERNEL.values() for size in e.phases.values()])
+"""Amplitudes of the laws that are periodic in the motor's angle."""
+
+TIMED = np.array([slot(e.name, e.parameters[0].name) for e in catalogue.BUILT_IN.values() if e.event or e.timed])
+"""Sizes of the laws that depend on the time since a recording began."""
+
+LENGTHS_DIFFER = 1.1
+"""Length of the longest recording over the mean of all from which they go each by itself: the others would continue to
+its end."""
+
+SIGN_WIDTH_RAD_S = 0.02  # dry friction of a simulated rig changes sign within this speed; its noise is larger
+
+FINER = 2
+"""A rig is stepped once and not thousands of times as in a fit: finer steps let friction stick closer to standstill."""
+
 
 def output_state(record: Record, structure: Structure) -> int:
     """Return the entry of the state that a recording measures; BadModel where recording and structure do not fit."""
@@ -200,10 +215,6 @@ def _samples_alike(record: Record, count: int, alike_s: FloatArray | None) -> In
     return alike
 
 
-PERIODIC = np.array([slot(e.name, size) for e in catalogue.KERNEL.values() for size in e.phases.values()])
-"""Amplitudes of the laws that are periodic in the motor's angle."""
-
-
 def _angle(record: Record, p: FloatArray) -> FloatArray:
     """Return the angle that periodic laws take their phase from; 0 where none of the parameters (K, SIZE) needs it."""
     if p[:, PERIODIC].any():
@@ -249,14 +260,6 @@ def _misread(grid: Grid, record: Record, case: Case) -> FloatArray | float:
     arguments = np.vstack([record.since_start_s, motion, record.total_torque_nm])
     return np.sum([law.law(arguments, law.values(case.p)) for law in laws], axis=0)
 
-
-TIMED = np.array([slot(e.name, e.parameters[0].name) for e in catalogue.BUILT_IN.values() if e.event or e.timed])
-"""Sizes of the laws that depend on the time since a recording began."""
-
-
-LENGTHS_DIFFER = 1.1
-"""Length of the longest recording over the mean of all from which they go each by itself: the others would continue to
-its end."""
 
 Outputs = Sequence[Record]
 """A recording's measured outputs, each as a recording of one output (``signals.outputs``)."""
@@ -336,12 +339,6 @@ def simulate_together(grid: Grid, drives: Sequence[Outputs], of: Sequence[int], 
     )
     out /= np.array([[each.unit for each in drives[i]] for i in of])[:, :, np.newaxis]
     return out
-
-
-SIGN_WIDTH_RAD_S = 0.02  # dry friction of a simulated rig changes sign within this speed; its noise is larger
-
-FINER = 2
-"""A rig is stepped once and not thousands of times as in a fit: finer steps let friction stick closer to standstill."""
 
 
 class Stepper:

@@ -25,6 +25,10 @@ EQUIVALENT_RATIO = 1.001
 
 Moments = tuple[float, float]
 
+PART_SEEN = 0.1
+"""Share of the time in which an event acts that must be in recordings where it begins or ends. A brake all through one
+recording is dry friction, which others that do not reverse hide; half a second of it in one of them is chance."""
+
 
 def from_their_moment(result: FitResult, model: DrivelineModel) -> FitResult:
     """Return a fit in which steps that end inside recordings begin there instead, where nominal values allow it."""
@@ -120,11 +124,6 @@ def _complement(
                 unknown = replace(unknown, low=first, high=last)
         own.append(unknown)
     return replace(basis, own=tuple(own)), local
-
-
-PART_SEEN = 0.1
-"""Share of the time in which an event acts that must be in recordings where it begins or ends. A brake all through one
-recording is dry friction, which others that do not reverse hide; half a second of it in one of them is chance."""
 
 
 def has_edge(name: str, result: FitResult) -> bool:

@@ -26,6 +26,9 @@ from estimator.physics.model import (
 from estimator.physics.motion import measured_speed, motor_angle, speed_scale, torque_scale
 from estimator.signals.record import FloatArray, OutputKind, Record
 
+LOAD_TORQUE, TWIST, PRELOAD = 0, 1, 2
+"""Where the constant load torque stands among a recording's own unknowns; a joint's twist at the start, and preload."""
+
 
 @dataclass(frozen=True, slots=True)
 class Shared:
@@ -136,10 +139,6 @@ def _own_unknowns(entry: Effect, record: Record) -> tuple[Shared, ...]:
         else Shared(entry.name, parameter.name, 1.0, parameter.low, parameter.high, parameter.null)
         for parameter in entry.own_parameters
     )
-
-
-LOAD_TORQUE, TWIST, PRELOAD = 0, 1, 2
-"""Where the constant load torque stands among a recording's own unknowns; a joint's twist at the start, and preload."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,6 +8,8 @@ import numpy as np
 
 from estimator.signals.record import BoolArray, FloatArray, Record, once
 
+LONGEST_LAG = 5
+
 
 def correlation_length(errors: Sequence[FloatArray]) -> float:
     """Return how many samples of an error count as one: ``1 + 2 sum rho_k^2``.
@@ -63,9 +65,6 @@ def _line_error(torque: FloatArray, gap: int) -> float:
     ends, middle = (torque[:-whole], torque[whole:]), torque[half : torque.size - whole + half]
     line = ends[0] + half / whole * (ends[1] - ends[0])
     return float(np.mean((middle - line) ** 2))
-
-
-LONGEST_LAG = 5
 
 
 def reading_lag(reading: FloatArray, reference: FloatArray) -> int:

@@ -42,6 +42,30 @@ CONTAMINATION = 4
 LARGEST = 1e30  # beyond it a value is no measurement, as for the estimators; the means can't overflow below
 UNTRUSTED = 0.5  # share of held values in a running mean from which on it is not trusted
 
+HALF_LENGTH = 8
+"""Delay of the low-pass in kept samples; its length is ``2 * 8 * M + 1`` taps.
+
+A Hamming window of L taps goes from one band to the other within 3.3 / L of the sampling frequency (Oppenheim
+and Schafer, Discrete-Time Signal Processing, window design): for M = 2 at 10 ms, L = 33 and 10 Hz. With the
+edge at the new Nyquist frequency, 25 Hz, what lies below 20 Hz passes untouched, and what folds back there,
+from above 30 Hz, is damped by 50 dB. A lower edge would empty the band below the Nyquist frequency, and the
+models' spare pole, with nothing to hold it, drifts across z = -1: seen in half of 24 simulated cruises at
+0.75, in none at 1.
+"""
+
+HIGH_PASS_HZ = 0.3
+"""Corner of the high-pass: below, a road grade and the driver move the speed more than the torque does."""
+
+MOST_FACTOR = 10_000  # a low-pass of 160,001 taps; the models' 20 ms of samples every 2 µs
+EDGE = 1.0  # edge of the low-pass (half amplitude) in parts of the new Nyquist frequency
+
+RASTER_S = 0.01
+"""Longest block [s]: its means see up to 50 Hz, the upper end of the paper's band for driveline resonances."""
+
+MOST_BLOCKS = 60_000
+"""Blocks that off-line models are fitted to, ten minutes at 10 ms: they know a resonance to a few parts in 100,000, and
+a longer recording is of a driveline that warms meanwhile. Each costs 6 kilobytes."""
+
 
 @compiled
 def _take(u: float, y: float, okay: bool, level: FloatArray) -> bool:
@@ -103,24 +127,6 @@ def decimate_block(
             produced += 1
         counters[PHASE] -= 1
     return produced
-
-
-HALF_LENGTH = 8
-"""Delay of the low-pass in kept samples; its length is ``2 * 8 * M + 1`` taps.
-
-A Hamming window of L taps goes from one band to the other within 3.3 / L of the sampling frequency (Oppenheim
-and Schafer, Discrete-Time Signal Processing, window design): for M = 2 at 10 ms, L = 33 and 10 Hz. With the
-edge at the new Nyquist frequency, 25 Hz, what lies below 20 Hz passes untouched, and what folds back there,
-from above 30 Hz, is damped by 50 dB. A lower edge would empty the band below the Nyquist frequency, and the
-models' spare pole, with nothing to hold it, drifts across z = -1: seen in half of 24 simulated cruises at
-0.75, in none at 1.
-"""
-
-HIGH_PASS_HZ = 0.3
-"""Corner of the high-pass: below, a road grade and the driver move the speed more than the torque does."""
-
-MOST_FACTOR = 10_000  # a low-pass of 160,001 taps; the models' 20 ms of samples every 2 µs
-EDGE = 1.0  # edge of the low-pass (half amplitude) in parts of the new Nyquist frequency
 
 
 @dataclass(frozen=True, slots=True)
@@ -261,15 +267,6 @@ def decimate(record: Record, factor: int, high_pass_hz: float = HIGH_PASS_HZ) ->
         kind=record.kind,
         location=record.location,
     )
-
-
-RASTER_S = 0.01
-"""Longest block [s]: its means see up to 50 Hz, the upper end of the paper's band for driveline resonances."""
-
-
-MOST_BLOCKS = 60_000
-"""Blocks that off-line models are fitted to, ten minutes at 10 ms: they know a resonance to a few parts in 100,000, and
-a longer recording is of a driveline that warms meanwhile. Each costs 6 kilobytes."""
 
 
 def first_part(record: Record) -> Record:

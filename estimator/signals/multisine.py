@@ -15,15 +15,6 @@ from numpy.typing import NDArray
 from estimator.signals.record import FloatArray, IntArray
 from estimator.signals.settings import Requirement, is_positive, require
 
-
-class Lines(Enum):
-    """Which lines of the spectrum carry power."""
-
-    FULL = "full"
-    ODD = "odd"
-    ODD_RANDOM = "odd_random"
-
-
 GROUP = 4  # odd lines in a group of which one, drawn at random, is left out to detect odd distortion
 FEWEST_LINES = 2  # with fewer it is a sine
 
@@ -31,6 +22,14 @@ ROUNDS = 400
 """Rounds of clipping at most (Van der Ouderaa, Schoukens and Renneboog, IEEE Trans. Instrum. Meas. 37, 1988)."""
 
 CLIP = 0.95  # share of the peak at which a round clips, at first; it rises to 1
+
+
+class Lines(Enum):
+    """Which lines of the spectrum carry power."""
+
+    FULL = "full"
+    ODD = "odd"
+    ODD_RANDOM = "odd_random"
 
 
 def excited_lines(

@@ -21,6 +21,12 @@ Result = TypeVar("Result")
 MOST_BYTES = 2**20
 """Size of an array that is kept, at most: what is asked for again and again is of stretches, not of whole hours."""
 
+DIGITS = 9  # digits a period is rounded to at most, so that 0.01 s is 0.01 s in every recording of a rig
+ALLOWED = 3.0  # the roundest period within so many standard errors is taken
+
+MOST_JITTER = 0.005
+"""... but not beyond this share of the period: a few wild stamps determine nothing."""
+
 
 def once(function: Callable[[Object], Result]) -> Callable[[Object], Result]:
     """Remember what a function returns for each object, as long as that lives; arrays of more than ``MOST_BYTES`` not.
@@ -245,13 +251,6 @@ def sliced(record: Record, rows: slice, name: str | None = None) -> Record:
     began_s = float(record.time_s[0]) if record.began_s is None else record.began_s
     name = record.name if name is None else name
     return replace(record, name=name, began_s=began_s, channels=channels, unused=unused, **parts)
-
-
-DIGITS = 9  # digits a period is rounded to at most, so that 0.01 s is 0.01 s in every recording of a rig
-ALLOWED = 3.0  # the roundest period within so many standard errors is taken
-
-MOST_JITTER = 0.005
-"""... but not beyond this share of the period: a few wild stamps determine nothing."""
 
 
 def uniform_period_s(time_s: FloatArray) -> float:

@@ -43,16 +43,18 @@ COMMANDS: dict[str, str] = {
     "export": "Write the on-line estimator for a PLC, or the driveline as an FMU.",
 }
 
-
-def module_of(command: str) -> str:
-    """Return the module that holds a command."""
-    return f"hil.cli.{command.replace(' ', '_')}"
-
-
 NEVER_QUIET = frozenset(
     {"bugreport", "commission", "completion", "effects", "look", "model", "monitor", "rig", "runs", "sim", "solve"}
 )
 """Commands that ask, or whose output is what they are called for: ``--quiet`` does not silence them."""
+
+NO_TERMINAL = "TTY_COMPATIBLE"
+"""By this variable, at 0, the console library takes no stream for a terminal: it draws no progress."""
+
+
+def module_of(command: str) -> str:
+    """Return the module that holds a command."""
+    return f"hil.cli.{command.replace(' ', '_')}"
 
 
 def common_options(line: Sequence[str]) -> tuple[list[str], bool, str | None]:
@@ -66,10 +68,6 @@ def common_options(line: Sequence[str]) -> tuple[list[str], bool, str | None]:
         raise UsageError(f"{error}. See: hil --help") from error
     silent = common.quiet and "--json" not in own and not NEVER_QUIET.intersection(own[:1])
     return own, silent, common.log_level
-
-
-NO_TERMINAL = "TTY_COMPATIBLE"
-"""By this variable, at 0, the console library takes no stream for a terminal: it draws no progress."""
 
 
 def is_silent() -> bool:

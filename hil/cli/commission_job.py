@@ -29,6 +29,8 @@ from hil.result_folder import publish
 if TYPE_CHECKING:
     from rich.console import Console
 
+REPORT, MODEL = "commissioning.html", "model.toml"
+
 
 def job_in(
     folder: Path,
@@ -104,9 +106,6 @@ class Bar:
         if share >= 1.0:
             self._open.close()
             self._show = None
-
-
-REPORT, MODEL = "commissioning.html", "model.toml"
 
 
 def write_report(state: CommissioningState) -> None:

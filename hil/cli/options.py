@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 
 _HELD: ContextVar[tuple[ExitStack, set[Path]]] = ContextVar("held")
 
+VARIABLE = "HIL_JOBS"
+
 
 def hold(folder: Path) -> None:
     """Hold the folder of the results until the command ends: no other command writes there, nor computes for nothing.
@@ -102,9 +104,6 @@ TrustLaws = Annotated[
         "--trust-laws", help="Run the Python code that [laws] of the model file name; without it they are refused."
     ),
 ]
-
-
-VARIABLE = "HIL_JOBS"
 
 
 def use_cores(count: int | None) -> None:

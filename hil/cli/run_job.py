@@ -36,6 +36,9 @@ if TYPE_CHECKING:
     from hil.rig.damper import Damping
     from hil.rig.live import LiveEstimate
 
+SHOW_EVERY_S = 0.1
+"""Time between two changes of the bar [s of the run]; the cycle has better things to do."""
+
 
 def live_estimate(
     rig: Rig, recording: Path, filter_of: Path | None = None, filter_run: str | None = None
@@ -228,10 +231,6 @@ def _document(job: RunJob, summary: RunSummary, grants: RealTimeGrants) -> dict[
         "online": None if job.live is None else job.live.course.summary(),
         "damper": None if job.damper is None else job.damper.document(),
     }
-
-
-SHOW_EVERY_S = 0.1
-"""Time between two changes of the bar [s of the run]; the cycle has better things to do."""
 
 
 @contextmanager

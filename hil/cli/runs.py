@@ -25,6 +25,12 @@ RunId = Annotated[int, typer.Argument(metavar="RUN", help="Number of the run, as
 HERE = Path()
 """The folder where none is given."""
 
+LONGEST_VALUE = 100
+"""Characters of a setting that stand on one line."""
+
+HEAD = ("recording", "experiment", "started_utc", "duration_s", "samples", "flagged", "outcome", "verdict")
+"""The facts that come first."""
+
 
 def opened(folder: Path) -> RunStore:
     """Open the store of a folder; a look must not make one."""
@@ -138,13 +144,6 @@ def _print_table(runs: Sequence[Run]) -> None:
 def _first_sentence(text: str) -> str:
     """Return what ended a run, without what to do then: 'hil runs show' has it all."""
     return text.split(". ", 1)[0].rstrip(".")
-
-
-LONGEST_VALUE = 100
-"""Characters of a setting that stand on one line."""
-
-HEAD = ("recording", "experiment", "started_utc", "duration_s", "samples", "flagged", "outcome", "verdict")
-"""The facts that come first."""
 
 
 def show(run: RunId, store: Folder = HERE, as_json: AsJson = False) -> None:

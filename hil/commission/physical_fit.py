@@ -33,6 +33,12 @@ MOTOR_SHARES = (0.01, 0.03, 0.1, 0.3)
 FRICTION_RATE = 0.01
 """Start of a viscous friction, over the inertia it brakes [1/s]: a vehicle rolls on for minutes."""
 
+NATURAL_DELAY = 1
+"""Samples of delay that sampling alone makes."""
+
+LONGEST = 5
+"""Longest delay tried [samples]."""
+
 
 @dataclass(frozen=True, slots=True)
 class PhysicalFit:
@@ -115,13 +121,6 @@ def _summary(model: DrivelineModel, result: FitResult) -> PhysicalFit:
         for name, load in load_torques(result, model).items()
     }
     return PhysicalFit(DrivelineModel(model.structure, parameters), values, loads, result.rms)
-
-
-NATURAL_DELAY = 1
-"""Samples of delay that sampling alone makes."""
-
-LONGEST = 5
-"""Longest delay tried [samples]."""
 
 
 @dataclass(frozen=True, slots=True)

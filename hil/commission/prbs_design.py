@@ -17,6 +17,24 @@ from hil.config.rig_file import Rig
 if TYPE_CHECKING:
     from estimator.identification.offline.fits import LinearFit
 
+FREQUENCY_STD = 0.002
+"""Relative: 0.2 % of the frequency shows a change of stiffness of 0.4 %."""
+
+DAMPING_STD = 0.02
+"""Relative: 2 % of the damping."""
+
+MARGIN = 2.0
+"""A road's unevenness and wind double what noise alone asks for; the run itself shows whether it was enough."""
+
+COMFORT_LIMIT_M_S2 = 0.315
+"""Upper end of "not uncomfortable" [m/s2 RMS]: ISO 2631-1:1997, C.2.3."""
+
+FELT_HZ = (0.5, 20.0)
+"""Band of vibration looked at [Hz]: ISO 2631-1 begins at 0.5 Hz; above 20 Hz W_d is below 0.1, and noise begins."""
+
+DEFAULT_TRAVEL_M_PER_RAD = 0.48 / 5.6
+"""Way per radian of the motor shaft [m]: wheel radius 0.48 m over ratio 5.6, the bus assumed in DESIGN."""
+
 
 @dataclass(frozen=True, slots=True)
 class ResonanceSpread:
@@ -39,16 +57,6 @@ def resonance_spread(fit: LinearFit, band_hz: tuple[float, float]) -> ResonanceS
     every = uncertain_modes(fit.model, fit.covariance)
     known = next(each for each in every if each.frequency_hz.value == mode.frequency_hz)
     return ResonanceSpread(mode, known.frequency_hz.std / mode.frequency_hz, known.damping.std / abs(mode.damping))
-
-
-FREQUENCY_STD = 0.002
-"""Relative: 0.2 % of the frequency shows a change of stiffness of 0.4 %."""
-
-DAMPING_STD = 0.02
-"""Relative: 2 % of the damping."""
-
-MARGIN = 2.0
-"""A road's unevenness and wind double what noise alone asks for; the run itself shows whether it was enough."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,16 +112,6 @@ def choose(wanted_nm: float, needed: float, caps: Iterable[Cap], step_nm: float)
         chosen = math.floor(cap.amplitude_nm / step_nm + 1e-9) * step_nm
         reason = f"held down by {cap.reason}"
     return Choice(chosen, needed, cap, reason)
-
-
-COMFORT_LIMIT_M_S2 = 0.315
-"""Upper end of "not uncomfortable" [m/s2 RMS]: ISO 2631-1:1997, C.2.3."""
-
-FELT_HZ = (0.5, 20.0)
-"""Band of vibration looked at [Hz]: ISO 2631-1 begins at 0.5 Hz; above 20 Hz W_d is below 0.1, and noise begins."""
-
-DEFAULT_TRAVEL_M_PER_RAD = 0.48 / 5.6
-"""Way per radian of the motor shaft [m]: wheel radius 0.48 m over ratio 5.6, the bus assumed in DESIGN."""
 
 
 def vibration_m_s2(

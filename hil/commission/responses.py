@@ -29,6 +29,27 @@ DRAWN = 400
 DIGITS = 6
 """Significant digits of what is kept to be drawn."""
 
+Z95 = 1.959963984540054
+"""97.5 % point of the normal distribution."""
+
+TRUSTED = 0.2
+"""Share of its value that a parameter of a model from here is trusted to at best: temperature, load and tyres move it
+by as much, however short its interval."""
+
+RINGING_S = 0.25
+"""Width of the average [s]: two periods and more of a driveline's resonance, from 8 Hz up; a quarter of a pulse."""
+
+HIGH_PASS_HZ = 0.3
+"""As in the identification: what is slower is the road's."""
+
+LOW_HZ, HIGH_HZ = 0.8, 20.0
+"""Lines used [Hz]: above twice the high-pass, below where a resolver's noise covers a driveline's response."""
+
+COHERENT = 0.5
+"""A line is used where at least half of the speed's power is the torque's, in both tests."""
+
+FEWEST_LINES = 6
+
 
 def columns_of(path: Path) -> Mapping[str, FloatArray]:
     """Return the numeric columns of a recording, each of shape (N,)."""
@@ -62,14 +83,6 @@ def json_safe(evidence: Any) -> Any:
     if isinstance(evidence, np.floating | float):
         return float(evidence) if np.isfinite(evidence) else None
     return int(evidence) if isinstance(evidence, np.integer) else evidence
-
-
-Z95 = 1.959963984540054
-"""97.5 % point of the normal distribution."""
-
-TRUSTED = 0.2
-"""Share of its value that a parameter of a model from here is trusted to at best: temperature, load and tyres move it
-by as much, however short its interval."""
 
 
 class Measured(NamedTuple):
@@ -114,10 +127,6 @@ def of_repeats(values: FloatArray) -> Measured:
 
     spread = float(student.ppf(0.975, n - 1) * np.std(values, ddof=1) / math.sqrt(n))
     return Measured(float(np.mean(values)), spread)
-
-
-RINGING_S = 0.25
-"""Width of the average [s]: two periods and more of a driveline's resonance, from 8 Hz up; a quarter of a pulse."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,18 +179,6 @@ def _gain(reading: FloatArray, reference: FloatArray) -> float:
     lag = reading_lag(reading, reference)
     n = reading.shape[0] - lag
     return _slope(reading[lag:], reference[:n])
-
-
-HIGH_PASS_HZ = 0.3
-"""As in the identification: what is slower is the road's."""
-
-LOW_HZ, HIGH_HZ = 0.8, 20.0
-"""Lines used [Hz]: above twice the high-pass, below where a resolver's noise covers a driveline's response."""
-
-COHERENT = 0.5
-"""A line is used where at least half of the speed's power is the torque's, in both tests."""
-
-FEWEST_LINES = 6
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,6 +19,9 @@ from hil.files import is_inside, read_json, write_whole
 from hil.orders.runner import RunRecord, now_utc
 from hil.version import __version__
 
+SCHEMA: Final = "hil.commission/1"
+FILE_NAME: Final = "commission.json"
+
 
 @dataclass(frozen=True, slots=True)
 class StepFinding:
@@ -104,10 +107,6 @@ class StepRecord:
     def run(self, name: str) -> RunRecord | None:
         """Return the whole run of a name, if there is one."""
         return next((run for run in self.runs if run.name == name and run.whole), None)
-
-
-SCHEMA: Final = "hil.commission/1"
-FILE_NAME: Final = "commission.json"
 
 
 @dataclass(frozen=True, slots=True)

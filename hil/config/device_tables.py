@@ -25,6 +25,20 @@ from drivers.plc.register import Access
 from hil.config.table import ExistingFile, FileTable, Positive, TcpPort, Text, Unsigned32
 from hil.problems import Fault, refuse
 
+_OBJECTS: Final[Mapping[str, int]] = MappingProxyType(
+    {
+        "abort_connection": ABORT_CONNECTION,
+        "quick_stop": 0x605A,
+        "shutdown": 0x605B,
+        "disable_operation": 0x605C,
+        "halt": 0x605D,
+        "fault_reaction": 0x605E,
+    }
+)
+
+_NODE_GUARDING: Final = ("guard_time_ms", "life_time_factor", "node_guarding")
+"""What a person might call it who comes from another master."""
+
 
 class SpeedUnitTable(FileTable):
     """Unit of the velocity actual value 0x606C, from the drive's manual; over what its data sheet says."""
@@ -109,18 +123,6 @@ TimeOut = Annotated[float, Field(ge=0.05, le=60.0)]
 """Longest wait [s]: not so short that a healthy drive on a busy bus misses it."""
 
 
-_OBJECTS: Final[Mapping[str, int]] = MappingProxyType(
-    {
-        "abort_connection": ABORT_CONNECTION,
-        "quick_stop": 0x605A,
-        "shutdown": 0x605B,
-        "disable_operation": 0x605C,
-        "halt": 0x605D,
-        "fault_reaction": 0x605E,
-    }
-)
-
-
 class OptionCodesTable(FileTable):
     """What the drive does by itself when something ends (CiA 402-2): a DCF's choice or its own, unless given here."""
 
@@ -136,10 +138,6 @@ class OptionCodesTable(FileTable):
         """The codes that are given, by object."""
         codes = {index: getattr(self, name) for name, index in _OBJECTS.items()}
         return {index: code for index, code in codes.items() if code is not None}
-
-
-_NODE_GUARDING: Final = ("guard_time_ms", "life_time_factor", "node_guarding")
-"""What a person might call it who comes from another master."""
 
 
 class InverterTable(FileTable):

@@ -37,6 +37,12 @@ MEANINGS: Final[Mapping[str, str]] = {
 Ask = Callable[[str, str, str], str]
 """Asks a person: what for, the default (empty: none), what was wrong with the answer before (empty: nothing)."""
 
+DIGITS = 6
+"""Of an interval's ends."""
+
+COMMENTS_AT = 48
+"""Column in which comments begin."""
+
 
 @dataclass(frozen=True, slots=True)
 class Known:
@@ -116,13 +122,6 @@ def _asked(what: str, default: float | None, ask: Ask, positive: bool) -> float:
         if math.isfinite(value) and (value > 0.0 if positive else value >= 0.0):
             return value
         wrong = f"expected a number {'above 0' if positive else 'of 0 or more'}, got {text!r}"
-
-
-DIGITS = 6
-"""Of an interval's ends."""
-
-COMMENTS_AT = 48
-"""Column in which comments begin."""
 
 
 def model_text(

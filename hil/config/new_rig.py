@@ -39,6 +39,36 @@ GivenValues = Mapping[str, Value]
 MODES: Final = tuple(mode.name.lower() for mode in TorqueMode)
 USUAL_MODE: Final = TorqueMode.CYCLIC_SYNCHRONOUS_TORQUE.name.lower()
 
+SIMULATED_ACCEPTANCE = '{ by = "hil rig new --simulated", why = "simulated drives: no shaft turns" }'
+
+PARTS_OF_LIMIT: Final = {
+    "rate_limit": 5.0,
+    "prbs_limit": 0.3,
+    "sum_limit": 1.75,
+    "prbs_amplitude": 0.3,
+    "torque": 1.25,
+    "cruise_slew": 2.5,
+    "reversal_slew": 5.0,
+    "tip_slew": 7.5,
+    "swing": 0.625,
+    "step": 0.75,
+}
+"""Torques and rates in parts of one inverter's torque limit."""
+
+TIP_SPEED: Final = 2.0 / 3.0
+"""Speed of the tips in parts of the cruise's."""
+
+COMMENTS_AT: Final = 41
+"""Column in which comments begin."""
+
+HEXADECIMAL: Final = ("vendor_id", "product_code")
+
+OWN_EDS: Final = "# eds ="
+"""Beginning of the template's line that shows how to name an EDS."""
+
+HEARTBEAT: Final = "heartbeat_ms ="
+"""Beginning of the template's line of each inverter that what its data sheet makes necessary comes after."""
+
 
 class NotAnAnswer(Exception):
     """An answer does not fit; the text says what would."""
@@ -178,9 +208,6 @@ def _asked(question: Question, default: str, found: GivenValues, ask: Ask) -> Va
             wrong = f"expected {fits}, got {text!r}" if text else f"expected {fits}: there is no default"
 
 
-SIMULATED_ACCEPTANCE = '{ by = "hil rig new --simulated", why = "simulated drives: no shaft turns" }'
-
-
 @dataclass(frozen=True, slots=True)
 class NewDrive:
     """Both inverters of a new rig file, by their data sheet."""
@@ -263,36 +290,6 @@ def _lines(report: EdsReport, simulated: bool) -> Iterator[str]:
 def _is_guess(line: RigLine) -> bool:
     """Whether a person has to fill the line in."""
     return line.key == "speed_unit" or line.key.startswith("accepted.")
-
-
-PARTS_OF_LIMIT: Final = {
-    "rate_limit": 5.0,
-    "prbs_limit": 0.3,
-    "sum_limit": 1.75,
-    "prbs_amplitude": 0.3,
-    "torque": 1.25,
-    "cruise_slew": 2.5,
-    "reversal_slew": 5.0,
-    "tip_slew": 7.5,
-    "swing": 0.625,
-    "step": 0.75,
-}
-"""Torques and rates in parts of one inverter's torque limit."""
-
-TIP_SPEED: Final = 2.0 / 3.0
-"""Speed of the tips in parts of the cruise's."""
-
-COMMENTS_AT: Final = 41
-"""Column in which comments begin."""
-
-HEXADECIMAL: Final = ("vendor_id", "product_code")
-
-
-OWN_EDS: Final = "# eds ="
-"""Beginning of the template's line that shows how to name an EDS."""
-
-HEARTBEAT: Final = "heartbeat_ms ="
-"""Beginning of the template's line of each inverter that what its data sheet makes necessary comes after."""
 
 
 def rig_text(answers: GivenValues, file: Path, simulated: bool, drive_lines: Sequence[str] = ()) -> str:

@@ -22,6 +22,25 @@ from hil.errors import UsageError
 
 ExperimentDict = Mapping[str, Any]
 
+SPEEDS = (0.25, 0.5, 1.0)
+"""Parts of the fastest speed to cruise, coast and step at."""
+
+TORQUES = (0.35, 0.8)
+"""Parts of the largest torque to swing and step by."""
+
+TURNS = (0.05, 0.2)
+"""Parts of the fastest speed to turn at."""
+
+STEPS_S = (0.5, 2.0)
+RAMPS_S = (1.0, 4.0)
+
+ONE_ALONE = (0.5, 0.0, 1.0)
+"""Parts of inverter m1: half, and each inverter by itself."""
+
+PERIOD_S = 10.0
+BAND = (0.005, 0.3)
+"""Band of a multi-sine, in parts of the sampling rate."""
+
 
 @dataclass(frozen=True, slots=True)
 class Limits:
@@ -61,22 +80,6 @@ def _speed_of(table: AnyExperiment) -> float:
         case PulsesTable():
             return table.most_speed_rad_s
     return 0.0
-
-
-SPEEDS = (0.25, 0.5, 1.0)
-"""Parts of the fastest speed to cruise, coast and step at."""
-
-TORQUES = (0.35, 0.8)
-"""Parts of the largest torque to swing and step by."""
-
-TURNS = (0.05, 0.2)
-"""Parts of the fastest speed to turn at."""
-
-STEPS_S = (0.5, 2.0)
-RAMPS_S = (1.0, 4.0)
-
-ONE_ALONE = (0.5, 0.0, 1.0)
-"""Parts of inverter m1: half, and each inverter by itself."""
 
 
 def candidates(rig: Rig, limits: Limits) -> Iterator[tuple[str, ExperimentDict]]:
@@ -131,11 +134,6 @@ def _strong_prbs(rig: Rig, limits: Limits) -> dict[str, float]:
         "prbs_clock_divider": 1,
         "torque_nm": min(limits.torque_nm, room_nm),
     }
-
-
-PERIOD_S = 10.0
-BAND = (0.005, 0.3)
-"""Band of a multi-sine, in parts of the sampling rate."""
 
 
 def _multisine(rig: Rig) -> dict[str, Any]:

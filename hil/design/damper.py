@@ -47,6 +47,8 @@ LINEARISED = {
 
 BETWEEN = (Element.TORQUE_PATH, Element.SHAFT, Element.SPEED_SENSOR)
 
+SHOWN_S = 1.0
+
 
 @dataclass(frozen=True, slots=True)
 class Order:
@@ -190,9 +192,6 @@ def design_lines(file: DamperFile, found: Damper) -> Iterator[str]:
         yield "  no rig, so no torque limit: it can be looked at, and not driven"
     else:
         yield f"  torque under the rig's PRBS up to {file.torque_nm:.0f} Nm, limited to {file.rig.limit_nm:.0f} Nm"
-
-
-SHOWN_S = 1.0
 
 
 def draw(found: Damper, region: Region, path: Path) -> None:

@@ -30,6 +30,9 @@ NEARLY = 0.02
 WIDE_INTERVAL = 0.1
 """Half of a 95 % interval over its value from which a parameter is not well known."""
 
+SPEED_ROOM = 1.2
+"""Part of the fastest speed that may be reached: a hold of it swings by some per cent."""
+
 
 class NothingAllowed(UsageError):
     """No experiment passes the rig's limits."""
@@ -187,10 +190,6 @@ def is_needed(known: Open, aim: Aim) -> bool:
 
 def _widths(known: Open, planned: Planned) -> tuple[Width, ...]:
     return tuple(widths(known.candidates[0], known.line, planned.record))
-
-
-SPEED_ROOM = 1.2
-"""Part of the fastest speed that may be reached: a hold of it swings by some per cent."""
 
 
 def on_paper(source: RigSource, name: str, table: ExperimentDict, model: DrivelineModel, limits: Limits) -> Planned:

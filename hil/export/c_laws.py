@@ -35,6 +35,23 @@ static double greater(double a, double b) { return b > a ? b : a; }
 _SCALARS = {float: "double", int: "int", bool: "int", FloatArray: "Array"}
 _SHORT = {float: "d", int: "i", bool: "b"}
 
+INDENT = "    "
+
+_OPERATORS = {
+    ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==",
+    ast.NotEq: "!=", ast.BitAnd: "&", ast.BitOr: "|",
+}  # fmt: skip
+_CONSTANTS = {math.inf: "INFINITY", -math.inf: "-INFINITY"}
+_OF_MATH = ("sin", "cos", "exp", "expm1", "log", "sqrt", "copysign", "ceil")
+_FUNCTIONS: dict[Any, str] = {
+    **{getattr(module, name): name for module in (math, np) for name in _OF_MATH},
+    **dict.fromkeys((abs, np.abs), "fabs"),
+    **dict.fromkeys((min, np.minimum), "lesser"),
+    **dict.fromkeys((max, np.maximum), "greater"),
+}
+_TRANSPARENT = (lanes.every, lanes.some, lanes.broadcast_as, lanes.borrowed, np.asarray, under_own)
+"""Functions that return their first argument where there is one number only, and no law of a user's own."""
+
 
 def is_record(kind: Type) -> bool:
     """Tell whether a type is a NamedTuple's."""
@@ -69,9 +86,6 @@ def of_hint(hint: Any) -> Type:
     if hint == FloatArray:  # typing hands out copies
         return FloatArray
     return tuple(typing.get_args(hint)) if typing.get_origin(hint) is tuple else hint
-
-
-INDENT = "    "
 
 
 class Translation:
@@ -236,21 +250,6 @@ def _parsed(function: Callable[..., Any]) -> ast.FunctionDef:
 
 Text = tuple[str, Type]
 """C text and its type."""
-
-_OPERATORS = {
-    ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==",
-    ast.NotEq: "!=", ast.BitAnd: "&", ast.BitOr: "|",
-}  # fmt: skip
-_CONSTANTS = {math.inf: "INFINITY", -math.inf: "-INFINITY"}
-_OF_MATH = ("sin", "cos", "exp", "expm1", "log", "sqrt", "copysign", "ceil")
-_FUNCTIONS: dict[Any, str] = {
-    **{getattr(module, name): name for module in (math, np) for name in _OF_MATH},
-    **dict.fromkeys((abs, np.abs), "fabs"),
-    **dict.fromkeys((min, np.minimum), "lesser"),
-    **dict.fromkeys((max, np.maximum), "greater"),
-}
-_TRANSPARENT = (lanes.every, lanes.some, lanes.broadcast_as, lanes.borrowed, np.asarray, under_own)
-"""Functions that return their first argument where there is one number only, and no law of a user's own."""
 
 
 class NotTranslatable(ValueError):

@@ -24,6 +24,9 @@ PROFILES: Final[Mapping[str, type[Any]]] = MappingProxyType(
 )
 """Every profile by its name."""
 
+PLC_WORD = 32767
+"""Largest INT of IEC 61131-3. Array sizes stay below it: a loop to it would count beyond and never end."""
+
 
 def profile(text: str) -> Adaptation:
     name, _, rest = text.partition(":")
@@ -43,10 +46,6 @@ def profile(text: str) -> Adaptation:
     made: Adaptation = kind(**values)
     made.law  # noqa: B018 - checks the numbers
     return made
-
-
-PLC_WORD = 32767
-"""Largest INT of IEC 61131-3. Array sizes stay below it: a loop to it would count beyond and never end."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

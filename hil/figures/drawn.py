@@ -53,6 +53,36 @@ SETTINGS: Final[Mapping[Any, Any]] = {
     "figure.constrained_layout.use": True,
 }
 
+SIGNALS_HEIGHT_IN = 3.1
+
+COLUMNS = 4
+BLOCK_HEIGHT_IN = 2.9
+LEGEND_HEIGHT_IN = 0.3
+
+LOWEST_HZ = 0.5
+"""Below, the high-pass has taken away what the models could be held against."""
+
+POINTS = 400
+
+PHASE_TICKS_DEG = (-180.0, -90.0, 0.0, 90.0, 180.0)
+
+EDGE_SHARE, LABEL_SHARE = 0.04, 0.2
+"""Of a scale's range: free at its ends, and above where the panel's name stands."""
+
+CONFIDENCE = 1.96
+"""Standard deviations of a 95 % interval."""
+
+POLES_HEIGHT_IN = 3.0
+GUIDE = "#c5ccd4"
+VIEW = 1.25
+"""Half width of the whole map."""
+
+CLOSE_SHARE = 1.4
+"""Half width of the close-up, in parts of the largest distance of a pole from their middle."""
+
+LEAST_CLOSE = 0.002
+"""Half width of the close-up at least: of one model alone there is no distance."""
+
 
 def require_matplotlib() -> None:
     """Refuse before anything is driven where there is nothing to draw with."""
@@ -99,9 +129,6 @@ def label_panel(axes: Axes, text: str) -> None:
     label.set_in_layout(False)  # it lies inside: panels need not make room for it
 
 
-SIGNALS_HEIGHT_IN = 3.1
-
-
 def signals_figure(records: Sequence[Record]) -> Figure:
     """Draw torque above speed, one column for each recording; the rows have one scale each."""
     from matplotlib.figure import Figure
@@ -120,24 +147,6 @@ def signals_figure(records: Sequence[Record]) -> Figure:
     low, high = axes[0][0].get_ylim()
     axes[0][0].set_ylim(low, high + 0.12 * (high - low))  # room for the panels' names
     return figure
-
-
-COLUMNS = 4
-BLOCK_HEIGHT_IN = 2.9
-LEGEND_HEIGHT_IN = 0.3
-
-LOWEST_HZ = 0.5
-"""Below, the high-pass has taken away what the models could be held against."""
-
-POINTS = 400
-
-PHASE_TICKS_DEG = (-180.0, -90.0, 0.0, 90.0, 180.0)
-
-EDGE_SHARE, LABEL_SHARE = 0.04, 0.2
-"""Of a scale's range: free at its ends, and above where the panel's name stands."""
-
-CONFIDENCE = 1.96
-"""Standard deviations of a 95 % interval."""
 
 
 def responses_figure(models: Sequence[LocalModel]) -> Figure:
@@ -223,18 +232,6 @@ def _share_scale(rows: Iterable[Sequence[Axes]], title: str, ticks: Sequence[flo
             axes.set_yticks(ticks)
     for row in rows:
         row[0].set_ylabel(title)
-
-
-POLES_HEIGHT_IN = 3.0
-GUIDE = "#c5ccd4"
-VIEW = 1.25
-"""Half width of the whole map."""
-
-CLOSE_SHARE = 1.4
-"""Half width of the close-up, in parts of the largest distance of a pole from their middle."""
-
-LEAST_CLOSE = 0.002
-"""Half width of the close-up at least: of one model alone there is no distance."""
 
 
 def poles_figure(models: Sequence[LocalModel]) -> Figure:

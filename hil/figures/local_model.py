@@ -18,6 +18,19 @@ from estimator.signals.record import FloatArray, Record
 
 STATES, INPUTS = 3, 2
 
+COHERENT = 0.9
+"""Coherence from which on a spectral estimate is held against a model."""
+
+HALF_TURN_DEG = 180.0
+
+TRUTH, MODEL_FILE = "truth", "model file"
+"""Names of what there is to compare with."""
+
+NOT_KNOWN = float("nan")
+
+AGREEMENT_DB = 3.0
+"""On-line model and spectral estimate agree where they differ by no more: a factor of 1.4."""
+
 
 @dataclass(frozen=True, slots=True)
 class TwoMassLine:
@@ -78,15 +91,6 @@ class TwoMassLine:
         z = np.exp(2j * np.pi * np.asarray(frequency_hz) * held_s)
         states = np.linalg.solve(z[:, np.newaxis, np.newaxis] * np.eye(STATES) - a, b[:, :1])
         return np.asarray(states[:, 0, 0], dtype=np.complex128)
-
-
-COHERENT = 0.9
-"""Coherence from which on a spectral estimate is held against a model."""
-
-HALF_TURN_DEG = 180.0
-
-TRUTH, MODEL_FILE = "truth", "model file"
-"""Names of what there is to compare with."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,12 +177,6 @@ def degrees(response: ComplexArray) -> FloatArray:
     angle = np.rad2deg(np.angle(response))
     jumps = np.abs(np.diff(angle, append=angle[-1:])) > HALF_TURN_DEG
     return np.asarray(np.where(jumps, np.nan, angle), dtype=np.float64)
-
-
-NOT_KNOWN = float("nan")
-
-AGREEMENT_DB = 3.0
-"""On-line model and spectral estimate agree where they differ by no more: a factor of 1.4."""
 
 
 @dataclass(frozen=True, slots=True)

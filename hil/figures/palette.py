@@ -30,6 +30,11 @@ PALE: Final = "#b4bac1"
 SERIES: Final = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, WINE, INDIGO)
 """Colours of several alike, such as the runs of a set; more than eight begin again."""
 
+POINTS = 240
+
+SPIRAL_DAMPINGS = (0.1, 0.3, 0.6)
+"""Damping ratios whose lines are drawn."""
+
 
 def series_colour(number: int) -> str:
     """Return the colour of one of several alike, counted from 0."""
@@ -40,12 +45,6 @@ def faded(colour: str, opacity: float) -> str:
     """Return a colour ``#rrggbb`` as CSS with an opacity of 0 to 1, for bands and areas."""
     red, green, blue = (int(colour[i : i + 2], 16) for i in (1, 3, 5))
     return f"rgba({red},{green},{blue},{opacity:g})"
-
-
-POINTS = 240
-
-SPIRAL_DAMPINGS = (0.1, 0.3, 0.6)
-"""Damping ratios whose lines are drawn."""
 
 
 def unit_circle() -> tuple[FloatArray, FloatArray]:

@@ -39,6 +39,36 @@ from hil.version import __version__
 PRBS_STATES = 1023
 """States of a ten-cell shift register."""
 
+LAG_S = 0.25
+"""Time constant of the foot [s]."""
+
+SHORTEST_S, LONGEST_S = 1.5, 6.0
+"""Time between two corrections [s]."""
+
+GRAVITY_M_S2: Final = 9.80665
+AIR_KG_M3: Final = 1.2
+DRAG_AREA_M2: Final = 5.0
+"""c_d A of a city bus: 0.6 to 0.7 times 7.5 to 8 m^2 of front."""
+
+ROLLING: Final = 0.008
+"""Rolling resistance of bus tyres on asphalt; those on a test drum have 0.006, a rough road 0.01."""
+
+WAVELENGTHS_M: Final = (90.0, 150.0, 260.0, 410.0)
+"""Of the road's rises and falls; no two in a whole ratio."""
+
+GUST_S: Final = 3.0
+"""Time over which a gust lasts [s]."""
+
+ROUGHNESS_M: Final = 0.3
+"""Distance over which the surface changes [m]: at 8 m/s its corner is at v / 2 pi L = 4 Hz."""
+
+EXPERIMENT = "cruise"
+
+GEAR_RATIO, WHEEL_RADIUS_M = 5.6, 0.48
+"""Of the bus that the default model is of (`hil.simulator.driveline.DEFAULT_BUS`)."""
+
+ANY_PORT = Address("127.0.0.1", 0)
+
 
 @dataclass(frozen=True, slots=True)
 class Conditions:
@@ -74,13 +104,6 @@ def _draw(rng: np.random.Generator) -> Conditions:
     )
 
 
-LAG_S = 0.25
-"""Time constant of the foot [s]."""
-
-SHORTEST_S, LONGEST_S = 1.5, 6.0
-"""Time between two corrections [s]."""
-
-
 class PedalCruise(Cruise):
     """A cruise with a driver whose foot corrects the torque."""
 
@@ -108,24 +131,6 @@ class PedalCruise(Cruise):
             self._wanted_nm = self._pedal_nm * float(self._rng.standard_normal())
             self._next_s += float(self._rng.uniform(SHORTEST_S, LONGEST_S))
         return super().torque_nm(time_s, speed_rad_s) + self._foot.value
-
-
-GRAVITY_M_S2: Final = 9.80665
-AIR_KG_M3: Final = 1.2
-DRAG_AREA_M2: Final = 5.0
-"""c_d A of a city bus: 0.6 to 0.7 times 7.5 to 8 m^2 of front."""
-
-ROLLING: Final = 0.008
-"""Rolling resistance of bus tyres on asphalt; those on a test drum have 0.006, a rough road 0.01."""
-
-WAVELENGTHS_M: Final = (90.0, 150.0, 260.0, 410.0)
-"""Of the road's rises and falls; no two in a whole ratio."""
-
-GUST_S: Final = 3.0
-"""Time over which a gust lasts [s]."""
-
-ROUGHNESS_M: Final = 0.3
-"""Distance over which the surface changes [m]: at 8 m/s its corner is at v / 2 pi L = 4 Hz."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -206,13 +211,6 @@ class RoadPlant:
 
 
 RIG_FILE = Path(__file__).with_name("paper_rig.toml")
-
-EXPERIMENT = "cruise"
-
-GEAR_RATIO, WHEEL_RADIUS_M = 5.6, 0.48
-"""Of the bus that the default model is of (`hil.simulator.driveline.DEFAULT_BUS`)."""
-
-ANY_PORT = Address("127.0.0.1", 0)
 
 
 @dataclass(frozen=True, slots=True)

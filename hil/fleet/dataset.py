@@ -41,6 +41,15 @@ FAILURES = "failures.parquet"
 SURVEY = "survey.parquet"
 RESULTS = "command="  # begins the name of a folder of results
 
+PLACE = ("vehicle", "rig", "started", "name", "url")
+"""Columns of where a recording belongs, which the last survey says."""
+
+LARGEST = 1e100
+"""From here on a number is of nothing that is measured, and its square may be beyond a float."""
+
+MOST_ROWS, LONGEST_S = 256, 60.0
+"""Results, and time, after which a part is written: what a killed run has to compute again."""
+
 
 def _columns(texts: str, numbers: str = "", counts: str = "") -> pa.Schema:
     kinds = ((f"key vehicle rig started name {texts}", pa.string()), (numbers, pa.float64()), (counts, pa.int64()))
@@ -65,15 +74,6 @@ _FILES: Mapping[str, pa.Schema] = {
     ),
 }
 """Columns of the tables that are one file, replaced by each call."""
-
-PLACE = ("vehicle", "rig", "started", "name", "url")
-"""Columns of where a recording belongs, which the last survey says."""
-
-LARGEST = 1e100
-"""From here on a number is of nothing that is measured, and its square may be beyond a float."""
-
-MOST_ROWS, LONGEST_S = 256, 60.0
-"""Results, and time, after which a part is written: what a killed run has to compute again."""
 
 
 class Writer:

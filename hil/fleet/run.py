@@ -40,6 +40,8 @@ Item = TypeVar("Item")
 StageProgress = Callable[[str, int, int], None]
 """Called with the stage, how much of it is done, and how much there is."""
 
+LEAST_MEMORY = 512 << 20  # of a worker [bytes]: hil alone takes 300 MiB, and Dask kills one at 95 % of its limit
+
 
 @dataclass(frozen=True, slots=True)
 class Engine:
@@ -110,9 +112,6 @@ class WithoutHttp(WorkerPlugin):
     def setup(self, worker: Any) -> None:
         """Close it before the first task."""
         worker.http_server.stop()
-
-
-LEAST_MEMORY = 512 << 20  # of a worker [bytes]: hil alone takes 300 MiB, and Dask kills one at 95 % of its limit
 
 
 def _require_room(memory: str) -> None:

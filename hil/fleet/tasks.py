@@ -37,6 +37,8 @@ DIAGNOSE, IDENTIFY = "diagnose", "identify"
 PATIENCE = 3.0
 """Times its limit after which a task that does not end by itself takes its worker with it."""
 
+TWO_MASS = ("J_M", "J_L", "k", "c", "b_M", "b_L")
+
 
 @dataclass(frozen=True, slots=True)
 class FleetJob:
@@ -148,8 +150,6 @@ def _ended_after(limit_s: float) -> Iterator[None]:
 
 ResultRows = tuple[DatasetRow, list[DatasetRow], list[DatasetRow], str]
 """Columns of the recording, rows of its effects and of parameters, and the verdict."""
-
-TWO_MASS = ("J_M", "J_L", "k", "c", "b_M", "b_L")
 
 
 def _diagnosed(records: Sequence[Record], file: ModelFile, job: FleetJob, paths: Sequence[Path]) -> ResultRows:

@@ -20,6 +20,13 @@ without real-time scheduling reaches now and then, and which the estimate does w
 PLC_STALE_S = 1.0
 """As in a run, where a PLC silent for so long ends it."""
 
+NO_BUS = "a recording is played: no bus"
+
+UNKNOWN = (Activity.LOST, Activity.STARTING)
+"""When what was known of the bus is known no more: while the drives are being armed there is no cycle."""
+
+_LABELS = ("node", "power stage", "NMT state", "heartbeat", "TPDO age", "EMCY", "EMCY so far")
+
 
 def verdict(snapshot: Snapshot, health: Health) -> str:
     """Say in one word whether anything is wrong."""
@@ -78,12 +85,6 @@ def good(quality: Quality) -> str:
     return f"{math.floor(1000.0 * quality.good / quality.samples) / 10.0:g} % good in {WINDOW_S:g} s"
 
 
-NO_BUS = "a recording is played: no bus"
-
-UNKNOWN = (Activity.LOST, Activity.STARTING)
-"""When what was known of the bus is known no more: while the drives are being armed there is no cycle."""
-
-
 def health_summary(snapshot: Snapshot, width: int, height: int) -> list[str]:
     """Health in a few lines; what is wrong before figures, and how much of it has no room here."""
     health = snapshot.health
@@ -136,9 +137,6 @@ def full(snapshot: Snapshot, width: int, height: int) -> list[str]:
         if not lines or len(lines) + len(section) <= height:
             lines += section
     return [line[:width] for line in lines][:height]
-
-
-_LABELS = ("node", "power stage", "NMT state", "heartbeat", "TPDO age", "EMCY", "EMCY so far")
 
 
 def _node_table(health: Health) -> list[str]:

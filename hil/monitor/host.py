@@ -64,6 +64,12 @@ _NMT_TITLES = {state.value: state.title for state in NmtState}
 
 Tell = Callable[[Notice], None]
 
+HEALTH_EVERY_NS = 200_000_000
+"""How often the view is informed of the bus's health [ns]."""
+
+TRY_AGAIN_S = 1.0
+"""Pause before a bus that was lost is opened again [s]."""
+
 
 class NodeWatch:
     """Life signs of one node, taken where frames are received; what is wrong with a frame is the driver's to say."""
@@ -160,13 +166,6 @@ def _spread_s(histogram: Histogram) -> tuple[float, float, float]:
         return math.nan, math.nan, math.nan
     p50_ns, p99_ns = (histogram.quantile_ns(share) or 0 for share in (0.5, 0.99))
     return p50_ns / NS_PER_S, p99_ns / NS_PER_S, histogram.max_ns / NS_PER_S
-
-
-HEALTH_EVERY_NS = 200_000_000
-"""How often the view is informed of the bus's health [ns]."""
-
-TRY_AGAIN_S = 1.0
-"""Pause before a bus that was lost is opened again [s]."""
 
 
 @dataclass(frozen=True, slots=True)

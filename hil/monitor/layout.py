@@ -54,14 +54,13 @@ Screen.small #too-small { display: block; }
 Screen.small .page.shown { display: none; }
 """
 
+MOST_CHANNELS = 4
+"""Lines that further channels take from the plots of the first page."""
+
 
 def page(name: str, *parts: Widget) -> Container:
     """Put widgets on a page of their own."""
     return Container(*parts, id=name, classes="page")
-
-
-MOST_CHANNELS = 4
-"""Lines that further channels take from the plots of the first page."""
 
 
 def _channels(count: int) -> list[Panel]:

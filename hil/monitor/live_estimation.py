@@ -51,6 +51,11 @@ KEPT_ALARMS = 20
 
 VALUES_PER_WIDTH = 2
 
+SAMPLES = 64
+
+NICE = 10
+"""The cycle and the screen come first."""
+
 
 class LiveEstimation:
     """Estimates a run while it lasts, and keeps what was before."""
@@ -216,12 +221,6 @@ class LiveEstimation:
             measured_hz=self._measured[0],
             measured_gain=self._measured[1],
         )
-
-
-SAMPLES = 64
-
-NICE = 10
-"""The cycle and the screen come first."""
 
 
 class WarmUp:

@@ -26,6 +26,17 @@ CONTINUES = (LIVE, NOT_EXCITED)
 REPORTED_SHARE = 0.01
 """From this share of missing samples on they are reported: a frame lost now and then is no news."""
 
+LARGEST_REACH = 2.0
+"""Real part up to which poles and zeros are in the picture; a spare zero may be anywhere."""
+
+RESPONSE = "response w/T [dB], + measured"
+
+ROOM_OF_TITLE = 6
+"""Characters of a title besides its text and its value, a short rule included."""
+
+HISTORY_S = 120.0
+"""What the histories reach back [s]."""
+
 
 def course(snapshot: Snapshot) -> str:
     """Tell in a word or two whether the estimate continues."""
@@ -81,18 +92,6 @@ def with_interval(value: float, std: float, unit: str, digits: int) -> str:
 def resonance_in_words(estimation: Estimation) -> str:
     """Write the resonance, with how sure it is."""
     return with_interval(estimation.resonance_hz, estimation.resonance_std_hz, "Hz", 2)
-
-
-LARGEST_REACH = 2.0
-"""Real part up to which poles and zeros are in the picture; a spare zero may be anywhere."""
-
-RESPONSE = "response w/T [dB], + measured"
-
-ROOM_OF_TITLE = 6
-"""Characters of a title besides its text and its value, a short rule included."""
-
-HISTORY_S = 120.0
-"""What the histories reach back [s]."""
 
 
 def response(snapshot: Snapshot, width: int, height: int) -> list[str]:

@@ -30,6 +30,14 @@ LEAST_WIDTH = 10
 """A panel that is narrower shows nothing: an axis alone takes as much. A terminal passes through any size while it is
 resized."""
 
+MORE = "… (5: log)"
+
+QUIET = (Activity.CONNECTING, Activity.STARTING, Activity.LOST, Activity.PLAYED, Activity.ENDED)
+"""When it is no news that nothing comes."""
+
+TIME, KIND = 10, 5
+"""Characters of the time and of the kind before an entry's text; a blank follows each."""
+
 
 def drawn(draw: Draw, snapshot: Snapshot, width: int, height: int) -> list[str]:
     """Return a panel's lines, none of them outside its room, whatever that is."""
@@ -61,12 +69,6 @@ class Panel(Widget):
         return text
 
 
-MORE = "… (5: log)"
-
-QUIET = (Activity.CONNECTING, Activity.STARTING, Activity.LOST, Activity.PLAYED, Activity.ENDED)
-"""When it is no news that nothing comes."""
-
-
 def headline(snapshot: Snapshot, width: int, height: int) -> list[str]:
     """One line: activity, run, phase and time on the left, the rig's name on the right."""
     head = snapshot.headline
@@ -91,10 +93,6 @@ def message(snapshot: Snapshot, width: int, height: int) -> list[str]:
     """Give the last thing the operator has to know; what has no room is on the log page."""
     text = " ".join(snapshot.headline.message.split())
     return [text if len(text) <= width else (text[: max(0, width - len(MORE))] + MORE)[:width]]
-
-
-TIME, KIND = 10, 5
-"""Characters of the time and of the kind before an entry's text; a blank follows each."""
 
 
 def log(snapshot: Snapshot, width: int, height: int, top: int = 0) -> list[str]:

@@ -16,6 +16,9 @@ BLANK = 0x2800
 _BITS = np.array([[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]])
 """Bit of each dot of a cell, by row and column (Unicode Standard, chapter 21.1)."""
 
+AXIS = 8
+"""Characters for the numbers on the left and the line next to them."""
+
 
 class Canvas:
     """Dots, switched on by column and row from the upper left."""
@@ -63,10 +66,6 @@ def envelope(x: FloatArray, y: FloatArray, width: int) -> list[tuple[int, float,
             low, high = min(low, before), max(high, before)
         found.append((column, low, high))
     return found
-
-
-AXIS = 8
-"""Characters for the numbers on the left and the line next to them."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -35,6 +35,9 @@ _WORDS = {
     NO_VALUE: "no value",
 }
 
+SILENT_AFTER_S = 2.0
+"""Without a word from the source for so long [s] the screen says how old it is."""
+
 
 @dataclass(frozen=True, slots=True)
 class Quality:
@@ -113,10 +116,6 @@ class QualityWatch:
             standing_s=standing_ns / 1e9,
             why=words(self._latest),
         )
-
-
-SILENT_AFTER_S = 2.0
-"""Without a word from the source for so long [s] the screen says how old it is."""
 
 
 class Activity(Enum):

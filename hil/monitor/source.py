@@ -32,6 +32,9 @@ HARD_END = (
     "heartbeat is gone; see that they did (hil check), before anyone goes near the shaft."
 )
 
+OPTIONAL = (columns.REFERENCE, "prbs_nm", columns.FLAGS)
+"""Columns a recording may lack; zero stands for them."""
+
 
 class RigSource:
     """A rig in a process of its own, from `__enter__` to `__exit__`.
@@ -99,10 +102,6 @@ class RigSource:
         if self._process.is_alive():
             self._last_words.append(Ended(f"after {LONGEST_END_S:g} s {HARD_END}"))
         self._connection.close()
-
-
-OPTIONAL = (columns.REFERENCE, "prbs_nm", columns.FLAGS)
-"""Columns a recording may lack; zero stands for them."""
 
 
 class ReplaySource:

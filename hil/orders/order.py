@@ -18,6 +18,9 @@ from hil.errors import RigFileError, UsageError
 from hil.problems import validate
 from hil.simulator.addresses import with_addresses
 
+HALT_S = 1.0
+"""Recorded part of coming to a stand [s]."""
+
 
 @dataclass(frozen=True, slots=True)
 class Order:
@@ -97,9 +100,6 @@ def _shown(leaves: dict[str, Any], key: str) -> str:
 
 
 ExperimentKind = TypeVar("ExperimentKind", bound=AnyExperiment)
-
-HALT_S = 1.0
-"""Recorded part of coming to a stand [s]."""
 
 
 def first_of(rig: Rig, kind: type[ExperimentKind]) -> ExperimentKind | None:

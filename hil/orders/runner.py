@@ -41,6 +41,18 @@ Number = Annotated[FiniteFloat, Field(ge=-1e30, le=1e30)]
 
 Both = Annotated[list[Number], Field(min_length=2, max_length=2)]
 
+NO_DRAG = 1e-3
+"""Viscous friction of a vehicle of which only the inertia is known, over that inertia [1/s]: next to none."""
+
+FILTER_S = 0.2
+"""Low-pass of the speed [s]: a resonance at 8 Hz is a tenth of itself behind it."""
+
+MARGIN_SHARE = 0.25
+"""How far a speed may leave its predicted range, in parts of the range: grade and drag are not in the prediction."""
+
+RUNS = "runs"
+"""Folder of the recordings, and of the store of runs, inside that of the commissioning."""
+
 
 @dataclass(slots=True)
 class RunRecord:
@@ -64,10 +76,6 @@ class RunRecord:
 def now_utc() -> str:
     """Return the present time as text."""
     return datetime.now(UTC).isoformat(timespec="seconds")
-
-
-NO_DRAG = 1e-3
-"""Viscous friction of a vehicle of which only the inertia is known, over that inertia [1/s]: next to none."""
 
 
 @dataclass(slots=True, kw_only=True)
@@ -119,13 +127,6 @@ def predict(rig: Rig, name: str, model: DrivelineModel, speed_rad_s: float = 0.0
     )
 
 
-FILTER_S = 0.2
-"""Low-pass of the speed [s]: a resonance at 8 Hz is a tenth of itself behind it."""
-
-MARGIN_SHARE = 0.25
-"""How far a speed may leave its predicted range, in parts of the range: grade and drag are not in the prediction."""
-
-
 @dataclass(slots=True)
 class WithinBand:
     """An experiment inside a speed band.
@@ -164,10 +165,6 @@ class WithinBand:
 def margin_rad_s(low_rad_s: float, high_rad_s: float, least_rad_s: float) -> float:
     """Return the margin of a predicted range [rad/s]."""
     return max(least_rad_s, MARGIN_SHARE * (high_rad_s - low_rad_s))
-
-
-RUNS = "runs"
-"""Folder of the recordings, and of the store of runs, inside that of the commissioning."""
 
 
 @dataclass(frozen=True, slots=True)

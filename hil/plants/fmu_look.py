@@ -15,6 +15,8 @@ from hil.recording.sandbox import Document, Gone, Sandbox
 
 AT_LOAD: Final = r"load|wheel|road|brake|dist|vehicle|abtrieb|last"
 
+_SPEED, _TORQUE = ("rad/s", "rad.s-1", "1/s", "rpm", "1/min"), ("N.m", "Nm", "N*m", "N m")
+
 
 @dataclass(frozen=True, slots=True)
 class _Looks:
@@ -27,7 +29,6 @@ class _Looks:
     several: bool = False
 
 
-_SPEED, _TORQUE = ("rad/s", "rad.s-1", "1/s", "rpm", "1/min"), ("N.m", "Nm", "N*m", "N m")
 _BY_KEY: Final = {
     "torque": _Looks("input", _TORQUE, r"torque|tau|^T(_|\d|$)|moment|^M(_|\d|$)", False, True),
     "output": _Looks("output", _SPEED, r"speed|omega|^w(_|\d|$)|^n(_|\d|$)|dphi|der\(", False),

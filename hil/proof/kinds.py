@@ -12,17 +12,6 @@ from hil.proof.truth.specimen import EFFECTS, NOTHING, PAIR_SIGN, find
 
 OFF = "off"
 
-
-class Group(Enum):
-    """What the right verdict is the same for."""
-
-    SINGLE = "single"
-    PAIR = "pairs"
-    NONE = "none"
-    OFF = "off"
-    OUTSIDE = "outside"
-
-
 PAIRS = (
     "backlash+coulomb_friction_motor",
     "backlash+actuator_lag",
@@ -60,6 +49,18 @@ PAIRS = (
 """Pairs that meet on real vehicles: wear with wear, wear with road or load, mechanics with a fault of the chain that
 records it. Left out are those that no recording of torque and speed tells from one of them alone."""
 
+SEEDS = 2**31  # seeds of cases
+
+
+class Group(Enum):
+    """What the right verdict is the same for."""
+
+    SINGLE = "single"
+    PAIR = "pairs"
+    NONE = "none"
+    OFF = "off"
+    OUTSIDE = "outside"
+
 
 @dataclass(frozen=True, slots=True)
 class CaseKind:
@@ -89,7 +90,6 @@ def kind(name: str) -> CaseKind:
 SHARES = {Group.SINGLE: 0.5, Group.PAIR: 0.2, Group.OUTSIDE: 0.15, Group.OFF: 0.1, Group.NONE: 0.05}
 """How often each group is drawn: one effect of the catalogue in every second case."""
 
-SEEDS = 2**31  # seeds of cases
 
 NAMES = {
     Group.SINGLE: tuple(_singles(catalogued=True)),

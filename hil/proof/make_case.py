@@ -26,16 +26,6 @@ outputs = [
 ]
 """
 
-
-def model_toml(specimen: Specimen, at_the_load: bool = False) -> str:
-    """Return the text of the model file; with the speed ``at_the_load`` as a second output where it is recorded."""
-    lines = ['schema = "hil.model/1"', 'structure = "two_mass"', "", "[parameters]"]
-    for name, value in specimen.nominal.items():
-        lines.append(f"{name} = {{ value = {value:.6g}, tolerance = {NOMINAL_TOLERANCE} }}")
-    text = "\n".join([*lines, "", "[geometry]", f"gear_ratio = {specimen.bus.gear_ratio}", ""])
-    return f"{text}\n{SPEED_AT_THE_LOAD}" if at_the_load else text
-
-
 _COLUMNS = (
     ("time_s", "%.6f"),
     ("torque_ref_nm", "%.3f"),
@@ -45,6 +35,15 @@ _COLUMNS = (
     ("flags", "%d"),
 )
 _AT_THE_LOAD = ("speed_load_rad_s", "%.5f")
+
+
+def model_toml(specimen: Specimen, at_the_load: bool = False) -> str:
+    """Return the text of the model file; with the speed ``at_the_load`` as a second output where it is recorded."""
+    lines = ['schema = "hil.model/1"', 'structure = "two_mass"', "", "[parameters]"]
+    for name, value in specimen.nominal.items():
+        lines.append(f"{name} = {{ value = {value:.6g}, tolerance = {NOMINAL_TOLERANCE} }}")
+    text = "\n".join([*lines, "", "[geometry]", f"gear_ratio = {specimen.bus.gear_ratio}", ""])
+    return f"{text}\n{SPEED_AT_THE_LOAD}" if at_the_load else text
 
 
 def write_recording(path: Path, recording: TruthRecording, at_the_load: bool = False) -> None:

@@ -38,6 +38,12 @@ RESULTS = "wire.json"
 
 LIMIT_S = 600.0  # time one command may take [s]
 
+STALE_SHARE: Final = 0.1
+
+_READY = re.compile(r"ready bus=(?P<bus>\S+) modbus=(?P<modbus>\S+) commitment=(?P<commitment>[0-9a-f]{64})\n")
+
+_END_S = 5.0  # time the process gets to end by itself once its input has ended [s]
+
 
 @dataclass(frozen=True, slots=True)
 class Concealed:
@@ -49,8 +55,6 @@ class Concealed:
     truth: Mapping[str, Any] = field(default_factory=dict)  # what the faults are to a diagnosis
     refused: str = ""  # word that must stand in the reason for which the tool refuses to drive
 
-
-STALE_SHARE: Final = 0.1
 
 WIRED: Final[Mapping[str, Concealed]] = MappingProxyType(
     {
@@ -77,11 +81,6 @@ WIRED: Final[Mapping[str, Concealed]] = MappingProxyType(
     }
 )
 """By name. A new rig is one entry."""
-
-
-_READY = re.compile(r"ready bus=(?P<bus>\S+) modbus=(?P<modbus>\S+) commitment=(?P<commitment>[0-9a-f]{64})\n")
-
-_END_S = 5.0  # time the process gets to end by itself once its input has ended [s]
 
 
 class SealedProcess:

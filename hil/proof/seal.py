@@ -34,6 +34,10 @@ _FIELDS = {"schema", "nonce", "digests", "truth"}
 
 Truth = Mapping[str, object]
 
+MAGIC = b"hil.sealed/1\n"
+AES_NONCE_BYTES = 12
+KEY_BYTES = 32
+
 
 class SealBroken(InputError):
     """An opened seal is not what was committed to: changed by whoever handed it over, or damaged.
@@ -113,11 +117,6 @@ def _fields(opened: object) -> tuple[str, dict[str, str], dict[str, object]]:
     if not (isinstance(digests, dict) and isinstance(truth, dict)):
         raise SealBroken("seal: digests and truth: expected an object each")
     return nonce, digests, truth
-
-
-MAGIC = b"hil.sealed/1\n"
-AES_NONCE_BYTES = 12
-KEY_BYTES = 32
 
 
 def new_key() -> str:

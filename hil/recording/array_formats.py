@@ -23,6 +23,8 @@ from hil.recording.table import Table, columns_of_shared_length, is_column
 
 MOMENTS: Final = "mM"
 
+TABLE, OFFICE, TEXT = (f"{{urn:oasis:names:tc:opendocument:xmlns:{each}:1.0}}" for each in ("table", "office", "text"))
+
 
 def read_numpy(path: Path, request: Request) -> Table:
     """Read arrays: vectors by their names, columns of matrices by address, fields of structured arrays."""
@@ -81,9 +83,6 @@ def _cell(cell: object) -> str:
     if isinstance(cell, datetime | date | time):
         return str(cell)
     return "" if cell is None else repr(cell) if isinstance(cell, float) else str(cell)
-
-
-TABLE, OFFICE, TEXT = (f"{{urn:oasis:names:tc:opendocument:xmlns:{each}:1.0}}" for each in ("table", "office", "text"))
 
 
 def read_ods(path: Path, request: Request) -> Table:

@@ -25,6 +25,8 @@ PROCESSOR_S: Final = 10.0
 BYTES_PER_S: Final = 2e5
 """Time it may take: a floor, and for large files a twentieth of the 4 MB/s measured with MDF."""
 
+CURE = "Make room, or choose another disk."
+
 
 def memory_bytes(file_bytes: int) -> int:
     """Return what reading a recording of that size may take [byte]."""
@@ -60,9 +62,6 @@ def damaged(path: Path, expected: str, error: Exception) -> RecordingError:
     return RecordingError(
         path, f"expected {expected}, got a damaged or truncated one ({got.rstrip('.')}). Take a copy that is whole."
     )
-
-
-CURE = "Make room, or choose another disk."
 
 
 def no_room(path: Path, what: str, error: OSError, then: str = CURE) -> RecordingError:

@@ -40,6 +40,8 @@ _DECIMAL_COMMA: Final = re.compile(r"[+-]?(?:\d{1,3}(?:\.\d{3})+|\d*),\d+(?:[eE]
 
 Moment = Callable[[str], float]
 
+_EPOCH: Final = datetime(1970, 1, 1)
+
 
 def understood(table: Table) -> Table:
     """Return a table with the units of its columns, times as seconds, and texts of numbers as numbers."""
@@ -149,9 +151,6 @@ def _clock_s(found: re.Match[str]) -> float:
     if found["half"]:
         hour = hour % 12 + 12 * (found["half"] in "pP")
     return 3600.0 * hour + 60.0 * int(found["min"]) + float((found["s"] or "0").replace(",", "."))
-
-
-_EPOCH: Final = datetime(1970, 1, 1)
 
 
 def _day_s(year: str, month: str, day: str) -> float:

@@ -37,6 +37,37 @@ from hil.recording.request import FormatHints, Request
 from hil.recording.table import Column, ColumnKind, Table, as_text, line_of
 from hil.recording.text_form import BLANKS, MISSING, SAMPLE_LINES, TextForm, recognise, split
 
+SPECIAL = ",;\t|"  # characters that a reader could take for a delimiter
+
+OWN: Final[Mapping[str, object]] = {"delimiter": ",", "decimal": ".", "header_line": 1, "units_line": 0}
+"""Form of a recording with a sidecar: as hil writes it, nothing has to be recognised."""
+
+BLOCK_BYTES = 1 << 22  # pyarrow parses this much at once; also the longest line it can take
+TRAILING = "\0"  # stands for what follows a delimiter that ends a row
+
+LONG_FORM: Final = frozenset({"_time", "_field", "_value"})
+"""Columns of a text of InfluxDB, with a row for each value of each series."""
+
+UNPACKED_PER_BYTE: Final = 200  # text of numbers packs to a tenth: beyond, it was made to fill the memory
+
+END_OF_HEADER: Final = "***End_of_Header***"
+
+MARKS: Final = (
+    (codecs.BOM_UTF8, "utf-8-sig"),
+    (codecs.BOM_UTF32_LE, "utf-32"),  # begins like that of UTF-16
+    (codecs.BOM_UTF16_LE, "utf-16"),
+    (codecs.BOM_UTF16_BE, "utf-16"),
+)
+"""Byte order marks (Unicode 15, 23.8) and the encoding that reads them."""
+
+WITHOUT_MARK: Final = ((1, "utf-16-le"), (0, "utf-16-be"))
+"""UTF-16 without a mark: of ASCII every second byte is NUL, from this one on."""
+
+LOOKED_AT_BYTES: Final = 64  # enough for the names of a column or two
+
+FALLBACK: Final = "latin-1"
+"""What a file that is no UTF-8 most likely is: of a Windows program, whose other characters are in no unit."""
+
 
 def as_column(cells: pa.ChunkedArray, kind: ColumnKind | None = None, decimal: str = ".") -> Column:
     """Turn text into the kind it is said to be; unsaid into int64, float64 or text, whichever first fits every cell.
@@ -78,15 +109,6 @@ def without_groups(cells: pa.ChunkedArray, mark: str) -> pa.ChunkedArray:
     return pa.compute.if_else(grouped, pa.compute.replace_substring(cells, mark, ""), cells)
 
 
-SPECIAL = ",;\t|"  # characters that a reader could take for a delimiter
-
-OWN: Final[Mapping[str, object]] = {"delimiter": ",", "decimal": ".", "header_line": 1, "units_line": 0}
-"""Form of a recording with a sidecar: as hil writes it, nothing has to be recognised."""
-
-BLOCK_BYTES = 1 << 22  # pyarrow parses this much at once; also the longest line it can take
-TRAILING = "\0"  # stands for what follows a delimiter that ends a row
-
-
 def read(path: Path, request: Request) -> Table:
     """Read a text recording, in the form that it is recognised to have or that was set by hand."""
     said = read_sidecar(path)
@@ -94,12 +116,6 @@ def read(path: Path, request: Request) -> Table:
     if path.suffix.lower() == ".lvm":
         text = labview_text(text)
     return table_of_text(path, text, request.form, encoding, said)
-
-
-LONG_FORM: Final = frozenset({"_time", "_field", "_value"})
-"""Columns of a text of InfluxDB, with a row for each value of each series."""
-
-UNPACKED_PER_BYTE: Final = 200  # text of numbers packs to a tenth: beyond, it was made to fill the memory
 
 
 def read_packed(path: Path, request: Request) -> Table:
@@ -166,9 +182,6 @@ def pivoted(table: Table) -> Table:
         columns[name] = np.full(times.size, np.nan)
         columns[name][np.searchsorted(times, stamps[of_it])] = values[of_it]
     return replace(table, columns=columns, first_line=None, skipped=(), remarks=(*table.remarks, "series by _field"))
-
-
-END_OF_HEADER: Final = "***End_of_Header***"
 
 
 def labview_text(text: str) -> str:
@@ -332,23 +345,6 @@ def _quoted(text: str) -> str:
     """Quote a text with anything in it that a reader could take for a delimiter, or that would leave a line blank."""
     unclear = not text.strip() or any(c in text for c in f'{SPECIAL}"')
     return '"' + text.replace('"', '""') + '"' if unclear else text
-
-
-MARKS: Final = (
-    (codecs.BOM_UTF8, "utf-8-sig"),
-    (codecs.BOM_UTF32_LE, "utf-32"),  # begins like that of UTF-16
-    (codecs.BOM_UTF16_LE, "utf-16"),
-    (codecs.BOM_UTF16_BE, "utf-16"),
-)
-"""Byte order marks (Unicode 15, 23.8) and the encoding that reads them."""
-
-WITHOUT_MARK: Final = ((1, "utf-16-le"), (0, "utf-16-be"))
-"""UTF-16 without a mark: of ASCII every second byte is NUL, from this one on."""
-
-LOOKED_AT_BYTES: Final = 64  # enough for the names of a column or two
-
-FALLBACK: Final = "latin-1"
-"""What a file that is no UTF-8 most likely is: of a Windows program, whose other characters are in no unit."""
 
 
 def encoding_of(content: bytes, given: str) -> str:

@@ -27,6 +27,10 @@ SCHEMA = "hil.recording/1"
 
 OUTCOME = "outcome"  # key of the metadata of a run that did not come to its end: what ended it
 
+_DAMAGED = (ValueError, KeyError, TypeError, AttributeError)
+
+SCHEMA_KEY, UNITS_KEY, TYPES_KEY = "schema", "units", "types"
+
 
 def description_of(table: Table, stored_as: Mapping[str, str]) -> str:
     """Describe a table whose columns are stored under other names."""
@@ -35,9 +39,6 @@ def description_of(table: Table, stored_as: Mapping[str, str]) -> str:
         for name, column in table.columns.items()
     ]
     return json.dumps({"schema": SCHEMA, "columns": columns, "metadata": dict(table.metadata)})
-
-
-_DAMAGED = (ValueError, KeyError, TypeError, AttributeError)
 
 
 def described_table(path: Path, text: str, column: Callable[[str, ColumnKind], Column]) -> Table:
@@ -77,9 +78,6 @@ def _damaged(path: Path, error: Exception) -> RecordingError:
     return RecordingError(
         path, f"expected a description {SCHEMA} inside, got a damaged one ({error!r}). Take a copy that is whole."
     )
-
-
-SCHEMA_KEY, UNITS_KEY, TYPES_KEY = "schema", "units", "types"
 
 
 @dataclass(frozen=True, slots=True)

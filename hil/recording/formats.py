@@ -22,6 +22,8 @@ from hil.recording.request import Request
 from hil.recording.sandbox import READER
 from hil.recording.table import Table
 
+TEXT_BYTES = 4096  # of a file, by which it is seen to be text
+
 
 @dataclass(frozen=True, slots=True)
 class Format:
@@ -152,9 +154,6 @@ def format_of(path: Path) -> Format:
         raise RecordingError(path, f"expected a recording, got {path.suffix or 'no ending'!r}. {_way_out(path)}")
     _require_readable(path)
     return known
-
-
-TEXT_BYTES = 4096  # of a file, by which it is seen to be text
 
 
 def _way_out(path: Path) -> str:

@@ -28,6 +28,12 @@ CELL_BYTES = 8  # of the widest number; a longer element, such as a table's row,
 DAMAGED = (OSError, KeyError, ValueError, TypeError, RuntimeError, IndexError, AttributeError)
 """What h5py raises on a file that is cut or damaged."""
 
+PICKLED_TEXT = re.compile(r"(?:^|\n)a?V([^\n]*)\n")
+"""A text in a pickle of protocol 0, read as what it is: nothing is unpickled."""
+
+DESCRIPTION = "recording_json"
+COLUMNS = "columns"
+
 
 @contextmanager
 def reading(path: Path, what: str) -> Iterator[Any]:
@@ -94,12 +100,6 @@ def write_whole(path: Path, fill: Callable[[Any], None], header: bytes = b"") ->
 
 File: TypeAlias = Any
 Dataset: TypeAlias = Any  # those of h5py, which has no types
-
-PICKLED_TEXT = re.compile(r"(?:^|\n)a?V([^\n]*)\n")
-"""A text in a pickle of protocol 0, read as what it is: nothing is unpickled."""
-
-DESCRIPTION = "recording_json"
-COLUMNS = "columns"
 
 
 def read(path: Path, request: Request) -> Table:

@@ -24,6 +24,8 @@ LONG_PERIOD_S = 1.0
 
 EPOCH_S = 1e9  # seconds since 1970 that no recording lasts: what is larger is a time of day
 
+CHANNEL_HEADINGS = ("channel", "unit", "samples", "missing", "low", "high", "could be")
+
 
 def signals_lines(survey: Survey, roles: Roles, encoding: str | None = None) -> list[str]:
     """Return the lines of a ``[signals]`` table; none where the file has the contract's columns."""
@@ -123,9 +125,6 @@ class Look:
     survey: Survey
     roles: Roles
     signals: tuple[str, ...]
-
-
-CHANNEL_HEADINGS = ("channel", "unit", "samples", "missing", "low", "high", "could be")
 
 
 def channel_rows(group: Group) -> Iterator[tuple[str, str, int, int, float | None, float | None, str]]:

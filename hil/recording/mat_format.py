@@ -41,6 +41,18 @@ DAMAGED = (ValueError, TypeError, IndexError, KeyError, OSError, NotImplementedE
 OBJECTS: Final = "__function_workspace__"
 """Variable in which MATLAB keeps what its objects hold (versions 5 to 7)."""
 
+TITLE = b"MATLAB 7.3 MAT-file"
+
+HEADER = (
+    (TITLE + b", Platform: hil, HDF5 schema 1.00 .").ljust(116) + bytes(8) + b"\x00\x02IM"
+)  # text, no subsystem data, version 2.0, little-endian
+
+REFERENCES = "#refs#"
+
+LONGEST_NAME = 63  # characters of a variable's name that MATLAB distinguishes (``namelengthmax``)
+
+DEEPEST: Final = 12  # structs inside structs that are looked into
+
 
 def read(path: Path, request: Request) -> Table:
     import scipy.io
@@ -77,23 +89,11 @@ def read_metadata(path: Path) -> Mapping[str, str]:
         return metadata_of(path, _text(file[DESCRIPTION])) if DESCRIPTION in file else _foreign_metadata(file)
 
 
-TITLE = b"MATLAB 7.3 MAT-file"
-
-
 def is_version_73(path: Path) -> bool:
     """Whether a .mat file is HDF5 inside; its header says so (MAT-File Format, version 7.3: version 0x0200)."""
     with open_regular(path) as file:
         header = file.read(128)
     return header.startswith(TITLE) or header[124:] in (b"\x00\x02IM", b"\x02\x00MI")
-
-
-HEADER = (
-    (TITLE + b", Platform: hil, HDF5 schema 1.00 .").ljust(116) + bytes(8) + b"\x00\x02IM"
-)  # text, no subsystem data, version 2.0, little-endian
-
-REFERENCES = "#refs#"
-
-LONGEST_NAME = 63  # characters of a variable's name that MATLAB distinguishes (``namelengthmax``)
 
 
 def write(table: Table, path: Path) -> None:
@@ -263,9 +263,6 @@ def columns_of(table: Any) -> dict[str, Any]:
     if table.index.dtype.kind not in "mM":
         return columns
     return {str(table.index.name or "Time"): seconds_since_first(table.index.to_numpy()), **columns}
-
-
-DEEPEST: Final = 12  # structs inside structs that are looked into
 
 
 def walk(

@@ -52,6 +52,9 @@ FINISHED, UNFINISHED = b"MDF     ", b"UnFinMF "
 
 IDENTIFICATION_BYTES = 64
 
+BUS_EVENT: Final = 2  # flag of a group of bus events, ``cg_flags`` (ASAM MDF 4.1, table 51)
+ANY_BUS: Final = 0  # channel of the bus, as asammdf counts: every one
+
 
 def is_unfinished(path: Path) -> bool:
     """Whether a file was left by a writer that did not come to its end."""
@@ -101,10 +104,6 @@ def _quiet() -> Iterator[None]:
             yield
     finally:
         logger.disabled = before
-
-
-BUS_EVENT: Final = 2  # flag of a group of bus events, ``cg_flags`` (ASAM MDF 4.1, table 51)
-ANY_BUS: Final = 0  # channel of the bus, as asammdf counts: every one
 
 
 def is_bus_log(mdf: MDF) -> bool:

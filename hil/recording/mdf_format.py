@@ -35,6 +35,15 @@ DESCRIPTION = "recording.json"
 
 FINALISED = "its writer never finished it: it was finalised in a copy and read from there, the file stays as it is"
 
+VERSION = "4.10"
+RIG_NAME = "rig.toml"
+ROW_NUMBER = "row"
+
+TIME_MASTER, INDEX_MASTER = 1, 4  # kinds of master channel, ``cn_sync_type`` (ASAM MDF 4.1, table 59)
+
+LONGEST_PROPERTY = 200
+"""Characters of a value that still stands in the file's comment; longer ones are in the attachments only."""
+
 
 def _description(mdf: MDF) -> str | None:
     if mdf.version < "4":  # such files have no attachments, and asammdf refuses to say so
@@ -54,16 +63,6 @@ def _own(path: Path, mdf: MDF, text: str) -> Table:
         return cells.astype(np.bool_) if kind is ColumnKind.BOOLEAN else cells
 
     return described_table(path, text, column)
-
-
-VERSION = "4.10"
-RIG_NAME = "rig.toml"
-ROW_NUMBER = "row"
-
-TIME_MASTER, INDEX_MASTER = 1, 4  # kinds of master channel, ``cn_sync_type`` (ASAM MDF 4.1, table 59)
-
-LONGEST_PROPERTY = 200
-"""Characters of a value that still stands in the file's comment; longer ones are in the attachments only."""
 
 
 def read(path: Path, request: Request) -> Table:

@@ -32,6 +32,15 @@ NS: Final = 1e-9
 MOST_ODD_LINES: Final = 0.01
 """Share of the lines of a log that may be none of its form, skipped and counted; beyond, the log is damaged."""
 
+EVENT: Final = re.compile(r"\s*\(?\d")
+"""What a line of a text log begins with that is a frame, or should be one."""
+
+HEAD_LINES: Final = 40  # lines among which a log says in which form it is
+
+HEADS: Final = (";", "date", "base", "internal", "//")
+
+FEW_ODD_LINES: Final = 3  # lines that may be odd in a log of any length: its beginning is often cut
+
 
 @dataclass(slots=True)
 class Group:
@@ -235,19 +244,6 @@ def _message(message: Any, frames: list[tuple[float, bytes]], start: float) -> G
         group.channels[signal.name] = np.array([float(values.get(signal.name, np.nan)) for values in decoded])
         group.units[signal.name] = str(signal.unit or "")
     return group
-
-
-EVENT: Final = re.compile(r"\s*\(?\d")
-"""What a line of a text log begins with that is a frame, or should be one."""
-
-
-HEAD_LINES: Final = 40  # lines among which a log says in which form it is
-
-
-HEADS: Final = (";", "date", "base", "internal", "//")
-
-
-FEW_ODD_LINES: Final = 3  # lines that may be odd in a log of any length: its beginning is often cut
 
 
 class _Log:

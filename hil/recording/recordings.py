@@ -23,6 +23,19 @@ from hil.recording.signals import Tell, read_record
 from hil.recording.signals_config import SignalsConfig
 from hil.recording.table import Table
 
+CSV = ".csv"
+
+_SHOWN = 16
+"""Digits of a checksum that are shown: enough to distinguish any two that a person will ever compare."""
+
+_SINGLE_LINE = 100
+
+# A single late or missing sample is flagged and left out. That does not help where hardly a stretch between two of them
+# is whole: the torque of a flagged sample is held, wrong by a step of the PRBS half of the time. With one bad cycle in
+# 20 a stretch is 20 cycles long on average, which the default model (four coefficients at twice the period) needs twice
+# over to forget where it began. A diagnosis refuses nothing: the acquisition is among what it looks into.
+WORST_SHARE = 0.05  # part of the cycles that may have been late, missing or without an answer
+
 
 def read_records(
     paths: Sequence[Path],
@@ -78,9 +91,6 @@ def _require_own_samples(paths: Sequence[Path], records: Sequence[Record]) -> No
         known[samples] = path
 
 
-CSV = ".csv"
-
-
 class Facts(NamedTuple):
     """What is known of a recording whose rows are not kept."""
 
@@ -109,12 +119,6 @@ def read_facts(path: Path) -> Facts:
     return facts_of(read_table(path))
 
 
-_SHOWN = 16
-"""Digits of a checksum that are shown: enough to distinguish any two that a person will ever compare."""
-
-_SINGLE_LINE = 100
-
-
 def self_description(metadata: Mapping[str, str]) -> list[str]:
     """Return a line for each thing that is said; long texts by their length, the rig file by its checksum."""
     if not metadata:
@@ -132,13 +136,6 @@ def self_description(metadata: Mapping[str, str]) -> list[str]:
             is_short = len(shown) <= _SINGLE_LINE and "\n" not in shown
             lines.append(f"{key}: {shown}" if is_short else f"{key}: {len(value)} characters")
     return lines
-
-
-# A single late or missing sample is flagged and left out. That does not help where hardly a stretch between two of them
-# is whole: the torque of a flagged sample is held, wrong by a step of the PRBS half of the time. With one bad cycle in
-# 20 a stretch is 20 cycles long on average, which the default model (four coefficients at twice the period) needs twice
-# over to forget where it began. A diagnosis refuses nothing: the acquisition is among what it looks into.
-WORST_SHARE = 0.05  # part of the cycles that may have been late, missing or without an answer
 
 
 def require_even_cycles(paths: Iterable[Path]) -> None:

@@ -13,6 +13,10 @@ from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, field_validator
 
 from hil.recording.table import Column, is_column
 
+MOST_SLICES: Final = 512  # columns of a matrix that have an address each
+
+_SLICE: Final = re.compile(r"(?P<open>[\[(])\s*(?P<row>:|\d+)\s*,\s*(?P<column>:|\d+)\s*[\])]")
+
 
 class FormatHints(BaseModel):
     """How a text recording is written; what is left out is recognised."""
@@ -71,11 +75,6 @@ class Request:
     def of_document(cls, document: Mapping[str, Any]) -> Request:
         """Return what `as_document` was made of."""
         return TypeAdapter(Request).validate_python(document)
-
-
-MOST_SLICES: Final = 512  # columns of a matrix that have an address each
-
-_SLICE: Final = re.compile(r"(?P<open>[\[(])\s*(?P<row>:|\d+)\s*,\s*(?P<column>:|\d+)\s*[\])]")
 
 
 def canonical(address: str) -> str:

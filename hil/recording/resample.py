@@ -44,6 +44,16 @@ COARSER = 1.2
 
 ROUND = 0.01  # share of the least step within which all steps are multiples of it, where stamps are rounded
 
+EDGE, HALF_LENGTH = 1.0, 8
+"""Of the low-pass: in new Nyquist frequencies, and in new periods; as in `estimator.signals.decimate`."""
+
+GAP: Final = 2.5
+"""Distance of two samples, in the channel's own period, beyond which those between are missing: jitter is less."""
+
+THINS: Final = 1.5  # ratio of the new period to the channel's own from which on it is thinned
+MOST_RATIO: Final = 10_000  # of both periods; the low-pass has 16 times as many taps
+HALF: Final = 0.5  # weight of present samples in the low-pass below which the result is missing
+
 
 def time_base(table: Table, signal: TimeSignal) -> tuple[FloatArray, float, tuple[str, ...]]:
     """Return the time of each row and the sampling period."""
@@ -130,17 +140,6 @@ def _refuse(table: Table, column: str, time: FloatArray, span: int, wrong: NDArr
             f"{table.place(row)}, column {column}: {expected}, got {time[row]:.9g} s "
             f"after {time[row - span]:.9g} s in {before}",
         )
-
-
-EDGE, HALF_LENGTH = 1.0, 8
-"""Of the low-pass: in new Nyquist frequencies, and in new periods; as in `estimator.signals.decimate`."""
-
-GAP: Final = 2.5
-"""Distance of two samples, in the channel's own period, beyond which those between are missing: jitter is less."""
-
-THINS: Final = 1.5  # ratio of the new period to the channel's own from which on it is thinned
-MOST_RATIO: Final = 10_000  # of both periods; the low-pass has 16 times as many taps
-HALF: Final = 0.5  # weight of present samples in the low-pass below which the result is missing
 
 
 @dataclass(frozen=True, slots=True)

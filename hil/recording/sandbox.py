@@ -41,6 +41,26 @@ _DTYPES: Final[Mapping[ColumnKind, type[np.generic]]] = {
 
 Document = dict[str, Any]
 
+_SAID: Final = ("units", "metadata", "remarks", "master", "elsewhere")
+"""All of a table but its columns and path."""
+
+TRIES: Final = 20  # attempts to remove the folder of a process whose command has ended
+
+PROCESS: Final = "hil.recording.reader_process"
+
+WAITING: Final = 6.0
+"""How much longer than its processor's time a reading may last, on a machine that does other things."""
+
+ENDING_S: Final = 5.0  # how long a process may take to end by itself
+
+ENVIRONMENT: Final = {
+    "OPENBLAS_NUM_THREADS": "1",
+    "OMP_NUM_THREADS": "1",
+    "MALLOC_ARENA_MAX": "2",
+    "ARROW_DEFAULT_MEMORY_POOL": "system",
+}
+"""Threads and allocators that reserve address space, which is what is bounded, are left out."""
+
 
 def send(stream: IO[bytes], document: Document, columns: Mapping[str, Column] | None = None) -> None:
     """Write a document, and the columns it is about."""
@@ -59,10 +79,6 @@ def receive(stream: IO[bytes]) -> tuple[Document, dict[str, Column]]:
     """Read what `send` has written."""
     document: Document = json.loads(_receive_text(stream))
     return document, {name: _column(stream, ColumnKind(kind), size) for name, kind, size in document["columns"]}
-
-
-_SAID: Final = ("units", "metadata", "remarks", "master", "elsewhere")
-"""All of a table but its columns and path."""
 
 
 def described(table: Table) -> Document:
@@ -105,8 +121,6 @@ def _fill(stream: IO[bytes], place: memoryview) -> None:
             raise EOFError
         done += count
 
-
-TRIES: Final = 20  # attempts to remove the folder of a process whose command has ended
 
 Answer = Callable[[Document, dict[str, Column]], tuple[Document, Mapping[str, Column] | None]]
 
@@ -171,21 +185,6 @@ def _address_space() -> int:
         return 1 << 30
     return pages * os.sysconf("SC_PAGE_SIZE")
 
-
-PROCESS: Final = "hil.recording.reader_process"
-
-WAITING: Final = 6.0
-"""How much longer than its processor's time a reading may last, on a machine that does other things."""
-
-ENDING_S: Final = 5.0  # how long a process may take to end by itself
-
-ENVIRONMENT: Final = {
-    "OPENBLAS_NUM_THREADS": "1",
-    "OMP_NUM_THREADS": "1",
-    "MALLOC_ARENA_MAX": "2",
-    "ARROW_DEFAULT_MEMORY_POOL": "system",
-}
-"""Threads and allocators that reserve address space, which is what is bounded, are left out."""
 
 ReadPart = Literal["table", "metadata", "survey"]
 

@@ -19,6 +19,50 @@ import numpy as np
 from hil.errors import RecordingError
 from hil.recording.table import FloatArray, Table
 
+TURN: Final = 2.0 * math.pi
+FOOT_M, POUND_N = 0.3048, 4.4482216152605
+
+_SUPERSCRIPTS: Final = str.maketrans("\u2070\u00b9\u00b2\u00b3\u207b", "0123-")
+
+_SUFFIXES: Final[Mapping[str, str]] = {
+    "rpm": "rpm",
+    "1_min": "1/min",
+    "rad_s": "rad/s",
+    "radps": "rad/s",
+    "rad_per_s": "rad/s",
+    "deg_s": "deg/s",
+    "nm": "Nm",
+    "knm": "kNm",
+    "deg": "deg",
+    "rad": "rad",
+    "kmh": "km/h",
+    "km_h": "km/h",
+    "m_s": "m/s",
+    "ms": "ms",
+    "us": "us",
+    "ns": "ns",
+    "pct": "%",
+    "percent": "%",
+    "permille": "permille",
+}
+"""What a name may end in behind an underscore or a blank, and the unit that it is."""
+
+_TIME_IN_S: Final = re.compile(r"(t|time|zeit)(_\w+)?_s")
+
+_AFTER_WORD: Final = re.compile(r"(?:\sin|\s*[/;])\s+(\S+(?:\s\S+)?)$")
+"""``n in 1/min``, and ``n / min⁻¹`` as ISO 80000 has it."""
+
+_IN_BRACKETS: Final = re.compile(r"\s*(?:\[([^\[\]]*)\]|\(([^()]*)\))\s*$")
+_NAMED_AT_THE_END: Final = re.compile(r"\s*(?:\[[^\[\]]*[\]\)]|\([^()]*\))\s*$")
+
+WITHOUT_MEANING: Final = re.compile(r"(values?|data|signals?|samples?|y)(\(.*\))?|\d+", re.IGNORECASE)
+"""Parts of a path that say nothing of what a channel is."""
+
+WRAPS_BITS: Final = (8, 16, 32)  # lengths of the whole numbers that loggers store
+
+STEP_RATIO: Final = 4.0
+"""How much larger a step may be where the reading begins anew, put right, than the largest other step."""
+
 
 class Quantity(Enum):
     """What a unit is of; the value is the word for people."""
@@ -42,9 +86,6 @@ class Unit:
     quantity: Quantity
     factor: float
 
-
-TURN: Final = 2.0 * math.pi
-FOOT_M, POUND_N = 0.3048, 4.4482216152605
 
 _SPELLED: Final[Mapping[tuple[Quantity, float], str]] = {
     (Quantity.TIME, 1.0): "s sec second seconds",
@@ -82,39 +123,6 @@ _SPELLED: Final[Mapping[tuple[Quantity, float], str]] = {
 _UNITS: Final[Mapping[str, Unit]] = MappingProxyType(
     {spelling: Unit(*meaning) for meaning, spellings in _SPELLED.items() for spelling in spellings.split()}
 )
-
-_SUPERSCRIPTS: Final = str.maketrans("\u2070\u00b9\u00b2\u00b3\u207b", "0123-")
-
-_SUFFIXES: Final[Mapping[str, str]] = {
-    "rpm": "rpm",
-    "1_min": "1/min",
-    "rad_s": "rad/s",
-    "radps": "rad/s",
-    "rad_per_s": "rad/s",
-    "deg_s": "deg/s",
-    "nm": "Nm",
-    "knm": "kNm",
-    "deg": "deg",
-    "rad": "rad",
-    "kmh": "km/h",
-    "km_h": "km/h",
-    "m_s": "m/s",
-    "ms": "ms",
-    "us": "us",
-    "ns": "ns",
-    "pct": "%",
-    "percent": "%",
-    "permille": "permille",
-}
-"""What a name may end in behind an underscore or a blank, and the unit that it is."""
-
-_TIME_IN_S: Final = re.compile(r"(t|time|zeit)(_\w+)?_s")
-
-_AFTER_WORD: Final = re.compile(r"(?:\sin|\s*[/;])\s+(\S+(?:\s\S+)?)$")
-"""``n in 1/min``, and ``n / min⁻¹`` as ISO 80000 has it."""
-
-_IN_BRACKETS: Final = re.compile(r"\s*(?:\[([^\[\]]*)\]|\(([^()]*)\))\s*$")
-_NAMED_AT_THE_END: Final = re.compile(r"\s*(?:\[[^\[\]]*[\]\)]|\([^()]*\))\s*$")
 
 
 def unit_of(text: str) -> Unit | None:
@@ -154,10 +162,6 @@ def without_unit(name: str) -> str:
     return bare or name
 
 
-WITHOUT_MEANING: Final = re.compile(r"(values?|data|signals?|samples?|y)(\(.*\))?|\d+", re.IGNORECASE)
-"""Parts of a path that say nothing of what a channel is."""
-
-
 def called(path: str) -> str:
     """Return the part of a channel's path that tells what it is."""
     parts = [part.strip() for part in re.split(r"[./]", path) if part.strip()]
@@ -185,11 +189,6 @@ EXPECTED: Final = {
     Role.ACCELERATION: (),
 }
 """Quantities that a column of a role may be of."""
-
-WRAPS_BITS: Final = (8, 16, 32)  # lengths of the whole numbers that loggers store
-
-STEP_RATIO: Final = 4.0
-"""How much larger a step may be where the reading begins anew, put right, than the largest other step."""
 
 
 def scale_of(table: Table, column: str, role: Role, given: float | None) -> float:

@@ -53,6 +53,12 @@ FEWEST_SAMPLES = 10
 
 Tell = Callable[[str], None]  # takes one line of what was recognised, left out or fixed
 
+CANCELS: Final = 0.01
+"""Ratio of the spread of a sum of torques to theirs below which they cancel: two readings differ by more."""
+
+FOLLOWS: Final = 0.3
+"""Correlation of a torque's impulse with the change of the speed from which on one follows the other."""
+
 
 def read_record(
     path: Path | str,
@@ -344,13 +350,6 @@ def _require_samples(table: Table, okay: NDArray[np.bool_]) -> None:
             f"expected {FEWEST_SAMPLES} usable samples or more, got {usable} of {okay.size} rows "
             "(the others are nan, flagged or masked). Record longer or fix the mask.",
         )
-
-
-CANCELS: Final = 0.01
-"""Ratio of the spread of a sum of torques to theirs below which they cancel: two readings differ by more."""
-
-FOLLOWS: Final = 0.3
-"""Correlation of a torque's impulse with the change of the speed from which on one follows the other."""
 
 
 def require_plausible_torques(

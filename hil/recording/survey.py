@@ -22,6 +22,27 @@ TIME_NAMES: Final = ("time", "zeit", "t", "timestamp", "timestamps", "stamp")
 
 EVEN: Final = 0.5  # share of the period by which a step of an even time may differ from it
 
+BY_UNIT, BY_WORD, BY_LETTER, BY_CHANCE = 4, 3, 2, 1  # how sure a role is
+
+WORDS: Final = {
+    Role.TORQUE: r"torque|drehmoment|trq|\btq|moment|tau|force|kraft",
+    Role.SPEED: r"speed|drehzahl|velocity|geschw|omega|rpm|\bvel",
+    Role.POSITION: r"position|\bpos|angle|winkel|displacement|\bweg|phi",
+}
+"""Parts of names, as people write them in English and German."""
+
+LETTERS: Final = {
+    Role.TORQUE: r"T|[Tt]_?[Mm]?\d+|[Tt]_?[Mm]|[UuMmF]\d*|um|tq\d*",
+    Role.SPEED: r"[nN](_?[mM])?\d*|[wW]\d*|v\d*",
+    Role.POSITION: r"q(m)?\d*|p\d*|x\d*",
+}
+"""Whole names."""
+
+ANY_OUTPUT: Final = r"[yz]\d*"  # names of a measured output of whatever kind
+
+NOT_MEASURED: Final = re.compile(r"ref|soll|set|cmd|command|target|limit|max|min|prbs|demand|request", re.IGNORECASE)
+"""Parts of names of what was asked for, not read."""
+
 
 @dataclass(frozen=True, slots=True)
 class Channel:
@@ -148,28 +169,6 @@ def rounded(period_s: float) -> float:
         if math.isclose(value, period_s, rel_tol=0.02):
             return value
     return period_s
-
-
-BY_UNIT, BY_WORD, BY_LETTER, BY_CHANCE = 4, 3, 2, 1  # how sure a role is
-
-WORDS: Final = {
-    Role.TORQUE: r"torque|drehmoment|trq|\btq|moment|tau|force|kraft",
-    Role.SPEED: r"speed|drehzahl|velocity|geschw|omega|rpm|\bvel",
-    Role.POSITION: r"position|\bpos|angle|winkel|displacement|\bweg|phi",
-}
-"""Parts of names, as people write them in English and German."""
-
-LETTERS: Final = {
-    Role.TORQUE: r"T|[Tt]_?[Mm]?\d+|[Tt]_?[Mm]|[UuMmF]\d*|um|tq\d*",
-    Role.SPEED: r"[nN](_?[mM])?\d*|[wW]\d*|v\d*",
-    Role.POSITION: r"q(m)?\d*|p\d*|x\d*",
-}
-"""Whole names."""
-
-ANY_OUTPUT: Final = r"[yz]\d*"  # names of a measured output of whatever kind
-
-NOT_MEASURED: Final = re.compile(r"ref|soll|set|cmd|command|target|limit|max|min|prbs|demand|request", re.IGNORECASE)
-"""Parts of names of what was asked for, not read."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -23,6 +23,16 @@ Column = NDArray[Any]
 
 _LARGEST_INTEGER = np.iinfo(np.int64).max
 
+LARGEST = 1e30
+"""Magnitude beyond which a number is no measurement, in whatever unit; its fourth power still is a float."""
+
+LEFT_OUT = ": left out, "  # what every remark on a column that was not read has behind the column's name
+
+NAME_IN_MODEL = "For a foreign recording, name its columns in [signals] of the model file."
+NAME_IN_PYTHON = "Name its columns: from_pandas(frame, torque=[...], speed=..., time=...)."
+
+LONGEST_CELL = 40  # characters of a wrong cell that a message shows
+
 
 class ColumnKind(Enum):
     """What the cells of a column are; the value is the word that files use for it."""
@@ -98,16 +108,6 @@ def columns_of_shared_length(
 
 
 FloatArray = NDArray[np.float64]
-
-LARGEST = 1e30
-"""Magnitude beyond which a number is no measurement, in whatever unit; its fourth power still is a float."""
-
-LEFT_OUT = ": left out, "  # what every remark on a column that was not read has behind the column's name
-
-NAME_IN_MODEL = "For a foreign recording, name its columns in [signals] of the model file."
-NAME_IN_PYTHON = "Name its columns: from_pandas(frame, torque=[...], speed=..., time=...)."
-
-LONGEST_CELL = 40  # characters of a wrong cell that a message shows
 
 
 @dataclass(frozen=True, slots=True)

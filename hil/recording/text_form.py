@@ -22,6 +22,29 @@ NUMBER: Final = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?(?:i
 DATE_TIME: Final = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(?::\d\d(?:[.,]\d{1,9})?)?(?:Z|[+-]\d\d:?\d\d)?")
 """A date with a time of day (ISO 8601)."""
 
+COMMA, TAB, BLANKS = ",", "\t", " "
+
+DELIMITER_WORDS: Final[Mapping[str, str]] = {TAB: "a tab", BLANKS: "blanks", COMMA: "a comma", ";": "a semicolon"}
+
+SAMPLE_LINES: Final = 200
+"""Lines that are looked at: more than any header has, and enough rows to tell what a column holds."""
+
+MOST_CELLS: Final = 100_000  # cells that are looked at: of a hundred columns those of all lines
+
+DELIMITERS: Final = (COMMA, ";", TAB, "|", BLANKS)
+DECIMALS: Final = (".", ",")
+
+COMMENTS: Final = ("#", "%", "//")
+
+NAMES_THE_DELIMITER: Final = "sep="  # first line of a file that Excel shall read
+
+TYPE_WORDS: Final = frozenset(
+    "f4 f8 i1 i2 i4 i8 u1 u2 u4 u8 b float double single real int integer uint bool boolean string text".split()
+)
+"""Words of a line of data types, as INCA and others write one."""
+
+HALF: Final = 0.5  # share of the cells of rows that are no texts, in most files
+
 
 class CellKind(Enum):
     """What a cell alone says of itself."""
@@ -41,11 +64,6 @@ def kind_of(cell: str, decimal: str = ".") -> CellKind:
     if NUMBER.fullmatch(plain):
         return CellKind.NUMBER
     return CellKind.DATE_TIME if DATE_TIME.fullmatch(cell.strip()) else CellKind.TEXT
-
-
-COMMA, TAB, BLANKS = ",", "\t", " "
-
-DELIMITER_WORDS: Final[Mapping[str, str]] = {TAB: "a tab", BLANKS: "blanks", COMMA: "a comma", ";": "a semicolon"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,26 +104,6 @@ class TextForm:
             (bool(self.repeated), f"{', '.join(self.repeated)} more than once, numbered"),
         )
         return (text for holds, text in parts if holds)
-
-
-SAMPLE_LINES: Final = 200
-"""Lines that are looked at: more than any header has, and enough rows to tell what a column holds."""
-
-MOST_CELLS: Final = 100_000  # cells that are looked at: of a hundred columns those of all lines
-
-DELIMITERS: Final = (COMMA, ";", TAB, "|", BLANKS)
-DECIMALS: Final = (".", ",")
-
-COMMENTS: Final = ("#", "%", "//")
-
-NAMES_THE_DELIMITER: Final = "sep="  # first line of a file that Excel shall read
-
-TYPE_WORDS: Final = frozenset(
-    "f4 f8 i1 i2 i4 i8 u1 u2 u4 u8 b float double single real int integer uint bool boolean string text".split()
-)
-"""Words of a line of data types, as INCA and others write one."""
-
-HALF: Final = 0.5  # share of the cells of rows that are no texts, in most files
 
 
 def split(line: str, delimiter: str) -> list[str]:

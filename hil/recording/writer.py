@@ -39,6 +39,20 @@ from hil.recording.publish import write_table
 from hil.recording.table import Table
 from hil.sample import Sample
 
+PAUSE_S = 0.002
+"""After what was written [s]: lines that come faster, as those of a run without a clock, are written together."""
+
+CSV, PART = ".csv", ".part.csv"
+
+CAPACITY = 20_000  # samples that may wait for the disk: 200 s at 10 ms, some 10 MB
+DRAIN_S = 60.0  # time the disk has for them when the run is over [s]
+FIRST_WRITE_S = 10.0  # time it has for the first bytes [s]
+
+NOT_ENDED = "did not reach its end: the program was killed, or the disk was full"
+"""What a recording says of its outcome until it has one."""
+
+LONGEST_ROW = 1 << 16  # bytes; the disk tore at most one row
+
 
 def cells_of(sample: Sample) -> tuple[float | int, ...]:
     """Return one sample in the order of ``columns.UNITS``, then its channels; the flags alone are an integer."""
@@ -71,10 +85,6 @@ def table_of(
         units,
         metadata,
     )
-
-
-PAUSE_S = 0.002
-"""After what was written [s]: lines that come faster, as those of a run without a clock, are written together."""
 
 
 class WritingThread:
@@ -152,18 +162,6 @@ class WritingThread:
                 data = data[taken:]
         except OSError as error:
             self.failed = error
-
-
-CSV, PART = ".csv", ".part.csv"
-
-CAPACITY = 20_000  # samples that may wait for the disk: 200 s at 10 ms, some 10 MB
-DRAIN_S = 60.0  # time the disk has for them when the run is over [s]
-FIRST_WRITE_S = 10.0  # time it has for the first bytes [s]
-
-NOT_ENDED = "did not reach its end: the program was killed, or the disk was full"
-"""What a recording says of its outcome until it has one."""
-
-LONGEST_ROW = 1 << 16  # bytes; the disk tore at most one row
 
 
 def hold(file: FileIO | int) -> bool:

@@ -32,6 +32,14 @@ DB_PER_LOG = 20.0 / np.log(10.0)
 ROOM_DB = (6.0, 4.0)
 """Below the lowest and above the highest level that is drawn."""
 
+LOWEST_HZ = 0.5
+"""Below, the high-pass has taken away what the models could be held against."""
+
+HIGHEST_HZ = 50.0
+"""Above there are no resonances of drivelines."""
+
+POINTS = 300
+
 
 def panels() -> go.Figure:
     """Return an empty figure."""
@@ -138,15 +146,6 @@ def _band(
     figure: go.Figure, f: FloatArray, y: FloatArray, half: FloatArray, row: int, colour: str, group: dict[str, Any]
 ) -> None:
     figure.add_traces(band(f, y - half, y + half, colour, **group), rows=row, cols=1)
-
-
-LOWEST_HZ = 0.5
-"""Below, the high-pass has taken away what the models could be held against."""
-
-HIGHEST_HZ = 50.0
-"""Above there are no resonances of drivelines."""
-
-POINTS = 300
 
 
 def response_figure(name: str, model: LocalModel, best: LinearFit | None = None) -> Figure:

@@ -42,6 +42,8 @@ STATUSES = {
 COURSES = 4
 """Figures over time that share the page."""
 
+SPEED = ("speed [rad/s]", [("speed", "speed_rad_s", Style.AFTER)])
+
 
 def commission_page(state: StateDocument, titles: Mapping[str, str], made: Provenance | None = None) -> str:
     steps = state["steps"]
@@ -219,9 +221,6 @@ def _course(name: str, course: Mapping[str, Any], *panels: tuple[str, Sequence[t
         for axis, lines in panels
     ]
     return list(time_figure(name, _array(course["time_s"]), drawn, COURSES))
-
-
-SPEED = ("speed [rad/s]", [("speed", "speed_rad_s", Style.AFTER)])
 
 
 def _noise(evidence: Evidence) -> list[Any]:

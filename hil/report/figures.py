@@ -21,6 +21,41 @@ from estimator.signals.record import FloatArray
 from hil.figures.palette import BLACK, BLUE, GREEN, GREY, ORANGE, PALE, PURPLE, VERMILION, faded
 from hil.report.page import Figure, Paragraph, note
 
+GAP = -32768
+"""Stands for a sample that is not there."""
+
+LARGEST = 32700
+
+PAGE_SAMPLES = 3_000_000
+"""Samples of a page at most, of all its lines: 8 MB as text."""
+
+EVEN = 1e-3
+"""Share of a period that time stamps may be off an even raster."""
+
+SHADE = ORANGE
+PANEL_PX = 230
+LEGEND_PX = 130
+AXIS_TITLE_PX = 54
+TOP_PX = 34
+DECADES = {"type": "log", "exponentformat": "power", "minor": {"dtick": "D1", "showgrid": True}}
+"""A logarithmic axis; its ticks are plotly's own choice: 1, 2 and 5 of each decade where there are few."""
+
+CONFIG = {"responsive": True, "displaylogo": False, "modeBarButtonsToRemove": ["select2d", "lasso2d"]}
+
+SPECTRUM_SEGMENTS = 6
+"""A recording is cut into about this many segments for Welch's average, which smooths the spectrum."""
+
+SHORTEST_SEGMENT = 256
+LONGEST_SEGMENT = 4096
+
+DRAWN_STRETCHES = 11_000
+"""Shared by the recordings of a page: eight lines of two points per stretch keep it under 10 MB."""
+
+LONGEST_STRETCHES = 1500
+"""More points than pixels of a wide screen show nothing more."""
+
+TORQUE_NAMES = ("T_M1", "T_M2")
+
 
 def extremes(y: FloatArray, stretches: int) -> NDArray[np.intp]:
     """Choose which samples of a trace to draw."""
@@ -37,18 +72,6 @@ def extremes(y: FloatArray, stretches: int) -> NDArray[np.intp]:
     chosen = np.unique(np.concatenate([[0, n - 1], lowest, highest]))
     kept: NDArray[np.intp] = chosen[chosen < n]
     return kept
-
-
-GAP = -32768
-"""Stands for a sample that is not there."""
-
-LARGEST = 32700
-
-PAGE_SAMPLES = 3_000_000
-"""Samples of a page at most, of all its lines: 8 MB as text."""
-
-EVEN = 1e-3
-"""Share of a period that time stamps may be off an even raster."""
 
 
 def packed(time_s: FloatArray, lines: Sequence[FloatArray], recordings: int) -> tuple[dict[str, Any], int]:
@@ -117,30 +140,6 @@ plotly.io.templates.default = "none"  # copied into every figure at each change 
 
 INPUT_STYLES = (Style.FIRST_INPUT, Style.SECOND_INPUT, Style.THIRD_INPUT)
 MODEL_STYLES = (Style.AFTER, Style.BEFORE, Style.THIRD_MODEL, Style.FOURTH_MODEL)
-
-SHADE = ORANGE
-PANEL_PX = 230
-LEGEND_PX = 130
-AXIS_TITLE_PX = 54
-TOP_PX = 34
-DECADES = {"type": "log", "exponentformat": "power", "minor": {"dtick": "D1", "showgrid": True}}
-"""A logarithmic axis; its ticks are plotly's own choice: 1, 2 and 5 of each decade where there are few."""
-
-CONFIG = {"responsive": True, "displaylogo": False, "modeBarButtonsToRemove": ["select2d", "lasso2d"]}
-
-SPECTRUM_SEGMENTS = 6
-"""A recording is cut into about this many segments for Welch's average, which smooths the spectrum."""
-
-SHORTEST_SEGMENT = 256
-LONGEST_SEGMENT = 4096
-
-DRAWN_STRETCHES = 11_000
-"""Shared by the recordings of a page: eight lines of two points per stretch keep it under 10 MB."""
-
-LONGEST_STRETCHES = 1500
-"""More points than pixels of a wide screen show nothing more."""
-
-TORQUE_NAMES = ("T_M1", "T_M2")
 
 
 @dataclass(frozen=True, slots=True)

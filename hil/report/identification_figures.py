@@ -34,6 +34,15 @@ GUIDE = "#c5ccd4"
 MARGIN = 1.25
 """Half width of the first view; zeros far outside are left to zooming."""
 
+PANEL_PX, AROUND_PX = 160, 140
+
+COURSE_PX = 780
+STRETCHES = 400
+"""A course is drawn with two points in each of so many parts."""
+
+VIEW_SHARE = {"hz": 0.1, "damping": 0.6}
+"""First view about the last estimate, to either side, in parts of it: the start-up is far outside."""
+
 
 @dataclass(frozen=True, slots=True)
 class PoleSet:
@@ -122,9 +131,6 @@ def known_sets(models: Sequence[LocalModel]) -> list[PoleSet]:
     return [PoleSet(known[0][0], poles, zeros, BLACK, reference=True)]
 
 
-PANEL_PX, AROUND_PX = 160, 140
-
-
 def residual_figure(name: str, validation: Validation) -> Figure:
     """Draw residual against past input, against later input, and against itself, over one another."""
     panels = (
@@ -167,14 +173,6 @@ def _stems(figure: go.Figure, row: int, title: str, test: CorrelationTest, colou
         row=row,
         col=1,
     )
-
-
-COURSE_PX = 780
-STRETCHES = 400
-"""A course is drawn with two points in each of so many parts."""
-
-VIEW_SHARE = {"hz": 0.1, "damping": 0.6}
-"""First view about the last estimate, to either side, in parts of it: the start-up is far outside."""
 
 
 def course_figure(name: str, course: OnlineTrajectory, model: LocalModel) -> Figure:

@@ -21,6 +21,9 @@ from hil.provenance import Provenance
 from hil.report.identification_wording import best_statement, joint_statement, verdict
 from hil.report.numbers import as_json, fields_as_json, json_number
 
+SCHEMA: Final = "hil.identification/1"
+FILE_NAME: Final = "identification.json"
+
 
 def studied(each: Study) -> dict[str, Any]:
     """Return intervals, third order, validation, feedback, cancellations, physical parameters; JSON types only."""
@@ -140,10 +143,6 @@ def _physical(physical: PhysicalEstimate | None, reason: str) -> dict[str, Any]:
         for group, members in groups.items()
     }
     return content | {"reason": ""}
-
-
-SCHEMA: Final = "hil.identification/1"
-FILE_NAME: Final = "identification.json"
 
 
 def identification_text(

@@ -54,6 +54,9 @@ MOST_DRAWN = 12
 LARGEST_REGION = 1.0
 """Regions wider than this in z say only that the data know nothing of the root; they would hide the others."""
 
+MOST_CANDIDATES = 8
+"""Structures shown of an order selection."""
+
 
 def recording_section(model: LocalModel, study: Study, number: int) -> html.Section:
     """Return the section; ``number`` makes its figures' names unique in the page."""
@@ -200,10 +203,6 @@ def _feedback(study: Study) -> str:
 def _verdict(test: CorrelationTest) -> str:
     good = "independent: the model holds"
     return good if test.is_independent else "dependent: the model misses a part of the response"
-
-
-MOST_CANDIDATES = 8
-"""Structures shown of an order selection."""
 
 
 def numbers_table(models: Sequence[LocalModel], studies: Sequence[Study]) -> list[Any]:

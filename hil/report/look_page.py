@@ -32,6 +32,9 @@ GAP: Final = 1.5
 
 LEGEND: Final = "Shaded: orange, rows or values are missing; purple, a reading stands at its end; grey, masked."
 
+MOST_MARKS: Final = 200
+"""Of one kind in one channel: more can't be distinguished."""
+
 
 def look_page(found: Look, signals: SignalsConfig, request: Request) -> str:
     """Return the text of the page; ``signals`` is what the recording is read by, with its masks."""
@@ -101,10 +104,6 @@ def _marks(time_s: FloatArray, values: dict[str, FloatArray], masks: list[MaskRa
         for mask in masks:
             if mask.column == name:
                 yield from _spans(time_s, ~in_mask(each, mask), GREY)
-
-
-MOST_MARKS: Final = 200
-"""Of one kind in one channel: more can't be distinguished."""
 
 
 def _spans(time_s: FloatArray, rows: NDArray[np.bool_], colour: str) -> Iterator[Mark]:

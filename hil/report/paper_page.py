@@ -23,6 +23,8 @@ SOURCE = (
     "EPE'18 ECCE Europe"
 )
 
+SCHEMA: Final = "hil.paper/1"
+
 
 def paper_page(
     models: Sequence[LocalModel],
@@ -155,9 +157,6 @@ def _conditions(models: Sequence[LocalModel], driven: Sequence[Conditions]) -> l
         "deviation of the driver's corrections."
     )
     return [html.table(headings, rows, numbers=range(1, 7)), html.note(note)]
-
-
-SCHEMA: Final = "hil.paper/1"
 
 
 def paper_text(

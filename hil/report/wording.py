@@ -18,19 +18,6 @@ BADGES = {
 
 DOUBTFUL = "? the input is in doubt"
 
-
-def badge(diagnosis: Diagnosis) -> str:
-    """Return the mark of a verdict; while the input is in doubt, that."""
-    return DOUBTFUL if diagnosis.doubts else BADGES[diagnosis.verdict]
-
-
-def doubt_lines(diagnosis: Diagnosis) -> list[str]:
-    """Return what is doubtful about the input, a text each, with the line that cures it."""
-    return [
-        doubt.statement + (f" In [signals] write: {doubt.line}" if doubt.line else "") for doubt in diagnosis.doubts
-    ]
-
-
 ELEMENTS = {each: each.value.replace("_", " ") for each in Element}
 
 PLACES = {"motor": "motor", "shaft": "shaft", "load": "load", "sensor": "reading"}
@@ -52,12 +39,6 @@ CHECKS = {
 
 _QUANTITIES = {"rad/s": "speed", "m/s": "speed", "rad": "position", "m": "position", "Nm": "torque", "N": "force"}
 
-
-def quantity(output_unit: str) -> str:
-    """Name a measured output by its unit."""
-    return _QUANTITIES.get(output_unit, "output")
-
-
 _DIMENSIONS = {
     OutputKind.SPEED: "speed",
     OutputKind.POSITION: "angle",
@@ -65,6 +46,23 @@ _DIMENSIONS = {
     OutputKind.TORQUE: "torque",
     OutputKind.ACCELERATION: "acceleration",
 }
+
+
+def badge(diagnosis: Diagnosis) -> str:
+    """Return the mark of a verdict; while the input is in doubt, that."""
+    return DOUBTFUL if diagnosis.doubts else BADGES[diagnosis.verdict]
+
+
+def doubt_lines(diagnosis: Diagnosis) -> list[str]:
+    """Return what is doubtful about the input, a text each, with the line that cures it."""
+    return [
+        doubt.statement + (f" In [signals] write: {doubt.line}" if doubt.line else "") for doubt in diagnosis.doubts
+    ]
+
+
+def quantity(output_unit: str) -> str:
+    """Name a measured output by its unit."""
+    return _QUANTITIES.get(output_unit, "output")
 
 
 def output_unit(kind: OutputKind, motion: Motion) -> str:

@@ -20,6 +20,13 @@ from hil.rig.pacing import NS_PER_S, Tick
 from hil.rig.timing import RunTiming
 from hil.sample import Sample, SampleFlag
 
+_DOUBTS = {
+    (False, False): SampleFlag.GOOD,
+    (True, False): SampleFlag.M1_DOUBTFUL,
+    (False, True): SampleFlag.M2_DOUBTFUL,
+    (True, True): SampleFlag.M1_DOUBTFUL | SampleFlag.M2_DOUBTFUL,
+}
+
 
 @dataclass(slots=True)
 class _Station:
@@ -43,14 +50,6 @@ class _Station:
         """Build what the supervision judges."""
         offset_nm = command.prbs_nm if self.inverter.has_offset else 0.0
         return DriveRecord(command.base_nm + command.prbs_nm, feedback, *self.inverter.messages(), offset_nm)
-
-
-_DOUBTS = {
-    (False, False): SampleFlag.GOOD,
-    (True, False): SampleFlag.M1_DOUBTFUL,
-    (False, True): SampleFlag.M2_DOUBTFUL,
-    (True, True): SampleFlag.M1_DOUBTFUL | SampleFlag.M2_DOUBTFUL,
-}
 
 
 class Cycle:

@@ -30,6 +30,12 @@ from hil.sample import Sample
 FORGETTING = 0.995
 """lambda_1: a sample 200 kept ones old, 4 s at 20 ms, weighs a third. A stiffness that drops is followed in seconds."""
 
+BLOCK_SAMPLES = 10_000
+"""Samples of a block when nothing has to be waited for."""
+
+BLOCK_S = 0.1
+"""Length of a block on the wall clock at a given speed [s]."""
+
 
 def tracking_settings(sample_time_s: float = Settings().sample_time_s) -> Settings:
     """Return how a resonance is followed: the paper's settings, but with a constant forgetting.
@@ -96,12 +102,6 @@ class LiveEstimate:
             self.latest = estimate
             self.course.append(estimate)
 
-
-BLOCK_SAMPLES = 10_000
-"""Samples of a block when nothing has to be waited for."""
-
-BLOCK_S = 0.1
-"""Length of a block on the wall clock at a given speed [s]."""
 
 OnCourse = Callable[[Course, float], None]
 """Called after each block with the course so far and the time in the recording [s]."""

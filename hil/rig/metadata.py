@@ -12,6 +12,9 @@ from hil.config.rig_file import read_rig
 from hil.recording.checksum import RIG_CHECKSUM, RIG_TEXT, text_sha256
 from hil.version import __version__
 
+EARLIEST_NS = 946_684_800 * 1_000_000_000
+"""The year 2000: a time before it is none of a calendar, but counted from the beginning of a trace."""
+
 
 def run_metadata(rig_path: Path, experiment: str, text: str | None = None) -> dict[str, str]:
     """Describe a run that begins now; ``text`` is that of the rig file with what was changed for this run."""
@@ -28,10 +31,6 @@ def run_metadata(rig_path: Path, experiment: str, text: str | None = None) -> di
         "eds_m1_sha256": _sha256(inverters.m1.eds or shipped),
         "eds_m2_sha256": _sha256(inverters.m2.eds or shipped),
     }
-
-
-EARLIEST_NS = 946_684_800 * 1_000_000_000
-"""The year 2000: a time before it is none of a calendar, but counted from the beginning of a trace."""
 
 
 def replay_metadata(rig_path: Path, trace: Path, first_ns: int) -> dict[str, str]:

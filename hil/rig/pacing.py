@@ -12,6 +12,13 @@ from typing import Protocol
 
 NS_PER_S = 1_000_000_000
 
+DISK_PATIENCE_S = 60.0
+"""How long a run without a clock may wait for the disk [s]."""
+
+FREE_PATIENCE_S = 5.0
+"""How long host, drives and PLC wait for each other at least where the host keeps no clock [s of the wall clock]: such
+a run uses the processors up, and the machine may be busy with others."""
+
 
 def period_ns(period_s: float) -> int:
     """Period in whole nanoseconds, as the pacers count it."""
@@ -59,18 +66,9 @@ class Pacer(Protocol):
     def next(self) -> Tick: ...  # when the next cycle is due
 
 
-DISK_PATIENCE_S = 60.0
-"""How long a run without a clock may wait for the disk [s]."""
-
-
 def disk_patience_s(pacer: Pacer) -> float:
     """How long a cycle may wait for the disk [s]: not at all where it waits for nothing."""
     return 0.0 if pacer.poll_patience_s == 0.0 else DISK_PATIENCE_S
-
-
-FREE_PATIENCE_S = 5.0
-"""How long host, drives and PLC wait for each other at least where the host keeps no clock [s of the wall clock]: such
-a run uses the processors up, and the machine may be busy with others."""
 
 
 def device_patience_s(pacer: Pacer) -> float:

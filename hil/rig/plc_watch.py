@@ -34,6 +34,20 @@ from hil.sample import SampleFlag
 
 FIT_MODES = (DriveMode.SERIES, DriveMode.ELECTRIC)
 
+POLL_EVERY_NS = NS_PER_S // 10
+"""Time between two polls [ns]: a clutch takes longer than this to close."""
+
+SILENT_AFTER_NS = NS_PER_S
+"""Without an answer for so long the PLC counts as silent [ns]: ten polls, and its client's own time-out."""
+
+MOST_OF_RATED: Final = 3.0
+"""A limit of the PLC beyond so many times the drives' rated value is refused."""
+
+MAX_MOTOR_SPEED: Final = (0x6080, 0)
+"""Of CiA 402 [rpm]; few drives have it."""
+
+RPM: Final = 2.0 * math.pi / 60.0
+
 
 @dataclass(frozen=True, slots=True)
 class Needs:
@@ -63,13 +77,6 @@ def changes(before: PlcStatus, status: PlcStatus, needs: Needs) -> Iterator[str]
     yield from reasons_against(status, needs)
     if status.drive_mode in FIT_MODES and status.drive_mode is not before.drive_mode:
         yield f"drive mode is {status.drive_mode.value}, expected {before.drive_mode.value} as at the start"
-
-
-POLL_EVERY_NS = NS_PER_S // 10
-"""Time between two polls [ns]: a clutch takes longer than this to close."""
-
-SILENT_AFTER_NS = NS_PER_S
-"""Without an answer for so long the PLC counts as silent [ns]: ten polls, and its client's own time-out."""
 
 
 class PlcWatch:
@@ -142,15 +149,6 @@ class PlcWatch:
             reasons.append(f"speed is {read} rad/s, expected at most {self._latest.speed_limit_rad_s:g} rad/s")
         if reasons:
             raise RunAborted(f"PLC: {'; '.join(reasons)}. The run was ended at zero torque; fix the cause, run again.")
-
-
-MOST_OF_RATED: Final = 3.0
-"""A limit of the PLC beyond so many times the drives' rated value is refused."""
-
-MAX_MOTOR_SPEED: Final = (0x6080, 0)
-"""Of CiA 402 [rpm]; few drives have it."""
-
-RPM: Final = 2.0 * math.pi / 60.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -26,6 +26,10 @@ _STEPS_BITS = 7
 _STEPS = 1 << _STEPS_BITS
 """Bins in a doubling."""
 
+SCHEMA = "hil.timing/1"
+
+QUANTILES = (("p50", 0.5), ("p99", 0.99), ("p99.9", 0.999))
+
 
 class Histogram:
     """Counts of times [ns]."""
@@ -70,11 +74,6 @@ def _upper_edge_ns(number: int) -> int:
     """Largest time of a bin [ns]."""
     shift = max(number // _STEPS - 1, 0)
     return ((number - shift * _STEPS + 1) << shift) - 1
-
-
-SCHEMA = "hil.timing/1"
-
-QUANTILES = (("p50", 0.5), ("p99", 0.99), ("p99.9", 0.999))
 
 
 @dataclass(slots=True)

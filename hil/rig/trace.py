@@ -44,6 +44,21 @@ MOST_WAITING = 200_000
 
 NS_PER_S = 1_000_000_000
 
+CONTAINER_BYTES: Final = 16 << 20
+"""A container holds 128 KiB in files of Vector and of python-can."""
+
+FLOOR_BYTES: Final = 32 << 20
+UNPACKED_PER_BYTE: Final = 64
+"""What a whole file may unpack to: a floor, and for large files a multiple of their size; frames pack tenfold."""
+
+HEADER_BYTES: Final = blf.OBJ_HEADER_BASE_STRUCT.size
+
+LATEST_S = float(1 << 33)
+"""Times beyond are none of a clock [s]; in nanoseconds they would not fit into 64 bit."""
+
+COUNTED_FROM_1 = (".blf", ".asc")
+"""Formats whose channels python-can counts from 0, and their files and every other program from 1."""
+
 
 class BusTrace:
     """A trace file, from `__enter__` to `__exit__`."""
@@ -119,16 +134,6 @@ def require_trace_name(path: Path) -> None:
         raise RecordingError(path, f"expected a name that ends in one of {', '.join(SUFFIXES)}, got {path.suffix!r}")
 
 
-CONTAINER_BYTES: Final = 16 << 20
-"""A container holds 128 KiB in files of Vector and of python-can."""
-
-FLOOR_BYTES: Final = 32 << 20
-UNPACKED_PER_BYTE: Final = 64
-"""What a whole file may unpack to: a floor, and for large files a multiple of their size; frames pack tenfold."""
-
-HEADER_BYTES: Final = blf.OBJ_HEADER_BASE_STRUCT.size
-
-
 class BoundedBlfReader(can.BLFReader):
     """Gives the frames of a BLF."""
 
@@ -181,13 +186,6 @@ def _require_lengths(data: bytes) -> None:
         if size < HEADER_BYTES:
             raise blf.BLFParseError(f"expected an object of {HEADER_BYTES} bytes or more, got one of {size}")
         at = data.find(b"LOBJ", at + size, at + size + 8)
-
-
-LATEST_S = float(1 << 33)
-"""Times beyond are none of a clock [s]; in nanoseconds they would not fit into 64 bit."""
-
-COUNTED_FROM_1 = (".blf", ".asc")
-"""Formats whose channels python-can counts from 0, and their files and every other program from 1."""
 
 
 class _TrcReader(can.TRCReader):

@@ -20,6 +20,23 @@ from hil.simulator.faults import DriveLimits, InverterFaults
 
 _WARM = 0.9  # where derating begins
 
+SUPPLY_V: Final = 650.0  # a bus's traction battery
+UNDER_VOLTAGE_V: Final = 0.7 * SUPPLY_V  # below it the drive goes into fault
+DISCHARGE_S: Final = 0.02  # time constant with which a drive under load empties its capacitors [s]
+
+_INT16 = IntegerType.INTEGER16
+
+DRAWN_AT_ONCE = 512
+
+GENERIC: Final = 0x01
+_CLASSES: Final = {0x2000: 0x02, 0x3000: 0x04, 0x4000: 0x08, 0x8100: 0x10, 0x8200: 0x10, 0x5000: 0x20, 0x6000: 0x20}
+"""Bits of the error register besides the generic one, by class of error code (CiA 301, 7.5.2.2): current, voltage,
+temperature, communication, device profile."""
+
+_HISTORY: Final = 4  # entries of the pre-defined error field
+
+_NO_DATA: Final = bytes(5)
+
 
 @dataclass(frozen=True, slots=True)
 class SimulatedInverter:
@@ -61,11 +78,6 @@ class Heat:
         """Let a torque act for a time; exact for a torque that is constant meanwhile."""
         goal = (torque_permille / self._limits.continuous_permille) ** 2
         self._x = goal + (self._x - goal) * math.exp(-duration_s / self._limits.thermal_time_constant_s)
-
-
-SUPPLY_V: Final = 650.0  # a bus's traction battery
-UNDER_VOLTAGE_V: Final = 0.7 * SUPPLY_V  # below it the drive goes into fault
-DISCHARGE_S: Final = 0.02  # time constant with which a drive under load empties its capacitors [s]
 
 
 class DcLink:
@@ -113,11 +125,6 @@ class SampleClock:
         return sampled_rad_s, sampled_torque
 
 
-_INT16 = IntegerType.INTEGER16
-
-DRAWN_AT_ONCE = 512
-
-
 def _normal(random: np.random.Generator) -> Iterator[float]:
     """Draw standard normal numbers for ever.
 
@@ -159,16 +166,6 @@ class DriveSensors:
     def _converted(self, permille: float) -> int:
         """Read as a converter does: in steps, and saturating."""
         return min(max(self._settings.faults.limits.quantised(permille), _INT16.low), _INT16.high)
-
-
-GENERIC: Final = 0x01
-_CLASSES: Final = {0x2000: 0x02, 0x3000: 0x04, 0x4000: 0x08, 0x8100: 0x10, 0x8200: 0x10, 0x5000: 0x20, 0x6000: 0x20}
-"""Bits of the error register besides the generic one, by class of error code (CiA 301, 7.5.2.2): current, voltage,
-temperature, communication, device profile."""
-
-_HISTORY: Final = 4  # entries of the pre-defined error field
-
-_NO_DATA: Final = bytes(5)
 
 
 class ErrorList:

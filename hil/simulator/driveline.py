@@ -41,6 +41,8 @@ DEFAULT_BUS = DrivelineModel(
 Assumed, for the paper gives no parameter values: first resonance 8.2 Hz, inside the 5 to 50 Hz band it names.
 """
 
+NO_EXPERIMENT_S = 60.0  # length of the widest recording where the rig file has no experiment [s]
+
 
 @dataclass(frozen=True, slots=True)
 class EffectSpec:
@@ -130,9 +132,6 @@ def _recording_of(kind: OutputKind, at: Location) -> Record:
     """Return a recording of such an output, as a model is asked for one."""
     nothing = np.zeros(1)
     return Record("channel", 1.0, nothing, nothing[:, np.newaxis], nothing, np.ones(1, dtype=np.bool_), kind, at)
-
-
-NO_EXPERIMENT_S = 60.0  # length of the widest recording where the rig file has no experiment [s]
 
 
 def out_of_bounds(rig: Rig, model: DrivelineModel, name: str, values: Mapping[str, float]) -> Iterator[str]:

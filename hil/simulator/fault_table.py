@@ -27,6 +27,15 @@ NOBODY: Final = (0xBAD, 0xBAD)  # vendor-ID and product code of no device
 
 LAST_COB_ID: Final = 0x7FF
 
+_STATES: Final = {
+    "ready": PowerState.READY_TO_SWITCH_ON,
+    "switched_on": PowerState.SWITCHED_ON,
+    "quick_stop": PowerState.QUICK_STOP_ACTIVE,
+    "disabled": PowerState.SWITCH_ON_DISABLED,
+}
+
+_SPEC = re.compile(r"(?P<device>\w+)\.(?P<kind>\w+)(?:@(?P<at_s>[^=]+))?(?:=(?P<size>.+))?")
+
 
 @dataclass(frozen=True, slots=True)
 class Moment:
@@ -127,14 +136,6 @@ def _frames(sign: str, high: float, unit: str) -> Size:
     return Size(f"{sign}[:ID]", words, read)
 
 
-_STATES: Final = {
-    "ready": PowerState.READY_TO_SWITCH_ON,
-    "switched_on": PowerState.SWITCHED_ON,
-    "quick_stop": PowerState.QUICK_STOP_ACTIVE,
-    "disabled": PowerState.SWITCH_ON_DISABLED,
-}
-
-
 def _state(text: str) -> PowerState:
     if text not in _STATES:
         raise ValueError(text)
@@ -227,8 +228,6 @@ DEVICES: Final[Mapping[str, Mapping[str, FaultKind]]] = MappingProxyType(
     }
 )
 """Every fault that can be asked for, by device and name."""
-
-_SPEC = re.compile(r"(?P<device>\w+)\.(?P<kind>\w+)(?:@(?P<at_s>[^=]+))?(?:=(?P<size>.+))?")
 
 
 def known_faults() -> str:

@@ -15,6 +15,9 @@ PDO_COB_IDS = range(0x180, 0x580)  # the PDOs of the predefined connection set (
 
 T = TypeVar("T")
 
+LATE_BY_S: Final = 1.5
+"""How late a slow PLC answers [s of the wall clock]: beyond the second that a client waits."""
+
 
 @dataclass(frozen=True, slots=True)
 class AtStep(Generic[T]):
@@ -130,10 +133,6 @@ class BusFaults:
     def touch_frames(self) -> bool:
         """Whether a frame is ever treated in another way than on a good bus."""
         return replace(self, swapped_nodes=False) != BusFaults()
-
-
-LATE_BY_S: Final = 1.5
-"""How late a slow PLC answers [s of the wall clock]: beyond the second that a client waits."""
 
 
 class PlcAnswers(Enum):

@@ -39,6 +39,22 @@ _ABORT = 0x80
 
 _REQUEST_BYTES = 8
 
+NOT_MAPPABLE = 0x06040041
+LENGTH_EXCEEDED = 0x06040042
+WRONG_DEVICE_STATE = 0x08000022  # SDO abort codes
+
+EVENT_DRIVEN = range(254, 256)
+ACYCLIC = 0
+"""Transmission types: at an event, and at the SYNC after one; 1 to 240 are every n-th SYNC (CiA 301, 7.5.2.35)."""
+
+_KNOWN_TYPES = (*range(241), *EVENT_DRIVEN)
+_COB_ID_BITS = (1 << 30) - 1
+
+MAX_TORQUE = 0x6072
+SUPPORTED_MODES = 0x6502
+
+INTEGERS = frozenset(IntegerType)  # data types that are simulated by value
+
 
 class ObjectServer(canopen.LocalNode):
     """The library's node, with the hooks it offers, but without its NMT slave."""
@@ -142,18 +158,6 @@ class PdoFrame:
         return found
 
 
-NOT_MAPPABLE = 0x06040041
-LENGTH_EXCEEDED = 0x06040042
-WRONG_DEVICE_STATE = 0x08000022  # SDO abort codes
-
-EVENT_DRIVEN = range(254, 256)
-ACYCLIC = 0
-"""Transmission types: at an event, and at the SYNC after one; 1 to 240 are every n-th SYNC (CiA 301, 7.5.2.35)."""
-
-_KNOWN_TYPES = (*range(241), *EVENT_DRIVEN)
-_COB_ID_BITS = (1 << 30) - 1
-
-
 class PdoObjects:
     """Objects 0x1400 to 0x1BFF of one node."""
 
@@ -242,12 +246,6 @@ class PdoObjects:
     def _read_or_nothing(self, index: int, subindex: int) -> int:
         """Read a parameter; one the data sheet does not list is 0."""
         return self._read(index, subindex) if self._there(index, subindex) else 0
-
-
-MAX_TORQUE = 0x6072
-SUPPORTED_MODES = 0x6502
-
-INTEGERS = frozenset(IntegerType)  # data types that are simulated by value
 
 
 def power_on_values(eds: EdsFile) -> dict[int, int]:

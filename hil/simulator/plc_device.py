@@ -16,6 +16,12 @@ from hil.simulator.faults import PlcAnswers, PlcFaults
 CELLS: Final = 10
 TAPS: Final = (10, 7)
 
+IDENTITY: Final = MappingProxyType({"vendor_code": 0x00484944, "device_code": 0x2024, "map_version": 1})
+"""What this PLC identifies as; the shipped map expects the same, which a test sees to."""
+
+COUNTS: Final = 65536  # the PLC's watchdog starts over here: it is a 16-bit register
+ROUNDING_CYCLES: Final = 1e-6  # part of a PLC cycle by which sums of steps may fall short of a whole one
+
 
 class PlcPrbs:
     """The generator, clocked by the PLC's cycle."""
@@ -38,13 +44,6 @@ class PlcPrbs:
             feedback = sum(self._state >> (cell - 1) for cell in TAPS) & 1
             self._state = ((self._state << 1) | feedback) & (2**CELLS - 1)
             self._held = 0
-
-
-IDENTITY: Final = MappingProxyType({"vendor_code": 0x00484944, "device_code": 0x2024, "map_version": 1})
-"""What this PLC identifies as; the shipped map expects the same, which a test sees to."""
-
-COUNTS: Final = 65536  # the PLC's watchdog starts over here: it is a 16-bit register
-ROUNDING_CYCLES: Final = 1e-6  # part of a PLC cycle by which sums of steps may fall short of a whole one
 
 
 class ValueRefusedError(ValueError):

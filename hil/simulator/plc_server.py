@@ -42,6 +42,17 @@ KIND: Final = {
 }
 """What each function code works on; Modbus Application Protocol V1.1b3, section 6."""
 
+READ_CODES: Final = frozenset({1, 2, 3, 4})
+"""Function codes that only read; Modbus Application Protocol V1.1b3, section 6. All others count as writing."""
+
+REGISTERS: Final = (ReadHoldingRegistersResponse, ReadInputRegistersResponse)
+"""Answers that can be a register short."""
+
+NO_LINGER: Final = struct.pack("ii", 1, 0)  # value of SO_LINGER: closing such a socket sends RST and not FIN
+
+SETTLE_TURNS: Final = 5
+"""Turns of the event loop; asyncio takes three from accepting a connection to telling its protocol."""
+
 
 class PlcRegisters(SimCore):
     """pymodbus's view of the device: the two methods its server calls, for exactly the addresses of the map."""
@@ -127,10 +138,6 @@ class PlcRegisters(SimCore):
         return self._ordered(register).decode([int(value) for value in values[offset : offset + register.size]])
 
 
-READ_CODES: Final = frozenset({1, 2, 3, 4})
-"""Function codes that only read; Modbus Application Protocol V1.1b3, section 6. All others count as writing."""
-
-
 @dataclass(frozen=True, slots=True)
 class PlcSecurity:
     """The PLC's own certificate, and what each role may do."""
@@ -144,12 +151,6 @@ class PlcSecurity:
         if access is Access.READ:
             return function_code in READ_CODES
         return access is Access.READ_WRITE
-
-
-REGISTERS: Final = (ReadHoldingRegistersResponse, ReadInputRegistersResponse)
-"""Answers that can be a register short."""
-
-NO_LINGER: Final = struct.pack("ii", 1, 0)  # value of SO_LINGER: closing such a socket sends RST and not FIN
 
 
 class PlcTcpServer(ModbusTcpServer):
@@ -255,10 +256,6 @@ class PlcSession(ServerRequestHandler):
 
 
 logging.getLogger("pymodbus").addHandler(logging.NullHandler())  # else it logs to standard error by itself
-
-
-SETTLE_TURNS: Final = 5
-"""Turns of the event loop; asyncio takes three from accepting a connection to telling its protocol."""
 
 
 async def _close(server: PlcTcpServer, sockets: Sequence[TransportSocket]) -> None:

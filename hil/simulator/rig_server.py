@@ -37,6 +37,12 @@ _RANGES = {
     ValueType.INT32: (-(1 << 31), (1 << 31) - 1),
 }
 
+SERIAL_NUMBERS = (1, 2)
+"""Of the drives behind m1 and m2, unless the rig file says; they stay with them where the node ids are swapped."""
+
+HOST_TIMEOUT_S = 1.0
+"""Simulated time without a beat of the host after which the PLC permits no torque [s]: ten of the host's polls."""
+
 
 class ChannelSensors:
     """The channels of one rig file on one plant."""
@@ -92,13 +98,6 @@ def _converted(register: Register, value: float) -> float:
     step = 1.0 if register.scale is None else register.scale
     low, high = _RANGES[register.type]
     return min(max(round(value / step), low), high) * step
-
-
-SERIAL_NUMBERS = (1, 2)
-"""Of the drives behind m1 and m2, unless the rig file says; they stay with them where the node ids are swapped."""
-
-HOST_TIMEOUT_S = 1.0
-"""Simulated time without a beat of the host after which the PLC permits no torque [s]: ten of the host's polls."""
 
 
 class RigServer:

@@ -13,6 +13,26 @@ from drivers.canopen.heartbeat import HEARTBEAT_COB_ID
 from drivers.canopen.silence import Silence
 from drivers.inverter.cia402 import AUTOMATIC, PowerState
 
+_S = PowerState
+
+STANDARD_CODES: Final[Mapping[int, int]] = MappingProxyType(
+    {0x6007: 1, 0x605A: 2, 0x605B: 0, 0x605C: 1, 0x605D: 1, 0x605E: 2}
+)
+"""CiA 402-2's own default values, for a drive whose EDS lists no such object."""
+
+_STAYING: Final = 4
+"""Quick stop codes from 5 on are those from 1 on, but the drive stays in QUICK STOP ACTIVE."""
+
+NS_PER_MS = 1_000_000
+
+GRACE_NS = 40 * NS_PER_MS
+"""What this program, which is no drive, leaves for reading heartbeats that came while it was held up itself [ns]."""
+
+LONGEST_LOOK_NS = 15 * NS_PER_MS
+"""It looks every 10 ms: a longer time between two looks is one in which it was held up."""
+
+HEARTBEAT_ERROR: Final = 0x8130  # error code of CiA 301
+
 
 class Ramp(Enum):
     """How the torque goes to zero."""
@@ -40,8 +60,6 @@ class Stop:
     final: PowerState
 
 
-_S = PowerState
-
 _SLOPES: Final = MappingProxyType({1: Ramp.SLOPE, 2: Ramp.QUICK})
 
 KNOWN_CODES: Final[Mapping[int, frozenset[int]]] = MappingProxyType(
@@ -55,14 +73,6 @@ KNOWN_CODES: Final[Mapping[int, frozenset[int]]] = MappingProxyType(
     }
 )
 """The codes this drive knows of each object; it refuses others."""
-
-STANDARD_CODES: Final[Mapping[int, int]] = MappingProxyType(
-    {0x6007: 1, 0x605A: 2, 0x605B: 0, 0x605C: 1, 0x605D: 1, 0x605E: 2}
-)
-"""CiA 402-2's own default values, for a drive whose EDS lists no such object."""
-
-_STAYING: Final = 4
-"""Quick stop codes from 5 on are those from 1 on, but the drive stays in QUICK STOP ACTIVE."""
 
 
 def stop_between(state: PowerState, target: PowerState, codes: Mapping[int, int]) -> Stop:
@@ -94,15 +104,6 @@ def _quick_stop(code: int) -> Stop:
 
 def _ramp(code: int) -> Ramp:
     return _SLOPES.get(code, Ramp.AT_ONCE)
-
-
-NS_PER_MS = 1_000_000
-
-GRACE_NS = 40 * NS_PER_MS
-"""What this program, which is no drive, leaves for reading heartbeats that came while it was held up itself [ns]."""
-
-LONGEST_LOOK_NS = 15 * NS_PER_MS
-"""It looks every 10 ms: a longer time between two looks is one in which it was held up."""
 
 
 class HeartbeatConsumer:
@@ -141,9 +142,6 @@ class RpdoDeadline:
             return False
         self._last_ns = None
         return True
-
-
-HEARTBEAT_ERROR: Final = 0x8130  # error code of CiA 301
 
 
 class HostWatch:

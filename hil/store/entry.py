@@ -27,6 +27,10 @@ EXPERIMENT, STARTED, VERSION = "experiment", "started_utc", "hil_version"
 OWN_KEYS = frozenset({RIG_TEXT, RIG_CHECKSUM, EXPERIMENT, STARTED, VERSION, *CHECKSUMS, OUTCOME, "schema"})
 """What has a place of its own in an entry; the rest is its settings."""
 
+_MODE = (("frequency_hz", "resonance [Hz]"), ("damping", "damping"))
+
+_NOT_COMPARED = frozenset({"notes", "attachments", "settings", "eds_sha256", "id", "alarms"})
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunEntry:
@@ -208,9 +212,6 @@ def alarms_of(run: Run) -> list[str]:
     return statements(_content(run, ONLINE))
 
 
-_MODE = (("frequency_hz", "resonance [Hz]"), ("damping", "damping"))
-
-
 def _resonance(run: Run) -> dict[str, Any]:
     results = map(_table, _list(_content(run, IDENTIFICATION).get("recordings")))
     own = next((entry for entry in results if entry.get("name") == run.entry.recording.stem), {})
@@ -251,9 +252,6 @@ def _table(content: Any) -> dict[str, Any]:
 
 def _list(content: Any) -> list[Any]:
     return content if isinstance(content, list) else []
-
-
-_NOT_COMPARED = frozenset({"notes", "attachments", "settings", "eds_sha256", "id", "alarms"})
 
 
 @dataclass(frozen=True, slots=True)

@@ -33,6 +33,8 @@ paths; the names of the user and of this machine. Comments of the rig file, oper
 it. Names of files and rigs are, and so are addresses of devices.
 """
 
+DISTRIBUTION = "hil-driveline"
+
 
 @dataclass(frozen=True, slots=True)
 class Part:
@@ -113,9 +115,6 @@ def _last_run(folder: Path) -> dict[str, Any]:
 
 def _json(name: str, document: Any) -> Part:
     return Part(name, (json.dumps(document, indent=1, ensure_ascii=False) + "\n").encode())
-
-
-DISTRIBUTION = "hil-driveline"
 
 
 def versions() -> dict[str, Any]:

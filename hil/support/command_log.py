@@ -26,6 +26,22 @@ from hil.errors import UsageError
 from hil.support.redact import Redaction
 from hil.version import __version__
 
+DEFAULT: Final = "info"
+VARIABLE: Final = "HIL_LOG"
+
+BYTES: Final = 1_000_000
+"""A log is rotated here; an ordinary command writes about 300 bytes."""
+
+OLDER_LOGS: Final = 4
+"""Older logs next to the newest."""
+
+LOGGER: Final = logging.getLogger("hil")
+
+OURS: Final = ("hil", "drivers", "estimator")
+"""Loggers at the level asked for. Those of libraries, which tell every SDO at info, are at warning, but for debug."""
+
+OTHERS: Final = ("", "numba")
+
 
 def state_folder() -> Path:
     """Return the user's folder for logs, such as ~/.local/state/hil; it may not be there yet."""
@@ -45,23 +61,6 @@ class Level(StrEnum):
     WARNING = "warning"
     ERROR = "error"
     OFF = "off"
-
-
-DEFAULT: Final = "info"
-VARIABLE: Final = "HIL_LOG"
-
-BYTES: Final = 1_000_000
-"""A log is rotated here; an ordinary command writes about 300 bytes."""
-
-OLDER_LOGS: Final = 4
-"""Older logs next to the newest."""
-
-LOGGER: Final = logging.getLogger("hil")
-
-OURS: Final = ("hil", "drivers", "estimator")
-"""Loggers at the level asked for. Those of libraries, which tell every SDO at info, are at warning, but for debug."""
-
-OTHERS: Final = ("", "numba")
 
 
 def level_of(given: str | None) -> str:

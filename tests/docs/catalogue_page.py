@@ -14,28 +14,32 @@ from hil.report.catalogue import bounds_text, null_text, structures_text, unit_t
 
 PAGE = Path(__file__).parents[2] / "docs" / "catalogue.md"
 
+USUAL = "one_mass, two_mass, three_mass"
+"""Structures that the page names at its head, once."""
+
 _FACTS = re.compile(r"<!-- facts: (?P<name>\w+) -->\n(?P<facts>.*?)<!-- end -->", re.S)
 
 
 def facts_of(entry: Effect) -> str:
     """Return what the catalogue says of one effect, as Markdown."""
-    rows = [
-        ("excited by", entry.excited_by),
-        ("confused with", _names(entry.resembles)),
-        ("the same to torque and speed", _names(entry.equivalent)),
-        ("contains", _names(entry.contains)),
-        ("structures", ", ".join(f"`{name}`" for name in structures_text(entry).split(", "))),
-        ("source", entry.source),
+    structures = structures_text(entry)
+    sentences = [
+        ("Excited by", entry.excited_by),
+        ("Confused with", _names(entry.resembles)),
+        ("The same to torque and speed:", _names(entry.equivalent)),
+        ("Contains", _names(entry.contains)),
+        ("Structures:", "" if structures == USUAL else structures),
+        ("Source:", entry.source),
     ]
-    lines = ["```text", entry.law, "```", ""]
-    lines += [
-        f"![{entry.title}: speed with and without it, what is left, and the law](images/effects/{entry.name}.svg)"
-    ]
-    lines += ["", "| | |", "| --- | --- |"]
-    lines += [f"| {label} | {text} |" for label, text in rows if text]
-    lines += ["", "| parameter | unit | null | bounds | meaning |", "| --- | --- | --- | --- | --- |"]
-    lines += [_parameter(entry, parameter) for parameter in entry.parameters]
-    return "\n".join(lines) + "\n"
+    return "\n".join(
+        [
+            *("```text", entry.law, "```", ""),
+            *(f"![{entry.title}](images/effects/{entry.name}.svg)", ""),
+            *(" ".join(f"**{label}** {text}." for label, text in sentences if text), ""),
+            *(_parameter(entry, parameter) for parameter in entry.parameters),
+            "",
+        ]
+    )
 
 
 def _names(names: tuple[str, ...]) -> str:
@@ -43,9 +47,11 @@ def _names(names: tuple[str, ...]) -> str:
 
 
 def _parameter(entry: Effect, parameter: EffectParameter) -> str:
-    name = f"`{parameter.name}`" + (", optional" if parameter.optional else "")
-    cells = (name, unit_text(parameter), null_text(parameter), bounds_text(entry, parameter), parameter.meaning)
-    return f"| {' | '.join(cells)} |"
+    """Return a line of the list: name, unit, null, bounds, meaning."""
+    unit = "" if unit_text(parameter) == "–" else f" [{unit_text(parameter)}]"
+    optional = ", optional" if parameter.optional else ""
+    bounds = bounds_text(entry, parameter).removesuffix(" scales")
+    return f"- `{parameter.name}`{unit}{optional}, {null_text(parameter)} ({bounds}): {parameter.meaning}"
 
 
 def facts_on_page() -> dict[str, str]:

@@ -4,6 +4,7 @@ Run it to bring the page up to date: ``python -m tests.docs.commands_page``.
 """
 
 import sys
+from collections import Counter
 from collections.abc import Iterator
 from enum import Enum
 from pathlib import Path
@@ -66,9 +67,10 @@ Written from the commands themselves by `python -m tests.docs.commands_page`; a 
 
 def page() -> str:
     """Return the page's text."""
-    parts = [TOP, *_map(), *_everywhere(), *_statuses()]
+    shared = _shared()
+    parts = [TOP, *_map(), *_everywhere(shared), *_statuses()]
     for name in COMMANDS:
-        parts += _section(name)
+        parts += _section(name, shared)
     return "\n".join(parts).rstrip() + "\n"
 
 
@@ -80,16 +82,27 @@ def _map() -> Iterator[str]:
     yield ""
 
 
-def _everywhere() -> Iterator[str]:
-    yield from ("## Options of every command", "", "| option | |", "| --- | --- |")
-    yield "| `--help` | Show this and exit; after a command: its own help, with an example. |"
-    yield from (f"| {_names(each)} | {_cell(each.help)} |" for each in typer.main.get_command(root).params)
+def _shared() -> set[str]:
+    """Return the lines of options that three commands or more have in common, of each option at most one: given once."""
+    own = [command(name) for name in COMMANDS]
+    parts = [part for each in own for part in (each, *getattr(each, "commands", {}).values())]
+    lines = Counter(line for part in parts for line in set(map(_option, _options(part))))
+    rare_first = [line for line, n in reversed(lines.most_common()) if n > 2]
+    return set({line.split("`")[1].split()[0]: line for line in rare_first}.values())
+
+
+def _everywhere(shared: set[str]) -> Iterator[str]:
+    yield from ("## Options of every command", "")
+    yield "- `--help`: Show this and exit; after a command: its own help, with an example."
+    yield from (f"- {_names(each)}: {_cell(each.help)}" for each in typer.main.get_command(root).params)
+    yield from ("", "## Options of several commands", "", "A command that has one names it after *also*.", "")
+    yield from (sorted(shared))
     yield ""
 
 
 def _statuses() -> Iterator[str]:
-    yield from ("## Exit status", "", "| status | means |", "| --- | --- |")
-    yield from (f"| {status.value} | {STATUSES[status]} |" for status in ExitStatus)
+    yield from ("## Exit status", "")
+    yield from (f"- {status.value}: {STATUSES[status]}" for status in ExitStatus)
     yield from (
         "",
         "Torque is zero and the drives are disarmed on every way out; if a drive can't confirm it, a message says so.",
@@ -97,29 +110,39 @@ def _statuses() -> Iterator[str]:
     )
 
 
-def _section(name: str) -> Iterator[str]:
+def _section(name: str, shared: set[str]) -> Iterator[str]:
     own = command(name)
     inner = getattr(own, "commands", {})
     yield from (f"## hil {name}", "")
-    yield from _in_words(f"hil {name}", own, bool(inner))
+    yield from _in_words(f"hil {name}", own, bool(inner), shared)
     for each, part in inner.items():
         yield from (f"### hil {name} {each}", "")
-        yield from _in_words(f"hil {name} {each}", part, False)
+        yield from _in_words(f"hil {name} {each}", part, False, shared)
 
 
-def _in_words(name: str, given: Any, group: bool) -> Iterator[str]:
+def _in_words(name: str, given: Any, group: bool, shared: set[str]) -> Iterator[str]:
     """Yield usage, text, arguments, options and examples of one command."""
     arguments = [each for each in given.params if each.param_type_name == "argument"]
-    options = [each for each in given.params if each.param_type_name == "option"]
+    options = [(each, _option(each)) for each in _options(given)]
     usage = [name, *(["[OPTIONS]"] if options else []), *map(_sign, arguments), *(["COMMAND"] if group else [])]
     yield from ("```text", " ".join(usage), "```", "", _text(given.help), "")
-    if arguments or options:
-        yield from ("| name | meaning | default |", "| --- | --- | --- |")
-        yield from (f"| `{_sign(each)}` | {_cell(each.help or '')} | |" for each in arguments)
-        yield from (f"| {_names(each)} | {_cell(each.help or '')} | {_default(each)} |" for each in options)
-        yield ""
+    yield from (f"- `{_sign(each)}`: {_cell(each.help or '')}" for each in arguments)
+    yield from (line for _, line in options if line not in shared)
+    if also := [f"`{each.opts[0]}`" for each, line in options if line in shared]:
+        yield f"- also {', '.join(also)}"
+    yield ""
     if shown := examples(given.epilog or ""):
         yield from ("```sh", *(line.rstrip(".;") for line in shown), "```", "")
+
+
+def _options(given: Any) -> list[Any]:
+    return [each for each in given.params if each.param_type_name == "option"]
+
+
+def _option(option: Any) -> str:
+    """Return the line of an option: its names, what it means, and its default."""
+    default = _default(option)
+    return f"- {_names(option)}: {_cell(option.help or '')}" + (f" Default: {default}." if default else "")
 
 
 def _sign(argument: Any) -> str:
@@ -144,7 +167,7 @@ def _kind(option: Any) -> str:
 
 def _default(option: Any) -> str:
     value = option.default
-    if value in (None, False, ()) or value == [] or option.required:
+    if value in (None, False, (), "") or value == [] or option.required:
         return ""
     return f"`{option.opts[0] if value is True else getattr(value, 'value', value)}`"
 
@@ -156,7 +179,7 @@ def _text(words: str | None) -> str:
 
 
 def _cell(text: str) -> str:
-    return _escaped(" ".join(text.split())).replace("|", "\\|")
+    return _escaped(" ".join(text.split()))
 
 
 def _escaped(text: str) -> str:

@@ -37,6 +37,7 @@ class Result:
     commit: str
     rooms: tuple[str, ...]  # folders whose code the figure depends on
     text: str  # Markdown
+    totals: tuple[str, ...] = ()  # of a long table: "sum", "max" or "" for each column behind the first
     noted: bool = True  # False: the commit is the one that brought the figure into the manual; it was measured before
 
     @property
@@ -45,12 +46,30 @@ class Result:
         return not self.command or bool(git("rev-list", "--max-count=1", f"{self.commit}..HEAD", "--", *self.rooms))
 
     @property
+    def shown(self) -> str:
+        """The text; of a long table its totals, and the rows with something in the last column: what was wrong."""
+        if not self.totals:
+            return self.text.strip()
+        head, line, *rows = self.text.strip().splitlines()
+        cells = [[cell.strip() for cell in row.strip("|").split("|")] for row in rows]
+        columns = zip(self.totals, list(zip(*cells, strict=True))[1:], strict=True)
+        total = " | ".join([f"all {len(rows)}", *(_total(how, column) for how, column in columns)])
+        wrong = [row for row, own in zip(rows, cells, strict=True) if own[-1] != "0"]
+        return "\n".join([head, line, f"| {total} |", *wrong])
+
+    @property
     def filled(self) -> str:
         """Return what stands on a page: where it comes from, then the text."""
         by = f"`{self.command}`, " if self.command else "By a program that has left the project, "
         when = f"commit {self.commit}" if self.noted else f"in the manual since commit {self.commit}"
         old = f"; **older than {' and '.join(f'`{room}`' for room in self.rooms)}**" if self.outdated else ""
-        return f"{by}{when}{old}:\n\n{self.text.strip()}\n"
+        rows = f"; each row is in `docs/results/{self.name}.toml`" if self.totals else ""
+        return f"{by}{when}{old}{rows}:\n\n{self.shown}\n"
+
+
+def _total(how: str, column: tuple[str, ...]) -> str:
+    """Return the sum or the largest of a column's cells, as they are written."""
+    return max(column, key=float) if how == "max" else str(sum(map(int, column))) if how == "sum" else ""
 
 
 def git(*words: str) -> str:
@@ -71,7 +90,9 @@ def results() -> dict[str, Result]:
 
 def _read(path: Path) -> Result:
     content = tomllib.loads(path.read_text("utf-8"))
-    return Result(path.stem, **{**content, "rooms": tuple(content["rooms"])})
+    return Result(
+        path.stem, **{**content, "rooms": tuple(content["rooms"]), "totals": tuple(content.get("totals", ()))}
+    )
 
 
 def places(page: str) -> dict[str, str]:

@@ -18,7 +18,7 @@ def test_every_place_shows_its_result_and_whether_it_is_of_an_older_version() ->
             marked = (
                 "**older than" in filled
             )  # a mark that is no longer needed does no harm until it is filled in again
-            if result.text.strip() not in filled or f"commit {result.commit}" not in filled or result.outdated > marked:
+            if result.shown not in filled or f"commit {result.commit}" not in filled or result.outdated > marked:
                 stale.append(f"{page.relative_to(ROOT)}: {name}")
     assert stale == [], RENEW
 
@@ -40,9 +40,17 @@ def test_a_figure_without_its_program_or_before_a_change_is_outdated() -> None:
     assert "older than `hil`" in Result("a", "", head, ("hil",), "x").filled
 
 
+def test_of_a_long_table_the_totals_and_what_was_wrong_are_shown() -> None:
+    text = (
+        "| fault | runs | worst [s] | wrong |\n| --- | --- | --- | --- |\n| a | 3 | 0.20 | 0 |\n| b | 4 | 0.10 | 2 |\n"
+    )
+    lines = Result("a", "make bench", "x", ("hil",), text, ("sum", "max", "sum")).shown.splitlines()
+    assert lines[2:] == ["| all 2 | 7 | 0.20 | 2 |", "| b | 4 | 0.10 | 2 |"]
+
+
 def test_a_place_is_filled_in_and_filled_in_again_alike() -> None:
     name = next(iter(results()))
     page = f"Before.\n\n<!-- result: {name} -->\n<!-- end -->\n\nAfter.\n"
     filled = with_results(page)
-    assert results()[name].text.strip() in filled
+    assert results()[name].shown in filled
     assert with_results(filled) == filled

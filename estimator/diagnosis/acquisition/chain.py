@@ -22,6 +22,9 @@ from estimator.signals.record import BoolArray, FloatArray, Record, separated_ou
 UNREAD = frozenset({"stale_samples", "lost_samples"})
 """Findings whose readings are not what was measured in that row."""
 
+AMONG_READ = (stale_samples, speed_quantisation, stamped_jitter)
+"""What is looked for among the readings that were not lost."""
+
 
 def compensate(records: Sequence[Record], findings: Sequence[AcquisitionFinding]) -> tuple[Record, ...]:
     """Return the records as they would be without what was found."""
@@ -83,10 +86,6 @@ def _repeating(output: FloatArray, record: Record) -> FloatArray:
     (stale,) = repeated([np.where(flagged(record), np.nan, record.output)]).rows
     renewed = np.maximum.accumulate(np.where(stale, 0, np.arange(output.size)))
     return output[renewed]
-
-
-AMONG_READ = (stale_samples, speed_quantisation, stamped_jitter)
-"""What is looked for among the readings that were not lost."""
 
 
 def recognise(records: Sequence[Record]) -> tuple[AcquisitionFinding, ...]:

@@ -11,6 +11,22 @@ from scipy import stats
 
 from estimator.signals.record import BoolArray, FloatArray, Record
 
+OUTPUT = 0  # column of the measured output in ``Finding.cells``; torque input i is column ``1 + i``
+
+LEVEL = 1e-6
+"""Largest probability by chance. A handful of tests on every recording ever diagnosed shall not raise a false alarm."""
+
+SMALLEST_SHARE = 0.002
+"""Smallest share of touched rows worth a finding. One row in five hundred costs a fit next to nothing: masked or not,
+its variance grows by the like. At one in two hundred and thirty the search for laws without a name still sees them (a
+sealed case, seed 701), and what it sees should have its name."""
+
+ORDER = 12
+"""Past samples of output and torque that are seen. A line of two masses needs 2, one of three 4; the rest is there to
+average the noise of the reading."""
+
+ROWS_PER_REGRESSOR = 5  # a recording with fewer usable rows than this per coefficient is not judged
+
 
 def channels(record: Record) -> FloatArray:
     """Return output and torques side by side, NaN where nothing was read; shape (N, 1 + M)."""
@@ -60,9 +76,6 @@ def mean_run(masks: list[BoolArray]) -> float:
     return float(lengths @ lengths / lengths.sum()) if lengths.size else 1.0
 
 
-OUTPUT = 0  # column of the measured output in ``Finding.cells``; torque input i is column ``1 + i``
-
-
 class Sized(NamedTuple):
     """A parameter as found: value, 95 % interval, unit."""
 
@@ -94,22 +107,6 @@ def no_cells(record: Record) -> BoolArray:
     """Return a mask of a recording's readings that is False throughout, shape (N, 1 + M)."""
     n, inputs = record.torque_nm.shape
     return np.zeros((n, 1 + inputs), dtype=np.bool_)
-
-
-LEVEL = 1e-6
-"""Largest probability by chance. A handful of tests on every recording ever diagnosed shall not raise a false alarm."""
-
-SMALLEST_SHARE = 0.002
-"""Smallest share of touched rows worth a finding. One row in five hundred costs a fit next to nothing: masked or not,
-its variance grows by the like. At one in two hundred and thirty the search for laws without a name still sees them (a
-sealed case, seed 701), and what it sees should have its name."""
-
-
-ORDER = 12
-"""Past samples of output and torque that are seen. A line of two masses needs 2, one of three 4; the rest is there to
-average the noise of the reading."""
-
-ROWS_PER_REGRESSOR = 5  # a recording with fewer usable rows than this per coefficient is not judged
 
 
 @dataclass(frozen=True, slots=True)

@@ -26,6 +26,32 @@ AGREEMENT = 0.5  # share of the stamps' offsets that the output must confirm: ha
 ABOVE_ROUNDING = 2.0  # offsets of this many times what rounding the stamps leaves are more than rounding
 SMALLEST_PERIODS = 1e-3  # jitter below this share of the period is not looked into
 
+PAST = 8  # past errors that may explain an error: most of a period of a driveline's first mode at 10 ms
+
+AROUND = 3
+"""Slopes before and after that may explain it: a delay, a lag or a wrong inertia show as a mix of them."""
+
+BLOCK = 250
+"""Rows within which these explain by coefficients of their own, to tell whether there is jitter at all: a simulated
+angle that drifts off the true one moves what depends on it as a delay does that comes and goes. Its size is estimated
+from all rows: so many coefficients follow a part of the jitter too."""
+
+LEAST_GAIN = 0.05  # share of the error's variance that jitter must account for, on average: less changes no fit
+OF_A_KINK = 0.17  # ``(E|tau| / 2 sigma_t)^2``: 1 / 2 pi for Gaussian offsets, 3 / 16 for uniform ones
+
+MOST_OF_IT = 0.5
+"""Share of the error's variance beyond the noise that must be jitter: where other things leave more, the model has not
+converged, and what is left of their error may follow the slope in ways that nothing here accounts for."""
+
+OF_THE_MANY = 0.4
+"""Jitter seen in the median must be this share of that seen in the mean. Between Gaussian and uniform jitter it is 1 to
+1.6; a few wild rows (stale samples, a clunk) leave nothing in the median."""
+
+NEIGHBOURS = 0.5
+"""Share of the jitter that neighbouring rows may have in common: 0 if drawn anew for each, 1 if it delays both."""
+
+ROUNDING = 1e-6  # least noise of an error, in parts of its standard deviation
+
 
 def stamp_offsets_s(record: Record) -> FloatArray:
     """Return how far each time stamp is from the uniform time base [s]; zeros where stamps are even, shape (N,)."""
@@ -79,31 +105,6 @@ def _pooled(found: Sequence[tuple[float, float]]) -> tuple[float, float]:
     weights = np.array([1.0 / error**2 for _, error in found])
     mean = float(weights @ np.array([value for value, _ in found])) / float(weights.sum())
     return mean, float(1.0 / np.sqrt(weights.sum()))
-
-
-PAST = 8  # past errors that may explain an error: most of a period of a driveline's first mode at 10 ms
-
-AROUND = 3
-"""Slopes before and after that may explain it: a delay, a lag or a wrong inertia show as a mix of them."""
-
-BLOCK = 250
-"""Rows within which these explain by coefficients of their own, to tell whether there is jitter at all: a simulated
-angle that drifts off the true one moves what depends on it as a delay does that comes and goes. Its size is estimated
-from all rows: so many coefficients follow a part of the jitter too."""
-
-LEAST_GAIN = 0.05  # share of the error's variance that jitter must account for, on average: less changes no fit
-OF_A_KINK = 0.17  # ``(E|tau| / 2 sigma_t)^2``: 1 / 2 pi for Gaussian offsets, 3 / 16 for uniform ones
-
-MOST_OF_IT = 0.5
-"""Share of the error's variance beyond the noise that must be jitter: where other things leave more, the model has not
-converged, and what is left of their error may follow the slope in ways that nothing here accounts for."""
-
-OF_THE_MANY = 0.4
-"""Jitter seen in the median must be this share of that seen in the mean. Between Gaussian and uniform jitter it is 1 to
-1.6; a few wild rows (stale samples, a clunk) leave nothing in the median."""
-
-NEIGHBOURS = 0.5
-"""Share of the jitter that neighbouring rows may have in common: 0 if drawn anew for each, 1 if it delays both."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -225,9 +226,6 @@ def _about_its_mean(signal: FloatArray, lengths: tuple[int, ...]) -> FloatArray:
     """Return a signal of all recordings in a row, less its mean in each, shape (n,)."""
     parts = np.split(signal, np.cumsum(lengths)[:-1])
     return np.concatenate([part - part.mean() for part in parts])
-
-
-ROUNDING = 1e-6  # least noise of an error, in parts of its standard deviation
 
 
 @dataclass(frozen=True, slots=True)

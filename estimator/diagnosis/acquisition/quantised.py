@@ -38,6 +38,47 @@ CORE_QUANTILE = 0.05
 DECIMALS = 9  # values with more decimals than this are taken as not rounded
 ROUND_OFF = 1e-9  # values closer than this share of the largest are the same number, scaled in another way
 
+MODEL_ERROR = 0.1  # relative error of extrapolating the density to zero, in addition to its sampling error
+
+NOISE_PER_STEP = 1.0
+"""A lattice matters from a step of this many standard deviations of the one-step error: below that its rounding adds
+under 1/12, 4 % of the error's size."""
+
+BINS_PER_STEP = 8  # fineness of the histogram whose spectrum is searched: it takes 3 % off the finest step's R
+PADDING = 4  # points of the spectrum per resolution cell, so that no peak falls between two
+
+LEVELS = 6
+"""A lattice must be visited on this many levels within the spread of a recording; fewer are lumps, no lattice."""
+
+HARMONIC = 0.8
+"""Lattices of q/2, q/3 ... fit as well as q: the coarsest that is this share of the best is taken."""
+
+REGULAR = 0.2
+"""Smallest R of a lattice: noise of 0.29 steps came after the rounding, as much as the rounding's own error."""
+
+SMOOTHING = 25
+"""Samples of a moving mean that wipes out a lattice, and leaves the lumps of a drive that keeps to a few speeds."""
+
+ABOVE_LUMPS = 3.0  # R of the readings must be this many times that of their moving mean
+
+MOST_BINS = 2**22  # bins of a spectrum of levels: a finer noise in a wider range shows no lattice that matters
+
+LONGEST_ZERO = 20  # more zeros than this in a row are a signal at zero
+NEAR_STEPS = 5  # a value near zero is within so many lattice steps of it
+COMMON_LEVELS = 5  # so many of the commonest other values are looked at, whether they come as zero does
+
+AS_EXACTLY = 0.5
+"""Of what is near another level for short as large a share must be that level exactly, times this, as for zero."""
+
+NEAR_SHARE = 0.02
+"""... or within this share of the channel's size, whichever is more."""
+
+MORE_THAN_MEANT = 5.0
+"""Where zeros are lost, those between values near zero are so too if there are so many times as many of them as of any
+value next to zero: rounded noise of half a lattice step around zero shows it four times as often as the next value."""
+
+LONGEST_BURST = 50  # more missing rows than this in a row are a gap
+
 
 def lattice_step(values: FloatArray) -> float:
     """Return the step of the lattice that values lie on [unit of the values]; tiny where they lie on none."""
@@ -64,9 +105,6 @@ class ChanceRepeats:
 
     expected: float  # best estimate of their number
     upper: float
-
-
-MODEL_ERROR = 0.1  # relative error of extrapolating the density to zero, in addition to its sampling error
 
 
 def chance_repeats(differences: FloatArray, step: float) -> ChanceRepeats:
@@ -109,31 +147,6 @@ def repeats(values: FloatArray, step: float) -> BoolArray:
     if read.size:
         found[1:] = np.abs(np.diff(values)) <= ROUND_OFF * max(float(np.abs(read).max()), step)
     return found
-
-
-NOISE_PER_STEP = 1.0
-"""A lattice matters from a step of this many standard deviations of the one-step error: below that its rounding adds
-under 1/12, 4 % of the error's size."""
-
-BINS_PER_STEP = 8  # fineness of the histogram whose spectrum is searched: it takes 3 % off the finest step's R
-PADDING = 4  # points of the spectrum per resolution cell, so that no peak falls between two
-
-LEVELS = 6
-"""A lattice must be visited on this many levels within the spread of a recording; fewer are lumps, no lattice."""
-
-HARMONIC = 0.8
-"""Lattices of q/2, q/3 ... fit as well as q: the coarsest that is this share of the best is taken."""
-
-REGULAR = 0.2
-"""Smallest R of a lattice: noise of 0.29 steps came after the rounding, as much as the rounding's own error."""
-
-SMOOTHING = 25
-"""Samples of a moving mean that wipes out a lattice, and leaves the lumps of a drive that keeps to a few speeds."""
-
-ABOVE_LUMPS = 3.0  # R of the readings must be this many times that of their moving mean
-
-
-MOST_BINS = 2**22  # bins of a spectrum of levels: a finer noise in a wider range shows no lattice that matters
 
 
 def speed_quantisation(records: Sequence[Record]) -> AcquisitionFinding | None:
@@ -253,21 +266,6 @@ def _smooth(values: FloatArray) -> FloatArray:
     return np.convolve(values, np.full(SMOOTHING, 1.0 / SMOOTHING), mode="valid")
 
 
-LONGEST_ZERO = 20  # more zeros than this in a row are a signal at zero
-NEAR_STEPS = 5  # a value near zero is within so many lattice steps of it
-COMMON_LEVELS = 5  # so many of the commonest other values are looked at, whether they come as zero does
-
-AS_EXACTLY = 0.5
-"""Of what is near another level for short as large a share must be that level exactly, times this, as for zero."""
-
-NEAR_SHARE = 0.02
-"""... or within this share of the channel's size, whichever is more."""
-
-MORE_THAN_MEANT = 5.0
-"""Where zeros are lost, those between values near zero are so too if there are so many times as many of them as of any
-value next to zero: rounded noise of half a lattice step around zero shows it four times as often as the next value."""
-
-
 def lost_zeros(records: Sequence[Record]) -> tuple[list[BoolArray], float]:
     """Return the readings that are zero and shouldn't be, each (N, 1 + M), and the probability by chance."""
     read = [channels(record) for record in records]
@@ -361,9 +359,6 @@ def _has_levels(series: Sequence[FloatArray], near: float, count: int) -> bool:
 def _visits(series: Sequence[FloatArray], near: float) -> int:
     """Return how many values are near zero for a short while, or on their way through it."""
     return sum(int(shorter_runs(np.abs(values) <= near, LONGEST_ZERO).sum()) for values in series)
-
-
-LONGEST_BURST = 50  # more missing rows than this in a row are a gap
 
 
 def lost_samples(records: Sequence[Record]) -> AcquisitionFinding | None:

@@ -41,6 +41,34 @@ REST_ROWS = 8
 
 NEAR_ZERO = 0.02  # zero is within this share of the channel's size
 
+CATCH_UP = 0.8
+"""Smallest ratio of the median change after a repeat to the usual one, for the repeats to be stale. Two periods of
+motion give up to 2, of white noise 1; an innocent repeat in white noise gives sqrt(3)/2 = 0.87, one in a slow signal
+on a lattice a small fraction."""
+
+PERIODS = 3  # the torque of a row is predicted from its own reference and from those before it, so many in all
+FEWEST_ROWS = 100  # fewer rows that were read do not show how a drive follows
+
+MOST_LEFT = 0.25
+"""Share of the torque's changes, as a power, that a reference may leave; one that leaves more does not tell."""
+
+AS_GOOD = 0.003
+"""One that leaves no more than this share tells the torque as well as a reading does: of a step a twentieth is left."""
+
+LONGEST_HOLD = 20  # longest clock looked for, in samples
+ON_TICK = 0.95  # share of the steps that must fall on the ticks; the rest may be steps of the base torque
+FEWEST_STEPS = 20  # fewer steps do not show a clock
+CLEAR_STEP = 8.0  # a step is a change this many times the usual one within a hold
+
+SAME_STEP = 0.2
+"""A change is the clock's step if it differs from it by at most this share: the base torque may drift meanwhile."""
+
+CLEAR = (2.0, 3.0, 4.0)
+"""A step tells whether it was answered where the answer is this many times the predictor's error. Torques found stale
+are mended and the predictor fitted again, for wrong torques blur it; each pass asks for more, the last one counts."""
+
+ANSWERED = 0.5  # share of the answer that must have come early: half way between none and all of it
+
 
 def informative_rows(values: FloatArray, step: float) -> BoolArray:
     """Return the rows of a channel in which a repeat would tell, shape (N,)."""
@@ -65,12 +93,6 @@ def _moving_share(moving: BoolArray, read: BoolArray) -> FloatArray:
         sliding_window_view(np.pad(rows, HALF_WINDOW), 2 * HALF_WINDOW + 1).sum(axis=1) for rows in (moving, read)
     ]
     return counts[0] / np.maximum(counts[1], 1)
-
-
-CATCH_UP = 0.8
-"""Smallest ratio of the median change after a repeat to the usual one, for the repeats to be stale. Two periods of
-motion give up to 2, of white noise 1; an innocent repeat in white noise gives sqrt(3)/2 = 0.87, one in a slow signal
-on a lattice a small fraction."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,16 +156,6 @@ def _ratio(after: FloatArray, usual: FloatArray) -> float:
     return float(np.median(after) / np.median(usual)) if after.size and usual.size else 0.0
 
 
-PERIODS = 3  # the torque of a row is predicted from its own reference and from those before it, so many in all
-FEWEST_ROWS = 100  # fewer rows that were read do not show how a drive follows
-
-MOST_LEFT = 0.25
-"""Share of the torque's changes, as a power, that a reference may leave; one that leaves more does not tell."""
-
-AS_GOOD = 0.003
-"""One that leaves no more than this share tells the torque as well as a reading does: of a step a twentieth is left."""
-
-
 def followed(torque: FloatArray, trusted: BoolArray, reference: FloatArray) -> tuple[FloatArray, BoolArray, bool]:
     regressors = _regressors(np.where(~trusted & (reference == 0.0), np.nan, reference))  # lost with the torque
     predicted = all_of(np.isfinite(regressors))
@@ -165,15 +177,6 @@ def followed(torque: FloatArray, trusted: BoolArray, reference: FloatArray) -> t
 def _regressors(reference: FloatArray) -> FloatArray:
     before = [np.concatenate([np.full(lag, reference[0]), reference[: reference.size - lag]]) for lag in range(PERIODS)]
     return np.column_stack([*before, np.ones(reference.size)])
-
-
-LONGEST_HOLD = 20  # longest clock looked for, in samples
-ON_TICK = 0.95  # share of the steps that must fall on the ticks; the rest may be steps of the base torque
-FEWEST_STEPS = 20  # fewer steps do not show a clock
-CLEAR_STEP = 8.0  # a step is a change this many times the usual one within a hold
-
-SAME_STEP = 0.2
-"""A change is the clock's step if it differs from it by at most this share: the base torque may drift meanwhile."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -235,13 +238,6 @@ def _by_clock(torque: FloatArray, trusted: BoolArray) -> tuple[FloatArray, BoolA
             filled[begin:change], filled[change:end] = before, after
             known[begin:end] = True
     return filled, known
-
-
-CLEAR = (2.0, 3.0, 4.0)
-"""A step tells whether it was answered where the answer is this many times the predictor's error. Torques found stale
-are mended and the predictor fitted again, for wrong torques blur it; each pass asks for more, the last one counts."""
-
-ANSWERED = 0.5  # share of the answer that must have come early: half way between none and all of it
 
 
 @dataclass(frozen=True, slots=True)

@@ -44,6 +44,25 @@ equal springs has each twice as stiff as the whole."""
 
 ROUNDING = 1e-6  # share of a value by which a fit may end beyond a bound
 
+BINS = 12  # bins of torque and of speed, of equal count
+
+COLUMNS = {"most_predictable": PREDICTOR_ORDER, "most_dependent": 2 * BINS + 3}
+"""How many signals a share of the innovations is sought in: past samples; bins, waves in the angle, and a mean."""
+
+MIN_SAMPLES = 50
+
+CHANCE = 4.0  # standard deviations of what noise shows by chance that a share may be beyond its limit
+FEWEST_PERIODS = 5  # times that a wave repeats in a recording to be a line: what is slower is drift
+
+CHANGE_S = 1.0
+EDGE = 0.02  # distance from the bound of a disturbance's logarithm within which it has reached it
+
+DISTURBANCES = {
+    Size.TORQUE: "is more than the noise of a torque reading",
+    Size.DRIFT: "is more than the drift of a torque reading",
+    Size.WALK: "is more than the slow change of a load",
+}
+
 
 def is_possible(hypothesis: Hypothesis, records: Sequence[Record]) -> bool:
     """Tell whether a machine can be so: its input is on, it is not stuck, no load walks so far, events take place."""
@@ -143,26 +162,6 @@ def _is_stuck(values: Mapping[str, Mapping[str, float]], records: Sequence[Recor
         for parameter in EFFECTS[name].parameters
         if parameter.dimension == "torque" and parameter.null == 0.0  # that of a limit is beyond all torque
     )
-
-
-BINS = 12  # bins of torque and of speed, of equal count
-
-COLUMNS = {"most_predictable": PREDICTOR_ORDER, "most_dependent": 2 * BINS + 3}
-"""How many signals a share of the innovations is sought in: past samples; bins, waves in the angle, and a mean."""
-
-MIN_SAMPLES = 50
-
-CHANCE = 4.0  # standard deviations of what noise shows by chance that a share may be beyond its limit
-FEWEST_PERIODS = 5  # times that a wave repeats in a recording to be a line: what is slower is drift
-
-CHANGE_S = 1.0
-EDGE = 0.02  # distance from the bound of a disturbance's logarithm within which it has reached it
-
-DISTURBANCES = {
-    Size.TORQUE: "is more than the noise of a torque reading",
-    Size.DRIFT: "is more than the drift of a torque reading",
-    Size.WALK: "is more than the slow change of a load",
-}
 
 
 @dataclass(frozen=True, slots=True)

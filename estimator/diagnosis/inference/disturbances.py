@@ -22,6 +22,27 @@ from estimator.physics.problem import Rows
 from estimator.signals.correlation import stand_in_variance
 from estimator.signals.record import BoolArray, FloatArray, Location, OutputKind, Record, by_output
 
+READING = 3  # how many sizes are of an output's reading
+
+TORQUE_SHARE, DRIFT_SHARE, WALK_SHARE = 2e-3, 2e-3, 5e-4
+"""Usual sizes as shares of the torque in use: a reading of a per mille of the rated torque, its drift, and the change
+of the load in a second (a grade of half a per mille, a breath of wind)."""
+
+FORM_SHARE, MOST_FORM = 0.1, 0.5
+"""Usual share of a law's change by which its form is off, and the share beyond which it is another law."""
+
+MOST_TORQUE, MOST_DRIFT, MOST_WALK = 2e-2, 2e-2, 5e-3
+"""Sizes beyond which such a disturbance is physics to be named."""
+
+COLOUR_S, DRIFT_S = 0.03, 3.0
+"""Usual correlation times of a sensor's coloured noise and of a current sensor's drift [s]."""
+
+PRIOR_SPREAD = 1.5
+"""Standard deviation of the logarithm of a size around the usual one: a factor of 20 is two of them."""
+
+STEP = 1e-4  # change of a logarithm by which derivatives are found
+ENOUGH = 0.5  # fall of minus twice the log-posterior below which sizes are estimated
+
 
 @dataclass(frozen=True, slots=True)
 class LinearLine:
@@ -116,9 +137,6 @@ class Size(IntEnum):
     DRIFT_S = 5
     WALK = 6
     FORM = 7
-
-
-READING = 3  # how many sizes are of an output's reading
 
 
 def of_first(sizes: FloatArray) -> FloatArray:
@@ -237,23 +255,6 @@ def whitener(
     return Whitener(terms, terms_of(h), tuple(each), tuple(use), tuple(rows))
 
 
-TORQUE_SHARE, DRIFT_SHARE, WALK_SHARE = 2e-3, 2e-3, 5e-4
-"""Usual sizes as shares of the torque in use: a reading of a per mille of the rated torque, its drift, and the change
-of the load in a second (a grade of half a per mille, a breath of wind)."""
-
-FORM_SHARE, MOST_FORM = 0.1, 0.5
-"""Usual share of a law's change by which its form is off, and the share beyond which it is another law."""
-
-MOST_TORQUE, MOST_DRIFT, MOST_WALK = 2e-2, 2e-2, 5e-3
-"""Sizes beyond which such a disturbance is physics to be named."""
-
-COLOUR_S, DRIFT_S = 0.03, 3.0
-"""Usual correlation times of a sensor's coloured noise and of a current sensor's drift [s]."""
-
-PRIOR_SPREAD = 1.5
-"""Standard deviation of the logarithm of a size around the usual one: a factor of 20 is two of them."""
-
-
 @dataclass(frozen=True, slots=True)
 class Limits:
     """Usual values of a noise model and the bounds it is estimated in, all logarithms, each of shape (S,)."""
@@ -320,10 +321,6 @@ def limits_for(records: Sequence[Record], white: float) -> Limits:
     if in_output:  # of an imposed motion nothing is integrated: torque noise is the reading's
         high[[Size.TORQUE, Size.DRIFT]] = usual[[Size.TORQUE, Size.DRIFT]] = low[[Size.TORQUE, Size.DRIFT]]
     return Limits(np.clip(usual, low, high), low, high)
-
-
-STEP = 1e-4  # change of a logarithm by which derivatives are found
-ENOUGH = 0.5  # fall of minus twice the log-posterior below which sizes are estimated
 
 
 def minus_twice_log_prior(sizes: FloatArray, limits: Limits) -> float:

@@ -43,6 +43,16 @@ from estimator.physics.problem import Problem, make_problem, parameters, start_v
 from estimator.physics.unknowns import LocalBasis, Shared
 from estimator.signals.record import BoolArray, FloatArray, OutputKind, Record, by_output
 
+ITERATIONS = 8  # steps of a least-squares fit of what is a recording's own, which is nearly linear
+
+DIMENSIONS = {
+    OutputKind.SPEED: "speed",
+    OutputKind.POSITION: "angle",
+    OutputKind.FORCE: "torque",
+    OutputKind.TORQUE: "torque",
+    OutputKind.ACCELERATION: "acceleration",
+}
+
 
 def foreign_outputs(
     result: FitResult,
@@ -56,9 +66,6 @@ def foreign_outputs(
         simulate_foreign(model, result.p, result.problem.grid, record, samples, effects)
         for record, samples in zip(records, use, strict=True)
     )
-
-
-ITERATIONS = 8  # steps of a least-squares fit of what is a recording's own, which is nearly linear
 
 
 def on_recordings(
@@ -170,15 +177,6 @@ def found_effect(standing: Standing, runs: FreeRuns) -> FoundEffect:
         least_necessity=standing.necessity.least,
         counted=standing.counted,
     )
-
-
-DIMENSIONS = {
-    OutputKind.SPEED: "speed",
-    OutputKind.POSITION: "angle",
-    OutputKind.FORCE: "torque",
-    OutputKind.TORQUE: "torque",
-    OutputKind.ACCELERATION: "acceleration",
-}
 
 
 @dataclass(frozen=True)

@@ -42,6 +42,23 @@ GRADE = "road_grade"
 Progress = Callable[[str, float], None]
 """Called with what is being done and the share of the work behind it; raise from it to cancel."""
 
+SETTLED_DEVIANCE = 1.0
+"""Fall of minus twice the log-likelihood below which another pass over unknowns and disturbances is not made."""
+
+DIGITS = 0.02  # the same over the difference from a rival that the fit is for
+
+MOST_PASSES = 6
+
+THOROUGH, ROUGH = Effort(derivatives=6, steps=30), Effort(derivatives=1, steps=6)
+"""What a pass may cost at most, and a first comparison."""
+
+MOST_ROUGH, MUCH = 3, 0.05
+"""Such comparisons under disturbances of their own at most, and the fall of minus twice the log-likelihood per sample
+for the next."""
+
+ROUNDS = 2  # steps of Fisher scoring in a pass
+WITH_MOMENTS = 1  # passes in which moments of events are looked for elsewhere
+
 
 def silent(_message: str, _share: float) -> None:
     """Report nothing."""
@@ -132,24 +149,6 @@ def with_line_values(result: FitResult, line: Mapping[str, float]) -> FitResult:
         if not shared.effect and shared.name in line:
             x[i] = min(max(line[shared.name] / shared.scale, shared.low), shared.high)
     return replace(result, x=x)
-
-
-SETTLED_DEVIANCE = 1.0
-"""Fall of minus twice the log-likelihood below which another pass over unknowns and disturbances is not made."""
-
-DIGITS = 0.02  # the same over the difference from a rival that the fit is for
-
-MOST_PASSES = 6
-
-THOROUGH, ROUGH = Effort(derivatives=6, steps=30), Effort(derivatives=1, steps=6)
-"""What a pass may cost at most, and a first comparison."""
-
-MOST_ROUGH, MUCH = 3, 0.05
-"""Such comparisons under disturbances of their own at most, and the fall of minus twice the log-likelihood per sample
-for the next."""
-
-ROUNDS = 2  # steps of Fisher scoring in a pass
-WITH_MOMENTS = 1  # passes in which moments of events are looked for elsewhere
 
 
 @dataclass(frozen=True)

@@ -31,6 +31,11 @@ ALIKE_WITHIN: float = THRESHOLDS["alike_within"]
 ALIKE_SHARE: float = THRESHOLDS["alike_share"]
 """The same over what the effect itself explains: laws of nature are written in other forms than the model's."""
 
+COUNTED: Sequence[tuple[float, Counted]] = [
+    (row["necessity_from"], Counted(row["right"], row["of"])) for row in THRESHOLDS["counted"]
+]
+"""Of names whose necessity (its lower end) is from so much up to that of the next row: the count."""
+
 
 @dataclass(frozen=True, slots=True)
 class Necessity:
@@ -38,12 +43,6 @@ class Necessity:
 
     value: float
     least: float  # lower end of its one-sided 95 % interval, by the scatter of the blocks
-
-
-COUNTED: Sequence[tuple[float, Counted]] = [
-    (row["necessity_from"], Counted(row["right"], row["of"])) for row in THRESHOLDS["counted"]
-]
-"""Of names whose necessity (its lower end) is from so much up to that of the next row: the count."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -28,13 +28,14 @@ PLACES: Mapping[Element, str] = {
     Element.ACQUISITION: "in the acquisition",
 }
 
+MOST_NAMES = 4  # untried effects that a headline lists
+
+LINE = frozenset({"J_M", "J_L", "k"})  # what a line's answer to a torque is in proportion to
+
 
 def times(ratio: float) -> str:
     """Return a multiple to three digits as people write it: 281 and not 2.81e+02."""
     return f"{float(f'{ratio:.3g}'):.0f}" if ratio >= 100.0 else f"{ratio:.3g}"
-
-
-MOST_NAMES = 4  # untried effects that a headline lists
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,9 +159,6 @@ def _wrong_values(left: str, off_nominal: Sequence[OffNominal]) -> str:
         f"model explains the recordings down to the noise; {left}. {_common_factor(off_nominal)}Check the data sheet, "
         "or widen the tolerance where it is a guess, and diagnose again."
     )
-
-
-LINE = frozenset({"J_M", "J_L", "k"})  # what a line's answer to a torque is in proportion to
 
 
 def _common_factor(off_nominal: Sequence[OffNominal]) -> str:

@@ -18,6 +18,16 @@ from estimator.physics.problem import case_of
 from estimator.physics.simulate import simulate_each
 from estimator.signals.record import BoolArray, FloatArray, Record
 
+AROUND = 2  # samples before and behind a moment between which a law's change counts
+LASTS = 3.0  # samples over which such an error is correlated: about as long as a change counts
+
+_MOTOR = (slots.COULOMB, slots.STRIBECK, slots.STRIBECK_COULOMB)
+_LOAD = (slots.COULOMB_LOAD, slots.BRAKE)
+_SHAFT = (slots.GAP, slots.STAGE)
+
+DRIVES = {Element.TORQUE_PATH: 1.0, Element.MOTOR: -1.0, Element.SHAFT: 1.0, Element.LOAD: 1.0}
+"""Sign of a law at its place: the torque path drives the motor, friction at the motor brakes it."""
+
 
 @dataclass(frozen=True, slots=True)
 class Motion:
@@ -68,21 +78,12 @@ def between(values: FloatArray) -> FloatArray:
     return 0.5 * (values + later)
 
 
-AROUND = 2  # samples before and behind a moment between which a law's change counts
-LASTS = 3.0  # samples over which such an error is correlated: about as long as a change counts
-
-
 class FormPlace(IntEnum):
     """Where a law whose form is in error acts: on the motor, against the load, in the shaft."""
 
     MOTOR = 0
     LOAD = 1
     SHAFT = 2
-
-
-_MOTOR = (slots.COULOMB, slots.STRIBECK, slots.STRIBECK_COULOMB)
-_LOAD = (slots.COULOMB_LOAD, slots.BRAKE)
-_SHAFT = (slots.GAP, slots.STAGE)
 
 
 def form_changes(result: FitResult, index: int) -> FloatArray:
@@ -179,9 +180,6 @@ ELEMENTS = {
     InputPlace.SENSOR: Element.SPEED_SENSOR,
 }
 """The element that a place is reported as: an input alone does not distinguish those that act there."""
-
-DRIVES = {Element.TORQUE_PATH: 1.0, Element.MOTOR: -1.0, Element.SHAFT: 1.0, Element.LOAD: 1.0}
-"""Sign of a law at its place: the torque path drives the motor, friction at the motor brakes it."""
 
 
 def places(result: FitResult) -> tuple[InputPlace, ...]:

@@ -24,6 +24,17 @@ from estimator.physics.fit import FitResult
 from estimator.physics.kernel import state_vector
 from estimator.signals.record import FloatArray
 
+SLOWEST, FASTEST = 1e-3, 1e2
+"""Range of the walk's rate, as a share of the torque or speed in use, per root second."""
+
+INITIAL_SPREAD = 10.0
+"""Before the first sample a state may be off by this many times its size in use; the input by its size in use."""
+
+FORGETS_S = 1.0
+"""A shaft torque that stays is invisible: it only holds another twist. Its walk returns to zero in about this time."""
+
+SEARCH_TOLERANCE = 0.15  # of the rate's decimal logarithm: the likelihood is flat around its top
+
 
 class Chain(NamedTuple):
     """The line as the input sees it, over B blocks, or 1 that stands for all."""
@@ -183,18 +194,6 @@ def run_smoother(chain: Chain, kept: Filtered, estimates: FloatArray, variance: 
             for j in range(m):
                 spread -= kept.covariances[b, m - 1, r] * information[r, j] * kept.covariances[b, j, m - 1]
         variance[b] = spread
-
-
-SLOWEST, FASTEST = 1e-3, 1e2
-"""Range of the walk's rate, as a share of the torque or speed in use, per root second."""
-
-INITIAL_SPREAD = 10.0
-"""Before the first sample a state may be off by this many times its size in use; the input by its size in use."""
-
-FORGETS_S = 1.0
-"""A shaft torque that stays is invisible: it only holds another twist. Its walk returns to zero in about this time."""
-
-SEARCH_TOLERANCE = 0.15  # of the rate's decimal logarithm: the likelihood is flat around its top
 
 
 @dataclass(frozen=True, slots=True)

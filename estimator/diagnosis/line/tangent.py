@@ -33,6 +33,37 @@ from estimator.signals.record import FloatArray, OutputKind, Record
 
 MOTOR, LOAD = 0, 1  # columns of the inputs: torque on the motor shaft, and torque against the load
 
+NUDGE = 1e-5  # size of a difference step, as a share of the speed or torque in use
+
+LONGEST_BLOCK_S = 0.01
+BLOCKS_PER_PERIOD = 12.0
+"""Samples closer together than this many per period of the line's fastest mode are averaged."""
+
+_NONLINEAR = tuple(
+    (slot(entry.name, parameter.name), parameter.null)
+    for entry in BUILT_IN.values()
+    if entry.element not in (Element.TORQUE_PATH, Element.ACQUISITION) and not entry.profile
+    for parameter in entry.parameters[:1]
+)
+"""Decisive parameter of each effect that changes how the line answers to a torque behind the torque path."""
+
+_BY_ANGLE = [
+    slot(entry.name, entry.parameters[0].name)
+    for entry in BUILT_IN.values()
+    if entry.acting is not None and entry.acting.place is Place.LOAD_ANGLE
+]
+"""Sizes of the laws by which the motion depends on where it is."""
+
+_MOVED_BY = {
+    slots.SLIDER: (state_vector.State._fields.index("loading"),),
+    slots.SLIP: (state_vector.VEHICLE_SPEED,),
+    slots.RELAXING: (state_vector.RELAXING,),
+    slots.BRANCH_INERTIA: (state_vector.BRANCH_TWIST, state_vector.BRANCH_SPEED),
+    slots.FILTER: (state_vector.FILTERED,),
+    slots.FILTER_SHAPE: (state_vector.FILTER_RISE,),
+}
+"""States that a law has of its own, by its size."""
+
 
 @dataclass(frozen=True, slots=True)
 class Tangent:
@@ -170,13 +201,6 @@ def run_block(setting: Setting, first: int, torques: Torques, p: FloatArray, sta
     return setting.out[0, first : torque.shape[0]].mean()
 
 
-NUDGE = 1e-5  # size of a difference step, as a share of the speed or torque in use
-
-LONGEST_BLOCK_S = 0.01
-BLOCKS_PER_PERIOD = 12.0
-"""Samples closer together than this many per period of the line's fastest mode are averaged."""
-
-
 def block_length(result: FitResult) -> int:
     """Return how many samples of a fit's recordings make a block: 1 where they are as far apart as the line needs."""
     sample_time_s = result.problem.records[0].sample_time_s
@@ -250,37 +274,9 @@ def _of_joint(result: FitResult) -> Tangent:
     )
 
 
-_NONLINEAR = tuple(
-    (slot(entry.name, parameter.name), parameter.null)
-    for entry in BUILT_IN.values()
-    if entry.element not in (Element.TORQUE_PATH, Element.ACQUISITION) and not entry.profile
-    for parameter in entry.parameters[:1]
-)
-"""Decisive parameter of each effect that changes how the line answers to a torque behind the torque path."""
-
-
-_BY_ANGLE = [
-    slot(entry.name, entry.parameters[0].name)
-    for entry in BUILT_IN.values()
-    if entry.acting is not None and entry.acting.place is Place.LOAD_ANGLE
-]
-"""Sizes of the laws by which the motion depends on where it is."""
-
-
 def is_linear(p: FloatArray) -> bool:
     """Tell whether a parameter vector is that of a linear line that does not change with time."""
     return all(p[i] == null for i, null in _NONLINEAR)
-
-
-_MOVED_BY = {
-    slots.SLIDER: (state_vector.State._fields.index("loading"),),
-    slots.SLIP: (state_vector.VEHICLE_SPEED,),
-    slots.RELAXING: (state_vector.RELAXING,),
-    slots.BRANCH_INERTIA: (state_vector.BRANCH_TWIST, state_vector.BRANCH_SPEED),
-    slots.FILTER: (state_vector.FILTERED,),
-    slots.FILTER_SHAPE: (state_vector.FILTER_RISE,),
-}
-"""States that a law has of its own, by its size."""
 
 
 def active_states(structure: Structure, p: FloatArray, kind: OutputKind) -> tuple[int, ...]:

@@ -22,14 +22,48 @@ from estimator.signals.record import FloatArray, OutputKind, Record
 
 # --- factors
 
+RPM, DEGREE, TURN = math.pi / 30.0, math.pi / 180.0, 2.0 * math.pi
+
+_SPEED, _POSITION = (OutputKind.SPEED,), (OutputKind.POSITION,)
+_MOVES = (OutputKind.SPEED, OutputKind.POSITION, OutputKind.ACCELERATION)
+_ANY, _LINE, _BOTH = tuple(OutputKind), (Motion.TRANSLATION,), (Motion.ROTATION, Motion.TRANSLATION)
+
+GEARS = (3.0, 16.0)  # ratios of the gears behind traction motors
+
+_KP_N = 9.80665
+_CENT = "per cent of a rated torque of about {2} Nm"
+_MILLE = "per mille of a rated torque of about {3} Nm"
+
+SLOWEST_S, FASTEST_S = 0.5, 1e-5
+"""A driveline sampled slower, or faster, is more likely recorded in another unit of time."""
+
+SHORTEST_S = 1.0  # no recording of a driveline is shorter
+
+PERIODS = (1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 4e-3, 5e-3, 1e-2, 2e-2, 5e-2, 1e-1)
+"""Usual periods [s], for times that are counted in rows."""
+
+UNLIKELY = 0.02  # prior of a period that no driveline is sampled with, and of each that rows may have
+DAY_S = 86_400.0
+TIME_UNITS = {1e-3: "ms", 1e-6: "us", DAY_S: "days"}
+"""Units of time that a column may have, by their size [s]."""
+
+LIMITS = (0.7, 0.5, 0.35, 0.25, 0.15, 0.1, 0.07, 0.05)
+"""Limits of a torque that are tried, in the largest reading of all recordings: what is read beyond is not there."""
+
+DEPTHS, TIMES = (0.5, 0.8, 0.95), (0.05, 0.3, 1.0)
+"""Losses of a torque over time that are tried, and their time constants in the recording's length."""
+
+LEAST_SHIFT_S = 0.05  # a shift that no filter and no bus makes
+MOST_GAIN = 3.5  # factor by which an inverter's gain may be off and is no unit
+STEPS = 60  # values that a factor may have, evenly in its logarithm
+
+MASSES = (Structure.TWO_MASS, Structure.THREE_MASS)
+
 
 class Part(Enum):
     """What a factor belongs to."""
 
     TORQUE, OUTPUT, MODEL = range(3)
-
-
-RPM, DEGREE, TURN = math.pi / 30.0, math.pi / 180.0, 2.0 * math.pi
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,15 +87,7 @@ class Row:
         return 1.0 if self.part is Part.TORQUE else -1.0
 
 
-_SPEED, _POSITION = (OutputKind.SPEED,), (OutputKind.POSITION,)
-_MOVES = (OutputKind.SPEED, OutputKind.POSITION, OutputKind.ACCELERATION)
-_ANY, _LINE, _BOTH = tuple(OutputKind), (Motion.TRANSLATION,), (Motion.ROTATION, Motion.TRANSLATION)
-
-GEARS = (3.0, 16.0)  # ratios of the gears behind traction motors
 _T, _O, _M = Part.TORQUE, Part.OUTPUT, Part.MODEL
-_KP_N = 9.80665
-_CENT = "per cent of a rated torque of about {2} Nm"
-_MILLE = "per mille of a rated torque of about {3} Nm"
 
 ROWS: tuple[Row, ...] = (
     Row("is the speed in rpm, expected rad/s", _O, RPM, RPM, 0.2, _SPEED),
@@ -151,30 +177,6 @@ class Change:
     is_physics: bool = False  # nothing is wrong then: what is there is for a diagnosis to find
     may_be_alone: bool = True  # whether one of several recordings may have it alone
     is_open: bool = False  # it may be physics as well, so that it is doubted and not refused
-
-
-SLOWEST_S, FASTEST_S = 0.5, 1e-5
-"""A driveline sampled slower, or faster, is more likely recorded in another unit of time."""
-
-SHORTEST_S = 1.0  # no recording of a driveline is shorter
-
-PERIODS = (1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 4e-3, 5e-3, 1e-2, 2e-2, 5e-2, 1e-1)
-"""Usual periods [s], for times that are counted in rows."""
-
-UNLIKELY = 0.02  # prior of a period that no driveline is sampled with, and of each that rows may have
-DAY_S = 86_400.0
-TIME_UNITS = {1e-3: "ms", 1e-6: "us", DAY_S: "days"}
-"""Units of time that a column may have, by their size [s]."""
-
-LIMITS = (0.7, 0.5, 0.35, 0.25, 0.15, 0.1, 0.07, 0.05)
-"""Limits of a torque that are tried, in the largest reading of all recordings: what is read beyond is not there."""
-
-DEPTHS, TIMES = (0.5, 0.8, 0.95), (0.05, 0.3, 1.0)
-"""Losses of a torque over time that are tried, and their time constants in the recording's length."""
-
-LEAST_SHIFT_S = 0.05  # a shift that no filter and no bus makes
-MOST_GAIN = 3.5  # factor by which an inverter's gain may be off and is no unit
-STEPS = 60  # values that a factor may have, evenly in its logarithm
 
 
 def changes_of(records: Sequence[Record], line: Line, ratio: float = 1.0) -> Iterator[Change]:
@@ -293,9 +295,6 @@ def _of_model(line: DrivelineModel, ratio: float) -> Iterator[Change]:
         for factor, unit in ((1e-3, "g m^2"), (1e-4, "kg cm^2"), (1e-7, "g cm^2"), (0.25, "GD^2, which is 4 J")):
             question = f"is {name} in the model file in {unit}, the others in kg m^2"
             yield Change(question, 0.02, of_line=partial(_with_one, name=name, factor=factor))
-
-
-MASSES = (Structure.TWO_MASS, Structure.THREE_MASS)
 
 
 def _of_physics(records: Sequence[Record], line: DrivelineModel) -> Iterator[Change]:

@@ -18,6 +18,36 @@ FAR = 4.0  # how far a jump must be, in the largest other steps
 TURN = 2.0 * math.pi
 NEAR_A_TURN = 0.01  # share within which a jump is one of a whole turn
 
+FEWEST_SAMPLES = 10  # rows at the limit that count
+FEWEST_LEVELS = 10  # a channel of fewer values is switched
+SMALLEST_SHARE = 0.005  # share of the rows that must stand at the limit: fewer change no fit
+
+OFTEN = 10.0
+"""How often the limit must come over any other value: four times what a smooth peak read in steps can have."""
+
+AT_PACE = 0.1
+"""Step before the signal comes to the limit, in its usual steps (medians): below, it settles there."""
+
+FEWEST_GOOD = 0.5  # share of the recording's good rows that a channel must have read
+LEAST_CORRELATION = 0.5  # correlation with what a channel should go like from which it goes like that, or the other way
+
+MOST_RATIO = 2.0
+"""Factor by which a speed may be larger or smaller than the motor's: the shaft's twist is no part of its spread."""
+
+CHANCE = 3.0  # standard deviations of the correlation of two signals that have nothing to do with each other
+IDENTICAL_SHARE = 1e-9  # difference over the spread up to which two channels are one signal
+
+SMOOTH_S = 0.2
+"""Width of the mean over which channels are compared: below a driveline's first mode both ends move as one."""
+
+LAG_STEP_S, LAGS = 0.01, 30  # steps in which a channel's lag is sought [s], and how many of them either way
+BLOCKS = 8  # parts of a recording in which a channel's lag is estimated, each by itself
+DEAD_S = 0.5  # time for which a reading that does not change at all is dead, where it should [s]
+MOVED = 0.5  # range, over its spread, of what a channel should go like, from which a reading should change
+
+CLEARLY = 6.0
+"""Standard errors by which a lag must change over a recording: 1 in 1000 by chance, with as many degrees of freedom."""
+
 
 def period_of(values: FloatArray, seen: BoolArray) -> float | None:
     """Return after how much a reading begins anew; None where it does not."""
@@ -59,17 +89,6 @@ def unwrapped(records: Sequence[Record]) -> tuple[list[Record], list[str]]:
             "angle, give it as it was read, without jumps."
         )
     return mended, warnings
-
-
-FEWEST_SAMPLES = 10  # rows at the limit that count
-FEWEST_LEVELS = 10  # a channel of fewer values is switched
-SMALLEST_SHARE = 0.005  # share of the rows that must stand at the limit: fewer change no fit
-
-OFTEN = 10.0
-"""How often the limit must come over any other value: four times what a smooth peak read in steps can have."""
-
-AT_PACE = 0.1
-"""Step before the signal comes to the limit, in its usual steps (medians): below, it settles there."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -184,28 +203,6 @@ def standstill(record: Record) -> str:
         f"{what}: under torques of up to {np.abs(torque).max():.3g} Nm the line is held (brake, parking lock) by at "
         "least that much, or the sensor is dead. Release what holds it, and check the channel."
     )
-
-
-FEWEST_GOOD = 0.5  # share of the recording's good rows that a channel must have read
-LEAST_CORRELATION = 0.5  # correlation with what a channel should go like from which it goes like that, or the other way
-
-MOST_RATIO = 2.0
-"""Factor by which a speed may be larger or smaller than the motor's: the shaft's twist is no part of its spread."""
-
-CHANCE = 3.0  # standard deviations of the correlation of two signals that have nothing to do with each other
-IDENTICAL_SHARE = 1e-9  # difference over the spread up to which two channels are one signal
-
-SMOOTH_S = 0.2
-"""Width of the mean over which channels are compared: below a driveline's first mode both ends move as one."""
-
-
-LAG_STEP_S, LAGS = 0.01, 30  # steps in which a channel's lag is sought [s], and how many of them either way
-BLOCKS = 8  # parts of a recording in which a channel's lag is estimated, each by itself
-DEAD_S = 0.5  # time for which a reading that does not change at all is dead, where it should [s]
-MOVED = 0.5  # range, over its spread, of what a channel should go like, from which a reading should change
-
-CLEARLY = 6.0
-"""Standard errors by which a lag must change over a recording: 1 in 1000 by chance, with as many degrees of freedom."""
 
 
 def with_usable_channels(records: Sequence[Record]) -> tuple[list[Record], list[str]]:

@@ -18,6 +18,34 @@ from estimator.physics.motion import measured_speed
 from estimator.physics.simulate import simulate
 from estimator.signals.record import FloatArray, Record
 
+UNEQUAL = 1000.0
+"""Ratio of two inertias from which on one of them is invisible from the other: 1 / 1000 of the motion."""
+
+BELOW, ABOVE = (0.1, 0.6), (1.6, math.inf)
+"""The two bands, in first modes of the nominal model: a mode off by a quarter lies in neither."""
+
+BLOCK_HZ, FEWEST_BINS = 1.0, 8
+"""Frequencies compared at a time: few enough for a delay of some samples not to matter."""
+
+BANDS_TELL = 0.5  # share of the output in either band that must follow from the torque
+AGREE = 2.5  # factor between the ratios of the two bands up to which they are of one cause
+STRETCH_S = 1.0  # over which the change of speed is looked at
+FEWEST_STEPS = 10  # samples of a stretch at least
+FEWEST_STRETCHES = 10  # stretches that a recording must hold to say anything: the regression has three unknowns
+
+TELLS = 0.25
+"""Share of the motion that may be left unexplained by torque and line where they tell an inertia. Where a road or a
+brake moves the line and a control sets the torque it is above 0.4, in tip-ins and under a PRBS below 0.2."""
+
+ONE_WAY = 0.8
+"""Share of the cross-spectrum that must have one sign: where the output is late by more, its direction is not known."""
+
+JOINT = 0.5  # no inertia makes a joint linear: what stiffens and rubs leaves twice as much
+LONGEST_LAG_S = 2.0  # that is looked for between torque and output
+
+BODY = DrivelineModel(Structure.ONE_MASS, {"J_M": Parameter(1.0, 0.0), "b_M": Parameter(0.0, 0.0)})
+"""What any line is as a whole, where no model is known; its inertia says nothing."""
+
 
 def driven(record: Record, line: DrivelineModel, grid: Grid, from_hz: float = 0.0, to_hz: float = np.inf) -> FloatArray:
     """Simulate the output that the torque of a band of frequencies makes from rest; shape (N,) [unit of the output].
@@ -32,10 +60,6 @@ def driven(record: Record, line: DrivelineModel, grid: Grid, from_hz: float = 0.
         torque = np.fft.irfft(spectrum, torque.size)
     alone = replace(record, torque_nm=torque[:, np.newaxis], load_nm=None, torque_okay=None, offset_s=None)
     return simulate(grid, alone, flat(line), InitialCondition(0.0, 0.0, 0.0))
-
-
-UNEQUAL = 1000.0
-"""Ratio of two inertias from which on one of them is invisible from the other: 1 / 1000 of the motion."""
 
 
 def model_warnings(model: DrivelineModel) -> list[str]:
@@ -67,29 +91,6 @@ def _damping(values: Mapping[str, float]) -> list[str]:
     ]
 
 
-BELOW, ABOVE = (0.1, 0.6), (1.6, math.inf)
-"""The two bands, in first modes of the nominal model: a mode off by a quarter lies in neither."""
-
-BLOCK_HZ, FEWEST_BINS = 1.0, 8
-"""Frequencies compared at a time: few enough for a delay of some samples not to matter."""
-
-BANDS_TELL = 0.5  # share of the output in either band that must follow from the torque
-AGREE = 2.5  # factor between the ratios of the two bands up to which they are of one cause
-STRETCH_S = 1.0  # over which the change of speed is looked at
-FEWEST_STEPS = 10  # samples of a stretch at least
-FEWEST_STRETCHES = 10  # stretches that a recording must hold to say anything: the regression has three unknowns
-
-TELLS = 0.25
-"""Share of the motion that may be left unexplained by torque and line where they tell an inertia. Where a road or a
-brake moves the line and a control sets the torque it is above 0.4, in tip-ins and under a PRBS below 0.2."""
-
-ONE_WAY = 0.8
-"""Share of the cross-spectrum that must have one sign: where the output is late by more, its direction is not known."""
-
-JOINT = 0.5  # no inertia makes a joint linear: what stiffens and rubs leaves twice as much
-LONGEST_LAG_S = 2.0  # that is looked for between torque and output
-
-
 @dataclass(frozen=True, slots=True)
 class Inertia:
     """The inertia that a recording fits over the nominal one, negative where the speed falls with the torque.
@@ -109,9 +110,6 @@ class Inertia:
 
 
 NOTHING = Inertia(math.nan, 1.0)
-
-BODY = DrivelineModel(Structure.ONE_MASS, {"J_M": Parameter(1.0, 0.0), "b_M": Parameter(0.0, 0.0)})
-"""What any line is as a whole, where no model is known; its inertia says nothing."""
 
 
 def fitted_inertia(record: Record, line: DrivelineModel) -> Inertia:

@@ -43,6 +43,34 @@ line itself must go further than that: a motion that settles without noise is st
 
 SELDOM = 0.05  # share of equal neighbours elsewhere up to which twenty in a row are no chance: 1e-26
 
+MOST_SAMPLES_TIMES_RECORDINGS = 500_000
+"""Samples of all recordings, counted once for each recording: 12 of 3000 samples. A fit takes some 1.4 kB for each."""
+
+SEED = 1
+
+LONGEST_S = 0.01
+LONGEST_OF_RIGID_S = 0.02
+"""The same where a likelihood of the samples is formed: on a millisecond's grid only an encoder's steps are seen."""
+
+BAND_POWER = 0.99
+"""Share of the power of what a joint takes that lies within its band: a joint has no mode, its motion is imposed."""
+
+FEWEST_KEPT = 200
+"""Samples of the shortest recording that are kept in any case: fewer do not carry a model with a dozen unknowns."""
+
+TURN = 2.0 * np.pi
+PER_PERIOD = 12.0  # samples kept per period of the line's fastest mode, at least; and one in `LONGEST_S`
+
+FEWEST_SAMPLES = 200  # fewer good samples than this do not carry a model with a dozen unknowns and its hold-out
+
+NEAR_MODE = 0.7
+"""From this share of the first natural frequency on a line answers otherwise than one body: by ``1 / (1 - 0.7^2)``,
+twice as much."""
+
+UNREAD = ", and that every torque is read: what another one does counts as noise."
+
+SAME_PERIOD = 1e-3  # relative difference of sampling periods that rounding of time stamps makes
+
 
 @dataclass(frozen=True, slots=True)
 class NotRead:
@@ -99,12 +127,6 @@ def without_not_read(records: Sequence[Record]) -> tuple[list[Record], list[str]
     return mended, warnings
 
 
-MOST_SAMPLES_TIMES_RECORDINGS = 500_000
-"""Samples of all recordings, counted once for each recording: 12 of 3000 samples. A fit takes some 1.4 kB for each."""
-
-SEED = 1
-
-
 def shortened_to_memory(segments: Cut, training: Iterable[str]) -> tuple[Cut, list[str]]:
     """Leave out pieces of the recordings that are fitted, as many as a fit can't hold; say which are used."""
     pieces = segments.of(training)
@@ -134,20 +156,6 @@ def _warning(used: Sequence[Record], pieces: Sequence[Record]) -> str:
         f"counts as one), drawn from the whole list: {', '.join(piece.name for piece in used)}. Each has unknowns of "
         "its own, so more would take gigabytes. Give those that matter, and the others by --holdout."
     )
-
-
-LONGEST_S = 0.01
-LONGEST_OF_RIGID_S = 0.02
-"""The same where a likelihood of the samples is formed: on a millisecond's grid only an encoder's steps are seen."""
-
-BAND_POWER = 0.99
-"""Share of the power of what a joint takes that lies within its band: a joint has no mode, its motion is imposed."""
-
-FEWEST_KEPT = 200
-"""Samples of the shortest recording that are kept in any case: fewer do not carry a model with a dozen unknowns."""
-
-TURN = 2.0 * np.pi
-PER_PERIOD = 12.0  # samples kept per period of the line's fastest mode, at least; and one in `LONGEST_S`
 
 
 def thinned(records: Sequence[Record], model: DrivelineModel) -> list[Record]:
@@ -212,16 +220,6 @@ def _kept(channels: Sequence[Channel], rows: slice) -> tuple[Channel, ...]:
 def _blocks(values: NDArray[Any], factor: int) -> NDArray[Any]:
     count = values.shape[0] // factor
     return values[: count * factor].reshape(count, factor, *values.shape[1:])
-
-
-FEWEST_SAMPLES = 200  # fewer good samples than this do not carry a model with a dozen unknowns and its hold-out
-
-NEAR_MODE = 0.7
-"""From this share of the first natural frequency on a line answers otherwise than one body: by ``1 / (1 - 0.7^2)``,
-twice as much."""
-
-
-UNREAD = ", and that every torque is read: what another one does counts as noise."
 
 
 def require_signals(record: Record) -> None:
@@ -303,9 +301,6 @@ def _good(record: Record, signal: FloatArray) -> FloatArray:
 
 def _rms(signals: Sequence[FloatArray]) -> float:
     return math.sqrt(sum(float(signal @ signal) for signal in signals) / sum(signal.size for signal in signals))
-
-
-SAME_PERIOD = 1e-3  # relative difference of sampling periods that rounding of time stamps makes
 
 
 def require_together(records: Sequence[Record]) -> None:

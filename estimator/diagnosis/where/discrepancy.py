@@ -33,6 +33,12 @@ from estimator.physics.model import Motion as Kind, unit
 from estimator.physics.problem import outputs_at
 from estimator.signals.record import BoolArray, FloatArray
 
+BINS = 24
+
+FEWEST_PASSES = 3  # a bin that the signal passes less often says nothing of its own scatter
+
+FUNCTION = 0.5  # share of a law's power that must be a function of one signal to be drawn over it
+
 
 @dataclass(frozen=True, slots=True)
 class Axis:
@@ -93,11 +99,6 @@ def input_unit(place: InputPlace, result: FitResult, kind: Kind) -> str:
     return unit(names[result.problem.records[0].kind.value], kind)
 
 
-BINS = 24
-
-FEWEST_PASSES = 3  # a bin that the signal passes less often says nothing of its own scatter
-
-
 @dataclass(frozen=True, slots=True)
 class Binned:
     """Data and a law over the bins that the signal passes often enough, and how much of the law they tell."""
@@ -153,9 +154,6 @@ def _passes(bins: FloatArray, signals: Sequence[FloatArray]) -> tuple[FloatArray
     length = np.diff(np.append(start, bins.size)).astype(float)
     sums = [np.add.reduceat(each, start) / length for each in signals]
     return bins[start], np.stack([*sums, length], axis=1)
-
-
-FUNCTION = 0.5  # share of a law's power that must be a function of one signal to be drawn over it
 
 
 def picture(

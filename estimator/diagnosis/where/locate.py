@@ -23,6 +23,26 @@ from estimator.signals.record import FloatArray, Record
 SEGMENT = 256  # samples of a segment: 2.56 s at 10 ms, long enough to resolve a driveline's first mode
 FEWEST_PER_BAND = 3  # frequencies in a band at least
 
+COHERENT = 0.5  # share of the output's power that the torque must explain before a response is compared there
+
+WINDOW_S = 0.5  # errors are averaged over this time before they are called a mismatch
+FALSE_ALARM = 0.01  # probability that noise alone is called a mismatch anywhere in a recording
+
+SMALLEST_RATIO = 1.2
+"""Mean square, in floors, that a window must reach at least: the floor itself is known to about a tenth."""
+
+CENTRAL = 0.8  # share of the mismatch's power that band and region hold
+LONGEST_SEGMENT = 512  # samples of a segment of Welch's average
+
+_SIGNAL_NAMES = {
+    Element.TORQUE_PATH: "torque",
+    Element.MOTOR: "motor speed",
+    Element.SHAFT: "shaft torque",
+    Element.LOAD: "load speed",
+    Element.SPEED_SENSOR: "motor speed",
+    Element.ACQUISITION: "motor speed",
+}
+
 
 def error_spectrum(before: FitResult, after: FitResult, floor: float) -> ErrorSpectrum:
     """Return the density of the error of two fits, and where the first stands above the floor."""
@@ -75,9 +95,6 @@ def _octaves(frequency: FloatArray) -> FloatArray:
     while 0.5 * edges[-1] >= max(float(frequency[0]), FEWEST_PER_BAND * step):
         edges.append(0.5 * edges[-1])
     return np.array([*edges, float(frequency[0])][::-1]) if edges[-1] > frequency[0] else np.array(edges[::-1])
-
-
-COHERENT = 0.5  # share of the output's power that the torque must explain before a response is compared there
 
 
 def responses(before: FitResult, after: FitResult) -> dict[str, Response]:
@@ -135,16 +152,6 @@ def _p_value(measured: SpectralEstimate, model: SpectralEstimate) -> float:
     deviation = np.abs(measured.response - model.response)[good] / measured.magnitude_std[good]
     degrees = 2.0 * float(good.sum())
     return float(stats.chi2.sf(float(deviation @ deviation), degrees))
-
-
-WINDOW_S = 0.5  # errors are averaged over this time before they are called a mismatch
-FALSE_ALARM = 0.01  # probability that noise alone is called a mismatch anywhere in a recording
-
-SMALLEST_RATIO = 1.2
-"""Mean square, in floors, that a window must reach at least: the floor itself is known to about a tenth."""
-
-CENTRAL = 0.8  # share of the mismatch's power that band and region hold
-LONGEST_SEGMENT = 512  # samples of a segment of Welch's average
 
 
 def _errors(result: FitResult, index: int) -> FloatArray:
@@ -225,16 +232,6 @@ def region(result: FitResult, element: Element, floor: float = 0.0) -> Region:
     order = np.argsort(x)
     low, high = _central(x[order], w[order])
     return Region(_SIGNAL_NAMES[element], low, high)
-
-
-_SIGNAL_NAMES = {
-    Element.TORQUE_PATH: "torque",
-    Element.MOTOR: "motor speed",
-    Element.SHAFT: "shaft torque",
-    Element.LOAD: "load speed",
-    Element.SPEED_SENSOR: "motor speed",
-    Element.ACQUISITION: "motor speed",
-}
 
 
 def _signal(element: Element, motion: Motion, result: FitResult) -> FloatArray:

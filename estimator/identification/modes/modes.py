@@ -21,6 +21,18 @@ from estimator.signals.record import FloatArray
 LIGHTLY_DAMPED = 0.5
 """Damping ratio from which on a pair is no resonance: beyond 0.5 its peak rises less than 15 % above 1."""
 
+CONFIDENCE = 0.95  # of every interval and ellipse that does not say otherwise
+OUTLINE = 73  # points of an ellipse: every 5 degrees, the first one twice
+
+QUANTILE = NormalDist().inv_cdf(0.5 + CONFIDENCE / 2.0)
+"""Half width of such an interval in standard deviations: 1.96."""
+
+SHORT = 0.5  # reach of an interval to either side, against the value, up to which a number is known
+STEP = 0.01  # of the difference quotient, in standard deviations
+
+FAR = 1e6
+"""Squared distance, in units of its uncertainty, beyond which none is farther: a thousand standard deviations."""
+
 
 @dataclass(frozen=True, slots=True)
 class Mode:
@@ -111,16 +123,6 @@ def two_mass_resonance(J_M: float, J_L: float, k: float, c: float, b_M: float, b
     return Mode(abs(s) / (2.0 * np.pi), -s.real / abs(s))
 
 
-CONFIDENCE = 0.95  # of every interval and ellipse that does not say otherwise
-OUTLINE = 73  # points of an ellipse: every 5 degrees, the first one twice
-
-QUANTILE = NormalDist().inv_cdf(0.5 + CONFIDENCE / 2.0)
-"""Half width of such an interval in standard deviations: 1.96."""
-
-SHORT = 0.5  # reach of an interval to either side, against the value, up to which a number is known
-STEP = 0.01  # of the difference quotient, in standard deviations
-
-
 @dataclass(frozen=True, slots=True)
 class Uncertain:
     """A number and its standard deviation; infinite where the data say nothing of it."""
@@ -199,10 +201,6 @@ def covariance_of(slope: ComplexArray, P: FloatArray) -> FloatArray:
         return np.diag([np.inf, np.inf])
     G = np.array([slope.real, slope.imag])
     return np.asarray(G @ P @ G.T, dtype=np.float64)
-
-
-FAR = 1e6
-"""Squared distance, in units of its uncertainty, beyond which none is farther: a thousand standard deviations."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -24,6 +24,12 @@ from estimator.identification.linear_model import ComplexArray, LinearModel
 from estimator.identification.modes.modes import propagate, square_root
 from estimator.signals.record import FloatArray
 
+THIRD = 3
+
+MOST_DOUBLINGS = 17
+"""2^17 samples, longer than most recordings: what a pole does beyond was not seen, and where many poles crowd together
+at 1, as those of fast recordings do, rounding may put one of them outside."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ContinuousModel:
@@ -80,13 +86,6 @@ def to_continuous(model: LinearModel) -> ContinuousModel:
     rate = np.real(logm(block)) / model.sample_time_s
     A_c, B_c = rate[:n, :n], rate[:n, n:]
     return ContinuousModel(numerator_of(A_c, B_c, C, D), np.real(np.poly(A_c)))
-
-
-THIRD = 3
-
-MOST_DOUBLINGS = 17
-"""2^17 samples, longer than most recordings: what a pole does beyond was not seen, and where many poles crowd together
-at 1, as those of fast recordings do, rounding may put one of them outside."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -41,6 +41,9 @@ and k hold 97 and 96 % of the truths; on forty of them, reaching half as far, 90
 SAMPLES_PER_COEFFICIENT = 10
 """Terms of the sums asked for per coefficient; where masks leave fewer, the order ends there."""
 
+PERIOD_TOLERANCE = 0.02
+"""Relative. Jitter averages out over a recording; a wrong period is off by far more."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class NoiseModel:
@@ -115,10 +118,6 @@ def sandwich(gradient: FloatArray, okay: BoolArray, noise: NoiseModel) -> FloatA
     psi_h = noise.coloured_backwards(psi)
     scale = noise.std**2 * n_samples / max(n_samples - spent, 1)
     return np.asarray(scale * bread @ (psi_h.T @ psi_h) @ bread, dtype=np.float64)
-
-
-PERIOD_TOLERANCE = 0.02
-"""Relative. Jitter averages out over a recording; a wrong period is off by far more."""
 
 
 def require_identifiable(record: Record, orders: Orders) -> None:

@@ -37,6 +37,10 @@ test alone would call every drive nonlinear."""
 QUANTILES = (0.1, 0.35, 0.65, 0.9)  # knots of the piecewise linear functions, of the signal's own distribution
 LAGS = (1, 2, 3)  # numerators of the responses, in samples of the noise model: as many as a two-mass drive has
 
+REGIONS = 3  # of equal numbers of samples: below, about and above the middle
+
+MOST_EVALUATIONS = 30
+
 
 @dataclass(frozen=True, slots=True)
 class Linearity:
@@ -116,11 +120,6 @@ def _tested(J: FloatArray, w: FloatArray, columns: FloatArray) -> tuple[float, f
         return 1.0, 0.0
     variance = (total - gained) / free
     return float(fisher.sf(gained / q / variance, q, free)), float(np.sqrt(max(gained - q * variance, 0.0) / total))
-
-
-REGIONS = 3  # of equal numbers of samples: below, about and above the middle
-
-MOST_EVALUATIONS = 30
 
 
 @dataclass(frozen=True, slots=True)

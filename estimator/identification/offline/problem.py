@@ -27,6 +27,23 @@ from estimator.signals.record import BoolArray, FloatArray
 INSIDE = 1.0 - 1e-6
 """Stands for 1 in both: rounding then leaves every pole inside, the slowest with a time constant of 10^6 samples."""
 
+MOST_UNREAD = 200
+"""Unknowns spent on torque that was not read: their cost grows with the square. Beyond, the torque held stands."""
+
+DEPENDENT = 1e-9
+"""Singular value, against the largest, below which an unknown of the torque changes nothing by itself."""
+
+RIDGE = 1e-12  # keeps an output that no whitened error depends on from making the normal equations singular
+
+MOST_EVALUATIONS = 60
+"""Evaluations per start. Gauss-Newton needs 10 to 30; more are spent in a valley with a flat floor."""
+
+MOST_STARTS = 3
+"""Starts that are followed, those of least cost first: the next best is there for what the best misses."""
+
+SETTLED = 1e-7
+"""Relative change of the sum of squares that ends a fit: of 10 000 samples, a thousandth of one parameter's share."""
+
 
 def parameters_of(a: FloatArray) -> FloatArray:
     """Return x, shape (na,), of coefficients ``a_1 .. a_na``; poles on or outside the circle are moved inside."""
@@ -66,15 +83,6 @@ def _product(sections: list[FloatArray], without: int = -1) -> FloatArray:
         if i != without:
             product = np.convolve(product, section)
     return product
-
-
-MOST_UNREAD = 200
-"""Unknowns spent on torque that was not read: their cost grows with the square. Beyond, the torque held stands."""
-
-DEPENDENT = 1e-9
-"""Singular value, against the largest, below which an unknown of the torque changes nothing by itself."""
-
-RIDGE = 1e-12  # keeps an output that no whitened error depends on from making the normal equations singular
 
 
 class _Outputs:
@@ -178,16 +186,6 @@ def gaps(okay: BoolArray) -> list[tuple[int, int]]:
     """Return start and end (exclusive) of each run of samples that are not okay."""
     edges = np.flatnonzero(np.diff(np.concatenate([[True], okay, [True]]).astype(np.int8)))
     return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
-
-
-MOST_EVALUATIONS = 60
-"""Evaluations per start. Gauss-Newton needs 10 to 30; more are spent in a valley with a flat floor."""
-
-MOST_STARTS = 3
-"""Starts that are followed, those of least cost first: the next best is there for what the best misses."""
-
-SETTLED = 1e-7
-"""Relative change of the sum of squares that ends a fit: of 10 000 samples, a thousandth of one parameter's share."""
 
 
 def transient(n_samples: int, sample_time_s: float) -> FloatArray:

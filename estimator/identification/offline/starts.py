@@ -27,6 +27,9 @@ HIGH_ORDER = 16  # order of the averaging ARX model: four times the paper's orde
 LARGEST_RADIUS = 0.999
 """Radius to which a pole on or outside the unit circle is brought; its time constant is then 1000 samples."""
 
+PAST = 40  # samples of the past: longer than the impulse response of the predictor, which the noise ends
+FUTURE = 15  # predicted outputs that the state is found from: several times the order
+
 
 def stabilised(model: LinearModel) -> LinearModel:
     """Reflect poles outside the unit circle into it (same magnitude response but for a factor)."""
@@ -100,10 +103,6 @@ def candidates(
         everywhere = np.ones_like(okay)
         begin = arx(u, smooth, everywhere, orders, sample_time_s) or at_rest
         yield steiglitz_mcbride(u, smooth, everywhere, orders, begin)
-
-
-PAST = 40  # samples of the past: longer than the impulse response of the predictor, which the noise ends
-FUTURE = 15  # predicted outputs that the state is found from: several times the order
 
 
 def subspace(u: FloatArray, y: FloatArray, okay: BoolArray, orders: Orders, sample_time_s: float) -> LinearModel | None:

@@ -43,6 +43,19 @@ SETTLING = 5.0
 """Time constants of the high-pass that are left out: a constant acceleration leaves a transient there, which a further
 pole would be taken to explain."""
 
+LAGS = 25  # lags looked at to either side: half a second at 20 ms, the decay time of a drive's resonance
+
+JUMP = 1.2
+"""Gap in the sizes of an input's steps, as a ratio, beyond which the larger ones are jumps of an excitation."""
+
+LEAST_CORRELATED = 0.05
+"""Root of the sum of squared correlations, beyond what chance makes of it, below which a model misses nothing that
+matters: in a recording of a million samples the smallest departure is significant."""
+
+LEAST_DELAY = 1  # samples before which held torque can't act on a sampled speed
+
+SIGNIFICANCE = 0.01  # false alarms of the detection, on recordings in open loop
+
 
 @dataclass(frozen=True, slots=True)
 class Candidate:
@@ -121,19 +134,6 @@ def criterion(fit: LinearFit) -> float:
     n = fit.n_samples / fit.block
     power = max(fit.noise.std**2, np.finfo(np.float64).tiny)
     return n * float(np.log(power)) + fit.model.orders.n_parameters * float(np.log(n))
-
-
-LAGS = 25  # lags looked at to either side: half a second at 20 ms, the decay time of a drive's resonance
-
-
-JUMP = 1.2
-"""Gap in the sizes of an input's steps, as a ratio, beyond which the larger ones are jumps of an excitation."""
-
-LEAST_CORRELATED = 0.05
-"""Root of the sum of squared correlations, beyond what chance makes of it, below which a model misses nothing that
-matters: in a recording of a million samples the smallest departure is significant."""
-
-LEAST_DELAY = 1  # samples before which held torque can't act on a sampled speed
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -249,9 +249,6 @@ def _product(e: FloatArray, x: FloatArray, lag: int) -> float:
     if lag >= 0:
         return float(e[lag:] @ x[: x.shape[0] - lag])
     return float(e[:lag] @ x[-lag:])
-
-
-SIGNIFICANCE = 0.01  # false alarms of the detection, on recordings in open loop
 
 
 @dataclass(frozen=True, slots=True)

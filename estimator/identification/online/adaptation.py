@@ -29,6 +29,15 @@ from estimator.identification.online.recursive import Parts
 from estimator.signals.record import FloatArray
 from estimator.signals.settings import Requirement, is_positive, require
 
+# Places in `law`, see GainLaw.as_array.
+INITIAL_GAIN, LAMBDA1, LAMBDA0, LAMBDA2, TRACE, ALPHA, HOLDS_AT_ONCE = range(7)
+
+# Places in `live` that belong to the gain.
+LAMBDA1_NOW = 0
+HOLDS_TRACE = 1  # 1 while tr F is held
+
+INFORMATION_GAIN = 1000.0  # start of the gain that tells what the samples determine, where F itself can't
+
 
 @dataclass(frozen=True, slots=True)
 class GainLaw:
@@ -190,16 +199,6 @@ PROFILES: tuple[type[Adaptation], ...] = (
     ConstantGain,
 )
 """Every profile."""
-
-
-# Places in `law`, see GainLaw.as_array.
-INITIAL_GAIN, LAMBDA1, LAMBDA0, LAMBDA2, TRACE, ALPHA, HOLDS_AT_ONCE = range(7)
-
-# Places in `live` that belong to the gain.
-LAMBDA1_NOW = 0
-HOLDS_TRACE = 1  # 1 while tr F is held
-
-INFORMATION_GAIN = 1000.0  # start of the gain that tells what the samples determine, where F itself can't
 
 
 @inlined

@@ -51,6 +51,38 @@ from estimator.signals.settings import Requirement, is_positive, require
 ESTIMATED = ("J_M", "J_L", "k", "c")
 """What the filter estimates; the frictions are given, since near a constant speed they are part of the load torque."""
 
+# Columns that are propagated: the motion, then its derivatives.
+MOTION = 0
+BY_STATE = 1  # three columns: by w_M, w_L, s
+BY_LOAD = 4
+BY_LOG = 5  # four columns: by ln J_M, ln J_L, ln k, ln c
+BY_TORQUE = 9
+N_COLUMNS = 10
+
+TERMS = 16  # 1 / 16! = 5e-14 of a part of the period whose largest rate times length is 1
+MOST_PARTS = 128
+
+N_STATES = 8  # w_M, w_L, s, T_0, ln J_M, ln J_L, ln k, ln c
+N_MOTION = 4
+FIRST_LOG = 4
+
+# Places in `law`: numbers, then three rows of N_STATES.
+PERIOD, VARIANCE = 0, 1
+NOISE = 2  # variance each state gains per sample
+START = NOISE + N_STATES  # variance of each state before the first sample
+ORIGIN = START + N_STATES  # value of each state before the first sample
+
+# Places in `live` besides those of all estimators, where theirs have the gain.
+STARTED = 0  # 1 once an output has set the speeds
+REJECTED = 1  # outputs in a row that the prediction makes impossible
+
+GATE = 100.0  # standard deviations beyond which an output is no measurement
+PATIENCE = 20.0  # such outputs in a row after which it is the motion that is wrong
+LARGEST_TORQUE = 1e12  # beyond it a torque is no measurement; below it nothing here can overflow
+WIDEST = 4.6  # ln 100: how far a parameter may go from where it started
+
+WIDTH = 2 * N_STATES  # W = [Phi U, I]
+
 
 @dataclass(frozen=True, slots=True)
 class TwoMass:
@@ -105,18 +137,6 @@ class EkfNoise:
         motion = [self.start_speed_rad_s**2, self.start_speed_rad_s**2, self.start_twist_rad**2, self.start_load_nm**2]
         origin = [0.0, 0.0, 0.0, 0.0, *np.log([start.J_M, start.J_L, start.k, start.c])]
         return np.array([period_s, self.output_rad_s**2, *noise, *motion, *[self.start_log**2] * 4, *origin])
-
-
-# Columns that are propagated: the motion, then its derivatives.
-MOTION = 0
-BY_STATE = 1  # three columns: by w_M, w_L, s
-BY_LOAD = 4
-BY_LOG = 5  # four columns: by ln J_M, ln J_L, ln k, ln c
-BY_TORQUE = 9
-N_COLUMNS = 10
-
-TERMS = 16  # 1 / 16! = 5e-14 of a part of the period whose largest rate times length is 1
-MOST_PARTS = 128
 
 
 @inlined
@@ -204,28 +224,6 @@ def transfer_function(x: FloatArray, theta: FloatArray) -> None:
     theta[3] = b0
     theta[4] = c0 + theta[0] * b0
     theta[5] = a00 * c0 + a01 * c1 + a02 * c2 + theta[0] * c0 + theta[1] * b0
-
-
-N_STATES = 8  # w_M, w_L, s, T_0, ln J_M, ln J_L, ln k, ln c
-N_MOTION = 4
-FIRST_LOG = 4
-
-# Places in `law`: numbers, then three rows of N_STATES.
-PERIOD, VARIANCE = 0, 1
-NOISE = 2  # variance each state gains per sample
-START = NOISE + N_STATES  # variance of each state before the first sample
-ORIGIN = START + N_STATES  # value of each state before the first sample
-
-# Places in `live` besides those of all estimators, where theirs have the gain.
-STARTED = 0  # 1 once an output has set the speeds
-REJECTED = 1  # outputs in a row that the prediction makes impossible
-
-GATE = 100.0  # standard deviations beyond which an output is no measurement
-PATIENCE = 20.0  # such outputs in a row after which it is the motion that is wrong
-LARGEST_TORQUE = 1e12  # beyond it a torque is no measurement; below it nothing here can overflow
-WIDEST = 4.6  # ln 100: how far a parameter may go from where it started
-
-WIDTH = 2 * N_STATES  # W = [Phi U, I]
 
 
 def memory_parts(of: Orders) -> Shapes:

@@ -35,6 +35,8 @@ N_LIVE = 11
 # Reasons, as in estimator.identification.online.recursive.Reason.
 NONE, TOO_FEW_SAMPLES, NOT_EXCITED, UNSTABLE, CONSTANT_OUTPUT = range(5)
 
+VERSION = 2  # goes up when a part changes its meaning; states of another version are refused
+
 
 class Memory:
     """A record of numbers and its parts."""
@@ -60,8 +62,6 @@ class Memory:
         """Copies of what the next sample needs, by name."""
         return {name: self[name].copy() for name in self._kept}
 
-
-VERSION = 2  # goes up when a part changes its meaning; states of another version are refused
 
 SavedState = dict[str, Any]
 

@@ -25,6 +25,10 @@ from estimator.signals.record import FloatArray
 
 NORMAL_95 = 1.959963984540054  # standard deviations that hold 95 % of a normal distribution, either way
 
+HIGHEST = 40.0  # no threshold is sought above
+NODES = 200  # of the Gauss-Legendre quadrature: twelve digits for thresholds from 0.1 up
+HALVINGS = 40  # of the interval that holds the threshold: to below 1e-10 of `HIGHEST`
+
 
 @dataclass(frozen=True, slots=True)
 class Level:
@@ -132,11 +136,6 @@ class TrackingState(IntEnum):
     def words(self) -> str:
         """The state as it stands in a text."""
         return self.word.replace("_", " ")
-
-
-HIGHEST = 40.0  # no threshold is sought above
-NODES = 200  # of the Gauss-Legendre quadrature: twelve digits for thresholds from 0.1 up
-HALVINGS = 40  # of the interval that holds the threshold: to below 1e-10 of `HIGHEST`
 
 
 @cache

@@ -67,16 +67,6 @@ CLOSES = 1.0
 # Verdicts, as in estimator.identification.tracking.follow.Excitation.
 _, EXCITED, LACKING, DROWNED = 0, 1, 2, 3
 
-
-class Excitation(IntEnum):
-    """Verdict on a block; the numbers are those of the compiled loop."""
-
-    UNKNOWN = 0  # no resonance has been known yet
-    EXCITED = 1
-    LACKING = 2  # the torque has lost its power
-    DROWNED = 3  # the noise is above what the model makes of the torque
-
-
 # Places in `mode`: the resonance that was known last.
 MODE_HZ = 0  # 0 before there was one
 MODE_DAMPING, POLE_RE, POLE_IM, RHO_RE, RHO_IM = 1, 2, 3, 4, 5
@@ -96,6 +86,54 @@ WITHIN = 2  # mean of TORQUE over the memory
 USUAL = 3  # mean of TORQUE while excited; 0 before it ever was
 IN_A_ROW = 4  # excited blocks without another in between
 N_LASTING = 5
+
+# Rows of `past`: newest value first.
+Y_HAT = 0
+Y_HAT_F = 1  # filtered by the resonance's pair of poles
+INPUT = 2
+INPUT_F = 3
+
+# Places in `structure`.
+NA, NB, NK = 0, 1, 2
+
+# Places in `heard`: the residual as the resonance hears it.
+ONCE_RE, ONCE_IM, TWICE_RE, TWICE_IM = 0, 1, 2, 3  # filtered by the pole, and once more
+DENSITY = 4  # its density there, as the variance of a white residual [output unit squared]
+COUNT = 5  # samples heard so far
+
+# Places in `pair`: 1 + l_1 q^-1 + l_2 q^-2 of the resonance's poles, and what the others amplify there.
+L_1, L_2, OTHERS = 0, 1, 2
+
+LEAST_DISTANCE = 0.1  # of the other poles: one that passes by the resonance, while the estimate moves, is no gain
+
+# Places in `numbers`.
+SAMPLE_TIME_S, LOWEST_HZ, HIGHEST_HZ, LARGEST_DAMPING, AT_MEMORY, AT_FEWEST, BLOCK, AT_OPENS, AT_CLOSES = range(9)
+
+# Columns of `out`: those of a mode, then
+FREQUENCY_STD_HZ, DAMPING_STD = 3, 4
+
+UNIFORM = 12.0**-0.5  # standard deviation of a value that may lie anywhere in a range of 1
+
+USABLE = 0  # estimator.identification.online.recursive.Reason.NONE
+
+MEMORY = 500
+"""Kept samples over which the residual's density is averaged: 10 s at 20 ms, some thirty times the memory of a mode at
+8 Hz and a damping of 0.06, so that S is known within a fifth."""
+
+TRUSTED = 26
+"""Excited blocks in a row after which an estimate that had to begin anew counts as settled: as many as the watch takes
+to know what is usual."""
+
+SAMPLES_BEFORE_STD = 240  # samples of a usable estimate before a standard deviation is given
+
+
+class Excitation(IntEnum):
+    """Verdict on a block; the numbers are those of the compiled loop."""
+
+    UNKNOWN = 0  # no resonance has been known yet
+    EXCITED = 1
+    LACKING = 2  # the torque has lost its power
+    DROWNED = 3  # the noise is above what the model makes of the torque
 
 
 @compiled
@@ -161,36 +199,6 @@ def forgotten(lasting: FloatArray) -> float:
     if lasting[USUAL] <= lasting[WITHIN]:
         return 1.0
     return float(lasting[USUAL] / lasting[WITHIN])
-
-
-# Rows of `past`: newest value first.
-Y_HAT = 0
-Y_HAT_F = 1  # filtered by the resonance's pair of poles
-INPUT = 2
-INPUT_F = 3
-
-# Places in `structure`.
-NA, NB, NK = 0, 1, 2
-
-# Places in `heard`: the residual as the resonance hears it.
-ONCE_RE, ONCE_IM, TWICE_RE, TWICE_IM = 0, 1, 2, 3  # filtered by the pole, and once more
-DENSITY = 4  # its density there, as the variance of a white residual [output unit squared]
-COUNT = 5  # samples heard so far
-
-# Places in `pair`: 1 + l_1 q^-1 + l_2 q^-2 of the resonance's poles, and what the others amplify there.
-L_1, L_2, OTHERS = 0, 1, 2
-
-LEAST_DISTANCE = 0.1  # of the other poles: one that passes by the resonance, while the estimate moves, is no gain
-
-# Places in `numbers`.
-SAMPLE_TIME_S, LOWEST_HZ, HIGHEST_HZ, LARGEST_DAMPING, AT_MEMORY, AT_FEWEST, BLOCK, AT_OPENS, AT_CLOSES = range(9)
-
-# Columns of `out`: those of a mode, then
-FREQUENCY_STD_HZ, DAMPING_STD = 3, 4
-
-UNIFORM = 12.0**-0.5  # standard deviation of a value that may lie anywhere in a range of 1
-
-USABLE = 0  # estimator.identification.online.recursive.Reason.NONE
 
 
 @compiled
@@ -376,17 +384,6 @@ def follow_block(
             deviations(numbers, roots, found, P, lasting, frequency, damping, out[t])
         if block[SAMPLES] == numbers[BLOCK]:
             end_block(numbers[AT_MEMORY], numbers[AT_OPENS], numbers[AT_CLOSES], block, lasting)
-
-
-MEMORY = 500
-"""Kept samples over which the residual's density is averaged: 10 s at 20 ms, some thirty times the memory of a mode at
-8 Hz and a damping of 0.06, so that S is known within a fifth."""
-
-TRUSTED = 26
-"""Excited blocks in a row after which an estimate that had to begin anew counts as settled: as many as the watch takes
-to know what is usual."""
-
-SAMPLES_BEFORE_STD = 240  # samples of a usable estimate before a standard deviation is given
 
 
 @dataclass(frozen=True, slots=True, eq=False)

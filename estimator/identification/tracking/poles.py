@@ -34,6 +34,10 @@ START = 0.4 + 0.9j  # no root of unity, and neither real nor imaginary: Durand's
 # Places in what `dominant` fills.
 FREQUENCY_HZ, DAMPING, HEIGHT = 0, 1, 2
 
+# Places in `through`: the torque's steps passed once and twice through 1 / (1 - pole q^-1), and the last torque.
+ONCE_RE, ONCE_IM, TWICE_RE, TWICE_IM, LAST = 0, 1, 2, 3, 4
+N_THROUGH = 5
+
 
 @inlined
 def squared(z: complex) -> float:
@@ -172,11 +176,6 @@ def mode_gradient(z: ComplexArray, i: int, sample_time_s: float, frequency: Floa
         frequency[k] = along / (2.0 * np.pi)
         damping[k] = -ds.real / magnitude + s.real * along / (magnitude * magnitude)
         power *= z[i]
-
-
-# Places in `through`: the torque's steps passed once and twice through 1 / (1 - pole q^-1), and the last torque.
-ONCE_RE, ONCE_IM, TWICE_RE, TWICE_IM, LAST = 0, 1, 2, 3, 4
-N_THROUGH = 5
 
 
 @compiled

@@ -46,6 +46,28 @@ from estimator.identification.tracking.poles import (
 from estimator.signals.record import BoolArray, FloatArray, IntArray
 from estimator.signals.settings import Requirement, is_positive, require
 
+HOUR_S = 3600.0
+
+# Rows of `past`: newest value first.
+OUTPUT, INPUT = 0, 1
+
+# Places in `mode`: the reference's resonance.
+REFERENCE_HZ = 0  # 0 while there is no reference
+POLE_RE, POLE_IM, WEIGHT_RE, WEIGHT_IM = 1, 2, 3, 4
+ERROR, OUTPUT_THEN = 5, 6  # of the last sample; NaN where it was not good
+N_MODE = 7
+
+# Places in `score`: sums over the present block.
+GOOD = 0  # samples that were good, and so was the one before
+PSI_E = 1  # sum of psi and the error's step
+PSI_2 = 2  # sum of psi^2
+ERROR_2, OUTPUT_2 = 3, 4  # sums of the squared steps of error and output
+N_SCORE = 5
+
+CANDIDATES = 5
+"""Estimates that the reference is chosen from, one a block: a single one may be of a bad moment, when a spare pair of
+poles passes by the resonance."""
+
 
 @dataclass(frozen=True, slots=True)
 class Spread:
@@ -91,9 +113,6 @@ def spread_of(number: FloatArray, deviation_hz: FloatArray, information: FloatAr
     return Spread(float(np.sqrt(information @ rest**2 / (number.size - 2))), float(information.mean()))
 
 
-HOUR_S = 3600.0
-
-
 @dataclass(frozen=True, slots=True)
 class WatchSettings:
     """How a change is watched for."""
@@ -128,23 +147,6 @@ class WatchSettings:
         """Return the threshold next to a level learnt from so many blocks."""
         per_hour = HOUR_S / (self.block_samples(sample_time_s) * sample_time_s)
         return threshold_for(self.false_alarms_per_hour, per_hour, blocks, self.reference_blocks - 2)
-
-
-# Rows of `past`: newest value first.
-OUTPUT, INPUT = 0, 1
-
-# Places in `mode`: the reference's resonance.
-REFERENCE_HZ = 0  # 0 while there is no reference
-POLE_RE, POLE_IM, WEIGHT_RE, WEIGHT_IM = 1, 2, 3, 4
-ERROR, OUTPUT_THEN = 5, 6  # of the last sample; NaN where it was not good
-N_MODE = 7
-
-# Places in `score`: sums over the present block.
-GOOD = 0  # samples that were good, and so was the one before
-PSI_E = 1  # sum of psi and the error's step
-PSI_2 = 2  # sum of psi^2
-ERROR_2, OUTPUT_2 = 3, 4  # sums of the squared steps of error and output
-N_SCORE = 5
 
 
 @compiled
@@ -220,11 +222,6 @@ def watch_block(
             take_error(y[t] - value if okay[t] else np.nan, y[t], mode, through, score)
         pass_torque(past[INPUT, 0], complex(mode[POLE_RE], mode[POLE_IM]), through)
         shift_in(past[OUTPUT], value)
-
-
-CANDIDATES = 5
-"""Estimates that the reference is chosen from, one a block: a single one may be of a bad moment, when a spare pair of
-poles passes by the resonance."""
 
 
 @dataclass(slots=True)

@@ -48,6 +48,15 @@ EXPONENT = EffectParameter(
 )
 AT = EffectParameter("at_rad_s", "speed", 1.0, 0.01, math.inf, "speed at which q is so much: w_1", True)
 
+LEAST_RANGE = 0.2
+"""Share of its top speed that the speed of a recording must range over: in less any law of it is a straight line."""
+
+STRAIGHT = 3.0
+"""Peak speed over the top speed from which on the law is a straight line, as viscous friction is: 10 % off it."""
+
+BY_PLACE = 0.5
+"""Share of the speed's variance that may go with the place: beyond it most of the law would be a torque over it."""
+
 
 @compiled
 def quadratic_law(speed: float, drag: float, exponent: float, at: float) -> float:
@@ -149,13 +158,6 @@ AERODYNAMIC_DRAG = Effect(
 # Eddy-current drag at the motor: it rises with the speed, levels off, and falls beyond a peak.
 
 
-LEAST_RANGE = 0.2
-"""Share of its top speed that the speed of a recording must range over: in less any law of it is a straight line."""
-
-STRAIGHT = 3.0
-"""Peak speed over the top speed from which on the law is a straight line, as viscous friction is: 10 % off it."""
-
-
 @compiled
 def eddy_law(speed: float, peak: float, peak_speed: float) -> float:
     """Return ``2 T_p s / (1 + s^2)`` with ``s = w/w_p``, the torque against the motion."""
@@ -211,10 +213,6 @@ EDDY_DRAG = Effect(
 
 
 # Viscous friction at the motor that is not the same forward and backward: seals, helical gears, worn bearings.
-
-
-BY_PLACE = 0.5
-"""Share of the speed's variance that may go with the place: beyond it most of the law would be a torque over it."""
 
 
 @compiled

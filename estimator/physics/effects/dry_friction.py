@@ -41,6 +41,19 @@ CREEP = EffectParameter(
     "creep_rad_s", "speed", 0.0, 0.02, 20.0, "speed over which it creeps near rest: w_c", True, form="creeping"
 )
 
+STICKING = 0.02  # presliding of a contact that sticks, in the scale of one that deflects
+
+LOAD_PRESLIDING = EffectParameter(
+    "presliding_rad",
+    "angle",
+    0.0,
+    0.5 * STICKING,
+    10.0,
+    "deflection at which it breaks away: x_b",
+    True,
+    form="presliding",
+)
+
 
 def motor_scales(model: Driveline, records: Sequence[Record]) -> tuple[float, ...]:
     """Return a twentieth of the torque in use [Nm], the twist [rad] at which bristles hold it, a speed of creep."""
@@ -98,20 +111,6 @@ COULOMB_FRICTION_MOTOR = Effect(
 
 
 # Dry friction on the load side: a constant torque against the motion.
-
-
-STICKING = 0.02  # presliding of a contact that sticks, in the scale of one that deflects
-
-LOAD_PRESLIDING = EffectParameter(
-    "presliding_rad",
-    "angle",
-    0.0,
-    0.5 * STICKING,
-    10.0,
-    "deflection at which it breaks away: x_b",
-    True,
-    form="presliding",
-)
 
 
 def load_scales(model: Driveline, records: Sequence[Record]) -> tuple[float, ...]:

@@ -51,6 +51,24 @@ GENERATOR_COUPLED = Effect(
 
 # The payload steps: people get on or off.
 
+MOST_DAMPING = 0.15  # steel shafts and their rubber couplings stay below this damping ratio of their own
+LEAST_AMPLIFIED = 2.0  # by which a resonance amplifies at least, ``1 / (2 zeta)``, whatever damps it
+
+LIGHTEST, STIFFEST = 0.03, 0.95
+"""Inertia within the line, over the motor's, and share of the twist on the shaft behind it, beyond which it
+would take too many steps to follow them."""
+
+MOST_INERTIA = 50.0  # most inertia, in tenths of the motor's
+
+SOFTEST = 0.4
+"""Share of the twist on the shaft below which the shaft would be the stiffer of both springs by far."""
+
+NEAR_HALF_RATE = 0.4
+"""Frequency over the sampling rate up to which an inertia within the line is looked for: from farther above a
+fit may end at its image on the other side of half the rate."""
+
+ABOVE = 5.0  # frequency over the line's own near which it is looked for where the samples are fast
+
 
 def payload_described(
     model: Driveline, values: Mapping[str, float], line: Mapping[str, float]
@@ -85,27 +103,6 @@ INERTIA_CHANGE = Effect(
 
 
 # One more inertia on a spring: a second resonance that the model does not have.
-
-
-MOST_DAMPING = 0.15  # steel shafts and their rubber couplings stay below this damping ratio of their own
-LEAST_AMPLIFIED = 2.0  # by which a resonance amplifies at least, ``1 / (2 zeta)``, whatever damps it
-
-
-LIGHTEST, STIFFEST = 0.03, 0.95
-"""Inertia within the line, over the motor's, and share of the twist on the shaft behind it, beyond which it
-would take too many steps to follow them."""
-
-MOST_INERTIA = 50.0  # most inertia, in tenths of the motor's
-
-SOFTEST = 0.4
-"""Share of the twist on the shaft below which the shaft would be the stiffer of both springs by far."""
-
-
-NEAR_HALF_RATE = 0.4
-"""Frequency over the sampling rate up to which an inertia within the line is looked for: from farther above a
-fit may end at its image on the other side of half the rate."""
-
-ABOVE = 5.0  # frequency over the line's own near which it is looked for where the samples are fast
 
 
 @compiled

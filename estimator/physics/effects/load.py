@@ -35,6 +35,11 @@ DEGREE = 3  # cubic: a road is laid out without kinks, so a profile with an edge
 SHORTEST_S = 4 * KNOT_SPACING_S
 """A profile needs a few knots; a shorter recording can't tell it from the constant load."""
 
+SWINGS_RAD = (1.0, 2.0, 4.0, 8.0)
+"""Ranges of the load's angle from which a fit starts where the gear ratio is not known."""
+
+LIGHTEST = 0.005  # least share of the load's inertia that a wheel has
+
 
 def grade_basis(time_s: FloatArray, at_s: FloatArray | None = None) -> FloatArray:
     """Return the profile's basis: cubic B-splines, the first left out (their sum is the constant load)."""
@@ -122,10 +127,6 @@ LOAD_IMBALANCE = Effect(
 
 
 # Gravity on a load that is not balanced: an arm, a pendulum, a door.
-
-
-SWINGS_RAD = (1.0, 2.0, 4.0, 8.0)
-"""Ranges of the load's angle from which a fit starts where the gear ratio is not known."""
 
 
 @compiled
@@ -227,9 +228,6 @@ GROUNDED_SPRING = Effect(
 
 
 # The tyre slips: the wheel's inertia is coupled to the vehicle's by creep and no longer rigidly.
-
-
-LIGHTEST = 0.005  # least share of the load's inertia that a wheel has
 
 
 @compiled

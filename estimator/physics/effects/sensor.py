@@ -20,6 +20,25 @@ from estimator.signals.record import OutputKind, Record
 STEEPEST = -0.5
 """A resolver whose error falls by more than this per radian is no resolver; Newton's steps stay finite there."""
 
+STANDSTILL = 0.05  # share of its top speed below which a recording comes to standstill between two samples
+LEAST_SHARE = 0.5  # share of the magnitude from which a sensor's own motion has no sign left
+
+SPEED_QUANTISATION = Effect(
+    name="speed_quantisation",
+    element=Element.SPEED_SENSOR,
+    title="coarse resolution of the speed",
+    law="w_read = q round(w / q)",
+    source="Widrow, Kollar: Quantization Noise, Cambridge 2008",
+    excited_by="a speed that passes many steps",
+    parameters=(EffectParameter("step_rad_s", "speed", 0.0, 0.0, float("inf"), "step q"),),
+    structures=EVERY_LINE,
+    resembles=(),
+    text="the speed is read in steps of {step_rad_s:.3g} {unit[speed]}",
+    kinds=frozenset({OutputKind.SPEED}),
+    recognised=True,
+    linear=True,
+)
+
 
 @compiled
 def resolver_error(angle: float, once: float, once_phase: float, twice: float, twice_phase: float) -> float:
@@ -84,10 +103,6 @@ RESOLVER_ERROR = Effect(
 # The sensor reads the magnitude of the speed.
 
 
-STANDSTILL = 0.05  # share of its top speed below which a recording comes to standstill between two samples
-LEAST_SHARE = 0.5  # share of the magnitude from which a sensor's own motion has no sign left
-
-
 def blind_testable(model: Driveline, records: Sequence[Record]) -> Untestable | None:
     """Need a speed near standstill, where the sign could be lost."""
     if any(float(np.nanmin(np.abs(measured_speed(record)))) < STANDSTILL * speed_scale([record]) for record in records):
@@ -125,23 +140,6 @@ SPEED_SIGN_BLIND = Effect(
 # Speed quantisation: the speed is read in steps that are not small against its noise.
 #
 # It is recognised in the raw recordings (``diagnosis.acquisition``) and compensated there; no fit releases it.
-
-
-SPEED_QUANTISATION = Effect(
-    name="speed_quantisation",
-    element=Element.SPEED_SENSOR,
-    title="coarse resolution of the speed",
-    law="w_read = q round(w / q)",
-    source="Widrow, Kollar: Quantization Noise, Cambridge 2008",
-    excited_by="a speed that passes many steps",
-    parameters=(EffectParameter("step_rad_s", "speed", 0.0, 0.0, float("inf"), "step q"),),
-    structures=EVERY_LINE,
-    resembles=(),
-    text="the speed is read in steps of {step_rad_s:.3g} {unit[speed]}",
-    kinds=frozenset({OutputKind.SPEED}),
-    recognised=True,
-    linear=True,
-)
 
 
 # Stale samples: a reading that was not renewed in time, and repeats the one before without a flag.

@@ -29,6 +29,9 @@ from estimator.signals.record import Record
 
 # Backlash: a gap in the line that the twist must cross before the shaft carries torque.
 
+CONTACT_PER_GAP = 0.05
+"""Depth of contact of a simulated joint that was given none: faces of steel are rounded by far less than their gap."""
+
 
 @compiled
 def damping_share(loaded_twist: float, contact: float) -> float:
@@ -70,10 +73,6 @@ def gap_reparametrised(
     if values["across"] > 0.0:
         return []
     return [OtherForm((values["gap_rad"] / gap_scales(model, records)[0], Held(0.0), Held(0.0), Held(1.0)), {})]
-
-
-CONTACT_PER_GAP = 0.05
-"""Depth of contact of a simulated joint that was given none: faces of steel are rounded by far less than their gap."""
 
 
 def gap_completed(values: Mapping[str, float]) -> Mapping[str, float]:

@@ -37,6 +37,12 @@ one. What a fit finds beyond it stands for something else that is slow."""
 
 EQUAL_POLES = 1e-6  # half the distance of two poles, times the step, below which they are one
 
+FASTEST_S = 1e-9  # below this a lag is none; it keeps the exponential's argument finite
+
+PARTED_S = 0.03
+"""How far apart the clocks of the scale are at the end [s]: half a period of a resonance at 16 Hz. A fit that begins
+further off ends where another of its periods matches."""
+
 
 class LowPass(NamedTuple):
     """A low-pass over steps of one length: what is left, behind a step, of its output and of its rate times ``tau``."""
@@ -101,9 +107,6 @@ def quick_enough(key: str) -> Callable[[Driveline, Sequence[Record], Mapping[str
 
 
 # The torque in the air gap follows its reading with a lag.
-
-
-FASTEST_S = 1e-9  # below this a lag is none; it keeps the exponential's argument finite
 
 
 @compiled
@@ -246,11 +249,6 @@ SPEED_FILTER = Effect(
 
 
 # Torque and speed are stamped by clocks that run at different rates.
-
-
-PARTED_S = 0.03
-"""How far apart the clocks of the scale are at the end [s]: half a period of a resonance at 16 Hz. A fit that begins
-further off ends where another of its periods matches."""
 
 
 def drift_unresolved(model: Driveline, records: Sequence[Record], values: Mapping[str, float]) -> str:

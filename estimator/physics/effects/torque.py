@@ -33,6 +33,22 @@ from estimator.signals.record import FloatArray, Record
 
 # One inverter gives more or less torque than its reading says.
 
+IN_PROPORTION = ("inertia", "stiffness", "damping", "torque", "quadratic_drag")
+"""Dimensions that change with the torque."""
+
+QUICKEST = 0.04
+"""Shortest time constant in lengths of the longest recording: a loss that is complete before anything can have warmed
+is a gain, or what a recording began with."""
+
+EDGE = 100.0  # sharpness from which on a knee is an edge
+
+SPREAD = 0.3  # share of the largest torque by which its size must differ: about one size any law is a gain
+
+LEAST_S = 8.0  # a drift shows in recordings of this length: in less it is the noise of the reading
+
+ORDERS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 18, 20, 24, 30, 36, 48)
+"""Periods per motor turn that are tried: pole pairs and slots of usual machines, and their small multiples."""
+
 
 def gain_testable(model: Driveline, records: Sequence[Record]) -> Untestable | None:
     """Need two inputs whose ratio changes, or else a wrong gain is a change of all other parameters."""
@@ -45,10 +61,6 @@ def gain_testable(model: Driveline, records: Sequence[Record]) -> Untestable | N
         "Let the other one carry the PRBS in one recording",
         "cruise",
     )
-
-
-IN_PROPORTION = ("inertia", "stiffness", "damping", "torque", "quadratic_drag")
-"""Dimensions that change with the torque."""
 
 
 def gain_rescaled(values: Mapping[str, float]) -> Mapping[str, float]:
@@ -89,11 +101,6 @@ INVERTER_GAIN_MISMATCH = Effect(
 
 
 # The true torque falls behind its reading as magnets and windings warm.
-
-
-QUICKEST = 0.04
-"""Shortest time constant in lengths of the longest recording: a loss that is complete before anything can have warmed
-is a gain, or what a recording began with."""
 
 
 def derating_scales(model: Driveline, records: Sequence[Record]) -> tuple[float, ...]:
@@ -156,9 +163,6 @@ TORQUE_DERATING = Effect(
 # The true torque stops at a limit that its reading passes.
 
 
-EDGE = 100.0  # sharpness from which on a knee is an edge
-
-
 def saturation_scales(model: Driveline, records: Sequence[Record]) -> tuple[float, ...]:
     """Return the largest torque of one input, twice, of all together, and 1."""
     each = largest_torque(records)
@@ -211,9 +215,6 @@ TORQUE_SATURATION = Effect(
 
 
 # The true torque grows less than its reading: the machine's iron saturates, for both signs alike or not.
-
-
-SPREAD = 0.3  # share of the largest torque by which its size must differ: about one size any law is a gain
 
 
 def nonlinearity_law(torque: FloatArray, _since_start_s: FloatArray, curvature: float, asymmetry: float) -> FloatArray:
@@ -272,9 +273,6 @@ TORQUE_NONLINEARITY = Effect(
 
 
 # The reading of the torque is off by an offset, from the start on or as it drifts away.
-
-
-LEAST_S = 8.0  # a drift shows in recordings of this length: in less it is the noise of the reading
 
 
 def bias_law(torque: FloatArray, since_start_s: FloatArray, offset: float, time_constant_s: float) -> FloatArray:
@@ -336,10 +334,6 @@ TORQUE_BIAS = Effect(
 
 
 # A torque ripple whose frequency follows the motor's speed.
-
-
-ORDERS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 18, 20, 24, 30, 36, 48)
-"""Periods per motor turn that are tried: pole pairs and slots of usual machines, and their small multiples."""
 
 
 def ripple_starts(model: Driveline, records: Sequence[Record]) -> list[FitStart]:

@@ -21,6 +21,31 @@ from estimator.physics.laws import LEAST, fading, inertia_while, overtoned_wave,
 from estimator.physics.layout import slot
 from estimator.signals.record import FloatArray
 
+SUMS: dict[Total, Sum] = {}
+"""Of each function that is put together here, for who has to write it in another language."""
+
+STICK_STABILITY = 1.5
+"""Runge-Kutta is stable to h * slope / J = 2.78; friction's slope at standstill is held to about half of it."""
+
+WAVING = np.array(
+    [
+        slot(entry.name, name)
+        for entry in KERNEL.values()
+        if entry.waving
+        for name in entry.phases.values() or [entry.parameters[0].name]
+    ]
+)
+"""Sizes of the laws over the angle, or over the time."""
+
+EVENTS = np.array(
+    [
+        [slot(entry.name, name) for name in (entry.parameters[0].name, "from_s", "to_s")]
+        for entry in BUILT_IN.values()
+        if entry.event
+    ]
+)
+"""Size and both moments of each event."""
+
 
 class Line(NamedTuple):
     """What a line is made of."""
@@ -88,10 +113,6 @@ class Sum(NamedTuple):
     terms: tuple[Term, ...]  # each law and its parameters' places
 
 
-SUMS: dict[Total, Sum] = {}
-"""Of each function that is put together here, for who has to write it in another language."""
-
-
 def parameters_at(places: Sequence[int]) -> Callable[..., Any]:
     """Return the compiled function that takes these places out of the parameters, as a tuple."""
     first, rest = places[0], places[1:]
@@ -135,30 +156,6 @@ load_drag = total(Place.LOAD)
 held_by_angle = total(Place.LOAD_ANGLE)
 over_recorded_angle = total(Place.RECORDED_ANGLE)
 shaft_loss = total(Place.SHAFT_LOSS, given=2)
-
-
-STICK_STABILITY = 1.5
-"""Runge-Kutta is stable to h * slope / J = 2.78; friction's slope at standstill is held to about half of it."""
-
-
-WAVING = np.array(
-    [
-        slot(entry.name, name)
-        for entry in KERNEL.values()
-        if entry.waving
-        for name in entry.phases.values() or [entry.parameters[0].name]
-    ]
-)
-"""Sizes of the laws over the angle, or over the time."""
-
-EVENTS = np.array(
-    [
-        [slot(entry.name, name) for name in (entry.parameters[0].name, "from_s", "to_s")]
-        for entry in BUILT_IN.values()
-        if entry.event
-    ]
-)
-"""Size and both moments of each event."""
 
 
 @inlined

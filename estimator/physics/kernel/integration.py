@@ -51,6 +51,13 @@ from estimator.physics.kernel.state_vector import (
 )
 from estimator.signals.record import FloatArray, IntArray
 
+RADIANS_PER_STEP_OF_MODE = 0.6
+"""Integration step in radians of the extra mode, which is seen through the motor's inertia only."""
+
+DECAY_PER_STEP, RADIANS_ON_CURVE = 1.0, 0.6
+"""Integration step over a curve's fastest decay and mode: fourth order is stable to 2.8, and between knots a curve may
+be steeper than a secant."""
+
 
 class Feed(NamedTuple):
     """What is known of a torque's way before it begins."""
@@ -135,15 +142,6 @@ def _for_its_states(
         made(Line(masses, elastic, True, False, own), *given)
     else:
         made(Line(masses, elastic, False, False, own), *given)
-
-
-RADIANS_PER_STEP_OF_MODE = 0.6
-"""Integration step in radians of the extra mode, which is seen through the motor's inertia only."""
-
-
-DECAY_PER_STEP, RADIANS_ON_CURVE = 1.0, 0.6
-"""Integration step over a curve's fastest decay and mode: fourth order is stable to 2.8, and between knots a curve may
-be steeper than a secant."""
 
 
 @inlined

@@ -28,6 +28,12 @@ from estimator.physics.kernel.state_vector import SHAFT_TORQUE, Conditions, Stat
 from estimator.physics.laws import beyond_gap, dry_friction, smooth_sign
 from estimator.signals.record import FloatArray
 
+PARTS = 8  # steps that are taken in place of one
+
+DEPTHS, FAST = 4.0, 0.25
+"""Depths of contact, ``e_c``, beyond the edge of a gap in which its damping sets in, where a step covers this share of
+one: the damping is smooth, but not over such a step."""
+
 
 def at_moment(line: Line, time_s: float, k: int) -> Line:
     """Return a line whose own laws are given this time [s] and the torque reading of sample k."""
@@ -328,13 +334,6 @@ def runge_kutta(line: Line, now: Conditions, torque: float, rise: float, x: Stat
     x = advanced(line, x, second, h / 3.0)
     x = advanced(line, x, third, h / 3.0)
     return advanced(line, x, fourth, h / 6.0)
-
-
-PARTS = 8  # steps that are taken in place of one
-
-DEPTHS, FAST = 4.0, 0.25
-"""Depths of contact, ``e_c``, beyond the edge of a gap in which its damping sets in, where a step covers this share of
-one: the damping is smooth, but not over such a step."""
 
 
 @inlined

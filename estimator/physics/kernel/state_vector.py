@@ -20,6 +20,8 @@ STATES = 18
 
 RELAXING, LAGGED, LAG_RISE, FILTERED, FILTER_RISE, BRISTLES_MOTOR, BRISTLES_LOAD = 11, 12, 13, 14, 15, 16, 17
 
+FOLLOWS = 0.3  # part of its correction with which the other end of a line follows
+
 
 class State(NamedTuple):
     """Mechanical state."""
@@ -45,9 +47,6 @@ def unpacked(state: FloatArray) -> State:
         state[0], state[1], state[2], state[3], state[4], state[5],
         state[6], state[7], state[8], state[9], state[10], state[11],
     )  # fmt: skip
-
-
-FOLLOWS = 0.3  # part of its correction with which the other end of a line follows
 
 
 @inlined

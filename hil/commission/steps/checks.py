@@ -25,6 +25,16 @@ from hil.rig.plc_watch import max_speed_rad_s, plc_limits
 
 MENDING = "Correct the rig file, or fix or connect the device it describes; see: hil check RIG"
 
+BEYOND = 1.001
+"""A probe is so many times its limit: by less than any drive resolves."""
+
+FRESH = Evidence(0, 0, 0.0)
+"""Feedback and permission of this moment, at rest."""
+
+MAP = "Compare scale and unit of its register with the register map"
+
+DEFECT = "Connect nothing; this is a defect of the program: report it"
+
 
 def _about_devices(job: StepContext) -> str:
     return (
@@ -78,17 +88,6 @@ def _findings(found: Found) -> list[StepFinding]:
 
 
 DEVICES = Step("devices", "Devices", _about_devices, _do_devices)
-
-
-BEYOND = 1.001
-"""A probe is so many times its limit: by less than any drive resolves."""
-
-FRESH = Evidence(0, 0, 0.0)
-"""Feedback and permission of this moment, at rest."""
-
-MAP = "Compare scale and unit of its register with the register map"
-
-DEFECT = "Connect nothing; this is a defect of the program: report it"
 
 
 @dataclass(frozen=True, slots=True)

@@ -31,6 +31,17 @@ SLOWEST = 0.6
 SEED_STEP = 127
 """From run to run the shift register begins so many states further on (a prime: none comes twice in eight)."""
 
+SPREAD = 0.02
+"""Largest standard deviation of the resonance between runs, relative: what the paper's runs agree to in its figures."""
+
+AGREEMENT = 0.02
+"""On-line and batch estimate of one run agree within this, relative: DESIGN's trials gave 1 to 2.2 %."""
+
+LEAST_FIT_PERCENT = 70.0
+"""Free-run fit of a batch model: below, a third of the speed's course is not the model's."""
+
+DRAWN_HZ = (0.5, 25.0)
+
 
 def _speed_parts() -> list[float]:
     """Return the speeds of the runs, in parts of the cruise's: up and down, so that no run waits long for its speed."""
@@ -92,18 +103,6 @@ def _do_experiments(job: StepContext) -> Outcome:
 
 
 EXPERIMENTS = Step("experiments", "Experiments", _about_experiments, _do_experiments, orders, needs=("prbs",))
-
-
-SPREAD = 0.02
-"""Largest standard deviation of the resonance between runs, relative: what the paper's runs agree to in its figures."""
-
-AGREEMENT = 0.02
-"""On-line and batch estimate of one run agree within this, relative: DESIGN's trials gave 1 to 2.2 %."""
-
-LEAST_FIT_PERCENT = 70.0
-"""Free-run fit of a batch model: below, a third of the speed's course is not the model's."""
-
-DRAWN_HZ = (0.5, 25.0)
 
 
 IdentifiedRun: TypeAlias = "tuple[Identification, BestEstimate]"

@@ -36,6 +36,20 @@ RESONANCE = 0.03
 
 MODEL_FILE = "nominal.toml"
 
+FOLDER = "diagnosis"
+AUGMENTED = "model.toml"
+NOMINAL_FILE = "nominal.toml"
+
+OTHERS = ("tip", "reversal")
+"""Explained next to the slowest and the fastest PRBS run.
+
+Nothing is held out as a whole: a gain that is wrong shows in some of these only, and a recording that can't show it
+would speak against it. The diagnosis keeps stretches of each back instead.
+"""
+
+ALONE = ("m1", "m2")
+"""Explained, too: each inverter by itself, from the scales step. Nothing tells a wrong gain of one as well."""
+
 
 def _about_validation(job: StepContext) -> str:
     return (
@@ -150,21 +164,6 @@ def _evidence_validation(fit: PhysicalFit, compared: list[Comparison]) -> dict[s
 
 
 VALIDATION = Step("validation", "Validation", _about_validation, _do_validation, needs=("identification",))
-
-
-FOLDER = "diagnosis"
-AUGMENTED = "model.toml"
-NOMINAL_FILE = "nominal.toml"
-
-OTHERS = ("tip", "reversal")
-"""Explained next to the slowest and the fastest PRBS run.
-
-Nothing is held out as a whole: a gain that is wrong shows in some of these only, and a recording that can't show it
-would speak against it. The diagnosis keeps stretches of each back instead.
-"""
-
-ALONE = ("m1", "m2")
-"""Explained, too: each inverter by itself, from the scales step. Nothing tells a wrong gain of one as well."""
 
 
 def _about_diagnosis(job: StepContext) -> str:

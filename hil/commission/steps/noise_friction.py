@@ -29,6 +29,15 @@ TORQUE_PERMILLE = 2.0
 LOST_SHARE = 0.01
 """Largest share of samples that are stale or late."""
 
+INERTIA = (0.7, 1.3)
+"""Inertia over that of the rig file: it tunes the speed holds, which 30 % leave sound (phase margin 67 degrees)."""
+
+FRICTION_SHARE = 0.5
+"""Largest dry friction, in parts of the torque of the reversal: beyond, the vehicle hardly turns round."""
+
+LOAD_SHARE = 0.2
+"""Largest constant load (grade), in parts of that torque."""
+
 
 def _orders_noise(job: StepContext) -> list[Order]:
     return [Order("rest", {"kind": "rest", "duration_s": DURATION_S})]
@@ -99,16 +108,6 @@ def samples_lost(runs: Sequence[RunRecord]) -> StepFinding:
 
 
 NOISE = Step("noise", "Noise at standstill", _about_noise, _do_noise, _orders_noise, needs=("devices",))
-
-
-INERTIA = (0.7, 1.3)
-"""Inertia over that of the rig file: it tunes the speed holds, which 30 % leave sound (phase margin 67 degrees)."""
-
-FRICTION_SHARE = 0.5
-"""Largest dry friction, in parts of the torque of the reversal: beyond, the vehicle hardly turns round."""
-
-LOAD_SHARE = 0.2
-"""Largest constant load (grade), in parts of that torque."""
 
 
 def _orders_friction(job: StepContext) -> list[Order]:

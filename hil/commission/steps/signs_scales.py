@@ -52,6 +52,23 @@ SPARE_SPEED = 5.0
 
 SPARE_RAD_S = 0.5
 
+DURATION_S_SCALES = 20.0
+
+CRAWL = 0.15
+"""Speed, in parts of that of the rig file's cruise: dry friction then has one sign, and nobody is driven far."""
+
+PRBS_SHARE = 0.15
+"""Amplitude, in parts of an inverter's torque limit; never above half of what the guard leaves a PRBS."""
+
+BASE_SHARE = 0.5
+"""Largest base torque, in parts of an inverter's torque limit."""
+
+GAIN = (0.98, 1.02)
+"""Torque of m2 over that of m1, for the same reading."""
+
+DELAY_PERIODS = 0.1
+"""How much later one inverter may act than the other, in sampling periods."""
+
 
 @dataclass(frozen=True, slots=True)
 class _Answer:
@@ -182,24 +199,6 @@ def _findings(name: str, answer: _Answer) -> list[StepFinding]:
 
 
 SIGNS = Step("signs", "Signs and sizes", _about_signs, _do_signs, _orders_signs, needs=("devices", "limits"))
-
-
-DURATION_S_SCALES = 20.0
-
-CRAWL = 0.15
-"""Speed, in parts of that of the rig file's cruise: dry friction then has one sign, and nobody is driven far."""
-
-PRBS_SHARE = 0.15
-"""Amplitude, in parts of an inverter's torque limit; never above half of what the guard leaves a PRBS."""
-
-BASE_SHARE = 0.5
-"""Largest base torque, in parts of an inverter's torque limit."""
-
-GAIN = (0.98, 1.02)
-"""Torque of m2 over that of m1, for the same reading."""
-
-DELAY_PERIODS = 0.1
-"""How much later one inverter may act than the other, in sampling periods."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -25,6 +25,36 @@ from hil.errors import UsageError
 OF_THE_RECORDER = ("stale_samples", "lost_samples", "sample_jitter", "clock_drift")
 """Effects of what records, not of the line: a simulation has no recorder."""
 
+_START = {
+    "angle_rad": "START_ANGLE",
+    "speed_rad_s": "START_SPEED",
+    "twist_rad": "START_TWIST",
+    "load_speed_rad_s": "START_LOAD_SPEED",
+    "middle_twist_rad": "START_MIDDLE_TWIST",
+    "middle_speed_rad_s": "START_MIDDLE_SPEED",
+    "load_torque_nm": "START_TRACTION",
+}
+
+_QUANTISATION = slot("speed_quantisation", "step_rad_s")
+
+WARMTH = state_vector.STATES
+"""Place of how warm the windings are, behind the states of the kernel."""
+
+STATES = state_vector.STATES + 1
+
+NAMED = (
+    "TIME", "T_M1", "T_M2", "T_LOAD", "ANGLE_READ", "TURN_RATE",
+    "SPEED_MEASURED", "SPEED_MOTOR", "SPEED_LOAD", "ANGLE_MOTOR", "TORQUE_SHAFT",
+    "START_ANGLE", "START_SPEED", "START_TWIST", "START_LOAD_SPEED", "START_MIDDLE_TWIST", "START_MIDDLE_SPEED",
+    "START_TRACTION", "BEFORE_ALL", "STEP_S", "SIGN_WIDTH", "ANGLE_IS_READ",
+    "SPEED_SEEN", "TORQUE_PASSED", "LOAD_PASSED", "SEEN_BEFORE", "OTHER_BEFORE", "ACTED", "STEPS_DONE",
+)  # fmt: skip
+"""What stands first in the C array, in this order; the states, their derivatives and the parameters follow."""
+
+STATE = len(NAMED)
+PARAMETER = STATE + STATES
+VALUES = PARAMETER + SIZE
+
 
 @dataclass(frozen=True, slots=True)
 class Driveline:
@@ -49,17 +79,6 @@ class Driveline:
     def masses(self) -> int:
         """How many inertias it has."""
         return len(MASSES[self.structure])
-
-
-_START = {
-    "angle_rad": "START_ANGLE",
-    "speed_rad_s": "START_SPEED",
-    "twist_rad": "START_TWIST",
-    "load_speed_rad_s": "START_LOAD_SPEED",
-    "middle_twist_rad": "START_MIDDLE_TWIST",
-    "middle_speed_rad_s": "START_MIDDLE_SPEED",
-    "load_torque_nm": "START_TRACTION",
-}
 
 
 def driveline(name: str, model: DrivelineModel, period_s: float, sensor_at: Location = Location.MOTOR) -> Driveline:
@@ -89,9 +108,6 @@ def driveline(name: str, model: DrivelineModel, period_s: float, sensor_at: Loca
         False,
         tuple(notes),
     )
-
-
-_QUANTISATION = slot("speed_quantisation", "step_rad_s")
 
 
 def begun(d: Driveline, model: DrivelineModel, record: Record) -> tuple[Driveline, FloatArray]:
@@ -125,25 +141,6 @@ def started(d: Driveline, grid: Grid, case: Case, record: Record) -> tuple[Drive
         start={key: float(getattr(case.start, attribute)) for attribute, key in _START.items()},
     )
     return line, load
-
-
-WARMTH = state_vector.STATES
-"""Place of how warm the windings are, behind the states of the kernel."""
-
-STATES = state_vector.STATES + 1
-
-NAMED = (
-    "TIME", "T_M1", "T_M2", "T_LOAD", "ANGLE_READ", "TURN_RATE",
-    "SPEED_MEASURED", "SPEED_MOTOR", "SPEED_LOAD", "ANGLE_MOTOR", "TORQUE_SHAFT",
-    "START_ANGLE", "START_SPEED", "START_TWIST", "START_LOAD_SPEED", "START_MIDDLE_TWIST", "START_MIDDLE_SPEED",
-    "START_TRACTION", "BEFORE_ALL", "STEP_S", "SIGN_WIDTH", "ANGLE_IS_READ",
-    "SPEED_SEEN", "TORQUE_PASSED", "LOAD_PASSED", "SEEN_BEFORE", "OTHER_BEFORE", "ACTED", "STEPS_DONE",
-)  # fmt: skip
-"""What stands first in the C array, in this order; the states, their derivatives and the parameters follow."""
-
-STATE = len(NAMED)
-PARAMETER = STATE + STATES
-VALUES = PARAMETER + SIZE
 
 
 @dataclass(frozen=True, slots=True)

@@ -69,6 +69,20 @@ _FROM_STATES = (
     "FILTERED", "FILTER_RISE", "BRISTLES_MOTOR", "BRISTLES_LOAD",
 )  # fmt: skip
 
+_TYPES = {
+    "2": {"INSTANCE": "fmi2Component", "REAL": "fmi2Real"},
+    "3": {"INSTANCE": "fmi3Instance", "REAL": "fmi3Float64"},
+}
+
+PLATFORM = {"2.0": "linux64", "3.0": "x86_64-linux"}
+"""Folder of the binary, as each version of the standard calls it."""
+
+OPTIONS = ("-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-shared")
+"""No product and sum in one instruction: the steps are those of hil to the last bits."""
+
+COMPILER_S: Final = 300.0
+"""Time for compiling an FMU's sources [s]."""
+
 
 def laws() -> str:
     """Return laws.h."""
@@ -128,12 +142,6 @@ def own(name: str) -> str:
     return (resources.files("hil.export.fmu") / "c" / name).read_text("ascii")
 
 
-_TYPES = {
-    "2": {"INSTANCE": "fmi2Component", "REAL": "fmi2Real"},
-    "3": {"INSTANCE": "fmi3Instance", "REAL": "fmi3Float64"},
-}
-
-
 def interface(number: str) -> str:
     """Return the C file with the functions of a version of the standard: what both have, and what it has alone."""
     text = own("fmi.c").replace("fmiX", f"fmi{number}")
@@ -153,13 +161,6 @@ def stubs(types: str, functions: str, written: str) -> str:
         named = re.sub(r"(fmi2Byte)\[\]", r"\1 bytes[]", " ".join(given.split()))
         out.append(f"{returned} {name}({named}) {{ {error} }}")
     return "\n".join((*out, ""))
-
-
-PLATFORM = {"2.0": "linux64", "3.0": "x86_64-linux"}
-"""Folder of the binary, as each version of the standard calls it."""
-
-OPTIONS = ("-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-shared")
-"""No product and sum in one instruction: the steps are those of hil to the last bits."""
 
 
 def c_files(d: Driveline, version: str) -> tuple[dict[str, str], list[str], str]:
@@ -215,10 +216,6 @@ def _compiler() -> str:
             "name it in the variable CC, or write the FMU without a binary: --sources-only"
         )
     return found
-
-
-COMPILER_S: Final = 300.0
-"""Time for compiling an FMU's sources [s]."""
 
 
 def _binary(files: dict[str, str], compiled: list[str]) -> bytes:

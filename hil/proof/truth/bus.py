@@ -18,6 +18,10 @@ NOMINAL_TOLERANCE = 0.2
 """Tolerance stated in the nominal model: wide enough that ``true = nominal (1 + tolerance)`` is never passed
 (1 / 0.85 = 1.18)."""
 
+PERIOD_S = 0.01
+SAMPLES = 3000
+DURATION_S = SAMPLES * PERIOD_S
+
 
 @dataclass(frozen=True, slots=True)
 class Bus:
@@ -79,11 +83,6 @@ def draw_nominal(bus: Bus, rng: np.random.Generator, error: float = NOMINAL_ERRO
     """Return the six values of the nominal model, each off by up to a share of the true one."""
     names = ("J_M", "J_L", "k", "c", "b_M", "b_L")
     return {name: getattr(bus, name) * (1.0 + rng.uniform(-error, error)) for name in names}
-
-
-PERIOD_S = 0.01
-SAMPLES = 3000
-DURATION_S = SAMPLES * PERIOD_S
 
 
 class Test(Enum):

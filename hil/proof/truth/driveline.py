@@ -13,6 +13,8 @@ from hil.proof.truth.compiled import compiled
 from hil.proof.truth.laws import brake_torque, eddy_torque, gravity_torque, resolver_speed, torque_by_direction
 from hil.proof.truth.physics import FLAT_ROAD, SPEEDS, STATES, FloatArray, Physics, StateIndex
 
+_SETTLING_S = 3.0  # the shaft's oscillation, 2.5 1/s and faster, is down to 0.06 % by then
+
 
 @compiled
 def true_torques(p: Physics, m1_nm: FloatArray, m2_nm: FloatArray, times_s: FloatArray) -> FloatArray:
@@ -157,9 +159,6 @@ class TruthDriveline:
     def speed_rad_s(self) -> float:
         """Motor speed as the resolver gives it, behind its filter where it has one [rad/s]."""
         return float(speed_as_sensed(self._physics, self._state))
-
-
-_SETTLING_S = 3.0  # the shaft's oscillation, 2.5 1/s and faster, is down to 0.06 % by then
 
 
 @dataclass(frozen=True, slots=True)

@@ -43,6 +43,21 @@ per turn is left out: to torque and speed it is the Cardan joint's."""
 
 USUAL_TORQUE_NM = 200.0  # torque at which both kinds of ripple are alike
 
+LOST_TOGETHER = (
+    (True, True, True),
+    (True, True, False),
+    (True, False, True),
+    (False, True, False),
+    (False, False, True),
+)
+"""What one loss takes along: torque of m1, torque of m2, speed."""
+
+MOST_STAMPED_S = 0.0024
+"""A recording whose time steps differ from the period by more than half of it is refused by any reader."""
+
+WAVE_M = (3.6, 5.4)
+"""Length of a washboard road's waves: between one and two turns of a wheel of 0.48 m, and neither."""
+
 
 def _draw_gain(rng: np.random.Generator, bus: Bus) -> Sizes:
     error = log_uniform(rng, 0.05, 0.15)
@@ -208,18 +223,6 @@ SPEED_SENSOR = (
     ),
 )
 
-LOST_TOGETHER = (
-    (True, True, True),
-    (True, True, False),
-    (True, False, True),
-    (False, True, False),
-    (False, False, True),
-)
-"""What one loss takes along: torque of m1, torque of m2, speed."""
-
-MOST_STAMPED_S = 0.0024
-"""A recording whose time steps differ from the period by more than half of it is refused by any reader."""
-
 
 def _draw_stale(rng: np.random.Generator, bus: Bus) -> Sizes:
     periodic = bool(rng.random() < 0.5)
@@ -283,9 +286,6 @@ ACQUISITION = (
         fitted={"rate": "clock_error"},
     ),
 )
-
-WAVE_M = (3.6, 5.4)
-"""Length of a washboard road's waves: between one and two turns of a wheel of 0.48 m, and neither."""
 
 
 def _corrugate(physics: Physics, sizes: Sizes, rng: np.random.Generator) -> Physics:

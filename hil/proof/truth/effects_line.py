@@ -32,6 +32,12 @@ _load = partial(HiddenEffect, place=ConcealedAt.LOAD)
 _motor = partial(HiddenEffect, place=ConcealedAt.MOTOR)
 _shaft = partial(HiddenEffect, place=ConcealedAt.SHAFT)
 
+WAVES = 6
+SHORTEST_M, LONGEST_M = 40.0, 250.0
+"""Wave lengths: shorter is roughness the tyre swallows, longer does not turn within a recording."""
+
+ROAD_LENGTH_M = 20_000.0
+
 
 def _draw_stribeck(rng: np.random.Generator, bus: Bus) -> Sizes:
     coulomb_nm = log_uniform(rng, 8.0, 25.0)
@@ -212,13 +218,6 @@ SHAFT = (
         ),
     ),
 )
-
-
-WAVES = 6
-SHORTEST_M, LONGEST_M = 40.0, 250.0
-"""Wave lengths: shorter is roughness the tyre swallows, longer does not turn within a recording."""
-
-ROAD_LENGTH_M = 20_000.0
 
 
 def _lay_road(physics: Physics, sizes: Sizes, rng: np.random.Generator) -> Physics:

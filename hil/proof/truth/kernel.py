@@ -22,6 +22,13 @@ from hil.proof.truth.physics import STATES, FloatArray, Physics, StateIndex
 Speeds = tuple[float, float, float, float]
 """Of motor, extra inertia, load (wheels), vehicle [rad/s]; also used for accelerations."""
 
+MAX_STEP_S = 1e-4
+"""The shaft mode (51 rad/s) moves by 0.005 rad of phase in it: relative error of its period 1e-6. Against the
+closed solution the speed is right to 0.0002 rad/s, against a stiff reference of all laws to 0.002 rad/s: a
+twentieth of the sensor's noise."""
+
+FASTER = 6.0  # by how much the smaller branch of a viscoelastic shaft relaxes faster than the other
+
 
 @compiled
 def speeds_of(state: FloatArray) -> Speeds:
@@ -140,15 +147,6 @@ def accelerations(state: FloatArray, p: Physics, disturbance_nm: float, speeds: 
     on_vehicle = -disturbance_nm - p.quadratic_load * vehicle * abs(vehicle)
     of_load, of_vehicle = _of_wheels_and_vehicle(state, p, to_load + _on_load(state, p, load), on_vehicle, speeds)
     return of_motor, of_extra, of_load, of_vehicle
-
-
-MAX_STEP_S = 1e-4
-"""The shaft mode (51 rad/s) moves by 0.005 rad of phase in it: relative error of its period 1e-6. Against the
-closed solution the speed is right to 0.0002 rad/s, against a stiff reference of all laws to 0.002 rad/s: a
-twentieth of the sensor's noise."""
-
-
-FASTER = 6.0  # by how much the smaller branch of a viscoelastic shaft relaxes faster than the other
 
 
 @compiled

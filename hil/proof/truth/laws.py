@@ -14,6 +14,22 @@ MICRO_DAMPING_S = 1e-2
 MICRO_DAMPING_SPEED_RAD_S = 0.1
 """Bristle damping dies away with speed, or LuGre friction overshoots several times at a fast reversal."""
 
+STANDSTILL_RAD_S = 0.02  # speed within which a torque that depends on the direction changes over
+
+RIPPLE_OVERTONE = 0.2
+"""Second harmonic of the torque ripple over the first: no machine's ripple is a pure sine."""
+
+BRAKE_RISE_S = 0.15  # time a brake pad takes to come on and off
+CLUTCH_FALL_S = 0.03  # time a clutch takes to open
+TIME_TO_DERATE_S = 30.0  # a loss that grows evenly is complete by then: the length of a recording
+
+TYRE_SHAPE = 1.6  # shape factor of the magic formula for longitudinal slip
+
+STANDSTILL_DAMPING_S = 0.01
+STANDSTILL_SPEED_RAD_S = 5.0
+"""The carcass damps the wheel's wind-up near standstill, where rolling can't relax it: damping over the contact's
+stiffness, and the speed at which rolling takes over (Pacejka, section 8.6)."""
+
 
 @compiled
 def sliding_torque(kinetic_nm: float, breakaway_nm: float, stribeck_speed: float, speed: float) -> float:
@@ -91,9 +107,6 @@ def inertia_over_rotor(p: Physics, speed: float) -> float:
     return 1.0 + p.drawn_share * square / (1.0 + square)
 
 
-STANDSTILL_RAD_S = 0.02  # speed within which a torque that depends on the direction changes over
-
-
 @compiled
 def torque_by_direction(p: Physics, speed: float) -> float:
     """Return what friction at the motor holds more forward than it would, or less backward [Nm]."""
@@ -108,10 +121,6 @@ def behind_gears(p: Physics, torque_nm: float, speed: float) -> float:
     driving = torque_nm * speed > 0.0
     behind = torque_nm * p.efficiency if driving else torque_nm / p.efficiency_back
     return torque_nm + (behind - torque_nm) * abs(math.tanh(speed / STANDSTILL_RAD_S))
-
-
-RIPPLE_OVERTONE = 0.2
-"""Second harmonic of the torque ripple over the first: no machine's ripple is a pure sine."""
 
 
 @compiled
@@ -164,11 +173,6 @@ def resolver_speed(p: Physics, angle_motor: float, speed_motor: float) -> float:
     slope = p.resolver_once_rad * math.cos(angle_motor + p.resolver_once_phase_rad)
     slope += 2.0 * p.resolver_twice_rad * math.cos(2.0 * angle_motor + p.resolver_twice_phase_rad)
     return speed_motor * (1.0 + slope)
-
-
-BRAKE_RISE_S = 0.15  # time a brake pad takes to come on and off
-CLUTCH_FALL_S = 0.03  # time a clutch takes to open
-TIME_TO_DERATE_S = 30.0  # a loss that grows evenly is complete by then: the length of a recording
 
 
 @compiled
@@ -243,14 +247,6 @@ def bias_torque(p: Physics, time_s: float) -> float:
 def is_blocked(p: Physics, time_s: float) -> bool:
     """Tell whether the inverters give no torque at a time."""
     return bool(p.dropout_every_s > 0.0 and (time_s + 0.5 * p.dropout_every_s) % p.dropout_every_s < p.dropout_s)
-
-
-TYRE_SHAPE = 1.6  # shape factor of the magic formula for longitudinal slip
-
-STANDSTILL_DAMPING_S = 0.01
-STANDSTILL_SPEED_RAD_S = 5.0
-"""The carcass damps the wheel's wind-up near standstill, where rolling can't relax it: damping over the contact's
-stiffness, and the speed at which rolling takes over (Pacejka, section 8.6)."""
 
 
 @compiled

@@ -15,6 +15,8 @@ FloatArray = NDArray[np.float64]
 
 FLAT_ROAD: FloatArray = np.zeros((0, 3))  # a height profile without hills
 
+ELEMENTS = 8  # Jenkins elements of a shaft with hysteresis
+
 
 class Physics(NamedTuple):
     """A driveline with all it may hide."""
@@ -115,9 +117,6 @@ class Physics(NamedTuple):
     filter_time_s: float = 0.0  # speed filter of first order
     filter_rad_s: float = 0.0  # speed filter of first order
     filter_damping: float = 1.0  # speed filter of first order
-
-
-ELEMENTS = 8  # Jenkins elements of a shaft with hysteresis
 
 
 class StateIndex(IntEnum):

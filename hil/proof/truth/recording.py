@@ -11,6 +11,15 @@ from scipy.signal import lfilter
 from hil.proof.truth.bus import PERIOD_S
 from hil.proof.truth.physics import FloatArray
 
+TORQUE_QUANTUM_NM = 0.6  # 0.1 % of a rated torque of 600 Nm: the resolution of object 0x6077
+
+TORQUE_NOISE_NM = 0.5
+SPEED_NOISE_RAD_S = 0.05
+
+CURVATURE_SPEED_RAD_S = 100.0  # speed at which the curvature's share of the reading is missing
+
+FLAG_M1, FLAG_M2 = 1, 2  # quality flags of a row: an inverter did not answer. The speed comes from m1
+
 
 @dataclass(frozen=True, slots=True)
 class Acquisition:
@@ -39,12 +48,6 @@ class Acquisition:
 
 
 FAULTLESS = Acquisition()
-
-
-TORQUE_QUANTUM_NM = 0.6  # 0.1 % of a rated torque of 600 Nm: the resolution of object 0x6077
-
-TORQUE_NOISE_NM = 0.5
-SPEED_NOISE_RAD_S = 0.05
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,9 +96,6 @@ def coloured(size: float, corner_hz: float, shape: tuple[int, ...], rng: np.rand
     return noise
 
 
-CURVATURE_SPEED_RAD_S = 100.0  # speed at which the curvature's share of the reading is missing
-
-
 def sampling_instants_s(time_s: FloatArray, acquisition: Acquisition, rng: np.random.Generator) -> FloatArray:
     """Return when each speed is truly sampled [s], shape (N,); none is before the recording begins."""
     instants = time_s * (1.0 + acquisition.clock_error)
@@ -131,8 +131,6 @@ def _counted(speed_rad_s: FloatArray, count_rad: float, time_s: float, rng: np.r
 
 IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
-
-FLAG_M1, FLAG_M2 = 1, 2  # quality flags of a row: an inverter did not answer. The speed comes from m1
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,6 +14,15 @@ crossover, and the loop's low-pass (at five times the crossover, see `speed_hold
 0.6 % of the vehicle's own response there.
 """
 
+TURNING_FILTER_S = 0.1
+"""Low-pass of the speed that decides on turning [s]: a resonance at 8 Hz is a fifth of itself behind it."""
+
+LEAD_S = 1.0
+"""Zero torque before the first pulse and after the last [s]: what the readings show without one."""
+
+WAVE_STEPS = 4
+"""Steps in one wave of pulses; see `Pulses`."""
+
 
 class Cruise:
     """Hold a speed, so slowly that the loop does not shape the response to the PRBS: the paper's own test."""
@@ -78,10 +87,6 @@ class Ramp(Coast):
         return self.hold_nm + self.swing_nm * share
 
 
-TURNING_FILTER_S = 0.1
-"""Low-pass of the speed that decides on turning [s]: a resonance at 8 Hz is a fifth of itself behind it."""
-
-
 @dataclass(slots=True)
 class Reversal(Coast):
     """Constant torque one way until the speed is reached, then the other way: shows dry friction and backlash.
@@ -104,13 +109,6 @@ class Reversal(Coast):
         if self._direction * self._speed.update(speed_rad_s) >= self.turning_speed_rad_s:
             self._direction = -self._direction
         return self.hold_nm + self._direction * self.swing_nm
-
-
-LEAD_S = 1.0
-"""Zero torque before the first pulse and after the last [s]: what the readings show without one."""
-
-WAVE_STEPS = 4
-"""Steps in one wave of pulses; see `Pulses`."""
 
 
 @dataclass(frozen=True, slots=True)

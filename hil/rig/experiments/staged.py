@@ -20,6 +20,29 @@ from dataclasses import dataclass
 from hil.errors import RunAborted
 from hil.rig.experiments.base import BaseTorque, MeasureLaw, Phase
 
+SEPARATION = 5.0
+"""Ratio between low-pass, crossover and integral corner frequencies; see the module's text."""
+
+BANDWIDTH_HZ = 0.1
+"""Crossover of the approach's speed loop [Hz]: 50 times below the 5 Hz the paper begins at."""
+
+SETTLED_FOR_S = 1.0
+"""The mean speed is taken over so long [s]: several periods of any driveline resonance, several turns of the motor,
+so that a resolver whose error goes round with the shaft does not keep the vehicle from ever being there."""
+
+STEADY_WITHIN_RAD_S = 0.05
+"""How far that mean may move from one such time to the next [rad/s].
+
+What is handed over is then the torque that holds the speed, to within 0.05 rad/s² times the inertia: 5 Nm
+for 100 kg m².
+"""
+
+TOLERANCE_SHARE = 0.02
+"""Part of the start speed within which the vehicle counts as there."""
+
+TOLERANCE_LEAST_RAD_S = 0.5
+"""The tolerance at and near standstill [rad/s]: ten times the speed noise assumed in docs (0.05 rad/s)."""
+
 
 class LowPass:
     """Low-pass one signal; it starts at the first value it is given."""
@@ -34,10 +57,6 @@ class LowPass:
         """Take the value of this cycle and return the low-passed one."""
         self.value = value if math.isnan(self.value) else self.value + self._share * (value - self.value)
         return self.value
-
-
-SEPARATION = 5.0
-"""Ratio between low-pass, crossover and integral corner frequencies; see the module's text."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,27 +105,6 @@ class SpeedHold:
     def error_rad_s(self) -> float:
         """Target minus low-passed speed [rad/s]; NaN before the first cycle."""
         return self._target_rad_s - self._speed.value
-
-
-BANDWIDTH_HZ = 0.1
-"""Crossover of the approach's speed loop [Hz]: 50 times below the 5 Hz the paper begins at."""
-
-SETTLED_FOR_S = 1.0
-"""The mean speed is taken over so long [s]: several periods of any driveline resonance, several turns of the motor,
-so that a resolver whose error goes round with the shaft does not keep the vehicle from ever being there."""
-
-STEADY_WITHIN_RAD_S = 0.05
-"""How far that mean may move from one such time to the next [rad/s].
-
-What is handed over is then the torque that holds the speed, to within 0.05 rad/s² times the inertia: 5 Nm
-for 100 kg m².
-"""
-
-TOLERANCE_SHARE = 0.02
-"""Part of the start speed within which the vehicle counts as there."""
-
-TOLERANCE_LEAST_RAD_S = 0.5
-"""The tolerance at and near standstill [rad/s]: ten times the speed noise assumed in docs (0.05 rad/s)."""
 
 
 class Approach:

@@ -1,5 +1,6 @@
 """Failures on the rig: a simulated device, the bus or the PLC goes wrong during a run, or is wrong before it."""
 
+import re
 from functools import partial
 from pathlib import Path
 
@@ -20,6 +21,9 @@ BUS_PORT, PLC_PORT = 54791, 5091
 
 BRIDGED = r"Virtual bus channel \S+ on "
 """The server's own name of its bus, another one each time."""
+
+ALWAYS_PRINTED = re.compile(r"^registers of plc\n.*?┘\n|^m\d: if the host fails(?:.|\n(?!\w+: |error))*\n", re.M | re.S)
+"""What `hil check` prints of a healthy rig as well."""
 
 SHORTER = (
     ("127.0.0.1:54701", f"127.0.0.1:{BUS_PORT}"),
@@ -48,6 +52,7 @@ def on_rig(command: str, fault: str, draws: bool = False) -> Outcome:
     with RigServer(plant_for(rig, []), rig, rig.can.url, Address(rig.plc.host, rig.plc.port), faults):
         pace = ("--pace", "fast") if command.startswith("hil run") else ()
         text, status = said(command, *pace, without=BRIDGED)
+    text = re.sub(r"(?:^\.\.\.\n)+", "...\n", ALWAYS_PRINTED.sub("...\n", text), flags=re.M)
     return Outcome(
         f"hil sim rig.toml --fault {fault}\n{command}", text, status, signals_of(Path("cruise.csv")) if draws else None
     )
