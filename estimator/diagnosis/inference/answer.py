@@ -90,12 +90,13 @@ def answer(
             keep(SearchResult(read, search, decision))
             progress("simulating what was found", 0.9)
             laws = laws_around(decision.judged)
-            basis = Basis(decision, laws, search, model, _effort(search, level, decision), _warnings(search, level))
+            effort = _effort(search, level, decision)
+            basis = Basis(decision, laws, search, model, effort, _warnings(search, level), ready.doubts)
             diagnosis = said(basis)
             if decision.judged.failed and not decision.judged.off_nominal:
                 diagnosis = with_law(diagnosis, decision.judged.believed.hypothesis, decision.runs)
         except TimeIsUp:
-            diagnosis = undecided(started[-1] if started else None, chain, line, model, work, level)
+            diagnosis = undecided(started[-1] if started else None, chain, line, model, work, level, ready.doubts)
     progress("done", 1.0)
     return replace(diagnosis, timing_s={"total": time.perf_counter() - began})
 

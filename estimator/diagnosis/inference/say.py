@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -23,8 +23,10 @@ from estimator.diagnosis.noise import SMALLEST_P
 from estimator.diagnosis.result import (
     Diagnosis,
     Discrepancy,
+    Doubt,
     Effort,
     Estimated,
+    FoundEffect,
     Interval,
     Mismatch,
     Refinement,
@@ -55,6 +57,7 @@ class Basis:
     model: DrivelineModel  # as it was given, with what the line reads through
     effort: Effort
     warnings: tuple[str, ...] = ()
+    doubts: Sequence[Doubt] = ()  # about the input
 
 
 def said(basis: Basis) -> Diagnosis:
@@ -63,7 +66,7 @@ def said(basis: Basis) -> Diagnosis:
     judged, runs, verdict = decision.judged, decision.runs, decision.verdict
     is_explained = verdict is not Verdict.UNEXPLAINED
     named = [found_effect(each, runs) for each in judged.named]
-    effects = (*named, *decision.acquired) if is_explained else ()
+    effects = _as_sure_as(basis.doubts, (*named, *decision.acquired) if is_explained else ())
     traces = judged.traces if is_explained else ()
     added = [*effects, *(found_effect(each, runs) for each in traces)]
     mismatch, remainder = _mismatch(basis), _remainder(basis)
@@ -77,6 +80,7 @@ def said(basis: Basis) -> Diagnosis:
         judged.off_nominal,
         untestable,
         can_be_retuned(line),
+        basis.doubts,
     )
     return Diagnosis(
         verdict=verdict,
@@ -93,6 +97,7 @@ def said(basis: Basis) -> Diagnosis:
         augmented=augmented_model(runs.estimate, basis.model, added),
         traces=courses_of(runs),
         warnings=basis.warnings,
+        doubts=tuple(basis.doubts),
         discrepancy=_discrepancy(basis) if mismatch.detected and line.plant is None else None,
         remainder=remainder,
         off_nominal=judged.off_nominal,
@@ -105,8 +110,19 @@ def said(basis: Basis) -> Diagnosis:
     )
 
 
+def _as_sure_as(doubts: Sequence[Doubt], effects: tuple[FoundEffect, ...]) -> tuple[FoundEffect, ...]:
+    """Return effects without how sure their names are while the input is in doubt: the one place that decides it."""
+    return tuple(replace(each, probability=math.nan, counted=None) for each in effects) if doubts else effects
+
+
 def undecided(
-    search: Search | None, chain: Chain, line: DrivelineModel, model: DrivelineModel, work: Work, level: str
+    search: Search | None,
+    chain: Chain,
+    line: DrivelineModel,
+    model: DrivelineModel,
+    work: Work,
+    level: str,
+    doubts: Sequence[Doubt] = (),
 ) -> Diagnosis:
     """Return the answer of a search that the limit of time has ended: nothing is decided, and nothing rejected."""
     names, blind = open_hypotheses(line, chain.records)
@@ -123,7 +139,7 @@ def undecided(
     simulations = 0 if search is None else search.simulations
     effort = Effort(level, simulations, False, untried, len(names), work.limit_s)
     untestable = untestable_effects(blind)
-    context = Context(untestable=untestable, can_be_retuned=can_be_retuned(line))
+    context = Context(untestable=untestable, can_be_retuned=can_be_retuned(line), doubts=doubts)
     return Diagnosis(
         verdict=Verdict.UNEXPLAINED,
         statement=statement(Verdict.UNEXPLAINED, fit, (), effort, context),
@@ -139,6 +155,7 @@ def undecided(
         augmented=augmented,
         traces=(),
         effort=effort,
+        doubts=tuple(doubts),
     )
 
 
