@@ -83,7 +83,7 @@ def _map() -> Iterator[str]:
 
 
 def _shared() -> set[str]:
-    """Return the lines of options that three commands or more have in common, of each option at most one: given once."""
+    """Return the lines of options that three commands or more have in common, of each at most one: given once."""
     own = [command(name) for name in COMMANDS]
     parts = [part for each in own for part in (each, *getattr(each, "commands", {}).values())]
     lines = Counter(line for part in parts for line in set(map(_option, _options(part))))

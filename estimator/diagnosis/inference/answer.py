@@ -88,9 +88,9 @@ def answer(
             keep(SearchResult(read, search, decision))
             progress("simulating what was found", 0.9)
             effort, law = _effort(search, level, decision), unnamed_law(decision)
-            diagnosis = said(Basis(decision, search, model, effort, _warnings(search, level), law))
+            diagnosis = said(Basis(decision, search, model, effort, _warnings(search, level), law, ready.doubts))
         except TimeIsUp:
-            diagnosis = undecided(started[-1] if started else None, chain, line, model, work, level)
+            diagnosis = undecided(started[-1] if started else None, chain, line, model, work, level, ready.doubts)
     progress("done", 1.0)
     return replace(diagnosis, timing_s={"total": time.perf_counter() - began})
 

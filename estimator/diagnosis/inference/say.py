@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -23,8 +23,10 @@ from estimator.diagnosis.noise import SMALLEST_P
 from estimator.diagnosis.result import (
     Diagnosis,
     Discrepancy,
+    Doubt,
     Effort,
     Estimated,
+    FoundEffect,
     Interval,
     Mismatch,
     Refinement,
@@ -55,6 +57,7 @@ class Basis:
     effort: Effort
     warnings: tuple[str, ...] = ()
     law: Law | None = None  # without a name, next to what is decided
+    doubts: Sequence[Doubt] = ()  # about the input
 
 
 def said(basis: Basis) -> Diagnosis:
@@ -63,7 +66,7 @@ def said(basis: Basis) -> Diagnosis:
     judged, runs, verdict = decision.judged, decision.runs, decision.verdict
     is_explained = verdict is not Verdict.UNEXPLAINED
     named = [found_effect(each, runs) for each in judged.named]
-    effects = (*named, *decision.acquired) if is_explained else ()
+    effects = _as_sure_as(basis.doubts, (*named, *decision.acquired) if is_explained else ())
     traces = judged.traces if is_explained else ()
     added = [*effects, *(found_effect(each, runs) for each in traces)]
     law, figures = basis.law, decision.figures
@@ -79,6 +82,7 @@ def said(basis: Basis) -> Diagnosis:
         untestable,
         can_be_retuned(line),
         mismatch.element,
+        basis.doubts,
     )
     augmented, courses = augmented_model(runs.estimate, basis.model, added), courses_of(runs)
     said_of_law = "" if law is None else f" {sentences(law.table, figures.unit)}"
@@ -96,6 +100,7 @@ def said(basis: Basis) -> Diagnosis:
         augmented=augmented if law is None else law.augmented(augmented),
         traces=courses if law is None else law.drawn(courses, judged.believed.hypothesis, runs),
         warnings=basis.warnings,
+        doubts=tuple(basis.doubts),
         discrepancy=seen,
         remainder=remainder,
         off_nominal=judged.off_nominal,
@@ -109,8 +114,19 @@ def said(basis: Basis) -> Diagnosis:
     )
 
 
+def _as_sure_as(doubts: Sequence[Doubt], effects: tuple[FoundEffect, ...]) -> tuple[FoundEffect, ...]:
+    """Return effects without how sure their names are while the input is in doubt: the one place that decides it."""
+    return tuple(replace(each, probability=math.nan, counted=None) for each in effects) if doubts else effects
+
+
 def undecided(
-    fits: Fits | None, chain: Chain, line: DrivelineModel, model: DrivelineModel, work: Work, level: str
+    fits: Fits | None,
+    chain: Chain,
+    line: DrivelineModel,
+    model: DrivelineModel,
+    work: Work,
+    level: str,
+    doubts: Sequence[Doubt] = (),
 ) -> Diagnosis:
     """Return the answer of a search that the limit of time has ended: nothing is decided, and nothing rejected."""
     names, blind = open_hypotheses(line, chain.records)
@@ -127,7 +143,7 @@ def undecided(
     simulations = 0 if fits is None else fits.simulations
     effort = Effort(level, simulations, False, untried, len(names), work.limit_s)
     untestable = untestable_effects(blind)
-    context = Context(untestable=untestable, can_be_retuned=can_be_retuned(line))
+    context = Context(untestable=untestable, can_be_retuned=can_be_retuned(line), doubts=doubts)
     return Diagnosis(
         verdict=Verdict.UNEXPLAINED,
         statement=statement(Verdict.UNEXPLAINED, fit, (), effort, context),
@@ -142,6 +158,7 @@ def undecided(
         augmented=augmented,
         traces=(),
         effort=effort,
+        doubts=tuple(doubts),
     )
 
 

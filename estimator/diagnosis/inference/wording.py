@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from estimator.diagnosis.result import (
+    Doubt,
     Effort,
     Fit,
     FoundEffect,
@@ -49,13 +50,15 @@ class Context:
     untestable: Sequence[UntestableEffect] = ()
     can_be_retuned: bool = True  # false for a plant whose parameters are not fitted
     element: Element | None = None  # where the mismatch most likely is
+    doubts: Sequence[Doubt] = ()  # about the input: they come first
 
 
 def statement(
     verdict: Verdict, fit: Fit, effects: Sequence[FoundEffect], effort: Effort, context: Context = Context()
 ) -> str:
     """Return one paragraph: verdict, figures, and what to do next."""
-    parts = [] if effort.finished else [_not_decided(effort)]
+    parts = [_doubted(context.doubts)] if context.doubts else []
+    parts += [] if effort.finished else [_not_decided(effort)]
     parts.append(_headline(verdict, fit, effects, effort, context))
     if context.remainder is not None and not context.off_nominal:
         parts.append(_left(verdict, context.remainder, context.element))
@@ -77,6 +80,12 @@ def statement(
         f"Neither found nor excluded without {e.needs}: {EFFECTS[e.name].title}." for e in context.untestable if e.needs
     ]
     return " ".join(parts)
+
+
+def _doubted(doubts: Sequence[Doubt]) -> str:
+    return (
+        f"The input is in doubt (recordings: {', '.join(each.about for each in doubts)}). If it is right all the same:"
+    )
 
 
 def _moving(trace: Slight) -> str:

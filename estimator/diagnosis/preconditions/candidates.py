@@ -47,6 +47,16 @@ DAY_S = 86_400.0
 TIME_UNITS = {1e-3: "ms", 1e-6: "us", DAY_S: "days"}
 """Units of time that a column may have, by their size [s]."""
 
+SAME_PERIOD = 1e-3  # relative difference of sampling periods that rounding of time stamps makes
+
+INERTIA_UNITS = (
+    (1e-3, "in g m^2, expected kg m^2", 0.02),
+    (1e-4, "in kg cm^2, expected kg m^2", 0.04),
+    (1e-7, "in g cm^2, expected kg m^2", 0.02),
+    (0.25, "a GD^2, which is 4 J", 0.03),
+)
+"""What inertias in a model file may be in, with the prior of each."""
+
 LIMITS = (0.7, 0.5, 0.35, 0.25, 0.15, 0.1, 0.07, 0.05)
 """Limits of a torque that are tried, in the largest reading of all recordings: what is read beyond is not there."""
 
@@ -118,10 +128,6 @@ ROWS: tuple[Row, ...] = (
     Row("is the torque that of one of two equal inverters, expected the sum", _T, 2.0, 2.0, 0.02),
     Row("does the torque count twice: the sum is named, and half of it again", _T, 0.5, 0.5, 0.02),
     Row("is the torque a current in A, by a torque constant of about {0} Nm/A", _T, 0.05, 5.0, 0.04),
-    Row("is the inertia in the model file in g m^2, expected kg m^2", _M, 1e-3, 1e-3, 0.02),
-    Row("is the inertia in the model file in kg cm^2, expected kg m^2", _M, 1e-4, 1e-4, 0.04),
-    Row("is the inertia in the model file in g cm^2, expected kg m^2", _M, 1e-7, 1e-7, 0.02),
-    Row("is the inertia in the model file a GD^2, which is 4 J", _M, 0.25, 0.25, 0.03),
     Row(
         "is it of another vehicle, or with another payload, than the others: its inertia fits {0} times the nominal",
         _M, 1.0 / 3.0, 3.0, 1.0, _MOVES, _BOTH, alone=True,
@@ -176,6 +182,7 @@ class Change:
     factors: int = 0  # how many factors may be wrong, too
     is_physics: bool = False  # nothing is wrong then: what is there is for a diagnosis to find
     may_be_alone: bool = True  # whether one of several recordings may have it alone
+    is_of_one: bool = False  # whether it can only be so in one of several
     is_open: bool = False  # it may be physics as well, so that it is doubted and not refused
 
 
@@ -186,7 +193,7 @@ def changes_of(records: Sequence[Record], line: Line, ratio: float = 1.0) -> Ite
     if records[0].imposed is None:
         yield from _of_inputs(records[0], line, ratio)
         yield from _of_columns(records[0])
-    yield from _of_time(records[0])
+    yield from _of_time(records)
     if line is not None:
         yield from _of_shifts(records, line)
         yield from _of_model(line, abs(ratio))
@@ -257,8 +264,13 @@ def of_one_unit(record: Record, i: int, ratio: float) -> Iterator[Change]:
         yield Change(question, 0.05, _scaled(at), cure=cure, is_open=1.0 / MOST_GAIN < factor < MOST_GAIN)
 
 
-def _of_time(record: Record) -> Iterator[Change]:
-    period_s = record.sample_time_s
+def _of_time(records: Sequence[Record]) -> Iterator[Change]:
+    """Yield that times are in another unit, or that one recording has another period than the others."""
+    record, period_s = records[0], records[0].sample_time_s
+    usual_s = float(np.median([each.sample_time_s for each in records]))
+    if any(not math.isclose(each.sample_time_s, usual_s, rel_tol=SAME_PERIOD) for each in records):
+        question = f"is the sampling period {usual_s:.3g} s as the others'? Is its time in another unit"
+        yield Change(question, 0.1, partial(_at_period, period_s=usual_s), is_of_one=True)
     factors = {1e-3: 0.1, 1e-6: 0.02, DAY_S: 0.05, 60.0: 0.005, 0.1: 0.01, 10.0: 0.01, 0.5: 0.002, 2.0: 0.002}
     if period_s == 1.0:
         factors |= dict.fromkeys(PERIODS, UNLIKELY)
@@ -266,10 +278,7 @@ def _of_time(record: Record) -> Iterator[Change]:
         if FASTEST_S <= factor * period_s <= SLOWEST_S and record.okay.size * factor * period_s >= SHORTEST_S:
             unit = f"Is time in {TIME_UNITS[factor]}, expected s" if factor in TIME_UNITS else "Is time in another unit"
             question = f"is the sampling period {factor * period_s:.3g} s, as read {period_s:.3g} s? {unit}"
-            timed = lambda each, by=factor: replace(  # noqa: E731
-                each, sample_time_s=by * each.sample_time_s, time_s=by * each.time_s
-            )
-            cure = Cure(record.name, time=factor)
+            timed, cure = partial(_timed, by=factor), Cure(record.name, time=factor)
             yield Change(question, prior, timed, cure=cure, may_be_alone=factor in TIME_UNITS)
 
 
@@ -290,11 +299,13 @@ def _of_model(line: DrivelineModel, ratio: float) -> Iterator[Change]:
         swapped = lambda each: _with_inertias(each, J_M=each.parameters["J_L"], J_L=each.parameters["J_M"])  # noqa: E731
         yield Change("are J_M and J_L exchanged in the model file", 0.1, of_line=swapped)
         question = f"is J_L in the model file that of another vehicle or in another unit, about {ratio:.2g} times it"
-        yield Change(question, 0.1 / STEPS, of_line=lambda each: _with_one(each, "J_L", ratio))
-    for name in [each for each in line.parameters if each.startswith("J")] if line.structure in MASSES else ():
-        for factor, unit in ((1e-3, "g m^2"), (1e-4, "kg cm^2"), (1e-7, "g cm^2"), (0.25, "GD^2, which is 4 J")):
-            question = f"is {name} in the model file in {unit}, the others in kg m^2"
-            yield Change(question, 0.02, of_line=partial(_with_one, name=name, factor=factor))
+        yield Change(question, 0.1 / STEPS, of_line=partial(_with_times, names=["J_L"], factor=ratio))
+    inertias = [each for each in line.parameters if each.startswith("J")] if line.motion is Motion.ROTATION else []
+    for names in [inertias, *([each] for each in inertias)] if len(inertias) > 1 else [inertias] if inertias else ():
+        which = "the inertia" if names == inertias else names[0]
+        for factor, unit, prior in INERTIA_UNITS:
+            question = f"is {which} in the model file {unit}"
+            yield Change(question, prior, of_line=partial(_with_times, names=names, factor=factor), factors=1)
 
 
 def _of_physics(records: Sequence[Record], line: DrivelineModel) -> Iterator[Change]:
@@ -312,7 +323,7 @@ def _of_physics(records: Sequence[Record], line: DrivelineModel) -> Iterator[Cha
         for time in TIMES:
             yield Change(question, 0.005, partial(_fading, depth=depth, time=time), is_physics=True)
     if line.structure in MASSES:
-        alone = lambda each: _with_one(each, "J_L", 1e-3)  # noqa: E731
+        alone = partial(_with_times, names=["J_L"], factor=1e-3)
         yield Change("does a clutch slip, or is the shaft broken, so that the motor turns alone", 0.1, of_line=alone,
                      is_physics=True)  # fmt: skip
 
@@ -352,6 +363,14 @@ def _with(record: Record, label: str, is_added: bool) -> Record:
     return replace(record, torque_nm=np.column_stack([read, column]), torque_okay=None)
 
 
+def _timed(record: Record, by: float) -> Record:
+    return replace(record, sample_time_s=by * record.sample_time_s, time_s=by * record.time_s)
+
+
+def _at_period(record: Record, period_s: float) -> Record:
+    return _timed(record, period_s / record.sample_time_s)
+
+
 def _differentiated(record: Record) -> Record:
     return replace(record, output=np.gradient(_bridged(record), record.sample_time_s))
 
@@ -381,6 +400,6 @@ def _with_inertias(line: DrivelineModel, **inertias: Parameter) -> DrivelineMode
     return replace(line, parameters={**line.parameters, **inertias})
 
 
-def _with_one(line: DrivelineModel, name: str, factor: float) -> DrivelineModel:
-    known = line.parameters[name]
-    return _with_inertias(line, **{name: replace(known, value=known.value * factor)})
+def _with_times(line: DrivelineModel, names: Sequence[str], factor: float) -> DrivelineModel:
+    known = {name: line.parameters[name] for name in names}
+    return _with_inertias(line, **{name: replace(each, value=each.value * factor) for name, each in known.items()})

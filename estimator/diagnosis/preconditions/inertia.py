@@ -30,7 +30,7 @@ BLOCK_HZ, FEWEST_BINS = 1.0, 8
 BANDS_TELL = 0.5  # share of the output in either band that must follow from the torque
 AGREE = 2.5  # factor between the ratios of the two bands up to which they are of one cause
 STRETCH_S = 1.0  # over which the change of speed is looked at
-FEWEST_STEPS = 10  # samples of a stretch at least
+FEWEST_STEPS, FEWEST_PERIODS = 10, 2.0  # samples, and periods of the first mode, of a stretch at least
 FEWEST_STRETCHES = 10  # stretches that a recording must hold to say anything: the regression has three unknowns
 
 TELLS = 0.25
@@ -107,6 +107,11 @@ class Inertia:
     def tells(self) -> bool:
         """Whether enough of the motion follows from the torque for the ratio to mean anything."""
         return self.rest <= TELLS and self.ratio != 0.0
+
+    @property
+    def falls(self) -> bool:
+        """Whether the motion tells that it falls where the torque rises."""
+        return self.tells and self.ratio < 0.0
 
 
 NOTHING = Inertia(math.nan, 1.0)
@@ -204,8 +209,14 @@ def by_band(
 
 def as_one_body(record: Record, line: DrivelineModel, first_hz: float) -> Inertia:
     """Return the ratio of inertias by which the impulse of the torque changes the speed."""
+    period = 1.0 / (first_hz * record.sample_time_s) if first_hz > 0.0 else 0.0
     step = max(round(STRETCH_S / record.sample_time_s), FEWEST_STEPS)
-    width = min(step, max(1, round(1.0 / (first_hz * record.sample_time_s)))) if first_hz > 0.0 else 1
+    width = min(step, max(1, round(period)))
+    # a short recording is cut into shorter stretches, as long as these average the mode
+    step = min(
+        step,
+        max((record.okay.size - 2 * width) // (FEWEST_STRETCHES + 1), FEWEST_STEPS, round(FEWEST_PERIODS * period)),
+    )
     inside = slice(width, record.okay.size - width)
     okay = record.okay[inside]
     both = okay[step:] & okay[:-step]

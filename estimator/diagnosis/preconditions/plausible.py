@@ -254,13 +254,15 @@ def _ranked(records: Sequence[Record], line: Line, found: Sequence[Inertia]) -> 
     spread = 0.0 if line is None else CLOSE[0] * math.log1p(_tolerance(line))
     off = _log_near(OFFSETS, max(spread, 0.5 * CLOSE[1]), PHYSICS_SHARE)
     off = off - np.logaddexp.reduce(off)
-    nothing = [
-        _log_fits(each, size, record, (), np.zeros(1), line)[0]
-        for each, size, record in zip(found, sizes, records, strict=True)
-    ]
     unknown = [
         math.log(UNKNOWN_FIT) - REST * math.log(TELLS) + _usual((), size[0], *size, record)
         for size, record in zip(sizes, records, strict=True)
+    ]
+    nothing = [
+        np.full(OFFSETS.size, math.log(STRANGE) + other)
+        if each.falls
+        else _log_fits(each, size, record, (), np.zeros(1), line)[0]
+        for each, size, record, other in zip(found, sizes, records, unknown, strict=True)
     ]
     all_of = [Candidate(Change(), log_weight=math.log(ELSE) + sum(unknown), is_else=True)]
     for change in changes_of(records, line, _ratio(found, line)):
@@ -320,22 +322,27 @@ def _candidates(
         np.logaddexp(_log_fits(each, largest(record), record, chosen, logs, line), math.log(STRANGE) + other)
         for each, record, other in zip(fits, changed, unknown, strict=True)
     ]
-    counted = [each.ratio for each in fits if each.tells]
-    is_turned = sum(each < 0.0 for each in counted) > 0.5 * len(counted)
+    is_turned = sum(each.falls for each in fits) > 0.5 * sum(each.tells for each in fits)
+    as_most = [  # one that goes the other way than the others is strange
+        each if not fit.tells or fit.falls == is_turned else np.full_like(each, math.log(STRANGE) + other)
+        for each, fit, other in zip(at, fits, unknown, strict=True)
+    ]
 
     def made(total: FloatArray, log_prior: float, only: int | None) -> Candidate:
         by_factor = np.logaddexp.reduce(total + off, axis=-1)
         best = float(logs[np.argmax(by_factor)])
         factors = tuple((row, row.low if row.low == row.high else float(f"{math.exp(best):.2g}")) for row in chosen)
         weight = float(np.logaddexp.reduce(by_factor) - math.log(logs.size)) + log_prior
-        turned = is_turned if only is None else fits[only].tells and fits[only].ratio < 0.0
+        turned = is_turned if only is None else fits[only].falls
         return Candidate(change, factors, weight + (math.log(TURNED) if turned else 0.0), turned, only)
 
     all_nothing = np.sum(nothing, axis=0)
-    if not any(row.alone for row in chosen):
-        yield made(all_nothing[np.newaxis] if is_nothing else np.sum(at, axis=0), prior, None)
+    if not (change.is_of_one or any(row.alone for row in chosen)):
+        yield made(all_nothing[np.newaxis] if is_nothing and not is_turned else np.sum(as_most, axis=0), prior, None)
     may_be_alone = len(changed) > 1 and len(chosen) < 2 and change.may_be_alone and not change.is_physics
-    for i in range(len(changed) if may_be_alone and (not is_nothing or is_turned) else 0):
+    for i in range(len(changed) if may_be_alone else 0):
+        if is_nothing and not fits[i].falls:
+            continue
         yield made(at[i] + all_nothing - nothing[i], prior + math.log(ALONE / len(changed)), i)
 
 

@@ -14,8 +14,9 @@ from scipy.signal import detrend
 
 from estimator.diagnosis.acquisition.chain import without_lost_samples
 from estimator.diagnosis.acquisition.finding import runs
-from estimator.diagnosis.inference.wording import how_sure
 from estimator.diagnosis.noise import noise_floor, share_of
+from estimator.diagnosis.preconditions.agreement import disagreements
+from estimator.diagnosis.preconditions.candidates import SAME_PERIOD
 from estimator.diagnosis.preconditions.channels import standstill, unwrapped, with_usable_channels, without_clipped
 from estimator.diagnosis.preconditions.inertia import driven, model_warnings
 from estimator.diagnosis.preconditions.plausible import doubts_about
@@ -68,8 +69,6 @@ NEAR_MODE = 0.7
 twice as much."""
 
 UNREAD = ", and that every torque is read: what another one does counts as noise."
-
-SAME_PERIOD = 1e-3  # relative difference of sampling periods that rounding of time stamps makes
 
 
 @dataclass(frozen=True, slots=True)
@@ -340,22 +339,9 @@ class Prepared:
     doubts: tuple[Doubt, ...] = ()
 
     def finished(self, diagnosis: Diagnosis) -> Diagnosis:
-        """Return a diagnosis of these records under the recordings' own names, with doubts and warnings.
-
-        The one place that decides what a doubt does: it comes first, and with one open no name is given as sure.
-        """
+        """Return a diagnosis of these records under the recordings' own names, with their warnings."""
         whole = joined(diagnosis, self.segments)
-        whole = replace(whole, warnings=(*self.warnings, *whole.warnings))
-        if not self.doubts:
-            return whole
-        about = ", ".join(doubt.about for doubt in self.doubts)
-        statement = whole.statement.replace(how_sure(whole.effects), "")
-        return replace(
-            whole,
-            doubts=self.doubts,
-            statement=f"The input is in doubt (recordings: {about}). If it is right all the same: {statement}",
-            effects=tuple(replace(effect, probability=math.nan, counted=None) for effect in whole.effects),
-        )
+        return replace(whole, warnings=(*self.warnings, *whole.warnings))
 
 
 def with_motion_corrected(records: Sequence[Record]) -> tuple[list[Record], list[str]]:
@@ -370,11 +356,15 @@ def with_motion_corrected(records: Sequence[Record]) -> tuple[list[Record], list
 def doubtful(records: Sequence[Record], model: DrivelineModel | None) -> list[Doubt]:
     """Ask of recordings as they were read whether they can be of one drive, and of a model where there is one.
 
-    The longest stretch of each is asked. Raises `Implausible` where they can't be.
+    The longest stretch of each is asked; where units and signs leave no doubt, also whether they are of one line.
+    Raises `Implausible` where they can't be of a drive.
     """
     mended, _ = with_motion_corrected(records)
     thin_ones = mended if model is None else thinned(mended, model)
-    return doubts_about(without_lost_samples([_longest(record) for record in thin_ones]), model)
+    doubts = doubts_about(without_lost_samples([_longest(record) for record in thin_ones]), model)
+    if doubts or model is None:
+        return doubts
+    return disagreements(without_lost_samples([_longest(record) for record in mended]), model)
 
 
 def _longest(record: Record) -> Record:

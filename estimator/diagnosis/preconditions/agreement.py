@@ -1,0 +1,100 @@
+"""Are recordings of one line? The inertias and the stiffness that each fits by itself are compared.
+
+The fit is that of ``identify``: a Box-Jenkins model of two masses and the drive behind it, with 95 % intervals. A
+recording that such a line does not explain by itself is not compared: what its numbers differ by is physics, perhaps.
+Nor are friction and damping: a dry friction, which a diagnosis is to find, makes a viscous one of any size.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from statistics import median
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from estimator.diagnosis.inference.wording import times
+from estimator.diagnosis.result import Doubt
+from estimator.errors import EstimatorError
+from estimator.identification.best import band_of
+from estimator.identification.modes.modes import Uncertain
+from estimator.identification.modes.physical import RESPONDING, physical_parameters
+from estimator.identification.offline.fits import fit_of, solved
+from estimator.identification.offline.validation import validate
+from estimator.physics.model import DrivelineModel, Structure, natural_frequencies_rad_s
+from estimator.signals.decimate import HIGH_PASS_HZ, first_part, high_passed
+from estimator.signals.record import OutputKind, Record
+
+APART = 1.3
+"""Factor by which two intervals must miss each other: temperature, load and amplitude change a line by less."""
+
+NOISE_ORDER = 12  # of the model of the noise: enough for the intervals, and a third of the work of all it may have
+
+COMPARED = ("J_M", "J_L", "k")  # and what one wrong scale of the torque changes by one factor
+
+SURE = 0.95  # with which both intervals hold their value
+
+
+def disagreements(records: Sequence[Record], model: DrivelineModel) -> list[Doubt]:
+    """Return a doubt for each recording that is not of the line that most of the others are of, and by how much."""
+    found = {record.name: line for record in records if (line := _own_line(record, model)) is not None}
+    asked = found if len(found) > 2 else list(found)[1:]  # of two, nobody knows which
+    return [
+        Doubt(name if len(found) > 2 else ", ".join(found), _statement(name, found, differing), SURE)
+        for name in asked
+        if (differing := _differing(name, found))
+    ]
+
+
+def _own_line(record: Record, model: DrivelineModel) -> Mapping[str, Uncertain] | None:
+    """Return the drive that a recording fits by itself; None where it does not tell one."""
+    if record.imposed is not None or record.load_nm is not None or record.kind is not OutputKind.SPEED:
+        return None
+    low_hz, high_hz = band_of(record)
+    first_hz = float(natural_frequencies_rad_s(model.values())[0]) / (2.0 * math.pi)
+    if model.structure is not Structure.TWO_MASS or not low_hz <= first_hz <= high_hz:
+        return None
+    try:
+        with threadpool_limits(1), np.errstate(divide="ignore"):  # of a line that is none
+            data = high_passed(first_part(record), HIGH_PASS_HZ)
+            fit = fit_of(*solved(data, RESPONDING, NOISE_ORDER))
+            if not validate(fit, data).independence.is_independent:
+                return None
+            drive = physical_parameters(fit.model, fit.covariance)
+    except EstimatorError:
+        return None
+    return {name: drive.parameters[name].estimate for name in COMPARED}
+
+
+def _differing(name: str, found: Mapping[str, Mapping[str, Uncertain]]) -> dict[str, float]:
+    """Return by how much which parameters of a recording are apart from those of most others that determine them."""
+    differing = {}
+    for key, mine in found[name].items():
+        others = [line[key] for other, line in found.items() if other != name and line[key].is_determined]
+        apart = [each.value for each in others if mine.is_determined and _are_apart(mine, each)]
+        if 2 * len(apart) > len(others):
+            differing[key] = mine.value / median(apart)
+    return differing
+
+
+def _are_apart(one: Uncertain, other: Uncertain) -> bool:
+    (low, high), (its_low, its_high) = one.ci95, other.ci95
+    return low > APART * its_high or its_low > APART * high
+
+
+def _statement(name: str, found: Mapping[str, Mapping[str, Uncertain]], differing: Mapping[str, float]) -> str:
+    said = ", ".join(f"its {key} fits {times(ratio)} times" for key, ratio in differing.items())
+    ratios = list(differing.values())
+    is_gain = len(ratios) == len(COMPARED) and max(ratios) < APART * min(ratios)
+    why = (
+        f"as under a torque of {times(1.0 / ratios[0])} times what was read"
+        if is_gain
+        else "another vehicle, shaft or payload, or a change between them"
+    )
+    others = " and ".join(each for each in found if each != name)
+    of = "those of the others" if len(found) > 2 else f"that of {others}"
+    return (
+        f"recording {name} is not of the line of {others}: {said} {of} ({why}). To go on with the rest alone, leave "
+        f"out {name}{'' if len(found) > 2 else f', or {others}'}."
+    )
