@@ -48,7 +48,7 @@ def design(
     [design]; how well it distinguishes explanations is the distance of what each would let the sensor read, in units of
     its noise. Writes TOML, which hil run drives, unless nothing is open or nothing that may be driven would tell.
     """
-    from estimator.design import left_open
+    from estimator.design.left_open import left_open
     from hil.config.model_file import read_model_for_recordings
     from hil.config.rig_file import read_rig
     from hil.design.design import Aim, designed, is_needed

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from hil.config.experiment_tables import (
+    EVEN_SHARE,
     AnyExperiment,
     CoastTable,
     CruiseTable,
@@ -22,19 +23,19 @@ from hil.errors import UsageError
 
 ExperimentDict = Mapping[str, Any]
 
-SPEEDS = (0.25, 0.5, 1.0)
-"""Parts of the fastest speed to cruise, coast and step at."""
+SPEEDS = (0.02, 0.25, 0.5, 1.0)
+"""Parts of the fastest speed to cruise at and coast from; the first is a creep."""
 
 TORQUES = (0.35, 0.8)
 """Parts of the largest torque to swing and step by."""
 
-TURNS = (0.05, 0.2)
-"""Parts of the fastest speed to turn at."""
+TURNS = (0.05, 0.2, 1.0)
+"""Parts of the fastest speed to turn at; at the last one each way is a long pull, which heats what heats."""
 
 STEPS_S = (0.5, 2.0)
 RAMPS_S = (1.0, 4.0)
 
-ONE_ALONE = (0.5, 0.0, 1.0)
+ONE_ALONE = (EVEN_SHARE, 0.0, 1.0)
 """Parts of inverter m1: half, and each inverter by itself."""
 
 PERIOD_S = 10.0
@@ -105,11 +106,21 @@ def candidates(rig: Rig, limits: Limits) -> Iterator[tuple[str, ExperimentDict]]
         turning = {"kind": "reversal", "turning_speed_rad_s": turn * fastest, "swing_nm": swing}
         yield f"reversal by {swing:.3g} Nm at {turn * fastest:.3g} rad/s{_by(share)}", {**turning, **shared}
     for speed, part, step_s in itertools.product((0.0, 0.5 * fastest), TORQUES, STEPS_S):
-        stepping = {"kind": "tip", "speed_rad_s": speed, "step_nm": part * strongest, "step_s": step_s}
-        yield f"steps of {part * strongest:.3g} Nm for {step_s:g} s at {speed:.3g} rad/s", {**stepping, **common}
+        yield _steps(rig, limits, speed, part, step_s, EVEN_SHARE)
+    for share in ONE_ALONE[1:]:
+        yield _steps(rig, limits, 0.5 * fastest, TORQUES[-1], STEPS_S[-1], share)
     for part, ramp_s in itertools.product(TORQUES, RAMPS_S):
         ramping = {"kind": "ramp", "swing_nm": part * strongest, "ramp_s": ramp_s}
         yield f"ramps to {part * strongest:.3g} Nm in {ramp_s:g} s", {**ramping, **common, "prbs": False}
+
+
+def _steps(
+    rig: Rig, limits: Limits, speed_rad_s: float, part: float, step_s: float, share: float
+) -> tuple[str, ExperimentDict]:
+    common = {"duration_s": limits.duration_s, "share_m1": share, **_within(rig, limits, share)}
+    step_nm = part * common["torque_nm"]
+    stepping = {"kind": "tip", "speed_rad_s": speed_rad_s, "step_nm": step_nm, "step_s": step_s}
+    return f"steps of {step_nm:.3g} Nm for {step_s:g} s at {speed_rad_s:.3g} rad/s{_by(share)}", {**stepping, **common}
 
 
 def _within(rig: Rig, limits: Limits, share_m1: float) -> dict[str, float]:

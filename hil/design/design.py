@@ -11,7 +11,8 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from drivers.errors import CommandRefused
-from estimator.design import Expected, Open, Width, as_model, expected, shown, widths
+from estimator.design.open import Open
+from estimator.design.paper import Expected, Width, as_model, expected, shown, widths
 from estimator.physics.model import DrivelineModel
 from estimator.signals.record import Record
 from hil.design.candidates import ExperimentDict, Limits, candidates
@@ -84,7 +85,7 @@ class Design:
     planned: Planned
     decides: Expected | None  # where it is to decide between hypotheses
     widths: tuple[Width, ...]  # of the most probable hypothesis' values, now and after it
-    shows: tuple[str, ...]  # effects that no recording so far could show, and this experiment does
+    shows: tuple[str, ...]  # effects that no recording so far shows or excludes, and this experiment does
     others: tuple[tuple[str, float], ...]  # what else was driven on paper, and what it was judged by
     refused: dict[str, str]  # what may not be driven, and why
 

@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 import tomlkit
 
-from estimator.design import Open, Width, name_of
+from estimator.design.open import Open, name_of
+from estimator.design.paper import Width
 from hil.design.design import WORTH, Aim, Design, Planned
 from hil.figures.drawn import drawing, require_matplotlib
 
@@ -53,7 +54,7 @@ def conditions(known: Open) -> Iterator[str]:
         if each.moves:
             size = ", ".join(f"{parameter} = {value:.3g}" for parameter, value in each.size.items())
             moved = ", ".join(f"{value} by {100.0 * share:+.2g} %" for value, share in each.moves.items())
-            yield f"as if without {name}, which no recording could show: {size} would move {moved}"
+            yield f"as if without {name}, which the recordings do not show: {size} would move {moved}"
 
 
 def design_lines(known: Open, design: Design) -> Iterator[str]:
@@ -75,7 +76,7 @@ def design_lines(known: Open, design: Design) -> Iterator[str]:
         yield f"  expected: intervals that are wide become shorter by a factor of {_factor(design.factor)}"
         yield from (f"    {line}" for line in width_lines(design.widths))
     if design.shows:
-        yield f"  shows what no recording so far could: {', '.join(design.shows)}"
+        yield f"  shows what no recording so far does: {', '.join(design.shows)}"
     if not design.is_worth_driving:
         yield f"  {obstacle(design)}"
     others = ", ".join(f"{name} ({_value(value, design)})" for name, value in design.others[:LISTED])

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from estimator.design import Open, left_open, name_of
+from estimator.design.left_open import left_open
+from estimator.design.open import Open, name_of
 from estimator.diagnosis.result import Diagnosis, Verdict
 from estimator.signals.record import Record
 from hil.config.model_file import ModelFile

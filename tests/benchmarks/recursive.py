@@ -16,11 +16,12 @@ import os
 import subprocess
 import sys
 import tracemalloc
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from statistics import median
 from tempfile import TemporaryDirectory
+from types import MappingProxyType
 
 import numpy as np
 
@@ -44,7 +45,21 @@ PEER_SAMPLES = 100_000
 
 HINT = "python -m venv /tmp/peers && /tmp/peers/bin/pip install padasip==1.2.2, then --padasip /tmp/peers/bin/python"
 COLUMNS = ("one update", "next to", "here", "there", "ratio", "pair by pair", "limit")
-C_FLAGS: tuple[tuple[str, ...], ...] = ((), ("-march=native",))
+FIXED = tuple(
+    f"-D{name}={value}"
+    for name, value in (("NA", MODEL.orders.na), ("NB", MODEL.orders.nb), ("NK", MODEL.orders.nk), ("NL", MODEL.A.size))
+)
+NATIVE = "-march=native"
+C: Mapping[str, tuple[tuple[str, ...], str]] = MappingProxyType(
+    {
+        "C, gcc -O3": ((), "at most 2"),
+        "C, gcc -O3 -march=native": ((NATIVE,), "at most 2"),
+        "C of fixed size, the same guards": (FIXED, "at most 1.1"),
+        "C of fixed size, without guards": ((*FIXED, "-DPLAIN"), "at most 1.1"),
+        "C of fixed size, without guards, -march=native": ((*FIXED, "-DPLAIN", NATIVE), "at most 1.1"),
+    }
+)
+"""What OEFO is compared with: how it is compiled, and the limit."""
 
 
 def oefo() -> Oefo:
@@ -119,10 +134,9 @@ def per_sample(
 def update(pairs: int) -> list[tuple[str, ...]]:
     """Return the lines of OEFO next to C."""
     lines = []
-    for flags in C_FLAGS:
-        companion = " ".join(["C, gcc -O3", *flags])
+    for companion, (flags, limit) in C.items():
         comparison = against_c(pairs, data(BLOCK), BLOCKS, flags)
-        lines.append(per_sample(comparison, BLOCK * BLOCKS, "OEFO, in blocks", companion, "at most 2", inverse=True))
+        lines.append(per_sample(comparison, BLOCK * BLOCKS, "OEFO, in blocks", companion, limit, inverse=True))
     return lines
 
 

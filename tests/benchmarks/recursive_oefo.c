@@ -1,11 +1,31 @@
 /* The same algorithm as estimator/identification/online/oefo_kernel.py, as one would write it in C: equations (1) to
  * (7) of the paper with na, nb, nk, L and the adaptation gain free, F as U D U^T, masks, guards, status and stability
- * test. Compiled to a shared library; theta, prediction, errors, mask and reason of each sample go to `out`. */
+ * test. Compiled to a shared library; theta, prediction, errors, mask and reason of each sample go to `out`.
+ *
+ * With -DNA=.. -DNB=.. -DNK=.. -DNL=.. these are constants to the compiler, as somebody would write it for one model.
+ * -DPLAIN leaves masks, status and the test of stability out. */
 #include <math.h>
 #include <stdbool.h>
 #include <string.h>
 
+#ifdef NA
+enum { MOST = NA + NB };
+#define OF(s, name, constant) constant
+#define PART static inline __attribute__((always_inline))
+#else
 enum { MOST = 32 };
+#define NA 0
+#define NB 0
+#define NK 0
+#define NL 0
+#define OF(s, name, constant) (s)->name
+#define PART static
+#endif
+#ifdef PLAIN
+enum { GUARDED = 0 };
+#else
+enum { GUARDED = 1 };
+#endif
 static const double LARGEST = 1e30, RUNAWAY = 1e3, SETTLING = 10.0, LEARNT = 0.1;
 enum reason { NONE, TOO_FEW_SAMPLES, NOT_EXCITED, UNSTABLE, CONSTANT_OUTPUT };
 
@@ -18,28 +38,28 @@ struct oefo {
     double y_hat[MOST], y_hat_f[MOST], u[MOST], u_f[MOST];
 };
 
-static void push(double *row, int depth, double value)
+PART void push(double *row, int depth, double value)
 {
     memmove(row + 1, row, (depth - 1) * sizeof *row);
     row[0] = value;
 }
 
-static double filtered(const struct oefo *s, double value, const double *row)
+PART double filtered(const struct oefo *s, double value, const double *row)
 {
-    for (int i = 1; i < s->n_l; i++)
+    for (int i = 1; i < OF(s, n_l, NL); i++)
         value -= s->L[i] * row[i - 1];
     return value;
 }
 
-static void regressor(const struct oefo *s, const double *outputs, const double *inputs, double *restrict phi)
+PART void regressor(const struct oefo *s, const double *outputs, const double *inputs, double *restrict phi)
 {
-    for (int i = 0; i < s->na; i++)
+    for (int i = 0; i < OF(s, na, NA); i++)
         phi[i] = -outputs[i];
-    for (int j = 0; j < s->nb; j++)
-        phi[s->na + j] = inputs[s->nk + j];
+    for (int j = 0; j < OF(s, nb, NB); j++)
+        phi[OF(s, na, NA) + j] = inputs[OF(s, nk, NK) + j];
 }
 
-static double dot(const double *a, const double *b, int n)
+PART double dot(const double *a, const double *b, int n)
 {
     double total = 0.0;
     for (int i = 0; i < n; i++)
@@ -48,7 +68,7 @@ static double dot(const double *a, const double *b, int n)
 }
 
 /* Takes Phi into F; g becomes F Phi of the F before. Returns Phi^T F Phi. */
-static double learn(struct oefo *s, int n, const double *restrict Phi, double *restrict g)
+PART double learn(struct oefo *s, int n, const double *restrict Phi, double *restrict g)
 {
     double f[MOST], total = 0.0, trace = 0.0;
     for (int j = 0; j < n; j++) {
@@ -92,7 +112,7 @@ static double learn(struct oefo *s, int n, const double *restrict Phi, double *r
     return total;
 }
 
-static bool is_stable(const double *a, int n)
+PART bool is_stable(const double *a, int n)
 {
     double c[MOST];
     memcpy(c, a, n * sizeof *c);
@@ -110,7 +130,7 @@ static bool is_stable(const double *a, int n)
     return true;
 }
 
-static enum reason verdict(const struct oefo *s, int n, bool stable)
+PART enum reason verdict(const struct oefo *s, int n, bool stable)
 {
     if (s->used < SETTLING * n)
         return TOO_FEW_SAMPLES;
@@ -124,9 +144,9 @@ static enum reason verdict(const struct oefo *s, int n, bool stable)
     return stable ? NONE : UNSTABLE;
 }
 
-static void step(struct oefo *s, int depth, double u, double y, bool okay, double *out)
+PART void step(struct oefo *s, int depth, double u, double y, bool okay, double *out)
 {
-    const int n = s->na + s->nb;
+    const int n = OF(s, na, NA) + OF(s, nb, NB);
     double phi[MOST], Phi[MOST], g[MOST], e_prior = 0.0, e_post = 0.0;
     if (fabs(u) <= LARGEST) {
         if (s->begun && u != s->u[0])
@@ -135,7 +155,7 @@ static void step(struct oefo *s, int depth, double u, double y, bool okay, doubl
         s->held = fmax(s->held - 1.0, 0.0);
     } else {
         u = s->u[0];
-        s->held = s->nk + s->nb;
+        s->held = OF(s, nk, NK) + OF(s, nb, NB);
     }
     push(s->u, depth, u);
     push(s->u_f, depth, filtered(s, u, s->u_f));
@@ -145,7 +165,7 @@ static void step(struct oefo *s, int depth, double u, double y, bool okay, doubl
     else
         regressor(s, s->y_hat_f, s->u_f, Phi);
     double y_hat = dot(s->theta, phi, n);
-    const bool used = okay && fabs(y) <= LARGEST && s->held == 0.0;
+    const bool used = !GUARDED || (okay && fabs(y) <= LARGEST && s->held == 0.0);
     if (used) {
         e_prior = y - y_hat;
         e_post = e_prior / (1.0 + learn(s, n, Phi, g));
@@ -160,9 +180,9 @@ static void step(struct oefo *s, int depth, double u, double y, bool okay, doubl
     }
     if (!(fabs(y_hat) <= RUNAWAY * s->peak))
         y_hat = used ? y : 0.0;
-    const bool stable = is_stable(s->theta, s->na);
+    const bool stable = !GUARDED || is_stable(s->theta, OF(s, na, NA));
     if (stable && s->adapts)
-        memcpy(s->L + 1, s->theta, s->na * sizeof *s->L);
+        memcpy(s->L + 1, s->theta, OF(s, na, NA) * sizeof *s->L);
     push(s->y_hat, depth, y_hat);
     push(s->y_hat_f, depth, filtered(s, y_hat, s->y_hat_f));
     memcpy(out, s->theta, n * sizeof *out);
@@ -170,7 +190,7 @@ static void step(struct oefo *s, int depth, double u, double y, bool okay, doubl
     out[n + 1] = e_prior;
     out[n + 2] = e_post;
     out[n + 3] = used;
-    out[n + 4] = verdict(s, n, stable);
+    out[n + 4] = GUARDED ? verdict(s, n, stable) : NONE;
 }
 
 /* Runs a block from the start. law: initial gain, lambda1, lambda0, trace, alpha. out: a row of n + 5 per sample.
@@ -181,6 +201,7 @@ int oefo_run(int na, int nb, int nk, int start_up, const double *L, int n_l, con
     const int n = na + nb, depth = fmax(fmax(na, nk + nb), n_l);
     if (n > MOST || depth > MOST)
         return 1;
+    const int rows = NA > 0 ? (NA > NL ? NA : NL) > NK + NB ? (NA > NL ? NA : NL) : NK + NB : depth; /* constant, if fixed */
     struct oefo s = {.na = na, .nb = nb, .nk = nk, .start_up = start_up, .n_l = n_l, .initial_gain = law[0],
                      .lambda1 = law[1], .lambda0 = law[2], .trace = law[3], .alpha = law[4]};
     memcpy(s.L, L, n_l * sizeof *L);
@@ -189,6 +210,6 @@ int oefo_run(int na, int nb, int nk, int start_up, const double *L, int n_l, con
         s.D[i] = s.diag[i] = s.initial_gain;
     }
     for (long t = 0; t < count; t++)
-        step(&s, depth, u[t], y[t], okay[t] != 0, out + t * (n + 5));
+        step(&s, rows, u[t], y[t], okay[t] != 0, out + t * (n + 5));
     return 0;
 }

@@ -43,12 +43,13 @@ def test_both_simulations_are_as_exact(problem: Problem) -> None:
     assert simulated.our_error / 5.0 < simulated.their_error < 5.0 * simulated.our_error
 
 
-def test_the_c_is_the_same_algorithm() -> None:
+@pytest.mark.parametrize("flags", [(), recursive.FIXED], ids=["any orders", "fixed size"])
+def test_the_c_is_the_same_algorithm(flags: tuple[str, ...]) -> None:
     u, y, okay = data(2000)
     okay[300:320] = False
     y[500], u[700] = np.nan, np.nan
     ours = recursive.oefo().run(u, y, okay)
-    with recursive_c.compiled() as run:
+    with recursive_c.compiled(*flags) as run:
         out = run(MODEL.orders, MODEL.A, DecreasingThenConstantTrace().law, recursive.START_UP, u, y, okay)
     n = MODEL.orders.n_parameters
     np.testing.assert_allclose(out[:, :n], ours.theta, rtol=1e-9, atol=1e-12)

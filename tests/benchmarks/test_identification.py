@@ -5,7 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from tests.benchmarks.buses import CLEAN, ON_THE_ROAD
+from tests.benchmarks.buses import CLEAN, ON_THE_ROAD, draw_bus, drive
+from tests.benchmarks.identification.bound import least_errors
 from tests.benchmarks.identification.methods import BAND_HZ, PEERS, Answer, Case, Interval, Peer, make_case, of_poles
 from tests.benchmarks.identification.rigs import buses, cruises, experiment
 from tests.benchmarks.identification.run import Judged, judge
@@ -23,7 +24,7 @@ def poles_of(frequency_hz: float, damping: float) -> list[complex]:
 
 def said(frequency_hz: float, damping: float = 0.05, intervals: dict[str, Interval] | None = None) -> Judged:
     """Return a bus about which one method said this."""
-    return Judged(7, TRUTH, {"m": Answer(frequency_hz, damping, intervals or {}, cpu_s=0.2)})
+    return Judged(7, TRUTH, {"m": Answer(frequency_hz, damping, intervals or {}, cpu_s=0.2)}, (0.001, 0.01))
 
 
 @pytest.fixture(scope="module")
@@ -62,8 +63,20 @@ def test_every_method_is_asked_about_a_bus_and_reported_in_the_tables(judged: Ju
     assert set(judged.truth) <= set(best.intervals)  # and sums of parameters, whose truth follows
 
 
+def test_the_least_error_falls_with_the_root_of_the_time_and_with_the_noise() -> None:
+    bus = draw_bus(5)
+    least = {
+        (seconds, world): np.array(
+            least_errors(Case(bus, drive(bus, seconds, world=world), *(np.zeros(1),) * 2), world)
+        )
+        for seconds, world in ((15.0, ON_THE_ROAD), (60.0, ON_THE_ROAD), (15.0, CLEAN))
+    }
+    assert least[15.0, ON_THE_ROAD] / least[60.0, ON_THE_ROAD] == pytest.approx([2.0, 2.0], rel=0.15)
+    assert (least[15.0, CLEAN] < least[15.0, ON_THE_ROAD]).all()
+
+
 def test_errors_are_those_of_the_buses_answered_for() -> None:
-    found = errors([said(8.08), said(7.96, 0.055), Judged(9, TRUTH, {"m": Answer(cpu_s=0.4)})], "m")
+    found = errors([said(8.08), said(7.96, 0.055), Judged(9, TRUTH, {"m": Answer(cpu_s=0.4)}, (0.001, 0.01))], "m")
     assert found.frequency_rms == pytest.approx(math.sqrt((1.0 + 0.25) / 2))
     assert found.damping_rms == pytest.approx(math.sqrt(100 / 2))
     assert (found.frequency_worst, found.damping_worst, found.cpu_s) == pytest.approx((1.0, 10.0, 0.2))

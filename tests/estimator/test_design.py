@@ -7,32 +7,25 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.design import (
-    Candidate,
-    Open,
-    _on_paper as on_paper,
-    _precision as precision,
-    _supposed as supposed,
-    as_model,
-    distance,
-    expected,
-    name_of,
-    shown,
-    widths,
-)
+from estimator.design.open import Candidate, Open, Untested, name_of, precision_of as precision
+from estimator.design.paper import LEAST_DIFFERENCE, _on_paper as on_paper, as_model, distance, expected, shown, widths
+from estimator.design.untested import with_untested
 from estimator.diagnosis.inference.descent import descended
 from estimator.diagnosis.inference.disturbances import whitener_of
 from estimator.diagnosis.inference.fits import Fits
-from estimator.diagnosis.inference.hypotheses import THOROUGH
+from estimator.diagnosis.inference.hypotheses import THOROUGH, all_good_samples
 from estimator.diagnosis.inference.search import search_from_nothing
+from estimator.diagnosis.noise import noise_floor
 from estimator.physics.driveline import InitialCondition
 from estimator.physics.fit import not_fitted
 from estimator.physics.layout import flat, grid_for
 from estimator.physics.problem import make_problem
 from estimator.physics.simulate import simulate
 from estimator.physics.unknowns import own_unknowns
-from estimator.signals.record import Record
-from tests.estimator.diagnosis.one_effect import bench_with
+from estimator.signals.record import Record, separated_outputs
+from tests.estimator.diagnosis.one_effect import Bench, bench_with
+from tests.estimator.diagnosis.planted import SIGMA
+from tests.estimator.diagnosis.test_several_outputs import SHAFT_TORQUE, with_output
 from tests.estimator.physics.bench import record
 
 NAMES = ["coulomb_friction_motor", "coulomb_friction_load"]
@@ -73,6 +66,11 @@ def with_share(of: Record, share: float) -> Record:
     return replace(of, torque_nm=np.outer(of.total_torque_nm, [share, 1.0 - share]))
 
 
+def supposed(known: Open, name: str) -> Untested:
+    """An effect that was not tested, in the size at which a fit of it begins."""
+    return with_untested(replace(known, untested=(name,))).supposed[name]
+
+
 def recorded_with_share(known: Open, share: float) -> Open:
     """The same, the recordings so far as one share of the inverters gives them."""
 
@@ -99,7 +97,7 @@ def test_what_an_experiment_promises_is_what_a_fit_to_it_finds(known: Open) -> N
     """The rival, fitted to noise-free samples of the truth with what it knew before, is behind by the distance."""
     truth, rival = known.candidates
     paper = driven(known, 60.0)
-    said = replace(paper, output=on_paper(truth, known.line, paper).outputs[0])
+    said = replace(paper, output=on_paper(truth, known.line, [paper]).outputs[0])
     before = rival.fit.result.problem
     records = [*before.records, said]
     own = [own_unknowns(rival.effects, each) for each in records]
@@ -137,9 +135,7 @@ def test_a_gain_is_shown_by_two_shares_neither_of_which_shows_it_alone(known: Op
 
 def test_what_an_experiment_hardly_tells_is_not_shown_by_it(known: Open) -> None:
     halves = recorded_with_share(replace(known, untested=(GAIN,)), 0.5)
-    found = supposed(halves, GAIN)
-    assert found is not None
-    asked = replace(halves, supposed={GAIN: found})
+    asked = replace(halves, supposed={GAIN: supposed(halves, GAIN)})
     short, long = (with_share(driven(known, 60.0, cycles), 1.0) for cycles in (8, 800))
     assert shown(asked, long) == (GAIN,)
     assert shown(asked, short) == ()
@@ -147,11 +143,44 @@ def test_what_an_experiment_hardly_tells_is_not_shown_by_it(known: Open) -> None
 
 def test_a_gain_that_was_not_tested_moves_the_values_by_what_it_changes_the_torque(known: Open) -> None:
     found = supposed(recorded_with_share(known, 0.5), GAIN)
-    assert found is not None
     assert found.size == {"gain_m1": pytest.approx(0.9)}
     moved = [share for name, share in found.moves.items() if name in ("J_M", "k")]
     assert moved
     assert all(share == pytest.approx(-0.05, abs=0.01) for share in moved)
+
+
+def left_by(bench: Bench, *names: str) -> Open:
+    """What recordings leave open that only one set of effects was searched in."""
+    records = separated_outputs(bench.records, noise_floor)
+    fits = Fits(bench.model, records, all_good_samples(records), names)
+    best = search_from_nothing(fits).best
+    return Open(fits.model, (Candidate(name_of(best.effects), 1.0, best, precision(best)),), {}, ())
+
+
+def test_what_the_noise_conceals_is_untested_where_it_moves_a_value_and_an_experiment_shows_it() -> None:
+    quiet = bench_with(NAMES[0], {"friction_nm": 8.0})
+    noise = [30.0 * SIGMA * np.random.default_rng(seed).standard_normal(each.time_s.size)
+             for seed, each in enumerate(quiet.records)]  # fmt: skip
+    loud = [replace(each, output=each.output + noise[i]) for i, each in enumerate(quiet.records)]
+    assert with_untested(left_by(quiet, NAMES[0])).untested == ()
+    found = with_untested(left_by(replace(quiet, records=loud), NAMES[0]))
+    law = "torque_nonlinearity"
+    assert {law, "quadratic_friction"} <= set(found.untested)
+    assert all(each.moves for each in found.supposed.values())
+    assert law not in shown(found, driven(found, 60.0))
+    assert law in shown(found, driven(found, 1000.0, 1600))
+
+
+FILTER = ("speed_filter", {"time_constant_s": 0.01, "shape": 0.0})
+
+
+@pytest.mark.parametrize("bench", [bench_with(*FILTER), with_output(SHAFT_TORQUE, *FILTER)], ids=["one", "two outputs"])
+def test_a_second_output_of_the_rig_is_on_paper_too(bench: Bench) -> None:
+    """A lag of the torque and a filter of the speed move the speed alike; the shaft's torque knows only the lag."""
+    filtered, lag = left_by(bench, FILTER[0]), left_by(bench, "actuator_lag")
+    (truth,), (rival,) = filtered.candidates, lag.candidates
+    differs = distance(truth, rival, filtered.line, driven(filtered, 60.0))
+    assert (differs > LEAST_DIFFERENCE) is (truth.fit.outputs == 2)
 
 
 def test_decided_is_the_verdict_that_the_odds_do_not_contradict(known: Open) -> None:

@@ -17,6 +17,7 @@ from estimator.identification.settings import Settings
 from estimator.signals.decimate import decimate
 from estimator.signals.record import Record
 from tests.benchmarks.buses import CLEAN, ON_THE_ROAD, World, draw_bus, drive
+from tests.benchmarks.identification.bound import least_errors
 from tests.benchmarks.identification.methods import OURS, PEERS, Answer, Method, make_case
 from tests.benchmarks.ratios import table
 
@@ -29,11 +30,12 @@ WARM_UP_SEED = 999_999
 
 @dataclass(frozen=True, slots=True)
 class Judged:
-    """One bus: its seed, its truth and what each method said."""
+    """One bus: its seed, its truth, what each method said, and the least errors of frequency and damping, relative."""
 
     seed: int
     truth: Mapping[str, float]
     answers: Mapping[str, Answer]
+    least: tuple[float, float]
 
 
 def methods() -> dict[str, Method]:
@@ -55,7 +57,7 @@ def judge(seed: int, world: World) -> Judged:
         begun = time.process_time()
         answer = method(case)
         answers[name] = replace(answer, cpu_s=time.process_time() - begun)
-    return Judged(seed, case.truth, answers)
+    return Judged(seed, case.truth, answers, least_errors(case, world))
 
 
 def judge_all(seeds: Sequence[int], world: World, jobs: int) -> list[Judged]:

@@ -174,6 +174,12 @@ def error_row(one: Errors, reference: Errors | None) -> tuple[str, ...]:
     )
 
 
+def least_row(judged: Sequence[Judged]) -> tuple[str, ...]:
+    """Return the line of the least RMS errors that an unbiased method can be expected to have on these buses."""
+    frequency, damping = 100.0 * np.sqrt(np.mean(np.square([one.least for one in judged]), axis=0))
+    return ("least possible (Cramér, Rao)", f"{frequency:.3f} %", f"{damping:.2f} %", "", "", "", "")
+
+
 def coverage_row(one: Coverage) -> tuple[str, ...]:
     """Return the line of a quantity."""
     determined = one.held_determined
@@ -195,7 +201,8 @@ def tables(judged: Sequence[Judged]) -> str:
     scored = {name: errors(judged, name) for name in methods}
     reference = scored.get(REFERENCE)
     unit = "in seconds" if reference is None else f"as a ratio to {REFERENCE} ({1e3 * reference.cpu_s:.3g} ms)"
-    parts = [f"Processor time per bus {unit}, median.\n\n", table(ERROR_COLUMNS, _rows(scored, reference))]
+    rows = [*_rows(scored, reference), least_row(judged)]
+    parts = [f"Processor time per bus {unit}, median.\n\n", table(ERROR_COLUMNS, rows)]
     for name in methods:
         covered = coverages(judged, name)
         if covered:

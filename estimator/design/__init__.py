@@ -1,0 +1,1 @@
+"""The next experiment: what recordings leave open, what they did not test, and experiments judged on paper."""

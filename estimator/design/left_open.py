@@ -1,0 +1,95 @@
+"""Diagnose recordings, and keep what they do not decide between."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from threadpoolctl import threadpool_limits
+
+from estimator.design.open import Candidate, Open, name_of, precision_of
+from estimator.design.paper import LEAST_PROBABILITY, TEMPERED
+from estimator.design.untested import with_untested
+from estimator.diagnosis.first_use import compile_kernels, is_first_use
+from estimator.diagnosis.inference.answer import SearchResult, answer
+from estimator.diagnosis.inference.hypotheses import Effects, Hypothesis, Progress, silent
+from estimator.diagnosis.inference.standing import ALIKE_WITHIN
+from estimator.diagnosis.preconditions.prepare import prepare
+from estimator.diagnosis.result import Diagnosis, Verdict
+from estimator.physics.catalogue import EFFECTS
+from estimator.physics.model import DrivelineModel
+from estimator.physics.parallel import Work
+from estimator.physics.simulate import MASSES
+from estimator.signals.record import Record
+
+MOST_OPEN = 4
+"""Hypotheses that are compared, the most probable: each pair is fitted to every experiment on paper."""
+
+
+def left_open(
+    records: Sequence[Record], model: DrivelineModel, effort: str = "normal", progress: Progress = silent
+) -> tuple[Open, Diagnosis]:
+    """Diagnose, and return the hypotheses that recordings do not decide between, with the diagnosis."""
+    masses = len(MASSES.get(model.structure, ()))
+    if masses and is_first_use(masses):
+        progress("preparing", 0.0)
+        compile_kernels(masses)
+    kept_of: list[SearchResult] = []
+    with threadpool_limits(1, user_api="blas"):
+        ready = prepare(records, model)
+        diagnosis = ready.finished(answer(ready, model, progress, effort, Work(), kept_of.append))
+        untested = tuple(each.name for each in diagnosis.untestable if not each.needs)
+        return with_untested(_open(kept_of[0], untested, diagnosis)), diagnosis
+
+
+def _open(found: SearchResult, untested: tuple[str, ...], diagnosis: Diagnosis) -> Open:
+    """Return the verdict's set and those as probable that do not simulate worse; none counts for more than it does."""
+    search, judged = found.search, found.decision.judged
+    best = judged.believed.hypothesis
+    within = max(ALIKE_WITHIN, 2.0 * TEMPERED * math.log(1.0 / (1.0 - LEAST_PROBABILITY)))
+    near = {
+        each.effects: each
+        for each in search.fits.ended.values()
+        if search.fits.is_plausible(each)
+        and each.score - best.score < within
+        and not _holds(each.effects, best.effects)
+        and not (each.effects in judged.tried and judged.believed.beats(judged.tried[each.effects]))
+    } | {best.effects: best}
+    behind = {effects: max(each.score - best.score, 0.0) for effects, each in near.items()}
+    ordered: list[Hypothesis] = []
+    for effects in sorted(near, key=lambda effects: (behind[effects], effects != best.effects, sorted(effects))):
+        if len(ordered) < MOST_OPEN and not any(_are_twins(near[effects], other) for other in ordered):
+            ordered.append(near[effects])
+    weights = [math.exp(-0.5 * behind[each.effects] / TEMPERED) for each in ordered]
+    is_made = diagnosis.verdict in (Verdict.EXPLAINED, Verdict.NO_MISMATCH)
+    named = frozenset(each.name for each in diagnosis.effects if not EFFECTS[each.name].recognised)
+    traces = frozenset(each.name for each in diagnosis.slight)
+    total = sum(weights)
+    candidates = tuple(
+        Candidate(name_of(each.effects), weight / total, each, precision_of(each))
+        for each, weight in zip(ordered, weights, strict=True)
+    )
+    names = sorted({name for each in candidates for name in each.effects})
+    twins = {name: tuple(EFFECTS[name].equivalent) for name in names if EFFECTS[name].equivalent}
+    return Open(
+        search.fits.model,
+        candidates,
+        twins if best.outputs == 1 else {},
+        untested,
+        named=named if is_made else None,
+        traces=traces,
+    )
+
+
+def _are_twins(one: Hypothesis, other: Hypothesis) -> bool:
+    """Tell whether two sets are the same linear system by a single output: no experiment distinguishes them."""
+    mine, its = one.effects - other.effects, other.effects - one.effects
+    if one.outputs > 1 or len(mine) != 1 or len(its) != 1:
+        return False
+    return next(iter(its)) in EFFECTS[next(iter(mine))].equivalent
+
+
+def _holds(effects: Effects, others: Effects) -> bool:
+    """Tell whether a set is another one with more in it: what is added has not paid, and is no other explanation."""
+    special = effects.union(*(EFFECTS[name].contains for name in effects))
+    return effects != others and others <= special
