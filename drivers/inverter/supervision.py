@@ -73,8 +73,8 @@ deviations, less 1 each: {MOST_SURPRISE:g} | 0.1 s each | end
 acceleration per torque | that of `inertia_empty_kg_m2` to `inertia_full_kg_m2` | {100 * GAIN_SHARE - 100:.0f} % and \
 {DEVIATIONS:g} deviations | none | end
 load | `most_grade`, and rolling | {DEVIATIONS:g} deviations | none | end
-speed that stands to the last bit | no jump before, no torque beyond load and friction since | {MOST_HELD_RAD_S:g} rad/s that they \
-should have changed it by | none | end
+speed that stands to the last bit | no jump before, no torque beyond load and friction since | \
+{MOST_HELD_RAD_S:g} rad/s that it should have changed by | none | end
 TPDOs of each kind per SYNC | one | {100 * LOST_SHARE:g} % lost in {LOST_S:g} s; {MOST_SURPLUS} too many within \
 {SURPLUS_CYCLES} cycles | none | flag, end
 age of the feedback | one period | none | `feedback_timeout_s` | flag, end

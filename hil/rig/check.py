@@ -71,6 +71,7 @@ class DeviceFinding:
     registers: tuple[Reading, ...] = ()  # what the registers of a PLC hold
     channels: tuple[ChannelReading, ...] = ()  # what the further channels of the rig file read at this device
     max_speed_rad_s: float | None = None  # the largest speed that a drive gives for itself [rad/s], where it does
+    dead_cycles: int | None = None  # from a command to the answer that shows it, where a stop proof has counted them
     questions: tuple[str, ...] = ()  # what only someone who knows the vehicle can confirm
 
 
@@ -147,6 +148,7 @@ def _inverter(link: CanLink, name: str, rig: Rig, prove_stop: bool, made: dict[s
             inverter.protections(),
             channels=tuple(_objects_read(inverter, name, rig)),
             max_speed_rad_s=max_speed_rad_s(inverter),
+            dead_cycles=inverter.dead_cycles,
         )
 
     address = _node(table)
