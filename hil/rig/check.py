@@ -100,13 +100,13 @@ def _can(rig: Rig, prove_stop: bool) -> tuple[DeviceFinding, ...]:
         m1, m2 = (_inverter(link, name, rig, prove_stop, made) for name in tables)
         if len(made) == len(tables):
             m2 = _or_failed("m2", m2.address, lambda: _one_shaft(m2, made["m1"], made["m2"]))
-            m2 = _or_failed("m2", m2.address, lambda: _one_bus(m2, made["m1"], made["m2"]))
+            m2 = _or_failed("m2", m2.address, lambda: _one_bus(m2, made["m1"], made["m2"], rig.plc.cob_ids))
         return bus, m1, m2
 
 
-def _one_bus(finding: DeviceFinding, m1: Inverter, m2: Inverter) -> DeviceFinding:
+def _one_bus(finding: DeviceFinding, m1: Inverter, m2: Inverter, gateway: Sequence[int]) -> DeviceFinding:
     """See that each COB-ID is used once."""
-    if shared := tuple(shared_cob_ids(m1, m2)):
+    if shared := tuple(shared_cob_ids(m1, m2, gateway)):
         return replace(finding, verdict=DeviceVerdict.DIFFERS, differences=(*finding.differences, *shared))
     return finding
 
