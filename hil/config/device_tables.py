@@ -247,7 +247,7 @@ class PlcTable(FileTable):
     host: Text
     port: TcpPort
     map: ExistingFile | None = None
-    cob_ids: tuple[CobId, ...] = ()
+    cob_ids: Annotated[tuple[CobId, ...], Field(strict=False)] = ()
     security: PlcSecurityTable | None = None
 
 
