@@ -67,6 +67,7 @@ class Inverter(InspectedInverter):
         self._power = PowerControl(self._sdo, settings, self._torque_objects(), self._error_code)
         self._before_arming: InverterFeedback | None = None
         self._armed = False
+        self.dead_cycles: int | None = None  # of the last `prove_stop`; None where it was not measured
 
     @property
     def latest(self) -> InverterFeedback | None:
@@ -261,11 +262,16 @@ class Inverter(InspectedInverter):
             self._power,
             self._monitor,
             self.configure,
-            lambda: self._send_command(Command.SHUTDOWN),
+            self._send_command,
+            self._await_state,
         )
         differences = tuple(proof.run(self._given, period_s))
-        self._proof = proof.seen
+        self._proof, self.dead_cycles = proof.seen, proof.dead_cycles
         return differences
+
+    def _await_state(self, after_ns: int, timeout_s: float) -> PowerState | None:
+        feedback = self.await_feedback(after_ns, timeout_s)
+        return None if feedback is None else feedback.state
 
     def disarm(self) -> None:
         """Take the torque to zero and leave OPERATION_ENABLED, confirmed by the statusword.

@@ -40,12 +40,15 @@ TIMING_S: Final = 0.01  # by so much torque and speed may be sampled apart [s]
 BLOCK_S: Final = 0.1  # time between two steps of the vehicle's filter [s]
 GRADE_PER_ROOT_M: Final = 0.004  # how far a grade goes from what it was, over the root of the way [1/m^0.5]
 WIND_RAD_S2: Final = 0.15  # how far the rest of the load goes in a second [rad/s²]
-UNKNOWN_LOAD_RAD_S2: Final = 2.0  # deviation of the first load [rad/s²]: a grade of 1.7 %
 GAIN_WALK: Final = 0.02  # how far the gain goes in a second
 STILL_RAD_S: Final = 0.15  # ten times the noise of a resolver's low-passed speed: nearer to zero a vehicle may stand
+WINDOW_RAD_S: Final = 0.3  # so slow a motor may be that its drive shows to stand
+
 UNWINDS_S: Final = 0.6
 """After a turn of the torque the shaft unwinds and winds up again: the motor's speed is not the vehicle's for so long,
 two time constants of the filter included."""
+
+GAP_RAD: Final = 0.05  # that a shaft may go through without a torque, there and back
 
 SLOW_RAD_S: Final = 0.5  # nearer to zero dry friction may turn at any time, so that a torque's gain is not to be had
 
@@ -134,22 +137,28 @@ class VehicleObserver:
         self._reading_rad_s = math.nan
         self._last_nm = 0.0
         self._since_turn_s = math.inf
+        self._released_rad = 0.0
         self._changed = True
-        self._x = np.array([math.nan, 0.0, 1.0, TWIST_S2])
-        self._p = np.diag([0.01, UNKNOWN_LOAD_RAD_S2**2, 1.0, TWIST_S2**2])
-        self._held_rad_s = 0.0
+        self._jump_rad_s = 0.0  # last change of the reading
+        self._direction = 0.0
+        self._begun_s = 0.0
+        self._unknown_rad_s2 = 0.25 * vehicle.most_load_rad_s2
+        low, high = vehicle.gains
+        self._x = np.array([math.nan, 0.0, 0.5 * (low + high), TWIST_S2])
+        self._p = np.diag([0.01, self._unknown_rad_s2**2, (0.5 * (high - low)) ** 2, TWIST_S2**2])
+        self._held_rad_s = self._stands_s = 0.0
         self._surprise = (0.0, 0.0)
 
     def take(self, torque_nm: float, speed_rad_s: float, reading_rad_s: float, cycles: int) -> Motion | None:
         """Take the torque of both drives, the low-passed speed, and the last reading; give the motion once a block."""
-        self._since_turn_s = 0.0 if torque_nm * self._last_nm < 0.0 else self._since_turn_s + cycles * self._period_s
-        self._last_nm = torque_nm or self._last_nm
+        self._look_for_turn(torque_nm, cycles)
         u = self._torque.take(torque_nm, cycles) / self._vehicle.inertia_kg_m2
         self._pushed += 0.5 * cycles * (u + self._last_u)
         self._last_u = u
         self._swing += cycles * (reading_rad_s - speed_rad_s) ** 2
-        self._changed |= reading_rad_s != self._reading_rad_s
-        self._reading_rad_s = reading_rad_s
+        if reading_rad_s != self._reading_rad_s:
+            self._jump_rad_s = 0.0 if math.isnan(self._reading_rad_s) else reading_rad_s - self._reading_rad_s
+            self._changed, self._reading_rad_s = True, reading_rad_s
         self._count += cycles
         if self._count < self._cycles:
             return None
@@ -163,27 +172,44 @@ class VehicleObserver:
         self._count, self._swing, self._pushed, self._changed = 0, 0.0, 0.0, False
         return motion
 
+    def _look_for_turn(self, torque_nm: float, cycles: int) -> None:
+        """See whether the torque has changed its sign, and how far the shaft may unwind by it."""
+        self._since_turn_s += cycles * self._period_s
+        if torque_nm * self._last_nm < 0.0:
+            before_rad = self._released_rad if self._since_turn_s < UNWINDS_S else 0.0
+            released_rad = GAP_RAD + TWIST_S2 * abs(torque_nm - self._last_nm) / self._vehicle.inertia_kg_m2
+            self._since_turn_s, self._released_rad = 0.0, max(before_rad, released_rad)
+        self._last_nm = torque_nm or self._last_nm
+
     def _step(self, dt_s: float, u: float, rate: float, speed_rad_s: float, noise_rad_s: float) -> Motion:
         if math.isnan(self._x[0]):
             self._x[0] = speed_rad_s
-        before, load = float(self._x[0]), float(self._x[1])
-        self._spread(dt_s, u, abs(speed_rad_s), turned=speed_rad_s * before < 0.0)
+        before = float(self._x[0])
+        stands = max(abs(speed_rad_s), abs(before)) < STILL_RAD_S or not self._changed
+        self._spread(dt_s, u)
+        self._begun_s += dt_s
+        if self._begun_s < UNWINDS_S:  # a vehicle let go on a grade: its load comes through the low-pass by and by
+            self._p[1, 1] += self._unknown_rad_s2**2 * dt_s / UNWINDS_S
+        if not stands:
+            self._walk(dt_s, abs(speed_rad_s), turned=speed_rad_s * before < 0.0)
+        slow, unwinds = abs(speed_rad_s) < SLOW_RAD_S, self._since_turn_s < UNWINDS_S
         x, h = self._x, np.array([1.0, 0.0, 0.0, rate])
         predicted = float(h @ x)
+        noise_rad_s = math.hypot(
+            noise_rad_s,
+            slow * ROLLING_RAD_S2 * dt_s,  # dry friction may have turned
+            unwinds * self._released_rad / (2.0 * SWING_S),
+        )
         k = self._p @ h
         s = float(h @ k) + noise_rad_s**2
-        if max(abs(speed_rad_s), abs(before)) < STILL_RAD_S or not self._changed:
-            self._stand(dt_s, u, load, speed_rad_s, noise_rad_s)
+        if stands:
+            self._stand(dt_s, u, speed_rad_s, noise_rad_s)
         else:
-            self._held_rad_s = 0.0
+            self._held_rad_s, self._stands_s, self._direction = 0.0, 0.0, math.copysign(1.0, speed_rad_s)
             off = speed_rad_s - predicted
-            if abs(speed_rad_s) < SLOW_RAD_S or self._since_turn_s < UNWINDS_S:
-                self._learn(k * SPEED_AND_LOAD, h, off, s)
-            else:
-                self._learn(k, h, off, s)
-                faster, slower = self._surprise
-                deviations = off / math.sqrt(s)
-                self._surprise = max(0.0, faster + deviations - 1.0), max(0.0, slower - deviations - 1.0)
+            self._learn(k * SPEED_AND_LOAD if slow or unwinds else k, h, off, s)
+            deviations, (faster, slower) = off / math.sqrt(s), self._surprise
+            self._surprise = max(0.0, faster + deviations - 1.0), max(0.0, slower - deviations - 1.0)
         (_, load, gain, _), (_, load_std, gain_std, _) = self._x.tolist(), np.sqrt(self._p.diagonal()).tolist()
         return Motion(
             speed_rad_s, predicted, math.sqrt(s), gain, gain_std, load, load_std, self._held_rad_s, max(self._surprise)
@@ -196,27 +222,45 @@ class VehicleObserver:
         self._x = self._x + k / s * off
         self._p = left @ self._p @ left.T + np.outer(k, k) * (noise / s**2)
 
-    def _spread(self, dt_s: float, u: float, speed_rad_s: float, turned: bool) -> None:
+    def _spread(self, dt_s: float, u: float) -> None:
         """Carry state and covariance over a block."""
         f = np.eye(4)
         f[0, 1], f[0, 2] = -dt_s, u * dt_s
         self._x = f @ self._x
         self._p = f @ self._p @ f.T
+        self._p[2, 2] += GAIN_WALK**2 * dt_s
+
+    def _walk(self, dt_s: float, speed_rad_s: float, turned: bool) -> None:
+        """Let the load go as far as it may in a block, on the way driven and by the wind."""
         travel_m = self._vehicle.travel_m_per_rad
         walk = WIND_RAD_S2**2 + (GRAVITY_M_S2 * GRADE_PER_ROOT_M) ** 2 / travel_m * speed_rad_s
         self._p[0, 0] += walk * dt_s**3 / 3.0
         self._p[0, 1] -= walk * dt_s**2 / 2.0
         self._p[1, 0] = self._p[0, 1]
         self._p[1, 1] += walk * dt_s + (ROLLING_RAD_S2**2 if turned else 0.0)  # friction changes its sign
-        self._p[2, 2] += GAIN_WALK**2 * dt_s
 
-    def _stand(self, dt_s: float, u: float, load: float, speed_rad_s: float, noise_rad_s: float) -> None:
-        """Take a speed that is zero, or stands to the last bit: only that it does not change is learnt from it."""
-        surely = max(abs(u - load) - ROLLING_RAD_S2, 0.0) * self._vehicle.gains[0]
-        self._held_rad_s += math.copysign(surely, u - load) * dt_s
-        load_var = max(self._p[1, 1], ROLLING_RAD_S2**2)
-        if abs(u) < 0.5 * ROLLING_RAD_S2 and abs(speed_rad_s) < STILL_RAD_S:
-            load, load_var = 0.0, ROLLING_RAD_S2**2  # it stands without a torque
+    def _stand(self, dt_s: float, u: float, speed_rad_s: float, noise_rad_s: float) -> None:
+        """Take a speed near zero, or one that stands to the last bit: a dead reading, or a drive at rest."""
+        load, load_std = float(self._x[1]), math.sqrt(self._p[1, 1])
+        if self._changed:  # the reading lives, so the vehicle stands: friction holds it, and a load like its torque
+            low, high = sorted(gain * u for gain in self._vehicle.gains)
+            load = min(max(load, low - ROLLING_RAD_S2), high + ROLLING_RAD_S2)
+            load_std, self._held_rad_s, self._stands_s = max(load_std, ROLLING_RAD_S2), 0.0, 0.0
+        else:
+            self._hold(dt_s, u, load, load_std)
+            noise_rad_s = math.hypot(noise_rad_s, WINDOW_RAD_S)
         self._x[:2] = speed_rad_s, load
         self._p[:2, :], self._p[:, :2] = 0.0, 0.0
-        self._p[0, 0], self._p[1, 1] = noise_rad_s**2, load_var
+        self._p[0, 0], self._p[1, 1] = noise_rad_s**2, load_std**2
+
+    def _hold(self, dt_s: float, u: float, load: float, load_std: float) -> None:
+        """Sum up by how much the speed should have changed since it stands, at least: its last jump, and by torque."""
+        if not self._stands_s:
+            self._held_rad_s = -self._jump_rad_s
+        self._stands_s += dt_s
+        push = math.copysign(1.0, u - load)
+        # where it moved that way friction is in the load; a load that is known too little is taken for friction alone
+        turns = 2.0 * ROLLING_RAD_S2 if push * self._direction < 0.0 else 0.0
+        met, spread = push * load + turns, 3.0 * math.hypot(load_std, WIND_RAD_S2)
+        holds = min(max(ROLLING_RAD_S2, met - spread), met + spread) if self._direction else ROLLING_RAD_S2
+        self._held_rad_s += push * max(push * self._vehicle.gains[0] * u - holds, 0.0) * dt_s

@@ -37,7 +37,8 @@ from drivers.capability.plan import DrivePlan
 from drivers.capability.table import EVENT_TIMER, Function
 from drivers.errors import ConfigMismatch, DeviceFault
 from drivers.inverter.check import Difference
-from drivers.inverter.cia402 import FAULT_STATES, TORQUE_STATES, PowerState
+from drivers.inverter.cia402 import FAULT_STATES, TORQUE_STATES, Command, PowerState
+from drivers.inverter.dead_time import dead_cycles
 from drivers.inverter.drive_settings import ABORT_CONNECTION, NO_ACTION, DriveSetting, chosen_code
 from drivers.inverter.power_control import PowerControl
 from drivers.inverter.settings import Acceptance, InverterSettings, acceptance_line
@@ -172,7 +173,7 @@ CONNECTION_LOST = (0x8100, 0x8200)  # error classes of CiA 301 that say so: comm
 
 
 class StopProof:
-    """The host of one drive, playing dead."""
+    """The host of one drive, playing dead; before that it counts how long an answer takes (`dead_cycles`)."""
 
     def __init__(
         self,
@@ -181,17 +182,20 @@ class StopProof:
         power: PowerControl,
         monitor: NodeMonitor,
         configure: Callable[[], None],
-        send_ready: Callable[[], None],
+        send: Callable[[Command], None],
+        await_state: Callable[[int, float], PowerState | None],
     ) -> None:
         self._link = link
         self._settings = settings
         self._power = power
         self._monitor = monitor
         self._configure = configure
-        self._send_ready = send_ready
+        self._send = send
+        self._await_state = await_state
         self._reacts = True
         self._longest_look_s = LONGEST_LOOK_S
         self.seen: dict[str, str] = {}
+        self.dead_cycles: int | None = None
 
     def run(self, given: tuple[DriveSetting, ...], period_s: float) -> Iterator[Difference]:
         """Play dead in both ways; the drive is disabled at the end."""
@@ -201,6 +205,9 @@ class StopProof:
         timers = [setting for setting in given if setting.subindex == EVENT_TIMER and setting.watches_host]
         consumers = [setting for setting in given if setting.index == CONSUMER_HEARTBEAT]
         try:
+            self._make_ready()
+            self.dead_cycles = dead_cycles(lambda command: self._exchange(command, period_s))
+            self._revive()
             if timers:
                 yield from self._without_commands(timers[0], period_s)
             else:
@@ -223,7 +230,7 @@ class StopProof:
 
     def _without_commands(self, timer: DriveSetting, period_s: float) -> Iterator[Difference]:
         self._make_ready()
-        self._send_ready()
+        self._send(Command.SHUTDOWN)
         self._link.sync()
         yield from self._noticed(
             "stop without commands", "rpdo_deadline", timer, timer.value, lambda: self._sync_and_wait(period_s)
@@ -232,7 +239,7 @@ class StopProof:
     def _without_anything(self) -> None:
         """Let a drive without a deadline be without commands and SYNC, and write down what it does by itself."""
         self._make_ready()
-        self._send_ready()
+        self._send(Command.SHUTDOWN)
         self._link.sync()
         self._watch(self._settings.rpdo_deadline_ms, _wait)
         state = self._power.state()
@@ -301,6 +308,14 @@ class StopProof:
     def _complained(self) -> bool:
         emergency = self._monitor.emergency
         return emergency is not None and emergency.code & 0xFF00 in CONNECTION_LOST
+
+    def _exchange(self, command: Command, period_s: float) -> PowerState | None:
+        """Spend one cycle as a run does."""
+        began_s = time.monotonic()
+        self._send(command)
+        state = self._await_state(self._link.sync(), period_s)
+        time.sleep(max(0.0, began_s + period_s - time.monotonic()))
+        return state
 
     def _sync_and_wait(self, period_s: float) -> None:
         self._link.sync()

@@ -35,8 +35,8 @@ def check(
         bool,
         typer.Option(
             "--prove-stop",
-            help="Stop heartbeat and RPDOs of drives that agree, and see that they stop. Configures them and leaves "
-            "them disabled; no torque is commanded. Not while another program drives them.",
+            help="Stop heartbeat and RPDOs of drives that agree, and see that they stop; count their dead time. "
+            "Configures them and leaves them disabled; no torque is commanded. Not while another program drives them.",
         ),
     ] = False,
     proof: Annotated[
@@ -155,6 +155,8 @@ def _details(finding: DeviceFinding) -> Iterator[str]:
     yield from finding.remarks
     yield from (f"not the same everywhere: {each}" for each in finding.commissioned)
     yield from (f"if the host fails, {each}" for each in finding.protections)
+    if finding.dead_cycles is not None:
+        yield f"dead time: {finding.dead_cycles} cycles from a command to the answer that shows it"
 
 
 def _register_table(finding: DeviceFinding) -> Table:
@@ -212,6 +214,7 @@ def _device(finding: DeviceFinding) -> dict[str, Any]:
         **({"questions": list(finding.questions)} if finding.questions else {}),
         "commissioned": [asdict(each) for each in finding.commissioned],
         "protections": [asdict(each) for each in finding.protections],
+        **({} if finding.dead_cycles is None else {"dead_cycles": finding.dead_cycles}),
         **({"registers": [_register(each) for each in finding.registers]} if finding.registers else {}),
         **({"channels": [_channel(each) for each in finding.channels]} if finding.channels else {}),
     }

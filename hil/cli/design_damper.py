@@ -26,6 +26,10 @@ def damper(
     recording: Annotated[
         Path | None, typer.Option(metavar="REC", help="A run of this rig: the dead time of bus and inverters.")
     ] = None,
+    check: Annotated[
+        Path | None,
+        typer.Option(metavar="JSON", help="What hil check --prove-stop --out kept: the dead time of both inverters."),
+    ] = None,
     share: Annotated[
         float, typer.Option(min=0.01, max=1.0, help="Share of both torque limits that it may take.")
     ] = 0.25,
@@ -47,7 +51,7 @@ def damper(
     require_folder(out)
     order = asked(rig, target, share)
     region, known = region_of(model, estimate)
-    found = design_damper(region, timing_of(known, order.period_s, recording, tell), order.demand)
+    found = design_damper(region, timing_of(known, order.period_s, recording, tell, check), order.demand)
     file = file_of(found, region, order, str(model))
     publish(
         out,

@@ -115,6 +115,10 @@ NodeId = Annotated[int, Field(ge=1, le=127)]
 """Of CANopen."""
 
 
+CobId = Annotated[int, Field(ge=0, le=0x7FF)]
+"""Of 11 bits."""
+
+
 OptionCode = Annotated[int, Field(ge=-32768, le=32767)]
 """INTEGER16; the negative codes are the maker's own."""
 
@@ -233,11 +237,15 @@ class PlcSecurityTable(CredentialsTable):
 
 
 class PlcTable(FileTable):
-    """The PLC. ``map`` is relative to the rig file; without it the shipped ``plc.toml`` counts."""
+    """The PLC. ``map`` is relative to the rig file; without it the shipped ``plc.toml`` counts.
+
+    ``cob_ids`` are those under which its gateway, where it has one, sends on the rig's CAN bus.
+    """
 
     host: Text
     port: TcpPort
     map: ExistingFile | None = None
+    cob_ids: Annotated[tuple[CobId, ...], Field(strict=False)] = ()
     security: PlcSecurityTable | None = None
 
 

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from scipy.special import chdtri
 
+from drivers.inverter.dead_time import MOST_CYCLES
 from estimator.damper import MOST_SENSITIVE, PARAMETERS, Damper, Demand, Loop, Region, Timing, points
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Element
@@ -31,6 +32,8 @@ from hil.recording.formats import read_table
 from hil.report.diagnosis_json import SCHEMA as DIAGNOSIS
 from hil.report.identification_input import PhysicalValue, json_object, physical_value, physical_values, table
 
+CHECK = "hil.check/1"  # schema of what `hil check` prints and keeps
+DRIVES = 2
 USUAL_PERIOD_S = 0.01
 Z95 = 1.96
 
@@ -118,18 +121,39 @@ def _known(path: Path) -> dict[str, PhysicalValue]:
     return found
 
 
-def timing_of(model: DrivelineModel, period_s: float, recording: Path | None, tell: Callable[[str], None]) -> Timing:
-    """Return when a torque acts: one period for the bus, what a recording shows, and the model's own delay and lag.
+def timing_of(
+    model: DrivelineModel,
+    period_s: float,
+    recording: Path | None,
+    tell: Callable[[str], None],
+    check: Path | None = None,
+) -> Timing:
+    """Return when a torque acts: what was measured and a cycle, and the model's own delay and lag.
 
-    The speed of one SYNC makes the torque that the next one puts into effect.
+    The cycle: the speed of one SYNC makes the torque that the next one puts into effect. Measured: what a stop proof
+    has counted of the drives, and how late the torque of a recording follows; the greater of both where both are given.
     """
     effects = {name: {key: one.value for key, one in values.items()} for name, values in model.effects.items()}
     late_s = effects.get("transport_delay", {}).get("delay_s", 0.0)
     lag_s = effects.get("actuator_lag", {}).get("time_constant_s", 0.0)
-    cycles = 0 if recording is None else _cycles_late(recording, period_s)
-    said = "taken for one period: give --recording" if recording is None else f"{recording}: {cycles} cycles more"
-    tell(f"dead time of bus and inverters: {said}")
+    measured = {} if recording is None else {recording: _cycles_late(recording, period_s)}
+    measured |= {} if check is None else {check: _cycles_counted(check)}
+    cycles = max(measured.values(), default=0)
+    said = "; ".join(f"{path}: {count} cycles and one" for path, count in measured.items())
+    tell(f"dead time of bus and inverters: {said or 'taken for one period: give --check or --recording'}")
     return Timing(period_s, (1 + cycles) * period_s + late_s, lag_s)
+
+
+def _cycles_counted(path: Path) -> int:
+    """Return the most cycles that a stop proof has counted from a command to the answer of a drive."""
+    content = json_object(path)
+    devices = content.get("devices") if content.get("schema") == CHECK else None
+    counted = [each.get("dead_cycles") for each in devices or () if isinstance(each, dict)]
+    counted = [each for each in counted if type(each) is int and 0 <= each <= MOST_CYCLES]
+    if len(counted) < DRIVES:
+        expected = f"dead_cycles of both drives, as hil check --prove-stop --out {path.name} counts them"
+        raise FileProblem(path, f"devices | expected {expected} | got those of {len(counted)}")
+    return max(counted)
 
 
 def _cycles_late(path: Path, period_s: float) -> int:

@@ -40,6 +40,7 @@ class Devices:
     plc: Plc
     channels: Channels
     vehicle: Vehicle | None = None
+    gateway_cob_ids: tuple[int, ...] = ()  # what the PLC's gateway sends on the bus
 
 
 @contextmanager
@@ -55,7 +56,8 @@ def open_devices(rig: Rig, patience_s: float = 0.0) -> Iterator[Devices]:
         require_sole_host(link, rig, min(m1.settings.host_heartbeat_s, m2.settings.host_heartbeat_s))
         with connected_plc(rig.plc, loop, patience_s) as plc:
             channels = Channels(rig.channels, rig.register_map, {"m1": m1, "m2": m2}, loop, plc)
-            yield Devices(link, m1, m2, TorqueGuard(rig.guard_limits), loop, plc, channels, rig.vehicle.vehicle)
+            guard = TorqueGuard(rig.guard_limits)
+            yield Devices(link, m1, m2, guard, loop, plc, channels, rig.vehicle.vehicle, rig.plc.cob_ids)
 
 
 def _watching(settings: InverterSettings, patience_s: float) -> InverterSettings:

@@ -71,6 +71,7 @@ class DeviceFinding:
     registers: tuple[Reading, ...] = ()  # what the registers of a PLC hold
     channels: tuple[ChannelReading, ...] = ()  # what the further channels of the rig file read at this device
     max_speed_rad_s: float | None = None  # the largest speed that a drive gives for itself [rad/s], where it does
+    dead_cycles: int | None = None  # from a command to the answer that shows it, where a stop proof has counted them
     questions: tuple[str, ...] = ()  # what only someone who knows the vehicle can confirm
 
 
@@ -99,13 +100,13 @@ def _can(rig: Rig, prove_stop: bool) -> tuple[DeviceFinding, ...]:
         m1, m2 = (_inverter(link, name, rig, prove_stop, made) for name in tables)
         if len(made) == len(tables):
             m2 = _or_failed("m2", m2.address, lambda: _one_shaft(m2, made["m1"], made["m2"]))
-            m2 = _or_failed("m2", m2.address, lambda: _one_bus(m2, made["m1"], made["m2"]))
+            m2 = _or_failed("m2", m2.address, lambda: _one_bus(m2, made["m1"], made["m2"], rig.plc.cob_ids))
         return bus, m1, m2
 
 
-def _one_bus(finding: DeviceFinding, m1: Inverter, m2: Inverter) -> DeviceFinding:
+def _one_bus(finding: DeviceFinding, m1: Inverter, m2: Inverter, gateway: Sequence[int]) -> DeviceFinding:
     """See that each COB-ID is used once."""
-    if shared := tuple(shared_cob_ids(m1, m2)):
+    if shared := tuple(shared_cob_ids(m1, m2, gateway)):
         return replace(finding, verdict=DeviceVerdict.DIFFERS, differences=(*finding.differences, *shared))
     return finding
 
@@ -147,6 +148,7 @@ def _inverter(link: CanLink, name: str, rig: Rig, prove_stop: bool, made: dict[s
             inverter.protections(),
             channels=tuple(_objects_read(inverter, name, rig)),
             max_speed_rad_s=max_speed_rad_s(inverter),
+            dead_cycles=inverter.dead_cycles,
         )
 
     address = _node(table)

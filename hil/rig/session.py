@@ -98,8 +98,8 @@ def _fit(devices: Devices, plan: Plan) -> PlcStatus:
 def _configure(devices: Devices, stop: StopRequest) -> None:
     for inverter in (devices.m1, devices.m2):
         inverter.wake()
-    if shared := tuple(shared_cob_ids(devices.m1, devices.m2)):
-        raise ConfigMismatch(f"{'; '.join(map(str, shared))}. Give each drive a data sheet with COB-IDs of its own.")
+    if shared := tuple(shared_cob_ids(devices.m1, devices.m2, devices.gateway_cob_ids)):
+        raise ConfigMismatch(f"{'; '.join(map(str, shared))}. Give each COB-IDs of its own.")
     for inverter in (devices.m1, devices.m2):
         stop.raise_if_requested()
         inverter.configure()

@@ -3,9 +3,14 @@
 Drawn: the vehicle's mass (half to one and a half times the rig file's), its line, gap and friction, a road whose grade
 changes with the way (up to 6 %, and to 60 % of what the experiment's torque climbs; level for pulses and rest), waves
 in it, wind, every kind of experiment, both torque modes, PRBS by host and PLC, 0 to 3 % lost PDOs, a host that is late,
-speeds from 5 to 80 rad/s, a resolver's noise up to three times as large, and two drives of different makes: other
-filters of the speed, other steps of the torque, a clock of its own. A run that this machine was too busy for is counted
+speeds from 3 to 80 rad/s, a resolver's noise up to three times as large, and two drives of different makes: other
+filters of the speed, other steps of the torque, a clock of its own; half of them read a speed below 0.3 rad/s as zero,
+and begin on the level. A run that this machine was too busy for is counted
 by itself.
+
+An approach ends where the speed has become steady, which it does not in gusts or where the grade changes. So in three
+of four runs the air is still and the grade as it begins until the measured part does; in the fourth the approach may
+end by itself, and is counted by itself.
 """
 
 from __future__ import annotations
@@ -15,7 +20,6 @@ import sys
 import tempfile
 import uuid
 from collections import Counter
-from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -28,12 +32,14 @@ from drivers.plc.types import PrbsSource
 from hil.config.rig_file import Rig
 from hil.errors import RunAborted
 from hil.rig.build import open_devices
+from hil.rig.experiments.base import Phase
 from hil.rig.pacing import FREE_PATIENCE_S, FreePacer, Tick, period_ns
 from hil.rig.plan import plan_run
 from hil.rig.session import run_plan
 from hil.rig.stop import StopRequest
 from hil.simulator.addresses import Address, with_addresses
 from hil.simulator.fault_table import rig_faults
+from hil.simulator.inverter_node import InverterNode
 from hil.simulator.rig_server import RigServer
 from tests.campaigns.faults.rig import campaign_rig
 from tests.campaigns.faults.runs import asked_for
@@ -44,21 +50,30 @@ TRAVEL_M_PER_RAD = 0.086
 GRAVITY_M_S2 = 9.81
 TORQUE_NM = 1000.0  # of the experiments, both inverters together
 STEPS = 10  # of integration in a cycle
+SHARPEST_M = 300.0
+"""Least radius of a crest or sag: 0.33 % of grade per metre, as in a street of a town."""
+
+LEAST_LAG_S = 0.001  # of a drive's filter of its speed
 BUSY = "too busy"
 OWN_END = ("approach", "standstill test")
 """How an experiment ends that does not get where it should: by itself, and not by the supervision."""
 
 
 class Road:
-    """The grade over the way: straight pieces of 5 to 40 m between random grades, and waves."""
+    """The grade over the way, curved with radii of `SHARPEST_M` and more, and waves."""
 
     def __init__(self, rng: np.random.Generator, most: float) -> None:
         lengths = rng.uniform(5.0, 40.0, 400)
-        lengths[0] = rng.uniform(0.0, 100.0)  # a speed is to be reached on the first
         self._at_m = np.concatenate([[0.0], np.cumsum(lengths)])
-        self._grades = rng.uniform(-most, most, self._at_m.size)
-        self._grades[1] = self._grades[0]
+        grades = [float(rng.uniform(-most, most))]
+        for length_m, bend in zip(lengths.tolist(), rng.uniform(-1.0, 1.0, lengths.size).tolist(), strict=True):
+            grades.append(min(max(grades[-1] + bend * length_m / SHARPEST_M, -most), most))
+        self._grades = np.array(grades)
         self._wave, self._length_m = rng.uniform(0.0, 0.002), rng.uniform(0.5, 5.0)
+
+    def begin_level(self) -> None:
+        """Have no grade where the run begins."""
+        self._grades -= self._grades[0]
 
     def grade(self, way_m: float) -> float:
         way_m = abs(way_m)
@@ -74,6 +89,7 @@ class Vehicle:
         self._motor = float(rng.uniform(1.0, 3.0))
         self._body = self.mass * INERTIA_KG_M2 - self._motor
         self._k, self._c = float(rng.uniform(2000.0, 6000.0)), float(rng.uniform(3.0, 15.0))
+        self.calm = bool(rng.random() < 0.75)
         self._gap = 0.5 * float(rng.uniform(0.0, 0.05)) * bool(rng.random() < 0.5)
         weight_nm = self.mass * INERTIA_KG_M2 * GRAVITY_M_S2 / TRAVEL_M_PER_RAD
         self._weight_nm, self._friction_nm = weight_nm, weight_nm * float(rng.uniform(0.004, 0.01))
@@ -85,8 +101,13 @@ class Vehicle:
     def speed_rad_s(self) -> float:
         return self._speeds[0]
 
+    def follow(self, phase: Phase, time_s: float) -> None:
+        """See the run begin its measured part: from there on the grade changes and the wind blows."""
+        self.calm &= phase is Phase.APPROACH
+
     def advance(self, torque_nm: tuple[float, float], duration_s: float) -> None:
-        self._wind_nm += -self._wind_nm * duration_s / 3.0 + self._gusts_nm * math.sqrt(duration_s) * self._rng.normal()
+        gust_nm = 0.0 if self.calm else self._gusts_nm * math.sqrt(duration_s) * self._rng.normal()
+        self._wind_nm += -self._wind_nm * duration_s / 3.0 + gust_nm
         load_nm = self._wind_nm + self._weight_nm * self.road.grade(self._way_m)
         step_s, total_nm = duration_s / STEPS, sum(torque_nm)
         motor, body = self._speeds
@@ -98,7 +119,7 @@ class Vehicle:
             rubbed = step_s * self._friction_nm / self._body  # dry friction: it stops, and does not turn
             body = 0.0 if abs(body) <= rubbed else body - math.copysign(rubbed, body)
             self._twist += step_s * (motor - body)
-            self._way_m += step_s * body * TRAVEL_M_PER_RAD
+            self._way_m += 0.0 if self.calm else step_s * body * TRAVEL_M_PER_RAD
         self._speeds = [motor, body]
 
 
@@ -119,9 +140,9 @@ class LatePacer(FreePacer):
 
 def experiments(rng: np.random.Generator) -> dict[str, dict[str, Any]]:
     """One of each kind, at a random speed."""
-    speed = float(rng.uniform(5.0, 80.0))
+    speed = float(np.exp(rng.uniform(np.log(3.0), np.log(80.0))))
     common = {"torque_nm": TORQUE_NM, "share_m1": 0.5, "slew_nm_per_s": 2000.0, "duration_s": 6.0}
-    common["approach_timeout_s"] = 20.0
+    common["approach_timeout_s"] = 60.0
     return {
         "cruise": {**common, "speed_rad_s": speed},
         "tip": {**common, "speed_rad_s": speed, "step_nm": 300.0, "step_s": float(rng.uniform(0.3, 2.0))},
@@ -158,19 +179,32 @@ def drawn_rig(rng: np.random.Generator, rig: Rig, name: str) -> tuple[Rig, list[
     return made, faults
 
 
-def _filter_speed(server: RigServer, lag_s: float, period_s: float) -> None:
-    """Give m2 a filter of its speed that m1 has not."""
-    node = server._slaves._m2
-    assert node is not None
-    sensors = node._device._sensors
-    sample: Callable[[float, float, int], None] = sensors.sample
-    left, held = math.exp(-period_s / lag_s), [0.0]
+class SpeedReading:
+    """How a drive reads its speed: through a filter, and as zero within a window around it."""
 
-    def filtered(speed_rad_s: float, torque: float, step: int) -> None:
-        held[0] = speed_rad_s + left * (held[0] - speed_rad_s)
-        sample(held[0], torque, step)
+    def __init__(self, lag_s: float, window_rad_s: float, period_s: float) -> None:
+        self._left, self._window_rad_s = math.exp(-period_s / lag_s), window_rad_s
+        self._filtered_rad_s = 0.0
 
-    sensors.sample = filtered  # type: ignore[method-assign]
+    def filtered(self, speed_rad_s: float) -> float:
+        """Take the speed of the next cycle [rad/s]."""
+        self._filtered_rad_s = speed_rad_s + self._left * (self._filtered_rad_s - speed_rad_s)
+        return self._filtered_rad_s
+
+    def shown(self, reading_rad_s: float) -> float:
+        return 0.0 if abs(reading_rad_s) < self._window_rad_s else reading_rad_s
+
+    def have(self, node: InverterNode | None) -> None:
+        """Have a simulated drive read so."""
+        assert node is not None
+        sensors = node._device._sensors
+        sample, scale = sensors.sample, sensors._velocity_scale
+
+        def read(speed_rad_s: float, torque: float, step: int) -> None:
+            sample(self.filtered(speed_rad_s), torque, step)
+            sensors.speed = scale.to_raw(self.shown(scale.to_rad_s(sensors.speed)), "reading")
+
+        sensors.sample = read  # type: ignore[method-assign]
 
 
 def healthy_run(rig: Rig, seed: tuple[int, int]) -> tuple[str, str, str]:
@@ -178,20 +212,24 @@ def healthy_run(rig: Rig, seed: tuple[int, int]) -> tuple[str, str, str]:
     rng = np.random.default_rng(seed)
     name = str(rng.choice(["cruise", "tip", "reversal", "pulses", "rest"]))
     made, faults = drawn_rig(rng, rig, name)
-    vehicle, lag_s = Vehicle(rng, level=name in ("pulses", "rest")), float(rng.uniform(0.001, 0.03))
-    late = float(rng.choice([0.0, 0.003]))
+    vehicle, lag_s = Vehicle(rng, level=name in ("pulses", "rest")), float(rng.uniform(LEAST_LAG_S, 0.03))
+    late, window_rad_s = float(rng.choice([0.0, 0.003])), float(rng.choice([0.0, 0.3]))
+    if window_rad_s:
+        vehicle.road.begin_level()  # it can't be told from a dead reading before it has moved
     mode = made.inverters.m1.mode.name.lower()
     what = f"mass {vehicle.mass:.2f}, PRBS {made.prbs.source.value}, {mode}, {', '.join(faults)}, host late {late}"
+    what += f", zero window {window_rad_s}"
     server = RigServer(
         vehicle, made, f"virtual:{uuid.uuid4()}", Address("127.0.0.1", 0), rig_faults(faults, made.period_s)
     )
     with server:
-        _filter_speed(server, lag_s, made.period_s)
+        for node, filter_s in ((server._slaves._m1, LEAST_LAG_S), (server._slaves._m2, lag_s)):
+            SpeedReading(filter_s, window_rad_s, made.period_s).have(node)
         at = with_addresses(made, server.bus_url, str(server.modbus))
         try:
             with open_devices(at, FREE_PATIENCE_S) as devices:
                 pacer = LatePacer(period_ns(at.period_s), rng, late)
-                run_plan(devices, plan_run(at, name), pacer, Samples(), StopRequest(), lambda phase, time_s: None)
+                run_plan(devices, plan_run(at, name), pacer, Samples(), StopRequest(), vehicle.follow)
         except (DriverError, RunAborted) as error:
             return name, what, str(error)
     return name, what, ""

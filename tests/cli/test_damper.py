@@ -13,7 +13,7 @@ from estimator.damper import Timing
 from hil.cli.main import run
 from hil.config.model_file import read_model
 from hil.design.damper import timing_of
-from hil.errors import UsageError
+from hil.errors import FileProblem, UsageError
 from hil.recording.formats import read_table
 from tests.cli.bus_model import MODEL
 from tests.cli.conftest import EXAMPLE
@@ -86,6 +86,17 @@ def test_the_dead_time_is_measured_where_the_torque_changes(tmp_path: Path) -> N
         timing_of(model, 0.01, tmp_path / "still.csv", print)
     with pytest.raises(UsageError, match=r"a row every 0.02 s, .*, got a row every 0.01 s"):
         timing_of(model, 0.02, tmp_path / "run.csv", print)
+
+
+def test_the_dead_time_that_a_stop_proof_counted_is_designed_for_with_a_cycle_more(tmp_path: Path) -> None:
+    (tmp_path / "bus.toml").write_text(MODEL)
+    model, proof = read_model(tmp_path / "bus.toml").model, tmp_path / "proof.json"
+    devices = [{"name": "can"}, {"name": "m1", "dead_cycles": 1}, {"name": "m2", "dead_cycles": 2}]
+    proof.write_text(json.dumps({"schema": "hil.check/1", "devices": devices}))
+    assert timing_of(model, 0.01, None, print, proof) == Timing(0.01, pytest.approx(0.03))
+    proof.write_text(json.dumps({"schema": "hil.check/1", "devices": devices[:2]}))
+    with pytest.raises(FileProblem, match=r"expected dead_cycles of both drives, .* got those of 1"):
+        timing_of(model, 0.01, None, print, proof)
 
 
 @pytest.mark.parametrize(

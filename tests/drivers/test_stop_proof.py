@@ -1,12 +1,14 @@
 """A dead host is noticed, or it is said that it is not; nothing of it commands torque."""
 
+from collections import deque
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from drivers.errors import ConfigMismatch, DeviceFault
-from drivers.inverter.cia402 import PowerState
+from drivers.inverter.cia402 import Command, PowerState, next_state
+from drivers.inverter.dead_time import MOST_CYCLES, dead_cycles
 from drivers.inverter.settings import Acceptance
 from hil.simulator.faults import InverterFaults
 from tests.drivers.can_bench import M1, SIMULATED_M1, Bench, bench
@@ -29,6 +31,18 @@ def test_drive_that_watches_its_host_is_proved_to_stop_without_any_torque() -> N
         assert len(seen) > 5
         assert set(seen) == {0.0}
         assert rig.m1._power.state() is PowerState.SWITCH_ON_DISABLED
+        assert rig.m1.dead_cycles == 0  # the answer to a SYNC shows what it has put into effect
+
+
+@pytest.mark.parametrize(("late", "counted"), [(0, 0), (3, 3), (MOST_CYCLES + 1, None)])
+def test_the_dead_time_is_the_most_cycles_until_an_answer_shows_the_command(late: int, counted: int | None) -> None:
+    shown = deque([PowerState.READY_TO_SWITCH_ON] * (late + 1), maxlen=late + 1)
+
+    def exchange(command: Command) -> PowerState:
+        shown.append(next_state(shown[-1], command))
+        return shown[0]
+
+    assert dead_cycles(exchange) == counted
 
 
 @pytest.mark.parametrize("abort_connection", [1, 2, 3])

@@ -1,5 +1,6 @@
 """`hil check`: the rig as described, the proof that the drives stop, and what somebody has accepted."""
 
+import re
 from pathlib import Path
 
 import pytest
@@ -40,6 +41,27 @@ def test_cob_ids_that_both_drives_would_use_are_named_before_anything_is_armed(t
     assert "0x182, which m1 uses" in str(m2.differences[-1])
 
 
+@pytest.mark.parametrize(
+    ("cob_id", "said"),
+    [
+        (
+            0x201,
+            "inverter m1 (node 1): COB-ID of its RPDO 0x1400 is 0x201, which the PLC's gateway uses for its messages",
+        ),
+        (0x582, "inverter m2 (node 2): COB-ID of its SDO answer is 0x582, which the PLC's gateway uses"),
+        (0x080, "plc: COB-ID of its messages is 0x080, which this program uses for its SYNC"),
+    ],
+)
+def test_a_cob_id_of_the_plc_s_gateway_that_is_used_is_named_before_anything_is_armed(cob_id: int, said: str) -> None:
+    with served(changed(small_rig(), {"plc": {"cob_ids": (0x3A0, cob_id)}})) as (server, rig):
+        m2 = check_rig(rig)[2]
+        with pytest.raises(ConfigMismatch, match=re.escape(said)):
+            run_once(rig, Samples())
+        assert_disarmed(server.bus_url, 1, 2)
+    assert str(m2.differences[0]).startswith(said)
+    assert m2.verdict is DeviceVerdict.DIFFERS
+
+
 def test_missing_bus_is_one_fault_and_the_plc_is_still_checked() -> None:
     with served() as (_, rig):
         findings = check_rig(changed(rig, {"can": {"url": "ws://127.0.0.1:9/"}}))
@@ -73,6 +95,7 @@ def test_both_drives_prove_it_and_are_disabled_after_it() -> None:
         findings = check_rig(rig, prove_stop=True)
         assert_disarmed(server.bus_url, 1, 2)
     assert {finding.verdict for finding in findings} == {DeviceVerdict.AGREES}
+    assert [finding.dead_cycles for finding in findings] == [None, 0, 0, None]
 
 
 def test_a_drive_that_ignores_what_watches_its_host_fails_and_the_other_is_still_proved() -> None:

@@ -27,6 +27,9 @@ import numpy as np
 
 from drivers.canopen.can_link import SYNC_COB_ID, CanLink
 from drivers.inverter.drive_supervision import NO_TORQUE_S
+from drivers.inverter.observer import BLOCK_S
+from drivers.inverter.supervision import MOST_HELD_RAD_S
+from drivers.inverter.vehicle import ROLLING_RAD_S2
 from drivers.plc.plc import Plc
 from drivers.plc.register import Register, RegisterKind
 from drivers.plc.register_map import RegisterMap
@@ -71,6 +74,12 @@ PLAIN = ("PLC's", "slow slope")
 """Beginnings of kinds that are tried on rigs of their own: without what follows nothing goes wrong."""
 
 SPEED_SLACK_RAD_S = 3.0
+
+DEAD_READINGS = ("both speeds zero", "both speeds stuck")
+"""What a vehicle does that friction holds. How fast one without any gets by then is no measure: it is told by what no
+friction would hold, `ROLLING_RAD_S2` of a full vehicle, and how far that goes, `MOST_HELD_RAD_S`."""
+
+FULL = 1.5  # times the inertia: the rig file's `inertia_full_kg_m2`
 INERTIA_KG_M2 = 100.0
 
 
@@ -89,6 +98,7 @@ class Man:
         self._ramp_nm = [0.0, 0.0]
         self.step_nm = math.inf
         self.cycle = 0
+        self.fault_cycle = fault.at
         self.asked_nm: list[tuple[float, float]] = []
         self.on_fault: Callable[[], None] = lambda: None
         self.added_nm: Callable[[], tuple[float, float]] = lambda: (0.0, 0.0)
@@ -305,8 +315,21 @@ def _judge_shaft(rig: Rig, man: Man, shaft: Shaft, fastest_rad_s: float, outcome
         if length > LATE_CYCLES:
             outcome.problems.append(f"m{drive + 1} was wrong by {impulse:.1f} Nm s, {length:.0f} cycles too many")
     fastest = max(map(abs, shaft.speeds_rad_s), default=0.0)
-    if fastest_rad_s and fastest > 1.3 * fastest_rad_s + SPEED_SLACK_RAD_S:
+    if man.kind in DEAD_READINGS:
+        _judge_dead_reading(rig, shaft, man, outcome)
+    elif fastest_rad_s and fastest > 1.3 * fastest_rad_s + SPEED_SLACK_RAD_S:
         outcome.problems.append(f"the shaft turned at {fastest:.1f} rad/s, {fastest_rad_s:.1f} without a fault")
+
+
+def _judge_dead_reading(rig: Rig, shaft: Shaft, man: Man, outcome: Outcome) -> None:
+    """Sum up what no friction holds: a vehicle at rest that reads zero, or a speed that stands, is as good as dead."""
+    held_nm, late = ROLLING_RAD_S2 * INERTIA_KG_M2 * FULL, 0
+    gained_rad_s = 0.0
+    for given in shaft.torques_nm[man.fault_cycle :]:
+        late += gained_rad_s >= 2.0 * MOST_HELD_RAD_S
+        gained_rad_s += max(abs(sum(given)) - held_nm, 0.0) / (INERTIA_KG_M2 * FULL) * rig.period_s
+    if late > LATE_CYCLES + BLOCK_S / rig.period_s:
+        outcome.problems.append(f"a dead reading went on for {gained_rad_s:.2f} rad/s that no friction holds")
 
 
 def _judge_end(rig: Rig, server: RigServer, fault: Fault, outcome: Outcome) -> None:
