@@ -96,8 +96,15 @@ def _recorded(candidate: Candidate, line: DrivelineModel, record: Record) -> lis
 def _like(output: Record, record: Record) -> Record:
     """Return a further output of a recording; until it is simulated it has the size that it was seen to have."""
     size = np.full(record.time_s.size, np.abs(output.output[output.okay]).max())
-    what = {"kind": output.kind, "location": output.location, "label": output.label, "unit": output.unit}
-    return replace(record, output=size, lead=record, **what)
+    return replace(
+        record,
+        output=size,
+        lead=record,
+        kind=output.kind,
+        location=output.location,
+        label=output.label,
+        unit=output.unit,
+    )
 
 
 def distance(truth: Candidate, rival: Candidate, line: DrivelineModel, record: Record) -> float:
