@@ -148,8 +148,8 @@ def _cycles_counted(path: Path) -> int:
     """Return the most cycles that a stop proof has counted from a command to the answer of a drive."""
     content = json_object(path)
     devices = content.get("devices") if content.get("schema") == CHECK else None
-    counted = [each.get("dead_cycles") for each in devices or () if isinstance(each, dict)]
-    counted = [each for each in counted if type(each) is int and 0 <= each <= MOST_CYCLES]
+    given = [each.get("dead_cycles") for each in devices or () if isinstance(each, dict)]
+    counted = [int(each) for each in given if type(each) is int and 0 <= each <= MOST_CYCLES]
     if len(counted) < DRIVES:
         expected = f"dead_cycles of both drives, as hil check --prove-stop --out {path.name} counts them"
         raise FileProblem(path, f"devices | expected {expected} | got those of {len(counted)}")
