@@ -190,3 +190,4 @@ def _change(model: Any, data: Any, bus: Bus, effect: str, sizes: Sizes, time_s: 
         model.tendon_stiffness[0] = bus.k * (1.0 + sizes["step"] * on)
     elif effect == "inertia_change" and time_s >= sizes["at_s"]:
         model.body_inertia[model.body("load").id] = bus.J_L * (1.0 + sizes["share"])
+        model.dof_M0[load] = bus.J_L * (1.0 + sizes["share"])  # of a body on one hinge the engine takes this one
