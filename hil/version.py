@@ -1,12 +1,17 @@
-"""The version of this program and the commit that it was made from, as results carry them."""
+"""The version of this program, the commit that it was made from, as results carry them, and its optional libraries."""
 
 import os
+import re
 import subprocess
 from functools import cache
+from importlib.metadata import PackageNotFoundError, requires
 from pathlib import Path
 from typing import Final
 
 __version__ = "0.3.0"
+
+DISTRIBUTION: Final = "hil-driveline"
+"""Name of this project where it is installed."""
 
 PACKAGE: Final = Path(__file__).resolve().parent
 COMMIT_FILE: Final = "commit.txt"
@@ -26,6 +31,20 @@ def _commit() -> str:
     if kept.is_file():
         return kept.read_text("ascii").strip()
     return commit_of(PACKAGE.parent)
+
+
+def install_hint(extra: str) -> str:
+    """Return the command that installs the libraries of an extra of pyproject.toml, such as ``fmu``.
+
+    They are named themselves, with the versions of the installed copy: no package index has this project.
+    """
+    try:
+        lines = requires(DISTRIBUTION) or []
+    except PackageNotFoundError:
+        lines = []
+    of_extra = (line.partition(";") for line in lines)
+    needed = [f"'{library.strip()}'" for library, _, of in of_extra if re.fullmatch(rf" *extra == .{extra}.", of)]
+    return f"pip install {' '.join(needed)}" if needed else f"pip install '.[{extra}]' in the folder of this project"
 
 
 def commit_of(checkout: Path) -> str:

@@ -37,6 +37,15 @@ def test_a_checkout_has_its_commit_and_says_where_the_program_was_changed(checko
     assert version.commit_of(checkout) == f"{head}, changed"
 
 
+def test_a_missing_library_is_installed_by_its_own_name_since_no_index_has_this_project(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    assert re.fullmatch(r"pip install '(?i:fmpy)>=[\d.]+'", version.install_hint("fmu"))
+    assert version.install_hint("formats").count("'") == 6
+    monkeypatch.setattr(version, "DISTRIBUTION", "not-installed-here")
+    assert version.install_hint("fmu") == "pip install '.[fmu]' in the folder of this project"
+
+
 def test_no_commit_of_a_repository_that_the_program_only_lies_in(checkout: Path) -> None:
     (checkout / "site-packages").mkdir()
     assert version.commit_of(checkout / "site-packages") == ""

@@ -54,10 +54,10 @@ ALONE: Final = (0.0,)
 class DriveRecord(NamedTuple):
     """One drive in one cycle: its command, its answer (None without), TPDOs of its seldomest and commonest kind."""
 
-    commanded_nm: float
-    feedback: InverterFeedback | None
-    fewest: int = 1
-    most: int = 1
+    commanded_nm: float  # [Nm], base and PRBS
+    feedback: InverterFeedback | None  # of this cycle's SYNC
+    fewest: int = 1  # TPDOs of the seldomest kind
+    most: int = 1  # TPDOs of the commonest kind
     offset_nm: float = 0.0  # of the command, what no slope of the drive holds
 
 

@@ -188,7 +188,7 @@ class VehicleObserver:
         stands = max(abs(speed_rad_s), abs(before)) < STILL_RAD_S or not self._changed
         self._spread(dt_s, u)
         self._begun_s += dt_s
-        if self._begun_s < UNWINDS_S:  # a vehicle let go on a grade: its load comes through the low-pass by and by
+        if self._begun_s < UNWINDS_S:  # a vehicle released on a grade: its load comes through the low-pass by and by
             self._p[1, 1] += self._unknown_rad_s2**2 * dt_s / UNWINDS_S
         if not stands:
             self._walk(dt_s, abs(speed_rad_s), turned=speed_rad_s * before < 0.0)

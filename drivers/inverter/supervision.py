@@ -103,7 +103,7 @@ class PlcPart(NamedTuple):
 
     m1_nm: float = 0.0  # amplitude at each drive
     m2_nm: float = 0.0  # amplitude at each drive
-    levels: tuple[float, ...] = (0.0,)
+    levels: tuple[float, ...] = (0.0,)  # each in multiples of the amplitudes
     seen: float = 0.0  # the level it has just reported; 0 without a report
 
 
@@ -114,20 +114,20 @@ NO_PART: Final = PlcPart()
 class CycleRecord(NamedTuple):
     """One cycle, as everything is judged by it."""
 
-    t_ns: int
-    m1: DriveRecord
-    m2: DriveRecord
-    plc: PlcPart = NO_PART
+    t_ns: int  # monotonic
+    m1: DriveRecord  # first drive
+    m2: DriveRecord  # second drive
+    plc: PlcPart = NO_PART  # its PRBS
 
 
 @dataclass(frozen=True, slots=True)
 class SupervisionLimits:
     """What the rules of one rig need: its guard's limits, a count of each speed [rad/s], and its vehicle."""
 
-    guard: GuardLimits
-    count_m1_rad_s: float = 0.0
-    count_m2_rad_s: float = 0.0
-    vehicle: Vehicle | None = None
+    guard: GuardLimits  # the rig file's
+    count_m1_rad_s: float = 0.0  # one count of its speed [rad/s]
+    count_m2_rad_s: float = 0.0  # one count of its speed [rad/s]
+    vehicle: Vehicle | None = None  # None: speeds are not compared with what torques make
 
 
 class _Turned:

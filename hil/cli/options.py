@@ -17,6 +17,7 @@ from hil.cli.command_line import is_silent
 from hil.cli.printing import say
 from hil.errors import UsageError
 from hil.printable import printable
+from hil.version import install_hint
 
 if TYPE_CHECKING:
     from estimator.identification.settings import Settings
@@ -147,7 +148,7 @@ def require_dask() -> None:
     from importlib.util import find_spec
 
     if find_spec("distributed") is None:
-        raise UsageError("expected Dask distributed, got none: pip install 'hil-driveline[fleet]'")
+        raise UsageError(f"expected Dask distributed, got none. Install it: {install_hint('fleet')}")
 
 
 FilterOf = Annotated[

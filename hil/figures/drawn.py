@@ -15,6 +15,7 @@ from estimator.signals.record import Record
 from hil.errors import UsageError
 from hil.figures.local_model import LocalModel, decibels, degrees, mode_text
 from hil.figures.palette import BLACK, BLUE, PALE, VERMILION, damping_lines, frequency_marks, series_colour, unit_circle
+from hil.version import install_hint
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -90,7 +91,7 @@ def require_matplotlib() -> None:
         import matplotlib as mpl  # noqa: F401
     except ModuleNotFoundError as error:
         raise UsageError(
-            "figures: expected matplotlib to draw them with, it is not installed. Install it: pip install matplotlib"
+            f"figures: expected matplotlib to draw them with, it is not installed. Install it: {install_hint('paper')}"
         ) from error
 
 

@@ -32,6 +32,7 @@ from hil.plants.names import Names, names, some
 from hil.printable import printable
 from hil.recording.sandbox import Document, Gone, Sandbox
 from hil.recording.table import Column
+from hil.version import install_hint
 
 ROUNDS = 4
 """Steps of Gauss and Newton: the output is nearly linear in a load and an initial state."""
@@ -73,9 +74,7 @@ class FmuPlant:
             )
         self.name = path.name
         if importlib.util.find_spec("fmpy") is None:
-            raise UsageError(
-                "expected FMPy, which simulates FMUs, got none. Install it: pip install 'hil-driveline[fmu]'"
-            )
+            raise UsageError(f"expected FMPy, which simulates FMUs, got none. Install it: {install_hint('fmu')}")
         self._path, self._is_ended = path.absolute(), False
         self._idle, self._every, self._free = list[Sandbox](), list[Sandbox](), threading.Condition()
         self._opening_s = self._worked_s = 0.0

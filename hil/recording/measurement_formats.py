@@ -2,7 +2,7 @@
 
 What a file holds becomes groups of channels that share a time; from there on they are read as the groups of an MDF file
 are (`hil.recording.mdf_file`): the recording is made of those asked for, others are named, `resample_s` brings all
-to one period. The libraries of TDMS and MCAP are extras: ``pip install hil-driveline[formats]``.
+to one period. The libraries of TDMS and MCAP are of the extra ``formats``.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from hil.recording.bus_database import DATA_SHEETS, database_of
 from hil.recording.mdf_file import foreign_table, foreign_tables
 from hil.recording.request import Request
 from hil.recording.table import Column, Table, as_column, is_column
+from hil.version import install_hint
 
 NS: Final = 1e-9
 
@@ -106,7 +107,7 @@ def library(path: Path, module: str, package: str) -> Any:
         raise RecordingError(
             path,
             f"expected the library {package}, which reads {path.suffix} files, got none. Install it: "
-            f"pip install 'hil-driveline[formats]'; or save the recording as Parquet or CSV.",
+            f"{install_hint('formats')}; or save the recording as Parquet or CSV.",
         ) from None
 
 

@@ -19,7 +19,7 @@ from drivers.foreign_file import read_regular_text
 from hil.errors import InputError, UsageError
 from hil.support.command_log import VARIABLE, log_file
 from hil.support.redact import Redaction
-from hil.version import __version__
+from hil.version import DISTRIBUTION, __version__
 
 ABOUT = """What is in this report, for whoever is asked to send it: read it before you do.
 
@@ -32,8 +32,6 @@ Taken out and marked: keys, passwords, tokens and certificates; users and passwo
 paths; the names of the user and of this machine. Comments of the rig file, operator's notes and recordings are not in
 it. Names of files and rigs are, and so are addresses of devices.
 """
-
-DISTRIBUTION = "hil-driveline"
 
 
 @dataclass(frozen=True, slots=True)

@@ -215,7 +215,7 @@ def healthy_run(rig: Rig, seed: tuple[int, int]) -> tuple[str, str, str]:
     vehicle, lag_s = Vehicle(rng, level=name in ("pulses", "rest")), float(rng.uniform(LEAST_LAG_S, 0.03))
     late, window_rad_s = float(rng.choice([0.0, 0.003])), float(rng.choice([0.0, 0.3]))
     if window_rad_s:
-        vehicle.road.begin_level()  # it can't be told from a dead reading before it has moved
+        vehicle.road.begin_level()  # it can't be distinguished from a dead reading before it has moved
     mode = made.inverters.m1.mode.name.lower()
     what = f"mass {vehicle.mass:.2f}, PRBS {made.prbs.source.value}, {mode}, {', '.join(faults)}, host late {late}"
     what += f", zero window {window_rad_s}"

@@ -75,11 +75,7 @@ def page() -> str:
 
 
 def _map() -> Iterator[str]:
-    yield from ("| command | does |", "| --- | --- |")
-    for name, line in COMMANDS.items():
-        more = f" ([more]({READ_MORE[name]}.md))" if name in READ_MORE else ""
-        yield f"| [`hil {name}`](#hil-{name.replace(' ', '-')}) | {_cell(line)}{more} |"
-    yield ""
+    yield from (", ".join(f"[{name}](#hil-{name.replace(' ', '-')})" for name in COMMANDS), "")
 
 
 def _shared() -> set[str]:
@@ -101,8 +97,8 @@ def _everywhere(shared: set[str]) -> Iterator[str]:
 
 
 def _statuses() -> Iterator[str]:
-    yield from ("## Exit status", "")
-    yield from (f"- {status.value}: {STATUSES[status]}" for status in ExitStatus)
+    yield from ("## Exit status", "", "| status | means |", "| --- | --- |")
+    yield from (f"| {status.value} | {STATUSES[status]} |" for status in ExitStatus)
     yield from (
         "",
         "Torque is zero and the drives are disarmed on every way out; if a drive can't confirm it, a message says so.",
@@ -115,6 +111,8 @@ def _section(name: str, shared: set[str]) -> Iterator[str]:
     inner = getattr(own, "commands", {})
     yield from (f"## hil {name}", "")
     yield from _in_words(f"hil {name}", own, bool(inner), shared)
+    if name in READ_MORE:
+        yield from (f"More: [{READ_MORE[name]}]({READ_MORE[name]}.md).", "")
     for each, part in inner.items():
         yield from (f"### hil {name} {each}", "")
         yield from _in_words(f"hil {name} {each}", part, False, shared)

@@ -94,5 +94,5 @@ def test_the_same_data_make_the_same_bytes_whatever_the_users_settings(
 def test_where_there_is_nothing_to_draw_with_it_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
     require_matplotlib()
     monkeypatch.setitem(sys.modules, "matplotlib", None)
-    with pytest.raises(UsageError, match="pip install matplotlib"):
+    with pytest.raises(UsageError, match="pip install 'matplotlib"):
         require_matplotlib()

@@ -40,7 +40,7 @@ class Search:
 def search_from_nothing(fits: Fits, most: float = math.inf, progress: Progress = silent) -> Search:
     """Search from nothing; where that way leaves more than noise, from each of the most promising first effects too.
 
-    A later way replaces the first one where it ends at a more probable set. After ``most`` simulations none goes on.
+    A later way replaces the first one where it ends at a more probable set. After ``most`` simulations it ends.
     """
     found = _climbed(Search(fits, (fits.nothing(),)), most, progress)
     alone = [each for effects, each in fits.ended.items() if len(effects) == 1 and fits.is_plausible(each)]

@@ -43,6 +43,7 @@ from hil.problems import read_toml
 from hil.recording import read_record
 from hil.recording.signals_config import SignalsConfig
 from hil.result_folder import publish
+from hil.version import install_hint
 
 USED = (
     conditions.conditions, conditions.with_torque, conditions.is_elastic, conditions.is_extended,
@@ -201,7 +202,7 @@ def _headers() -> dict[str, str]:
     except ModuleNotFoundError as error:
         raise UsageError(
             "hil export fmu: expected FMPy, which brings the headers of the FMI standard, got none. Install it: "
-            "pip install 'hil-driveline[fmu]'"
+            + install_hint("fmu")
         ) from error
     folder = Path(fmpy.__file__).parent / "c-code"
     return {path.name: path.read_text("utf-8") for path in sorted(folder.glob("fmi*.h"))}

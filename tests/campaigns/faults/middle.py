@@ -76,7 +76,7 @@ PLAIN = ("PLC's", "slow slope")
 SPEED_SLACK_RAD_S = 3.0
 
 DEAD_READINGS = ("both speeds zero", "both speeds stuck")
-"""What a vehicle does that friction holds. How fast one without any gets by then is no measure: it is told by what no
+"""What a vehicle does that friction holds. How fast one without any gets by then is no measure: it is known by what no
 friction would hold, `ROLLING_RAD_S2` of a full vehicle, and how far that goes, `MOST_HELD_RAD_S`."""
 
 FULL = 1.5  # times the inertia: the rig file's `inertia_full_kg_m2`
@@ -329,7 +329,7 @@ def _judge_dead_reading(rig: Rig, shaft: Shaft, man: Man, outcome: Outcome) -> N
         late += gained_rad_s >= 2.0 * MOST_HELD_RAD_S
         gained_rad_s += max(abs(sum(given)) - held_nm, 0.0) / (INERTIA_KG_M2 * FULL) * rig.period_s
     if late > LATE_CYCLES + BLOCK_S / rig.period_s:
-        outcome.problems.append(f"a dead reading went on for {gained_rad_s:.2f} rad/s that no friction holds")
+        outcome.problems.append(f"a dead reading lasted for {gained_rad_s:.2f} rad/s that no friction holds")
 
 
 def _judge_end(rig: Rig, server: RigServer, fault: Fault, outcome: Outcome) -> None:

@@ -36,7 +36,7 @@ def test_the_one_that_is_of_another_line_is_named_by_how_much(name: str, factor:
     assert f"its {name} fits " in doubt.statement
     said = float(doubt.statement.split(f"its {name} fits ")[1].split()[0])
     assert said == pytest.approx(factor, rel=0.2)
-    assert "To go on with the rest alone, leave out d." in doubt.statement
+    assert "To continue with the rest alone, leave out d." in doubt.statement
 
 
 def test_recordings_of_one_line_agree() -> None:
