@@ -266,7 +266,8 @@ def _period(u: FloatArray) -> int | None:
     power = np.concatenate([[0.0], np.cumsum(x**2)])
     overlap = np.fft.irfft(np.abs(np.fft.rfft(x, 2 * n)) ** 2)[: lags.size]
     size = np.sqrt(power[n - lags] * (power[n] - power[lags]))
-    correlation = overlap / np.maximum(size, np.finfo(np.float64).tiny)
+    least = max(np.sqrt(np.finfo(np.float64).eps) * power[n], np.finfo(np.float64).tiny)  # rounding of the overlap
+    correlation = overlap / np.maximum(size, least)
     below = np.flatnonzero(correlation < 0.5 * PERIODIC_CORRELATION)
     if not below.size or below[0] >= lags.size - 1:
         return None

@@ -105,6 +105,14 @@ def test_a_short_slow_recording_of_a_short_period_has_an_estimate() -> None:
     assert np.isfinite(spectral_estimate(record).response).all()
 
 
+def test_a_torque_that_rests_after_its_beginning_repeats_nothing(records: list[Record]) -> None:
+    whole = records[0]
+    torque_nm = np.where(np.arange(whole.okay.size)[:, np.newaxis] < whole.okay.size // 8, whole.torque_nm, 0.0)
+    estimate = spectral_estimate(replace(whole, torque_nm=torque_nm))
+    assert np.isfinite(estimate.response).all()
+    assert estimate.distortion is None
+
+
 def test_too_short_stretches_are_refused(records: list[Record]) -> None:
     okay = np.arange(records[0].okay.size) % 40 > 10  # gaps of 0.11 s, and 0.29 s between them
     with pytest.raises(NotExciting, match="no unbroken stretch of 2 s") as refusal:
