@@ -108,9 +108,9 @@ def _reported(law: TableFit, motion: Motion) -> UnnamedTable:
 def sentences(table: UnnamedTable, of: str) -> str:
     """Return what is said of the law, for the end of a statement."""
     parts = [
-        f"A law without a name is in the augmented model: a torque over {table.over}, through {len(table.knots)} "
-        f"knots. On data that no fit has seen the free-run error falls with it from {table.rms_before:.4g} to "
-        f"{table.rms_after:.4g} {of}."
+        f"A law without a name is in the augmented model: a torque over {table.over}, through "
+        f"{len(table.knots)} knots. On data that no fit has seen the free-run error falls with it from "
+        f"{table.rms_before:.4g} to {table.rms_after:.4g} {of}."
     ]
     if table.looks_like:
         parts.append(f"It looks like {table.looks_like}.")

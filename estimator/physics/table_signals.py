@@ -6,14 +6,15 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from estimator.physics.curve import slope_at_knot
 from estimator.physics.driveline import Case, EffectValue, Motion, Structure, unit
 from estimator.physics.inputs import recorded_shaft_torque
 from estimator.physics.joint import imposed_in
 from estimator.physics.kernel import state_vector
-from estimator.physics.layout import Grid
+from estimator.physics.layout import Grid, flat_values, slot
 from estimator.physics.motion import motor_angle
 from estimator.physics.simulate import simulate_each
-from estimator.physics.tables import PLACES, TABLES, Table, table_of
+from estimator.physics.tables import COUNT, PLACES, TABLES, Table, table_of
 from estimator.signals.record import FloatArray, Record
 
 _STATES = {
@@ -62,3 +63,11 @@ def beyond_knots(
 def slopes_of(table: Table) -> list[float]:
     """Return the slopes of a curve from knot to knot [Nm/unit of the place]."""
     return [float(slope) for slope in np.diff(table.values) / np.diff(table.knots)]
+
+
+def slopes_at_knots(table: Table) -> list[float]:
+    """Return the slopes of a curve at its knots [Nm/unit of the place]."""
+    p = flat_values({}, {table.name: {key: each.value for key, each in table.effect().items()}})
+    count, last = slot(table.name, COUNT), len(table.knots) - 1
+    wraps = PLACES[table.place].periodic
+    return [float(slope_at_knot(p, count, i, last, wraps)) for i in range(last + 1)]

@@ -134,6 +134,23 @@ def damper(
     say(f"{out}: for {rig.name}; call it every {file.period_s:g} s, with the frequency of FB_HilEstimator")
 
 
+@app.command(epilog="Example: hil export law out/augmented.toml --out law.st")
+def law(
+    model: Annotated[Path, typer.Argument(metavar="MODEL", help="augmented.toml with a law without a name.")],
+    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="Structured Text to write; replaced.")],
+    table: Annotated[
+        str | None, typer.Option("--table", metavar="PLACE", help="Which of several: shaft_twist, motor_speed, ...")
+    ] = None,
+) -> None:
+    """Write a law without a name for a PLC: the curve of [tables.PLACE], as the simulation has it."""
+    from hil.export.law import law_text
+    from hil.result_folder import publish
+
+    text = law_text(model, table)
+    publish(out.parent, {out.name: lambda path: path.write_text(text, encoding="ascii")})
+    say(f"{out}: call FB_HilLaw")
+
+
 @app.command(epilog="Example: hil export fmu out/augmented.toml --recording run_1.csv --out bus.fmu")
 def fmu(
     model: Annotated[Path, typer.Argument(metavar="MODEL", help="Model file, nominal or augmented.")],

@@ -10,11 +10,10 @@ import keyword
 from pathlib import Path
 from typing import Final
 
-from estimator.physics.curve import slope_at_knot
 from estimator.physics.driveline import unit
 from estimator.physics.effect import Element
-from estimator.physics.layout import flat, slot
 from estimator.physics.model import DrivelineModel
+from estimator.physics.table_signals import slopes_at_knots
 from estimator.physics.tables import PLACES, TABLES, Table, table_of
 from hil.config.model_file import read_model
 from hil.errors import ModelFileError, UsageError
@@ -83,7 +82,7 @@ def declaration(source: Path, name: str, place: str | None) -> dict[str, str]:
     if not name.isidentifier() or keyword.iskeyword(name) or not name.isascii():
         raise UsageError(f"--name {name!r}: expected a name for a Python function, of letters, digits and _")
     model = read_model(source).model
-    table = _chosen(source, model, place)
+    table = chosen_table(source, model, place)
     if table.place not in _SIGNALS:
         raise ModelFileError(
             source,
@@ -92,7 +91,8 @@ def declaration(source: Path, name: str, place: str | None) -> dict[str, str]:
     return {f"{name}.py": _function(source, model, table, name), f"{name}.toml": _declared(table, name)}
 
 
-def _chosen(source: Path, model: DrivelineModel, place: str | None) -> Table:
+def chosen_table(source: Path, model: DrivelineModel, place: str | None) -> Table:
+    """Return the law without a name that a model has, or the one over a place of those it has."""
     found = {each.place: each for each in (table_of(n, v) for n, v in model.effects.items() if n in TABLES)}
     if not found:
         raise ModelFileError(source, "tables | expected a law without a name, as hil diagnose writes it | got none")
@@ -105,9 +105,7 @@ def _chosen(source: Path, model: DrivelineModel, place: str | None) -> Table:
 
 
 def _function(source: Path, model: DrivelineModel, table: Table, name: str) -> str:
-    at, p = PLACES[table.place], flat(model)
-    count, last = slot(table.name, "knots"), len(table.knots) - 1
-    slopes = tuple(float(slope_at_knot(p, count, i, last, False)) for i in range(last + 1))
+    at = PLACES[table.place]
     is_torque = at.element is Element.TORQUE_PATH
     return _FUNCTION.format(
         name=name,
@@ -118,7 +116,7 @@ def _function(source: Path, model: DrivelineModel, table: Table, name: str) -> s
         knot_unit=unit(at.dimension, model.motion),
         values=table.values,
         sign=at.sign,
-        slopes=slopes,
+        slopes=slopes_at_knots(table),
         signal=_SIGNALS[table.place],
         minus="-" if is_torque else "",
         size_says="against the motor's motion" if is_torque else at.sign,

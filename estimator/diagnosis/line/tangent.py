@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from estimator.compiled import compiled, ir_inlined
 from estimator.physics import layout
-from estimator.physics.catalogue import BUILT_IN
+from estimator.physics.catalogue import BUILT_IN, KERNEL
 from estimator.physics.effect import Element, Place
 from estimator.physics.fit import FitResult
 from estimator.physics.inputs import initial_state, shaft_torque
@@ -41,11 +41,12 @@ BLOCKS_PER_PERIOD = 12.0
 
 _NONLINEAR = tuple(
     (slot(entry.name, parameter.name), parameter.null)
-    for entry in BUILT_IN.values()
+    for entry in KERNEL.values()
     if entry.element not in (Element.TORQUE_PATH, Element.ACQUISITION) and not entry.profile
     for parameter in entry.parameters[:1]
 )
-"""Decisive parameter of each effect that changes how the line answers to a torque behind the torque path."""
+"""Decisive parameter of each effect that changes how the line answers to a torque behind the torque path; of a table
+how many knots it has."""
 
 _BY_ANGLE = [
     slot(entry.name, entry.parameters[0].name)

@@ -42,9 +42,10 @@ def retuned(records: list[Record]) -> Hypothesis:
 def test_a_gap_is_found_as_a_curve_over_the_twist_without_the_catalogue() -> None:
     """A gap of 0.02 rad, which the re-tuned line can't follow."""
     hypothesis = retuned(recorded({"backlash": {"gap_rad": 0.02, "contact_rad": 0.0005}}))
-    law = best_table(hypothesis)
+    law = best_table(hypothesis, model(TWO_MASS, tolerance=0.1))
     assert law is not None
     assert law.place == "shaft_twist"
+    assert law.not_carried == ()  # on each recording it is better by a fit to the other one
     assert law.after < 0.5 * law.before
     assert law.result.rms < 0.5 * hypothesis.result.rms
     inside = np.abs(law.knots) < 0.008

@@ -1,0 +1,131 @@
+"""The fit of one curve in the free run, and what is reported of it: its values with their intervals."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from estimator.diagnosis.table_curves import Curve, Masks
+from estimator.physics.fit import FitResult
+from estimator.physics.jacobian import jacobian_at
+from estimator.physics.layout import OBSERVER, slot
+from estimator.physics.least_squares import minimise
+from estimator.physics.problem import Problem, bounds, outputs_at, residual_at
+from estimator.physics.tables import Table
+from estimator.signals.correlation import effective_samples
+from estimator.signals.record import FloatArray
+
+Z95 = 1.96
+
+
+class Descent:
+    """The fit of one curve: unknowns are those of the line, the curve's slopes and damping, and the recordings' own."""
+
+    def __init__(self, curve: Curve, result: FitResult, use: Masks) -> None:
+        self.curve, self.problem = curve, curve.released(result, use)
+        self.first = len(result.problem.shared)
+        self.after = self.first + curve.pieces
+        self.simulations = 0
+        self._x0 = result.x
+        self._scale = np.sqrt(max(result.squares, 1e-300) / 1000.0)
+        low, high = bounds(self.problem)
+        low[self.first : self.after], high[self.first : self.after] = curve.most
+        self.low, self.high = low, high
+
+    def start(self, slopes: FloatArray) -> FloatArray:
+        """Return unknowns with these slopes, all else as the line had it."""
+        damping = [0.1] if self.curve.damping else []
+        return np.concatenate([self._x0[: self.first], slopes, damping, self._x0[self.first :]])
+
+    def x(self, z: FloatArray) -> FloatArray:
+        """Return the scaled unknowns of the problem: values in the place of slopes."""
+        x = z.copy()
+        slopes = z[self.first : self.after] - self.curve.own
+        x[self.first : self.after] = self.curve.values_of_slopes @ slopes
+        return x
+
+    def at(self, gain: float) -> Problem:
+        p = self.problem.p.copy()
+        p[slot("", OBSERVER)] = gain
+        return replace(self.problem, p=p)
+
+    def fitted(self, z: FloatArray, gain: float, smooth: float, steps: int) -> tuple[FloatArray, float]:
+        """Return unknowns after some steps at a gain, and the squared error there."""
+        problem, seen = self.at(gain), dict[bytes, tuple[FloatArray, ...]]()
+        bend = np.zeros((self.curve.pieces - 1, z.size))
+        bend[:, self.first : self.after] = np.sqrt(smooth) * np.diff(np.eye(self.curve.pieces), axis=0)
+        ridge = np.zeros((self.curve.pieces, z.size))
+        ridge[:, self.first : self.after] = 1e-2 * np.sqrt(smooth) * np.eye(self.curve.pieces)
+        rows = np.vstack([bend, ridge])
+        least = z.copy()
+        least[self.first : self.after] = self.curve.own
+
+        def outputs(z: FloatArray) -> tuple[FloatArray, ...]:
+            key = z.tobytes()
+            if key not in seen:
+                seen.clear()
+                seen[key] = outputs_at(problem, self.x(z))
+                self.simulations += 1
+            return seen[key]
+
+        def residual(z: FloatArray) -> FloatArray:
+            return np.concatenate([residual_at(problem, outputs(z)) / self._scale, rows @ (z - least)])
+
+        def jacobian(z: FloatArray) -> FloatArray:
+            found = jacobian_at(problem, self.x(z), outputs(z))
+            self.simulations += self.after + 4
+            found[:, self.first : self.after] = found[:, self.first : self.after] @ self.curve.values_of_slopes
+            return np.vstack([found / self._scale, rows])
+
+        solution = minimise(residual, jacobian, z, self.low, self.high, steps)
+        size = rows.shape[0]
+        return solution.x, float(np.sum((self._scale * solution.residual[:-size]) ** 2))
+
+    def error(self, z: FloatArray, masks: Masks) -> float:
+        """Return the RMS of the free-run error over some samples."""
+        return rms_over(self.at(0.0), outputs_at(self.at(0.0), self.x(z)), masks)
+
+
+def rms_over(problem: Problem, outputs: Sequence[FloatArray], masks: Masks) -> float:
+    """Return the RMS of the errors of first outputs over some samples [unit of the output]."""
+    return float(np.sqrt(np.mean(np.concatenate(errors_over(problem, outputs, masks)) ** 2)))
+
+
+def errors_over(problem: Problem, outputs: Sequence[FloatArray], masks: Masks) -> list[FloatArray]:
+    rows = zip(problem.records, outputs, masks, strict=True)
+    return [(out - record.output)[mask] for record, out, mask in rows if record.lead is None]
+
+
+def reported(descent: Descent, z: FloatArray) -> tuple[FitResult, Table]:
+    """Return the fit with the curve among what is given, and the curve with its intervals."""
+    problem, x, curve = descent.at(0.0), descent.x(z), descent.curve
+    outputs = outputs_at(problem, x)
+    residual = residual_at(problem, outputs)
+    values = np.insert(x[descent.first : descent.after], curve.zero, 0.0)
+    half = np.insert(_half_widths(descent, problem, x, outputs, residual), curve.zero, 0.0)
+    damping = float(x[descent.after] * curve.damping) if curve.damping else 0.0
+    bands = tuple((float(v - h), float(v + h)) for v, h in zip(values, half, strict=True))
+    table = Table(curve.place, tuple(curve.knots.tolist()), tuple(values.tolist()), bands, damping)
+    added = range(descent.first, descent.after + bool(curve.damping))
+    p = problem.p.copy()
+    for i in added:
+        p[problem.shared[i].slot] = problem.shared[i].scale * x[i]
+    given = replace(problem, p=p, shared=problem.shared[: descent.first])
+    return FitResult(given, np.delete(x, added), outputs, residual, None, False), table
+
+
+def _half_widths(
+    descent: Descent, problem: Problem, x: FloatArray, outputs: Sequence[FloatArray], residual: FloatArray
+) -> FloatArray:
+    """Return half of the 95 % intervals of the values [Nm]: of errors that are worth fewer than they are."""
+    derivative = jacobian_at(problem, x, outputs)
+    free = np.flatnonzero(derivative.any(axis=0))
+    j = derivative[:, free]
+    variance = float(residual @ residual) / effective_samples([residual])
+    scale = np.sqrt(np.maximum(np.diag(j.T @ j), 1e-300))
+    inverse = np.linalg.pinv((j / scale).T @ (j / scale), rcond=1e-10, hermitian=True) / np.outer(scale, scale)
+    spread = np.zeros(x.size)
+    spread[free] = np.sqrt(np.maximum(np.diag(inverse), 0.0) * variance)
+    return Z95 * spread[descent.first : descent.after]
