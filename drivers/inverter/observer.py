@@ -26,6 +26,7 @@ FloatArray = npt.NDArray[np.float64]
 SAMPLED_CYCLES: Final = 2
 """A drive may take its command, and sample its torque, each a cycle later than another."""
 
+IDENTITY: Final = np.eye(4)
 SPEED_AND_LOAD: Final = np.array([1.0, 1.0, 0.0, 0.0])  # what is learnt where friction or the shaft may turn
 
 SWING_S: Final = 0.15
@@ -217,18 +218,18 @@ class VehicleObserver:
 
     def _learn(self, k: FloatArray, h: FloatArray, off: float, s: float) -> None:
         """Take a speed; where ``k`` has been cut, by Joseph's form of the update."""
-        left = np.eye(4) - np.outer(k, h) / s
+        left = IDENTITY - np.outer(k, h) / s
         noise = s - float(h @ self._p @ h)
         self._x = self._x + k / s * off
         self._p = left @ self._p @ left.T + np.outer(k, k) * (noise / s**2)
 
     def _spread(self, dt_s: float, u: float) -> None:
         """Carry state and covariance over a block."""
-        f = np.eye(4)
-        f[0, 1], f[0, 2] = -dt_s, u * dt_s
-        self._x = f @ self._x
-        self._p = f @ self._p @ f.T
-        self._p[2, 2] += GAIN_WALK**2 * dt_s
+        x, p, pushed = self._x, self._p, u * dt_s
+        x[0] += pushed * x[2] - dt_s * x[1]
+        p[0] += pushed * p[2] - dt_s * p[1]
+        p[:, 0] += pushed * p[:, 2] - dt_s * p[:, 1]
+        p[2, 2] += GAIN_WALK**2 * dt_s
 
     def _walk(self, dt_s: float, speed_rad_s: float, turned: bool) -> None:
         """Let the load go as far as it may in a block, on the way driven and by the wind."""

@@ -46,9 +46,9 @@ GAIN_SHARE: Final = 1.15
 """By so much acceleration over torque may be beyond what the inertias have: torque readings are 5 % off, and friction
 that changes with the torque is taken for inertia. The same came to 2 deviations beyond it."""
 
-MOST_HELD_RAD_S: Final = 0.75
-"""That a speed which stands to the last bit should have changed by: the same came to 0.5, for half of their drives show
-a speed below 0.3 rad/s as zero."""
+MOST_HELD_RAD_S: Final = 1.0
+"""That a speed which stands to the last bit should have changed by: the same came to 0.65, for half of their drives
+show a speed below 0.3 rad/s as zero, after a reading with noise."""
 
 TURNED_LOOKS: Final = 2
 TURNED_CYCLES: Final = 5

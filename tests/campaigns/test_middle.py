@@ -23,6 +23,7 @@ from tests.campaigns.faults.rig import campaign_rig
         ("limit bit, some counts", "bit 11"),
         ("stuck at another torque, frozen", "torque actual value"),
         ("slow slope: stuck", "torque actual value"),
+        ("both speeds reversed", "velocity|0x606C"),
     ],
 )
 def test_a_fault_ends_the_run_and_none_does_not(kind: str, ends: str, tmp_path: Path) -> None:

@@ -142,3 +142,26 @@ def test_a_slow_response_is_as_uncertain_as_it_is_long() -> None:
         prediction.command(100.0, 0.0)
     low, high = prediction.range()
     assert (low, high) == pytest.approx((100.0 * (1.0 - math.exp(-0.3)), 100.0))
+
+
+@pytest.mark.parametrize("factor", [-1.0, 0.0], ids=["reversed", "zero"])
+def test_a_speed_gone_wrong_in_a_slow_cruise_whose_torque_turns_all_the_time(factor: float) -> None:
+    """The PRBS is larger than the torque of the cruise: it turns many times in the 0.6 s in which a shaft unwinds."""
+    bus = Bus(speed_rad_s=2.0, read=lambda w, t: w if t < 15.0 else factor * w)
+    assert abs(bus.drive(60.0)) < 5.0
+    assert wrong(bus.motions[-1])
+    assert not any(map(wrong, bus.motions[:140]))
+
+
+@pytest.mark.parametrize("grade", [-0.06, 0.03, 0.06])
+@pytest.mark.parametrize("mass", [0.5, 1.5])
+def test_a_start_on_a_grade_is_no_wrong_gain(grade: float, mass: float) -> None:
+    bus = Bus(mass, lambda way_m: grade if mass < 1.0 else grade / 3.0)
+    bus.drive(15.0)
+    assert not any(map(wrong, bus.motions))
+
+
+def test_a_drive_that_shows_a_slow_motor_as_standing_is_not_dead() -> None:
+    bus = Bus(speed_rad_s=2.0, read=lambda w, t: 0.0 if abs(w) < 0.3 else w)
+    bus.drive(20.0)
+    assert not any(map(wrong, bus.motions))

@@ -215,7 +215,7 @@ def run_with(rig: Rig, experiment: str, fault: Fault, folder: Path, fastest_rad_
         outcome.steps = len(shaft.torques_nm)
         _judge_shaft(rig, man, shaft, fastest_rad_s, outcome)
         _judge_end(rig, server, fault, outcome)
-    if recorder.kept is not None and read_table(recorder.kept).n_rows != recorder.n_samples:
+    if recorder.written_file is not None and read_table(recorder.written_file).n_rows != recorder.n_samples:
         outcome.problems.append("the recording lacks rows")
     for left in folder.glob(f"{path.stem}*"):
         left.unlink()

@@ -253,7 +253,7 @@ def _judge_words(kind: Kind, experiment: str, step: int, steps: int, outcome: Ou
 
 
 def _judge_recording(recorder: RecordingWriter, path: Path, outcome: Outcome) -> None:
-    kept = recorder.kept
+    kept = recorder.written_file
     try:
         rows = 0 if kept is None else read_table(kept).n_rows
     except RecordingError as error:
