@@ -37,9 +37,9 @@ def test_the_engine_s_line_without_an_effect_is_the_same() -> None:
 def test_every_effect_of_the_engine_moves_its_line() -> None:
     pytest.importorskip("mujoco", reason="MuJoCo is not installed: worlds of the rigid-body engine are left out")
     torque_nm = np.where(np.arange(3000) % 300 < 150, 500.0, -450.0)
-    plain = engine._drive(BUS, NOTHING, {}, 25.0, torque_nm)
+    plain = engine._drive(BUS, NOTHING, {}, 10.0, torque_nm)
     for name, draw in engine.EFFECTS.items():
-        changed = engine._drive(BUS, name, draw(np.random.default_rng(1), BUS), 25.0, torque_nm)
+        changed = engine._drive(BUS, name, draw(np.random.default_rng(1), BUS), 10.0, torque_nm)
         assert (np.std(changed - plain) > 0.05) == (name != NOTHING), name
 
 
