@@ -42,6 +42,8 @@ ELSE, TURNED, ALONE = 0.05, 0.15, 0.2  # priors of something else, of a sign tur
 USUAL_TORQUE_NM, USUAL_SPEED_RAD_S = (200.0, math.log(8.0)), (80.0, math.log(5.0))
 """Median, and spread of the logarithm, of the largest torque and speed in a recording of a drive."""
 
+FAR = 4.0  # spreads beyond which a size is strange, by how much ever: it decides nothing more
+
 FASTEST_RAD_S, UNREACHED = 2500.0, 1e-3  # 24,000 rpm, and how seldom a recording is of a drive that is faster
 
 WHOLE, FEWEST_VALUES = 1e-6, 5
@@ -270,7 +272,8 @@ def _usual(chosen: Sequence[Row], read: float, torque_nm: float, output: float, 
 
 
 def _log_size(value: float, median: float, spread: float) -> float:
-    return -0.5 * (math.log(max(value, 1e-12) / median) / spread) ** 2 - math.log(spread * math.sqrt(2.0 * math.pi))
+    off = min(abs(math.log(max(value, 1e-12) / median)) / spread, FAR)
+    return -0.5 * off**2 - math.log(spread * math.sqrt(2.0 * math.pi))
 
 
 def largest(record: Record) -> tuple[float, float]:
