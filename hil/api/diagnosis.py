@@ -18,10 +18,10 @@ from hil.plants.scales import with_lines, with_the_line_to_write
 from hil.provenance import Provenance, provenance
 from hil.report import page as html
 from hil.report.diagnosis_files import publish_diagnosis
-from hil.report.diagnosis_html import course_panels
+from hil.report.diagnosis_html import course_panels, doubts
 from hil.report.figures import time_panels
 from hil.report.numbers import shown, shown_interval
-from hil.report.wording import badge, doubt_lines, headline
+from hil.report.wording import badge, headline
 
 if TYPE_CHECKING:
     import pandas
@@ -96,9 +96,7 @@ class DiagnosisResult:
         ]
         found = html.table(("effect", "parameter", "value", "95 % interval"), rows, numbers=(2, 3)) if rows else None
         title = html.Heading(f"{badge(self.diagnosis)}: {headline(self.diagnosis)}")
-        return html.fragment(
-            title, *map(html.warning, doubt_lines(self.diagnosis)), html.paragraph(self.diagnosis.statement), found
-        )
+        return html.fragment(title, *doubts(self.diagnosis), html.paragraph(self.diagnosis.statement), found)
 
 
 def diagnose(

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from estimator.diagnosis.preconditions.channels import standstill
-from estimator.diagnosis.preconditions.plausible import are_whole_numbers
+from estimator.diagnosis.preconditions.odds import are_whole_numbers
 from estimator.diagnosis.preconditions.prepare import doubtful, with_motion_corrected
 from estimator.diagnosis.result import Diagnosis, Doubt
 from estimator.errors import Cure, EstimatorError, Implausible

@@ -8,7 +8,7 @@ lies a straight line, or the first of them is held, as the channel says. A gap i
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -115,18 +115,29 @@ def _change_of_level(off: FloatArray) -> FloatArray:
     return change
 
 
+def is_uniform(time: FloatArray) -> bool:
+    """Tell whether times are read as they are; shape (N,), two or more."""
+    return not any(wrong.any() for _, wrong, _ in _uneven(time))
+
+
 def _require_uniform(table: Table, column: str, time: FloatArray) -> None:
+    for span, wrong, expected in _uneven(time):
+        _refuse(table, column, time, span, wrong, expected)
+
+
+def _uneven(time: FloatArray) -> Iterator[tuple[int, NDArray[np.bool_], str]]:
+    """Yield what makes times uneven: the rows between which it is asked, where it is so, and what was expected."""
     steps = np.diff(time)
-    _refuse(table, column, time, 1, ~(steps > 0), "expected a time greater than in the row before")
+    yield 1, ~(steps > 0), "expected a time greater than in the row before"
     period = float(np.median(steps))
     cure = "a missing sample is a row with nan, not a row left out; uneven rows need resample_s in [signals]"
     expected = f"expected a uniform step of {period:.6g} s within {JITTER:.0%} ({cure})"
-    _refuse(table, column, time, 1, np.abs(steps - period) > JITTER * period, expected)
+    yield 1, np.abs(steps - period) > JITTER * period, expected
     window = min(WINDOW_STEPS, steps.size)
     rates = (time[window:] - time[:-window]) / window
     allowed = (RATE + 2 * JITTER / window) * period
     expected = f"expected a constant rate, a mean step of {period:.6g} s over {window} rows, resample it;"
-    _refuse(table, column, time, window, np.abs(rates - period) > allowed, expected)
+    yield window, np.abs(rates - period) > allowed, expected
 
 
 def _refuse(table: Table, column: str, time: FloatArray, span: int, wrong: NDArray[np.bool_], expected: str) -> None:

@@ -12,15 +12,13 @@ import numpy as np
 from pydantic import TypeAdapter
 
 from hil.recording.channels import are_row_numbers, is_even_time, time_quantity
-from hil.recording.resample import GAP, straightened
+from hil.recording.resample import GAP, is_uniform, straightened
 from hil.recording.scales import EXPECTED, Quantity, Role, called, unit_of, without_unit, wrapped_at
 from hil.recording.table import LARGEST, Column, ColumnKind, Table
 from hil.recording.text_form import MISSING
 
 TIME_NAMES: Final = ("time", "zeit", "t", "timestamp", "timestamps", "stamp")
 """What a column of times is called, or begins with."""
-
-EVEN: Final = 0.5  # share of the period by which a step of an even time may differ from it
 
 BY_UNIT, BY_WORD, BY_LETTER, BY_CHANCE = 4, 3, 2, 1  # how sure a role is
 
@@ -123,7 +121,7 @@ def _group(table: Table) -> Group:
     steps = np.diff(stamps)
     straight = straightened(stamps)
     period = float(np.median(steps if straight is None else np.diff(straight)))
-    even = straight is not None or bool((steps > 0.0).all() and (np.abs(steps - period) <= EVEN * period).all())
+    even = straight is not None or is_uniform(stamps)
     return Group(time.name, period, even, int((steps > GAP * period).sum()) if straight is None else 0, channels)
 
 

@@ -51,7 +51,6 @@ from hil.report.wording import (
     PLACES,
     badge,
     belief,
-    doubt_lines,
     headline,
     location_rows,
     quantity,
@@ -125,7 +124,7 @@ def diagnosis_summary(diagnosis: Diagnosis) -> RenderableType:
         [
             html.header(
                 headline(diagnosis), html.paragraph(f"Recordings: {names}."),
-                *map(html.warning, doubt_lines(diagnosis)), html.paragraph(diagnosis.statement),
+                *doubts(diagnosis), html.paragraph(diagnosis.statement),
                 kind=_kind(diagnosis), badge=badge(diagnosis),
             ),
             _fit(diagnosis.fit),
@@ -140,13 +139,20 @@ def diagnosis_summary(diagnosis: Diagnosis) -> RenderableType:
     )  # fmt: skip
 
 
+def doubts(diagnosis: Diagnosis) -> Iterator[html.Paragraph]:
+    """Yield what is doubtful about the input, a paragraph each, with the line that cures it."""
+    for doubt in diagnosis.doubts:
+        line = (" In [signals] write: ", html.Code(doubt.line)) if doubt.line else ()
+        yield html.warning(doubt.statement, *line)
+
+
 def _kind(diagnosis: Diagnosis) -> str:
     """Return what the head of a page looks like: no verdict's colour while the input is in doubt."""
     return "unexplained" if diagnosis.doubts else diagnosis.verdict.value
 
 
 def _statement(diagnosis: Diagnosis, one_in: int) -> Iterator[html.Paragraph]:
-    yield from map(html.warning, doubt_lines(diagnosis))
+    yield from doubts(diagnosis)
     yield html.paragraph(diagnosis.statement, kind="statement")
     for text in diagnosis.warnings:
         yield html.warning(f"Note: {text}")

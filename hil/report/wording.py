@@ -53,13 +53,6 @@ def badge(diagnosis: Diagnosis) -> str:
     return DOUBTFUL if diagnosis.doubts else BADGES[diagnosis.verdict]
 
 
-def doubt_lines(diagnosis: Diagnosis) -> list[str]:
-    """Return what is doubtful about the input, a text each, with the line that cures it."""
-    return [
-        doubt.statement + (f" In [signals] write: {doubt.line}" if doubt.line else "") for doubt in diagnosis.doubts
-    ]
-
-
 def quantity(output_unit: str) -> str:
     """Name a measured output by its unit."""
     return _QUANTITIES.get(output_unit, "output")

@@ -178,6 +178,10 @@ def output_turned(columns: Columns) -> Columns:
     return {**columns, "w": -columns["w"]}
 
 
+def in_rpm(columns: Columns) -> Columns:
+    return {**columns, "w": columns["w"] * 200.0 * 30.0 / np.pi, "T_1": columns["T_1"] * 200.0}
+
+
 def per_mille(columns: Columns) -> Columns:
     return {**columns, "T_1": np.round(columns["T_1"] * 5.0), "T_2": np.round(columns["T_2"] * 5.0)}
 
@@ -218,6 +222,7 @@ def looked(tmp_path: Path, columns: Columns, capsys: pytest.CaptureFixture[str])
             'torque = [ { column = "T_1" }, { column = "T_2", scale = -1 } ]',
         ),
         (output_turned, "sign of torque or output turned round", 'speed = { column = "w", scale = -1, at = "motor" }'),
+        (in_rpm, "is the speed in rpm, expected rad/s?", 'speed = { column = "w", scale = 0.10472, at = "motor" }'),
         (in_ms, "Is time in ms, expected s?", 'time = { column = "time_s", scale = 0.001 }'),
         (in_days, "Is time in days, expected s?", 'time = { column = "time_s", scale = 86400 }'),
         (one_dead, "torque input 2 stays at 0", "if the channel is dead"),
@@ -230,3 +235,12 @@ def test_what_is_wrong_is_named_with_the_line_that_cures_it(
     _, _, err = looked(tmp_path, spoilt(recorded(tmp_path / "run.csv")), capsys)
     assert what in err
     assert line in err
+
+
+def test_rows_at_two_rates_are_uneven(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    columns = recorded(tmp_path / "run.csv")
+    half = columns["t"][columns["t"].size // 2]
+    slower = np.where(columns["t"] < half, columns["t"], half + 1.3 * (columns["t"] - half))
+    _, out, err = looked(tmp_path, {**columns, "t": slower}, capsys)
+    assert "resample_s = " in out
+    assert "can't be read yet" not in err

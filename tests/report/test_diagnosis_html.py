@@ -226,4 +226,4 @@ def test_an_open_doubt_comes_first_without_tick_or_percentage(diagnosis: Diagnos
     assert "✓" not in text.split("<h2")[0]
     assert "names were right" not in text.split("<h2")[0]
     assert text.index("1.53 times the nominal") < text.index(diagnosis.statement[:20])
-    assert "In [signals] write: scale = 2" in text
+    assert "In [signals] write: <code>scale = 2</code>" in text

@@ -95,6 +95,6 @@ def _statement(name: str, found: Mapping[str, Mapping[str, Uncertain]], differin
     others = " and ".join(each for each in found if each != name)
     of = "those of the others" if len(found) > 2 else f"that of {others}"
     return (
-        f"recording {name} is not of the line of {others}: {said} {of} ({why}). To continue with the rest alone, leave "
+        f"recording {name} is not of the line of {others}: {said} {of} ({why}). To diagnose the rest alone, leave "
         f"out {name}{'' if len(found) > 2 else f', or {others}'}."
     )

@@ -15,7 +15,7 @@ from functools import partial
 import numpy as np
 
 from estimator.diagnosis.preconditions.channels import dead_rows
-from estimator.diagnosis.preconditions.inertia import lag_of
+from estimator.diagnosis.preconditions.inertia import bridged, lag_of
 from estimator.errors import Cure
 from estimator.physics.model import DrivelineModel, Motion, Parameter, Structure
 from estimator.signals.record import FloatArray, OutputKind, Record
@@ -65,6 +65,7 @@ DEPTHS, TIMES = (0.5, 0.8, 0.95), (0.05, 0.3, 1.0)
 
 LEAST_SHIFT_S = 0.05  # a shift that no filter and no bus makes
 MOST_GAIN = 3.5  # factor by which an inverter's gain may be off and is no unit
+OF_ONE = (0.02, 30.0)  # factors that one input alone may be off by: shares of a rated torque, gears; and a thousand
 STEPS = 60  # values that a factor may have, evenly in its logarithm
 
 MASSES = (Structure.TWO_MASS, Structure.THREE_MASS)
@@ -186,12 +187,14 @@ class Change:
     is_open: bool = False  # it may be physics as well, so that it is doubted and not refused
 
 
-def changes_of(records: Sequence[Record], line: Line, ratio: float = 1.0) -> Iterator[Change]:
-    """Yield nothing, then all that may be wrong beyond a factor; ``ratio`` is that of the inertia that is off."""
+def changes_of(records: Sequence[Record], line: Line, ratio: float, off: Record) -> Iterator[Change]:
+    """Yield nothing, then all that may be wrong beyond a factor; ``ratio`` is the inertia's in a recording ``off``."""
     period_s = records[0].sample_time_s
     yield Change(prior=1.0 if FASTEST_S <= period_s <= SLOWEST_S else UNLIKELY, factors=2)
     if records[0].imposed is None:
-        yield from _of_inputs(records[0], line, ratio)
+        yield from _of_inputs(records[0], line)
+        if line is not None:
+            yield from of_one_unit(off, ratio)
         yield from _of_columns(records[0])
     yield from _of_time(records)
     if line is not None:
@@ -200,7 +203,7 @@ def changes_of(records: Sequence[Record], line: Line, ratio: float = 1.0) -> Ite
         yield from _of_physics(records, line)
 
 
-def _of_inputs(record: Record, line: Line, ratio: float) -> Iterator[Change]:
+def _of_inputs(record: Record, line: Line) -> Iterator[Change]:
     """Yield what may be wrong with one of several inputs."""
     count, name = record.torque_nm.shape[1], record.name
     for i in range(count if count > 1 else 0):
@@ -211,7 +214,6 @@ def _of_inputs(record: Record, line: Line, ratio: float) -> Iterator[Change]:
             kept = _scaled(np.where(np.arange(count) == i, 0.0, 1.0))
             question = f"does {record.input(i)} count twice, in the others, too"
             yield Change(question, 0.05, kept, cure=Cure(name, dropped=i))
-            yield from of_one_unit(record, i, ratio)
         if line is not None and np.ptp(record.torque_nm[:, i]) == 0.0:
             question = f"is {record.input(i)} dead, while its inverter drives as the others do"
             yield Change(question, 0.3, partial(_as_others, i=i))
@@ -249,16 +251,19 @@ def _of_columns(record: Record) -> Iterator[Change]:
         yield Change(question, 0.1, _without_dead, is_open=True)  # a vehicle that rolls has no torque either
 
 
-def of_one_unit(record: Record, i: int, ratio: float) -> Iterator[Change]:
+def of_one_unit(record: Record, ratio: float) -> Iterator[Change]:
     """Yield that one of several inputs is in a unit of its own, by the factor that makes the inertia the nominal."""
-    total = record.total_torque_nm
-    share = float(record.torque_nm[:, i] @ total) / (float(total @ total) or 1.0)
-    factor = float(f"{(1.0 / ratio - 1.0 + share) / (share or 1.0):.2g}") if record.torque_nm.shape[1] > 1 else 0.0
-    if factor > 0.0 and ratio != 1.0:
-        at = np.where(np.arange(record.torque_nm.shape[1]) == i, factor, 1.0)
+    total, count = record.total_torque_nm, record.torque_nm.shape[1]
+    for i in range(count if count > 1 and ratio != 1.0 else 0):
+        share = float(record.torque_nm[:, i] @ total) / (float(total @ total) or 1.0)
+        factor = float(f"{(1.0 / ratio - 1.0 + share) / (share or 1.0):.2g}")
+        is_thousand = factor > 0.0 and abs(abs(math.log10(factor)) - 3.0) < 0.1
+        if not (OF_ONE[0] < factor < OF_ONE[1] or is_thousand):
+            continue
+        at = np.where(np.arange(count) == i, factor, 1.0)
         question = (
-            f"is {record.input(i)} in a unit of its own, to be multiplied by about {factor:g} (per cent of "
-            f"{100 * factor:.2g} Nm), or is its inverter's gain that far off"
+            f"is {record.input(i)} in a unit of its own, to be multiplied by about {factor:g}, or is its inverter's "
+            "gain that far off"
         )
         cure = Cure(record.name, torque=factor, inputs=(i,))
         yield Change(question, 0.05, _scaled(at), cure=cure, is_open=1.0 / MOST_GAIN < factor < MOST_GAIN)
@@ -340,14 +345,9 @@ def times(torque: float, output: float) -> Callable[[Record], Record]:
     return lambda each: replace(each, torque_nm=each.torque_nm * torque, output=each.output * output)
 
 
-def _bridged(record: Record) -> FloatArray:
-    good = np.flatnonzero(record.okay)
-    return np.interp(np.arange(record.okay.size), good, record.output[good])
-
-
 def _swapped(record: Record, i: int) -> Record:
     torque = record.torque_nm.copy()
-    torque[:, i] = _bridged(record)
+    torque[:, i] = bridged(record)
     return replace(record, torque_nm=torque, output=record.torque_nm[:, i], torque_okay=None)
 
 
@@ -372,11 +372,11 @@ def _at_period(record: Record, period_s: float) -> Record:
 
 
 def _differentiated(record: Record) -> Record:
-    return replace(record, output=np.gradient(_bridged(record), record.sample_time_s))
+    return replace(record, output=np.gradient(bridged(record), record.sample_time_s))
 
 
 def _summed(record: Record) -> Record:
-    return replace(record, output=np.cumsum(_bridged(record)) * record.sample_time_s)
+    return replace(record, output=np.cumsum(bridged(record)) * record.sample_time_s)
 
 
 def _without_dead(record: Record) -> Record:
@@ -386,7 +386,7 @@ def _without_dead(record: Record) -> Record:
 
 def _shifted(record: Record, lag_s: float) -> Record:
     rows = round(lag_s / record.sample_time_s)
-    output, okay = np.roll(_bridged(record), -rows), np.roll(record.okay, -rows)
+    output, okay = np.roll(bridged(record), -rows), np.roll(record.okay, -rows)
     okay[-rows if rows > 0 else 0 : None if rows > 0 else -rows] = False
     return replace(record, output=output, okay=okay)
 

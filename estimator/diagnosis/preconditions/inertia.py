@@ -163,7 +163,7 @@ def lag_of(record: Record, line: DrivelineModel) -> float | None:
     grid = _grid_or_none(record, line)
     if grid is None or record.imposed is not None:
         return None
-    signals = (np.diff(each) for each in (_bridged(record), driven(record, line, grid)))
+    signals = (np.diff(each) for each in (bridged(record), driven(record, line, grid)))
     Y, M = (np.fft.rfft(detrend(each) * np.hanning(each.size), 2 * each.size) for each in signals)
     first_hz = float(natural_frequencies_rad_s(line.values())[0]) / (2.0 * math.pi)
     together = Y * M.conj()
@@ -176,7 +176,8 @@ def lag_of(record: Record, line: DrivelineModel) -> float | None:
     return best * record.sample_time_s if abs(best) < most else None
 
 
-def _bridged(record: Record) -> FloatArray:
+def bridged(record: Record) -> FloatArray:
+    """Return the output with straight lines over samples that are missing; shape (N,) [unit of the output]."""
     good = np.flatnonzero(record.okay)
     return np.interp(np.arange(record.okay.size), good, record.output[good])
 
@@ -189,7 +190,7 @@ def by_band(
     Nothing, where less than a share of the cross-spectrum has one sign.
     """
     model = driven(record, line, grid, 0.5 * low_hz, 2.0 * high_hz)
-    output = _bridged(record)
+    output = bridged(record)
     frequency = np.fft.rfftfreq(model.size, record.sample_time_s)
     band = (frequency >= low_hz) & (frequency < high_hz)
     Y, M = (np.fft.rfft(detrend(signal) * np.hanning(signal.size))[band] for signal in (output, model))
