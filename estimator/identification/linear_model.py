@@ -245,3 +245,17 @@ def free_response(A: FloatArray, state: FloatArray, n_samples: int) -> FloatArra
     impulse = np.zeros(max(n_samples, state.shape[0]))
     impulse[: state.shape[0]] = state
     return np.asarray(lfilter([1.0], A, impulse), dtype=np.float64)[:n_samples]
+
+
+def products_of_past(e: FloatArray, p: int) -> FloatArray:
+    """Return ``sum_t e(t-1-i) e(t-1-j)`` over all t with p samples before them, shape (p, p).
+
+    Each diagonal follows from its first product and what enters and leaves at the ends (M. Morf, B. Dickinson, T.
+    Kailath and A. Vieira, IEEE Trans. ASSP 25, 1977): p products per sample in place of p^2.
+    """
+    products = np.empty((p, p))
+    products[0] = products[:, 0] = np.correlate(e[:-1], e[p - 1 : -1], "valid")[::-1]
+    enters, leaves = e[: p - 1][::-1], e[-p:-1][::-1]
+    for i in range(p - 1):
+        products[i + 1, 1:] = products[i, :-1] + enters[i] * enters - leaves[i] * leaves
+    return products

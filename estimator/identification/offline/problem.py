@@ -19,7 +19,14 @@ from scipy.sparse import csc_array, diags_array
 from scipy.sparse.linalg import splu
 from threadpoolctl import threadpool_limits
 
-from estimator.identification.linear_model import ComplexArray, LinearModel, Orders, free_response, solve_least_squares
+from estimator.identification.linear_model import (
+    ComplexArray,
+    LinearModel,
+    Orders,
+    free_response,
+    products_of_past,
+    solve_least_squares,
+)
 from estimator.identification.offline.starts import delayed
 from estimator.signals.decimate import HIGH_PASS_HZ, Blocks
 from estimator.signals.record import BoolArray, FloatArray
@@ -382,7 +389,8 @@ class Problem:
             if not np.array_equal(known.plant, plant):
                 x = np.concatenate([plant, start[n:]])
                 E = self._past(x)
-                normal = E.T @ E
+                measured = self._at(x).elimination.n_unknowns == 0
+                normal = products_of_past(self._at(x).e, self.noise_order) if measured else E.T @ E
                 normal[np.diag_indices_from(normal)] += RIDGE * normal.max() + np.finfo(np.float64).tiny
                 inverse = np.asarray(np.linalg.inv(normal), dtype=np.float64)
                 x[n:] -= inverse @ (E.T @ self.residual(x))

@@ -6,6 +6,7 @@ from estimator.identification.linear_model import (
     ROWS,
     LinearModel,
     Orders,
+    products_of_past,
     singular_values,
     solve_least_squares,
     triangular,
@@ -132,3 +133,10 @@ def test_an_output_that_never_moves_is_refused() -> None:
     refusal = refused(prbs_nm(N, 60.0), y=np.full(N, 120.0))
     assert "never changes" in str(refusal)
     assert refusal.names == ORDERS.names
+
+
+@pytest.mark.parametrize("p", [1, 2, 50])
+def test_products_of_the_past_are_those_of_the_rows_written_out(p: int) -> None:
+    e = np.random.default_rng(p).standard_normal(300)
+    rows = np.array([e[t - p : t][::-1] for t in range(p, e.size)])
+    np.testing.assert_allclose(products_of_past(e, p), rows.T @ rows, atol=1e-10)
