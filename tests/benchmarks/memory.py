@@ -1,17 +1,22 @@
-"""``python -m tests.benchmarks.memory RECORDINGS.npz``: one diagnosis in a process of its own, and its peak memory.
+"""``python -m tests.benchmarks.memory RECORDINGS.npz [identify]``: one job in a process of its own, and what it took.
 
-Written as one line: peak resident memory once the recordings are loaded and once they are diagnosed [MiB], the verdict.
+The job is a diagnosis, or an identification of each recording. Written as one line: peak resident memory once the
+recordings are loaded and at the end [MiB], processor time of the job [s] without the programs' own beginning, and the
+verdict.
 """
 
 import json
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
 
 from estimator.diagnosis.diagnose import diagnose
+from estimator.identification.settings import Settings
 from estimator.physics.model import DrivelineModel, Parameter, Structure
 from estimator.signals.record import FloatArray, Record
+from hil.report.identification_files import identify_all
 from tests.benchmarks.cases import Case
 
 KIB_PER_MIB = 1024
@@ -53,11 +58,16 @@ def peak_mib() -> float:
 
 
 def main(arguments: list[str]) -> int:
-    """Diagnose a case and write what it took."""
+    """Do the job of a case and write what it took."""
     case = read_case(Path(arguments[0]))
-    loaded = peak_mib()
-    verdict = diagnose(case.records, case.model).verdict.value
-    sys.stdout.write(json.dumps({"loaded_mib": loaded, "peak_mib": peak_mib(), "verdict": verdict}) + "\n")
+    loaded, begun_s = peak_mib(), time.process_time()
+    if arguments[1:] == ["identify"]:
+        verdict = ", ".join(sorted({each.best.verdict.value for each in identify_all(case.records, Settings())}))
+    else:
+        verdict = diagnose(case.records, case.model).verdict.value
+    taken_s = time.process_time() - begun_s
+    found = {"loaded_mib": loaded, "peak_mib": peak_mib(), "processor_s": taken_s, "verdict": verdict}
+    sys.stdout.write(json.dumps(found) + "\n")
     return 0
 
 
