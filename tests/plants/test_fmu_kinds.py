@@ -11,14 +11,17 @@ from typing import Any
 import numpy as np
 import pytest
 
+from estimator.physics.driveline import InitialCondition
+from estimator.physics.layout import flat, grid_for
 from estimator.physics.model import DrivelineModel, Parameter, Structure
+from estimator.physics.simulate import simulate
 from hil.errors import UsageError
 from hil.export.fmu import package
 from hil.export.fmu.driveline import driveline
 from hil.plants.fmu_plant import FmuPlant
 from hil.plants.fmu_process import MOST_EVENTS, _Progress
 from tests.estimator.physics import bench
-from tests.estimator.physics.bench import TWO_MASS, random_steps
+from tests.estimator.physics.bench import THREE_MASS, TWO_MASS, model, random_steps
 from tests.plants.test_fmu_faults import DESCRIPTION
 
 pytest.importorskip("fmpy")
@@ -100,6 +103,27 @@ def test_an_array_is_driven_by_its_elements(tmp_path: Path, monkeypatch: pytest.
     )
     np.testing.assert_allclose(loaded, expected, rtol=1e-12)
     assert np.abs(loaded - reference).max() > 0.1
+
+
+THREE_MASSES = DrivelineModel(
+    Structure.THREE_MASS, {name: Parameter(THREE_MASS[name], 0.2) for name in Structure.THREE_MASS.parameter_names}
+)
+WITH_EVENTS = model(TWO_MASS, effects={"backlash": {"gap_rad": 0.02}, "coulomb_friction_motor": {"friction_nm": 8.0}})
+
+
+@COMPILES
+@pytest.mark.parametrize("of", [THREE_MASSES, WITH_EVENTS], ids=["three masses", "a gap and dry friction"])
+def test_what_is_exported_is_simulated_as_here(of: DrivelineModel, tmp_path: Path) -> None:
+    """A gap opens and closes, and dry friction sticks, between the periods: the FMU has these events inside a step."""
+    record = bench.record(random_steps(200, 1, size_nm=40.0))
+    package.write(driveline("drive", of, record.sample_time_s), "3.0", tmp_path / "drive.fmu")
+    plant = FmuPlant(tmp_path / "drive.fmu", ["torque=T_M1"], trusted=True)
+    grid = grid_for(of, [record])
+    width = {"sign_width": grid.sign_width}  # within which dry friction changes sign: here by the recording's speeds
+    simulated = plant.simulated(record, plant.named(record.kind), record.torque_nm, width)
+    here = simulate(grid, record, flat(of), InitialCondition(0.0, 0.0, 0.0))
+    assert np.ptp(here) > 0.1
+    np.testing.assert_allclose(simulated, here, atol=1e-6 * np.ptp(here))
 
 
 @COMPILES
