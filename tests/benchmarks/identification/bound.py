@@ -11,6 +11,8 @@ spectrum are taken as unknown. A method that knows less of the noise, as all her
 """
 
 import math
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -33,7 +35,7 @@ def least_errors(case: Case, world: World) -> tuple[float, float]:
     values = np.array(list(case.bus.line.parameters.values()))
     ends = [(Line(*values * (1.0 + d)), Line(*values * (1.0 - d))) for d in STEP * np.eye(values.size)]
 
-    def slopes(of) -> Array:  # by the logarithm of each parameter
+    def slopes(of: Callable[[Line], Any]) -> Array:  # by the logarithm of each parameter
         return np.array([(of(up) - of(down)) / (2.0 * STEP) for up, down in ends])
 
     response = slopes(lambda line: _responses(line, omega, buses.PERIOD_S)[:, buses.MOTOR])
