@@ -14,7 +14,7 @@ from estimator.errors import BadModel
 from estimator.physics.driveline import InitialCondition
 from estimator.physics.layout import Grid, flat, grid_for
 from estimator.physics.model import DrivelineModel, Parameter, Structure, natural_frequencies_rad_s
-from estimator.physics.motion import measured_speed
+from estimator.physics.motion import measured_speed, turns_on
 from estimator.physics.simulate import simulate
 from estimator.signals.record import FloatArray, Record
 
@@ -225,24 +225,46 @@ def as_one_body(record: Record, line: DrivelineModel, first_hz: float) -> Inerti
         return NOTHING
     signals = [uniform_filter1d(signal, width)[inside] for signal in _integrals(record)]
     changes = [(signal[step:] - signal[:-step])[both] for signal in signals]
-    speed, impulse, turned = (change - change.mean() for change in changes)
-    without = _rest(speed, turned[:, np.newaxis])
-    design = np.column_stack([impulse, turned])
+    speed, impulse, *usual = (change - change.mean() for change in changes)
+    without = _rest(speed, np.column_stack(usual))
+    design = np.column_stack([impulse, *usual])
     inverse = float(np.linalg.lstsq(design, speed, rcond=None)[0][0])
     rest = _rest(speed, design)
     if inverse == 0.0 or not without @ without > 0.0:
         return NOTHING
     total = sum(value for name, value in line.values().items() if name.startswith("J"))
-    return Inertia(1.0 / (inverse * total), float(rest @ rest) / float(without @ without))
+    found = Inertia(1.0 / (inverse * total), float(rest @ rest) / float(without @ without))
+    return found if found.tells else _as_nominal(impulse, total * speed, np.column_stack(usual)) or found
 
 
-def _integrals(record: Record) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _as_nominal(impulse: FloatArray, nominal: FloatArray, usual: FloatArray) -> Inertia | None:
+    """Return the nominal inertia where friction and gravity take what it leaves of the torque; None where they do not.
+
+    Of a drive that is slow against its friction, the motion follows from the torque as little as the inertia shows.
+    """
+    rest, power = _rest(impulse - nominal, usual), float(impulse @ impulse)
+    share = float(rest @ rest) / power if power > 0.0 else 1.0
+    return Inertia(1.0, share) if share <= TELLS else None
+
+
+def _integrals(record: Record) -> list[FloatArray]:
+    """Return the speed, and the integrals of the torque and of what is usual beside it: friction, and gravity.
+
+    Friction is viscous and dry; gravity is that of a machine that goes to and fro, by the angle from where it began.
+    """
     speed = measured_speed(record)
     good = np.flatnonzero(np.isfinite(speed))
     speed = np.interp(np.arange(speed.size), good, speed[good])
+    angle = _integral(speed, record.sample_time_s)
+    usual = [angle, _integral(np.sign(speed), record.sample_time_s)]
+    if not turns_on([record]):
+        usual += [_integral(wave(angle), record.sample_time_s) for wave in (np.sin, np.cos)]
     impulse = np.concatenate([[0.0], np.cumsum(record.total_torque_nm[:-1])]) * record.sample_time_s
-    angle = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]))]) * record.sample_time_s
-    return speed, impulse, angle
+    return [speed, impulse, *usual]
+
+
+def _integral(signal: FloatArray, period_s: float) -> FloatArray:
+    return np.concatenate([[0.0], np.cumsum(0.5 * (signal[1:] + signal[:-1]))]) * period_s
 
 
 def _rest(y: FloatArray, design: FloatArray) -> FloatArray:
