@@ -21,6 +21,7 @@ from estimator.identification.best import band_of
 from estimator.identification.modes.modes import Uncertain
 from estimator.identification.modes.physical import RESPONDING, physical_parameters
 from estimator.identification.offline.fits import fit_of, solved
+from estimator.identification.offline.linearity import judge_linearity
 from estimator.identification.offline.validation import validate
 from estimator.physics.model import DrivelineModel, Structure, natural_frequencies_rad_s
 from estimator.signals.decimate import HIGH_PASS_HZ, first_part, high_passed
@@ -58,8 +59,10 @@ def _own_line(record: Record, model: DrivelineModel) -> Mapping[str, Uncertain] 
     try:
         with threadpool_limits(1), np.errstate(divide="ignore"):  # of a line that is none
             data = high_passed(first_part(record), HIGH_PASS_HZ)
-            fit = fit_of(*solved(data, RESPONDING, NOISE_ORDER))
-            if not validate(fit, data).independence.is_independent:
+            problem, x, first = solved(data, RESPONDING, NOISE_ORDER)
+            fit = fit_of(problem, x, first)
+            is_linear = judge_linearity(problem, x, first_part(record), first, HIGH_PASS_HZ).is_linear
+            if not (is_linear and validate(fit, data).independence.is_independent):
                 return None
             drive = physical_parameters(fit.model, fit.covariance)
     except EstimatorError:
