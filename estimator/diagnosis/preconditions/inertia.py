@@ -121,7 +121,7 @@ def fitted_inertia(record: Record, line: DrivelineModel) -> Inertia:
     """Return the inertia that a recording fits: by both bands of a line with a mode, and as one body."""
     if record.imposed is not None:
         return _of_joint(record, line)
-    first_hz = float(natural_frequencies_rad_s(line.values())[0]) / (2.0 * math.pi)
+    first_hz = _first_hz(line)
     log_ratio, found, grid = math.nan, as_one_body(record, line, first_hz), _grid_or_none(record, line)
     if grid is not None and 0.0 < ABOVE[0] * first_hz < 0.5 / record.sample_time_s:
         below = by_band(record, line, grid, BELOW[0] * first_hz, BELOW[1] * first_hz, ONE_WAY)
@@ -165,7 +165,7 @@ def lag_of(record: Record, line: DrivelineModel) -> float | None:
         return None
     signals = (np.diff(each) for each in (bridged(record), driven(record, line, grid)))
     Y, M = (np.fft.rfft(detrend(each) * np.hanning(each.size), 2 * each.size) for each in signals)
-    first_hz = float(natural_frequencies_rad_s(line.values())[0]) / (2.0 * math.pi)
+    first_hz = _first_hz(line)
     together = Y * M.conj()
     if first_hz > 0.0:  # where the mode rings, any whole period of it fits
         together[np.fft.rfftfreq(2 * record.okay.size - 2, record.sample_time_s) > BELOW[1] * first_hz] = 0.0
@@ -210,6 +210,43 @@ def by_band(
 
 def as_one_body(record: Record, line: DrivelineModel, first_hz: float) -> Inertia:
     """Return the ratio of inertias by which the impulse of the torque changes the speed."""
+    changes = _changes(record, first_hz)
+    if changes is None:
+        return NOTHING
+    speed, impulse, usual = changes
+    without = _rest(speed, usual)
+    design = np.column_stack([impulse, usual])
+    inverse = float(np.linalg.lstsq(design, speed, rcond=None)[0][0])
+    rest = _rest(speed, design)
+    if inverse == 0.0 or not without @ without > 0.0:
+        return NOTHING
+    return Inertia(1.0 / (inverse * _total(line)), float(rest @ rest) / float(without @ without))
+
+
+def held_by_friction(record: Record, line: DrivelineModel) -> Inertia | None:
+    """Return the nominal inertia where friction and gravity take what it leaves of the torque; None where they do not.
+
+    Of a drive that is slow against its friction, the motion follows from the torque as little as the inertia shows.
+    """
+    changes = None if record.imposed is not None else _changes(record, _first_hz(line))
+    if changes is None:
+        return None
+    speed, impulse, usual = changes
+    rest, power = _rest(impulse - _total(line) * speed, usual), float(impulse @ impulse)
+    share = float(rest @ rest) / power if power > 0.0 else 1.0
+    return Inertia(1.0, share) if share <= TELLS else None
+
+
+def _total(line: DrivelineModel) -> float:
+    return sum(value for name, value in line.values().items() if name.startswith("J"))
+
+
+def _first_hz(line: DrivelineModel) -> float:
+    return float(natural_frequencies_rad_s(line.values())[0]) / (2.0 * math.pi)
+
+
+def _changes(record: Record, first_hz: float) -> tuple[FloatArray, FloatArray, FloatArray] | None:
+    """Return how speed, impulse and what is usual change over stretches that average the mode; None of too few."""
     period = 1.0 / (first_hz * record.sample_time_s) if first_hz > 0.0 else 0.0
     step = max(round(STRETCH_S / record.sample_time_s), FEWEST_STEPS)
     width = min(step, max(1, round(period)))
@@ -222,29 +259,11 @@ def as_one_body(record: Record, line: DrivelineModel, first_hz: float) -> Inerti
     okay = record.okay[inside]
     both = okay[step:] & okay[:-step]
     if both.sum() < FEWEST_STRETCHES * step:
-        return NOTHING
+        return None
     signals = [uniform_filter1d(signal, width)[inside] for signal in _integrals(record)]
     changes = [(signal[step:] - signal[:-step])[both] for signal in signals]
     speed, impulse, *usual = (change - change.mean() for change in changes)
-    without = _rest(speed, np.column_stack(usual))
-    design = np.column_stack([impulse, *usual])
-    inverse = float(np.linalg.lstsq(design, speed, rcond=None)[0][0])
-    rest = _rest(speed, design)
-    if inverse == 0.0 or not without @ without > 0.0:
-        return NOTHING
-    total = sum(value for name, value in line.values().items() if name.startswith("J"))
-    found = Inertia(1.0 / (inverse * total), float(rest @ rest) / float(without @ without))
-    return found if found.tells else _as_nominal(impulse, total * speed, np.column_stack(usual)) or found
-
-
-def _as_nominal(impulse: FloatArray, nominal: FloatArray, usual: FloatArray) -> Inertia | None:
-    """Return the nominal inertia where friction and gravity take what it leaves of the torque; None where they do not.
-
-    Of a drive that is slow against its friction, the motion follows from the torque as little as the inertia shows.
-    """
-    rest, power = _rest(impulse - nominal, usual), float(impulse @ impulse)
-    share = float(rest @ rest) / power if power > 0.0 else 1.0
-    return Inertia(1.0, share) if share <= TELLS else None
+    return speed, impulse, np.column_stack(usual)
 
 
 def _integrals(record: Record) -> list[FloatArray]:

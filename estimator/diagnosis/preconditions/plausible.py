@@ -14,7 +14,7 @@ import numpy as np
 
 from estimator.diagnosis.inference.wording import times as multiple
 from estimator.diagnosis.preconditions.candidates import Line, Part, of_one_unit
-from estimator.diagnosis.preconditions.inertia import BODY, Inertia, fitted_inertia
+from estimator.diagnosis.preconditions.inertia import BODY, Inertia, fitted_inertia, held_by_friction
 from estimator.diagnosis.preconditions.odds import (
     FASTEST_RAD_S,
     Candidate,
@@ -87,7 +87,7 @@ def _judged(records: Sequence[Record], line: Line, is_tried: bool = False) -> tu
     if not long:
         return None, False
     records, found = [record for record, _ in long], [each for _, each in long]
-    if line is not None and not _is_suspicious(found, line):
+    if line is not None and not _is_suspicious(_less_friction(records, found, line), line):
         return None, False
     ranked = with_odds(records, line, found)
     (best, odds), others = ranked[0], [each for each in ranked[1:] if not each[0].is_right]
@@ -114,6 +114,14 @@ def _judged(records: Sequence[Record], line: Line, is_tried: bool = False) -> tu
         return None, False
     about = ", ".join(record.name for record in _blamed(records, found, line, best))
     return Doubt(about, _text(records, line, found, ranked), 1.0 - is_right, cure=cure), is_refused
+
+
+def _less_friction(records: Sequence[Record], found: Sequence[Inertia], line: DrivelineModel) -> list[Inertia]:
+    """Return what recordings fit, those that tell nothing as what friction explains: it is no fault of theirs."""
+    return [
+        each if each.tells else held_by_friction(record, line) or each
+        for record, each in zip(records, found, strict=True)
+    ]
 
 
 def _passes(best: Candidate, records: Sequence[Record], line: Line, found: Sequence[Inertia]) -> bool:
