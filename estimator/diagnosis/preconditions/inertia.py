@@ -267,7 +267,7 @@ def _changes(record: Record, first_hz: float) -> tuple[FloatArray, FloatArray, F
 
 
 def _integrals(record: Record) -> list[FloatArray]:
-    """Return the speed, and the integrals of the torque and of what is usual beside it: friction, and gravity.
+    """Return the speed, and the integrals of the torque and of what is usual next to it: friction, and gravity.
 
     Friction is viscous and dry; gravity is that of a machine that goes to and fro, by the angle from where it began.
     """
