@@ -118,9 +118,9 @@ def test_a_line_with_a_gap_answers_as_its_simulation_does(at_load: bool) -> None
     assert line.phi.shape == (SAMPLES, 3, 3)
     force, nothing = 1e-4 * walk(4), np.zeros(SAMPLES)
     motor, load = (nothing, force) if at_load else (force, nothing)
-    torque_nm = result.problem.records[0].torque_nm + motor[:, np.newaxis] * [1.0, 0.0]
+    torque_nm = result.problem.records[0].torque_nm + motor[:, np.newaxis]
     pushed = replace(result.problem.records[0], torque_nm=torque_nm)
-    case = replace(case_of(result.problem.local[0], result.p, result.local_of(0)), load_nm=load)
+    case = replace(case_of(result.problem.local[0], result.p, result.local_of(0)), extra_load_nm=load)
     nudged = simulate_each(result.problem.grid, pushed, [case])[0] - result.outputs[0]
     assert np.max(np.abs(answer(line, motor, load) - nudged)) < 0.02 * np.ptp(nudged)
 
