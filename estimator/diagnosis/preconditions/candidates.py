@@ -266,7 +266,7 @@ def of_one_unit(record: Record, ratio: float) -> Iterator[Change]:
             "gain that far off"
         )
         cure = Cure(record.name, torque=factor, inputs=(i,))
-        yield Change(question, 0.05, _scaled(at), cure=cure, is_open=1.0 / MOST_GAIN < factor < MOST_GAIN)
+        yield Change(question, 0.05 / STEPS, _scaled(at), cure=cure, is_open=1.0 / MOST_GAIN < factor < MOST_GAIN)
 
 
 def _of_time(records: Sequence[Record]) -> Iterator[Change]:
