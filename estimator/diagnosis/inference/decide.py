@@ -29,7 +29,7 @@ from estimator.diagnosis.inference.fits import Fits
 from estimator.diagnosis.inference.hypotheses import SETTLED_DEVIANCE, Effects, Hypothesis, fitted
 from estimator.diagnosis.inference.moves import fit_look_alikes
 from estimator.diagnosis.inference.search import Search
-from estimator.diagnosis.inference.sheet import free_line
+from estimator.diagnosis.inference.sheet import FreeLine, free_line
 from estimator.diagnosis.inference.standing import (
     ALIKE_SHARE,
     ALIKE_WITHIN,
@@ -43,6 +43,7 @@ from estimator.diagnosis.inference.trials import Trial, necessity, noise_of
 from estimator.diagnosis.result import Fit, FoundEffect, OffNominal, Verdict
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import not_fitted
+from estimator.physics.model import DrivelineModel
 from estimator.physics.problem import Problem
 from estimator.physics.steps import from_their_moment
 
@@ -174,7 +175,7 @@ def _judged(search: Search, rival: Rival) -> Judged:
     chosen = nothing
     while (larger := _needed_beyond(chosen, tried, noise)) is not None:
         chosen = larger
-    if sheet is not None and sheet.tried(fits.model).beats(chosen):
+    if sheet is not None and _is_rather(sheet, fits.model, chosen, noise):
         off_nominal = sheet.off_nominal if sheet.leaves_noise else ()
         return Judged(nothing, likely, nothing, off_nominal=off_nominal, tried=trials.all, failed=failed)
     believed, weak = chosen, dict[str, Standing]()
@@ -231,6 +232,16 @@ def _needed_beyond(chosen: Trial, tried: Sequence[Trial], noise: float) -> Trial
         and not any(other.beats(each) for other in tried)
     ]
     return min(better, key=lambda each: (each.size, each.hypothesis.score, sorted(each.effects)), default=None)
+
+
+def _is_rather(sheet: FreeLine, model: DrivelineModel, chosen: Trial, noise: float) -> bool:
+    """Tell whether values off their sheet stand in a set's place: as few of them, or more that leave nothing but noise.
+
+    More of them are taken as a larger set is: only where the simulation needs them.
+    """
+    trial = sheet.tried(model)
+    is_larger = sheet.leaves_noise and trial.size > chosen.size
+    return trial.beats(chosen) or (is_larger and necessity(trial, chosen, noise).least >= LEAST_NECESSITY)
 
 
 def _nearest(fits: Fits, found: Hypothesis) -> list[Hypothesis]:

@@ -37,6 +37,10 @@ TELLS = 0.25
 """Share of the motion that may be left unexplained by torque and line where they tell an inertia. Where a road or a
 brake moves the line and a control sets the torque it is above 0.4, in tip-ins and under a PRBS below 0.2."""
 
+HELD = 0.05
+"""Share of the torque's impulse that may be left where friction and gravity explain it: servos that are slow against
+their friction leave less than a hundredth, a sign turned in one of two inputs a sixth."""
+
 ONE_WAY = 0.8
 """Share of the cross-spectrum that must have one sign: where the output is late by more, its direction is not known."""
 
@@ -234,7 +238,7 @@ def held_by_friction(record: Record, line: DrivelineModel) -> Inertia | None:
     speed, impulse, usual = changes
     rest, power = _rest(impulse - _total(line) * speed, usual), float(impulse @ impulse)
     share = float(rest @ rest) / power if power > 0.0 else 1.0
-    return Inertia(1.0, share) if share <= TELLS else None
+    return Inertia(1.0, share) if share <= HELD else None
 
 
 def _total(line: DrivelineModel) -> float:

@@ -144,7 +144,6 @@ def test_courses_intervals_and_texts_are_joined() -> None:
     names = [record.name for record in parts.records]
     seen = Discrepancy(
         element=None,
-        laws=(),
         equivalents=(Equivalent("load", "Nm", dict(zip(names, course, strict=True)), 0.0, True),),
         spectrum=None,  # type: ignore[arg-type]
         responses=dict(zip(names, response, strict=True)),
