@@ -112,7 +112,7 @@ def test_a_long_course_is_thinned_the_same_by_run_and_replay(
 ) -> None:
     drive, whole = drives(22, 1, 8.0)[0], tmp_path / "whole.json"
     play_record(drive, tracking_settings(), Pace(), lambda course, time_s: None).write(whole)
-    monkeypatch.setattr(live_course, "MOST", most)
+    monkeypatch.setattr(live_course, "MOST_ESTIMATES", most)
     live = LiveEstimate(tracking_chain(0.01))
     for sample in driven(record=drive):
         live(sample)
