@@ -13,6 +13,9 @@ from enum import Enum, IntEnum, IntFlag
 
 from drivers.errors import ProtocolViolation
 
+_STATE_MASK = 0x6F
+_QUICK_STOP_BIT = 0x20
+
 
 class PowerState(Enum):
     """State of the power drive system; the value is its name in messages."""
@@ -131,8 +134,6 @@ STATUSWORD_STATE_BITS: dict[PowerState, int] = {
 }
 """Bits 0 to 3, 5 and 6 of the statusword in each state (CiA 402-2, table "State coding")."""
 
-_STATE_MASK = 0x6F
-_QUICK_STOP_BIT = 0x20
 _QUICK_STOP_COUNTS = frozenset({_S.READY_TO_SWITCH_ON, _S.SWITCHED_ON, _S.OPERATION_ENABLED, _S.QUICK_STOP_ACTIVE})
 
 

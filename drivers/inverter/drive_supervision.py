@@ -32,6 +32,9 @@ LOST_S: Final = 10.0
 LOST_SHARE: Final = 0.2
 """Of the TPDOs of the last `LOST_S`, weighted by exp(-age / `LOST_S`), so many may be lost."""
 
+ALONE: Final = (0.0,)
+"""Levels of a PLC that adds nothing."""
+
 
 def left_operation(where: str, state: PowerState) -> str:
     """Say that a drive is not in the state it was armed in."""
@@ -45,10 +48,6 @@ def left_operation(where: str, state: PowerState) -> str:
 def most_late(guard: GuardLimits) -> int:
     """Give how many answers may still come: an older one is too old for another rule."""
     return round(guard.feedback_timeout_s / guard.period_s)
-
-
-ALONE: Final = (0.0,)
-"""Levels of a PLC that adds nothing."""
 
 
 class DriveRecord(NamedTuple):

@@ -62,6 +62,20 @@ _MANUFACTURER: Final = range(0x2000, 0x6000)
 NEEDED: Final = ("heartbeat_consumer", "rpdo_deadline", "abort_connection")
 """What is to be there, or accepted."""
 
+SOURCE = "proof"  # where the expectations come from, in the differences found
+
+CONSUMER_HEARTBEAT = 0x1016
+
+HEARD_PERIODS = 3
+"""So many of the host's heartbeats come before they end: a consumer watches from the first it hears (CiA 301)."""
+
+PATIENCE_S = 0.1
+"""How much later than promised a drive may say that its host is gone [s]: neither end is a real-time system. With the
+defaults that is 0.25 s without host or command."""
+
+LONGEST_LOOK_S = 0.05  # a longer time between two looks is one in which this machine was held up [s]
+CONNECTION_LOST = (0x8100, 0x8200)  # error classes of CiA 301 that say so: communication, protocol
+
 
 @dataclass(frozen=True, slots=True)
 class Protection:
@@ -155,21 +169,6 @@ def _own_watchdogs(plan: DrivePlan) -> str:
         if index in _MANUFACTURER and _WATCHDOG.search(described.section.get("ParameterName") or "")
     ]
     return f"{', '.join(found)}: see the manual" if found else ""
-
-
-SOURCE = "proof"  # where the expectations come from, in the differences found
-
-CONSUMER_HEARTBEAT = 0x1016
-
-HEARD_PERIODS = 3
-"""So many of the host's heartbeats come before they end: a consumer watches from the first it hears (CiA 301)."""
-
-PATIENCE_S = 0.1
-"""How much later than promised a drive may say that its host is gone [s]: neither end is a real-time system. With the
-defaults that is 0.25 s without host or command."""
-
-LONGEST_LOOK_S = 0.05  # a longer time between two looks is one in which this machine was held up [s]
-CONNECTION_LOST = (0x8100, 0x8200)  # error classes of CiA 301 that say so: communication, protocol
 
 
 class StopProof:
