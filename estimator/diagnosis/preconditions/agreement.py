@@ -27,7 +27,7 @@ from estimator.physics.model import DrivelineModel, Structure, natural_frequenci
 from estimator.signals.decimate import HIGH_PASS_HZ, first_part, high_passed
 from estimator.signals.record import OutputKind, Record
 
-APART = 1.3
+LEAST_RATIO = 1.3
 """Factor by which two intervals must miss each other: temperature, load and amplitude change a line by less."""
 
 NOISE_ORDER = 12  # of the model of the noise: enough for the intervals, and a third of the work of all it may have
@@ -71,25 +71,25 @@ def _own_line(record: Record, model: DrivelineModel) -> Mapping[str, Uncertain] 
 
 
 def _differing(name: str, found: Mapping[str, Mapping[str, Uncertain]]) -> dict[str, float]:
-    """Return by how much which parameters of a recording are apart from those of most others that determine them."""
+    """Return by how much which parameters of a recording differ from those of most others that determine them."""
     differing = {}
     for key, mine in found[name].items():
         others = [line[key] for other, line in found.items() if other != name and line[key].is_determined]
-        apart = [each.value for each in others if mine.is_determined and _are_apart(mine, each)]
-        if 2 * len(apart) > len(others):
-            differing[key] = mine.value / median(apart)
+        unlike = [each.value for each in others if mine.is_determined and _differ(mine, each)]
+        if 2 * len(unlike) > len(others):
+            differing[key] = mine.value / median(unlike)
     return differing
 
 
-def _are_apart(one: Uncertain, other: Uncertain) -> bool:
+def _differ(one: Uncertain, other: Uncertain) -> bool:
     (low, high), (its_low, its_high) = one.ci95, other.ci95
-    return low > APART * its_high or its_low > APART * high
+    return low > LEAST_RATIO * its_high or its_low > LEAST_RATIO * high
 
 
 def _statement(name: str, found: Mapping[str, Mapping[str, Uncertain]], differing: Mapping[str, float]) -> str:
     said = ", ".join(f"its {key} fits {times(ratio)} times" for key, ratio in differing.items())
     ratios = list(differing.values())
-    is_gain = len(ratios) == len(COMPARED) and max(ratios) < APART * min(ratios)
+    is_gain = len(ratios) == len(COMPARED) and max(ratios) < LEAST_RATIO * min(ratios)
     why = (
         f"as under a torque of {times(1.0 / ratios[0])} times what was read"
         if is_gain

@@ -38,7 +38,7 @@ BANDS_BEYOND = math.log(8.0)
 """Logarithm of the ratio of the inertias seen below and above the first mode from which on inertias are doubted: a
 torque path with a lag of 50 ms, or a filter like it, makes a fifth."""
 
-APART = math.log(1.3)
+LEAST_LOG_RATIO = math.log(1.3)
 """Logarithm of the ratio of the inertias of two recordings from which on they are compared: of one line, bands and
 body differ by less."""
 
@@ -142,7 +142,7 @@ def _is_suspicious(found: Sequence[Inertia], line: DrivelineModel) -> bool:
     return (
         any(not each.tells or not is_within_tolerance(each, line) for each in found)
         or any(abs(each.log_ratio) > BANDS_BEYOND for each in found)
-        or (bool(counted) and max(counted) - min(counted) > APART)
+        or (bool(counted) and max(counted) - min(counted) > LEAST_LOG_RATIO)
     )
 
 
