@@ -62,11 +62,19 @@ class Challenge:
     seal: Seal
 
 
-def draw_challenge(seed: int, effect: str | None = None, faults: Sequence[str] = ()) -> Challenge:
-    """Draw a challenge; without an effect one of `CONCEALED` is drawn."""
+def draw_challenge(
+    seed: int, effect: str | None = None, faults: Sequence[str] = (), *, on_rollers: bool = False
+) -> Challenge:
+    """Draw a challenge; without an effect one of `CONCEALED` is drawn.
+
+    The rolling resistance of the truth is a constant torque, as while the bus rolls forward. At standstill it would
+    push the bus backwards; rollers that make up for it take it away.
+    """
     name = choose_effect(CONCEALED, seed) if effect is None else effect
     specimen = draw_specimen(name, seed)
     physics = specimen.physics(stream(seed, Stream.RECORDING))
+    if on_rollers:
+        physics = physics._replace(load_torque_nm=0.0)
     truth = {**specimen.truth(), "faults": list(faults)}
     return Challenge(specimen, TruthDriveline(physics), tuple(faults), seal(truth))
 
@@ -83,6 +91,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--seed", required=True, type=int, help="what everything is drawn from, 0 or more")
     parser.add_argument("--effect", help=f"conceal this one; otherwise one of {', '.join(CONCEALED)} is drawn")
     parser.add_argument("--fault", action="append", default=[], metavar="SPEC", help="as hil sim takes it; repeatable")
+    parser.add_argument("--on-rollers", action="store_true", help="without rolling resistance: it begins at standstill")
     parser.add_argument("--rig", type=Path, default=RIG_FILE, help="rig file the simulated devices agree with")
     parser.add_argument("--bus", default="ws://127.0.0.1:0/", help="where the CAN bus is served")
     parser.add_argument("--modbus", default="127.0.0.1:0", help="where the PLC is served")
@@ -120,7 +129,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     with suppress(KeyboardInterrupt):
         try:
             rig = read_rig(options.rig)
-            challenge = draw_challenge(options.seed, options.effect, options.fault)
+            challenge = draw_challenge(options.seed, options.effect, options.fault, on_rollers=options.on_rollers)
             if options.model is not None:
                 options.model.write_text(model_toml(challenge.specimen), encoding="utf-8")
             serve(challenge, rig, options.bus, options.modbus, sys.stdin, sys.stdout)
