@@ -99,10 +99,9 @@ class Measured(NamedTuple):
             return False
         return None
 
-    @property
-    def is_seen(self) -> bool:
-        """Whether zero is outside the interval."""
-        return abs(self.value) > self.ci95
+    def exceeds(self, size: float) -> bool:
+        """Tell whether the value is surely larger than a size, either way."""
+        return abs(self.value) - self.ci95 > size
 
     def shown(self, unit: str = "", scale: float = 1.0) -> str:
         """Return ``3.1 ± 0.4 %``: the interval with two digits, the value with as many places."""

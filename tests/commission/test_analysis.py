@@ -14,6 +14,7 @@ from hil.commission import prbs_design as amplitude
 from hil.commission.physical_fit import select_delay
 from hil.commission.prbs_design import Cap, resonance_spread, vibration_m_s2
 from hil.commission.responses import Measured, pulse_response, response_ratio
+from hil.commission.steps.signs_scales import MOVES
 from hil.config.rig_file import read_rig
 from hil.orders.runner import rigid_model
 from hil.rig.experiments.laws import LEAD_S, Pulses
@@ -67,7 +68,11 @@ def test_pulses_tell_sign_and_size(factor: float) -> None:
     found = pulse_response(reference, 0.99 * reference, speed, 100.0, PERIOD_S, 4, 400, round(LEAD_S / PERIOD_S))
     assert found.speed.value == pytest.approx(factor, abs=0.15)
     assert found.reading.value == pytest.approx(0.99, abs=1e-3)
-    assert found.speed.is_seen
+    assert found.speed.exceeds(MOVES)
+
+
+def test_creep_under_friction_has_no_direction() -> None:
+    assert not Measured(-0.026, 0.020).exceeds(MOVES)
 
 
 def test_gain_and_delay_between_two_tests() -> None:

@@ -44,6 +44,10 @@ SHARES_M1 = {"m1": 1.0, "m2": 0.0}
 SIZE = (0.5, 2.0)
 """Response over that of the rig file's inertia: it is roughly known, and a wrong scale is off by more."""
 
+MOVES = 0.1
+"""Part of that response which the interval must exceed, or the vehicle counts as held: dry friction lets creep and noise
+through, whose direction says nothing of the torque's sign."""
+
 READING_SCALE = (0.98, 1.02)
 """Torque reading over its reference."""
 
@@ -80,7 +84,8 @@ class _Answer:
 
     @property
     def seen(self) -> bool:
-        return self.response.speed.is_seen
+        """Whether the vehicle surely moved."""
+        return self.response.speed.exceeds(MOVES)
 
 
 def _order_signs(job: StepContext, name: str, level: int) -> Order:
