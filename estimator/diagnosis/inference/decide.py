@@ -237,11 +237,13 @@ def _needed_beyond(chosen: Trial, tried: Sequence[Trial], noise: float) -> Trial
 def _is_rather(sheet: FreeLine, model: DrivelineModel, chosen: Trial, noise: float) -> bool:
     """Tell whether values off their sheet stand in a set's place: as few of them, or more that leave nothing but noise.
 
-    More of them are taken as a larger set is: only where the simulation needs them.
+    A wrong value is more usual than a law that the model lacks: of as many, the law must clearly simulate better. More
+    of them are taken as a larger set is: only where the simulation needs them.
     """
     trial = sheet.tried(model)
-    is_larger = sheet.leaves_noise and trial.size > chosen.size
-    return trial.beats(chosen) or (is_larger and necessity(trial, chosen, noise).least >= LEAST_NECESSITY)
+    if trial.size <= chosen.size:
+        return not chosen.clearly_beats(trial)
+    return sheet.leaves_noise and necessity(trial, chosen, noise).least >= LEAST_NECESSITY
 
 
 def _nearest(fits: Fits, found: Hypothesis) -> list[Hypothesis]:

@@ -11,6 +11,7 @@ from estimator.diagnosis.inference.fits import Fits
 from estimator.diagnosis.inference.hypotheses import NOTHING, Catalogue, Hypothesis, covariance, fitted
 from estimator.diagnosis.inference.trials import Trial, tried
 from estimator.diagnosis.result import OffNominal
+from estimator.physics.driveline import Structure
 from estimator.physics.fit import not_fitted
 from estimator.physics.model import DrivelineModel, parameter_unit
 
@@ -42,8 +43,10 @@ def free_line(fits: Fits) -> FreeLine | None:
     trusted = [not s.effect and np.isfinite(s.low) and s.low < s.high for s in shared]
     if not any(free and at_bound for free, at_bound in zip(trusted, nothing.pinned, strict=False)):
         return None
+    # a joint has nothing to integrate: of its stiffness and damping, one may be none at all
+    least = 0.0 if nothing.problem.grid.structure is Structure.JOINT else 1.0 / FREELY
     freed = tuple(
-        replace(s, low=min(s.low, 1.0 / FREELY), high=max(s.high, FREELY)) if free else s
+        replace(s, low=min(s.low, least), high=max(s.high, FREELY)) if free else s
         for s, free in zip(shared, trusted, strict=True)
     )
     problem = replace(nothing.problem, shared=freed)

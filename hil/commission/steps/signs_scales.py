@@ -45,7 +45,7 @@ SIZE = (0.5, 2.0)
 """Response over that of the rig file's inertia: it is roughly known, and a wrong scale is off by more."""
 
 MOVES = 0.1
-"""Part of that response which the interval must exceed, or the vehicle counts as held: dry friction lets creep and noise
+"""Part of that response that must surely be exceeded, or the vehicle counts as held: dry friction lets creep and noise
 through, whose direction says nothing of the torque's sign."""
 
 READING_SCALE = (0.98, 1.02)
