@@ -48,7 +48,8 @@ FILTER_S = 0.2
 """Low-pass of the speed [s]: a resonance at 8 Hz is a tenth of itself behind it."""
 
 MARGIN_SHARE = 0.25
-"""How far a speed may leave its predicted range, in parts of the range: grade and drag are not in the prediction."""
+"""How far a speed may leave its predicted range, in parts of the way from standstill to its fastest: grade and drag are
+not in the prediction, and slow a vehicle that begins rolling as much as one that begins at rest."""
 
 RUNS = "runs"
 """Folder of the recordings, and of the store of runs, inside that of the commissioning."""
@@ -164,7 +165,7 @@ class WithinBand:
 
 def margin_rad_s(low_rad_s: float, high_rad_s: float, least_rad_s: float) -> float:
     """Return the margin of a predicted range [rad/s]."""
-    return max(least_rad_s, MARGIN_SHARE * (high_rad_s - low_rad_s))
+    return max(least_rad_s, MARGIN_SHARE * (max(high_rad_s, 0.0) - min(low_rad_s, 0.0)))
 
 
 @dataclass(frozen=True, slots=True)
