@@ -22,7 +22,9 @@ from hil.proof.seal import verify
 from hil.proof.sealed_rig import CONCEALED
 
 RIGS = 20
-EFFECTS = tuple(name for name in CONCEALED if name != "none")
+EFFECTS = tuple(name for name in CONCEALED if name not in ("none", "road_grade"))
+"""What is concealed: a grade lets go of a bus at standstill, and commissioning ends there with a word about it."""
+
 LIMIT_S = 3600.0
 
 
