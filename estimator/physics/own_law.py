@@ -147,8 +147,7 @@ class OwnLaw:
         try:
             with np.errstate(all="ignore"):
                 together = np.asarray(self.function(*TRIAL, **values), dtype=float)
-        # Noqa: BLE001  # a function of numbers may fail on arrays in any way: it is called one by one.
-        except Exception:
+        except Exception:  # noqa: BLE001  # a function of numbers may fail on arrays in any way: it is called one by one
             return False
         return together.shape in ((), TRIAL.shape[1:]) and bool(np.all(together == self._one_by_one(TRIAL, values)))
 
@@ -187,8 +186,7 @@ class OwnLaw:
         return self._one_by_one(arguments, values)
 
     def _one_by_one(self, arguments: FloatArray, values: Mapping[str, float]) -> FloatArray:
-        # Type: ignore[arg-type].
-        return np.array([float(self.function(*column, **values)) for column in arguments.T.tolist()])
+        return np.array([float(self.function(*column, **values)) for column in arguments.T.tolist()])  # type: ignore[arg-type]
 
     def effect(self) -> Effect:
         """Return the law as an entry of the catalogue."""

@@ -222,7 +222,7 @@ def clock_of(torque: FloatArray, trusted: BoolArray) -> Clock | None:
 
 
 def fill(torque: FloatArray, trusted: BoolArray, reference: FloatArray | None = None) -> tuple[FloatArray, BoolArray]:
-    """Return a torque [Nm] with rows filled that are not trusted, and the rows that now are known; both of shape (N,)."""
+    """Fill the rows of a torque [Nm] that are not trusted; return it and the rows that now are known, shape (N,)."""
     filled, known = _by_clock(torque, trusted)
     if reference is None or trusted.all():
         return filled, known

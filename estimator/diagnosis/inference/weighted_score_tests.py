@@ -33,7 +33,7 @@ class OutputChanges:
     around: list[tuple[FitResult, list[dict[bytes, FloatArray]]]] = field(default_factory=list)
 
     def near(self, fit: FitResult) -> list[dict[bytes, FloatArray]]:
-        """Return what is known around a motion that hardly differs from a fit's, by recording; empty where there is none."""
+        """Return what is known around a motion that is nearly a fit's, by recording; empty where there is none."""
         for other, known in self.around:
             if _difference(fit, other) < SAME_MOTION:
                 return known

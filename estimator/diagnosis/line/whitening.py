@@ -122,8 +122,9 @@ def fill_gains(
 ) -> None:
     """Fill the gains of a recording's filter; see ``fill_gains_in``, which needs no room of its own.
 
-    ``q`` and ``r`` are the variances of state and readings, ``prior`` that of the first state, ``observed`` (N, C) which
-    outputs were read, ``at_input`` and ``unread`` how an input that was not read acts, and its variance in each row.
+    ``q`` and ``r`` are the variances of state and readings, ``prior`` that of the first state, ``observed`` (N, C)
+    which outputs were read, ``at_input`` and ``unread`` how an input that was not read acts, and its variance in each
+    row.
     """
     count, m = h.shape
     room = (np.empty((m, m)), np.empty((count, m)), np.empty((count, m)), np.zeros(m), np.empty(count))

@@ -301,8 +301,7 @@ def _of_shifts(records: Sequence[Record], line: DrivelineModel) -> Iterator[Chan
 
 def _of_model(line: DrivelineModel, ratio: float) -> Iterator[Change]:
     if line.structure is Structure.TWO_MASS:
-        # Noqa: E731.
-        swapped = lambda each: _with_inertias(each, J_M=each.parameters["J_L"], J_L=each.parameters["J_M"])
+        swapped = lambda each: _with_inertias(each, J_M=each.parameters["J_L"], J_L=each.parameters["J_M"])  # noqa: E731
         yield Change("are J_M and J_L exchanged in the model file", 0.1, of_line=swapped)
         question = f"is J_L in the model file that of another vehicle or in another unit, about {ratio:.2g} times it"
         yield Change(question, 0.1 / STEPS, of_line=partial(_with_times, names=["J_L"], factor=ratio))
