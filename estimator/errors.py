@@ -107,7 +107,7 @@ class Cure:
     swapped: int | None = None
     kind: str | None = None
     dropped: int | None = None
-    columns: tuple[str, ...] = ()
+    columns: tuple[str, ...] = ()  # names in the file
     is_instead: bool = False
 
 

@@ -55,9 +55,10 @@ def figures(root: Path) -> dict[str, str]:
     for package in PACKAGES:
         of = [(sources[path], tree) for path, tree in trees.items() if path.parts[0] == package]
         functions = [bool(ast.get_docstring(each)) for _, tree in of for each in _public(tree)]
-        fields = [explained for text, tree in of for explained in _fields(tree, text.splitlines())]
+        fields = [True for _, tree in of for _ in _fields(tree)]
+        missing = [each for text, tree in of for each in unexplained_fields(tree, text.splitlines())]
         found[f"{package}: public functions without docstring"] = _share(functions)
-        found[f"{package}: fields without a word"] = _share(fields)
+        found[f"{package}: fields without a word"] = _share([False] * len(missing) + fields[len(missing) :])
     meanings = _meanings(trees)
     found["public classes of one name in one package"] = f"{sum(1 for n in meanings.values() if n > 1)}"
     pages = [*(root / "docs").rglob("*.md"), *root.glob("*.md")]
@@ -100,23 +101,27 @@ def _public(tree: ast.Module) -> Iterator[ast.FunctionDef | ast.AsyncFunctionDef
                 yield each
 
 
-def _fields(tree: ast.Module, lines: list[str]) -> Iterator[bool]:
-    """Yield of each public field of a public dataclass or named tuple whether a comment or docstring explains it."""
+def _fields(tree: ast.Module) -> Iterator[tuple[ast.ClassDef, ast.AnnAssign, ast.stmt | None]]:
+    """Yield the fields of public dataclasses and named tuples: class, field, and what stands below it."""
     for node in tree.body:
-        if not isinstance(node, ast.ClassDef) or node.name.startswith("_"):
-            continue
-        marks = [ast.unparse(each) for each in (*node.decorator_list, *node.bases)]
-        if not any("dataclass" in mark or mark == "NamedTuple" for mark in marks):
-            continue
-        text = ast.get_docstring(node) or ""
-        for field, after in zip(node.body, [*node.body[1:], None], strict=True):
-            if isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name):
-                name = field.target.id
-                own = "#" in "".join(lines[field.lineno - 1 : field.end_lineno])
-                above = lines[field.lineno - 2].strip().startswith("#")
-                below = isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant)
-                inside = f"`{name}`" in text or f"{name} :" in text or f", {name} :" in text
-                yield own or above or below or inside
+        if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+            marks = [ast.unparse(each) for each in (*node.decorator_list, *node.bases)]
+            if any("dataclass" in mark or mark == "NamedTuple" for mark in marks):
+                for field, below in zip(node.body, [*node.body[1:], None], strict=True):
+                    if isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name):
+                        yield node, field, below
+
+
+def unexplained_fields(tree: ast.Module, lines: list[str]) -> Iterator[ast.AnnAssign]:
+    """Yield the fields that no comment, no docstring below them and no docstring of their class explains."""
+    for node, field, after in _fields(tree):
+        name, text = ast.unparse(field.target), ast.get_docstring(node) or ""
+        own = "#" in "".join(lines[field.lineno - 1 : field.end_lineno])
+        above = lines[field.lineno - 2].strip().startswith("#")
+        below = isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant)
+        inside = f"`{name}`" in text or f"{name} :" in text or f", {name} :" in text
+        if not (own or above or below or inside):
+            yield field
 
 
 def _meanings(trees: dict[Path, ast.Module]) -> dict[tuple[str, str], int]:

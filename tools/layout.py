@@ -1,7 +1,8 @@
 """``python tools/layout.py``: what of a file's order a program can check, in the product and in the tools.
 
 A module is imported by one statement and under one name; no file imports or mentions itself, as files that were joined
-do; constants stand above the first definition. That the docstring names the whole file is for a reader to see.
+do; constants stand above the first definition; fields of public records in estimator and drivers are explained. That
+the docstring names the whole file is for a reader to see.
 """
 
 from __future__ import annotations
@@ -13,8 +14,11 @@ from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
+from figures import unexplained_fields
+
 ROOT = Path(__file__).parent.parent
 ROOMS = ("hil", "drivers", "estimator", "tools")
+EXPLAINED = ("drivers", "estimator")  # where every field has a comment or a docstring
 DEFINITIONS = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
 
 Finding = tuple[int, str]
@@ -41,6 +45,9 @@ def findings(path: Path) -> Iterator[Finding]:
     yield from _imports(tree, name, path.name == "__init__.py")
     for node in late_constants(tree):
         yield node.lineno, f"{_targets(node)[0]} stands below the first definition: move it above"
+    if name.partition(".")[0] in EXPLAINED:
+        for node in unexplained_fields(tree, text.splitlines()):
+            yield node.lineno, f"{ast.unparse(node.target)} has no word: say its unit, shape and meaning in a comment"
     if path.name != "__init__.py":
         for number, line in enumerate(text.splitlines(), start=1):
             if f"`{name}`" in line or f"`{path.relative_to(ROOT)}`" in line:

@@ -34,7 +34,7 @@ class Candidate:
 class Untested:
     """An effect that recordings neither show nor exclude, in the size at which a fit of it begins."""
 
-    name: str
+    name: str  # key of the catalogue
     size: Mapping[str, float]  # values of its parameters, where they are not those at which the law does nothing
     supposed: Candidate  # the most probable hypothesis with it, its other unknowns fitted to the recordings
     moves: Mapping[str, float]  # values reported that leave their 95 % intervals with it: by what share of themselves

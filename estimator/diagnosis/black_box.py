@@ -76,7 +76,7 @@ class PlantSetting:
 
     torque_nm: FloatArray  # (N, M): of its inputs
     load_nm: FloatArray  # (N,)
-    start: InitialCondition
+    start: InitialCondition  # of the line that stands for the plant
     tuned: Mapping[str, float]  # factor on those of its parameters that act as the line's of these names
     laws: FloatArray | None  # (layout.SIZE,): parameters of laws at its shafts (``flange``), where there are any
     sign_width: float  # speed within which their dry friction changes sign [rad/s]
@@ -131,9 +131,10 @@ class BlackBox:
     has_start: bool  # whether the initial state of that line means the same
     tuned: Collection[str] = ()  # parameters of that line that parameters of the plant act as
     laws: Collection[str] = ()  # effects whose torque can be put at its shafts
-    _known: dict[bytes, Future[FloatArray]] = field(default_factory=dict)
+    _known: dict[bytes, Future[FloatArray]] = field(default_factory=dict)  # outputs by digest of recording and case
+    # Latest cases of each recording.
     _around: WeakKeyDictionary[Record, deque[_Known]] = field(default_factory=WeakKeyDictionary)
-    _lock: threading.Lock = field(default_factory=threading.Lock)
+    _lock: threading.Lock = field(default_factory=threading.Lock)  # of both: cases are simulated in threads
 
     def simulated(self, record: Record, cases: Sequence[Case]) -> FloatArray:
         """Simulate the recorded output of a recording, as its sensor shows it, under each case; shape (K, N)."""

@@ -90,6 +90,7 @@ def compile_kernels(masses: int) -> None:
 
 
 def compile_laws(model: DrivelineModel, sample_time_s: float) -> None:
+    """Compile the kernel with laws of the user's own by a simulation of two samples; without such laws do nothing."""
     p = flat(model)
     for law in model.laws:
         for parameter in law.law.parameters:

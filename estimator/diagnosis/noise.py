@@ -85,11 +85,12 @@ class Gain:
     """What a larger model gains over a smaller one."""
 
     delta_bic: float  # information gained, residual correlation taken into account
-    p_value: float
+    p_value: float  # of the gain, were the smaller model true
     n_effective: float  # independent samples the larger model's residual is worth
 
 
 def residuals_by_record(result: FitResult) -> list[FloatArray]:
+    """Split a fit's residual into those of its recordings, of the samples that count."""
     sizes = np.cumsum([int(use.sum()) for use in result.problem.use])[:-1]
     return list(np.split(result.residual, sizes))
 

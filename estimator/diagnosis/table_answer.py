@@ -26,9 +26,9 @@ Entry = TypeVar("Entry", Parameter, EffectValue)
 class Law:
     """A law without a name that is in the augmented model."""
 
-    table: UnnamedTable
+    table: UnnamedTable  # as it is reported
     fit: Fit  # the decision's figures, those of the augmented model with the law
-    found: TableFit
+    found: TableFit  # its fit to the recordings
     final: FitResult  # the free runs of all recordings with it
     line: DrivelineModel  # the line with the law among its effects
 

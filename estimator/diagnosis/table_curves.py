@@ -29,16 +29,17 @@ Masks = tuple[BoolArray, ...]
 class Curve:
     """A curve that is fitted: its knots, and the unknowns that a fit of the line gets with it."""
 
-    place: str
-    knots: FloatArray
+    place: str  # key of ``PLACES``
+    knots: FloatArray  # rising [unit of the place]
     base: float  # slope in which those of the curve count [Nm/unit of the place]
     own: float  # slope that the line has without it, in ``base``
     most: tuple[float, float]  # bounds of the slopes, its own among them
     damping: float  # scale of a damping of its own; 0 where it has none
-    reached: tuple[float, float]
+    reached: tuple[float, float]  # values of the signal that the recordings contain
 
     @property
     def name(self) -> str:
+        """Name of the law in the model: the prefix of tables and the place."""
         return PREFIX + self.place
 
     @property
@@ -53,6 +54,7 @@ class Curve:
 
     @property
     def middles(self) -> FloatArray:
+        """Middles between the knots [unit of the place], one for each slope."""
         return 0.5 * (self.knots[1:] + self.knots[:-1])
 
     @cached_property
@@ -64,6 +66,7 @@ class Curve:
 
     @property
     def free(self) -> list[int]:
+        """Indices of the knots whose values are fitted: all but ``zero``."""
         return [i for i in range(self.knots.size) if i != self.zero]
 
     def released(self, result: FitResult, use: Masks) -> Problem:

@@ -47,6 +47,7 @@ class Descent:
         return x
 
     def at(self, gain: float) -> Problem:
+        """Return the problem simulated as an observer of the readings at a gain; at 0 it is a free run."""
         p = self.problem.p.copy()
         p[slot("", OBSERVER)] = gain
         return replace(self.problem, p=p)
@@ -94,6 +95,7 @@ def rms_over(problem: Problem, outputs: Sequence[FloatArray], masks: Masks) -> f
 
 
 def errors_over(problem: Problem, outputs: Sequence[FloatArray], masks: Masks) -> list[FloatArray]:
+    """Return simulated less measured output of the samples that count, by recording; those of a lead are left out."""
     rows = zip(problem.records, outputs, masks, strict=True)
     return [(out - record.output)[mask] for record, out, mask in rows if record.lead is None]
 

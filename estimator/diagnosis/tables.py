@@ -61,17 +61,17 @@ as so many thousandths of the squared error before."""
 class TableFit:
     """A law without a name, fitted."""
 
-    table: Table
+    table: Table  # place, knots and values
     result: FitResult  # the free run with it, the line re-tuned next to it; the curve stands in ``problem.p``
     before: float  # RMS of the free-run error on unseen samples without it [unit of the output]
     after: float  # and with it
     reached: tuple[float, float]  # between which values of its signal the recordings were
     rival: str = ""  # place that explains nearly as much
-    rival_after: float = np.nan
-    looks_like: str = ""
-    formula: str = ""
+    rival_after: float = np.nan  # RMS with a curve there in its stead
+    looks_like: str = ""  # law of a known form that it resembles
+    formula: str = ""  # of that law, its values filled in
     not_carried: tuple[str, ...] = ()  # recordings on which a fit to the others is worse with it
-    simulations: int = 0
+    simulations: int = 0  # spent on it
 
     @property
     def place(self) -> str:
@@ -108,9 +108,9 @@ def blocks_of(records: Sequence[Record], use: Sequence[BoolArray], which: Sequen
 class Candidate:
     """The best curve of a place, fitted to the samples that fit."""
 
-    descent: Descent
-    z: FloatArray
-    smooth: float
+    descent: Descent  # for this place
+    z: FloatArray  # unknowns, scaled
+    smooth: float  # weight of the curve's second differences
     chosen_by: float  # RMS over the samples that choose
 
 
@@ -118,7 +118,7 @@ class Candidate:
 class Scouted:
     """A place after the first gains: what its shapes leave there, the best of them first."""
 
-    descent: Descent
+    descent: Descent  # for this place
     left: list[tuple[float, FloatArray]]  # squared error and unknowns
 
     @property

@@ -83,7 +83,7 @@ class Distortion:
     """
 
     frequency_hz: FloatArray
-    amplitude: FloatArray
+    amplitude: FloatArray  # [output unit]
     noise: FloatArray
     is_even: BoolArray
 
@@ -128,7 +128,7 @@ class SpectralEstimate:
     coherence: FloatArray
     magnitude_std: FloatArray
     n_averages: float
-    used_samples: int = 0
+    used_samples: int = 0  # in all stretches
     bridged_samples: int = 0
     distortion: Distortion | None = None
 

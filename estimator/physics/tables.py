@@ -68,12 +68,12 @@ def table_of(name: str, values: Mapping[str, EffectValue]) -> Table:
 class TablePlace:
     """Where a curve acts."""
 
-    element: Element
+    element: Element  # part of the line
     over: str  # what it is a function of, in words
     dimension: str  # of that
-    structures: frozenset[Structure]
+    structures: frozenset[Structure]  # lines that have this part
     sign: str  # what a positive value does
-    periodic: bool = False
+    periodic: bool = False  # whether it repeats with every turn
 
 
 PLACES: Mapping[str, TablePlace] = MappingProxyType(

@@ -134,6 +134,7 @@ class Chain:
         return replace(self, records=steady, findings=(*self.findings, found), shifts=shifts)
 
     def effects(self) -> dict[str, dict[str, float]]:
+        """Values of the parameters of the faults found, by effect and parameter."""
         return {f.name: {name: sized.value for name, sized in f.parameters.items()} for f in self.findings}
 
     def errors(self, outputs: Sequence[FloatArray], within: Sequence[BoolArray] | None = None) -> list[FloatArray]:
@@ -161,6 +162,7 @@ def _read_rows(record: Record, findings: Iterable[AcquisitionFinding]) -> BoolAr
 
 
 def without_acquisition_effects(model: DrivelineModel) -> DrivelineModel:
+    """Return a model without the effects that are recognised before a fit: these are mended in the recordings."""
     return replace(model, effects={name: v for name, v in model.effects.items() if not EFFECTS[name].recognised})
 
 

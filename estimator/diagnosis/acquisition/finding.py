@@ -35,6 +35,7 @@ def channels(record: Record) -> FloatArray:
 
 
 def flagged(record: Record) -> BoolArray:
+    """Return the rows that count in no fit: output not read, or no torque input trusted; shape (N,)."""
     return ~np.isfinite(record.output) | ~record.torque_trusted.any(axis=1)
 
 
@@ -49,6 +50,7 @@ def all_of(cells: BoolArray) -> BoolArray:
 
 
 def runs(rows: BoolArray) -> list[tuple[int, int]]:
+    """Return where True begins and ends, ``[begin, end)`` of each stretch; of a mask of shape (N,)."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], rows, [False]])))
     return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
 
@@ -79,9 +81,9 @@ def mean_run(masks: list[BoolArray]) -> float:
 class Sized(NamedTuple):
     """A parameter as found: value, 95 % interval, unit."""
 
-    value: float
-    ci95: tuple[float, float]
-    unit: str
+    value: float  # estimate [unit]
+    ci95: tuple[float, float]  # [unit]
+    unit: str  # "" where it has none
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +91,7 @@ class AcquisitionFinding:
     """One effect of the acquisition or of the sensor's resolution."""
 
     name: str  # as in the catalogue
-    parameters: Mapping[str, Sized]
+    parameters: Mapping[str, Sized]  # by name, as the catalogue has them
     cells: Mapping[str, BoolArray]  # (N, 1 + M): the readings it touches
     p_value: float  # probability of as much by chance in recordings without the effect
     statement: str  # one sentence for an engineer
@@ -100,6 +102,7 @@ class AcquisitionFinding:
         return no_cells(record) if cells is None else cells
 
     def rows(self, record: Record) -> BoolArray:
+        """Return the rows of a recording in which a reading is touched, shape (N,)."""
         return any_of(self.touched(record))
 
 
@@ -116,7 +119,7 @@ class Prediction:
     rows: np.ndarray[tuple[int], np.dtype[np.intp]]  # (n,): rows that were predicted
     error: FloatArray  # (n,): reading less prediction, in those rows [unit of the output]
     regressors: int  # number of coefficients
-    gain: float
+    gain: float  # change of the output per change of the torque, summed over its lags [unit of the output/Nm]
 
     @property
     def typical(self) -> float:

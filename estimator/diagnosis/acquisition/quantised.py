@@ -104,7 +104,7 @@ class ChanceRepeats:
     """How often a reading equals the one before by chance."""
 
     expected: float  # best estimate of their number
-    upper: float
+    upper: float  # most that chance gives, two standard errors above it
 
 
 def chance_repeats(differences: FloatArray, step: float) -> ChanceRepeats:

@@ -102,11 +102,12 @@ class Repeated:
     rows: tuple[BoolArray, ...]  # (N,): per recording, rows that repeat where a repeat tells
     total: int  # rows in which a repeat would tell
     expected: float  # repeats by chance among these
-    upper: float
+    upper: float  # most that chance gives
     catch_up: float  # median change after a repeat, over the usual one
 
     @property
     def count(self) -> int:
+        """Rows that repeat where a repeat tells, in all recordings."""
         return sum(int(rows.sum()) for rows in self.rows)
 
     @property
@@ -157,6 +158,11 @@ def _ratio(after: FloatArray, usual: FloatArray) -> float:
 
 
 def followed(torque: FloatArray, trusted: BoolArray, reference: FloatArray) -> tuple[FloatArray, BoolArray, bool]:
+    """Return a torque as its reference implies it, the rows in which it does, and whether that is as good as a reading.
+
+    ``torque`` and ``reference`` [Nm] and ``trusted`` have shape (N,). Where the reference does not explain the torque's
+    changes the torque is returned as it is, with no row.
+    """
     regressors = _regressors(np.where(~trusted & (reference == 0.0), np.nan, reference))  # lost with the torque
     predicted = all_of(np.isfinite(regressors))
     read = predicted & trusted
@@ -183,16 +189,17 @@ def _regressors(reference: FloatArray) -> FloatArray:
 class Clock:
     """When and by how much a torque steps: in rows ``k % period == phase`` [samples], by ``+-step_nm``."""
 
-    period: int
-    phase: int
-    step_nm: float
-    usual_nm: float
+    period: int  # from tick to tick [samples]
+    phase: int  # row of the first tick, below ``period``
+    step_nm: float  # median size of a step at a tick [Nm]
+    usual_nm: float  # typical change from row to row within a hold [Nm]
 
     def ticks(self, first: int, last: int) -> list[int]:
         """Return the ticks from one row to another, both included."""
         return [row for row in range(first, last + 1) if row % self.period == self.phase]
 
     def explains(self, change_nm: float) -> bool:
+        """Return whether a change [Nm] is one step of the clock, or so small that there was none."""
         size = abs(change_nm)
         return size <= CLEAR_STEP * self.usual_nm or abs(size - self.step_nm) <= SAME_STEP * self.step_nm
 
@@ -215,6 +222,7 @@ def clock_of(torque: FloatArray, trusted: BoolArray) -> Clock | None:
 
 
 def fill(torque: FloatArray, trusted: BoolArray, reference: FloatArray | None = None) -> tuple[FloatArray, BoolArray]:
+    """Fill the rows of a torque [Nm] that are not trusted; return it and the rows that now are known, shape (N,)."""
     filled, known = _by_clock(torque, trusted)
     if reference is None or trusted.all():
         return filled, known
@@ -246,9 +254,9 @@ class LateTorque:
 
     rows: BoolArray  # (N,): rows whose torques repeat while the output answers the next one
     early: int  # clear steps that were answered early, of those before which the torque repeats
-    repeats: int
+    repeats: int  # clear steps before which the torque repeats
     early_others: int  # the same of those before which it does not
-    others: int
+    others: int  # clear steps before which it does not
 
 
 def late_torque(record: Record, inputs: Sequence[int], trusted: BoolArray) -> LateTorque | None:

@@ -35,9 +35,9 @@ LEVELS: Mapping[str, int] = {"quick": 3_000, "normal": 10_000, "thorough": 100_0
 class SearchResult:
     """What a search found, the recordings as they were read for it, and what was decided."""
 
-    chain: Chain
-    search: Search
-    decision: Decision
+    chain: Chain  # recordings, and the faults of their acquisition
+    search: Search  # the way to the best set
+    decision: Decision  # what is believed of it
 
 
 def searched(

@@ -168,11 +168,11 @@ def _is_stuck(values: Mapping[str, Mapping[str, float]], records: Sequence[Recor
 class Test:
     """One property that noise has: how far an error is from it, and the most that noise shows."""
 
-    name: str
-    value: float
-    most: float
-    is_share: bool = False
-    key: str = ""
+    name: str  # what an error that fails it does, in words
+    value: float  # of the error
+    most: float  # above it the error is more than noise
+    is_share: bool = False  # whether both are shares of the error's power
+    key: str = ""  # of `thresholds.toml`; "" for a size of the noise model at its bound
 
     @property
     def failed(self) -> bool:
@@ -181,6 +181,7 @@ class Test:
 
 
 def tests(best: Hypothesis) -> tuple[Test, ...]:
+    """Test what a hypothesis leaves for all that noise may not do; each says how far it is from that."""
     problem = best.result.problem
     errors = residuals(best, best.white.residual)
     whole = np.concatenate(errors)

@@ -90,11 +90,11 @@ class Judged:
 class Decision:
     """What is believed, and what its free runs leave: everything that is said is made from this record."""
 
-    judged: Judged
-    runs: FreeRuns
-    figures: Fit
+    judged: Judged  # sets compared and effects believed
+    runs: FreeRuns  # free runs without and with these effects
+    figures: Fit  # RMS errors of the runs, as they are reported
     acquired: tuple[FoundEffect, ...]  # faults of the acquisition that matter
-    verdict: Verdict
+    verdict: Verdict  # in one word
 
 
 def decide(search: Search, chain: Chain, unseen: Unseen, rival: Rival = no_rival) -> Decision:

@@ -39,8 +39,8 @@ MUCH_BYTES = 2**25  # room of a derivative that is rather found again than kept 
 class Effort:
     """How much a descent may cost: derivatives found anew, and steps."""
 
-    derivatives: int
-    steps: int
+    derivatives: int  # how often they are found anew at most
+    steps: int  # at most
 
 
 def extended(problem: Problem, x: FloatArray, previous: FitResult, anew: str = "") -> FitResult:

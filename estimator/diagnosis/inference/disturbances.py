@@ -48,7 +48,7 @@ ENOUGH = 0.5  # fall of minus twice the log-posterior below which sizes are esti
 class LinearLine:
     """The linear line as disturbances see it, sampled."""
 
-    f: FloatArray
+    f: FloatArray  # (n, n): how the state changes from sample to sample
     torque: FloatArray  # (n,)
     load: FloatArray  # (n,)
     h: FloatArray  # (C, n): how each output shows the state
@@ -153,11 +153,11 @@ def readings(sizes: FloatArray) -> FloatArray:
 class Whitener:
     """Kalman filters for recordings: a linear map of their errors to innovations of variance 1."""
 
-    f: Terms
-    h: Terms
+    f: Terms  # transition of the state, (m, m)
+    h: Terms  # how each output shows the state, (C, m)
     gains: tuple[Gains, ...]  # of each recording
     use: tuple[BoolArray, ...]  # (N_i, C)
-    rows: tuple[Rows, ...]
+    rows: tuple[Rows, ...]  # where the samples of each recording stand when stacked
 
     def __call__(self, stacked: FloatArray) -> FloatArray:
         """Return the innovations of stacked errors of the samples that count, shape (R,) or (R, K)."""
@@ -182,6 +182,7 @@ class Whitener:
         return found
 
     def minus_twice_log(self, innovations: FloatArray) -> float:
+        """Return minus twice the log likelihood of stacked innovations, shape (R,), but for its constant."""
         return 2.0 * float(self.logs.sum()) + float(innovations @ innovations)
 
 
@@ -259,9 +260,9 @@ def whitener(
 class Limits:
     """Usual values of a noise model and the bounds it is estimated in, all logarithms, each of shape (S,)."""
 
-    usual: FloatArray
-    low: FloatArray
-    high: FloatArray
+    usual: FloatArray  # mode of the prior
+    low: FloatArray  # lower bounds
+    high: FloatArray  # upper bounds
 
     def freed(self) -> Limits:
         """Return limits for a load that may walk as far as it likes: a road's grade."""
@@ -270,6 +271,7 @@ class Limits:
         return replace(self, high=high)
 
     def without_forms(self) -> Limits:
+        """Return limits for laws whose form is not in error: that part of the noise keeps its usual size."""
         low, high = self.low.copy(), self.high.copy()
         low[Size.FORM] = high[Size.FORM] = self.usual[Size.FORM]
         return replace(self, low=low, high=high)
@@ -280,6 +282,7 @@ class Limits:
 
 
 def reading_noise(sizes: FloatArray) -> FloatArray:
+    """Return the standard deviation of each output's noise, white and coloured [unit of the output]; shape (C,)."""
     each = np.exp(readings(sizes))
     return np.hypot(each[:, Size.WHITE], each[:, Size.COLOURED])
 

@@ -110,7 +110,7 @@ def _held(basis: LocalBasis, x: FloatArray) -> LocalBasis:
 class Unseen:
     """The samples that judge: those of recordings kept out of the fit, else blocks of the recordings themselves."""
 
-    line: DrivelineModel
+    line: DrivelineModel  # nominal model
     chain: Chain  # of recordings kept out of every fit
 
     def rms(self, hypothesis: Hypothesis, whole: FitResult, is_whole: bool, seen: Chain, is_as_read: bool) -> float:
@@ -183,14 +183,14 @@ def found_effect(standing: Standing, runs: FreeRuns) -> FoundEffect:
 class FreeRuns:
     """Free runs before and after, on the recordings at their own rate."""
 
-    chain: Chain
-    unseen: Unseen
-    believed: Hypothesis
+    chain: Chain  # recordings of the fit, as read and as mended
+    unseen: Unseen  # samples that judge
+    believed: Hypothesis  # set of effects
     is_whole: bool  # whether what is believed leaves nothing but its disturbances
     before: FitResult  # the nominal model, re-tuned
-    after: FitResult
+    after: FitResult  # the nominal model with the effects believed
     held_before: float  # RMS of their errors on samples that no fit has seen [unit of the output]
-    held_after: float
+    held_after: float  # the same with these effects
 
     @cached_property
     def retuned(self) -> FitResult:
@@ -199,6 +199,7 @@ class FreeRuns:
 
     @cached_property
     def final(self) -> FitResult:
+        """The nominal model with the effects believed: the recordings' first outputs."""
         return self.after.first_outputs()
 
     @cached_property
@@ -275,6 +276,7 @@ def acquired(runs: FreeRuns) -> tuple[FoundEffect, ...]:
 
 
 def figures_of(runs: FreeRuns, noise: float, findings: Sequence[FoundEffect]) -> Fit:
+    """Return the RMS errors that are reported [unit of the output], those of the nominal model by the raw readings."""
     chain, line, retuned = runs.chain, runs.unseen.line, runs.retuned
     as_read = fit(replace(retuned.problem, records=chain.raw), retuned.x) if chain.findings else retuned
     return Fit(

@@ -61,19 +61,19 @@ class Fits:
         The best score of a set with an effect whose values are no case of it, and as a score test foresees it.
     """
 
-    model: DrivelineModel
-    records: Sequence[Record]
+    model: DrivelineModel  # nominal
+    records: Sequence[Record]  # all of one kind of output
     use: Sequence[BoolArray]
     names: Sequence[str]
-    grid: Grid | None = None
+    grid: Grid | None = None  # steps of the simulation; None: chosen for these recordings
     work: Work = field(default_factory=Work)  # what was simulated so far
-    ended: dict[Effects, Hypothesis] = field(default_factory=dict)
+    ended: dict[Effects, Hypothesis] = field(default_factory=dict)  # by set
     rough: dict[Effects, Hypothesis] = field(default_factory=dict)
-    implausible: dict[str, float] = field(default_factory=dict)
+    implausible: dict[str, float] = field(default_factory=dict)  # by effect
     foreseen: dict[str, float] = field(default_factory=dict)
-    _changes: OutputChanges = field(default_factory=OutputChanges)
-    _done: set[tuple[str, Effects, str]] = field(default_factory=set)
-    _lock: Lock = field(default_factory=Lock)
+    _changes: OutputChanges = field(default_factory=OutputChanges)  # of the output, for score tests
+    _done: set[tuple[str, Effects, str]] = field(default_factory=set)  # descents that need not be made again
+    _lock: Lock = field(default_factory=Lock)  # sets are fitted in threads
 
     @cached_property
     def limits(self) -> Limits:

@@ -155,10 +155,10 @@ def with_line_values(result: FitResult, line: Mapping[str, float]) -> FitResult:
 class Hypothesis:
     """A set of effects, fitted."""
 
-    effects: Effects
+    effects: Effects  # names in the set
     result: FitResult  # unknowns, simulations and errors
     sizes: FloatArray  # (S,): logarithms of the disturbances' sizes and times (`whitener.Size`)
-    limits: Limits
+    limits: Limits  # usual values and bounds of ``sizes``
     minus_twice_log: float  # minus twice the log-likelihood of the recordings, and of the disturbances' prior
     choices: float  # minus the logarithm of its prior probability (`Catalogue.choices`)
 
@@ -273,6 +273,7 @@ def samples_of(result: FitResult) -> FloatArray:
 
 
 def of_first_outputs(hypothesis: Hypothesis) -> Hypothesis:
+    """Return a hypothesis as the recordings' first outputs see it; itself where there is only one output."""
     result = hypothesis.result.first_outputs()
     if result is hypothesis.result:
         return hypothesis
@@ -305,5 +306,6 @@ def covariance(hypothesis: Hypothesis) -> FloatArray:
 
 
 def residuals(hypothesis: Hypothesis, stacked: FloatArray) -> Sequence[FloatArray]:
+    """Split a stacked residual into those of each recording."""
     ends = np.cumsum([int(use.sum()) for use in hypothesis.result.problem.use])[:-1]
     return np.split(stacked, ends)

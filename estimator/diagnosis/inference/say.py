@@ -51,11 +51,11 @@ from estimator.signals.record import FloatArray
 class Basis:
     """What a result is made from: the decision, and what the search did."""
 
-    decision: Decision
-    search: Search
+    decision: Decision  # what is believed
+    search: Search  # sets that were fitted
     model: DrivelineModel  # as it was given, with what the line reads through
-    effort: Effort
-    warnings: tuple[str, ...] = ()
+    effort: Effort  # simulations and time spent
+    warnings: tuple[str, ...] = ()  # about the recordings, as sentences
     law: Law | None = None  # without a name, next to what is decided
     doubts: Sequence[Doubt] = ()  # about the input
 

@@ -54,8 +54,8 @@ ROUNDS = 3
 class ScoredStart:
     """A start of an effect's fit, and the fall of the squared error it promises to first order."""
 
-    release: Release
-    promise: float
+    release: Release  # parameters to set free, and where they begin
+    promise: float  # in units of minus twice the log likelihood
 
     @property
     def variant(self) -> frozenset[str]:

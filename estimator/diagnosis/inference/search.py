@@ -27,8 +27,8 @@ MOST_EFFECTS = 8
 class Search:
     """A search that has ended: the way to its best set, and all that was fitted."""
 
-    fits: Fits
-    path: tuple[Hypothesis, ...]
+    fits: Fits  # all that were made
+    path: tuple[Hypothesis, ...]  # each step's set, the last one the best
     is_cut_short: bool = False  # it ended at its limit of simulations
 
     @property

@@ -26,7 +26,7 @@ CLEARLY = 3.0  # standard errors by which a value must lie beyond what it is tru
 class FreeLine:
     """The nominal line with its values free."""
 
-    hypothesis: Hypothesis
+    hypothesis: Hypothesis  # without effects
     score: float  # that of the hypothesis, with the price of the choice among the line's values
     leaves_noise: bool  # whether what it leaves passes for noise
     off_nominal: tuple[OffNominal, ...]  # what clearly left its tolerance, the clearest first

@@ -41,7 +41,7 @@ COUNTED: Sequence[tuple[float, Counted]] = [
 class Necessity:
     """Which share of the squared error beyond the noise comes back without a law, on samples that no fit has seen."""
 
-    value: float
+    value: float  # estimate, as a share of 1
     least: float  # lower end of its one-sided 95 % interval, by the scatter of the blocks
 
 
@@ -49,8 +49,8 @@ class Necessity:
 class Standing:
     """What speaks for one effect of a set."""
 
-    name: str
-    necessity: Necessity
+    name: str  # key of the catalogue
+    necessity: Necessity  # of this effect, within its set
     share: float  # of the re-tuned model's squared free-run error on unseen samples, that comes back without it
     evidence: float  # by which the score rises without it
     alike: Mapping[str, Mapping[str, float]]  # effects that explain as much in its place, with their values there

@@ -82,10 +82,10 @@ class Trial:
         Squared free-run error in each block that the fit has not seen, and how many samples count there.
     """
 
-    hypothesis: Hypothesis
+    hypothesis: Hypothesis  # the set, as the likelihood has it
     size: int
-    fit: FitResult
-    squares: FloatArray
+    fit: FitResult  # tuned for the free run on samples between the blocks
+    squares: FloatArray  # [square of the output's unit]
     samples: FloatArray
 
     @property
@@ -137,8 +137,8 @@ def necessity(whole: Trial, without: Trial, noise: float) -> Necessity:
 class Trials:
     """The sets that were tried in free simulation; each is tuned once."""
 
-    model: DrivelineModel
-    _tried: dict[Effects, Trial] = field(default_factory=dict)
+    model: DrivelineModel  # nominal
+    _tried: dict[Effects, Trial] = field(default_factory=dict)  # by set
 
     @property
     def all(self) -> Mapping[Effects, Trial]:

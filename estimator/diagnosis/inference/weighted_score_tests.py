@@ -29,9 +29,11 @@ ROOM_BYTES = 2**27  # room that answers may take
 class OutputChanges:
     """Changes of the output, by what was changed, around some motions."""
 
+    # A fit, and for each recording changes by digest of what was changed.
     around: list[tuple[FitResult, list[dict[bytes, FloatArray]]]] = field(default_factory=list)
 
     def near(self, fit: FitResult) -> list[dict[bytes, FloatArray]]:
+        """Return what is known around a motion that is nearly a fit's, by recording; empty where there is none."""
         for other, known in self.around:
             if _difference(fit, other) < SAME_MOTION:
                 return known

@@ -43,11 +43,11 @@ def times(ratio: float) -> str:
 class Context:
     """What a statement adds to the verdict."""
 
-    remainder: Remainder | None = None
-    traces: Sequence[Slight] = ()
-    refinements: Sequence[str] = ()
-    off_nominal: Sequence[OffNominal] = ()
-    untestable: Sequence[UntestableEffect] = ()
+    remainder: Remainder | None = None  # error that no effect explains
+    traces: Sequence[Slight] = ()  # effects that are there and matter little
+    refinements: Sequence[str] = ()  # effects that may be there and are not established
+    off_nominal: Sequence[OffNominal] = ()  # values that left their data sheet
+    untestable: Sequence[UntestableEffect] = ()  # effects that these recordings can't show
     can_be_retuned: bool = True  # false for a plant whose parameters are not fitted
     element: Element | None = None  # where the mismatch most likely is
     doubts: Sequence[Doubt] = ()  # about the input: they come first
@@ -184,6 +184,7 @@ def _common_factor(off_nominal: Sequence[OffNominal]) -> str:
 
 
 def off_the_sheet(off_nominal: Sequence[OffNominal]) -> str:
+    """Say which nominal values are outside the tolerance of their data sheet, and by how much."""
     parts = []
     for each in off_nominal:
         trusted = f"{100.0 * each.tolerance:.2g} %"

@@ -36,12 +36,12 @@ class Motion:
     ``angle`` is by the recording's own output.
     """
 
-    time_s: FloatArray
-    torque: FloatArray
+    time_s: FloatArray  # from the recording's beginning
+    torque: FloatArray  # sum of the inputs [Nm]
     angle: FloatArray
-    speed: FloatArray
-    twist: FloatArray
-    load_speed: FloatArray
+    speed: FloatArray  # of the motor
+    twist: FloatArray  # of the shaft
+    load_speed: FloatArray  # behind the shaft; of one mass the motor's
 
 
 def simulated(result: FitResult, index: int, state: int | None = None) -> FloatArray:
@@ -52,10 +52,12 @@ def simulated(result: FitResult, index: int, state: int | None = None) -> FloatA
 
 
 def motion_of(result: FitResult, index: int) -> Motion:
+    """Return what happens in a recording as a fit simulates it, sample by sample."""
     return motion_in_blocks(result.problem.records[index], states_of(result, index), 1)
 
 
 def states_of(result: FitResult, index: int) -> dict[str, FloatArray]:
+    """Return angle [rad], speeds [rad/s] and twist [rad] of a recording as a fit simulates it, each of shape (N,)."""
     wanted = (state_vector.SPEED, state_vector.TWIST, state_vector.LOAD_SPEED)
     speed, twist, load_speed = (simulated(result, index, state) for state in wanted)
     if result.problem.grid.structure is Structure.ONE_MASS:
@@ -65,6 +67,7 @@ def states_of(result: FitResult, index: int) -> dict[str, FloatArray]:
 
 
 def motion_in_blocks(record: Record, states: dict[str, FloatArray], length: int) -> Motion:
+    """Return the means over blocks of a number of samples; what is left at the end is no block."""
     return Motion(
         block_mean(record.time_s, length),
         block_mean(record.total_torque_nm, length),
@@ -183,6 +186,7 @@ ELEMENTS = {
 
 
 def places(result: FitResult) -> tuple[InputPlace, ...]:
+    """Return the places at which an unknown input may act on a line of this structure."""
     if result.problem.grid.structure is Structure.JOINT:
         return (InputPlace.SHAFT,)
     if result.problem.grid.structure is Structure.ONE_MASS:
@@ -191,6 +195,7 @@ def places(result: FitResult) -> tuple[InputPlace, ...]:
 
 
 def size_at(result: FitResult, place: InputPlace) -> float:
+    """Return the usual size of an input at a place: a torque [Nm], or a speed [rad/s] at the sensor."""
     records = result.problem.records
     return speed_scale(records) if place is InputPlace.SENSOR else torque_scale(records)
 
@@ -199,9 +204,9 @@ def size_at(result: FitResult, place: InputPlace) -> float:
 class BlockedRecording:
     """One recording of a fit, in blocks."""
 
-    record: Record
+    record: Record  # as it was fitted
     length: int  # samples per block
-    tangent: Tangent
+    tangent: Tangent  # the line linearised around the fit
     error: FloatArray  # (B,): measured less simulated output, averaged over the block's good samples
     weight: FloatArray  # (B,): how many samples of the block count
     motion: Motion  # as the fit has it, in the middle of each block

@@ -50,11 +50,11 @@ class Chain(NamedTuple):
 class Filtered(NamedTuple):
     """What the smoother needs of the filter: predictions, gains, surprises and their precision (0: not observed)."""
 
-    means: FloatArray
-    covariances: FloatArray
-    gains: FloatArray
-    surprises: FloatArray
-    precisions: FloatArray
+    means: FloatArray  # (B, n + 1): predicted state and input
+    covariances: FloatArray  # (B, n + 1, n + 1) of these
+    gains: FloatArray  # (B, n + 1): correction per unit of surprise
+    surprises: FloatArray  # (B,): error less its prediction
+    precisions: FloatArray  # (B,): one over their variance
 
 
 @compiled
@@ -201,7 +201,7 @@ class Input:
     """The input at one place of one recording; arrays of shape (B,), one value per block."""
 
     value: FloatArray  # estimate and its standard error
-    std: FloatArray
+    std: FloatArray  # of ``value``
     motion: Motion  # what then happens in the line, in the middle of each block
 
 
@@ -209,8 +209,8 @@ class Input:
 class Explanation:
     """The inputs at one place, one per recording."""
 
-    place: InputPlace
-    inputs: tuple[Input, ...]
+    place: InputPlace  # where they act
+    inputs: tuple[Input, ...]  # in the order of the recordings
     rate: float  # standard deviation of the walk's change in one second [unit of the input]
     log_likelihood: float  # of the error, at the best rate
 

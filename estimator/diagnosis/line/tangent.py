@@ -81,15 +81,15 @@ class Tangent:
 class Setting(NamedTuple):
     """What the kernel is given in every block alike, and room for its answers; see ``integration.integrate``."""
 
-    masses: Masses
-    sample_time_s: float
-    substeps: int
-    sign_width: float
-    angle: FloatArray
-    outputs: NDArray[np.int_]
-    sensor: bool
-    out: FloatArray
-    slopes: FloatArray
+    masses: Masses  # which structure the kernel is compiled for
+    sample_time_s: float  # from row to row
+    substeps: int  # steps of integration in a sample
+    sign_width: float  # speed within which dry friction changes sign [rad/s]
+    angle: FloatArray  # (N,): of the motor, as recorded [rad]
+    outputs: NDArray[np.int_]  # entries of the state to read out; the first is the recorded one
+    sensor: bool  # whether the speed sensor's effects act on the first of them
+    out: FloatArray  # (outputs, N): filled by the kernel
+    slopes: FloatArray  # (2, N): the torque's changes within a sample; (2, 0): not wanted
 
 
 class Nudges(NamedTuple):

@@ -22,12 +22,13 @@ SETTLED = 1e-5
 class Terms(NamedTuple):
     """The entries of a matrix that are not 0."""
 
-    rows: IntArray
-    columns: IntArray
-    values: FloatArray
+    rows: IntArray  # (K,)
+    columns: IntArray  # (K,)
+    values: FloatArray  # (K,): entry ``[rows, columns]``
 
 
 def terms_of(matrix: FloatArray) -> Terms:
+    """Return the entries of a matrix that are not 0."""
     rows, columns = np.nonzero(matrix)
     return Terms(rows, columns, matrix[rows, columns])
 
@@ -92,6 +93,7 @@ def predict(f: Terms, q: FloatArray, p: FloatArray, half: FloatArray, before: Fl
 
 @inlined
 def is_as_before(observed: BoolArray, t: int) -> bool:
+    """Return whether the same outputs were read in a row as in the one before: only then may a gain be kept."""
     same = True
     for i in range(observed.shape[1]):
         same = same and observed[t, i] == observed[t - 1, i]
@@ -100,6 +102,7 @@ def is_as_before(observed: BoolArray, t: int) -> bool:
 
 @inlined
 def add_input(at_input: FloatArray, n: int, variance: float, p: FloatArray) -> None:
+    """Add an input's variance in row n to a covariance of the state, in place."""
     for i in range(p.shape[0]):
         for k in range(p.shape[0]):
             p[i, k] += variance * at_input[n, i] * at_input[n, k]
@@ -117,6 +120,12 @@ def fill_gains(
     unread: FloatArray,
     gains: Gains,
 ) -> None:
+    """Fill the gains of a recording's filter; see ``fill_gains_in``, which needs no room of its own.
+
+    ``q`` and ``r`` are the variances of state and readings, ``prior`` that of the first state, ``observed`` (N, C)
+    which outputs were read, ``at_input`` and ``unread`` how an input that was not read acts, and its variance in each
+    row.
+    """
     count, m = h.shape
     room = (np.empty((m, m)), np.empty((count, m)), np.empty((count, m)), np.zeros(m), np.empty(count))
     fill_gains_in(f, h, q, r, prior.copy(), observed, at_input, unread, gains, room)

@@ -82,13 +82,13 @@ class Row:
     """One mistake that is a factor."""
 
     question: str  # what to ask
-    part: Part
+    part: Part  # what is to be multiplied
     low: float  # what the column is to be multiplied by is between them, evenly in its logarithm
-    high: float
-    prior: float
-    kinds: tuple[OutputKind, ...] = tuple(OutputKind)
+    high: float  # upper end
+    prior: float  # probability before a recording is seen
+    kinds: tuple[OutputKind, ...] = tuple(OutputKind)  # outputs it can be made with
     motions: tuple[Motion, ...] = (Motion.ROTATION,)  # the outputs and motions it can be made with
-    reads: tuple[float, float] | None = None
+    reads: tuple[float, float] | None = None  # between which its largest value stands in the file
     whole: bool = False  # whether the torques then are whole numbers
     alone: bool = False  # whether it can only be so in one of several recordings
 
@@ -175,10 +175,10 @@ Line = DrivelineModel | None
 class Change:
     """What may be wrong beyond a factor, undone: in the recordings, or in the model."""
 
-    question: str = ""
-    prior: float = 1.0
-    of_record: Callable[[Record], Record] | None = None
-    of_line: Callable[[DrivelineModel], DrivelineModel] | None = None
+    question: str = ""  # what to ask
+    prior: float = 1.0  # probability before a recording is seen
+    of_record: Callable[[Record], Record] | None = None  # undoes it in a recording
+    of_line: Callable[[DrivelineModel], DrivelineModel] | None = None  # undoes it in the model
     cure: Cure | None = None  # without one, there is no line that undoes it
     factors: int = 0  # how many factors may be wrong, too
     is_physics: bool = False  # nothing is wrong then: what is there is for a diagnosis to find

@@ -95,12 +95,13 @@ def unwrapped(records: Sequence[Record]) -> tuple[list[Record], list[str]]:
 class Clipped:
     """One channel at one limit: the value, and in which rows it stands there, shape (N,)."""
 
-    channel: str
-    value: float
-    rows: BoolArray
+    channel: str  # in words, for a warning
+    value: float  # the limit, in the channel's unit
+    rows: BoolArray  # where it stands there
 
 
 def clipped(channel: str, values: FloatArray, seen: BoolArray) -> list[Clipped]:
+    """Return the limits at which a channel is clipped: an end that is met far more often than other values are."""
     levels, counts = np.unique(values[seen], return_counts=True)
     if levels.size < FEWEST_LEVELS:
         return []

@@ -103,7 +103,7 @@ class Inertia:
     of the inertias seen below and above the first mode. Of a joint it is the torque that the motion takes.
     """
 
-    ratio: float
+    ratio: float  # 1 where the model is right
     rest: float
     log_ratio: float = math.nan
 

@@ -58,12 +58,12 @@ OFFSETS = np.linspace(-2.0, 2.0, 81)  # of the logarithm of the nominal inertia 
 class Candidate:
     """What would explain the recordings, in all of them or in one alone, with the logarithm of its weight."""
 
-    change: Change
-    rows: tuple[tuple[Row, float], ...] = ()
-    log_weight: float = 0.0
-    is_turned: bool = False
+    change: Change  # beyond a factor
+    rows: tuple[tuple[Row, float], ...] = ()  # factors, each with its value
+    log_weight: float = 0.0  # prior times likelihood
+    is_turned: bool = False  # whether the sign of the output is wrong
     only: int | None = None  # the recording that it is wrong in alone
-    is_else: bool = False
+    is_else: bool = False  # something that is not in the list
 
     @property
     def is_right(self) -> bool:
@@ -96,6 +96,7 @@ class Candidate:
         )
 
     def factors(self) -> tuple[float, float]:
+        """Return the factors on the torque and on the output that would put right what is wrong."""
         of = {part: math.prod(f for row, f in self.rows if row.part is part) for part in (Part.TORQUE, Part.OUTPUT)}
         return of[Part.TORQUE], of[Part.OUTPUT]
 
@@ -289,6 +290,7 @@ def are_whole_numbers(record: Record) -> bool:
 
 
 def tolerance_of(line: DrivelineModel) -> float:
+    """Return the tolerance of the nominal inertia; of a line without one, the largest tolerance."""
     inertias = [each.tolerance for name, each in line.parameters.items() if name.startswith("J")]
     return max(inertias or [each.tolerance for each in line.parameters.values()])
 
@@ -309,6 +311,7 @@ def ratio_off(found: Sequence[Inertia], line: Line) -> tuple[float, int]:
 
 
 def changed_by(record: Record, change: Change) -> Record:
+    """Return a recording with a change undone in it."""
     return record if change.of_record is None else change.of_record(record)
 
 

@@ -75,9 +75,9 @@ UNREAD = ", and that every torque is read: what another one does counts as noise
 class NotRead:
     """Rows of a channel that no sensor has read, shape (N,), and what is there instead."""
 
-    channel: str
-    rows: BoolArray
-    held: bool
+    channel: str  # in words, for a warning
+    rows: BoolArray  # where it was not read
+    held: bool  # the value before stands there; else it is interpolated
 
 
 def not_read(channel: str, values: FloatArray, seen: BoolArray, may_rest: bool) -> list[NotRead]:
@@ -332,11 +332,11 @@ def require_together(records: Sequence[Record]) -> None:
 class Prepared:
     """Recordings fit for a diagnosis: cut at long gaps, without what was cut off, with what there is to say of them."""
 
-    records: tuple[Record, ...]
-    holdout: tuple[Record, ...]
-    warnings: tuple[str, ...]
-    segments: Cut
-    doubts: tuple[Doubt, ...] = ()
+    records: tuple[Record, ...]  # to be fitted
+    holdout: tuple[Record, ...]  # kept out of every fit
+    warnings: tuple[str, ...]  # as sentences
+    segments: Cut  # which part of which recording each record is
+    doubts: tuple[Doubt, ...] = ()  # about the input
 
     def finished(self, diagnosis: Diagnosis) -> Diagnosis:
         """Return a diagnosis of these records under the recordings' own names, with their warnings."""
@@ -345,6 +345,7 @@ class Prepared:
 
 
 def with_motion_corrected(records: Sequence[Record]) -> tuple[list[Record], list[str]]:
+    """Return recordings unwrapped and without what no sensor has read, and a warning for each change."""
     warnings: list[str] = []
     mended = list(records)
     for mend in (unwrapped, without_clipped, without_not_read, with_usable_channels):

@@ -44,9 +44,9 @@ FUNCTION = 0.5  # share of a law's power that must be a function of one signal t
 class Axis:
     """A signal that a law may be drawn over: its name, the dimension of its unit, and its values."""
 
-    name: str
-    dimension: str
-    values: Callable[[Motion, FitResult], FloatArray]
+    name: str  # in words, for a label
+    dimension: str  # key of the units
+    values: Callable[[Motion, FitResult], FloatArray]  # by motion and fit, (B,)
     without: Callable[[Motion, FitResult], FloatArray] | None = None  # the torque there without the law, drawn with it
 
 
@@ -89,10 +89,12 @@ AXES: Mapping[Element, tuple[Axis, ...]] = {
 
 
 def signal_unit(dimension: str, kind: Kind) -> str:
+    """Return the unit of a signal's dimension, for rotation or translation."""
     return f"{unit('speed', kind)}/s" if dimension == "speed/s" else unit(dimension, kind)
 
 
 def input_unit(place: InputPlace, result: FitResult, kind: Kind) -> str:
+    """Return the unit of an unknown input at a place; at the sensor that of the output."""
     if place is not InputPlace.SENSOR:
         return unit("torque", kind)
     names = {"speed": "speed", "position": "angle", "force": "torque"}

@@ -222,6 +222,7 @@ def band_hz(mismatch: Sequence[FloatArray], sample_times_s: Sequence[float], noi
 
 
 def region(result: FitResult, element: Element, floor: float = 0.0) -> Region:
+    """Return where a mismatch is: the range of the element's signal that holds the central part of its power."""
     values, weights = [], []
     for i in range(len(result.problem.records)):
         values.append(_signal(element, motion_of(result, i), result))

@@ -230,7 +230,7 @@ class Problem:
     read: BoolArray | None = None  # whether the input was read
     noise_order: int = 0  # of D; 0 for an output-error fit
     block: int = 1  # samples whose mean error is one sample to D
-    _last: list[_Point] = field(default_factory=list, init=False, repr=False)
+    _last: list[_Point] = field(default_factory=list, init=False, repr=False)  # the latest point that was asked for
 
     @property
     def period_s(self) -> float:
