@@ -69,7 +69,7 @@ class TableFit:
     rival: str = ""  # place that explains nearly as much
     rival_after: float = np.nan  # RMS with a curve there in its stead
     looks_like: str = ""  # law of a known form that it resembles
-    formula: str = ""  # of that law, its values filled in
+    formula: str = ""  # of fewest terms within the band; "" without one
     not_carried: tuple[str, ...] = ()  # recordings on which a fit to the others is worse with it
     simulations: int = 0  # spent on it
 

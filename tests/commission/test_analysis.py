@@ -16,7 +16,7 @@ from hil.commission.prbs_design import Cap, resonance_spread, vibration_m_s2
 from hil.commission.responses import Measured, pulse_response, response_ratio
 from hil.commission.steps.signs_scales import MOVES
 from hil.config.rig_file import read_rig
-from hil.orders.runner import rigid_model
+from hil.orders.runner import margin_rad_s, rigid_model
 from hil.rig.experiments.laws import LEAD_S, Pulses
 from hil.simulator.driveline import DEFAULT_BUS
 from tests.commission.rigs import EXAMPLE
@@ -73,6 +73,12 @@ def test_pulses_tell_sign_and_size(factor: float) -> None:
 
 def test_creep_under_friction_has_no_direction() -> None:
     assert not Measured(-0.026, 0.020).exceeds(MOVES)
+
+
+def test_a_run_that_begins_rolling_may_be_slowed_as_one_from_standstill() -> None:
+    assert margin_rad_s(8.6, 9.3, 1.0) == margin_rad_s(0.0, 9.3, 1.0) == pytest.approx(0.25 * 9.3)
+    assert margin_rad_s(-9.3, -8.6, 1.0) == pytest.approx(0.25 * 9.3)
+    assert margin_rad_s(8.6, 9.3, 3.0) == 3.0
 
 
 def test_gain_and_delay_between_two_tests() -> None:

@@ -55,7 +55,7 @@ class ScoredStart:
     """A start of an effect's fit, and the fall of the squared error it promises to first order."""
 
     release: Release  # parameters to set free, and where they begin
-    promise: float  # in units of minus twice the log likelihood
+    promise: float  # that fall, of errors as the projector weights them; 0: none
 
     @property
     def variant(self) -> frozenset[str]:

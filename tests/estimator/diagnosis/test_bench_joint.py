@@ -7,6 +7,8 @@ import pytest
 from estimator.diagnosis import diagnose
 from estimator.diagnosis.inference.standing import ALIKE_SHARE
 from estimator.diagnosis.result import Diagnosis, Verdict
+from estimator.physics.effect import Element
+from estimator.physics.model import DrivelineModel, Parameter, Structure
 from tests.estimator.diagnosis.bench_joint import Joint
 
 
@@ -17,6 +19,14 @@ def diagnosed(joint: Joint) -> Diagnosis:
 @pytest.mark.parametrize("zero_error", [0.0, 800.0])
 def test_a_spring_and_a_damper_miss_nothing(zero_error: float) -> None:
     assert diagnosed(Joint(zero_error=zero_error)).verdict is Verdict.NO_MISMATCH
+
+
+def test_a_damper_whose_sheet_has_a_stiffness_is_given_no_law_for_it() -> None:
+    joint = Joint(k=1.0, c=1.75e5)
+    nominal = DrivelineModel(Structure.JOINT, {"k": Parameter(3e5, 0.95), "c": Parameter(1e5, 0.95)})
+    found = diagnose([joint.record(number) for number in range(3)], nominal)
+    assert found.effects == ()
+    assert found.mismatch.element is Element.SHAFT
 
 
 @pytest.mark.campaign
