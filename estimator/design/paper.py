@@ -55,7 +55,7 @@ def as_model(candidate: Candidate, line: DrivelineModel) -> DrivelineModel:
         | (always if EFFECTS[name].event else {})
         for name in candidate.effects - {GRADE}
     }
-    given = {name: replace(each, value=values[name]) for name, each in line.parameters.items()}
+    given = {name: each.at(values[name]) for name, each in line.parameters.items()}
     return replace(line, parameters=given, effects={**line.effects, **added})
 
 

@@ -361,17 +361,15 @@ def _retuned_line(result: FitResult, model: DrivelineModel) -> dict[str, Paramet
         if shared.effect or shared.name not in model.parameters:
             continue
         value, known = float(result.x[i]) * shared.scale, model.parameters[shared.name]
-        if known.ci95 is None:
-            found[shared.name] = replace(known, value=value)
-            continue
-        low, high = interval(result, cov, i) if known.is_unknown and cov is not None else known.ci95
-        found[shared.name] = Parameter(value, ci95=(min(low, value), max(high, value)))
+        if known.is_unknown and cov is not None:
+            known = replace(known, ci95=interval(result, cov, i))
+        found[shared.name] = known.at(value)
     return found
 
 
 def _retuned_effects(result: FitResult, model: DrivelineModel) -> dict[str, Mapping[str, EffectValue]]:
     """Return the effects that a model had, those known roughly with the values that were fitted."""
     return {
-        name: {key: replace(v, value=result.values_of(name).get(key, v.value)) for key, v in values.items()}
+        name: {key: v.at(result.values_of(name).get(key, v.value)) for key, v in values.items()}
         for name, values in model.effects.items()
     }

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import TypeVar
 
 from estimator.diagnosis.inference.decide import Decision
 from estimator.diagnosis.inference.figures import FreeRuns, Unseen, foreign_outputs, on_recordings
@@ -16,10 +15,8 @@ from estimator.diagnosis.inference.hypotheses import Hypothesis, all_good_sample
 from estimator.diagnosis.result import Fit, Trace, UnnamedTable
 from estimator.diagnosis.tables import TableFit, best_table
 from estimator.physics.fit import FitResult
-from estimator.physics.model import DrivelineModel, EffectValue, Motion, Parameter, unit
+from estimator.physics.model import DrivelineModel, EffectValue, Motion, unit
 from estimator.physics.tables import PLACES
-
-Entry = TypeVar("Entry", Parameter, EffectValue)
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,11 +37,11 @@ class Law:
     def augmented(self, model: DrivelineModel) -> DrivelineModel:
         """Return a model with the law, and the line and its effects as they are next to it."""
         of_line = self.final.values_of("")
-        parameters = {name: _next_to_it(p, of_line.get(name, p.value)) for name, p in model.parameters.items()}
+        parameters = {name: p.at(of_line.get(name, p.value)) for name, p in model.parameters.items()}
         effects: dict[str, Mapping[str, EffectValue]] = {}
         for name, values in model.effects.items():
             found = self.final.values_of(name)
-            effects[name] = {key: _next_to_it(value, found.get(key, value.value)) for key, value in values.items()}
+            effects[name] = {key: value.at(found.get(key, value.value)) for key, value in values.items()}
         return _with_table(replace(model, parameters=parameters, effects=effects), self.found)
 
     def drawn(self, traces: tuple[Trace, ...], believed: Hypothesis, runs: FreeRuns) -> tuple[Trace, ...]:
@@ -78,16 +75,6 @@ def unnamed_law(decision: Decision) -> Law | None:
 
 def _with_table(model: DrivelineModel, law: TableFit) -> DrivelineModel:
     return replace(model, effects={**model.effects, law.table.name: law.table.effect()})
-
-
-def _next_to_it(entry: Entry, value: float) -> Entry:
-    """Return what a value is next to the law; an interval that was found without it is widened to hold it.
-
-    A law that moves a value beyond its interval shows that the interval did not know of the law.
-    """
-    if entry.ci95 is None:
-        return replace(entry, value=value)
-    return replace(entry, value=value, ci95=(min(entry.ci95[0], value), max(entry.ci95[1], value)))
 
 
 def _reported(law: TableFit, motion: Motion) -> UnnamedTable:

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Protocol
 
@@ -120,6 +120,11 @@ class Load(Enum):
     SHARED = "shared"
 
 
+def widened(ci95: tuple[float, float] | None, value: float) -> tuple[float, float] | None:
+    """Return an interval that holds a value, in its unit; None where there is none."""
+    return None if ci95 is None else (min(ci95[0], value), max(ci95[1], value))
+
+
 @dataclass(frozen=True, slots=True)
 class Parameter:
     """A nominal value [SI] and what it is trusted to: re-tuning it within that is no missing physics.
@@ -145,6 +150,10 @@ class Parameter:
         reach = max(half_width, least_share * value)
         reach = reach if math.isfinite(reach) else UNKNOWN_WITHIN * value
         return cls(value, ci95=(max(value - reach, 0.0), value + reach))
+
+    def at(self, value: float) -> Parameter:
+        """Return it at another value [SI]; what moves a value out of its interval was not known of: it is widened."""
+        return replace(self, value=value, ci95=widened(self.ci95, value))
 
     @property
     def low(self) -> float:
@@ -176,6 +185,10 @@ class EffectValue:
     value: float  # in the parameter's unit
     ci95: tuple[float, float] | None = None  # in the same unit; None where it was given
     tolerance: float = 0.0  # relative, 0 for a value that is trusted exactly
+
+    def at(self, value: float) -> EffectValue:
+        """Return it at another value; see `Parameter.at`."""
+        return replace(self, value=value, ci95=widened(self.ci95, value))
 
 
 class Driveline(Protocol):

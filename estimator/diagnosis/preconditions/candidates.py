@@ -402,4 +402,4 @@ def _with_inertias(line: DrivelineModel, **inertias: Parameter) -> DrivelineMode
 
 def _with_times(line: DrivelineModel, names: Sequence[str], factor: float) -> DrivelineModel:
     known = {name: line.parameters[name] for name in names}
-    return _with_inertias(line, **{name: replace(each, value=each.value * factor) for name, each in known.items()})
+    return _with_inertias(line, **{name: each.at(each.value * factor) for name, each in known.items()})

@@ -11,7 +11,7 @@ import pytest
 
 from estimator.diagnosis.preconditions.plausible import BEYOND, doubts_about
 from estimator.errors import Cure, Implausible
-from estimator.physics.driveline import InitialCondition
+from estimator.physics.driveline import InitialCondition, Parameter, Structure
 from estimator.physics.effect import Element
 from estimator.physics.model import DrivelineModel
 from estimator.signals.record import FloatArray, OutputKind, Record
@@ -75,6 +75,13 @@ def test_a_factor_is_named(fault: str, values: dict[str, float]) -> None:
     found, _ = judged(change(drive(values)), model(values))
     assert found.startswith("recording run is implausible: ")
     assert said in found
+
+
+def test_a_factor_is_named_against_measured_values() -> None:
+    known = {name: Parameter.measured(value, 0.1 * value, 0.1) for name, value in TWO_MASS.items()}
+    line = DrivelineModel(Structure.TWO_MASS, known)
+    change, said = WRONG["rpm"]
+    assert said in judged(change(drive()), line)[0]
 
 
 @pytest.mark.parametrize("direction", [1.0, -1.0], ids=["too large", "too small"])
