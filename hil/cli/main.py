@@ -96,4 +96,8 @@ def _complain(text: str) -> None:
 def main() -> None:
     """Entry point of the console script ``hil``."""
     interrupt_on_signals()
-    sys.exit(run(sys.argv[1:], keep_log=True))
+    status = run(sys.argv[1:], keep_log=True)
+    # CPython remembers Ctrl-C inside an `exec` of a string (a dataclass that is being imported) and ends a program that
+    # was started by `-m` by SIGINT in place of its status; the next string that is executed makes it forget.
+    exec("")
+    sys.exit(status)

@@ -142,6 +142,28 @@ def test_while_it_reads_and_while_it_computes(
     assert not out.exists()
 
 
+WITHIN_EXEC = """
+import hil.cli.main as main
+
+def interrupted(*_, **__):
+    try:
+        exec("raise KeyboardInterrupt")
+    except KeyboardInterrupt:
+        return 130
+
+main.run = interrupted
+main.main()
+"""
+
+
+def test_within_a_string_that_is_executed(tmp_path: Path) -> None:
+    """As the definition of a dataclass does while its module is imported; seen with `-m` alone."""
+    (tmp_path / "within_exec.py").write_text(WITHIN_EXEC, encoding="utf-8")
+    path = os.pathsep.join([str(tmp_path), os.getcwd()])
+    done = subprocess.run([sys.executable, "-m", "within_exec"], env={**os.environ, "PYTHONPATH": path})
+    assert done.returncode == 130
+
+
 def test_while_it_imports(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     def interrupt(name: str) -> NoReturn:
         raise KeyboardInterrupt
