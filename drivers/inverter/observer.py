@@ -148,6 +148,7 @@ class VehicleObserver:
         self._x = np.array([math.nan, 0.0, 0.5 * (low + high), TWIST_S2])
         self._p = np.diag([0.01, self._unknown_rad_s2**2, (0.5 * (high - low)) ** 2, TWIST_S2**2])
         self._held_rad_s = self._stands_s = 0.0
+        self._last_free = (0.0, 0.0, 0.0)  # torque, acceleration and its variance when it last moved
         self._surprise = (0.0, 0.0)
 
     def take(self, torque_nm: float, speed_rad_s: float, reading_rad_s: float, cycles: int) -> Motion | None:
@@ -248,20 +249,26 @@ class VehicleObserver:
             load = min(max(load, low - ROLLING_RAD_S2), high + ROLLING_RAD_S2)
             load_std, self._held_rad_s, self._stands_s = max(load_std, ROLLING_RAD_S2), 0.0, 0.0
         else:
-            self._hold(dt_s, u, load, load_std)
+            self._hold(dt_s, u)
             noise_rad_s = math.hypot(noise_rad_s, WINDOW_RAD_S)
         self._x[:2] = speed_rad_s, load
         self._p[:2, :], self._p[:, :2] = 0.0, 0.0
         self._p[0, 0], self._p[1, 1] = noise_rad_s**2, load_std**2
 
-    def _hold(self, dt_s: float, u: float, load: float, load_std: float) -> None:
+    def _hold(self, dt_s: float, u: float) -> None:
         """Sum up by how much the speed should have changed since it stands, at least: its last jump, and by torque."""
+        gain = float(self._x[2])
         if not self._stands_s:
             self._held_rad_s = -self._jump_rad_s
+            net = np.array([0.0, -1.0, u, 0.0])  # gain and load were learnt together, and are surer together
+            self._last_free = u, float(net @ self._x), float(net @ self._p @ net)
         self._stands_s += dt_s
-        push = math.copysign(1.0, u - load)
-        # where it moved that way friction is in the load; a load that is known too little is taken for friction alone
-        turns = 2.0 * ROLLING_RAD_S2 if push * self._direction < 0.0 else 0.0
-        met, spread = push * load + turns, 3.0 * math.hypot(load_std, WIND_RAD_S2)
-        holds = min(max(ROLLING_RAD_S2, met - spread), met + spread) if self._direction else ROLLING_RAD_S2
-        self._held_rad_s += push * max(push * self._vehicle.gains[0] * u - holds, 0.0) * dt_s
+        free_u, free, variance = self._last_free
+        free += gain * (u - free_u)
+        push = math.copysign(1.0, free)
+        speeds_up = push * self._vehicle.gains[0] * u - ROLLING_RAD_S2  # with no load but friction
+        if self._direction:  # which holds as far as what it did before it stood does not speak against it
+            turns = 2.0 * ROLLING_RAD_S2 if push * self._direction < 0.0 else 0.0  # friction, that was in the load
+            spread = 3.0 * math.sqrt(variance + self._p[2, 2] * (u - free_u) ** 2 + WIND_RAD_S2**2)
+            speeds_up = min(max(speeds_up, abs(free) - turns - spread), abs(free) - turns + spread)
+        self._held_rad_s += push * max(speeds_up, 0.0) * dt_s

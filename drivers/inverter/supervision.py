@@ -50,9 +50,9 @@ MOST_HELD_RAD_S: Final = 1.0
 """That a speed which stands to the last bit should have changed by: the same came to 0.65, for half of their drives
 show a speed below 0.3 rad/s as zero, after a reading with noise."""
 
-TURNED_LOOKS: Final = 2
-TURNED_CYCLES: Final = 5
-"""Reports of the PLC's level that a drive has the opposite of, in all of so many cycles around each report."""
+LEVEL_LOOKS: Final = 2
+LEVEL_CYCLES: Final = 5
+"""Reports of the PLC's level that a drive is away from by more than half, in all of so many cycles around each."""
 
 RULES: Final = f"""\
 power state, 0x6041 | OPERATION ENABLED, in every mode | none | one TPDO | end; never enabled again
@@ -63,7 +63,7 @@ torque 0x6077 of a drive | its command by slope and `torque_response_s`, of the 
 torques of both | the two predictions | `torque_error_sum_nm`, of both distances | tolerance × `torque_error_time_s` \
 | flag, end
 torques with the PLC's PRBS | the same and one of its levels, the one it reports; nothing while it is off | as above \
-| as above, and while it is switched; the opposite of the level reported: {TURNED_LOOKS} reports | flag, end
+| as above, and while it is switched; half a level or more from the one reported: {LEVEL_LOOKS} reports | flag, end
 reading that repeats to the last bit | the command of its first | `torque_error_nm` | tolerance × `feedback_timeout_s` \
 | end
 speeds 0x606C of both, low-passed | one speed | {SPEED_NOISE_RAD_S:g} rad/s, a count of each, {100 * SPEED_SHARE:g} % \
@@ -130,30 +130,32 @@ class SupervisionLimits:
     vehicle: Vehicle | None = None  # None: speeds are not compared with what torques make
 
 
-class _Turned:
-    """Compares what both drives have besides their commands with the level that the PLC reports."""
+class _Level:
+    """Follows how far each drive is from its prediction with the level that the PLC reports."""
 
     def __init__(self) -> None:
-        self._added: deque[tuple[float, float]] = deque(maxlen=TURNED_CYCLES)
-        self._level = 0.0
+        self._off: deque[tuple[tuple[float, ...], tuple[float, ...]]] = deque(maxlen=LEVEL_CYCLES)
+        self._seen = 0
         self._wait = 0
         self._looks = [0, 0]
 
-    def take(self, plc: PlcPart, added_nm: tuple[float, float]) -> str:
-        """Take one cycle; give the name of a drive that has the opposite of it, where one has."""
-        self._added.append(added_nm)
+    def take(self, plc: PlcPart, off_nm: tuple[tuple[float, ...], tuple[float, ...]]) -> str:
+        """Take both drives' distances at each level; give the name of one that does not follow, where one does not."""
+        self._off.append(off_nm)
         if plc.seen:
-            self._level, self._wait = plc.seen, TURNED_CYCLES // 2 + 1
+            self._seen, self._wait = plc.levels.index(plc.seen), LEVEL_CYCLES // 2 + 1
         self._wait -= 1
-        if self._wait or len(self._added) < TURNED_CYCLES:
+        if self._wait or len(self._off) < LEVEL_CYCLES:
             return ""
         for drive, part_nm in enumerate((plc.m1_nm, plc.m2_nm)):
-            follows = [each[drive] * self._level / part_nm for each in self._added] if part_nm else [0.0]
-            if max(follows) < -0.5:
+            # in parts of a level, towards the other one; none where a slope or a lag leaves room for both
+            scale = -plc.levels[self._seen] / part_nm if part_nm else 0.0
+            off = [scale * each[drive][self._seen] for each in self._off]
+            if min(off) > 0.5:
                 self._looks[drive] += 1
-            elif min(follows) > 0.5:
+            elif max(off) < 0.5:
                 self._looks[drive] = 0
-            if self._looks[drive] >= TURNED_LOOKS:
+            if self._looks[drive] >= LEVEL_LOOKS:
                 return f"m{drive + 1}"
         return ""
 
@@ -201,7 +203,7 @@ class Supervision:
         self._apart = Excess(SPEED_NOISE_RAD_S, guard.error.time_s, guard.period_s)
         self._vehicle = limits.vehicle
         self._observer = None if limits.vehicle is None else VehicleObserver(limits.vehicle, guard.period_s)
-        self._turned = _Turned()
+        self._level = _Level()
         self._cycles = 0
         self._first_ns: int | None = None
         self.ended: DriverError | None = None
@@ -223,8 +225,8 @@ class Supervision:
         if answered and one is not None and other is not None:
             sum_fault = self._compare_sum(record, one, other)
             self._compare_speeds(record.t_ns, one, other)
-            if len(plc.levels) > 1:
-                self._compare_levels(record, one, other)
+            if len(plc.levels) == 2:
+                self._compare_levels(plc)
             self._follow_vehicle(one, other)
             self._cycles = 0
         if self.ended is None and (m1.faults or m2.faults or m1.wrong_torque or m2.wrong_torque or sum_fault):
@@ -280,12 +282,11 @@ class Supervision:
                 "one shaft. Compare sign, unit (0x60A9) and gear of both, their resolvers, and their node ids."
             )
 
-    def _compare_levels(self, record: CycleRecord, one: InverterFeedback, other: InverterFeedback) -> None:
-        added_nm = one.torque_nm - record.m1.commanded_nm, other.torque_nm - record.m2.commanded_nm
-        if name := self._turned.take(record.plc, added_nm):
+    def _compare_levels(self, plc: PlcPart) -> None:
+        if name := self._level.take(plc, (self._m1.off_nm, self._m2.off_nm)):
             self._m1.faults.append(
-                f"inverter {name}: its torque 0x6077 goes down where the PLC's own PRBS goes up, expected the level "
-                "that the PLC reports. Compare the signs of both, and the share the PLC gives each."
+                f"inverter {name}: its torque 0x6077 does not go up and down with the PLC's own PRBS, expected the "
+                "level that the PLC reports. Compare the signs of both, and the share the PLC gives each."
             )
 
     def _follow_vehicle(self, one: InverterFeedback, other: InverterFeedback) -> None:

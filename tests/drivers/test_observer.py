@@ -24,6 +24,7 @@ class Bus:
     speed_rad_s: float = 20.0
     step_nm: float = 0.0
     read: Callable[[float, float], float] = lambda speed, time_s: speed
+    prbs_nm: float = 60.0
     seed: int = 0
     motions: list[Motion] = field(default_factory=list)
 
@@ -42,7 +43,7 @@ class Bus:
             held += 20.0 * error * PERIOD_S * (abs(wanted) < 500.0)
             wanted += max(-10.0, min(10.0, max(-500.0, min(500.0, 100.0 * error + held)) - wanted))
             step_nm = self.step_nm * (1.0 if k // 200 % 2 else -1.0) if abs(error) < 10.0 else 0.0
-            torque = wanted + step_nm + 60.0 * (1.0 if rng.random() < 0.5 else -1.0)
+            torque = wanted + step_nm + self.prbs_nm * (1.0 if rng.random() < 0.5 else -1.0)
             motion = observer.take(torque, low_pass.take(speed), speed, 1)
             if motion is not None:
                 self.motions.append(motion)
@@ -164,4 +165,13 @@ def test_a_start_on_a_grade_is_no_wrong_gain(grade: float, mass: float) -> None:
 def test_a_drive_that_shows_a_slow_motor_as_standing_is_not_dead() -> None:
     bus = Bus(speed_rad_s=2.0, read=lambda w, t: 0.0 if abs(w) < 0.3 else w)
     bus.drive(20.0)
+    assert not any(map(wrong, bus.motions))
+
+
+def test_a_drive_that_shows_a_bus_as_standing_where_a_hill_stops_it_is_not_dead() -> None:
+    """Torque against load is known better than each: both were learnt from the same acceleration."""
+    slow = {"read": lambda w, t: 0.0 if abs(w) < 0.3 else w, "prbs_nm": 0.0}
+    bus = Bus(1.4, speed_rad_s=30.0, grade=lambda way: min(0.01 * way, 0.033), **slow)
+    assert abs(bus.drive(20.0)) < 30.0
+    assert any(motion.held_rad_s for motion in bus.motions)
     assert not any(map(wrong, bus.motions))

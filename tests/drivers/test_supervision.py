@@ -376,15 +376,22 @@ def test_the_table_of_the_documentation_is_that_of_the_rules() -> None:
 
 
 def with_plc(
-    m1: Callable[[float], float], m2: Callable[[float], float], divider: int, levels: tuple[float, ...] = (1.0, -1.0)
+    m1: Callable[[float], float],
+    m2: Callable[[float], float],
+    divider: int,
+    levels: tuple[float, ...] = (1.0, -1.0),
+    part_nm: float = 60.0,
 ) -> str:
-    """Drives with 100 Nm each and 60 Nm of the PLC, of which each makes something; what ends 20 s of it."""
+    """Drives with 100 Nm each and a part of the PLC, of which each makes something; what ends 20 s of it."""
     made, generator = supervised(), Prbs(1.0, 10, divider, 1)
     course = [generator.next() for _ in range(2000)]
     for k, level in enumerate(course):
-        drives = [DriveRecord(100.0, answer(100.0 + 60.0 * of(level))) for of in (m1, m2)]
-        made.take(CycleRecord(k * PERIOD_NS, *drives, PlcPart(60.0, 60.0, levels, 0.0 if k % 10 else level)))
+        drives = [DriveRecord(100.0, answer(100.0 + part_nm * of(level))) for of in (m1, m2)]
+        made.take(CycleRecord(k * PERIOD_NS, *drives, PlcPart(part_nm, part_nm, levels, 0.0 if k % 10 else level)))
     return str(made.ended)
+
+
+NO_LEVEL = "inverter m2: its torque 0x6077 does not go up and down with the PLC's own PRBS"
 
 
 @pytest.mark.parametrize("divider", [1, 2, 5])
@@ -400,7 +407,22 @@ def test_the_prbs_of_the_plc_is_one_of_two_levels_on_each_drive(divider: int) ->
     assert "expected 100 Nm as commanded and one of 60, -60 Nm" in with_plc(
         lambda level: 0.0, lambda level: level, divider
     )
-    assert "inverter m2: its torque 0x6077 goes down" in with_plc(lambda level: level, lambda level: -level, divider)
+    assert NO_LEVEL in with_plc(lambda level: level, lambda level: -level, divider)
+    assert NO_LEVEL in with_plc(lambda level: level, lambda level: 0.0, divider, part_nm=20.0)  # under its tolerance
+
+
+def test_a_slope_is_no_other_level_of_the_plc() -> None:
+    """A torque on its way to a command that has jumped is below or above it, whatever level the PLC has."""
+    sloped = replace(M1, mode=TorqueMode.PROFILE_TORQUE, torque_slope_nm_per_s=700.0)
+    made, generator = supervised(sloped), Prbs(1.0, 10, 3, 1)
+    step_nm, ramp_nm = 700.0 * PERIOD_S, 0.0
+    for k in range(1000):
+        target_nm = 300.0 if k // 100 % 2 else -300.0
+        ramp_nm += min(max(target_nm - ramp_nm, -step_nm), step_nm)
+        level = generator.next()
+        m1, m2 = DriveRecord(target_nm, answer(ramp_nm + 60.0 * level)), DriveRecord(0.0, answer(60.0 * level))
+        made.take(CycleRecord(k * PERIOD_NS, m1, m2, PlcPart(60.0, 60.0, (1.0, -1.0), 0.0 if k % 10 else level)))
+    assert made.ended is None
 
 
 def test_a_prbs_of_the_plc_that_is_confirmed_off_widens_nothing() -> None:
