@@ -1,22 +1,28 @@
 """What the steps compute, against signals whose answer is known."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
+from estimator.identification.modes.modes import two_mass_resonance
 from estimator.identification.offline.fits import fit_output_error
 from estimator.physics.simulate import Stepper
 from estimator.signals.decimate import decimate
 from estimator.signals.prbs import prbs_nm
 from estimator.signals.record import Record
 from hil.commission import prbs_design as amplitude
-from hil.commission.physical_fit import select_delay
+from hil.commission.physical_fit import fit_two_mass, select_delay
 from hil.commission.prbs_design import Cap, resonance_spread, vibration_m_s2
 from hil.commission.responses import Measured, pulse_response, response_ratio
+from hil.commission.steps.models import validated
 from hil.commission.steps.signs_scales import MOVES
 from hil.config.rig_file import read_rig
 from hil.orders.runner import margin_rad_s, rigid_model
+from hil.plants import ModelPlant
+from hil.report.comparison import compare_record
 from hil.rig.experiments.laws import LEAD_S, Pulses
 from hil.simulator.driveline import DEFAULT_BUS
 from tests.commission.rigs import EXAMPLE
@@ -38,6 +44,17 @@ def simulated(torque_nm: np.ndarray, name: str = "run", noise: float = 0.05, gai
 
 def excited(n: int = 2000, level_nm: float = 60.0, **arguments: float) -> Record:
     return simulated(12.5 + prbs_nm(n, level_nm, clock_divider=2), **arguments)
+
+
+NOISE_RAD_S = 0.05
+
+
+def lagging(lag_s: float, seed: int) -> Record:
+    """A run whose torque acts through a lag [s] that its reading does not show."""
+    read = 12.5 + prbs_nm(2000, 60.0, clock_divider=2, seed=seed)
+    left = math.exp(-PERIOD_S / lag_s) if lag_s else 0.0
+    acting = lfilter([1.0 - left], [1.0, -left], read, zi=[left * 12.5])[0]
+    return replace(simulated(acting, noise=NOISE_RAD_S), torque_nm=read[:, None])
 
 
 def test_interval_on_both_sides_of_a_limit_tells_nothing() -> None:
@@ -136,3 +153,22 @@ def test_amplitude_serves_is_raised_or_is_held_down() -> None:
     assert (raised.amplitude_nm, raised.reason[:6]) == (pytest.approx(10.8), "raised")
     held = amplitude.choose(180.0, 10.0, cap, 1.2)
     assert (held.amplitude_nm, held.reason) == (pytest.approx(150.0), "held down by a limit")
+
+
+def test_values_of_a_model_that_is_another_are_not_determined() -> None:
+    """A lag that the model has not makes a motor of 1.6 kg m² one of 2.5 or more, with an interval that excludes it."""
+    bus, mode = DEFAULT_BUS.values(), two_mass_resonance(**DEFAULT_BUS.values())
+    assert mode is not None
+    told = {}
+    for lag_s in (0.0, 0.02):
+        seen, unseen = (lagging(lag_s, seed) for seed in (1, 2))
+        fit = fit_two_mass([seen], bus["J_M"] + bus["J_L"], mode)
+        compared = [compare_record(ModelPlant("fitted", fit.model), unseen)]
+        findings, judged = validated(fit, compared, mode, NOISE_RAD_S)
+        told[lag_s] = next(each for each in findings if each.what == "J_M")
+        low, high = judged.model.parameters["J_M"].bounds(may_be_zero=False)
+        assert low < bus["J_M"] < high
+        assert (fit.model.parameters["J_M"].low < bus["J_M"] < fit.model.parameters["J_M"].high) is not bool(lag_s)
+    assert told[0.0].within is True
+    assert told[0.02].within is False
+    assert told[0.02].measured.endswith("kg m^2, not determined: the model leaves more than noise")

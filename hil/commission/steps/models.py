@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -9,7 +11,7 @@ import numpy as np
 
 from estimator.identification.modes.modes import Mode, two_mass_resonance
 from estimator.physics.model import DrivelineModel, parameter_unit
-from hil.commission.responses import TRUSTED, record_of, thinned
+from hil.commission.responses import TRUSTED, Measured, record_of, thinned
 from hil.commission.state import StepFinding, model_from_json, model_json, stated
 from hil.commission.step import Outcome, Step, StepContext
 from hil.commission.steps.experiments import cruises
@@ -33,6 +35,10 @@ NOISE = 1.5
 
 RESONANCE = 0.03
 """Resonance of the physical model against that of the runs, relative."""
+
+ERROR_TO_NOISE = "error against the standstill noise"
+RESONANCE_OF_MODEL = "resonance of the physical model"
+"""What shows that the line is another than two masses and a spring: its values are not determined then."""
 
 MODEL_FILE = "nominal.toml"
 
@@ -72,8 +78,9 @@ def _do_validation(job: StepContext) -> Outcome:
     fit = fit_two_mass(seen, inertia, mode)
     job.progress("simulating unseen runs", 0.8)
     compared = [compare_record(ModelPlant("fitted", fit.model), record) for record in unseen]
+    findings, fit = validated(fit, compared, mode, job.evidence("noise").get("speed_std_rad_s"))
     job.progress("validated", 1.0)
-    return Outcome(_findings_validation(job, fit, mode, compared), _evidence_validation(fit, compared))
+    return Outcome(findings, _evidence_validation(fit, compared))
 
 
 def _mode(job: StepContext) -> Mode:
@@ -91,11 +98,20 @@ def _mode(job: StepContext) -> Mode:
     )
 
 
+def validated(
+    fit: PhysicalFit, compared: Sequence[Comparison], mode: Mode, noise_rad_s: float | None
+) -> tuple[list[StepFinding], PhysicalFit]:
+    """Judge a fit by runs that it has not seen; where the line is another its values are not determined."""
+    findings = _findings_validation(fit, compared, mode, noise_rad_s)
+    if any(each.within is False for each in findings if each.what in (ERROR_TO_NOISE, RESONANCE_OF_MODEL)):
+        fit = fit.undetermined()
+    return [*findings, *_parameter_findings(fit)], fit
+
+
 def _findings_validation(
-    job: StepContext, fit: PhysicalFit, mode: Mode, compared: list[Comparison]
+    fit: PhysicalFit, compared: Sequence[Comparison], mode: Mode, noise: float | None
 ) -> list[StepFinding]:
     unseen = float(np.sqrt(np.mean([each.rms**2 for each in compared])))
-    noise = job.evidence("noise").get("speed_std_rad_s")
     physical = two_mass_resonance(**fit.model.values())
     percent = [each.fit_percent for each in compared]
     findings = [
@@ -111,7 +127,7 @@ def _findings_validation(
     if noise:
         findings.append(
             StepFinding(
-                "error against the standstill noise",
+                ERROR_TO_NOISE,
                 f"at most {NOISE:g} times",
                 f"{unseen / noise:.2f} times {shown(noise, 'rad/s')}",
                 unseen <= NOISE * noise,
@@ -122,14 +138,14 @@ def _findings_validation(
         off = physical.frequency_hz / mode.frequency_hz - 1.0
         findings.append(
             StepFinding(
-                "resonance of the physical model",
+                RESONANCE_OF_MODEL,
                 f"that of the runs, {shown(mode.frequency_hz, 'Hz')}, within {100.0 * RESONANCE:g} %",
                 f"{shown(physical.frequency_hz, 'Hz')}, {100.0 * off:+.2f} %",
                 abs(off) <= RESONANCE,
                 "Two masses and a spring do not explain everything: see the diagnosis",
             )
         )
-    return [*findings, *_parameter_findings(fit)]
+    return findings
 
 
 def _parameter_findings(fit: PhysicalFit) -> list[StepFinding]:
@@ -137,14 +153,21 @@ def _parameter_findings(fit: PhysicalFit) -> list[StepFinding]:
         StepFinding(
             name,
             f"known within ±{100.0 * TRUSTED:g} %",
-            value.shown(parameter_unit(name, fit.model.motion)),
+            _value(name, value, fit),
             value.ci95 <= TRUSTED * abs(value.value),
             "These runs do not determine it well: drive longer, or take it from the maker",
         )
         if name in ("J_M", "J_L", "k", "c")
-        else stated(name, value.shown(parameter_unit(name, fit.model.motion)))
+        else stated(name, _value(name, value, fit))
         for name, value in fit.parameters.items()
     ]
+
+
+def _value(name: str, value: Measured, fit: PhysicalFit) -> str:
+    unit = parameter_unit(name, fit.model.motion)
+    if math.isfinite(value.ci95):
+        return value.shown(unit)
+    return f"about {shown(value.value, unit)}, not determined: the model leaves more than noise"
 
 
 def _evidence_validation(fit: PhysicalFit, compared: list[Comparison]) -> dict[str, Any]:
