@@ -29,7 +29,7 @@ EFFECTS = tuple(name for name in CONCEALED if name not in ("none", "road_grade")
 LIMIT_S = 3600.0
 
 CALLS = 4
-"""A simulated drive misses a heartbeat where the machine is busy; the command continues there when it is called again."""
+"""A simulated drive misses a heartbeat where the machine is busy; called again, the command continues there."""
 
 
 def effect_of(seed: int) -> str:

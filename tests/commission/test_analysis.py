@@ -159,16 +159,16 @@ def test_values_of_a_model_that_is_another_are_not_determined() -> None:
     """A lag that the model has not makes a motor of 1.6 kg m² one of 2.5 or more, with an interval that excludes it."""
     bus, mode = DEFAULT_BUS.values(), two_mass_resonance(**DEFAULT_BUS.values())
     assert mode is not None
-    told = {}
+    found = {}
     for lag_s in (0.0, 0.02):
         seen, unseen = (lagging(lag_s, seed) for seed in (1, 2))
         fit = fit_two_mass([seen], bus["J_M"] + bus["J_L"], mode)
         compared = [compare_record(ModelPlant("fitted", fit.model), unseen)]
         findings, judged = validated(fit, compared, mode, NOISE_RAD_S)
-        told[lag_s] = next(each for each in findings if each.what == "J_M")
+        found[lag_s] = next(each for each in findings if each.what == "J_M")
         low, high = judged.model.parameters["J_M"].bounds(may_be_zero=False)
         assert low < bus["J_M"] < high
         assert (fit.model.parameters["J_M"].low < bus["J_M"] < fit.model.parameters["J_M"].high) is not bool(lag_s)
-    assert told[0.0].within is True
-    assert told[0.02].within is False
-    assert told[0.02].measured.endswith("kg m^2, not determined: the model leaves more than noise")
+    assert found[0.0].within is True
+    assert found[0.02].within is False
+    assert found[0.02].measured.endswith("kg m^2, not determined: the model leaves more than noise")
