@@ -51,7 +51,7 @@ class PhysicalFit:
     rms: float  # RMS of the free-run error [rad/s]
 
     def undetermined(self) -> PhysicalFit:
-        """Return it as one of another line: a wrong structure bends the values, however short their intervals.
+        """Return it as one of another line: a wrong structure shifts the values, however short their intervals.
 
         A lag of 20 ms that nobody knew of had made 1.52 kg m² of a motor 3.07 ± 0.47.
         """
