@@ -78,7 +78,7 @@ def _factors(columns: tuple[str, ...], factor: float, decimals: int | None = Non
 
 
 def _unit(rng: np.random.Generator) -> Drawn:
-    rated = float(rng.uniform(150.0, 1500.0))
+    rated = float(rng.uniform(150.0, 650.0))  # beyond, a per mille is a gain that payload and friction make, too
     gear = float(rng.uniform(3.5, 12.0))
     torques = {
         "kNm": ("kNm", 1e-3, None),
