@@ -49,6 +49,7 @@ from tests.campaigns.dirty import Known, make_dirty
 from tests.campaigns.engine import ROLE as ENGINE_ROLE, make_engine
 from tests.campaigns.engine_outside import LAWS, PLACES, ROLE as OUTSIDE_ROLE, make_outside
 from tests.campaigns.forms import FORMS, Role, make_form
+from tests.estimator.diagnosis.sentences import contradictions
 
 KINDS = [name for name, effect in EFFECTS.items() if effect.catalogued and name != NOTHING]
 OUTSIDE = [name for name, effect in EFFECTS.items() if not effect.catalogued]
@@ -154,6 +155,7 @@ def answered(form: str, seed: int, at_the_load: bool = False, **options: Any) ->
         "traces": [trace["name"] for trace in answer["traces"]],
         "refinements": [each["name"] for each in answer["refinements"]],
         "fit": answer["fit"],
+        "contradictions": contradictions(diagnosis),
         "time_s": round(time.perf_counter() - began, 2),
         "cpu_s": round(time.process_time() - worked, 2),
     }
@@ -218,7 +220,7 @@ def main_named(row: Row) -> bool:
 def table(rows: Sequence[Row]) -> str:
     """Return the results as a table in Markdown: a line for each form, one for each role, one for all."""
     head = ["form, outputs", "worlds", "main named", "names", "false names", "no false name", "no verdict"]
-    head += ["of stated 0.9, there", "CPU median, most [s]"]
+    head += ["of stated 0.9, there", "reports that contradict their numbers", "CPU median, most [s]"]
     groups = []
     for form, outputs in product(ALL, (1, 2)):
         groups.append((f"{form}, {outputs}", [row for row in rows if (row["form"], row["outputs"]) == (form, outputs)]))
@@ -236,7 +238,12 @@ def _cells(title: str, rows: Sequence[Row]) -> str:
     worked = sorted(row.get("cpu_s", 0.0) for row in rows)
     undecided = sum(row["verdict"] in ("unexplained", "refused") for row in rows)
     cells = [title, len(rows), f"{sum(map(main_named, strong))} of {len(strong)}", len(names), false, clean, undecided]
-    cells += [f"{sum(sure)} of {len(sure)}", f"{worked[len(worked) // 2]:.1f}, {worked[-1]:.1f}"]
+    read = [row["contradictions"] for row in rows if "contradictions" in row]
+    cells += [
+        f"{sum(sure)} of {len(sure)}",
+        f"{sum(map(bool, read))} of {len(read)}",
+        f"{worked[len(worked) // 2]:.1f}, {worked[-1]:.1f}",
+    ]
     return f"| {' | '.join(map(str, cells))} |"
 
 

@@ -1,0 +1,83 @@
+"""Reads a diagnosis back: whatever its statement and its lists say is held against its own numbers."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+import pytest
+
+from estimator.diagnosis.inference.wording import times
+from estimator.diagnosis.result import Diagnosis, Verdict
+
+NUMBER = r"(-?[\d.]+(?:e[+-]?\d+)?)"
+
+
+def near(text: str, value: float) -> bool:
+    """Tell whether a number of a sentence is this one, to the three digits that sentences have."""
+    return float(text) == pytest.approx(value, rel=5e-3)
+
+
+def contradictions(found: Diagnosis) -> list[str]:
+    """Return every sentence that says another thing than the numbers; none where all is well."""
+    return [*_errors(found), *_what_is_left(found), *_names(found), *_rejected(found)]
+
+
+def _errors(found: Diagnosis) -> Iterator[str]:
+    fit, said, unit = found.fit, found.statement, re.escape(found.fit.unit)
+    table = found.table
+    told = [(fit.retuned, fit.augmented), (fit.holdout_retuned, fit.holdout_augmented)]
+    told += [] if table is None else [(table.rms_before, table.rms_after)]
+    for move, before, after in re.findall(f"(falls|rises)(?: with it)? from {NUMBER} to {NUMBER} {unit}", said):
+        if not any(near(before, was) and near(after, now) for was, now in told):
+            yield f"the error {move} from {before} to {after}: no fit has these"
+        if (float(after) < float(before)) is not (move == "falls"):
+            yield f"the error {move} from {before} to {after}"
+        if move == "rises" and found.verdict in (Verdict.EXPLAINED, Verdict.PARTLY_EXPLAINED):
+            yield f"{found.verdict.value}, and the error rises from {before} to {after}"
+    for error, noise in re.findall(f"free-run error(?: of)? {NUMBER} {unit}(?: at a noise of|, noise) {NUMBER}", said):
+        if not near(error, fit.retuned) or not near(noise, fit.noise_floor):
+            yield f"an error of {error} at a noise of {noise}: {fit.retuned} and {fit.noise_floor}"
+
+
+def _what_is_left(found: Diagnosis) -> Iterator[str]:
+    left = found.remainder
+    for share in re.findall(r"(\d+) % of the squared error is left", found.statement):
+        if left is None or abs(float(share) - 100.0 * left.share) > 0.5 + 1e-9:
+            yield f"{share} % is left: {left}"
+        if found.verdict is not Verdict.PARTLY_EXPLAINED:
+            yield f"{share} % is left, and the verdict is {found.verdict.value}"
+    for many in re.findall(r"([\d.,]+) times the noise", found.statement):
+        if left is None or many != times(left.times_noise):
+            yield f"{many} times the noise: {left}"
+
+
+def _names(found: Diagnosis) -> Iterator[str]:
+    said = found.statement
+    names = {each.name for each in found.effects}
+    for effect in found.effects:
+        if effect.statement not in said:
+            yield f"{effect.name} is named and not in the statement"
+        if effect.counted is not None and effect.probability > effect.counted.right / effect.counted.of:
+            yield f"{effect.name}: {effect.probability} is more than was counted"
+    tables = set() if found.table is None else {f"table_{found.table.place}"}
+    in_model = set(found.augmented.effects) - tables
+    if twice := (names | in_model) & {each.name for each in (*found.rejected, *found.refinements)}:
+        yield f"in the model and out of it: {', '.join(sorted(twice))}"
+    if ("Not established, and not in the model: " in said) is not bool(found.refinements):
+        yield f"refinements: {found.refinements}"
+    if found.traces[0].torque_nm.shape[1] == 1:
+        shown = {each.name for each in (*found.effects, *found.rejected, *found.refinements, *found.slight)}
+        if "inverter_gain_mismatch" in shown or re.search(r"\b(inverters? m[12]|in m2)\b", said):
+            yield "a second inverter, where one input is read"
+
+
+def _rejected(found: Diagnosis) -> Iterator[str]:
+    for each in found.rejected:
+        if "better by" in each.reason or each.delta_bic > 0.0:
+            yield f"{each.name} is rejected: {each.reason} ({each.delta_bic:+.3g})"
+        for left, size, believed, size_of in re.findall(
+            rf"it leaves {NUMBER} on .* with (\d+) effects; what is believed leaves {NUMBER} with (\d+)", each.reason
+        ):
+            if float(left) < float(believed) and int(size) <= int(size_of):
+                yield f"{each.name} is rejected: {each.reason}"
