@@ -9,6 +9,7 @@ import typer
 
 from hil.cli.options import Dbc
 from hil.cli.printing import say
+from hil.errors import UsageError
 from hil.export import FmiVersion, Tc6
 
 if TYPE_CHECKING:
@@ -159,8 +160,11 @@ def fmu(
         FmiVersion, typer.Option("--fmi", metavar="VERSION", help="Version of the standard, 2.0 or 3.0.")
     ] = FmiVersion.V2,
     period: Annotated[
-        float, typer.Option("--period", min=1e-5, metavar="SECONDS", help="Usual communication step.")
-    ] = CYCLE_S,
+        float | None,
+        typer.Option(
+            "--period", min=1e-5, metavar="SECONDS", help="Usual communication step: 0.01, or that of --recording."
+        ),
+    ] = None,
     recording: Annotated[
         Path | None,
         typer.Option(
@@ -179,5 +183,7 @@ def fmu(
     """
     from hil.export.fmu.package import written_fmu
 
-    for line in written_fmu(model, out, fmi.value, period, recording, sources_only, dbc):
+    if None not in (period, recording):
+        raise UsageError("expected one usual step, got --period with --recording, whose own it is. Leave --period out.")
+    for line in written_fmu(model, out, fmi.value, period or CYCLE_S, recording, sources_only, dbc):
         say(line)

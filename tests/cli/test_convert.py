@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from pathlib import Path
 
+import can
 import numpy as np
 import pytest
 
@@ -89,6 +90,15 @@ def test_a_bus_trace_becomes_signals_by_the_eds_files(
     assert table.metadata["rig_file"] == short_rig.read_text(encoding="utf-8")
     assert table.metadata["replayed_from"] == trace
     assert table.units["torque_m1_nm"] == "Nm"
+    both = tmp_path / "both.log"
+    with can.LogReader(tmp_path / trace) as frames, can.Logger(both) as logger:
+        for frame in frames:
+            for channel in ("can0", "can1"):
+                frame.channel = channel
+                logger(frame)
+    of_one = tmp_path / "of_one.parquet"
+    assert hil(["convert", str(both), str(of_one), "--rig", str(short_rig), "--channel", "can1"]) == 0
+    np.testing.assert_array_equal(read_table(of_one).columns["torque_m1_nm"], expected.columns["torque_m1_nm"])
     whole = list(replay(tmp_path / trace, read_rig(short_rig), whole=True))
     assert hil(["convert", str(tmp_path / trace), str(out), "--rig", str(short_rig), "--all", "--force"]) == 0
     assert read_table(out).n_rows == len(whole) > table.n_rows

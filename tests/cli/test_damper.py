@@ -61,8 +61,10 @@ def write_estimate(path: Path, half_width: float) -> list[str]:
 def test_the_estimates_region_replaces_the_tolerance(
     given: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert run(["design", "damper", *given, *write_estimate(tmp_path / "diagnosis.json", 20.0), "--json"]) == 0
+    less = ["--target", "0.2"]
+    assert run(["design", "damper", *given, *write_estimate(tmp_path / "diagnosis.json", 20.0), *less, "--json"]) == 0
     design = json.loads(capsys.readouterr().out)
+    assert 0.2 <= design["least_damping"] < 0.3
     assert design["line"]["k"] == 4000.0
     assert design["intervals"]["k"] == pytest.approx([3980.0, 4020.0], rel=1e-6)
     high = 4020.0 / (0.98 * 1.6)  # one parameter: its own interval is the region

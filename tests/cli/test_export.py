@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fmpy import simulate_fmu
+from fmpy import read_model_description, simulate_fmu
 
 from estimator.identification.settings import Settings
 from estimator.signals.record import Record
@@ -212,6 +212,25 @@ def test_the_recording_is_simulated_as_hil_does(version: str, tmp_path: Path) ->
     )["speed_measured"]  # fmt: skip
     expected = read_table(out).numeric(["speed_sim_rad_s"])["speed_sim_rad_s"]
     assert np.abs(found - expected).max() < 1e-6
+
+
+def test_the_usual_step_is_as_given_or_that_of_the_recording(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "run_1.csv"
+    bench.record(path, 1, noise=0.05)
+    header, *rows = path.read_text().splitlines(keepends=True)
+    path.write_text("".join([header, *rows[::2]]))
+    recording = ["--recording", str(path)]
+    for more, step_s in (([], bench.DT), (["--period", "0.004"], 0.004), (recording, 2.0 * bench.DT)):
+        fmu = read_model_description(exported(tmp_path, "--sources-only", *more), validate=False)
+        assert float(fmu.defaultExperiment.stepSize) == pytest.approx(step_s)
+        (longest,) = (float(each.start) for each in fmu.modelVariables if each.name == "step_s")
+        assert step_s / longest == pytest.approx(round(step_s / longest))  # whole steps of integration in each
+    command = ["export", "fmu", str(tmp_path / "drive.toml"), "--out", str(tmp_path / "again.fmu"), *recording]
+    assert run([*command, "--period", "0.004"]) == 2
+    assert "got --period with --recording" in capsys.readouterr().err
+    assert not (tmp_path / "again.fmu").exists()
 
 
 def test_without_a_compiler_it_says_what_to_do(

@@ -40,6 +40,12 @@ def test_a_set_is_made_answered_opened_and_scored(
     assert run(["prove", "--out", str(out), "--no-rigs"]) == 0  # continues: nothing is left to do
     again = json.loads((out / "scoreboard.json").read_text())
     assert {**again, "made": data["made"]} == data
+    digest = re.findall(r"digest: ([0-9a-f]{64})", said)[-1]
+    opened = ["prove", "open", str(out), "--key-file", str(key), "--verdicts"]
+    assert run([*opened, digest]) == 0
+    capsys.readouterr()
+    assert run([*opened, "0" * 64]) == 2  # verdicts that were replaced after their digest had been kept
+    assert "expected the verdicts of digest 000" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -82,6 +82,8 @@ def test_runs_are_listed_with_what_tells_them_apart(folder: Path, capsys: Captur
         (("--verdict", "explained"), [1]),
         (("--experiment", "cruise", "--verdict", "explained"), [1]),
         (("--verdict", "unexplained"), []),
+        (("--rig", "bench"), [1, 2, 3]),
+        (("--rig", "other"), []),
     ],
 )
 def test_runs_are_found_by_experiment_date_and_verdict(
@@ -101,6 +103,20 @@ def test_one_run_is_shown_with_the_state_of_its_recording(folder: Path, capsys: 
     assert document["eds_sha256"] == {"m1": "ab" * 32}
     (folder / "a.csv").write_text("time_s,speed_rad_s\n0.0,1.0\n", encoding="utf-8")
     assert "damaged, or was changed" in documents(capsys, "show", "1")["recording_state"]
+
+
+def test_a_note_and_a_result_stay_with_their_run(folder: Path, capsys: Capture) -> None:
+    (folder / "result.json").write_text('{"answer": 42}', encoding="utf-8")
+    assert hil(["runs", "note", "2", "belt was loose"]) == 0
+    assert hil(["runs", "attach", "2", "own_result", "result.json"]) == 0
+    capsys.readouterr()
+    for run, kept in (("2", True), ("1", False)):
+        assert hil(["runs", "show", run]) == 0
+        said = capsys.readouterr().out
+        assert ("belt was loose" in said, "result.json" in said) == (kept, kept)
+    assert [each["id"] for each in documents(capsys, "--text", "belt was")["runs"]] == [2]
+    assert hil(["runs", "attach", "2", "own_result", "missing.json"]) == 2
+    assert hil(["runs", "note", "9", "text"]) == 2
 
 
 def test_alarms_are_listed_and_shown(folder: Path, capsys: Capture) -> None:

@@ -12,6 +12,8 @@ from hil.cli.main import run
 from hil.cli.options import Pace
 from hil.config.model_file import read_model
 from hil.design.damper import asked
+from hil.fleet.run import Engine
+from hil.fleet.tasks import FleetJob
 from hil.orders.operator import StepChoice
 from hil.orders.order import RigSource
 from tests.cli.bus_model import MODEL
@@ -51,10 +53,27 @@ def test_a_fleet_is_diagnosed_by_vehicle_and_by_what_is_usual_in_it(
 ) -> None:
     (tmp_path / "bus.toml").write_text(MODEL)
     asked_for: list[bool] = []
-    monkeypatch.setattr(fleet, "_carry_out", lambda sources, out, job, by_vehicle, *rest: asked_for.append(by_vehicle))
+    work: list[tuple[str | None, Engine, float]] = []
+
+    def carry_out(
+        sources: object,
+        out: object,
+        job: FleetJob,
+        by_vehicle: bool,
+        pattern: str | None,
+        engine: Engine,
+        *rest: object,
+    ) -> None:
+        asked_for.append(by_vehicle)
+        work.append((pattern, engine, job.budget_s))
+
+    monkeypatch.setattr(fleet, "_carry_out", carry_out)
     line = ["fleet", "diagnose", str(tmp_path), "--model", str(tmp_path / "bus.toml"), "--out", str(tmp_path / "out")]
     assert run([*line, "--by", "vehicle"]) == run(line) == 0
     assert asked_for == [True, False]
     assert run([*line, "--prior", str(tmp_path)]) == 2
     assert "expected a dataset that hil fleet" in capsys.readouterr().err
     assert len(asked_for) == 2
+    options = ("--pattern", "(?P<vehicle>b)/", "--jobs", "3", "--memory", "1GiB", "--retries", "0", "--budget-s", "60")
+    assert run([*line, *options]) == 0
+    assert work[-1] == ("(?P<vehicle>b)/", Engine(None, 3, "1GiB", 0), 60.0)

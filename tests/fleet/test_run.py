@@ -10,6 +10,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
+from urllib.request import urlopen
 
 import numpy as np
 import pytest
@@ -85,6 +86,19 @@ def by_two(drives: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
         "sources": [],
     }
     return out
+
+
+def test_the_pages_of_dask_are_there_while_it_runs_where_they_are_asked_for(drives: Path, tmp_path: Path) -> None:
+    command = hil("identify", drives / "bus_0", "--out", tmp_path / "results", "--jobs", 1, "--dashboard")
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as fleet:
+        assert fleet.stderr is not None
+        said = next(line for line in fleet.stderr if "dashboard: " in line)
+        address = said.partition("dashboard: ")[2].partition(",")[0]
+        assert address.startswith("http://127.0.0.1:")
+        with urlopen(address, timeout=LONGEST_S) as page:
+            assert "Dask" in page.read().decode()
+        fleet.stderr.read()
+    assert fleet.returncode == 0
 
 
 MODEL = """

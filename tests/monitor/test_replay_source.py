@@ -1,10 +1,13 @@
 """A recording or a bus trace in place of a rig."""
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from hil.cli.main import run
 from hil.errors import RecordingError
+from hil.monitor.app import MonitorApp
 from hil.monitor.messages import Began, Over, Report, Samples
 from hil.monitor.opening import open_recording
 from hil.monitor.source import ReplaySource, recorded_samples
@@ -56,6 +59,31 @@ def test_a_recording_comes_back_as_the_samples_it_is_of(tmp_path: Path, suffix: 
         for row in SAMPLES:
             writer.append(row)
     assert recorded_samples(path) == (SAMPLES, {})
+
+
+def test_a_picture_of_a_page_is_drawn_when_asked_for_in_the_size_asked_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with RecordingWriter(tmp_path / "r.csv") as writer:
+        for row in SAMPLES:
+            writer.append(row)
+    waited_s: list[float] = []
+    timer = MonitorApp.set_timer
+
+    def noted(app: MonitorApp, delay_s: float, then: Any) -> Any:
+        waited_s.append(delay_s)
+        return timer(app, delay_s, then)
+
+    monkeypatch.setattr(MonitorApp, "set_timer", noted)
+    picture = tmp_path / "screen.svg"
+    line = ["monitor", "--replay", str(tmp_path / "r.csv"), "--speed", "1000", "--page", "log", "--size", "100x30"]
+    assert run([*line, "--snapshot", str(picture), "--after", "0.7"]) == 0
+    assert waited_s == [0.7]
+    drawn = picture.read_text(encoding="utf-8").replace("&#160;", " ")
+    assert "100 samples played, 14 of them flagged" in drawn
+    assert "line-29)" in drawn
+    assert "line-30)" not in drawn
+    assert run([*line, "--snapshot", str(tmp_path / "never.svg"), "--after", "0"]) == 2
 
 
 @pytest.mark.parametrize(

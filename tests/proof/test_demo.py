@@ -19,9 +19,14 @@ from hil.cli.main import run
 from hil.config.rig_file import read_rig
 from hil.proof.rigs import sealed_process
 from hil.proof.seal import verify
+from tests.docs.gallery.case import skeleton
+from tests.docs.pages import DOCS, ROOT, blocks
 
 SEED_OF_NONE = 115
 """A seed whose bus hides nothing: the quickest to diagnose."""
+
+SEED_OF_PAGES = "102"
+"""What README and manual show of a demo is of this seed."""
 
 
 @pytest.mark.campaign
@@ -80,3 +85,14 @@ def test_the_whole_job_ends_with_a_judged_verdict_and_a_seal_that_verifies(tmp_p
     assert inertia["found"] == pytest.approx(truth["true"]["J_M"], rel=0.01)
     names = {"cruise.csv", "nominal.toml", "rig.toml", "diagnosis.json", "augmented.toml", "report.html"}
     assert {path.name for path in tmp_path.iterdir()} == names | {"seal.json", "judgement.json"}
+
+
+@pytest.mark.campaign
+@pytest.mark.timeout(1800)  # three experiments are driven and diagnosed
+def test_the_pages_show_what_the_demo_prints_numbers_apart(tmp_path, capsys):
+    assert run(["demo", "--seed", SEED_OF_PAGES, "--out", str(tmp_path)]) == 0
+    said = skeleton(capsys.readouterr().out)
+    for page in (ROOT / "README.md", DOCS / "get-started.md"):
+        (shown,) = (block.text for block in blocks(page) if "seal opened" in block.text)
+        lines = [line for line in shown.splitlines() if line != "..." and "commit" not in line and "report" not in line]
+        assert [line for line in lines if skeleton(line).strip() not in said] == []

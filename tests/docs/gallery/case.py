@@ -38,8 +38,8 @@ class Failure:
 WIDTH = 84
 """Characters of a line in a block of the built page."""
 
-_PARAGRAPH = re.compile(r"[a-z' ]+: ")
-"""How a line begins that is a statement of its own: ``note: ...``, ``can't tell: ...``."""
+_PARAGRAPH = re.compile(r"(?! )(?:[A-Za-z]+: |[A-Za-z' ]+  )")
+"""How a line begins that is a statement of its own, ``Note: ...``, or the row of a table, ``dry friction  ...``."""
 
 _NUMBER = re.compile(r"\d+(?:\.\d+)?(?:e[+-]?\d+)?")
 

@@ -60,7 +60,7 @@ def cruise_alone() -> Outcome:
     """Diagnose a drive at a speed that never changes its sign."""
     bench.record(RUN, 1, noise=0.02, reverse=False)
     bench.model(MODEL)
-    text, status = said(DIAGNOSE, only=("can't tell: coulomb",))
+    text, status = said(DIAGNOSE, only=("neither found nor excluded", "dry friction at the motor"))
     return Outcome(DIAGNOSE, text, status, signals_of(RUN))
 
 
@@ -83,9 +83,9 @@ def too_short() -> Outcome:
 RECORDINGS = (
     Failure("wrong_units", partial(diagnosed, in_rpm), quick=True),
     Failure("wrong_sign", partial(diagnosed, torque_turned), quick=True),
-    Failure("gap", partial(diagnosed, gap, ("note:",))),
-    Failure("clipped_speed", partial(diagnosed, speed_clipped, ("note:",))),
-    Failure("clipped_torque", partial(diagnosed, torque_clipped, ("note:",))),
+    Failure("gap", partial(diagnosed, gap, ("Note:",))),
+    Failure("clipped_speed", partial(diagnosed, speed_clipped, ("Note:",))),
+    Failure("clipped_torque", partial(diagnosed, torque_clipped, ("found", "nonlinear torque", "Note:"))),
     Failure("cruise_alone", cruise_alone),
     Failure("weak_prbs", partial(identified, 1.0, 0.0, "validation")),
     Failure("closed_loop", partial(identified, 20.0, 60.0, "feedback")),
