@@ -97,6 +97,11 @@ EFFECTS: Mapping[str, Effect] = _Effects()
 """Name to entry, along the chain from torque command to load."""
 
 
+def title_of(name: str) -> str:
+    """Return an effect's title, for sentences; of a name that is in no catalogue its words."""
+    return EFFECTS[name].title if name in EFFECTS else name.replace("_", " ")
+
+
 def effect_problems(
     name: str, values: Mapping[str, EffectValue], structure: Structure, laws: Sequence[LawName]
 ) -> list[str]:

@@ -13,6 +13,7 @@ import tomlkit
 
 from estimator.design.open import Open, name_of
 from estimator.design.paper import Width
+from estimator.physics.catalogue import title_of
 from hil.design.design import WORTH, Aim, Design, Planned
 from hil.figures.drawn import drawing, require_matplotlib
 
@@ -25,26 +26,31 @@ LISTED = 3
 """Other experiments that are named."""
 
 
+def in_words(candidate: str) -> str:
+    """Return a set of effects, by its name in files, as a sentence has it."""
+    return " and ".join(map(title_of, candidate.split(" + ")))
+
+
 def question_lines(known: Open) -> Iterator[str]:
     """Say what recordings leave open."""
     first, *rivals = known.candidates
     if not rivals:
-        yield f"One explanation is left: {first.name}."
+        yield f"One explanation is left: {in_words(first.name)}."
     else:
         yield "The recordings leave open, with the odds of each among these:"
         yield from (f"  {each.name:40} {each.probability:.3f}" for each in known.candidates)
     for each in known.against if known.named is not None else ():
         yield (
-            f"  The verdict names {name_of(known.named or frozenset())}; with odds of {each.probability:.3f} it is "
-            f"{each.name}: not decided."
+            f"  The verdict names {in_words(name_of(known.named or frozenset()))}; with odds of "
+            f"{each.probability:.3f} it is {in_words(each.name)}: not decided."
         )
     if known.untested:
-        yield f"  Neither found nor excluded so far: {', '.join(known.untested)}."
+        yield f"  Neither found nor excluded so far: {', '.join(map(title_of, known.untested))}."
     yield from (f"  {condition}." for condition in conditions(known))
     for name, twins in known.twins.items():
         yield (
-            f"  {name} and {' and '.join(twins)} are the same linear system by this output: no experiment "
-            "distinguishes them. Measure another output, such as the load's speed."
+            f"  {title_of(name)} and {' and '.join(map(title_of, twins))} are the same linear system by this output: "
+            "no experiment distinguishes them. Measure another output, such as the load's speed."
         )
 
 
@@ -54,7 +60,7 @@ def conditions(known: Open) -> Iterator[str]:
         if each.moves:
             size = ", ".join(f"{parameter} = {value:.3g}" for parameter, value in each.size.items())
             moved = ", ".join(f"{value} by {100.0 * share:+.2g} %" for value, share in each.moves.items())
-            yield f"as if without {name}, which the recordings do not show: {size} would move {moved}"
+            yield f"as if without {title_of(name)}, which the recordings do not show: {size} would move {moved}"
 
 
 def design_lines(known: Open, design: Design) -> Iterator[str]:
@@ -76,7 +82,7 @@ def design_lines(known: Open, design: Design) -> Iterator[str]:
         yield f"  expected: intervals that are wide become shorter by a factor of {_factor(design.factor)}"
         yield from (f"    {line}" for line in width_lines(design.widths))
     if design.shows:
-        yield f"  shows what no recording so far does: {', '.join(design.shows)}"
+        yield f"  shows what no recording so far does: {', '.join(map(title_of, design.shows))}"
     if not design.is_worth_driving:
         yield f"  {obstacle(design)}"
     others = ", ".join(f"{name} ({_value(value, design)})" for name, value in design.others[:LISTED])

@@ -11,11 +11,12 @@ from typing import Any
 from estimator.design.left_open import left_open
 from estimator.design.open import Open, name_of
 from estimator.diagnosis.result import Diagnosis, Verdict
+from estimator.physics.catalogue import title_of
 from estimator.signals.record import Record
 from hil.config.model_file import ModelFile
 from hil.config.rig_file import Rig
 from hil.design.design import Aim, Design, NothingAllowed, designed, is_needed
-from hil.design.report import conditions, design_lines, obstacle, question_lines
+from hil.design.report import conditions, design_lines, in_words, obstacle, question_lines
 from hil.design.solve_state import STATE, Driven, End, Odds, SolveState
 from hil.errors import UsageError
 from hil.orders.operator import Answer, StepChoice
@@ -180,10 +181,12 @@ def _undecidable(known: Open, diagnosis: Diagnosis) -> str:
     if diagnosis.verdict in (Verdict.UNEXPLAINED, Verdict.PARTLY_EXPLAINED):
         return "what is left has no name in the catalogue, and an experiment is designed to decide between names"
     if known.against:
-        rivals = ", ".join(f"{each.name} ({each.probability:.2f})" for each in known.against)
-        return f"the verdict names {name_of(known.named or frozenset())}, and the odds leave {rivals}"
+        rivals = ", ".join(f"{in_words(each.name)} ({each.probability:.2f})" for each in known.against)
+        return f"the verdict names {in_words(name_of(known.named or frozenset()))}, and the odds leave {rivals}"
     twins = {name: known.twins[name] for name in sorted(known.candidates[0].effects) if name in known.twins}
-    return "; ".join(f"{name} or {' or '.join(others)}: another output decides it" for name, others in twins.items())
+    return "; ".join(
+        f"{' or '.join(map(title_of, (name, *others)))}: another output decides it" for name, others in twins.items()
+    )
 
 
 def _first(rig: Rig) -> tuple[str, dict[str, Any]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from estimator.diagnosis.result import Counted, Diagnosis, FoundEffect, Mismatch, Verdict
-from estimator.physics.catalogue import EFFECTS
+from estimator.physics.catalogue import title_of
 from estimator.physics.effect import Element
 from estimator.physics.model import Motion, unit
 from estimator.signals.record import OutputKind
@@ -118,11 +118,6 @@ def belief(effect: FoundEffect) -> str:
         f"Without it {effect.necessity:.0%} of the error beyond the noise comes back, on samples not used for the fit; "
         f"{effect.share:.0%} of the squared error goes with it. {counted_in_words(effect.counted)}{of_which}. "
     )
-
-
-def title_of(name: str) -> str:
-    """Return an effect's title in words."""
-    return EFFECTS[name].title if name in EFFECTS else name.replace("_", " ")
 
 
 def location_rows(mismatch: Mismatch) -> list[tuple[str, str]]:

@@ -248,7 +248,8 @@ def _publish(job: StepContext, result: Diagnosis, nominal: DrivelineModel, made:
 
 def _findings_diagnosis(result: Diagnosis) -> list[StepFinding]:
     from estimator.diagnosis.result import Verdict
-    from hil.report.wording import headline, title_of
+    from estimator.physics.catalogue import title_of
+    from hil.report.wording import headline
 
     fit = result.fit
     advice = {

@@ -26,10 +26,10 @@ def contradictions(found: Diagnosis) -> list[str]:
 def _errors(found: Diagnosis) -> Iterator[str]:
     fit, said, unit = found.fit, found.statement, re.escape(found.fit.unit)
     table = found.table
-    told = [(fit.retuned, fit.augmented), (fit.holdout_retuned, fit.holdout_augmented)]
-    told += [] if table is None else [(table.rms_before, table.rms_after)]
+    known = [(fit.retuned, fit.augmented), (fit.holdout_retuned, fit.holdout_augmented)]
+    known += [] if table is None else [(table.rms_before, table.rms_after)]
     for move, before, after in re.findall(f"(falls|rises)(?: with it)? from {NUMBER} to {NUMBER} {unit}", said):
-        if not any(near(before, was) and near(after, now) for was, now in told):
+        if not any(near(before, was) and near(after, now) for was, now in known):
             yield f"the error {move} from {before} to {after}: no fit has these"
         if (float(after) < float(before)) is not (move == "falls"):
             yield f"the error {move} from {before} to {after}"

@@ -73,7 +73,7 @@ def test_a_law_that_the_free_run_does_without_is_a_refinement_outside_the_model(
     found = diagnosed(search, decision)
     assert set(found.augmented.effects) == {FRICTION}
     assert [each.name for each in found.refinements] == [DRAG]
-    assert f"Not established, and not in the model: {DRAG}." in found.statement
+    assert "Not established, and not in the model: quadratic friction at the motor." in found.statement
 
 
 def test_a_general_law_gives_way_to_its_special_case_where_that_does_as_well(friction: Search) -> None:

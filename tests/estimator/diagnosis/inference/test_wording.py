@@ -59,4 +59,4 @@ def says_what_its_numbers_say(
     assert "of the squared error is left" not in said or verdict is Verdict.PARTLY_EXPLAINED
     assert ("Nothing is missing" in said) is (verdict is Verdict.NO_MISMATCH and effort.finished)
     if not effort.finished:
-        assert "after 1 s, 2 of 40 effects untried, among them backlash, gravity" in said
+        assert "after 1 s, 2 of 40 effects untried, among them backlash in the shaft line, gravity" in said
