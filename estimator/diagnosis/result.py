@@ -185,6 +185,17 @@ class RejectedEffect:
 
 
 @dataclass(frozen=True, slots=True)
+class FittedSet:
+    """One set of effects of the search: where it was begun, how it came out, and why it was left."""
+
+    effects: tuple[str, ...]  # keys of the catalogue; () is the nominal model, re-tuned
+    begun_from: tuple[str, ...]  # the set whose values it was begun at
+    score: float  # minus twice its log posterior, up to a constant: 0 for the most probable set
+    rms: float  # free-run error on samples that no fit has seen; NaN where it was not tried [unit of the output]
+    outcome: str  # in a few words
+
+
+@dataclass(frozen=True, slots=True)
 class Effort:
     """What the search cost, in work that is the same on every machine, and what it did not get to."""
 
@@ -194,6 +205,7 @@ class Effort:
     untried: tuple[str, ...] = ()  # effects that were promising, or not looked at, and not fitted
     candidates: int = 0  # effects that these recordings can show
     limit_s: float = math.inf  # of time, inf without one [s]
+    sets: tuple[FittedSet, ...] = ()  # the smaller first, then the more probable
 
 
 @dataclass(frozen=True, slots=True)

@@ -83,6 +83,9 @@ def diagnose(
     trust_fmu: TrustFmu = False,
     trust_laws: TrustLaws = False,
     jobs: Jobs = None,
+    explain: Annotated[
+        bool, typer.Option("--explain", help="Print every set of effects that the search has fitted, too.")
+    ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print diagnosis.json instead of the summary.")] = False,
 ) -> None:
     """Say where simulation and recordings differ, and which physics the model lacks.
@@ -104,6 +107,7 @@ def diagnose(
     from hil.report.diagnosis_html import diagnosis_summary
     from hil.report.diagnosis_json import diagnosis_text
     from hil.report.fmu_terms import in_its_terms
+    from hil.report.search_table import search_table
     from hil.store import attach_to_runs
     from hil.store.entry import DIAGNOSIS, MODEL
 
@@ -135,6 +139,8 @@ def diagnose(
             typer.echo(text, nl=False)
         else:
             Console().print(diagnosis_summary(diagnosis))
+            if explain:
+                Console().print(search_table(diagnosis))
     results = {DIAGNOSIS: out / "diagnosis.json", **({} if file.is_foreign else {MODEL: out / "augmented.toml"})}
     for complaint in attach_to_runs(every, results):
         typer.echo(complaint, err=True)

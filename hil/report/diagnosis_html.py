@@ -25,7 +25,7 @@ from estimator.diagnosis.result import (
     Trace,
     Verdict,
 )
-from estimator.physics.catalogue import EFFECTS
+from estimator.physics.catalogue import EFFECTS, title_of
 from estimator.physics.effect import Element
 from estimator.signals.record import FloatArray
 from hil.provenance import Provenance
@@ -54,7 +54,6 @@ from hil.report.wording import (
     headline,
     location_rows,
     quantity,
-    title_of,
     torque_axis,
 )
 

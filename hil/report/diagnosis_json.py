@@ -56,7 +56,7 @@ def diagnosis_json(diagnosis: Diagnosis) -> Json:
         "tables": {} if diagnosis.table is None else {diagnosis.table.place: _table(diagnosis.table)},
         "traces": as_json(diagnosis.slight),
         "refinements": as_json(diagnosis.refinements),
-        "effort": fields_as_json(diagnosis.effort, "level", "simulations", "finished", "untried"),
+        "effort": fields_as_json(diagnosis.effort, "level", "simulations", "finished", "untried", "sets"),
     }
 
 

@@ -57,6 +57,23 @@ def test_the_augmented_model_is_valid_input_and_keeps_the_signals(result: Path, 
     assert run(["simulate", *arguments, "--out", str(simulated)]) == 0
 
 
+def test_the_search_is_told_set_by_set(
+    result: Path, bench_folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    sets = json.loads((result / "diagnosis.json").read_text())["effort"]["sets"]
+    nothing, best = sets[0], next(each for each in sets if each["outcome"] == "believed")
+    assert (nothing["effects"], nothing["begun_from"]) == ([], [])
+    assert (best["effects"], best["begun_from"], best["score"]) == (["coulomb_friction_motor"], [], 0.0)
+    assert best["rms"] < 0.2 * nothing["rms"]
+    assert all(each["score"] is None or each["score"] >= 0.0 for each in sets)
+    arguments = [str(bench_folder / "run_1.csv"), "--model", str(bench_folder / "drive.toml"), "--explain"]
+    assert run(["diagnose", *arguments, "--out", str(tmp_path / "result")]) == 0
+    printed = " ".join(capsys.readouterr().out.split())
+    assert "Every set of effects that was fitted." in printed
+    assert "nothing nothing" in printed  # the first row: the nominal model is begun from itself
+    assert "a step of the way" in printed
+
+
 def test_a_full_disk_takes_the_files_but_not_the_verdict(
     bench_folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -69,6 +69,7 @@ class Fits:
     work: Work = field(default_factory=Work)  # what was simulated so far
     ended: dict[Effects, Hypothesis] = field(default_factory=dict)  # by set
     rough: dict[Effects, Hypothesis] = field(default_factory=dict)
+    begun_from: dict[Effects, Effects] = field(default_factory=dict)  # by set
     implausible: dict[str, float] = field(default_factory=dict)  # by effect
     foreseen: dict[str, float] = field(default_factory=dict)
     _changes: OutputChanges = field(default_factory=OutputChanges)  # of the output, for score tests
@@ -123,7 +124,7 @@ class Fits:
             own = tuple(own_unknowns(self.model.effects, record) for record in self.records)
             problem = self._problem(NOTHING, Release(nominal_unknowns(self.model), own))
             initial = not_fitted(problem, start_vector(problem))
-            self._keep(fitted(NOTHING, initial, self.limits.usual, self.limits, self.catalogue))
+            self._keep(fitted(NOTHING, initial, self.limits.usual, self.limits, self.catalogue), NOTHING)
         return self.ended[NOTHING]
 
     def without(self, current: Hypothesis, name: str) -> Hypothesis:
@@ -135,7 +136,8 @@ class Fits:
         if self.is_first("without", current.effects, name) or effects not in self.ended:
             result = self._reduced(current, name) if name != GRADE else current.result
             limits = self.limits_of(effects)
-            self._keep(fitted(effects, result, current.sizes, limits, self.catalogue, current.minus_twice_log))
+            whole = fitted(effects, result, current.sizes, limits, self.catalogue, current.minus_twice_log)
+            self._keep(whole, current.effects)
         return self.ended[effects]
 
     def exchanged(self, current: Hypothesis, name: str, other: str) -> Hypothesis | None:
@@ -171,6 +173,7 @@ class Fits:
             best = self._more_plausible(best, self._compared(effects, loose, rival))
         is_case = self.is_plausible(best)
         with self._lock:
+            self.begun_from.setdefault(effects, rival.effects)
             if not is_case:
                 self.implausible[name] = min(best.score, self.implausible.get(name, math.inf))
             elif effects not in self.rough or best.score < self.rough[effects].score:
@@ -217,7 +220,7 @@ class Fits:
             loose = widened(whole, self.model)
             if loose is not None:
                 whole = self._more_plausible(whole, self._fitted(whole, loose, rival))
-            self._keep(whole if self.is_plausible(whole) else rough)
+            self._keep(whole if self.is_plausible(whole) else rough, rival.effects)
         return self.ended[rough.effects]
 
     def view(self, around: Hypothesis) -> WeightedScoreTests:
@@ -278,8 +281,9 @@ class Fits:
         grid = self.grid or grid_for(self.model, self.records)
         return make_problem(self.model, self.records, shared, own=release.own, use=self.use, grid=grid)
 
-    def _keep(self, hypothesis: Hypothesis) -> None:
+    def _keep(self, hypothesis: Hypothesis, begun_from: Effects) -> None:
         with self._lock:
+            self.begun_from.setdefault(hypothesis.effects, begun_from)
             known = self.ended.get(hypothesis.effects)
             if known is None or hypothesis.score < known.score:
                 self.ended[hypothesis.effects] = hypothesis

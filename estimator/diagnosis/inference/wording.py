@@ -17,7 +17,7 @@ from estimator.diagnosis.result import (
     UntestableEffect,
     Verdict,
 )
-from estimator.physics.catalogue import EFFECTS
+from estimator.physics.catalogue import title_of
 from estimator.physics.effect import Element
 
 PLACES: Mapping[Element, str] = {
@@ -64,20 +64,21 @@ def statement(
         parts.append(_left(verdict, context.remainder, context.element))
     if context.traces:
         for reason in dict.fromkeys(each.reason for each in context.traces):
-            parts.append(f"Seen, but {reason}: {', '.join(t.name for t in context.traces if t.reason == reason)}.")
+            titles = [title_of(each.name) for each in context.traces if each.reason == reason]
+            parts.append(f"Seen, but {reason}: {', '.join(titles)}.")
         parts += [_moving(each) for each in context.traces if each.moves]
     if context.refinements:
-        parts.append(f"Not established, and not in the model: {', '.join(context.refinements)}.")
+        parts.append(f"Not established, and not in the model: {', '.join(map(title_of, context.refinements))}.")
     twins = sorted({twin for effect in effects for twin in effect.indistinguishable_from})
     if twins:
-        others = " or ".join(twins)
+        others = " or ".join(map(title_of, twins))
         parts.append(f"These recordings could as well be explained by {others}: the probability is that one is there.")
     tests = sorted({entry.suggested_test for entry in context.untestable if not entry.needs})
     if tests:
-        names = ", ".join(entry.name for entry in context.untestable if not entry.needs)
+        names = ", ".join(title_of(entry.name) for entry in context.untestable if not entry.needs)
         parts.append(f"Neither found nor excluded by these recordings: {names}. Record a {' or a '.join(tests)}.")
     parts += [
-        f"Neither found nor excluded without {e.needs}: {EFFECTS[e.name].title}." for e in context.untestable if e.needs
+        f"Neither found nor excluded without {e.needs}: {title_of(e.name)}." for e in context.untestable if e.needs
     ]
     return " ".join(parts)
 
@@ -91,12 +92,12 @@ def _doubted(doubts: Sequence[Doubt]) -> str:
 def _moving(trace: Slight) -> str:
     """Say what a trace does to the values that are reported, though it hardly moves the error."""
     moved = ", ".join(f"{name} by {100.0 * share:+.2g} %" for name, share in trace.moves.items())
-    return f"The values are those with {trace.name}: without it, {moved}."
+    return f"The values are those with {title_of(trace.name)}: without it, {moved}."
 
 
 def _not_decided(effort: Effort) -> str:
     count = len(effort.untried)
-    among = ", ".join(effort.untried[:MOST_NAMES]) + (", …" if count > MOST_NAMES else "")
+    among = ", ".join(map(title_of, effort.untried[:MOST_NAMES])) + (", …" if count > MOST_NAMES else "")
     left = f", {count} of {effort.candidates} effects untried, among them {among}" if count else ""
     return f"Not decided: the search was ended after {effort.limit_s:.3g} s{left}."
 

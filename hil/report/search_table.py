@@ -1,0 +1,43 @@
+"""The log of a search, as ``hil diagnose --explain`` prints it: each set of effects that was fitted, and its end."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+from rich.console import RenderableType
+
+from estimator.diagnosis.result import Diagnosis, FittedSet
+from estimator.physics.catalogue import title_of
+from hil.report import page as html
+from hil.report.numbers import shown
+from hil.report.terminal import rendered
+
+
+def search_table(diagnosis: Diagnosis) -> RenderableType:
+    """Return a row for each set, the smaller first: what it was begun from, its score, its error and its end."""
+    headings = ("set", "begun from", "score", f"error [{diagnosis.fit.unit}]", "outcome")
+    about = (
+        "Every set of effects that was fitted. Score: minus twice its log-probability, beyond the most probable set's. "
+        "Error: of the free run, tuned for it, on samples that no fit has seen; of the sets that were tried so."
+    )
+    return rendered([html.paragraph(about), html.table(headings, list(_rows(diagnosis.effort.sets)), numbers=(2, 3))])
+
+
+def _rows(sets: Sequence[FittedSet]) -> Iterator[tuple[str, ...]]:
+    for each in sets:
+        before = "the same, elsewhere" if each.begun_from == each.effects and each.effects else _change(each)
+        numbers = ("–" if math.isnan(value) else shown(value) for value in (each.score, each.rms))
+        yield _in_words(each.effects), before, *numbers, each.outcome
+
+
+def _in_words(effects: Sequence[str]) -> str:
+    return ", ".join(map(title_of, effects)) or "nothing"
+
+
+def _change(each: FittedSet) -> str:
+    """Say the set that one was begun from by what differs."""
+    new, gone = set(each.effects) - set(each.begun_from), set(each.begun_from) - set(each.effects)
+    if gone and new:
+        return f"{_in_words(each.begun_from)}: {_in_words(sorted(gone))} exchanged"
+    return _in_words(each.begun_from)
