@@ -57,7 +57,7 @@ def test_the_augmented_model_is_valid_input_and_keeps_the_signals(result: Path, 
     assert run(["simulate", *arguments, "--out", str(simulated)]) == 0
 
 
-def test_the_search_is_told_set_by_set(
+def test_the_search_is_listed_set_by_set(
     result: Path, bench_folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     sets = json.loads((result / "diagnosis.json").read_text())["effort"]["sets"]
