@@ -61,6 +61,31 @@ class Bus:
         return body
 
 
+LOW, HIGH = VEHICLE.gains
+MOST = VEHICLE.most_load_rad_s2
+FINE = Motion(
+    speed_rad_s=10.0, predicted_rad_s=10.0, deviation_rad_s=0.1, gain=1.0, gain_deviation=0.01, load_rad_s2=0.0,
+    load_deviation_rad_s2=0.1, held_rad_s=0.0, surprise=0.0,
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("bound", "within", "said"),
+    [
+        ("held_rad_s", (-1.0, 1.0), "and stands, expected it to have changed by"),
+        ("surprise", (0.0, 15.0), "the speed 0x606C is 10 rad/s, expected 10 within 0.3 rad/s"),
+        ("gain", (LOW / 1.15 - 0.03, HIGH * 1.15 + 0.03), "times as fast as the torque makes 100 kg m2 change"),
+        ("load_rad_s2", (-MOST - 0.3, MOST + 0.3), "(a grade of 12 %); the speed 0x606C is 10 rad/s"),
+    ],
+)
+def test_each_bound_of_a_motion_is_kept_to_its_end(bound: str, within: tuple[float, float], said: str) -> None:
+    low, high = within
+    for value in (low + 1e-6, high - 1e-6):
+        assert _wrong_motion(FINE._replace(**{bound: value}), VEHICLE) == ""
+    for value in (low - 1e-6, high + 1e-6) if bound != "surprise" else (high + 1e-6,):
+        assert said in _wrong_motion(FINE._replace(**{bound: value}), VEHICLE)
+
+
 def wrong(motion: Motion) -> bool:
     return bool(_wrong_motion(motion, VEHICLE))
 

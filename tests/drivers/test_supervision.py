@@ -173,6 +173,7 @@ def test_both_together_have_a_limit_below_the_sum_of_theirs() -> None:
         return str(made.ended)
 
     assert "both inverters: torque actual value 0x6077 is 244 Nm, expected 200 Nm" in both(122.0, 122.0)
+    assert "is 156 Nm, expected 200 Nm" in both(78.0, 78.0), "too little is as wrong as too much"
     assert both(121.0, 121.0) == "None"
     assert both(129.0, 71.0) == "None", "opposite errors turn no shaft"
 
@@ -351,6 +352,15 @@ def test_doubtful_rows_are_those_of_the_drive_that_is() -> None:
     assert doubtful(100.0, answer(), messages=2) == (False, True)
     assert doubtful(100.0, answer(), messages=1) == (False, False)
     assert made.ended is None
+
+
+def test_two_speeds_apart_make_both_doubtful() -> None:
+    made = supervised()
+    seen = [
+        made.take(CycleRecord(k * PERIOD_NS, DriveRecord(0.0, answer(0.0, 0.0)), DriveRecord(0.0, answer(0.0, 20.0))))
+        for k in range(3)
+    ]
+    assert seen[-1] == (True, True)
 
 
 def test_what_does_not_come_is_judged_by_its_age() -> None:

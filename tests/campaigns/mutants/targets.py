@@ -28,6 +28,7 @@ TARGETS: dict[str, Target] = {
     "drivers.guard_limits": Target(("tests/drivers/test_torque_guard.py", "tests/drivers/test_supervision.py")),
     "drivers.inverter.supervision": Target(("tests/drivers/test_supervision.py", "tests/drivers/test_observer.py")),
     "drivers.inverter.drive_supervision": Target(("tests/drivers/test_supervision.py",)),
+    "drivers.inverter.observer": Target(("tests/drivers/test_observer.py", "tests/drivers/test_supervision.py")),
     "drivers.scaling": Target(("tests/drivers/test_scaling.py",)),
     "drivers.inverter.cia402": Target(
         ("tests/drivers/test_cia402.py",), {"0 -> 1 #3": "a previous controlword of which bit 7 alone counts"}
@@ -62,4 +63,12 @@ TARGETS: dict[str, Target] = {
     "hil.fleet.sources": Target(("tests/fleet/test_known.py", "tests/fleet/test_sources.py")),
     "hil.fleet.dataset": Target(("tests/fleet/test_foreign_dataset.py", "tests/fleet/test_dataset.py")),
     "hil.recording.publish": Target(("tests/recording/test_round_trip.py",)),
+    "hil.design.candidates": Target(("tests/design/test_candidates.py",)),
+    "hil.design.solve_state": Target(("tests/design/test_solve.py",)),
+    "hil.simulator.addresses": Target(("tests/simulator/test_simulated_rig.py",)),
+    "hil.simulator.drive_physics": Target(("tests/simulator/test_drive_physics.py",)),
+    "hil.simulator.faults": Target(("tests/simulator/test_faults.py",)),
+    "hil.simulator.faulty_wire": Target(("tests/simulator/test_faulty_wire.py",)),
+    "hil.simulator.plc_device": Target(("tests/simulator/test_plc_device.py",)),
+    "hil.simulator.stopping": Target(("tests/simulator/test_stopping.py",)),
 }
