@@ -1,4 +1,4 @@
-"""``python -m tests.campaigns.fuzz [--minutes M] [--only NAME]``: every reader and bus decoder, fed with mutants.
+"""``python -m tests.campaigns.fuzz [--minutes M] [--inputs N] [--only NAME]``: readers and decoders, fed with mutants.
 
 Each is tried in a process of its own. Prints a table, Markdown, of how many inputs there were, what became of them, the
 longest time and the most memory; exits 1 if one ended with a traceback or a warning, took too long or too much. What
@@ -8,6 +8,7 @@ was wrong is kept in ``out/fuzz``: fixed, it belongs into ``tests/campaigns/fuzz
 import argparse
 import hashlib
 import json
+import math
 import os
 import selectors
 import subprocess
@@ -59,10 +60,10 @@ class Course:
         self.most_mib = max(self.most_mib, line["mib"])
 
 
-def fuzz(name: str, seed: int, minutes: float) -> Course:
-    """Try mutants of one target for a time; its process is started anew where it ends."""
+def fuzz(name: str, seed: int, minutes: float, most: float = math.inf) -> Course:
+    """Try mutants of one target for a time, or so many; its process is started anew where it ends."""
     course, number, end_s = Course(), 0, time.monotonic() + 60.0 * minutes
-    while time.monotonic() < end_s:
+    while time.monotonic() < end_s and course.inputs < most:
         with _worker(name, seed, number) as answers:
             for line in _lines(answers, end_s):
                 if line is None:
@@ -73,6 +74,8 @@ def fuzz(name: str, seed: int, minutes: float) -> Course:
                 number = max(number, line["number"] + 1)
                 if line["wrong"]:
                     _keep(name, line)
+                if course.inputs >= most:
+                    break
     return course
 
 
@@ -132,12 +135,13 @@ def main(arguments: list[str] | None = None) -> int:
     """Run the campaign."""
     parser = argparse.ArgumentParser(prog="python -m tests.campaigns.fuzz")
     parser.add_argument("--minutes", type=float, default=5.0, help="For each target.")
+    parser.add_argument("--inputs", type=int, default=math.inf, help="For each target, at most.")
     parser.add_argument("--only", action="append", choices=TARGETS)
     parser.add_argument("--seed", type=int, default=1)
     asked = parser.parse_args(arguments)
     courses = {}
     for name in asked.only or TARGETS:
-        course = courses[name] = fuzz(name, asked.seed, asked.minutes)
+        course = courses[name] = fuzz(name, asked.seed, asked.minutes, asked.inputs)
         for problem in dict.fromkeys(course.wrong):
             print(f"{name}: {problem}", file=sys.stderr, flush=True)
     return report(courses)
