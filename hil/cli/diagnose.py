@@ -84,7 +84,10 @@ def diagnose(
     trust_laws: TrustLaws = False,
     jobs: Jobs = None,
     explain: Annotated[
-        bool, typer.Option("--explain", help="Print every set of effects that the search has fitted, too.")
+        bool,
+        typer.Option(
+            "--explain", help="Print every set of effects that the search fitted, too (in diagnosis.json: effort.sets)."
+        ),
     ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print diagnosis.json instead of the summary.")] = False,
 ) -> None:

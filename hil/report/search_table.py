@@ -21,12 +21,14 @@ def search_table(diagnosis: Diagnosis) -> RenderableType:
         "Every set of effects that was fitted. Score: minus twice its log-probability, beyond the most probable set's. "
         "Error: of the free run, tuned for it, on samples that no fit has seen; of the sets that were tried so."
     )
+    if not diagnosis.effort.sets:
+        return rendered([html.paragraph("No set of effects was fitted.")])
     return rendered([html.paragraph(about), html.table(headings, list(_rows(diagnosis.effort.sets)), numbers=(2, 3))])
 
 
 def _rows(sets: Sequence[FittedSet]) -> Iterator[tuple[str, ...]]:
     for each in sets:
-        before = "the same, elsewhere" if each.begun_from == each.effects and each.effects else _change(each)
+        before = _change(each) if each.effects else "–"
         numbers = ("–" if math.isnan(value) else shown(value) for value in (each.score, each.rms))
         yield _in_words(each.effects), before, *numbers, each.outcome
 

@@ -66,12 +66,13 @@ def test_the_search_is_listed_set_by_set(
     assert (best["effects"], best["begun_from"], best["score"]) == (["coulomb_friction_motor"], [], 0.0)
     assert best["rms"] < 0.2 * nothing["rms"]
     assert all(each["score"] is None or each["score"] >= 0.0 for each in sets)
+    assert sets == sorted(sets, key=lambda each: len(each["effects"]))
     arguments = [str(bench_folder / "run_1.csv"), "--model", str(bench_folder / "drive.toml"), "--explain"]
     assert run(["diagnose", *arguments, "--out", str(tmp_path / "result")]) == 0
     printed = " ".join(capsys.readouterr().out.split())
     assert "Every set of effects that was fitted." in printed
-    assert "nothing nothing" in printed  # the first row: the nominal model is begun from itself
-    assert "a step of the way" in printed
+    assert "nothing – " in printed  # the first row: the nominal model is begun from none
+    assert "on the way of the search" in printed
 
 
 def test_a_full_disk_takes_the_files_but_not_the_verdict(

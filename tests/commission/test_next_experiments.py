@@ -159,14 +159,19 @@ def test_what_is_open_is_driven_until_it_is_decided(world: World, verdict: str, 
     assert world.driven == ["next_1", "next_2"]
     assert (record.status, record.evidence["end"]) == (Status.DONE, "decided")
     assert [each["probabilities"] for each in record.evidence["odds"]] == [OPEN, OPEN, DECIDED]
-    assert [each.measured.rpartition("After: ")[2][:14] for each in record.findings[:2]] == [
-        "backlash 0.600",
-        "backlash 0.970",
+    assert [each.measured.rpartition("After: ")[2].partition(",")[0] for each in record.findings[:2]] == [
+        "backlash in the shaft line 0.600",
+        "backlash in the shaft line 0.970",
     ]
     assert record.findings[-1].within is True
     assert (world.folder / "model.toml").read_text(encoding="utf-8") == "augmented"
     page = commission_page(world.state.document(), {name: name for name in NAMES})
-    for text in ("steps about standstill", "backlash 0.970", "solve/report.html", "after 4 recordings"):
+    for text in (
+        "steps about standstill",
+        "backlash in the shaft line 0.970",
+        "solve/report.html",
+        "after 4 recordings",
+    ):
         assert text in page
     assert world.call().attempt == 1
 
@@ -175,7 +180,7 @@ def test_declined_the_verdict_stands_with_the_operators_reason(world: World) -> 
     world.diagnosed("unexplained")
     record = world.call(world.person("s", "no room"))
     assert (record.status, record.evidence["end"], world.driven) == (Status.DONE, "the operator declined", [])
-    assert record.findings[-1].measured == "explained: backlash 0.600, shaft_hysteresis 0.400"
+    assert record.findings[-1].measured == "explained: backlash in the shaft line 0.600, hysteresis of the shaft 0.400"
     assert record.findings[-1].advice.startswith("no room")
     assert world.call(world.person()).attempt == 1
     assert world.call(world.person("y"), repeat=frozenset({"solve"})).evidence["end"] == "decided"

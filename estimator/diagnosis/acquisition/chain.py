@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.special import ndtr
 
 from estimator.diagnosis.acquisition.finding import OUTPUT, AcquisitionFinding, flagged, no_cells
 from estimator.diagnosis.acquisition.jitter import hidden_jitter, mean_shift, stamp_offsets_s, stamped_jitter
@@ -18,6 +20,9 @@ from estimator.physics.fit import FitResult, rates
 from estimator.physics.free_run import NOTHING_KNOWN, FreeRun, Own, free_run
 from estimator.physics.model import DrivelineModel
 from estimator.signals.record import BoolArray, FloatArray, Record, separated_outputs, uniform_period_s
+
+SHARP = 0.05  # noise of so small a part of a step moves no reading across its ends
+REACH = 8  # steps away from the nearest that a reading may be: noise is less than a step where a lattice is seen
 
 UNREAD = frozenset({"stale_samples", "lost_samples"})
 """Findings whose readings are not what was measured in that row."""
@@ -71,15 +76,26 @@ def _on_time(record: Record) -> Record:
     return replace(record, sample_time_s=period_s, time_s=record.time_s - offset_s, offset_s=offset_s)
 
 
-def as_read(output: FloatArray, record: Record, effects: Mapping[str, Mapping[str, float]]) -> FloatArray:
-    """Return a simulated output as this recording would show it."""
+def as_read(
+    output: FloatArray, record: Record, effects: Mapping[str, Mapping[str, float]], noise: float = 0.0
+) -> FloatArray:
+    """Return a simulated output as this recording would show it, in the mean of a noise before it is rounded."""
     read = output
     if "speed_quantisation" in effects:
-        step = effects["speed_quantisation"]["step_rad_s"]
-        read = np.round(read / step) * step
+        read = _rounded(read, effects["speed_quantisation"]["step_rad_s"], noise)
     if "stale_samples" in effects:
         read = _repeating(read, record)
     return read
+
+
+def _rounded(output: FloatArray, step: float, noise: float) -> FloatArray:
+    """Return what is read in steps in the mean: with much noise the output itself (dither), without any its step."""
+    nearest = np.round(output / step)
+    if noise < SHARP * step:
+        return nearest * step
+    below = (nearest - output / step)[:, None] + np.arange(-REACH, REACH + 1) - 0.5
+    reached = ndtr(below * (step / noise))  # probability to be below each step's lower end
+    return step * (nearest + np.sum(np.diff(reached, axis=1) * np.arange(-REACH, REACH), axis=1))
 
 
 def _repeating(output: FloatArray, record: Record) -> FloatArray:
@@ -137,14 +153,42 @@ class Chain:
         """Values of the parameters of the faults found, by effect and parameter."""
         return {f.name: {name: sized.value for name, sized in f.parameters.items()} for f in self.findings}
 
+    def added_squares(self, result: FitResult) -> float:
+        """Sum of the squared errors that the faults add to the good readings of a model, whatever it leaves itself.
+
+        Rounding and jitter that is not stamped can be known of and not undone: with them known the error falls by
+        nothing.
+        """
+        return sum(
+            _added(finding, output, slope, record)
+            for output, slope, record in zip(result.outputs, rates(result), self.raw, strict=True)
+            for finding in self.findings
+        )
+
     def errors(self, outputs: Sequence[FloatArray], within: Sequence[BoolArray] | None = None) -> list[FloatArray]:
         """Return simulated, as this chain would have read it, less recorded; the good rows of each raw recording."""
-        read = [as_read(output, record, self.effects()) for output, record in zip(outputs, self.raw, strict=True)]
+        effects, noise = self.effects(), 0.0
+        if "speed_quantisation" in effects:
+            rounding = effects["speed_quantisation"]["step_rad_s"] ** 2 / 12.0
+            noise = math.sqrt(max(noise_floor(self.records) ** 2 - rounding, 0.0))
+        read = [as_read(output, record, effects, noise) for output, record in zip(outputs, self.raw, strict=True)]
         shifted = [each + shift for each, shift in zip(read, self.shifts, strict=True)] if self.shifts else read
         rows = [_read_rows(record, self.findings) for record in self.raw]
         if within is not None:
             rows = [read & inside for read, inside in zip(rows, within, strict=True)]
         return [(each - record.output)[good] for each, record, good in zip(shifted, self.raw, rows, strict=True)]
+
+
+def _added(finding: AcquisitionFinding, output: FloatArray, slope: FloatArray, record: Record) -> float:
+    sizes = {name: sized.value for name, sized in finding.parameters.items()}
+    if finding.name == "speed_quantisation":  # rounding is uniform over a step
+        return float(record.okay.sum()) * sizes["step_rad_s"] ** 2 / 12.0
+    if finding.name == "sample_jitter":
+        return float(np.sum(np.mean((sizes["jitter_s"] * slope[:, record.okay]) ** 2, axis=0)))  # of both sides
+    if finding.name == "stale_samples":
+        return float(np.sum((_repeating(output, record) - output)[record.okay] ** 2))
+    rows = record.okay & finding.touched(record)[:, OUTPUT]
+    return float(np.sum((output - record.output)[rows] ** 2))
 
 
 def with_faults_compensated(records: Sequence[Record]) -> Chain:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 from estimator.diagnosis.acquisition.chain import Chain, with_faults_compensated, without_acquisition_effects
@@ -17,11 +17,11 @@ from estimator.diagnosis.inference.figures import Unseen, on_recordings
 from estimator.diagnosis.inference.fits import Fits
 from estimator.diagnosis.inference.free_forms import free_form
 from estimator.diagnosis.inference.hypotheses import Progress, all_good_samples, open_hypotheses, silent
-from estimator.diagnosis.inference.say import Basis, said, undecided
+from estimator.diagnosis.inference.say import Basis, fitted_sets, said, undecided
 from estimator.diagnosis.inference.search import Search, search_from_nothing
 from estimator.diagnosis.noise import noise_floor
 from estimator.diagnosis.preconditions.prepare import Prepared, as_slow_as_needed
-from estimator.diagnosis.result import Diagnosis, Effort, FittedSet
+from estimator.diagnosis.result import Diagnosis, Effort
 from estimator.diagnosis.table_answer import unnamed_law
 from estimator.physics.model import DrivelineModel
 from estimator.physics.parallel import TimeIsUp, Work, counted
@@ -100,40 +100,8 @@ def _effort(search: Search, level: str, decision: Decision) -> Effort:
     fits, best = search.fits, decision.judged.believed.hypothesis.score
     settled = {*fits.implausible, *(name for effects in (*fits.ended, *fits.rough) for name in effects)}
     untried = tuple(name for name in fits.names if name not in settled and fits.foreseen.get(name, -math.inf) < best)
-    return Effort(
-        level, fits.simulations, True, untried, len(fits.names), sets=tuple(sorted(_sets(search, decision), key=_place))
-    )
-
-
-def _place(fitted: FittedSet) -> tuple[int, float, tuple[str, ...]]:
-    """Return a set's place in a list: the smaller first, then the more probable; threads fit in any order."""
-    return len(fitted.effects), math.inf if math.isnan(fitted.score) else fitted.score, fitted.effects
-
-
-def _sets(search: Search, decision: Decision) -> Iterator[FittedSet]:
-    """Yield every set that the search has fitted, as an expert asks for them."""
-    fits, judged = search.fits, decision.judged
-    way = {each.effects for each in search.path}
-    for effects, before in fits.begun_from.items():
-        fit = fits.ended.get(effects) or fits.rough.get(effects)
-        trial = judged.tried.get(effects)
-        rms = math.nan if trial is None else trial.rms
-        if fit is None:
-            outcome = "its values are no case of it"
-        elif effects == judged.believed.effects:
-            outcome = "believed"
-        elif effects == search.best.effects:
-            outcome = "the most probable; what of it is not established is a refinement"
-        elif effects in way:
-            outcome = "a step of the way"
-        elif rms > judged.believed.rms:
-            outcome = "simulates worse than what is believed"
-        elif effects not in fits.ended:
-            outcome = "left after a few steps: others promised more"
-        else:
-            outcome = "less probable"
-        score = math.nan if fit is None else fit.score - search.best.score
-        yield FittedSet(tuple(sorted(effects)), tuple(sorted(before)), score, rms, outcome)
+    sets = fitted_sets(fits, search.path, decision.judged)
+    return Effort(level, fits.simulations, True, untried, len(fits.names), sets=sets)
 
 
 def _warnings(search: Search, level: str) -> tuple[str, ...]:

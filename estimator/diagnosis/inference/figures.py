@@ -264,15 +264,14 @@ def figures_without(chain: Chain, line: DrivelineModel, nothing: Hypothesis | No
 
 
 def acquired(runs: FreeRuns) -> tuple[FoundEffect, ...]:
-    """Return faults of the acquisition that matter: with which the squared error falls by more than a trace."""
+    """Return faults of the acquisition that matter: that add more than a trace of the squared error."""
     chain = runs.chain
     if not chain.findings:
         return ()
     before = [(out - raw.output)[raw.okay] for out, raw in zip(runs.final.outputs, chain.raw, strict=True)]
-    after = chain.errors(runs.final.outputs)
-    if rms_of(after) ** 2 > (1.0 - LEAST_SHARE) * rms_of(before) ** 2:
+    if chain.added_squares(runs.final) < LEAST_SHARE * sum(float(error @ error) for error in before):
         return ()
-    return acquired_effects(chain, before, after)
+    return acquired_effects(chain, before, chain.errors(runs.final.outputs))
 
 
 def figures_of(runs: FreeRuns, noise: float, findings: Sequence[FoundEffect]) -> Fit:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,7 +14,7 @@ from estimator.diagnosis.inference.checks import tests_in_words
 from estimator.diagnosis.inference.decide import Decision, Judged
 from estimator.diagnosis.inference.figures import courses_of, figures_without, first_figures, found_effect
 from estimator.diagnosis.inference.fits import Fits
-from estimator.diagnosis.inference.hypotheses import Hypothesis, of_first_outputs, open_hypotheses
+from estimator.diagnosis.inference.hypotheses import Effects, Hypothesis, of_first_outputs, open_hypotheses
 from estimator.diagnosis.inference.search import Search
 from estimator.diagnosis.inference.standing import Standing
 from estimator.diagnosis.inference.trials import Trial
@@ -26,6 +26,7 @@ from estimator.diagnosis.result import (
     Doubt,
     Effort,
     Estimated,
+    FittedSet,
     FoundEffect,
     Interval,
     Mismatch,
@@ -141,7 +142,8 @@ def undecided(
     tried = set() if fits is None else {*fits.scores(), *fits.implausible}
     untried = tuple(name for name in names if name not in tried)
     simulations = 0 if fits is None else fits.simulations
-    effort = Effort(level, simulations, False, untried, len(names), work.limit_s)
+    sets = () if fits is None else fitted_sets(fits)
+    effort = Effort(level, simulations, False, untried, len(names), work.limit_s, sets)
     untestable = untestable_effects(blind)
     context = Context(untestable=untestable, can_be_retuned=can_be_retuned(line), doubts=doubts)
     return Diagnosis(
@@ -160,6 +162,37 @@ def undecided(
         effort=effort,
         doubts=tuple(doubts),
     )
+
+
+def fitted_sets(fits: Fits, way: Sequence[Hypothesis] = (), judged: Judged | None = None) -> tuple[FittedSet, ...]:
+    """Return every set that was fitted, the smaller first, then the more probable: threads fit in any order."""
+    steps = {each.effects for each in way}
+    best = min((each.score for each in fits.ended.values()), default=math.nan)
+    found = []
+    for effects, before in fits.begun_from.items():
+        fit = fits.ended.get(effects) or fits.rough.get(effects)
+        trial = None if judged is None else judged.tried.get(effects)
+        rms = math.nan if trial is None else trial.rms
+        outcome = _outcome(effects, fits, steps, judged, rms)
+        score = math.nan if fit is None else fit.score - best
+        found.append(FittedSet(tuple(sorted(effects)), tuple(sorted(before)), score, rms, outcome))
+    return tuple(sorted(found, key=lambda e: (len(e.effects), math.isnan(e.score), e.score, e.effects)))
+
+
+def _outcome(effects: Effects, fits: Fits, steps: Set[Effects], judged: Judged | None, rms: float) -> str:
+    if effects not in fits.ended and effects not in fits.rough:
+        return "its values are no case of it"
+    if judged is None:
+        return "the limit of time came before it was judged"
+    if effects == judged.believed.effects:
+        return "believed"
+    if effects == judged.best.effects:
+        return "where the search ended; what of it is not established is a refinement"
+    if effects in steps:
+        return "on the way of the search"
+    if rms > judged.believed.rms:
+        return "simulates worse than what is believed"
+    return "less probable" if effects in fits.ended else "left after a few steps: others promised more"
 
 
 def can_be_retuned(line: DrivelineModel) -> bool:

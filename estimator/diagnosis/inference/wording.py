@@ -31,6 +31,8 @@ PLACES: Mapping[Element, str] = {
 
 MOST_NAMES = 4  # untried effects that a headline lists
 
+STAYS = 1e-3  # an error that changes by less does not change to anyone who reads it
+
 LINE = frozenset({"J_M", "J_L", "k"})  # what a line's answer to a torque is in proportion to
 
 
@@ -132,7 +134,7 @@ def _fall(fit: Fit) -> str:
 
 def _change(before: float, after: float) -> str:
     one, other = _pair(before, after)
-    if one == other:
+    if one == other or abs(after - before) < STAYS * before:
         return f"stays at {one}"
     return f"{'falls' if after < before else 'rises'} from {one} to {other}"
 

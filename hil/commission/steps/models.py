@@ -40,6 +40,8 @@ ERROR_TO_NOISE = "error against the standstill noise"
 RESONANCE_OF_MODEL = "resonance of the physical model"
 """What shows that the line is another than two masses and a spring: its values are not determined then."""
 
+LONGER = "These runs do not determine it well: drive longer, or take it from the maker"
+
 MODEL_FILE = "nominal.toml"
 
 FOLDER = "diagnosis"
@@ -155,7 +157,7 @@ def _parameter_findings(fit: PhysicalFit) -> list[StepFinding]:
             f"known within ±{100.0 * TRUSTED:g} %",
             _value(name, value, fit),
             value.ci95 <= TRUSTED * abs(value.value),
-            "These runs do not determine it well: drive longer, or take it from the maker",
+            LONGER if math.isfinite(value.ci95) else "See the diagnosis: what it finds missing determines this too",
         )
         if name in ("J_M", "J_L", "k", "c")
         else stated(name, _value(name, value, fit))

@@ -77,7 +77,9 @@ def _needless(job: StepContext) -> str:
 
 
 def _findings(state: SolveState) -> list[StepFinding]:
-    odds = [", ".join(f"{name} {p:.3f}" for name, p in each.probabilities.items()) for each in state.odds]
+    from hil.design.report import in_words  # half a second, and the bus comes first
+
+    odds = [", ".join(f"{in_words(name)} {p:.3f}" for name, p in each.probabilities.items()) for each in state.odds]
     findings = [
         stated(f"driven: {run.name}", f"odds before: {before}. After: {after}")
         for run, before, after in zip(state.driven, odds, odds[1:], strict=False)

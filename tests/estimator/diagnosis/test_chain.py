@@ -90,6 +90,8 @@ class TestHiddenJitter:
         assert [finding.name for finding in found.findings] == ["sample_jitter"]
         assert found.effects()["sample_jitter"]["jitter_s"] == pytest.approx(1.5e-3, rel=0.1)
         assert found.with_jitter_in(result) is found
+        excess = float(np.sum((result.outputs[0] - records[0].output) ** 2)) - SAMPLES * NOISE**2
+        assert found.added_squares(result) == pytest.approx(excess, rel=0.25)  # though it cannot be undone
 
     def test_what_it_adds_in_the_mean_is_taken_off(self) -> None:
         """Where the torque steps, readings are off to one side, come they early or late: the line seems heavier."""
@@ -104,6 +106,26 @@ class TestHiddenJitter:
         before, after = np.mean(heavier, axis=0)
         assert before > 0.008
         assert abs(after) < 0.4 * before
+
+
+class TestRounded:
+    """A reading in steps of four times its noise: known of, and not to be undone."""
+
+    STEP = 4.0 * NOISE
+    READ = replace(HEALTHY, output=STEP * np.round(HEALTHY.output / STEP))
+
+    def test_it_adds_what_rounding_adds(self) -> None:
+        chain = with_faults_compensated([self.READ])
+        assert [finding.name for finding in chain.findings] == ["speed_quantisation"]
+        result = Bench(MODEL, [self.READ], all_good_samples([self.READ])).fit(NOTHING)
+        assert chain.added_squares(result) == pytest.approx(SAMPLES * self.STEP**2 / 12.0, rel=1e-6)
+
+    def test_the_reading_in_the_mean_is_nearer_than_the_speed_and_than_its_step(self) -> None:
+        true = TRUTH.speed()
+        (errors,) = with_faults_compensated([self.READ]).errors([true])
+        stepped = self.STEP * np.round(true / self.STEP)
+        assert np.std(errors) < 0.99 * np.std(true - self.READ.output)
+        assert np.std(errors) < 0.95 * np.std(stepped - self.READ.output)
 
 
 class TestReplay:
