@@ -31,6 +31,7 @@ LEFT_OUT = ": left out, "  # what every remark on a column that was not read has
 NAME_IN_MODEL = "For a foreign recording, name its columns in [signals] of the model file."
 NAME_IN_PYTHON = "Name its columns: from_pandas(frame, torque=[...], speed=..., time=...)."
 
+MOST_NAMES = 100  # columns that a refusal lists
 LONGEST_CELL = 40  # characters of a wrong cell that a message shows
 
 
@@ -167,8 +168,10 @@ class Table:
         if column is None:
             if name in self.elsewhere:
                 return self.elsewhere[name]
-            listed = ", ".join([*self.columns, *self.elsewhere])
-            return f"column {name}: missing, the {'frame' if self.is_frame else 'file'} has {listed}. " + (
+            names = [*self.columns, *self.elsewhere]
+            listed = ", ".join(each[:LONGEST_CELL] for each in names[:MOST_NAMES])
+            more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
+            return f"column {name}: missing, the {'frame' if self.is_frame else 'file'} has {listed}{more}. " + (
                 NAME_IN_PYTHON if self.is_frame else NAME_IN_MODEL
             )
         row = _first_bad(column)

@@ -122,7 +122,7 @@ def diagnosis_summary(diagnosis: Diagnosis) -> RenderableType:
     return rendered(
         [
             html.header(
-                headline(diagnosis), html.paragraph(f"Recordings: {names}."),
+                headline(diagnosis), *([html.paragraph(f"Recordings: {names}.")] if names else []),
                 *doubts(diagnosis), html.paragraph(diagnosis.statement),
                 kind=_kind(diagnosis), badge=badge(diagnosis),
             ),

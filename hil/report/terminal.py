@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from typing import Any, Literal
 
-from rich.console import Group, RenderableType
+from rich.console import Console, ConsoleOptions, Group, RenderableType, RenderResult
 from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
@@ -37,21 +38,38 @@ def _rendered(block: Any) -> Iterator[RenderableType]:
         case html.Paragraph():
             yield Text(_words(block))
         case html.HtmlTable():
-            yield _table(block)
+            yield _Table(block)
 
 
 def _words(block: html.Paragraph) -> str:
     return "".join(str(piece) for piece in block.pieces)
 
 
-def _table(block: html.HtmlTable) -> Table:
-    """Make a table of the columns that hold text; numbers are never cut."""
+LEAST_LABELS = 12
+"""Columns of a terminal that words need beside the numbers of a table: with fewer, numbers are folded, too."""
+
+
+@dataclass(frozen=True)
+class _Table:
+    """A table whose numbers are whole where the terminal has room for them and for what they are of."""
+
+    block: html.HtmlTable
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        block = self.block
+        columns = [[block.headings[i], *(str(row.cells[i]) for row in block.rows)] for i in block.numbers]
+        numbers = sum(max(map(len, column)) + 2 for column in columns)
+        yield _table(self.block, is_whole=numbers + LEAST_LABELS <= options.max_width)
+
+
+def _table(block: html.HtmlTable, is_whole: bool) -> Table:
+    """Make a table of the columns that hold text."""
     columns = [i for i, _ in enumerate(block.headings) if any(str(row.cells[i]) for row in block.rows)]
     table = Table(box=None, pad_edge=False, show_header=any(block.headings))
     for i in columns:
         is_number = i in block.numbers
         justify: Literal["right", "left"] = "right" if is_number else "left"
-        table.add_column(Text(block.headings[i]), justify=justify, overflow="fold", no_wrap=is_number)
+        table.add_column(Text(block.headings[i]), justify=justify, overflow="fold", no_wrap=is_number and is_whole)
     for row in block.rows:
         style = "dim" if row.kind == "undetermined" else ""
         table.add_row(*(Text(str(row.cells[i])) for i in columns), style=style)

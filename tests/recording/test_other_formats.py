@@ -169,3 +169,11 @@ def test_an_address_that_is_not_there_is_refused_with_those_that_are(tmp_path: P
     scipy.io.savemat(tmp_path / "drive.mat", {"log": {"t": TIME, "w": SPEED}})
     with pytest.raises(RecordingError, match=r"column log.v: missing, the file has log.t, log.w"):
         read_table(tmp_path / "drive.mat").numeric(["log.v"])
+
+
+def test_a_refusal_lists_names_as_people_read_them(tmp_path: Path) -> None:
+    names = [f"c{i}" for i in range(149)] + ["x" * 1000]
+    (tmp_path / "wide.csv").write_text("\n".join([",".join(names), *[",".join(["1.0"] * 150)] * 3]), "utf-8")
+    with pytest.raises(RecordingError, match=r"column v: missing, the file has c0, c1, .* and 50 more\.") as refused:
+        read_table(tmp_path / "wide.csv").numeric(["v"])
+    assert len(str(refused.value)) < 2000

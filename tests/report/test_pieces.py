@@ -15,7 +15,7 @@ from estimator.identification.modes.modes import square_root
 from estimator.physics.model import Motion
 from estimator.signals.record import OutputKind
 from hil.errors import UsageError
-from hil.report import bode
+from hil.report import bode, page as html, terminal
 from hil.report.diagnosis_html import diagnosis_summary
 from hil.report.figures import LONGEST_STRETCHES, extremes, input_lines, stretches_for
 from hil.report.numbers import listed, p_statement, shown, shown_interval, shown_p, shown_ratio
@@ -152,3 +152,13 @@ def test_the_band_of_a_phase_does_not_cross_the_figure(first: float) -> None:
         any(low.y[i] <= inside[i] <= high.y[i] for low, high in zip(lows, highs, strict=True)) for i in range(f.size)
     ]
     assert all(held)
+
+
+@pytest.mark.parametrize("width", [40, 60, 80])
+def test_a_narrow_terminal_takes_no_label_from_its_numbers(width: int) -> None:
+    rows = [("nominal, as given", "0.7362", "14.7 ×", "–"), ("augmented", "0.05027", "1 ×", "0.04967")]
+    headings = ("model", "RMS error [rad/s]", "to noise floor", "on unseen data [rad/s]")
+    table = terminal.rendered([html.table(headings, rows, numbers=(1, 2, 3))])
+    letters = "".join(rendered(table, width).split())
+    for cell in ("nominal", "given", "augmente", "0.73", "14.7", "0.049"):
+        assert cell in letters
