@@ -21,6 +21,10 @@ COLOURS: Mapping[str, str] = {
 }
 
 
+LEAST_LABELS = 12
+"""Columns of a terminal that words need next to the numbers of a table: with fewer, numbers are folded, too."""
+
+
 def rendered(blocks: Iterable[Any]) -> RenderableType:
     """Return what a terminal shows of blocks."""
     return Group(*(shown for block in blocks if block for shown in _rendered(block)))
@@ -43,10 +47,6 @@ def _rendered(block: Any) -> Iterator[RenderableType]:
 
 def _words(block: html.Paragraph) -> str:
     return "".join(str(piece) for piece in block.pieces)
-
-
-LEAST_LABELS = 12
-"""Columns of a terminal that words need beside the numbers of a table: with fewer, numbers are folded, too."""
 
 
 @dataclass(frozen=True)
