@@ -30,7 +30,7 @@ from scipy.stats import chi2, t
 
 from estimator.errors import NotExciting
 from estimator.identification.linear_model import ComplexArray
-from estimator.identification.offline.problem import gaps
+from estimator.identification.offline.missing import gaps
 from estimator.signals.decimate import Blocks, block_of
 from estimator.signals.record import BoolArray, FloatArray, IntArray, Record
 
