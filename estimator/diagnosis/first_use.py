@@ -23,11 +23,11 @@ from numba.core.types import boolean, float64, int64
 from estimator.compiled import IS_COMPILED, ROOT
 from estimator.diagnosis.line.equivalent import Chain, Filtered, run_filter, run_smoother
 from estimator.diagnosis.line.tangent import Nudges, Setting, linearise
+from estimator.least_squares import least
 from estimator.physics.driveline import InitialCondition
 from estimator.physics.kernel.integration import integrate
 from estimator.physics.kernel.side_by_side import integrate_each, integrate_side_by_side
 from estimator.physics.layout import Grid, flat
-from estimator.physics.least_squares import least
 from estimator.physics.model import DrivelineModel
 from estimator.physics.simulate import simulate
 from estimator.signals.record import Record

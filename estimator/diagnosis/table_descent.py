@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 
 from estimator.diagnosis.table_curves import Curve, Masks
+from estimator.least_squares import minimise
 from estimator.physics.fit import FitResult
 from estimator.physics.jacobian import jacobian_at
 from estimator.physics.layout import OBSERVER, slot
-from estimator.physics.least_squares import minimise
 from estimator.physics.problem import Problem, bounds, outputs_at, residual_at
 from estimator.physics.tables import Table
 from estimator.signals.correlation import effective_samples

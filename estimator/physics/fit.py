@@ -8,9 +8,9 @@ from functools import partial
 
 import numpy as np
 
+from estimator.least_squares import Solution, minimise
 from estimator.physics.effect import MOMENTS
 from estimator.physics.jacobian import jacobian_at
-from estimator.physics.least_squares import Solution, minimise
 from estimator.physics.model import Structure
 from estimator.physics.parallel import concurrently
 from estimator.physics.problem import (

@@ -15,10 +15,10 @@ from typing import Protocol
 
 import numpy as np
 
+from estimator.least_squares import least_inside, unbounded_first
 from estimator.physics.effect import Effect
 from estimator.physics.fit import FitResult
 from estimator.physics.layout import slot
-from estimator.physics.least_squares import least_inside, unbounded_first
 from estimator.physics.problem import bounds
 from estimator.physics.unknowns import Shared
 from estimator.signals.record import FloatArray, Record

@@ -12,10 +12,10 @@ from scipy.linalg import expm
 from scipy.optimize import least_squares
 from threadpoolctl import threadpool_limits
 
+from estimator.least_squares import CONVERGED
 from estimator.physics.driveline import InitialCondition
 from estimator.physics.fit import FitResult, fit
 from estimator.physics.layout import slot
-from estimator.physics.least_squares import CONVERGED
 from estimator.physics.model import Structure
 from estimator.physics.problem import (
     Problem,

@@ -14,9 +14,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from estimator.least_squares import damped_step
 from estimator.physics.fit import FitResult, in_common
 from estimator.physics.jacobian import jacobian_at
-from estimator.physics.least_squares import damped_step
 from estimator.physics.problem import Problem, bounds, outputs_at, residual_at
 from estimator.signals.record import FloatArray
 

@@ -15,14 +15,13 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from scipy.optimize import least_squares
 from scipy.signal import lfilter
 from scipy.stats import f as fisher
 from threadpoolctl import threadpool_limits
 
 from estimator.identification.linear_model import LinearModel
 from estimator.identification.modes.modes import Mode, resonance
-from estimator.identification.offline.problem import Problem
+from estimator.identification.offline.problem import Problem, descended
 from estimator.identification.offline.starts import delayed
 from estimator.signals.decimate import Decimator
 from estimator.signals.record import BoolArray, FloatArray, Record
@@ -39,7 +38,7 @@ LAGS = (1, 2, 3)  # numerators of the responses, in samples of the noise model: 
 
 REGIONS = 3  # of equal numbers of samples: below, about and above the middle
 
-MOST_EVALUATIONS = 30
+MOST_DERIVATIVES = 30  # for the model of a region, which begins at that of the whole
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,5 +157,4 @@ def _model_of(problem: Problem, x: FloatArray, rows: BoolArray) -> LinearModel:
         return problem.jacobian(joined(plant))[rows, :n]
 
     with threadpool_limits(1):
-        solution = least_squares(residual, x[:n], jac=jacobian, x_scale="jac", method="lm", max_nfev=MOST_EVALUATIONS)
-    return problem.model(joined(solution.x))
+        return problem.model(joined(descended(residual, jacobian, x[:n], MOST_DERIVATIVES)))

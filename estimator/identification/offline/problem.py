@@ -13,7 +13,6 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from scipy.optimize import least_squares
 from scipy.signal import lfilter
 from threadpoolctl import threadpool_limits
 
@@ -27,14 +26,15 @@ from estimator.identification.linear_model import (
 )
 from estimator.identification.offline.missing import RIDGE, Elimination, OutputResponses, UnreadTorque
 from estimator.identification.offline.starts import delayed
+from estimator.least_squares import TrustRegion, minimise
 from estimator.signals.decimate import HIGH_PASS_HZ, Blocks
 from estimator.signals.record import BoolArray, FloatArray
 
 INSIDE = 1.0 - 1e-6
 """Stands for 1 in both: rounding then leaves every pole inside, the slowest with a time constant of 10^6 samples."""
 
-MOST_EVALUATIONS = 60
-"""Evaluations per start. Gauss-Newton needs 10 to 30; more are spent in a valley with a flat floor."""
+MOST_DERIVATIVES = 45
+"""Jacobians per start. Gauss-Newton needs 10 to 30; more are spent in a valley with a flat floor."""
 
 MOST_STARTS = 3
 """Starts that are followed, those of least cost first: the next best is there for what the best misses."""
@@ -258,7 +258,7 @@ class Problem:
             begin = sorted(begin, key=self._cost)[:MOST_STARTS]
             if self.noise_order:
                 begin = [min((self._with_noise_projected(x) for x in begin), key=self._cost)]
-            return min((_least(self.residual, self.jacobian, x) for x in begin), key=self._cost)
+            return min((descended(self.residual, self.jacobian, x) for x in begin), key=self._cost)
 
     def _cost(self, x: FloatArray) -> float:
         w = self.residual(x)
@@ -290,7 +290,7 @@ class Problem:
             J = self._plant_slopes(found.x)
             return np.asarray(J - found.E @ (found.inverse @ (found.E.T @ J)), dtype=np.float64)
 
-        return at(_least(lambda plant: self.residual(at(plant).x), slopes, start[:n])).x
+        return at(descended(lambda plant: self.residual(at(plant).x), slopes, start[:n])).x
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -303,10 +303,15 @@ class _Projected:
     inverse: FloatArray  # of E^T E
 
 
-def _least(
-    residual: Callable[[FloatArray], FloatArray], jacobian: Callable[[FloatArray], FloatArray], start: FloatArray
+def descended(
+    residual: Callable[[FloatArray], FloatArray],
+    jacobian: Callable[[FloatArray], FloatArray],
+    start: FloatArray,
+    derivatives: int = MOST_DERIVATIVES,
 ) -> FloatArray:
-    """Return the minimum of the sum of squares that Levenberg's and Marquardt's descent reaches from a start."""
-    return least_squares(
-        residual, start, jac=jacobian, x_scale="jac", method="lm", ftol=SETTLED, max_nfev=MOST_EVALUATIONS
-    ).x
+    """Return the minimum of the sum of squares that is reached from a start, shape (U,), by so many Jacobians at most.
+
+    A derivative costs little more than a simulation here: each step has its own.
+    """
+    free, region = np.full(start.shape, np.inf), TrustRegion()
+    return minimise(residual, jacobian, start, -free, free, derivatives, False, SETTLED, region).x

@@ -6,10 +6,14 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares, lsq_linear
 
-from estimator.physics import least_squares as bounded
-from estimator.physics.least_squares import (
+from estimator import least_squares as bounded
+from estimator.least_squares import (
     CONVERGED,
+    UNDAMPED,
+    Damping,
+    Marquardt,
     Solution,
+    TrustRegion,
     least_inside,
     least_of_quadratic,
     minimise,
@@ -134,7 +138,11 @@ def test_a_bound_is_left_again_when_the_optimum_lies_inside(measured: FloatArray
     assert likelihood_ratio(residual, ours.x, theirs) < CONVERGED
 
 
-def test_rosenbrocks_valley_is_followed_to_its_end() -> None:
+RULES = pytest.mark.parametrize("rule", [Marquardt, TrustRegion])
+
+
+@RULES
+def test_rosenbrocks_valley_is_followed_to_its_end(rule: Callable[[], Damping]) -> None:
     """Zero residual at (1, 1); the classic start is (-1.2, 1)."""
 
     def residual(x: FloatArray) -> FloatArray:
@@ -143,9 +151,47 @@ def test_rosenbrocks_valley_is_followed_to_its_end() -> None:
     def jacobian(x: FloatArray) -> FloatArray:
         return np.array([[-20.0 * x[0], 10.0], [-1.0, 0.0]])
 
-    ours = minimise(residual, jacobian, np.array([-1.2, 1.0]), np.full(2, -5.0), np.full(2, 5.0))
-    np.testing.assert_allclose(ours.x, [1.0, 1.0], atol=1e-6)
-    assert ours.converged
+    for box in (5.0, np.inf):
+        bounds = np.full(2, -box), np.full(2, box)
+        ours = minimise(residual, jacobian, np.array([-1.2, 1.0]), *bounds, damping=rule())
+        np.testing.assert_allclose(ours.x, [1.0, 1.0], atol=1e-6)
+        assert ours.converged
+
+
+@pytest.mark.parametrize("high", [np.inf, 2.0])
+def test_a_trust_region_ends_at_the_minimum_that_a_bound_leaves(measured: FloatArray, high: float) -> None:
+    def residual(x: FloatArray) -> FloatArray:
+        return decay(x) - measured
+
+    low, most = -UNBOUNDED, np.array([high, np.inf, np.inf])
+    start = np.array([2.0, 3.0, 1.0])
+    ours = minimise(residual, decay_jacobian, start, low, most, settled=1e-9, damping=TrustRegion())
+    theirs = least_squares(residual, start, decay_jacobian, (low, most), xtol=1e-12, ftol=1e-12, gtol=1e-12)
+    np.testing.assert_allclose(ours.x, theirs.x, rtol=1e-4)
+
+
+def test_a_step_of_a_trust_region_is_as_long_as_its_radius() -> None:
+    """Also where bounds cut it short, and where a column all but depends on another."""
+    rng = np.random.default_rng(3)
+    J = rng.normal(size=(50, 4)) * [1.0, 1e3, 1e-3, 1.0]
+    J[:, 3] = J[:, 0] + 1e-7 * J[:, 3]
+    gradient, curvature, norms = J.T @ rng.normal(size=50), J.T @ J, np.linalg.norm(J, axis=0)
+    for low in (-np.inf, -0.01 / norms):
+        for radius in (1e-6, 1e-3, 0.1):
+            region = TrustRegion(radius)
+            step = region.step(np.zeros(4), gradient, curvature, np.full(4, low), np.full(4, np.inf))
+            assert np.linalg.norm(norms * step) <= 1.1 * radius
+            assert np.all(step >= low)
+            if np.all(step > low) and region.damping > UNDAMPED:
+                assert np.linalg.norm(norms * step) == pytest.approx(radius, rel=0.1)
+
+
+@RULES
+def test_where_no_step_helps_that_is_said(rule: Callable[[], Damping]) -> None:
+    """A derivative of the wrong sign leads uphill, however short the step."""
+    ours = minimise(lambda x: x + 1.0, lambda x: -np.eye(3), np.ones(3), -UNBOUNDED, UNBOUNDED, damping=rule())
+    assert ours.stuck
+    np.testing.assert_array_equal(ours.x, np.ones(3))
 
 
 def test_near_the_end_the_derivative_is_carried_on() -> None:
@@ -202,14 +248,15 @@ def test_a_slow_way_ends_where_the_independent_errors_can_not_tell_any_more() ->
     assert fewer < steps
 
 
-def test_an_unknown_without_any_influence_is_left_alone(measured: FloatArray) -> None:
+@RULES
+def test_an_unknown_without_any_influence_is_left_alone(measured: FloatArray, rule: Callable[[], Damping]) -> None:
     def residual(x: FloatArray) -> FloatArray:
         return decay(np.array([3.0, x[0], 0.5])) - measured
 
     def jacobian(x: FloatArray) -> FloatArray:
         return np.column_stack([decay_jacobian(np.array([3.0, x[0], 0.5]))[:, 1], np.zeros(TIME.size)])
 
-    ours = minimise(residual, jacobian, np.array([0.5, 7.0]), np.full(2, -np.inf), np.full(2, np.inf))
+    ours = minimise(residual, jacobian, np.array([0.5, 7.0]), -UNBOUNDED[:2], UNBOUNDED[:2], damping=rule())
     assert ours.converged
     assert ours.x[0] == pytest.approx(1.2, abs=0.05)
     assert ours.x[1] == pytest.approx(7.0, abs=1e-6)
