@@ -12,7 +12,7 @@ from functools import partial
 
 import numpy as np
 
-from estimator.diagnosis.acquisition.chain import Chain
+from estimator.diagnosis.acquisition.finding import AcquisitionFinding
 from estimator.diagnosis.inference.hypotheses import Hypothesis, covariance as of_innovations, line_values
 from estimator.diagnosis.noise import gain_from_squares, residuals_by_record, unpredictable
 from estimator.diagnosis.result import Estimated, Evidence, FoundEffect, Interval, Profile, Retuned
@@ -188,7 +188,7 @@ def moments_in(name: str, result: FitResult) -> dict[str, tuple[Interval, ...]]:
 
 
 def acquired_effects(
-    chain: Chain, before: Sequence[FloatArray], after: Sequence[FloatArray]
+    findings: Sequence[AcquisitionFinding], before: Sequence[FloatArray], after: Sequence[FloatArray]
 ) -> tuple[FoundEffect, ...]:
     """Return what was recognised of the acquisition as effects."""
     gained = gain_from_squares(_squares(before), _squares(after), 1, 1, after)
@@ -204,7 +204,7 @@ def acquired_effects(
             indistinguishable_from=(),
             evidence=Evidence(gained.delta_bic, held[0], held[1], finding.p_value),
         )
-        for finding in chain.findings
+        for finding in findings
     )
 
 

@@ -186,10 +186,10 @@ class RejectedEffect:
 
 @dataclass(frozen=True, slots=True)
 class FittedSet:
-    """One set of effects of the search: where it was begun, how it came out, and why it was left."""
+    """One set of effects of the search: where it was started, how it came out, and why it was left."""
 
     effects: tuple[str, ...]  # keys of the catalogue; () is the nominal model, re-tuned
-    begun_from: tuple[str, ...]  # the set whose values it was begun at
+    started_from: tuple[str, ...]  # the set whose values were its initial values
     score: float  # minus twice its log posterior, up to a constant: 0 for the most probable set
     rms: float  # free-run error on samples that no fit has seen; NaN where it was not tried [unit of the output]
     outcome: str  # in a few words

@@ -15,8 +15,8 @@ from hil.report.terminal import rendered
 
 
 def search_table(diagnosis: Diagnosis) -> RenderableType:
-    """Return a row for each set, the smaller first: what it was begun from, its score, its error and its end."""
-    headings = ("set", "begun from", "score", f"error [{diagnosis.fit.unit}]", "outcome")
+    """Return a row for each set, the smaller first: what it was started from, its score, its error and its outcome."""
+    headings = ("set", "started from", "score", f"error [{diagnosis.fit.unit}]", "outcome")
     about = (
         "Every set of effects that was fitted. Score: minus twice its log-probability, beyond the most probable set's. "
         "Error: of the free run, tuned for it, on samples that no fit has seen; of the sets that were tried so."
@@ -28,7 +28,7 @@ def search_table(diagnosis: Diagnosis) -> RenderableType:
 
 def _rows(sets: Sequence[FittedSet]) -> Iterator[tuple[str, ...]]:
     for each in sets:
-        before = _change(each) if each.effects else "–"
+        before = _origin(each) if each.effects else "–"
         numbers = ("–" if math.isnan(value) else shown(value) for value in (each.score, each.rms))
         yield _in_words(each.effects), before, *numbers, each.outcome
 
@@ -37,9 +37,9 @@ def _in_words(effects: Sequence[str]) -> str:
     return ", ".join(map(title_of, effects)) or "nothing"
 
 
-def _change(each: FittedSet) -> str:
-    """Say the set that one was begun from by what differs."""
-    new, gone = set(each.effects) - set(each.begun_from), set(each.begun_from) - set(each.effects)
+def _origin(each: FittedSet) -> str:
+    """Name the set that one was started from, and what was exchanged, where an effect took another's place."""
+    new, gone = set(each.effects) - set(each.started_from), set(each.started_from) - set(each.effects)
     if gone and new:
-        return f"{_in_words(each.begun_from)}: {_in_words(sorted(gone))} exchanged"
-    return _in_words(each.begun_from)
+        return f"{_in_words(each.started_from)}: {_in_words(sorted(gone))} exchanged"
+    return _in_words(each.started_from)

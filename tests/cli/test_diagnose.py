@@ -62,8 +62,8 @@ def test_the_search_is_listed_set_by_set(
 ) -> None:
     sets = json.loads((result / "diagnosis.json").read_text())["effort"]["sets"]
     nothing, best = sets[0], next(each for each in sets if each["outcome"] == "believed")
-    assert (nothing["effects"], nothing["begun_from"]) == ([], [])
-    assert (best["effects"], best["begun_from"], best["score"]) == (["coulomb_friction_motor"], [], 0.0)
+    assert (nothing["effects"], nothing["started_from"]) == ([], [])
+    assert (best["effects"], best["started_from"], best["score"]) == (["coulomb_friction_motor"], [], 0.0)
     assert best["rms"] < 0.2 * nothing["rms"]
     assert all(each["score"] is None or each["score"] >= 0.0 for each in sets)
     assert sets == sorted(sets, key=lambda each: len(each["effects"]))
@@ -71,7 +71,7 @@ def test_the_search_is_listed_set_by_set(
     assert run(["diagnose", *arguments, "--out", str(tmp_path / "result")]) == 0
     printed = " ".join(capsys.readouterr().out.split())
     assert "Every set of effects that was fitted." in printed
-    assert "nothing – " in printed  # the first row: the nominal model is begun from none
+    assert "nothing – " in printed  # the first row: the nominal model is started from none
     assert "on the way of the search" in printed
 
 

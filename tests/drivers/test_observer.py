@@ -194,7 +194,7 @@ def test_a_drive_that_shows_a_slow_motor_as_standing_is_not_dead() -> None:
 
 
 def test_a_drive_that_shows_a_bus_as_standing_where_a_hill_stops_it_is_not_dead() -> None:
-    """Torque against load is known better than each: both were learnt from the same acceleration."""
+    """Torque less load is known better than each: both were estimated from the same acceleration."""
     slow = {"read": lambda w, t: 0.0 if abs(w) < 0.3 else w, "prbs_nm": 0.0}
     bus = Bus(1.4, speed_rad_s=30.0, grade=lambda way: min(0.01 * way, 0.033), **slow)
     assert abs(bus.drive(20.0)) < 30.0

@@ -354,7 +354,7 @@ def test_doubtful_rows_are_those_of_the_drive_that_is() -> None:
     assert made.ended is None
 
 
-def test_two_speeds_apart_make_both_doubtful() -> None:
+def test_two_speeds_that_differ_make_both_doubtful() -> None:
     made = supervised()
     seen = [
         made.take(CycleRecord(k * PERIOD_NS, DriveRecord(0.0, answer(0.0, 0.0)), DriveRecord(0.0, answer(0.0, 20.0))))

@@ -89,7 +89,7 @@ def test_the_whole_job_ends_with_a_judged_verdict_and_a_seal_that_verifies(tmp_p
 
 @pytest.mark.campaign
 @pytest.mark.timeout(1800)  # three experiments are driven and diagnosed
-def test_the_pages_show_what_the_demo_prints_numbers_apart(tmp_path, capsys):
+def test_the_pages_show_what_the_demo_prints_except_for_its_numbers(tmp_path, capsys):
     assert run(["demo", "--seed", SEED_OF_PAGES, "--out", str(tmp_path)]) == 0
     said = skeleton(capsys.readouterr().out)
     for page in (ROOT / "README.md", DOCS / "get-started.md"):

@@ -89,7 +89,10 @@ def as_read(
 
 
 def _rounded(output: FloatArray, step: float, noise: float) -> FloatArray:
-    """Return what is read in steps in the mean: with much noise the output itself (dither), without any its step."""
+    """Return the expected reading in steps of an output with white noise, shape (N,), all in the output's unit.
+
+    With much noise it is the output itself, without any the nearest step (Widrow and Kollár, Quantization Noise, 2008).
+    """
     nearest = np.round(output / step)
     if noise < SHARP * step:
         return nearest * step
@@ -153,17 +156,17 @@ class Chain:
         """Values of the parameters of the faults found, by effect and parameter."""
         return {f.name: {name: sized.value for name, sized in f.parameters.items()} for f in self.findings}
 
-    def added_squares(self, result: FitResult) -> float:
-        """Sum of the squared errors that the faults add to the good readings of a model, whatever it leaves itself.
+    def added_squares(self, result: FitResult) -> list[float]:
+        """Return the sum of squared errors that each finding adds to the good readings [square of the output's unit].
 
-        Rounding and jitter that is not stamped can be known of and not undone: with them known the error falls by
-        nothing.
+        It is of what the fault does to the readings that ``result`` simulates. By how much the error falls once a fault
+        is known is no measure of it: rounding, and jitter that is not stamped, are known and not undone.
         """
-        return sum(
-            _added(finding, output, slope, record)
-            for output, slope, record in zip(result.outputs, rates(result), self.raw, strict=True)
-            for finding in self.findings
-        )
+        slopes = rates(result)
+        return [
+            sum(_added(each, *of) for of in zip(result.outputs, slopes, self.raw, strict=True))
+            for each in self.findings
+        ]
 
     def errors(self, outputs: Sequence[FloatArray], within: Sequence[BoolArray] | None = None) -> list[FloatArray]:
         """Return simulated, as this chain would have read it, less recorded; the good rows of each raw recording."""
@@ -180,6 +183,7 @@ class Chain:
 
 
 def _added(finding: AcquisitionFinding, output: FloatArray, slope: FloatArray, record: Record) -> float:
+    """Return the squares that a fault adds to an output, shape (N,), whose slopes of both sides have shape (2, N)."""
     sizes = {name: sized.value for name, sized in finding.parameters.items()}
     if finding.name == "speed_quantisation":  # rounding is uniform over a step
         return float(record.okay.sum()) * sizes["step_rad_s"] ** 2 / 12.0

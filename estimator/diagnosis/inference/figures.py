@@ -269,9 +269,10 @@ def acquired(runs: FreeRuns) -> tuple[FoundEffect, ...]:
     if not chain.findings:
         return ()
     before = [(out - raw.output)[raw.okay] for out, raw in zip(runs.final.outputs, chain.raw, strict=True)]
-    if chain.added_squares(runs.final) < LEAST_SHARE * sum(float(error @ error) for error in before):
-        return ()
-    return acquired_effects(chain, before, chain.errors(runs.final.outputs))
+    least = LEAST_SHARE * sum(float(error @ error) for error in before)
+    added = zip(chain.findings, chain.added_squares(runs.final), strict=True)
+    findings = [finding for finding, squares in added if squares >= least]
+    return acquired_effects(findings, before, chain.errors(runs.final.outputs))
 
 
 def figures_of(runs: FreeRuns, noise: float, findings: Sequence[FoundEffect]) -> Fit:

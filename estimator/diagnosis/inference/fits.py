@@ -69,7 +69,7 @@ class Fits:
     work: Work = field(default_factory=Work)  # what was simulated so far
     ended: dict[Effects, Hypothesis] = field(default_factory=dict)  # by set
     rough: dict[Effects, Hypothesis] = field(default_factory=dict)
-    begun_from: dict[Effects, Effects] = field(default_factory=dict)  # by set
+    started_from: dict[Effects, Effects] = field(default_factory=dict)  # by set
     implausible: dict[str, float] = field(default_factory=dict)  # by effect
     foreseen: dict[str, float] = field(default_factory=dict)
     _changes: OutputChanges = field(default_factory=OutputChanges)  # of the output, for score tests
@@ -173,7 +173,7 @@ class Fits:
             best = self._more_plausible(best, self._compared(effects, loose, rival))
         is_case = self.is_plausible(best)
         with self._lock:
-            self.begun_from.setdefault(effects, rival.effects)
+            self.started_from.setdefault(effects, rival.effects)
             if not is_case:
                 self.implausible[name] = min(best.score, self.implausible.get(name, math.inf))
             elif effects not in self.rough or best.score < self.rough[effects].score:
@@ -281,9 +281,9 @@ class Fits:
         grid = self.grid or grid_for(self.model, self.records)
         return make_problem(self.model, self.records, shared, own=release.own, use=self.use, grid=grid)
 
-    def _keep(self, hypothesis: Hypothesis, begun_from: Effects) -> None:
+    def _keep(self, hypothesis: Hypothesis, started_from: Effects) -> None:
         with self._lock:
-            self.begun_from.setdefault(hypothesis.effects, begun_from)
+            self.started_from.setdefault(hypothesis.effects, started_from)
             known = self.ended.get(hypothesis.effects)
             if known is None or hypothesis.score < known.score:
                 self.ended[hypothesis.effects] = hypothesis

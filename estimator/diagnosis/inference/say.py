@@ -169,7 +169,7 @@ def fitted_sets(fits: Fits, way: Sequence[Hypothesis] = (), judged: Judged | Non
     steps = {each.effects for each in way}
     best = min((each.score for each in fits.ended.values()), default=math.nan)
     found = []
-    for effects, before in fits.begun_from.items():
+    for effects, before in list(fits.started_from.items()):
         fit = fits.ended.get(effects) or fits.rough.get(effects)
         trial = None if judged is None else judged.tried.get(effects)
         rms = math.nan if trial is None else trial.rms

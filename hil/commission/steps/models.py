@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -35,10 +35,6 @@ NOISE = 1.5
 
 RESONANCE = 0.03
 """Resonance of the physical model against that of the runs, relative."""
-
-ERROR_TO_NOISE = "error against the standstill noise"
-RESONANCE_OF_MODEL = "resonance of the physical model"
-"""What shows that the line is another than two masses and a spring: its values are not determined then."""
 
 LONGER = "These runs do not determine it well: drive longer, or take it from the maker"
 
@@ -104,50 +100,49 @@ def validated(
     fit: PhysicalFit, compared: Sequence[Comparison], mode: Mode, noise_rad_s: float | None
 ) -> tuple[list[StepFinding], PhysicalFit]:
     """Judge a fit by runs that it has not seen; where the line is another its values are not determined."""
-    findings = _findings_validation(fit, compared, mode, noise_rad_s)
-    if any(each.within is False for each in findings if each.what in (ERROR_TO_NOISE, RESONANCE_OF_MODEL)):
+    unseen_rad_s = float(np.sqrt(np.mean([each.rms**2 for each in compared])))
+    of_structure = list(_structure_findings(fit, unseen_rad_s, mode, noise_rad_s))
+    if any(finding.within is False for finding in of_structure):
         fit = fit.undetermined()
-    return [*findings, *_parameter_findings(fit)], fit
+    return [*_unseen_findings(fit, compared, unseen_rad_s), *of_structure, *_parameter_findings(fit)], fit
 
 
-def _findings_validation(
-    fit: PhysicalFit, compared: Sequence[Comparison], mode: Mode, noise: float | None
-) -> list[StepFinding]:
-    unseen = float(np.sqrt(np.mean([each.rms**2 for each in compared])))
-    physical = two_mass_resonance(**fit.model.values())
+def _unseen_findings(fit: PhysicalFit, compared: Sequence[Comparison], unseen_rad_s: float) -> list[StepFinding]:
     percent = [each.fit_percent for each in compared]
-    findings = [
+    return [
         StepFinding(
             "error on unseen runs (free run, RMS)",
             f"at most {UNSEEN:g} times the {shown(fit.rms, 'rad/s')} on the runs of the fit",
-            f"{shown(unseen, 'rad/s')}, {unseen / fit.rms:.2f} times",
-            unseen <= UNSEEN * fit.rms,
+            f"{shown(unseen_rad_s, 'rad/s')}, {unseen_rad_s / fit.rms:.2f} times",
+            unseen_rad_s <= UNSEEN * fit.rms,
             "The runs differ: look at road, wind and load in the report, and at the diagnosis",
         ),
         stated("fit on unseen runs", f"{min(percent):.1f} to {max(percent):.1f} %"),
     ]
-    if noise:
-        findings.append(
-            StepFinding(
-                ERROR_TO_NOISE,
-                f"at most {NOISE:g} times",
-                f"{unseen / noise:.2f} times {shown(noise, 'rad/s')}",
-                unseen <= NOISE * noise,
-                "There is more than motor, shaft and load: see the diagnosis",
-            )
+
+
+def _structure_findings(
+    fit: PhysicalFit, unseen_rad_s: float, mode: Mode, noise_rad_s: float | None
+) -> Iterator[StepFinding]:
+    """Yield what shows whether the line is motor, shaft and load alone."""
+    physical = two_mass_resonance(**fit.model.values())
+    if noise_rad_s:
+        yield StepFinding(
+            "error against the standstill noise",
+            f"at most {NOISE:g} times",
+            f"{unseen_rad_s / noise_rad_s:.2f} times {shown(noise_rad_s, 'rad/s')}",
+            unseen_rad_s <= NOISE * noise_rad_s,
+            "There is more than motor, shaft and load: see the diagnosis",
         )
     if physical is not None:
         off = physical.frequency_hz / mode.frequency_hz - 1.0
-        findings.append(
-            StepFinding(
-                RESONANCE_OF_MODEL,
-                f"that of the runs, {shown(mode.frequency_hz, 'Hz')}, within {100.0 * RESONANCE:g} %",
-                f"{shown(physical.frequency_hz, 'Hz')}, {100.0 * off:+.2f} %",
-                abs(off) <= RESONANCE,
-                "Two masses and a spring do not explain everything: see the diagnosis",
-            )
+        yield StepFinding(
+            "resonance of the physical model",
+            f"that of the runs, {shown(mode.frequency_hz, 'Hz')}, within {100.0 * RESONANCE:g} %",
+            f"{shown(physical.frequency_hz, 'Hz')}, {100.0 * off:+.2f} %",
+            abs(off) <= RESONANCE,
+            "Two masses and a spring do not explain everything: see the diagnosis",
         )
-    return findings
 
 
 def _parameter_findings(fit: PhysicalFit) -> list[StepFinding]:

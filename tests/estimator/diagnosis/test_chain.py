@@ -91,7 +91,7 @@ class TestHiddenJitter:
         assert found.effects()["sample_jitter"]["jitter_s"] == pytest.approx(1.5e-3, rel=0.1)
         assert found.with_jitter_in(result) is found
         excess = float(np.sum((result.outputs[0] - records[0].output) ** 2)) - SAMPLES * NOISE**2
-        assert found.added_squares(result) == pytest.approx(excess, rel=0.25)  # though it cannot be undone
+        assert found.added_squares(result) == [pytest.approx(excess, rel=0.25)]  # though it cannot be undone
 
     def test_what_it_adds_in_the_mean_is_taken_off(self) -> None:
         """Where the torque steps, readings are off to one side, come they early or late: the line seems heavier."""
@@ -118,7 +118,7 @@ class TestRounded:
         chain = with_faults_compensated([self.READ])
         assert [finding.name for finding in chain.findings] == ["speed_quantisation"]
         result = Bench(MODEL, [self.READ], all_good_samples([self.READ])).fit(NOTHING)
-        assert chain.added_squares(result) == pytest.approx(SAMPLES * self.STEP**2 / 12.0, rel=1e-6)
+        assert chain.added_squares(result) == [pytest.approx(SAMPLES * self.STEP**2 / 12.0, rel=1e-6)]
 
     def test_the_reading_in_the_mean_is_nearer_than_the_speed_and_than_its_step(self) -> None:
         true = TRUTH.speed()
