@@ -260,9 +260,7 @@ class VehicleObserver:
         gain = float(self._x[2])
         if not self._stands_s:
             self._held_rad_s = -self._jump_rad_s
-            net = np.array(
-                [0.0, -1.0, u, 0.0]
-            )  # the errors of gain and load are correlated: their sum is known better than each
+            net = np.array([0.0, -1.0, u, 0.0])  # the errors of gain and load are correlated
             self._last_free = u, float(net @ self._x), float(net @ self._p @ net)
         self._stands_s += dt_s
         free_u, free, variance = self._last_free
@@ -270,9 +268,7 @@ class VehicleObserver:
         push = math.copysign(1.0, free)
         speeds_up = push * self._vehicle.gains[0] * u - ROLLING_RAD_S2  # with no load but friction
         if self._direction:  # within what it did before it stood
-            turns = (
-                2.0 * ROLLING_RAD_S2 if push * self._direction < 0.0 else 0.0
-            )  # friction: it was in the load as it moved
+            turns = 2.0 * ROLLING_RAD_S2 if push * self._direction < 0.0 else 0.0  # friction: it was in the load
             spread = 3.0 * math.sqrt(variance + self._p[2, 2] * (u - free_u) ** 2 + WIND_RAD_S2**2)
             speeds_up = min(max(speeds_up, abs(free) - turns - spread), abs(free) - turns + spread)
         self._held_rad_s += push * max(speeds_up, 0.0) * dt_s
