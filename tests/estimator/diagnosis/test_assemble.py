@@ -177,7 +177,7 @@ class TestAcquired:
     @pytest.fixture
     def acquired(self) -> FoundEffect:
         chain = Chain((), (), (self.FOUND,))
-        (effect,) = acquired_effects(chain, self.BEFORE, [0.1 * error for error in self.BEFORE])
+        (effect,) = acquired_effects(chain.findings, self.BEFORE, [0.1 * error for error in self.BEFORE])
         return effect
 
     def test_they_are_said_as_found(self, acquired: FoundEffect) -> None:
