@@ -12,6 +12,7 @@ import math
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import zip_longest
 from typing import Final, NamedTuple
 
 from drivers.errors import DeviceFault, DeviceTimeout, DriverError, WrongTorque
@@ -50,9 +51,12 @@ MOST_HELD_RAD_S: Final = 1.0
 """That a speed which stands to the last bit should have changed by: the same came to 0.65, for half of their drives
 show a speed below 0.3 rad/s as zero, after a reading with noise."""
 
-LEVEL_LOOKS: Final = 2
-LEVEL_CYCLES: Final = 5
-"""Reports of the PLC's level that a drive is away from by more than half, in all of so many cycles around each."""
+PRBS_CYCLES: Final = 32
+"""Over which both drives' parts of the PLC's PRBS are compared. Of levels that have nothing to do with each other the
+correlation has a deviation of 0.13 there: a half is beyond three of them."""
+
+PRBS_LAGS: Final = 3  # cycles by which one drive may be later than the other
+NO_PRBS: Final = 0.05  # of the other's mean square: a drive with a first-order lag of ten levels' length has as much
 
 RULES: Final = f"""\
 power state, 0x6041 | OPERATION ENABLED, in every mode | none | one TPDO | end; never enabled again
@@ -62,8 +66,9 @@ torque 0x6077 of a drive | its command by slope and `torque_response_s`, of the 
 | `torque_error_nm` | tolerance × `torque_error_time_s` | flag, end
 torques of both | the two predictions | `torque_error_sum_nm`, of both distances | tolerance × `torque_error_time_s` \
 | flag, end
-torques with the PLC's PRBS | the same and one of its levels, the one it reports; nothing while it is off | as above \
-| as above, and while it is switched; half a level or more from the one reported: {LEVEL_LOOKS} reports | flag, end
+torques with the PLC's PRBS | the same and one of its levels; nothing while it is off | as above \
+| as above, and while it is switched | flag, end
+the PLC's PRBS at both drives | the same ups and downs | {PRBS_LAGS} cycles | about {PRBS_CYCLES} cycles | end
 reading that repeats to the last bit | the command of its first | `torque_error_nm` | tolerance × `feedback_timeout_s` \
 | end
 speeds 0x606C of both, low-passed | one speed | {SPEED_NOISE_RAD_S:g} rad/s, a count of each, {100 * SPEED_SHARE:g} % \
@@ -104,7 +109,6 @@ class PlcPart(NamedTuple):
     m1_nm: float = 0.0  # amplitude at each drive
     m2_nm: float = 0.0  # amplitude at each drive
     levels: tuple[float, ...] = (0.0,)  # each in multiples of the amplitudes
-    seen: float = 0.0  # the level it has just reported; 0 without a report
 
 
 NO_PART: Final = PlcPart()
@@ -130,33 +134,41 @@ class SupervisionLimits:
     vehicle: Vehicle | None = None  # None: speeds are not compared with what torques make
 
 
-class _Level:
-    """Follows how far each drive is from its prediction with the level that the PLC reports."""
+class _SharedPrbs:
+    """Compares the PLC's PRBS at both drives: it adds one sequence to both references.
+
+    Neither its level of a cycle nor its register is needed for that. A turn of both is no fault: everything is
+    identified from the torques that the drives read.
+    """
 
     def __init__(self) -> None:
-        self._off: deque[tuple[tuple[float, ...], tuple[float, ...]]] = deque(maxlen=LEVEL_CYCLES)
-        self._seen = 0
-        self._wait = 0
-        self._looks = [0, 0]
+        # of each drive, the newest first: 1 at the upper level, -1 at the lower, between them where it is between
+        self._levels = [deque[float](maxlen=PRBS_LAGS + 1) for _ in range(2)]
+        # sums over the last PRBS_CYCLES or so: products at each lag, and squares
+        self._products, self._squares = [0.0] * (2 * PRBS_LAGS + 1), [0.0, 0.0]
+        self._cycles = 0
 
-    def take(self, plc: PlcPart, off_nm: tuple[tuple[float, ...], tuple[float, ...]]) -> str:
-        """Take both drives' distances at each level; give the name of one that does not follow, where one does not."""
-        self._off.append(off_nm)
-        if plc.seen:
-            self._seen, self._wait = plc.levels.index(plc.seen), LEVEL_CYCLES // 2 + 1
-        self._wait -= 1
-        if self._wait or len(self._off) < LEVEL_CYCLES:
+    def take(self, parts_nm: tuple[float, float], off_nm: tuple[tuple[float, ...], tuple[float, ...]]) -> str:
+        """Take both drives' distances from the upper and from the lower level; say what is wrong, if anything."""
+        between = [(abs(lower), abs(upper), part) for (upper, lower), part in zip(off_nm, parts_nm, strict=True)]
+        if any(lower + upper <= part for lower, upper, part in between):  # a slope, or a lost answer, hides the level
             return ""
-        for drive, part_nm in enumerate((plc.m1_nm, plc.m2_nm)):
-            # in parts of a level, towards the other one; none where a slope or a lag leaves room for both
-            scale = -plc.levels[self._seen] / part_nm if part_nm else 0.0
-            off = [scale * each[drive][self._seen] for each in self._off]
-            if min(off) > 0.5:
-                self._looks[drive] += 1
-            elif max(off) < 0.5:
-                self._looks[drive] = 0
-            if self._looks[drive] >= LEVEL_LOOKS:
-                return f"m{drive + 1}"
+        left = 1.0 - 1.0 / PRBS_CYCLES
+        for drive, (lower, upper, part) in enumerate(between):
+            level = min(max(0.5 * (lower - upper) / part, -1.0), 1.0)
+            self._levels[drive].appendleft(level)
+            self._squares[drive] = left * self._squares[drive] + level**2
+        one, other = self._levels
+        pairs = [one[0] * level for level in other] + [level * other[0] for level in list(one)[1:]]
+        self._products = [left * sum_ + pair for sum_, pair in zip_longest(self._products, pairs, fillvalue=0.0)]
+        self._cycles += 1
+        less, more = sorted(self._squares)
+        if self._cycles < PRBS_CYCLES:
+            return ""
+        if less < NO_PRBS * more:
+            return f"m{1 + self._squares.index(less)}: its torque 0x6077 does not go up and down"
+        if -min(self._products) > max(0.5 * more, max(self._products)):
+            return "m1 or m2: its torque 0x6077 goes up where that of the other goes down"
         return ""
 
 
@@ -203,7 +215,7 @@ class Supervision:
         self._apart = Excess(SPEED_NOISE_RAD_S, guard.error.time_s, guard.period_s)
         self._vehicle = limits.vehicle
         self._observer = None if limits.vehicle is None else VehicleObserver(limits.vehicle, guard.period_s)
-        self._level = _Level()
+        self._shared_prbs = _SharedPrbs()
         self._cycles = 0
         self._first_ns: int | None = None
         self.ended: DriverError | None = None
@@ -225,8 +237,8 @@ class Supervision:
         if answered and one is not None and other is not None:
             sum_fault = self._compare_sum(record, one, other)
             self._compare_speeds(record.t_ns, one, other)
-            if len(plc.levels) == 2:
-                self._compare_levels(plc)
+            if len(plc.levels) == 2 and plc.m1_nm and plc.m2_nm:
+                self._compare_prbs(plc)
             self._follow_vehicle(one, other)
             self._cycles = 0
         if self.ended is None and (m1.faults or m2.faults or m1.wrong_torque or m2.wrong_torque or sum_fault):
@@ -282,11 +294,11 @@ class Supervision:
                 "one shaft. Compare sign, unit (0x60A9) and gear of both, their resolvers, and their node ids."
             )
 
-    def _compare_levels(self, plc: PlcPart) -> None:
-        if name := self._level.take(plc, (self._m1.off_nm, self._m2.off_nm)):
+    def _compare_prbs(self, plc: PlcPart) -> None:
+        if wrong := self._shared_prbs.take((plc.m1_nm, plc.m2_nm), (self._m1.off_nm, self._m2.off_nm)):
             self._m1.faults.append(
-                f"inverter {name}: its torque 0x6077 does not go up and down with the PLC's own PRBS, expected the "
-                "level that the PLC reports. Compare the signs of both, and the share the PLC gives each."
+                f"inverter {wrong} with the PLC's own PRBS, expected one sequence at both. Compare the signs of both, "
+                "and the share that the PLC gives each."
             )
 
     def _follow_vehicle(self, one: InverterFeedback, other: InverterFeedback) -> None:

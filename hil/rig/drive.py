@@ -116,7 +116,7 @@ class Drive:
         damping_nm = self.plan.damping_nm(base.phase, tick.cycle)
         request = self.plan.split.request(base_nm, prbs_nm + damping_nm)
         self.prbs.follow(tick, base.phase, self.watch.status)
-        part = self.prbs.part(tick, self.watch.news)
+        part = self.prbs.part(tick)
         sample = self.cycle.step(tick, request, time_s, flags, self.watch.status.age_ns(tick.now_ns), part)
         if self.plan.plc_prbs is not None:
             sample = replace(sample, prbs_nm=self.prbs.known_nm(self.watch.news))

@@ -134,7 +134,7 @@ class PlcPrbs:
         if self._change is None and (self._since_ns is None or status.t_ns > self._since_ns):
             self._judge(status)
 
-    def part(self, tick: Tick, news: PlcStatus | None) -> PlcPart:
+    def part(self, tick: Tick) -> PlcPart:
         """Give what the PLC may add in this cycle: nothing while it is confirmed off, anything while that changes."""
         if self._order is None:
             return NO_PART
@@ -144,9 +144,7 @@ class PlcPrbs:
             return PlcPart(*parts_nm, levels=(0.0, 1.0, -1.0))
         if not self._holds.enabled:
             return NO_PART
-        fresh = news is not None and news.age_ns(tick.now_ns) <= SETTLED_S * NS_PER_S
-        seen = math.copysign(1.0, news.prbs_torque_nm) if news is not None and fresh and news.prbs_torque_nm else 0.0
-        return PlcPart(*parts_nm, levels=(1.0, -1.0), seen=seen)
+        return PlcPart(*parts_nm, levels=(1.0, -1.0))
 
     def known_nm(self, news: PlcStatus | None) -> float:
         """Give what the PLC reports to put out, where it reported since the last cycle; NaN otherwise [Nm]."""

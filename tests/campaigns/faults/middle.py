@@ -28,7 +28,7 @@ import numpy as np
 from drivers.canopen.can_link import SYNC_COB_ID, CanLink
 from drivers.inverter.drive_supervision import NO_TORQUE_S
 from drivers.inverter.observer import BLOCK_S
-from drivers.inverter.supervision import MOST_HELD_RAD_S
+from drivers.inverter.supervision import MOST_HELD_RAD_S, PRBS_CYCLES
 from drivers.inverter.vehicle import ROLLING_RAD_S2
 from drivers.plc.plc import Plc
 from drivers.plc.register import Register, RegisterKind
@@ -298,7 +298,7 @@ def _judge_shaft(rig: Rig, man: Man, shaft: Shaft, fastest_rad_s: float, outcome
         "limit bit, some counts": NO_TORQUE_S,
         "stuck and frozen": rig.guard_limits.feedback_timeout_s,
         "PLC's PRBS ignored": error.time_s + 2.0 * SETTLED_S,  # while it is switched any level is right
-        "PLC's PRBS turned": 2.0,  # until two reports of the PLC, ten a second, come amidst levels that last
+        "PLC's PRBS turned": 2.0 * PRBS_CYCLES * rig.period_s,  # while it is compared with the other drive's
     }
     time_s = own.get(man.kind, error.time_s)  # a drive that shows nothing of it is judged by another row of the table
     for drive, limit_nm in ((0, error.m1_nm), (1, error.m2_nm)):
