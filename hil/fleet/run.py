@@ -40,6 +40,10 @@ Item = TypeVar("Item")
 StageProgress = Callable[[str, int, int], None]
 """Called with the stage, how much of it is done, and how much there is."""
 
+RESTARTED_WITHIN = "1 h"
+"""A worker that has died and is back later is not used again, and where it was the last one all would wait for ever: by
+default after 15 s, which a restart takes on a busy machine."""
+
 LEAST_MEMORY = 512 << 20  # of a worker [bytes]: hil alone takes 300 MiB, and Dask kills one at 95 % of its limit
 
 
@@ -83,6 +87,7 @@ def _own_cluster(engine: Engine, folder: str) -> Iterator[Client]:
     """
     settings = {
         "distributed.scheduler.allowed-failures": engine.retries,
+        "distributed.deploy.lost-worker-timeout": RESTARTED_WITHIN,
         "distributed.worker.daemon": False,
         "distributed.worker.http.routes": [],
         "temporary-directory": folder,

@@ -238,8 +238,14 @@ if __name__ == "__main__":
 
 def test_work_that_takes_its_worker_with_it_costs_itself_alone(tmp_path: Path) -> None:
     (tmp_path / "deadly.py").write_text(DEADLY)
+    restart_takes_long = {"DASK_DISTRIBUTED__DEPLOY__LOST_WORKER_TIMEOUT": "0.1s"}
     done = subprocess.run(
-        [sys.executable, str(tmp_path / "deadly.py")], capture_output=True, text=True, timeout=LONGEST_S, check=True
+        [sys.executable, str(tmp_path / "deadly.py")],
+        env={**os.environ, **restart_takes_long},
+        capture_output=True,
+        text=True,
+        timeout=LONGEST_S,
+        check=True,
     )
     assert sorted(done.stdout.splitlines()) == [
         "a|A|",
