@@ -34,17 +34,17 @@ class Sample:
     order; NaN where one was not read in this cycle.
     """
 
-    cycle: int
+    cycle: int  # from 0 at the first cycle of the run, counting those that were missed
     t_ns: int
     time_s: float
-    torque_ref_m1_nm: float
-    torque_ref_m2_nm: float
-    prbs_nm: float
-    torque_m1_nm: float
-    torque_m2_nm: float
+    torque_ref_m1_nm: float  # asked of inverter m1, PRBS included
+    torque_ref_m2_nm: float  # asked of inverter m2, PRBS included
+    prbs_nm: float  # both inverters together; the PLC's own is NaN between its reports
+    torque_m1_nm: float  # 0x6077 of inverter m1; repeated where it did not answer
+    torque_m2_nm: float  # the same of inverter m2
     speed_rad_s: float
     age_ns: int
-    flags: SampleFlag
+    flags: SampleFlag  # `GOOD` where nothing is to be said
     channels: tuple[float, ...] = ()
 
     @property

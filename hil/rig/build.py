@@ -32,14 +32,14 @@ NAMES = ("m1", "m2")
 class Devices:
     """Everything a run drives or asks, opened."""
 
-    link: CanLink
-    m1: Inverter
-    m2: Inverter
-    guard: TorqueGuard
-    plc_loop: PlcLoop
-    plc: Plc
-    channels: Channels
-    vehicle: Vehicle | None = None
+    link: CanLink  # the CAN bus of both inverters
+    m1: Inverter  # not configured yet; its settings are those of [inverters.m1]
+    m2: Inverter  # the same of [inverters.m2]
+    guard: TorqueGuard  # disabled; nothing else makes a torque command
+    plc_loop: PlcLoop  # thread and event loop that `plc` belongs to
+    plc: Plc  # Modbus client, connected; it is called through `plc_loop` alone
+    channels: Channels  # [[channels]] of the rig file, besides torque and speed
+    vehicle: Vehicle | None = None  # None: speeds are not compared with what torques make
     gateway_cob_ids: tuple[int, ...] = ()  # what the PLC's gateway sends on the bus
 
 

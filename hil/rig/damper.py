@@ -42,16 +42,18 @@ class Damping:
     ``off`` says why it is off, and since when; it is empty while it acts.
     """
 
-    file: DamperFile
-    rig: DesignedFor
-    live: LiveEstimate
+    file: DamperFile  # filter, period, region and line of the design
+    rig: DesignedFor  # the file's own `rig`, which is there; `limit_nm` of it bounds the torque
+    live: LiveEstimate  # of the same run; its resonance is compared with the design's region
     off: str = ""
-    ends_run: bool = False
-    _watch: SwingWatch = field(init=False)
-    _given_nm: float = 0.0
-    _last: Sample | None = None
+    ends_run: bool = False  # True where [guard] without_damper is "end"; `hil.rig.plan` sets it
+    _watch: SwingWatch = field(init=False)  # made from the file
+    _given_nm: float = 0.0  # torque of the present cycle [Nm]
+    _last: Sample | None = None  # latest sample, of any phase; None before the first
+    # both states of the filter [Nm]; None: it starts anew with the next speed
     _states: tuple[float, float] | None = None
-    _at_limit: int = 0
+    _at_limit: int = 0  # cycles in succession with the torque at its limit
+    # of the measured part: time [s], PRBS [Nm], speed [rad/s], `Sample.counts`
     _rows: list[tuple[float, float, float, bool]] = field(default_factory=list)
 
     def __post_init__(self) -> None:

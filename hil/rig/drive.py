@@ -72,13 +72,13 @@ class Drive:
     stop: StopRequest  # ends the run at the next cycle when requested
     progress: CycleProgress  # called with every cycle
     observers: Sequence[Observer] = ()  # given every sample
-    _summary: RunSummary = field(init=False)
-    _catch_up: CatchUp = field(init=False)
-    _phase: Phase = Phase.APPROACH
-    _phase_from: int = 0
-    _last: Sample | None = None
-    _late: Tick | None = None
-    _cycle: int = 0
+    _summary: RunSummary = field(init=False)  # what `run` returns, filled in as it advances
+    _catch_up: CatchUp = field(init=False)  # spreads the step of the base torque after cycles that are missing
+    _phase: Phase = Phase.APPROACH  # of the latest cycle
+    _phase_from: int = 0  # number of the cycle in which it began
+    _last: Sample | None = None  # latest recorded sample
+    _late: Tick | None = None  # latest cycle that began more than a period late
+    _cycle: int = 0  # number of the latest cycle
 
     def __post_init__(self) -> None:
         self._summary = RunSummary(self.cycle.timing)

@@ -25,17 +25,17 @@ from hil.simulator.driveline import simulation_model
 class RigidVehicle:
     """One inertia [kg m²] with viscous friction [Nm s/rad], and where both are from."""
 
-    inertia_kg_m2: float
-    friction_nm_s: float
-    source: str
+    inertia_kg_m2: float  # sum of the model's J_*; without a model that of [vehicle]
+    friction_nm_s: float  # sum of the model's b_*; 0 without a model
+    source: str  # table of the rig file that they are from, in words
 
 
 @dataclass(slots=True)
 class Range:
     """Smallest and largest of what it has seen."""
 
-    low: float = math.inf
-    high: float = -math.inf
+    low: float = math.inf  # infinite before the first value
+    high: float = -math.inf  # -infinite before the first value
 
     def see(self, value: float) -> None:
         """Take one value."""
@@ -47,9 +47,9 @@ class Range:
 class Ranges:
     """What torques and speed of a run are between."""
 
-    torque_m1_nm: Range = field(default_factory=Range)  # of each inverter, PRBS included
-    torque_m2_nm: Range = field(default_factory=Range)
-    speed_rad_s: Range = field(default_factory=Range)
+    torque_m1_nm: Range = field(default_factory=Range)  # of inverter m1, PRBS included
+    torque_m2_nm: Range = field(default_factory=Range)  # of inverter m2, PRBS included
+    speed_rad_s: Range = field(default_factory=Range)  # of the whole run
     speed_measured_rad_s: Range = field(default_factory=Range)  # in the recorded part
 
     def see(self, phase: Phase, torque_m1_nm: float, torque_m2_nm: float, speed_rad_s: float) -> None:
@@ -73,8 +73,8 @@ class Prediction(Ranges):
 
     vehicle: RigidVehicle  # the model the prediction is made with
     period_s: float  # time between two cycles [s]
-    cycles: int = 0  # cycles of the whole run and of its recorded part
-    measured: int = 0
+    cycles: int = 0  # of the whole run
+    measured: int = 0  # of these, in the recorded part
     torque_nm: Range = field(default_factory=Range)  # of the base torque of both inverters
 
 
@@ -82,9 +82,11 @@ class Vehicle(Protocol):
     """A vehicle that can be driven on paper."""
 
     @property
-    def speed_rad_s(self) -> float: ...
+    def speed_rad_s(self) -> float:
+        """Speed of the motor shaft, positive forward [rad/s]."""
 
-    def step(self, torque_m1_nm: float, torque_m2_nm: float) -> object: ...
+    def step(self, torque_m1_nm: float, torque_m2_nm: float) -> object:
+        """Advance by one cycle with the torques of both inverters [Nm]; what it returns is not used."""
 
 
 def on_paper(rig: Rig, name: str, vehicle: Vehicle) -> Iterator[tuple[Phase, TorqueRequest, float]]:

@@ -46,8 +46,8 @@ class Split:
     mismatch of the two is found by.
     """
 
-    base_m1: float
-    prbs_m1: float
+    base_m1: float  # of the base torque: share_m1 of the experiment
+    prbs_m1: float  # of the PRBS and of a damper's torque: target of [prbs]
 
     def request(self, base_nm: float, prbs_nm: float) -> TorqueRequest:
         """Request for a total base torque [Nm] and a total PRBS [Nm]."""
@@ -68,10 +68,10 @@ class Split:
 class PlcPrbsOrder:
     """What the PLC's generator is sent: torques as the guard let them through, PLC cycles per level, first state."""
 
-    m1: GuardedTorque
-    m2: GuardedTorque
-    clock_divider: int
-    seed: int
+    m1: GuardedTorque  # `prbs_nm` of it is the amplitude at inverter m1 [Nm]
+    m2: GuardedTorque  # the same at inverter m2
+    clock_divider: int  # PLC cycles each level is held
+    seed: int  # first state of the register, 1 to 1023
 
 
 def guarded_prbs(limits: GuardLimits, split: Split, amplitude_nm: float) -> tuple[GuardedTorque, GuardedTorque]:

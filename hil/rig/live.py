@@ -48,8 +48,8 @@ def tracking_settings(sample_time_s: float = Settings().sample_time_s) -> Settin
 class OnlineSetup(NamedTuple):
     """What estimates on line: settings, and the observation filter of an earlier run (`tracking_chain`)."""
 
-    settings: Settings = tracking_settings()
-    L: FloatArray | None = None
+    settings: Settings = tracking_settings()  # of the recursive estimator and of what comes before it
+    L: FloatArray | None = None  # (m,), 1 first, powers of 1/z; None: the filter follows the estimate
 
 
 USUAL = OnlineSetup()
@@ -111,9 +111,9 @@ OnCourse = Callable[[Course, float], None]
 class Pace:
     """How fast to play."""
 
-    speed: float | None = None  # multiple of real time
-    clock: Callable[[], float] = time.monotonic  # the wall clock [s], and how to wait
-    sleep: Callable[[float], None] = time.sleep  # the wall clock [s], and how to wait
+    speed: float | None = None  # multiple of real time; None: as fast as it can
+    clock: Callable[[], float] = time.monotonic  # the wall clock [s]
+    sleep: Callable[[float], None] = time.sleep  # waits for so long [s]
 
     def block_samples(self, sample_time_s: float) -> int:
         """Return how many samples to take at once."""

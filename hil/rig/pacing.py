@@ -46,7 +46,7 @@ class Tick:
     how much later it really begins [ns].
     """
 
-    cycle: int
+    cycle: int  # from 0, counting those that were missed
     due_ns: int
     late_ns: int
 
@@ -63,7 +63,8 @@ class Pacer(Protocol):
     answer_timeout_s: float  # how long a device may take to answer a SYNC, by the wall clock
     poll_patience_s: float  # how long a cycle may wait for an answer that is not part of it, such as the PLC's
 
-    def next(self) -> Tick: ...  # when the next cycle is due
+    def next(self) -> Tick:
+        """Return the next cycle, when it is due; `RealTimePacer` sleeps until then."""
 
 
 def disk_patience_s(pacer: Pacer) -> float:
@@ -110,5 +111,6 @@ class FreePacer:
         self._cycle = -1
 
     def next(self) -> Tick:
+        """Return the next cycle at once: due a period after the last, and never late."""
         self._cycle += 1
         return Tick(self._cycle, self._cycle * self.period_ns, 0)

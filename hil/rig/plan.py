@@ -41,9 +41,9 @@ class NoPrbs:
 class Plan:
     """What a run is made of. Experiment and PRBS have a state: a plan is for one run."""
 
-    name: str  # which experiment, and the time between two cycles [s]
-    period_s: float  # which experiment, and the time between two cycles [s]
-    experiment: Experiment  # which experiment, and the time between two cycles [s]
+    name: str  # of the experiment: NAME of [experiments.NAME]
+    period_s: float  # time between two cycles [s]
+    experiment: Experiment  # its base torque, in phases
     prbs: Levels  # the PRBS as the host makes it
     plc_prbs: PlcPrbsOrder | None  # what the PLC's own generator is sent
     split: Split  # shares of the two inverters

@@ -53,7 +53,7 @@ RPM: Final = 2.0 * math.pi / 60.0
 class Needs:
     """What a run needs of the vehicle: the largest torque it asks of one inverter, PRBS included [Nm]."""
 
-    torque_of_one_nm: float
+    torque_of_one_nm: float  # compared with the torque limit that the PLC reports
 
 
 def reasons_against(status: PlcStatus, needs: Needs) -> Iterator[str]:
@@ -157,8 +157,8 @@ class PlcLimit:
 
     what: str  # its name
     question: str  # it and what it is to be compared with, in words
-    found: str  # it, and the largest that is believed, with their unit
-    most: str | None  # it, and the largest that is believed, with their unit
+    found: str  # what the PLC reports, with its unit
+    most: str | None  # the largest that is believed, with its unit; None where nothing is known to compare with
     believed: bool  # whether it is within that
 
 

@@ -42,8 +42,8 @@ _SET_TIMER_SLACK, _GET_TIMER_SLACK = 29, 30
 class Grant:
     """Whether one thing was given, and in words what or why not."""
 
-    given: bool
-    statement: str
+    given: bool  # False also where it was not asked for
+    statement: str  # a part of a sentence, without a full stop
 
     def __str__(self) -> str:
         return self.statement
@@ -53,9 +53,9 @@ class Grant:
 class RealTimeGrants:
     """What the system gave a run."""
 
-    scheduling: Grant
-    memory: Grant
-    timer_slack: Grant
+    scheduling: Grant  # SCHED_FIFO
+    memory: Grant  # mlockall
+    timer_slack: Grant  # of 1 ns
 
     def as_json(self) -> dict[str, dict[str, object]]:
         """Give them as a JSON document."""

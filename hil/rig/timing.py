@@ -81,15 +81,15 @@ class RunTiming:
     """The timing record of one run."""
 
     period_ns: int  # what the period should be [ns]
-    period: Histogram = field(default_factory=Histogram)  # histograms of the times above [ns]
-    lateness: Histogram = field(default_factory=Histogram)  # histograms of the times above [ns]
-    reply_age: Histogram = field(default_factory=Histogram)  # histograms of the times above [ns]
+    period: Histogram = field(default_factory=Histogram)  # from one SYNC to the next of successive cycles [ns]
+    lateness: Histogram = field(default_factory=Histogram)  # of each cycle that took place [ns]
+    reply_age: Histogram = field(default_factory=Histogram)  # of each answer that came in time, of either inverter [ns]
     cycles: int = 0  # cycles that took place
     missed: int = 0  # cycles that did not
     late: int = 0  # cycles that began later than half a period
     unanswered: int = 0  # answers that did not come in time, of either inverter
-    _last_cycle: int | None = None
-    _last_sync_ns: int | None = None
+    _last_cycle: int | None = None  # number of the latest cycle; None before the first
+    _last_sync_ns: int | None = None  # host time of its SYNC
 
     def begin(self, tick: Tick, sync_ns: int) -> None:
         """Take note of a cycle that begins, and of its SYNC [ns]."""

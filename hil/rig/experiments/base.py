@@ -31,28 +31,34 @@ class Phase(Enum):
 class BaseTorque:
     """The torque an experiment asks of both inverters together, PRBS excluded [Nm], and its phase."""
 
-    torque_nm: float
-    phase: Phase
+    torque_nm: float  # positive forward
+    phase: Phase  # that this cycle belongs to
 
 
 class Experiment(Protocol):
     """A plan that answers each cycle with a base torque."""
 
     @property
-    def duration_s(self) -> float: ...  # of the measured part
+    def duration_s(self) -> float:
+        """Length of the measured part [s]."""
 
-    def torque(self, time_s: float, speed_rad_s: float) -> BaseTorque: ...  # of one cycle
+    def torque(self, time_s: float, speed_rad_s: float) -> BaseTorque:
+        """Return torque and phase of a cycle, by the time since the first [s] and the motor speed [rad/s]."""
 
 
 class MeasureLaw(Protocol):
     """The law that makes one kind of experiment: its torque during the measured part."""
 
     @property
-    def start_speed_rad_s(self) -> float: ...  # what the vehicle must have when the measured part begins
+    def start_speed_rad_s(self) -> float:
+        """Motor speed that the vehicle has to have before the measured part begins [rad/s]."""
 
     @property
-    def duration_s(self) -> float: ...
+    def duration_s(self) -> float:
+        """Length of the measured part [s]."""
 
-    def begin(self, torque_nm: float) -> None: ...  # takes over at the torque that holds the start speed
+    def begin(self, torque_nm: float) -> None:
+        """Take over at the base torque that holds the start speed [Nm]; called once."""
 
-    def torque_nm(self, time_s: float, speed_rad_s: float) -> float: ...  # since the beginning of the measured part
+    def torque_nm(self, time_s: float, speed_rad_s: float) -> float:
+        """Return the base torque wanted [Nm], by the time since the measured part began [s] and the speed [rad/s]."""

@@ -36,9 +36,11 @@ class Cruise:
         self._hold = SpeedHold(speed_rad_s, tuning, torque_limit_nm, period_s)
 
     def begin(self, torque_nm: float) -> None:
+        """Take over at the torque that holds the start speed [Nm]: the integral starts there."""
         self._hold.start_from(torque_nm)
 
     def torque_nm(self, time_s: float, speed_rad_s: float) -> float:
+        """Return the torque of the speed loop [Nm]; the time does not matter to it."""
         return self._hold.torque_nm(speed_rad_s)
 
 
@@ -46,14 +48,16 @@ class Cruise:
 class Coast:
     """No torque from a speed on: what slows the vehicle is its own."""
 
-    start_speed_rad_s: float
-    duration_s: float
+    start_speed_rad_s: float  # that the approach leads up to
+    duration_s: float  # of the measured part
     hold_nm: float = field(default=0.0, init=False)  # what held the start speed
 
     def begin(self, torque_nm: float) -> None:
+        """Keep the torque that holds the start speed [Nm]."""
         self.hold_nm = torque_nm
 
     def torque_nm(self, time_s: float, speed_rad_s: float) -> float:
+        """Return zero [Nm], at every time and speed."""
         return 0.0
 
 
@@ -64,8 +68,8 @@ class Tip(Coast):
     A step larger than the holding torque takes the driveline through zero torque, where backlash lies.
     """
 
-    step_nm: float
-    step_s: float
+    step_nm: float  # up or down from `hold_nm`, both inverters together
+    step_s: float  # length of each step but the first, which is half as long
 
     def torque_nm(self, time_s: float, speed_rad_s: float) -> float:
         """Torque of the step that runs now [Nm]; the first half step is up, so that the mean speed stays."""
@@ -95,11 +99,11 @@ class Reversal(Coast):
     speed cross zero in every half period whatever the inertia is.
     """
 
-    turning_speed_rad_s: float
-    swing_nm: float
-    period_s: float
-    _speed: LowPass = field(init=False)
-    _direction: float = field(default=1.0, init=False)
+    turning_speed_rad_s: float  # low-passed speed, either way, at which the torque turns
+    swing_nm: float  # torque either way about `hold_nm`
+    period_s: float  # of the torque cycle, not of the swing
+    _speed: LowPass = field(init=False)  # by `TURNING_FILTER_S`
+    _direction: float = field(default=1.0, init=False)  # 1 or -1
 
     def __post_init__(self) -> None:
         self._speed = LowPass(TURNING_FILTER_S, self.period_s)
@@ -115,9 +119,10 @@ class Reversal(Coast):
 class Rest:
     """No torque, of a vehicle that stands."""
 
-    duration_s: float
+    duration_s: float  # of the measured part
 
     def torque_nm(self, time_s: float) -> float:
+        """Return zero [Nm], at every time."""
         return 0.0
 
 
@@ -125,10 +130,11 @@ class Rest:
 class Pulses(Rest):
     """Waves of +1, -1, -1, +1 steps of torque: speed and place return to where they were after each."""
 
-    step_nm: float
-    step_s: float
+    step_nm: float  # height of a step, both inverters together
+    step_s: float  # length of each of a wave's steps
 
     def torque_nm(self, time_s: float) -> float:
+        """Return the torque of the step that runs at a time [Nm]; zero before the first wave and after the last."""
         waves = max(0, int((self.duration_s - 2.0 * LEAD_S) / (WAVE_STEPS * self.step_s) + 1e-9))
         step = int((time_s - LEAD_S) / self.step_s + 1e-9)
         if time_s < LEAD_S - 1e-9 or step >= waves * WAVE_STEPS:

@@ -63,9 +63,9 @@ class LowPass:
 class HoldTuning:
     """Gain [Nm s/rad], reset time [s] and low-pass time constant [s] of a speed hold."""
 
-    gain_nm_s_per_rad: float
-    reset_s: float
-    filter_s: float
+    gain_nm_s_per_rad: float  # `gain` of the module's text
+    reset_s: float  # longer: the integral follows more slowly
+    filter_s: float  # of the speed
 
     @classmethod
     def for_bandwidth(cls, bandwidth_hz: float, inertia_kg_m2: float) -> HoldTuning:
@@ -153,8 +153,8 @@ class TorqueBounds:
     plans.
     """
 
-    torque_nm: float
-    slew_nm_per_s: float
+    torque_nm: float  # torque_nm of the experiment, both inverters together
+    slew_nm_per_s: float  # slew_nm_per_s of the experiment
 
 
 class StagedExperiment:
