@@ -40,10 +40,10 @@ NEUTRAL = 1.0
 class ModelFile:
     """A model and, where the file has them, the way its recordings are read and prepared, and a user's own laws."""
 
-    model: DrivelineModel
-    signals: SignalsConfig | None = None
-    laws: Mapping[str, LawTable] = field(default_factory=dict)
-    prepared: Prepared | None = None
+    model: DrivelineModel  # structure, parameters, effects, load and priors of the file
+    signals: SignalsConfig | None = None  # [signals]; None: recordings have the columns of this program's own
+    laws: Mapping[str, LawTable] = field(default_factory=dict)  # [laws] by name; their folders are absolute
+    prepared: Prepared | None = None  # [prepared], what hil diagnose did to recordings before it fitted
 
     @property
     def on_bench(self) -> bool:

@@ -48,8 +48,8 @@ COMMENTS_AT = 48
 class Known:
     """What is known of a parameter before anybody is asked, and from where."""
 
-    parameter: Parameter
-    source: str
+    parameter: Parameter  # value, and tolerance or interval
+    source: str  # in words, for the comment in the new file
 
 
 def assignments(option: str, texts: Sequence[str], structure: Structure) -> dict[str, float]:

@@ -78,10 +78,11 @@ class NotAnAnswer(Exception):
 class AnswerKind:
     """What an answer has to be: its type, as pydantic reads it from text, and the same in words."""
 
-    type: Any
-    fits: str
+    type: Any  # an annotation that pydantic validates by
+    fits: str  # what the text has to be, for the message; continues "expected"
 
     def read(self, text: str) -> Value:
+        """Return the value that a text stands for; `NotAnAnswer` where it is none of this kind."""
         try:
             value: Value = TypeAdapter(self.type).validate_python(text)
         except ValidationError as error:
@@ -126,7 +127,7 @@ class Question:
 
     name: str  # key among the answers, and the option's name
     asks: str  # what is asked, unit included
-    kind: AnswerKind
+    kind: AnswerKind  # what an answer has to be
     simulated: str  # answer for the simulated rig of ``hil sim``
     vehicle: str = ""  # default on a vehicle
 
