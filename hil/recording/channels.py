@@ -234,5 +234,6 @@ def are_row_numbers(column: Column) -> bool:
 
 
 def time_quantity(unit: str) -> bool:
+    """Tell whether a unit is one of time; an empty or unknown one is not."""
     known = unit_of(unit) if unit else None
     return known is not None and known.quantity is Quantity.TIME

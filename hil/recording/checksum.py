@@ -61,9 +61,11 @@ class DataDigest:
         self._digest.update(_length(size))
 
     def take(self, cells: Column) -> None:
+        """Take the next cells of the column that was begun."""
         self._digest.update(_cells(cells, ColumnKind.of(cells)))
 
     def hexdigest(self) -> str:
+        """Return the SHA-256 of all that was taken, hexadecimal."""
         return self._digest.hexdigest()
 
 

@@ -42,6 +42,7 @@ def description_of(table: Table, stored_as: Mapping[str, str]) -> str:
 
 
 def described_table(path: Path, text: str, column: Callable[[str, ColumnKind], Column]) -> Table:
+    """Return the table of a description, its columns by ``column``; `RecordingError` where it is damaged."""
     document = _document(path, text)
     try:
         entries = [(str(e["name"]), str(e["stored_as"]), e["unit"], ColumnKind(e["kind"])) for e in document["columns"]]
@@ -61,6 +62,7 @@ def described_table(path: Path, text: str, column: Callable[[str, ColumnKind], C
 
 
 def metadata_of(path: Path, text: str) -> dict[str, str]:
+    """Return the metadata of a description; `RecordingError` where it is damaged."""
     metadata: dict[str, str] = _document(path, text)["metadata"]
     return metadata
 
@@ -84,13 +86,16 @@ def _damaged(path: Path, error: Exception) -> RecordingError:
 class Sidecar:
     """The sidecar of a CSV recording; ``found`` tells whether a file of ours is there at all."""
 
+    # every entry that is a text, the schema included where it was read
     metadata: Mapping[str, str] = field(default_factory=dict)
-    units: Mapping[str, str] = field(default_factory=dict)
+    units: Mapping[str, str] = field(default_factory=dict)  # by column; columns without a unit are left out
+    # of columns whose text alone does not tell their kind
     types: Mapping[str, ColumnKind] = field(default_factory=dict)
     found: bool = False
 
     @property
     def is_empty(self) -> bool:
+        """Whether it says nothing."""
         return not (self.metadata or self.units or self.types)
 
 
@@ -151,6 +156,7 @@ def read_sidecar(recording: Path) -> Sidecar:
 
 
 def read_sidecar_metadata(recording: Path) -> Mapping[str, str]:
+    """Return the metadata of `read_sidecar`, which raises where the file is damaged."""
     return read_sidecar(recording).metadata
 
 

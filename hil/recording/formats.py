@@ -35,7 +35,7 @@ class Format:
     ``is_sandboxed`` is True where a compiled library parses it: in a process of its own (`hil.recording.sandbox`).
     """
 
-    read: Callable[[Path, Request], Table]
+    read: Callable[[Path, Request], Table]  # a table for one time; `RecordingError` where the file is damaged
     write: Callable[[Table, Path], None] | None = None
     metadata: Callable[[Path], Mapping[str, str]] | None = None
     companion: Callable[[Path], Path] | None = None

@@ -103,6 +103,7 @@ Dataset: TypeAlias = Any  # those of h5py, which has no types
 
 
 def read(path: Path, request: Request) -> Table:
+    """Read an HDF5 recording: one of this program whole, of another the channels asked for."""
     with reading(path, "HDF5") as file:
         return _own(path, file) if _is_own(file) else _foreign(path, file, request)
 
@@ -114,6 +115,7 @@ def read_metadata(path: Path) -> dict[str, str]:
 
 
 def write(table: Table, path: Path) -> None:
+    """Write a table as HDF5, columns under names of their own, and what it says of itself."""
     stored_as = {name: _link(number, name) for number, name in enumerate(table.columns)}
 
     def fill(file: File) -> None:

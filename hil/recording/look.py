@@ -121,10 +121,10 @@ def _quoted(name: str) -> str:
 class Look:
     """What is in a recording, what its channels could be, and the table that reads it."""
 
-    path: Path
-    survey: Survey
-    roles: Roles
-    signals: tuple[str, ...]
+    path: Path  # as it was given
+    survey: Survey  # every channel in figures
+    roles: Roles  # what was chosen of the channels
+    signals: tuple[str, ...]  # lines of a [signals] table; empty where none is needed
 
 
 def channel_rows(group: Group) -> Iterator[tuple[str, str, int, int, float | None, float | None, str]]:
@@ -135,6 +135,7 @@ def channel_rows(group: Group) -> Iterator[tuple[str, str, int, int, float | Non
 
 
 def look(path: Path, dbc: Path | None = None) -> Look:
+    """Look into a recording of any format; ``dbc`` describes the frames where it is a log of a bus."""
     known = format_of(path)
     encoding = None
     if known.is_sandboxed:

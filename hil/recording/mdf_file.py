@@ -135,17 +135,18 @@ def decoded(path: Path, mdf: MDF, dbc: Path) -> MDF:
 class ChannelPlace:
     """Where a channel is in a file."""
 
-    group: int
-    index: int
+    group: int  # its number, from 0
+    index: int  # number of the channel in the group, from 0
 
 
 @dataclass(slots=True)
 class Raster:
     """The groups that share one time, and their channels by name."""
 
-    times: Column
-    master: str
-    unit: str
+    times: Column  # shape (n,), in `unit`
+    master: str  # name of the channel of times; "time" where there is none
+    unit: str  # of the times; s where the file gives none
+    # by the name in the table: one that comes again is numbered
     places: dict[str, ChannelPlace] = field(default_factory=dict)
 
     @property

@@ -66,6 +66,7 @@ def _own(path: Path, mdf: MDF, text: str) -> Table:
 
 
 def read(path: Path, request: Request) -> Table:
+    """Read an MDF recording: one of this program whole, of another the channels of one time."""
     with opened(path) as mdf:
         text = _description(mdf)
         table = foreign_table(path, mdf, request) if text is None else _own(path, mdf, text)
@@ -90,6 +91,7 @@ def read_metadata(path: Path) -> Mapping[str, str]:
 
 
 def write(table: Table, path: Path) -> None:
+    """Write a table as MDF 4 with the recording's time as master; without a usable one, with row numbers."""
     from asammdf import MDF
 
     stored_as = {name: _channel_name(number, name) for number, name in enumerate(table.columns)}

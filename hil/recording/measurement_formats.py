@@ -47,9 +47,9 @@ FEW_ODD_LINES: Final = 3  # lines that may be odd in a log of any length: its be
 class Group:
     """Channels that share a time [s]; shapes (n,)."""
 
-    time_s: Column
-    channels: dict[str, Column] = field(default_factory=dict)
-    units: dict[str, str] = field(default_factory=dict)
+    time_s: Column  # of each row
+    channels: dict[str, Column] = field(default_factory=dict)  # by name in the table
+    units: dict[str, str] = field(default_factory=dict)  # by channel; one that is missing or empty has no known unit
 
 
 def read(path: Path, request: Request) -> Table:

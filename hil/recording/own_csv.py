@@ -32,10 +32,10 @@ HELD_BYTES = 1 << 25  # cells that are held at once; a recording with more of th
 class Extent:
     """How much a recording holds: rows, times of the first and the last one, and rows that are not good."""
 
-    n_rows: int = 0
-    first_s: float = 0.0
-    last_s: float = 0.0
-    flagged: int = 0
+    n_rows: int = 0  # samples
+    first_s: float = 0.0  # time of the first row
+    last_s: float = 0.0  # time of the last row
+    flagged: int = 0  # rows whose flags are not 0
 
     @property
     def duration_s(self) -> float:

@@ -26,6 +26,7 @@ FOREIGN_KEYS = frozenset({b"pandas", b"ARROW:schema"})  # metadata other program
 
 
 def read(path: Path, request: Request) -> Table:
+    """Read a Parquet recording whole, its pages verified where they have checksums."""
     try:
         with pa.parquet.ParquetFile(path, page_checksum_verification=True) as file:
             _require_sizes(path, file.metadata)
@@ -110,6 +111,7 @@ def read_metadata(path: Path) -> dict[str, str]:
 
 
 def write(table: Table, path: Path) -> None:
+    """Write a table as Parquet with checksums of its pages; units are metadata of the columns."""
     fields, arrays = [], []
     for name, column in table.columns.items():
         array = pa.array(column, type=pa.string() if column.dtype == object else None)

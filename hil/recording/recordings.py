@@ -94,11 +94,12 @@ def _require_own_samples(paths: Sequence[Path], records: Sequence[Record]) -> No
 class Facts(NamedTuple):
     """What is known of a recording whose rows are not kept."""
 
-    metadata: Mapping[str, str]
-    extent: Extent
+    metadata: Mapping[str, str]  # what it says of itself
+    extent: Extent  # rows, times and flags
 
 
 def facts_of(table: Table) -> Facts:
+    """Return the facts of a table; without columns for them, times and flags count as 0."""
     there = table.numeric([name for name in (columns.TIME, columns.FLAGS) if name in table.columns])
     time_s = there.get(columns.TIME, np.zeros(1))
     flagged = int(np.count_nonzero(there[columns.FLAGS])) if columns.FLAGS in there else 0

@@ -54,9 +54,9 @@ class FormatHints(BaseModel):
 class Request:
     """What a reader has to know in addition to the file."""
 
-    form: FormatHints = field(default_factory=FormatHints)
+    form: FormatHints = field(default_factory=FormatHints)  # of a text recording
     columns: tuple[str, ...] = ()  # needed, by name or address in the file; empty for those that belong together
-    time: str | None = None
+    time: str | None = None  # column of times, by name or address; None: none is asked for
     held: tuple[str, ...] = ()  # of them, those whose last value counts until the next; others lie on straight lines
     resample_s: float | None = None  # to which channels of different rates are brought
     dbc: Path | None = None  # what the frames of a logged CAN bus mean

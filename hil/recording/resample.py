@@ -157,8 +157,8 @@ def _refuse(table: Table, column: str, time: FloatArray, span: int, wrong: NDArr
 class Series:
     """A channel with times of its own, shapes (n,); NaN is missing, and ``held`` a value counts until the next."""
 
-    time_s: FloatArray
-    values: FloatArray
+    time_s: FloatArray  # of the recording
+    values: FloatArray  # in whatever unit: none is converted here
     held: bool = False
 
     @property

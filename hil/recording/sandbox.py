@@ -82,6 +82,7 @@ def receive(stream: IO[bytes]) -> tuple[Document, dict[str, Column]]:
 
 
 def described(table: Table) -> Document:
+    """Return all of a table but its columns and path, as JSON has it."""
     return {name: getattr(table, name) for name in _SAID}
 
 
@@ -237,14 +238,17 @@ class Reader:
         self._process: Sandbox | None = None
 
     def table(self, path: Path, request: Request) -> Table:
+        """Read a table; `RecordingError` also where the file ends its reader, or takes too long."""
         document, columns = self._read(path, "table", request)
         return table_of(path, document, columns)
 
     def metadata(self, path: Path) -> Mapping[str, str]:
+        """Read what a recording says of itself; errors as of `table`."""
         said: Mapping[str, str] = self._read(path, "metadata", Request())[0]["metadata"]
         return said
 
     def survey(self, path: Path, request: Request) -> Survey:
+        """Return every channel in figures; errors as of `table`."""
         return Survey.of_document(self._read(path, "survey", request)[0]["survey"])
 
     def end(self) -> None:

@@ -83,7 +83,7 @@ class Quantity(Enum):
 class Unit:
     """One unit: a value in it times ``factor`` is in SI."""
 
-    quantity: Quantity
+    quantity: Quantity  # SHARE and OTHER have no way to SI without a scale
     factor: float
 
 

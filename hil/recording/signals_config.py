@@ -39,6 +39,7 @@ class _Scaled(_Strict):
 
     @property
     def given_scale(self) -> float | None:
+        """The scale of the file; None where it gives none, and the unit decides."""
         return self.scale if "scale" in self.model_fields_set else None
 
 
@@ -51,6 +52,7 @@ class TimeSignal(_Strict):
 
     @property
     def given_scale(self) -> float | None:
+        """The scale of the file; None where it gives none, and the unit decides."""
         return self.scale if "scale" in self.model_fields_set else None
 
     @model_validator(mode="after")

@@ -46,14 +46,14 @@ NOT_MEASURED: Final = re.compile(r"ref|soll|set|cmd|command|target|limit|max|min
 class Channel:
     """One channel in figures; ranges are in the file's own unit."""
 
-    name: str
-    unit: str
-    kind: str
-    rows: int
-    missing: int
-    low: float | None
-    high: float | None
-    increases: bool
+    name: str  # as in the file
+    unit: str  # as the file writes it; empty where it gives none
+    kind: str  # "number" or "text"
+    rows: int  # missing ones included
+    missing: int  # empty texts, or numbers that are not finite or beyond `LARGEST`
+    low: float | None  # None for texts, and where every number is missing
+    high: float | None  # None where `low` is
+    increases: bool  # every row above the one before, and none missing
     wraps_at: float | None  # where it begins anew, if it was stored with a sign and is read without
 
     @property
@@ -66,11 +66,11 @@ class Channel:
 class Group:
     """Channels that share their time; ``even`` where every row is a period after the one before."""
 
-    time: str | None
-    period_s: float | None
+    time: str | None  # name of the channel of times; None where none was recognised
+    period_s: float | None  # median step, in the file's unit where that is none of time; None without a time
     even: bool
-    gaps: int
-    channels: tuple[Channel, ...]
+    gaps: int  # steps longer than `GAP` periods
+    channels: tuple[Channel, ...]  # that of the times included
 
     @property
     def rows(self) -> int:
@@ -82,9 +82,9 @@ class Group:
 class Survey:
     """What is in a recording."""
 
-    groups: tuple[Group, ...]
-    said: tuple[str, ...] = ()
-    metadata: Mapping[str, str] = field(default_factory=dict)
+    groups: tuple[Group, ...]  # one for each time
+    said: tuple[str, ...] = ()  # remarks of the readers
+    metadata: Mapping[str, str] = field(default_factory=dict)  # of all times together
 
     @property
     def shows_a_course(self) -> bool:
@@ -173,18 +173,18 @@ def rounded(period_s: float) -> float:
 class Guess:
     """What a channel could be, and how sure that is."""
 
-    channel: Channel
-    role: Role
-    sure: int
+    channel: Channel  # that could have the role
+    role: Role  # one of several that it could have
+    sure: int  # `BY_CHANCE` to `BY_UNIT`, one more where name and unit agree
 
 
 @dataclass(frozen=True, slots=True)
 class Roles:
     """What was chosen of a file, inputs to be summed and speed or position, and what else could be one of them."""
 
-    torques: tuple[Guess, ...]
-    output: Guess | None
-    others: tuple[Guess, ...]
+    torques: tuple[Guess, ...]  # inputs to be summed, called alike but for a number
+    output: Guess | None  # speed or position; None where nothing could be one
+    others: tuple[Guess, ...]  # guesses that were not chosen
 
 
 def guesses(channel: Channel) -> list[Guess]:

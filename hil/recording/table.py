@@ -45,6 +45,7 @@ class ColumnKind(Enum):
 
     @staticmethod
     def of(column: Column) -> ColumnKind:
+        """Tell the kind of a column."""
         return ColumnKind.of_dtype(column.dtype)
 
     @staticmethod
@@ -76,6 +77,7 @@ def as_column(values: Column) -> Column:
 
 
 def as_text(cells: list[str]) -> Column:
+    """Return texts as a column of kind TEXT, shape (n,)."""
     column = np.empty(len(cells), dtype=object)
     column[:] = cells
     return column
@@ -117,8 +119,9 @@ class Table:
 
     path: Path  #: for messages; its stem is the recording's name
     columns: Mapping[str, Column]  #: float64, int64, bool, or object (text), shape (N,)
+    # by column, as the file writes them; columns without one are left out
     units: Mapping[str, str] = field(default_factory=dict)
-    metadata: Mapping[str, str] = field(default_factory=dict)
+    metadata: Mapping[str, str] = field(default_factory=dict)  # texts by key: what the file says of itself
     first_line: int | None = None  #: of the first row in a text file
     remarks: tuple[str, ...] = ()  #: what its reader recognised, had to leave out or fix
     skipped: tuple[int, ...] = ()  #: lines after the first row that are no rows, ascending

@@ -56,6 +56,7 @@ class CellKind(Enum):
 
 
 def kind_of(cell: str, decimal: str = ".") -> CellKind:
+    """Tell what a cell is, given the decimal mark; ``nan`` and empty ones are missing."""
     plain = cell.strip()
     if plain in MISSING or plain.lower() == "nan":
         return CellKind.MISSING
@@ -71,13 +72,13 @@ class TextForm:
     """How the lines of a text recording become rows; lines count from 1, 0 is none."""
 
     names: tuple[str, ...]  # none twice
-    delimiter: str = COMMA
-    decimal: str = "."
-    encoding: str = "utf-8"
-    first_row_line: int = 2
-    header_line: int = 1
-    units_line: int = 0
-    units: Mapping[str, str] = field(default_factory=dict)
+    delimiter: str = COMMA  # between cells; `BLANKS` stands for any number of them
+    decimal: str = "."  # mark, "." or ","
+    encoding: str = "utf-8"  # name of the text encoding, as Python knows it
+    first_row_line: int = 2  # of the first row of data
+    header_line: int = 1  # of the names; 0: columns are called 1, 2 and so on
+    units_line: int = 0  # of the units, if they have a line
+    units: Mapping[str, str] = field(default_factory=dict)  # by name of the column
     comment: str = ""  # what a line that is no row begins with
     trailing: bool = False  # every row ends in a delimiter
     repeated: tuple[str, ...] = ()  # names that the header has more than once
@@ -169,6 +170,7 @@ class _Cut:
 
 
 def recognise(lines: Sequence[str], hints: FormatHints) -> TextForm:
+    """Tell how the first lines of a text recording are written; what the hints give is not looked for."""
     skipped = hints.skip_lines
     delimiter = hints.delimiter
     if len(lines) > skipped and lines[skipped].strip().lower().startswith(NAMES_THE_DELIMITER):
