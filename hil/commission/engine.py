@@ -54,14 +54,15 @@ MOST_VEHICLE_S = 40 * 60
 class PlannedRun:
     """One run of a plan: what is predicted of it [s, Nm, rad/s]."""
 
-    name: str
-    seconds: float
-    torque_m1_nm: tuple[float, float]
-    torque_m2_nm: tuple[float, float]
-    speed_rad_s: tuple[float, float]
+    name: str  # of the order
+    seconds: float  # length of the whole run
+    torque_m1_nm: tuple[float, float]  # smallest and largest over the whole run, PRBS included
+    torque_m2_nm: tuple[float, float]  # the same of inverter m2
+    speed_rad_s: tuple[float, float]  # smallest and largest over the whole run
 
     @classmethod
     def of(cls, name: str, prediction: Prediction) -> PlannedRun:
+        """Return a prediction as a plan has it."""
         m1, m2, speed = prediction.torque_m1_nm, prediction.torque_m2_nm, prediction.speed_rad_s
         return cls(name, prediction.seconds, (m1.low, m1.high), (m2.low, m2.high), (speed.low, speed.high))
 
@@ -82,6 +83,7 @@ def vehicle_seconds(runs: Sequence[PlannedRun]) -> float:
 
 
 def announcement(job: StepContext, step: Step, runs: Sequence[PlannedRun]) -> list[str]:
+    """Return the lines that announce a step, and what is predicted of its runs."""
     number = [each.name for each in STEPS].index(step.name) + 1
     lines = ["", f"{number}/{len(STEPS)} {step.title} ({step.name})", f"  It {step.about(job)}"]
     if not runs:
@@ -132,8 +134,8 @@ def plan_document(job: StepContext) -> dict[str, Any]:
 class StepRequests:
     """What the command line asks of single steps: reasons to skip by name, and names to repeat."""
 
-    skip: Mapping[str, str] = field(default_factory=dict)
-    repeat: frozenset[str] = frozenset()
+    skip: Mapping[str, str] = field(default_factory=dict)  # reason by name of the step
+    repeat: frozenset[str] = frozenset()  # names of steps, also of those that are settled
 
 
 @dataclass(slots=True)
@@ -144,7 +146,7 @@ class Commissioning:
     talk: Talk  # Who is asked
     asked: StepRequests  # What the command line asks of single steps
     show: Callable[[Step, list[StepFinding]], None]  # Called with the findings of each step
-    _redone: set[str] = field(default_factory=set)
+    _redone: set[str] = field(default_factory=set)  # names of the steps attempted in this call
 
     def run(self) -> None:
         """Do every step that is not settled."""

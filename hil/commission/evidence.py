@@ -106,6 +106,7 @@ class ModelEvidence(_Table):
         return self
 
     def model(self) -> DrivelineModel:
+        """Return the driveline; `EstimatorError` or KeyError where it is none."""
         return DrivelineModel(
             self.structure,
             {

@@ -141,8 +141,8 @@ def _summary(model: DrivelineModel, result: FitResult) -> PhysicalFit:
 class DelaySelection:
     """The delay that suits best, beyond the sample that is natural, and the model with it."""
 
-    extra_samples: int
-    fit: LinearFit
+    extra_samples: int  # beyond `NATURAL_DELAY`, 0 to 4
+    fit: LinearFit  # of the output-error method, with that delay
 
 
 def select_delay(record: Record) -> DelaySelection:

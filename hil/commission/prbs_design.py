@@ -40,9 +40,9 @@ DEFAULT_TRAVEL_M_PER_RAD = 0.48 / 5.6
 class ResonanceSpread:
     """The resonance and the standard deviations of its frequency and damping, relative to each."""
 
-    mode: Mode
-    frequency_std: float
-    damping_std: float
+    mode: Mode  # the one in the band that was looked at
+    frequency_std: float  # over the frequency, 0.002 is 0.2 %
+    damping_std: float  # over the magnitude of the damping
 
     def scaled(self, factor: float) -> ResonanceSpread:
         """Return the same with standard deviations so many times as large."""
@@ -63,18 +63,18 @@ def resonance_spread(fit: LinearFit, band_hz: tuple[float, float]) -> ResonanceS
 class Cap:
     """A largest amplitude [Nm], of both inverters together, and what sets it."""
 
-    amplitude_nm: float
-    reason: str
+    amplitude_nm: float  # of several caps the lowest counts
+    reason: str  # key of the rig file, or what else limits it, in words
 
 
 @dataclass(frozen=True, slots=True)
 class Choice:
     """The amplitude [Nm], and why it is not another."""
 
-    amplitude_nm: float
-    needed_nm: float
-    cap: Cap
-    reason: str
+    amplitude_nm: float  # of both inverters together, a multiple of the step
+    needed_nm: float  # what the resonance needs, before it is rounded up
+    cap: Cap  # the lowest
+    reason: str  # in words, for the finding
 
 
 def excess(spread: ResonanceSpread) -> float:

@@ -58,6 +58,7 @@ def columns_of(path: Path) -> Mapping[str, FloatArray]:
 
 
 def record_of(path: Path) -> Record:
+    """Read a recording of the commissioning; `RecordingError` where it can't be used."""
     return read_record(path)
 
 
@@ -88,8 +89,8 @@ def json_safe(evidence: Any) -> Any:
 class Measured(NamedTuple):
     """A value and half the width of its 95 % interval; infinite where the data don't tell."""
 
-    value: float
-    ci95: float
+    value: float  # NaN where there is nothing to measure it from
+    ci95: float  # in the unit of the value
 
     def is_within(self, low: float, high: float) -> bool | None:
         """Tell whether the value lies in a range: None where the interval is on both sides of a limit."""
@@ -132,8 +133,8 @@ def of_repeats(values: FloatArray) -> Measured:
 class PulseResponse:
     """Of one inverter: speed over that of the rigid vehicle, and torque reading over torque reference."""
 
-    speed: Measured
-    reading: Measured
+    speed: Measured  # 1: as the rig file's inertia has it; negative: the other way round
+    reading: Measured  # 1: as commanded; negative: the other way round
 
 
 def pulse_response(
@@ -146,6 +147,7 @@ def pulse_response(
     wave_samples: int,
     lead_samples: int,
 ) -> PulseResponse:
+    """Return the response to waves of pulses, all courses of shape (N,); the first begins at ``lead_samples``."""
     rigid = averaged(
         np.concatenate([[0.0], np.cumsum(reference_nm)[:-1]]) * period_s / inertia_kg_m2, RINGING_S, period_s
     )
@@ -184,9 +186,9 @@ def _gain(reading: FloatArray, reference: FloatArray) -> float:
 class ResponseRatio:
     """Gain of m2 over m1, and how much later m2 acts [s]; both undetermined with too few coherent lines."""
 
-    gain: Measured
-    delay_s: Measured
-    lines: int
+    gain: Measured  # 1 where undetermined, with an infinite interval
+    delay_s: Measured  # negative where m2 acts earlier
+    lines: int  # frequencies at which both tests are coherent
 
 
 def response_ratio(first: Record, second: Record) -> ResponseRatio:

@@ -65,28 +65,29 @@ class Status(Enum):
 class Attempt:
     """An attempt before the last one."""
 
-    attempt: int
-    status: Status
-    because: str
-    ended_utc: Utc
-    recordings: list[str]
-    findings: list[StepFinding]
+    attempt: int  # its number, from 1
+    status: Status  # how it ended
+    because: str  # why, where it did not come to its end; else empty
+    ended_utc: Utc  # ISO 8601
+    recordings: list[str]  # relative to the folder, those of runs that were ended early too
+    findings: list[StepFinding]  # in their order
 
 
 @dataclass(slots=True)
 class StepRecord:
     """One step: the last attempt, and those before it."""
 
-    status: Status = Status.PENDING
-    because: str = ""
-    attempt: int = 0
-    rig_digest: str = ""
-    started_utc: Utc = ""
-    ended_utc: Utc = ""
-    findings: list[StepFinding] = field(default_factory=list)
+    status: Status = Status.PENDING  # of the last attempt
+    because: str = ""  # why it was skipped, blocked, interrupted or set back; else empty
+    attempt: int = 0  # number of the last one, from 1; 0 before the first
+    rig_digest: str = ""  # `rig_digest` of the rig file it was done with; empty before the first attempt
+    started_utc: Utc = ""  # ISO 8601; empty before the first attempt
+    ended_utc: Utc = ""  # ISO 8601; empty while it is under way
+    findings: list[StepFinding] = field(default_factory=list)  # of the last attempt, in their order
+    # what other steps and the report need of it, as `EVIDENCE` has it for the step
     evidence: dict[str, Any] = field(default_factory=dict)
-    runs: list[RunRecord] = field(default_factory=list)
-    history: list[Attempt] = field(default_factory=list)
+    runs: list[RunRecord] = field(default_factory=list)  # of the last attempt, those that were ended early too
+    history: list[Attempt] = field(default_factory=list)  # attempts before the last, oldest first
 
     def begin(self, rig_digest: str, keep_runs: bool) -> None:
         """Begin an attempt; the one before it goes to the history, by ``keep_runs`` whole runs and evidence stay."""
@@ -102,6 +103,7 @@ class StepRecord:
         self.started_utc, self.ended_utc = now_utc(), ""
 
     def end(self, status: Status, because: str = "") -> None:
+        """End the attempt now; ``because`` says why, where it did not come to its end."""
         self.status, self.because, self.ended_utc = status, because, now_utc()
 
     def run(self, name: str) -> RunRecord | None:
@@ -113,10 +115,10 @@ class StepRecord:
 class Note:
     """What was decided about the whole, such as keeping results after the rig file was changed."""
 
-    at_utc: Annotated[Utc, Field(min_length=1)]
-    what: str
-    changes: str
-    steps: str
+    at_utc: Annotated[Utc, Field(min_length=1)]  # ISO 8601
+    what: str  # what it was about
+    changes: str  # keys of the rig file with their old and new values; empty where none differs
+    steps: str  # what was decided of the steps done before: repeated, or kept and why
 
 
 @dataclass(slots=True)
@@ -128,16 +130,18 @@ class CommissioningState:
     rig_path: str  # The rig file as of the last call
     rig_text: str  # The rig file as of the last call
     steps: dict[str, StepRecord]  # Record of every step, by name, in order
-    started_utc: Annotated[Utc, Field(min_length=1)] = field(default_factory=now_utc)
-    notes: list[Note] = field(default_factory=list)
+    started_utc: Annotated[Utc, Field(min_length=1)] = field(default_factory=now_utc)  # of the first call, ISO 8601
+    notes: list[Note] = field(default_factory=list)  # oldest first
     made: dict[str, Any] | None = None  # What the report was made from (``hil.provenance``); None before there is one
-    schema: Literal["hil.commission/1"] = SCHEMA
+    schema: Literal["hil.commission/1"] = SCHEMA  # of the file
 
     @property
     def path(self) -> Path:
+        """The state file."""
         return self.folder / FILE_NAME
 
     def document(self) -> dict[str, Any]:
+        """Return what the state file holds, with the version of the program and the present time."""
         kept: dict[str, Any] = _STATE.dump_python(self, mode="json", exclude={"folder"})
         return {**kept, "hil_version": __version__, "updated_utc": now_utc()}
 

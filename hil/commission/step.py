@@ -22,9 +22,10 @@ MODEL_STEPS = ("validation", "scales")
 class Outcome:
     """What a step came to: findings and questions for people, evidence for the steps after it and for the report."""
 
-    findings: Sequence[StepFinding]
+    findings: Sequence[StepFinding]  # in the order in which they are shown
+    # what `EVIDENCE` has for the step; NaN and infinity become null in the file
     evidence: Mapping[str, Any] = field(default_factory=dict)
-    questions: Sequence[str] = ()
+    questions: Sequence[str] = ()  # each has to be answered with yes for the commissioning to continue
     needless: str = ""  # Why there was nothing to do: the step is skipped
 
 
@@ -80,13 +81,16 @@ class StepContext:
         return self.runner.run(step, order, self.model(), self.rolling_rad_s(), lambda run: self.note(step, run))
 
     def note(self, step: str, run: RunRecord) -> None:
+        """Enter a run in the record of a step, and save the state."""
         self.state.steps[step].runs.append(run)
         self.state.save()
 
     def recording(self, run: RunRecord) -> Path:
+        """Return the path of a run's recording; the folder where it has none."""
         return self.folder / (run.recording or "")
 
     def runs_of(self, step: str) -> list[RunRecord]:
+        """Return the runs of a step's last attempt that came to their end."""
         return [run for run in self.state.steps[step].runs if run.whole]
 
 
@@ -108,4 +112,5 @@ class Step:
     needs: tuple[str, ...] = ()  # Steps it builds on
 
     def record(self, job: StepContext) -> StepRecord:
+        """Return its record in the state."""
         return job.state.steps[self.name]

@@ -77,6 +77,7 @@ def result_document(state: Mapping[str, Any], folder: str, report: str | None) -
 
 
 def result_lines(document: Mapping[str, Any]) -> Iterator[str]:
+    """Return the lines of a result (schema ``hil.commission_result/1``)."""
     open_steps = [name for name, step in document["steps"].items() if step["status"] not in ("done", "skipped")]
     skipped = [name for name, step in document["steps"].items() if step["status"] == "skipped"]
     yield ""

@@ -94,12 +94,12 @@ DEVICES = Step("devices", "Devices", _about_devices, _do_devices)
 class Probe:
     """A request at a limit, which passes, and one beyond it, which is refused."""
 
-    what: str
-    limit: str
-    at: TorqueRequest
-    beyond: TorqueRequest
-    evidence_at: Evidence = FRESH
-    evidence_beyond: Evidence = FRESH
+    what: str  # what the limit is of, in words
+    limit: str  # with its unit
+    at: TorqueRequest  # has to pass, with `evidence_at`
+    beyond: TorqueRequest  # has to be refused, with `evidence_beyond`
+    evidence_at: Evidence = FRESH  # ages and speed
+    evidence_beyond: Evidence = FRESH  # ages and speed
 
 
 def _about_limits(job: StepContext) -> str:

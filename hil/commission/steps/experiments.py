@@ -50,6 +50,7 @@ def _speed_parts() -> list[float]:
 
 
 def orders(job: StepContext) -> list[Order]:
+    """Return the runs: cruises, then tip and reversal where the rig file has them, and the halt."""
     cruise = cruise_of(job.rig)
     amplitude_nm = job.evidence("prbs").get("amplitude_nm", job.rig.prbs.amplitude_nm)
     seeds = 2**job.rig.prbs.cells - 1

@@ -212,6 +212,7 @@ def explained(job: StepContext) -> list[Path]:
 
 
 def nominal_of(job: StepContext) -> DrivelineModel:
+    """Return the user's own model, else the one of the validation; `UsageError` where there is neither."""
     if job.nominal is not None:
         return job.nominal
     document = job.evidence("validation").get("model")
