@@ -22,8 +22,8 @@ class StepChoice(Enum):
 class Answer:
     """What to do, and for a skip the reason."""
 
-    what: StepChoice
-    because: str = ""
+    what: StepChoice  # GO is a yes, and in `Talk.keep_results` that results are kept
+    because: str = ""  # empty where no reason was asked for
 
 
 GO = Answer(StepChoice.GO)

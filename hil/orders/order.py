@@ -28,7 +28,7 @@ class Order:
 
     name: str  # Of the experiment in the changed rig file, and part of the recording's
     table: Mapping[str, Any]  # Its table in that file
-    prbs: Mapping[str, Any] = field(default_factory=dict)
+    prbs: Mapping[str, Any] = field(default_factory=dict)  # keys of [prbs] that change; None takes a key out
     least_margin_rad_s: float = 1.0  # How far the speed may leave its predicted range, at least
 
     @property
@@ -41,13 +41,14 @@ class Order:
 class RigSource:
     """The user's rig file, and the addresses that count in place of its own."""
 
-    path: Path
-    text: str
-    bus: str | None = None
-    modbus: str | None = None
-    take_over: bool = False
+    path: Path  # for messages, and what its paths are relative to
+    text: str  # as it was read
+    bus: str | None = None  # address in place of that of [can]; None: the file's
+    modbus: str | None = None  # HOST:PORT in place of that of [plc]; None: the file's
+    take_over: bool = False  # whether another host may be on the bus (`hil.rig.sole_host`)
 
     def rig(self) -> Rig:
+        """Return the rig at the addresses that count; `RigFileError` where the file is wrong."""
         return self._checked(self.text)
 
     def ordered(self, order: Order) -> tuple[Rig, str]:
@@ -74,6 +75,7 @@ def as_table(experiment: AnyExperiment, **changes: object) -> dict[str, Any]:
 
 
 def rig_digest(text: str) -> str:
+    """Return the SHA-256 of what a rig file says, hexadecimal; comments and layout do not count."""
     return hashlib.sha256(json.dumps(tomllib.loads(text), sort_keys=True, default=str).encode()).hexdigest()
 
 

@@ -62,16 +62,16 @@ class RunRecord:
     ``whole`` is False where the run was ended early; its recording then holds what there was.
     """
 
-    name: str
-    recording: str | None
+    name: str  # of the order
+    recording: str | None  # relative to the folder of the commissioning; None where nothing was recorded
     whole: bool
-    seconds: float
-    predicted: dict[str, Both]
-    measured: dict[str, Both]
-    flagged: int = 0
-    recorded: int = 0
-    prbs_nm: float = 0.0
-    last_rad_s: float = 0.0
+    seconds: float  # length of the whole run, approach and release included
+    predicted: dict[str, Both]  # lowest and highest, by the names of `Ranges`
+    measured: dict[str, Both]  # the same; names without a value are left out
+    flagged: int = 0  # recorded samples with a flag
+    recorded: int = 0  # samples of the measured part
+    prbs_nm: float = 0.0  # amplitude of both inverters together; 0 without a PRBS
+    last_rad_s: float = 0.0  # speed in the last cycle
 
 
 def now_utc() -> str:
@@ -140,7 +140,7 @@ class WithinBand:
     high_rad_s: float  # Ends of the band [rad/s]
     margin_rad_s: float  # What the speed at the beginning is given next to it
     period_s: float  # Time between two cycles [s]
-    _speed: LowPass | None = None
+    _speed: LowPass | None = None  # None before the first cycle
 
     @property
     def duration_s(self) -> float:
@@ -174,6 +174,7 @@ class Conditions:
 
     pace: str  # Its name, for the recording
     pacer: Callable[[Rig], Pacer]  # Makes a fresh pacer
+    # asks for real time for the time of a block, or for nothing
     scheduling: Callable[[], AbstractContextManager[RealTimeGrants]]
     progress: Callable[[Plan], AbstractContextManager[CycleProgress]]  # Shows a run for the time of a block
 
@@ -203,6 +204,7 @@ class Runner:
     source: RigSource  # The user's rig file
     folder: Path  # Of the commissioning
     conditions: Conditions  # How runs are driven
+    # by text of the rig file, model and speed at the beginning
     _predicted: dict[tuple[Hashable, ...], Prediction] = field(default_factory=dict)
 
     def predict(self, order: Order, model: DrivelineModel, speed_rad_s: float) -> Prediction:
@@ -222,6 +224,7 @@ class Runner:
         speed_rad_s: float,
         note: Callable[[RunRecord], None],
     ) -> RunRecord:
+        """Drive an order, record it, and return its record; ``note`` is given that of a run that is ended early too."""
         rig, text = self.source.ordered(order)
         prediction = self.predict(order, model, speed_rad_s)
         path, seen = self._free_path(step, order), _Measured()
