@@ -88,6 +88,7 @@ class MonitorApp(App[None]):
         self.interrupted = False
 
     def compose(self) -> ComposeResult:
+        """Yield the head line, every page, the message and the keys."""
         yield Panel(head_panels.headline, "headline")
         yield from pages(len(self._state.channel_units))
         yield Static("", id="too-small")
@@ -95,6 +96,7 @@ class MonitorApp(App[None]):
         yield Static("", id="keys", classes="keys", markup=False)
 
     def on_mount(self) -> None:
+        """Begin to draw, and take the stop signals that are not ignored."""
         self.action_page(self._page)
         self.set_interval(DRAW_EVERY_S, self._tick)
         if self._picture is not None:
@@ -106,6 +108,7 @@ class MonitorApp(App[None]):
                     self._handlers[number] = signal.signal(number, self._on_signal)
 
     def on_unmount(self) -> None:
+        """Give the stop signals back."""
         for number, handler in self._handlers.items():
             signal.signal(number, handler)
         self._handlers.clear()
@@ -151,6 +154,7 @@ class MonitorApp(App[None]):
         self.action_leave()
 
     def action_page(self, name: str) -> None:
+        """Show a page of `PAGES`, and the keys that count there."""
         self._page = name
         for container in self.screen_stack[0].query(".page").results(Container):
             container.set_class(container.id == name, "shown")
@@ -176,6 +180,7 @@ class MonitorApp(App[None]):
         self._draw()
 
     def action_start(self) -> None:
+        """Open the choice of an experiment; only while a rig is listened to."""
         if self._refuse(self._state.activity is Activity.LISTENING, "only a rig that is listened to can be started"):
             return
         if self._refuse(bool(self._choices), "the rig file has no [experiments]"):
@@ -189,22 +194,26 @@ class MonitorApp(App[None]):
         self._source.send(StartExperiment(name))
 
     def action_stop(self) -> None:
+        """Order the end of the run at zero torque; it is sent whatever the screen says."""
         self._source.send(Stop())
         self._state.stopping("stop: zero torque, disarming")
 
     def action_mark(self) -> None:
+        """Ask what to note; the mark has the time of the key."""
         t_ns = time.monotonic_ns()
         if self._refuse(self._state.is_driving, "a mark goes into a recording; nothing is being recorded"):
             return
         self.push_screen(MarkDialog(), lambda text: None if text is None else self._source.send(Mark(t_ns, text)))
 
     def action_reset(self) -> None:
+        """Order a reset of the drives' faults; only while a rig is listened to."""
         if self._refuse(self._state.activity is Activity.LISTENING, "stop first: faults are reset at rest"):
             return
         self._state.take(Notice(time.monotonic_ns(), LogTopic.INFO, "reset of the drives' faults asked for"))
         self._source.send(Reset())
 
     def action_help(self) -> None:
+        """Show the keys, and what the words mean."""
         self.push_screen(HelpDialog(HELP))
 
     def action_leave(self) -> None:

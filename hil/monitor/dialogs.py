@@ -58,6 +58,7 @@ class StartDialog(ModalScreen[str | None]):
         self._chosen: str | None = None
 
     def compose(self) -> ComposeResult:
+        """Yield the list of experiments, with room for what one commands and for the question."""
         with Vertical(classes="dialog"):
             yield Static("Start an experiment: arrows and Enter choose, Esc goes back", classes="lead")
             yield OptionList(
@@ -76,6 +77,7 @@ class StartDialog(ModalScreen[str | None]):
         self.query_one("#question", Static).update("")
 
     def on_option_list_option_selected(self, event: OptionList.OptionSelected) -> None:
+        """Ask for the key that confirms; nothing is started yet."""
         self._chosen = self._names[event.option_index]
         question = f"Arm both drives and run {self._chosen}, recorded in {self._out}? Press y for yes, Esc for no."
         self.query_one("#question", Static).update(printable(question))
@@ -86,6 +88,7 @@ class StartDialog(ModalScreen[str | None]):
             self.dismiss(self._chosen)
 
     def action_back(self) -> None:
+        """Close it; nothing is started."""
         self.dismiss(None)
 
 
@@ -99,15 +102,18 @@ class MarkDialog(ModalScreen[str | None]):
     BINDINGS: ClassVar[list[BindingType]] = [Binding("escape", "back", "Back")]
 
     def compose(self) -> ComposeResult:
+        """Yield a line to write in."""
         with Vertical(classes="dialog"):
             yield Static("Mark (its time is that of the key m). What happened?", classes="lead")
             yield Input(placeholder="mark", max_length=200)
             yield Static("Enter keeps it, Esc drops it. Ctrl-C ends the run, as everywhere.")
 
     def on_input_submitted(self, event: Input.Submitted) -> None:
+        """Give the text; "mark" where nothing was written."""
         self.dismiss(event.value.strip() or "mark")
 
     def action_back(self) -> None:
+        """Close it without a mark."""
         self.dismiss(None)
 
 
@@ -124,10 +130,12 @@ class HelpDialog(ModalScreen[None]):
         self._text = text
 
     def compose(self) -> ComposeResult:
+        """Yield the text."""
         with Vertical(classes="dialog"):
             yield Static(self._text, markup=False)
 
     def action_back(self) -> None:
+        """Close it."""
         self.dismiss(None)
 
 

@@ -233,6 +233,7 @@ class WarmUp:
         self._thread.start()
 
     def is_done(self) -> bool:
+        """Whether the chain is compiled; raises what that has failed by."""
         if self._failed is not None:
             raise self._failed
         return not self._thread.is_alive()

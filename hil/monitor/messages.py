@@ -21,7 +21,7 @@ from hil.sample import Sample
 class Samples:
     """Samples since the last message, oldest first, each with its phase; None while nothing is driven."""
 
-    rows: tuple[tuple[Sample, Phase | None], ...]
+    rows: tuple[tuple[Sample, Phase | None], ...]  # never empty
     lost: int = 0  # samples not sent since the view did not take them; they are in the recording all the same
 
 
@@ -32,8 +32,8 @@ class NodeHealth:
     node_id: int  # CANopen node
     power: str | None  # state of its power stage in the words of CiA 402; None before the first TPDO
     nmt: str | None  # NMT state of its last heartbeat
-    heartbeat_age_s: float | None
-    heartbeat_limit_s: float
+    heartbeat_age_s: float | None  # time since its last heartbeat [s]; None where there was none
+    heartbeat_limit_s: float  # age beyond which the heartbeat counts as missing [s]
     tpdo_age_s: float | None  # time since its last TPDO [s]; None where there was none
     emergency: str | None  # the active EMCY in words, or None
     n_emergencies: int  # EMCY frames since the monitor began, resets not counted
@@ -44,32 +44,32 @@ class NodeHealth:
 class PlcHealth:
     """The PLC: its last status, how old that is [s], and what keeps the next from coming."""
 
-    status: PlcStatus | None
-    age_s: float | None
-    trouble: str | None
+    status: PlcStatus | None  # None before the first
+    age_s: float | None  # None where there is no status
+    trouble: str | None  # in words; None where nothing does
 
 
 @dataclass(frozen=True, slots=True)
 class TimingHealth:
     """The cycle since the present stretch (listening, or one run) began; times in seconds, NaN while there is none."""
 
-    period_s: float
-    cycles: int
-    missed: int
-    late: int
-    unanswered: int
+    period_s: float  # what it should be
+    cycles: int  # that took place
+    missed: int  # that did not
+    late: int  # that began later than half a period
+    unanswered: int  # answers that did not come in time, of either inverter
     lateness_s: tuple[float, float, float]  # median, 99th percentile and largest
-    reply_s: tuple[float, float, float]
+    reply_s: tuple[float, float, float]  # the same of the time from SYNC to answer
 
 
 @dataclass(frozen=True, slots=True)
 class Health:
     """Both inverters, the PLC and the cycle."""
 
-    m1: NodeHealth
-    m2: NodeHealth
-    plc: PlcHealth
-    timing: TimingHealth
+    m1: NodeHealth  # inverter m1
+    m2: NodeHealth  # inverter m2
+    plc: PlcHealth  # by its last status
+    timing: TimingHealth  # of the present stretch
 
 
 class LogTopic(Enum):
@@ -87,28 +87,28 @@ class LogTopic(Enum):
 class Notice:
     """One thing that happened, on the host's monotonic clock [ns]."""
 
-    t_ns: int
-    kind: LogTopic
-    text: str
+    t_ns: int  # when, not when it was shown
+    kind: LogTopic  # INFO alone is not shown as the message of the screen
+    text: str  # what the log shows behind its age and topic
 
 
 @dataclass(frozen=True, slots=True)
 class Began:
     """An experiment begins; ``recording`` is where it will be."""
 
-    experiment: str
+    experiment: str  # its name in the rig file; empty where a recording is played
     recording: str
-    duration_s: float
+    duration_s: float  # of the measured part; of a recording, of all of it
 
 
 @dataclass(frozen=True, slots=True)
 class Over:
     """An experiment is over, the drives are disarmed."""
 
-    experiment: str  # its name
-    recording: str | None  # where its samples are
-    samples: int  # how many, and how many of them are not good
-    flagged: int  # how many, and how many of them are not good
+    experiment: str  # its name in the rig file; empty where a recording was played
+    recording: str | None  # where its samples are; None where nothing was recorded
+    samples: int  # of the measured part
+    flagged: int  # of these, with a flag
     stopped: bool  # whether someone asked for its end
     reason: str | None  # what ended it before its time
     run_id: int | None = None  # its number in the run store
@@ -119,7 +119,7 @@ class Over:
 class Lost:
     """The bus is gone; the rig's process keeps trying."""
 
-    reason: str
+    reason: str  # in words
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,7 +141,7 @@ class Ended:
 class StartExperiment:
     """Start an experiment of the rig file."""
 
-    experiment: str
+    experiment: str  # its name in the rig file
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,7 +154,7 @@ class Mark:
     """Something worth remembering happened at ``t_ns`` of the host's monotonic clock."""
 
     t_ns: int
-    text: str
+    text: str  # what the operator typed
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,8 +175,8 @@ Order = StartExperiment | Stop | Mark | Reset | Quit
 class Choice:
     """An experiment as it is offered: its name, and what it will command, in words."""
 
-    name: str
-    summary: str
+    name: str  # NAME of [experiments.NAME]
+    summary: str  # several lines
 
 
 def outcome(over: Over) -> str:

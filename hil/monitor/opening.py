@@ -33,9 +33,9 @@ from hil.simulator.rig_server import required_simulation
 class Opening:
     """What the view is made of."""
 
-    source: Source
-    state: LiveState
-    choices: tuple[Choice, ...] = ()
+    source: Source  # not entered yet: nothing is connected
+    state: LiveState  # takes the source's reports
+    choices: tuple[Choice, ...] = ()  # experiments of the rig file; empty where a recording is played
 
 
 def open_rig(

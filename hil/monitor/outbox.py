@@ -43,6 +43,7 @@ class Outbox:
         self._thread.join()
 
     def sample(self, sample: Sample, phase: Phase | None) -> None:
+        """Leave a sample; the oldest is dropped, and counted as lost, where too many wait."""
         self._samples.append((sample, phase))
         self._left += 1
 

@@ -55,11 +55,13 @@ class Panel(Widget):
         self._snapshot: Snapshot | None = None
 
     def show(self, snapshot: Snapshot) -> None:
+        """Take the latest snapshot, and draw it where the panel is on the screen."""
         self._snapshot = snapshot
         if self.is_on_screen:
             self.refresh()
 
     def render(self) -> Text:
+        """Return its lines as text without markup."""
         width, height = self.size
         if self._snapshot is None:
             return Text("")
@@ -138,6 +140,7 @@ class LogPanel(Panel):
         self._n_lines = 0
 
     def show(self, snapshot: Snapshot) -> None:
+        """Take the latest snapshot; the lines being read stay where they are."""
         n_lines = len(log_lines(snapshot, self.size.width)) if self.size.width else 0
         if self._top and self._n_lines:
             self._top += max(0, n_lines - self._n_lines)
@@ -155,6 +158,7 @@ class LogPanel(Panel):
 
     @property
     def page_lines(self) -> int:
+        """Lines of the log that have room, 1 at least."""
         return max(1, self.size.height - 1)
 
     def _log(self, snapshot: Snapshot, width: int, height: int) -> list[str]:

@@ -72,8 +72,8 @@ def envelope(x: FloatArray, y: FloatArray, width: int) -> list[tuple[int, float,
 class Range:
     """What an axis shows."""
 
-    low: float
-    high: float
+    low: float  # at its left or lower end
+    high: float  # at its right or upper end
 
 
 def title(text: str, value: str, width: int) -> str:
@@ -159,6 +159,7 @@ class Ring:
         self._end = 0
 
     def append(self, row: tuple[float, ...]) -> None:
+        """Add a row of ``columns`` numbers; the oldest is left out where there are more than ``length``."""
         if self._end == self._rows.shape[0]:  # move the younger half to the front: once in ``length`` rows
             self._rows[: self._length] = self._rows[self._length :]
             self._end = self._length
@@ -170,4 +171,5 @@ class Ring:
         return self._rows[max(0, self._end - self._length) : self._end].copy()
 
     def clear(self) -> None:
+        """Forget all rows."""
         self._end = 0

@@ -24,6 +24,7 @@ def torque(snapshot: Snapshot, width: int, height: int) -> list[str]:
 
 
 def speed(snapshot: Snapshot, width: int, height: int) -> list[str]:
+    """Draw the motor speed, gaps where a sample does not count."""
     s = snapshot.signals
     now = _or_why_not(snapshot, f"{_latest(s.speed_rad_s):.2f}")
     return _draw(s, "speed [rad/s]", s.speed_rad_s, 1.0, now, width, height)

@@ -43,9 +43,9 @@ SILENT_AFTER_S = 2.0
 class Quality:
     """The samples of the last seconds."""
 
-    samples: int = 0  # how many, since the first good one of this stretch (listening, or one run)
-    good: int = 0  # how many, since the first good one of this stretch (listening, or one run)
-    against: tuple[tuple[str, int], ...] = ()
+    samples: int = 0  # of the last `WINDOW_S`, from the first good one of this stretch (listening, or one run)
+    good: int = 0  # of these; a remark is no fault
+    against: tuple[tuple[str, int], ...] = ()  # what is against samples, and how many; the most frequent first
     standing_s: float = 0.0  # time since the last good sample [s]; 0 while the latest is good
     why: str = ""  # what is against the latest one, in words
 
@@ -139,10 +139,10 @@ class Headline:
     rig: str  # its name, or that of the recording that is played
     activity: Activity  # what is happening
     experiment: str  # of the run under way
-    phase: str  # of the run under way
-    phase_s: float  # of the run under way
-    duration_s: float  # of the run under way
-    recording: str  # of the run under way
+    phase: str  # of the run under way: value of `Phase`, or "arming"; empty where none is known
+    phase_s: float  # time since the phase began [s]; NaN while there is none
+    duration_s: float  # of the measured part [s]
+    recording: str  # path for the run under way, name of one that is played; empty without either
     message: str  # the last thing the operator has to know
     silent_s: float = 0.0  # time since the source last said anything [s]: so old is what is shown
 
@@ -151,9 +151,9 @@ class Headline:
 class Channel:
     """A further measured channel: its column in recordings, its unit, and its values, shape (N,)."""
 
-    name: str
-    unit: str
-    values: FloatArray
+    name: str  # column in recordings
+    unit: str  # as in the rig file
+    values: FloatArray  # NaN where it was not read
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -170,7 +170,7 @@ class Signals:
     torque_m2_nm: float  # the latest of each inverter [Nm]
     window_s: float  # what the plots reach back [s]
     twist_of: str  # where the numbers behind the twist are from, or why there is none
-    twist_std_rad: float
+    twist_std_rad: float  # standard deviation of the twist; NaN without a model
     channels: tuple[Channel, ...] = ()  # the further ones of the rig file, in its order
 
 
@@ -178,11 +178,11 @@ class Signals:
 class History:
     """The resonance over time, shape (n,) each; ``time_s`` is 0 now and negative before [s]."""
 
-    time_s: FloatArray
-    frequency_hz: FloatArray
-    frequency_std_hz: FloatArray
-    damping: FloatArray
-    damping_std: FloatArray
+    time_s: FloatArray  # oldest first
+    frequency_hz: FloatArray  # of the resonance
+    frequency_std_hz: FloatArray  # standard deviation
+    damping: FloatArray  # damping ratio
+    damping_std: FloatArray  # standard deviation
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -205,13 +205,13 @@ class Estimation:
 
     status: str  # the estimator's own word, and why
     live: bool  # whether samples come in
-    resonance_hz: float
-    resonance_std_hz: float
-    damping: float
-    damping_std: float
-    history: History
-    model: Model | None
-    alarms: tuple[Alarm, ...]
+    resonance_hz: float  # frequency; NaN while there is no resonance to be used
+    resonance_std_hz: float  # standard deviation
+    damping: float  # damping ratio
+    damping_std: float  # standard deviation
+    history: History  # of the resonance, over runs
+    model: Model | None  # None before there is one, and while it would be one of noise
+    alarms: tuple[Alarm, ...]  # oldest first
     state: TrackingState | None = None  # what the tracking is doing
 
 
@@ -219,12 +219,12 @@ class Estimation:
 class Snapshot:
     """Everything at one moment; ``health`` is None until the rig has sent it, and stays so for a recording."""
 
-    headline: Headline
-    signals: Signals
-    estimation: Estimation
+    headline: Headline  # first line of the screen, and its message
+    signals: Signals  # in the window that was chosen
+    estimation: Estimation  # of the run under way, or of the last
     health: Health | None
-    log: tuple[Notice, ...]
-    now_ns: int
-    runs: int
-    can_drive: bool
-    quality: Quality
+    log: tuple[Notice, ...]  # oldest first
+    now_ns: int  # time of the latest sample, on the samples' clock
+    runs: int  # that are over
+    can_drive: bool  # False where a recording is played
+    quality: Quality  # of the samples of the last seconds

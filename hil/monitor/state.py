@@ -80,10 +80,12 @@ class LiveState:
 
     @property
     def activity(self) -> Activity:
+        """What is happening."""
         return self._headline.activity
 
     @property
     def is_driving(self) -> bool:
+        """Whether a run is starting, under way or ordered to stop."""
         return self.activity in (Activity.STARTING, Activity.RUNNING, Activity.STOPPING)
 
     def zoom(self, by: int) -> None:
@@ -106,6 +108,7 @@ class LiveState:
         )
 
     def take(self, report: Report) -> None:
+        """Take a report of the source."""
         match report:
             case Samples():
                 self._take_samples(report)
