@@ -60,13 +60,13 @@ Courses = Mapping[Vehicle, Sequence["Course"]]
 class Course:
     """One parameter of one vehicle over its recordings; ``pooled`` where its fleet is large enough."""
 
-    of: Of
-    unit: str
-    seen: Seen
-    dates: tuple[str, ...]
-    usual: Usual
+    of: Of  # effect (empty for the line) and parameter
+    unit: str  # empty for a pure number
+    seen: Seen  # of this vehicle
+    dates: tuple[str, ...]  # day of each recording, its name where none is known
+    usual: Usual  # of all vehicles with that model
     pooled: Pooled | None
-    change: Change | None
+    change: Change | None  # the largest step over its recordings; None where none is beyond chance
 
 
 def _current(folder: Path) -> dict[str, DatasetRow]:

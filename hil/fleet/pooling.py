@@ -42,26 +42,26 @@ QUANTILE = float(norm.ppf(0.975))
 class Seen:
     """The values of one parameter in the recordings of a vehicle, in the order of time, shape (n,) each."""
 
-    value: FloatArray
-    std: FloatArray
+    value: FloatArray  # in the parameter's unit
+    std: FloatArray  # from the 95 % interval; 0 where there is none
 
 
 @dataclass(frozen=True, slots=True)
 class Usual:
     """What is usual: mean, spread over vehicles, and spread over the drives of one vehicle."""
 
-    mean: float
-    between: float
-    within: float
-    n_vehicles: int
+    mean: float  # over vehicles
+    between: float  # tau, standard deviation over vehicles
+    within: float  # omega, standard deviation over the drives of one vehicle, beyond what their own intervals make
+    n_vehicles: int  # that it was estimated from
 
 
 @dataclass(frozen=True, slots=True)
 class Pooled:
     """What is known of a vehicle's parameter from all its recordings and from the fleet."""
 
-    value: float
-    std: float
+    value: float  # mean of the posterior
+    std: float  # of the posterior: of the vehicle's level, not of a single drive
     from_fleet: float  # share of the value that came from the prior
     away: float  # from what is usual to its own recordings alone, in standard deviations of a usual vehicle's
 
@@ -75,10 +75,10 @@ class Pooled:
 class Change:
     """A step in a vehicle's recordings: which is the first of the new level, both levels, and how many deviations."""
 
-    first: int
-    before: float
-    after: float
-    away: float
+    first: int  # its place among the recordings, from 0
+    before: float  # weighted mean of the recordings before it
+    after: float  # weighted mean of it and those after it
+    away: float  # signed: positive where the level rose
 
 
 def threshold(comparisons: int) -> float:

@@ -51,8 +51,8 @@ LEAST_MEMORY = 512 << 20  # of a worker [bytes]: hil alone takes 300 MiB, and Da
 class Engine:
     """Where the work is done: on a cluster that runs, or on workers of this machine, each with one thread."""
 
-    scheduler: str | None = None
-    workers: int = 1
+    scheduler: str | None = None  # address of a cluster's; None: this machine works
+    workers: int = 1  # processes of this machine
     memory: str = "auto"  # of each worker, as Dask writes it; "auto" divides what there is
     retries: int = 2  # how often Dask tries again what a worker died of, or failed at
     dashboard: bool = False  # of this machine's cluster: a page of Dask's, which every local user can open
@@ -203,8 +203,10 @@ def hand_out(
 class Fleet:
     """The recordings of a fleet, described, and what is wrong with the others."""
 
+    # each content once, in the order in which the sources name them
     recordings: list[FleetRecording] = field(default_factory=list)
-    failed: list[tuple[FleetRecording, str]] = field(default_factory=list)
+    failed: list[tuple[FleetRecording, str]] = field(default_factory=list)  # with what is wrong with each
+    # with the recording of the same content that counts
     duplicates: list[tuple[FleetRecording, FleetRecording]] = field(default_factory=list)
 
     def pieces(self, by_vehicle: bool) -> list[tuple[FleetRecording, ...]]:
@@ -282,9 +284,9 @@ def survey(
 class Done:
     """How many pieces of work were computed, were there before, and failed."""
 
-    computed: int = 0
-    known: int = 0
-    failed: int = 0
+    computed: int = 0  # in this call
+    known: int = 0  # in the dataset before
+    failed: int = 0  # recordings that can't be read, and pieces without a result
 
 
 def carry_out(

@@ -40,8 +40,8 @@ class Seen:
     """What a recording's file says of itself: kept, so that one that is known is not read again."""
 
     sha256: str  # of its content, and of the sidecar that belongs to it
-    vehicle: str = ""
-    rig: str = ""
+    vehicle: str = ""  # empty where the file does not say
+    rig: str = ""  # name in the rig file that it was recorded with; empty without one
     started: str = ""  # ISO 8601
 
 
@@ -49,11 +49,11 @@ class Seen:
 class FleetRecording:
     """A recording of the fleet, by its path or its address of fsspec; the rest is empty where nothing says it."""
 
-    url: str
-    vehicle: str = ""
-    rig: str = ""
+    url: str  # absolute path, or address
+    vehicle: str = ""  # from the path; else what the file says, else rig or folder
+    rig: str = ""  # from the path, else what the file says
     started: str = ""  # ISO 8601
-    sha256: str = ""
+    sha256: str = ""  # as `Seen` has it; empty before the file was read
 
     @property
     def name(self) -> str:

@@ -44,14 +44,14 @@ TWO_MASS = ("J_M", "J_L", "k", "c", "b_M", "b_L")
 class FleetJob:
     """What is done to every recording; ``file`` is None where they are identified as they are."""
 
-    command: str
-    file: ModelFile | None
-    model: str = ""
-    model_sha256: str = ""
+    command: str  # `DIAGNOSE` or `IDENTIFY`
+    file: ModelFile | None  # its [signals] are how foreign recordings are read
+    model: str = ""  # name of the model file; empty without one
+    model_sha256: str = ""  # of the model file as it is; empty without one
     from_fleet: tuple[str, ...] = ()  # parameters of the model that the fleet's prior has set
-    effort: str = "normal"
-    budget_s: float = 3600.0
-    version: str = __version__
+    effort: str = "normal"  # level of a diagnosis, as --effort has it
+    budget_s: float = 3600.0  # of each recording, or of a vehicle's together
+    version: str = __version__  # of the client; a worker of another refuses
 
     def key(self, recordings: Sequence[FleetRecording]) -> str:
         """Return what a result is known by: the content of the recordings, the model's, the effort and the version."""
@@ -65,9 +65,9 @@ class FleetJob:
 class Outcome:
     """Rows and verdict of one piece of work; what was wrong with its input, or empty."""
 
-    rows: dict[str, list[DatasetRow]]
-    verdict: str
-    error: str = ""
+    rows: dict[str, list[DatasetRow]]  # by name of the dataset's table; empty with an error
+    verdict: str  # diagnosis.json or identification.json, as text
+    error: str = ""  # in words
 
 
 def describe(found: FleetRecording, limit_s: float) -> Seen | str:
