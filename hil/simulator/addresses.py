@@ -24,8 +24,8 @@ place of a drive that carries torque."""
 class Address:
     """A TCP address; port 0 lets the system choose a free one."""
 
-    host: str
-    port: int
+    host: str  # name or IP address, an IPv6 one without brackets
+    port: int  # 0 to 65535
 
     def __str__(self) -> str:
         host = f"[{self.host}]" if ":" in self.host else self.host

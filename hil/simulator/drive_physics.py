@@ -51,6 +51,7 @@ class SimulatedInverter:
     identity: tuple[int, int] = (0, 0)  # Vendor-ID and product code where its EDS has none
     speed_unit: SpeedUnit | None = None  # Unit of its velocity actual value where its EDS has none
     rated_torque_unit_nm: float = 1e-3  # What one count of its object 0x6076 is [Nm]
+    # by object, what reads a further channel [counts]
     sensors: Mapping[ObjectId, Callable[[], int]] = field(default_factory=dict)
     faults: InverterFaults = field(default_factory=InverterFaults)  # What is wrong with it
     serial_number: int | None = None  # Entry 4 of its identity, 0x1018; None for the EDS's
@@ -150,6 +151,7 @@ class DriveSensors:
         self.torque = self.current = self.speed = 0
 
     def sample(self, true_speed_rad_s: float, torque_permille: float, step: int) -> None:
+        """Take what a SYNC finds: true speed [rad/s] and torque [per mille of rated]; ``step`` is its number."""
         speed_rad_s, torque = self._clock.sample(true_speed_rad_s, torque_permille)
         torque_noise, speed_noise = next(self._noise), next(self._noise)
         torque += self._settings.torque_noise_counts * torque_noise
@@ -178,6 +180,7 @@ class ErrorList:
 
     @property
     def register(self) -> int:
+        """Error register, 0x1001, of what is wrong now."""
         bits = 0
         for code in self._active:
             bits |= GENERIC | _CLASSES.get(code & 0xFF00, _CLASSES.get(code & 0xF000, 0))

@@ -48,8 +48,8 @@ NO_EXPERIMENT_S = 60.0  # length of the widest recording where the rig file has 
 class EffectSpec:
     """An effect put into the simulated rig: its name in the catalogue and the parameters given for it."""
 
-    name: str
-    parameters: Mapping[str, float]
+    name: str  # not checked here
+    parameters: Mapping[str, float]  # in the catalogue's units; those left out have its defaults
 
     @classmethod
     def parse(cls, text: str) -> EffectSpec:

@@ -41,9 +41,9 @@ _SPEC = re.compile(r"(?P<device>\w+)\.(?P<kind>\w+)(?:@(?P<at_s>[^=]+))?(?:=(?P<
 class Moment:
     """When a fault comes, in simulated time [s], and its size; ``step`` is that SYNC, counted from 1."""
 
-    at_s: float
-    period_s: float
-    size: Any = None
+    at_s: float  # 0: from power-on
+    period_s: float  # of the SYNC, by the rig file
+    size: Any = None  # as `Size.read` returns it; None for a fault without one
 
     @property
     def step(self) -> int:
@@ -58,20 +58,20 @@ class Size:
     ``read`` raises ValueError for what it may not be; without a default it has to be given.
     """
 
-    sign: str
-    expected: str
+    sign: str  # such as CODE
+    expected: str  # continues "expected"
     read: Callable[[str], Any]
-    default: Any = None
+    default: Any = None  # None: it has to be given
 
 
 @dataclass(frozen=True, slots=True)
 class FaultKind:
     """One kind of fault: a row of the table; what it sets in its device's faults, a value or what makes it."""
 
-    fields: Mapping[str, Any]
-    size: Size | None = None
-    timed: bool = False
-    since_start: bool = False
+    fields: Mapping[str, Any]  # by field (``a.b``: a field of a field) its value, or what makes it of a `Moment`
+    size: Size | None = None  # None: it takes none
+    timed: bool = False  # whether it takes a moment
+    since_start: bool = False  # whether the moment may be left out: it is there from power-on then
 
     def put_into(self, faults: Any, when: Moment) -> Any:
         """Return a device's faults with this one among them."""

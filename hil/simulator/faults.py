@@ -23,8 +23,8 @@ LATE_BY_S: Final = 1.5
 class AtStep(Generic[T]):
     """What happens at one step, or from it on. Steps count the SYNCs from 1, here and below; 0 is power-on."""
 
-    step: int
-    what: T
+    step: int  # the first, or the only one
+    what: T  # error code, state, share or time: as the field that holds it says
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,9 +35,9 @@ class WrongTorque:
     torque more.
     """
 
-    step: int | None = None
-    gain: float = 1.0
-    offset_permille: float = 0.0
+    step: int | None = None  # None: never
+    gain: float = 1.0  # over what it is asked for
+    offset_permille: float = 0.0  # of rated torque
 
     def given(self, wanted_permille: float, step: int) -> float:
         """Torque it gives at a step [per mille of rated]."""
@@ -50,9 +50,9 @@ class WrongTorque:
 class WrongSpeed:
     """A resolver that reads another speed than the motor has, from one step on: so many times it, or stuck there."""
 
-    gain_from_step: int | None = None
-    gain: float = 1.0
-    stuck_from_step: int | None = None
+    gain_from_step: int | None = None  # None: never
+    gain: float = 1.0  # read over true; -1: turned round
+    stuck_from_step: int | None = None  # the reading of that moment stays; None: never
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,35 +77,35 @@ class DriveLimits:
 class InverterFaults:
     """What is wrong with a simulated inverter; by default nothing. What each does: docs/supported-protocols.md."""
 
-    absent: bool = False
-    hang_at_step: int | None = None
-    reset_at_step: int | None = None
-    bus_off_at_step: int | None = None
-    stale_from_step: int | None = None
-    stale_share: float = 0.0
-    ignores_target_from_step: int | None = None
+    absent: bool = False  # it is not on the bus
+    hang_at_step: int | None = None  # its program stops, link up: no torque, no answer
+    reset_at_step: int | None = None  # it starts anew, as at power-on
+    bus_off_at_step: int | None = None  # it leaves the bus; its torque goes as 0x6007 says
+    stale_from_step: int | None = None  # each TPDO repeats the one before from there on
+    stale_share: float = 0.0  # of its TPDOs that repeat the one before, at random, 0 to 1
+    ignores_target_from_step: int | None = None  # no torque in OPERATION ENABLED, bit 12 of 0x6041 is 0
     leaves_operation: AtStep[PowerState] | None = None  # for this state, by itself, with neither fault nor EMCY
-    wrong_torque: WrongTorque = field(default_factory=WrongTorque)
-    wrong_speed: WrongSpeed = field(default_factory=WrongSpeed)
+    wrong_torque: WrongTorque = field(default_factory=WrongTorque)  # none by default
+    wrong_speed: WrongSpeed = field(default_factory=WrongSpeed)  # none by default
     second_tpdo: AtStep[int] | None = None  # somebody sends each TPDO again, with a speed of 0, at every n-th SYNC
     fault: AtStep[int] | None = None  # its error code, for EMCY and object 0x603F
-    emcy: AtStep[int] | None = None
-    brown_out_at_step: int | None = None
-    identity: tuple[int, int] | None = None
-    velocity_unit: int | None = None
-    ignored_writes: frozenset[int] = frozenset()
-    missing_objects: frozenset[int] = frozenset()
-    locked_objects: frozenset[int] = frozenset()
-    clock_drift_ppm: float = 0.0
-    limits: DriveLimits = field(default_factory=DriveLimits)
+    emcy: AtStep[int] | None = None  # the error code that it sends, without a fault
+    brown_out_at_step: int | None = None  # its supply is gone: under-voltage 0x3220, not to be reset
+    identity: tuple[int, int] | None = None  # vendor-ID and product code that 0x1018 reads; None: its own
+    velocity_unit: int | None = None  # what 0x60A9 reads in place of its own; None: its own
+    ignored_writes: frozenset[int] = frozenset()  # indices whose writes are acknowledged and forgotten
+    missing_objects: frozenset[int] = frozenset()  # indices that it does not have, though its EDS does
+    locked_objects: frozenset[int] = frozenset()  # indices that it refuses to write
+    clock_drift_ppm: float = 0.0  # by which the clock it samples by is slow
+    limits: DriveLimits = field(default_factory=DriveLimits)  # that it sets itself
 
 
 @dataclass(frozen=True, slots=True)
 class Frames:
     """Some of the frames of a bus, and by how much they are touched: a share, 0 to 1, or a time [s]."""
 
-    amount: float
-    cob_id: int | None = None
+    amount: float  # whose meaning the fault gives
+    cob_id: int | None = None  # None: all PDOs
 
     def meant(self, cob_id: int) -> bool:
         """Whether a frame is one of them; all PDOs are where no COB-ID is named."""
@@ -120,14 +120,14 @@ class BusFaults:
     and jitter are of the wall clock. Swapped nodes: each inverter has the node id of the other.
     """
 
-    lose: AtStep[Frames] | None = None
-    corrupt: AtStep[Frames] | None = None
-    repeat: AtStep[Frames] | None = None
-    reorder: AtStep[Frames] | None = None
-    delay: AtStep[Frames] | None = None
-    jitter: AtStep[Frames] | None = None
-    off_at_step: int | None = None
-    swapped_nodes: bool = False
+    lose: AtStep[Frames] | None = None  # share that does not arrive
+    corrupt: AtStep[Frames] | None = None  # share that arrives one byte short
+    repeat: AtStep[Frames] | None = None  # share that arrives twice
+    reorder: AtStep[Frames] | None = None  # share that the next one overtakes
+    delay: AtStep[Frames] | None = None  # time by which they arrive later [s]
+    jitter: AtStep[Frames] | None = None  # largest time by which they arrive later, in their order [s]
+    off_at_step: int | None = None  # the host's controller leaves the bus: no frame either way
+    swapped_nodes: bool = False  # from power-on
 
     @property
     def touch_frames(self) -> bool:
@@ -157,9 +157,9 @@ class PlcFaults:
     ``swaps_floats`` the words of its floating-point values have the other order than the register map says.
     """
 
-    clutch_closes_at_s: float = math.inf
-    permissive_withdrawn_at_s: float = math.inf
-    mode_changes_at_s: float = math.inf
+    clutch_closes_at_s: float = math.inf  # it reports CLOSED from then on
+    permissive_withdrawn_at_s: float = math.inf  # and not given again
+    mode_changes_at_s: float = math.inf  # to ELECTRIC
     answers_at_s: frozenset[tuple[float, PlcAnswers]] = frozenset()
     swaps_floats: bool = False
 
@@ -173,7 +173,7 @@ class PlcFaults:
 class RigFaults:
     """What is wrong with the simulated devices; by default nothing."""
 
-    m1: InverterFaults = field(default_factory=InverterFaults)
-    m2: InverterFaults = field(default_factory=InverterFaults)
-    bus: BusFaults = field(default_factory=BusFaults)
-    plc: PlcFaults = field(default_factory=PlcFaults)
+    m1: InverterFaults = field(default_factory=InverterFaults)  # of the drive behind inverter m1
+    m2: InverterFaults = field(default_factory=InverterFaults)  # of the drive behind inverter m2
+    bus: BusFaults = field(default_factory=BusFaults)  # between host and devices
+    plc: PlcFaults = field(default_factory=PlcFaults)  # of the PLC and the vehicle it speaks for

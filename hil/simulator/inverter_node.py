@@ -96,6 +96,7 @@ class InverterNode:
 
     @property
     def torque_nm(self) -> float:
+        """Torque in effect now, what the PLC adds included [Nm]."""
         return self._device.torque_nm
 
     def add_torque(self, torque_nm: float) -> None:

@@ -128,10 +128,12 @@ class PdoFrame:
 
     @property
     def bits(self) -> int:
+        """Length of all mapped objects together."""
         return sum(mapped.length_bits for mapped in self.layout.objects)
 
     @property
     def size_bytes(self) -> int:
+        """Length of a frame; above 8 it does not fit."""
         return (self.bits + 7) // 8
 
     @property
@@ -175,9 +177,11 @@ class PdoObjects:
                 self._check_mapping(direction, communication, index, subindex, value)
 
     def rpdos(self) -> tuple[PdoFrame, ...]:
+        """Return the RPDOs that are valid and mapped now."""
         return tuple(self._frames(RPDO))
 
     def tpdos(self) -> tuple[PdoFrame, ...]:
+        """Return the TPDOs that are valid and mapped now."""
         return tuple(self._frames(TPDO))
 
     def deadline_ms(self, rpdo: PdoLayout) -> int:

@@ -55,10 +55,10 @@ class PlcSetup:
     """How the PLC is built, and what it starts with."""
 
     drive_mode: DriveMode = DriveMode.SERIES  # Mode at the start
-    speed_limit_rad_s: float = 320.0  # Limits it reports [rad/s, Nm]
-    torque_limit_nm: float = 450.0  # Limits it reports [rad/s, Nm]
+    speed_limit_rad_s: float = 320.0  # largest motor speed it reports [rad/s]
+    torque_limit_nm: float = 450.0  # largest torque of one inverter it reports [Nm]
     period_s: float = 0.01  # PLC cycle [s]
-    host_timeout_s: float = math.inf
+    host_timeout_s: float = math.inf  # simulated time without the host's beat after which it permits no torque
 
 
 _ACCEPTED: Final[Mapping[str, tuple[str, Callable[[Value], bool]]]] = MappingProxyType(

@@ -324,6 +324,7 @@ class PlcServer:
         self._paused = True
 
     def resume(self) -> None:
+        """Answer again, after `pause`."""
         self._paused = False
 
     def _answers(self) -> PlcAnswers:

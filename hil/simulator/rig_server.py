@@ -57,12 +57,14 @@ class ChannelSensors:
         self.sample()  # what a driveline has no place for is refused here, and not at the first SYNC
 
     def sample(self) -> None:
+        """Read every channel as it is now, with its noise."""
         if self._plant is not None:
             for table in self._tables:
                 noise = self._noise.get(table.column, 0.0) * float(self._random.standard_normal())
                 self._read[table.column] = self._plant.measured(table.kind, table.at) + noise
 
     def objects(self, inverter: str) -> Mapping[ObjectId, Callable[[], int]]:
+        """Return the objects of one inverter (m1, m2) that hold channels, and what reads each [counts]."""
         return {
             table.object_id: partial(self._count, table)
             for table in self._tables
@@ -212,6 +214,7 @@ class RigServer:
 
 
 def required_simulation(rig: Rig) -> SimulationTable:
+    """Return the table [simulation]; `UsageError` where the rig file has none."""
     if rig.simulation is None:
         raise UsageError(
             f"rig {rig.name!r}: expected a table [simulation] that says what to simulate, there is none. "

@@ -55,9 +55,9 @@ class AbortConnection(IntEnum):
 class Stop:
     """A stop under way: the ramp, the power state while it lasts, and that at its end."""
 
-    ramp: Ramp
-    passing: PowerState
-    final: PowerState
+    ramp: Ramp  # how the torque goes to zero
+    passing: PowerState  # until the torque is zero
+    final: PowerState  # once the torque is zero
 
 
 _SLOPES: Final = MappingProxyType({1: Ramp.SLOPE, 2: Ramp.QUICK})
@@ -116,6 +116,7 @@ class HeartbeatConsumer:
         self._silence = Silence(timeout_ms * NS_PER_MS, GRACE_NS, LONGEST_LOOK_NS)
 
     def beat(self, t_ns: int) -> None:
+        """Take a heartbeat, at this time of the monotonic clock [ns]."""
         self._silence.beat(t_ns)
 
     def lost(self, now_ns: int) -> bool:
@@ -134,6 +135,7 @@ class RpdoDeadline:
         self._last_ns: int | None = None
 
     def received(self, now_ns: int) -> None:
+        """Take an RPDO, at this time [ns]."""
         self._last_ns = now_ns
 
     def missed(self, now_ns: int) -> bool:
