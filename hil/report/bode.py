@@ -149,6 +149,7 @@ def _band(
 
 
 def response_figure(name: str, model: LocalModel, best: LinearFit | None = None) -> Figure:
+    """Return the frequency response of one experiment as a block; ``name`` is unique in the page."""
     return figure_block(response(model, best), name, HEIGHT_PX)
 
 

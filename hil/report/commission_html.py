@@ -46,6 +46,7 @@ SPEED = ("speed [rad/s]", [("speed", "speed_rad_s", Style.AFTER)])
 
 
 def commission_page(state: StateDocument, titles: Mapping[str, str], made: Provenance | None = None) -> str:
+    """Return the HTML of a commissioning; ``state`` as commission.json has it, titles by name of the step."""
     steps = state["steps"]
     begun, updated = moment(state["started_utc"]), moment(state["updated_utc"])
     return html.page(

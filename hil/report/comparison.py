@@ -36,16 +36,16 @@ class Comparison:
     """One output of a recording, its simulation by one model, and how far they differ."""
 
     model: str  # name of the model
-    motion: Motion
+    motion: Motion  # of the model
     record: Record  # the recording
     simulated: FloatArray  # (N,): In ``unit``
-    unit: str
+    unit: str  # of the output and of its errors
     rms: float  # of the error over the samples that count
-    largest: float  # of the error over the samples that count
-    load_torque: float  # constant load torque that was estimated [Nm
+    largest: float  # magnitude of the error over the samples that count
+    load_torque: float  # constant load torque that was estimated [Nm; translation N]
     fit_percent: float  # 100 (1 - norm of the error / norm of the output without its mean), the NRMSE fit
-    past_input: CorrelationTest
-    itself: CorrelationTest
+    past_input: CorrelationTest  # of the error and torques before it
+    itself: CorrelationTest  # of the error and its own past
     further: tuple[Comparison, ...] = ()  # those of the recording's further outputs that the model simulates
 
     @property

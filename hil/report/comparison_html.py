@@ -34,6 +34,7 @@ Compared = Sequence[Sequence[Comparison]]
 
 
 def comparison_page(comparisons: Compared, made: Provenance | None = None) -> str:
+    """Return the HTML of compare.html."""
     models = [each.model for each in comparisons[0]]
     count = len(comparisons)
     title = f"{listed(models)} against {count} recording{'s' if count > 1 else ''}"

@@ -29,6 +29,7 @@ Json = dict[str, Any]
 
 
 def diagnosis_text(diagnosis: Diagnosis, made: Provenance | None = None) -> str:
+    """Return the text of diagnosis.json."""
     content = diagnosis_json(diagnosis) | ({} if made is None else {"made": made.document()})
     return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 

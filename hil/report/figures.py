@@ -117,9 +117,9 @@ def _base64(values: np.ndarray[Any, Any]) -> str:
 class Mark(NamedTuple):
     """A span of time [s] to shade."""
 
-    from_s: float
-    to_s: float
-    colour: str = ORANGE
+    from_s: float  # in the time of the figure
+    to_s: float  # in the time of the figure
+    colour: str = ORANGE  # as plotly takes it
 
 
 class Style(Enum):
@@ -149,9 +149,9 @@ class Curve:
     A ``hidden`` one waits in the legend; one that is ``held`` keeps each value until the next: drawn in steps.
     """
 
-    name: str
-    y: FloatArray
-    style: Style
+    name: str  # in the legend; lines of one name are shown and hidden together
+    y: FloatArray  # over the time of the figure
+    style: Style  # of the line
     hidden: bool = False
     held: bool = False
 
@@ -160,8 +160,8 @@ class Curve:
 class Panel:
     """Lines that share an axis; ``band`` draws a pair of limits at plus and minus this value."""
 
-    axis: str
-    lines: tuple[Curve, ...]
+    axis: str  # title, with unit
+    lines: tuple[Curve, ...]  # drawn in this order, the last on top
     band: float | None = None
 
 

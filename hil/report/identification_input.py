@@ -178,9 +178,9 @@ def json_object(path: Path) -> dict[str, Any]:
 class PhysicalValue:
     """A physical parameter that a recording determines, with the half width of its 95 % interval."""
 
-    value: float
-    half_width: float
-    recording: str
+    value: float  # in the unit of identification.json, SI
+    half_width: float  # in the same unit
+    recording: str  # name of the one it is from
 
 
 def physical_values(path: Path, run: str | None = None) -> dict[str, PhysicalValue]:

@@ -155,6 +155,7 @@ def identification_text(
     made: Provenance | None = None,
     together: Together | None = None,
 ) -> str:
+    """Return the text of identification.json; ``studies`` is empty or has one for each of the results."""
     extras: list[dict[str, Any]] = [studied(each) for each in studies] or [{} for _ in results]
     document = {
         "schema": SCHEMA,

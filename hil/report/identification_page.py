@@ -313,6 +313,7 @@ def identification_page(
     made: Provenance | None = None,
     together: Together | None = None,
 ) -> str:
+    """Return the HTML of report.html; one study for each of the models."""
     drawn = list(zip(models, studies, strict=True))[:MOST_DRAWN]
     left = len(models) - len(drawn)
     return html.page(

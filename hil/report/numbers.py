@@ -73,6 +73,7 @@ def shown_interval(interval: tuple[float, float]) -> str:
 
 
 def shown_p(value: float) -> str:
+    """Format a probability; ``–`` where it is not finite, and no digits below the smallest that says anything."""
     if not math.isfinite(value):
         return "–"
     return f"< {SMALLEST_P:.0e}" if value < SMALLEST_P else f"{value:.2g}"

@@ -38,8 +38,8 @@ SCHEMES = ("https", "http")
 class Link:
     """A link; one that may not be followed (`is_allowed`) is shown as its text."""
 
-    text: str
-    href: str
+    text: str  # to be read
+    href: str  # file next to the page, or address
 
     def __str__(self) -> str:
         return self.text
@@ -49,8 +49,8 @@ class Link:
 class Badge:
     """A word on a coloured ground."""
 
-    text: str
-    kind: str = ""
+    text: str  # a word or two
+    kind: str = ""  # class of the style sheet, its colour
 
     def __str__(self) -> str:
         return self.text
@@ -60,7 +60,7 @@ class Badge:
 class Code:
     """A name as it stands in a file."""
 
-    text: str
+    text: str  # in a fixed width
 
     def __str__(self) -> str:
         return self.text
@@ -70,8 +70,8 @@ class Code:
 class Advised:
     """A value, and what to do about it."""
 
-    text: str
-    advice: str
+    text: str  # the value with its unit
+    advice: str  # without a full stop
 
     def __str__(self) -> str:
         return f"{self.text} → {self.advice}"
@@ -81,8 +81,8 @@ class Advised:
 class Bar:
     """A bar of a share, from 0 to 1, of its cell."""
 
-    share: float
-    kind: str
+    share: float  # of the cell's width
+    kind: str  # class of the style sheet: before, after, floor
 
     @property
     def percent(self) -> float:
@@ -97,10 +97,10 @@ class Bar:
 class IntervalBar:
     """A parameter's tolerance, nominal value, value and interval as a drawing; x from 0 to 100 per cent."""
 
-    label: str
-    tolerance: tuple[float, float]
-    interval: tuple[float, float]
-    value: float
+    label: str  # the same in words
+    tolerance: tuple[float, float]  # x of its ends; the nominal value is at 50
+    interval: tuple[float, float]  # x of its ends
+    value: float  # x of the value
 
     def __str__(self) -> str:
         return ""
@@ -110,39 +110,39 @@ class IntervalBar:
 class HtmlRow:
     """A row of a table; ``kind`` is a class of the style sheet (outside, undetermined)."""
 
-    cells: tuple[Any, ...]
-    kind: str = ""
+    cells: tuple[Any, ...]  # texts and inline pieces, one for each column
+    kind: str = ""  # empty: none
 
 
 @dataclass(frozen=True, slots=True)
 class Heading:
     """A heading within a section, with a remark after it."""
 
-    text: str
-    remark: str = ""
+    text: str  # one line
+    remark: str = ""  # such as the element of an effect
 
 
 @dataclass(frozen=True, slots=True)
 class Paragraph:
     """A paragraph of texts and inline pieces."""
 
-    pieces: tuple[Any, ...]
-    kind: str = ""
+    pieces: tuple[Any, ...]  # without blanks between them
+    kind: str = ""  # class of the style sheet, such as note or warning; empty: none
 
 
 @dataclass(frozen=True, slots=True)
 class Preformatted:
     """A text whose lines stay as they are."""
 
-    text: str
+    text: str  # several lines
 
 
 @dataclass(frozen=True, slots=True)
 class HtmlTable:
     """A table; columns in ``numbers`` (from 0) are flush right, one with sentences in it is prose."""
 
-    headings: tuple[str, ...]
-    rows: tuple[HtmlRow, ...]
+    headings: tuple[str, ...]  # one for each column; empty: no head
+    rows: tuple[HtmlRow, ...]  # may be empty
     numbers: frozenset[int] = frozenset()
 
     @property
@@ -162,24 +162,24 @@ class HtmlTable:
 class Details:
     """Blocks folded away under a line that opens them; on paper they are open."""
 
-    summary: str
-    blocks: tuple[Any, ...]
+    summary: str  # the line that opens them
+    blocks: tuple[Any, ...]  # of any kind
 
 
 @dataclass(frozen=True, slots=True)
 class Tiles:
     """A few figures, large: name, value, remark."""
 
-    entries: tuple[tuple[str, str, str], ...]
+    entries: tuple[tuple[str, str, str], ...]  # name, value, remark
 
 
 @dataclass(frozen=True, slots=True)
 class Figure:
     """A figure that `page.js` draws: plotly's data and layout, and the samples to zoom to."""
 
-    name: str
-    height_px: int
-    content: str
+    name: str  # unique in the page
+    height_px: int  # of the whole figure
+    content: str  # JSON
 
     @property
     def packed(self) -> str:
@@ -191,9 +191,9 @@ class Figure:
 class Register:
     """A table of many rows that `register.js` filters, sorts and shows; cells are texts, numbers or None."""
 
-    name: str
-    headings: tuple[str, ...]
-    rows: Sequence[Sequence[Any]]
+    name: str  # unique in the page
+    headings: tuple[str, ...]  # one for each column
+    rows: Sequence[Sequence[Any]]  # a cell for each heading
     folder: str = ""  # of the JSON files that the texts of the last column lead to, if they do
     choose: bool = False  # whether the first cell of a row chooses whose courses are shown
 
@@ -208,8 +208,8 @@ class Register:
 class Courses:
     """The courses of each name's values, as `register.js` draws them for the one that is chosen."""
 
-    hint: str
-    of: Mapping[str, Sequence[Mapping[str, Any]]]
+    hint: str  # shown while none is chosen
+    of: Mapping[str, Sequence[Mapping[str, Any]]]  # by the first cell of a row of the register, what is drawn
 
     @property
     def packed(self) -> str:
@@ -221,15 +221,15 @@ class Courses:
 class Cut:
     """The stretch in view of a figure, as the lines of ``[signals]`` that cut it; `page.js` writes them."""
 
-    figure: str
+    figure: str  # name of the figure
 
 
 @dataclass(frozen=True, slots=True)
 class Picture:
     """An SVG drawing, shown as an image: nothing in it can run."""
 
-    svg: str
-    label: str
+    svg: str  # source
+    label: str  # for who does not see it
 
     @property
     def address(self) -> str:
@@ -241,19 +241,19 @@ class Picture:
 class Header:
     """The head of a page: its badge, title, what it is of, and the blocks that come first."""
 
-    title: str
-    kind: str
-    badge: str
-    facts: tuple[tuple[str, str], ...]
-    blocks: tuple[Any, ...]
+    title: str  # heading of the page
+    kind: str  # class of the style sheet, of head and badge
+    badge: str  # empty: none
+    facts: tuple[tuple[str, str], ...]  # name and value
+    blocks: tuple[Any, ...]  # of any kind
 
 
 @dataclass(frozen=True, slots=True)
 class Section:
     """Blocks under a heading; the page's titles must differ, its addresses are made of them."""
 
-    title: str
-    blocks: tuple[Any, ...]
+    title: str  # differs from those of the page's other sections
+    blocks: tuple[Any, ...]  # of any kind
 
     @property
     def address(self) -> str:
