@@ -29,6 +29,7 @@ class CommandFailed(Exception):
 
 
 def run_hil(arguments: Sequence[str], folder: Path, limit_s: float) -> None:
+    """Run ``hil`` with arguments in a folder; `CommandFailed` where it does not end with 0 within ``limit_s``."""
     done = run(python("-m", "hil", *arguments), folder, limit_s, environment())
     if done.status is None:
         raise CommandFailed(f"hil {arguments[0]}: took longer than {limit_s:g} s and was ended")

@@ -36,11 +36,11 @@ class Outcome(Enum):
 class Comparison:
     """One true size next to the estimated one; ``inside`` says whether the 95 % interval holds the truth."""
 
-    what: str
-    unit: str
-    true: float
-    found: float
-    ci95: tuple[float, float] | None
+    what: str  # parameter, with its effect before it
+    unit: str  # as diagnosis.json has it
+    true: float  # by the seal
+    found: float  # by the diagnosis
+    ci95: tuple[float, float] | None  # None where none was given, or one end is not finite
 
     @property
     def inside(self) -> bool | None:
@@ -85,13 +85,14 @@ def _comparison(what: str, true: float, entry: Json) -> Comparison:
 class Judgement:
     """What became of one verdict."""
 
-    outcome: Outcome
-    hidden: tuple[str, ...]  # effects that were there, and that were named
-    named: tuple[str, ...]  # effects that were there, and that were named
+    outcome: Outcome  # one for the whole verdict
+    hidden: tuple[str, ...]  # effects that were there
+    named: tuple[str, ...]  # effects that the diagnosis names
     sizes: tuple[Comparison, ...]  # the hidden sizes that can be compared, then the nominal model's parameters
 
 
 def judge(diagnosis: Json, truth: Json) -> Judgement:
+    """Judge the content of diagnosis.json by that of an opened seal."""
     hidden = tuple(name for name in truth["effect"].split("+") if name != NOTHING)
     named = tuple(effect["name"] for effect in diagnosis["effects"])
     return Judgement(

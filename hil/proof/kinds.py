@@ -67,7 +67,7 @@ class CaseKind:
     """One row of a campaign."""
 
     name: str  # ``none``, ``off``, an effect, or a pair
-    group: Group
+    group: Group  # that its cases are counted in
     effect: str  # what is hidden, as the truth simulator calls it
     nominal_error: float = NOMINAL_ERROR  # share by which the nominal values are off at most
 
@@ -77,6 +77,7 @@ def _singles(catalogued: bool) -> list[str]:
 
 
 def kind(name: str) -> CaseKind:
+    """Return the kind of a name; `UsageError` where the name, or a part of it, is of no effect."""
     if name == NOTHING:
         return CaseKind(NOTHING, Group.NONE, NOTHING, nominal_error=0.0)
     if name == OFF:
@@ -104,9 +105,9 @@ NAMES = {
 class Drawn:
     """What one case hides, and what its bus and sizes are drawn from."""
 
-    name: str
-    kind: CaseKind
-    seed: int
+    name: str  # case_001 and on
+    kind: CaseKind  # what is hidden
+    seed: int  # of bus, sizes and recordings
 
 
 def draw(cases: int, seed: int) -> list[Drawn]:

@@ -88,6 +88,7 @@ def _share(text: str) -> float:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
+    """Make one case as files; return 0, or leave by SystemExit where the arguments are wrong."""
     parser = argparse.ArgumentParser(
         prog="python -m hil.proof.make_case", description="Make one case with something hidden, as files."
     )

@@ -46,14 +46,14 @@ Json = dict[str, Any]
 class Agreement:
     """One known value besides what was found."""
 
-    what: str
-    unit: str
-    truth: float
+    what: str  # as the truth file names it
+    unit: str  # of all its values
+    truth: float  # the known value
     found: float | None  # none where the verdict does not have it
     ci95: tuple[float, float] | None  # none where the verdict does not have it
     inside: bool | None  # whether the 95 % interval holds the known value
-    within: bool  # whether it agrees as closely as the truth file asks, and ``asked`` what that is
-    asked: str
+    within: bool  # whether it agrees as closely as the truth file asks
+    asked: str  # in words, how closely
 
 
 def run_real(

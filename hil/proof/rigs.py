@@ -148,6 +148,7 @@ def _end(process: Any) -> None:
 
 
 def rig_text(sealed: SealedProcess) -> str:
+    """Return the text of the demo's rig file, at the addresses of a sealed rig."""
     document: Any = tomlkit.parse(RIG_FILE.read_text(encoding="utf-8"))
     host, _, port = sealed.modbus.rpartition(":")
     document["can"]["url"] = sealed.bus

@@ -34,6 +34,7 @@ class Answer:
     """What the command made of a case."""
 
     diagnosis: Json | None  # content of ``diagnosis.json``
+    # of each fresh recording, as `fresh_over_floor` returns it; empty where none was simulated
     fresh_over_floor: Sequence[float] = ()
     diagnose_s: float = 0.0  # time taken [s], start of the process included
     fault: str | None = None  # why a command did not do its job
@@ -138,8 +139,8 @@ def _inside(time_s: np.ndarray[Any, Any], intervals: Intervals) -> np.ndarray[An
 class Rate:
     """A share of trials with its 95 % interval."""
 
-    hits: int
-    trials: int
+    hits: int  # of the trials
+    trials: int  # 0: nothing is known
 
     @property
     def value(self) -> float:

@@ -56,10 +56,10 @@ CONCEALED = (
 class Challenge:
     """A specimen at rest, ready to be driven, the faults of the devices it is driven by, and its seal."""
 
-    specimen: Specimen
-    plant: TruthDriveline
-    faults: tuple[str, ...]
-    seal: Seal
+    specimen: Specimen  # what is hidden in which bus
+    plant: TruthDriveline  # its physics, at standstill
+    faults: tuple[str, ...]  # as hil sim takes them
+    seal: Seal  # of specimen and faults
 
 
 def draw_challenge(

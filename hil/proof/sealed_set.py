@@ -101,11 +101,12 @@ def require_unchanged(folder: Path, digests: Digests) -> None:
 class Shown:
     """One case as it is shown: the commitment to its truth, and its files."""
 
-    commitment: str
-    files: Digests
+    commitment: str  # 64 hexadecimal digits
+    files: Digests  # SHA-256 by name
 
 
 def read_commitments(folder: Path) -> dict[str, Shown]:
+    """Read the list of a set's shown cases, by name; `UsageError` where it is none."""
     path, advice = folder / COMMITMENTS, "hil prove make DIR makes one"
     listed = read_list(path, advice)
     for name, entry in listed.items():

@@ -48,6 +48,7 @@ def work_on(
 
 
 def read_entries(path: Path, schema: str, key: str, advice: str) -> Any:
+    """Read what is under a key of a file of a schema; `UsageError`, with the advice, where it is none."""
     try:
         content = read_json(path)
     except OSError as error:

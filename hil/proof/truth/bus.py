@@ -27,12 +27,12 @@ DURATION_S = SAMPLES * PERIOD_S
 class Bus:
     """The true driveline of one bus, reflected to the motor shaft, without anything hidden."""
 
-    J_M: float  # inertia of motor and load [kg m^2]
-    J_L: float  # inertia of motor and load [kg m^2]
-    k: float  # shaft stiffness [Nm/rad] and damping [Nm s/rad]
-    c: float  # shaft stiffness [Nm/rad] and damping [Nm s/rad]
-    b_M: float  # viscous friction [Nm s/rad]
-    b_L: float  # viscous friction [Nm s/rad]
+    J_M: float  # inertia of the motor [kg m^2]
+    J_L: float  # inertia of the load [kg m^2]
+    k: float  # shaft stiffness [Nm/rad]
+    c: float  # shaft damping [Nm s/rad]
+    b_M: float  # viscous friction at the motor [Nm s/rad]
+    b_L: float  # viscous friction at the load [Nm s/rad]
     load_torque_nm: float  # rolling resistance
     gear_ratio: float  # motor turns per wheel turn
     wheel_radius_m: float  # rolling radius
@@ -145,4 +145,5 @@ _PLANS: dict[Test, Callable[[np.random.Generator], Plan]] = {
 
 
 def draw_plan(test: Test, rng: np.random.Generator) -> Plan:
+    """Draw what the driver does in a test of a kind."""
     return _PLANS[test](rng)

@@ -40,11 +40,11 @@ class TruthRecording:
     the load every 0.25 s) and ``events`` (when what took place) are the truth and go into no recording file.
     """
 
-    time_s: FloatArray
-    torque_ref_nm: FloatArray
-    torque_m1_nm: FloatArray
-    torque_m2_nm: FloatArray
-    speed_rad_s: FloatArray
+    time_s: FloatArray  # as the file has it: nominal, or the true instants
+    torque_ref_nm: FloatArray  # of both inverters together, without reading noise
+    torque_m1_nm: FloatArray  # as read
+    torque_m2_nm: FloatArray  # as read
+    speed_rad_s: FloatArray  # as read
     speed_true_rad_s: FloatArray
     disturbance_nm: FloatArray
     flags: IntArray | None = None
@@ -56,7 +56,7 @@ class TruthRecording:
 class Case:
     """What the tool gets, and what judges it; ``recordings`` and ``fresh`` in the order of `TESTS`."""
 
-    specimen: Specimen
+    specimen: Specimen  # that all recordings are of
     recordings: tuple[TruthRecording, ...]
     fresh: tuple[TruthRecording, ...]
 

@@ -61,8 +61,8 @@ def _limited(torque_nm: float, limit_nm: float, knee: float) -> float:
 class Piece:
     """A constant torque over a stretch of time."""
 
-    torque_nm: float
-    duration_s: float
+    torque_nm: float  # of both inverters together
+    duration_s: float  # how long it is held
 
 
 class DelayLine:
@@ -153,6 +153,7 @@ class TruthDriveline:
 
     @property
     def physics(self) -> Physics:
+        """What it is made of now."""
         return self._physics
 
     @property
@@ -165,8 +166,8 @@ class TruthDriveline:
 class Rolling:
     """A bus rolling steadily, and the torque reading that keeps it so [Nm]."""
 
-    driveline: TruthDriveline
-    torque_nm: float
+    driveline: TruthDriveline  # its clock and distance at zero
+    torque_nm: float  # both inverters together
 
 
 def holding_torque(physics: Physics, speed_rad_s: float, share_m1: float) -> float:

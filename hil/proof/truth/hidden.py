@@ -57,9 +57,10 @@ class HiddenEffect:
 
     name: str  # as in the contract's catalogue, or a name of its own outside it
     draw: Draw  # generator and bus to sizes
-    apply: Apply = same_physics
+    apply: Apply = same_physics  # physics, sizes and generator to the physics with the effect
     corrupt: Corrupt = same_recording  # acquisition and sizes to the acquisition with the effect
-    when: When | None = None
+    when: When | None = None  # from when to when an event lasts [s]; None for what is no event
+    # by parameter of the catalogue's effect: the size it should be, or what makes it
     fitted: Mapping[str, str | Convert] = field(default_factory=dict)
     place: ConcealedAt = ConcealedAt.NOWHERE  # the element it belongs to
     catalogued: bool = True  # false for what no entry of the contract's catalogue describes
@@ -117,10 +118,12 @@ def log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
 
 
 def log(low: float, high: float) -> Callable[[np.random.Generator], float]:
+    """Return the draw of a positive size, log-uniform between two ends."""
     return lambda rng: log_uniform(rng, low, high)
 
 
 def uniform(low: float, high: float) -> Callable[[np.random.Generator], float]:
+    """Return the draw of a size, uniform between two ends."""
     return lambda rng: rng.uniform(low, high)
 
 

@@ -32,6 +32,7 @@ FASTER = 6.0  # by how much the smaller branch of a viscoelastic shaft relaxes f
 
 @compiled
 def speeds_of(state: FloatArray) -> Speeds:
+    """Return the speeds of a state, shape (STATES,)."""
     return state[StateIndex.SPEED_M], state[StateIndex.SPEED_X], state[StateIndex.SPEED_L], state[StateIndex.SPEED_V]
 
 

@@ -28,23 +28,23 @@ class Acquisition:
     curvature: float = 0.0  # change of the speed's gain with speed
     sign_blind: bool = False  # the magnitude of the speed is read
     grid_rad_s: float = 0.0  # step of the speed's number format [rad/s]
-    count_rad: float = 0.0  # angle of an encoder's count, and the time over which counts are made to a speed
-    count_time_s: float = 0.0  # angle of an encoder's count, and the time over which counts are made to a speed
-    clock_error: float = 0.0
+    count_rad: float = 0.0  # angle of an encoder's count; 0: there is none
+    count_time_s: float = 0.0  # time over which counts are made to a speed
+    clock_error: float = 0.0  # by which speeds are sampled later than their time, over that time
     jitter_s: float = 0.0  # greatest deviation of a speed's sampling instant from its time
     stamps_told: bool = False  # whether ``time_s`` has the true instants
-    stale_share: float = 0.0  # share of samples that begin a run of repeats, the longest run
-    stale_most: int = 1  # share of samples that begin a run of repeats, the longest run
-    stale_every: int = 0  # share of samples that begin a run of repeats, the longest run
+    stale_share: float = 0.0  # share of samples that begin a run of repeats, at random
+    stale_most: int = 1  # longest run of repeats
+    stale_every: int = 0  # one in so many samples repeats the one before it, in place of random ones; 0: none
     stale_rows: bool = False  # whether torques are repeated with the speed
-    lost_share: float = 0.0  # share of samples that begin a run of lost ones, the longest run
-    lost_most: int = 1  # share of samples that begin a run of lost ones, the longest run
-    lost_m1: bool = False  # what is lost
-    lost_m2: bool = False  # what is lost
-    lost_speed: bool = False  # what is lost
+    lost_share: float = 0.0  # share of samples that begin a run of lost ones
+    lost_most: int = 1  # longest run of lost ones
+    lost_m1: bool = False  # whether the torque of m1 is lost
+    lost_m2: bool = False  # whether the torque of m2 is lost
+    lost_speed: bool = False  # whether the speed is lost
     lost_as_zero: bool = False  # whether a lost sample is recorded as 0, without a flag
-    spike_share: float = 0.0  # share of the speeds with a wrong bit, and the greatest of these errors
-    spike_rad_s: float = 0.0  # share of the speeds with a wrong bit, and the greatest of these errors
+    spike_share: float = 0.0  # share of the speeds with a wrong bit
+    spike_rad_s: float = 0.0  # greatest of these errors
 
 
 FAULTLESS = Acquisition()
@@ -58,13 +58,13 @@ class Noise:
     reading: of first order, with these corner frequencies.
     """
 
-    speed_rad_s: float = SPEED_NOISE_RAD_S
-    torque_nm: float = TORQUE_NOISE_NM
-    torque_quantum_nm: float = TORQUE_QUANTUM_NM
-    coloured_rad_s: float = 0.0
-    coloured_hz: float = 5.0
-    torque_drift_nm: float = 0.0
-    torque_drift_hz: float = 0.05
+    speed_rad_s: float = SPEED_NOISE_RAD_S  # white
+    torque_nm: float = TORQUE_NOISE_NM  # white, of each inverter's reading
+    torque_quantum_nm: float = TORQUE_QUANTUM_NM  # step of each inverter's reading; 0: none
+    coloured_rad_s: float = 0.0  # of the speed, on top of the white one
+    coloured_hz: float = 5.0  # its corner frequency
+    torque_drift_nm: float = 0.0  # of each inverter's reading
+    torque_drift_hz: float = 0.05  # its corner frequency
 
 
 USUAL = Noise()
@@ -137,9 +137,9 @@ BoolArray = NDArray[np.bool_]
 class Rows:
     """Columns of a recording, shape (N,) each; ``flags`` is None where the recorder has none to give."""
 
-    torque_m1_nm: FloatArray
-    torque_m2_nm: FloatArray
-    speed_rad_s: FloatArray
+    torque_m1_nm: FloatArray  # NaN, or 0 without a flag, where it is lost
+    torque_m2_nm: FloatArray  # the same
+    speed_rad_s: FloatArray  # the same
     flags: IntArray | None = None
 
 

@@ -79,10 +79,11 @@ class Specimen:
     seed: int  # what everything was drawn from
     bus: Bus  # the true driveline
     nominal: Mapping[str, float]  # the six values of the nominal model
-    sizes: Mapping[str, Sizes]
+    sizes: Mapping[str, Sizes]  # by name of the effect
 
     @property
     def effects(self) -> tuple[HiddenEffect, ...]:
+        """What is hidden, in the order of `effect`; one that changes nothing where that is ``none``."""
         return find(self.effect)
 
     def physics(self, rng: np.random.Generator, test: int = 0) -> Physics:
