@@ -105,8 +105,8 @@ def _kill_group(process: subprocess.Popen[Any]) -> None:
 class Done:
     """How a command ended: its status, None where it took too long, and what it said."""
 
-    status: int | None
-    said: str
+    status: int | None  # below 0: minus the number of the signal that ended it
+    said: str  # on its standard error
 
 
 def run(command: Sequence[str], folder: Path, limit_s: float, env: dict[str, str] | None = None) -> Done:
@@ -139,9 +139,11 @@ class Pipe(io.RawIOBase):
             os.set_blocking(stream.fileno(), not self._writes)
 
     def readable(self) -> bool:
+        """Whether it is the end that is read."""
         return not self._writes
 
     def writable(self) -> bool:
+        """Whether it is the end that is written."""
         return self._writes
 
     def readinto(self, place: WriteableBuffer) -> int:
@@ -161,6 +163,7 @@ class Pipe(io.RawIOBase):
                 return os.write(self._stream.fileno(), content)
 
     def close(self) -> None:
+        """Close it; what the process is no longer there to take is dropped."""
         if not self.closed:
             super().close()
             with suppress(OSError):

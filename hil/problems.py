@@ -61,9 +61,9 @@ WORDS: Final[Mapping[str, str]] = {
 class Fault:
     """One broken rule across keys: the key to fix (dotted, from the validator's own table), and why."""
 
-    key: str
-    expected: str
-    got: object
+    key: str  # empty for the table itself
+    expected: str  # continues "expected"
+    got: object  # the value; a table is shown as "a table"
 
 
 def refuse(faults: Iterable[Fault]) -> None:
@@ -175,8 +175,8 @@ Key = int | str
 class ModelWalk:
     """Where a walk has come to: the file's keys so far, and the annotation found there (None: not known)."""
 
-    keys: tuple[Key, ...]
-    annotation: Any
+    keys: tuple[Key, ...]  # numbers are places in a list, from 0
+    annotation: Any  # of a field of a pydantic model
 
     @classmethod
     def along(cls, model: type[BaseModel], where: Sequence[Key]) -> ModelWalk:

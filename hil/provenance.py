@@ -35,8 +35,8 @@ def under(line: Sequence[str]) -> Iterator[None]:
 class Source:
     """A file that took part: its path as it was given, and its SHA-256."""
 
-    file: str
-    sha256: str
+    file: str  # as it was given, not made absolute
+    sha256: str  # hexadecimal
 
     @classmethod
     def of(cls, path: Path) -> Source:
@@ -52,8 +52,8 @@ class Provenance:
     program: str  # with version and commit: hil 0.3.0 (1a2b3c4d5e6f)
     date: str  # ISO 8601, UTC
     command: str  # the command line; empty from Python
-    models: tuple[Source, ...]
-    recordings: tuple[Source, ...]
+    models: tuple[Source, ...]  # model files
+    recordings: tuple[Source, ...]  # in the order in which they were given
     rig: str = ""  # name of the rig that was recorded, where that is known
 
     def document(self) -> dict[str, Any]:

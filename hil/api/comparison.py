@@ -31,7 +31,7 @@ class ComparisonResult:
     """How far models are off; ``comparisons`` holds of each recording those of all models."""
 
     comparisons: Sequence[Sequence[Comparison]]
-    made: Provenance
+    made: Provenance  # files, with their checksums, and program
 
     def to_dataframe(self) -> pandas.DataFrame:
         """Return a row per recording, model and output: errors, fit, load torque, p-value."""

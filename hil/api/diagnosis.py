@@ -35,9 +35,9 @@ class DiagnosisResult:
     """What a diagnosis found: ``diagnosis`` holds all of it, as ``diagnosis.json`` does."""
 
     diagnosis: Diagnosis
-    file: ModelFile
-    records: tuple[Record, ...]
-    made: Provenance
+    file: ModelFile  # the model that was questioned
+    records: tuple[Record, ...]  # in the order in which they were given
+    made: Provenance  # files, with their checksums, and program
 
     @property
     def verdict(self) -> str:

@@ -33,10 +33,10 @@ class IdentificationResult:
     """What was identified; ``studies`` holds of each recording all of it."""
 
     studies: Sequence[Study]
-    records: tuple[Record, ...]
-    settings: Settings
-    file: ModelFile | None
-    made: Provenance
+    records: tuple[Record, ...]  # in the order in which they were given
+    settings: Settings  # of all of them
+    file: ModelFile | None  # None: recordings are this program's own
+    made: Provenance  # files, with their checksums, and program
 
     def to_dataframe(self) -> pandas.DataFrame:
         """Return a row per recording: resonance [Hz] and damping with 95 % intervals; NaN where there is none."""

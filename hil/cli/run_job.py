@@ -82,14 +82,14 @@ def damping(path: Path, live: LiveEstimate | None) -> Damping:
 class RunJob:
     """One run as it was asked for."""
 
-    rig: Rig
-    experiment: str
-    out: Path
-    trace: Path | None
-    pacer: Pacer
-    metadata: dict[str, str]
-    live: LiveEstimate | None
-    damper: Damping | None = None
+    rig: Rig  # at the addresses that count
+    experiment: str  # its name in the rig file
+    out: Path  # the recording
+    trace: Path | None  # of the bus; None: none is written
+    pacer: Pacer  # by the wall clock or as fast as answers come
+    metadata: dict[str, str]  # that the recording says of itself, besides what the end of the run adds
+    live: LiveEstimate | None  # None without an on-line estimate
+    damper: Damping | None = None  # None without --damper
 
 
 def record(job: RunJob, grants: RealTimeGrants) -> RunSummary:

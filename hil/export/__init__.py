@@ -22,4 +22,5 @@ class Tc6(Enum):
 
     @property
     def namespace(self) -> str:
+        """URI of its XML namespace."""
         return {Tc6.V2_01: "http://www.plcopen.org/xml/tc6_0201", Tc6.V2_0: "http://www.plcopen.org/xml/tc6_0200"}[self]

@@ -134,6 +134,7 @@ class Translation:
         self._structures[kind] = definition(kind)
 
     def text(self) -> str:
+        """Return the C source: structures, then functions, each before what calls it."""
         return "\n".join((PRELUDE, *self._structures.values(), "", *self._functions))
 
 

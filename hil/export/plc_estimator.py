@@ -29,6 +29,7 @@ PLC_WORD = 32767
 
 
 def profile(text: str) -> Adaptation:
+    """Read ``NAME[:key=value,...]``; `UsageError` where it names no profile, or keys that it has not."""
     name, _, rest = text.partition(":")
     kind = PROFILES.get(name.strip())
     if kind is None:
@@ -53,7 +54,7 @@ class PlcEstimator:
     """The estimator that is exported: what `OnlineChain` is on the host, from the same three settings."""
 
     settings: Settings = field(default_factory=Settings)  # orders, periods, high-pass and adaptation profile
-    cycle_s: float = 0.01
+    cycle_s: float = 0.01  # time between two calls on the PLC
     L: FloatArray | None = None  # denominator ``1, l_1 ..`` of the observation filter
     origin: str = "the defaults"  # where the settings come from, for the head of the text
 

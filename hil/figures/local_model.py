@@ -36,12 +36,12 @@ AGREEMENT_DB = 3.0
 class TwoMassLine:
     """A two-mass driveline without anything nonlinear, by the names of a model file [kg m^2, Nm/rad, Nm s/rad]."""
 
-    J_M: float
-    J_L: float
-    k: float
-    c: float
-    b_M: float  # noqa: N815
-    b_L: float  # noqa: N815
+    J_M: float  # inertia of the motor
+    J_L: float  # inertia of the load, at the motor shaft
+    k: float  # stiffness of the shaft
+    c: float  # damping of the shaft
+    b_M: float  # noqa: N815 - viscous friction at the motor
+    b_L: float  # noqa: N815 - viscous friction at the load
 
     @classmethod
     def of(cls, values: Mapping[str, float]) -> TwoMassLine:
@@ -97,8 +97,8 @@ class TwoMassLine:
 class Reference:
     """A driveline to compare with: the simulation's own (``truth``), or what a model file expects (``model file``)."""
 
-    name: str
-    line: TwoMassLine
+    name: str  # `TRUTH` or `MODEL_FILE`
+    line: TwoMassLine  # without effects
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,6 +118,7 @@ class LocalModel:
 
     @property
     def name(self) -> str:
+        """Name of the recording."""
         return self.record.name
 
     @property
@@ -127,6 +128,7 @@ class LocalModel:
 
     @property
     def reference_mode(self) -> Mode | None:
+        """Resonance of the reference; None without one, and where it does not oscillate."""
         return None if self.reference is None else self.reference.line.resonance
 
     def reference_response(self, frequency_hz: FloatArray) -> ComplexArray | None:
@@ -184,16 +186,17 @@ class ExperimentRow:
     """One experiment; NaN where there is no such value."""
 
     name: str  # the recording
-    online_hz: float  # natural frequency of the resonance [Hz]
-    offline_hz: float  # natural frequency of the resonance [Hz]
-    reference_hz: float  # natural frequency of the resonance [Hz]
-    online_damping: float  # its damping ratio
-    offline_damping: float  # its damping ratio
-    reference_damping: float  # its damping ratio
-    offline_db: float
-    spectral_db: float
+    online_hz: float  # natural frequency of the resonance [Hz]: of the on-line model
+    offline_hz: float  # of the output-error model
+    reference_hz: float  # of the reference
+    online_damping: float  # damping ratio of the resonance: of the on-line model
+    offline_damping: float  # of the output-error model
+    reference_damping: float  # of the reference
+    offline_db: float  # largest difference of the on-line model to the output-error model, over `coherent_hz`
+    spectral_db: float  # largest difference of the on-line model to the spectral estimate, over `coherent_hz`
+    # band around the resonance in which on-line model and spectral estimate agree; None where they do nowhere
     agrees_hz: tuple[float, float] | None
-    reference_db: float
+    reference_db: float  # largest difference of the on-line model to the reference, over `coherent_hz`
     fit_percent: float  # of the off-line model in free run
     status: str  # of the on-line estimate
 

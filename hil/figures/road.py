@@ -75,10 +75,10 @@ class Conditions:
     """One experiment's conditions."""
 
     speed_rad_s: float  # motor speed that the driver holds [rad/s]
-    payload_kg: float
+    payload_kg: float  # beyond the mass of the rig file's bus; below 0 it is lighter
     slope_rms: float  # how hilly the road is
-    wind_m_s: float  # mean head wind and standard deviation of its gusts [m/s]
-    gust_m_s: float  # mean head wind and standard deviation of its gusts [m/s]
+    wind_m_s: float  # mean head wind [m/s]
+    gust_m_s: float  # standard deviation of its gusts [m/s]
     roughness_nm: float  # RMS of what the road surface adds to the load torque, at the motor shaft [Nm]
     pedal_nm: float  # standard deviation of the driver's corrections by the pedal [Nm]
     prbs_seed: int  # first state of the shift register
@@ -137,8 +137,8 @@ class PedalCruise(Cruise):
 class Bus:
     """What of the bus the load torque depends on: its mass [kg] and metres driven per radian of the motor."""
 
-    mass_kg: float
-    metres_per_rad: float
+    mass_kg: float  # with its payload
+    metres_per_rad: float  # wheel radius over gear ratio
 
 
 class RoadLoad:
@@ -229,6 +229,7 @@ def drive(
     stop: StopRequest,
     progress: CycleProgress = lambda phase, time_s: None,
 ) -> Driven:
+    """Drive one experiment on a simulated rig under these conditions, and record it for ``duration_s`` [s]."""
     rig = read_rig(RIG_FILE)
     bus, line = _loaded(rig, conditions)
     load = RoadLoad(bus, conditions)

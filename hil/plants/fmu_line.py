@@ -50,7 +50,7 @@ MOST_PARTS = 16
 class FmuLine:
     """What is diagnosed in the place of an FMU."""
 
-    fmu: FmuPlant
+    fmu: FmuPlant  # that the user gave
     model: DrivelineModel  # the line, or the plant with the line that is nearest
     named: Names  # which variables of the FMU are what
     error: float  # RMS by which the line is off from the FMU, in the unit of the output

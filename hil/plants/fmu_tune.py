@@ -43,9 +43,9 @@ def tolerances(given: Sequence[str]) -> dict[str, float]:
 class Tuned:
     """A parameter of an FMU that acts as one of the line: that one goes with its ``exponent``-th power."""
 
-    name: str
+    name: str  # in the FMU
     start: float  # its value in the FMU
-    unit: str
+    unit: str  # as the FMU has it; empty where it has none
     exponent: float
     tolerance: float  # to which it is trusted
 

@@ -20,6 +20,7 @@ class Names:
     output: str = "speed_measured"  # what is held against the measured output
     load: str = "T_load"  # input or parameter that takes a constant load torque, to be estimated
     load_speed: str = "speed_load"  # output that is the speed of the load, for laws at it; "" for none
+    # parameters of the initial state: speed, twist, speed of the load; () for none
     start: tuple[str, ...] = ("start.speed", "start.twist", "start.load_speed")
 
 

@@ -33,9 +33,9 @@ class Plant(Protocol):
 class ModelPlant:
     """The model of a model file."""
 
-    name: str
-    model: DrivelineModel
-    events: Events = field(default_factory=dict)
+    name: str  # of the model file, or what its caller calls it
+    model: DrivelineModel  # with its effects
+    events: Events = field(default_factory=dict)  # by name of the recording, what a diagnosis found of its own in it
 
     @property
     def motion(self) -> Motion:
@@ -51,5 +51,5 @@ class ModelPlant:
 class Trust:
     """What code may run: that of a model file's own laws, and that in an FMU."""
 
-    laws: bool = False
-    fmu: bool = False
+    laws: bool = False  # --trust-laws
+    fmu: bool = False  # --trust-fmu

@@ -27,10 +27,10 @@ from hil.recording.signals_config import SignalsConfig
 class GivenInput:
     """What was given on the command line."""
 
-    model: Path
+    model: Path  # a model file or an FMU
     signals: Path | None  # file with the ``[signals]`` that recordings are read by
     mapped: Sequence[str]  # variables of an FMU (``names``)
-    trust: Trust
+    trust: Trust  # what code may run
     tuned: Sequence[str] = ()  # parameters of an FMU with what they are trusted to (``tolerances``)
     budget_s: float | None = None  # time that all simulations of an FMU may take [s]
 
@@ -39,9 +39,9 @@ class GivenInput:
 class DiagnosisInput:
     """A model and recordings; of an FMU, what is questioned in its place."""
 
-    file: ModelFile
-    records: tuple[Record, ...]
-    fmu: FmuLine | None = None
+    file: ModelFile  # in the place of an FMU, what simulates it and the [signals] that were given
+    records: tuple[Record, ...]  # in the order in which they were given
+    fmu: FmuLine | None = None  # None for a model file
 
 
 @contextmanager

@@ -40,12 +40,12 @@ class RunEntry:
     data_sha256: str = ""  # checksum of its cells (`hil.recording.checksum`)
     experiment: str = ""  # name of the experiment
     started_utc: str = ""  # ISO 8601 with offset
-    duration_s: Annotated[float, Field(allow_inf_nan=False)] = 0.0
-    samples: NonNegativeInt = 0  # rows, and how many of them are flagged
-    flagged: NonNegativeInt = 0  # rows, and how many of them are flagged
+    duration_s: Annotated[float, Field(allow_inf_nan=False)] = 0.0  # N periods of the recording [s]
+    samples: NonNegativeInt = 0  # rows
+    flagged: NonNegativeInt = 0  # rows with a flag
     software_version: str = ""  # of the program that recorded
-    rig_name: str = ""  # name and whole text of the rig file
-    rig_text: str = ""  # name and whole text of the rig file
+    rig_name: str = ""  # empty where the rig file has none
+    rig_text: str = ""  # the whole rig file; empty without one
     eds_sha256: Mapping[str, str] = field(default_factory=dict)  # SHA-256 of each EDS the scales were from
     outcome: str = COMPLETE  # `COMPLETE`, or what ended the run
     settings: Mapping[str, str] = field(default_factory=dict)  # what else the recording says of itself
@@ -60,8 +60,8 @@ class RunEntry:
 class Note:
     """What an operator wrote about a run."""
 
-    written_utc: str
-    text: str
+    written_utc: str  # ISO 8601 with offset
+    text: str  # as it was written
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,10 +89,12 @@ class Run:
 
     run_id: int  # its number
     entry: RunEntry  # what was entered
-    notes: tuple[Note, ...] = ()  # in a list of runs (`RunStore.find`) the attachments come without their documents
+    notes: tuple[Note, ...] = ()  # oldest first
+    # oldest first; in a list of runs (`RunStore.find`) without their documents
     attachments: tuple[Attachment, ...] = ()
 
     def latest(self, kind: str) -> Attachment | None:
+        """Return the last attachment of a kind; None without one."""
         return next((entry for entry in reversed(self.attachments) if entry.kind == kind), None)
 
     @property
@@ -258,12 +260,13 @@ def _list(content: Any) -> list[Any]:
 class Difference:
     """One fact of both runs; None where a run does not have it."""
 
-    what: str
-    a: Any
-    b: Any
+    what: str  # key of `run_facts` or of `results_of`
+    a: Any  # of the first run
+    b: Any  # of the second run
 
     @property
     def differs(self) -> bool:
+        """Whether both runs have other values."""
         return bool(self.a != self.b)
 
 
@@ -271,7 +274,7 @@ class Difference:
 class Comparison:
     """Two runs alongside each other; `rig_changes` are the lines of a unified diff of the rig files."""
 
-    rows: tuple[Difference, ...]
+    rows: tuple[Difference, ...]  # facts of either run, equal ones included
     rig_changes: tuple[str, ...]
 
 

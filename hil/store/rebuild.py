@@ -56,10 +56,10 @@ class Rebuilt:
 
     before: int = 0  # runs that were in it
     found: int = 0  # recordings that were entered now
-    moved: int = 0
+    moved: int = 0  # runs whose recording was found at another place
     copies: int = 0  # recordings with the data of a run whose own is still there, such as conversions
     attached: int = 0  # results (diagnosis.json, identification.json) that were attached now
-    unreadable: list[str] = field(default_factory=list)
+    unreadable: list[str] = field(default_factory=list)  # a message for each recording that can't be read
     removed: list[Path] = field(default_factory=list)  # unfinished files of processes that were killed
 
 

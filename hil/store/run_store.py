@@ -50,6 +50,7 @@ AttachmentOf = Literal["note", "result"]
 
 
 def store_of(folder: Path | str) -> Path:
+    """Return the folder of the store of a folder of recordings, be it there or not."""
     return Path(folder) / STORE_NAME
 
 
@@ -58,11 +59,11 @@ class RunFilter:
     """All that is given must hold; nothing given: every run."""
 
     experiment: str = ""  # name of the experiment
-    since: str = ""  # start of the run
-    until: str = ""  # start of the run
+    since: str = ""  # ISO 8601 or its beginning, compared as text: started then or later
+    until: str = ""  # ISO 8601 or its beginning, compared as text: started then or before
     rig: str = ""  # name of the rig, or the beginning of its rig file's SHA-256
     verdict: str = ""  # of the last diagnosis
-    text: str = ""
+    text: str = ""  # somewhere in names, rig file, notes or documents, in capitals or not
 
     def takes(self, run: Run) -> bool:
         """Whether all that is asked holds of a run; with `text`, of one with its documents."""
@@ -172,6 +173,7 @@ class RunStore:
         return taken
 
     def get(self, run_id: int) -> Run:
+        """Return a run with the documents of its attachments; `UsageError` where there is none of the number."""
         files = self._listed().get(run_id)
         run = None if files is None else self._read(run_id, files, True)
         if run is None:

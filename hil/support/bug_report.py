@@ -38,8 +38,8 @@ it. Names of files and rigs are, and so are addresses of devices.
 class Part:
     """One file of the report."""
 
-    name: str
-    content: bytes
+    name: str  # path in the ZIP, with /
+    content: bytes  # redacted
 
 
 @dataclass(frozen=True, slots=True)

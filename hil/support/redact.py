@@ -85,7 +85,9 @@ COMMON_NAMES: Final = frozenset({"root", "user", "users", "home", "admin", "loca
 class Redaction:
     """Takes out, and counts what it took out."""
 
+    # folders that are kept by a mark, such as <python>, by their paths; the longest first
     places: Mapping[str, str] = field(default_factory=lambda: dict(_places()))
+    # what stands in place of the names of user and machine
     names: Mapping[str, str] = field(default_factory=lambda: dict(_names()))
     counts: Counter[str] = field(default_factory=Counter)  # how often each kind was taken out
 
