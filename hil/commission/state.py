@@ -80,7 +80,7 @@ class StepRecord:
     status: Status = Status.PENDING  # of the last attempt
     because: str = ""  # why it was skipped, blocked, interrupted or set back; else empty
     attempt: int = 0  # number of the last one, from 1; 0 before the first
-    rig_digest: str = ""  # `rig_digest` of the rig file it was done with; empty before the first attempt
+    rig_digest: str = ""  # `rig_digest` of the rig file that its results are of, or were kept for; empty before any
     started_utc: Utc = ""  # ISO 8601; empty before the first attempt
     ended_utc: Utc = ""  # ISO 8601; empty while it is under way
     findings: list[StepFinding] = field(default_factory=list)  # of the last attempt, in their order
@@ -126,9 +126,9 @@ class CommissioningState:
     """A commissioning as far as it is."""
 
     folder: Path  # Where the file and everything next to it is
-    rig_name: str  # The rig file as of the last call
-    rig_path: str  # The rig file as of the last call
-    rig_text: str  # The rig file as of the last call
+    rig_name: str  # name in the rig file of the last call
+    rig_path: str  # path of that file, as it was given
+    rig_text: str  # its text
     steps: dict[str, StepRecord]  # Record of every step, by name, in order
     started_utc: Annotated[Utc, Field(min_length=1)] = field(default_factory=now_utc)  # of the first call, ISO 8601
     notes: list[Note] = field(default_factory=list)  # oldest first

@@ -33,8 +33,8 @@ class Outcome:
 class StepContext:
     """What the steps work with."""
 
-    source: RigSource  # The user's rig file, and what it says
-    rig: Rig  # The user's rig file, and what it says
+    source: RigSource  # the user's rig file, and the addresses in place of its own
+    rig: Rig  # what the file says, at these addresses
     state: CommissioningState  # Everything known so far
     runner: Runner  # Drives runs
     nominal: DrivelineModel | None  # The user's own model of the driveline, where there is one

@@ -41,8 +41,8 @@ class ChannelTable(FileTable):
     """
 
     column: Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$")]  # its column in a recording
-    kind: Annotated[OutputKind, Field(strict=False)]  # what it is, and where it is measured
-    at: Annotated[Location, Field(strict=False)]  # what it is, and where it is measured
+    kind: Annotated[OutputKind, Field(strict=False)]  # what is measured
+    at: Annotated[Location, Field(strict=False)]  # where it is measured
     inverter: Literal["m1", "m2"] | None = None  # the object of an inverter that a TPDO carries
     object: Annotated[int, Field(ge=0x1000, le=0xFFFF)] | None = None
     subindex: Annotated[int, Field(ge=0, le=255)] = 0  # the object of an inverter that a TPDO carries

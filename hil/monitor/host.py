@@ -172,8 +172,8 @@ def _spread_s(histogram: Histogram) -> tuple[float, float, float]:
 class HostJob:
     """What the rig's process is for."""
 
-    rig_path: Path  # the rig file, and what it says with the addresses of the command line
-    rig: Rig  # the rig file, and what it says with the addresses of the command line
+    rig_path: Path  # the rig file, absolute
+    rig: Rig  # what it says, at the addresses that count, for a host that is a monitor (`Rig.of_monitor`)
     out: Path  # folder of the recordings
     simulate: bool = False  # whether the rig is simulated, in this very process
     trust_laws: bool = False  # whether the code of its model's own laws may run

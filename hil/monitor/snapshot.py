@@ -161,13 +161,13 @@ class Signals:
     """The last seconds."""
 
     time_s: FloatArray  # shape (N,), 0 for the latest sample and negative before it [s]
-    torque_nm: FloatArray  # shape (N,)
-    reference_nm: FloatArray  # shape (N,)
-    prbs_nm: FloatArray  # shape (N,)
-    speed_rad_s: FloatArray  # shape (N,)
-    twist_rad: FloatArray  # shape (N,)
-    torque_m1_nm: float  # the latest of each inverter [Nm]
-    torque_m2_nm: float  # the latest of each inverter [Nm]
+    torque_nm: FloatArray  # shape (N,), of both inverters as read; NaN where a sample does not count
+    reference_nm: FloatArray  # shape (N,), of both inverters, PRBS included
+    prbs_nm: FloatArray  # shape (N,), of both inverters
+    speed_rad_s: FloatArray  # shape (N,); NaN where a sample does not count
+    twist_rad: FloatArray  # shape (N,), of the shaft; NaN without a model
+    torque_m1_nm: float  # of the latest sample, as read [Nm]; NaN before the first
+    torque_m2_nm: float  # the same of inverter m2
     window_s: float  # what the plots reach back [s]
     twist_of: str  # where the numbers behind the twist are from, or why there is none
     twist_std_rad: float  # standard deviation of the twist; NaN without a model
@@ -190,13 +190,14 @@ class Model:
     """The on-line model."""
 
     frequency_hz: FloatArray  # shape (n,)
-    gain: FloatArray  # shape (n,)
-    poles: ComplexArray  # in z
+    gain: FloatArray  # shape (n,), magnitude of the response from torque to speed
+    poles: ComplexArray  # in z, shape (na,)
     zeros: ComplexArray  # in z
     trail: ComplexArray  # poles of models before, oldest first, shape (m,)
     sample_time_s: float  # its period [s]
-    measured_hz: FloatArray = field(default_factory=lambda: np.empty(0))  # shape (m,)
-    measured_gain: FloatArray = field(default_factory=lambda: np.empty(0))  # shape (m,)
+    # shape (m,), where the response without a model is known
+    measured_hz: FloatArray = field(default_factory=lambda: np.empty(0))
+    measured_gain: FloatArray = field(default_factory=lambda: np.empty(0))  # shape (m,), its magnitude there
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -70,7 +70,7 @@ class RunRecord:
     measured: dict[str, Both]  # the same; names without a value are left out
     flagged: int = 0  # recorded samples with a flag
     recorded: int = 0  # samples of the measured part
-    prbs_nm: float = 0.0  # amplitude of both inverters together; 0 without a PRBS
+    prbs_nm: float = 0.0  # amplitude of PRBS or multi-sine, both inverters together; 0 without
     last_rad_s: float = 0.0  # speed in the last cycle
 
 
@@ -136,8 +136,8 @@ class WithinBand:
     """
 
     experiment: Experiment  # What is driven
-    low_rad_s: float  # Ends of the band [rad/s]
-    high_rad_s: float  # Ends of the band [rad/s]
+    low_rad_s: float  # lower end of the band
+    high_rad_s: float  # upper end of the band
     margin_rad_s: float  # What the speed at the beginning is given next to it
     period_s: float  # Time between two cycles [s]
     _speed: LowPass | None = None  # None before the first cycle

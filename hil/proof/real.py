@@ -49,8 +49,8 @@ class Agreement:
     what: str  # as the truth file names it
     unit: str  # of all its values
     truth: float  # the known value
-    found: float | None  # none where the verdict does not have it
-    ci95: tuple[float, float] | None  # none where the verdict does not have it
+    found: float | None  # None where the verdict does not have it
+    ci95: tuple[float, float] | None  # 95 % interval; None without one
     inside: bool | None  # whether the 95 % interval holds the known value
     within: bool  # whether it agrees as closely as the truth file asks
     asked: str  # in words, how closely

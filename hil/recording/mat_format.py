@@ -55,7 +55,7 @@ DEEPEST: Final = 12  # structs inside structs that are looked into
 
 
 def read(path: Path, request: Request) -> Table:
-    """Read a .mat file of any version; one of this program whole, `RecordingError` where it is damaged."""
+    """Read a .mat file of any version, one of this program whole; `RecordingError` where it is damaged."""
     import scipy.io
     from scipy.io.matlab import MatReadError
 

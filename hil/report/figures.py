@@ -118,7 +118,7 @@ class Mark(NamedTuple):
     """A span of time [s] to shade."""
 
     from_s: float  # in the time of the figure
-    to_s: float  # in the time of the figure
+    to_s: float  # after `from_s`
     colour: str = ORANGE  # as plotly takes it
 
 

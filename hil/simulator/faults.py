@@ -85,8 +85,8 @@ class InverterFaults:
     stale_share: float = 0.0  # of its TPDOs that repeat the one before, at random, 0 to 1
     ignores_target_from_step: int | None = None  # no torque in OPERATION ENABLED, bit 12 of 0x6041 is 0
     leaves_operation: AtStep[PowerState] | None = None  # for this state, by itself, with neither fault nor EMCY
-    wrong_torque: WrongTorque = field(default_factory=WrongTorque)  # none by default
-    wrong_speed: WrongSpeed = field(default_factory=WrongSpeed)  # none by default
+    wrong_torque: WrongTorque = field(default_factory=WrongTorque)  # by default it gives what it is asked for
+    wrong_speed: WrongSpeed = field(default_factory=WrongSpeed)  # by default its resolver reads right
     second_tpdo: AtStep[int] | None = None  # somebody sends each TPDO again, with a speed of 0, at every n-th SYNC
     fault: AtStep[int] | None = None  # its error code, for EMCY and object 0x603F
     emcy: AtStep[int] | None = None  # the error code that it sends, without a fault

@@ -260,7 +260,7 @@ def _list(content: Any) -> list[Any]:
 class Difference:
     """One fact of both runs; None where a run does not have it."""
 
-    what: str  # key of `run_facts` or of `results_of`
+    what: str  # key of `run_facts` or of `results_of`, or EDS of an inverter
     a: Any  # of the first run
     b: Any  # of the second run
 

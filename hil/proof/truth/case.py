@@ -42,9 +42,9 @@ class TruthRecording:
 
     time_s: FloatArray  # as the file has it: nominal, or the true instants
     torque_ref_nm: FloatArray  # of both inverters together, without reading noise
-    torque_m1_nm: FloatArray  # as read
-    torque_m2_nm: FloatArray  # as read
-    speed_rad_s: FloatArray  # as read
+    torque_m1_nm: FloatArray  # of inverter m1, as read
+    torque_m2_nm: FloatArray  # of inverter m2, as read
+    speed_rad_s: FloatArray  # of the motor, as read
     speed_true_rad_s: FloatArray
     disturbance_nm: FloatArray
     flags: IntArray | None = None

@@ -139,7 +139,7 @@ class Rows:
 
     torque_m1_nm: FloatArray  # NaN, or 0 without a flag, where it is lost
     torque_m2_nm: FloatArray  # the same
-    speed_rad_s: FloatArray  # the same
+    speed_rad_s: FloatArray  # likewise
     flags: IntArray | None = None
 
 
