@@ -94,8 +94,8 @@ class _Worst(_Course):
 class ModelEvidence(_Table):
     """A driveline: structure, and each parameter as in a model file, or as value and tolerance alone."""
 
-    structure: Structure
-    parameters: dict[str, Both | ParameterEntry]
+    structure: Structure  # one, two or three masses
+    parameters: dict[str, Both | ParameterEntry]  # by name; [value, tolerance], or as in a model file
 
     @model_validator(mode="after")
     def _is_a_driveline(self) -> ModelEvidence:

@@ -30,18 +30,18 @@ Three = Annotated[list[float], Field(min_length=3, max_length=3)]
 class FilterTable(FileTable):
     """Torque = -b(z) / a(z) speed, limited; the first of a is 1."""
 
-    b: Three
-    a: Three
+    b: Three  # of the numerator, powers of 1/z from 0 [Nm s/rad]; their sum is 0
+    a: Three  # of the denominator, powers of 1/z from 0
 
 
 class DesignedFor(FileTable):
     """The rig, its limits, and the torque of both inverters together that the damper never exceeds there."""
 
-    name: Text
-    torque_limit_m1_nm: Positive
-    torque_limit_m2_nm: Positive
-    prbs_limit_nm: Positive
-    limit_nm: Positive
+    name: Text  # of the rig
+    torque_limit_m1_nm: Positive  # of [inverters.m1]
+    torque_limit_m2_nm: Positive  # of [inverters.m2]
+    prbs_limit_nm: Positive  # of [guard]
+    limit_nm: Positive  # of the damper, both inverters together
 
     @classmethod
     def of(cls, rig: Rig, limit_nm: float) -> Self:
@@ -55,18 +55,18 @@ class DamperFile(FileTable):
     """The file; ``least_damping``, ``sensitivity`` and ``region_hz`` are of all lines, ``torque_nm`` under the PRBS."""
 
     schema_id: Annotated[Literal["hil.damper/1"], Field(alias="schema")]
-    model: Text
-    period_s: Annotated[float, Field(ge=0.001, le=1)]
-    dead_time_s: Annotated[float, Field(ge=0, le=0.5)]
-    lag_s: NotNegative
+    model: Text  # name of the model file it was designed by
+    period_s: Annotated[float, Field(ge=0.001, le=1)]  # of the rig
+    dead_time_s: Annotated[float, Field(ge=0, le=0.5)]  # from the speed sampled to the torque acting
+    lag_s: NotNegative  # time constant of the torque
     region_hz: Annotated[list[Positive], Field(min_length=2, max_length=2)]
     least_damping: Positive
     sensitivity: Positive
     torque_nm: NotNegative
-    line: dict[str, NotNegative]
+    line: dict[str, NotNegative]  # parameters of the nominal two-mass line, by name
     intervals: dict[str, Two] = Field(default_factory=dict)  # of the lines that it is good for
-    filter: FilterTable
-    rig: DesignedFor | None = None
+    filter: FilterTable  # the feedback itself
+    rig: DesignedFor | None = None  # None: it was designed for none, and can't be driven
 
     @model_validator(mode="after")
     def _sound(self) -> Self:

@@ -43,9 +43,9 @@ _NODE_GUARDING: Final = ("guard_time_ms", "life_time_factor", "node_guarding")
 class SpeedUnitTable(FileTable):
     """Unit of the velocity actual value 0x606C, from the drive's manual; over what its data sheet says."""
 
-    unit: Annotated[SpeedUnitName, Field(strict=False)]
-    counts_per_unit: Positive = 1.0
-    increments_per_turn: Positive | None = None
+    unit: Annotated[SpeedUnitName, Field(strict=False)]  # by name
+    counts_per_unit: Positive = 1.0  # 10 where it reads tenths
+    increments_per_turn: Positive | None = None  # where the unit counts increments, and only there
 
     @property
     def speed_unit(self) -> SpeedUnit:
@@ -79,8 +79,8 @@ class RatedTorqueUnit(Enum):
 class AcceptanceTable(FileTable):
     """Who accepted that it is missing, and why."""
 
-    by: Text
-    why: Text
+    by: Text  # a person's name
+    why: Text  # what stops the torque in its place, or why it does not have to
 
     @property
     def acceptance(self) -> Acceptance:
@@ -91,10 +91,10 @@ class AcceptanceTable(FileTable):
 class AcceptedTable(FileTable):
     """What a drive lacks, by name; see `drivers.inverter.stop_proof`."""
 
-    heartbeat_consumer: AcceptanceTable | None = None
-    rpdo_deadline: AcceptanceTable | None = None
-    abort_connection: AcceptanceTable | None = None
-    supported_modes: AcceptanceTable | None = None
+    heartbeat_consumer: AcceptanceTable | None = None  # 0x1016
+    rpdo_deadline: AcceptanceTable | None = None  # 0x1400:05
+    abort_connection: AcceptanceTable | None = None  # 0x6007
+    supported_modes: AcceptanceTable | None = None  # 0x6502
 
     @property
     def by_name(self) -> dict[str, Acceptance]:
@@ -130,12 +130,12 @@ TimeOut = Annotated[float, Field(ge=0.05, le=60.0)]
 class OptionCodesTable(FileTable):
     """What the drive does by itself when something ends (CiA 402-2): a DCF's choice or its own, unless given here."""
 
-    abort_connection: Annotated[int, Field(ge=1, le=3)] | None = None
-    quick_stop: OptionCode | None = None
-    shutdown: OptionCode | None = None
-    disable_operation: OptionCode | None = None
-    halt: OptionCode | None = None
-    fault_reaction: OptionCode | None = None
+    abort_connection: Annotated[int, Field(ge=1, le=3)] | None = None  # 0x6007
+    quick_stop: OptionCode | None = None  # 0x605A
+    shutdown: OptionCode | None = None  # 0x605B
+    disable_operation: OptionCode | None = None  # 0x605C
+    halt: OptionCode | None = None  # 0x605D
+    fault_reaction: OptionCode | None = None  # 0x605E
 
     @property
     def by_object(self) -> dict[int, int]:
@@ -151,29 +151,30 @@ class InverterTable(FileTable):
     default what `hil.config.rig_file.Rig.rpdo_deadline_ms` has.
     """
 
-    node_id: NodeId
-    vendor_id: Unsigned32
-    product_code: Unsigned32
-    serial_number: Unsigned32 | None = None
-    rated_torque_nm: Positive
-    torque_limit_nm: Positive
+    node_id: NodeId  # of CANopen
+    vendor_id: Unsigned32  # 0x1018:1
+    product_code: Unsigned32  # 0x1018:2
+    serial_number: Unsigned32 | None = None  # 0x1018:4; None: it is not compared
+    rated_torque_nm: Positive  # 0x6076
+    torque_limit_nm: Positive  # largest torque that it is ever commanded, base and PRBS together
     mode: Annotated[
         TorqueMode,
         BeforeValidator(_mode_by_name),
         WithJsonSchema({"enum": [mode.name.lower() for mode in TorqueMode], "type": "string"}),
-    ]
-    heartbeat_ms: Annotated[int, Field(ge=10, le=65535)]
+    ]  # mode of operation, 0x6060
+    heartbeat_ms: Annotated[int, Field(ge=10, le=65535)]  # period of its heartbeat, 0x1017
+    # without the host's heartbeat for so long it takes the host for dead, 0x1016
     host_timeout_ms: Annotated[int, Field(ge=50, le=65535)] = 150
     rpdo_deadline_ms: Annotated[int, Field(ge=2, le=65535)] | None = None
-    option_codes: OptionCodesTable = OptionCodesTable()
-    torque_slope_nm_per_s: Positive | None = None
-    speed_unit: SpeedUnitTable | None = None
-    rated_torque_unit: Annotated[RatedTorqueUnit, Field(strict=False)] = RatedTorqueUnit.MILLI
-    accepted: AcceptedTable = AcceptedTable()
-    follow_bit: bool = True
-    sdo_timeout_s: TimeOut = 0.5
-    mode_timeout_s: TimeOut = 2.0
-    state_timeout_s: TimeOut = 2.0
+    option_codes: OptionCodesTable = OptionCodesTable()  # what it does by itself when something ends
+    torque_slope_nm_per_s: Positive | None = None  # 0x6087, of profile torque; None: the drive's own
+    speed_unit: SpeedUnitTable | None = None  # of 0x606C; None: as its data sheet says
+    rated_torque_unit: Annotated[RatedTorqueUnit, Field(strict=False)] = RatedTorqueUnit.MILLI  # of 0x6076
+    accepted: AcceptedTable = AcceptedTable()  # what it lacks, and somebody accepts
+    follow_bit: bool = True  # whether bit 12 of 0x6041 says that it follows its target
+    sdo_timeout_s: TimeOut = 0.5  # of an SDO answer
+    mode_timeout_s: TimeOut = 2.0  # of the mode of operation, 0x6061
+    state_timeout_s: TimeOut = 2.0  # of a power state or NMT state
     eds: ExistingFile | None = None
 
     @model_validator(mode="before")
@@ -202,8 +203,8 @@ class InverterTable(FileTable):
 class InvertersTable(FileTable):
     """The two inverters on the motor shaft."""
 
-    m1: InverterTable
-    m2: InverterTable
+    m1: InverterTable  # its speed is the one that is recorded
+    m2: InverterTable  # on the same shaft
 
     @model_validator(mode="after")
     def _two_nodes(self) -> Self:
@@ -215,8 +216,8 @@ class InvertersTable(FileTable):
 class CredentialsTable(FileTable):
     """What one side trusts and shows; ``key`` without a password."""
 
-    ca: ExistingFile
-    certificate: ExistingFile
+    ca: ExistingFile  # certificate of the authority
+    certificate: ExistingFile  # of this side, signed by the authority
     key: ExistingFile
 
     @property
@@ -242,14 +243,14 @@ class PlcTable(FileTable):
     ``cob_ids`` are those under which its gateway, where it has one, sends on the rig's CAN bus.
     """
 
-    host: Text
-    port: TcpPort
+    host: Text  # name or IP address
+    port: TcpPort  # of Modbus TCP
     map: ExistingFile | None = None
     cob_ids: Annotated[tuple[CobId, ...], Field(strict=False)] = ()
-    security: PlcSecurityTable | None = None
+    security: PlcSecurityTable | None = None  # None: plain Modbus TCP
 
 
 class SimulatedPlcSecurityTable(CredentialsTable):
     """The simulated PLC's side: its own certificate, and what each role in a client's certificate may do."""
 
-    roles: Annotated[dict[Text, Annotated[Access, Field(strict=False)]], Field(min_length=1)]
+    roles: Annotated[dict[Text, Annotated[Access, Field(strict=False)]], Field(min_length=1)]  # by name of the role

@@ -47,7 +47,7 @@ class MultisineTable(FileTable):
     lowest_hz: Positive
     highest_hz: Positive
     lines: Annotated[Lines, Field(strict=False)] = Lines.ODD_RANDOM
-    seed: Annotated[int, Field(ge=0)] = 1
+    seed: Annotated[int, Field(ge=0)] = 1  # of the phases, and of the lines that are left out
 
     def excited(self, sample_time_s: float) -> IntArray:
         """Return the lines with power, as multiples of the fundamental, at a sampling time [s]."""
@@ -62,15 +62,15 @@ class MultisineTable(FileTable):
 class ExperimentTable(FileTable):
     """What every kind of experiment has; see the module's text."""
 
-    duration_s: Positive
-    torque_nm: Positive
-    slew_nm_per_s: Positive
-    approach_timeout_s: Positive = APPROACH_TIMEOUT_S
-    share_m1: Annotated[float, Field(ge=0, le=1)] = EVEN_SHARE
-    prbs: bool = True
-    prbs_amplitude_nm: Positive | None = None
-    prbs_clock_divider: Annotated[int, Field(ge=1, le=65535)] | None = None
-    multisine: MultisineTable | None = None
+    duration_s: Positive  # of the recorded part
+    torque_nm: Positive  # largest magnitude of the base torque
+    slew_nm_per_s: Positive  # its fastest change
+    approach_timeout_s: Positive = APPROACH_TIMEOUT_S  # in which the start speed must be reached
+    share_m1: Annotated[float, Field(ge=0, le=1)] = EVEN_SHARE  # of the base torque
+    prbs: bool = True  # whether a PRBS, or a multi-sine, is superposed
+    prbs_amplitude_nm: Positive | None = None  # None: that of [prbs]
+    prbs_clock_divider: Annotated[int, Field(ge=1, le=65535)] | None = None  # None: that of [prbs]
+    multisine: MultisineTable | None = None  # None: a PRBS
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
@@ -178,12 +178,12 @@ class PrbsTable(FileTable):
     """The pseudo-random binary torque; ``amplitude_nm`` is that of both inverters together."""
 
     amplitude_nm: Positive
-    cells: Annotated[int, Field(ge=2, le=16)] = 10
-    clock_divider: Annotated[int, Field(ge=1, le=65535)]
-    seed: Annotated[int, Field(ge=1, le=65535)]
-    source: Annotated[PrbsSource, Field(strict=False)]
-    target: Annotated[PrbsTarget, Field(strict=False)]
-    share_m1: Annotated[float, Field(ge=0, le=1)] | None = None
+    cells: Annotated[int, Field(ge=2, le=16)] = 10  # of the shift register
+    clock_divider: Annotated[int, Field(ge=1, le=65535)]  # cycles each level is held
+    seed: Annotated[int, Field(ge=1, le=65535)]  # first state of the register
+    source: Annotated[PrbsSource, Field(strict=False)]  # who makes it
+    target: Annotated[PrbsTarget, Field(strict=False)]  # which inverter carries it
+    share_m1: Annotated[float, Field(ge=0, le=1)] | None = None  # of the PRBS; only with target "shared"
 
     @property
     def parts_nm(self) -> dict[str, float]:

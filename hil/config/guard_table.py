@@ -36,16 +36,18 @@ class GuardTable(FileTable):
     follows its command, besides its torque slope: by default one period, 10 ms at least.
     """
 
-    rate_limit_nm_per_s: Positive
-    prbs_limit_nm: Positive
-    sum_limit_nm: Positive
-    feedback_timeout_s: Positive
-    permissive_timeout_s: Positive = 1.0
-    speed_limit_rad_s: Positive | None = None
+    rate_limit_nm_per_s: Positive  # fastest change of one inverter's base torque
+    prbs_limit_nm: Positive  # largest PRBS, and damper's torque, of one inverter
+    sum_limit_nm: Positive  # largest magnitude of both torques together, sign counted
+    feedback_timeout_s: Positive  # oldest feedback that a torque may be built on
+    permissive_timeout_s: Positive = 1.0  # oldest permission of the PLC that a torque may be built on
+    speed_limit_rad_s: Positive | None = None  # None: the PLC alone limits it
     torque_error_nm: Positive | None = None
     torque_error_sum_nm: Positive | None = None
+    # times the tolerance: what the excess may sum to before the run ends
     torque_error_time_s: Annotated[float, Field(gt=0, le=1)] = 0.12
     torque_response_s: Annotated[float, Field(gt=0, le=10)] | None = None
+    # how a run continues whose damper was switched off
     without_damper: Annotated[WithoutDamper, Field(strict=False)] = WithoutDamper.CONTINUE
 
     def error_limits(self, inverters: InvertersTable, period_s: float) -> ErrorLimits:

@@ -32,11 +32,11 @@ GROUP = "hil.laws"
 class LawParameter(FileTable):
     """A parameter of a law: its unit, where it does nothing, its bounds and where a fit starts."""
 
-    unit: str = ""
-    null: float = 0.0
-    low: float
-    high: float
-    start: float
+    unit: str = ""  # as text, for tables
+    null: float = 0.0  # value at which the law does nothing
+    low: float  # of a fit
+    high: float  # of a fit
+    start: float  # of a fit
 
 
 class LawTable(FileTable):
@@ -45,9 +45,10 @@ class LawTable(FileTable):
     ``folder`` is relative to the file; by default it is the file's own.
     """
 
+    # is imported, and so runs, only where it is trusted
     function: Annotated[str, Field(pattern=r"^[A-Za-z_][\w.]*:[A-Za-z_]\w*$")]
-    element: Literal["motor", "shaft", "load", "speed_sensor"]
-    parameters: dict[Text, LawParameter] = Field(min_length=1)
+    element: Literal["motor", "shaft", "load", "speed_sensor"]  # of the driveline, that it acts at
+    parameters: dict[Text, LawParameter] = Field(min_length=1)  # in the order in which the function takes them
     folder: Text = "."
 
 

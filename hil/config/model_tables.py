@@ -52,8 +52,8 @@ class _EffectEntry(_Entry):
 class ParameterEntry(_Entry):
     """A nominal value with the relative tolerance it is trusted to, or the 95 % interval to which it was measured."""
 
-    tolerance: float | None = None
-    ci95: Interval | None = None
+    tolerance: float | None = None  # relative; None with `ci95`
+    ci95: Interval | None = None  # [low, high], in the value's unit
 
     @model_validator(mode="after")
     def _one_of_both(self) -> Self:
@@ -81,10 +81,10 @@ Bounds = Annotated[list[float], Field(min_length=2, max_length=2)]
 class TableEntry(_Strict):
     """A law without a name, as data: its knots rise, and each has a value (``estimator.physics.tables``)."""
 
-    knots: list[float]
-    values: list[float]
-    ci95: list[Bounds] | None = None
-    damping: float = 0.0
+    knots: list[float]  # in the unit of the place
+    values: list[float]  # one for each knot [Nm; translation N]
+    ci95: list[Bounds] | None = None  # [low, high] of each value
+    damping: float = 0.0  # of its own over the rate, with `shaft_twist` alone [Nm s/rad]
 
     def law(self, place: str) -> LawAsTable:
         """Return it as the law at a place."""
@@ -104,42 +104,43 @@ class PriorEntry(_Strict):
     model_config = ConfigDict(extra="allow")
     __pydantic_extra__: dict[str, Interval]
 
-    odds: float | None = None
+    odds: float | None = None  # None: as of any other effect
 
 
 class PreparedRecording(_Strict):
     """A recording that was used."""
 
-    name: str
+    name: str  # of the recording
     sha256: str  # of its file
     samples_used: int  # how many of its samples counted
+    # by effect, when it begins and ends, since the recording began [s]
     events: dict[str, Annotated[list[float], Field(min_length=2, max_length=2)]] = {}
 
 
 class Prepared(_Strict):
     """What ``hil diagnose`` did to recordings before it fitted: ``hil simulate`` and ``hil compare`` do it again."""
 
-    mended: bool = True
+    mended: bool = True  # whether wraps, and what no sensor has read, were taken out (`with_motion_corrected`)
     one_in: int = Field(default=1, ge=1)  # to one in how many samples recordings are thinned
-    recordings: list[PreparedRecording] = []
+    recordings: list[PreparedRecording] = []  # that the diagnosis was made of
 
 
 class ModelDocument(_Strict):
     """The file's tables, before the model is made of them."""
 
     schema_: Literal["hil.model/1"] = Field(alias="schema")
-    structure: Annotated[Structure, Field(strict=False)]
-    motion: Annotated[Motion, Field(strict=False)] = Motion.ROTATION
-    parameters: dict[str, ParameterEntry]
-    geometry: _Geometry | None = None
-    load: _Load | None = None
-    machine: _Machine | None = None
-    priors: dict[str, PriorEntry] = {}
-    effects: dict[str, dict[str, _EffectEntry]] = {}
-    tables: dict[str, TableEntry] = {}
-    laws: dict[str, LawTable] = {}
-    signals: SignalsConfig | None = None
-    prepared: Prepared | None = None
+    structure: Annotated[Structure, Field(strict=False)]  # one, two or three masses, or a joint
+    motion: Annotated[Motion, Field(strict=False)] = Motion.ROTATION  # by which all values have their units
+    parameters: dict[str, ParameterEntry]  # by name, all those of the structure
+    geometry: _Geometry | None = None  # the gear ratio
+    load: _Load | None = None  # whose the constant load torque is, or what it is
+    machine: _Machine | None = None  # parts that it has; None: nobody says
+    priors: dict[str, PriorEntry] = {}  # by name of the effect
+    effects: dict[str, dict[str, _EffectEntry]] = {}  # by name, then by parameter
+    tables: dict[str, TableEntry] = {}  # laws without a name, by place
+    laws: dict[str, LawTable] = {}  # a user's own, by name
+    signals: SignalsConfig | None = None  # how its recordings are read; None: by this program's own columns
+    prepared: Prepared | None = None  # what a diagnosis did to recordings; None in a file by hand
 
 
 def as_toml(

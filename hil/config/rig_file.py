@@ -65,8 +65,8 @@ class VehicleTable(FileTable):
     """
 
     inertia_kg_m2: Positive
-    inertia_empty_kg_m2: Positive | None = None
-    inertia_full_kg_m2: Positive | None = None
+    inertia_empty_kg_m2: Positive | None = None  # None: half of `inertia_kg_m2`
+    inertia_full_kg_m2: Positive | None = None  # None: one and a half times `inertia_kg_m2`
     most_grade: Annotated[float, Field(ge=0, le=1)] = 0.12
     travel_m_per_rad: Positive = 0.086
 
@@ -94,11 +94,11 @@ class SimulationTable(FileTable):
     """
 
     model: ExistingFile | None = None
-    seed: Annotated[int, Field(ge=0)]
-    speed_noise_rad_s: NotNegative
-    torque_noise_permille: NotNegative
+    seed: Annotated[int, Field(ge=0)]  # of all that is random
+    speed_noise_rad_s: NotNegative  # standard deviation of each resolver's reading
+    torque_noise_permille: NotNegative  # standard deviation of 0x6077 [per mille of rated]
     channel_noise: dict[str, NotNegative] = Field(default_factory=dict)
-    plc_security: SimulatedPlcSecurityTable | None = None
+    plc_security: SimulatedPlcSecurityTable | None = None  # None: it speaks plain Modbus TCP
 
 
 class DesignTable(FileTable):
@@ -108,29 +108,30 @@ class DesignTable(FileTable):
     angle from where a recorded part begins is then free.
     """
 
-    most_torque_nm: Positive | None = None
-    most_speed_rad_s: Positive | None = None
-    most_duration_s: Positive | None = None
-    most_angle_rad: Positive | None = None
+    most_torque_nm: Positive | None = None  # largest base torque
+    most_speed_rad_s: Positive | None = None  # largest magnitude
+    most_duration_s: Positive | None = None  # of the recorded part
+    most_angle_rad: Positive | None = None  # None: free
 
 
 class Rig(FileTable):
     """One rig file. The key ``schema`` is `schema_id` here: pydantic has a use of its own for that name."""
 
     schema_id: Annotated[Literal["hil.rig/1"], Field(alias="schema")]
-    name: Text
-    period_s: Annotated[float, Field(ge=0.001, le=1)] = 0.01
-    can: CanTable
-    inverters: InvertersTable
-    plc: PlcTable
-    guard: GuardTable
-    prbs: PrbsTable
-    vehicle: VehicleTable
+    name: Text  # for people, and in results
+    period_s: Annotated[float, Field(ge=0.001, le=1)] = 0.01  # from one SYNC to the next
+    can: CanTable  # the bus of both inverters
+    inverters: InvertersTable  # both, on one shaft
+    plc: PlcTable  # what permits torque
+    guard: GuardTable  # limits of torque, and of what comes back
+    prbs: PrbsTable  # what excites, unless an experiment has its own
+    vehicle: VehicleTable  # what is known of it beforehand
+    # further ones that are recorded, in the order of the columns
     channels: list[ChannelTable] = Field(default_factory=list)
-    experiments: dict[str, AnyExperiment] = Field(default_factory=dict)
-    design: DesignTable = DesignTable()
-    simulation: SimulationTable | None = None
-    _takes_over: bool = PrivateAttr(default=False)
+    experiments: dict[str, AnyExperiment] = Field(default_factory=dict)  # by name
+    design: DesignTable = DesignTable()  # limits of experiments that the program designs
+    simulation: SimulationTable | None = None  # None: the rig can't be simulated
+    _takes_over: bool = PrivateAttr(default=False)  # set by `taking_over`
 
     @property
     def takes_over(self) -> bool:

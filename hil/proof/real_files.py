@@ -57,8 +57,8 @@ class Origin(FileTable):
     ``member`` is a file inside the archive that is fetched, ``convert`` what turns it into the recording.
     """
 
-    page: Text
-    url: Text | None = None
+    page: Text  # its address
+    url: Text | None = None  # None: a person has to fetch it
     member: Text | None = None
     convert: Annotated[Conversion, Field(strict=False)] = Conversion.NONE
 
@@ -66,32 +66,32 @@ class Origin(FileTable):
 class RecordingEntry(FileTable):
     """One recording: its place in the data folder, its checksum, its origin; ``rows`` cuts it, first and end."""
 
-    path: Relative
-    sha256: Sha256
-    origin: Origin
+    path: Relative  # in the data folder
+    sha256: Sha256  # of the file
+    origin: Origin  # where it comes from
     rows: Annotated[list[int], Field(min_length=2, max_length=2)] | None = None
 
 
 class RunEntry(FileTable):
     """One diagnosis: the recordings that are fitted, and those that are held out."""
 
-    name: Name
-    fit: Annotated[list[Text], Field(min_length=1)]
-    held_out: list[Text] = Field(default_factory=list)
+    name: Name  # of its own in the case
+    fit: Annotated[list[Text], Field(min_length=1)]  # names of [recordings]
+    held_out: list[Text] = Field(default_factory=list)  # names of [recordings]; the verdict is tried on them
 
 
 class CaseFile(FileTable):
     """Everything about a case but the truth."""
 
     schema_: Literal["hil.real-case/1"] = Field(alias="schema")
-    title: Text
+    title: Text  # for the page
     concealed: list[Text]  # names of the catalogue that the verdict should hold
-    conceals: Text
-    shown: Annotated[list[Text], Field(min_length=1)]
-    withheld: list[Text]  # channels the tool gets, and those that would tell what is concealed
-    format: FormatHints = FormatHints()
-    recordings: Annotated[dict[Name, RecordingEntry], Field(min_length=1)]
-    runs: Annotated[list[RunEntry], Field(min_length=1)]
+    conceals: Text  # the same in words
+    shown: Annotated[list[Text], Field(min_length=1)]  # channels that the tool gets
+    withheld: list[Text]  # channels that would tell what is concealed
+    format: FormatHints = FormatHints()  # how the recordings are written
+    recordings: Annotated[dict[Name, RecordingEntry], Field(min_length=1)]  # by name
+    runs: Annotated[list[RunEntry], Field(min_length=1)]  # each is judged by itself
 
     @model_validator(mode="after")
     def _fits_together(self) -> Self:
@@ -117,10 +117,11 @@ class CaseFile(FileTable):
 class KnownValue(FileTable):
     """A quantity that somebody else has measured or identified."""
 
-    what: Text
+    what: Text  # in words
+    # place of the same in diagnosis.json
     found: Annotated[str, Field(pattern=r"^(parameters\.\w+|effects\.\w+\.\w+|load_torque)$")]
-    value: float
-    unit: Text
+    value: float  # that was measured or identified by others
+    unit: Text  # of diagnosis.json, too
     within: Positive  # relative difference up to which the two agree
 
 
@@ -128,8 +129,8 @@ class TruthFile(FileTable):
     """What is known of a machine next to its recordings."""
 
     schema_: Literal["hil.real-truth/1"] = Field(alias="schema")
-    source: Text
-    values: list[KnownValue] = Field(default_factory=list)
+    source: Text  # who says so
+    values: list[KnownValue] = Field(default_factory=list)  # may be none
 
 
 def read_case(folder: Path) -> CaseFile:

@@ -46,7 +46,7 @@ class _Scaled(_Strict):
 class TimeSignal(_Strict):
     """The time of each row [s]: a column times ``scale``, or a fixed period ``sample_time_s``."""
 
-    column: Column | None = None
+    column: Column | None = None  # None with `sample_time_s`
     scale: float = Field(default=1.0, gt=0)
     sample_time_s: float | None = Field(default=None, gt=0)
 
@@ -74,13 +74,13 @@ class LoadSignal(_Scaled):
 class OutputSignal(_Scaled):
     """The measured output [rad/s, rad, Nm; translation m/s, m, N] and where it is measured."""
 
-    at: Annotated[Location, Field(strict=False)] = Location.MOTOR
+    at: Annotated[Location, Field(strict=False)] = Location.MOTOR  # the motor, the load or the shaft
 
 
 class MeasuredOutput(OutputSignal):
     """One of several measured outputs, of any kind the structure has there."""
 
-    kind: Annotated[OutputKind, Field(strict=False)]
+    kind: Annotated[OutputKind, Field(strict=False)]  # speed, position, acceleration or torque
 
     @model_validator(mode="after")
     def _is_somewhere(self) -> Self:
@@ -134,7 +134,7 @@ class SignalsConfig(_Strict):
         Period to which columns of different or uneven rates are brought [s]; nothing is without it.
     """
 
-    time: TimeSignal = TimeSignal(column=columns.TIME)
+    time: TimeSignal = TimeSignal(column=columns.TIME)  # without it `time_s` [s]
     torque: list[TorqueSignal] = []
     speed: OutputSignal | None = None
     position: OutputSignal | None = None

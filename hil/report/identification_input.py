@@ -108,8 +108,8 @@ class IdentificationFile(_Part):
     """The file: settings, and for each recording its observation filter."""
 
     schema_name: Literal["hil.identification/1"] = Field(alias="schema")
-    settings: _Settings
-    recordings: list[_Recording] = Field(min_length=1)
+    settings: _Settings  # of all recordings
+    recordings: list[_Recording] = Field(min_length=1)  # in their order
 
 
 def read_identification(path: Path) -> IdentificationFile:
