@@ -3,7 +3,7 @@
 ::
 
     rig  -> view   Samples, Health, Notice, Ready, Began, Over, Lost, Ended
-    view -> rig    Start, Stop, Mark, Reset, Quit
+    view -> rig    StartExperiment, Stop, Mark, Reset, Quit
 """
 
 from __future__ import annotations

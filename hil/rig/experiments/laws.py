@@ -10,7 +10,7 @@ BANDWIDTH_HZ = 0.01
 """Crossover of a cruise's speed loop while measuring [Hz].
 
 The lowest frequency of interest is 0.3 Hz (where the estimators' high-pass begins): 30 times above the
-crossover, and the loop's low-pass (at five times the crossover, see `speed_hold`) leaves it 1/30 * 1/6 =
+crossover, and the loop's low-pass (at five times the crossover, see `HoldTuning`) leaves it 1/30 * 1/6 =
 0.6 % of the vehicle's own response there.
 """
 

@@ -7,8 +7,8 @@ part in its driveline's dynamics::
     torque   = gain * (target - speed_f) + integral                 limited to +-limit
     integral' = gain / reset_s * (target - speed_f)                 stands still while the torque is limited
 
-The loop's crossover is ``gain / J / 2 pi`` hertz for a total inertia J. `SpeedHold.for_bandwidth` chooses
-the three times from one bandwidth: the low-pass a factor 5 above the crossover and the integral a factor 5
+The loop's crossover is ``gain / J / 2 pi`` hertz for a total inertia J. `HoldTuning.for_bandwidth` chooses
+gain and times by one bandwidth: the low-pass a factor 5 above the crossover and the integral a factor 5
 below, which leaves a phase margin of 90 - 2 * atan(1/5) = 67 degrees on a pure inertia.
 """
 
