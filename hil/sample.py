@@ -37,8 +37,8 @@ class Sample:
     cycle: int  # from 0 at the first cycle of the run, counting those that were missed
     t_ns: int
     time_s: float
-    torque_ref_m1_nm: float  # asked of inverter m1, PRBS included
-    torque_ref_m2_nm: float  # asked of inverter m2, PRBS included
+    torque_ref_m1_nm: float  # asked of inverter m1, PRBS and damper included; what the PLC adds is not in it
+    torque_ref_m2_nm: float  # the same of inverter m2
     prbs_nm: float  # both inverters together; the PLC's own is NaN between its reports
     torque_m1_nm: float  # 0x6077 of inverter m1; repeated where it did not answer
     torque_m2_nm: float  # the same of inverter m2
