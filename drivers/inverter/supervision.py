@@ -237,7 +237,8 @@ class Supervision:
         if answered and one is not None and other is not None:
             sum_fault = self._compare_sum(record, one, other)
             self._compare_speeds(record.t_ns, one, other)
-            if len(plc.levels) == 2 and plc.m1_nm and plc.m2_nm:
+            # what a drive answered last may be of a cycle in which the generator was switched
+            if len(m1.off_nm) == len(m2.off_nm) == 2 and plc.m1_nm and plc.m2_nm:
                 self._compare_prbs(plc)
             self._follow_vehicle(one, other)
             self._cycles = 0

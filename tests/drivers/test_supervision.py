@@ -422,6 +422,15 @@ def test_the_prbs_of_the_plc_is_one_of_two_levels_on_each_drive(divider: int) ->
     assert NO_PRBS in with_plc(lambda level: level, lambda level: 0.0, divider, part_nm=20.0)  # under its tolerance
 
 
+def test_a_drive_that_does_not_answer_as_the_generator_is_switched_on_is_compared_when_it_does() -> None:
+    made = supervised()
+    for k, (levels, is_lost) in enumerate([((0.0, 1.0, -1.0), False), ((1.0, -1.0), True), ((1.0, -1.0), False)]):
+        m1 = DriveRecord(100.0, answer(160.0))
+        m2 = DriveRecord(100.0, None if is_lost else answer(160.0 + 0.1 * k))
+        made.take(CycleRecord(k * PERIOD_NS, m1, m2, PlcPart(60.0, 60.0, levels)))
+    assert made.ended is None
+
+
 def test_a_slope_is_no_other_level_of_the_plc() -> None:
     """A torque on its way to a command that has jumped is below or above it, whatever level the PLC has."""
     sloped = replace(M1, mode=TorqueMode.PROFILE_TORQUE, torque_slope_nm_per_s=700.0)
