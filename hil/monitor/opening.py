@@ -11,6 +11,7 @@ from drivers.errors import DriverError
 from estimator.identification.chain import decimation_factor
 from estimator.identification.online.regression import checked_filter
 from estimator.physics.joint import Shaft
+from hil.config.experiment_tables import PulsesTable, RestTable
 from hil.config.model_file import read_model
 from hil.config.rig_file import Rig
 from hil.errors import HilError, RecordingError, UsageError
@@ -110,11 +111,12 @@ def _shaft(model: Path | None, rig: Rig | None, trust_laws: bool) -> Shaft | Non
 def _summary(rig: Rig, name: str, trust_laws: bool) -> str:
     """Tell what an experiment would command, and what to expect."""
     table = rig.experiments[name]
-    superposed = "PRBS" if table.multisine is None else "multi-sine"
+    after = ", from standstill on" if isinstance(table, PulsesTable | RestTable) else ", after the approach"
+    kind = "PRBS" if table.multisine is None else "multi-sine"
+    superposed = f"{kind} ±{rig.excitation_nm(table):g} Nm" if table.prbs else "no PRBS"
     lines = [
-        f"{table.kind}: {table.duration_s:g} s are recorded, after the approach.",
-        f"Base torque at most ±{table.torque_nm:g} Nm, {superposed} ±{rig.excitation_nm(table):g} Nm, both inverters "
-        "together.",
+        f"{table.kind}: {table.duration_s:g} s are recorded{after}.",
+        f"Base torque at most ±{table.torque_nm:g} Nm, {superposed}, both inverters together.",
     ]
     try:
         prediction = dry_run(rig, name, trust_laws)

@@ -225,7 +225,7 @@ class Snapshot:
     estimation: Estimation  # of the run under way, or of the last
     health: Health | None
     log: tuple[Notice, ...]  # oldest first
-    now_ns: int  # time of the latest sample, on the samples' clock
+    now_ns: int  # the present, on the samples' clock; 0 before the first sample
     runs: int  # that are over
     can_drive: bool  # False where a recording is played
     quality: Quality  # of the samples of the last seconds

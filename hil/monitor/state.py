@@ -71,7 +71,8 @@ class LiveState:
         self._quality = QualityWatch(period_s)
         self._health: Health | None = None
         self._log: deque[Notice] = deque(maxlen=KEPT_NOTICES)
-        self._now_ns = 0
+        self._now_ns = 0  # of the latest sample; 0 before the first
+        self._silent_ns = 0  # since then, as the last picture was told
         self._latest: Sample | None = None
         self._can_drive = can_drive
         self._headline = Headline(rig, Activity.CONNECTING, "", "", math.nan, math.nan, "", "")
@@ -125,19 +126,24 @@ class LiveState:
 
     def snapshot(self, silent_s: float = 0.0) -> Snapshot:
         """Give the picture of now; nothing has come for ``silent_s`` [s]."""
+        self._silent_ns = round(silent_s * NS_PER_S)
         return Snapshot(
             headline=replace(self._headline, silent_s=silent_s),
             signals=self._signals(),
             estimation=self._estimation.look(self._now_ns),
             health=self._health,
             log=tuple(self._log),
-            now_ns=self._now_ns,
+            now_ns=self._now_ns + self._silent_ns,
             runs=len(self.runs),
             can_drive=self._can_drive,
             quality=self._quality.look(self._now_ns),
         )
 
     def _take_samples(self, report: Samples) -> None:
+        self._silent_ns = 0
+        if not self._now_ns:  # what was said before had no clock yet
+            first_ns = report.rows[0][0].t_ns
+            self._log = deque((replace(each, t_ns=first_ns) for each in self._log), maxlen=KEPT_NOTICES)
         if report.lost:
             self._tell(LogTopic.INFO, f"{report.lost} samples not shown: this terminal did not take them in time")
         measured = [sample for sample, phase in report.rows if phase is Phase.MEASURE]
@@ -256,4 +262,4 @@ class LiveState:
             self.say(f"{notice.kind.value}: {notice.text}")
 
     def _tell(self, kind: LogTopic, text: str) -> None:
-        self._log.append(Notice(self._now_ns, kind, text))
+        self._log.append(Notice(self._now_ns + self._silent_ns, kind, text))

@@ -21,6 +21,9 @@ from hil.simulator.addresses import with_addresses
 HALT_S = 1.0
 """Recorded part of coming to a stand [s]."""
 
+OWN_EXCITATION = frozenset({"prbs_amplitude_nm", "prbs_clock_divider", "multisine"})
+"""Keys by which an experiment is excited otherwise than [prbs] says."""
+
 
 @dataclass(frozen=True, slots=True)
 class Order:
@@ -70,8 +73,12 @@ class RigSource:
 
 
 def as_table(experiment: AnyExperiment, **changes: object) -> dict[str, Any]:
-    """Return an experiment of a rig file as a table to order, with changes."""
-    return {**experiment.model_dump(mode="json", exclude_none=True), **changes}
+    """Return an experiment of a rig file as a table to order, with changes.
+
+    Where ``prbs`` is among them the order says what excites, by [prbs]: what the experiment has of its own goes.
+    """
+    own = OWN_EXCITATION if "prbs" in changes else frozenset()
+    return {**experiment.model_dump(mode="json", exclude_none=True, exclude=set(own)), **changes}
 
 
 def rig_digest(text: str) -> str:

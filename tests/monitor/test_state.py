@@ -67,6 +67,19 @@ def test_a_lost_bus_is_reported_once_and_its_return_too() -> None:
     assert live.activity is Activity.LISTENING
 
 
+def test_the_log_says_how_long_ago_what_happened_without_samples() -> None:
+    live, up_for = state(), 360_000_000  # this machine has run for 1,000 h at 10 ms a number
+    live.take(Lost("no bus"))
+    live.take(Samples(((sample(up_for), None),)))
+    shown = live.snapshot()
+    assert [(shown.now_ns - each.t_ns) / 1e9 for each in shown.log] == [0.0]
+    live.snapshot(silent_s=20.0)
+    live.take(Lost("no bus"))
+    live.take(Ready())
+    shown = live.snapshot(silent_s=25.0)
+    assert [(shown.now_ns - each.t_ns) / 1e9 for each in shown.log] == [25.0, 5.0]
+
+
 @pytest.mark.parametrize("kind", [kind for kind in LogTopic if kind is not LogTopic.INFO])
 def test_what_matters_stands_in_the_message_with_its_kind(kind: LogTopic) -> None:
     live = state()
