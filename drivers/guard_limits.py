@@ -15,8 +15,8 @@ NS_PER_S: Final = 1_000_000_000
 class ErrorLimits:
     """How far the torque a drive reports may be from the one it was commanded; see `drivers.inverter.supervision`."""
 
-    m1_nm: float  # of each inverter [Nm]
-    m2_nm: float  # of each inverter [Nm]
+    m1_nm: float  # of inverter m1: torque_error_nm [Nm]
+    m2_nm: float  # of inverter m2 [Nm]
     sum_nm: float  # of both together, sign counted [Nm]
     time_s: float  # so long in all a torque may be further off [s]
     response_s: float  # time in which a drive follows a change of its command [s]

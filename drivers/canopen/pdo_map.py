@@ -68,8 +68,8 @@ class MappedObject:
 class PdoLayout:
     """A PDO as its objects describe it."""
 
-    communication_index: int  # where its parameters are, for example 0x1800 and 0x1A00
-    mapping_index: int  # where its parameters are, for example 0x1800 and 0x1A00
+    communication_index: int  # of its communication parameter, for example 0x1800
+    mapping_index: int  # of its mapping parameter, for example 0x1A00
     cob_id: int  # CAN identifier
     valid: bool  # false if bit 31 of the COB-ID entry switches the PDO off
     transmission_type: int  # 1 to 240: at every n-th SYNC; 254, 255: event-driven

@@ -73,8 +73,8 @@ class Direction:
     """One of the two directions of PDOs."""
 
     name: str  # RPDO or TPDO
-    communication: int  # indices of the parameters of the first
-    mapping: int  # indices of the parameters of the first
+    communication: int  # index of the first one's communication parameter: 0x1400, 0x1800
+    mapping: int  # index of its mapping parameter: 0x1600, 0x1A00
     access: tuple[str, ...]  # access types of what one may carry
     first_cob_id: int  # of the first PDO, node 0, in CiA 301's pre-defined connection set
     types: range  # transmission types that this program can use

@@ -25,8 +25,8 @@ class Shortcoming:
     part: Part  # the object, as the table wants it
     entry: EdsEntry | None  # the object, as the data sheet has it
     key: str  # key of the data sheet that says so
-    expected: str  # both in words
-    found: str  # both in words
+    expected: str  # what a run needs, in words
+    found: str  # what the data sheet says, in words
 
     def __str__(self) -> str:
         name = f"0x{self.part.index:04X}:{self.part.subindex:02X}"
@@ -100,8 +100,8 @@ class DrivePlan:
 
     sheet: DataSheet  # its data sheet
     abilities: Abilities  # what it has of each function
-    command: CarrierSearch  # the search for RPDOs and for TPDOs
-    feedback: CarrierSearch  # the search for RPDOs and for TPDOs
+    command: CarrierSearch  # for RPDOs that carry what is commanded
+    feedback: CarrierSearch  # for TPDOs that carry what is read
     channels: tuple[ObjectId, ...]  # further objects that are to be recorded
     further: CarrierSearch  # the search for the TPDOs that carry those which the feedback's do not carry
 

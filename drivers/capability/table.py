@@ -80,8 +80,8 @@ class Without(Enum):
 class Part:
     """One value of the object dictionary that takes part in giving a function."""
 
-    index: int  # the object
-    subindex: int  # the object
+    index: int  # of the object
+    subindex: int  # of the value in it
     kinds: tuple[IntegerType, ...]  # data types it may have
     written: bool = False  # whether it is written
     read_back: bool = False  # whether what is written is read back

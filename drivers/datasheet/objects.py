@@ -54,8 +54,8 @@ _WITH_VALUES = (ObjectType.VAR, ObjectType.DOMAIN, ObjectType.ARRAY, ObjectType.
 class EdsEntry:
     """One value of the object dictionary."""
 
-    index: int  # where it is
-    subindex: int  # where it is
+    index: int  # of the object, 0x1000 to 0xFFFF
+    subindex: int  # in it; 0 for an object of one value
     section: EdsSection  # the section that describes it
     name: str  # parameterName, or the section's name without one
     kind: DataType | None  # data type

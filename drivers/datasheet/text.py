@@ -54,8 +54,8 @@ class EdsFinding:
     severity: Severity  # how bad it is
     line: int | None  # line of the file, from 1; None if it concerns the file as a whole
     place: str  # section, and key if it concerns one
-    expected: str  # both in words
-    found: str  # both in words
+    expected: str  # what should stand there, in words
+    found: str  # what stands there, in words
     advice: str  # what to do, as a sentence
 
     def __str__(self) -> str:
@@ -75,8 +75,8 @@ class EdsUnreadable(ConfigMismatch):
 class EdsKey:
     """One ``name=value`` and its line."""
 
-    name: str  # as written
-    value: str  # as written
+    name: str  # left of the equals sign, as written
+    value: str  # right of it, as written
     line: int  # from 1
 
 

@@ -17,8 +17,8 @@ SAMPLE_NODE_ID = 127
 class EdsContext:
     """One file under check."""
 
-    text: EdsText  # what it says
-    objects: Mapping[int, EdsObject]  # what it says
+    text: EdsText  # its sections and keys, line by line
+    objects: Mapping[int, EdsObject]  # its object dictionary, by index
     plan: DrivePlan  # how a drive with it is used
     used: frozenset[int]  # objects this program reads or writes
 

@@ -39,8 +39,8 @@ class Difference:
 
     where: str  # device
     what: str  # object and its name
-    expected: str  # both values in words
-    found: str  # both values in words
+    expected: str  # value that the source gives, in words
+    found: str  # value that the device gives, in words
     source: str  # where the expectation comes from
 
     def __str__(self) -> str:

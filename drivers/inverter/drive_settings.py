@@ -45,8 +45,8 @@ RIG_FILE: Final = "rig file"
 class DriveSetting:
     """One object that is written when a drive is configured, and read back."""
 
-    index: int  # the object
-    subindex: int  # the object
+    index: int  # of the object
+    subindex: int  # of the value in it
     name: str  # its name in CiA 301 or CiA 402
     value: int  # what it is given
     source: str  # who asks for it

@@ -37,8 +37,8 @@ class InverterFeedback(NamedTuple):
     speed_rad_s: float  # velocity actual value, 0x606C [rad/s]
     state: PowerState  # power state from the statusword, 0x6041
     t_ns: int  # when it arrived, host's monotonic clock [ns]
-    torque_raw: int  # the counts on the bus, so that a wrong scale can be corrected later
-    speed_raw: int  # the counts on the bus, so that a wrong scale can be corrected later
+    torque_raw: int  # counts of 0x6077 on the bus, so that a wrong scale can be corrected later
+    speed_raw: int  # counts of 0x606C, for the same
     limited: bool = False  # bit 11 of the statusword: the drive limits its torque
     follows: bool = True  # bit 12: the drive follows its target
 

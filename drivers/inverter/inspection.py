@@ -35,9 +35,9 @@ class CommissionedValue:
     """One value that is not the same everywhere."""
 
     what: str  # object and its name in the DCF, or what of ``[DeviceComissioning]`` it is
-    dcf: str  # its value in each, in words
-    device: str  # its value in each, in words
-    rig_file: str  # its value in each, in words
+    dcf: str  # its value in the device configuration file, in words
+    device: str  # in the drive
+    rig_file: str  # in the rig file
 
     def __str__(self) -> str:
         parts = (("DCF", self.dcf), ("device", self.device), ("rig file", self.rig_file))

@@ -117,10 +117,10 @@ class Motion(NamedTuple):
     speed_rad_s: float  # as read, low-passed
     predicted_rad_s: float  # from the blocks before
     deviation_rad_s: float  # of the difference of both
-    gain: float  # acceleration per torque over what the usual inertia has, and its deviation
-    gain_deviation: float  # acceleration per torque over what the usual inertia has, and its deviation
-    load_rad_s2: float  # and its deviation
-    load_deviation_rad_s2: float  # and its deviation
+    gain: float  # acceleration per torque, in multiples of what the usual inertia has
+    gain_deviation: float  # standard deviation of the gain
+    load_rad_s2: float  # deceleration by grade, wind and rolling
+    load_deviation_rad_s2: float  # standard deviation of the load
     held_rad_s: float  # speed that a standing vehicle should have got by now, at least
     surprise: float  # Page's sum of the differences of one sign, each over its deviation and less 1
 

@@ -54,8 +54,8 @@ class InverterSettings:
     torque_limit_nm: float  # greatest torque that will be commanded
     mode: TorqueMode = TorqueMode.CYCLIC_SYNCHRONOUS_TORQUE  # mode of operation to run in
     eds_path: Path | None = None  # the drive's EDS; None for the one that is shipped
-    vendor_id: int | None = None  # identity expected in object 0x1018; None for the EDS's
-    product_code: int | None = None  # identity expected in object 0x1018; None for the EDS's
+    vendor_id: int | None = None  # expected in 0x1018:01; None for the EDS's
+    product_code: int | None = None  # expected in 0x1018:02; None for the EDS's
     serial_number: int | None = None  # of the drive behind this node id, 0x1018:04; None where it is not compared
     heartbeat_ms: int = 100  # heartbeat period of the drive [ms]
     host_node_id: int = HOST_NODE_ID  # node id of the host's own heartbeat, 1 to 127

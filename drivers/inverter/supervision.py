@@ -106,8 +106,8 @@ def speed_tolerance_rad_s(one_rad_s: float, other_rad_s: float, counts_rad_s: fl
 class PlcPart(NamedTuple):
     """What the PLC adds to both commands by itself: the levels it may have, as parts of its amplitudes."""
 
-    m1_nm: float = 0.0  # amplitude at each drive
-    m2_nm: float = 0.0  # amplitude at each drive
+    m1_nm: float = 0.0  # amplitude at m1
+    m2_nm: float = 0.0  # amplitude at m2
     levels: tuple[float, ...] = (0.0,)  # each in multiples of the amplitudes
 
 
@@ -129,8 +129,8 @@ class SupervisionLimits:
     """What the rules of one rig need: its guard's limits, a count of each speed [rad/s], and its vehicle."""
 
     guard: GuardLimits  # the rig file's
-    count_m1_rad_s: float = 0.0  # one count of its speed [rad/s]
-    count_m2_rad_s: float = 0.0  # one count of its speed [rad/s]
+    count_m1_rad_s: float = 0.0  # one count of m1's speed [rad/s]
+    count_m2_rad_s: float = 0.0  # one count of m2's speed [rad/s]
     vehicle: Vehicle | None = None  # None: speeds are not compared with what torques make
 
 

@@ -15,8 +15,8 @@ class Vehicle:
     """What is known of it beforehand, at the motor shaft."""
 
     inertia_kg_m2: float  # usual total
-    empty_kg_m2: float  # least and greatest total
-    full_kg_m2: float  # least and greatest total
+    empty_kg_m2: float  # least total
+    full_kg_m2: float  # greatest total
     most_grade: float  # steepest road, rise over way
     travel_m_per_rad: float  # way per angle of the shaft
 

@@ -35,8 +35,8 @@ HANDSHAKE_S: Final = 5.0
 class AnswerIds:
     """Identifiers in the MBAP header of an answer (Modbus Messaging on TCP/IP V1.0b, 3.1.3)."""
 
-    transaction: int  # as in the request
-    unit: int  # as in the request
+    transaction: int  # transaction identifier of the request
+    unit: int  # unit identifier of the request
 
     def __str__(self) -> str:
         return f"transaction id {self.transaction}, unit id {self.unit}"

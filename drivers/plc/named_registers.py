@@ -41,8 +41,8 @@ NS_PER_S: Final = 1_000_000_000
 class Reading:
     """One register as it was read."""
 
-    name: str  # which it is
-    register: Register  # which it is
+    name: str  # in the register map
+    register: Register  # its kind, address, type and scale
     value: Value | None  # what it holds, in the register's own unit
     problem: str | None = None  # why the value can't be believed
     expected: str = ""  # what it should be, where there is a problem

@@ -43,11 +43,11 @@ class PrbsSettings:
 class PlcStatus:
     """Everything the PLC reports."""
 
-    drive_mode: DriveMode  # what the driveline is like, and whether torque is permitted
-    clutch: ClutchState  # what the driveline is like, and whether torque is permitted
-    permissive: bool  # what the driveline is like, and whether torque is permitted
-    speed_limit_rad_s: float  # largest motor speed, and largest torque of one inverter [rad/s, Nm]
-    torque_limit_nm: float  # largest motor speed, and largest torque of one inverter [rad/s, Nm]
+    drive_mode: DriveMode  # in effect
+    clutch: ClutchState  # coupling of engine and motor shaft
+    permissive: bool  # whether torque is permitted
+    speed_limit_rad_s: float  # largest permitted motor speed
+    torque_limit_nm: float  # largest permitted torque of one inverter
     plc_count: int  # its sign of life
     prbs: PrbsSettings  # the settings its own generator holds
     prbs_torque_nm: float  # that the PLC adds itself [Nm]

@@ -224,11 +224,18 @@ class LiveEstimation:
 
 
 class WarmUp:
-    """Makes the on-line chain ready, from a thread that begins at once and ends with the program."""
+    """Makes the on-line chain ready, from a thread that begins at once and ends with the program.
+
+    What compiles is a process, which is started here and not in the thread: once the view runs, standard error is its
+    own, without a file that a process could be given.
+    """
 
     def __init__(self, period_s: float, setup: OnlineSetup = USUAL) -> None:
         self._of = (period_s, setup)
         self._failed: Exception | None = None
+        self._process = multiprocessing.get_context("spawn").Process(target=_compile, args=self._of, daemon=True)
+        with safe_path():
+            self._process.start()
         self._thread = threading.Thread(target=self._run, name="compiling", daemon=True)
         self._thread.start()
 
@@ -239,10 +246,7 @@ class WarmUp:
         return not self._thread.is_alive()
 
     def _run(self) -> None:
-        process = multiprocessing.get_context("spawn").Process(target=_compile, args=self._of, daemon=True)
-        with safe_path():
-            process.start()
-        process.join()
+        self._process.join()
         try:
             run_once(*self._of)
         except Exception as error:  # noqa: BLE001 - raised where someone asks: a thread's own is lost

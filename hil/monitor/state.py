@@ -72,7 +72,7 @@ class LiveState:
         self._health: Health | None = None
         self._log: deque[Notice] = deque(maxlen=KEPT_NOTICES)
         self._now_ns = 0  # of the latest sample; 0 before the first
-        self._silent_ns = 0  # since then, as the last picture was told
+        self._silent_ns = 0  # since then, as of the last picture
         self._latest: Sample | None = None
         self._can_drive = can_drive
         self._headline = Headline(rig, Activity.CONNECTING, "", "", math.nan, math.nan, "", "")
