@@ -7,7 +7,7 @@ from tests.design.test_candidates import EXAMPLE
 
 OWN = {
     "amplitude and clock": "prbs_amplitude_nm = 50.0\nprbs_clock_divider = 3\n",
-    "multi-sine": "[experiments.cruise.multisine]\nperiod_s = 10.0\nlowest_hz = 0.5\nhighest_hz = 15.0\namplitude_nm = 60.0\n",
+    "multi-sine": "multisine = { period_s = 10.0, lowest_hz = 0.5, highest_hz = 15.0, amplitude_nm = 60.0 }\n",
 }
 SLEW = "torque_nm = 500.0\nslew_nm_per_s = 1000.0\n"
 
