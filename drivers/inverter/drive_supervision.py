@@ -32,9 +32,6 @@ LOST_S: Final = 10.0
 LOST_SHARE: Final = 0.2
 """Of the TPDOs of the last `LOST_S`, weighted by exp(-age / `LOST_S`), so many may be lost."""
 
-ALONE: Final = (0.0,)
-"""Levels of a PLC that adds nothing."""
-
 
 def left_operation(where: str, state: PowerState) -> str:
     """Say that a drive is not in the state it was armed in."""
@@ -109,8 +106,8 @@ class DriveSupervision:
         self.doubtful = False
         self.faults: list[str] = []
         self.wrong_torque = ""
-        self.off_nm: tuple[float, ...] = (0.0,)
-        self._before_nm = math.inf
+        self.off_nm = 0.0
+        self.plc_nm: float | None = None
         self.speed = LowPass(guard.period_s)
         self.followed = not self._watches_follow
         self._ignored_ns: int | None = None
@@ -120,9 +117,13 @@ class DriveSupervision:
         self._unanswered = 0
         self._late_ns: deque[int] = deque(maxlen=self._most_late)
 
-    def take(self, t_ns: int, seen: DriveRecord, part_nm: float, levels: tuple[float, ...]) -> None:
-        """Judge one cycle of this drive alone; the PLC adds one of these levels, times its part."""
-        self.doubtful = False
+    def take(self, t_ns: int, seen: DriveRecord, part_nm: float) -> None:
+        """Judge one cycle of this drive alone, to which the PLC adds up to its part, either way [Nm].
+
+        ``off_nm`` is then how far its torque is outside of what is predicted, and ``plc_nm`` what the PLC made of it:
+        None without an answer, and where a slope or a lost message leaves room for more than that part.
+        """
+        self.doubtful, self.plc_nm = False, None
         if seen.fewest != 1 or seen.most != 1 or self._surplus or self._late_ns or self.lost_share:
             self._count(t_ns, seen)
         self.torque.command(seen.commanded_nm - seen.offset_nm, seen.offset_nm)
@@ -144,32 +145,27 @@ class DriveSupervision:
             self._stale.clear()
         self.speed.take(feedback.speed_rad_s, cycles)
         late = min(max(cycles - 1, seen.most - 1) + self.repeated, self._most_late)
-        self._compare(
-            t_ns, feedback, ALONE if levels == ALONE else tuple([part_nm * level for level in levels]), late, cycles
-        )
+        self._compare(t_ns, feedback, part_nm, late, cycles)
         if feedback.limited:
             self._limited(t_ns, feedback.torque_nm, seen.commanded_nm, cycles)
 
-    def _compare(
-        self, t_ns: int, feedback: InverterFeedback, added_nm: tuple[float, ...], late: int, cycles: int
-    ) -> None:
-        """Compare a torque with what is predicted, once for each torque that the PLC may have added."""
+    def _compare(self, t_ns: int, feedback: InverterFeedback, part_nm: float, late: int, cycles: int) -> None:
+        """Compare a torque with what is predicted: a lag or a slope of the drive keeps it within the PLC's levels."""
         torque_nm, tolerance_nm = feedback.torque_nm, self.excess.tolerance
         low, high = self.torque.range(late)
+        if part_nm and high - low < part_nm:
+            self.plc_nm = torque_nm - 0.5 * (low + high)
         if feedback.limited:
             low, high = min(low, 0.0), max(high, 0.0)
-        if low <= torque_nm <= high and added_nm == ALONE:  # as in nearly every cycle
-            self.off_nm = ALONE
+        low, high = low - part_nm, high + part_nm
+        if low <= torque_nm <= high:  # as in nearly every cycle
+            self.off_nm = 0.0
             return
-        self.off_nm = off_nm = tuple([torque_nm - min(max(torque_nm, low + each), high + each) for each in added_nm])
-        distance_nm = min(map(abs, off_nm))
-        counted_nm = distance_nm
-        if len(added_nm) > 1:  # between its levels it may be once, while it goes from one to the other
-            counted_nm, self._before_nm = min(distance_nm, self._before_nm), distance_nm
-        if counted_nm > tolerance_nm:
+        self.off_nm = off_nm = torque_nm - min(max(torque_nm, low), high)
+        if abs(off_nm) > tolerance_nm:
             self.doubtful = True
-            if self.excess.take(t_ns, counted_nm, cycles):
-                self._wrong(feedback, low, high, added_nm)
+            if self.excess.take(t_ns, abs(off_nm), cycles):
+                self._wrong(feedback, low, high, part_nm)
 
     def _count(self, t_ns: int, seen: DriveRecord) -> None:
         self._cycles += 1
@@ -189,7 +185,10 @@ class DriveSupervision:
         self.lost_share = 0.0 if self.lost_share < 1e-4 else self.lost_share
         if self._surplus >= MOST_SURPLUS or self.lost_share > LOST_SHARE:
             percent = f"{100 * self.lost_share:.0f} %"
-            lost = f"{percent} of its TPDOs lost in {LOST_S:g} s, expected at most {100 * LOST_SHARE:g} %"
+            lost = (
+                f"{percent} of its TPDOs are lost, each weighted by exp(-age / {LOST_S:g} s), expected at most "
+                f"{100 * LOST_SHARE:g} %"
+            )
             surplus = f"{self._surplus} TPDOs more than SYNCs in the last {self._cycles} cycles, expected one per SYNC"
             self.faults.append(
                 f"{self.where}: {surplus if self._surplus >= MOST_SURPLUS else lost}. Look for another producer of "
@@ -236,11 +235,11 @@ class DriveSupervision:
             "check its program, and power-cycle it."
         )
 
-    def _wrong(self, feedback: InverterFeedback, low: float, high: float, added_nm: tuple[float, ...]) -> None:
+    def _wrong(self, feedback: InverterFeedback, low: float, high: float, part_nm: float) -> None:
         if self._watches_follow and not feedback.follows:
             self.faults.append(self._ignores())
             return
-        plc = "" if added_nm == (0.0,) else f" and one of {', '.join(f'{each:g}' for each in added_nm)} Nm of the PLC"
+        plc = f" and up to {part_nm:g} Nm of the PLC either way" if part_nm else ""
         expected = f"{low:g} Nm" if low == high else f"{low:g} to {high:g} Nm"
         self.wrong_torque = (
             f"inverter {self.name}: torque actual value 0x6077 is {feedback.torque_nm:g} Nm, expected {expected} as "

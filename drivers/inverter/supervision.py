@@ -51,12 +51,18 @@ MOST_HELD_RAD_S: Final = 1.0
 """That a speed which stands to the last bit should have changed by: the same came to 0.65, for half of their drives
 show a speed below 0.3 rad/s as zero, after a reading with noise."""
 
-PRBS_CYCLES: Final = 32
-"""Over which both drives' parts of the PLC's PRBS are compared. Of levels that have nothing to do with each other the
-correlation has a deviation of 0.13 there: a half is beyond three of them."""
+PRBS_S: Final = 0.32
+"""Over which both drives' parts of the PLC's PRBS are compared, by weights of exp(-age / it) [s]."""
 
-PRBS_LAGS: Final = 3  # cycles by which one drive may be later than the other
-NO_PRBS: Final = 0.05  # of the other's mean square: a drive with a first-order lag of ten levels' length has as much
+PRBS_LAG_S: Final = 0.03  # by which one drive may be later than the other [s]
+
+LEAST_CORRELATION: Final = 0.3
+"""Of both drives' parts. A lag of 60 ms at one of them, and levels of 10 ms, leave 0.53 (levels in turn through a first
+order: sqrt(a (2 - a)), a = 1 - exp(-10 / 60)); another sequence has a deviation of 0.25 at levels of 20 ms."""
+
+MOST_EVEN: Final = 0.5
+"""Mean square about the mean, in that of the PLC's levels, that one of both has at least where they are compared: what
+lasts longer than `PRBS_S` says nothing until it changes."""
 
 RULES: Final = f"""\
 power state, 0x6041 | OPERATION ENABLED, in every mode | none | one TPDO | end; never enabled again
@@ -66,9 +72,9 @@ torque 0x6077 of a drive | its command by slope and `torque_response_s`, of the 
 | `torque_error_nm` | tolerance × `torque_error_time_s` | flag, end
 torques of both | the two predictions | `torque_error_sum_nm`, of both distances | tolerance × `torque_error_time_s` \
 | flag, end
-torques with the PLC's PRBS | the same and one of its levels; nothing while it is off | as above \
-| as above, and while it is switched | flag, end
-the PLC's PRBS at both drives | the same ups and downs | {PRBS_LAGS} cycles | about {PRBS_CYCLES} cycles | end
+torques with the PLC's PRBS | the same, or between its levels; nothing while it is off | as above | as above | flag, end
+the PLC's PRBS at both drives, where its turn would be an error | one sequence: a correlation of \
+{LEAST_CORRELATION:g} | {1000 * PRBS_LAG_S:g} ms | {PRBS_S:g} s | end
 reading that repeats to the last bit | the command of its first | `torque_error_nm` | tolerance × `feedback_timeout_s` \
 | end
 speeds 0x606C of both, low-passed | one speed | {SPEED_NOISE_RAD_S:g} rad/s, a count of each, {100 * SPEED_SHARE:g} % \
@@ -80,8 +86,8 @@ acceleration per torque | that of `inertia_empty_kg_m2` to `inertia_full_kg_m2` 
 load | `most_grade`, and rolling | {DEVIATIONS:g} deviations | none | end
 speed that stands to the last bit | no jump before, no torque beyond load and friction since | \
 {MOST_HELD_RAD_S:g} rad/s that it should have changed by | none | end
-TPDOs of each kind per SYNC | one | {100 * LOST_SHARE:g} % lost in {LOST_S:g} s; {MOST_SURPLUS} too many within \
-{SURPLUS_CYCLES} cycles | none | flag, end
+TPDOs of each kind per SYNC | one | {100 * LOST_SHARE:g} % lost, weighted by exp(-age / {LOST_S:g} s); \
+{MOST_SURPLUS} too many within {SURPLUS_CYCLES} cycles | none | flag, end
 age of the feedback | one period | none | `feedback_timeout_s` | flag, end
 heartbeat and NMT state | OPERATIONAL, in every heartbeat and no boot-up | none | once | end
 heartbeat | one per `heartbeat_ms` | none | five periods, 0.5 s at least | end
@@ -104,11 +110,11 @@ def speed_tolerance_rad_s(one_rad_s: float, other_rad_s: float, counts_rad_s: fl
 
 
 class PlcPart(NamedTuple):
-    """What the PLC adds to both commands by itself: the levels it may have, as parts of its amplitudes."""
+    """What the PLC adds to both commands by itself: up to its amplitudes, either way."""
 
     m1_nm: float = 0.0  # amplitude at m1
     m2_nm: float = 0.0  # amplitude at m2
-    levels: tuple[float, ...] = (0.0,)  # each in multiples of the amplitudes
+    is_on: bool = False  # whether its generator is confirmed on, and not just being switched
 
 
 NO_PART: Final = PlcPart()
@@ -141,35 +147,38 @@ class _SharedPrbs:
     identified from the torques that the drives read.
     """
 
-    def __init__(self) -> None:
-        # of each drive, the newest first: 1 at the upper level, -1 at the lower, between them where it is between
-        self._levels = [deque[float](maxlen=PRBS_LAGS + 1) for _ in range(2)]
-        # sums over the last PRBS_CYCLES or so: products at each lag, and squares
-        self._products, self._squares = [0.0] * (2 * PRBS_LAGS + 1), [0.0, 0.0]
-        self._cycles = 0
+    def __init__(self, period_s: float) -> None:
+        self._lags, self._cycles = math.ceil(PRBS_LAG_S / period_s), math.ceil(PRBS_S / period_s)
+        # of each drive, the newest first: what the PLC made of its torque, over its part
+        self._levels = [deque[float](maxlen=self._lags + 1) for _ in range(2)]
+        # sums over the last cycles: weights, levels, their squares, and their products at each lag
+        self._weight, self._sums, self._squares = 0.0, [0.0, 0.0], [0.0, 0.0]
+        self._products = [0.0] * (2 * self._lags + 1)
+        self._taken = 0
 
-    def take(self, parts_nm: tuple[float, float], off_nm: tuple[tuple[float, ...], tuple[float, ...]]) -> str:
-        """Take both drives' distances from the upper and from the lower level; say what is wrong, if anything."""
-        between = [(abs(lower), abs(upper), part) for (upper, lower), part in zip(off_nm, parts_nm, strict=True)]
-        if any(lower + upper <= part for lower, upper, part in between):  # a slope, or a lost answer, hides the level
-            return ""
-        left = 1.0 - 1.0 / PRBS_CYCLES
-        for drive, (lower, upper, part) in enumerate(between):
-            level = min(max(0.5 * (lower - upper) / part, -1.0), 1.0)
+    def take(self, levels: tuple[float, float]) -> float:
+        """Take a cycle's levels; give the correlation at the lag at which it is greatest, 1 where nothing tells."""
+        left = 1.0 - 1.0 / self._cycles
+        for drive, level in enumerate(levels):
             self._levels[drive].appendleft(level)
+            self._sums[drive] = left * self._sums[drive] + level
             self._squares[drive] = left * self._squares[drive] + level**2
         one, other = self._levels
         pairs = [one[0] * level for level in other] + [level * other[0] for level in list(one)[1:]]
         self._products = [left * sum_ + pair for sum_, pair in zip_longest(self._products, pairs, fillvalue=0.0)]
-        self._cycles += 1
-        less, more = sorted(self._squares)
-        if self._cycles < PRBS_CYCLES:
-            return ""
-        if less < NO_PRBS * more:
-            return f"m{1 + self._squares.index(less)}: its torque 0x6077 does not go up and down"
-        if -min(self._products) > max(0.5 * more, max(self._products)):
-            return "m1 or m2: its torque 0x6077 goes up where that of the other goes down"
-        return ""
+        self._weight = left * self._weight + 1.0
+        self._taken += 1
+        means = [sum_ / self._weight for sum_ in self._sums]
+        less, more = sorted(max(each / self._weight - m**2, 0.0) for each, m in zip(self._squares, means, strict=True))
+        if self._taken < self._cycles or more < MOST_EVEN:
+            return 1.0
+        common = max(self._products) / self._weight - means[0] * means[1]
+        return common / math.sqrt(less * more) if less > 1e-9 * more else 0.0
+
+
+def _of_plc(plc: PlcPart) -> str:
+    part_nm = plc.m1_nm + plc.m2_nm
+    return f" and up to {part_nm:g} Nm of the PLC either way" if part_nm else ""
 
 
 def _wrong_motion(motion: Motion, vehicle: Vehicle) -> str:
@@ -208,14 +217,13 @@ class Supervision:
         self._m1 = DriveSupervision(m1, guard, guard.error.m1_nm)
         self._m2 = DriveSupervision(m2, guard, guard.error.m2_nm)
         self._both = Excess(guard.error.sum_nm, guard.error.time_s, guard.period_s)
-        self._before_nm = math.inf
         self._counts_rad_s = limits.count_m1_rad_s + limits.count_m2_rad_s
         self._stale_ns = guard.feedback_timeout_s * NS_PER_S
         # in units of its tolerance, which grows with the speed
         self._apart = Excess(SPEED_NOISE_RAD_S, guard.error.time_s, guard.period_s)
         self._vehicle = limits.vehicle
         self._observer = None if limits.vehicle is None else VehicleObserver(limits.vehicle, guard.period_s)
-        self._shared_prbs = _SharedPrbs()
+        self._shared_prbs = _SharedPrbs(guard.period_s)
         self._cycles = 0
         self._first_ns: int | None = None
         self.ended: DriverError | None = None
@@ -228,8 +236,8 @@ class Supervision:
     def take(self, record: CycleRecord) -> tuple[bool, bool]:
         """Judge one cycle; tell of each drive whether its readings are doubtful. What ends the run is in `ended`."""
         m1, m2, plc = self._m1, self._m2, record.plc
-        m1.take(record.t_ns, record.m1, plc.m1_nm, plc.levels)
-        m2.take(record.t_ns, record.m2, plc.m2_nm, plc.levels)
+        m1.take(record.t_ns, record.m1, plc.m1_nm)
+        m2.take(record.t_ns, record.m2, plc.m2_nm)
         self._cycles += 1
         one, other = m1.feedback, m2.feedback
         sum_fault = ""
@@ -237,8 +245,7 @@ class Supervision:
         if answered and one is not None and other is not None:
             sum_fault = self._compare_sum(record, one, other)
             self._compare_speeds(record.t_ns, one, other)
-            # what a drive answered last may be of a cycle in which the generator was switched
-            if len(m1.off_nm) == len(m2.off_nm) == 2 and plc.m1_nm and plc.m2_nm:
+            if plc.is_on:
                 self._compare_prbs(plc)
             self._follow_vehicle(one, other)
             self._cycles = 0
@@ -253,15 +260,13 @@ class Supervision:
         wrong = "; ".join(filter(None, (self._m1.wrong_torque, self._m2.wrong_torque, sum_fault)))
         self.ended = WrongTorque(
             f"{wrong}. The drive does not give what it is asked for: compare its rated torque, scale, sign and limits "
-            "with the rig file, and see that its RPDO arrives. For one that follows more slowly, or whose slope holds "
-            "the torque offset 0x60B2 too, set [guard] torque_response_s."
+            "with the rig file, see that its RPDO arrives, and what the PLC adds to it. For one that follows more "
+            "slowly, or whose slope holds the torque offset 0x60B2 too, set [guard] torque_response_s."
         )
 
     def _compare_sum(self, record: CycleRecord, one: InverterFeedback, other: InverterFeedback) -> str:
         """Compare both together, by how far each reading is from its own prediction, whatever cycle it is of."""
-        off_nm = abs(min(self._m1.off_nm, key=abs) + min(self._m2.off_nm, key=abs))
-        if len(record.plc.levels) > 1:
-            off_nm, self._before_nm = min(off_nm, self._before_nm), off_nm
+        off_nm = abs(self._m1.off_nm + self._m2.off_nm)
         if off_nm <= self._both.tolerance:
             return ""
         self._m1.doubtful = self._m2.doubtful = True
@@ -269,7 +274,8 @@ class Supervision:
             return ""
         return (
             f"both inverters: torque actual value 0x6077 is {one.torque_nm + other.torque_nm:g} Nm, expected "
-            f"{record.m1.commanded_nm + record.m2.commanded_nm:g} Nm as commanded, within {self._both.tolerance:g} Nm "
+            f"{record.m1.commanded_nm + record.m2.commanded_nm:g} Nm as commanded{_of_plc(record.plc)}, within "
+            f"{self._both.tolerance:g} Nm "
             f"(torque_error_sum_nm): m1 {one.torque_nm:g} for {record.m1.commanded_nm:g} Nm, m2 {other.torque_nm:g} "
             f"for {record.m2.commanded_nm:g} Nm"
         )
@@ -290,16 +296,24 @@ class Supervision:
                 each.stands_still(read, "the other drive reads a speed that changes") for each, read in stopped
             ]
             m1.faults.append(
-                f"inverters m1 and m2: velocity actual value 0x606C is {one.speed_rad_s:.3g} rad/s at m1 and "
-                f"{other.speed_rad_s:.3g} rad/s at m2, expected one speed within {tolerance:.2g} rad/s, for both read "
+                f"inverters m1 and m2: velocity actual value 0x606C, low-passed, is {one_rad_s:.3g} rad/s at m1 and "
+                f"{other_rad_s:.3g} rad/s at m2, expected one speed within {tolerance:.2g} rad/s, for both read "
                 "one shaft. Compare sign, unit (0x60A9) and gear of both, their resolvers, and their node ids."
             )
 
     def _compare_prbs(self, plc: PlcPart) -> None:
-        if wrong := self._shared_prbs.take((plc.m1_nm, plc.m2_nm), (self._m1.off_nm, self._m2.off_nm)):
-            self._m1.faults.append(
-                f"inverter {wrong} with the PLC's own PRBS, expected one sequence at both. Compare the signs of both, "
-                "and the share that the PLC gives each."
+        m1, m2 = self._m1, self._m2
+        if m1.plc_nm is None or m2.plc_nm is None:
+            return
+        # one that turned a smaller part would still be within its tolerance
+        if 2.0 * plc.m1_nm <= m1.excess.tolerance or 2.0 * plc.m2_nm <= m2.excess.tolerance:
+            return
+        correlation = self._shared_prbs.take((m1.plc_nm / plc.m1_nm, m2.plc_nm / plc.m2_nm))
+        if correlation < LEAST_CORRELATION:
+            m1.faults.append(
+                "inverters m1 and m2: their torques 0x6077 do not go up and down together with the PLC's own PRBS, got "
+                f"a correlation of {correlation:.2f}, expected {LEAST_CORRELATION:g} at least within "
+                f"{1000 * PRBS_LAG_S:g} ms. See that the PLC gives both its PRBS, and compare the signs of both."
             )
 
     def _follow_vehicle(self, one: InverterFeedback, other: InverterFeedback) -> None:

@@ -100,15 +100,28 @@ def _can(rig: Rig, prove_stop: bool) -> tuple[DeviceFinding, ...]:
         m1, m2 = (_inverter(link, name, rig, prove_stop, made) for name in tables)
         if len(made) == len(tables):
             m2 = _or_failed("m2", m2.address, lambda: _one_shaft(m2, made["m1"], made["m2"]))
-            m2 = _or_failed("m2", m2.address, lambda: _one_bus(m2, made["m1"], made["m2"], rig.plc.cob_ids))
+            return _one_bus((bus, m1, m2), made["m1"], made["m2"], rig.plc.cob_ids)
         return bus, m1, m2
 
 
-def _one_bus(finding: DeviceFinding, m1: Inverter, m2: Inverter, gateway: Sequence[int]) -> DeviceFinding:
-    """See that each COB-ID is used once."""
-    if shared := tuple(shared_cob_ids(m1, m2, gateway)):
-        return replace(finding, verdict=DeviceVerdict.DIFFERS, differences=(*finding.differences, *shared))
-    return finding
+def _one_bus(
+    findings: tuple[DeviceFinding, ...], m1: Inverter, m2: Inverter, gateway: Sequence[int]
+) -> tuple[DeviceFinding, ...]:
+    """See that each COB-ID is used once; what is not stands with the drive whose it is, the gateway's with the bus."""
+    bus, *drives = findings
+    try:
+        shared = tuple(shared_cob_ids(m1, m2, gateway))
+    except DriverError as error:
+        return replace(bus, verdict=DeviceVerdict.FAILED, notes=(*bus.notes, str(error))), *drives
+    of_drives = [tuple(each for each in shared if each.where == drive.settings.where) for drive in (m1, m2)]
+    of_bus = tuple(each for each in shared if all(each not in those for those in of_drives))
+    return tuple(map(_differing, findings, (of_bus, *of_drives)))
+
+
+def _differing(finding: DeviceFinding, differences: tuple[Difference, ...]) -> DeviceFinding:
+    if not differences:
+        return finding
+    return replace(finding, verdict=DeviceVerdict.DIFFERS, differences=(*finding.differences, *differences))
 
 
 def _one_shaft(finding: DeviceFinding, m1: Inverter, m2: Inverter) -> DeviceFinding:

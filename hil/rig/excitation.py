@@ -138,13 +138,11 @@ class PlcPrbs:
         """Give what the PLC may add in this cycle: nothing while it is confirmed off, anything while that changes."""
         if self._order is None:
             return NO_PART
-        parts_nm = self._order.m1.prbs_nm, self._order.m2.prbs_nm
+        parts_nm = abs(self._order.m1.prbs_nm), abs(self._order.m2.prbs_nm)
         settled = self._since_ns is None or tick.now_ns - self._since_ns > SETTLED_S * NS_PER_S
         if self._change is not None or not settled:
-            return PlcPart(*parts_nm, levels=(0.0, 1.0, -1.0))
-        if not self._holds.enabled:
-            return NO_PART
-        return PlcPart(*parts_nm, levels=(1.0, -1.0))
+            return PlcPart(*parts_nm)
+        return PlcPart(*parts_nm, is_on=True) if self._holds.enabled else NO_PART
 
     def known_nm(self, news: PlcStatus | None) -> float:
         """Give what the PLC reports to put out, where it reported since the last cycle; NaN otherwise [Nm]."""

@@ -17,7 +17,6 @@ from drivers.inverter.settings import InverterSettings
 from drivers.inverter.supervision import (
     SPEED_NOISE_RAD_S,
     CycleRecord,
-    PlcPart,
     Supervision,
     SupervisionLimits,
     rules_table,
@@ -383,67 +382,3 @@ def test_the_first_end_is_kept() -> None:
 def test_the_table_of_the_documentation_is_that_of_the_rules() -> None:
     page = (Path(__file__).parents[2] / "docs" / "reliability.md").read_text("utf-8")
     assert rules_table() in page
-
-
-def with_plc(
-    m1: Callable[[float], float],
-    m2: Callable[[float], float],
-    divider: int,
-    levels: tuple[float, ...] = (1.0, -1.0),
-    part_nm: float = 60.0,
-) -> str:
-    """Drives with 100 Nm each and a part of the PLC, of which each makes something; what ends 20 s of it."""
-    made, generator = supervised(), Prbs(1.0, 10, divider, 1)
-    course = [generator.next() for _ in range(2000)]
-    for k, level in enumerate(course):
-        drives = [DriveRecord(100.0, answer(100.0 + part_nm * of(level))) for of in (m1, m2)]
-        made.take(CycleRecord(k * PERIOD_NS, *drives, PlcPart(part_nm, part_nm, levels)))
-    return str(made.ended)
-
-
-TURNED = "inverter m1 or m2: its torque 0x6077 goes up where that of the other goes down with the PLC's own PRBS"
-NO_PRBS = "inverter m2: its torque 0x6077 does not go up and down with the PLC's own PRBS"
-
-
-@pytest.mark.parametrize("divider", [1, 2, 5])
-def test_the_prbs_of_the_plc_is_one_of_two_levels_on_each_drive(divider: int) -> None:
-    late = [0.0]
-
-    def one_cycle_late(level: float) -> float:
-        late.append(level)
-        return late[-2]
-
-    assert with_plc(lambda level: level, lambda level: level, divider) == "None"
-    assert with_plc(lambda level: level, one_cycle_late, divider) == "None"
-    assert "expected 100 Nm as commanded and one of 60, -60 Nm" in with_plc(
-        lambda level: 0.0, lambda level: level, divider
-    )
-    assert TURNED in with_plc(lambda level: level, lambda level: -level, divider)
-    assert NO_PRBS in with_plc(lambda level: level, lambda level: 0.0, divider, part_nm=20.0)  # under its tolerance
-
-
-def test_a_drive_that_does_not_answer_as_the_generator_is_switched_on_is_compared_when_it_does() -> None:
-    made = supervised()
-    for k, (levels, is_lost) in enumerate([((0.0, 1.0, -1.0), False), ((1.0, -1.0), True), ((1.0, -1.0), False)]):
-        m1 = DriveRecord(100.0, answer(160.0))
-        m2 = DriveRecord(100.0, None if is_lost else answer(160.0 + 0.1 * k))
-        made.take(CycleRecord(k * PERIOD_NS, m1, m2, PlcPart(60.0, 60.0, levels)))
-    assert made.ended is None
-
-
-def test_a_slope_is_no_other_level_of_the_plc() -> None:
-    """A torque on its way to a command that has jumped is below or above it, whatever level the PLC has."""
-    sloped = replace(M1, mode=TorqueMode.PROFILE_TORQUE, torque_slope_nm_per_s=700.0)
-    made, generator = supervised(sloped), Prbs(1.0, 10, 3, 1)
-    step_nm, ramp_nm = 700.0 * PERIOD_S, 0.0
-    for k in range(1000):
-        target_nm = 300.0 if k // 100 % 2 else -300.0
-        ramp_nm += min(max(target_nm - ramp_nm, -step_nm), step_nm)
-        level = generator.next()
-        m1, m2 = DriveRecord(target_nm, answer(ramp_nm + 60.0 * level)), DriveRecord(0.0, answer(60.0 * level))
-        made.take(CycleRecord(k * PERIOD_NS, m1, m2, PlcPart(60.0, 60.0, (1.0, -1.0))))
-    assert made.ended is None
-
-
-def test_a_prbs_of_the_plc_that_is_confirmed_off_widens_nothing() -> None:
-    assert "expected 200 Nm as commanded, within 42" in with_plc(lambda level: 1.0, lambda level: 1.0, 2, levels=(0.0,))

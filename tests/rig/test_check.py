@@ -42,24 +42,27 @@ def test_cob_ids_that_both_drives_would_use_are_named_before_anything_is_armed(t
 
 
 @pytest.mark.parametrize(
-    ("cob_id", "said"),
+    ("cob_id", "device", "said"),
     [
         (
             0x201,
+            "m1",
             "inverter m1 (node 1): COB-ID of its RPDO 0x1400 is 0x201, which the PLC's gateway uses for its messages",
         ),
-        (0x582, "inverter m2 (node 2): COB-ID of its SDO answer is 0x582, which the PLC's gateway uses"),
-        (0x080, "plc: COB-ID of its messages is 0x080, which this program uses for its SYNC"),
+        (0x582, "m2", "inverter m2 (node 2): COB-ID of its SDO answer is 0x582, which the PLC's gateway uses"),
+        (0x080, "can", "plc: COB-ID of its messages is 0x080, which this program uses for its SYNC"),
     ],
 )
-def test_a_cob_id_of_the_plc_s_gateway_that_is_used_is_named_before_anything_is_armed(cob_id: int, said: str) -> None:
+def test_a_cob_id_of_the_plc_s_gateway_that_is_used_is_named_before_anything_is_armed(
+    cob_id: int, device: str, said: str
+) -> None:
     with served(changed(small_rig(), {"plc": {"cob_ids": (0x3A0, cob_id)}})) as (server, rig):
-        m2 = check_rig(rig)[2]
+        found = {each.device: each for each in check_rig(rig)}
         with pytest.raises(ConfigMismatch, match=re.escape(said)):
             run_once(rig, Samples())
         assert_disarmed(server.bus_url, 1, 2)
-    assert str(m2.differences[0]).startswith(said)
-    assert m2.verdict is DeviceVerdict.DIFFERS
+    assert str(found[device].differences[0]).startswith(said)
+    assert {name for name, each in found.items() if each.verdict is DeviceVerdict.DIFFERS} == {device}
 
 
 def test_missing_bus_is_one_fault_and_the_plc_is_still_checked() -> None:

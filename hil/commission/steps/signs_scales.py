@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from drivers.plc.types import PrbsSource
 from estimator.errors import NotExciting
 from estimator.identification.settings import Settings
 from estimator.signals.correlation import reading_lag
@@ -234,7 +235,8 @@ def _order_scales(job: StepContext, name: str) -> Order:
         share_m1=SHARES_M1[name],
         prbs=True,
     )
-    prbs = {"amplitude_nm": _amplitude_nm(job, name), "target": name, "share_m1": None}
+    # a PLC gives both drives a part, as it was programmed; here one alone is to move
+    prbs = {"amplitude_nm": _amplitude_nm(job, name), "target": name, "share_m1": None, "source": PrbsSource.HOST.value}
     return Order(name, table, prbs)
 
 

@@ -28,7 +28,7 @@ import numpy as np
 from drivers.canopen.can_link import SYNC_COB_ID, CanLink
 from drivers.inverter.drive_supervision import NO_TORQUE_S
 from drivers.inverter.observer import BLOCK_S
-from drivers.inverter.supervision import MOST_HELD_RAD_S, PRBS_CYCLES
+from drivers.inverter.supervision import MOST_HELD_RAD_S, PRBS_S
 from drivers.inverter.vehicle import ROLLING_RAD_S2
 from drivers.plc.plc import Plc
 from drivers.plc.register import Register, RegisterKind
@@ -37,7 +37,6 @@ from hil.config.rig_file import Rig
 from hil.recording import RecordingWriter, read_table
 from hil.rig import build
 from hil.rig.build import Devices, open_devices
-from hil.rig.excitation import SETTLED_S
 from hil.rig.experiments.base import Phase
 from hil.rig.pacing import FreePacer, period_ns
 from hil.rig.plan import plan_run
@@ -297,8 +296,8 @@ def _judge_shaft(rig: Rig, man: Man, shaft: Shaft, fastest_rad_s: float, outcome
         "limit bit, no torque": NO_TORQUE_S,
         "limit bit, some counts": NO_TORQUE_S,
         "stuck and frozen": rig.guard_limits.feedback_timeout_s,
-        "PLC's PRBS ignored": error.time_s + 2.0 * SETTLED_S,  # while it is switched any level is right
-        "PLC's PRBS turned": 2.0 * PRBS_CYCLES * rig.period_s,  # while it is compared with the other drive's
+        "PLC's PRBS ignored": 2.0 * PRBS_S,  # while it is compared with the other drive's
+        "PLC's PRBS turned": 2.0 * PRBS_S,
     }
     time_s = own.get(man.kind, error.time_s)  # a drive that shows nothing of it is judged by another row of the table
     for drive, limit_nm in ((0, error.m1_nm), (1, error.m2_nm)):
