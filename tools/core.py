@@ -1,9 +1,10 @@
 """Figures of the estimator's core, counted from its source: how far a reader has to go, and which numbers decide.
 
 *The way of a diagnosis* is that of a reader who begins at ``diagnose`` and reads each function where it is first named,
-to its end, before the next one: a call, a function handed over, a property, a method (found by its name where only one
-class of the room has it). A *return* is a step back into a file that was left before. Files and returns are those of
-``estimator/diagnosis``; what it calls outside is not followed.
+to its end, before the next one: a call, a function handed over, a property, a method. A method is found by the class
+that a parameter is annotated with, or by its name where nothing else of the estimator, of Python or of NumPy has it. A
+*return* is a step back into a file that was left before. Files and returns are those of ``estimator/diagnosis``; what
+it calls outside is not followed.
 
 *A number that decides* is one that something is compared with or bounded by (a comparison, ``min``, ``max``, ``clip``):
 a named constant that holds numbers, or a number written there, other than 0, 1, 2 and a half. Those that stand in the
@@ -14,15 +15,18 @@ from __future__ import annotations
 
 import ast
 from collections import Counter, defaultdict
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from itertools import groupby
 from pathlib import Path
+
+import numpy as np
 
 ROOM, START = "estimator.diagnosis", ("estimator.diagnosis.diagnose", "diagnose")
 WATCHED = ("search", "hypotheses", "answer")  # files of `inference` that are to be entered a few times each
 GATHERED = ("thresholds", "priors")  # files whose numbers are where they belong
 BOUNDING = frozenset({"min", "max", "clip", "minimum", "maximum"})
 PLAIN = (0, 1, 2, 0.5)  # numbers that are no choice
+USUAL = {name for of in (np.ndarray, np.random.Generator, Path, str, dict, list, set, int) for name in dir(of)}
 
 Key = tuple[str, str]
 """A module, and the name of a function, class or method in it."""
@@ -30,7 +34,8 @@ Key = tuple[str, str]
 
 def core_figures(trees: Mapping[Path, ast.Module], lines: Mapping[Path, int]) -> dict[str, str]:
     """Return the figures of the core, by name, from syntax trees and lengths of all files, by path from the root."""
-    way = Way({".".join(path.with_suffix("").parts): tree for path, tree in trees.items()})
+    of_estimator = ((path, tree) for path, tree in trees.items() if path.parts[0] == "estimator")
+    way = Way({".".join(path.with_suffix("").parts): tree for path, tree in of_estimator})
     entered = Counter(way.files())
     rooms = [path for path in trees if path.parts[:2] in (("estimator", "diagnosis"), ("estimator", "physics"))]
     numbers = deciding({path: tree for path, tree in trees.items() if path.parts[:2] == ("estimator", "diagnosis")})
@@ -55,6 +60,7 @@ class Way:
         for module, tree in modules.items():
             for node in tree.body:
                 self._learn(module, node)
+        self._usual = USUAL | set(_fields(modules.values()))  # names by which no method is found
         self._order: list[Key] = []
 
     def files(self) -> list[str]:
@@ -94,15 +100,27 @@ class Way:
         if isinstance(use, ast.Name):
             return self._resolved(module, use.id)
         if isinstance(use.value, ast.Name):
-            owner = use.value.id
-            of = (module, within.partition(".")[0]) if owner in ("self", "cls") else self._resolved(module, owner)
-            method = None if of is None else (of[0], f"{of[1]}.{use.attr}")
-            inside = ".".join(self._names[module].get(owner, ("", "")))
-            for key in (method, self._resolved(inside, use.attr)):
+            of = self._owner(use.value.id, module, within)
+            inside = ".".join(self._names[module].get(use.value.id, ("", "")))
+            for key in (None if of is None else (of[0], f"{of[1]}.{use.attr}"), self._resolved(inside, use.attr)):
                 if key in self._nodes:
                     return key
-        same = self._methods[use.attr]
+            if of is not None:  # a field
+                return None
+        same = [] if use.attr in self._usual else self._methods[use.attr]
         return same[0] if len(same) == 1 else None
+
+    def _owner(self, name: str, module: str, within: str) -> Key | None:
+        """Return the class that a name stands for an instance of, or that it is itself."""
+        if name in ("self", "cls"):
+            return module, within.partition(".")[0]
+        node = self._nodes[module, within]
+        arguments = [*node.args.args, *node.args.kwonlyargs] if isinstance(node, ast.FunctionDef) else []
+        noted = next((each.annotation for each in arguments if each.arg == name), None)
+        if noted is not None:  # X, or X | None
+            noted = noted.left if isinstance(noted, ast.BinOp) else noted
+            name = noted.id if isinstance(noted, ast.Name) else ""
+        return self._resolved(module, name)
 
     def _resolved(self, module: str, name: str) -> Key | None:
         """Return what a name stands for, through re-exports; None for what is no function or class of the project."""
@@ -112,6 +130,14 @@ class Way:
             seen.add(key)
             key = self._names[key[0]].get(key[1])
         return key if key in self._nodes else None
+
+
+def _fields(trees: Iterable[ast.Module]) -> Iterator[str]:
+    """Yield the names of all fields of classes."""
+    for tree in trees:
+        for node in ast.walk(tree):
+            if isinstance(node, ast.ClassDef):
+                yield from (ast.unparse(each.target) for each in node.body if isinstance(each, ast.AnnAssign))
 
 
 def _uses(node: ast.FunctionDef) -> list[ast.Name | ast.Attribute]:
