@@ -7,8 +7,8 @@ that a parameter is annotated with, or by its name where nothing else of the est
 it calls outside is not followed.
 
 *A number that decides* is one that something is compared with or bounded by (a comparison, ``min``, ``max``, ``clip``):
-a named constant that holds numbers, or a number written there, other than 0, 1, 2 and a half. Those that stand in the
-files for thresholds and priors are where they belong; the others are counted.
+a named constant that holds numbers, or a number written there, other than 0, 1, 2, a half, and what keeps a
+logarithm finite. Those in the files for thresholds and priors are where they belong; the others are counted.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ WATCHED = ("search", "hypotheses", "answer")  # files of `inference` that are to
 GATHERED = ("thresholds", "priors")  # files whose numbers are where they belong
 BOUNDING = frozenset({"min", "max", "clip", "minimum", "maximum"})
 PLAIN = (0, 1, 2, 0.5)  # numbers that are no choice
+GUARD = 1e-9  # numbers up to here keep a logarithm or a division finite
 USUAL = {name for of in (np.ndarray, np.random.Generator, Path, str, dict, list, set, int) for name in dir(of)}
 
 Key = tuple[str, str]
@@ -167,8 +168,8 @@ def deciding(trees: Mapping[Path, ast.Module]) -> Counter[str]:
         for each in _compared(tree):
             if isinstance(each, ast.Name):
                 used |= {(module, each.id), imported.get(each.id, (module, each.id))} & named
-            elif isinstance(each, ast.Constant) and type(each.value) in (int, float) and each.value not in PLAIN:
-                written[module] += 1
+            elif isinstance(each, ast.Constant) and type(each.value) in (int, float):
+                written[module] += each.value not in PLAIN and each.value > GUARD
     found = written + Counter(module for module, _ in used)
     return Counter({module: count for module, count in found.items() if module.rpartition(".")[2] not in GATHERED})
 

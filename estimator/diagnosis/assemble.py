@@ -16,6 +16,7 @@ from estimator.diagnosis.acquisition.finding import AcquisitionFinding
 from estimator.diagnosis.inference.hypotheses import Hypothesis, covariance as of_innovations, line_values
 from estimator.diagnosis.noise import gain_from_squares, residuals_by_record, unpredictable
 from estimator.diagnosis.result import Estimated, Evidence, FoundEffect, Interval, Profile, Retuned
+from estimator.diagnosis.thresholds import Telling
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Element
 from estimator.physics.effects.load import ROAD_GRADE, grade_basis
@@ -30,10 +31,6 @@ from estimator.signals.correlation import correlation_length
 from estimator.signals.record import BoolArray, FloatArray
 
 Z95 = 1.959963984540054  # 97.5 % point of the normal distribution
-
-COHERENT_S = 1.0
-"""How long an error that is no noise keeps its value: the pace at which a test changes what it excites."""
-
 PROFILE_POINTS_S = 1.0  # a profile is reported every second
 
 
@@ -69,7 +66,7 @@ def reported_covariance(result: FitResult) -> FloatArray:
 def coherent_variance(result: FitResult) -> float:
     """Return the mean square of the error that is no noise, times the samples for which it keeps its value."""
     coherent = max(result.rms**2 - unpredictable(residuals_by_record(result)) ** 2, 0.0)
-    return coherent * COHERENT_S / min(record.sample_time_s for record in result.problem.records)
+    return coherent * Telling.COHERENT_S / min(record.sample_time_s for record in result.problem.records)
 
 
 def _free(result: FitResult) -> BoolArray:

@@ -12,6 +12,7 @@ from estimator.diagnosis.inference.answer import answer
 from estimator.diagnosis.inference.hypotheses import Progress, silent
 from estimator.diagnosis.preconditions.prepare import prepare
 from estimator.diagnosis.result import Diagnosis
+from estimator.diagnosis.thresholds import Telling
 from estimator.physics.model import DrivelineModel
 from estimator.physics.parallel import Work
 from estimator.physics.simulate import MASSES
@@ -19,9 +20,6 @@ from estimator.signals.record import Record
 
 BUDGET_S = math.inf
 """Time after which a diagnosis is ended undecided [s]: none, so that the answer depends on no machine."""
-
-
-TO_SEARCH = 0.92  # share of a limit of time after which no simulation is begun: the rest is for saying so
 
 
 def diagnose(
@@ -78,7 +76,7 @@ def diagnose(
         compile_laws(model, records[0].sample_time_s)
     with threadpool_limits(1, user_api="blas"):  # on tall, thin matrices more threads only wait for each other
         progress("checking the recordings", 0.0)
-        work = Work(BUDGET_S if budget_s is None else budget_s, TO_SEARCH)
+        work = Work(BUDGET_S if budget_s is None else budget_s, Telling.TO_SEARCH)
         ready = prepare(records, model, holdout)
         return ready.finished(answer(ready, model, progress, effort, work))
 

@@ -24,21 +24,9 @@ from estimator.diagnosis.result import (
     Profile,
     Trace,
 )
+from estimator.diagnosis.thresholds import Segments
 from estimator.physics.model import DrivelineModel
 from estimator.signals.record import FloatArray, Record, sliced
-
-LONG_S = 1.0  # a gap that is longer ends a segment
-
-LONG_SAMPLES = 10
-"""It must also hold more samples than this: where sampling is slow, a few lost ones are no gap."""
-
-SHORTEST_S = 2.0
-"""Good samples of a segment must cover this: less can't tell its initial state and its load from all else."""
-
-FEWEST_SAMPLES = 50
-"""Good samples of a segment at least: more than twice what a predictor of its own error looks back on."""
-
-FEWEST_FOR_START = 10  # good samples from which initial state and load are read off for a simulation alone
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +47,7 @@ class Cut:
 
 def segments(record: Record) -> list[slice]:
     """Return the rows of each segment of a recording, in order; short gaps stay in, at its ends, too."""
-    longest = max(round(LONG_S / record.sample_time_s), LONG_SAMPLES)
+    longest = max(round(Segments.LONG_S / record.sample_time_s), Segments.LONG_SAMPLES)
     good = np.flatnonzero(record.okay)
     breaks = np.flatnonzero(np.diff(good) > longest + 1)
     first = good[np.concatenate([[0], breaks + 1])]
@@ -74,7 +62,7 @@ def segments(record: Record) -> list[slice]:
 def tiles(record: Record) -> list[Record]:
     """Return the segments of a recording, each up to where the next begins: all rows, for a simulation of each."""
     parts = segments(record)
-    starts = [part.start for part in parts[1:] if int(record.okay[part].sum()) >= FEWEST_FOR_START]
+    starts = [part.start for part in parts[1:] if int(record.okay[part].sum()) >= Segments.FEWEST_FOR_START]
     if not starts:
         return [record]
     edges = [0, *starts, record.okay.size]
@@ -110,12 +98,12 @@ def cut(records: Sequence[Record]) -> Cut:
 
 def _is_long(record: Record, part: slice) -> bool:
     good = int(record.okay[part].sum())
-    return good >= max(FEWEST_SAMPLES, round(SHORTEST_S / record.sample_time_s))
+    return good >= max(Segments.FEWEST_SAMPLES, round(Segments.SHORTEST_S / record.sample_time_s))
 
 
 def _gaps_warning(record: Record, found: Sequence[slice], long: Sequence[slice]) -> str:
-    least = max(FEWEST_SAMPLES * record.sample_time_s, SHORTEST_S)
-    text = f"recording {record.name}: gaps of more than {LONG_S:g} s cut it into {len(found)} segments"
+    least = max(Segments.FEWEST_SAMPLES * record.sample_time_s, Segments.SHORTEST_S)
+    text = f"recording {record.name}: gaps of more than {Segments.LONG_S:g} s cut it into {len(found)} segments"
     if not long:
         return f"{text}, none of which holds {least:g} s of good samples; it is not used. Check flags and mask."
     used = sum(int(record.okay[part].sum()) for part in long) / int(record.okay.sum())

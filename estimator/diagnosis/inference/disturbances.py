@@ -13,6 +13,8 @@ from scipy.linalg import expm
 from estimator.diagnosis.line.blocks import LASTS, FormPlace, form_changes
 from estimator.diagnosis.line.whitening import Gains, Terms, fill_gains, innovate, terms_of
 from estimator.diagnosis.noise import noise_floor
+from estimator.diagnosis.priors import DisturbancePriors
+from estimator.diagnosis.thresholds import Fitting
 from estimator.physics.fit import FitResult
 from estimator.physics.layout import slot
 from estimator.physics.model import Structure
@@ -24,24 +26,7 @@ from estimator.signals.record import BoolArray, FloatArray, Location, OutputKind
 
 READING = 3  # how many sizes are of an output's reading
 
-TORQUE_SHARE, DRIFT_SHARE, WALK_SHARE = 2e-3, 2e-3, 5e-4
-"""Usual sizes as shares of the torque in use: a reading of a per mille of the rated torque, its drift, and the change
-of the load in a second (a grade of half a per mille, a breath of wind)."""
-
-FORM_SHARE, MOST_FORM = 0.1, 0.5
-"""Usual share of a law's change by which its form is off, and the share beyond which it is another law."""
-
-MOST_TORQUE, MOST_DRIFT, MOST_WALK = 2e-2, 2e-2, 5e-3
-"""Sizes beyond which such a disturbance is physics to be named."""
-
-COLOUR_S, DRIFT_S = 0.03, 3.0
-"""Usual correlation times of a sensor's coloured noise and of a current sensor's drift [s]."""
-
-PRIOR_SPREAD = 1.5
-"""Standard deviation of the logarithm of a size around the usual one: a factor of 20 is two of them."""
-
 STEP = 1e-4  # change of a logarithm by which derivatives are found
-ENOUGH = 0.5  # fall of minus twice the log-posterior below which sizes are estimated
 
 
 @dataclass(frozen=True, slots=True)
@@ -306,21 +291,26 @@ def limits_for(records: Sequence[Record], white: float) -> Limits:
         [
             white,
             0.5 * white,
-            COLOUR_S,
-            TORQUE_SHARE * torque,
-            DRIFT_SHARE * torque,
-            DRIFT_S,
-            WALK_SHARE * torque,
-            FORM_SHARE,
+            DisturbancePriors.COLOUR_S,
+            DisturbancePriors.TORQUE_SHARE * torque,
+            DisturbancePriors.DRIFT_SHARE * torque,
+            DisturbancePriors.DRIFT_S,
+            DisturbancePriors.WALK_SHARE * torque,
+            DisturbancePriors.FORM_SHARE,
         ]
     )
-    low, high = usual - np.log(1e3), usual + np.log(1e3)
-    low[Size.COLOUR_S], high[Size.COLOUR_S] = np.log([0.5 * period_s, max(0.3, 4.0 * period_s)])
-    low[Size.DRIFT_S], high[Size.DRIFT_S] = np.log([max(0.5, 4.0 * period_s), 20.0])
-    high[Size.FORM] = np.log(MOST_FORM)
-    high[Size.TORQUE] = np.log(MOST_TORQUE * torque)
-    high[Size.DRIFT] = np.log(MOST_DRIFT * torque)
-    high[Size.WALK] = np.log(MOST_WALK * torque)
+    low, high = usual - np.log(DisturbancePriors.FACTOR), usual + np.log(DisturbancePriors.FACTOR)
+    few_periods_s = DisturbancePriors.FEW_PERIODS * period_s
+    low[Size.COLOUR_S], high[Size.COLOUR_S] = np.log(
+        [0.5 * period_s, max(DisturbancePriors.MOST_COLOUR_S, few_periods_s)]
+    )
+    low[Size.DRIFT_S], high[Size.DRIFT_S] = np.log(
+        [max(DisturbancePriors.LEAST_DRIFT_S, few_periods_s), DisturbancePriors.MOST_DRIFT_S]
+    )
+    high[Size.FORM] = np.log(DisturbancePriors.MOST_FORM)
+    high[Size.TORQUE] = np.log(DisturbancePriors.MOST_TORQUE * torque)
+    high[Size.DRIFT] = np.log(DisturbancePriors.MOST_DRIFT * torque)
+    high[Size.WALK] = np.log(DisturbancePriors.MOST_WALK * torque)
     if in_output:  # of an imposed motion nothing is integrated: torque noise is the reading's
         high[[Size.TORQUE, Size.DRIFT]] = usual[[Size.TORQUE, Size.DRIFT]] = low[[Size.TORQUE, Size.DRIFT]]
     return Limits(np.clip(usual, low, high), low, high)
@@ -328,7 +318,7 @@ def limits_for(records: Sequence[Record], white: float) -> Limits:
 
 def minus_twice_log_prior(sizes: FloatArray, limits: Limits) -> float:
     """Return how far a noise model is from the usual one."""
-    return float(np.sum(((sizes - limits.usual) / PRIOR_SPREAD) ** 2))
+    return float(np.sum(((sizes - limits.usual) / DisturbancePriors.PRIOR_SPREAD) ** 2))
 
 
 def starts(sizes: FloatArray, limits: Limits) -> list[FloatArray]:
@@ -377,8 +367,10 @@ def estimate(
         # d(innovation / spread) holds both changes: e' = de/s - e dlog s
         pure = by_error + innovations * by_log
         gradient = 2.0 * by_log.sum(axis=1) + 2.0 * by_error @ innovations
-        gradient += 2.0 * (sizes - limits.usual) / PRIOR_SPREAD**2
-        information = 4.0 * by_log @ by_log.T + 2.0 * pure @ pure.T + 2.0 * np.eye(sizes.size) / PRIOR_SPREAD**2
+        gradient += 2.0 * (sizes - limits.usual) / DisturbancePriors.PRIOR_SPREAD**2
+        information = (
+            4.0 * by_log @ by_log.T + 2.0 * pure @ pure.T + 2.0 * np.eye(sizes.size) / DisturbancePriors.PRIOR_SPREAD**2
+        )
         promised = 0.0
         while damping < 1e6:
             at_bound = ((sizes <= limits.low) & (gradient > 0.0)) | ((sizes >= limits.high) & (gradient < 0.0))
@@ -394,6 +386,6 @@ def estimate(
                 sizes, value, innovations, logs = tried, moved_value, moved_innovations, moved_logs
                 break
             damping *= 5.0
-        if promised < ENOUGH:
+        if promised < Fitting.ENOUGH:
             break
     return sizes, value

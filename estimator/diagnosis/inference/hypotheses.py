@@ -21,6 +21,7 @@ from estimator.diagnosis.inference.disturbances import (
     whitener_of,
 )
 from estimator.diagnosis.inference.moments import has_moments, idle_moments, with_better_moments
+from estimator.diagnosis.thresholds import Fitting
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Untestable
 from estimator.physics.fit import FitResult, not_fitted
@@ -42,22 +43,8 @@ GRADE = "road_grade"
 Progress = Callable[[str, float], None]
 """Called with what is being done and the share of the work behind it; raise from it to cancel."""
 
-SETTLED_DEVIANCE = 1.0
-"""Fall of minus twice the log-likelihood below which another pass over unknowns and disturbances is not made."""
-
-DIGITS = 0.02  # the same over the difference from a rival that the fit is for
-
-MOST_PASSES = 6
-
 THOROUGH, ROUGH = Effort(derivatives=6, steps=30), Effort(derivatives=1, steps=6)
 """What a pass may cost at most, and a first comparison."""
-
-MOST_ROUGH, MUCH = 3, 0.05
-"""Such comparisons under disturbances of their own at most, and the fall of minus twice the log-likelihood per sample
-for the next."""
-
-ROUNDS = 2  # steps of Fisher scoring in a pass
-WITH_MOMENTS = 1  # passes in which moments of events are looked for elsewhere
 
 
 def silent(_message: str, _share: float) -> None:
@@ -229,13 +216,17 @@ def fitted(
     result, choices, sizes = initial, catalogue.choices(effects), np.clip(sizes, limits.low, limits.high)
     best: Hypothesis | None = None
     passes: list[float] = []
-    while best is None or len(passes) < MOST_PASSES:
+    while best is None or len(passes) < Fitting.MOST_PASSES:
         result = descended(result, whitener_of(result, sizes), THOROUGH)
-        if len(passes) < WITH_MOMENTS:
+        if len(passes) < Fitting.WITH_MOMENTS:
             result = _with_moments(result, sizes)
         is_anew = not passes and math.isnan(rival)  # with a rival they begin where its own ended
-        sizes, now = estimated(result, result.residual, sizes, limits, ROUNDS, is_anew)
-        enough = SETTLED_DEVIANCE if math.isnan(rival) else max(SETTLED_DEVIANCE, DIGITS * abs(now - rival))
+        sizes, now = estimated(result, result.residual, sizes, limits, Fitting.ROUNDS, is_anew)
+        enough = (
+            Fitting.SETTLED_DEVIANCE
+            if math.isnan(rival)
+            else max(Fitting.SETTLED_DEVIANCE, Fitting.DIGITS * abs(now - rival))
+        )
         last = best is not None and now > best.minus_twice_log - enough
         if best is None or now < best.minus_twice_log:
             best = Hypothesis(effects, result, sizes, limits, now, choices)
@@ -251,10 +242,10 @@ def compared(
     """Fit a hypothesis a few steps from another's disturbances, to be compared with others like it."""
     sizes, best = np.clip(parent.sizes, limits.low, limits.high), parent.minus_twice_log
     result, now = initial, math.inf
-    for _ in range(MOST_ROUGH):
+    for _ in range(Fitting.MOST_ROUGH):
         result = descended(result, whitener_of(result, sizes), ROUGH)
         sizes, now = estimated(result, result.residual, sizes, limits, rounds=1)
-        if now > best - MUCH * result.residual.size:
+        if now > best - Fitting.MUCH * result.residual.size:
             break
         best = now
     return Hypothesis(effects, result, sizes, limits, now, catalogue.choices(effects))

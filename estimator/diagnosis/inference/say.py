@@ -19,7 +19,6 @@ from estimator.diagnosis.inference.search import Search
 from estimator.diagnosis.inference.standing import Standing
 from estimator.diagnosis.inference.trials import Trial
 from estimator.diagnosis.inference.wording import Context, statement
-from estimator.diagnosis.noise import SMALLEST_P
 from estimator.diagnosis.result import (
     Diagnosis,
     Discrepancy,
@@ -39,6 +38,7 @@ from estimator.diagnosis.result import (
     Verdict,
 )
 from estimator.diagnosis.table_answer import Law, sentences
+from estimator.diagnosis.thresholds import Noise
 from estimator.diagnosis.where import locate
 from estimator.diagnosis.where.discrepancy import discrepancy
 from estimator.physics.catalogue import EFFECTS
@@ -268,7 +268,7 @@ def _mismatch(basis: Basis, seen: Discrepancy | None) -> Mismatch:
         time_s=locate.intervals(result, noise),
         band_hz=_band_hz(nothing, noise),
         region=None if element is None else locate.region(result, element, noise),
-        p_value=max(math.exp(-0.5 * gained), SMALLEST_P),
+        p_value=max(math.exp(-0.5 * gained), Noise.SMALLEST_P),
     )
 
 

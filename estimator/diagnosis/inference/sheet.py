@@ -11,15 +11,10 @@ from estimator.diagnosis.inference.fits import Fits
 from estimator.diagnosis.inference.hypotheses import NOTHING, Catalogue, Hypothesis, covariance, fitted
 from estimator.diagnosis.inference.trials import Trial, tried
 from estimator.diagnosis.result import OffNominal
+from estimator.diagnosis.thresholds import Judging
 from estimator.physics.driveline import Structure
 from estimator.physics.fit import not_fitted
 from estimator.physics.model import DrivelineModel, parameter_unit
-
-FREELY = 3.0
-"""Factor, either way, within which a nominal parameter is looked for: beyond it a value is no slip of a data sheet, and
-the integration's steps, chosen for the nominal line, would not follow."""
-
-CLEARLY = 3.0  # standard errors by which a value must lie beyond what it is trusted to
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,9 +39,9 @@ def free_line(fits: Fits) -> FreeLine | None:
     if not any(free and at_bound for free, at_bound in zip(trusted, nothing.pinned, strict=False)):
         return None
     # a joint has nothing to integrate: of its stiffness and damping, one may be none at all
-    least = 0.0 if nothing.problem.grid.structure is Structure.JOINT else 1.0 / FREELY
+    least = 0.0 if nothing.problem.grid.structure is Structure.JOINT else 1.0 / Judging.FREELY
     freed = tuple(
-        replace(s, low=min(s.low, least), high=max(s.high, FREELY)) if free else s
+        replace(s, low=min(s.low, least), high=max(s.high, Judging.FREELY)) if free else s
         for s, free in zip(shared, trusted, strict=True)
     )
     problem = replace(nothing.problem, shared=freed)
@@ -66,7 +61,7 @@ def _off_nominal(fits: Fits, found: Hypothesis) -> tuple[OffNominal, ...]:
     for i, trusted in enumerate(fits.nothing().result.problem.shared):
         ratio = float(found.result.x[i])
         by = max(trusted.low - ratio, ratio - trusted.high)
-        if not trusted.effect and trusted.low < trusted.high and by > CLEARLY * spread[i]:
+        if not trusted.effect and trusted.low < trusted.high and by > Judging.CLEARLY * spread[i]:
             sureness = by / max(float(spread[i]), np.finfo(float).tiny)
             given, unit = fits.model.parameters[trusted.name], parameter_unit(trusted.name, fits.model.motion)
             clear.append((sureness, OffNominal(trusted.name, ratio, trusted.high - 1.0, given.value, unit)))

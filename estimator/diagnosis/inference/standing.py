@@ -10,26 +10,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from estimator.diagnosis.inference.checks import THRESHOLDS
 from estimator.diagnosis.result import Counted
-
-LEAST_NECESSITY: float = THRESHOLDS["least_necessity"]
-"""Share of the squared error beyond the noise that must come back without a law for it to be named."""
-
-LEAST_EVIDENCE: float = THRESHOLDS["least_evidence"]
-"""Rise of minus twice the log-probability without a law from which the likelihood agrees that it is there."""
-
-LEAST_SHARE: float = THRESHOLDS["least_share"]
-"""Share of the re-tuned model's squared free-run error below which an effect is a trace (CONTRACT)."""
-
-CLEARLY_BELOW: float = THRESHOLDS["clearly_below"]
-"""RMS of the augmented model's error, over the spread of the signal, up to which anything is explained."""
-
-ALIKE_WITHIN: float = THRESHOLDS["alike_within"]
-"""Difference in score within which another effect in an effect's place is as good."""
-
-ALIKE_SHARE: float = THRESHOLDS["alike_share"]
-"""The same over what the effect itself explains: laws of nature are written in other forms than the model's."""
+from estimator.diagnosis.thresholds import THRESHOLDS
 
 COUNTED: Sequence[tuple[float, Counted]] = [
     (row["necessity_from"], Counted(row["right"], row["of"])) for row in THRESHOLDS["counted"]

@@ -19,26 +19,16 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.stats import t
 
-from estimator.diagnosis.inference.checks import THRESHOLDS
 from estimator.diagnosis.inference.descent import Effort, descended
 from estimator.diagnosis.inference.disturbances import reading_noise
 from estimator.diagnosis.inference.hypotheses import GRADE, Effects, Hypothesis
 from estimator.diagnosis.inference.standing import Necessity
+from estimator.diagnosis.thresholds import Judging
 from estimator.physics.fit import FitResult, in_common, not_fitted, warm_start
 from estimator.physics.model import DrivelineModel
 from estimator.physics.parallel import concurrently
 from estimator.physics.problem import Problem, bounds, make_problem
 from estimator.signals.record import BoolArray, FloatArray, Record, by_output
-
-BLOCK_S, EVERY_S = 0.6, 2.0
-"""Blocks kept out of a fit: shorter than the knot spacing of a load profile, so that its neighbours predict it."""
-
-FEWEST_BLOCKS = 3  # blocks of a recording at least: it may be shorter than one of these
-
-COURSE: int = THRESHOLDS["course"]
-"""Laws that a free course of the load counts for."""
-
-SURE = 0.95  # one-sided probability with which a comparison of blocks is sure
 
 TUNED = Effort(derivatives=2, steps=6)
 """What tuning a set for the free run may cost, from where the likelihood is greatest."""
@@ -46,7 +36,7 @@ TUNED = Effort(derivatives=2, steps=6)
 
 def quantile(count: int) -> float:
     """Return Student's quantile of so many blocks: how many standard errors a sum of theirs may be off by chance."""
-    return float(t.ppf(SURE, max(count - 1, 1)))
+    return float(t.ppf(Judging.SURE, max(count - 1, 1)))
 
 
 def blocks(record: Record) -> BoolArray:
@@ -62,8 +52,8 @@ def between_blocks(records: Sequence[Record]) -> tuple[BoolArray, ...]:
 def block_numbers(record: Record) -> FloatArray:
     """Return the number of the block that each sample is in, -1 between the blocks; shape (N,)."""
     since_s = record.time_s - record.time_s[0]
-    scale = min(1.0, float(since_s[-1]) / (FEWEST_BLOCKS * EVERY_S))
-    every_s, block_s = scale * EVERY_S, scale * BLOCK_S
+    scale = min(1.0, float(since_s[-1]) / (Judging.FEWEST_BLOCKS * Judging.EVERY_S))
+    every_s, block_s = scale * Judging.EVERY_S, scale * Judging.BLOCK_S
     phase = np.mod(since_s, every_s)
     middle = 0.5 * (every_s - block_s)
     inside = (phase >= middle) & (phase < middle + block_s)
@@ -169,7 +159,7 @@ class Trials:
 
 def size_of(effects: Effects) -> int:
     """Return for how many laws a set counts: a load's free course follows whatever is slow, as several laws would."""
-    return len(effects) + (COURSE - 1) * (GRADE in effects)
+    return len(effects) + (Judging.COURSE - 1) * (GRADE in effects)
 
 
 def tried(hypothesis: Hypothesis, model: DrivelineModel, size: int, subsets: Sequence[FitResult] = ()) -> Trial:

@@ -16,12 +16,12 @@ from estimator.diagnosis.acquisition.chain import without_lost_samples
 from estimator.diagnosis.acquisition.finding import runs
 from estimator.diagnosis.noise import noise_floor, share_of
 from estimator.diagnosis.preconditions.agreement import disagreements
-from estimator.diagnosis.preconditions.candidates import SAME_PERIOD
 from estimator.diagnosis.preconditions.channels import standstill, unwrapped, with_usable_channels, without_clipped
 from estimator.diagnosis.preconditions.inertia import driven, model_warnings
 from estimator.diagnosis.preconditions.plausible import doubts_about
 from estimator.diagnosis.result import Diagnosis, Doubt
 from estimator.diagnosis.segments import Cut, cut, joined, segments
+from estimator.diagnosis.thresholds import Mistakes, Recordings
 from estimator.errors import BadShape, NotExciting, made_of_each
 from estimator.physics.layout import Grid, grid_for
 from estimator.physics.model import DrivelineModel, Structure, natural_frequencies_rad_s
@@ -29,44 +29,9 @@ from estimator.physics.parallel import TimeIsUp
 from estimator.physics.simulate import output_state
 from estimator.signals.record import BoolArray, Channel, FloatArray, OutputKind, Record, separated_outputs, sliced
 
-FEWEST_IN_A_ROW = 20
-"""Samples in a row that count: by chance two in three of the steps between them would have to be alike."""
-
-ROUNDING = 2.0
-"""How far three samples of a straight line may be off one, in the file's least steps: each is rounded by half of one,
-and the middle one counts twice."""
-
-SMOOTH = 1e-9  # the same as a share of the signal's range, where a file has all digits
-
-BENT = 50.0
-"""How far three samples usually are off a straight line, in what rounding makes of one: below, it can't be decided. The
-line itself must go further than that: a motion that settles without noise is straight in the end."""
-
-SELDOM = 0.05  # share of equal neighbours elsewhere up to which twenty in a row are no chance: 1e-26
-
-MOST_SAMPLES_TIMES_RECORDINGS = 500_000
-"""Samples of all recordings, counted once for each recording: 12 of 3000 samples. A fit takes some 1.4 kB for each."""
-
 SEED = 1
 
-LONGEST_S = 0.01
-LONGEST_OF_RIGID_S = 0.02
-"""The same where a likelihood of the samples is formed: on a millisecond's grid only an encoder's steps are seen."""
-
-BAND_POWER = 0.99
-"""Share of the power of what a joint takes that lies within its band: a joint has no mode, its motion is imposed."""
-
-FEWEST_KEPT = 200
-"""Samples of the shortest recording that are kept in any case: fewer do not carry a model with a dozen unknowns."""
-
 TURN = 2.0 * np.pi
-PER_PERIOD = 12.0  # samples kept per period of the line's fastest mode, at least; and one in `LONGEST_S`
-
-FEWEST_SAMPLES = 200  # fewer good samples than this do not carry a model with a dozen unknowns and its hold-out
-
-NEAR_MODE = 0.7
-"""From this share of the first natural frequency on a line answers otherwise than one body: by ``1 / (1 - 0.7^2)``,
-twice as much."""
 
 UNREAD = ", and that every torque is read: what another one does counts as noise."
 
@@ -86,21 +51,23 @@ def not_read(channel: str, values: FloatArray, seen: BoolArray, may_rest: bool) 
     steps = np.abs(np.diff(values))
     if not whole.any() or not (steps > 0.0).any():
         return []
-    rounding = max(ROUNDING * float(steps[steps > 0.0].min()), SMOOTH * float(np.ptp(values[seen])))
+    rounding = max(
+        Recordings.ROUNDING * float(steps[steps > 0.0].min()), Recordings.SMOOTH * float(np.ptp(values[seen]))
+    )
     bend = np.abs(np.diff(values, 2))
     bent = bend[whole & (bend > rounding)]
     usual = float(np.median(bent)) if bent.size else 0.0
-    if usual < BENT * rounding:
+    if usual < Recordings.BENT * rounding:
         return []
     drawn, held = np.zeros_like(seen), np.zeros_like(seen)
     for first, behind in runs(whole & (bend <= rounding)):
         rows = slice(first, behind + 2)  # a triple has two rows more
-        if behind + 2 - first < FEWEST_IN_A_ROW:
+        if behind + 2 - first < Recordings.FEWEST_IN_A_ROW:
             continue
         moved = float(np.ptp(values[rows]))
         drawn[rows] |= moved >= usual
         held[rows] |= moved == 0.0 and values[first] != 0.0
-    if may_rest or float(np.mean(steps[~(held[1:] & held[:-1])] == 0.0)) > SELDOM:
+    if may_rest or float(np.mean(steps[~(held[1:] & held[:-1])] == 0.0)) > Recordings.SELDOM:
         held[:] = False
     return [NotRead(channel, rows, rows is held) for rows in (drawn, held) if rows.any()]
 
@@ -130,8 +97,8 @@ def shortened_to_memory(segments: Cut, training: Iterable[str]) -> tuple[Cut, li
     """Leave out pieces of the recordings that are fitted, as many as a fit can't hold; say which are used."""
     pieces = segments.of(training)
     used = list(pieces)
-    while (size := _size(used)) > MOST_SAMPLES_TIMES_RECORDINGS and len(used) > 1:
-        used = _some(pieces, min(int(len(used) * sqrt(MOST_SAMPLES_TIMES_RECORDINGS / size)), len(used) - 1))
+    while (size := _size(used)) > Recordings.MOST_SAMPLES_TIMES_RECORDINGS and len(used) > 1:
+        used = _some(pieces, min(int(len(used) * sqrt(Recordings.MOST_SAMPLES_TIMES_RECORDINGS / size)), len(used) - 1))
     if len(used) == len(pieces):
         return segments, []
     left_out = {piece.name for piece in pieces} - {piece.name for piece in used}
@@ -167,16 +134,16 @@ def thinned(records: Sequence[Record], model: DrivelineModel) -> list[Record]:
 def as_slow_as_needed(records: Sequence[Record], model: DrivelineModel) -> list[Record]:
     """Return recordings with no more samples than the line can answer to: between them only the sensor is seen."""
     shortest = min(record.okay.size for record in records)
-    factor = min(factor_for(records, model, LONGEST_OF_RIGID_S), max(shortest // FEWEST_KEPT, 1))
+    factor = min(factor_for(records, model, Recordings.LONGEST_OF_RIGID_S), max(shortest // Recordings.FEWEST_KEPT, 1))
     return [thin(record, factor) for record in records]
 
 
-def factor_for(records: Sequence[Record], model: DrivelineModel, longest_s: float = LONGEST_S) -> int:
+def factor_for(records: Sequence[Record], model: DrivelineModel, longest_s: float = Recordings.LONGEST_S) -> int:
     """Return one in how many samples is enough for recordings of one sampling period."""
     joint = model.structure is Structure.JOINT
     fastest_hz = max(map(_band_hz, records)) if joint else float(natural_frequencies_rad_s(model.values())[-1]) / TURN
     if fastest_hz > 0.0:
-        longest_s = min(longest_s, 1.0 / (PER_PERIOD * fastest_hz))
+        longest_s = min(longest_s, 1.0 / (Recordings.PER_PERIOD * fastest_hz))
     return max(1, int(longest_s / records[0].sample_time_s * (1.0 + 1e-9)))
 
 
@@ -184,7 +151,7 @@ def _band_hz(record: Record) -> float:
     """Return the frequency below which nearly all the power of an output is [Hz]."""
     output = np.where(record.okay, record.output, np.mean(record.output[record.okay]))
     power = np.cumsum(np.abs(np.fft.rfft(output - output.mean())) ** 2)
-    index = int(np.searchsorted(power, BAND_POWER * power[-1]))
+    index = int(np.searchsorted(power, Recordings.BAND_POWER * power[-1]))
     return float(np.fft.rfftfreq(output.size, record.sample_time_s)[index])
 
 
@@ -224,9 +191,10 @@ def _blocks(values: NDArray[Any], factor: int) -> NDArray[Any]:
 def require_signals(record: Record) -> None:
     """Refuse a recording with too few good samples, or of which torque or output does not change."""
     good = int(record.okay.sum())
-    if good < FEWEST_SAMPLES:
+    if good < Recordings.FEWEST_SAMPLES:
         raise NotExciting(
-            f"recording {record.name}: {good} good samples, expected at least {FEWEST_SAMPLES}. Record longer.",
+            f"recording {record.name}: {good} good samples, expected at least {Recordings.FEWEST_SAMPLES}. Record "
+            "longer.",
             (record.name,),
         )
     driven_by = ("torque", record.total_torque_nm) if record.imposed is None else ("imposed motion", record.imposed)
@@ -284,7 +252,7 @@ def _unexcited_mode(records: Sequence[Record], line: DrivelineModel, grid: Grid,
             f"the model's first mode is at {first_hz:.3g} Hz, beyond the {nyquist_hz:.3g} Hz that a sampling period of "
             f"{records[0].sample_time_s:g} s can show: {lacking}. Sample faster, or use structure = 'one_mass'."
         ]
-    answer = _rms([_good(record, driven(record, line, grid, NEAR_MODE * first_hz)) for record in records])
+    answer = _rms([_good(record, driven(record, line, grid, Recordings.NEAR_MODE * first_hz)) for record in records])
     if answer >= floor:
         return []
     return [
@@ -311,7 +279,7 @@ def require_together(records: Sequence[Record]) -> None:
     if len(set(names)) < len(names):
         raise BadShape(f"recordings must have different names, got {', '.join(names)}. Rename the files.")
     for record in records[1:]:
-        if not np.isclose(record.sample_time_s, first.sample_time_s, rtol=SAME_PERIOD):
+        if not np.isclose(record.sample_time_s, first.sample_time_s, rtol=Mistakes.SAME_PERIOD):
             raise BadShape(
                 f"recording {record.name}: sampling period {record.sample_time_s:g} s, expected "
                 f"{first.sample_time_s:g} s as in {first.name}. Diagnose recordings of one period together."

@@ -21,8 +21,8 @@ from estimator.diagnosis.line.blocks import (
     size_at,
 )
 from estimator.diagnosis.line.equivalent import Explanation, Input, explain, explain_all, smooth
-from estimator.diagnosis.noise import VERY_STRONG
 from estimator.diagnosis.result import Course, Discrepancy, Equivalent, LawPicture
+from estimator.diagnosis.thresholds import Noise, Places
 from estimator.diagnosis.where.locate import error_spectrum, responses
 from estimator.physics import model
 from estimator.physics.catalogue import EFFECTS
@@ -32,12 +32,6 @@ from estimator.physics.layout import slot
 from estimator.physics.model import Motion as Kind, unit
 from estimator.physics.problem import outputs_at
 from estimator.signals.record import BoolArray, FloatArray
-
-BINS = 24
-
-FEWEST_PASSES = 3  # a bin that the signal passes less often says nothing of its own scatter
-
-FUNCTION = 0.5  # share of a law's power that must be a function of one signal to be drawn over it
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,14 +113,14 @@ def binned_by_pass(
         return None
     edges = _edges(every, float(low), float(high))
     passes = [
-        _passes(np.where(good, np.clip(np.digitize(each, edges) - 1, -1, BINS), -1), (each, value, curve))
+        _passes(np.where(good, np.clip(np.digitize(each, edges) - 1, -1, Places.BINS), -1), (each, value, curve))
         for each, value, curve, good in zip(x, data, law, okay, strict=True)
     ]
     where = np.concatenate([bins for bins, _ in passes])
     means = np.concatenate([values for _, values in passes])
-    rows = [means[where == each] for each in range(BINS)]
-    rows = [row for row in rows if row.shape[0] >= FEWEST_PASSES]
-    if len(rows) < 4:
+    rows = [means[where == each] for each in range(Places.BINS)]
+    rows = [row for row in rows if row.shape[0] >= Places.FEWEST_PASSES]
+    if len(rows) < Places.FEWEST_BINS:
         return None
     centres, values, curves = (np.array([np.average(r[:, i], weights=r[:, 3]) for r in rows]) for i in range(3))
     spread = np.array([_half_width(r[:, 1]) for r in rows])
@@ -138,10 +132,10 @@ def binned_by_pass(
 
 def _edges(values: FloatArray, low: float, high: float) -> FloatArray:
     """Return bin edges, half as bins of one width would have them and half as bins of one count would."""
-    grid = np.linspace(low, high, 20 * BINS + 1)
+    grid = np.linspace(low, high, 20 * Places.BINS + 1)
     counted = np.searchsorted(np.sort(values), grid) / values.size
     share = 0.5 * (grid - low) / (high - low) + 0.5 * (counted - counted[0]) / (counted[-1] - counted[0])
-    return np.interp(np.linspace(0.0, 1.0, BINS + 1), share, grid)
+    return np.interp(np.linspace(0.0, 1.0, Places.BINS + 1), share, grid)
 
 
 def _half_width(values: FloatArray) -> float:
@@ -190,7 +184,7 @@ def picture(
         if binned is not None and (best is None or binned.explained > best.explained + 1e-9):
             labels = (name, element, axis.name, signal_unit(axis.dimension, kind), input_unit(place, without, kind))
             best = LawPicture(*labels, *binned.arrays, binned.explained)
-    return best if best is not None and (own is not None or best.explained >= FUNCTION) else None
+    return best if best is not None and (own is not None or best.explained >= Places.FUNCTION) else None
 
 
 def _sums(first: Sequence[FloatArray], second: Sequence[FloatArray]) -> list[FloatArray]:
@@ -238,7 +232,7 @@ def _equivalents(
             input_unit(place, retuned, motion),
             _courses(cut, explanation),
             explanation.log_likelihood,
-            2.0 * (most - explanation.log_likelihood) <= VERY_STRONG,
+            2.0 * (most - explanation.log_likelihood) <= Noise.VERY_STRONG,
         )
         for place, explanation in inputs.items()
     )
