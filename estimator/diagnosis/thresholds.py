@@ -1,9 +1,9 @@
 """Thresholds: every number that decides what a diagnosis refuses, tries, believes and says, in the order of its course.
 
-Beside each stands what it is for and where it is from. Those that were counted, or that the contract gives, are in
-``thresholds.toml`` with the command that counted them. Where no source or count stands beside a number it is a choice:
-its reason stands there, and no campaign has counted it. Steps of a numerical method, and what fits into memory, stand
-with their method; what is usual before a recording is seen, in `priors.py`.
+With each stands what it is for and where it is from. Those that were counted, or that the contract gives, are in
+``thresholds.toml`` with the command that counted them. Where neither a source nor a command is given, the number is a
+choice: its reason is given, and no campaign has counted it. Steps of a numerical method, and what fits into memory,
+stand with their method; what is usual before a recording is seen, in `priors.py`.
 """
 
 from __future__ import annotations

@@ -10,7 +10,7 @@ import numpy as np
 from scipy import signal, stats
 
 from estimator.diagnosis.acquisition.finding import runs
-from estimator.diagnosis.line.blocks import Motion, motion_of
+from estimator.diagnosis.line.line import Motion, motion_of
 from estimator.diagnosis.result import BandTest, ErrorSpectrum, Interval, Region, Response
 from estimator.diagnosis.thresholds import Places
 from estimator.errors import NotExciting
