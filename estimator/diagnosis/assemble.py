@@ -7,16 +7,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
+from scipy import stats
 
 from estimator.diagnosis.acquisition.finding import AcquisitionFinding
 from estimator.diagnosis.inference.hypotheses import Hypothesis, covariance as of_innovations, line_values
-from estimator.diagnosis.noise import gain_from_squares, residuals_by_record, unpredictable
+from estimator.diagnosis.noise import residuals_by_record, unpredictable
 from estimator.diagnosis.result import Estimated, Evidence, FoundEffect, Interval, Profile, Retuned
-from estimator.diagnosis.thresholds import Telling
+from estimator.diagnosis.thresholds import Noise, Telling
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Element
 from estimator.physics.effects.load import ROAD_GRADE, grade_basis
@@ -27,7 +28,7 @@ from estimator.physics.model import DrivelineModel, EffectValue, Parameter, para
 from estimator.physics.problem import local_part
 from estimator.physics.steps import inside, moments_of
 from estimator.physics.unknowns import LOAD_TORQUE, Shared
-from estimator.signals.correlation import correlation_length
+from estimator.signals.correlation import correlation_length, effective_samples
 from estimator.signals.record import BoolArray, FloatArray
 
 Z95 = 1.959963984540054  # 97.5 % point of the normal distribution
@@ -370,3 +371,27 @@ def _retuned_effects(result: FitResult, model: DrivelineModel) -> dict[str, Mapp
         name: {key: v.at(result.values_of(name).get(key, v.value)) for key, v in values.items()}
         for name, values in model.effects.items()
     }
+
+
+@dataclass(frozen=True, slots=True)
+class Gain:
+    """What a larger model gains over a smaller one."""
+
+    delta_bic: float  # information gained, residual correlation taken into account
+    p_value: float  # of the gain, were the smaller model true
+    n_effective: float  # independent samples the larger model's residual is worth
+
+
+def gain_from_squares(before: float, after: float, added: int, unknowns: int, errors: Sequence[FloatArray]) -> Gain:
+    """Compare two nested least-squares fits by their sums of squares.
+
+    ``delta_bic = n_e ln(S_0/S_1) - q ln n_e`` with the effective number of samples n_e of the larger model's
+    ``errors`` (Schwarz, Ann. Stat. 6, 1978), and the F test with the same n_e.
+    """
+    n = max(effective_samples(errors), unknowns + 2.0)
+    ratio = before / max(after, np.finfo(float).tiny)
+    if ratio <= 1.0:
+        return Gain(-added * math.log(n), 1.0, n)
+    f_value = (ratio - 1.0) * (n - unknowns) / added
+    p_value = max(float(stats.f.sf(f_value, added, n - unknowns)), Noise.SMALLEST_P)
+    return Gain(n * math.log(ratio) - added * math.log(n), p_value, n)

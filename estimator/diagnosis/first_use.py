@@ -21,6 +21,7 @@ from numba.core import types
 from numba.core.types import boolean, float64, int64
 
 from estimator.compiled import IS_COMPILED, ROOT
+from estimator.diagnosis.inference.hypotheses import Progress
 from estimator.diagnosis.line.equivalent import Filtered, run_filter, run_smoother
 from estimator.least_squares import least
 from estimator.physics.driveline import InitialCondition
@@ -28,7 +29,7 @@ from estimator.physics.kernel.integration import integrate
 from estimator.physics.kernel.side_by_side import integrate_each, integrate_side_by_side
 from estimator.physics.layout import Grid, flat
 from estimator.physics.model import DrivelineModel
-from estimator.physics.simulate import simulate
+from estimator.physics.simulate import MASSES, simulate
 from estimator.signals.record import Record
 
 COMPILING = "compiling, once on this machine, for some minutes"
@@ -46,6 +47,20 @@ SIDE_BY_SIDE: tuple[tuple[tuple[Any, ...], tuple[Any, ...]], ...] = (
     ((integrate_each,), (run_filter, run_smoother)),
 )
 """What one process compiles while the other does, callers last."""
+
+
+def compiled(model: DrivelineModel, records: Sequence[Record], progress: Progress) -> Progress:
+    """Compile what a diagnosis will call, where it has yet to be; return how it reports, with a note if it was so."""
+    masses = len(MASSES.get(model.structure, ()))  # of a joint on a bench there is nothing to compile
+    if masses and is_first_use(masses):
+        report = progress
+        progress = lambda message, share: report(f"{message} ({COMPILING})", share)  # noqa: E731  what most time goes to
+        progress("preparing", 0.0)
+        compile_kernels(masses)
+    if masses and model.laws:
+        progress("compiling the model's own laws", 0.0)
+        compile_laws(model, records[0].sample_time_s)
+    return progress
 
 
 def signatures(masses: int) -> dict[Any, tuple[Any, ...]]:

@@ -1,4 +1,4 @@
-"""Recordings with long gaps, cut into segments for the fit, and the diagnosis of segments put together again.
+"""What of the recordings is fitted: segments between long gaps, thinned; and their diagnosis put together again.
 
 Over a short gap the simulation continues with the torque it has. Over a long one it would diverge: the torque there was
 not read, or the model does not hold there (a mask: another brake, a gear change). So each segment is a recording of its
@@ -8,15 +8,17 @@ gap as before it. Time continues (``Record.began_s``), for laws over time.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass, replace
 from itertools import pairwise
+from math import sqrt
 from typing import Any, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
-from estimator.diagnosis.noise import share_of, stretches
 from estimator.diagnosis.result import (
     Course,
     Diagnosis,
@@ -24,9 +26,12 @@ from estimator.diagnosis.result import (
     Profile,
     Trace,
 )
-from estimator.diagnosis.thresholds import Segments
-from estimator.physics.model import DrivelineModel
-from estimator.signals.record import FloatArray, Record, sliced
+from estimator.diagnosis.thresholds import Noise, Recordings, Segments
+from estimator.physics.model import DrivelineModel, Structure, natural_frequencies_rad_s
+from estimator.signals.record import Channel, FloatArray, Record, sliced
+
+SEED = 1
+TURN = 2.0 * np.pi
 
 
 @dataclass(frozen=True, slots=True)
@@ -231,3 +236,120 @@ def _whole(parts: Mapping[str, Trace], cut: Cut) -> Trace:
         retuned=retuned,
         augmented=augmented,
     )
+
+
+def shortened_to_memory(segments: Cut, training: Iterable[str]) -> tuple[Cut, list[str]]:
+    """Leave out pieces of the recordings that are fitted, as many as a fit can't hold; say which are used."""
+    pieces = segments.of(training)
+    used = list(pieces)
+    while (size := _size(used)) > Recordings.MOST_SAMPLES_TIMES_RECORDINGS and len(used) > 1:
+        used = _some(pieces, min(int(len(used) * sqrt(Recordings.MOST_SAMPLES_TIMES_RECORDINGS / size)), len(used) - 1))
+    if len(used) == len(pieces):
+        return segments, []
+    left_out = {piece.name for piece in pieces} - {piece.name for piece in used}
+    kept = tuple(record for record in segments.records if record.name not in left_out)
+    return replace(segments, records=kept), [_warning(used, pieces)]
+
+
+def _size(pieces: Sequence[Record]) -> int:
+    return len(pieces) * sum(int(piece.output.shape[0]) for piece in pieces)
+
+
+def _some(pieces: Sequence[Record], count: int) -> list[Record]:
+    """Return one of each of so many equal parts of the list, at least one in all."""
+    edges = np.linspace(0, len(pieces), max(count, 1) + 1).astype(int)
+    return [pieces[i] for i in np.random.default_rng(SEED).integers(edges[:-1], edges[1:])]
+
+
+def _warning(used: Sequence[Record], pieces: Sequence[Record]) -> str:
+    return (
+        f"{len(used)} of {len(pieces)} recordings are used (each piece between long gaps, or stretch of a long one, "
+        f"counts as one), drawn from the whole list: {', '.join(piece.name for piece in used)}. Each has unknowns of "
+        "its own, so more would take gigabytes. Give those that matter, and the others by --holdout."
+    )
+
+
+def thinned(records: Sequence[Record], model: DrivelineModel) -> list[Record]:
+    """Return recordings with as many samples as the model's fastest mode needs; those that have no more as they are."""
+    if share_of(records) >= 1.0 or model.structure is Structure.JOINT:
+        return list(records)
+    return [thin(record, factor_for([record], model)) for record in records]
+
+
+def as_slow_as_needed(records: Sequence[Record], model: DrivelineModel) -> list[Record]:
+    """Return recordings with no more samples than the line can answer to: between them only the sensor is seen."""
+    shortest = min(record.okay.size for record in records)
+    factor = min(factor_for(records, model, Recordings.LONGEST_OF_RIGID_S), max(shortest // Recordings.FEWEST_KEPT, 1))
+    return [thin(record, factor) for record in records]
+
+
+def factor_for(records: Sequence[Record], model: DrivelineModel, longest_s: float = Recordings.LONGEST_S) -> int:
+    """Return one in how many samples is enough for recordings of one sampling period."""
+    joint = model.structure is Structure.JOINT
+    fastest_hz = max(map(_band_hz, records)) if joint else float(natural_frequencies_rad_s(model.values())[-1]) / TURN
+    if fastest_hz > 0.0:
+        longest_s = min(longest_s, 1.0 / (Recordings.PER_PERIOD * fastest_hz))
+    return max(1, int(longest_s / records[0].sample_time_s * (1.0 + 1e-9)))
+
+
+def _band_hz(record: Record) -> float:
+    """Return the frequency below which nearly all the power of an output is [Hz]."""
+    output = np.where(record.okay, record.output, np.mean(record.output[record.okay]))
+    power = np.cumsum(np.abs(np.fft.rfft(output - output.mean())) ** 2)
+    index = int(np.searchsorted(power, Recordings.BAND_POWER * power[-1]))
+    return float(np.fft.rfftfreq(output.size, record.sample_time_s)[index])
+
+
+def thin(record: Record, factor: int) -> Record:
+    """Return a recording with one in ``factor`` of its samples."""
+    if factor == 1:
+        return record
+    count = record.okay.size // factor
+    kept = slice(0, count * factor, factor)
+    trusted = np.asarray(_blocks(record.torque_trusted, factor).all(axis=1))
+    return replace(
+        record,
+        sample_time_s=factor * record.sample_time_s,
+        time_s=record.time_s[kept],
+        torque_nm=_blocks(record.torque_nm, factor).mean(axis=1),
+        output=record.output[kept],
+        okay=record.okay[kept],
+        torque_okay=None if record.torque_okay is None else trusted,
+        offset_s=None if record.offset_s is None else record.offset_s[kept],
+        imposed=None if record.imposed is None else record.imposed[kept],
+        reference_nm=None if record.reference_nm is None else _blocks(record.reference_nm, factor).mean(axis=1),
+        load_nm=None if record.load_nm is None else _blocks(record.load_nm, factor).mean(axis=1),
+        channels=_kept(record.channels, kept),
+        unused=_kept(record.unused, kept),
+    )
+
+
+def _kept(channels: Sequence[Channel], rows: slice) -> tuple[Channel, ...]:
+    return tuple(replace(each, output=each.output[rows], okay=each.okay[rows]) for each in channels)
+
+
+def _blocks(values: NDArray[Any], factor: int) -> NDArray[Any]:
+    count = values.shape[0] // factor
+    return values[: count * factor].reshape(count, factor, *values.shape[1:])
+
+
+def share_of(records: Sequence[Record]) -> float:
+    """Return which part of the samples of all recordings may be used."""
+    return Noise.MOST_SAMPLES / sum(record.okay.size for record in records)
+
+
+def stretches(record: Record, parts: Sequence[slice], share: float) -> list[slice]:
+    """Return the rows of a recording that are used, in order."""
+    if share >= 1.0:
+        return list(parts)
+    longest = max(round(Noise.LONGEST_S / record.sample_time_s), 1)
+    return [piece for part in parts for piece in _pieces(part, longest, share)]
+
+
+def _pieces(part: slice, longest: int, share: float) -> list[slice]:
+    size = part.stop - part.start
+    allowed = min(size, max(math.ceil(share * size), longest))
+    count = math.ceil(allowed / longest)
+    length = allowed // count
+    starts = part.start + np.linspace(0, size - length, count).astype(int)
+    return [slice(int(start), int(start) + length) for start in starts]

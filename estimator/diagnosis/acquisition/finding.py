@@ -42,15 +42,6 @@ def runs(rows: BoolArray) -> list[tuple[int, int]]:
     return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
 
 
-def shorter_runs(rows: BoolArray, longest: int) -> BoolArray:
-    """Return the rows that are in a run of at most ``longest``; shape (N,)."""
-    kept = rows.copy()
-    for begin, end in runs(rows):
-        if end - begin > longest:
-            kept[begin:end] = False
-    return kept
-
-
 def share_interval(count: float, total: float, mean_run: float = 1.0) -> tuple[float, float]:
     """Return the exact 95 % interval of a share (Clopper and Pearson, Biometrika 26, 1934)."""
     events, trials = count / mean_run, total / mean_run
@@ -143,16 +134,3 @@ def predict(record: Record, trusted: BoolArray) -> Prediction | None:
     return Prediction(
         Findings.ORDER + np.flatnonzero(usable), error, seen.shape[1], float(coefficients[Findings.ORDER])
     )
-
-
-def slope_test(signal: FloatArray, error: FloatArray) -> tuple[float, float]:
-    """Return the coefficient of a signal in an error and its standard error, robust to unequal variances.
-
-    White's estimator (Econometrica 48, 1980). The standard error is infinite where the signal is nothing.
-    """
-    power = float(signal @ signal)
-    if power <= 0.0:
-        return 0.0, float("inf")
-    slope = float(signal @ error) / power
-    left = error - slope * signal
-    return slope, float(np.sqrt(np.sum((signal * left) ** 2))) / power

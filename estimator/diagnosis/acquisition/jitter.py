@@ -9,7 +9,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from scipy import optimize, stats
 
-from estimator.diagnosis.acquisition.finding import OUTPUT, AcquisitionFinding, Sized, no_cells, predict, slope_test
+from estimator.diagnosis.acquisition.finding import OUTPUT, AcquisitionFinding, Sized, no_cells, predict
 from estimator.diagnosis.acquisition.quantised import decimal_place
 from estimator.diagnosis.thresholds import Findings, Jitter, Noise
 from estimator.signals.record import BoolArray, FloatArray, Record, uniform_period_s
@@ -249,3 +249,16 @@ def _independent(rest: _Rest, found: _Jitter) -> bool:
     """Tell whether rows in a row are off their time independently of each other: those of a clunk or a lag are not."""
     in_common = float((rest.error * rest.slope) @ (rest.next_error * rest.next_slope))
     return abs(in_common) < Jitter.NEIGHBOURS * found.jitter_s**2 * float(rest.slope**2 @ rest.next_slope**2)
+
+
+def slope_test(signal: FloatArray, error: FloatArray) -> tuple[float, float]:
+    """Return the coefficient of a signal in an error and its standard error, robust to unequal variances.
+
+    White's estimator (Econometrica 48, 1980). The standard error is infinite where the signal is nothing.
+    """
+    power = float(signal @ signal)
+    if power <= 0.0:
+        return 0.0, float("inf")
+    slope = float(signal @ error) / power
+    left = error - slope * signal
+    return slope, float(np.sqrt(np.sum((signal * left) ** 2))) / power

@@ -21,7 +21,6 @@ from estimator.diagnosis.acquisition.finding import (
     predict,
     runs,
     share_interval,
-    shorter_runs,
 )
 from estimator.diagnosis.thresholds import Findings, Noise, Quantised
 from estimator.signals.record import BoolArray, FloatArray, OutputKind, Record
@@ -29,6 +28,15 @@ from estimator.signals.record import BoolArray, FloatArray, OutputKind, Record
 BINS_PER_STEP = 8  # fineness of the histogram whose spectrum is searched: it takes 3 % off the finest step's R
 PADDING = 4  # points of the spectrum per resolution cell, so that no peak falls between two
 MOST_BINS = 2**22  # bins of a spectrum of levels: a finer noise in a wider range shows no lattice that matters
+
+
+def shorter_runs(rows: BoolArray, longest: int) -> BoolArray:
+    """Return the rows that are in a run of at most ``longest``; shape (N,)."""
+    kept = rows.copy()
+    for begin, end in runs(rows):
+        if end - begin > longest:
+            kept[begin:end] = False
+    return kept
 
 
 def lattice_step(values: FloatArray) -> float:

@@ -20,8 +20,9 @@ from estimator.diagnosis.inference.hypotheses import Progress, all_good_samples,
 from estimator.diagnosis.inference.say import Basis, fitted_sets, said, undecided
 from estimator.diagnosis.inference.search import Search, search_from_nothing
 from estimator.diagnosis.noise import noise_floor
-from estimator.diagnosis.preconditions.prepare import Prepared, as_slow_as_needed
+from estimator.diagnosis.preconditions.prepare import Prepared
 from estimator.diagnosis.result import Diagnosis, Effort
+from estimator.diagnosis.segments import as_slow_as_needed
 from estimator.diagnosis.table_answer import unnamed_law
 from estimator.diagnosis.thresholds import Telling
 from estimator.physics.model import DrivelineModel

@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from estimator.diagnosis.inference.disturbances import Size
-from estimator.diagnosis.inference.hypotheses import GRADE, Effects, Hypothesis, line_values, residuals
-from estimator.diagnosis.noise import unpredictable
+from estimator.diagnosis.inference.hypotheses import GRADE, Effects, Hypothesis, line_values
+from estimator.diagnosis.noise import residuals_by_record, unpredictable
 from estimator.diagnosis.thresholds import Checks, Noise
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Element, Span
@@ -151,7 +151,7 @@ class Test:
 def tests(best: Hypothesis) -> tuple[Test, ...]:
     """Test what a hypothesis leaves for all that noise may not do; each says how far it is from that."""
     problem = best.result.problem
-    errors = residuals(best, best.white.residual)
+    errors = residuals_by_record(best.white)
     whole = np.concatenate(errors)
     power = float(whole @ whole) / whole.size
     limited = (

@@ -20,7 +20,7 @@ from estimator.diagnosis.assemble import (
     rms_of,
 )
 from estimator.diagnosis.inference.descent import descended
-from estimator.diagnosis.inference.disturbances import reading_noise
+from estimator.diagnosis.inference.disturbances import reading_noise, whitener_of
 from estimator.diagnosis.inference.hypotheses import (
     GRADE,
     NOTHING,
@@ -29,10 +29,8 @@ from estimator.diagnosis.inference.hypotheses import (
     Hypothesis,
     all_good_samples,
     covariance,
-    refitted,
 )
-from estimator.diagnosis.inference.standing import Standing
-from estimator.diagnosis.inference.trials import blocks
+from estimator.diagnosis.inference.trials import Standing, blocks
 from estimator.diagnosis.result import Evidence, Fit, FoundEffect, OutputFit, Trace
 from estimator.diagnosis.thresholds import Judging, Noise
 from estimator.physics.catalogue import EFFECTS
@@ -333,3 +331,9 @@ def courses_of(runs: FreeRuns) -> tuple[Trace, ...]:
 def _trace(r: Record, runs: Sequence[FloatArray], holdout: bool) -> Trace:
     nominal, retuned, augmented = runs
     return Trace(r.name, r.time_s, r.torque_nm, r.output, r.okay, nominal, retuned, augmented, holdout)
+
+
+def refitted(hypothesis: Hypothesis, problem: Problem) -> FitResult:
+    """Return the fit of a hypothesis to other samples of the same recordings, its disturbances as they are."""
+    initial = not_fitted(problem, hypothesis.result.x)
+    return descended(initial, whitener_of(initial, hypothesis.sizes), THOROUGH)

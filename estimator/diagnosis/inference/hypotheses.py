@@ -24,15 +24,15 @@ from estimator.diagnosis.inference.moments import has_moments, idle_moments, wit
 from estimator.diagnosis.thresholds import Fitting
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Untestable
-from estimator.physics.fit import FitResult, not_fitted
+from estimator.physics.fit import FitResult
 from estimator.physics.jacobian import jacobian_at
 from estimator.physics.layout import slot
 from estimator.physics.machine import out_of_question
 from estimator.physics.model import DrivelineModel, Motion
 from estimator.physics.motion import turns_on
-from estimator.physics.problem import Problem, bounds
-from estimator.physics.unknowns import Release, Shared
-from estimator.signals.record import BoolArray, FloatArray, Record, by_output
+from estimator.physics.problem import bounds
+from estimator.physics.unknowns import Release
+from estimator.signals.record import BoolArray, FloatArray, Record
 
 Effects = frozenset[str]
 NOTHING: Effects = frozenset()
@@ -49,11 +49,6 @@ THOROUGH, ROUGH = Effort(derivatives=6, steps=30), Effort(derivatives=1, steps=6
 
 def silent(_message: str, _share: float) -> None:
     """Report nothing."""
-
-
-def with_effect(effects: Effects, name: str) -> Effects:
-    """Add an effect to a set; it replaces the special cases of itself."""
-    return (effects - set(EFFECTS[name].contains)) | {name}
 
 
 def open_hypotheses(model: DrivelineModel, records: Sequence[Record]) -> tuple[tuple[str, ...], dict[str, Untestable]]:
@@ -95,47 +90,9 @@ def unknowns_of(previous: FitResult, effects: Collection[str]) -> Release:
     )
 
 
-def inheriting(name: str, release: Release, previous: FitResult) -> Release:
-    """Return a start of a general law that keeps what a fit of its special case has found out by another telling.
-
-    Friction that was seen to bend before it slides does so with a Stribeck range, too: begun without, such a fit is far
-    behind the special case and would be given up.
-    """
-    found = {
-        key: value for special in EFFECTS[name].contains for key, value in previous.values_of(special).items() if value
-    }
-    limits = {parameter.name: (parameter.low, parameter.high) for parameter in EFFECTS[name].parameters}
-
-    def inherited(unknown: Shared) -> Shared:
-        if unknown.low < unknown.high or unknown.name not in found:
-            return unknown
-        low, high = limits[unknown.name]
-        return replace(unknown, low=low, high=high, start=min(max(found[unknown.name] / unknown.scale, low), high))
-
-    return replace(release, shared=tuple(inherited(unknown) for unknown in release.shared))
-
-
-def forgetting(result: FitResult, name: str) -> FitResult:
-    """Return a fit as if the parameters of an effect that all recordings share had not been released in it."""
-    keep = [shared.effect != name for shared in result.problem.shared]
-    shared = tuple(each for each, kept in zip(result.problem.shared, keep, strict=True) if kept)
-    left = [*keep, *[True] * (result.x.size - len(keep))]
-    problem = replace(result.problem, shared=shared)
-    return replace(result, problem=problem, x=result.x[left], derivative=None)  # which was found with the effect
-
-
 def line_values(result: FitResult) -> dict[str, float]:
     """Return the values of the line's own parameters in a fit, those that it may not change among them."""
     return {name: float(result.p[slot("", name)]) for name in result.problem.grid.structure.parameter_names}
-
-
-def with_line_values(result: FitResult, line: Mapping[str, float]) -> FitResult:
-    """Return a fit with some of the line's own parameters elsewhere, within what they are trusted to."""
-    x = result.x.copy()
-    for i, shared in enumerate(result.problem.shared):
-        if not shared.effect and shared.name in line:
-            x[i] = min(max(line[shared.name] / shared.scale, shared.low), shared.high)
-    return replace(result, x=x)
 
 
 @dataclass(frozen=True)
@@ -251,18 +208,6 @@ def compared(
     return Hypothesis(effects, result, sizes, limits, now, catalogue.choices(effects))
 
 
-def refitted(hypothesis: Hypothesis, problem: Problem) -> FitResult:
-    """Return the fit of a hypothesis to other samples of the same recordings, its disturbances as they are."""
-    initial = not_fitted(problem, hypothesis.result.x)
-    return descended(initial, whitener_of(initial, hypothesis.sizes), THOROUGH)
-
-
-def samples_of(result: FitResult) -> FloatArray:
-    """Return how many samples count of each output, shape (C,)."""
-    use = result.problem.use
-    return np.array([sum(int(each.sum()) for each in use[part]) for part in by_output(result.problem.records)])
-
-
 def of_first_outputs(hypothesis: Hypothesis) -> Hypothesis:
     """Return a hypothesis as the recordings' first outputs see it; itself where there is only one output."""
     result = hypothesis.result.first_outputs()
@@ -294,9 +239,3 @@ def covariance(hypothesis: Hypothesis) -> FloatArray:
     j = white.jacobian[:, free]
     full[np.ix_(free, free)] = np.linalg.pinv(j.T @ j, hermitian=True)
     return full
-
-
-def residuals(hypothesis: Hypothesis, stacked: FloatArray) -> Sequence[FloatArray]:
-    """Split a stacked residual into those of each recording."""
-    ends = np.cumsum([int(use.sum()) for use in hypothesis.result.problem.use])[:-1]
-    return np.split(stacked, ends)

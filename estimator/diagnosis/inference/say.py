@@ -16,8 +16,7 @@ from estimator.diagnosis.inference.figures import courses_of, figures_without, f
 from estimator.diagnosis.inference.fits import Fits
 from estimator.diagnosis.inference.hypotheses import Effects, Hypothesis, of_first_outputs, open_hypotheses
 from estimator.diagnosis.inference.search import Search
-from estimator.diagnosis.inference.standing import Standing
-from estimator.diagnosis.inference.trials import Trial
+from estimator.diagnosis.inference.trials import Standing, Trial
 from estimator.diagnosis.inference.wording import Context, statement
 from estimator.diagnosis.result import (
     Diagnosis,

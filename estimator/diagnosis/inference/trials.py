@@ -22,13 +22,18 @@ from scipy.stats import t
 from estimator.diagnosis.inference.descent import Effort, descended
 from estimator.diagnosis.inference.disturbances import reading_noise
 from estimator.diagnosis.inference.hypotheses import GRADE, Effects, Hypothesis
-from estimator.diagnosis.inference.standing import Necessity
-from estimator.diagnosis.thresholds import Judging
+from estimator.diagnosis.result import Counted
+from estimator.diagnosis.thresholds import THRESHOLDS, Judging
 from estimator.physics.fit import FitResult, in_common, not_fitted, warm_start
 from estimator.physics.model import DrivelineModel
 from estimator.physics.parallel import concurrently
 from estimator.physics.problem import Problem, bounds, make_problem
 from estimator.signals.record import BoolArray, FloatArray, Record, by_output
+
+COUNTED: Sequence[tuple[float, Counted]] = [
+    (row["necessity_from"], Counted(row["right"], row["of"])) for row in THRESHOLDS["counted"]
+]
+"""Of names whose necessity (its lower end) is from so much up to that of the next row: the count."""
 
 TUNED = Effort(derivatives=2, steps=6)
 """What tuning a set for the free run may cost, from where the likelihood is greatest."""
@@ -58,6 +63,37 @@ def block_numbers(record: Record) -> FloatArray:
     middle = 0.5 * (every_s - block_s)
     inside = (phase >= middle) & (phase < middle + block_s)
     return np.where(inside, np.floor(since_s / every_s), -1.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Necessity:
+    """Which share of the squared error beyond the noise comes back without a law, on samples that no fit has seen."""
+
+    value: float  # estimate, as a share of 1
+    least: float  # lower end of its one-sided 95 % interval, by the scatter of the blocks
+
+
+@dataclass(frozen=True, slots=True)
+class Standing:
+    """What speaks for one effect of a set."""
+
+    name: str  # key of the catalogue
+    necessity: Necessity  # of this effect, within its set
+    share: float  # of the re-tuned model's squared free-run error on unseen samples, that comes back without it
+    evidence: float  # by which the score rises without it
+    alike: Mapping[str, Mapping[str, float]]  # effects that explain as much in its place, with their values there
+    objection: str = ""  # why it is not established; "" where it is
+    slight: str = ""  # why it is a trace though established; "" where it is a name
+
+    @property
+    def counted(self) -> Counted:
+        """How many names of such a necessity were there."""
+        return next((count for least, count in reversed(COUNTED) if self.necessity.least >= least), COUNTED[0][1])
+
+    @property
+    def probability(self) -> float:
+        """Probability that this effect, or one that it can't be distinguished from, is there."""
+        return self.counted.probability
 
 
 @dataclass(frozen=True, slots=True)

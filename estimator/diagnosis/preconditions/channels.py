@@ -9,7 +9,8 @@ from itertools import combinations, pairwise
 
 import numpy as np
 
-from estimator.diagnosis.thresholds import Channels
+from estimator.diagnosis.acquisition.finding import runs
+from estimator.diagnosis.thresholds import Channels, Recordings
 from estimator.physics.motion import measured_speed
 from estimator.signals.record import BoolArray, Channel, FloatArray, IntArray, Location, OutputKind, Record
 
@@ -299,3 +300,60 @@ def _goes_like(record: Record, channel: Channel) -> FloatArray:
 
 def _smooth(values: FloatArray, width: int) -> FloatArray:
     return np.convolve(values, np.full(width, 1.0 / width), mode="same")
+
+
+@dataclass(frozen=True, slots=True)
+class NotRead:
+    """Rows of a channel that no sensor has read, shape (N,), and what is there instead."""
+
+    channel: str  # in words, for a warning
+    rows: BoolArray  # where it was not read
+    held: bool  # the value before stands there; else it is interpolated
+
+
+def not_read(channel: str, values: FloatArray, seen: BoolArray, may_rest: bool) -> list[NotRead]:
+    """Return the rows in which a channel is interpolated, and those in which it is held at one value."""
+    whole = seen[:-2] & seen[1:-1] & seen[2:]
+    steps = np.abs(np.diff(values))
+    if not whole.any() or not (steps > 0.0).any():
+        return []
+    rounding = max(
+        Recordings.ROUNDING * float(steps[steps > 0.0].min()), Recordings.SMOOTH * float(np.ptp(values[seen]))
+    )
+    bend = np.abs(np.diff(values, 2))
+    bent = bend[whole & (bend > rounding)]
+    usual = float(np.median(bent)) if bent.size else 0.0
+    if usual < Recordings.BENT * rounding:
+        return []
+    drawn, held = np.zeros_like(seen), np.zeros_like(seen)
+    for first, behind in runs(whole & (bend <= rounding)):
+        rows = slice(first, behind + 2)  # a triple has two rows more
+        if behind + 2 - first < Recordings.FEWEST_IN_A_ROW:
+            continue
+        moved = float(np.ptp(values[rows]))
+        drawn[rows] |= moved >= usual
+        held[rows] |= moved == 0.0 and values[first] != 0.0
+    if may_rest or float(np.mean(steps[~(held[1:] & held[:-1])] == 0.0)) > Recordings.SELDOM:
+        held[:] = False
+    return [NotRead(channel, rows, rows is held) for rows in (drawn, held) if rows.any()]
+
+
+def without_not_read(records: Sequence[Record]) -> tuple[list[Record], list[str]]:
+    """Mask the rows in which the output was not read; say so.
+
+    A torque that lies on straight lines may be one that was commanded: ramps, and levels.
+    """
+    mended, warnings = [], []
+    for record in records:
+        okay = record.okay.copy()
+        seen = record.okay & np.isfinite(record.output)
+        for found in not_read(record.kind.value, record.output, seen, record.kind is not OutputKind.SPEED):
+            okay &= ~found.rows
+            what = "stands still to the last digit" if found.held else "lies on straight lines to the last digit"
+            why = "its reading had stopped" if found.held else "it was interpolated, not read"
+            warnings.append(
+                f"recording {record.name}: the {found.channel} {what} in {found.rows.mean():.1%} of the rows: {why} "
+                "there; these rows are not used. Give the raw recording, with its gaps."
+            )
+        mended.append(record if np.array_equal(okay, record.okay) else replace(record, okay=okay))
+    return mended, warnings

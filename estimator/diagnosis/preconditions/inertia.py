@@ -3,21 +3,25 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 from scipy.signal import detrend
 
-from estimator.diagnosis.thresholds import Inertias
-from estimator.errors import BadModel
+from estimator.diagnosis.noise import noise_floor
+from estimator.diagnosis.preconditions.channels import standstill
+from estimator.diagnosis.thresholds import Inertias, Recordings
+from estimator.errors import BadModel, NotExciting
 from estimator.physics.driveline import InitialCondition
 from estimator.physics.layout import Grid, flat, grid_for
 from estimator.physics.model import DrivelineModel, Parameter, Structure, natural_frequencies_rad_s
 from estimator.physics.motion import measured_speed, turns_on
 from estimator.physics.simulate import simulate
 from estimator.signals.record import FloatArray, Record
+
+UNREAD = ", and that every torque is read: what another one does counts as noise."
 
 BODY = DrivelineModel(Structure.ONE_MASS, {"J_M": Parameter(1.0, 0.0), "b_M": Parameter(0.0, 0.0)})
 """What any line is as a whole, where no model is known; its inertia says nothing."""
@@ -270,3 +274,85 @@ def _integral(signal: FloatArray, period_s: float) -> FloatArray:
 
 def _rest(y: FloatArray, design: FloatArray) -> FloatArray:
     return y - design @ np.linalg.lstsq(design, y, rcond=None)[0]
+
+
+def require_signals(record: Record) -> None:
+    """Refuse a recording with too few good samples, or of which torque or output does not change."""
+    good = int(record.okay.sum())
+    if good < Recordings.FEWEST_SAMPLES:
+        raise NotExciting(
+            f"recording {record.name}: {good} good samples, expected at least {Recordings.FEWEST_SAMPLES}. Record "
+            "longer.",
+            (record.name,),
+        )
+    driven_by = ("torque", record.total_torque_nm) if record.imposed is None else ("imposed motion", record.imposed)
+    still = standstill(record)
+    for what, values in (driven_by, ("output", record.output)):
+        seen = values[record.okay]
+        if not still and float(np.ptp(seen)) == 0.0:
+            still = (
+                f"recording {record.name}: the {what} is constant at {seen[0]:g}, expected it to vary. "
+                "Excite the driveline (PRBS, reversal, tip-in) and check the channel."
+            )
+    if still:
+        raise NotExciting(still, (record.name,))
+
+
+def require_excitation(records: Sequence[Record], model: DrivelineModel) -> list[str]:
+    """Refuse recordings in which nothing moves beyond the noise; warn where only a part of the model is excited.
+
+    What the torque does to the output is asked of the nominal model. A part of it that stays below the noise of the
+    reading is not excited: whatever is fitted there is fitted to noise.
+    """
+    floor = noise_floor(records)
+    moved = _rms([_good(record, record.output) for record in records])
+    excited = math.sqrt(max(moved**2 - floor**2, 0.0))
+    unit = records[0].kind.value
+    if excited < floor:
+        raise NotExciting(
+            f"the {unit} moves by {excited:.3g} (rms) beyond a noise of {floor:.3g}, expected more than the noise. "
+            f"Excite the driveline (PRBS, reversal, tip-in){UNREAD}",
+            tuple(record.name for record in records),
+        )
+    if records[0].imposed is not None:  # no torque that could be too small
+        return []
+    line = replace(model, effects={})
+    grid = grid_for(line, records)
+    answer = _rms([_good(record, driven(record, line, grid)) for record in records])
+    if answer < floor:
+        raise NotExciting(
+            f"by the nominal model the torque moves the {unit} by {answer:.3g} (rms), less than its noise of "
+            f"{floor:.3g}: the torque read excites nothing. Excite the driveline (PRBS, reversal, tip-in), check that "
+            f"the torque is in Nm (force: N){UNREAD}",
+            tuple(record.name for record in records),
+        )
+    return _unexcited_mode(records, line, grid, floor)
+
+
+def _unexcited_mode(records: Sequence[Record], line: DrivelineModel, grid: Grid, floor: float) -> list[str]:
+    first_hz = float(natural_frequencies_rad_s(line.values())[0]) / (2.0 * math.pi)
+    if first_hz == 0.0:
+        return []
+    lacking = "stiffness, damping and effects of the shaft can't be determined from these recordings"
+    nyquist_hz = 0.5 / records[0].sample_time_s
+    if nyquist_hz < first_hz:
+        return [
+            f"the model's first mode is at {first_hz:.3g} Hz, beyond the {nyquist_hz:.3g} Hz that a sampling period of "
+            f"{records[0].sample_time_s:g} s can show: {lacking}. Sample faster, or use structure = 'one_mass'."
+        ]
+    answer = _rms([_good(record, driven(record, line, grid, Recordings.NEAR_MODE * first_hz)) for record in records])
+    if answer >= floor:
+        return []
+    return [
+        f"at and above the model's first mode ({first_hz:.3g} Hz) the torque moves the {records[0].kind.value} by "
+        f"{answer:.3g} (rms), less than its noise of {floor:.3g}: {lacking}. Superpose a PRBS, or a tip-in."
+    ]
+
+
+def _good(record: Record, signal: FloatArray) -> FloatArray:
+    """Return a signal's good samples without mean and trend."""
+    return detrend(signal[record.okay])
+
+
+def _rms(signals: Sequence[FloatArray]) -> float:
+    return math.sqrt(sum(float(signal @ signal) for signal in signals) / sum(signal.size for signal in signals))

@@ -11,17 +11,14 @@ from scipy import stats
 
 from estimator.diagnosis.assemble import (
     Z95,
+    Gain,
     covariance,
+    gain_from_squares,
     interval,
     interval_that_follows,
     reported_covariance,
 )
-from estimator.diagnosis.noise import (
-    Gain,
-    gain_from_squares,
-    noise_floor,
-    unpredictable,
-)
+from estimator.diagnosis.noise import noise_floor, unpredictable
 from estimator.physics.driveline import InitialCondition
 from estimator.physics.fit import FitResult
 from estimator.signals.correlation import effective_samples

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from estimator.diagnosis import diagnose
-from estimator.diagnosis.preconditions.channels import clipped, unwrapped, without_clipped
-from estimator.diagnosis.preconditions.inertia import model_warnings
-from estimator.diagnosis.preconditions.prepare import not_read, prepare, require_excitation, without_not_read
+from estimator.diagnosis.preconditions.channels import clipped, not_read, unwrapped, without_clipped, without_not_read
+from estimator.diagnosis.preconditions.inertia import model_warnings, require_excitation
+from estimator.diagnosis.preconditions.prepare import prepare
 from estimator.diagnosis.result import Verdict
 from estimator.diagnosis.thresholds import Recordings
 from estimator.errors import BadShape, NotExciting

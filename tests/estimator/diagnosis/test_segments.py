@@ -13,9 +13,9 @@ from estimator.diagnosis import diagnose
 from estimator.diagnosis.acquisition.chain import replay
 from estimator.diagnosis.inference.figures import foreign_outputs
 from estimator.diagnosis.inference.hypotheses import NOTHING, Effects, all_good_samples
-from estimator.diagnosis.noise import noise_floor, share_of, stretches
+from estimator.diagnosis.noise import noise_floor
 from estimator.diagnosis.result import Course, Discrepancy, Equivalent, Estimated, Profile, Response, Verdict
-from estimator.diagnosis.segments import cut, joined, segments
+from estimator.diagnosis.segments import cut, joined, segments, share_of, stretches
 from estimator.diagnosis.thresholds import Noise, Segments
 from estimator.errors import NotExciting
 from estimator.physics.driveline import InitialCondition

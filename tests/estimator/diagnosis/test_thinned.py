@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from estimator.diagnosis.inference.hypotheses import NOTHING, all_good_samples
-from estimator.diagnosis.preconditions.prepare import as_slow_as_needed, factor_for, thinned
+from estimator.diagnosis.segments import as_slow_as_needed, factor_for, thinned
 from estimator.diagnosis.thresholds import Noise, Recordings
 from estimator.physics.driveline import InitialCondition
 from estimator.physics.layout import flat, grid_for

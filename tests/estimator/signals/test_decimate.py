@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.diagnosis.preconditions.prepare import shortened_to_memory
-from estimator.diagnosis.segments import cut
+from estimator.diagnosis.segments import cut, shortened_to_memory
 from estimator.diagnosis.thresholds import Recordings
 from estimator.errors import BadSetting
 from estimator.identification.identify import identify

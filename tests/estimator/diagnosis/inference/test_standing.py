@@ -3,7 +3,7 @@
 import pytest
 
 from estimator.diagnosis.inference import standing
-from estimator.diagnosis.inference.standing import COUNTED, Necessity, Standing
+from estimator.diagnosis.inference.trials import COUNTED, Necessity, Standing
 from estimator.diagnosis.result import Counted
 
 
