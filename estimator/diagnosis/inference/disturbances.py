@@ -42,11 +42,6 @@ class Size(IntEnum):
     FORM = 7
 
 
-def of_first(sizes: FloatArray) -> FloatArray:
-    """Return the noise model of the first output alone, shape (8,)."""
-    return sizes[: len(Size)]
-
-
 def readings(sizes: FloatArray) -> FloatArray:
     """Return the sizes of each output's reading, shape (C, 3), of a noise model of C outputs."""
     return np.concatenate([sizes[:READING], sizes[len(Size) :]]).reshape(-1, READING)
@@ -178,10 +173,6 @@ class Limits:
         low, high = self.low.copy(), self.high.copy()
         low[Size.FORM] = high[Size.FORM] = self.usual[Size.FORM]
         return replace(self, low=low, high=high)
-
-    def of_first(self) -> Limits:
-        """Return those of the first output alone."""
-        return Limits(*(of_first(each) for each in (self.usual, self.low, self.high)))
 
 
 def reading_noise(sizes: FloatArray) -> FloatArray:

@@ -8,7 +8,7 @@ gone, or is written another way begins where the rest of it was fitted before.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from threading import Lock
@@ -25,7 +25,6 @@ from estimator.diagnosis.inference.hypotheses import (
     compared,
     fitted,
     line_values,
-    unknowns_of,
 )
 from estimator.diagnosis.inference.score_tests import ScoredStart, promising
 from estimator.diagnosis.inference.trials import Trials
@@ -326,3 +325,12 @@ def with_line_values(result: FitResult, line: Mapping[str, float]) -> FitResult:
         if not shared.effect and shared.name in line:
             x[i] = min(max(line[shared.name] / shared.scale, shared.low), shared.high)
     return replace(result, x=x)
+
+
+def unknowns_of(previous: FitResult, effects: Collection[str]) -> Release:
+    """Return the unknowns of a fit that belong to the line itself or to some effects."""
+    wanted = {"", *effects}
+    return Release(
+        tuple(unknown for unknown in previous.problem.shared if unknown.effect in wanted),
+        tuple(tuple(unknown for unknown in basis.own if unknown.effect in wanted) for basis in previous.problem.local),
+    )

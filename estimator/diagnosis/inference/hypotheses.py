@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -15,8 +15,6 @@ from estimator.diagnosis.inference.disturbances import (
     Limits,
     Whitener,
     estimated,
-    minus_twice_log_prior,
-    of_first,
     readings,
     whitener_of,
 )
@@ -31,7 +29,6 @@ from estimator.physics.machine import out_of_question
 from estimator.physics.model import DrivelineModel, Motion
 from estimator.physics.motion import turns_on
 from estimator.physics.problem import bounds
-from estimator.physics.unknowns import Release
 from estimator.signals.record import BoolArray, FloatArray, Record
 
 Effects = frozenset[str]
@@ -79,15 +76,6 @@ def open_hypotheses(model: DrivelineModel, records: Sequence[Record]) -> tuple[t
 def all_good_samples(records: Sequence[Record]) -> list[BoolArray]:
     """Return masks that use every good sample."""
     return [np.asarray(record.okay) for record in records]
-
-
-def unknowns_of(previous: FitResult, effects: Collection[str]) -> Release:
-    """Return the unknowns of a fit that belong to the line itself or to some effects."""
-    wanted = {"", *effects}
-    return Release(
-        tuple(unknown for unknown in previous.problem.shared if unknown.effect in wanted),
-        tuple(tuple(unknown for unknown in basis.own if unknown.effect in wanted) for basis in previous.problem.local),
-    )
 
 
 def line_values(result: FitResult) -> dict[str, float]:
@@ -206,17 +194,6 @@ def compared(
             break
         best = now
     return Hypothesis(effects, result, sizes, limits, now, catalogue.choices(effects))
-
-
-def of_first_outputs(hypothesis: Hypothesis) -> Hypothesis:
-    """Return a hypothesis as the recordings' first outputs see it; itself where there is only one output."""
-    result = hypothesis.result.first_outputs()
-    if result is hypothesis.result:
-        return hypothesis
-    sizes, limits = of_first(hypothesis.sizes), hypothesis.limits.of_first()
-    filtered = whitener_of(result, sizes)
-    now = filtered.minus_twice_log(filtered(result.residual)) + minus_twice_log_prior(sizes, limits)
-    return Hypothesis(hypothesis.effects, result, sizes, limits, now, hypothesis.choices)
 
 
 def _with_moments(result: FitResult, sizes: FloatArray) -> FitResult:

@@ -356,3 +356,24 @@ def _good(record: Record, signal: FloatArray) -> FloatArray:
 
 def _rms(signals: Sequence[FloatArray]) -> float:
     return math.sqrt(sum(float(signal @ signal) for signal in signals) / sum(signal.size for signal in signals))
+
+
+def tolerance_of(line: DrivelineModel) -> float:
+    """Return the tolerance of the nominal inertia; of a line without one, the largest tolerance."""
+    inertias = [each.tolerance for name, each in line.parameters.items() if name.startswith("J")]
+    return max(inertias or [each.tolerance for each in line.parameters.values()])
+
+
+def is_within_tolerance(found: Inertia, line: DrivelineModel) -> bool:
+    """Tell whether an inertia is within reach of re-tuning; one that nothing tells is not."""
+    return found.tells and 1.0 - tolerance_of(line) <= found.ratio <= 1.0 + tolerance_of(line)
+
+
+def ratio_off(found: Sequence[Inertia], line: DrivelineModel | None) -> tuple[float, int]:
+    """Return the middle one of the inertias' ratios beyond their tolerance, and of which recording; 1 of the first."""
+    off = [
+        (each.ratio, i)
+        for i, each in enumerate(found)
+        if each.tells and line is not None and not is_within_tolerance(each, line)
+    ]
+    return sorted(off)[len(off) // 2] if off else (1.0, 0)

@@ -18,11 +18,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from estimator.diagnosis.preconditions.candidates import Change, Line, Part, Row, changes_of, rows_for, times
-from estimator.diagnosis.preconditions.inertia import BODY, Inertia, fitted_inertia
+from estimator.diagnosis.preconditions.inertia import BODY, Inertia, fitted_inertia, ratio_off, tolerance_of
 from estimator.diagnosis.priors import MistakePriors
 from estimator.diagnosis.thresholds import Inertias, Mistakes
 from estimator.errors import Cure
-from estimator.physics.model import DrivelineModel
 from estimator.signals.record import FloatArray, OutputKind, Record
 
 
@@ -275,27 +274,6 @@ def are_whole_numbers(record: Record) -> bool:
     return (
         bool(np.abs(read - np.round(read)).max() <= Mistakes.WHOLE) and np.unique(read).size >= Mistakes.FEWEST_VALUES
     )
-
-
-def tolerance_of(line: DrivelineModel) -> float:
-    """Return the tolerance of the nominal inertia; of a line without one, the largest tolerance."""
-    inertias = [each.tolerance for name, each in line.parameters.items() if name.startswith("J")]
-    return max(inertias or [each.tolerance for each in line.parameters.values()])
-
-
-def is_within_tolerance(found: Inertia, line: DrivelineModel) -> bool:
-    """Tell whether an inertia is within reach of re-tuning; one that nothing tells is not."""
-    return found.tells and 1.0 - tolerance_of(line) <= found.ratio <= 1.0 + tolerance_of(line)
-
-
-def ratio_off(found: Sequence[Inertia], line: Line) -> tuple[float, int]:
-    """Return the middle one of the inertias' ratios beyond their tolerance, and of which recording; 1 of the first."""
-    off = [
-        (each.ratio, i)
-        for i, each in enumerate(found)
-        if each.tells and line is not None and not is_within_tolerance(each, line)
-    ]
-    return sorted(off)[len(off) // 2] if off else (1.0, 0)
 
 
 def changed_by(record: Record, change: Change) -> Record:

@@ -14,16 +14,16 @@ import numpy as np
 
 from estimator.diagnosis.inference.wording import times as multiple
 from estimator.diagnosis.preconditions.candidates import Line, Part, of_one_unit
-from estimator.diagnosis.preconditions.inertia import BODY, Inertia, fitted_inertia, held_by_friction
-from estimator.diagnosis.preconditions.odds import (
-    Candidate,
-    changed_by,
+from estimator.diagnosis.preconditions.inertia import (
+    BODY,
+    Inertia,
+    fitted_inertia,
+    held_by_friction,
     is_within_tolerance,
-    largest,
     ratio_off,
     tolerance_of,
-    with_odds,
 )
+from estimator.diagnosis.preconditions.odds import Candidate, changed_by, largest, with_odds
 from estimator.diagnosis.priors import MistakePriors
 from estimator.diagnosis.result import Doubt
 from estimator.diagnosis.thresholds import Mistakes

@@ -35,8 +35,8 @@ def error_spectrum(before: FitResult, after: FitResult, floor: float) -> ErrorSp
     """Return the density of the error of two fits, and where the first stands above the floor."""
     records = before.problem.records
     length = min(Places.SEGMENT, *(record.okay.size for record in records))
-    frequency, first, averages = _density(records, before.outputs, length)
-    _, second, _ = _density(records, after.outputs, length)
+    frequency, first, averages = _density(before, length)
+    _, second, _ = _density(after, length)
     density = 2.0 * floor**2 * records[0].sample_time_s
     return ErrorSpectrum(
         frequency[1:],
@@ -47,14 +47,13 @@ def error_spectrum(before: FitResult, after: FitResult, floor: float) -> ErrorSp
     )
 
 
-def _density(
-    records: Sequence[Record], outputs: Sequence[FloatArray], length: int
-) -> tuple[FloatArray, FloatArray, float]:
+def _density(result: FitResult, length: int) -> tuple[FloatArray, FloatArray, float]:
     """Return frequencies [Hz], mean density and the number of independent averages behind it."""
+    records = result.problem.records
     total, weight = np.zeros(length // 2 + 1), 0.0
     frequency = np.fft.rfftfreq(length, records[0].sample_time_s).astype(np.float64)
-    for record, output in zip(records, outputs, strict=True):
-        error = np.where(record.okay, record.output - output, 0.0)
+    for i, record in enumerate(records):
+        error = _error(result, i)
         _, density = signal.welch(error, 1.0 / record.sample_time_s, nperseg=length)
         segments = max(2.0 * error.size / length - 1.0, 1.0)
         total += segments * density * record.okay.size / max(int(record.okay.sum()), 1)
@@ -141,7 +140,7 @@ def _p_value(measured: SpectralEstimate, model: SpectralEstimate) -> float:
     return float(stats.chi2.sf(float(deviation @ deviation), degrees))
 
 
-def _errors(result: FitResult, index: int) -> FloatArray:
+def _error(result: FitResult, index: int) -> FloatArray:
     record = result.problem.records[index]
     return np.where(record.okay, result.outputs[index] - record.output, 0.0)
 
@@ -152,7 +151,7 @@ def _window_power(result: FitResult, index: int) -> tuple[FloatArray, FloatArray
     width = min(max(1, round(Places.WINDOW_S / record.sample_time_s)), record.okay.size)
     window = np.ones(width)
     count = np.convolve(record.okay.astype(float), window, mode="same")
-    power = np.convolve(_errors(result, index) ** 2, window, mode="same") / np.maximum(count, 1.0)
+    power = np.convolve(_error(result, index) ** 2, window, mode="same") / np.maximum(count, 1.0)
     return power, np.rint(count).astype(np.float64)
 
 
@@ -191,18 +190,19 @@ def _merged(spans: Sequence[Interval]) -> list[Interval]:
     return joined
 
 
-def band_hz(mismatch: Sequence[FloatArray], sample_times_s: Sequence[float], noise: float) -> Interval | None:
-    """Return the band that holds the central part of a mismatch's power [Hz]; None where noise could be all."""
-    frequency: FloatArray = np.fft.rfftfreq(min(Places.LONGEST_SEGMENT, mismatch[0].size), sample_times_s[0]).astype(
-        float
-    )
+def band_hz(result: FitResult, noise: float) -> Interval | None:
+    """Return the band that holds the central part of an error's power [Hz]; None where noise could be all."""
+    records = result.problem.records
+    length = min(Places.LONGEST_SEGMENT, records[0].okay.size)
+    frequency: FloatArray = np.fft.rfftfreq(length, records[0].sample_time_s).astype(float)
     density: FloatArray = np.zeros(frequency.size)
     white, averages = 0.0, 0.0
-    for errors, sample_time_s in zip(mismatch, sample_times_s, strict=True):
-        length = min(Places.LONGEST_SEGMENT, errors.size)
-        segments = max(2.0 * errors.size / length - 1.0, 1.0)
-        density += segments * np.interp(frequency, *signal.welch(errors, 1.0 / sample_time_s, nperseg=length))
-        white += segments * 2.0 * noise**2 * sample_time_s
+    for i, record in enumerate(records):
+        error = _error(result, i)
+        length = min(Places.LONGEST_SEGMENT, error.size)
+        segments = max(2.0 * error.size / length - 1.0, 1.0)
+        density += segments * np.interp(frequency, *signal.welch(error, 1.0 / record.sample_time_s, nperseg=length))
+        white += segments * 2.0 * noise**2 * record.sample_time_s
         averages += segments
     degrees = 2.0 * averages / (1.0 + 2.0 / 36.0)  # neighbours share half their samples (Welch)
     stands = density > white * stats.chi2.isf(Places.FALSE_ALARM / frequency.size, degrees) / degrees

@@ -54,9 +54,7 @@ class TestTime:
 
 
 def band_of(*records: Record, noise: float = SIGMA) -> tuple[float, float] | None:
-    result = fitted(*records)
-    errors = [np.where(r.okay, output - r.output, 0.0) for r, output in zip(records, result.outputs, strict=True)]
-    return band_hz(errors, [r.sample_time_s for r in records], noise)
+    return band_hz(fitted(*records), noise)
 
 
 class TestBand:
