@@ -7,17 +7,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
-from scipy import stats
 
 from estimator.diagnosis.acquisition.finding import AcquisitionFinding
 from estimator.diagnosis.inference.hypotheses import Hypothesis, covariance as of_innovations, line_values
 from estimator.diagnosis.noise import residuals_by_record, unpredictable
 from estimator.diagnosis.result import Estimated, Evidence, FoundEffect, Interval, Profile, Retuned
-from estimator.diagnosis.thresholds import Noise, Telling
+from estimator.diagnosis.thresholds import Telling
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Element
 from estimator.physics.effects.load import ROAD_GRADE, grade_basis
@@ -189,7 +188,6 @@ def acquired_effects(
     findings: Sequence[AcquisitionFinding], before: Sequence[FloatArray], after: Sequence[FloatArray]
 ) -> tuple[FoundEffect, ...]:
     """Return what was recognised of the acquisition as effects."""
-    gained = gain_from_squares(_squares(before), _squares(after), 1, 1, after)
     seen = [slice(int(0.7 * error.size), None) for error in after]
     held = [rms_of([e[rows] for e, rows in zip(errors, seen, strict=True)]) for errors in (before, after)]
     return tuple(
@@ -200,10 +198,21 @@ def acquired_effects(
             parameters={name: Estimated(*sized) for name, sized in finding.parameters.items()},
             time_s={},
             indistinguishable_from=(),
-            evidence=Evidence(gained.delta_bic, held[0], held[1], finding.p_value),
+            evidence=Evidence(bic_gained(before, after), held[0], held[1], finding.p_value),
         )
         for finding in findings
     )
+
+
+def bic_gained(before: Sequence[FloatArray], after: Sequence[FloatArray]) -> float:
+    """Return by how much one more unknown betters the information criterion of errors, for those of all recordings.
+
+    ``n_e ln(S_0/S_1) - ln n_e`` with the effective number of samples n_e of the errors ``after`` (Schwarz, Ann. Stat.
+    6, 1978).
+    """
+    n = max(effective_samples(after), 3.0)
+    ratio = _squares(before) / max(_squares(after), np.finfo(float).tiny)
+    return n * math.log(max(ratio, 1.0)) - math.log(n)
 
 
 def _squares(errors: Sequence[FloatArray]) -> float:
@@ -371,27 +380,3 @@ def _retuned_effects(result: FitResult, model: DrivelineModel) -> dict[str, Mapp
         name: {key: v.at(result.values_of(name).get(key, v.value)) for key, v in values.items()}
         for name, values in model.effects.items()
     }
-
-
-@dataclass(frozen=True, slots=True)
-class Gain:
-    """What a larger model gains over a smaller one."""
-
-    delta_bic: float  # information gained, residual correlation taken into account
-    p_value: float  # of the gain, were the smaller model true
-    n_effective: float  # independent samples the larger model's residual is worth
-
-
-def gain_from_squares(before: float, after: float, added: int, unknowns: int, errors: Sequence[FloatArray]) -> Gain:
-    """Compare two nested least-squares fits by their sums of squares.
-
-    ``delta_bic = n_e ln(S_0/S_1) - q ln n_e`` with the effective number of samples n_e of the larger model's
-    ``errors`` (Schwarz, Ann. Stat. 6, 1978), and the F test with the same n_e.
-    """
-    n = max(effective_samples(errors), unknowns + 2.0)
-    ratio = before / max(after, np.finfo(float).tiny)
-    if ratio <= 1.0:
-        return Gain(-added * math.log(n), 1.0, n)
-    f_value = (ratio - 1.0) * (n - unknowns) / added
-    p_value = max(float(stats.f.sf(f_value, added, n - unknowns)), Noise.SMALLEST_P)
-    return Gain(n * math.log(ratio) - added * math.log(n), p_value, n)

@@ -139,7 +139,6 @@ class Test:
     name: str  # what an error that fails it does, in words
     value: float  # of the error
     most: float  # above it the error is more than noise
-    is_share: bool = False  # whether both are shares of the error's power
     key: str = ""  # of `thresholds.toml`; "" for a size of the noise model at its bound
 
     @property
@@ -162,10 +161,7 @@ def tests(best: Hypothesis) -> tuple[Test, ...]:
     )
     bounded = (Test(name, float(_is_at_bound(best, size)), 0.5) for size, name in _bounded(best))
     return (
-        *(
-            Test(name, value, Checks.TEST_LIMITS[key] + chance(key, whole.size), key in COLUMNS, key)
-            for key, name, value in limited
-        ),
+        *(Test(name, value, Checks.TEST_LIMITS[key] + chance(key, whole.size), key) for key, name, value in limited),
         *bounded,
     )
 
