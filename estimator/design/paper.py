@@ -21,7 +21,8 @@ import numpy as np
 from estimator.design.open import Candidate, Open
 from estimator.diagnosis.assemble import Z95
 from estimator.diagnosis.inference.disturbances import whitener_of
-from estimator.diagnosis.inference.hypotheses import GRADE, line_values
+from estimator.diagnosis.inference.hypotheses import GRADE
+from estimator.diagnosis.line.line import line_values
 from estimator.diagnosis.thresholds import THRESHOLDS
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import FitResult, fit

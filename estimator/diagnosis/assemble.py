@@ -13,7 +13,8 @@ from functools import partial
 import numpy as np
 
 from estimator.diagnosis.acquisition.finding import AcquisitionFinding
-from estimator.diagnosis.inference.hypotheses import Hypothesis, covariance as of_innovations, line_values
+from estimator.diagnosis.inference.hypotheses import Hypothesis, covariance as of_innovations
+from estimator.diagnosis.line.line import line_values
 from estimator.diagnosis.noise import residuals_by_record, unpredictable
 from estimator.diagnosis.result import Estimated, Evidence, FoundEffect, Interval, Profile, Retuned
 from estimator.diagnosis.thresholds import Telling

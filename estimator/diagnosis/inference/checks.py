@@ -9,7 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from estimator.diagnosis.inference.disturbances import Size
-from estimator.diagnosis.inference.hypotheses import GRADE, Effects, Hypothesis, line_values
+from estimator.diagnosis.inference.hypotheses import GRADE, Effects, Hypothesis
+from estimator.diagnosis.line.line import line_values
 from estimator.diagnosis.noise import residuals_by_record, unpredictable
 from estimator.diagnosis.thresholds import Checks, Noise
 from estimator.physics.catalogue import EFFECTS

@@ -16,19 +16,11 @@ from threading import Lock
 from estimator.diagnosis.inference.checks import is_plausible, may_be_loose, widened
 from estimator.diagnosis.inference.descent import extended
 from estimator.diagnosis.inference.disturbances import Limits, limits_of
-from estimator.diagnosis.inference.hypotheses import (
-    GRADE,
-    NOTHING,
-    Catalogue,
-    Effects,
-    Hypothesis,
-    compared,
-    fitted,
-    line_values,
-)
+from estimator.diagnosis.inference.hypotheses import GRADE, NOTHING, Catalogue, Effects, Hypothesis, compared, fitted
 from estimator.diagnosis.inference.score_tests import ScoredStart, promising
 from estimator.diagnosis.inference.trials import Trials
 from estimator.diagnosis.inference.weighted_score_tests import OutputChanges, WeightedScoreTests
+from estimator.diagnosis.line.line import line_values
 from estimator.diagnosis.noise import noise_floor
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import FitResult, not_fitted, warm_start

@@ -24,7 +24,6 @@ from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Untestable
 from estimator.physics.fit import FitResult
 from estimator.physics.jacobian import jacobian_at
-from estimator.physics.layout import slot
 from estimator.physics.machine import out_of_question
 from estimator.physics.model import DrivelineModel, Motion
 from estimator.physics.motion import turns_on
@@ -76,11 +75,6 @@ def open_hypotheses(model: DrivelineModel, records: Sequence[Record]) -> tuple[t
 def all_good_samples(records: Sequence[Record]) -> list[BoolArray]:
     """Return masks that use every good sample."""
     return [np.asarray(record.okay) for record in records]
-
-
-def line_values(result: FitResult) -> dict[str, float]:
-    """Return the values of the line's own parameters in a fit, those that it may not change among them."""
-    return {name: float(result.p[slot("", name)]) for name in result.problem.grid.structure.parameter_names}
 
 
 @dataclass(frozen=True)
@@ -185,15 +179,15 @@ def compared(
     effects: Effects, initial: FitResult, parent: Hypothesis, limits: Limits, catalogue: Catalogue
 ) -> Hypothesis:
     """Fit a hypothesis a few steps from another's disturbances, to be compared with others like it."""
+    result, choices, now = initial, catalogue.choices(effects), math.inf
     sizes, best = np.clip(parent.sizes, limits.low, limits.high), parent.minus_twice_log
-    result, now = initial, math.inf
     for _ in range(Fitting.MOST_ROUGH):
         result = descended(result, whitener_of(result, sizes), ROUGH)
         sizes, now = estimated(result, result.residual, sizes, limits, rounds=1)
         if now > best - Fitting.MUCH * result.residual.size:
             break
         best = now
-    return Hypothesis(effects, result, sizes, limits, now, catalogue.choices(effects))
+    return Hypothesis(effects, result, sizes, limits, now, choices)
 
 
 def _with_moments(result: FitResult, sizes: FloatArray) -> FitResult:

@@ -14,7 +14,6 @@ from estimator.diagnosis.inference.checks import tests
 from estimator.diagnosis.inference.fits import Fits
 from estimator.diagnosis.inference.hypotheses import Hypothesis, Progress, silent
 from estimator.diagnosis.inference.moves import additions, begun_elsewhere, drops, exchanges, with_free_load
-from estimator.diagnosis.inference.trials import Trial, necessity, noise_of
 from estimator.diagnosis.thresholds import Judging, Searching
 
 
@@ -44,7 +43,7 @@ def search_from_nothing(fits: Fits, most: float = math.inf, progress: Progress =
     nearest = fits.trials.of(sorted(alone, key=lambda each: each.score)[: Searching.STARTS])
     best = min(nearest, key=lambda each: each.rms)
     for first in nearest:
-        if first.effects <= found.best.effects or _is_far_behind(first, best):
+        if first.effects <= found.best.effects or first.is_far_behind(best):
             continue
         other = _climbed(Search(fits, (fits.nothing(), first.hypothesis)), most, progress, found.path)
         better = other if other.best.score < found.best.score else found
@@ -80,7 +79,9 @@ def _better(fits: Fits, current: Hypothesis) -> Hypothesis | None:
     if again is not None:
         return again
     may_grow = len(current.effects) < Searching.MOST_EFFECTS and not _leaves_a_trace_at_most(fits, current)
-    larger = [each for each in additions(fits, current) if _simulates_better(fits, each, current)] if may_grow else []
+    larger = (
+        [each for each in additions(fits, current) if fits.trials.is_worth_adding(each, current)] if may_grow else []
+    )
     if (grown := _most_probable(fits, larger, current)) is not None:
         return grown
     smaller = drops(fits, current)
@@ -112,21 +113,3 @@ def _as_good(fits: Fits, smaller: Sequence[Hypothesis], current: Hypothesis) -> 
     whole = fits.trials.one(current)
     as_good = [each for each in fits.trials.of(smaller) if each.beats(whole) and fits.is_plausible(each.hypothesis)]
     return min(as_good, key=lambda each: each.rms).hypothesis if as_good else None
-
-
-def _simulates_better(fits: Fits, larger: Hypothesis, smaller: Hypothesis) -> bool:
-    """Tell whether a law that makes a set more probable surely makes its free run better, and by more than a little.
-
-    What the form of a law leaves is predicted a little better by nearly every further law; a search that follows the
-    likelihood alone wanders among sets of these.
-    """
-    if larger.effects <= smaller.effects:  # of the same laws, or fewer, a better fit
-        return True
-    one, other = fits.trials.of([smaller, larger])
-    needed = necessity(other, one, noise_of(larger))
-    return needed.value >= Searching.WORTH_ADDING and needed.least > 0.0
-
-
-def _is_far_behind(one: Trial, best: Trial) -> bool:
-    """Tell whether another first effect clearly leaves so much less that no search need begin from this one."""
-    return necessity(best, one, noise_of(best.hypothesis)).least >= Judging.LEAST_NECESSITY

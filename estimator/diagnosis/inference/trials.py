@@ -23,7 +23,7 @@ from estimator.diagnosis.inference.descent import Effort, descended
 from estimator.diagnosis.inference.disturbances import reading_noise
 from estimator.diagnosis.inference.hypotheses import GRADE, Effects, Hypothesis
 from estimator.diagnosis.result import Counted
-from estimator.diagnosis.thresholds import THRESHOLDS, Judging
+from estimator.diagnosis.thresholds import THRESHOLDS, Judging, Searching
 from estimator.physics.fit import FitResult, in_common, not_fitted, warm_start
 from estimator.physics.model import DrivelineModel
 from estimator.physics.parallel import concurrently
@@ -134,6 +134,10 @@ class Trial:
         scatter = math.sqrt(gained.size) * float(np.std(gained, ddof=1)) if gained.size > 1 else math.inf
         return float(gained.sum()) > quantile(gained.size) * scatter
 
+    def is_far_behind(self, best: Trial) -> bool:
+        """Tell whether another set clearly leaves so much less that no search need begin from this one."""
+        return necessity(best, self, noise_of(best.hypothesis)).least >= Judging.LEAST_NECESSITY
+
     def beats(self, other: Trial) -> bool:
         """Tell whether another set need not be considered: one of as few laws, or of fewer, simulates better.
 
@@ -182,6 +186,18 @@ class Trials:
     def one(self, hypothesis: Hypothesis) -> Trial:
         """Return the trial of one set."""
         return self.of([hypothesis])[0]
+
+    def is_worth_adding(self, larger: Hypothesis, smaller: Hypothesis) -> bool:
+        """Tell whether a law that makes a set more probable surely makes its free run better, by more than a little.
+
+        What the form of a law leaves is predicted a little better by nearly every further law; a search that follows
+        the likelihood alone wanders among sets of these.
+        """
+        if larger.effects <= smaller.effects:  # of the same laws, or fewer, a better fit
+            return True
+        one, other = self.of([smaller, larger])
+        needed = necessity(other, one, noise_of(larger))
+        return needed.value >= Searching.WORTH_ADDING and needed.least > 0.0
 
     def _is_new(self, hypothesis: Hypothesis) -> bool:
         known = self._tried.get(hypothesis.effects)

@@ -79,6 +79,11 @@ class LinearLine:
     shaft: FloatArray = field(default_factory=lambda: np.zeros(0))  # (n,)
 
 
+def line_values(result: FitResult) -> dict[str, float]:
+    """Return the values of the line's own parameters in a fit, those that it may not change among them."""
+    return {name: float(result.p[slot("", name)]) for name in result.problem.grid.structure.parameter_names}
+
+
 def line_of(result: FitResult) -> LinearLine:
     """Return the linear line with a fit's values, as the recordings' outputs show it.
 
@@ -89,7 +94,7 @@ def line_of(result: FitResult) -> LinearLine:
     if structure is Structure.JOINT:
         nothing = np.zeros(0)
         return LinearLine(np.zeros((0, 0)), nothing, nothing, np.zeros((len(outputs), 0)), 1.0)
-    values = {name: float(result.p[slot("", name)]) for name in structure.parameter_names}
+    values = line_values(result)
     a, at_motor, at_load = _continuous(values)
     n = a.shape[0]
     h = np.array([_seen(record, a, values) / record.unit for record in outputs])
