@@ -171,7 +171,7 @@ class Mistakes:
     MOST_LOAD = 10.0
     # Factor by which two intervals must miss each other: temperature, load and amplitude change a line by less
     LEAST_RATIO = 1.3
-    NOISE_ORDER = 12  # of a model of the noise of one recording: a third of the work of all it may have
+    NOISE_ORDER = 12  # of the model of the noise: enough for the intervals, a third of the work of all it may have
     BOTH_HOLD = 0.95  # probability with which both intervals hold their value
 
 
@@ -250,13 +250,12 @@ class Quantised:
     SMOOTHING = 25
     ABOVE_LUMPS = 3.0  # R of the readings must be this many times that of their moving mean
     LONGEST_ZERO = 20  # more zeros than this in a row are a signal at zero
-    NEAR_STEPS = 5  # a value near zero is within so many lattice steps of it
+    # A value near zero is within so many lattice steps of it, or this share of the channel's size, whichever is more
+    NEAR_STEPS, NEAR_SHARE = 5, 0.02
     COMMON_LEVELS = 5  # so many of the commonest other values are looked at, whether they come as zero does
     AS_OFTEN = 0.25  # share of the zeros that another level must come in for both to be levels of the signal
     # Of what is near another level for short as large a share must be that level exactly, times this, as for zero
     AS_EXACTLY = 0.5
-    # ... or within this share of the channel's size, whichever is more.
-    NEAR_SHARE = 0.02
     # Where zeros are lost, those between values near zero are so too if there are so many times as many of them as of
     # any value next to zero: rounded noise of half a lattice step around zero shows it four times as often as the next
     # value
@@ -302,7 +301,7 @@ class Fitting:
     SETTLED_DEVIANCE = 1.0
     DIGITS = 0.02  # the same over the difference from a rival that the fit is for
     MOST_PASSES = 6  # over unknowns and disturbances in turn
-    # Such comparisons under disturbances of their own at most, and the fall of minus twice the log-likelihood per
+    # Rough comparisons under disturbances of their own at most, and the fall of minus twice the log-likelihood per
     # sample for the next
     MOST_ROUGH, MUCH = 3, 0.05
     ROUNDS = 2  # steps of Fisher scoring in a pass
@@ -338,7 +337,7 @@ class Searching:
     STARTS = 5  # effects from each of which a search begins, the most promising
     # Share of the squared free-run error beyond the noise that a law must take for a search to continue from it
     WORTH_ADDING = 0.15
-    MOST_EFFECTS = 8  # of a set: no verdict on a machine was ever made of more
+    MOST_EFFECTS = 8  # of a set, at most
 
 
 class Checks:
@@ -364,7 +363,7 @@ class Checks:
 
 
 class Judging:
-    """What is established (`inference/trials`, `standing`, `decide`, `sheet`)."""
+    """What is established (`inference/trials`, `decide`)."""
 
     # Blocks kept out of a fit: shorter than the knot spacing of a load profile, so that its neighbours predict it
     BLOCK_S, EVERY_S = 0.6, 2.0
@@ -402,7 +401,7 @@ class Places:
     SMALLEST_RATIO = 1.2
     CENTRAL = 0.8  # share of the mismatch's power that band and region hold
     LONGEST_SEGMENT = 512  # samples of a segment of Welch's average
-    BINS = 24
+    BINS = 24  # of the signal that a curve is drawn over
     FEWEST_BINS = 4  # of a curve that is drawn
     FEWEST_PASSES = 3  # a bin that the signal passes less often says nothing of its own scatter
     FUNCTION = 0.5  # share of a law's power that must be a function of one signal to be drawn over it
