@@ -22,7 +22,7 @@ import numpy as np
 
 from estimator.diagnosis.inference.disturbances import Limits
 from estimator.diagnosis.inference.hypotheses import NOTHING, Hypothesis
-from estimator.diagnosis.preconditions.prepare import as_slow_as_needed
+from estimator.diagnosis.segments import as_slow_as_needed
 from estimator.diagnosis.table_curves import Masks
 from estimator.diagnosis.table_descent import rms_over
 from estimator.diagnosis.tables import CHOOSING, UNSEEN, best_table, blocks_of

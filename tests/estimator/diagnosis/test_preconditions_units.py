@@ -9,7 +9,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.diagnosis.preconditions.plausible import BEYOND, doubts_about
+from estimator.diagnosis.preconditions.plausible import doubts_about
+from estimator.diagnosis.thresholds import Mistakes
 from estimator.errors import Cure, Implausible
 from estimator.physics.driveline import InitialCondition, Parameter, Structure
 from estimator.physics.effect import Element
@@ -120,7 +121,7 @@ def test_missing_physics_passes(law: str) -> None:
 @pytest.mark.parametrize(("factor", "refused"), [(0.95, False), (1.05, True)])
 def test_the_tolerance_widens_what_is_plausible(factor: float, refused: bool) -> None:
     """A model trusted to a factor is taken at its word."""
-    wrong = output(1.0 / (1.5 * BEYOND * factor))(drive(ONE_MASS))
+    wrong = output(1.0 / (1.5 * Mistakes.BEYOND * factor))(drive(ONE_MASS))
     if refused:
         assert judged(wrong, model(ONE_MASS, 0.5))[0]
     else:
