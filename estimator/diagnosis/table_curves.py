@@ -21,6 +21,9 @@ FRACTIONS = (1 / 16, 1 / 8, 1 / 4, 1 / 2, 1.0)  # of that, where they stand on b
 EVEN_KNOTS = 7  # knots of a signal of one sign, equally far apart
 FEWEST_SAMPLES = 40  # samples between two knots at least
 
+STRAIGHT = {"shaft_twist": "k", "shaft_rate": "c", "motor_speed": "b_M", "load_speed": "b_L"}
+"""Parameter of the line that a straight curve at a place does the same as: intervals are those of both together."""
+
 Masks = tuple[BoolArray, ...]
 """Which samples count, per recording."""
 
@@ -41,6 +44,11 @@ class Curve:
     def name(self) -> str:
         """Name of the law in the model: the prefix of tables and the place."""
         return PREFIX + self.place
+
+    @property
+    def straight(self) -> tuple[str, str]:
+        """Effect, none, and name of the line's parameter that a straight curve does the same as."""
+        return "", STRAIGHT.get(self.place, "")
 
     @property
     def pieces(self) -> int:

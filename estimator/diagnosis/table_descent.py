@@ -55,13 +55,11 @@ class Descent:
     def fitted(self, z: FloatArray, gain: float, smooth: float, steps: int) -> tuple[FloatArray, float]:
         """Return unknowns after some steps at a gain, and the squared error there."""
         problem, seen = self.at(gain), dict[bytes, tuple[FloatArray, ...]]()
-        bend = np.zeros((self.curve.pieces - 1, z.size))
-        bend[:, self.first : self.after] = np.sqrt(smooth) * np.diff(np.eye(self.curve.pieces), axis=0)
-        ridge = np.zeros((self.curve.pieces, z.size))
-        ridge[:, self.first : self.after] = 1e-2 * np.sqrt(smooth) * np.eye(self.curve.pieces)
-        rows = np.vstack([bend, ridge])
-        least = z.copy()
-        least[self.first : self.after] = self.curve.own
+        of_curve = slice(self.first, self.after)
+        each = np.eye(self.curve.pieces)
+        penalty = np.sqrt(smooth) * np.vstack([np.diff(each, axis=0), 1e-2 * each])
+        rows = np.zeros((penalty.shape[0], z.size))
+        rows[:, of_curve] = penalty
 
         def outputs(z: FloatArray) -> tuple[FloatArray, ...]:
             key = z.tobytes()
@@ -72,12 +70,13 @@ class Descent:
             return seen[key]
 
         def residual(z: FloatArray) -> FloatArray:
-            return np.concatenate([residual_at(problem, outputs(z)) / self._scale, rows @ (z - least)])
+            bent = penalty @ (z[of_curve] - self.curve.own)  # other unknowns may be infinite, as a limit of none is
+            return np.concatenate([residual_at(problem, outputs(z)) / self._scale, bent])
 
         def jacobian(z: FloatArray) -> FloatArray:
             found = jacobian_at(problem, self.x(z), outputs(z))
             self.simulations += self.after + 4
-            found[:, self.first : self.after] = found[:, self.first : self.after] @ self.curve.values_of_slopes
+            found[:, of_curve] = found[:, of_curve] @ self.curve.values_of_slopes
             return np.vstack([found / self._scale, rows])
 
         solution = minimise(residual, jacobian, z, self.low, self.high, steps)
@@ -123,6 +122,9 @@ def _half_widths(
 ) -> FloatArray:
     """Return half of the 95 % intervals of the values [Nm]: of errors that are worth fewer than they are."""
     derivative = jacobian_at(problem, x, outputs)
+    for i, each in enumerate(problem.shared):
+        if (each.effect, each.name) == descent.curve.straight:  # their sum is what a recording tells
+            derivative[:, i] = 0.0
     free = np.flatnonzero(derivative.any(axis=0))
     j = derivative[:, free]
     variance = float(residual @ residual) / effective_samples([residual])

@@ -51,7 +51,7 @@ def _total(table: Table, slope: float) -> tuple[FloatArray, FloatArray, FloatArr
     half = np.zeros(x.size)
     if table.ci95 is not None:
         half = 0.5 * np.array([high - low for low, high in table.ci95])
-    span = float(np.ptp(total))
+    span = float(np.ptp(total)) or float(np.ptp(values)) or 1.0  # a curve may take away all that the line has
     return x, total, np.clip(half, WITHIN * span, WIDEST * span)
 
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from estimator.diagnosis.inference.hypotheses import Effects, Hypothesis
 from estimator.diagnosis.table_curves import Curve, Masks, curve_at, shapes
-from estimator.diagnosis.table_descent import Descent, errors_over, reported, rms_over
+from estimator.diagnosis.table_descent import Z95, Descent, errors_over, reported, rms_over
 from estimator.diagnosis.table_words import looks_like, shortest_formula
 from estimator.physics.driveline import Structure
 from estimator.physics.fit import ITERATIONS, FitResult, fit
@@ -186,7 +186,7 @@ def best_table(
     seen = tuple(u & ~a for u, a in zip(use, unseen, strict=True))
     known = fit(replace(whole.problem, use=seen), whole.x, ITERATIONS)
     before = min(rms_over(known.problem, each.outputs, unseen) for each in (known, retuned))
-    best, *others = sorted(found, key=lambda each: each.chosen_by)
+    best, *next_ones = sorted(found, key=lambda each: each.chosen_by)
     judged, z = _refitted(best, known, seen)
     of_law = errors_over(judged.problem, outputs_at(judged.at(0.0), judged.x(z)), unseen)
     after = float(np.sqrt(np.mean(np.concatenate(of_law) ** 2)))
@@ -194,11 +194,12 @@ def best_table(
         return None
     last, z = _refitted(replace(best, descent=judged, z=z), whole, use)
     result, table = reported(last, z)
-    kept = [] if line is None or len(records) == 1 else _left_out(best, whole, line, hypothesis.effects)
+    kept, others = ([], []) if line is None or len(records) == 1 else _left_out(best, whole, line, hypothesis.effects)
+    table = as_different_as(table, others)
     foreign = [] if line is None else _squares_on(holdout, line, hypothesis.effects, whole, result)
     if any(with_law > without for without, with_law in (_pooled(kept), _pooled(foreign))):
         return None
-    rival = others[0] if others and others[0].chosen_by < LOOK_ALIKE_SHARE * best.chosen_by else None
+    rival = next((each for each in next_ones if each.chosen_by < LOOK_ALIKE_SHARE * best.chosen_by), None)
     firsts = [record.name for record in records if record.lead is None]
     line_slope = last.curve.own * last.curve.base
     return TableFit(
@@ -227,15 +228,34 @@ Squares = tuple[float, float]
 """Squared error of the free run on a recording that a fit has not seen, without the law and with it."""
 
 
-def _left_out(best: Candidate, whole: FitResult, line: DrivelineModel, effects: Effects) -> list[Squares]:
-    """Return the errors on each recording of a fit to the others: what a law is worth on a drive of another kind."""
-    problem, found = whole.problem, list[Squares]()
+def _left_out(
+    best: Candidate, whole: FitResult, line: DrivelineModel, effects: Effects
+) -> tuple[list[Squares], list[FloatArray]]:
+    """Return, for each recording, the errors on it of a fit to the others, and that fit's torque at the knots.
+
+    They say what a law is worth on a drive of another kind, and how far its curve depends on one drive.
+    """
+    problem, found, torques = whole.problem, list[Squares](), list[FloatArray]()
     for i, record in enumerate(problem.records):
         seen = tuple(use & (i != j) for j, use in enumerate(problem.use))
         known = fit(replace(problem, use=seen), whole.x, STEPS)
-        with_law = reported(*_refitted(best, known, seen))[0]
+        with_law, table = reported(*_refitted(best, known, seen))
         found += _squares_on([record], line, effects, known, with_law)
-    return found
+        slope = with_law.values_of("").get(best.descent.curve.straight[1], 0.0)
+        torques.append(np.array(table.values) + slope * np.array(table.knots))
+    return found, torques
+
+
+def as_different_as(table: Table, torques: Sequence[FloatArray]) -> Table:
+    """Widen the intervals of a curve to those by the jackknife, of the torques without one recording each.
+
+    Where an error grows along a simulation, as behind a freewheel, its derivative holds for the smallest changes alone.
+    """
+    if table.ci95 is None or not torques:
+        return table
+    half = Z95 * np.sqrt(len(torques) - 1.0) * np.std(torques, axis=0)
+    bands = zip(table.ci95, table.values, half.tolist(), strict=True)
+    return replace(table, ci95=tuple((min(low, v - h), max(high, v + h)) for (low, high), v, h in bands))
 
 
 def _squares_on(

@@ -40,6 +40,7 @@ from estimator.diagnosis.inference.standing import (
     Standing,
 )
 from estimator.diagnosis.inference.trials import Trial, necessity, noise_of
+from estimator.diagnosis.noise import noise_floor
 from estimator.diagnosis.result import Fit, FoundEffect, OffNominal, Verdict
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import not_fitted
@@ -82,8 +83,13 @@ class Judged:
 
     @property
     def noise(self) -> float:
-        """The noise of the reading [unit of the output]."""
-        return noise_of(self.best.hypothesis)
+        """The noise of the reading [unit of the output].
+
+        Where more than noise is left, disturbances have taken up what is missing: then it is at most what neither the
+        reading's past nor the torque predicts.
+        """
+        noise = noise_of(self.best.hypothesis)
+        return min(noise, noise_floor(self.best.hypothesis.result.problem.records)) if self.failed else noise
 
 
 @dataclass(frozen=True, slots=True)

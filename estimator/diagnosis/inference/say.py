@@ -45,6 +45,7 @@ from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Element, Untestable
 from estimator.physics.model import DrivelineModel
 from estimator.physics.parallel import TimeIsUp, Work
+from estimator.physics.tables import TABLES
 from estimator.signals.record import FloatArray
 
 
@@ -67,7 +68,8 @@ def said(basis: Basis) -> Diagnosis:
     judged, runs, verdict = decision.judged, decision.runs, decision.verdict
     is_explained = verdict is not Verdict.UNEXPLAINED
     named = [found_effect(each, runs) for each in judged.named]
-    effects = _as_sure_as(basis.doubts, (*named, *decision.acquired) if is_explained else ())
+    is_uncounted = bool(basis.doubts) or any(name in TABLES for name in line.effects)
+    effects = _as_sure_as(is_uncounted, (*named, *decision.acquired) if is_explained else ())
     traces = judged.traces if is_explained else ()
     added = [*effects, *(found_effect(each, runs) for each in traces)]
     law, figures = basis.law, decision.figures
@@ -115,9 +117,12 @@ def said(basis: Basis) -> Diagnosis:
     )
 
 
-def _as_sure_as(doubts: Sequence[Doubt], effects: tuple[FoundEffect, ...]) -> tuple[FoundEffect, ...]:
-    """Return effects without how sure their names are while the input is in doubt: the one place that decides it."""
-    return tuple(replace(each, probability=math.nan, counted=None) for each in effects) if doubts else effects
+def _as_sure_as(is_uncounted: bool, effects: tuple[FoundEffect, ...]) -> tuple[FoundEffect, ...]:
+    """Return effects without how sure their names are where no such were counted: the one place that decides it.
+
+    That is where the input is in doubt, or the model has a law without a name, whose form leaves something to others.
+    """
+    return tuple(replace(each, probability=math.nan, counted=None) for each in effects) if is_uncounted else effects
 
 
 def undecided(
