@@ -45,10 +45,9 @@ class Curve:
         """Name of the law in the model: the prefix of tables and the place."""
         return PREFIX + self.place
 
-    @property
-    def straight(self) -> tuple[str, str]:
-        """Effect, none, and name of the line's parameter that a straight curve does the same as."""
-        return "", STRAIGHT.get(self.place, "")
+    def slope_of(self, p: FloatArray) -> float:
+        """Return the slope that a line of these parameters has without the curve; of torque over torque it is 1."""
+        return float(p[slot("", STRAIGHT[self.place])]) if self.place in STRAIGHT else 1.0
 
     @property
     def pieces(self) -> int:

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from estimator.diagnosis.table_curves import Curve, Masks
+from estimator.diagnosis.table_curves import STRAIGHT, Curve, Masks
 from estimator.least_squares import minimise
 from estimator.physics.fit import FitResult
 from estimator.physics.jacobian import jacobian_at
@@ -27,7 +27,6 @@ class Descent:
         self.curve, self.problem = curve, curve.released(result, use)
         self.first = len(result.problem.shared)
         self.after = self.first + curve.pieces
-        self.simulations = 0
         self._x0 = result.x
         self._scale = np.sqrt(max(result.squares, 1e-300) / 1000.0)
         low, high = bounds(self.problem)
@@ -66,7 +65,6 @@ class Descent:
             if key not in seen:
                 seen.clear()
                 seen[key] = outputs_at(problem, self.x(z))
-                self.simulations += 1
             return seen[key]
 
         def residual(z: FloatArray) -> FloatArray:
@@ -75,7 +73,6 @@ class Descent:
 
         def jacobian(z: FloatArray) -> FloatArray:
             found = jacobian_at(problem, self.x(z), outputs(z))
-            self.simulations += self.after + 4
             found[:, of_curve] = found[:, of_curve] @ self.curve.values_of_slopes
             return np.vstack([found / self._scale, rows])
 
@@ -89,14 +86,10 @@ class Descent:
 
 
 def rms_over(problem: Problem, outputs: Sequence[FloatArray], masks: Masks) -> float:
-    """Return the RMS of the errors of first outputs over some samples [unit of the output]."""
-    return float(np.sqrt(np.mean(np.concatenate(errors_over(problem, outputs, masks)) ** 2)))
-
-
-def errors_over(problem: Problem, outputs: Sequence[FloatArray], masks: Masks) -> list[FloatArray]:
-    """Return simulated less measured output of the samples that count, by recording; those of a lead are left out."""
+    """Return the RMS of the errors of first outputs over some samples, without those of a lead [unit of the output]."""
     rows = zip(problem.records, outputs, masks, strict=True)
-    return [(out - record.output)[mask] for record, out, mask in rows if record.lead is None]
+    errors = [(out - record.output)[mask] for record, out, mask in rows if record.lead is None]
+    return float(np.sqrt(np.mean(np.concatenate(errors) ** 2)))
 
 
 def reported(descent: Descent, z: FloatArray) -> tuple[FitResult, Table]:
@@ -123,7 +116,7 @@ def _half_widths(
     """Return half of the 95 % intervals of the values [Nm]: of errors that are worth fewer than they are."""
     derivative = jacobian_at(problem, x, outputs)
     for i, each in enumerate(problem.shared):
-        if (each.effect, each.name) == descent.curve.straight:  # their sum is what a recording tells
+        if not each.effect and each.name == STRAIGHT.get(descent.curve.place):  # a recording tells their sum
             derivative[:, i] = 0.0
     free = np.flatnonzero(derivative.any(axis=0))
     j = derivative[:, free]

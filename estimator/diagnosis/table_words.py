@@ -83,6 +83,8 @@ def _written(names: tuple[str, ...], found: FloatArray) -> str:
 def looks_like(table: Table, slope: float) -> str:
     """Return which known law lies within the band, as the rest of a sentence; "" where none does."""
     x, total, room = _total(table, slope)
+    if not total.any():
+        return "no torque at all"
     if table.place not in ("shaft_twist", "torque"):
         return _drag(x, total, room)
     unit, what = ("rad", "spring") if table.place == "shaft_twist" else ("Nm", "torque")

@@ -17,15 +17,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from estimator.diagnosis.inference.hypotheses import Effects, Hypothesis
+from estimator.diagnosis.result import UnnamedTable
 from estimator.diagnosis.table_curves import Curve, Masks, curve_at, shapes
-from estimator.diagnosis.table_descent import Z95, Descent, errors_over, reported, rms_over
+from estimator.diagnosis.table_descent import Z95, Descent, reported, rms_over
 from estimator.diagnosis.table_words import looks_like, shortest_formula
 from estimator.physics.driveline import Structure
 from estimator.physics.fit import ITERATIONS, FitResult, fit
 from estimator.physics.free_run import simulate_foreign
-from estimator.physics.model import DrivelineModel
-from estimator.physics.problem import outputs_at
-from estimator.physics.tables import Table
+from estimator.physics.model import DrivelineModel, unit
+from estimator.physics.tables import PLACES, Table
 from estimator.signals.record import BoolArray, FloatArray, Record
 
 SEARCHED = {
@@ -63,35 +63,7 @@ class TableFit:
 
     table: Table  # place, knots and values
     result: FitResult  # the free run with it, the line re-tuned next to it; the curve stands in ``problem.p``
-    before: float  # RMS of the free-run error on unseen samples without it [unit of the output]
-    after: float  # and with it
-    reached: tuple[float, float]  # between which values of its signal the recordings were
-    rival: str = ""  # place that explains nearly as much
-    rival_after: float = np.nan  # RMS with a curve there in its stead
-    looks_like: str = ""  # law of a known form that it resembles
-    formula: str = ""  # of fewest terms within the band; "" without one
-    not_carried: tuple[str, ...] = ()  # recordings on which a fit to the others is worse with it
-    simulations: int = 0  # spent on it
-
-    @property
-    def place(self) -> str:
-        """Key of ``tables.PLACES``."""
-        return self.table.place
-
-    @property
-    def knots(self) -> tuple[float, ...]:
-        """Knots, rising [unit of the place]."""
-        return self.table.knots
-
-    @property
-    def values(self) -> tuple[float, ...]:
-        """Values at them [Nm]."""
-        return self.table.values
-
-    @property
-    def ci95(self) -> tuple[tuple[float, float], ...] | None:
-        """Their 95 % intervals [Nm]."""
-        return self.table.ci95
+    told: UnnamedTable  # as it is reported
 
 
 def blocks_of(records: Sequence[Record], use: Sequence[BoolArray], which: Sequence[int]) -> Masks:
@@ -114,17 +86,8 @@ class Candidate:
     chosen_by: float  # RMS over the samples that choose
 
 
-@dataclass(frozen=True)
-class Scouted:
-    """A place after the first gains: what its shapes leave there, the best of them first."""
-
-    descent: Descent  # for this place
-    left: list[tuple[float, FloatArray]]  # squared error and unknowns
-
-    @property
-    def least(self) -> float:
-        """Squared error that the best shape leaves at the last of the first gains."""
-        return self.left[0][0]
+Scouted = tuple[Descent, list[tuple[float, FloatArray]]]
+"""A place after the first gains: squared error and unknowns that its shapes leave there, the best of them first."""
 
 
 def _scouted(curve: Curve, retuned: FitResult, fitting: Masks) -> Scouted:
@@ -135,13 +98,13 @@ def _scouted(curve: Curve, retuned: FitResult, fitting: Masks) -> Scouted:
         for gain in GAINS[:SCOUTS]:
             z, squares = descent.fitted(z, gain, SMOOTHNESS[0], SCOUT_STEPS)
         left.append((squares, z))
-    return Scouted(descent, sorted(left, key=lambda each: each[0]))
+    return descent, sorted(left, key=lambda each: each[0])
 
 
 def _best_curve(scouted: Scouted, choosing: Masks) -> Candidate:
     """Let the observer's gain down from the best shapes, and return what the choosing samples prefer."""
-    descent, found = scouted.descent, list[Candidate]()
-    for _, z in scouted.left[:CONTINUED]:
+    (descent, left), found = scouted, list[Candidate]()
+    for _, z in left[:CONTINUED]:
         for gain in GAINS[SCOUTS:]:
             z, _ = descent.fitted(z, gain, SMOOTHNESS[0], STEPS)
         found.append(Candidate(descent, z, SMOOTHNESS[0], descent.error(z, choosing)))
@@ -162,13 +125,11 @@ def table_at(hypothesis: Hypothesis, place: str) -> Candidate | None:
     return _best_curve(_scouted(curve, result, use), use)
 
 
-def best_table(
-    hypothesis: Hypothesis, line: DrivelineModel | None = None, holdout: Sequence[Record] = ()
-) -> TableFit | None:
-    """Return the best law without a name next to a fitted hypothesis; None where none is better on unseen samples.
+def best_table(hypothesis: Hypothesis, line: DrivelineModel, holdout: Sequence[Record] = ()) -> TableFit | None:
+    """Return the best law without a name next to a fitted hypothesis of a line; None where none is better.
 
-    With the ``line`` that recordings are simulated with, it must also be better on whole ones: on each by a fit to the
-    others, together, and on ``holdout``, which are kept out of every fit.
+    It is better on unseen data: on blocks of the recordings, on each whole recording by a fit to the others, together,
+    and on ``holdout``, which are kept out of every fit.
     """
     whole = hypothesis.result.first_outputs()
     if whole.problem.grid.plant is not None:
@@ -181,40 +142,45 @@ def best_table(
     places = [_scouted(curve, retuned, fitting) for curve in curves if curve is not None]
     if not places:
         return None
-    continued = sorted(places, key=lambda each: each.least)[:CONTINUED]
-    found = [_best_curve(each, choosing) for each in continued]
+    continued = sorted(places, key=lambda each: each[1][0][0])[:CONTINUED]
+    best, *others = sorted((_best_curve(each, choosing) for each in continued), key=lambda each: each.chosen_by)
     seen = tuple(u & ~a for u, a in zip(use, unseen, strict=True))
     known = fit(replace(whole.problem, use=seen), whole.x, ITERATIONS)
     before = min(rms_over(known.problem, each.outputs, unseen) for each in (known, retuned))
-    best, *next_ones = sorted(found, key=lambda each: each.chosen_by)
     judged, z = _refitted(best, known, seen)
-    of_law = errors_over(judged.problem, outputs_at(judged.at(0.0), judged.x(z)), unseen)
-    after = float(np.sqrt(np.mean(np.concatenate(of_law) ** 2)))
+    after = judged.error(z, unseen)
     if after > BETTER * before:
         return None
     last, z = _refitted(replace(best, descent=judged, z=z), whole, use)
     result, table = reported(last, z)
-    kept, others = ([], []) if line is None or len(records) == 1 else _left_out(best, whole, line, hypothesis.effects)
-    table = as_different_as(table, others)
-    foreign = [] if line is None else _squares_on(holdout, line, hypothesis.effects, whole, result)
+    kept, torques = ([], []) if len(records) == 1 else _left_out(best, whole, line, hypothesis.effects)
+    foreign = _squares_on(holdout, line, hypothesis.effects, whole, result)
     if any(with_law > without for without, with_law in (_pooled(kept), _pooled(foreign))):
         return None
-    rival = next((each for each in next_ones if each.chosen_by < LOOK_ALIKE_SHARE * best.chosen_by), None)
     firsts = [record.name for record in records if record.lead is None]
-    line_slope = last.curve.own * last.curve.base
-    return TableFit(
-        table,
-        result,
-        before,
-        after,
-        last.curve.reached,
-        "" if rival is None else rival.descent.curve.place,
-        np.nan if rival is None else rival.chosen_by,
-        looks_like(table, line_slope),
-        shortest_formula(table, line_slope),
-        tuple(name for name, (before, after) in zip(firsts, kept, strict=False) if after > before),
-        sum(each.descent.simulations for each in places) + judged.simulations + last.simulations,
+    rivals = [each.descent.curve.place for each in others if each.chosen_by < LOOK_ALIKE_SHARE * best.chosen_by]
+    not_carried = [name for name, (without, with_law) in zip(firsts, kept, strict=False) if with_law > without]
+    table, at = as_different_as(table, torques), PLACES[table.place]
+    slope = last.curve.own * last.curve.slope_of(result.p)
+    told = UnnamedTable(
+        place=table.place,
+        element=at.element,
+        over=at.over,
+        unit=unit(at.dimension, line.motion),
+        torque_unit=unit("torque", line.motion),
+        knots=table.knots,
+        values=table.values,
+        ci95=table.ci95 or (),
+        slope=slope,
+        reached=last.curve.reached,
+        rms_before=before,
+        rms_after=after,
+        looks_like=looks_like(table, slope),
+        formula=shortest_formula(table, slope),
+        rival=PLACES[rivals[0]].over if rivals else "",
+        not_carried=tuple(not_carried),
     )
+    return TableFit(table, result, told)
 
 
 def _refitted(best: Candidate, result: FitResult, use: Masks) -> tuple[Descent, FloatArray]:
@@ -241,8 +207,7 @@ def _left_out(
         known = fit(replace(problem, use=seen), whole.x, STEPS)
         with_law, table = reported(*_refitted(best, known, seen))
         found += _squares_on([record], line, effects, known, with_law)
-        slope = with_law.values_of("").get(best.descent.curve.straight[1], 0.0)
-        torques.append(np.array(table.values) + slope * np.array(table.knots))
+        torques.append(np.array(table.values) + best.descent.curve.slope_of(with_law.p) * np.array(table.knots))
     return found, torques
 
 

@@ -38,8 +38,9 @@ def _parts(table: UnnamedTable, error_unit: str) -> Iterator[object]:
         yield html.paragraph(f"{table.formula}, x for {table.over}", kind="law")
     yield _figure(table)
     yield html.note(
-        "The line is the curve, the points its values at the knots with their 95 % intervals; dashed, where the "
-        "recordings never were."
+        "The line is the curve"
+        + (", with what the line has there by itself, which is dotted" if table.slope else "")
+        + "; the points are its values at the knots with their 95 % intervals; dashed, where the recordings never were."
     )
     if table.rival:
         yield html.warning(f"A torque over {table.rival} explains nearly as much.")
@@ -48,12 +49,16 @@ def _parts(table: UnnamedTable, error_unit: str) -> Iterator[object]:
 
 
 def _figure(table: UnnamedTable) -> Figure:
-    knots, values = np.array(table.knots), np.array(table.values)
+    knots = np.array(table.knots)
+    values = np.array(table.values) + table.slope * knots
     x = np.union1d(np.linspace(knots[0], knots[-1], POINTS), list(table.reached))
     x = x[(x >= knots[0]) & (x <= knots[-1])]
-    y, seen = _curve(table, x), (x >= table.reached[0]) & (x <= table.reached[1])
+    y, seen = _curve(table, x) + table.slope * x, (x >= table.reached[0]) & (x <= table.reached[1])
     colour, width, _ = Style.AFTER.value
     figure = go.Figure()
+    if table.slope:
+        dotted = {"color": Style.BEFORE.value[0], "width": width, "dash": "dot"}
+        figure.add_trace(go.Scatter(x=knots, y=table.slope * knots, mode="lines", line=dotted, name="the line alone"))
     dashed = {"color": colour, "width": width, "dash": "dash"}
     figure.add_trace(go.Scatter(x=x, y=y, mode="lines", line=dashed, name="beyond the recordings"))
     solid = {"color": colour, "width": 2.2}

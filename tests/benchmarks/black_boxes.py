@@ -211,7 +211,7 @@ def of_line(of: Split, model: DrivelineModel) -> tuple[float, float, str]:
     whole = replace(problem, use=tuple(record.okay for record in of.records))
     hypothesis = Hypothesis(NOTHING, fit(whole, retuned.x), nothing, Limits(nothing, nothing, nothing), 0.0, 0.0)
     law = best_table(hypothesis, model)
-    return (before, before, "") if law is None else (law.before, law.after, law.place)
+    return (before, before, "") if law is None else (law.told.rms_before, law.told.rms_after, law.told.place)
 
 
 def compared(records: Sequence[Record], model: DrivelineModel) -> str:

@@ -38,7 +38,7 @@ from estimator.diagnosis.result import (
     UntestableEffect,
     Verdict,
 )
-from estimator.diagnosis.table_answer import Law, sentences
+from estimator.diagnosis.table_answer import NO_LAW, Law, sentences
 from estimator.diagnosis.where import locate
 from estimator.diagnosis.where.discrepancy import discrepancy
 from estimator.physics.catalogue import EFFECTS
@@ -88,10 +88,11 @@ def said(basis: Basis) -> Diagnosis:
         basis.doubts,
     )
     augmented, courses = augmented_model(runs.estimate, basis.model, added), courses_of(runs)
-    said_of_law = "" if law is None else f" {sentences(law.table, figures.unit)}"
+    is_without = law is None and not is_explained and judged.failed and not judged.off_nominal and line.plant is None
+    said_of_law = NO_LAW if is_without else "" if law is None else sentences(law.table, figures.unit)
     return Diagnosis(
         verdict=verdict,
-        statement=statement(verdict, figures, effects, basis.effort, context) + said_of_law,
+        statement=f"{statement(verdict, figures, effects, basis.effort, context)} {said_of_law}".rstrip(),
         mismatch=mismatch,
         effects=effects,
         rejected=_rejected(basis),
@@ -293,7 +294,7 @@ def _remainder(judged: Judged, law: Law | None) -> Remainder | None:
         times_noise=left / noise,
         element=None if law is None else law.table.element,
         band_hz=_band_hz(judged.believed.hypothesis, noise),
-        law="; it ".join([tests_in_words(judged.failed), *([] if law is None else [law.says])]),
+        law=tests_in_words(judged.failed) + ("" if law is None else f"; it follows a torque over {law.table.over}"),
     )
 
 

@@ -47,17 +47,18 @@ def test_a_gap_is_found_as_a_curve_over_the_twist_without_the_catalogue() -> Non
     hypothesis = retuned(recorded({"backlash": {"gap_rad": 0.02, "contact_rad": 0.0005}}))
     law = best_table(hypothesis, model(TWO_MASS, tolerance=0.1))
     assert law is not None
-    assert law.place == "shaft_twist"
-    assert law.not_carried == ()  # on each recording it is better by a fit to the other one
-    assert law.after < 0.5 * law.before
+    told = law.told
+    assert told.place == "shaft_twist"
+    assert told.not_carried == ()  # on each recording it is better by a fit to the other one
+    assert told.rms_after < 0.5 * told.rms_before
     assert law.result.rms < 0.5 * hypothesis.result.rms
-    inside = np.abs(law.knots) < 0.008
-    total = np.array(law.values) + TWO_MASS["k"] * np.array(law.knots)
+    inside = np.abs(told.knots) < 0.008
+    total = np.array(told.values) + told.slope * np.array(told.knots)
     assert np.max(np.abs(total[inside])) < 0.3 * TWO_MASS["k"] * 0.008
 
 
 def test_a_line_that_lacks_nothing_gets_no_law() -> None:
-    assert best_table(retuned(recorded({}))) is None
+    assert best_table(retuned(recorded({})), model(TWO_MASS, tolerance=0.1)) is None
 
 
 def test_the_free_form_of_a_place_fits_all_samples() -> None:
@@ -104,7 +105,7 @@ def total_of(total: FloatArray, place: str = "shaft_twist", slope: float = 4000.
         (4000.0 * np.maximum(KNOTS, 0.0), "a spring that acts one way only"),
         (np.clip(4000.0 * KNOTS, -64.0, 64.0), "a limit of 64 Nm"),
         (4000.0 * KNOTS + 4e5 * KNOTS**2, ""),
-        (0.0 * KNOTS, ""),  # nothing holds the shaft
+        (0.0 * KNOTS, "no torque at all"),
     ],
 )
 def test_what_a_curve_looks_like(total: FloatArray, expected: str) -> None:

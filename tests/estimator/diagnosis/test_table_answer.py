@@ -32,7 +32,7 @@ def test_a_value_that_a_law_moves_out_of_its_interval_widens_it() -> None:
     unused: Any = None
     fitted: Any = Fitted({"J_L": 139.0, "J_M": 3.9, "k": 7700.0})
     found: Any = Found()
-    law = Law(unused, unused, found, fitted, unused)
+    law = Law(unused, found, fitted, unused)
     after = law.augmented(DrivelineModel(Structure.TWO_MASS, LINE)).parameters
     assert (after["J_L"].value, after["J_L"].ci95) == (139.0, (92.7, 139.0))
     assert (after["J_M"].value, after["J_M"].ci95) == (3.9, (3.0, 4.5))
