@@ -36,7 +36,7 @@ class Law:
     @property
     def table(self) -> UnnamedTable:
         """The law, as it is reported."""
-        return self.found.told
+        return self.found.law
 
     def augmented(self, model: DrivelineModel) -> DrivelineModel:
         """Return a model with the law, and the line and its effects as they are next to it."""

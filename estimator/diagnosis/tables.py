@@ -63,7 +63,7 @@ class TableFit:
 
     table: Table  # place, knots and values
     result: FitResult  # the free run with it, the line re-tuned next to it; the curve stands in ``problem.p``
-    told: UnnamedTable  # as it is reported
+    law: UnnamedTable  # as it is reported
 
 
 def blocks_of(records: Sequence[Record], use: Sequence[BoolArray], which: Sequence[int]) -> Masks:
@@ -162,7 +162,7 @@ def best_table(hypothesis: Hypothesis, line: DrivelineModel, holdout: Sequence[R
     not_carried = [name for name, (without, with_law) in zip(firsts, kept, strict=False) if with_law > without]
     table, at = as_different_as(table, torques), PLACES[table.place]
     slope = last.curve.own * last.curve.slope_of(result.p)
-    told = UnnamedTable(
+    law = UnnamedTable(
         place=table.place,
         element=at.element,
         over=at.over,
@@ -180,7 +180,7 @@ def best_table(hypothesis: Hypothesis, line: DrivelineModel, holdout: Sequence[R
         rival=PLACES[rivals[0]].over if rivals else "",
         not_carried=tuple(not_carried),
     )
-    return TableFit(table, result, told)
+    return TableFit(table, result, law)
 
 
 def _refitted(best: Candidate, result: FitResult, use: Masks) -> tuple[Descent, FloatArray]:

@@ -210,8 +210,8 @@ def of_line(of: Split, model: DrivelineModel) -> tuple[float, float, str]:
     nothing = np.zeros(0)
     whole = replace(problem, use=tuple(record.okay for record in of.records))
     hypothesis = Hypothesis(NOTHING, fit(whole, retuned.x), nothing, Limits(nothing, nothing, nothing), 0.0, 0.0)
-    law = best_table(hypothesis, model)
-    return (before, before, "") if law is None else (law.told.rms_before, law.told.rms_after, law.told.place)
+    found = best_table(hypothesis, model)
+    return (before, before, "") if found is None else (found.law.rms_before, found.law.rms_after, found.law.place)
 
 
 def compared(records: Sequence[Record], model: DrivelineModel) -> str:
