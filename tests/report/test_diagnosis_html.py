@@ -206,6 +206,7 @@ def test_a_law_without_a_name_is_drawn_and_said(diagnosis: Diagnosis) -> None:
     assert "A torque over the torque that is read explains nearly as much." in page
     assert "It does not carry over to run_2." in page
     assert "beyond the recordings" in figures(page)
+    assert "the line alone" in figures(page)
     assert "A law without a name" not in diagnosis_page(diagnosis)
 
 
