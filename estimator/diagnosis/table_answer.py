@@ -78,7 +78,7 @@ def unnamed_law(decision: Decision) -> Law | None:
 
 
 def _with_table(model: DrivelineModel, law: TableFit) -> DrivelineModel:
-    return replace(model, effects={**model.effects, law.table.name: law.table.effect()})
+    return replace(model, effects={**model.effects, **law.effects})
 
 
 def sentences(table: UnnamedTable, of: str) -> str:

@@ -13,7 +13,7 @@ from estimator.physics.fit import FitResult
 from estimator.physics.jacobian import jacobian_at
 from estimator.physics.layout import OBSERVER, slot
 from estimator.physics.problem import Problem, bounds, outputs_at, residual_at
-from estimator.physics.tables import Table
+from estimator.physics.tables import DAMPING, Table
 from estimator.signals.correlation import effective_samples
 from estimator.signals.record import FloatArray
 
@@ -35,8 +35,8 @@ class Descent:
 
     def start(self, slopes: FloatArray) -> FloatArray:
         """Return unknowns with these slopes, all else as the line had it."""
-        damping = [0.1] if self.curve.damping else []
-        return np.concatenate([self._x0[: self.first], slopes, damping, self._x0[self.first :]])
+        more = [each.start for each in self.curve.more]
+        return np.concatenate([self._x0[: self.first], slopes, more, self._x0[self.first :]])
 
     def x(self, z: FloatArray) -> FloatArray:
         """Return the scaled unknowns of the problem: values in the place of slopes."""
@@ -99,13 +99,13 @@ def reported(descent: Descent, z: FloatArray) -> tuple[FitResult, Table]:
     residual = residual_at(problem, outputs)
     values = np.insert(x[descent.first : descent.after], curve.zero, 0.0)
     half = np.insert(_half_widths(descent, problem, x, outputs, residual), curve.zero, 0.0)
-    damping = float(x[descent.after] * curve.damping) if curve.damping else 0.0
     bands = tuple((float(v - h), float(v + h)) for v, h in zip(values, half, strict=True))
-    table = Table(curve.place, tuple(curve.knots.tolist()), tuple(values.tolist()), bands, damping)
-    added = range(descent.first, descent.after + bool(curve.damping))
+    added = range(descent.first, descent.after + len(curve.more))
     p = problem.p.copy()
     for i in added:
         p[problem.shared[i].slot] = problem.shared[i].scale * x[i]
+    damping = float(p[slot(curve.name, DAMPING)]) if curve.more else 0.0
+    table = Table(curve.place, tuple(curve.knots.tolist()), tuple(values.tolist()), bands, damping)
     given = replace(problem, p=p, shared=problem.shared[: descent.first])
     return FitResult(given, np.delete(x, added), outputs, residual, None, False), table
 

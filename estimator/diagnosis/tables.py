@@ -11,27 +11,28 @@ and its place, and the rest, which no choice has seen, say whether it is a law a
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from estimator.diagnosis.inference.hypotheses import Effects, Hypothesis
 from estimator.diagnosis.result import UnnamedTable
-from estimator.diagnosis.table_curves import Curve, Masks, curve_at, shapes
+from estimator.diagnosis.table_curves import SLIDER, YIELDING, Curve, Masks, curve_at, shapes
 from estimator.diagnosis.table_descent import Z95, Descent, reported, rms_over
 from estimator.diagnosis.table_words import looks_like, shortest_formula
 from estimator.physics.driveline import Structure
 from estimator.physics.fit import ITERATIONS, FitResult, fit
 from estimator.physics.free_run import simulate_foreign
-from estimator.physics.model import DrivelineModel, unit
+from estimator.physics.layout import slot
+from estimator.physics.model import DrivelineModel, EffectValue, unit
 from estimator.physics.tables import PLACES, Table
 from estimator.signals.record import BoolArray, FloatArray, Record
 
 SEARCHED = {
     Structure.ONE_MASS: ("torque", "motor_speed"),
-    Structure.TWO_MASS: ("torque", "motor_speed", "shaft_twist", "shaft_rate", "load_speed"),
-    Structure.THREE_MASS: ("torque", "motor_speed", "shaft_twist", "shaft_rate", "load_speed"),
+    Structure.TWO_MASS: ("torque", "motor_speed", "shaft_twist", YIELDING, "shaft_rate", "load_speed"),
+    Structure.THREE_MASS: ("torque", "motor_speed", "shaft_twist", YIELDING, "shaft_rate", "load_speed"),
     Structure.JOINT: ("shaft_twist", "shaft_rate"),
 }
 """Places at which a curve is looked for."""
@@ -52,6 +53,7 @@ SCOUTS, SCOUT_STEPS, STEPS, LAST_STEPS = 2, 3, 4, 10
 """Gains after which only the best shapes and places continue; Jacobians at each gain there, behind, and at the end."""
 
 CONTINUED = 2  # shapes of a place, and places, that continue
+AT_SLIDER = slot(SLIDER, "friction_nm")
 SMOOTHNESS = (1.0, 0.05)
 """Weights of the curve's bending that are tried: what its slope changes by from one piece to the next, squared, counts
 as so many thousandths of the squared error before."""
@@ -64,6 +66,9 @@ class TableFit:
     table: Table  # place, knots and values
     result: FitResult  # the free run with it, the line re-tuned next to it; the curve stands in ``problem.p``
     law: UnnamedTable  # as it is reported
+    effects: Mapping[
+        str, Mapping[str, EffectValue]
+    ]  # that the model gets: the table, and the slider of one that yields
 
 
 def blocks_of(records: Sequence[Record], use: Sequence[BoolArray], which: Sequence[int]) -> Masks:
@@ -138,7 +143,8 @@ def best_table(hypothesis: Hypothesis, line: DrivelineModel, holdout: Sequence[R
     unseen, choosing = (blocks_of(records, use, which) for which in (UNSEEN, CHOOSING))
     fitting = tuple(u & ~a & ~b for u, a, b in zip(use, unseen, choosing, strict=True))
     retuned = fit(replace(whole.problem, use=fitting), whole.x, STEPS)
-    curves = [curve_at(place, retuned, GAINS[0]) for place in SEARCHED[whole.problem.grid.structure]]
+    searched = [each for each in SEARCHED[whole.problem.grid.structure] if each != YIELDING or not whole.p[AT_SLIDER]]
+    curves = [curve_at(place, retuned, GAINS[0]) for place in searched]
     places = [_scouted(curve, retuned, fitting) for curve in curves if curve is not None]
     if not places:
         return None
@@ -158,10 +164,17 @@ def best_table(hypothesis: Hypothesis, line: DrivelineModel, holdout: Sequence[R
     if any(with_law > without for without, with_law in (_pooled(kept), _pooled(foreign))):
         return None
     firsts = [record.name for record in records if record.lead is None]
-    rivals = [each.descent.curve.place for each in others if each.chosen_by < LOOK_ALIKE_SHARE * best.chosen_by]
+    alike_places = [each.descent.curve.place for each in others if each.chosen_by < LOOK_ALIKE_SHARE * best.chosen_by]
+    rivals = [PLACES[place].over for place in alike_places if place != best.descent.curve.place]
     not_carried = [name for name, (without, with_law) in zip(firsts, kept, strict=False) if with_law > without]
     table, at = as_different_as(table, torques), PLACES[table.place]
     slope = last.curve.own * last.curve.slope_of(result.p)
+    effects, alike, formula = {table.name: table.effect()}, looks_like(table, slope), shortest_formula(table, slope)
+    if last.curve.yields:
+        names, of = ("friction_nm", "yield_rad", "sharpness"), unit("torque", line.motion)
+        effects[SLIDER] = {name: EffectValue(float(result.p[slot(SLIDER, name)])) for name in names}
+        alike = f"a clutch that slips at {result.p[AT_SLIDER]:.3g} {of}, by {SLIDER} next to the curve"
+        formula = ""
     law = UnnamedTable(
         place=table.place,
         element=at.element,
@@ -175,12 +188,12 @@ def best_table(hypothesis: Hypothesis, line: DrivelineModel, holdout: Sequence[R
         reached=last.curve.reached,
         rms_before=before,
         rms_after=after,
-        looks_like=looks_like(table, slope),
-        formula=shortest_formula(table, slope),
-        rival=PLACES[rivals[0]].over if rivals else "",
+        looks_like=alike,
+        formula=formula,
+        rival=next(iter(rivals), ""),
         not_carried=tuple(not_carried),
     )
-    return TableFit(table, result, law)
+    return TableFit(table, result, law, effects)
 
 
 def _refitted(best: Candidate, result: FitResult, use: Masks) -> tuple[Descent, FloatArray]:

@@ -57,6 +57,20 @@ def test_a_gap_is_found_as_a_curve_over_the_twist_without_the_catalogue() -> Non
     assert np.max(np.abs(total[inside])) < 0.3 * TWO_MASS["k"] * 0.008
 
 
+def test_a_clutch_that_slips_is_found_as_a_torque_that_yields() -> None:
+    """A shaft of the same stiffness up to 45 Nm; the curve takes the line's own away."""
+    knots = (-0.1, 0.0, 0.1)
+    away = Table("shaft_twist", knots, tuple(-TWO_MASS["k"] * knot for knot in knots), None, TWO_MASS["c"]).effect()
+    slider = {"friction_nm": 45.0, "yield_rad": 45.0 / TWO_MASS["k"], "sharpness": 10.0}
+    clutch = {"table_shaft_twist": {key: each.value for key, each in away.items()}, "shaft_hysteresis": slider}
+    hypothesis = retuned(recorded(clutch))
+    found = best_table(hypothesis, model(TWO_MASS, tolerance=0.1))
+    assert found is not None
+    assert found.law.rms_after < 0.2 * found.law.rms_before
+    assert found.effects["shaft_hysteresis"]["friction_nm"].value == pytest.approx(45.0, rel=0.05)
+    assert found.law.looks_like.startswith("a clutch that slips at 4")
+
+
 def test_a_line_that_lacks_nothing_gets_no_law() -> None:
     assert best_table(retuned(recorded({})), model(TWO_MASS, tolerance=0.1)) is None
 

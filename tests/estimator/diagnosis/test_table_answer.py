@@ -25,7 +25,9 @@ class Fitted:
 
 @dataclass
 class Found:
-    table: Table = field(default_factory=lambda: Table("motor_speed", (0.0, 1.0), (0.0, 2.0)))
+    effects: dict[str, Any] = field(
+        default_factory=lambda: {"table_motor_speed": Table("motor_speed", (0.0, 1.0), (0.0, 2.0)).effect()}
+    )
 
 
 def test_a_value_that_a_law_moves_out_of_its_interval_widens_it() -> None:
