@@ -69,22 +69,12 @@ class Curve:
         """The knot whose value is 0: what is constant is the load's."""
         return int(np.argmin(np.abs(self.knots)))
 
-    @property
-    def middles(self) -> FloatArray:
-        """Middles between the knots [unit of the place], one for each slope."""
-        return 0.5 * (self.knots[1:] + self.knots[:-1])
-
     @cached_property
     def values_of_slopes(self) -> FloatArray:
         """Matrix from slopes, less its own, to the values but that of knot ``zero``; shape (pieces, pieces)."""
         steps = self.base * np.diff(self.knots)
         sums = np.vstack([np.zeros(self.pieces), np.tril(np.ones((self.pieces, self.pieces))) * steps])
         return np.delete(sums - sums[self.zero], self.zero, axis=0)
-
-    @property
-    def free(self) -> list[int]:
-        """Indices of the knots whose values are fitted: all but ``zero``."""
-        return [i for i in range(self.knots.size) if i != self.zero]
 
     def released(self, result: FitResult, use: Masks) -> Problem:
         """Return the problem of a fit with the curve's values next to its own unknowns."""
@@ -93,7 +83,11 @@ class Curve:
         p[slot(self.name, COUNT)] = self.knots.size
         for i, knot in enumerate(self.knots.tolist()):
             p[slot(self.name, f"knot_{i + 1}")] = knot
-        more = [Shared(self.name, f"value_{i + 1}", 1.0, -np.inf, np.inf, 0.0) for i in self.free]
+        more = [
+            Shared(self.name, f"value_{i + 1}", 1.0, -np.inf, np.inf, 0.0)
+            for i in range(self.knots.size)
+            if i != self.zero
+        ]
         if self.yields:
             p[slot(SLIDER, "sharpness")] = SUDDEN
         return replace(problem, p=p, shared=(*problem.shared, *more, *self.more), use=use)
@@ -156,11 +150,11 @@ def _signals(place: str, result: FitResult, gain: float) -> list[FloatArray]:
 
 def shapes(curve: Curve) -> dict[str, FloatArray]:
     """Return slopes from which a curve is fitted, by name."""
-    at = curve.middles / np.abs(curve.knots).max()
+    at = 0.5 * (curve.knots[1:] + curve.knots[:-1]) / np.abs(curve.knots).max()  # in the middle of each piece
     one = np.ones(at.size)
-    straight = {"straight": (0.0 if curve.yields else curve.own) * one}
     if curve.yields:
-        return straight
+        return {"slipping": 0.0 * one}
+    straight = {"straight": curve.own * one}
     if curve.place in ("shaft_twist", "torque"):
         return straight | {
             "gap": np.where(np.abs(at) < 0.13, 0.02, 1.0),

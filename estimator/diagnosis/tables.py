@@ -161,7 +161,7 @@ def best_table(hypothesis: Hypothesis, line: DrivelineModel, holdout: Sequence[R
     result, table = reported(last, z)
     kept, torques = ([], []) if len(records) == 1 else _left_out(best, whole, line, hypothesis.effects)
     foreign = _squares_on(holdout, line, hypothesis.effects, whole, result)
-    if any(with_law > without for without, with_law in (_pooled(kept), _pooled(foreign))):
+    if any(sum(after for _, after in each) > sum(before for before, _ in each) for each in (kept, foreign)):
         return None
     firsts = [record.name for record in records if record.lead is None]
     alike_places = [each.descent.curve.place for each in others if each.chosen_by < LOOK_ALIKE_SHARE * best.chosen_by]
@@ -246,7 +246,3 @@ def _squares_on(
         return float(np.sum((run - record.output)[record.okay] ** 2))
 
     return [(squares(without, record), squares(with_law, record)) for record in records]
-
-
-def _pooled(squares: Sequence[Squares]) -> Squares:
-    return sum(before for before, _ in squares), sum(after for _, after in squares)

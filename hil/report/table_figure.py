@@ -2,50 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 import plotly.graph_objects as go
 
 from estimator.diagnosis.result import UnnamedTable
+from estimator.diagnosis.table_answer import sentences
 from estimator.physics.curve import curve_over
 from estimator.physics.layout import flat_values, slot
 from estimator.physics.tables import PREFIX, Table
 from estimator.signals.record import FloatArray
 from hil.report import page as html
 from hil.report.figures import LEGEND_PX, PANEL_PX, Style, figure_block
-from hil.report.numbers import shown
 from hil.report.page import Figure
-from hil.report.wording import ELEMENTS
 
 POINTS = 200
 
 
 def section(table: UnnamedTable, error_unit: str) -> html.Section:
     """Return the section."""
-    return html.section("A law without a name", *_parts(table, error_unit))
-
-
-def _parts(table: UnnamedTable, error_unit: str) -> Iterator[object]:
-    yield html.paragraph(
-        f"At the {ELEMENTS[table.element]}: a torque over {table.over}. On samples that no fit has seen the error "
-        f"falls with it from {shown(table.rms_before, error_unit)} to {shown(table.rms_after, error_unit)}. It is in "
-        "the augmented model, next to what the line has there: a description, not a cause."
+    return html.section(
+        "A law without a name",
+        html.paragraph(f"{sentences(table, error_unit)} It describes, and is no cause."),
+        _figure(table),
+        html.note(
+            "The line is the curve"
+            + (", with what the line has there by itself, which is dotted" if table.slope else "")
+            + "; the points are its values at the knots with their 95 % intervals; dashed, where no recording has been."
+        ),
     )
-    if table.looks_like:
-        yield html.paragraph(f"It looks like {table.looks_like}.")
-    if table.formula:
-        yield html.paragraph(f"{table.formula}, x for {table.over}", kind="law")
-    yield _figure(table)
-    yield html.note(
-        "The line is the curve"
-        + (", with what the line has there by itself, which is dotted" if table.slope else "")
-        + "; the points are its values at the knots with their 95 % intervals; dashed, where the recordings never were."
-    )
-    if table.rival:
-        yield html.warning(f"A torque over {table.rival} explains nearly as much.")
-    if table.not_carried:
-        yield html.warning(f"It does not carry over to {', '.join(table.not_carried)}.")
 
 
 def _figure(table: UnnamedTable) -> Figure:
