@@ -83,17 +83,13 @@ def _with_table(model: DrivelineModel, law: TableFit) -> DrivelineModel:
 
 def sentences(table: UnnamedTable, of: str) -> str:
     """Return what is said of the law, for the end of a statement."""
-    parts = [
+    parts = (
         f"A law without a name is in the augmented model: a torque over {table.over}, through "
         f"{len(table.knots)} knots. On data that no fit has seen the free-run error falls with it from "
-        f"{table.rms_before:.4g} to {table.rms_after:.4g} {of}."
-    ]
-    if table.looks_like:
-        parts.append(f"It looks like {table.looks_like}.")
-    if table.formula:
-        parts.append(f"The shortest formula within its band, with x for {table.over}: {table.formula}.")
-    if table.rival:
-        parts.append(f"A torque over {table.rival} explains nearly as much.")
-    if table.not_carried:
-        parts.append(f"It does not carry over to {', '.join(table.not_carried)}.")
-    return " ".join(parts)
+        f"{table.rms_before:.4g} to {table.rms_after:.4g} {of}.",
+        table.looks_like and f"It looks like {table.looks_like}.",
+        table.formula and f"The shortest formula within its band, with x for {table.over}: {table.formula}.",
+        table.rival and f"A torque over {table.rival} explains nearly as much.",
+        f"It does not carry over to {', '.join(table.not_carried)}." if table.not_carried else "",
+    )
+    return " ".join(filter(None, parts))

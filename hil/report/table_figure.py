@@ -9,8 +9,7 @@ from estimator.diagnosis.result import UnnamedTable
 from estimator.diagnosis.table_answer import sentences
 from estimator.physics.curve import curve_over
 from estimator.physics.layout import flat_values, slot
-from estimator.physics.tables import PREFIX, Table
-from estimator.signals.record import FloatArray
+from estimator.physics.tables import COUNT, Table
 from hil.report import page as html
 from hil.report.figures import LEGEND_PX, PANEL_PX, Style, figure_block
 from hil.report.page import Figure
@@ -37,7 +36,12 @@ def _figure(table: UnnamedTable) -> Figure:
     values = np.array(table.values) + table.slope * knots
     x = np.union1d(np.linspace(knots[0], knots[-1], POINTS), list(table.reached))
     x = x[(x >= knots[0]) & (x <= knots[-1])]
-    y, seen = _curve(table, x) + table.slope * x, (x >= table.reached[0]) & (x <= table.reached[1])
+    law = Table(table.place, table.knots, table.values)
+    p = flat_values({}, {law.name: {key: value.value for key, value in law.effect().items()}})
+    y, seen = (
+        curve_over(x, p, slot(law.name, COUNT)) + table.slope * x,
+        (x >= table.reached[0]) & (x <= table.reached[1]),
+    )
     colour, width, _ = Style.AFTER.value
     figure = go.Figure()
     if table.slope:
@@ -56,9 +60,3 @@ def _figure(table: UnnamedTable) -> Figure:
     figure.update_xaxes(title_text=f"{table.over} [{table.unit}]")
     figure.update_yaxes(title_text=f"torque [{table.torque_unit}]")
     return figure_block(figure, "law-without-a-name", PANEL_PX + 90 + LEGEND_PX)
-
-
-def _curve(table: UnnamedTable, x: FloatArray) -> FloatArray:
-    law = Table(table.place, table.knots, table.values)
-    values = {key: value.value for key, value in law.effect().items()}
-    return curve_over(x, flat_values({}, {law.name: values}), slot(PREFIX + table.place, "knots"))

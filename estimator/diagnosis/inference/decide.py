@@ -85,8 +85,7 @@ class Judged:
     def noise(self) -> float:
         """The noise of the reading [unit of the output].
 
-        Where more than noise is left, disturbances have taken up what is missing: then it is at most what neither the
-        reading's past nor the torque predicts.
+        Disturbances take up what is missing: where more than noise is left, it is at most what can't be predicted.
         """
         noise = noise_of(self.best.hypothesis)
         return min(noise, noise_floor(self.best.hypothesis.result.problem.records)) if self.failed else noise

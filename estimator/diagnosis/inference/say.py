@@ -61,6 +61,12 @@ class Basis:
     law: Law | None = None  # without a name, next to what is decided
     doubts: Sequence[Doubt] = ()  # about the input
 
+    @property
+    def refinements(self) -> tuple[Standing, ...]:
+        """What is possible and not in the model: without what a law without a name has."""
+        held = () if self.law is None else self.law.found.effects
+        return tuple(each for each in self.decision.judged.refinements if each.name not in held)
+
 
 def said(basis: Basis) -> Diagnosis:
     """Return the diagnosis."""
@@ -80,7 +86,7 @@ def said(basis: Basis) -> Diagnosis:
     context = Context(
         remainder,
         slight,
-        [each.name for each in judged.refinements],
+        [each.name for each in basis.refinements],
         judged.off_nominal,
         untestable,
         can_be_retuned(line),
@@ -111,7 +117,7 @@ def said(basis: Basis) -> Diagnosis:
         slight=slight,
         refinements=tuple(
             Refinement(each.name, each.objection, each.necessity.value, _values(judged.best, each))
-            for each in judged.refinements
+            for each in basis.refinements
         ),
         table=None if law is None else law.table,
         effort=basis.effort,
@@ -309,7 +315,8 @@ def _rejected(basis: Basis) -> tuple[RejectedEffect, ...]:
     standings = (*judged.named, *judged.traces, *judged.refinements)
     known = {each.name for each in standings} | {other for each in standings for other in each.alike}
     known |= {each.name for each in basis.decision.acquired} | {*basis.effort.untried}
-    found = {each.name: RejectedEffect(each.name, each.objection, 0.0) for each in judged.refinements}
+    known |= set() if basis.law is None else {*basis.law.found.effects}
+    found = {each.name: RejectedEffect(each.name, each.objection, 0.0) for each in basis.refinements}
     for scores, reason in (
         (fits.scores(), "fitted: the best set with it is {}"),
         (fits.implausible, "fitted, and ended at values that are no case of it"),
