@@ -27,7 +27,7 @@ STRAIGHT = {"shaft_twist": "k", "shaft_rate": "c", "motor_speed": "b_M", "load_s
 YIELDING, SLIDER = "shaft_yielding", "shaft_hysteresis"
 """A torque over the twist that yields, as a clutch slips: a straight curve and the slider of this effect."""
 
-LEVEL, SUDDEN = 0.7, 10.0  # level at which it begins, in the torque in use, and sharpness of its knee
+LEVEL, SUDDEN, REACH_OF_SLIP = 0.7, 10.0, 100.0  # its start in the torque in use, knee, reach in the twist without it
 
 Masks = tuple[BoolArray, ...]
 """Which samples count, per recording."""
@@ -109,9 +109,10 @@ def curve_at(place: str, result: FitResult, gain: float) -> Curve | None:
     top = max(abs(low), abs(high))
     damping = Shared(PREFIX + place, DAMPING, c or 0.02 * np.sqrt(k), 0.0, 5.0, 0.1)
     if yields:
+        knots = REACH_OF_SLIP * top * np.array([-1.0, 0.0, 1.0])
         level = Shared(SLIDER, "friction_nm", torque, 0.0, 4.0, LEVEL)
         twist = Shared(SLIDER, "yield_rad", torque / k, 0.02, 4.0, LEVEL)
-        return Curve(place, top * np.array([-1.0, 0.0, 1.0]), k, 1.0, (0.0, 1.0), (damping, level, twist), (low, high))
+        return Curve(place, knots, k, 1.0, (0.0, 1.0), (damping, level, twist), (low, high))
     if place == "shaft_twist":
         return Curve(place, knots, k, 1.0, (0.0, 8.0), (damping,), (low, high))
     if place == "torque":

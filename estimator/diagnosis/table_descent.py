@@ -35,8 +35,8 @@ class Descent:
 
     def start(self, slopes: FloatArray) -> FloatArray:
         """Return unknowns with these slopes, all else as the line had it."""
-        more = [each.start for each in self.curve.more]
-        return np.concatenate([self._x0[: self.first], slopes, more, self._x0[self.first :]])
+        own = [each.start for each in self.curve.more]
+        return np.concatenate([self._x0[: self.first], slopes, own, self._x0[self.first :]])
 
     def x(self, z: FloatArray) -> FloatArray:
         """Return the scaled unknowns of the problem: values in the place of slopes."""
