@@ -54,9 +54,7 @@ def _figure(table: UnnamedTable) -> Figure:
     half = [0.5 * (high - low) for low, high in table.ci95]
     bars = {"type": "data", "array": half, "thickness": width, "width": 3}
     marker = {"color": Style.BEFORE.value[0], "size": 7, "symbol": "diamond"}
-    figure.add_trace(
-        go.Scatter(x=knots, y=values, mode="markers", marker=marker, name="at the knots, 95 %", error_y=bars)
-    )
+    figure.add_trace(go.Scatter(x=knots, y=values, mode="markers", marker=marker, name="at knots, 95 %", error_y=bars))
     figure.update_xaxes(title_text=f"{table.over} [{table.unit}]")
     figure.update_yaxes(title_text=f"torque [{table.torque_unit}]")
     return figure_block(figure, "law-without-a-name", PANEL_PX + 90 + LEGEND_PX)
