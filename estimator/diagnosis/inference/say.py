@@ -125,10 +125,7 @@ def said(basis: Basis) -> Diagnosis:
 
 
 def _as_sure_as(is_uncounted: bool, effects: tuple[FoundEffect, ...]) -> tuple[FoundEffect, ...]:
-    """Return effects without how sure their names are where no such were counted: the one place that decides it.
-
-    That is where the input is in doubt, or the model has a law without a name, whose form leaves something to others.
-    """
+    """Return effects without how sure their names are where none were counted: with a doubt or a law without a name."""
     return tuple(replace(each, probability=math.nan, counted=None) for each in effects) if is_uncounted else effects
 
 
