@@ -108,7 +108,7 @@ def _judged(records: Sequence[Record], line: Line, is_tried: bool = False) -> tu
             cure = None
     is_wrong = 1.0 - is_right - math.fsum(each for candidate, each in ranked if candidate.is_else)
     is_one_of_all = best.only is None and not best.change.is_open
-    # a scale of any size may be physics as well, such as gravity: it is doubted, as an inertia next to another mistake is
+    # a scale of any size may be physics, too, such as gravity: it is doubted, as an inertia next to another mistake is
     open_parts = {Part.TORQUE, Part.OUTPUT} | ({Part.MODEL} if best.change.question else set())
     is_of_any_size = any(row.low < row.high and not row.whole and row.part in open_parts for row, _ in best.rows)
     may_be_refused = is_one_of_all and not is_of_any_size
