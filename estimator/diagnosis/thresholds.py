@@ -162,8 +162,8 @@ class Mistakes:
     # Odds of a candidate from which on its line is tried, and how much larger than those of the next
     LIKELY, OVER_THE_NEXT = 0.5, 4.0
     # Odds that something listed is wrong from which on recordings are refused: with an inertia that can't be, whichever
-    # of it it is; else where one thing is likely and is no physics. What is less sure is a doubt: a lag looks like a
-    # period.
+    # of it it is; else where one thing is likely, or as sure next to a recording that fits as read, and is no physics.
+    # What is less sure is a doubt: a lag looks like a period.
     SURELY = 0.9
     DOUBTFUL = 0.5  # odds that nothing is wrong below which recordings are doubted
     FEWEST_ODDS, MOST_NAMED = 0.01, 7  # odds from which on a candidate is named, and how many are

@@ -30,6 +30,7 @@ from estimator.diagnosis.inference.hypotheses import NOTHING, Catalogue, Effects
 from estimator.diagnosis.inference.moves import fit_look_alikes
 from estimator.diagnosis.inference.search import Search
 from estimator.diagnosis.inference.trials import Standing, Trial, necessity, noise_of, tried
+from estimator.diagnosis.noise import noise_floor
 from estimator.diagnosis.result import Fit, FoundEffect, OffNominal, Verdict
 from estimator.diagnosis.thresholds import Fitting, Judging
 from estimator.physics.catalogue import EFFECTS
@@ -71,8 +72,12 @@ class Judged:
 
     @property
     def noise(self) -> float:
-        """The noise of the reading [unit of the output]."""
-        return noise_of(self.best.hypothesis)
+        """The noise of the reading [unit of the output].
+
+        Disturbances take up what is missing: where more than noise is left, it is at most what can't be predicted.
+        """
+        noise = noise_of(self.best.hypothesis)
+        return min(noise, noise_floor(self.best.hypothesis.result.problem.records)) if self.failed else noise
 
 
 @dataclass(frozen=True, slots=True)

@@ -33,7 +33,7 @@ from estimator.diagnosis.result import (
     UntestableEffect,
     Verdict,
 )
-from estimator.diagnosis.table_answer import Law, sentences
+from estimator.diagnosis.table_answer import NO_LAW, Law, sentences
 from estimator.diagnosis.thresholds import Noise
 from estimator.diagnosis.where import locate
 from estimator.diagnosis.where.discrepancy import discrepancy
@@ -41,6 +41,7 @@ from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Element, Untestable
 from estimator.physics.model import DrivelineModel
 from estimator.physics.parallel import TimeIsUp, Work
+from estimator.physics.tables import TABLES
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,6 +56,12 @@ class Basis:
     law: Law | None = None  # without a name, next to what is decided
     doubts: Sequence[Doubt] = ()  # about the input
 
+    @property
+    def refinements(self) -> tuple[Standing, ...]:
+        """What is possible and not in the model: without what a law without a name has."""
+        held = () if self.law is None else self.law.found.effects
+        return tuple(each for each in self.decision.judged.refinements if each.name not in held)
+
 
 def said(basis: Basis) -> Diagnosis:
     """Return the diagnosis."""
@@ -62,7 +69,8 @@ def said(basis: Basis) -> Diagnosis:
     judged, runs, verdict = decision.judged, decision.runs, decision.verdict
     is_explained = verdict is not Verdict.UNEXPLAINED
     named = [found_effect(each, runs) for each in judged.named]
-    effects = _as_sure_as(basis.doubts, (*named, *decision.acquired) if is_explained else ())
+    is_uncounted = bool(basis.doubts) or any(name in TABLES for name in line.effects)
+    effects = _as_sure_as(is_uncounted, (*named, *decision.acquired) if is_explained else ())
     traces = judged.traces if is_explained else ()
     added = [*effects, *(found_effect(each, runs) for each in traces)]
     slight = tuple(_slight(each, basis) for each in traces)
@@ -76,17 +84,18 @@ def said(basis: Basis) -> Diagnosis:
     context = Context(
         remainder,
         slight,
-        [each.name for each in judged.refinements],
+        [each.name for each in basis.refinements],
         judged.off_nominal,
         untestable,
         can_be_retuned(line),
         mismatch.element,
         basis.doubts,
     )
-    said_of_law = "" if law is None else f" {sentences(law.table, decision.figures.unit)}"
+    is_without = law is None and not is_explained and judged.failed and not judged.off_nominal and line.plant is None
+    said_of_law = NO_LAW if is_without else "" if law is None else sentences(law.table, decision.figures.unit)
     return Diagnosis(
         verdict=verdict,
-        statement=statement(verdict, decision.figures, effects, basis.effort, context) + said_of_law,
+        statement=f"{statement(verdict, decision.figures, effects, basis.effort, context)} {said_of_law}".rstrip(),
         mismatch=mismatch,
         effects=effects,
         rejected=_rejected(basis),
@@ -105,16 +114,16 @@ def said(basis: Basis) -> Diagnosis:
         slight=slight,
         refinements=tuple(
             Refinement(each.name, each.objection, each.necessity.value, _values(judged.best, each))
-            for each in judged.refinements
+            for each in basis.refinements
         ),
         table=None if law is None else law.table,
         effort=basis.effort,
     )
 
 
-def _as_sure_as(doubts: Sequence[Doubt], effects: tuple[FoundEffect, ...]) -> tuple[FoundEffect, ...]:
-    """Return effects without how sure their names are while the input is in doubt: the one place that decides it."""
-    return tuple(replace(each, probability=math.nan, counted=None) for each in effects) if doubts else effects
+def _as_sure_as(is_uncounted: bool, effects: tuple[FoundEffect, ...]) -> tuple[FoundEffect, ...]:
+    """Return effects without how sure their names are where none were counted: with a doubt or a law without a name."""
+    return tuple(replace(each, probability=math.nan, counted=None) for each in effects) if is_uncounted else effects
 
 
 def undecided(
@@ -265,7 +274,7 @@ def _remainder(judged: Judged, law: Law | None) -> Remainder | None:
         times_noise=left / noise,
         element=None if law is None else law.table.element,
         band_hz=locate.band_hz(judged.believed.hypothesis.result.first_outputs(), noise),
-        law="; it ".join([tests_in_words(judged.failed), *([] if law is None else [law.says])]),
+        law=tests_in_words(judged.failed) + ("" if law is None else f"; it follows a torque over {law.table.over}"),
     )
 
 
@@ -280,7 +289,8 @@ def _rejected(basis: Basis) -> tuple[RejectedEffect, ...]:
     standings = (*judged.named, *judged.traces, *judged.refinements)
     known = {each.name for each in standings} | {other for each in standings for other in each.alike}
     known |= {each.name for each in basis.decision.acquired} | {*basis.effort.untried}
-    found = {each.name: RejectedEffect(each.name, each.objection, 0.0) for each in judged.refinements}
+    known |= set() if basis.law is None else {*basis.law.found.effects}
+    found = {each.name: RejectedEffect(each.name, each.objection, 0.0) for each in basis.refinements}
     for scores, reason in (
         (fits.scores(), "fitted: the best set with it is {}"),
         (fits.implausible, "fitted, and ended at values that are no case of it"),

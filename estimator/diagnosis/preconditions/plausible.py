@@ -82,10 +82,13 @@ def _judged(records: Sequence[Record], line: Line, is_tried: bool = False) -> tu
             cure = None
     is_wrong = 1.0 - is_right - math.fsum(each for candidate, each in ranked if candidate.is_else)
     is_one_of_all = best.only is None and not best.change.is_open
-    # a gear ratio or a scale of any size may be physics as well, such as gravity: it is doubted
-    is_of_any_size = any(row.low < row.high and not row.whole and row.part is not Part.MODEL for row, _ in best.rows)
+    # a scale of any size may be physics, too, such as gravity: it is doubted, as an inertia next to another mistake is
+    open_parts = {Part.TORQUE, Part.OUTPUT} | ({Part.MODEL} if best.change.question else set())
+    is_of_any_size = any(row.low < row.high and not row.whole and row.part in open_parts for row, _ in best.rows)
     may_be_refused = is_one_of_all and not is_of_any_size
-    is_refused = may_be_refused and is_wrong >= Mistakes.SURELY and (is_off or (is_clear and not may_be_physics))
+    fits_as_read = line is not None and any(is_within_tolerance(each, line) for each in found)
+    is_sure = odds >= Mistakes.SURELY if fits_as_read else is_clear
+    is_refused = may_be_refused and is_wrong >= Mistakes.SURELY and (is_off or (is_sure and not may_be_physics))
     if line is None and best.is_a_factor and not is_clear:
         return None, False
     about = ", ".join(record.name for record in _blamed(records, found, line, best))
