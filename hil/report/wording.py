@@ -95,7 +95,7 @@ def headline(diagnosis: Diagnosis) -> str:
 
 
 def _with_look_alikes(effect: FoundEffect) -> str:
-    """Name an effect and what it can't be distinguished from: the probability is that one of them is there."""
+    """Name an effect and what it can't be distinguished from: what was counted is that one of them is there."""
     return " or ".join(title_of(name) for name in (effect.name, *effect.indistinguishable_from))
 
 

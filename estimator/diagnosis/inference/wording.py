@@ -71,7 +71,7 @@ def statement(
     twins = sorted({twin for effect in effects for twin in effect.indistinguishable_from})
     if twins:
         others = " or ".join(map(title_of, twins))
-        parts.append(f"These recordings could as well be explained by {others}: the probability is that one is there.")
+        parts.append(f"These recordings could as well be explained by {others}: what was counted is that one is there.")
     tests = sorted({entry.suggested_test for entry in context.untestable if not entry.needs})
     if tests:
         names = ", ".join(title_of(entry.name) for entry in context.untestable if not entry.needs)

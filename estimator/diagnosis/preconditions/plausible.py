@@ -151,13 +151,14 @@ def _text(
     names = ", ".join(record.name for record in blamed)
     one = len(blamed) == 1
     return (
-        f"recording{'' if one else 's'} {names} {'is' if one else 'are'} implausible: {_misfit(records, line, shown)}. "
+        f"recording{'' if one else 's'} {names} {'is' if one else 'are'} implausible: "
+        f"{_misfit(records, line, shown, found)}. "
         f"What would explain it, with its odds: {'; '.join(named)}. What the drive can do decides, and whose the model "
         "file is; scales and columns stand in [signals]."
     )
 
 
-def _misfit(records: Sequence[Record], line: Line, shown: Sequence[Inertia]) -> str:
+def _misfit(records: Sequence[Record], line: Line, shown: Sequence[Inertia], found: Sequence[Inertia]) -> str:
     """Say what does not fit."""
     counted = [each for each in shown if each.tells]
     most = max(largest(record)[1] for record in records)
@@ -174,6 +175,9 @@ def _misfit(records: Sequence[Record], line: Line, shown: Sequence[Inertia]) -> 
     above = f"; above the first mode it fits {multiple(1.0 / bands[0])} times that" if bands else ""
     fits = "it fits an inertia" if len(counted) == 1 else "they fit inertias"
     expected = f"expected 1 within its tolerance and a factor of {Mistakes.BEYOND:g}"
+    others = [each.ratio for each in found if each.tells and each not in shown]
+    if others and all(_is_plausible(each, line) for each in counted):  # each by itself could be: it is not one vehicle
+        expected = f"expected what the others fit, {', '.join(map(multiple, others))}"
     return f"{falls}{fits} {ratios} times the nominal {_nominal(line)}, {expected}{above}"
 
 
