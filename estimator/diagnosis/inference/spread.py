@@ -23,9 +23,11 @@ import numpy as np
 from estimator.diagnosis.inference.descent import Weigh
 from estimator.diagnosis.inference.disturbances import LinearLine, Size, line_of
 from estimator.diagnosis.line.blocks import FormPlace, form_shifts
-from estimator.diagnosis.line.tangent import is_linear
+from estimator.physics.catalogue import KERNEL
+from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult
 from estimator.physics.jacobian import secants_at
+from estimator.physics.layout import slot
 from estimator.physics.model import Structure
 from estimator.physics.problem import outputs_at
 from estimator.signals.record import BoolArray, FloatArray, by_output
@@ -37,12 +39,22 @@ ROUNDS = 2  # the first is over the width that the derivative at a point gives
 
 DRAWS = 64  # the spread of a value is then known to 9 %
 
+_NONLINEAR = tuple(
+    (slot(entry.name, parameter.name), parameter.null)
+    for entry in KERNEL.values()
+    if entry.element in (Element.MOTOR, Element.SHAFT, Element.LOAD) and not entry.profile
+    for parameter in entry.parameters[:1]
+)
+"""Decisive parameter of each effect by which a line is not linear, and its value where the effect is not there."""
+
 
 def switches(result: FitResult) -> bool:
-    """Tell whether a model is one that intervals are drawn for: simulated here, with a law that bends the line."""
+    """Tell whether a model is one that intervals are drawn for: simulated here, with a law that is not linear."""
     problem = result.problem
-    simulated = problem.grid.structure is not Structure.JOINT and problem.grid.plant is None
-    return simulated and not all(is_linear(result.p_of(i)) for i in range(len(problem.bases)))
+    if problem.grid.structure is Structure.JOINT or problem.grid.plant is not None:
+        return False
+    each = [result.p_of(i) for i in range(len(problem.bases))]
+    return any(p[place] != null for p in each for place, null in _NONLINEAR)
 
 
 def with_secants(result: FitResult, weigh: Weigh) -> FitResult:
