@@ -2,7 +2,7 @@
 
 Counts for product code (`hil`, `drivers`, `estimator`): files and lines, lines of docstrings and of comments, public
 functions and fields without a word, constants below the first function or class, public names with several meanings in
-one package; and the words of the manual.
+one package; the words of the manual; and the figures of the estimator's core (`core.py`).
 """
 
 from __future__ import annotations
@@ -17,6 +17,8 @@ import tokenize
 from collections import defaultdict
 from collections.abc import Iterator
 from pathlib import Path
+
+from core import core_figures
 
 ROOT = Path(__file__).parent.parent
 PACKAGES = ("hil", "drivers", "estimator")
@@ -61,6 +63,7 @@ def figures(root: Path) -> dict[str, str]:
         found[f"{package}: fields without a word"] = _share([False] * len(missing) + fields[len(missing) :])
     meanings = _meanings(trees)
     found["public classes of one name in one package"] = f"{sum(1 for n in meanings.values() if n > 1)}"
+    found |= core_figures(trees, {path: text.count("\n") for path, text in sources.items()})
     pages = [*(root / "docs").rglob("*.md"), *root.glob("*.md")]
     found["words of the manual"] = f"{sum(len(page.read_text('utf-8').split()) for page in pages)}"
     return found

@@ -13,9 +13,9 @@ from estimator.design.untested import with_untested
 from estimator.diagnosis.first_use import compile_kernels, is_first_use
 from estimator.diagnosis.inference.answer import SearchResult, answer
 from estimator.diagnosis.inference.hypotheses import Effects, Hypothesis, Progress, silent
-from estimator.diagnosis.inference.standing import ALIKE_WITHIN
 from estimator.diagnosis.preconditions.prepare import prepare
 from estimator.diagnosis.result import Diagnosis, Verdict
+from estimator.diagnosis.thresholds import Judging
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.model import DrivelineModel
 from estimator.physics.parallel import Work
@@ -46,7 +46,7 @@ def _open(found: SearchResult, untested: tuple[str, ...], diagnosis: Diagnosis) 
     """Return the verdict's set and those as probable that do not simulate worse; none counts for more than it does."""
     search, judged = found.search, found.decision.judged
     best = judged.believed.hypothesis
-    within = max(ALIKE_WITHIN, 2.0 * TEMPERED * math.log(1.0 / (1.0 - LEAST_PROBABILITY)))
+    within = max(Judging.ALIKE_WITHIN, 2.0 * TEMPERED * math.log(1.0 / (1.0 - LEAST_PROBABILITY)))
     near = {
         each.effects: each
         for each in search.fits.ended.values()

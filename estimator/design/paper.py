@@ -20,9 +20,10 @@ import numpy as np
 
 from estimator.design.open import Candidate, Open
 from estimator.diagnosis.assemble import Z95
-from estimator.diagnosis.inference.checks import THRESHOLDS
 from estimator.diagnosis.inference.disturbances import whitener_of
-from estimator.diagnosis.inference.hypotheses import GRADE, line_values
+from estimator.diagnosis.inference.hypotheses import GRADE
+from estimator.diagnosis.line.line import line_values
+from estimator.diagnosis.thresholds import THRESHOLDS
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import FitResult, fit
 from estimator.physics.jacobian import jacobian_at

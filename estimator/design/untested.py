@@ -19,7 +19,8 @@ from estimator.design.open import Candidate, Open, Untested, name_of
 from estimator.design.paper import LEAST_DIFFERENCE, throughout
 from estimator.diagnosis.assemble import moved_values
 from estimator.diagnosis.inference.descent import Effort, descended, extended
-from estimator.diagnosis.inference.hypotheses import GRADE, Hypothesis, open_hypotheses, unknowns_of
+from estimator.diagnosis.inference.fits import unknowns_of
+from estimator.diagnosis.inference.hypotheses import GRADE, Hypothesis, open_hypotheses
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import FitResult, warm_start
 from estimator.physics.problem import make_problem

@@ -13,9 +13,11 @@ from functools import partial
 import numpy as np
 
 from estimator.diagnosis.acquisition.finding import AcquisitionFinding
-from estimator.diagnosis.inference.hypotheses import Hypothesis, covariance as of_innovations, line_values
-from estimator.diagnosis.noise import gain_from_squares, residuals_by_record, unpredictable
+from estimator.diagnosis.inference.hypotheses import Hypothesis, covariance as of_innovations
+from estimator.diagnosis.line.line import line_values
+from estimator.diagnosis.noise import residuals_by_record, unpredictable
 from estimator.diagnosis.result import Estimated, Evidence, FoundEffect, Interval, Profile, Retuned
+from estimator.diagnosis.thresholds import Telling
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Element
 from estimator.physics.effects.load import ROAD_GRADE, grade_basis
@@ -26,14 +28,10 @@ from estimator.physics.model import DrivelineModel, EffectValue, Parameter, para
 from estimator.physics.problem import local_part
 from estimator.physics.steps import inside, moments_of
 from estimator.physics.unknowns import LOAD_TORQUE, Shared
-from estimator.signals.correlation import correlation_length
+from estimator.signals.correlation import correlation_length, effective_samples
 from estimator.signals.record import BoolArray, FloatArray
 
 Z95 = 1.959963984540054  # 97.5 % point of the normal distribution
-
-COHERENT_S = 1.0
-"""How long an error that is no noise keeps its value: the pace at which a test changes what it excites."""
-
 PROFILE_POINTS_S = 1.0  # a profile is reported every second
 
 
@@ -69,7 +67,7 @@ def reported_covariance(result: FitResult) -> FloatArray:
 def coherent_variance(result: FitResult) -> float:
     """Return the mean square of the error that is no noise, times the samples for which it keeps its value."""
     coherent = max(result.rms**2 - unpredictable(residuals_by_record(result)) ** 2, 0.0)
-    return coherent * COHERENT_S / min(record.sample_time_s for record in result.problem.records)
+    return coherent * Telling.COHERENT_S / min(record.sample_time_s for record in result.problem.records)
 
 
 def free_unknowns(result: FitResult) -> BoolArray:
@@ -192,7 +190,6 @@ def acquired_effects(
     findings: Sequence[AcquisitionFinding], before: Sequence[FloatArray], after: Sequence[FloatArray]
 ) -> tuple[FoundEffect, ...]:
     """Return what was recognised of the acquisition as effects."""
-    gained = gain_from_squares(_squares(before), _squares(after), 1, 1, after)
     seen = [slice(int(0.7 * error.size), None) for error in after]
     held = [rms_of([e[rows] for e, rows in zip(errors, seen, strict=True)]) for errors in (before, after)]
     return tuple(
@@ -203,10 +200,21 @@ def acquired_effects(
             parameters={name: Estimated(*sized) for name, sized in finding.parameters.items()},
             time_s={},
             indistinguishable_from=(),
-            evidence=Evidence(gained.delta_bic, held[0], held[1], finding.p_value),
+            evidence=Evidence(bic_gained(before, after), held[0], held[1], finding.p_value),
         )
         for finding in findings
     )
+
+
+def bic_gained(before: Sequence[FloatArray], after: Sequence[FloatArray]) -> float:
+    """Return by how much one more unknown betters the information criterion of errors, for those of all recordings.
+
+    ``n_e ln(S_0/S_1) - ln n_e`` with the effective number of samples n_e of the errors ``after`` (Schwarz, Ann. Stat.
+    6, 1978).
+    """
+    n = max(effective_samples(after), 3.0)
+    ratio = _squares(before) / max(_squares(after), np.finfo(float).tiny)
+    return n * math.log(max(ratio, 1.0)) - math.log(n)
 
 
 def _squares(errors: Sequence[FloatArray]) -> float:

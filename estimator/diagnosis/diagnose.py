@@ -7,21 +7,18 @@ from collections.abc import Sequence
 
 from threadpoolctl import threadpool_limits
 
-from estimator.diagnosis.first_use import COMPILING, compile_kernels, compile_laws, is_first_use
+from estimator.diagnosis.first_use import compiled
 from estimator.diagnosis.inference.answer import answer
 from estimator.diagnosis.inference.hypotheses import Progress, silent
 from estimator.diagnosis.preconditions.prepare import prepare
 from estimator.diagnosis.result import Diagnosis
+from estimator.diagnosis.thresholds import Telling
 from estimator.physics.model import DrivelineModel
 from estimator.physics.parallel import Work
-from estimator.physics.simulate import MASSES
 from estimator.signals.record import Record
 
 BUDGET_S = math.inf
 """Time after which a diagnosis is ended undecided [s]: none, so that the answer depends on no machine."""
-
-
-TO_SEARCH = 0.92  # share of a limit of time after which no simulation is begun: the rest is for saying so
 
 
 def diagnose(
@@ -67,18 +64,10 @@ def diagnose(
     Implausible
         Where torque, output or time is off by a factor or in sign.
     """
-    progress = _rising(progress)
-    masses = len(MASSES.get(model.structure, ()))  # of a joint on a bench there is nothing to compile
-    if masses and is_first_use(masses):
-        progress = _with_compile_note(progress)
-        progress("preparing", 0.0)
-        compile_kernels(masses)
-    if masses and model.laws:
-        progress("compiling the model's own laws", 0.0)
-        compile_laws(model, records[0].sample_time_s)
+    progress = compiled(model, records, _rising(progress))
     with threadpool_limits(1, user_api="blas"):  # on tall, thin matrices more threads only wait for each other
         progress("checking the recordings", 0.0)
-        work = Work(BUDGET_S if budget_s is None else budget_s, TO_SEARCH)
+        work = Work(BUDGET_S if budget_s is None else budget_s, Telling.TO_SEARCH)
         ready = prepare(records, model, holdout)
         return ready.finished(answer(ready, model, progress, effort, work))
 
@@ -93,8 +82,3 @@ def _rising(progress: Progress) -> Progress:
         progress(message, most)
 
     return report
-
-
-def _with_compile_note(progress: Progress) -> Progress:
-    """Say at every stage what most of its time goes to."""
-    return lambda message, share: progress(f"{message} ({COMPILING})", share)

@@ -21,15 +21,15 @@ from numba.core import types
 from numba.core.types import boolean, float64, int64
 
 from estimator.compiled import IS_COMPILED, ROOT
-from estimator.diagnosis.line.equivalent import Chain, Filtered, run_filter, run_smoother
-from estimator.diagnosis.line.tangent import Nudges, Setting, linearise
+from estimator.diagnosis.inference.hypotheses import Progress
+from estimator.diagnosis.line.equivalent import Filtered, run_filter, run_smoother
 from estimator.least_squares import least
 from estimator.physics.driveline import InitialCondition
 from estimator.physics.kernel.integration import integrate
 from estimator.physics.kernel.side_by_side import integrate_each, integrate_side_by_side
 from estimator.physics.layout import Grid, flat
 from estimator.physics.model import DrivelineModel
-from estimator.physics.simulate import simulate
+from estimator.physics.simulate import MASSES, simulate
 from estimator.signals.record import Record
 
 COMPILING = "compiling, once on this machine, for some minutes"
@@ -39,23 +39,34 @@ _fields: Any = types.NamedTuple
 _TUPLE: Any = types.UniTuple
 _JOINED: Any = types.Tuple
 _NOTHING: Any = _JOINED(())
-_NUDGES = _fields((_INDICES, _ROW, float64), Nudges)
 _EACH = (_ROWS, _ROWS, _INDICES, _INDICES, _ROW, _ROW, _ROWS, _ROWS, _INDICES, boolean, _STACK)
-_CHAIN = _fields((_STACK, _ROWS, _ROWS, _ROW, float64, float64), Chain)
 _FILTERED = _fields((_ROWS, _STACK, _ROWS, _ROW, _ROW), Filtered)
 
 SIDE_BY_SIDE: tuple[tuple[tuple[Any, ...], tuple[Any, ...]], ...] = (
     ((integrate,), (integrate_side_by_side, least)),
-    ((integrate_each,), (linearise, run_filter, run_smoother)),
+    ((integrate_each,), (run_filter, run_smoother)),
 )
 """What one process compiles while the other does, callers last."""
+
+
+def compiled(model: DrivelineModel, records: Sequence[Record], progress: Progress) -> Progress:
+    """Compile what a diagnosis will call, where it has yet to be; return how it reports, with a note if it was so."""
+    masses = len(MASSES.get(model.structure, ()))  # of a joint on a bench there is nothing to compile
+    if masses and is_first_use(masses):
+        report = progress
+        progress = lambda message, share: report(f"{message} ({COMPILING})", share)  # noqa: E731  what most time goes to
+        progress("preparing", 0.0)
+        compile_kernels(masses)
+    if masses and model.laws:
+        progress("compiling the model's own laws", 0.0)
+        compile_laws(model, records[0].sample_time_s)
+    return progress
 
 
 def signatures(masses: int) -> dict[Any, tuple[Any, ...]]:
     """Return the types that a diagnosis calls the largest kernels with."""
     inertias, own = _TUPLE(int64, masses), _NOTHING
     steps = (float64, int64, float64)
-    setting = _fields((inertias, *steps, _ROW, _INDICES, boolean, _ROWS, _ROWS), Setting)
     return {
         integrate: (
             *(inertias, own, *steps, int64, int64, float64),
@@ -63,10 +74,9 @@ def signatures(masses: int) -> dict[Any, tuple[Any, ...]]:
         ),
         integrate_side_by_side: (inertias, *steps, int64, float64, _INDICES, *_EACH),
         integrate_each: (inertias, own, *steps, float64, *_EACH, _STACK, _INDICES),
-        linearise: (setting, _NUDGES, _ROW, _ROW, _ROW, _ROW, _ROW, int64, int64),
         least: (_ROWS, _ROW, _ROW, _ROW, int64, int64),
-        run_filter: (_CHAIN, _ROW, _ROW, float64, _ROWS, _FILTERED),
-        run_smoother: (_CHAIN, _FILTERED, _ROWS, _ROW),
+        run_filter: (_ROWS, _ROW, float64, float64, _ROWS, _ROW, boolean[::1], _FILTERED),
+        run_smoother: (_ROWS, _ROW, _FILTERED, _ROW, _ROW),
     }
 
 

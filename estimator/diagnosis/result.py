@@ -235,6 +235,7 @@ class UnnamedTable:
     knots: tuple[float, ...]  # rising
     values: tuple[float, ...]  # at the knots, and their 95 % intervals
     ci95: tuple[Interval, ...]  # one for each knot
+    slope: float  # of the line itself there, which formula and likeness count in; 0 where it has none
     reached: Interval  # where the recordings were: beyond, the curve is a guess
     rms_before: float  # free-run error on samples that no fit has seen, without it and with it [unit of the output]
     rms_after: float  # with the law

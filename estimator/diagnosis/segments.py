@@ -1,4 +1,4 @@
-"""Recordings with long gaps, cut into segments for the fit, and the diagnosis of segments put together again.
+"""What of the recordings is fitted: segments between long gaps, thinned; and their diagnosis put together again.
 
 Over a short gap the simulation continues with the torque it has. Over a long one it would diverge: the torque there was
 not read, or the model does not hold there (a mask: another brake, a gear change). So each segment is a recording of its
@@ -8,15 +8,17 @@ gap as before it. Time continues (``Record.began_s``), for laws over time.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass, replace
 from itertools import pairwise
+from math import sqrt
 from typing import Any, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
-from estimator.diagnosis.noise import share_of, stretches
 from estimator.diagnosis.result import (
     Course,
     Diagnosis,
@@ -24,21 +26,12 @@ from estimator.diagnosis.result import (
     Profile,
     Trace,
 )
-from estimator.physics.model import DrivelineModel
-from estimator.signals.record import FloatArray, Record, sliced
+from estimator.diagnosis.thresholds import Noise, Recordings, Segments
+from estimator.physics.model import DrivelineModel, Structure, natural_frequencies_rad_s
+from estimator.signals.record import Channel, FloatArray, Record, sliced
 
-LONG_S = 1.0  # a gap that is longer ends a segment
-
-LONG_SAMPLES = 10
-"""It must also hold more samples than this: where sampling is slow, a few lost ones are no gap."""
-
-SHORTEST_S = 2.0
-"""Good samples of a segment must cover this: less can't tell its initial state and its load from all else."""
-
-FEWEST_SAMPLES = 50
-"""Good samples of a segment at least: more than twice what a predictor of its own error looks back on."""
-
-FEWEST_FOR_START = 10  # good samples from which initial state and load are read off for a simulation alone
+SEED = 1
+TURN = 2.0 * np.pi
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +52,7 @@ class Cut:
 
 def segments(record: Record) -> list[slice]:
     """Return the rows of each segment of a recording, in order; short gaps stay in, at its ends, too."""
-    longest = max(round(LONG_S / record.sample_time_s), LONG_SAMPLES)
+    longest = max(round(Segments.LONG_S / record.sample_time_s), Segments.LONG_SAMPLES)
     good = np.flatnonzero(record.okay)
     breaks = np.flatnonzero(np.diff(good) > longest + 1)
     first = good[np.concatenate([[0], breaks + 1])]
@@ -74,7 +67,7 @@ def segments(record: Record) -> list[slice]:
 def tiles(record: Record) -> list[Record]:
     """Return the segments of a recording, each up to where the next begins: all rows, for a simulation of each."""
     parts = segments(record)
-    starts = [part.start for part in parts[1:] if int(record.okay[part].sum()) >= FEWEST_FOR_START]
+    starts = [part.start for part in parts[1:] if int(record.okay[part].sum()) >= Segments.FEWEST_FOR_START]
     if not starts:
         return [record]
     edges = [0, *starts, record.okay.size]
@@ -110,12 +103,12 @@ def cut(records: Sequence[Record]) -> Cut:
 
 def _is_long(record: Record, part: slice) -> bool:
     good = int(record.okay[part].sum())
-    return good >= max(FEWEST_SAMPLES, round(SHORTEST_S / record.sample_time_s))
+    return good >= max(Segments.FEWEST_SAMPLES, round(Segments.SHORTEST_S / record.sample_time_s))
 
 
 def _gaps_warning(record: Record, found: Sequence[slice], long: Sequence[slice]) -> str:
-    least = max(FEWEST_SAMPLES * record.sample_time_s, SHORTEST_S)
-    text = f"recording {record.name}: gaps of more than {LONG_S:g} s cut it into {len(found)} segments"
+    least = max(Segments.FEWEST_SAMPLES * record.sample_time_s, Segments.SHORTEST_S)
+    text = f"recording {record.name}: gaps of more than {Segments.LONG_S:g} s cut it into {len(found)} segments"
     if not long:
         return f"{text}, none of which holds {least:g} s of good samples; it is not used. Check flags and mask."
     used = sum(int(record.okay[part].sum()) for part in long) / int(record.okay.sum())
@@ -243,3 +236,120 @@ def _whole(parts: Mapping[str, Trace], cut: Cut) -> Trace:
         retuned=retuned,
         augmented=augmented,
     )
+
+
+def shortened_to_memory(segments: Cut, training: Iterable[str]) -> tuple[Cut, list[str]]:
+    """Leave out pieces of the recordings that are fitted, as many as a fit can't hold; say which are used."""
+    pieces = segments.of(training)
+    used = list(pieces)
+    while (size := _size(used)) > Recordings.MOST_SAMPLES_TIMES_RECORDINGS and len(used) > 1:
+        used = _some(pieces, min(int(len(used) * sqrt(Recordings.MOST_SAMPLES_TIMES_RECORDINGS / size)), len(used) - 1))
+    if len(used) == len(pieces):
+        return segments, []
+    left_out = {piece.name for piece in pieces} - {piece.name for piece in used}
+    kept = tuple(record for record in segments.records if record.name not in left_out)
+    return replace(segments, records=kept), [_warning(used, pieces)]
+
+
+def _size(pieces: Sequence[Record]) -> int:
+    return len(pieces) * sum(int(piece.output.shape[0]) for piece in pieces)
+
+
+def _some(pieces: Sequence[Record], count: int) -> list[Record]:
+    """Return one of each of so many equal parts of the list, at least one in all."""
+    edges = np.linspace(0, len(pieces), max(count, 1) + 1).astype(int)
+    return [pieces[i] for i in np.random.default_rng(SEED).integers(edges[:-1], edges[1:])]
+
+
+def _warning(used: Sequence[Record], pieces: Sequence[Record]) -> str:
+    return (
+        f"{len(used)} of {len(pieces)} recordings are used (each piece between long gaps, or stretch of a long one, "
+        f"counts as one), drawn from the whole list: {', '.join(piece.name for piece in used)}. Each has unknowns of "
+        "its own, so more would take gigabytes. Give those that matter, and the others by --holdout."
+    )
+
+
+def thinned(records: Sequence[Record], model: DrivelineModel) -> list[Record]:
+    """Return recordings with as many samples as the model's fastest mode needs; those that have no more as they are."""
+    if share_of(records) >= 1.0 or model.structure is Structure.JOINT:
+        return list(records)
+    return [thin(record, factor_for([record], model)) for record in records]
+
+
+def as_slow_as_needed(records: Sequence[Record], model: DrivelineModel) -> list[Record]:
+    """Return recordings with no more samples than the line can answer to: between them only the sensor is seen."""
+    shortest = min(record.okay.size for record in records)
+    factor = min(factor_for(records, model, Recordings.LONGEST_OF_RIGID_S), max(shortest // Recordings.FEWEST_KEPT, 1))
+    return [thin(record, factor) for record in records]
+
+
+def factor_for(records: Sequence[Record], model: DrivelineModel, longest_s: float = Recordings.LONGEST_S) -> int:
+    """Return one in how many samples is enough for recordings of one sampling period."""
+    joint = model.structure is Structure.JOINT
+    fastest_hz = max(map(_band_hz, records)) if joint else float(natural_frequencies_rad_s(model.values())[-1]) / TURN
+    if fastest_hz > 0.0:
+        longest_s = min(longest_s, 1.0 / (Recordings.PER_PERIOD * fastest_hz))
+    return max(1, int(longest_s / records[0].sample_time_s * (1.0 + 1e-9)))
+
+
+def _band_hz(record: Record) -> float:
+    """Return the frequency below which nearly all the power of an output is [Hz]."""
+    output = np.where(record.okay, record.output, np.mean(record.output[record.okay]))
+    power = np.cumsum(np.abs(np.fft.rfft(output - output.mean())) ** 2)
+    index = int(np.searchsorted(power, Recordings.BAND_POWER * power[-1]))
+    return float(np.fft.rfftfreq(output.size, record.sample_time_s)[index])
+
+
+def thin(record: Record, factor: int) -> Record:
+    """Return a recording with one in ``factor`` of its samples."""
+    if factor == 1:
+        return record
+    count = record.okay.size // factor
+    kept = slice(0, count * factor, factor)
+    trusted = np.asarray(_blocks(record.torque_trusted, factor).all(axis=1))
+    return replace(
+        record,
+        sample_time_s=factor * record.sample_time_s,
+        time_s=record.time_s[kept],
+        torque_nm=_blocks(record.torque_nm, factor).mean(axis=1),
+        output=record.output[kept],
+        okay=record.okay[kept],
+        torque_okay=None if record.torque_okay is None else trusted,
+        offset_s=None if record.offset_s is None else record.offset_s[kept],
+        imposed=None if record.imposed is None else record.imposed[kept],
+        reference_nm=None if record.reference_nm is None else _blocks(record.reference_nm, factor).mean(axis=1),
+        load_nm=None if record.load_nm is None else _blocks(record.load_nm, factor).mean(axis=1),
+        channels=_kept(record.channels, kept),
+        unused=_kept(record.unused, kept),
+    )
+
+
+def _kept(channels: Sequence[Channel], rows: slice) -> tuple[Channel, ...]:
+    return tuple(replace(each, output=each.output[rows], okay=each.okay[rows]) for each in channels)
+
+
+def _blocks(values: NDArray[Any], factor: int) -> NDArray[Any]:
+    count = values.shape[0] // factor
+    return values[: count * factor].reshape(count, factor, *values.shape[1:])
+
+
+def share_of(records: Sequence[Record]) -> float:
+    """Return which part of the samples of all recordings may be used."""
+    return Noise.MOST_SAMPLES / sum(record.okay.size for record in records)
+
+
+def stretches(record: Record, parts: Sequence[slice], share: float) -> list[slice]:
+    """Return the rows of a recording that are used, in order."""
+    if share >= 1.0:
+        return list(parts)
+    longest = max(round(Noise.LONGEST_S / record.sample_time_s), 1)
+    return [piece for part in parts for piece in _pieces(part, longest, share)]
+
+
+def _pieces(part: slice, longest: int, share: float) -> list[slice]:
+    size = part.stop - part.start
+    allowed = min(size, max(math.ceil(share * size), longest))
+    count = math.ceil(allowed / longest)
+    length = allowed // count
+    starts = part.start + np.linspace(0, size - length, count).astype(int)
+    return [slice(int(start), int(start) + length) for start in starts]

@@ -13,26 +13,30 @@ from estimator.diagnosis.inference.decide import Decision
 from estimator.diagnosis.inference.figures import FreeRuns, Unseen, foreign_outputs, on_recordings
 from estimator.diagnosis.inference.hypotheses import Hypothesis, all_good_samples
 from estimator.diagnosis.result import Fit, Trace, UnnamedTable
+from estimator.diagnosis.table_curves import FEWEST_SAMPLES
 from estimator.diagnosis.tables import TableFit, best_table
 from estimator.physics.fit import FitResult
-from estimator.physics.model import DrivelineModel, EffectValue, Motion, unit
-from estimator.physics.tables import PLACES
+from estimator.physics.model import DrivelineModel, EffectValue
+
+NO_LAW = (
+    f"No law without a name is in the augmented model: no curve with {FEWEST_SAMPLES} samples between its knots lowers "
+    "the error on data that no fit has seen."
+)
 
 
 @dataclass(frozen=True, slots=True)
 class Law:
     """A law without a name that is in the augmented model."""
 
-    table: UnnamedTable  # as it is reported
     fit: Fit  # the decision's figures, those of the augmented model with the law
     found: TableFit  # its fit to the recordings
     final: FitResult  # the free runs of all recordings with it
     line: DrivelineModel  # the line with the law among its effects
 
     @property
-    def says(self) -> str:
-        """What the rest follows: the end of a sentence that begins with "it"."""
-        return f"follows a torque over {self.table.over}"
+    def table(self) -> UnnamedTable:
+        """The law, as it is reported."""
+        return self.found.law
 
     def augmented(self, model: DrivelineModel) -> DrivelineModel:
         """Return a model with the law, and the line and its effects as they are next to it."""
@@ -70,47 +74,22 @@ def unnamed_law(decision: Decision) -> Law | None:
     if final.rms >= figures.augmented or held >= figures.holdout_augmented:
         return None
     fit = replace(figures, augmented=final.rms, holdout_augmented=held)
-    return Law(_reported(found, line.motion), fit, found, final, tabled)
+    return Law(fit, found, final, tabled)
 
 
 def _with_table(model: DrivelineModel, law: TableFit) -> DrivelineModel:
-    return replace(model, effects={**model.effects, law.table.name: law.table.effect()})
-
-
-def _reported(law: TableFit, motion: Motion) -> UnnamedTable:
-    at = PLACES[law.place]
-    return UnnamedTable(
-        place=law.place,
-        element=at.element,
-        over=at.over,
-        unit=unit(at.dimension, motion),
-        torque_unit=unit("torque", motion),
-        knots=law.knots,
-        values=law.values,
-        ci95=law.ci95 or (),
-        reached=law.reached,
-        rms_before=law.before,
-        rms_after=law.after,
-        looks_like=law.looks_like,
-        formula=law.formula,
-        rival=PLACES[law.rival].over if law.rival else "",
-        not_carried=law.not_carried,
-    )
+    return replace(model, effects={**model.effects, **law.effects})
 
 
 def sentences(table: UnnamedTable, of: str) -> str:
     """Return what is said of the law, for the end of a statement."""
-    parts = [
+    parts = (
         f"A law without a name is in the augmented model: a torque over {table.over}, through "
         f"{len(table.knots)} knots. On data that no fit has seen the free-run error falls with it from "
-        f"{table.rms_before:.4g} to {table.rms_after:.4g} {of}."
-    ]
-    if table.looks_like:
-        parts.append(f"It looks like {table.looks_like}.")
-    if table.formula:
-        parts.append(f"The shortest formula within its band, with x for {table.over}: {table.formula}.")
-    if table.rival:
-        parts.append(f"A torque over {table.rival} explains nearly as much.")
-    if table.not_carried:
-        parts.append(f"It does not carry over to {', '.join(table.not_carried)}.")
-    return " ".join(parts)
+        f"{table.rms_before:.4g} to {table.rms_after:.4g} {of}.",
+        table.looks_like and f"It looks like {table.looks_like}.",
+        table.formula and f"The shortest formula within its band, with x for {table.over}: {table.formula}.",
+        table.rival and f"A torque over {table.rival} explains nearly as much.",
+        f"It does not carry over to {', '.join(table.not_carried)}." if table.not_carried else "",
+    )
+    return " ".join(filter(None, parts))

@@ -21,6 +21,14 @@ FRACTIONS = (1 / 16, 1 / 8, 1 / 4, 1 / 2, 1.0)  # of that, where they stand on b
 EVEN_KNOTS = 7  # knots of a signal of one sign, equally far apart
 FEWEST_SAMPLES = 40  # samples between two knots at least
 
+STRAIGHT = {"shaft_twist": "k", "shaft_rate": "c", "motor_speed": "b_M", "load_speed": "b_L"}
+"""Parameter of the line that a straight curve at a place does the same as: intervals are those of both together."""
+
+YIELDING, SLIDER = "shaft_yielding", "shaft_hysteresis"
+"""A torque over the twist that yields, as a clutch slips: a straight curve and the slider of this effect."""
+
+LEVEL, SUDDEN, REACH_OF_SLIP = 0.7, 10.0, 100.0  # its start in the torque in use, knee, reach in the twist without it
+
 Masks = tuple[BoolArray, ...]
 """Which samples count, per recording."""
 
@@ -34,13 +42,22 @@ class Curve:
     base: float  # slope in which those of the curve count [Nm/unit of the place]
     own: float  # slope that the line has without it, in ``base``
     most: tuple[float, float]  # bounds of the slopes, its own among them
-    damping: float  # scale of a damping of its own; 0 where it has none
+    more: tuple[Shared, ...]  # unknowns next to the slopes: a damping of its own, a level at which it yields
     reached: tuple[float, float]  # values of the signal that the recordings contain
 
     @property
     def name(self) -> str:
         """Name of the law in the model: the prefix of tables and the place."""
         return PREFIX + self.place
+
+    def slope_of(self, p: FloatArray) -> float:
+        """Return the slope that a line of these parameters has without the curve; of torque over torque it is 1."""
+        return float(p[slot("", STRAIGHT[self.place])]) if self.place in STRAIGHT else 1.0
+
+    @property
+    def yields(self) -> bool:
+        """Whether the torque has a level at which it yields."""
+        return any(each.effect == SLIDER for each in self.more)
 
     @property
     def pieces(self) -> int:
@@ -52,22 +69,12 @@ class Curve:
         """The knot whose value is 0: what is constant is the load's."""
         return int(np.argmin(np.abs(self.knots)))
 
-    @property
-    def middles(self) -> FloatArray:
-        """Middles between the knots [unit of the place], one for each slope."""
-        return 0.5 * (self.knots[1:] + self.knots[:-1])
-
     @cached_property
     def values_of_slopes(self) -> FloatArray:
         """Matrix from slopes, less its own, to the values but that of knot ``zero``; shape (pieces, pieces)."""
         steps = self.base * np.diff(self.knots)
         sums = np.vstack([np.zeros(self.pieces), np.tril(np.ones((self.pieces, self.pieces))) * steps])
         return np.delete(sums - sums[self.zero], self.zero, axis=0)
-
-    @property
-    def free(self) -> list[int]:
-        """Indices of the knots whose values are fitted: all but ``zero``."""
-        return [i for i in range(self.knots.size) if i != self.zero]
 
     def released(self, result: FitResult, use: Masks) -> Problem:
         """Return the problem of a fit with the curve's values next to its own unknowns."""
@@ -76,10 +83,14 @@ class Curve:
         p[slot(self.name, COUNT)] = self.knots.size
         for i, knot in enumerate(self.knots.tolist()):
             p[slot(self.name, f"knot_{i + 1}")] = knot
-        more = [Shared(self.name, f"value_{i + 1}", 1.0, -np.inf, np.inf, 0.0) for i in self.free]
-        if self.damping:
-            more.append(Shared(self.name, DAMPING, self.damping, 0.0, 5.0, 0.0))
-        return replace(problem, p=p, shared=(*problem.shared, *more), use=use)
+        more = [
+            Shared(self.name, f"value_{i + 1}", 1.0, -np.inf, np.inf, 0.0)
+            for i in range(self.knots.size)
+            if i != self.zero
+        ]
+        if self.yields:
+            p[slot(SLIDER, "sharpness")] = SUDDEN
+        return replace(problem, p=p, shared=(*problem.shared, *more, *self.more), use=use)
 
 
 def curve_at(place: str, result: FitResult, gain: float) -> Curve | None:
@@ -87,6 +98,8 @@ def curve_at(place: str, result: FitResult, gain: float) -> Curve | None:
     problem = result.problem
     k, c = (float(result.p[slot("", name)]) for name in ("k", "c"))
     torque = torque_scale([problem.records[drive[0]] for drive in problem.drives])
+    yields = place == YIELDING
+    place = "shaft_twist" if yields else place
     signal = np.concatenate(_signals(place, result, gain))
     signal = signal[np.isfinite(signal)]
     low, high = (float(each) for each in np.quantile(signal, [0.005, 0.995]))
@@ -94,11 +107,17 @@ def curve_at(place: str, result: FitResult, gain: float) -> Curve | None:
     if knots is None:
         return None
     top = max(abs(low), abs(high))
+    damping = Shared(PREFIX + place, DAMPING, c or 0.02 * np.sqrt(k), 0.0, 5.0, 0.1)
+    if yields:
+        knots = REACH_OF_SLIP * top * np.array([-1.0, 0.0, 1.0])
+        level = Shared(SLIDER, "friction_nm", torque, 0.0, 4.0, LEVEL)
+        twist = Shared(SLIDER, "yield_rad", torque / k, 0.02, 4.0, LEVEL)
+        return Curve(place, knots, k, 1.0, (0.0, 1.0), (damping, level, twist), (low, high))
     if place == "shaft_twist":
-        return Curve(place, knots, k, 1.0, (0.0, 8.0), c or 0.02 * np.sqrt(k), (low, high))
+        return Curve(place, knots, k, 1.0, (0.0, 8.0), (damping,), (low, high))
     if place == "torque":
-        return Curve(place, knots, 1.0, 1.0, (0.0, 3.0), 0.0, (low, high))
-    return Curve(place, knots, torque / top, 0.0, (-10.0, 10.0), 0.0, (low, high))
+        return Curve(place, knots, 1.0, 1.0, (0.0, 3.0), (), (low, high))
+    return Curve(place, knots, torque / top, 0.0, (-10.0, 10.0), (), (low, high))
 
 
 def _knots(signal: FloatArray, low: float, high: float) -> FloatArray | None:
@@ -132,8 +151,10 @@ def _signals(place: str, result: FitResult, gain: float) -> list[FloatArray]:
 
 def shapes(curve: Curve) -> dict[str, FloatArray]:
     """Return slopes from which a curve is fitted, by name."""
-    at = curve.middles / np.abs(curve.knots).max()
+    at = 0.5 * (curve.knots[1:] + curve.knots[:-1]) / np.abs(curve.knots).max()  # in the middle of each piece
     one = np.ones(at.size)
+    if curve.yields:
+        return {"slipping": 0.0 * one}
     straight = {"straight": curve.own * one}
     if curve.place in ("shaft_twist", "torque"):
         return straight | {

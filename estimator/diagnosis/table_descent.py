@@ -7,13 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from estimator.diagnosis.table_curves import Curve, Masks
+from estimator.diagnosis.table_curves import STRAIGHT, Curve, Masks
 from estimator.least_squares import minimise
 from estimator.physics.fit import FitResult
 from estimator.physics.jacobian import jacobian_at
 from estimator.physics.layout import OBSERVER, slot
 from estimator.physics.problem import Problem, bounds, outputs_at, residual_at
-from estimator.physics.tables import Table
+from estimator.physics.tables import DAMPING, Table
 from estimator.signals.correlation import effective_samples
 from estimator.signals.record import FloatArray
 
@@ -27,7 +27,6 @@ class Descent:
         self.curve, self.problem = curve, curve.released(result, use)
         self.first = len(result.problem.shared)
         self.after = self.first + curve.pieces
-        self.simulations = 0
         self._x0 = result.x
         self._scale = np.sqrt(max(result.squares, 1e-300) / 1000.0)
         low, high = bounds(self.problem)
@@ -36,8 +35,8 @@ class Descent:
 
     def start(self, slopes: FloatArray) -> FloatArray:
         """Return unknowns with these slopes, all else as the line had it."""
-        damping = [0.1] if self.curve.damping else []
-        return np.concatenate([self._x0[: self.first], slopes, damping, self._x0[self.first :]])
+        own = [each.start for each in self.curve.more]
+        return np.concatenate([self._x0[: self.first], slopes, own, self._x0[self.first :]])
 
     def x(self, z: FloatArray) -> FloatArray:
         """Return the scaled unknowns of the problem: values in the place of slopes."""
@@ -55,29 +54,26 @@ class Descent:
     def fitted(self, z: FloatArray, gain: float, smooth: float, steps: int) -> tuple[FloatArray, float]:
         """Return unknowns after some steps at a gain, and the squared error there."""
         problem, seen = self.at(gain), dict[bytes, tuple[FloatArray, ...]]()
-        bend = np.zeros((self.curve.pieces - 1, z.size))
-        bend[:, self.first : self.after] = np.sqrt(smooth) * np.diff(np.eye(self.curve.pieces), axis=0)
-        ridge = np.zeros((self.curve.pieces, z.size))
-        ridge[:, self.first : self.after] = 1e-2 * np.sqrt(smooth) * np.eye(self.curve.pieces)
-        rows = np.vstack([bend, ridge])
-        least = z.copy()
-        least[self.first : self.after] = self.curve.own
+        of_curve = slice(self.first, self.after)
+        each = np.eye(self.curve.pieces)
+        penalty = np.sqrt(smooth) * np.vstack([np.diff(each, axis=0), 1e-2 * each])
+        rows = np.zeros((penalty.shape[0], z.size))
+        rows[:, of_curve] = penalty
 
         def outputs(z: FloatArray) -> tuple[FloatArray, ...]:
             key = z.tobytes()
             if key not in seen:
                 seen.clear()
                 seen[key] = outputs_at(problem, self.x(z))
-                self.simulations += 1
             return seen[key]
 
         def residual(z: FloatArray) -> FloatArray:
-            return np.concatenate([residual_at(problem, outputs(z)) / self._scale, rows @ (z - least)])
+            bent = penalty @ (z[of_curve] - self.curve.own)  # other unknowns may be infinite, as a limit of none is
+            return np.concatenate([residual_at(problem, outputs(z)) / self._scale, bent])
 
         def jacobian(z: FloatArray) -> FloatArray:
             found = jacobian_at(problem, self.x(z), outputs(z))
-            self.simulations += self.after + 4
-            found[:, self.first : self.after] = found[:, self.first : self.after] @ self.curve.values_of_slopes
+            found[:, of_curve] = found[:, of_curve] @ self.curve.values_of_slopes
             return np.vstack([found / self._scale, rows])
 
         solution = minimise(residual, jacobian, z, self.low, self.high, steps)
@@ -90,14 +86,10 @@ class Descent:
 
 
 def rms_over(problem: Problem, outputs: Sequence[FloatArray], masks: Masks) -> float:
-    """Return the RMS of the errors of first outputs over some samples [unit of the output]."""
-    return float(np.sqrt(np.mean(np.concatenate(errors_over(problem, outputs, masks)) ** 2)))
-
-
-def errors_over(problem: Problem, outputs: Sequence[FloatArray], masks: Masks) -> list[FloatArray]:
-    """Return simulated less measured output of the samples that count, by recording; those of a lead are left out."""
+    """Return the RMS of the errors of first outputs over some samples, without those of a lead [unit of the output]."""
     rows = zip(problem.records, outputs, masks, strict=True)
-    return [(out - record.output)[mask] for record, out, mask in rows if record.lead is None]
+    errors = [(out - record.output)[mask] for record, out, mask in rows if record.lead is None]
+    return float(np.sqrt(np.mean(np.concatenate(errors) ** 2)))
 
 
 def reported(descent: Descent, z: FloatArray) -> tuple[FitResult, Table]:
@@ -107,13 +99,13 @@ def reported(descent: Descent, z: FloatArray) -> tuple[FitResult, Table]:
     residual = residual_at(problem, outputs)
     values = np.insert(x[descent.first : descent.after], curve.zero, 0.0)
     half = np.insert(_half_widths(descent, problem, x, outputs, residual), curve.zero, 0.0)
-    damping = float(x[descent.after] * curve.damping) if curve.damping else 0.0
     bands = tuple((float(v - h), float(v + h)) for v, h in zip(values, half, strict=True))
-    table = Table(curve.place, tuple(curve.knots.tolist()), tuple(values.tolist()), bands, damping)
-    added = range(descent.first, descent.after + bool(curve.damping))
+    added = range(descent.first, descent.after + len(curve.more))
     p = problem.p.copy()
     for i in added:
         p[problem.shared[i].slot] = problem.shared[i].scale * x[i]
+    damping = float(p[slot(curve.name, DAMPING)]) if curve.more else 0.0
+    table = Table(curve.place, tuple(curve.knots.tolist()), tuple(values.tolist()), bands, damping)
     given = replace(problem, p=p, shared=problem.shared[: descent.first])
     return FitResult(given, np.delete(x, added), outputs, residual, None, False), table
 
@@ -123,6 +115,9 @@ def _half_widths(
 ) -> FloatArray:
     """Return half of the 95 % intervals of the values [Nm]: of errors that are worth fewer than they are."""
     derivative = jacobian_at(problem, x, outputs)
+    for i, each in enumerate(problem.shared):
+        if not each.effect and each.name == STRAIGHT.get(descent.curve.place):  # a recording tells their sum
+            derivative[:, i] = 0.0
     free = np.flatnonzero(derivative.any(axis=0))
     j = derivative[:, free]
     variance = float(residual @ residual) / effective_samples([residual])

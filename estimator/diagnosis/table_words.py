@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from itertools import combinations
 
 import numpy as np
@@ -51,7 +51,7 @@ def _total(table: Table, slope: float) -> tuple[FloatArray, FloatArray, FloatArr
     half = np.zeros(x.size)
     if table.ci95 is not None:
         half = 0.5 * np.array([high - low for low, high in table.ci95])
-    span = float(np.ptp(total))
+    span = float(np.ptp(total)) or float(np.ptp(values)) or 1.0  # a curve may take away all that the line has
     return x, total, np.clip(half, WITHIN * span, WIDEST * span)
 
 
@@ -83,6 +83,8 @@ def _written(names: tuple[str, ...], found: FloatArray) -> str:
 def looks_like(table: Table, slope: float) -> str:
     """Return which known law lies within the band, as the rest of a sentence; "" where none does."""
     x, total, room = _total(table, slope)
+    if not total.any():
+        return "no torque at all"
     if table.place not in ("shaft_twist", "torque"):
         return _drag(x, total, room)
     unit, what = ("rad", "spring") if table.place == "shaft_twist" else ("Nm", "torque")
@@ -95,18 +97,19 @@ def looks_like(table: Table, slope: float) -> str:
         shapes.append((f"a dead band of {2.0 * half:.3g} {unit}", _beyond(2.0 * half)))
     if np.count_nonzero(np.abs(total) > AT_LIMIT * top) >= FEWEST_AT_LIMIT:
         shapes.append((f"a limit of {top:.3g} Nm", _limited(top, total, x)))
-    best, text = 1.0, ""
+    found = []
     for name, shape in shapes:
         column = shape(x) / room
-        weight = float(column @ column)
-        if weight <= 0.0:
-            continue
-        factor = float(column @ (total / room)) / weight
+        factor = float(column @ (total / room)) / max(float(column @ column), 1e-300)
         factor = 1.0 if "limit" in name else min(max(factor, (1.0 - RETUNED) * slope), (1.0 + RETUNED) * slope)
-        worst = float(np.max(np.abs(factor * column - total / room)))
-        if worst <= best:
-            best, text = worst, name
-    return text
+        found.append((name, factor * column * room))
+    return _nearest(found, total, room)
+
+
+def _nearest(found: Sequence[tuple[str, FloatArray]], total: FloatArray, room: FloatArray) -> str:
+    """Return the name of the torque that is nearest, in bands; "" where none lies within."""
+    off, name = min((float(np.max(np.abs(torque - total) / room)), name) for name, torque in found)
+    return name if off <= 1.0 else ""
 
 
 def _beyond(gap: float) -> Function:
@@ -126,11 +129,10 @@ def _drag(x: FloatArray, total: FloatArray, room: FloatArray) -> str:
         "a drag with the square of the speed": TERMS["x |x|"],
         "viscous friction": TERMS["x"],
     }
-    best, text = 1.0, ""
+    found = []
     for name, function in known.items():
         columns = np.column_stack([function(x), np.ones_like(x)])  # a constant is the load's
-        found = np.linalg.lstsq(columns / room[:, None], total / room, rcond=None)[0]
-        worst = float(np.max(np.abs(columns @ found - total) / room))
-        if worst <= best and not math.isclose(float(found[0]), 0.0, abs_tol=1e-12):
-            best, text = worst, f"{name} of {found[0]:.3g} Nm" if name == "dry friction" else name
-    return text
+        size, constant = np.linalg.lstsq(columns / room[:, None], total / room, rcond=None)[0]
+        if not math.isclose(float(size), 0.0, abs_tol=1e-12):
+            found.append((f"{name} of {size:.3g} Nm" if name == "dry friction" else name, columns @ [size, constant]))
+    return _nearest(found, total, room) if found else ""

@@ -11,27 +11,28 @@ and its place, and the rest, which no choice has seen, say whether it is a law a
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from estimator.diagnosis.inference.hypotheses import Effects, Hypothesis
-from estimator.diagnosis.table_curves import Curve, Masks, curve_at, shapes
-from estimator.diagnosis.table_descent import Descent, errors_over, reported, rms_over
+from estimator.diagnosis.result import UnnamedTable
+from estimator.diagnosis.table_curves import SLIDER, YIELDING, Curve, Masks, curve_at, shapes
+from estimator.diagnosis.table_descent import Z95, Descent, reported, rms_over
 from estimator.diagnosis.table_words import looks_like, shortest_formula
 from estimator.physics.driveline import Structure
 from estimator.physics.fit import ITERATIONS, FitResult, fit
 from estimator.physics.free_run import simulate_foreign
-from estimator.physics.model import DrivelineModel
-from estimator.physics.problem import outputs_at
-from estimator.physics.tables import Table
+from estimator.physics.layout import slot
+from estimator.physics.model import DrivelineModel, EffectValue, unit
+from estimator.physics.tables import PLACES, Table
 from estimator.signals.record import BoolArray, FloatArray, Record
 
 SEARCHED = {
     Structure.ONE_MASS: ("torque", "motor_speed"),
-    Structure.TWO_MASS: ("torque", "motor_speed", "shaft_twist", "shaft_rate", "load_speed"),
-    Structure.THREE_MASS: ("torque", "motor_speed", "shaft_twist", "shaft_rate", "load_speed"),
+    Structure.TWO_MASS: ("torque", "motor_speed", "shaft_twist", YIELDING, "shaft_rate", "load_speed"),
+    Structure.THREE_MASS: ("torque", "motor_speed", "shaft_twist", YIELDING, "shaft_rate", "load_speed"),
     Structure.JOINT: ("shaft_twist", "shaft_rate"),
 }
 """Places at which a curve is looked for."""
@@ -52,6 +53,7 @@ SCOUTS, SCOUT_STEPS, STEPS, LAST_STEPS = 2, 3, 4, 10
 """Gains after which only the best shapes and places continue; Jacobians at each gain there, behind, and at the end."""
 
 CONTINUED = 2  # shapes of a place, and places, that continue
+AT_SLIDER = slot(SLIDER, "friction_nm")
 SMOOTHNESS = (1.0, 0.05)
 """Weights of the curve's bending that are tried: what its slope changes by from one piece to the next, squared, counts
 as so many thousandths of the squared error before."""
@@ -63,35 +65,10 @@ class TableFit:
 
     table: Table  # place, knots and values
     result: FitResult  # the free run with it, the line re-tuned next to it; the curve stands in ``problem.p``
-    before: float  # RMS of the free-run error on unseen samples without it [unit of the output]
-    after: float  # and with it
-    reached: tuple[float, float]  # between which values of its signal the recordings were
-    rival: str = ""  # place that explains nearly as much
-    rival_after: float = np.nan  # RMS with a curve there in its stead
-    looks_like: str = ""  # law of a known form that it resembles
-    formula: str = ""  # of fewest terms within the band; "" without one
-    not_carried: tuple[str, ...] = ()  # recordings on which a fit to the others is worse with it
-    simulations: int = 0  # spent on it
-
-    @property
-    def place(self) -> str:
-        """Key of ``tables.PLACES``."""
-        return self.table.place
-
-    @property
-    def knots(self) -> tuple[float, ...]:
-        """Knots, rising [unit of the place]."""
-        return self.table.knots
-
-    @property
-    def values(self) -> tuple[float, ...]:
-        """Values at them [Nm]."""
-        return self.table.values
-
-    @property
-    def ci95(self) -> tuple[tuple[float, float], ...] | None:
-        """Their 95 % intervals [Nm]."""
-        return self.table.ci95
+    law: UnnamedTable  # as it is reported
+    effects: Mapping[
+        str, Mapping[str, EffectValue]
+    ]  # that the model gets: the table, and the slider of one that yields
 
 
 def blocks_of(records: Sequence[Record], use: Sequence[BoolArray], which: Sequence[int]) -> Masks:
@@ -114,17 +91,8 @@ class Candidate:
     chosen_by: float  # RMS over the samples that choose
 
 
-@dataclass(frozen=True)
-class Scouted:
-    """A place after the first gains: what its shapes leave there, the best of them first."""
-
-    descent: Descent  # for this place
-    left: list[tuple[float, FloatArray]]  # squared error and unknowns
-
-    @property
-    def least(self) -> float:
-        """Squared error that the best shape leaves at the last of the first gains."""
-        return self.left[0][0]
+Scouted = tuple[Descent, list[tuple[float, FloatArray]]]
+"""A place after the first gains: squared error and unknowns that its shapes leave there, the best of them first."""
 
 
 def _scouted(curve: Curve, retuned: FitResult, fitting: Masks) -> Scouted:
@@ -135,13 +103,13 @@ def _scouted(curve: Curve, retuned: FitResult, fitting: Masks) -> Scouted:
         for gain in GAINS[:SCOUTS]:
             z, squares = descent.fitted(z, gain, SMOOTHNESS[0], SCOUT_STEPS)
         left.append((squares, z))
-    return Scouted(descent, sorted(left, key=lambda each: each[0]))
+    return descent, sorted(left, key=lambda each: each[0])
 
 
 def _best_curve(scouted: Scouted, choosing: Masks) -> Candidate:
     """Let the observer's gain down from the best shapes, and return what the choosing samples prefer."""
-    descent, found = scouted.descent, list[Candidate]()
-    for _, z in scouted.left[:CONTINUED]:
+    (descent, left), found = scouted, list[Candidate]()
+    for _, z in left[:CONTINUED]:
         for gain in GAINS[SCOUTS:]:
             z, _ = descent.fitted(z, gain, SMOOTHNESS[0], STEPS)
         found.append(Candidate(descent, z, SMOOTHNESS[0], descent.error(z, choosing)))
@@ -162,13 +130,11 @@ def table_at(hypothesis: Hypothesis, place: str) -> Candidate | None:
     return _best_curve(_scouted(curve, result, use), use)
 
 
-def best_table(
-    hypothesis: Hypothesis, line: DrivelineModel | None = None, holdout: Sequence[Record] = ()
-) -> TableFit | None:
-    """Return the best law without a name next to a fitted hypothesis; None where none is better on unseen samples.
+def best_table(hypothesis: Hypothesis, line: DrivelineModel, holdout: Sequence[Record] = ()) -> TableFit | None:
+    """Return the best law without a name next to a fitted hypothesis of a line; None where none is better.
 
-    With the ``line`` that recordings are simulated with, it must also be better on whole ones: on each by a fit to the
-    others, together, and on ``holdout``, which are kept out of every fit.
+    It is better on unseen data: on blocks of the recordings, on each whole recording by a fit to the others, together,
+    and on ``holdout``, which are kept out of every fit.
     """
     whole = hypothesis.result.first_outputs()
     if whole.problem.grid.plant is not None:
@@ -177,43 +143,57 @@ def best_table(
     unseen, choosing = (blocks_of(records, use, which) for which in (UNSEEN, CHOOSING))
     fitting = tuple(u & ~a & ~b for u, a, b in zip(use, unseen, choosing, strict=True))
     retuned = fit(replace(whole.problem, use=fitting), whole.x, STEPS)
-    curves = [curve_at(place, retuned, GAINS[0]) for place in SEARCHED[whole.problem.grid.structure]]
+    searched = [each for each in SEARCHED[whole.problem.grid.structure] if each != YIELDING or not whole.p[AT_SLIDER]]
+    curves = [curve_at(place, retuned, GAINS[0]) for place in searched]
     places = [_scouted(curve, retuned, fitting) for curve in curves if curve is not None]
     if not places:
         return None
-    continued = sorted(places, key=lambda each: each.least)[:CONTINUED]
-    found = [_best_curve(each, choosing) for each in continued]
+    continued = sorted(places, key=lambda each: each[1][0][0])[:CONTINUED]
+    best, *others = sorted((_best_curve(each, choosing) for each in continued), key=lambda each: each.chosen_by)
     seen = tuple(u & ~a for u, a in zip(use, unseen, strict=True))
     known = fit(replace(whole.problem, use=seen), whole.x, ITERATIONS)
     before = min(rms_over(known.problem, each.outputs, unseen) for each in (known, retuned))
-    best, *others = sorted(found, key=lambda each: each.chosen_by)
     judged, z = _refitted(best, known, seen)
-    of_law = errors_over(judged.problem, outputs_at(judged.at(0.0), judged.x(z)), unseen)
-    after = float(np.sqrt(np.mean(np.concatenate(of_law) ** 2)))
+    after = judged.error(z, unseen)
     if after > BETTER * before:
         return None
     last, z = _refitted(replace(best, descent=judged, z=z), whole, use)
     result, table = reported(last, z)
-    kept = [] if line is None or len(records) == 1 else _left_out(best, whole, line, hypothesis.effects)
-    foreign = [] if line is None else _squares_on(holdout, line, hypothesis.effects, whole, result)
-    if any(with_law > without for without, with_law in (_pooled(kept), _pooled(foreign))):
+    kept, torques = ([], []) if len(records) == 1 else _left_out(best, whole, line, hypothesis.effects)
+    foreign = _squares_on(holdout, line, hypothesis.effects, whole, result)
+    if any(sum(after for _, after in each) > sum(before for before, _ in each) for each in (kept, foreign)):
         return None
-    rival = others[0] if others and others[0].chosen_by < LOOK_ALIKE_SHARE * best.chosen_by else None
     firsts = [record.name for record in records if record.lead is None]
-    line_slope = last.curve.own * last.curve.base
-    return TableFit(
-        table,
-        result,
-        before,
-        after,
-        last.curve.reached,
-        "" if rival is None else rival.descent.curve.place,
-        np.nan if rival is None else rival.chosen_by,
-        looks_like(table, line_slope),
-        shortest_formula(table, line_slope),
-        tuple(name for name, (before, after) in zip(firsts, kept, strict=False) if after > before),
-        sum(each.descent.simulations for each in places) + judged.simulations + last.simulations,
+    alike_places = [each.descent.curve.place for each in others if each.chosen_by < LOOK_ALIKE_SHARE * best.chosen_by]
+    rivals = [PLACES[place].over for place in alike_places if place != best.descent.curve.place]
+    not_carried = [name for name, (without, with_law) in zip(firsts, kept, strict=False) if with_law > without]
+    table, at = as_different_as(table, torques), PLACES[table.place]
+    slope = last.curve.own * last.curve.slope_of(result.p)
+    effects, alike, formula = {table.name: table.effect()}, looks_like(table, slope), shortest_formula(table, slope)
+    if last.curve.yields:
+        names, of = ("friction_nm", "yield_rad", "sharpness"), unit("torque", line.motion)
+        effects[SLIDER] = {name: EffectValue(float(result.p[slot(SLIDER, name)])) for name in names}
+        alike = f"a clutch that slips at {result.p[AT_SLIDER]:.3g} {of}, by {SLIDER} next to the curve"
+        formula = ""
+    law = UnnamedTable(
+        place=table.place,
+        element=at.element,
+        over=at.over,
+        unit=unit(at.dimension, line.motion),
+        torque_unit=unit("torque", line.motion),
+        knots=table.knots,
+        values=table.values,
+        ci95=table.ci95 or (),
+        slope=slope,
+        reached=last.curve.reached,
+        rms_before=before,
+        rms_after=after,
+        looks_like=alike,
+        formula=formula,
+        rival=next(iter(rivals), ""),
+        not_carried=tuple(not_carried),
     )
+    return TableFit(table, result, law, effects)
 
 
 def _refitted(best: Candidate, result: FitResult, use: Masks) -> tuple[Descent, FloatArray]:
@@ -227,15 +207,33 @@ Squares = tuple[float, float]
 """Squared error of the free run on a recording that a fit has not seen, without the law and with it."""
 
 
-def _left_out(best: Candidate, whole: FitResult, line: DrivelineModel, effects: Effects) -> list[Squares]:
-    """Return the errors on each recording of a fit to the others: what a law is worth on a drive of another kind."""
-    problem, found = whole.problem, list[Squares]()
+def _left_out(
+    best: Candidate, whole: FitResult, line: DrivelineModel, effects: Effects
+) -> tuple[list[Squares], list[FloatArray]]:
+    """Return, for each recording, the errors on it of a fit to the others, and that fit's torque at the knots.
+
+    They say what a law is worth on a drive of another kind, and how far its curve depends on one drive.
+    """
+    problem, found, torques = whole.problem, list[Squares](), list[FloatArray]()
     for i, record in enumerate(problem.records):
         seen = tuple(use & (i != j) for j, use in enumerate(problem.use))
         known = fit(replace(problem, use=seen), whole.x, STEPS)
-        with_law = reported(*_refitted(best, known, seen))[0]
+        with_law, table = reported(*_refitted(best, known, seen))
         found += _squares_on([record], line, effects, known, with_law)
-    return found
+        torques.append(np.array(table.values) + best.descent.curve.slope_of(with_law.p) * np.array(table.knots))
+    return found, torques
+
+
+def as_different_as(table: Table, torques: Sequence[FloatArray]) -> Table:
+    """Widen the intervals of a curve to those by the jackknife, of the torques without one recording each.
+
+    Where an error grows along a simulation, as behind a freewheel, its derivative holds for the smallest changes alone.
+    """
+    if table.ci95 is None or not torques:
+        return table
+    half = Z95 * np.sqrt(len(torques) - 1.0) * np.std(torques, axis=0)
+    bands = zip(table.ci95, table.values, half.tolist(), strict=True)
+    return replace(table, ci95=tuple((min(low, v - h), max(high, v + h)) for (low, high), v, h in bands))
 
 
 def _squares_on(
@@ -248,7 +246,3 @@ def _squares_on(
         return float(np.sum((run - record.output)[record.okay] ** 2))
 
     return [(squares(without, record), squares(with_law, record)) for record in records]
-
-
-def _pooled(squares: Sequence[Squares]) -> Squares:
-    return sum(before for before, _ in squares), sum(after for _, after in squares)

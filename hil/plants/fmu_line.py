@@ -17,7 +17,7 @@ from estimator.diagnosis.acquisition.chain import replay
 from estimator.diagnosis.black_box import BlackBox, PlantSetting, equivalent_line
 from estimator.diagnosis.flange import AT_LOAD, AT_MOTOR, FREE, slots_of, with_only
 from estimator.diagnosis.noise import noise_floor
-from estimator.diagnosis.preconditions.prepare import thin
+from estimator.diagnosis.segments import thin
 from estimator.physics.catalogue import BUILT_IN
 from estimator.physics.layout import flat, slot
 from estimator.physics.model import DrivelineModel, Load, Structure

@@ -88,8 +88,8 @@ def _law(table: UnnamedTable | None) -> Json | None:
 
 def _table(table: UnnamedTable) -> Json:
     return fields_as_json(
-        table, "element", "over", "unit", "knots", "values", "ci95", "reached", "rms_before", "rms_after",
-        "looks_like", "formula", "rival", "not_carried",
+        table, "element", "over", "unit", "knots", "values", "ci95", "slope", "reached", "rms_before",
+        "rms_after", "looks_like", "formula", "rival", "not_carried",
     )  # fmt: skip
 
 

@@ -2,74 +2,59 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 import plotly.graph_objects as go
 
 from estimator.diagnosis.result import UnnamedTable
+from estimator.diagnosis.table_answer import sentences
 from estimator.physics.curve import curve_over
 from estimator.physics.layout import flat_values, slot
-from estimator.physics.tables import PREFIX, Table
-from estimator.signals.record import FloatArray
+from estimator.physics.tables import COUNT, Table
 from hil.report import page as html
 from hil.report.figures import LEGEND_PX, PANEL_PX, Style, figure_block
-from hil.report.numbers import shown
 from hil.report.page import Figure
-from hil.report.wording import ELEMENTS
 
 POINTS = 200
 
 
 def section(table: UnnamedTable, error_unit: str) -> html.Section:
     """Return the section."""
-    return html.section("A law without a name", *_parts(table, error_unit))
-
-
-def _parts(table: UnnamedTable, error_unit: str) -> Iterator[object]:
-    yield html.paragraph(
-        f"At the {ELEMENTS[table.element]}: a torque over {table.over}. On samples that no fit has seen the error "
-        f"falls with it from {shown(table.rms_before, error_unit)} to {shown(table.rms_after, error_unit)}. It is in "
-        "the augmented model, next to what the line has there: a description, not a cause."
+    return html.section(
+        "A law without a name",
+        html.paragraph(f"{sentences(table, error_unit)} It describes, and is no cause."),
+        _figure(table),
+        html.note(
+            "The line is the curve"
+            + (", with what the line has there by itself, which is dotted" if table.slope else "")
+            + "; the points are its values at the knots with their 95 % intervals; dashed, where no recording has been."
+        ),
     )
-    if table.looks_like:
-        yield html.paragraph(f"It looks like {table.looks_like}.")
-    if table.formula:
-        yield html.paragraph(f"{table.formula}, x for {table.over}", kind="law")
-    yield _figure(table)
-    yield html.note(
-        "The line is the curve, the points its values at the knots with their 95 % intervals; dashed, where the "
-        "recordings never were."
-    )
-    if table.rival:
-        yield html.warning(f"A torque over {table.rival} explains nearly as much.")
-    if table.not_carried:
-        yield html.warning(f"It does not carry over to {', '.join(table.not_carried)}.")
 
 
 def _figure(table: UnnamedTable) -> Figure:
-    knots, values = np.array(table.knots), np.array(table.values)
+    knots = np.array(table.knots)
+    values = np.array(table.values) + table.slope * knots
     x = np.union1d(np.linspace(knots[0], knots[-1], POINTS), list(table.reached))
     x = x[(x >= knots[0]) & (x <= knots[-1])]
-    y, seen = _curve(table, x), (x >= table.reached[0]) & (x <= table.reached[1])
+    law = Table(table.place, table.knots, table.values)
+    p = flat_values({}, {law.name: {key: value.value for key, value in law.effect().items()}})
+    y, seen = (
+        curve_over(x, p, slot(law.name, COUNT)) + table.slope * x,
+        (x >= table.reached[0]) & (x <= table.reached[1]),
+    )
     colour, width, _ = Style.AFTER.value
     figure = go.Figure()
+    if table.slope:
+        dotted = {"color": Style.BEFORE.value[0], "width": width, "dash": "dot"}
+        figure.add_trace(go.Scatter(x=knots, y=table.slope * knots, mode="lines", line=dotted, name="the line alone"))
     dashed = {"color": colour, "width": width, "dash": "dash"}
     figure.add_trace(go.Scatter(x=x, y=y, mode="lines", line=dashed, name="beyond the recordings"))
     solid = {"color": colour, "width": 2.2}
     figure.add_trace(go.Scatter(x=x, y=np.where(seen, y, np.nan), mode="lines", line=solid, name="law found"))
-    bars = {}
-    if table.ci95:
-        half = np.array([0.5 * (high - low) for low, high in table.ci95])
-        bars = {"error_y": {"type": "data", "array": half, "thickness": width, "width": 3}}
+    half = [0.5 * (high - low) for low, high in table.ci95]
+    bars = {"type": "data", "array": half, "thickness": width, "width": 3}
     marker = {"color": Style.BEFORE.value[0], "size": 7, "symbol": "diamond"}
-    figure.add_trace(go.Scatter(x=knots, y=values, mode="markers", marker=marker, name="at the knots, 95 %", **bars))
+    figure.add_trace(go.Scatter(x=knots, y=values, mode="markers", marker=marker, name="at knots, 95 %", error_y=bars))
     figure.update_xaxes(title_text=f"{table.over} [{table.unit}]")
     figure.update_yaxes(title_text=f"torque [{table.torque_unit}]")
     return figure_block(figure, "law-without-a-name", PANEL_PX + 90 + LEGEND_PX)
-
-
-def _curve(table: UnnamedTable, x: FloatArray) -> FloatArray:
-    law = Table(table.place, table.knots, table.values)
-    values = {key: value.value for key, value in law.effect().items()}
-    return curve_over(x, flat_values({}, {law.name: values}), slot(PREFIX + table.place, "knots"))

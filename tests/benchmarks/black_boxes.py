@@ -20,9 +20,10 @@ from pathlib import Path
 
 import numpy as np
 
-from estimator.diagnosis.inference.disturbances import Limits
-from estimator.diagnosis.inference.hypotheses import NOTHING, Hypothesis
-from estimator.diagnosis.preconditions.prepare import as_slow_as_needed
+from estimator.diagnosis.inference.fits import Fits
+from estimator.diagnosis.inference.hypotheses import all_good_samples
+from estimator.diagnosis.preconditions.prepare import prepare
+from estimator.diagnosis.segments import as_slow_as_needed
 from estimator.diagnosis.table_curves import Masks
 from estimator.diagnosis.table_descent import rms_over
 from estimator.diagnosis.tables import CHOOSING, UNSEEN, best_table, blocks_of
@@ -31,8 +32,6 @@ from estimator.identification.linear_model import Orders
 from estimator.identification.offline.fits import fit_box_jenkins
 from estimator.physics.fit import fit
 from estimator.physics.model import DrivelineModel
-from estimator.physics.problem import make_problem
-from estimator.physics.unknowns import nominal_unknowns
 from estimator.signals.record import FloatArray, IntArray, Record
 from hil.config.model_file import read_model_for_recordings
 from hil.recording import read_records
@@ -62,7 +61,8 @@ class Split:
 
 
 def torque_of(record: Record) -> FloatArray:
-    return record.total_torque_nm
+    """Return what drives a recording: the torques, or the motion that a bench imposes on a joint."""
+    return record.total_torque_nm if record.imposed is None else record.imposed
 
 
 def split(records: Sequence[Record]) -> Split:
@@ -82,7 +82,10 @@ def rms(outputs: Sequence[FloatArray], records: Sequence[Record], masks: Masks) 
 
 def box_jenkins(of: Split) -> float:
     """Return the error of a Box-Jenkins model of order 4 of each recording."""
-    seen = [replace(record, okay=record.okay & ~unseen) for record, unseen in zip(of.records, of.unseen, strict=True)]
+    seen = [
+        replace(record, okay=record.okay & ~unseen, torque_nm=torque_of(record)[:, np.newaxis], imposed=None)
+        for record, unseen in zip(of.records, of.unseen, strict=True)
+    ]
     outputs = [fit_box_jenkins(record, Orders(LAGS, LAGS, 1)).simulate(torque_of(record)) for record in seen]
     return rms(outputs, of.records, of.unseen)
 
@@ -203,20 +206,21 @@ def sparse(of: Split) -> float:
 
 def of_line(of: Split, model: DrivelineModel) -> tuple[float, float, str]:
     """Return the errors of the re-tuned line and of it with the best law, and the law's place."""
+    fits = Fits(model, of.records, all_good_samples(of.records), ())
+    hypothesis = fits.nothing()
+    found = best_table(hypothesis, model)
+    if found is not None:
+        return found.law.rms_before, found.law.rms_after, found.law.place
+    whole = hypothesis.result.first_outputs()
     seen = tuple(record.okay & ~unseen for record, unseen in zip(of.records, of.unseen, strict=True))
-    problem = make_problem(model, of.records, nominal_unknowns(model), use=seen)
-    retuned = fit(problem)
-    before = rms_over(problem, retuned.outputs, of.unseen)
-    nothing = np.zeros(0)
-    whole = replace(problem, use=tuple(record.okay for record in of.records))
-    hypothesis = Hypothesis(NOTHING, fit(whole, retuned.x), nothing, Limits(nothing, nothing, nothing), 0.0, 0.0)
-    law = best_table(hypothesis, model)
-    return (before, before, "") if law is None else (law.before, law.after, law.place)
+    retuned = fit(replace(whole.problem, use=seen), whole.x)
+    before = rms_over(retuned.problem, retuned.outputs, of.unseen)
+    return before, before, ""
 
 
 def compared(records: Sequence[Record], model: DrivelineModel) -> str:
     """Return a line of Markdown: the errors on unseen samples of all that were fitted."""
-    of = split(as_slow_as_needed(records, model))
+    of = split(as_slow_as_needed(prepare(records, model).records, model))
     before, after, place = of_line(of, model)
     cells = [f"{before:.4g}", f"{after:.4g} ({place})" if place else "none"]
     for each in (box_jenkins, narx, sparse):

@@ -23,10 +23,11 @@ from scipy.optimize import minimize_scalar
 from threadpoolctl import threadpool_limits
 
 from estimator.diagnosis.inference.answer import SearchResult, answer
-from estimator.diagnosis.inference.checks import TEST_LIMITS, THRESHOLDS_FILE, chance, tests
+from estimator.diagnosis.inference.checks import chance, tests
 from estimator.diagnosis.inference.hypotheses import silent
 from estimator.diagnosis.preconditions.prepare import prepare
 from estimator.diagnosis.result import Counted
+from estimator.diagnosis.thresholds import THRESHOLDS_FILE, Checks
 from estimator.errors import EstimatorError
 from estimator.physics.parallel import Work
 from hil.proof.truth.specimen import NOTHING
@@ -119,7 +120,8 @@ def limits_of(worlds: Sequence[World]) -> dict[str, float]:
     """Return how far an error may be from noise, by the worlds of which all is explained."""
     explained = [world for world in worlds if world.is_explained]
     found = {
-        key: float(np.quantile([world.tests[key] for world in explained], 1.0 - MOST_REFUSED)) for key in TEST_LIMITS
+        key: float(np.quantile([world.tests[key] for world in explained], 1.0 - MOST_REFUSED))
+        for key in Checks.TEST_LIMITS
     }
     return {key: max(limit, OTHER_FORMS.get(key, 0.0)) for key, limit in found.items()}
 

@@ -4,8 +4,8 @@ import tomllib
 
 import pytest
 
-from estimator.diagnosis.inference.checks import THRESHOLDS, THRESHOLDS_FILE
 from estimator.diagnosis.result import Counted
+from estimator.diagnosis.thresholds import THRESHOLDS, THRESHOLDS_FILE
 from tests.campaigns.calibrate import FEWEST_NAMES, World, counted, divisor_of, limits_of, written
 from tests.campaigns.worlds import Row
 

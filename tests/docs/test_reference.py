@@ -9,9 +9,7 @@ from pydantic import BaseModel
 
 from drivers.inverter.drive_settings import OPTION_CODES
 from drivers.plc.register_map import USED
-from estimator.diagnosis.inference import checks, standing, trials
-from estimator.diagnosis.inference.moves import STARTS
-from estimator.diagnosis.where import locate
+from estimator.diagnosis.thresholds import Checks, Judging, Places, Searching
 from hil.cli.main import ExitStatus
 from hil.config.experiment_tables import AnyExperiment
 from hil.config.model_file import read_model
@@ -80,16 +78,16 @@ def test_every_object_that_is_configured_is_listed(index: int) -> None:
 def test_the_thresholds_of_a_verdict_are_those_of_the_code() -> None:
     page = re.sub(r"\s+", " ", text("diagnosis.md"))
     for said in (
-        f"blocks of {trials.BLOCK_S:g} s every {trials.EVERY_S:g} s",
-        f"over {locate.WINDOW_S:g} s",
-        f"central {locate.CENTRAL:.0%}".replace("%", " %"),
-        f"whose share is below {standing.LEAST_SHARE:g}",
+        f"blocks of {Judging.BLOCK_S:g} s every {Judging.EVERY_S:g} s",
+        f"over {Places.WINDOW_S:g} s",
+        f"central {Places.CENTRAL:.0%}".replace("%", " %"),
+        f"whose share is below {Judging.LEAST_SHARE:g}",
     ):
         assert said in page
-    assert checks.LEAST_THROUGH == 0.2
+    assert Checks.LEAST_THROUGH == 0.2
     assert "lets through less than a fifth" in page
     assert "the five most promising effects" in page
-    assert STARTS == 5
+    assert Searching.STARTS == 5
 
 
 def test_every_concealed_effect_is_listed() -> None:

@@ -120,11 +120,12 @@ def unnamed_table() -> UnnamedTable:
         knots=(-0.04, -0.02, 0.0, 0.02, 0.04),
         values=values,
         ci95=tuple((value - 2.0, value + 2.0) for value in values),
+        slope=2000.0,
         reached=(-0.03, 0.025),
         rms_before=0.41,
         rms_after=0.12,
         looks_like="a dead band of 0.02 rad",
-        formula="torque = -1e+03 x",
+        formula="torque = 1e+03 x",
         rival="the torque that is read",
         not_carried=("run_2",),
     )

@@ -15,14 +15,12 @@ from estimator.diagnosis.acquisition.quantised import lost_samples, speed_quanti
 from estimator.diagnosis.acquisition.stale import fill, repeated, stale_samples
 from estimator.diagnosis.noise import noise_floor
 from estimator.diagnosis.segments import tiles
+from estimator.diagnosis.thresholds import Quantised
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import FitResult, rates
 from estimator.physics.free_run import NOTHING_KNOWN, FreeRun, Own, free_run
 from estimator.physics.model import DrivelineModel
 from estimator.signals.record import BoolArray, FloatArray, Record, separated_outputs, uniform_period_s
-
-SHARP = 0.05  # noise of so small a part of a step moves no reading across its ends
-REACH = 8  # steps away from the nearest that a reading may be: noise is less than a step where a lattice is seen
 
 UNREAD = frozenset({"stale_samples", "lost_samples"})
 """Findings whose readings are not what was measured in that row."""
@@ -94,11 +92,11 @@ def _rounded(output: FloatArray, step: float, noise: float) -> FloatArray:
     With much noise it is the output itself, without any the nearest step (Widrow and Kollár, Quantization Noise, 2008).
     """
     nearest = np.round(output / step)
-    if noise < SHARP * step:
+    if noise < Quantised.SHARP * step:
         return nearest * step
-    below = (nearest - output / step)[:, None] + np.arange(-REACH, REACH + 1) - 0.5
+    below = (nearest - output / step)[:, None] + np.arange(-Quantised.REACH, Quantised.REACH + 1) - 0.5
     reached = ndtr(below * (step / noise))  # probability to be below each step's lower end
-    return step * (nearest + np.sum(np.diff(reached, axis=1) * np.arange(-REACH, REACH), axis=1))
+    return step * (nearest + np.sum(np.diff(reached, axis=1) * np.arange(-Quantised.REACH, Quantised.REACH), axis=1))
 
 
 def _repeating(output: FloatArray, record: Record) -> FloatArray:

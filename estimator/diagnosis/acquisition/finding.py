@@ -9,23 +9,10 @@ from typing import NamedTuple
 import numpy as np
 from scipy import stats
 
+from estimator.diagnosis.thresholds import Findings
 from estimator.signals.record import BoolArray, FloatArray, Record
 
 OUTPUT = 0  # column of the measured output in ``Finding.cells``; torque input i is column ``1 + i``
-
-LEVEL = 1e-6
-"""Largest probability by chance. A handful of tests on every recording ever diagnosed shall not raise a false alarm."""
-
-SMALLEST_SHARE = 0.002
-"""Smallest share of touched rows worth a finding. One row in five hundred costs a fit next to nothing: masked or not,
-its variance grows by the like. At one in two hundred and thirty the search for laws without a name still sees them (a
-sealed case, seed 701), and what it sees should have its name."""
-
-ORDER = 12
-"""Past samples of output and torque that are seen. A line of two masses needs 2, one of three 4; the rest is there to
-average the noise of the reading."""
-
-ROWS_PER_REGRESSOR = 5  # a recording with fewer usable rows than this per coefficient is not judged
 
 
 def channels(record: Record) -> FloatArray:
@@ -53,15 +40,6 @@ def runs(rows: BoolArray) -> list[tuple[int, int]]:
     """Return where True begins and ends, ``[begin, end)`` of each stretch; of a mask of shape (N,)."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], rows, [False]])))
     return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
-
-
-def shorter_runs(rows: BoolArray, longest: int) -> BoolArray:
-    """Return the rows that are in a run of at most ``longest``; shape (N,)."""
-    kept = rows.copy()
-    for begin, end in runs(rows):
-        if end - begin > longest:
-            kept[begin:end] = False
-    return kept
 
 
 def share_interval(count: float, total: float, mean_run: float = 1.0) -> tuple[float, float]:
@@ -140,30 +118,19 @@ def predict(record: Record, trusted: BoolArray) -> Prediction | None:
     """
     good = np.flatnonzero(trusted)
     n = trusted.size
-    if good.size < ROWS_PER_REGRESSOR * 2 * ORDER:
+    if good.size < Findings.ROWS_PER_REGRESSOR * 2 * Findings.ORDER:
         return None
     y = np.interp(np.arange(n), good, record.output[good] - record.output[good].mean())
     u = record.total_torque_nm
-    lags = range(1, ORDER + 1)
-    past = [signal[ORDER - lag : n - lag] for signal in (y, u) for lag in lags]
-    regressors = np.column_stack([*past, u[ORDER:], np.ones(n - ORDER)])
-    usable = trusted[ORDER:] & trusted[ORDER - 1 : -1]
-    if usable.sum() < ROWS_PER_REGRESSOR * regressors.shape[1]:
+    lags = range(1, Findings.ORDER + 1)
+    past = [signal[Findings.ORDER - lag : n - lag] for signal in (y, u) for lag in lags]
+    regressors = np.column_stack([*past, u[Findings.ORDER :], np.ones(n - Findings.ORDER)])
+    usable = trusted[Findings.ORDER :] & trusted[Findings.ORDER - 1 : -1]
+    if usable.sum() < Findings.ROWS_PER_REGRESSOR * regressors.shape[1]:
         return None
-    seen, measured = regressors[usable], y[ORDER:][usable]
+    seen, measured = regressors[usable], y[Findings.ORDER :][usable]
     coefficients = np.linalg.lstsq(seen, measured, rcond=None)[0]
     error = measured - seen @ coefficients
-    return Prediction(ORDER + np.flatnonzero(usable), error, seen.shape[1], float(coefficients[ORDER]))
-
-
-def slope_test(signal: FloatArray, error: FloatArray) -> tuple[float, float]:
-    """Return the coefficient of a signal in an error and its standard error, robust to unequal variances.
-
-    White's estimator (Econometrica 48, 1980). The standard error is infinite where the signal is nothing.
-    """
-    power = float(signal @ signal)
-    if power <= 0.0:
-        return 0.0, float("inf")
-    slope = float(signal @ error) / power
-    left = error - slope * signal
-    return slope, float(np.sqrt(np.sum((signal * left) ** 2))) / power
+    return Prediction(
+        Findings.ORDER + np.flatnonzero(usable), error, seen.shape[1], float(coefficients[Findings.ORDER])
+    )

@@ -9,48 +9,10 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from scipy import optimize, stats
 
-from estimator.diagnosis.acquisition.finding import (
-    LEVEL,
-    OUTPUT,
-    AcquisitionFinding,
-    Sized,
-    no_cells,
-    predict,
-    slope_test,
-)
+from estimator.diagnosis.acquisition.finding import OUTPUT, AcquisitionFinding, Sized, no_cells, predict
 from estimator.diagnosis.acquisition.quantised import decimal_place
-from estimator.diagnosis.noise import SMALLEST_P
+from estimator.diagnosis.thresholds import Findings, Jitter, Noise
 from estimator.signals.record import BoolArray, FloatArray, Record, uniform_period_s
-
-AGREEMENT = 0.5  # share of the stamps' offsets that the output must confirm: half way between none and all
-ABOVE_ROUNDING = 2.0  # offsets of this many times what rounding the stamps leaves are more than rounding
-SMALLEST_PERIODS = 1e-3  # jitter below this share of the period is not looked into
-
-PAST = 8  # past errors that may explain an error: most of a period of a driveline's first mode at 10 ms
-
-AROUND = 3
-"""Slopes before and after that may explain it: a delay, a lag or a wrong inertia show as a mix of them."""
-
-BLOCK = 250
-"""Rows within which these explain by coefficients of their own, to tell whether there is jitter at all: a simulated
-angle that drifts off the true one moves what depends on it as a delay does that comes and goes. Its size is estimated
-from all rows: so many coefficients follow a part of the jitter too."""
-
-LEAST_GAIN = 0.05  # share of the error's variance that jitter must account for, on average: less changes no fit
-OF_A_KINK = 0.17  # ``(E|tau| / 2 sigma_t)^2``: 1 / 2 pi for Gaussian offsets, 3 / 16 for uniform ones
-
-MOST_OF_IT = 0.5
-"""Share of the error's variance beyond the noise that must be jitter: where other things leave more, the model has not
-converged, and what is left of their error may follow the slope in ways that nothing here accounts for."""
-
-OF_THE_MANY = 0.4
-"""Jitter seen in the median must be this share of that seen in the mean. Between Gaussian and uniform jitter it is 1 to
-1.6; a few wild rows (stale samples, a clunk) leave nothing in the median."""
-
-NEIGHBOURS = 0.5
-"""Share of the jitter that neighbouring rows may have in common: 0 if drawn anew for each, 1 if it delays both."""
-
-ROUNDING = 1e-6  # least noise of an error, in parts of its standard deviation
 
 
 def stamp_offsets_s(record: Record) -> FloatArray:
@@ -58,7 +20,7 @@ def stamp_offsets_s(record: Record) -> FloatArray:
     since = record.time_s - uniform_period_s(record.time_s) * np.arange(record.time_s.size)
     offset: FloatArray = since - since.mean()
     rounding_s = decimal_place(record.time_s) / np.sqrt(12.0)
-    smallest = max(ABOVE_ROUNDING * rounding_s, SMALLEST_PERIODS * record.sample_time_s)
+    smallest = max(Jitter.ABOVE_ROUNDING * rounding_s, Jitter.SMALLEST_PERIODS * record.sample_time_s)
     return offset if float(np.std(offset)) > smallest else np.zeros_like(offset)
 
 
@@ -71,7 +33,7 @@ def stamped_jitter(records: Sequence[Record]) -> AcquisitionFinding | None:
         return None
     agreement, error = _pooled(confirmed)
     p_value = float(stats.norm.sf(agreement / error))
-    if p_value > LEVEL or agreement < AGREEMENT:
+    if p_value > Findings.LEVEL or agreement < Jitter.AGREEMENT:
         return None
     every = np.concatenate([offsets[record.name] for record in stamped])
     jitter_s, n = float(np.std(every)), every.size
@@ -83,7 +45,7 @@ def stamped_jitter(records: Sequence[Record]) -> AcquisitionFinding | None:
         name="sample_jitter",
         parameters={"jitter_s": Sized(jitter_s, (low, high), "s")},
         cells=cells,
-        p_value=max(p_value, SMALLEST_P),
+        p_value=max(p_value, Noise.SMALLEST_P),
         statement=f"the samples were taken {1e3 * jitter_s:.2g} ms (rms) off their time, as their time stamps show",
     )
 
@@ -124,31 +86,31 @@ def hidden_jitter(
 ) -> AcquisitionFinding | None:
     """Recognise jitter in the errors of a simulation that explains everything else."""
     rest = _rests(errors, slopes, okay)
-    within = _rests(errors, slopes, okay, BLOCK)
+    within = _rests(errors, slopes, okay, Jitter.BLOCK)
     if rest is None or within is None or _likeliest(within.error, within.steepness) is None:
         return None
     p_value = _score_p_value(rest)
-    if p_value > LEVEL:
+    if p_value > Findings.LEVEL:
         return None
     found = _likeliest(rest.error, rest.steepness)
     if found is None or not (_of_the_many(rest, found) and _independent(rest, found)):
         return None
     whole = np.concatenate([error[good] - error[good].mean() for error, good in zip(errors, okay, strict=True)])
-    if found.jitter_s**2 * np.mean(rest.steepness**2) < MOST_OF_IT * (np.mean(whole**2) - found.noise**2):
+    if found.jitter_s**2 * np.mean(rest.steepness**2) < Jitter.MOST_OF_IT * (np.mean(whole**2) - found.noise**2):
         return None
     jitter_s, ci95 = found.jitter_s, found.ci95
     return AcquisitionFinding(
         name="sample_jitter",
         parameters={"jitter_s": Sized(jitter_s, ci95, "s")},
         cells=_outputs(records, okay),
-        p_value=max(p_value, SMALLEST_P),
+        p_value=max(p_value, Noise.SMALLEST_P),
         statement=f"the samples were taken {1e3 * jitter_s:.2g} ms (rms) off their time, which no time stamp shows",
     )
 
 
 def mean_shift(slopes: FloatArray, jitter_s: float) -> FloatArray:
     """Return what readings off their time by ``jitter_s`` (rms) are off in the mean: a kink is cut short."""
-    return np.sqrt(OF_A_KINK) * jitter_s * (slopes[1] - slopes[0])
+    return np.sqrt(Jitter.OF_A_KINK) * jitter_s * (slopes[1] - slopes[0])
 
 
 def _outputs(records: Sequence[Record], okay: Sequence[BoolArray]) -> Mapping[str, BoolArray]:
@@ -178,23 +140,23 @@ def _rest(error: FloatArray, slopes: FloatArray, okay: BoolArray, block: int | N
     Rows whose surroundings are not okay are left out.
     """
     filled = np.where(okay, error, 0.0)
-    width = 2 * AROUND + 1
-    first, last = PAST, error.size - AROUND
-    if last - first < 10 * (PAST + width):
+    width = 2 * Jitter.AROUND + 1
+    first, last = Jitter.PAST, error.size - Jitter.AROUND
+    if last - first < Jitter.ROWS_IN_ALL * (Jitter.PAST + width):
         return None
     slope, kink = slopes.mean(axis=0), slopes[1] - slopes[0]
-    steepness = np.sqrt(np.mean(slopes**2, axis=0) - OF_A_KINK * kink**2)
-    past = sliding_window_view(filled, PAST)[: last - first]
-    around = sliding_window_view(slope, width)[first - AROUND : last - AROUND]
-    usable: BoolArray = np.all(sliding_window_view(okay, PAST + 1)[: last - first], axis=1)
-    if usable.sum() < 5 * (PAST + width):
+    steepness = np.sqrt(np.mean(slopes**2, axis=0) - Jitter.OF_A_KINK * kink**2)
+    past = sliding_window_view(filled, Jitter.PAST)[: last - first]
+    around = sliding_window_view(slope, width)[first - Jitter.AROUND : last - Jitter.AROUND]
+    usable: BoolArray = np.all(sliding_window_view(okay, Jitter.PAST + 1)[: last - first], axis=1)
+    if usable.sum() < Jitter.ROWS_PER_COEFFICIENT * (Jitter.PAST + width):
         return None
     regressors = np.column_stack([past, around, kink[first:last], np.ones(last - first)])
     left = np.full(last - first, np.nan)
     blocks = 1 if block is None else max(1, (last - first) // block)
     for stretch in np.array_split(np.arange(last - first), blocks):
         rows = stretch[usable[stretch]]
-        if rows.size >= 5 * (PAST + width):
+        if rows.size >= Jitter.ROWS_PER_COEFFICIENT * (Jitter.PAST + width):
             a, now = regressors[rows], filled[first:last][rows]
             left[rows] = now - a @ np.linalg.lstsq(a, now, rcond=None)[0]
     pairs = np.isfinite(left[:-1]) & np.isfinite(left[1:])
@@ -240,7 +202,9 @@ def _likeliest(error: FloatArray, steepness: FloatArray) -> _Jitter | None:
 
     def cost(logs: FloatArray, jitter: float | None = None) -> float:
         variance = np.exp(2.0 * logs[0]) + (np.exp(2.0 * logs[1]) if jitter is None else jitter**2) * steepness**2
-        variance = variance + (ROUNDING * size) ** 2  # an error of exactly 0 would be infinitely likely without noise
+        variance = (
+            variance + (Jitter.ROUNDING * size) ** 2
+        )  # an error of exactly 0 would be infinitely likely without noise
         return float(np.sum(np.log(variance) + error**2 / variance))
 
     size, steep = float(np.std(error)), float(np.sqrt(np.mean(steepness**2)))
@@ -249,7 +213,7 @@ def _likeliest(error: FloatArray, steepness: FloatArray) -> _Jitter | None:
     start = np.array([np.log(size), np.log(0.5 * size / steep)])
     best = optimize.minimize(cost, start, method="Nelder-Mead", options={"xatol": 1e-5, "fatol": 1e-4})
     noise, jitter = (float(value) for value in np.exp(best.x))
-    if (jitter * steep) ** 2 < LEAST_GAIN * size**2:
+    if (jitter * steep) ** 2 < Jitter.LEAST_GAIN * size**2:
         return None
 
     def excess(log_jitter: float) -> float:
@@ -278,10 +242,23 @@ def _of_the_many(rest: _Rest, found: _Jitter) -> bool:
     mad_to_sigma = 1.0 / float(stats.norm.ppf(0.75))
     typical = (mad_to_sigma * np.median(np.abs(rest.error[steep]))) ** 2
     expected = found.noise**2 + found.jitter_s**2 * float(np.median(rest.steepness[steep] ** 2))
-    return bool(typical - found.noise**2 > OF_THE_MANY * (expected - found.noise**2))
+    return bool(typical - found.noise**2 > Jitter.OF_THE_MANY * (expected - found.noise**2))
 
 
 def _independent(rest: _Rest, found: _Jitter) -> bool:
     """Tell whether rows in a row are off their time independently of each other: those of a clunk or a lag are not."""
     in_common = float((rest.error * rest.slope) @ (rest.next_error * rest.next_slope))
-    return abs(in_common) < NEIGHBOURS * found.jitter_s**2 * float(rest.slope**2 @ rest.next_slope**2)
+    return abs(in_common) < Jitter.NEIGHBOURS * found.jitter_s**2 * float(rest.slope**2 @ rest.next_slope**2)
+
+
+def slope_test(signal: FloatArray, error: FloatArray) -> tuple[float, float]:
+    """Return the coefficient of a signal in an error and its standard error, robust to unequal variances.
+
+    White's estimator (Econometrica 48, 1980). The standard error is infinite where the signal is nothing.
+    """
+    power = float(signal @ signal)
+    if power <= 0.0:
+        return 0.0, float("inf")
+    slope = float(signal @ error) / power
+    left = error - slope * signal
+    return slope, float(np.sqrt(np.sum((signal * left) ** 2))) / power

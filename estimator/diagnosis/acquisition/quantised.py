@@ -10,9 +10,7 @@ import numpy as np
 from scipy import stats
 
 from estimator.diagnosis.acquisition.finding import (
-    LEVEL,
     OUTPUT,
-    SMALLEST_SHARE,
     AcquisitionFinding,
     Sized,
     all_of,
@@ -23,61 +21,22 @@ from estimator.diagnosis.acquisition.finding import (
     predict,
     runs,
     share_interval,
-    shorter_runs,
 )
-from estimator.diagnosis.noise import SMALLEST_P
+from estimator.diagnosis.thresholds import Findings, Noise, Quantised
 from estimator.signals.record import BoolArray, FloatArray, OutputKind, Record
-
-STEP_QUANTILE = 0.02
-"""The step is taken at this quantile of the gaps between the values: on a coarse lattice most gaps are the step; on
-one so fine that gaps are a matter of chance it is too large, which errs to the side of calling repeats innocent."""
-
-CORE_QUANTILE = 0.05
-"""Differences that count as near zero: the smallest twentieth of them. A density varies little over that."""
-
-DECIMALS = 9  # values with more decimals than this are taken as not rounded
-ROUND_OFF = 1e-9  # values closer than this share of the largest are the same number, scaled in another way
-
-MODEL_ERROR = 0.1  # relative error of extrapolating the density to zero, in addition to its sampling error
-
-NOISE_PER_STEP = 1.0
-"""A lattice matters from a step of this many standard deviations of the one-step error: below that its rounding adds
-under 1/12, 4 % of the error's size."""
 
 BINS_PER_STEP = 8  # fineness of the histogram whose spectrum is searched: it takes 3 % off the finest step's R
 PADDING = 4  # points of the spectrum per resolution cell, so that no peak falls between two
-
-LEVELS = 6
-"""A lattice must be visited on this many levels within the spread of a recording; fewer are lumps, no lattice."""
-
-HARMONIC = 0.8
-"""Lattices of q/2, q/3 ... fit as well as q: the coarsest that is this share of the best is taken."""
-
-REGULAR = 0.2
-"""Smallest R of a lattice: noise of 0.29 steps came after the rounding, as much as the rounding's own error."""
-
-SMOOTHING = 25
-"""Samples of a moving mean that wipes out a lattice, and leaves the lumps of a drive that keeps to a few speeds."""
-
-ABOVE_LUMPS = 3.0  # R of the readings must be this many times that of their moving mean
-
 MOST_BINS = 2**22  # bins of a spectrum of levels: a finer noise in a wider range shows no lattice that matters
 
-LONGEST_ZERO = 20  # more zeros than this in a row are a signal at zero
-NEAR_STEPS = 5  # a value near zero is within so many lattice steps of it
-COMMON_LEVELS = 5  # so many of the commonest other values are looked at, whether they come as zero does
 
-AS_EXACTLY = 0.5
-"""Of what is near another level for short as large a share must be that level exactly, times this, as for zero."""
-
-NEAR_SHARE = 0.02
-"""... or within this share of the channel's size, whichever is more."""
-
-MORE_THAN_MEANT = 5.0
-"""Where zeros are lost, those between values near zero are so too if there are so many times as many of them as of any
-value next to zero: rounded noise of half a lattice step around zero shows it four times as often as the next value."""
-
-LONGEST_BURST = 50  # more missing rows than this in a row are a gap
+def shorter_runs(rows: BoolArray, longest: int) -> BoolArray:
+    """Return the rows that are in a run of at most ``longest``; shape (N,)."""
+    kept = rows.copy()
+    for begin, end in runs(rows):
+        if end - begin > longest:
+            kept[begin:end] = False
+    return kept
 
 
 def lattice_step(values: FloatArray) -> float:
@@ -86,13 +45,13 @@ def lattice_step(values: FloatArray) -> float:
     if levels.size < 3:
         return 0.0
     gaps = np.diff(levels)
-    gaps = gaps[gaps > ROUND_OFF * float(np.abs(levels).max())]
-    return float(np.quantile(gaps, STEP_QUANTILE, method="lower")) if gaps.size else 0.0
+    gaps = gaps[gaps > Quantised.ROUND_OFF * float(np.abs(levels).max())]
+    return float(np.quantile(gaps, Quantised.STEP_QUANTILE, method="lower")) if gaps.size else 0.0
 
 
 def decimal_place(values: FloatArray) -> float:
     """Return the decimal place that values were rounded to when they were written [their unit], 0 where to none."""
-    for decimals in range(DECIMALS + 1):
+    for decimals in range(Quantised.DECIMALS + 1):
         ticks = values * 10.0**decimals
         if float(np.abs(ticks - np.round(ticks)).max()) < 1e-6 * max(1.0, 1e-9 * float(np.abs(ticks).max())):
             return float(10.0**-decimals)
@@ -119,7 +78,7 @@ def chance_repeats(differences: FloatArray, step: float) -> ChanceRepeats:
         return ChanceRepeats(float(size.size), float(size.size))
     if step <= 0.0:  # without a lattice none is zero by chance
         return ChanceRepeats(0.0, _most_common(differences, step))
-    points = max(1, math.floor(float(np.quantile(moving, CORE_QUANTILE)) / step + 0.5))
+    points = max(1, math.floor(float(np.quantile(moving, Quantised.CORE_QUANTILE)) / step + 0.5))
     near = float(np.sum(moving <= (points + 0.5) * step))
     far = float(np.sum(moving <= (2 * points + 0.5) * step)) - near
     # Half an event more keeps the logarithms finite where a band is empty.
@@ -129,7 +88,7 @@ def chance_repeats(differences: FloatArray, step: float) -> ChanceRepeats:
     slope = max(math.log(near_rate / far_rate), 0.0)
     expected = near_rate * math.exp(lever * slope)
     sampling = math.hypot((1.0 + lever) / math.sqrt(near + 0.5), lever / math.sqrt(far + 0.5))
-    upper = max(expected * (1.0 + MODEL_ERROR + 2.0 * sampling), _most_common(differences, step))
+    upper = max(expected * (1.0 + Quantised.MODEL_ERROR + 2.0 * sampling), _most_common(differences, step))
     return ChanceRepeats(min(expected, float(size.size)), min(upper, float(size.size)))
 
 
@@ -145,7 +104,7 @@ def repeats(values: FloatArray, step: float) -> BoolArray:
     found = np.zeros(values.shape, dtype=np.bool_)
     read = values[np.isfinite(values)]
     if read.size:
-        found[1:] = np.abs(np.diff(values)) <= ROUND_OFF * max(float(np.abs(read).max()), step)
+        found[1:] = np.abs(np.diff(values)) <= Quantised.ROUND_OFF * max(float(np.abs(read).max()), step)
     return found
 
 
@@ -190,7 +149,7 @@ class _Step:
 def _step(moving: Sequence[FloatArray], sigma: float) -> _Step | None:
     values = np.concatenate(moving)
     spread = float(np.median([np.ptp(one) for one in moving if one.size]))
-    finest, coarsest = NOISE_PER_STEP * sigma, spread / LEVELS
+    finest, coarsest = Quantised.NOISE_PER_STEP * sigma, spread / Quantised.LEVELS
     if not finest <= coarsest:
         return None
     candidates = [lattice_step(values), _by_spectrum(values, finest, coarsest)]
@@ -199,14 +158,14 @@ def _step(moving: Sequence[FloatArray], sigma: float) -> _Step | None:
     if best is None:
         return None
     q, regularity, error = best
-    smooth = [_smooth(one) for one in moving if one.size > SMOOTHING]
+    smooth = [_smooth(one) for one in moving if one.size > Quantised.SMOOTHING]
     if not smooth:
         return None
     lumps = _regularity(np.concatenate(smooth), q)
     p_value = float(np.exp(-values.size * regularity**2)) * PADDING * float(np.ptp(values)) / finest
-    if p_value > LEVEL or regularity < max(REGULAR, ABOVE_LUMPS * lumps):
+    if p_value > Findings.LEVEL or regularity < max(Quantised.REGULAR, Quantised.ABOVE_LUMPS * lumps):
         return None
-    return _Step(q, (q - 1.96 * error, q + 1.96 * error), max(p_value, SMALLEST_P))
+    return _Step(q, (q - 1.96 * error, q + 1.96 * error), max(p_value, Noise.SMALLEST_P))
 
 
 def _by_spectrum(values: FloatArray, finest: float, coarsest: float) -> float | None:
@@ -221,7 +180,7 @@ def _by_spectrum(values: FloatArray, finest: float, coarsest: float) -> float | 
     searched = regularity[first : last + 1]
     if searched.size == 0:
         return None
-    lowest = int(np.argmax(searched >= HARMONIC * searched.max()))
+    lowest = int(np.argmax(searched >= Quantised.HARMONIC * searched.max()))
     peak = lowest + int(np.argmax(searched[lowest : lowest + 2 * PADDING]))
     return size * width / (first + peak)
 
@@ -263,7 +222,7 @@ def _regularity(values: FloatArray, step: float) -> float:
 
 
 def _smooth(values: FloatArray) -> FloatArray:
-    return np.convolve(values, np.full(SMOOTHING, 1.0 / SMOOTHING), mode="valid")
+    return np.convolve(values, np.full(Quantised.SMOOTHING, 1.0 / Quantised.SMOOTHING), mode="valid")
 
 
 def lost_zeros(records: Sequence[Record]) -> tuple[list[BoolArray], float]:
@@ -289,7 +248,7 @@ def _with_their_frames(read: Sequence[FloatArray], lost: Sequence[BoolArray]) ->
         zero = [read[k][:, column] == 0.0 for k in having]
         rows, zeros = np.concatenate(others), np.concatenate(zero)
         usual = float(np.mean(zeros[~rows]))
-        if stats.binom.sf(int(zeros[rows].sum()) - 1, int(rows.sum()), usual) <= LEVEL:
+        if stats.binom.sf(int(zeros[rows].sum()) - 1, int(rows.sum()), usual) <= Findings.LEVEL:
             for k, its_rows, its_zeros in zip(having, others, zero, strict=True):
                 whole[k][:, column] |= its_rows & its_zeros
     return whole
@@ -303,22 +262,24 @@ def _zeros_of(series: Sequence[FloatArray]) -> tuple[list[BoolArray], float]:
     step = lattice_step(pooled)
     if step == 0.0:
         return none, 1.0
-    near = max((NEAR_STEPS + 0.5) * step, NEAR_SHARE * float(np.quantile(np.abs(pooled), 0.9)))
+    near = max((Quantised.NEAR_STEPS + 0.5) * step, Quantised.NEAR_SHARE * float(np.quantile(np.abs(pooled), 0.9)))
     rows = [_out_of_line(values, near) for values in series]
     count = sum(int(found.sum()) for found in rows)
-    if count < sum(int(np.sum((values == 0.0) & ~shorter_runs(values == 0.0, LONGEST_ZERO))) for values in series):
+    if count < sum(
+        int(np.sum((values == 0.0) & ~shorter_runs(values == 0.0, Quantised.LONGEST_ZERO))) for values in series
+    ):
         return none, 1.0  # it rests at zero for longer than it would have been lost
     other = float(np.sum((pooled != 0.0) & (np.abs(pooled) <= near)))
     expected = (other + 2.0 * np.sqrt(other + 1.0)) * step / (2.0 * near)
     p_value = float(stats.poisson.sf(count - 1, expected))
-    enough = p_value <= LEVEL and count >= SMALLEST_SHARE * pooled.size
+    enough = p_value <= Findings.LEVEL and count >= Findings.SMALLEST_SHARE * pooled.size
     if not enough or _has_levels(series, near, count):
         return none, 1.0
     short = [_out_of_line(values, 0.0) for values in series]
     near_zero = sum(int(found.sum()) for found in short) - count
-    next_to_zero = pooled[(pooled != 0.0) & (np.abs(pooled) <= (NEAR_STEPS + 0.5) * step)]
+    next_to_zero = pooled[(pooled != 0.0) & (np.abs(pooled) <= (Quantised.NEAR_STEPS + 0.5) * step)]
     usual = max(np.unique(next_to_zero, return_counts=True)[1], default=1)
-    found = short if near_zero > MORE_THAN_MEANT * usual else rows
+    found = short if near_zero > Quantised.MORE_THAN_MEANT * usual else rows
     return [inside | _at_ends(values, near, found) for values, inside in zip(series, found, strict=True)], p_value
 
 
@@ -335,7 +296,7 @@ def _at_ends(values: FloatArray, near: float, found: Sequence[BoolArray]) -> Boo
 def _out_of_line(values: FloatArray, near: float) -> BoolArray:
     found = np.zeros(values.shape, dtype=np.bool_)
     for begin, end in runs(values == 0.0):
-        if begin > 0 and end < values.size and end - begin <= LONGEST_ZERO:
+        if begin > 0 and end < values.size and end - begin <= Quantised.LONGEST_ZERO:
             found[begin:end] = min(abs(values[begin - 1]), abs(values[end])) > near
     return found
 
@@ -347,18 +308,19 @@ def _has_levels(series: Sequence[FloatArray], near: float, count: int) -> bool:
     """
     pooled = np.concatenate(series)
     levels, times = np.unique(pooled[np.isfinite(pooled) & (pooled != 0.0)], return_counts=True)
-    common = levels[np.argsort(times)[-COMMON_LEVELS:]]
+    common = levels[np.argsort(times)[-Quantised.COMMON_LEVELS :]]
     alone = [sum(int(_out_of_line(values - level, near).sum()) for values in series) for level in common]
     exactly = count / _visits(series, near)
     return any(
-        rows >= 0.25 * count and rows >= AS_EXACTLY * exactly * _visits([values - level for values in series], near)
+        rows >= Quantised.AS_OFTEN * count
+        and rows >= Quantised.AS_EXACTLY * exactly * _visits([values - level for values in series], near)
         for level, rows in zip(common, alone, strict=True)
     )
 
 
 def _visits(series: Sequence[FloatArray], near: float) -> int:
     """Return how many values are near zero for a short while, or on their way through it."""
-    return sum(int(shorter_runs(np.abs(values) <= near, LONGEST_ZERO).sum()) for values in series)
+    return sum(int(shorter_runs(np.abs(values) <= near, Quantised.LONGEST_ZERO).sum()) for values in series)
 
 
 def lost_samples(records: Sequence[Record]) -> AcquisitionFinding | None:
@@ -368,7 +330,7 @@ def lost_samples(records: Sequence[Record]) -> AcquisitionFinding | None:
     cells = [absent | zero for absent, zero in zip(missing, zeros, strict=True)]
     rows = [any_of(lost) for lost in cells]
     count, total = sum(int(lost.sum()) for lost in rows), sum(lost.size for lost in rows)
-    if count < SMALLEST_SHARE * total:
+    if count < Findings.SMALLEST_SHARE * total:
         return None
     share = count / total
     silent = any(zero.any() for zero in zeros)
@@ -381,7 +343,7 @@ def lost_samples(records: Sequence[Record]) -> AcquisitionFinding | None:
         name="lost_samples",
         parameters={"share": Sized(share, share_interval(count, total, mean_run(rows)), "")},
         cells={record.name: lost for record, lost in zip(records, cells, strict=True)},
-        p_value=max(p_value, SMALLEST_P) if silent else SMALLEST_P,
+        p_value=max(p_value, Noise.SMALLEST_P) if silent else Noise.SMALLEST_P,
         statement=f"{100.0 * share:.2g}% of the samples were lost: their rows are {how}",
     )
 
@@ -391,5 +353,5 @@ def _missing(record: Record) -> BoolArray:
     lost = ~record.torque_trusted
     whole_row = all_of(lost) & ~record.okay
     lost = np.column_stack([~np.isfinite(record.output) | whole_row, lost])
-    short = shorter_runs(any_of(lost), LONGEST_BURST)
+    short = shorter_runs(any_of(lost), Quantised.LONGEST_BURST)
     return lost & short[:, np.newaxis]

@@ -10,9 +10,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from scipy import stats
 
 from estimator.diagnosis.acquisition.finding import (
-    LEVEL,
     OUTPUT,
-    SMALLEST_SHARE,
     AcquisitionFinding,
     Sized,
     all_of,
@@ -25,49 +23,8 @@ from estimator.diagnosis.acquisition.finding import (
     share_interval,
 )
 from estimator.diagnosis.acquisition.quantised import chance_repeats, lattice_step, repeats
-from estimator.diagnosis.noise import SMALLEST_P
+from estimator.diagnosis.thresholds import Findings, Noise, Stale
 from estimator.signals.record import BoolArray, FloatArray, Record
-
-HALF_WINDOW = 25
-"""Rows before and after that tell whether the signal moves: long against a stale burst, short against a standstill."""
-
-STEPS_PER_ROW = 1.5
-"""The signal moves if all but a quarter of its changes, repeats left out, are larger than so many lattice steps, two
-steps that is: where one step is common, a repeat is the likeliest outcome and can't be predicted from its neighbours.
-The quarter is taken, not the half, because a torque that jumps every few samples is at rest in between."""
-
-REST_ROWS = 8
-"""A run of repeats this long, at zero or at the end of the channel's range, is standstill or saturation."""
-
-NEAR_ZERO = 0.02  # zero is within this share of the channel's size
-
-CATCH_UP = 0.8
-"""Smallest ratio of the median change after a repeat to the usual one, for the repeats to be stale. Two periods of
-motion give up to 2, of white noise 1; an innocent repeat in white noise gives sqrt(3)/2 = 0.87, one in a slow signal
-on a lattice a small fraction."""
-
-PERIODS = 3  # the torque of a row is predicted from its own reference and from those before it, so many in all
-FEWEST_ROWS = 100  # fewer rows that were read do not show how a drive follows
-
-MOST_LEFT = 0.25
-"""Share of the torque's changes, as a power, that a reference may leave; one that leaves more does not tell."""
-
-AS_GOOD = 0.003
-"""One that leaves no more than this share tells the torque as well as a reading does: of a step a twentieth is left."""
-
-LONGEST_HOLD = 20  # longest clock looked for, in samples
-ON_TICK = 0.95  # share of the steps that must fall on the ticks; the rest may be steps of the base torque
-FEWEST_STEPS = 20  # fewer steps do not show a clock
-CLEAR_STEP = 8.0  # a step is a change this many times the usual one within a hold
-
-SAME_STEP = 0.2
-"""A change is the clock's step if it differs from it by at most this share: the base torque may drift meanwhile."""
-
-CLEAR = (2.0, 3.0, 4.0)
-"""A step tells whether it was answered where the answer is this many times the predictor's error. Torques found stale
-are mended and the predictor fitted again, for wrong torques blur it; each pass asks for more, the last one counts."""
-
-ANSWERED = 0.5  # share of the answer that must have come early: half way between none and all of it
 
 
 def informative_rows(values: FloatArray, step: float) -> BoolArray:
@@ -76,13 +33,13 @@ def informative_rows(values: FloatArray, step: float) -> BoolArray:
     read, again = np.isfinite(change), repeats(values, step)
     informative: BoolArray = read & (_moving_share(read & ~again, read) > 0.5)
     moving = change[informative & ~again]
-    if moving.size == 0 or float(np.quantile(moving, 0.25)) <= STEPS_PER_ROW * step:
+    if moving.size == 0 or float(np.quantile(moving, Stale.AT_REST)) <= Stale.STEPS_PER_ROW * step:
         return np.zeros_like(informative)
     low, high = float(np.nanmin(values)), float(np.nanmax(values))
     for begin, end in runs(again):
         value = values[begin]
-        at_rest = abs(value) <= NEAR_ZERO * max(abs(low), abs(high)) or value in (low, high)
-        if end - begin >= REST_ROWS and at_rest:
+        at_rest = abs(value) <= Stale.NEAR_ZERO * max(abs(low), abs(high)) or value in (low, high)
+        if end - begin >= Stale.REST_ROWS and at_rest:
             informative[begin:end] = False
     return informative
 
@@ -90,7 +47,8 @@ def informative_rows(values: FloatArray, step: float) -> BoolArray:
 def _moving_share(moving: BoolArray, read: BoolArray) -> FloatArray:
     """Return the share of the readings around each row that differ from the one before, shape (N,)."""
     counts = [
-        sliding_window_view(np.pad(rows, HALF_WINDOW), 2 * HALF_WINDOW + 1).sum(axis=1) for rows in (moving, read)
+        sliding_window_view(np.pad(rows, Stale.HALF_WINDOW), 2 * Stale.HALF_WINDOW + 1).sum(axis=1)
+        for rows in (moving, read)
     ]
     return counts[0] / np.maximum(counts[1], 1)
 
@@ -118,7 +76,11 @@ class Repeated:
     @property
     def is_stale(self) -> bool:
         """Whether they are beyond chance, enough to matter, and caught up with."""
-        return self.share(self.count) >= SMALLEST_SHARE and self.p_value <= LEVEL and self.catch_up >= CATCH_UP
+        return (
+            self.share(self.count) >= Findings.SMALLEST_SHARE
+            and self.p_value <= Findings.LEVEL
+            and self.catch_up >= Stale.CATCH_UP
+        )
 
     def share(self, count: float) -> float:
         """Return the share of stale rows behind a count of repeats: those by chance taken off."""
@@ -167,7 +129,7 @@ def followed(torque: FloatArray, trusted: BoolArray, reference: FloatArray) -> t
     predicted = all_of(np.isfinite(regressors))
     read = predicted & trusted
     both = read[1:] & read[:-1]
-    if read.sum() < FEWEST_ROWS or not both.any():
+    if read.sum() < Stale.FEWEST_ROWS or not both.any():
         return torque, np.zeros_like(trusted), False
     gain = np.linalg.lstsq(regressors[read], torque[read])[0]
     by_reference = regressors @ gain
@@ -175,13 +137,15 @@ def followed(torque: FloatArray, trusted: BoolArray, reference: FloatArray) -> t
     by_reference += np.interp(np.arange(torque.size), rows, (torque - by_reference)[rows])
     left, change = np.diff(torque - regressors @ gain)[both], np.diff(torque)[both]
     power_left, power = float(left @ left), float(change @ change)
-    if power_left > MOST_LEFT * power:
+    if power_left > Stale.MOST_LEFT * power:
         return torque, np.zeros_like(trusted), False
-    return by_reference, predicted, power_left <= AS_GOOD * power
+    return by_reference, predicted, power_left <= Stale.AS_GOOD * power
 
 
 def _regressors(reference: FloatArray) -> FloatArray:
-    before = [np.concatenate([np.full(lag, reference[0]), reference[: reference.size - lag]]) for lag in range(PERIODS)]
+    before = [
+        np.concatenate([np.full(lag, reference[0]), reference[: reference.size - lag]]) for lag in range(Stale.PERIODS)
+    ]
     return np.column_stack([*before, np.ones(reference.size)])
 
 
@@ -201,22 +165,22 @@ class Clock:
     def explains(self, change_nm: float) -> bool:
         """Return whether a change [Nm] is one step of the clock, or so small that there was none."""
         size = abs(change_nm)
-        return size <= CLEAR_STEP * self.usual_nm or abs(size - self.step_nm) <= SAME_STEP * self.step_nm
+        return size <= Stale.CLEAR_STEP * self.usual_nm or abs(size - self.step_nm) <= Stale.SAME_STEP * self.step_nm
 
 
 def clock_of(torque: FloatArray, trusted: BoolArray) -> Clock | None:
     """Return the clock at whose ticks a torque steps; None where there is none of two samples or more."""
     change = np.abs(np.diff(torque))
     known = trusted[1:] & trusted[:-1]
-    if known.sum() < FEWEST_STEPS:
+    if known.sum() < Stale.FEWEST_STEPS:
         return None
     usual = 1.4826 * float(np.median(change[known]))
-    steps = 1 + np.flatnonzero(known & (change > CLEAR_STEP * usual))
-    if steps.size < FEWEST_STEPS:
+    steps = 1 + np.flatnonzero(known & (change > Stale.CLEAR_STEP * usual))
+    if steps.size < Stale.FEWEST_STEPS:
         return None
-    for period in range(LONGEST_HOLD, 1, -1):
+    for period in range(Stale.LONGEST_HOLD, 1, -1):
         on_tick = np.bincount(steps % period, minlength=period)
-        if on_tick.max() >= ON_TICK * steps.size:
+        if on_tick.max() >= Stale.ON_TICK * steps.size:
             return Clock(period, int(on_tick.argmax()), float(np.median(change[steps - 1])), usual)
     return None
 
@@ -266,7 +230,7 @@ def late_torque(record: Record, inputs: Sequence[int], trusted: BoolArray) -> La
     again = read & all_of(np.column_stack([_repeats(record.torque_nm[:, i]) for i in inputs]))
     step = np.append(np.where(read[1:], np.diff(torque), 0.0), 0.0)  # from this row to the next
     found, stale = None, np.zeros_like(read)
-    for clear in CLEAR:
+    for clear in Stale.CLEAR:
         prediction = predict(_mended(record, inputs, stale), trusted)
         if prediction is None or prediction.gain == 0.0:
             return None
@@ -286,11 +250,11 @@ def _late(again: BoolArray, step: FloatArray, early: FloatArray, clear: BoolArra
     """Compare the clear steps after repeats with the others, and follow a burst of repeats back to its beginning."""
     clear = clear & np.isfinite(early)
     answered = np.zeros_like(clear)
-    answered[clear] = early[clear] / step[clear] > ANSWERED
+    answered[clear] = early[clear] / step[clear] > Stale.ANSWERED
     rows = np.zeros_like(clear)
     for last in np.flatnonzero(answered & again):
         row = int(last)
-        while row > 0 and again[row] and early[row] / step[last] > ANSWERED:
+        while row > 0 and again[row] and early[row] / step[last] > Stale.ANSWERED:
             rows[row] = True
             row -= 1
     counts = (answered & again, clear & again, answered & ~again, clear & ~again)
@@ -340,7 +304,7 @@ def stale_samples(records: Sequence[Record]) -> AcquisitionFinding | None:
         name="stale_samples",
         parameters={"share": Sized(value, ci95, "")},
         cells=cells,
-        p_value=max(min(size[2] for size in sizes.values()), SMALLEST_P),
+        p_value=max(min(size[2] for size in sizes.values()), Noise.SMALLEST_P),
         statement=_statement(value, tuple(sizes), records),
     )
 
@@ -400,7 +364,7 @@ def _with_output(records: Sequence[Record], i: int, cells: Cells) -> Size | None
     usual = (float(others.sum()) + 1.0) / (others.size + 2.0)
     p_value = float(stats.binom.sf(int(joint.sum()) - 1, joint.size, usual))
     share = float(joint.sum()) / sum(record.okay.size for record in records)
-    if not (p_value <= LEVEL and share >= SMALLEST_SHARE):
+    if not (p_value <= Findings.LEVEL and share >= Findings.SMALLEST_SHARE):
         return None
     for record, repeat in zip(records, again, strict=True):
         cells[record.name][:, 1 + i] = repeat & cells[record.name][:, OUTPUT]
@@ -435,7 +399,7 @@ def _by_answer(records: Sequence[Record], inputs: tuple[int, ...], cells: Cells)
     steps = sum(late.repeats + late.others for late in found.values())
     count = sum(late.early for late in found.values())
     p_value = pooled_p_value(list(found.values()))
-    if not (count >= SMALLEST_SHARE * max(steps, 1) and p_value <= LEVEL):
+    if not (count >= Findings.SMALLEST_SHARE * max(steps, 1) and p_value <= Findings.LEVEL):
         return None
     for name, late in found.items():
         for i in inputs:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from estimator.diagnosis.acquisition.chain import Chain, with_faults_compensated, without_acquisition_effects
@@ -20,15 +20,14 @@ from estimator.diagnosis.inference.hypotheses import Progress, all_good_samples,
 from estimator.diagnosis.inference.say import Basis, fitted_sets, said, undecided
 from estimator.diagnosis.inference.search import Search, search_from_nothing
 from estimator.diagnosis.noise import noise_floor
-from estimator.diagnosis.preconditions.prepare import Prepared, as_slow_as_needed
+from estimator.diagnosis.preconditions.prepare import Prepared
 from estimator.diagnosis.result import Diagnosis, Effort
+from estimator.diagnosis.segments import as_slow_as_needed
 from estimator.diagnosis.table_answer import unnamed_law
+from estimator.diagnosis.thresholds import Telling
 from estimator.physics.model import DrivelineModel
 from estimator.physics.parallel import TimeIsUp, Work, counted
 from estimator.signals.record import separated_outputs
-
-LEVELS: Mapping[str, int] = {"quick": 3_000, "normal": 10_000, "thorough": 100_000}
-"""Free runs of all recordings after which a search makes no further step: a choice of how long people wait."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,7 +81,7 @@ def answer(
     started: list[Fits] = []
     with counted(work):
         try:
-            read, search = searched(chain, line, work, LEVELS[level], started.append, progress)
+            read, search = searched(chain, line, work, Telling.LEVELS[level], started.append, progress)
             progress("weighing what was found", 0.8)
             decision = decide(search, read, Unseen(line, with_faults_compensated(ready.holdout)), free_form)
             keep(SearchResult(read, search, decision))
@@ -108,7 +107,7 @@ def _warnings(search: Search, level: str) -> tuple[str, ...]:
     if not search.is_cut_short:
         return ()
     return (
-        f"the search ended with the best set of effects so far, after the {LEVELS[level]:,} simulations of its effort "
-        f"({level}); further effects, and look-alikes of those named, were not tried. Try --effort thorough, or fewer "
-        "recordings.",
+        f"the search ended with the best set of effects so far, after the {Telling.LEVELS[level]:,} simulations of its "
+        f"effort ({level}); further effects, and look-alikes of those named, were not tried. Try --effort thorough, or "
+        "fewer recordings.",
     )

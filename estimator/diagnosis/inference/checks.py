@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 
 from estimator.diagnosis.inference.disturbances import Size
-from estimator.diagnosis.inference.hypotheses import GRADE, Effects, Hypothesis, line_values, residuals
-from estimator.diagnosis.noise import PREDICTOR_ORDER, unpredictable
+from estimator.diagnosis.inference.hypotheses import GRADE, Effects, Hypothesis
+from estimator.diagnosis.line.line import line_values
+from estimator.diagnosis.noise import residuals_by_record, unpredictable
+from estimator.diagnosis.thresholds import Checks, Noise
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Element, Span
 from estimator.physics.fit import FitResult
@@ -23,39 +23,8 @@ from estimator.physics.steps import has_edge
 from estimator.physics.unknowns import Shared
 from estimator.signals.record import FloatArray, Record
 
-THRESHOLDS_FILE = Path(__file__).parent / "thresholds.toml"
-
-THRESHOLDS = tomllib.loads(THRESHOLDS_FILE.read_text(encoding="utf-8"))
-
-TEST_LIMITS: dict[str, float] = {
-    key: THRESHOLDS["noise"][key] for key in ("most_predictable", "most_dependent", "most_line", "most_change")
-}
-"""What their own past may predict of the innovations, and what torque, speed and angle may, beyond chance; the power
-of a line in their spectrum over their mean power; their mean square in a second, in standard deviations from that of
-all."""
-
-LEAST_THROUGH, PARTS = 0.2, 4
-"""Share of the torque's RMS that must get through the torque path in each of so many parts of a recording: less
-switches the input off to explain nothing."""
-
-LOOSE = 3.0
-"""Factor by which a nominal parameter that an effect changes may be beyond its tolerance: a line that is split in two
-equal springs has each twice as stiff as the whole."""
-
-ROUNDING = 1e-6  # share of a value by which a fit may end beyond a bound
-
-BINS = 12  # bins of torque and of speed, of equal count
-
-COLUMNS = {"most_predictable": PREDICTOR_ORDER, "most_dependent": 2 * BINS + 3}
+COLUMNS = {"most_predictable": Noise.PREDICTOR_ORDER, "most_dependent": 2 * Checks.BINS + 3}
 """How many signals a share of the innovations is sought in: past samples; bins, waves in the angle, and a mean."""
-
-MIN_SAMPLES = 50
-
-CHANCE = 4.0  # standard deviations of what noise shows by chance that a share may be beyond its limit
-FEWEST_PERIODS = 5  # times that a wave repeats in a recording to be a line: what is slower is drift
-
-CHANGE_S = 1.0
-EDGE = 0.02  # distance from the bound of a disturbance's logarithm within which it has reached it
 
 DISTURBANCES = {
     Size.TORQUE: "is more than the noise of a torque reading",
@@ -90,7 +59,7 @@ def widened(hypothesis: Hypothesis, model: DrivelineModel) -> FitResult | None:
     result = hypothesis.result
     wide = _spans(hypothesis, model)
     shared = tuple(
-        replace(each, low=each.low / LOOSE, high=each.high * LOOSE)
+        replace(each, low=each.low / Checks.LOOSE, high=each.high * Checks.LOOSE)
         if pinned and not each.effect and each.name in wide and _is_tight(each, model)
         else each
         for each, pinned in zip(result.problem.shared, result.pinned, strict=False)
@@ -108,7 +77,7 @@ def may_be_loose(shared: Shared, effects: Effects, model: DrivelineModel) -> boo
 
 
 def _is_tight(shared: Shared, model: DrivelineModel) -> bool:
-    return shared.low < shared.high <= 1.0 + model.parameters[shared.name].tolerance + ROUNDING
+    return shared.low < shared.high <= 1.0 + model.parameters[shared.name].tolerance + Checks.ROUNDING
 
 
 def _spans(hypothesis: Hypothesis, model: DrivelineModel) -> dict[str, list[Span]]:
@@ -126,7 +95,7 @@ def _is_described(hypothesis: Hypothesis, model: DrivelineModel) -> bool:
     line = line_values(hypothesis.result)
     for name, spans in _spans(hypothesis, model).items():
         given = model.parameters[name]
-        low, high = (given.value * (1.0 + sign * (given.tolerance + ROUNDING)) for sign in (-1.0, 1.0))
+        low, high = (given.value * (1.0 + sign * (given.tolerance + Checks.ROUNDING)) for sign in (-1.0, 1.0))
         if not any(first <= high and low <= last for first, last in [*spans, (line[name], line[name])]):
             return False
     return True
@@ -136,9 +105,9 @@ def _is_driven(result: FitResult, records: Sequence[Record]) -> bool:
     for i, record in enumerate(records):
         through = shaft_torque(record.torque_nm, record.time_s - record.time_s[0], result.p_of(i))
         for passed, read in zip(
-            np.array_split(through, PARTS), np.array_split(record.total_torque_nm, PARTS), strict=True
+            np.array_split(through, Checks.PARTS), np.array_split(record.total_torque_nm, Checks.PARTS), strict=True
         ):
-            if float(passed @ passed) < LEAST_THROUGH**2 * float(read @ read):
+            if float(passed @ passed) < Checks.LEAST_THROUGH**2 * float(read @ read):
                 return False
     return True
 
@@ -171,7 +140,6 @@ class Test:
     name: str  # what an error that fails it does, in words
     value: float  # of the error
     most: float  # above it the error is more than noise
-    is_share: bool = False  # whether both are shares of the error's power
     key: str = ""  # of `thresholds.toml`; "" for a size of the noise model at its bound
 
     @property
@@ -183,7 +151,7 @@ class Test:
 def tests(best: Hypothesis) -> tuple[Test, ...]:
     """Test what a hypothesis leaves for all that noise may not do; each says how far it is from that."""
     problem = best.result.problem
-    errors = residuals(best, best.white.residual)
+    errors = residuals_by_record(best.white)
     whole = np.concatenate(errors)
     power = float(whole @ whole) / whole.size
     limited = (
@@ -194,10 +162,7 @@ def tests(best: Hypothesis) -> tuple[Test, ...]:
     )
     bounded = (Test(name, float(_is_at_bound(best, size)), 0.5) for size, name in _bounded(best))
     return (
-        *(
-            Test(name, value, TEST_LIMITS[key] + chance(key, whole.size), key in COLUMNS, key)
-            for key, name, value in limited
-        ),
+        *(Test(name, value, Checks.TEST_LIMITS[key] + chance(key, whole.size), key) for key, name, value in limited),
         *bounded,
     )
 
@@ -210,7 +175,7 @@ def tests_in_words(failed: Sequence[Test]) -> str:
 
 def chance(key: str, samples: int) -> float:
     """Return how large a share of so many samples' variance a test finds in noise by chance; 0 where it is no share."""
-    return CHANCE * math.sqrt(2.0 * COLUMNS[key]) / samples if key in COLUMNS else 0.0
+    return Checks.CHANCE * math.sqrt(2.0 * COLUMNS[key]) / samples if key in COLUMNS else 0.0
 
 
 def _bounded(best: Hypothesis) -> list[tuple[Size, str]]:
@@ -218,7 +183,7 @@ def _bounded(best: Hypothesis) -> list[tuple[Size, str]]:
 
 
 def _is_at_bound(best: Hypothesis, size: Size) -> bool:
-    return bool(best.sizes[size] > best.limits.high[size] - EDGE)
+    return bool(best.sizes[size] > best.limits.high[size] - Checks.EDGE)
 
 
 def _dependent(best: Hypothesis, whole: FloatArray) -> float:
@@ -230,7 +195,7 @@ def _dependent(best: Hypothesis, whole: FloatArray) -> float:
     )
     columns = [np.ones(whole.size)]
     for signal in (torque, speed):
-        edges = np.unique(np.quantile(signal, np.linspace(0.0, 1.0, BINS + 1)[1:-1]))
+        edges = np.unique(np.quantile(signal, np.linspace(0.0, 1.0, Checks.BINS + 1)[1:-1]))
         columns += [(np.digitize(signal, edges) == i).astype(float) for i in range(edges.size)]
     columns += [wave(times * angle) for times in (1.0, 2.0) for wave in (np.sin, np.cos)]
     basis = np.linalg.qr(np.column_stack(columns))[0]
@@ -246,14 +211,14 @@ def _driven_by(record: Record) -> FloatArray:
 def _line(error: FloatArray) -> float:
     """Return the largest power at one frequency over the mean power; of what repeats often enough to be a line."""
     power = np.abs(np.fft.rfft(error))[1:] ** 2
-    return float(power[FEWEST_PERIODS - 1 :].max() / power.mean())
+    return float(power[Checks.FEWEST_PERIODS - 1 :].max() / power.mean())
 
 
 def _change(errors: Sequence[FloatArray], records: Sequence[Record], power: float) -> float:
     """Return the largest mean square over a second, or 50 samples, less the mean of all, in standard deviations."""
     found = 0.0
     for error, record in zip(errors, records, strict=True):
-        length = max(1, min(max(round(CHANGE_S / record.sample_time_s), MIN_SAMPLES), error.size))
+        length = max(1, min(max(round(Checks.CHANGE_S / record.sample_time_s), Checks.MIN_SAMPLES), error.size))
         squares = (error[: error.size // length * length] ** 2).reshape(-1, length).mean(axis=1)
         found = max(found, (float(squares.max()) / power - 1.0) * math.sqrt(0.5 * length))
     return found

@@ -26,29 +26,19 @@ from estimator.diagnosis.acquisition.chain import Chain
 from estimator.diagnosis.inference.checks import Test, is_possible, tests
 from estimator.diagnosis.inference.figures import FreeRuns, Unseen, acquired, figures_of, free_runs
 from estimator.diagnosis.inference.fits import Fits
-from estimator.diagnosis.inference.hypotheses import SETTLED_DEVIANCE, Effects, Hypothesis, fitted
+from estimator.diagnosis.inference.hypotheses import NOTHING, Catalogue, Effects, Hypothesis, covariance, fitted
 from estimator.diagnosis.inference.moves import fit_look_alikes
 from estimator.diagnosis.inference.search import Search
-from estimator.diagnosis.inference.sheet import FreeLine, free_line
-from estimator.diagnosis.inference.standing import (
-    ALIKE_SHARE,
-    ALIKE_WITHIN,
-    CLEARLY_BELOW,
-    LEAST_EVIDENCE,
-    LEAST_NECESSITY,
-    LEAST_SHARE,
-    Standing,
-)
-from estimator.diagnosis.inference.trials import Trial, necessity, noise_of
+from estimator.diagnosis.inference.trials import Standing, Trial, necessity, noise_of, tried
+from estimator.diagnosis.noise import noise_floor
 from estimator.diagnosis.result import Fit, FoundEffect, OffNominal, Verdict
+from estimator.diagnosis.thresholds import Fitting, Judging
 from estimator.physics.catalogue import EFFECTS
+from estimator.physics.driveline import Structure
 from estimator.physics.fit import not_fitted
-from estimator.physics.model import DrivelineModel
+from estimator.physics.model import DrivelineModel, parameter_unit
 from estimator.physics.problem import Problem
 from estimator.physics.steps import from_their_moment
-
-NEAREST = 2
-"""Sets of each size that are tried in free simulation: the most probable, and as many that simulate best as fitted."""
 
 Rival = Callable[[Trial, str], Trial | None]
 """A set without a name, and the name, to that set with a free form of one of its own laws; None where it has none."""
@@ -82,8 +72,12 @@ class Judged:
 
     @property
     def noise(self) -> float:
-        """The noise of the reading [unit of the output]."""
-        return noise_of(self.best.hypothesis)
+        """The noise of the reading [unit of the output].
+
+        Disturbances take up what is missing: where more than noise is left, it is at most what can't be predicted.
+        """
+        noise = noise_of(self.best.hypothesis)
+        return min(noise, noise_floor(self.best.hypothesis.result.problem.records)) if self.failed else noise
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,7 +125,7 @@ def _with_runs(judged: Judged, chain: Chain, unseen: Unseen) -> Decision:
 
 def verdict_of(of_spread: float, is_named: bool, is_more_than_noise: bool) -> Verdict:
     """Return the verdict on a set that leaves an error of so much of the signal's spread (CONTRACT)."""
-    if of_spread > CLEARLY_BELOW:
+    if of_spread > Judging.CLEARLY_BELOW:
         return Verdict.UNEXPLAINED
     if is_named:
         return Verdict.PARTLY_EXPLAINED if is_more_than_noise else Verdict.EXPLAINED
@@ -143,7 +137,7 @@ def _objection(decision: Decision) -> str:
     if not decision.judged.named:
         return ""
     fit, runs = decision.figures, decision.runs
-    if runs.final.rms > CLEARLY_BELOW * spread(runs.final.problem):
+    if runs.final.rms > Judging.CLEARLY_BELOW * spread(runs.final.problem):
         return "it leaves as much as the signal itself"
     if fit.augmented < fit.retuned and fit.holdout_augmented < fit.holdout_retuned:
         return ""
@@ -228,7 +222,7 @@ def _needed_beyond(chosen: Trial, tried: Sequence[Trial], noise: float) -> Trial
         for each in tried
         if each.size > chosen.size
         and each.hypothesis.score < chosen.hypothesis.score
-        and necessity(each, chosen, noise).least >= LEAST_NECESSITY
+        and necessity(each, chosen, noise).least >= Judging.LEAST_NECESSITY
         and not any(other.beats(each) for other in tried)
     ]
     return min(better, key=lambda each: (each.size, each.hypothesis.score, sorted(each.effects)), default=None)
@@ -243,7 +237,7 @@ def _is_rather(sheet: FreeLine, model: DrivelineModel, chosen: Trial, noise: flo
     trial = sheet.tried(model)
     if trial.size <= chosen.size:
         return not chosen.clearly_beats(trial)
-    return sheet.leaves_noise and necessity(trial, chosen, noise).least >= LEAST_NECESSITY
+    return sheet.leaves_noise and necessity(trial, chosen, noise).least >= Judging.LEAST_NECESSITY
 
 
 def _nearest(fits: Fits, found: Hypothesis) -> list[Hypothesis]:
@@ -252,8 +246,8 @@ def _nearest(fits: Fits, found: Hypothesis) -> list[Hypothesis]:
     chosen: dict[Effects, Hypothesis] = {each.effects: each for each in (fits.nothing(), found)}
     for size in range(1, len(found.effects) + 1):
         same = [each for each in possible if len(each.effects) == size]
-        chosen |= {each.effects: each for each in sorted(same, key=lambda each: each.score)[:NEAREST]}
-        chosen |= {each.effects: each for each in sorted(same, key=lambda each: each.result.squares)[:NEAREST]}
+        chosen |= {each.effects: each for each in sorted(same, key=lambda each: each.score)[: Judging.NEAREST]}
+        chosen |= {each.effects: each for each in sorted(same, key=lambda each: each.result.squares)[: Judging.NEAREST]}
     return [each for each in chosen.values() if is_possible(each, fits.records)]
 
 
@@ -265,7 +259,7 @@ def _from_its_moment(fits: Fits, hypothesis: Hypothesis) -> Hypothesis:
     initial = not_fitted(turned.problem, turned.x)
     sizes, limits, before = hypothesis.sizes, hypothesis.limits, hypothesis.minus_twice_log
     found = fitted(hypothesis.effects, initial, sizes, limits, fits.catalogue, before)
-    return found if found.score <= hypothesis.score + SETTLED_DEVIANCE else hypothesis
+    return found if found.score <= hypothesis.score + Fitting.SETTLED_DEVIANCE else hypothesis
 
 
 def _standing(name: str, fits: Fits, whole: Trial, noise: float, rival: Rival) -> Standing:
@@ -276,7 +270,7 @@ def _standing(name: str, fits: Fits, whole: Trial, noise: float, rival: Rival) -
     needed = necessity(whole, without, noise)
     evidence = without.hypothesis.score - whole.hypothesis.score
     alike = _alike(name, fits, whole, evidence)
-    slight = TOO_SMALL if share < LEAST_SHARE else "" if fits.is_resolved(whole.hypothesis, name) else TOO_SHORT
+    slight = TOO_SMALL if share < Judging.LEAST_SHARE else "" if fits.is_resolved(whole.hypothesis, name) else TOO_SHORT
     standing = Standing(name, needed, share, evidence, alike, slight=slight)
     return replace(standing, objection=_against(standing, whole, without, rival))
 
@@ -284,9 +278,9 @@ def _standing(name: str, fits: Fits, whole: Trial, noise: float, rival: Rival) -
 def _against(standing: Standing, whole: Trial, without: Trial, rival: Rival) -> str:
     """Return what speaks against a name, as the end of a sentence; "" where nothing does."""
     back = f"{standing.necessity.value:.0%}".replace("%", " %")
-    if standing.necessity.least < LEAST_NECESSITY:
+    if standing.necessity.least < Judging.LEAST_NECESSITY:
         return f"without it {back} of the error beyond the noise comes back, which is too little to be sure"
-    if standing.evidence < LEAST_EVIDENCE:
+    if standing.evidence < Judging.LEAST_EVIDENCE:
         return f"minus twice the log-probability rises by {standing.evidence:.3g} only without it"
     free = rival(without, standing.name)
     if free is not None and not whole.clearly_beats(free):
@@ -297,7 +291,7 @@ def _against(standing: Standing, whole: Trial, without: Trial, rival: Rival) -> 
 def _alike(name: str, fits: Fits, whole: Trial, evidence: float) -> dict[str, Mapping[str, float]]:
     """Return the effects that are as probable in an effect's place and simulate as well, with their values there."""
     best, others = whole.hypothesis, whole.effects - {name}
-    within = max(ALIKE_WITHIN, ALIKE_SHARE * evidence)
+    within = max(Judging.ALIKE_WITHIN, Judging.ALIKE_SHARE * evidence)
     exchanged = [
         each
         for effects, each in sorted(fits.ended.items(), key=lambda item: sorted(item[0]))
@@ -323,6 +317,57 @@ def _no_more_general_than_needed(fits: Fits, whole: Trial, noise: float) -> Tria
                 continue
             trial = fits.trials.one(simpler)
             beyond = float(trial.squares.sum() - whole.squares.sum()) / total
-            if necessity(whole, trial, noise).least < LEAST_NECESSITY or beyond < LEAST_SHARE:
+            if necessity(whole, trial, noise).least < Judging.LEAST_NECESSITY or beyond < Judging.LEAST_SHARE:
                 return _no_more_general_than_needed(fits, trial, noise)
     return whole
+
+
+@dataclass(frozen=True, slots=True)
+class FreeLine:
+    """The nominal line with its values free."""
+
+    hypothesis: Hypothesis  # without effects
+    score: float  # that of the hypothesis, with the price of the choice among the line's values
+    leaves_noise: bool  # whether what it leaves passes for noise
+    off_nominal: tuple[OffNominal, ...]  # what clearly left its tolerance, the clearest first
+
+    def tried(self, model: DrivelineModel) -> Trial:
+        """Return its trial in free simulation, a value off its sheet counted as a law."""
+        return tried(self.hypothesis, model, len(self.off_nominal))
+
+
+def free_line(fits: Fits) -> FreeLine | None:
+    """Fit the nominal line beyond its tolerances; None where these hold nothing back."""
+    nothing = fits.nothing().result
+    shared = nothing.problem.shared
+    trusted = [not s.effect and np.isfinite(s.low) and s.low < s.high for s in shared]
+    if not any(free and at_bound for free, at_bound in zip(trusted, nothing.pinned, strict=False)):
+        return None
+    # a joint has nothing to integrate: of its stiffness and damping, one may be none at all
+    least = 0.0 if nothing.problem.grid.structure is Structure.JOINT else 1.0 / Judging.FREELY
+    freed = tuple(
+        replace(s, low=min(s.low, least), high=max(s.high, Judging.FREELY)) if free else s
+        for s, free in zip(shared, trusted, strict=True)
+    )
+    problem = replace(nothing.problem, shared=freed)
+    sizes = fits.nothing().sizes
+    initial = not_fitted(problem, nothing.x)
+    found = fitted(NOTHING, initial, sizes, fits.limits, fits.catalogue, fits.nothing().minus_twice_log)
+    off_nominal = _off_nominal(fits, found)
+    if not off_nominal:
+        return None
+    chosen = Catalogue(len(fits.names) + sum(trusted)).choices(frozenset(each.name for each in off_nominal))
+    return FreeLine(found, found.score + 2.0 * chosen, not any(test.failed for test in tests(found)), off_nominal)
+
+
+def _off_nominal(fits: Fits, found: Hypothesis) -> tuple[OffNominal, ...]:
+    spread = np.sqrt(np.maximum(np.diag(covariance(found)), 0.0))
+    clear = []
+    for i, trusted in enumerate(fits.nothing().result.problem.shared):
+        ratio = float(found.result.x[i])
+        by = max(trusted.low - ratio, ratio - trusted.high)
+        if not trusted.effect and trusted.low < trusted.high and by > Judging.CLEARLY * spread[i]:
+            sureness = by / max(float(spread[i]), np.finfo(float).tiny)
+            given, unit = fits.model.parameters[trusted.name], parameter_unit(trusted.name, fits.model.motion)
+            clear.append((sureness, OffNominal(trusted.name, ratio, trusted.high - 1.0, given.value, unit)))
+    return tuple(value for _, value in sorted(clear, key=lambda each: -each[0]))

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from estimator.diagnosis.thresholds import Fitting
 from estimator.least_squares import damped_step
 from estimator.physics.fit import FitResult, in_common
 from estimator.physics.jacobian import jacobian_at
@@ -21,12 +22,6 @@ from estimator.physics.problem import Problem, bounds, outputs_at, residual_at
 from estimator.signals.record import FloatArray
 
 Weigh = Callable[[FloatArray], FloatArray]
-
-LITTLE = 0.2  # fall of the squared innovations, of variance 1, that changes no conclusion
-LEAST_SHARE_OF_PROMISE = 0.5  # share of a step's promise that it must keep for the derivative to be carried on
-
-NEAR = 10.0
-"""Fall of the squared innovations over a step behind which a derivative that was found anew still holds."""
 
 FIRST_DAMPING = 1e-3
 EASE, STIFFEN = 0.2, 5.0
@@ -105,14 +100,14 @@ class _Descent:
         while True:
             moved = damped_step(self._x, gradient, curvature, self._damping, self._low, self._high)
             promise = float(-moved @ (2.0 * gradient + curvature @ moved))
-            if promise < LITTLE:
+            if promise < Fitting.LITTLE:
                 self._converged = self._fresh
                 return not self._fresh and self._find_derivative()
             gained = self._try(moved)
             if gained > 0.0:
                 self._damping = max(self._damping * EASE, LEAST_DAMPING)
-                self._fresh = self._fresh and LEAST_SHARE_OF_PROMISE * promise <= gained < NEAR
-                return gained >= LEAST_SHARE_OF_PROMISE * promise or self._left == 0 or self._find_derivative()
+                self._fresh = self._fresh and Fitting.LEAST_SHARE_OF_PROMISE * promise <= gained < Fitting.NEAR
+                return gained >= Fitting.LEAST_SHARE_OF_PROMISE * promise or self._left == 0 or self._find_derivative()
             if not self._fresh:
                 return self._find_derivative()
             self._damping *= STIFFEN

@@ -2,125 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from enum import IntEnum
 from functools import partial
 
 import numpy as np
-from scipy.linalg import expm
 
-from estimator.diagnosis.line.blocks import LASTS, FormPlace, form_changes
+from estimator.diagnosis.line.line import LASTS, FormPlace, LinearLine, form_changes, line_of
 from estimator.diagnosis.line.whitening import Gains, Terms, fill_gains, innovate, terms_of
 from estimator.diagnosis.noise import noise_floor
+from estimator.diagnosis.priors import DisturbancePriors
+from estimator.diagnosis.thresholds import Fitting
 from estimator.physics.fit import FitResult
-from estimator.physics.layout import slot
-from estimator.physics.model import Structure
 from estimator.physics.motion import torque_scale
 from estimator.physics.parallel import check_time
 from estimator.physics.problem import Rows
 from estimator.signals.correlation import stand_in_variance
-from estimator.signals.record import BoolArray, FloatArray, Location, OutputKind, Record, by_output
+from estimator.signals.record import BoolArray, FloatArray, OutputKind, Record, by_output
 
 READING = 3  # how many sizes are of an output's reading
 
-TORQUE_SHARE, DRIFT_SHARE, WALK_SHARE = 2e-3, 2e-3, 5e-4
-"""Usual sizes as shares of the torque in use: a reading of a per mille of the rated torque, its drift, and the change
-of the load in a second (a grade of half a per mille, a breath of wind)."""
-
-FORM_SHARE, MOST_FORM = 0.1, 0.5
-"""Usual share of a law's change by which its form is off, and the share beyond which it is another law."""
-
-MOST_TORQUE, MOST_DRIFT, MOST_WALK = 2e-2, 2e-2, 5e-3
-"""Sizes beyond which such a disturbance is physics to be named."""
-
-COLOUR_S, DRIFT_S = 0.03, 3.0
-"""Usual correlation times of a sensor's coloured noise and of a current sensor's drift [s]."""
-
-PRIOR_SPREAD = 1.5
-"""Standard deviation of the logarithm of a size around the usual one: a factor of 20 is two of them."""
-
 STEP = 1e-4  # change of a logarithm by which derivatives are found
-ENOUGH = 0.5  # fall of minus twice the log-posterior below which sizes are estimated
-
-
-@dataclass(frozen=True, slots=True)
-class LinearLine:
-    """The linear line as disturbances see it, sampled."""
-
-    f: FloatArray  # (n, n): how the state changes from sample to sample
-    torque: FloatArray  # (n,)
-    load: FloatArray  # (n,)
-    h: FloatArray  # (C, n): how each output shows the state
-    direct: float = 0.0  # how the load shows in the output at once
-    shaft: FloatArray = field(default_factory=lambda: np.zeros(0))  # (n,)
-
-
-def line_of(result: FitResult) -> LinearLine:
-    """Return the linear line with a fit's values, as the recordings' outputs show it.
-
-    Effects beyond it do not change how disturbances spread.
-    """
-    records, structure = result.problem.records, result.problem.grid.structure
-    outputs = [records[part.start] for part in by_output(records)]
-    if structure is Structure.JOINT:
-        nothing = np.zeros(0)
-        return LinearLine(np.zeros((0, 0)), nothing, nothing, np.zeros((len(outputs), 0)), 1.0)
-    values = {name: float(result.p[slot("", name)]) for name in structure.parameter_names}
-    a, at_motor, at_load = _continuous(values)
-    n = a.shape[0]
-    h = np.array([_seen(record, a, values) / record.unit for record in outputs])
-    joined = np.zeros((n + 3, n + 3))
-    joined[:n, :n], joined[:n, n], joined[:n, n + 1], joined[:n, n + 2] = a, at_motor, at_load, _in_shaft(values)
-    moved = expm(joined * outputs[0].sample_time_s)
-    keep = list(range(n if h[:, -1].any() else n - 1))  # the angle stands last
-    return LinearLine(
-        moved[np.ix_(keep, keep)], moved[keep, n], moved[keep, n + 1], h[:, keep], 0.0, moved[keep, n + 2]
-    )
-
-
-def _seen(record: Record, a: FloatArray, values: Mapping[str, float]) -> FloatArray:
-    """Return how the state of a chain shows in an output; what a torque adds to an acceleration at once is left out."""
-    h, is_load = np.zeros(a.shape[0]), record.location is Location.LOAD
-    speed = h.size - 2 if is_load else 0
-    if record.kind is OutputKind.TORQUE:
-        h[:3] = values["c"], values["k"], -values["c"]
-    elif record.kind is OutputKind.ACCELERATION:
-        h[:] = a[speed]
-    elif record.kind is OutputKind.POSITION:
-        h[-1], h[1:-1:2] = 1.0, -float(is_load)  # behind the shafts less their twists
-    else:
-        h[speed] = 1.0
-    return h
-
-
-def _in_shaft(values: Mapping[str, float]) -> FloatArray:
-    """Return how a torque more in the first shaft drives a chain: back on the motor, and on what is behind it."""
-    inertias = [values[name] for name in ("J_M", "J_2", "J_L") if name in values]
-    at_shaft = np.zeros(2 * len(inertias))
-    if len(inertias) > 1:
-        at_shaft[[0, 2]] = -1.0 / inertias[0], 1.0 / inertias[1]
-    return at_shaft
-
-
-def _continuous(values: dict[str, float]) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return state matrix and inputs of a chain: speeds and twists in turn, last the motor's angle."""
-    inertias = [values[name] for name in ("J_M", "J_2", "J_L") if name in values]
-    springs = [(values[k], values[c]) for k, c in (("k", "c"), ("k_2", "c_2")) if k in values]
-    viscous = [values["b_M"], *[0.0] * (len(inertias) - 2), *([values["b_L"]] if "b_L" in values else [])]
-    n = 2 * len(inertias)
-    a, at_motor, at_load = np.zeros((n, n)), np.zeros(n), np.zeros(n)
-    a[n - 1, 0] = 1.0
-    for i, (inertia, b) in enumerate(zip(inertias, viscous, strict=True)):
-        a[2 * i, 2 * i] -= b / inertia
-    for i, (k, c) in enumerate(springs):
-        left, twist, right = 2 * i, 2 * i + 1, 2 * i + 2
-        a[twist, left], a[twist, right] = 1.0, -1.0
-        for speed, sign, inertia in ((left, -1.0, inertias[i]), (right, 1.0, inertias[i + 1])):
-            a[speed, [twist, left, right]] += sign / inertia * np.array([k, c, -c])
-    at_motor[0] = 1.0 / inertias[0]
-    at_load[n - 2] = -1.0 / inertias[-1]
-    return a, at_motor, at_load
 
 
 class Size(IntEnum):
@@ -137,11 +40,6 @@ class Size(IntEnum):
     DRIFT_S = 5
     WALK = 6
     FORM = 7
-
-
-def of_first(sizes: FloatArray) -> FloatArray:
-    """Return the noise model of the first output alone, shape (8,)."""
-    return sizes[: len(Size)]
 
 
 def readings(sizes: FloatArray) -> FloatArray:
@@ -276,10 +174,6 @@ class Limits:
         low[Size.FORM] = high[Size.FORM] = self.usual[Size.FORM]
         return replace(self, low=low, high=high)
 
-    def of_first(self) -> Limits:
-        """Return those of the first output alone."""
-        return Limits(*(of_first(each) for each in (self.usual, self.low, self.high)))
-
 
 def reading_noise(sizes: FloatArray) -> FloatArray:
     """Return the standard deviation of each output's noise, white and coloured [unit of the output]; shape (C,)."""
@@ -306,21 +200,26 @@ def limits_for(records: Sequence[Record], white: float) -> Limits:
         [
             white,
             0.5 * white,
-            COLOUR_S,
-            TORQUE_SHARE * torque,
-            DRIFT_SHARE * torque,
-            DRIFT_S,
-            WALK_SHARE * torque,
-            FORM_SHARE,
+            DisturbancePriors.COLOUR_S,
+            DisturbancePriors.TORQUE_SHARE * torque,
+            DisturbancePriors.DRIFT_SHARE * torque,
+            DisturbancePriors.DRIFT_S,
+            DisturbancePriors.WALK_SHARE * torque,
+            DisturbancePriors.FORM_SHARE,
         ]
     )
-    low, high = usual - np.log(1e3), usual + np.log(1e3)
-    low[Size.COLOUR_S], high[Size.COLOUR_S] = np.log([0.5 * period_s, max(0.3, 4.0 * period_s)])
-    low[Size.DRIFT_S], high[Size.DRIFT_S] = np.log([max(0.5, 4.0 * period_s), 20.0])
-    high[Size.FORM] = np.log(MOST_FORM)
-    high[Size.TORQUE] = np.log(MOST_TORQUE * torque)
-    high[Size.DRIFT] = np.log(MOST_DRIFT * torque)
-    high[Size.WALK] = np.log(MOST_WALK * torque)
+    low, high = usual - np.log(DisturbancePriors.FACTOR), usual + np.log(DisturbancePriors.FACTOR)
+    few_periods_s = DisturbancePriors.FEW_PERIODS * period_s
+    low[Size.COLOUR_S], high[Size.COLOUR_S] = np.log(
+        [0.5 * period_s, max(DisturbancePriors.MOST_COLOUR_S, few_periods_s)]
+    )
+    low[Size.DRIFT_S], high[Size.DRIFT_S] = np.log(
+        [max(DisturbancePriors.LEAST_DRIFT_S, few_periods_s), DisturbancePriors.MOST_DRIFT_S]
+    )
+    high[Size.FORM] = np.log(DisturbancePriors.MOST_FORM)
+    high[Size.TORQUE] = np.log(DisturbancePriors.MOST_TORQUE * torque)
+    high[Size.DRIFT] = np.log(DisturbancePriors.MOST_DRIFT * torque)
+    high[Size.WALK] = np.log(DisturbancePriors.MOST_WALK * torque)
     if in_output:  # of an imposed motion nothing is integrated: torque noise is the reading's
         high[[Size.TORQUE, Size.DRIFT]] = usual[[Size.TORQUE, Size.DRIFT]] = low[[Size.TORQUE, Size.DRIFT]]
     return Limits(np.clip(usual, low, high), low, high)
@@ -328,7 +227,7 @@ def limits_for(records: Sequence[Record], white: float) -> Limits:
 
 def minus_twice_log_prior(sizes: FloatArray, limits: Limits) -> float:
     """Return how far a noise model is from the usual one."""
-    return float(np.sum(((sizes - limits.usual) / PRIOR_SPREAD) ** 2))
+    return float(np.sum(((sizes - limits.usual) / DisturbancePriors.PRIOR_SPREAD) ** 2))
 
 
 def starts(sizes: FloatArray, limits: Limits) -> list[FloatArray]:
@@ -377,8 +276,10 @@ def estimate(
         # d(innovation / spread) holds both changes: e' = de/s - e dlog s
         pure = by_error + innovations * by_log
         gradient = 2.0 * by_log.sum(axis=1) + 2.0 * by_error @ innovations
-        gradient += 2.0 * (sizes - limits.usual) / PRIOR_SPREAD**2
-        information = 4.0 * by_log @ by_log.T + 2.0 * pure @ pure.T + 2.0 * np.eye(sizes.size) / PRIOR_SPREAD**2
+        gradient += 2.0 * (sizes - limits.usual) / DisturbancePriors.PRIOR_SPREAD**2
+        information = (
+            4.0 * by_log @ by_log.T + 2.0 * pure @ pure.T + 2.0 * np.eye(sizes.size) / DisturbancePriors.PRIOR_SPREAD**2
+        )
         promised = 0.0
         while damping < 1e6:
             at_bound = ((sizes <= limits.low) & (gradient > 0.0)) | ((sizes >= limits.high) & (gradient < 0.0))
@@ -394,6 +295,6 @@ def estimate(
                 sizes, value, innovations, logs = tried, moved_value, moved_innovations, moved_logs
                 break
             damping *= 5.0
-        if promised < ENOUGH:
+        if promised < Fitting.ENOUGH:
             break
     return sizes, value

@@ -21,7 +21,7 @@ from estimator.diagnosis.assemble import (
     rms_of,
 )
 from estimator.diagnosis.inference.descent import descended
-from estimator.diagnosis.inference.disturbances import Size, reading_noise
+from estimator.diagnosis.inference.disturbances import Size, reading_noise, whitener_of
 from estimator.diagnosis.inference.hypotheses import (
     GRADE,
     NOTHING,
@@ -29,13 +29,11 @@ from estimator.diagnosis.inference.hypotheses import (
     Effects,
     Hypothesis,
     all_good_samples,
-    refitted,
 )
 from estimator.diagnosis.inference.spread import beyond_the_line, with_secants
-from estimator.diagnosis.inference.standing import LEAST_SHARE, Standing
-from estimator.diagnosis.inference.trials import blocks
-from estimator.diagnosis.noise import SMALLEST_P
+from estimator.diagnosis.inference.trials import Standing, blocks
 from estimator.diagnosis.result import Evidence, Fit, FoundEffect, OutputFit, Trace
+from estimator.diagnosis.thresholds import Judging, Noise
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import FitResult, fit, not_fitted, warm_start
 from estimator.physics.free_run import simulate_foreign
@@ -160,7 +158,7 @@ def found_effect(standing: Standing, runs: FreeRuns) -> FoundEffect:
         profiles, parameters = profiles_of(course, of_course, model), profile_size(course, of_course, model)
     else:
         parameters = parameters_of(standing.name, runs.estimate, runs.covariance, model)
-    p_value = max(math.exp(-0.5 * max(standing.evidence, 0.0)), SMALLEST_P)
+    p_value = max(math.exp(-0.5 * max(standing.evidence, 0.0)), Noise.SMALLEST_P)
     return FoundEffect(
         name=entry.name,
         element=entry.element,
@@ -283,7 +281,7 @@ def acquired(runs: FreeRuns) -> tuple[FoundEffect, ...]:
     if not chain.findings:
         return ()
     before = [(out - raw.output)[raw.okay] for out, raw in zip(runs.final.outputs, chain.raw, strict=True)]
-    least = LEAST_SHARE * sum(float(error @ error) for error in before)
+    least = Judging.LEAST_SHARE * sum(float(error @ error) for error in before)
     added = zip(chain.findings, chain.added_squares(runs.final), strict=True)
     findings = [finding for finding, squares in added if squares >= least]
     return acquired_effects(findings, before, chain.errors(runs.final.outputs))
@@ -347,3 +345,9 @@ def courses_of(runs: FreeRuns) -> tuple[Trace, ...]:
 def _trace(r: Record, runs: Sequence[FloatArray], holdout: bool) -> Trace:
     nominal, retuned, augmented = runs
     return Trace(r.name, r.time_s, r.torque_nm, r.output, r.okay, nominal, retuned, augmented, holdout)
+
+
+def refitted(hypothesis: Hypothesis, problem: Problem) -> FitResult:
+    """Return the fit of a hypothesis to other samples of the same recordings, its disturbances as they are."""
+    initial = not_fitted(problem, hypothesis.result.x)
+    return descended(initial, whitener_of(initial, hypothesis.sizes), THOROUGH)

@@ -8,7 +8,7 @@ gone, or is written another way begins where the rest of it was fitted before.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from threading import Lock
@@ -16,24 +16,11 @@ from threading import Lock
 from estimator.diagnosis.inference.checks import is_plausible, may_be_loose, widened
 from estimator.diagnosis.inference.descent import extended
 from estimator.diagnosis.inference.disturbances import Limits, limits_of
-from estimator.diagnosis.inference.hypotheses import (
-    GRADE,
-    NOTHING,
-    Catalogue,
-    Effects,
-    Hypothesis,
-    compared,
-    fitted,
-    forgetting,
-    inheriting,
-    line_values,
-    unknowns_of,
-    with_effect,
-    with_line_values,
-)
+from estimator.diagnosis.inference.hypotheses import GRADE, NOTHING, Catalogue, Effects, Hypothesis, compared, fitted
 from estimator.diagnosis.inference.score_tests import ScoredStart, promising
 from estimator.diagnosis.inference.trials import Trials
 from estimator.diagnosis.inference.weighted_score_tests import OutputChanges, WeightedScoreTests
+from estimator.diagnosis.line.line import line_values
 from estimator.diagnosis.noise import noise_floor
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import FitResult, not_fitted, warm_start
@@ -41,7 +28,7 @@ from estimator.physics.layout import Grid, grid_for
 from estimator.physics.model import DrivelineModel
 from estimator.physics.parallel import Work
 from estimator.physics.problem import Problem, make_problem, start_vector
-from estimator.physics.unknowns import Release, nominal_unknowns, own_unknowns, released
+from estimator.physics.unknowns import Release, Shared, nominal_unknowns, own_unknowns, released
 from estimator.signals.record import BoolArray, Record
 
 
@@ -287,3 +274,55 @@ class Fits:
             known = self.ended.get(hypothesis.effects)
             if known is None or hypothesis.score < known.score:
                 self.ended[hypothesis.effects] = hypothesis
+
+
+def with_effect(effects: Effects, name: str) -> Effects:
+    """Add an effect to a set; it replaces the special cases of itself."""
+    return (effects - set(EFFECTS[name].contains)) | {name}
+
+
+def inheriting(name: str, release: Release, previous: FitResult) -> Release:
+    """Return a start of a general law that keeps what a fit of its special case has found out by another telling.
+
+    Friction that was seen to bend before it slides does so with a Stribeck range, too: begun without, such a fit is far
+    behind the special case and would be given up.
+    """
+    found = {
+        key: value for special in EFFECTS[name].contains for key, value in previous.values_of(special).items() if value
+    }
+    limits = {parameter.name: (parameter.low, parameter.high) for parameter in EFFECTS[name].parameters}
+
+    def inherited(unknown: Shared) -> Shared:
+        if unknown.low < unknown.high or unknown.name not in found:
+            return unknown
+        low, high = limits[unknown.name]
+        return replace(unknown, low=low, high=high, start=min(max(found[unknown.name] / unknown.scale, low), high))
+
+    return replace(release, shared=tuple(inherited(unknown) for unknown in release.shared))
+
+
+def forgetting(result: FitResult, name: str) -> FitResult:
+    """Return a fit as if the parameters of an effect that all recordings share had not been released in it."""
+    keep = [shared.effect != name for shared in result.problem.shared]
+    shared = tuple(each for each, kept in zip(result.problem.shared, keep, strict=True) if kept)
+    left = [*keep, *[True] * (result.x.size - len(keep))]
+    problem = replace(result.problem, shared=shared)
+    return replace(result, problem=problem, x=result.x[left], derivative=None)  # which was found with the effect
+
+
+def with_line_values(result: FitResult, line: Mapping[str, float]) -> FitResult:
+    """Return a fit with some of the line's own parameters elsewhere, within what they are trusted to."""
+    x = result.x.copy()
+    for i, shared in enumerate(result.problem.shared):
+        if not shared.effect and shared.name in line:
+            x[i] = min(max(line[shared.name] / shared.scale, shared.low), shared.high)
+    return replace(result, x=x)
+
+
+def unknowns_of(previous: FitResult, effects: Collection[str]) -> Release:
+    """Return the unknowns of a fit that belong to the line itself or to some effects."""
+    wanted = {"", *effects}
+    return Release(
+        tuple(unknown for unknown in previous.problem.shared if unknown.effect in wanted),
+        tuple(tuple(unknown for unknown in basis.own if unknown.effect in wanted) for basis in previous.problem.local),
+    )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -15,23 +15,20 @@ from estimator.diagnosis.inference.disturbances import (
     Limits,
     Whitener,
     estimated,
-    minus_twice_log_prior,
-    of_first,
     readings,
     whitener_of,
 )
 from estimator.diagnosis.inference.moments import has_moments, idle_moments, with_better_moments
+from estimator.diagnosis.thresholds import Fitting
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Untestable
-from estimator.physics.fit import FitResult, not_fitted
+from estimator.physics.fit import FitResult
 from estimator.physics.jacobian import jacobian_at
-from estimator.physics.layout import slot
 from estimator.physics.machine import out_of_question
 from estimator.physics.model import DrivelineModel, Motion
 from estimator.physics.motion import turns_on
-from estimator.physics.problem import Problem, bounds
-from estimator.physics.unknowns import Release, Shared
-from estimator.signals.record import BoolArray, FloatArray, Record, by_output
+from estimator.physics.problem import bounds
+from estimator.signals.record import BoolArray, FloatArray, Record
 
 Effects = frozenset[str]
 NOTHING: Effects = frozenset()
@@ -42,31 +39,12 @@ GRADE = "road_grade"
 Progress = Callable[[str, float], None]
 """Called with what is being done and the share of the work behind it; raise from it to cancel."""
 
-SETTLED_DEVIANCE = 1.0
-"""Fall of minus twice the log-likelihood below which another pass over unknowns and disturbances is not made."""
-
-DIGITS = 0.02  # the same over the difference from a rival that the fit is for
-
-MOST_PASSES = 6
-
 THOROUGH, ROUGH = Effort(derivatives=6, steps=30), Effort(derivatives=1, steps=6)
 """What a pass may cost at most, and a first comparison."""
-
-MOST_ROUGH, MUCH = 3, 0.05
-"""Such comparisons under disturbances of their own at most, and the fall of minus twice the log-likelihood per sample
-for the next."""
-
-ROUNDS = 2  # steps of Fisher scoring in a pass
-WITH_MOMENTS = 1  # passes in which moments of events are looked for elsewhere
 
 
 def silent(_message: str, _share: float) -> None:
     """Report nothing."""
-
-
-def with_effect(effects: Effects, name: str) -> Effects:
-    """Add an effect to a set; it replaces the special cases of itself."""
-    return (effects - set(EFFECTS[name].contains)) | {name}
 
 
 def open_hypotheses(model: DrivelineModel, records: Sequence[Record]) -> tuple[tuple[str, ...], dict[str, Untestable]]:
@@ -97,58 +75,6 @@ def open_hypotheses(model: DrivelineModel, records: Sequence[Record]) -> tuple[t
 def all_good_samples(records: Sequence[Record]) -> list[BoolArray]:
     """Return masks that use every good sample."""
     return [np.asarray(record.okay) for record in records]
-
-
-def unknowns_of(previous: FitResult, effects: Collection[str]) -> Release:
-    """Return the unknowns of a fit that belong to the line itself or to some effects."""
-    wanted = {"", *effects}
-    return Release(
-        tuple(unknown for unknown in previous.problem.shared if unknown.effect in wanted),
-        tuple(tuple(unknown for unknown in basis.own if unknown.effect in wanted) for basis in previous.problem.local),
-    )
-
-
-def inheriting(name: str, release: Release, previous: FitResult) -> Release:
-    """Return a start of a general law that keeps what a fit of its special case has found out by another telling.
-
-    Friction that was seen to bend before it slides does so with a Stribeck range, too: begun without, such a fit is far
-    behind the special case and would be given up.
-    """
-    found = {
-        key: value for special in EFFECTS[name].contains for key, value in previous.values_of(special).items() if value
-    }
-    limits = {parameter.name: (parameter.low, parameter.high) for parameter in EFFECTS[name].parameters}
-
-    def inherited(unknown: Shared) -> Shared:
-        if unknown.low < unknown.high or unknown.name not in found:
-            return unknown
-        low, high = limits[unknown.name]
-        return replace(unknown, low=low, high=high, start=min(max(found[unknown.name] / unknown.scale, low), high))
-
-    return replace(release, shared=tuple(inherited(unknown) for unknown in release.shared))
-
-
-def forgetting(result: FitResult, name: str) -> FitResult:
-    """Return a fit as if the parameters of an effect that all recordings share had not been released in it."""
-    keep = [shared.effect != name for shared in result.problem.shared]
-    shared = tuple(each for each, kept in zip(result.problem.shared, keep, strict=True) if kept)
-    left = [*keep, *[True] * (result.x.size - len(keep))]
-    problem = replace(result.problem, shared=shared)
-    return replace(result, problem=problem, x=result.x[left], derivative=None)  # which was found with the effect
-
-
-def line_values(result: FitResult) -> dict[str, float]:
-    """Return the values of the line's own parameters in a fit, those that it may not change among them."""
-    return {name: float(result.p[slot("", name)]) for name in result.problem.grid.structure.parameter_names}
-
-
-def with_line_values(result: FitResult, line: Mapping[str, float]) -> FitResult:
-    """Return a fit with some of the line's own parameters elsewhere, within what they are trusted to."""
-    x = result.x.copy()
-    for i, shared in enumerate(result.problem.shared):
-        if not shared.effect and shared.name in line:
-            x[i] = min(max(line[shared.name] / shared.scale, shared.low), shared.high)
-    return replace(result, x=x)
 
 
 @dataclass(frozen=True)
@@ -229,13 +155,17 @@ def fitted(
     result, choices, sizes = initial, catalogue.choices(effects), np.clip(sizes, limits.low, limits.high)
     best: Hypothesis | None = None
     passes: list[float] = []
-    while best is None or len(passes) < MOST_PASSES:
+    while best is None or len(passes) < Fitting.MOST_PASSES:
         result = descended(result, whitener_of(result, sizes), THOROUGH)
-        if len(passes) < WITH_MOMENTS:
+        if len(passes) < Fitting.WITH_MOMENTS:
             result = _with_moments(result, sizes)
         is_anew = not passes and math.isnan(rival)  # with a rival they begin where its own ended
-        sizes, now = estimated(result, result.residual, sizes, limits, ROUNDS, is_anew)
-        enough = SETTLED_DEVIANCE if math.isnan(rival) else max(SETTLED_DEVIANCE, DIGITS * abs(now - rival))
+        sizes, now = estimated(result, result.residual, sizes, limits, Fitting.ROUNDS, is_anew)
+        enough = (
+            Fitting.SETTLED_DEVIANCE
+            if math.isnan(rival)
+            else max(Fitting.SETTLED_DEVIANCE, Fitting.DIGITS * abs(now - rival))
+        )
         last = best is not None and now > best.minus_twice_log - enough
         if best is None or now < best.minus_twice_log:
             best = Hypothesis(effects, result, sizes, limits, now, choices)
@@ -249,38 +179,15 @@ def compared(
     effects: Effects, initial: FitResult, parent: Hypothesis, limits: Limits, catalogue: Catalogue
 ) -> Hypothesis:
     """Fit a hypothesis a few steps from another's disturbances, to be compared with others like it."""
+    result, choices, now = initial, catalogue.choices(effects), math.inf
     sizes, best = np.clip(parent.sizes, limits.low, limits.high), parent.minus_twice_log
-    result, now = initial, math.inf
-    for _ in range(MOST_ROUGH):
+    for _ in range(Fitting.MOST_ROUGH):
         result = descended(result, whitener_of(result, sizes), ROUGH)
         sizes, now = estimated(result, result.residual, sizes, limits, rounds=1)
-        if now > best - MUCH * result.residual.size:
+        if now > best - Fitting.MUCH * result.residual.size:
             break
         best = now
-    return Hypothesis(effects, result, sizes, limits, now, catalogue.choices(effects))
-
-
-def refitted(hypothesis: Hypothesis, problem: Problem) -> FitResult:
-    """Return the fit of a hypothesis to other samples of the same recordings, its disturbances as they are."""
-    initial = not_fitted(problem, hypothesis.result.x)
-    return descended(initial, whitener_of(initial, hypothesis.sizes), THOROUGH)
-
-
-def samples_of(result: FitResult) -> FloatArray:
-    """Return how many samples count of each output, shape (C,)."""
-    use = result.problem.use
-    return np.array([sum(int(each.sum()) for each in use[part]) for part in by_output(result.problem.records)])
-
-
-def of_first_outputs(hypothesis: Hypothesis) -> Hypothesis:
-    """Return a hypothesis as the recordings' first outputs see it; itself where there is only one output."""
-    result = hypothesis.result.first_outputs()
-    if result is hypothesis.result:
-        return hypothesis
-    sizes, limits = of_first(hypothesis.sizes), hypothesis.limits.of_first()
-    filtered = whitener_of(result, sizes)
-    now = filtered.minus_twice_log(filtered(result.residual)) + minus_twice_log_prior(sizes, limits)
-    return Hypothesis(hypothesis.effects, result, sizes, limits, now, hypothesis.choices)
+    return Hypothesis(effects, result, sizes, limits, now, choices)
 
 
 def _with_moments(result: FitResult, sizes: FloatArray) -> FitResult:
@@ -303,9 +210,3 @@ def covariance(hypothesis: Hypothesis) -> FloatArray:
     j = white.jacobian[:, free]
     full[np.ix_(free, free)] = np.linalg.pinv(j.T @ j, hermitian=True)
     return full
-
-
-def residuals(hypothesis: Hypothesis, stacked: FloatArray) -> Sequence[FloatArray]:
-    """Split a stacked residual into those of each recording."""
-    ends = np.cumsum([int(use.sum()) for use in hypothesis.result.problem.use])[:-1]
-    return np.split(stacked, ends)

@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from estimator.diagnosis.inference.disturbances import Whitener
+from estimator.diagnosis.thresholds import Fitting
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import MOMENT_NAMES, FitResult
 from estimator.physics.jacobian import changes
@@ -21,10 +22,6 @@ from estimator.signals.record import FloatArray, Record
 OFFSETS_S = np.array([0.01, 0.02, 0.04, 0.08, 0.15, 0.3, 0.6, 1.2, 2.4, 5.0, 10.0])
 OFFSETS_S = np.concatenate([-OFFSETS_S[::-1], OFFSETS_S])
 """Where else the likelihood is looked at, around the moment a fit ended at; and at the recording's own ends."""
-
-WORTH_MOVING = 2.0  # fall of the squared innovations that moments elsewhere must bring
-
-MOVES = 4
 
 
 def with_better_moments(result: FitResult, filtered: Whitener) -> tuple[Problem, FloatArray] | None:
@@ -66,7 +63,7 @@ def _moved_in(result: FitResult, filtered: Whitener, index: int) -> FloatArray |
     for begin, end in ends:
         may_move = [row for row in (begin, end) if basis.low[row] < basis.high[row]]
         sets = [[row] for row in may_move] + ([may_move] if len(may_move) > 1 else [])
-        for _ in range(MOVES):
+        for _ in range(Fitting.MOVES):
             tried = [_shifted(local, rows, offset) for rows in sets for offset in OFFSETS_S]
             tried += [_shifted(local, [row], {begin: first, end: last}[row] - local[row]) for row in may_move]
             tried = [each for each in tried if first <= each[begin] <= each[end] <= max(last, local[end])]
@@ -76,7 +73,7 @@ def _moved_in(result: FitResult, filtered: Whitener, index: int) -> FloatArray |
             if squares.min() >= best:
                 break
             best, local = float(squares.min()), tried[int(squares.argmin())]
-    return local if best < began - WORTH_MOVING else None
+    return local if best < began - Fitting.WORTH_MOVING else None
 
 
 def _shifted(local: FloatArray, rows: list[int], offset_s: float) -> FloatArray:

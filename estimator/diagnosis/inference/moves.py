@@ -16,6 +16,8 @@ from estimator.diagnosis.inference.fits import Fits
 from estimator.diagnosis.inference.hypotheses import GRADE, Hypothesis, open_hypotheses
 from estimator.diagnosis.inference.score_tests import ScoredStart, Screen, promising
 from estimator.diagnosis.inference.weighted_score_tests import WeightedScoreTests
+from estimator.diagnosis.priors import EffectPriors
+from estimator.diagnosis.thresholds import Searching
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Element
 from estimator.physics.jacobian import jacobian_at
@@ -27,32 +29,6 @@ from estimator.physics.steps import Moments, moments_of
 from estimator.physics.unknowns import Release
 
 BLIND = "speed_sign_blind"
-
-MOST_FITS = 6  # effects that are fitted on top of a set, the most promising of a first look
-WORTH_FITTING = 0.1  # share of the best promise below which an effect is not fitted
-
-FEWEST_FITS = 2
-"""Effects that are fitted however little a first look promises: a gap shows only near its own width."""
-
-SAME_PROMISE = 0.5  # share of what an effect promises that a look-alike must promise in its place
-
-NEARLY = 0.3
-"""Share of what an effect explains by which another's first few steps may be behind for it to be fitted to its end."""
-
-FINISHED = 2  # best of these that are fitted to their end
-STARTS = 5  # effects from each of which a search begins, the most promising
-
-COMMON = (
-    "coulomb_friction_motor",
-    "load_imbalance",
-    "backlash",
-    "actuator_lag",
-    "transport_delay",
-    "inverter_gain_mismatch",
-    "aerodynamic_drag",
-)
-"""Laws that most machines have: each search begins from these, too, whatever a look at the bare line promises of them.
-Dry friction, for one, shows little around a line that has settled on too much damping."""
 
 Starts = Mapping[str, Sequence[ScoredStart]]
 
@@ -68,7 +44,7 @@ def additions(fits: Fits, current: Hypothesis) -> list[Hypothesis]:
     missed = [each for each in _most_missed(fits, current, list(looked)) if _is_elsewhere(*each, starts)]
     tried = [*starts.items(), *((name, [start]) for name, start in missed)]
     rough = concurrently(lambda each: fits.added(current, *each), tried)
-    most = FINISHED if current.effects else STARTS
+    most = Searching.FINISHED if current.effects else Searching.STARTS
     found = sorted((each for each in rough[: len(starts)] if each is not None), key=lambda each: each.score)
     near = [each for each in found[:most] if _may_be_best(each, found[0], current)]
     near += [each for each in rough[len(starts) :] if each is not None]
@@ -116,7 +92,7 @@ def fit_look_alikes(fits: Fits, best: Hypothesis) -> None:
         exchanged = len(effects) == len(best.effects) and len(effects & best.effects) == len(effects) - 1
         if exchanged and effects not in fits.ended:
             gone = next(iter(best.effects - effects))
-            if rough.score < best.score + NEARLY * _gain(best, fits.without(best, gone)):
+            if rough.score < best.score + Searching.NEARLY * _gain(best, fits.without(best, gone)):
                 fits.finish(rough, best)
 
 
@@ -127,17 +103,21 @@ def _looked(view: Screen, names: Sequence[str], around: Hypothesis) -> dict[str,
     return dict(zip(tried, concurrently(view.starts, tried), strict=True))
 
 
-def _worth_fitting(current: Hypothesis, looked: Starts, least: float = 0.0, some: int = FEWEST_FITS) -> Starts:
+def _worth_fitting(
+    current: Hypothesis, looked: Starts, least: float = 0.0, some: int = Searching.FEWEST_FITS
+) -> Starts:
     """Return the starts of the effects that are worth a fit, the most promising first; ``some`` in any case."""
     order = sorted(looked, key=lambda name: -looked[name][0].promise)
-    least = max(least, WORTH_FITTING * looked[order[0]][0].promise if order else 0.0)
+    least = max(least, Searching.WORTH_FITTING * looked[order[0]][0].promise if order else 0.0)
     least = max(least, _price(current))
     worth = [name for i, name in enumerate(order) if looked[name][0].promise >= least or i < some]
     equals = {name: EFFECTS[name].equivalent if current.outputs == 1 else () for name in worth}
     twins = {twin for name in worth for twin in equals[name] if precedes(name, twin)}
-    worth = [name for name in worth if name not in twins][:MOST_FITS]
+    worth = [name for name in worth if name not in twins][: Searching.MOST_FITS]
     if some and not current.effects:
-        worth += [name for name in order if EFFECTS[name].widens] + [name for name in COMMON if name in looked]
+        worth += [name for name in order if EFFECTS[name].widens] + [
+            name for name in EffectPriors.COMMON if name in looked
+        ]
     return {name: promising(looked[name]) for name in dict.fromkeys(worth)}
 
 
@@ -150,7 +130,7 @@ def _most_missed(fits: Fits, current: Hypothesis, names: Sequence[str]) -> list[
     fit = fits.trials.one(current).fit
     view = Screen(replace(fit, derivative=jacobian_at(fit.problem, fit.x, fit.outputs)), fits.model)
     looked = _looked(view, names, current)
-    order = sorted(looked, key=lambda name: -looked[name][0].promise)[:FEWEST_FITS]
+    order = sorted(looked, key=lambda name: -looked[name][0].promise)[: Searching.FEWEST_FITS]
     return [(name, looked[name][0]) for name in order if looked[name][0].promise > 0.0]
 
 
@@ -185,7 +165,7 @@ def _at_moments(view: WeightedScoreTests, looked: Starts, moments: Sequence[Mome
 def _may_be_best(each: Hypothesis, best: Hypothesis, current: Hypothesis) -> bool:
     """Tell whether a fit of a few steps may end as the best: near it, or an event whose moments are not found."""
     is_event = any(EFFECTS[name].event for name in each.effects - current.effects)
-    return each.score <= best.score + NEARLY * _gain(best, current) or (is_event and not current.effects)
+    return each.score <= best.score + Searching.NEARLY * _gain(best, current) or (is_event and not current.effects)
 
 
 def _open(fits: Fits, current: Hypothesis) -> Sequence[str]:
@@ -212,11 +192,11 @@ def _nearest(fits: Fits, current: Hypothesis, name: str) -> tuple[Hypothesis | N
     view = fits.view(reduced)
     alike = [other for other in fits.names if other not in current.effects and are_alike(name, other)]
     looked = _looked(view, alike, reduced)
-    least = SAME_PROMISE * view.starts(name)[0].promise if name != GRADE else 0.0
+    least = Searching.SAME_PROMISE * view.starts(name)[0].promise if name != GRADE else 0.0
     moments = moments_of(current.result, name) if name != GRADE and EFFECTS[name].event else _promised_moments(looked)
     starts = {**_worth_fitting(reduced, looked, least, some=0), **_at_moments(view, looked, moments, _price(reduced))}
     rough = [fits.added(reduced, other, starts[other], current) for other in starts]
-    near = current.score + NEARLY * _gain(current, reduced)
+    near = current.score + Searching.NEARLY * _gain(current, reduced)
     found = [each for each in rough if each is not None and each.score < near]
     best = [fits.finish(min(found, key=lambda each: each.score), current)] if found else []
     best += with_free_load(fits, reduced) if GRADE in alike else []

@@ -6,8 +6,6 @@ import math
 from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from estimator.diagnosis.acquisition.chain import Chain
 from estimator.diagnosis.assemble import (
     augmented_model,
@@ -20,12 +18,10 @@ from estimator.diagnosis.inference.checks import tests_in_words
 from estimator.diagnosis.inference.decide import Decision, Judged
 from estimator.diagnosis.inference.figures import courses_of, figures_without, first_figures, found_effect
 from estimator.diagnosis.inference.fits import Fits
-from estimator.diagnosis.inference.hypotheses import Effects, Hypothesis, of_first_outputs, open_hypotheses
+from estimator.diagnosis.inference.hypotheses import Effects, Hypothesis, open_hypotheses
 from estimator.diagnosis.inference.search import Search
-from estimator.diagnosis.inference.standing import Standing
-from estimator.diagnosis.inference.trials import Trial
+from estimator.diagnosis.inference.trials import Standing, Trial
 from estimator.diagnosis.inference.wording import Context, statement
-from estimator.diagnosis.noise import SMALLEST_P
 from estimator.diagnosis.result import (
     Diagnosis,
     Discrepancy,
@@ -34,7 +30,6 @@ from estimator.diagnosis.result import (
     Estimated,
     FittedSet,
     FoundEffect,
-    Interval,
     Mismatch,
     Refinement,
     RejectedEffect,
@@ -44,14 +39,15 @@ from estimator.diagnosis.result import (
     UntestableEffect,
     Verdict,
 )
-from estimator.diagnosis.table_answer import Law, sentences
+from estimator.diagnosis.table_answer import NO_LAW, Law, sentences
+from estimator.diagnosis.thresholds import Noise
 from estimator.diagnosis.where import locate
 from estimator.diagnosis.where.discrepancy import discrepancy
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Element, Untestable
 from estimator.physics.model import DrivelineModel
 from estimator.physics.parallel import TimeIsUp, Work
-from estimator.signals.record import FloatArray
+from estimator.physics.tables import TABLES
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,41 +62,51 @@ class Basis:
     law: Law | None = None  # without a name, next to what is decided
     doubts: Sequence[Doubt] = ()  # about the input
 
+    @property
+    def refinements(self) -> tuple[Standing, ...]:
+        """What is possible and not in the model: without what a law without a name has."""
+        held = () if self.law is None else self.law.found.effects
+        return tuple(each for each in self.decision.judged.refinements if each.name not in held)
+
 
 def said(basis: Basis) -> Diagnosis:
     """Return the diagnosis."""
-    decision, line = basis.decision, basis.search.fits.model
+    decision, line, law = basis.decision, basis.search.fits.model, basis.law
     judged, runs, verdict = decision.judged, decision.runs, decision.verdict
     is_explained = verdict is not Verdict.UNEXPLAINED
     named = [found_effect(each, runs) for each in judged.named]
-    effects = _as_sure_as(basis.doubts, (*named, *decision.acquired) if is_explained else ())
+    is_uncounted = bool(basis.doubts) or any(name in TABLES for name in line.effects)
+    effects = _as_sure_as(is_uncounted, (*named, *decision.acquired) if is_explained else ())
     traces = judged.traces if is_explained else ()
     added = [*effects, *(found_effect(each, runs) for each in traces)]
-    law, figures = basis.law, decision.figures
-    seen = _discrepancy(basis) if verdict is not Verdict.NO_MISMATCH and line.plant is None else None
+    slight = tuple(_slight(each, basis) for each in traces)
+    augmented, courses = augmented_model(runs.estimate, runs.covariance, basis.model, added), courses_of(runs)
+    seen = None
+    if verdict is not Verdict.NO_MISMATCH and line.plant is None:
+        nothing, believed = (each.hypothesis.result.first_outputs() for each in (judged.nothing, judged.believed))
+        seen = discrepancy(nothing, believed, judged.noise, line.motion)
     mismatch, remainder = _mismatch(basis, seen), _remainder(judged, law)
     untestable = untestable_effects(open_hypotheses(line, runs.chain.records)[1])
-    slight = tuple(_slight(each, basis) for each in traces)
     context = Context(
         remainder,
         slight,
-        [each.name for each in judged.refinements],
+        [each.name for each in basis.refinements],
         judged.off_nominal,
         untestable,
         can_be_retuned(line),
         mismatch.element,
         basis.doubts,
     )
-    augmented, courses = augmented_model(runs.estimate, runs.covariance, basis.model, added), courses_of(runs)
-    said_of_law = "" if law is None else f" {sentences(law.table, figures.unit)}"
+    is_without = law is None and not is_explained and judged.failed and not judged.off_nominal and line.plant is None
+    said_of_law = NO_LAW if is_without else "" if law is None else sentences(law.table, decision.figures.unit)
     return Diagnosis(
         verdict=verdict,
-        statement=statement(verdict, figures, effects, basis.effort, context) + said_of_law,
+        statement=f"{statement(verdict, decision.figures, effects, basis.effort, context)} {said_of_law}".rstrip(),
         mismatch=mismatch,
         effects=effects,
         rejected=_rejected(basis),
         untestable=untestable,
-        fit=figures if law is None else law.fit,
+        fit=decision.figures if law is None else law.fit,
         parameters=retuned_parameters(runs.estimate, runs.covariance, line, is_explained),
         load_torque=load_torques(runs.estimate, runs.covariance, line),
         timing_s={},
@@ -114,16 +120,16 @@ def said(basis: Basis) -> Diagnosis:
         slight=slight,
         refinements=tuple(
             Refinement(each.name, each.objection, each.necessity.value, _values(judged.best, each))
-            for each in judged.refinements
+            for each in basis.refinements
         ),
         table=None if law is None else law.table,
         effort=basis.effort,
     )
 
 
-def _as_sure_as(doubts: Sequence[Doubt], effects: tuple[FoundEffect, ...]) -> tuple[FoundEffect, ...]:
-    """Return effects without how sure their names are while the input is in doubt: the one place that decides it."""
-    return tuple(replace(each, probability=math.nan, counted=None) for each in effects) if doubts else effects
+def _as_sure_as(is_uncounted: bool, effects: tuple[FoundEffect, ...]) -> tuple[FoundEffect, ...]:
+    """Return effects without how sure their names are where none were counted: with a doubt or a law without a name."""
+    return tuple(replace(each, probability=math.nan, counted=None) for each in effects) if is_uncounted else effects
 
 
 def undecided(
@@ -229,19 +235,6 @@ def _values(trial: Trial, standing: Standing) -> Mapping[str, float]:
     return trial.hypothesis.result.values_of(standing.name)
 
 
-def _errors(hypothesis: Hypothesis) -> list[FloatArray]:
-    """Return the free-run error per recording, 0 where a sample is missing."""
-    result = hypothesis.result.first_outputs()
-    return [
-        np.where(r.okay, r.output - out, 0.0) for r, out in zip(result.problem.records, result.outputs, strict=True)
-    ]
-
-
-def _band_hz(hypothesis: Hypothesis, noise: float) -> Interval | None:
-    errors = _errors(hypothesis)
-    return locate.band_hz(errors, [hypothesis.result.problem.records[0].sample_time_s] * len(errors), noise)
-
-
 def _place(basis: Basis, seen: Discrepancy | None) -> Element | None:
     """Return where the mismatch is.
 
@@ -273,17 +266,10 @@ def _mismatch(basis: Basis, seen: Discrepancy | None) -> Mismatch:
         detected=True,
         element=element,
         time_s=locate.intervals(result, noise),
-        band_hz=_band_hz(nothing, noise),
+        band_hz=locate.band_hz(result, noise),
         region=None if element is None else locate.region(result, element, noise),
-        p_value=max(math.exp(-0.5 * gained), SMALLEST_P),
+        p_value=max(math.exp(-0.5 * gained), Noise.SMALLEST_P),
     )
-
-
-def _discrepancy(basis: Basis) -> Discrepancy:
-    """Return the mismatch as the report draws it."""
-    judged = basis.decision.judged
-    nothing, believed = of_first_outputs(judged.nothing.hypothesis), judged.believed.hypothesis.result.first_outputs()
-    return discrepancy(nothing.result, believed, judged.noise, basis.search.fits.model.motion)
 
 
 def _remainder(judged: Judged, law: Law | None) -> Remainder | None:
@@ -294,8 +280,8 @@ def _remainder(judged: Judged, law: Law | None) -> Remainder | None:
         share=min(max(left**2 - noise**2, 0.0) / judged.nothing.rms**2, 1.0),
         times_noise=left / noise,
         element=None if law is None else law.table.element,
-        band_hz=_band_hz(judged.believed.hypothesis, noise),
-        law="; it ".join([tests_in_words(judged.failed), *([] if law is None else [law.says])]),
+        band_hz=locate.band_hz(judged.believed.hypothesis.result.first_outputs(), noise),
+        law=tests_in_words(judged.failed) + ("" if law is None else f"; it follows a torque over {law.table.over}"),
     )
 
 
@@ -310,7 +296,8 @@ def _rejected(basis: Basis) -> tuple[RejectedEffect, ...]:
     standings = (*judged.named, *judged.traces, *judged.refinements)
     known = {each.name for each in standings} | {other for each in standings for other in each.alike}
     known |= {each.name for each in basis.decision.acquired} | {*basis.effort.untried}
-    found = {each.name: RejectedEffect(each.name, each.objection, 0.0) for each in judged.refinements}
+    known |= set() if basis.law is None else {*basis.law.found.effects}
+    found = {each.name: RejectedEffect(each.name, each.objection, 0.0) for each in basis.refinements}
     for scores, reason in (
         (fits.scores(), "fitted: the best set with it is {}"),
         (fits.implausible, "fitted, and ended at values that are no case of it"),

@@ -8,6 +8,7 @@ from functools import partial
 
 import numpy as np
 
+from estimator.diagnosis.thresholds import Searching
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.driveline import Case
 from estimator.physics.effect import Effect
@@ -30,24 +31,8 @@ from estimator.physics.steps import Moments
 from estimator.physics.unknowns import Release, Shared, effect_unknowns
 from estimator.signals.record import FloatArray, Record
 
-SMALLEST_SCALING, LARGEST_SCALING = 0.1, 4.0
-"""How far from a start's own size the first look may place a fit's start: the direction holds no further."""
-
-SIZES = np.geomspace(0.05, 10.0, 15)
-"""Sizes of an event that are tried, in multiples of its start's: all recordings share it, each finds its interval."""
-
 ROOM_SAMPLES = 2**21
 """Samples that are simulated in one call at most, in whole starts: side by side they take less time, and more room."""
-
-STEP_SHARES = (1.0, 0.1)
-"""Shares of a start's size that are looked along: what is not smooth shows in full, what moves far in small."""
-
-STARTS = 2  # start points of an effect that are fitted, the most promising of its list
-SHAPES = 2  # further ones, of other shapes than these
-PROMISING = 0.5  # share of the best start's promise below which another start of the same effect is not tried
-
-ROUNDS = 3
-"""Rounds in which the size of an event and its intervals in all recordings find each other from there."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,10 +60,12 @@ def promising(starts: Sequence[ScoredStart]) -> list[ScoredStart]:
     These are the second best, and the best of other shapes, since a law has an optimum near each, and of every other
     variant: a look at one is no look at another.
     """
-    near = [scored for scored in starts if scored.promise >= PROMISING * starts[0].promise or scored is starts[0]]
+    near = [
+        scored for scored in starts if scored.promise >= Searching.PROMISING * starts[0].promise or scored is starts[0]
+    ]
     best = {(scored.variant, scored.shape): scored for scored in reversed(near)}
-    distinct = [scored for scored in near[STARTS:] if best[scored.variant, scored.shape] is scored]
-    first = [*near[:STARTS], *distinct[:SHAPES]]
+    distinct = [scored for scored in near[Searching.STARTS_OF_A_LAW :] if best[scored.variant, scored.shape] is scored]
+    first = [*near[: Searching.STARTS_OF_A_LAW], *distinct[: Searching.SHAPES]]
     seen = {scored.variant for scored in first}
     others = {scored.variant: scored for scored in reversed(near) if scored.variant not in seen}
     return [*first, *others.values()]
@@ -98,7 +85,7 @@ class _Steps:
         first = next(shared for shared in release.shared if shared.low < shared.high)
         null = next(parameter.null for parameter in entry.shared_parameters if parameter.name == first.name)
         zero = _zero(first, null)
-        return cls(release, first, zero, tuple(share * (first.start - zero) for share in STEP_SHARES))
+        return cls(release, first, zero, tuple(share * (first.start - zero) for share in Searching.STEP_SHARES))
 
     def filled(self, p: FloatArray) -> list[FloatArray]:
         """Return parameters with each of the steps."""
@@ -157,7 +144,7 @@ class Screen:
 
     def _plain(self, entry: Effect, releases: Sequence[Release]) -> list[ScoredStart]:
         found = []
-        for some in self._at_a_time(releases, len(STEP_SHARES)):
+        for some in self._at_a_time(releases, len(Searching.STEP_SHARES)):
             tried = [_Steps.of(entry, release) for release in some]
             outputs = self._each([steps.filled for steps in tried])
             for steps, mine in zip(tried, outputs, strict=True):
@@ -186,9 +173,9 @@ class Screen:
         if not np.isfinite(moved).all():  # so far out that the line is unstable: this start promises nothing
             return ScoredStart(release, 0.0)
         ends = sorted((limit - zero) / step for limit in (first.low, first.high))
-        most = LARGEST_SCALING * abs((first.start - zero) / step)
+        most = Searching.LARGEST_SCALING * abs((first.start - zero) / step)
         reached, promise = self._projector.promise(moved, max(ends[0], -most), min(ends[1], most))
-        least = SMALLEST_SCALING * abs((first.start - zero) / step)
+        least = Searching.SMALLEST_SCALING * abs((first.start - zero) / step)
         size = float(np.copysign(max(abs(reached), least), reached))
         return ScoredStart(
             _with_start(release, first, float(np.clip(zero + size * step, first.low, first.high))), promise
@@ -254,10 +241,10 @@ class Screen:
             for i, own in enumerate(release.own[: len(self._rows)])
         ]
         scans = [scanned(*self._projector.products(grid.answers, i), entry.lasting) for i, grid in enumerate(grids)]
-        tried = [value for value in SIZES * size.scale * abs(size.start) if self._may_be(size, value)]
+        tried = [value for value in Searching.EVENT_SIZES * size.scale * abs(size.start) if self._may_be(size, value)]
         tried += [-value for value in tried if self._may_be(size, -value)]
         best = max(tried, key=lambda value: sum(each.best(value).error_reduction for each in scans))
-        for _ in range(ROUNDS):
+        for _ in range(Searching.EVENT_ROUNDS):
             stretches = [each.best(best) for each in scans]
             power = sum(stretch.power for stretch in stretches)
             if power == 0.0:
@@ -276,7 +263,7 @@ class Screen:
                 for grid, stretch in zip(grids, stretches, strict=True)
             ]
         )
-        return ScoredStart(found, self._projector.promise(best * change, 0.0, LARGEST_SCALING)[1])
+        return ScoredStart(found, self._projector.promise(best * change, 0.0, Searching.LARGEST_SCALING)[1])
 
     @staticmethod
     def _may_be(size: Shared, value: float) -> bool:

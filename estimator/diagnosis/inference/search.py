@@ -13,14 +13,8 @@ from dataclasses import dataclass, replace
 from estimator.diagnosis.inference.checks import tests
 from estimator.diagnosis.inference.fits import Fits
 from estimator.diagnosis.inference.hypotheses import Hypothesis, Progress, silent
-from estimator.diagnosis.inference.moves import STARTS, additions, begun_elsewhere, drops, exchanges, with_free_load
-from estimator.diagnosis.inference.standing import LEAST_NECESSITY, LEAST_SHARE
-from estimator.diagnosis.inference.trials import Trial, necessity, noise_of
-
-WORTH_ADDING = 0.15
-"""Share of the squared free-run error beyond the noise that a law must take for a search to continue from it."""
-
-MOST_EFFECTS = 8
+from estimator.diagnosis.inference.moves import additions, begun_elsewhere, drops, exchanges, with_free_load
+from estimator.diagnosis.thresholds import Judging, Searching
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,10 +40,10 @@ def search_from_nothing(fits: Fits, most: float = math.inf, progress: Progress =
     alone = [each for effects, each in fits.ended.items() if len(effects) == 1 and fits.is_plausible(each)]
     if len(found.best.effects) < 2 or not alone or not any(test.failed for test in tests(found.best)):
         return found
-    nearest = fits.trials.of(sorted(alone, key=lambda each: each.score)[:STARTS])
+    nearest = fits.trials.of(sorted(alone, key=lambda each: each.score)[: Searching.STARTS])
     best = min(nearest, key=lambda each: each.rms)
     for first in nearest:
-        if first.effects <= found.best.effects or _is_far_behind(first, best):
+        if first.effects <= found.best.effects or first.is_far_behind(best):
             continue
         other = _climbed(Search(fits, (fits.nothing(), first.hypothesis)), most, progress, found.path)
         better = other if other.best.score < found.best.score else found
@@ -65,7 +59,7 @@ def _climbed(start: Search, most: float, progress: Progress, rival: Sequence[Hyp
     It is given up where, from its second effect on, a set is worse than one of as few effects on a rival's way.
     """
     fits, path = start.fits, start.path
-    for _ in range(2 * MOST_EFFECTS):
+    for _ in range(2 * Searching.MOST_EFFECTS):
         progress("comparing hypotheses", 0.1 + 0.7 * len(path) / (len(path) + 3))
         if fits.simulations >= most:
             return Search(fits, path, is_cut_short=True)
@@ -84,8 +78,10 @@ def _better(fits: Fits, current: Hypothesis) -> Hypothesis | None:
     again = _most_probable(fits, begun_elsewhere(fits, current), current)
     if again is not None:
         return again
-    may_grow = len(current.effects) < MOST_EFFECTS and not _leaves_a_trace_at_most(fits, current)
-    larger = [each for each in additions(fits, current) if _simulates_better(fits, each, current)] if may_grow else []
+    may_grow = len(current.effects) < Searching.MOST_EFFECTS and not _leaves_a_trace_at_most(fits, current)
+    larger = (
+        [each for each in additions(fits, current) if fits.trials.is_worth_adding(each, current)] if may_grow else []
+    )
     if (grown := _most_probable(fits, larger, current)) is not None:
         return grown
     smaller = drops(fits, current)
@@ -102,7 +98,7 @@ def _leaves_a_trace_at_most(fits: Fits, current: Hypothesis) -> bool:
     if not current.effects:
         return False
     nothing, its = fits.trials.of([fits.nothing(), current])
-    return float(its.excess(fits.noise).sum()) < LEAST_SHARE * float(nothing.excess(fits.noise).sum())
+    return float(its.excess(fits.noise).sum()) < Judging.LEAST_SHARE * float(nothing.excess(fits.noise).sum())
 
 
 def _most_probable(fits: Fits, found: Sequence[Hypothesis], current: Hypothesis) -> Hypothesis | None:
@@ -117,21 +113,3 @@ def _as_good(fits: Fits, smaller: Sequence[Hypothesis], current: Hypothesis) -> 
     whole = fits.trials.one(current)
     as_good = [each for each in fits.trials.of(smaller) if each.beats(whole) and fits.is_plausible(each.hypothesis)]
     return min(as_good, key=lambda each: each.rms).hypothesis if as_good else None
-
-
-def _simulates_better(fits: Fits, larger: Hypothesis, smaller: Hypothesis) -> bool:
-    """Tell whether a law that makes a set more probable surely makes its free run better, and by more than a little.
-
-    What the form of a law leaves is predicted a little better by nearly every further law; a search that follows the
-    likelihood alone wanders among sets of these.
-    """
-    if larger.effects <= smaller.effects:  # of the same laws, or fewer, a better fit
-        return True
-    one, other = fits.trials.of([smaller, larger])
-    needed = necessity(other, one, noise_of(larger))
-    return needed.value >= WORTH_ADDING and needed.least > 0.0
-
-
-def _is_far_behind(one: Trial, best: Trial) -> bool:
-    """Tell whether another first effect clearly leaves so much less that no search need begin from this one."""
-    return necessity(best, one, noise_of(best.hypothesis)).least >= LEAST_NECESSITY

@@ -21,8 +21,8 @@ from dataclasses import replace
 import numpy as np
 
 from estimator.diagnosis.inference.descent import Weigh
-from estimator.diagnosis.inference.disturbances import LinearLine, Size, line_of
-from estimator.diagnosis.line.blocks import FormPlace, form_shifts
+from estimator.diagnosis.inference.disturbances import Size
+from estimator.diagnosis.line.line import FormPlace, LinearLine, form_shifts, line_of
 from estimator.physics.catalogue import KERNEL
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult

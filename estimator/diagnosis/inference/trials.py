@@ -19,26 +19,21 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.stats import t
 
-from estimator.diagnosis.inference.checks import THRESHOLDS
 from estimator.diagnosis.inference.descent import Effort, descended
 from estimator.diagnosis.inference.disturbances import reading_noise
 from estimator.diagnosis.inference.hypotheses import GRADE, Effects, Hypothesis
-from estimator.diagnosis.inference.standing import Necessity
+from estimator.diagnosis.result import Counted
+from estimator.diagnosis.thresholds import THRESHOLDS, Judging, Searching
 from estimator.physics.fit import FitResult, in_common, not_fitted, warm_start
 from estimator.physics.model import DrivelineModel
 from estimator.physics.parallel import concurrently
 from estimator.physics.problem import Problem, bounds, make_problem
 from estimator.signals.record import BoolArray, FloatArray, Record, by_output
 
-BLOCK_S, EVERY_S = 0.6, 2.0
-"""Blocks kept out of a fit: shorter than the knot spacing of a load profile, so that its neighbours predict it."""
-
-FEWEST_BLOCKS = 3  # blocks of a recording at least: it may be shorter than one of these
-
-COURSE: int = THRESHOLDS["course"]
-"""Laws that a free course of the load counts for."""
-
-SURE = 0.95  # one-sided probability with which a comparison of blocks is sure
+COUNTED: Sequence[tuple[float, Counted]] = [
+    (row["necessity_from"], Counted(row["right"], row["of"])) for row in THRESHOLDS["counted"]
+]
+"""Of names whose necessity (its lower end) is from so much up to that of the next row: the count."""
 
 TUNED = Effort(derivatives=2, steps=6)
 """What tuning a set for the free run may cost, from where the likelihood is greatest."""
@@ -46,7 +41,7 @@ TUNED = Effort(derivatives=2, steps=6)
 
 def quantile(count: int) -> float:
     """Return Student's quantile of so many blocks: how many standard errors a sum of theirs may be off by chance."""
-    return float(t.ppf(SURE, max(count - 1, 1)))
+    return float(t.ppf(Judging.SURE, max(count - 1, 1)))
 
 
 def blocks(record: Record) -> BoolArray:
@@ -62,12 +57,43 @@ def between_blocks(records: Sequence[Record]) -> tuple[BoolArray, ...]:
 def block_numbers(record: Record) -> FloatArray:
     """Return the number of the block that each sample is in, -1 between the blocks; shape (N,)."""
     since_s = record.time_s - record.time_s[0]
-    scale = min(1.0, float(since_s[-1]) / (FEWEST_BLOCKS * EVERY_S))
-    every_s, block_s = scale * EVERY_S, scale * BLOCK_S
+    scale = min(1.0, float(since_s[-1]) / (Judging.FEWEST_BLOCKS * Judging.EVERY_S))
+    every_s, block_s = scale * Judging.EVERY_S, scale * Judging.BLOCK_S
     phase = np.mod(since_s, every_s)
     middle = 0.5 * (every_s - block_s)
     inside = (phase >= middle) & (phase < middle + block_s)
     return np.where(inside, np.floor(since_s / every_s), -1.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Necessity:
+    """Which share of the squared error beyond the noise comes back without a law, on samples that no fit has seen."""
+
+    value: float  # estimate, as a share of 1
+    least: float  # lower end of its one-sided 95 % interval, by the scatter of the blocks
+
+
+@dataclass(frozen=True, slots=True)
+class Standing:
+    """What speaks for one effect of a set."""
+
+    name: str  # key of the catalogue
+    necessity: Necessity  # of this effect, within its set
+    share: float  # of the re-tuned model's squared free-run error on unseen samples, that comes back without it
+    evidence: float  # by which the score rises without it
+    alike: Mapping[str, Mapping[str, float]]  # effects that explain as much in its place, with their values there
+    objection: str = ""  # why it is not established; "" where it is
+    slight: str = ""  # why it is a trace though established; "" where it is a name
+
+    @property
+    def counted(self) -> Counted:
+        """How many names of such a necessity were there."""
+        return next((count for least, count in reversed(COUNTED) if self.necessity.least >= least), COUNTED[0][1])
+
+    @property
+    def probability(self) -> float:
+        """Probability that this effect, or one that it can't be distinguished from, is there."""
+        return self.counted.probability
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,6 +133,10 @@ class Trial:
         gained = other.squares - self.squares
         scatter = math.sqrt(gained.size) * float(np.std(gained, ddof=1)) if gained.size > 1 else math.inf
         return float(gained.sum()) > quantile(gained.size) * scatter
+
+    def is_far_behind(self, best: Trial) -> bool:
+        """Tell whether another set clearly leaves so much less that no search need begin from this one."""
+        return necessity(best, self, noise_of(best.hypothesis)).least >= Judging.LEAST_NECESSITY
 
     def beats(self, other: Trial) -> bool:
         """Tell whether another set need not be considered: one of as few laws, or of fewer, simulates better.
@@ -157,6 +187,18 @@ class Trials:
         """Return the trial of one set."""
         return self.of([hypothesis])[0]
 
+    def is_worth_adding(self, larger: Hypothesis, smaller: Hypothesis) -> bool:
+        """Tell whether a law that makes a set more probable surely makes its free run better, by more than a little.
+
+        What the form of a law leaves is predicted a little better by nearly every further law; a search that follows
+        the likelihood alone wanders among sets of these.
+        """
+        if larger.effects <= smaller.effects:  # of the same laws, or fewer, a better fit
+            return True
+        one, other = self.of([smaller, larger])
+        needed = necessity(other, one, noise_of(larger))
+        return needed.value >= Searching.WORTH_ADDING and needed.least > 0.0
+
     def _is_new(self, hypothesis: Hypothesis) -> bool:
         known = self._tried.get(hypothesis.effects)
         return known is None or known.hypothesis is not hypothesis
@@ -169,7 +211,7 @@ class Trials:
 
 def size_of(effects: Effects) -> int:
     """Return for how many laws a set counts: a load's free course follows whatever is slow, as several laws would."""
-    return len(effects) + (COURSE - 1) * (GRADE in effects)
+    return len(effects) + (Judging.COURSE - 1) * (GRADE in effects)
 
 
 def tried(hypothesis: Hypothesis, model: DrivelineModel, size: int, subsets: Sequence[FitResult] = ()) -> Trial:

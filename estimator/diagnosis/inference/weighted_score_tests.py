@@ -14,13 +14,11 @@ import numpy as np
 from estimator.diagnosis.inference.disturbances import Whitener
 from estimator.diagnosis.inference.hypotheses import Hypothesis
 from estimator.diagnosis.inference.score_tests import Screen
+from estimator.diagnosis.thresholds import Searching
 from estimator.physics.fit import FitResult
 from estimator.physics.model import DrivelineModel
 from estimator.physics.own_scan import Projector, Simulate
 from estimator.signals.record import FloatArray
-
-SAME_MOTION = 0.02
-"""RMS by which two motions may differ, over what the output moves, for effects to move the output alike in both."""
 
 ROOM_BYTES = 2**27  # room that answers may take
 
@@ -35,7 +33,7 @@ class OutputChanges:
     def near(self, fit: FitResult) -> list[dict[bytes, FloatArray]]:
         """Return what is known around a motion that is nearly a fit's, by recording; empty where there is none."""
         for other, known in self.around:
-            if _difference(fit, other) < SAME_MOTION:
+            if _difference(fit, other) < Searching.SAME_MOTION:
                 return known
         return [{} for _ in fit.problem.drives]
 

@@ -17,6 +17,7 @@ from estimator.diagnosis.result import (
     UntestableEffect,
     Verdict,
 )
+from estimator.diagnosis.thresholds import Telling
 from estimator.physics.catalogue import title_of
 from estimator.physics.effect import Element
 
@@ -28,10 +29,6 @@ PLACES: Mapping[Element, str] = {
     Element.SPEED_SENSOR: "in the reading",
     Element.ACQUISITION: "in the acquisition",
 }
-
-MOST_NAMES = 4  # untried effects that a headline lists
-
-STAYS = 1e-3  # an error that changes by less does not change to anyone who reads it
 
 LINE = frozenset({"J_M", "J_L", "k"})  # what a line's answer to a torque is in proportion to
 
@@ -99,7 +96,9 @@ def _moving(trace: Slight) -> str:
 
 def _not_decided(effort: Effort) -> str:
     count = len(effort.untried)
-    among = ", ".join(map(title_of, effort.untried[:MOST_NAMES])) + (", …" if count > MOST_NAMES else "")
+    among = ", ".join(map(title_of, effort.untried[: Telling.MOST_NAMES])) + (
+        ", …" if count > Telling.MOST_NAMES else ""
+    )
     left = f", {count} of {effort.candidates} effects untried, among them {among}" if count else ""
     return f"Not decided: the search was ended after {effort.limit_s:.3g} s{left}."
 
@@ -134,7 +133,7 @@ def _fall(fit: Fit) -> str:
 
 def _change(before: float, after: float) -> str:
     one, other = _pair(before, after)
-    if one == other or abs(after - before) < STAYS * before:
+    if one == other or abs(after - before) < Telling.STAYS * before:
         return f"stays at {one}"
     return f"{'falls' if after < before else 'rises'} from {one} to {other}"
 

@@ -1,1 +1,1 @@
-"""The line of a fit, linearised and cut into blocks: what small torques do to it, and which would explain its error."""
+"""The line of a fit: the linear one, the filter that whitens its errors, and the input that would explain them."""

@@ -1,28 +1,31 @@
 """The torque at one place of the line, or the error of the reading, that by itself would explain a fit's error.
 
-What the simulation lacks is taken for an unknown input of the linearised line: a random walk, estimated with its
-standard error by a fixed-interval Kalman smoother (Durbin and Koopman, Time Series Analysis by State Space Methods,
-chapter 4). How fast the walk may go is found by the marginal likelihood of the error, and that likelihood tells how
-plausible the place is: at the right one a simple input explains the error, elsewhere it takes a wild one.
+What the simulation lacks is taken for an unknown input of the linear line that whitens its errors, too (`line.py`): a
+random walk, estimated with its standard error by a fixed-interval Kalman smoother (Durbin and Koopman, Time Series
+Analysis by State Space Methods, chapter 4). How fast the walk may go is found by the marginal likelihood of the error,
+and that likelihood tells how plausible the place is: at the right one a simple input explains the error, elsewhere it
+takes a wild one.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
-from functools import partial
+from dataclasses import dataclass
+from enum import Enum
 from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import minimize_scalar
 
 from estimator.compiled import compiled
-from estimator.diagnosis.line.blocks import FORCES, BlockedRecording, InputPlace, Motion, places, size_at
-from estimator.diagnosis.line.tangent import LOAD, MOTOR
+from estimator.diagnosis.line.line import LinearLine, line_of
+from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult
-from estimator.physics.kernel import state_vector
-from estimator.signals.record import FloatArray
+from estimator.physics.layout import slot
+from estimator.physics.model import Structure
+from estimator.physics.motion import speed_scale, torque_scale
+from estimator.physics.parallel import concurrently
+from estimator.signals.record import BoolArray, FloatArray
 
 SLOWEST, FASTEST = 1e-3, 1e2
 """Range of the walk's rate, as a share of the torque or speed in use, per root second."""
@@ -35,26 +38,61 @@ FORGETS_S = 1.0
 
 SEARCH_TOLERANCE = 0.15  # of the rate's decimal logarithm: the likelihood is flat around its top
 
+DRIVES = {Element.TORQUE_PATH: 1.0, Element.MOTOR: -1.0, Element.SHAFT: 1.0, Element.LOAD: 1.0}
+"""Sign of a law at its place: the torque path drives the motor, friction at the motor brakes it."""
 
-class Chain(NamedTuple):
-    """The line as the input sees it, over B blocks, or 1 that stands for all."""
 
-    phi: FloatArray  # (B, n, n): how the state moves on
-    drive: FloatArray  # (B, n): how the input acts on it
-    c: FloatArray  # (B, n): how state and input show in the output
-    direct: FloatArray  # (B, n): how state and input show in the output
-    memory: float  # share of the input that is there in the next block
-    walk: float  # variance of its change from block to block
+class InputPlace(Enum):
+    """Where an unknown input may act: on the motor, in the shaft, against the load, on the reading."""
+
+    MOTOR = "motor"
+    SHAFT = "shaft"
+    LOAD = "load"
+    SENSOR = "sensor"
+
+
+PLACES = {
+    Element.TORQUE_PATH: InputPlace.MOTOR,
+    Element.MOTOR: InputPlace.MOTOR,
+    Element.SHAFT: InputPlace.SHAFT,
+    Element.LOAD: InputPlace.LOAD,
+    Element.SPEED_SENSOR: InputPlace.SENSOR,
+    Element.ACQUISITION: InputPlace.SENSOR,
+}
+"""Where a law of an element acts."""
+
+ELEMENTS = {
+    InputPlace.MOTOR: Element.MOTOR,
+    InputPlace.SHAFT: Element.SHAFT,
+    InputPlace.LOAD: Element.LOAD,
+    InputPlace.SENSOR: Element.SPEED_SENSOR,
+}
+"""The element that a place is reported as: an input alone does not distinguish those that act there."""
+
+
+def places(result: FitResult) -> tuple[InputPlace, ...]:
+    """Return the places at which an unknown input may act on a line of this structure."""
+    if result.problem.grid.structure is Structure.JOINT:
+        return (InputPlace.SHAFT,)
+    if result.problem.grid.structure is Structure.ONE_MASS:
+        return (InputPlace.MOTOR, InputPlace.SENSOR)
+    return tuple(InputPlace)
+
+
+def size_at(result: FitResult, place: InputPlace) -> float:
+    """Return the usual size of an input at a place: a torque [Nm], or a speed [rad/s] at the sensor."""
+    records = result.problem.records
+    return speed_scale(records) if place is InputPlace.SENSOR else torque_scale(records)
 
 
 class Filtered(NamedTuple):
     """What the smoother needs of the filter: predictions, gains, surprises and their precision (0: not observed)."""
 
-    means: FloatArray  # (B, n + 1): predicted state and input
-    covariances: FloatArray  # (B, n + 1, n + 1) of these
-    gains: FloatArray  # (B, n + 1): correction per unit of surprise
-    surprises: FloatArray  # (B,): error less its prediction
-    precisions: FloatArray  # (B,): one over their variance
+    means: FloatArray  # (N, n + 1): predicted state and input
+    covariances: FloatArray  # (N, n + 1, n + 1) of these
+    gains: FloatArray  # (N, n + 1): correction per unit of surprise
+    surprises: FloatArray  # (N,): error less its prediction
+    precisions: FloatArray  # (N,): one over their variance
 
 
 @compiled
@@ -84,20 +122,6 @@ def symmetric_product(a: FloatArray, b: FloatArray, out: FloatArray) -> None:
 
 
 @compiled
-def load(chain: Chain, block: int, f: FloatArray, h: FloatArray) -> None:
-    """Fill the transition and the observation of one block."""
-    n = chain.phi.shape[1]
-    i = block if chain.phi.shape[0] > 1 else 0
-    for r in range(n):
-        for j in range(n):
-            f[r, j] = chain.phi[i, r, j]
-        f[r, n] = chain.drive[i, r]
-        h[r] = chain.c[i, r]
-    h[n] = chain.direct[i]
-    f[n, n] = chain.memory
-
-
-@compiled
 def observe(
     error: float, noise: float, h: FloatArray, mean: FloatArray, covariance: FloatArray, gain: FloatArray
 ) -> tuple[float, float]:
@@ -122,28 +146,36 @@ def observe(
 
 @compiled
 def run_filter(
-    chain: Chain, error: FloatArray, weight: FloatArray, noise: float, prior: FloatArray, kept: Filtered
+    f: FloatArray,
+    h: FloatArray,
+    walk: float,
+    noise: float,
+    prior: FloatArray,
+    error: FloatArray,
+    seen: BoolArray,
+    kept: Filtered,
 ) -> float:
-    """Return the log-likelihood of an error; keep what the smoother needs where ``kept`` has room."""
-    m = prior.shape[0]
+    """Return the log-likelihood of an error; keep what the smoother needs where ``kept`` has room.
+
+    State and input move on by ``f``, (m, m), show by ``h``, (m,), and begin within ``prior``, (m, m); ``walk`` is the
+    variance of the input's change from sample to sample, ``noise`` that of the reading.
+    """
+    m = h.shape[0]
     keep = kept.surprises.shape[0] > 0
-    f, h, half = np.zeros((m, m)), np.zeros(m), np.zeros((m, m))
-    mean, moved, gain = np.zeros(m), np.zeros(m), np.zeros(m)
+    half, mean, moved, gain = np.zeros((m, m)), np.zeros(m), np.zeros(m), np.zeros(m)
     covariance = prior.copy()
     likelihood = 0.0
-    for b in range(error.shape[0]):
-        if b == 0 or chain.phi.shape[0] > 1:
-            load(chain, b, f, h)
+    for t in range(error.shape[0]):
         if keep:
-            kept.means[b] = mean
-            kept.covariances[b] = covariance
-        if weight[b] > 0.0:
-            surprise, precision = observe(error[b], noise / weight[b], h, mean, covariance, gain)
+            kept.means[t] = mean
+            kept.covariances[t] = covariance
+        if seen[t]:
+            surprise, precision = observe(error[t], noise, h, mean, covariance, gain)
             likelihood -= 0.5 * (np.log(2.0 * np.pi / precision) + surprise * surprise * precision)
             if keep:
-                kept.surprises[b] = surprise
-                kept.precisions[b] = precision
-                kept.gains[b] = gain
+                kept.surprises[t] = surprise
+                kept.precisions[t] = precision
+                kept.gains[t] = gain
         for r in range(m):
             moved[r] = 0.0
             for j in range(m):
@@ -151,7 +183,7 @@ def run_filter(
         mean[:] = moved
         product(f, covariance, half)
         symmetric_product(half, f.T, covariance)
-        covariance[m - 1, m - 1] += chain.walk
+        covariance[m - 1, m - 1] += walk
     return likelihood
 
 
@@ -168,41 +200,38 @@ def fill_step(f: FloatArray, gain: FloatArray, h: FloatArray, step: FloatArray) 
 
 
 @compiled
-def run_smoother(chain: Chain, kept: Filtered, estimates: FloatArray, variance: FloatArray) -> None:
-    """Go back over what the filter kept: fill the estimates, shape (B, m), and the input's variance, shape (B,)."""
-    m = kept.means.shape[1]
-    f, h, step, half = np.zeros((m, m)), np.zeros(m), np.zeros((m, m)), np.zeros((m, m))
+def run_smoother(f: FloatArray, h: FloatArray, kept: Filtered, value: FloatArray, variance: FloatArray) -> None:
+    """Go back over what the filter kept: fill the input's estimate and its variance, each of shape (N,)."""
+    m = h.shape[0]
+    step, half = np.zeros((m, m)), np.zeros((m, m))
     score, back, information = np.zeros(m), np.zeros(m), np.zeros((m, m))
-    for b in range(kept.surprises.shape[0] - 1, -1, -1):
-        load(chain, b, f, h)
-        precision = kept.precisions[b]
-        fill_step(f, kept.gains[b], h, step)
+    for t in range(kept.surprises.shape[0] - 1, -1, -1):
+        precision = kept.precisions[t]
+        fill_step(f, kept.gains[t], h, step)
         for r in range(m):
-            back[r] = h[r] * kept.surprises[b] * precision
+            back[r] = h[r] * kept.surprises[t] * precision
             for j in range(m):
                 back[r] += step[j, r] * score[j]
         score[:] = back
         product(information, step, half)
         product(step.T, half, information)
-        spread = kept.covariances[b, m - 1, m - 1]
+        own = kept.covariances[t, m - 1]
+        value[t], variance[t] = kept.means[t, m - 1], own[m - 1]
         for r in range(m):
-            estimates[b, r] = kept.means[b, r]
+            value[t] += own[r] * score[r]
             for j in range(m):
                 information[r, j] += h[r] * h[j] * precision
-                estimates[b, r] += kept.covariances[b, r, j] * score[j]
         for r in range(m):
             for j in range(m):
-                spread -= kept.covariances[b, m - 1, r] * information[r, j] * kept.covariances[b, j, m - 1]
-        variance[b] = spread
+                variance[t] -= own[r] * information[r, j] * own[j]
 
 
 @dataclass(frozen=True, slots=True)
 class Input:
-    """The input at one place of one recording; arrays of shape (B,), one value per block."""
+    """The input at one place of one recording; arrays of shape (N,)."""
 
     value: FloatArray  # estimate and its standard error
     std: FloatArray  # of ``value``
-    motion: Motion  # what then happens in the line, in the middle of each block
 
 
 @dataclass(frozen=True, slots=True)
@@ -215,14 +244,15 @@ class Explanation:
     log_likelihood: float  # of the error, at the best rate
 
 
-def explain(result: FitResult, cut: Sequence[BlockedRecording], place: InputPlace, floor: float) -> Explanation:
-    """Estimate the input at one place that explains a fit's error."""
-    size = size_at(result, place)
+def explain(result: FitResult, place: InputPlace, floor: float) -> Explanation:
+    """Estimate the input at one place that explains a fit's error, each recording's in turn."""
+    problem, size = result.problem, size_at(result, place)
+    errors = [record.output - output for record, output in zip(problem.records, result.outputs, strict=True)]
 
     def deficit(exponent: float) -> float:
-        rate = size * 10.0**exponent
-        nothing = _room(0, cut[0].tangent.scale.size + 1)
-        return -sum(_filter(line, place, _chain(line, place, rate), size, floor, nothing) for line in cut)
+        chain = _chain(result, place, size * 10.0**exponent, floor)
+        nothing = _room(0, chain.h.size)
+        return -sum(run_filter(*chain, error, use, nothing) for error, use in zip(errors, problem.use, strict=True))
 
     best = minimize_scalar(
         deficit,
@@ -231,57 +261,64 @@ def explain(result: FitResult, cut: Sequence[BlockedRecording], place: InputPlac
         options={"xatol": SEARCH_TOLERANCE},
     )
     rate = size * 10.0 ** float(best.x)
-    return Explanation(place, tuple(smooth(line, place, rate, size, floor) for line in cut), rate, -float(best.fun))
+    return Explanation(place, smoothed(result, errors, problem.use, place, rate, floor), rate, -float(best.fun))
 
 
-def explain_all(result: FitResult, cut: Sequence[BlockedRecording], floor: float) -> dict[InputPlace, Explanation]:
+def explain_all(result: FitResult, floor: float) -> dict[InputPlace, Explanation]:
     """Estimate the input at every place; the compiled passes hold no interpreter lock and run side by side."""
     wanted = places(result)
-    with ThreadPoolExecutor(2) as pool:
-        found = list(pool.map(partial(_explain_at, result, cut, floor), wanted))
-    return dict(zip(wanted, found, strict=True))
+    return dict(zip(wanted, concurrently(lambda place: explain(result, place, floor), wanted), strict=True))
 
 
-def _explain_at(result: FitResult, cut: Sequence[BlockedRecording], floor: float, place: InputPlace) -> Explanation:
-    return explain(result, cut, place, floor)
+def smoothed(
+    result: FitResult,
+    errors: Sequence[FloatArray],
+    use: Sequence[BoolArray],
+    place: InputPlace,
+    rate: float,
+    floor: float,
+) -> tuple[Input, ...]:
+    """Estimate the input at one place that explains errors of each recording where they are seen, its rate given."""
+    chain, found = _chain(result, place, rate, floor), []
+    for error, seen in zip(errors, use, strict=True):
+        kept, value, variance = _room(error.size, chain.h.size), np.zeros(error.size), np.zeros(error.size)
+        run_filter(*chain, error, seen, kept)
+        run_smoother(chain.f, chain.h, kept, value, variance)
+        found.append(Input(value, np.sqrt(np.maximum(variance, 0.0))))
+    return tuple(found)
 
 
-def smooth(line: BlockedRecording, place: InputPlace, rate: float, size: float, floor: float) -> Input:
-    """Estimate the input at one place of one recording, its walk's rate given."""
-    chain = _chain(line, place, rate)
-    m = line.tangent.scale.size + 1
-    kept, estimates, variance = _room(line.size, m), np.zeros((line.size, m)), np.zeros(line.size)
-    _filter(line, place, chain, size, floor, kept)
-    run_smoother(chain, kept, estimates, variance)
-    later = np.vstack([estimates[1:], estimates[-1:]])
-    middle = 0.5 * (estimates + later)
-    names = {state_vector.SPEED: "speed", state_vector.TWIST: "twist", state_vector.LOAD_SPEED: "load_speed"}
-    moved = {
-        names[state]: getattr(line.motion, names[state]) + middle[:, i]
-        for i, state in enumerate(line.tangent.states)
-        if state in names
-    }
-    if state_vector.LOAD_SPEED not in line.tangent.states:
-        moved["load_speed"] = moved["speed"]
-    return Input(estimates[:, -1], np.sqrt(np.maximum(variance, 0.0)), replace(line.motion, **moved))
+class Chain(NamedTuple):
+    """The line of n states as an input sees it, as `run_filter` takes it; its last state is the input."""
+
+    f: FloatArray  # (n + 1, n + 1): how they move on
+    h: FloatArray  # (n + 1,): how they show in the output
+    walk: float  # variance of the input's change from sample to sample
+    noise: float  # of the reading, its variance
+    prior: FloatArray  # (n + 1, n + 1): covariance of their first values
 
 
-def _chain(line: BlockedRecording, place: InputPlace, rate: float) -> Chain:
-    tangent = line.tangent
-    motor, load = FORCES[place]
-    direct = tangent.d[:, MOTOR] * motor + tangent.d[:, LOAD] * load + (1.0 if place is InputPlace.SENSOR else 0.0)
-    drive = np.ascontiguousarray(tangent.gamma[:, :, MOTOR] * motor + tangent.gamma[:, :, LOAD] * load)
-    memory = float(np.exp(-line.period_s / FORGETS_S)) if place is InputPlace.SHAFT else 1.0
-    return Chain(tangent.phi, drive, tangent.c, direct, memory, rate**2 * line.period_s)
+def _chain(result: FitResult, place: InputPlace, rate: float, floor: float) -> Chain:
+    line, period_s, size = line_of(result), result.problem.records[0].sample_time_s, size_at(result, place)
+    n, is_sensor = line.torque.size, place is InputPlace.SENSOR
+    f, h, prior = np.zeros((n + 1, n + 1)), np.zeros(n + 1), np.zeros((n + 1, n + 1))
+    f[:n, :n], f[n, n] = line.f, np.exp(-period_s / FORGETS_S) if place is InputPlace.SHAFT else 1.0
+    h[:n], h[n] = line.h[0], 1.0 if is_sensor else line.direct
+    if not is_sensor:  # with an error of the reading the line itself is as simulated
+        f[:n, n] = {InputPlace.MOTOR: line.torque, InputPlace.LOAD: line.load, InputPlace.SHAFT: line.shaft}[place]
+        prior[np.arange(n), np.arange(n)] = (INITIAL_SPREAD * _scales(result, line)) ** 2
+    prior[n, n] = size**2
+    return Chain(f, h, rate**2 * period_s, floor**2, prior)
 
 
-def _filter(
-    line: BlockedRecording, place: InputPlace, chain: Chain, size: float, floor: float, kept: Filtered
-) -> float:
-    """Run the filter over one recording and return the log-likelihood of its error."""
-    states = np.zeros_like(line.tangent.scale) if place is InputPlace.SENSOR else INITIAL_SPREAD * line.tangent.scale
-    prior = np.diag(np.append(states, size) ** 2)  # with an error of the reading the line itself is as simulated
-    return run_filter(chain, line.error, np.where(line.okay, line.weight, 0.0), floor**2, prior, kept)
+def _scales(result: FitResult, line: LinearLine) -> FloatArray:
+    """Return the size of each state in use, shape (n,): speeds and twists in turn; an angle stands last."""
+    records, stiffness = result.problem.records, float(result.p[slot("", "k")])
+    speed, torque = speed_scale(records), torque_scale(records)
+    scales = np.resize([speed, torque / stiffness if stiffness > 0.0 else 1.0], line.torque.size)
+    if scales.size % 2 == 0:
+        scales[-1:] = 1.0
+    return scales
 
 
 def _room(rows: int, m: int) -> Filtered:

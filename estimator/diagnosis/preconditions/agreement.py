@@ -16,6 +16,7 @@ from threadpoolctl import threadpool_limits
 
 from estimator.diagnosis.inference.wording import times
 from estimator.diagnosis.result import Doubt
+from estimator.diagnosis.thresholds import Mistakes
 from estimator.errors import EstimatorError
 from estimator.identification.best import band_of
 from estimator.identification.modes.modes import Uncertain
@@ -27,14 +28,7 @@ from estimator.physics.model import DrivelineModel, Structure, natural_frequenci
 from estimator.signals.decimate import HIGH_PASS_HZ, first_part, high_passed
 from estimator.signals.record import OutputKind, Record
 
-LEAST_RATIO = 1.3
-"""Factor by which two intervals must miss each other: temperature, load and amplitude change a line by less."""
-
-NOISE_ORDER = 12  # of the model of the noise: enough for the intervals, and a third of the work of all it may have
-
 COMPARED = ("J_M", "J_L", "k")  # and what one wrong scale of the torque changes by one factor
-
-SURE = 0.95  # with which both intervals hold their value
 
 
 def disagreements(records: Sequence[Record], model: DrivelineModel) -> list[Doubt]:
@@ -42,7 +36,7 @@ def disagreements(records: Sequence[Record], model: DrivelineModel) -> list[Doub
     found = {record.name: line for record in records if (line := _own_line(record, model)) is not None}
     asked = found if len(found) > 2 else list(found)[1:]  # of two, nobody knows which
     return [
-        Doubt(name if len(found) > 2 else ", ".join(found), _statement(name, found, differing), SURE)
+        Doubt(name if len(found) > 2 else ", ".join(found), _statement(name, found, differing), Mistakes.BOTH_HOLD)
         for name in asked
         if (differing := _differing(name, found))
     ]
@@ -59,7 +53,7 @@ def _own_line(record: Record, model: DrivelineModel) -> Mapping[str, Uncertain] 
     try:
         with threadpool_limits(1), np.errstate(divide="ignore"):  # of a line that is none
             data = high_passed(first_part(record), HIGH_PASS_HZ)
-            problem, x, first = solved(data, RESPONDING, NOISE_ORDER)
+            problem, x, first = solved(data, RESPONDING, Mistakes.NOISE_ORDER)
             fit = fit_of(problem, x, first)
             is_linear = judge_linearity(problem, x, first_part(record), first, HIGH_PASS_HZ).is_linear
             if not (is_linear and validate(fit, data).independence.is_independent):
@@ -83,13 +77,13 @@ def _differing(name: str, found: Mapping[str, Mapping[str, Uncertain]]) -> dict[
 
 def _differ(one: Uncertain, other: Uncertain) -> bool:
     (low, high), (its_low, its_high) = one.ci95, other.ci95
-    return low > LEAST_RATIO * its_high or its_low > LEAST_RATIO * high
+    return low > Mistakes.LEAST_RATIO * its_high or its_low > Mistakes.LEAST_RATIO * high
 
 
 def _statement(name: str, found: Mapping[str, Mapping[str, Uncertain]], differing: Mapping[str, float]) -> str:
     said = ", ".join(f"its {key} fits {times(ratio)} times" for key, ratio in differing.items())
     ratios = list(differing.values())
-    is_gain = len(ratios) == len(COMPARED) and max(ratios) < LEAST_RATIO * min(ratios)
+    is_gain = len(ratios) == len(COMPARED) and max(ratios) < Mistakes.LEAST_RATIO * min(ratios)
     why = (
         f"as under a torque of {times(1.0 / ratios[0])} times what was read"
         if is_gain

@@ -16,6 +16,8 @@ import numpy as np
 
 from estimator.diagnosis.preconditions.channels import dead_rows
 from estimator.diagnosis.preconditions.inertia import bridged, lag_of
+from estimator.diagnosis.priors import MistakePriors
+from estimator.diagnosis.thresholds import Mistakes
 from estimator.errors import Cure
 from estimator.physics.model import DrivelineModel, Motion, Parameter, Structure
 from estimator.signals.record import FloatArray, OutputKind, Record
@@ -28,45 +30,13 @@ _SPEED, _POSITION = (OutputKind.SPEED,), (OutputKind.POSITION,)
 _MOVES = (OutputKind.SPEED, OutputKind.POSITION, OutputKind.ACCELERATION)
 _ANY, _LINE, _BOTH = tuple(OutputKind), (Motion.TRANSLATION,), (Motion.ROTATION, Motion.TRANSLATION)
 
-GEARS = (3.0, 16.0)  # ratios of the gears behind traction motors
-
 _KP_N = 9.80665
 _CENT = "per cent of a rated torque of about {2} Nm"
 _MILLE = "per mille of a rated torque of about {3} Nm"
 
-SLOWEST_S, FASTEST_S = 0.5, 1e-5
-"""A driveline sampled slower, or faster, is more likely recorded in another unit of time."""
-
-SHORTEST_S = 1.0  # no recording of a driveline is shorter
-
-PERIODS = (1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 4e-3, 5e-3, 1e-2, 2e-2, 5e-2, 1e-1)
-"""Usual periods [s], for times that are counted in rows."""
-
-UNLIKELY = 0.02  # prior of a period that no driveline is sampled with, and of each that rows may have
 DAY_S = 86_400.0
 TIME_UNITS = {1e-3: "ms", 1e-6: "us", DAY_S: "days"}
 """Units of time that a column may have, by their size [s]."""
-
-SAME_PERIOD = 1e-3  # relative difference of sampling periods that rounding of time stamps makes
-
-INERTIA_UNITS = (
-    (1e-3, "in g m^2, expected kg m^2", 0.02),
-    (1e-4, "in kg cm^2, expected kg m^2", 0.04),
-    (1e-7, "in g cm^2, expected kg m^2", 0.02),
-    (0.25, "a GD^2, which is 4 J", 0.03),
-)
-"""What inertias in a model file may be in, with the prior of each."""
-
-LIMITS = (0.7, 0.5, 0.35, 0.25, 0.15, 0.1, 0.07, 0.05)
-"""Limits of a torque that are tried, in the largest reading of all recordings: what is read beyond is not there."""
-
-DEPTHS, TIMES = (0.5, 0.8, 0.95), (0.05, 0.3, 1.0)
-"""Losses of a torque over time that are tried, and their time constants in the recording's length."""
-
-LEAST_SHIFT_S = 0.05  # a shift that no filter and no bus makes
-MOST_GAIN = 3.5  # factor by which an inverter's gain may be off and is no unit
-OF_ONE = (0.02, 30.0)  # factors that one input alone may be off by: shares of a rated torque, gears; and a thousand
-STEPS = 60  # values that a factor may have, evenly in its logarithm
 
 MASSES = (Structure.TWO_MASS, Structure.THREE_MASS)
 
@@ -142,7 +112,7 @@ ROWS: tuple[Row, ...] = (
 
 def _gear_rows(gear_ratio: float | None) -> Iterator[Row]:
     """Yield what a gear between motor and wheel makes wrong; sharp where the model has its ratio."""
-    low, high = GEARS if gear_ratio is None else (gear_ratio, gear_ratio)
+    low, high = MistakePriors.GEARS if gear_ratio is None else (gear_ratio, gear_ratio)
     for part, what in ((Part.TORQUE, "torque"), (Part.OUTPUT, "speed")):
         question = "is the {0} that at the wheel, expected at the motor shaft: a gear ratio of about {1}"
         twice = "was the {0} reflected though it was at the motor shaft: a gear ratio of about {1}"
@@ -190,7 +160,9 @@ class Change:
 def changes_of(records: Sequence[Record], line: Line, ratio: float, off: Record) -> Iterator[Change]:
     """Yield nothing, then all that may be wrong beyond a factor; ``ratio`` is the inertia's in a recording ``off``."""
     period_s = records[0].sample_time_s
-    yield Change(prior=1.0 if FASTEST_S <= period_s <= SLOWEST_S else UNLIKELY, factors=2)
+    yield Change(
+        prior=1.0 if Mistakes.FASTEST_S <= period_s <= Mistakes.SLOWEST_S else MistakePriors.UNLIKELY, factors=2
+    )
     if records[0].imposed is None:
         yield from _of_inputs(records[0], line)
         if line is not None:
@@ -258,7 +230,7 @@ def of_one_unit(record: Record, ratio: float) -> Iterator[Change]:
         share = float(record.torque_nm[:, i] @ total) / (float(total @ total) or 1.0)
         factor = float(f"{(1.0 / ratio - 1.0 + share) / (share or 1.0):.2g}")
         is_thousand = factor > 0.0 and abs(abs(math.log10(factor)) - 3.0) < 0.1
-        if not (OF_ONE[0] < factor < OF_ONE[1] or is_thousand):
+        if not (Mistakes.OF_ONE[0] < factor < Mistakes.OF_ONE[1] or is_thousand):
             continue
         at = np.where(np.arange(count) == i, factor, 1.0)
         question = (
@@ -266,21 +238,30 @@ def of_one_unit(record: Record, ratio: float) -> Iterator[Change]:
             "gain that far off"
         )
         cure = Cure(record.name, torque=factor, inputs=(i,))
-        yield Change(question, 0.05 / STEPS, _scaled(at), cure=cure, is_open=1.0 / MOST_GAIN < factor < MOST_GAIN)
+        yield Change(
+            question,
+            0.05 / Mistakes.STEPS,
+            _scaled(at),
+            cure=cure,
+            is_open=1.0 / Mistakes.MOST_GAIN < factor < Mistakes.MOST_GAIN,
+        )
 
 
 def _of_time(records: Sequence[Record]) -> Iterator[Change]:
     """Yield that times are in another unit, or that one recording has another period than the others."""
     record, period_s = records[0], records[0].sample_time_s
     usual_s = float(np.median([each.sample_time_s for each in records]))
-    if any(not math.isclose(each.sample_time_s, usual_s, rel_tol=SAME_PERIOD) for each in records):
+    if any(not math.isclose(each.sample_time_s, usual_s, rel_tol=Mistakes.SAME_PERIOD) for each in records):
         question = f"is the sampling period {usual_s:.3g} s as the others'? Is its time in another unit"
         yield Change(question, 0.1, partial(_at_period, period_s=usual_s), is_of_one=True)
     factors = {1e-3: 0.1, 1e-6: 0.02, DAY_S: 0.05, 60.0: 0.005, 0.1: 0.01, 10.0: 0.01, 0.5: 0.002, 2.0: 0.002}
     if period_s == 1.0:
-        factors |= dict.fromkeys(PERIODS, UNLIKELY)
+        factors |= dict.fromkeys(MistakePriors.PERIODS, MistakePriors.UNLIKELY)
     for factor, prior in factors.items():
-        if FASTEST_S <= factor * period_s <= SLOWEST_S and record.okay.size * factor * period_s >= SHORTEST_S:
+        if (
+            Mistakes.FASTEST_S <= factor * period_s <= Mistakes.SLOWEST_S
+            and record.okay.size * factor * period_s >= Mistakes.SHORTEST_S
+        ):
             unit = f"Is time in {TIME_UNITS[factor]}, expected s" if factor in TIME_UNITS else "Is time in another unit"
             question = f"is the sampling period {factor * period_s:.3g} s, as read {period_s:.3g} s? {unit}"
             timed, cure = partial(_timed, by=factor), Cure(record.name, time=factor)
@@ -290,7 +271,7 @@ def _of_time(records: Sequence[Record]) -> Iterator[Change]:
 def _of_shifts(records: Sequence[Record], line: DrivelineModel) -> Iterator[Change]:
     """Yield that the output lags behind, or leads, the torque, by what the recordings show."""
     lags = {lag for record in records if (lag := lag_of(record, line)) is not None}
-    for lag_s in sorted(lag for lag in lags if abs(lag) >= LEAST_SHIFT_S):
+    for lag_s in sorted(lag for lag in lags if abs(lag) >= Mistakes.LEAST_SHIFT_S):
         side = "late" if lag_s > 0.0 else "early"
         question = (
             f"is the {records[0].kind.value} {abs(lag_s):.3g} s {side} against the torque: a shift between columns, or "
@@ -304,11 +285,11 @@ def _of_model(line: DrivelineModel, ratio: float) -> Iterator[Change]:
         swapped = lambda each: _with_inertias(each, J_M=each.parameters["J_L"], J_L=each.parameters["J_M"])  # noqa: E731
         yield Change("are J_M and J_L exchanged in the model file", 0.1, of_line=swapped)
         question = f"is J_L in the model file that of another vehicle or in another unit, about {ratio:.2g} times it"
-        yield Change(question, 0.1 / STEPS, of_line=partial(_with_times, names=["J_L"], factor=ratio))
+        yield Change(question, 0.1 / Mistakes.STEPS, of_line=partial(_with_times, names=["J_L"], factor=ratio))
     inertias = [each for each in line.parameters if each.startswith("J")] if line.motion is Motion.ROTATION else []
     for names in [inertias, *([each] for each in inertias)] if len(inertias) > 1 else [inertias] if inertias else ():
         which = "the inertia" if names == inertias else names[0]
-        for factor, unit, prior in INERTIA_UNITS:
+        for factor, unit, prior in MistakePriors.INERTIA_UNITS:
             question = f"is {which} in the model file {unit}"
             yield Change(question, prior, of_line=partial(_with_times, names=names, factor=factor), factors=1)
 
@@ -319,13 +300,13 @@ def _of_physics(records: Sequence[Record], line: DrivelineModel) -> Iterator[Cha
         return
     most = np.max([np.abs(record.torque_nm).max(axis=0) for record in records], axis=0)
     question = "does the torque stop at a limit, or is it lost over time"
-    for share in LIMITS:
+    for share in Mistakes.LIMITS:
         for inputs in [range(most.size), *([i] for i in range(most.size if most.size > 1 else 0))]:
             limit = np.where(np.isin(np.arange(most.size), list(inputs)), share * most, np.inf)
             clipped = lambda each, at=limit: replace(each, torque_nm=np.clip(each.torque_nm, -at, at))  # noqa: E731
             yield Change(question, 0.005, clipped, is_physics=True)
-    for depth in DEPTHS:
-        for time in TIMES:
+    for depth in Mistakes.DEPTHS:
+        for time in Mistakes.TIMES:
             yield Change(question, 0.005, partial(_fading, depth=depth, time=time), is_physics=True)
     if line.structure in MASSES:
         alone = partial(_with_times, names=["J_L"], factor=1e-3)

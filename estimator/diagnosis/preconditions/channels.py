@@ -9,60 +9,28 @@ from itertools import combinations, pairwise
 
 import numpy as np
 
+from estimator.diagnosis.acquisition.finding import runs
+from estimator.diagnosis.thresholds import Channels, Recordings
 from estimator.physics.motion import measured_speed
 from estimator.signals.record import BoolArray, Channel, FloatArray, IntArray, Location, OutputKind, Record
 
-HALF = 0.5  # share of the range of a reading that a jump must exceed
-FAR = 4.0  # how far a jump must be, in the largest other steps
-
 TURN = 2.0 * math.pi
-NEAR_A_TURN = 0.01  # share within which a jump is one of a whole turn
-
-FEWEST_SAMPLES = 10  # rows at the limit that count
-FEWEST_LEVELS = 10  # a channel of fewer values is switched
-SMALLEST_SHARE = 0.005  # share of the rows that must stand at the limit: fewer change no fit
-
-OFTEN = 10.0
-"""How often the limit must come over any other value: four times what a smooth peak read in steps can have."""
-
-AT_PACE = 0.1
-"""Step before the signal comes to the limit, in its usual steps (medians): below, it settles there."""
-
-FEWEST_GOOD = 0.5  # share of the recording's good rows that a channel must have read
-LEAST_CORRELATION = 0.5  # correlation with what a channel should go like from which it goes like that, or the other way
-
-MOST_RATIO = 2.0
-"""Factor by which a speed may be larger or smaller than the motor's: the shaft's twist is no part of its spread."""
-
-CHANCE = 3.0  # standard deviations of the correlation of two signals that have nothing to do with each other
-IDENTICAL_SHARE = 1e-9  # difference over the spread up to which two channels are one signal
-
-SMOOTH_S = 0.2
-"""Width of the mean over which channels are compared: below a driveline's first mode both ends move as one."""
-
-LAG_STEP_S, LAGS = 0.01, 30  # steps in which a channel's lag is sought [s], and how many of them either way
-BLOCKS = 8  # parts of a recording in which a channel's lag is estimated, each by itself
-DEAD_S = 0.5  # time for which a reading that does not change at all is dead, where it should [s]
-MOVED = 0.5  # range, over its spread, of what a channel should go like, from which a reading should change
-
-CLEARLY = 6.0
-"""Standard errors by which a lag must change over a recording: 1 in 1000 by chance, with as many degrees of freedom."""
 
 
 def period_of(values: FloatArray, seen: BoolArray) -> float | None:
     """Return after how much a reading begins anew; None where it does not."""
     both = seen[1:] & seen[:-1] & (values[1:] != 0.0) & (values[:-1] != 0.0)  # a lost reading is zero
     steps = np.where(both, np.diff(values), 0.0)
-    jumps = np.abs(steps) > HALF * float(np.ptp(values[seen]))
+    jumps = np.abs(steps) > Channels.HALF * float(np.ptp(values[seen]))
     if not jumps.any() or jumps.all():
         return None
     largest = float(np.abs(steps[~jumps]).max())
     sizes = np.abs(steps[jumps])
-    if sizes.min() <= FAR * largest or float(np.ptp(sizes)) > 2.0 * largest:
+    if sizes.min() <= Channels.FAR * largest or float(np.ptp(sizes)) > 2.0 * largest:
         return None
     onward = np.array([_motion(steps, jumps, i) for i in np.flatnonzero(jumps).tolist()])
     period = float(np.mean(np.sign(steps[jumps]) * (steps[jumps] - onward)))
-    if abs(period / TURN - 1.0) <= NEAR_A_TURN:
+    if abs(period / TURN - 1.0) <= Channels.NEAR_A_TURN:
         return TURN
     return period if sizes.size > 1 else None
 
@@ -103,13 +71,15 @@ class Clipped:
 def clipped(channel: str, values: FloatArray, seen: BoolArray) -> list[Clipped]:
     """Return the limits at which a channel is clipped: an end that is met far more often than other values are."""
     levels, counts = np.unique(values[seen], return_counts=True)
-    if levels.size < FEWEST_LEVELS:
+    if levels.size < Channels.FEWEST_LEVELS:
         return []
     others = counts[1:-1][levels[1:-1] != 0.0]
     found = []
     for end in (0, -1):
         limit = float(levels[end])
-        often = counts[end] >= max(FEWEST_SAMPLES, SMALLEST_SHARE * values.size, OFTEN * others.max(initial=1))
+        often = counts[end] >= max(
+            Channels.FEWEST_SAMPLES, Channels.SMALLEST_SHARE * values.size, Channels.OFTEN * others.max(initial=1)
+        )
         rows: BoolArray = seen & (values == limit)
         if limit != 0.0 and often and _at_pace(values, seen, rows):
             found.append(Clipped(channel, limit, rows))
@@ -122,7 +92,7 @@ def _at_pace(values: FloatArray, seen: BoolArray, rows: BoolArray) -> bool:
     read = seen[2:] & seen[1:-1] & seen[:-2]
     comes = before[read & rows[2:] & ~rows[1:-1]]
     usual = before[read & ~rows[1:-1] & ~rows[:-2] & (before > 0.0)]
-    return bool(comes.size and usual.size and np.median(comes) >= AT_PACE * np.median(usual))
+    return bool(comes.size and usual.size and np.median(comes) >= Channels.AT_PACE * np.median(usual))
 
 
 def without_clipped(records: Sequence[Record]) -> tuple[list[Record], list[str]]:
@@ -161,7 +131,7 @@ def dead_rows(torque: FloatArray, sample_time_s: float) -> BoolArray:
     """Tell where a torque stands still for long, of one that elsewhere hardly ever does."""
     ends = np.flatnonzero(np.diff(torque) != 0.0) + 1
     spans = np.diff([0, *ends.tolist(), torque.size])
-    long = spans * sample_time_s >= DEAD_S
+    long = spans * sample_time_s >= Channels.DEAD_S
     dead = np.repeat(long, spans)
     return dead if np.count_nonzero(long) == 1 and not dead.all() else np.zeros(torque.size, dtype=np.bool_)
 
@@ -229,10 +199,10 @@ def _without_dead(record: Record, channel: Channel) -> tuple[Channel, list[str]]
     if read.size == 0 or np.ptp(read) == 0.0:  # never read, or dead throughout: for `_fault` to say
         return channel, []
     like, okay, notes = _goes_like(record, channel), channel.okay.copy(), []
-    least = max(2, round(DEAD_S / record.sample_time_s))
+    least = max(2, round(Channels.DEAD_S / record.sample_time_s))
     ends = np.flatnonzero(np.diff(channel.output) != 0.0) + 1
     for first, end in pairwise([0, *ends.tolist(), channel.output.size]):
-        if end - first >= least and np.ptp(like[first:end]) > MOVED * np.nanstd(like):
+        if end - first >= least and np.ptp(like[first:end]) > Channels.MOVED * np.nanstd(like):
             okay[first:end] = False
             notes.append(
                 f"stays at {channel.output[first]:g} from {record.time_s[first]:g} to {record.time_s[end - 1]:g} s, "
@@ -244,18 +214,18 @@ def _without_dead(record: Record, channel: Channel) -> tuple[Channel, list[str]]
 def _fault(record: Record, channel: Channel, others: Sequence[Channel]) -> str:
     """Return what keeps a channel out of a fit; empty where nothing does."""
     good = channel.okay & record.okay
-    if good.sum() < FEWEST_GOOD * record.okay.sum():
+    if good.sum() < Channels.FEWEST_GOOD * record.okay.sum():
         return f"{good.sum()} of {record.okay.sum()} good rows hold a reading of it. Record it at the others' rate."
     values = channel.output[good]
     spread = float(np.std(values))
-    if spread <= IDENTICAL_SHARE * (float(np.abs(values).max()) or 1.0):
+    if spread <= Channels.IDENTICAL_SHARE * (float(np.abs(values).max()) or 1.0):
         return f"it stays at {values[0]:g}: its sensor is dead, or not the column that was meant."
     for label, other in (("the recording's first output", record.output), *((o.label, o.output) for o in others)):
-        if np.nanmax(np.abs(other[good] - values)) <= IDENTICAL_SHARE * spread:
+        if np.nanmax(np.abs(other[good] - values)) <= Channels.IDENTICAL_SHARE * spread:
             return f"it is the same signal as {label}. Name each sensor once."
     like = _goes_like(record, channel)
     seen = good & np.isfinite(like)
-    width = max(1, round(SMOOTH_S / record.sample_time_s))
+    width = max(1, round(Channels.SMOOTH_S / record.sample_time_s))
     mine, its = (_smooth(np.where(seen, each, 0.0), width) for each in (channel.output, like))
     return _turned(channel, mine[seen], its[seen], seen.sum() / width) or _off_clock(record, mine, its, seen)
 
@@ -265,13 +235,13 @@ def _turned(channel: Channel, mine: FloatArray, its: FloatArray, independent: fl
     both = float(np.linalg.norm(mine) * np.linalg.norm(its))
     alike = float(mine @ its) / both if both else 0.0
     if channel.kind is not OutputKind.TORQUE or channel.location is not Location.LOAD:
-        if abs(alike) < CHANCE / np.sqrt(independent):
+        if abs(alike) < Channels.CHANCE / np.sqrt(independent):
             return "it does not follow the motor at all: it is another signal, or the sensor shows only noise."
-    if alike < -LEAST_CORRELATION:
+    if alike < -Channels.LEAST_CORRELATION:
         return "it moves opposite to the motor: its sign is turned. Give it a negative scale."
-    if channel.kind is OutputKind.SPEED and alike > LEAST_CORRELATION:
+    if channel.kind is OutputKind.SPEED and alike > Channels.LEAST_CORRELATION:
         ratio = float(np.linalg.norm(mine) / np.linalg.norm(its))
-        if not 1.0 / MOST_RATIO < ratio < MOST_RATIO:
+        if not 1.0 / Channels.MOST_RATIO < ratio < Channels.MOST_RATIO:
             return (
                 f"it is {ratio:.3g} times the motor's speed: outputs must be reflected to the motor shaft. "
                 f"Multiply its scale by {1.0 / ratio:.4g}, the gear's ratio."
@@ -285,16 +255,18 @@ def _off_clock(record: Record, mine: FloatArray, its: FloatArray, seen: BoolArra
     A sensor that is elsewhere in the line lags by as much at the end as at the beginning; one that has another clock
     does not.
     """
-    shifts = max(1, round(LAG_STEP_S / record.sample_time_s)) * np.arange(-LAGS, LAGS + 1)
+    shifts = max(1, round(Channels.LAG_STEP_S / record.sample_time_s)) * np.arange(-Channels.LAGS, Channels.LAGS + 1)
     rows = np.flatnonzero(seen)[shifts[-1] : -shifts[-1]]
-    blocks = [each[(each >= shifts[-1]) & (each < its.size - shifts[-1])] for each in np.array_split(rows, BLOCKS)]
+    blocks = [
+        each[(each >= shifts[-1]) & (each < its.size - shifts[-1])] for each in np.array_split(rows, Channels.BLOCKS)
+    ]
     if min(block.size for block in blocks) < shifts.size:  # too short to tell
         return ""
     lags = [record.sample_time_s * _lag(mine, its, block, shifts) for block in blocks]
     times = [float(record.time_s[block].mean()) for block in blocks]
     (rate, _), spread = np.polyfit(times, lags, 1, cov=True)
     apart_s = abs(float(rate)) * float(record.time_s[-1] - record.time_s[0])
-    if abs(rate) <= CLEARLY * float(np.sqrt(spread[0, 0])) or apart_s <= record.sample_time_s:
+    if abs(rate) <= Channels.CLEARLY * float(np.sqrt(spread[0, 0])) or apart_s <= record.sample_time_s:
         return ""
     return (
         f"its clock and that of the first output differ by {abs(rate) * 1e6:.0f} ppm, {apart_s:.3g} s over the "
@@ -328,3 +300,60 @@ def _goes_like(record: Record, channel: Channel) -> FloatArray:
 
 def _smooth(values: FloatArray, width: int) -> FloatArray:
     return np.convolve(values, np.full(width, 1.0 / width), mode="same")
+
+
+@dataclass(frozen=True, slots=True)
+class NotRead:
+    """Rows of a channel that no sensor has read, shape (N,), and what is there instead."""
+
+    channel: str  # in words, for a warning
+    rows: BoolArray  # where it was not read
+    held: bool  # the value before stands there; else it is interpolated
+
+
+def not_read(channel: str, values: FloatArray, seen: BoolArray, may_rest: bool) -> list[NotRead]:
+    """Return the rows in which a channel is interpolated, and those in which it is held at one value."""
+    whole = seen[:-2] & seen[1:-1] & seen[2:]
+    steps = np.abs(np.diff(values))
+    if not whole.any() or not (steps > 0.0).any():
+        return []
+    rounding = max(
+        Recordings.ROUNDING * float(steps[steps > 0.0].min()), Recordings.SMOOTH * float(np.ptp(values[seen]))
+    )
+    bend = np.abs(np.diff(values, 2))
+    bent = bend[whole & (bend > rounding)]
+    usual = float(np.median(bent)) if bent.size else 0.0
+    if usual < Recordings.BENT * rounding:
+        return []
+    drawn, held = np.zeros_like(seen), np.zeros_like(seen)
+    for first, behind in runs(whole & (bend <= rounding)):
+        rows = slice(first, behind + 2)  # a triple has two rows more
+        if behind + 2 - first < Recordings.FEWEST_IN_A_ROW:
+            continue
+        moved = float(np.ptp(values[rows]))
+        drawn[rows] |= moved >= usual
+        held[rows] |= moved == 0.0 and values[first] != 0.0
+    if may_rest or float(np.mean(steps[~(held[1:] & held[:-1])] == 0.0)) > Recordings.SELDOM:
+        held[:] = False
+    return [NotRead(channel, rows, rows is held) for rows in (drawn, held) if rows.any()]
+
+
+def without_not_read(records: Sequence[Record]) -> tuple[list[Record], list[str]]:
+    """Mask the rows in which the output was not read; say so.
+
+    A torque that lies on straight lines may be one that was commanded: ramps, and levels.
+    """
+    mended, warnings = [], []
+    for record in records:
+        okay = record.okay.copy()
+        seen = record.okay & np.isfinite(record.output)
+        for found in not_read(record.kind.value, record.output, seen, record.kind is not OutputKind.SPEED):
+            okay &= ~found.rows
+            what = "stands still to the last digit" if found.held else "lies on straight lines to the last digit"
+            why = "its reading had stopped" if found.held else "it was interpolated, not read"
+            warnings.append(
+                f"recording {record.name}: the {found.channel} {what} in {found.rows.mean():.1%} of the rows: {why} "
+                "there; these rows are not used. Give the raw recording, with its gaps."
+            )
+        mended.append(record if np.array_equal(okay, record.okay) else replace(record, okay=okay))
+    return mended, warnings

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 from scipy.signal import detrend
 
-from estimator.errors import BadModel
+from estimator.diagnosis.noise import noise_floor
+from estimator.diagnosis.preconditions.channels import standstill
+from estimator.diagnosis.thresholds import Inertias, Recordings
+from estimator.errors import BadModel, NotExciting
 from estimator.physics.driveline import InitialCondition
 from estimator.physics.layout import Grid, flat, grid_for
 from estimator.physics.model import DrivelineModel, Parameter, Structure, natural_frequencies_rad_s
@@ -18,34 +21,7 @@ from estimator.physics.motion import measured_speed, turns_on
 from estimator.physics.simulate import simulate
 from estimator.signals.record import FloatArray, Record
 
-UNEQUAL = 1000.0
-"""Ratio of two inertias from which on one of them is invisible from the other: 1 / 1000 of the motion."""
-
-BELOW, ABOVE = (0.1, 0.6), (1.6, math.inf)
-"""The two bands, in first modes of the nominal model: a mode off by a quarter lies in neither."""
-
-BLOCK_HZ, FEWEST_BINS = 1.0, 8
-"""Frequencies compared at a time: few enough for a delay of some samples not to matter."""
-
-BANDS_TELL = 0.5  # share of the output in either band that must follow from the torque
-AGREE = 2.5  # factor between the ratios of the two bands up to which they are of one cause
-STRETCH_S = 1.0  # over which the change of speed is looked at
-FEWEST_STEPS, FEWEST_PERIODS = 10, 2.0  # samples, and periods of the first mode, of a stretch at least
-FEWEST_STRETCHES = 10  # stretches that a recording must hold to say anything: the regression has three unknowns
-
-TELLS = 0.25
-"""Share of the motion that may be left unexplained by torque and line where they tell an inertia. Where a road or a
-brake moves the line and a control sets the torque it is above 0.4, in tip-ins and under a PRBS below 0.2."""
-
-HELD = 0.05
-"""Share of the torque's impulse that may be left where friction and gravity explain it: servos that are slow against
-their friction leave less than a hundredth, a sign turned in one of two inputs a sixth."""
-
-ONE_WAY = 0.8
-"""Share of the cross-spectrum that must have one sign: where the output is late by more, its direction is not known."""
-
-JOINT = 0.5  # no inertia makes a joint linear: what stiffens and rubs leaves twice as much
-LONGEST_LAG_S = 2.0  # that is looked for between torque and output
+UNREAD = ", and that every torque is read: what another one does counts as noise."
 
 BODY = DrivelineModel(Structure.ONE_MASS, {"J_M": Parameter(1.0, 0.0), "b_M": Parameter(0.0, 0.0)})
 """What any line is as a whole, where no model is known; its inertia says nothing."""
@@ -75,7 +51,7 @@ def model_warnings(model: DrivelineModel) -> list[str]:
 
 def _inertias(values: Mapping[str, float]) -> list[str]:
     small, large = min(values, key=values.__getitem__, default=""), max(values, key=values.__getitem__, default="")
-    if small == large or values[large] < UNEQUAL * values[small]:
+    if small == large or values[large] < Inertias.UNEQUAL * values[small]:
         return []
     return [
         f"model: {small} = {values[small]:g} and {large} = {values[large]:g} differ by a factor of "
@@ -110,7 +86,7 @@ class Inertia:
     @property
     def tells(self) -> bool:
         """Whether enough of the motion follows from the torque for the ratio to mean anything."""
-        return self.rest <= TELLS and self.ratio != 0.0
+        return self.rest <= Inertias.TELLS and self.ratio != 0.0
 
     @property
     def falls(self) -> bool:
@@ -127,15 +103,17 @@ def fitted_inertia(record: Record, line: DrivelineModel) -> Inertia:
         return _of_joint(record, line)
     first_hz = _first_hz(line)
     log_ratio, found, grid = math.nan, as_one_body(record, line, first_hz), _grid_or_none(record, line)
-    if grid is not None and 0.0 < ABOVE[0] * first_hz < 0.5 / record.sample_time_s:
-        below = by_band(record, line, grid, BELOW[0] * first_hz, BELOW[1] * first_hz, ONE_WAY)
-        above = by_band(record, line, grid, ABOVE[0] * first_hz, ABOVE[1] * first_hz)
-        if max(below.rest, above.rest) <= 1.0 - BANDS_TELL:
+    if grid is not None and 0.0 < Inertias.ABOVE[0] * first_hz < 0.5 / record.sample_time_s:
+        below = by_band(
+            record, line, grid, Inertias.BELOW[0] * first_hz, Inertias.BELOW[1] * first_hz, Inertias.ONE_WAY
+        )
+        above = by_band(record, line, grid, Inertias.ABOVE[0] * first_hz, Inertias.ABOVE[1] * first_hz)
+        if max(below.rest, above.rest) <= 1.0 - Inertias.BANDS_TELL:
             log_ratio = math.log(abs(below.ratio / above.ratio))
             mean = math.copysign(math.sqrt(abs(below.ratio * above.ratio)), below.ratio)
-            if found.tells and abs(math.log(abs(found.ratio / mean))) > math.log(AGREE):
+            if found.tells and abs(math.log(abs(found.ratio / mean))) > math.log(Inertias.AGREE):
                 return replace(found, log_ratio=math.log(abs(found.ratio / above.ratio)))  # a load too heavy to show
-            if abs(log_ratio) <= math.log(AGREE):
+            if abs(log_ratio) <= math.log(Inertias.AGREE):
                 return Inertia(mean, min(below.rest, found.rest), log_ratio)  # comparable with that of one body alone
     return replace(found, log_ratio=log_ratio)
 
@@ -151,7 +129,7 @@ def _of_joint(record: Record, line: DrivelineModel) -> Inertia:
     rest = _rest(
         taken, np.column_stack([each[record.okay] for each in (*parts, np.sign(parts[1]), np.ones(twist.size))])
     )
-    return Inertia(both / power, JOINT * float(rest @ rest) / float(taken @ taken)) if both != 0.0 else NOTHING
+    return Inertia(both / power, Inertias.JOINT * float(rest @ rest) / float(taken @ taken)) if both != 0.0 else NOTHING
 
 
 def _grid_or_none(record: Record, line: DrivelineModel) -> Grid | None:
@@ -172,9 +150,9 @@ def lag_of(record: Record, line: DrivelineModel) -> float | None:
     first_hz = _first_hz(line)
     together = Y * M.conj()
     if first_hz > 0.0:  # where the mode rings, any whole period of it fits
-        together[np.fft.rfftfreq(2 * record.okay.size - 2, record.sample_time_s) > BELOW[1] * first_hz] = 0.0
+        together[np.fft.rfftfreq(2 * record.okay.size - 2, record.sample_time_s) > Inertias.BELOW[1] * first_hz] = 0.0
     likeness = np.fft.irfft(together)
-    most = min(round(LONGEST_LAG_S / record.sample_time_s), likeness.size // 4)
+    most = min(round(Inertias.LONGEST_LAG_S / record.sample_time_s), likeness.size // 4)
     lags = np.arange(-most, most + 1)
     best = int(lags[np.argmax(likeness[lags])])
     return best * record.sample_time_s if abs(best) < most else None
@@ -198,7 +176,7 @@ def by_band(
     frequency = np.fft.rfftfreq(model.size, record.sample_time_s)
     band = (frequency >= low_hz) & (frequency < high_hz)
     Y, M = (np.fft.rfft(detrend(signal) * np.hanning(signal.size))[band] for signal in (output, model))
-    bins = max(FEWEST_BINS, round(BLOCK_HZ / frequency[1]))
+    bins = max(Inertias.FEWEST_BINS, round(Inertias.BLOCK_HZ / frequency[1]))
     blocks = Y.size // bins
     if blocks == 0:
         return NOTHING
@@ -238,7 +216,7 @@ def held_by_friction(record: Record, line: DrivelineModel) -> Inertia | None:
     speed, impulse, usual = changes
     rest, power = _rest(impulse - _total(line) * speed, usual), float(impulse @ impulse)
     share = float(rest @ rest) / power if power > 0.0 else 1.0
-    return Inertia(1.0, share) if share <= HELD else None
+    return Inertia(1.0, share) if share <= Inertias.HELD else None
 
 
 def _total(line: DrivelineModel) -> float:
@@ -252,17 +230,21 @@ def _first_hz(line: DrivelineModel) -> float:
 def _changes(record: Record, first_hz: float) -> tuple[FloatArray, FloatArray, FloatArray] | None:
     """Return how speed, impulse and what is usual change over stretches that average the mode; None of too few."""
     period = 1.0 / (first_hz * record.sample_time_s) if first_hz > 0.0 else 0.0
-    step = max(round(STRETCH_S / record.sample_time_s), FEWEST_STEPS)
+    step = max(round(Inertias.STRETCH_S / record.sample_time_s), Inertias.FEWEST_STEPS)
     width = min(step, max(1, round(period)))
     # a short recording is cut into shorter stretches, as long as these average the mode
     step = min(
         step,
-        max((record.okay.size - 2 * width) // (FEWEST_STRETCHES + 1), FEWEST_STEPS, round(FEWEST_PERIODS * period)),
+        max(
+            (record.okay.size - 2 * width) // (Inertias.FEWEST_STRETCHES + 1),
+            Inertias.FEWEST_STEPS,
+            round(Inertias.FEWEST_PERIODS * period),
+        ),
     )
     inside = slice(width, record.okay.size - width)
     okay = record.okay[inside]
     both = okay[step:] & okay[:-step]
-    if both.sum() < FEWEST_STRETCHES * step:
+    if both.sum() < Inertias.FEWEST_STRETCHES * step:
         return None
     signals = [uniform_filter1d(signal, width)[inside] for signal in _integrals(record)]
     changes = [(signal[step:] - signal[:-step])[both] for signal in signals]
@@ -292,3 +274,106 @@ def _integral(signal: FloatArray, period_s: float) -> FloatArray:
 
 def _rest(y: FloatArray, design: FloatArray) -> FloatArray:
     return y - design @ np.linalg.lstsq(design, y, rcond=None)[0]
+
+
+def require_signals(record: Record) -> None:
+    """Refuse a recording with too few good samples, or of which torque or output does not change."""
+    good = int(record.okay.sum())
+    if good < Recordings.FEWEST_SAMPLES:
+        raise NotExciting(
+            f"recording {record.name}: {good} good samples, expected at least {Recordings.FEWEST_SAMPLES}. Record "
+            "longer.",
+            (record.name,),
+        )
+    driven_by = ("torque", record.total_torque_nm) if record.imposed is None else ("imposed motion", record.imposed)
+    still = standstill(record)
+    for what, values in (driven_by, ("output", record.output)):
+        seen = values[record.okay]
+        if not still and float(np.ptp(seen)) == 0.0:
+            still = (
+                f"recording {record.name}: the {what} is constant at {seen[0]:g}, expected it to vary. "
+                "Excite the driveline (PRBS, reversal, tip-in) and check the channel."
+            )
+    if still:
+        raise NotExciting(still, (record.name,))
+
+
+def require_excitation(records: Sequence[Record], model: DrivelineModel) -> list[str]:
+    """Refuse recordings in which nothing moves beyond the noise; warn where only a part of the model is excited.
+
+    What the torque does to the output is asked of the nominal model. A part of it that stays below the noise of the
+    reading is not excited: whatever is fitted there is fitted to noise.
+    """
+    floor = noise_floor(records)
+    moved = _rms([_good(record, record.output) for record in records])
+    excited = math.sqrt(max(moved**2 - floor**2, 0.0))
+    unit = records[0].kind.value
+    if excited < floor:
+        raise NotExciting(
+            f"the {unit} moves by {excited:.3g} (rms) beyond a noise of {floor:.3g}, expected more than the noise. "
+            f"Excite the driveline (PRBS, reversal, tip-in){UNREAD}",
+            tuple(record.name for record in records),
+        )
+    if records[0].imposed is not None:  # no torque that could be too small
+        return []
+    line = replace(model, effects={})
+    grid = grid_for(line, records)
+    answer = _rms([_good(record, driven(record, line, grid)) for record in records])
+    if answer < floor:
+        raise NotExciting(
+            f"by the nominal model the torque moves the {unit} by {answer:.3g} (rms), less than its noise of "
+            f"{floor:.3g}: the torque read excites nothing. Excite the driveline (PRBS, reversal, tip-in), check that "
+            f"the torque is in Nm (force: N){UNREAD}",
+            tuple(record.name for record in records),
+        )
+    return _unexcited_mode(records, line, grid, floor)
+
+
+def _unexcited_mode(records: Sequence[Record], line: DrivelineModel, grid: Grid, floor: float) -> list[str]:
+    first_hz = float(natural_frequencies_rad_s(line.values())[0]) / (2.0 * math.pi)
+    if first_hz == 0.0:
+        return []
+    lacking = "stiffness, damping and effects of the shaft can't be determined from these recordings"
+    nyquist_hz = 0.5 / records[0].sample_time_s
+    if nyquist_hz < first_hz:
+        return [
+            f"the model's first mode is at {first_hz:.3g} Hz, beyond the {nyquist_hz:.3g} Hz that a sampling period of "
+            f"{records[0].sample_time_s:g} s can show: {lacking}. Sample faster, or use structure = 'one_mass'."
+        ]
+    answer = _rms([_good(record, driven(record, line, grid, Recordings.NEAR_MODE * first_hz)) for record in records])
+    if answer >= floor:
+        return []
+    return [
+        f"at and above the model's first mode ({first_hz:.3g} Hz) the torque moves the {records[0].kind.value} by "
+        f"{answer:.3g} (rms), less than its noise of {floor:.3g}: {lacking}. Superpose a PRBS, or a tip-in."
+    ]
+
+
+def _good(record: Record, signal: FloatArray) -> FloatArray:
+    """Return a signal's good samples without mean and trend."""
+    return detrend(signal[record.okay])
+
+
+def _rms(signals: Sequence[FloatArray]) -> float:
+    return math.sqrt(sum(float(signal @ signal) for signal in signals) / sum(signal.size for signal in signals))
+
+
+def tolerance_of(line: DrivelineModel) -> float:
+    """Return the tolerance of the nominal inertia; of a line without one, the largest tolerance."""
+    inertias = [each.tolerance for name, each in line.parameters.items() if name.startswith("J")]
+    return max(inertias or [each.tolerance for each in line.parameters.values()])
+
+
+def is_within_tolerance(found: Inertia, line: DrivelineModel) -> bool:
+    """Tell whether an inertia is within reach of re-tuning; one that nothing tells is not."""
+    return found.tells and 1.0 - tolerance_of(line) <= found.ratio <= 1.0 + tolerance_of(line)
+
+
+def ratio_off(found: Sequence[Inertia], line: DrivelineModel | None) -> tuple[float, int]:
+    """Return the middle one of the inertias' ratios beyond their tolerance, and of which recording; 1 of the first."""
+    off = [
+        (each.ratio, i)
+        for i, each in enumerate(found)
+        if each.tells and line is not None and not is_within_tolerance(each, line)
+    ]
+    return sorted(off)[len(off) // 2] if off else (1.0, 0)

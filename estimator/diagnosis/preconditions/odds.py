@@ -17,41 +17,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from estimator.diagnosis.preconditions.candidates import STEPS, Change, Line, Part, Row, changes_of, rows_for, times
-from estimator.diagnosis.preconditions.inertia import BODY, TELLS, Inertia, fitted_inertia
+from estimator.diagnosis.preconditions.candidates import Change, Line, Part, Row, changes_of, rows_for, times
+from estimator.diagnosis.preconditions.inertia import BODY, Inertia, fitted_inertia, ratio_off, tolerance_of
+from estimator.diagnosis.priors import MistakePriors
+from estimator.diagnosis.thresholds import Inertias, Mistakes
 from estimator.errors import Cure
-from estimator.physics.model import DrivelineModel
 from estimator.signals.record import FloatArray, OutputKind, Record
-
-CLOSE = 0.6, 0.1
-"""Spread of the logarithm of the inertia's ratio: this share of the tolerance, and the error of its fit."""
-
-PHYSICS, PHYSICS_SHARE = math.log(2.0), 0.08
-"""Spread where physics is missing or a payload is on, and how often that is."""
-
-BANDS, BANDS_PHYSICS, BANDS_OTHER = 0.35, 0.1, 1.2
-"""Spread of the two bands' ratio, the share of the cases in which physics spreads it further, and that."""
-
-REST, LEAST_REST = 4.0, 0.02
-"""Power of the unexplained motion: as of eight independent stretches; and what the shortest model error leaves."""
-
-UNKNOWN_FIT = 1.0 / 6.0  # density of an inertia that nothing tells: from a twentieth to twenty times
-
-ELSE, TURNED, ALONE = 0.05, 0.15, 0.2  # priors of something else, of a sign turned, and of one recording alone
-
-USUAL_TORQUE_NM, USUAL_SPEED_RAD_S = (200.0, math.log(8.0)), (80.0, math.log(5.0))
-"""Median, and spread of the logarithm, of the largest torque and speed in a recording of a drive."""
-
-FAR = 4.0  # spreads beyond which a size is strange, by how much ever: it decides nothing more
-
-FASTEST_RAD_S, UNREACHED = 2500.0, 1e-3  # 24,000 rpm, and how seldom a recording is of a drive that is faster
-
-WHOLE, FEWEST_VALUES = 1e-6, 5
-"""How far whole numbers may be off, and how many there must be: fewer are levels that were asked for."""
-
-STRANGE = 0.02  # share of the recordings in which something else is, too, or physics that is in no other
-
-OFFSETS = np.linspace(-2.0, 2.0, 81)  # of the logarithm of the nominal inertia that are tried
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,20 +93,22 @@ def with_odds(records: Sequence[Record], line: Line, found: Sequence[Inertia]) -
     sizes = [largest(record) for record in records]
     is_whole = all(are_whole_numbers(record) for record in records)
     rows = rows_for(line, records[0].kind, is_whole)
-    spread = 0.0 if line is None else CLOSE[0] * math.log1p(tolerance_of(line))
-    off = _log_near(OFFSETS, max(spread, 0.5 * CLOSE[1]), PHYSICS_SHARE)
+    spread = 0.0 if line is None else MistakePriors.CLOSE[0] * math.log1p(tolerance_of(line))
+    off = _log_near(MistakePriors.OFFSETS, max(spread, 0.5 * MistakePriors.CLOSE[1]), MistakePriors.PHYSICS_SHARE)
     off = off - np.logaddexp.reduce(off)
     unknown = [
-        math.log(UNKNOWN_FIT) - REST * math.log(TELLS) + _usual((), size[0], *size, record)
+        math.log(MistakePriors.UNKNOWN_FIT)
+        - MistakePriors.REST * math.log(Inertias.TELLS)
+        + _usual((), size[0], *size, record)
         for size, record in zip(sizes, records, strict=True)
     ]
     nothing = [
-        np.full(OFFSETS.size, math.log(STRANGE) + other)
+        np.full(MistakePriors.OFFSETS.size, math.log(MistakePriors.STRANGE) + other)
         if each.falls
         else _log_fits(each, size, record, (), np.zeros(1), line)[0]
         for each, size, record, other in zip(found, sizes, records, unknown, strict=True)
     ]
-    all_of = [Candidate(Change(), log_weight=math.log(ELSE) + sum(unknown), is_else=True)]
+    all_of = [Candidate(Change(), log_weight=math.log(MistakePriors.ELSE) + sum(unknown), is_else=True)]
     ratio, off_in = ratio_off(found, line)
     for change in changes_of(records, line, ratio, records[off_in]):
         changed = [changed_by(record, change) for record in records]
@@ -187,16 +160,18 @@ def _candidates(
     Of the inertias, the nominal one's offset is common to all recordings: they are compared with each other.
     """
     ranged = next((row for row in chosen if row.low != row.high), None)
-    logs = np.zeros(1) if ranged is None else np.linspace(math.log(ranged.low), math.log(ranged.high), STEPS)
+    logs = np.zeros(1) if ranged is None else np.linspace(math.log(ranged.low), math.log(ranged.high), Mistakes.STEPS)
     prior = math.log(change.prior) + sum(math.log(row.prior) for row in chosen)
     is_nothing = not (chosen or change.question)
     at = [
-        np.logaddexp(_log_fits(each, largest(record), record, chosen, logs, line), math.log(STRANGE) + other)
+        np.logaddexp(
+            _log_fits(each, largest(record), record, chosen, logs, line), math.log(MistakePriors.STRANGE) + other
+        )
         for each, record, other in zip(fits, changed, unknown, strict=True)
     ]
     is_turned = sum(each.falls for each in fits) > 0.5 * sum(each.tells for each in fits)
     as_most = [  # one that goes the other way than the others is strange
-        each if not fit.tells or fit.falls == is_turned else np.full_like(each, math.log(STRANGE) + other)
+        each if not fit.tells or fit.falls == is_turned else np.full_like(each, math.log(MistakePriors.STRANGE) + other)
         for each, fit, other in zip(at, fits, unknown, strict=True)
     ]
 
@@ -206,7 +181,7 @@ def _candidates(
         factors = tuple((row, row.low if row.low == row.high else float(f"{math.exp(best):.2g}")) for row in chosen)
         weight = float(np.logaddexp.reduce(by_factor) - math.log(logs.size)) + log_prior
         turned = is_turned if only is None else fits[only].falls
-        return Candidate(change, factors, weight + (math.log(TURNED) if turned else 0.0), turned, only)
+        return Candidate(change, factors, weight + (math.log(MistakePriors.TURNED) if turned else 0.0), turned, only)
 
     all_nothing = np.sum(nothing, axis=0)
     if not (change.is_of_one or any(row.alone for row in chosen)):
@@ -215,7 +190,7 @@ def _candidates(
     for i in range(len(changed) if may_be_alone else 0):
         if is_nothing and not fits[i].falls:
             continue
-        yield made(at[i] + all_nothing - nothing[i], prior + math.log(ALONE / len(changed)), i)
+        yield made(at[i] + all_nothing - nothing[i], prior + math.log(MistakePriors.ALONE / len(changed)), i)
 
 
 def _log_fits(
@@ -228,7 +203,7 @@ def _log_fits(
 ) -> FloatArray:
     """Return the log likelihood of one recording for every factor out of a range and every offset, shape (L, K)."""
     if not math.isfinite(found.ratio) or found.ratio == 0.0:
-        return np.full((logs.size, OFFSETS.size), -math.inf)
+        return np.full((logs.size, MistakePriors.OFFSETS.size), -math.inf)
     by = {part: np.zeros(logs.size) for part in Part}
     over = np.full(logs.size, -math.log(abs(found.ratio)))
     for row in chosen:
@@ -236,21 +211,27 @@ def _log_fits(
         by[row.part] = by[row.part] + of_row
         over = over - row.sign * of_row
     is_model = any(row.part is Part.MODEL for row in chosen)
-    left = over[:, np.newaxis] - OFFSETS
-    fit = np.full_like(left, math.log(UNKNOWN_FIT)) if line is None else _log_near(left, CLOSE[1], STRANGE)
+    left = over[:, np.newaxis] - MistakePriors.OFFSETS
+    fit = (
+        np.full_like(left, math.log(MistakePriors.UNKNOWN_FIT))
+        if line is None
+        else _log_near(left, MistakePriors.CLOSE[1], MistakePriors.STRANGE)
+    )
     bands = 0.0
     if math.isfinite(found.log_ratio):
-        other = _normal(found.log_ratio, BANDS_OTHER)
-        near = (1.0 - BANDS_PHYSICS) * _normal(found.log_ratio, BANDS) + BANDS_PHYSICS * other
+        other = _normal(found.log_ratio, MistakePriors.BANDS_OTHER)
+        near = (1.0 - MistakePriors.BANDS_PHYSICS) * _normal(
+            found.log_ratio, MistakePriors.BANDS
+        ) + MistakePriors.BANDS_PHYSICS * other
         bands = math.log((other if is_model else near) or 1e-300)
     torque, output = size[0] * np.exp(by[Part.TORQUE]), size[1] * np.exp(by[Part.OUTPUT])
     usual = np.array([_usual(chosen, size[0], float(t), float(o), record) for t, o in zip(torque, output, strict=True)])
-    return fit + usual[:, np.newaxis] + bands - REST * math.log(max(found.rest, LEAST_REST))
+    return fit + usual[:, np.newaxis] + bands - MistakePriors.REST * math.log(max(found.rest, MistakePriors.LEAST_REST))
 
 
 def _log_near(over: FloatArray, spread: float, often: float) -> FloatArray:
     """Return the log density of an inertia's offset: as close as its spread, or, that often, as physics makes it."""
-    wide = math.hypot(spread, PHYSICS)
+    wide = math.hypot(spread, MistakePriors.PHYSICS)
     near = [math.log(w / s) - 0.5 * (over / s) ** 2 for w, s in ((1.0 - often, spread), (often, wide))]
     result: FloatArray = np.logaddexp(*near) - 0.5 * math.log(2.0 * math.pi)
     return result
@@ -266,14 +247,18 @@ def _usual(chosen: Sequence[Row], read: float, torque_nm: float, output: float, 
     if reads is not None:
         of_torque = -math.log(math.log(reads[1] / reads[0])) if reads[0] <= read <= reads[1] else -math.inf
     else:
-        of_torque = _log_size(torque_nm, *USUAL_TORQUE_NM)
+        of_torque = _log_size(torque_nm, *MistakePriors.USUAL_TORQUE_NM)
     if record.kind is not OutputKind.SPEED:
         return of_torque
-    return of_torque + _log_size(output, *USUAL_SPEED_RAD_S) + (math.log(UNREACHED) if output > FASTEST_RAD_S else 0.0)
+    return (
+        of_torque
+        + _log_size(output, *MistakePriors.USUAL_SPEED_RAD_S)
+        + (math.log(MistakePriors.UNREACHED) if output > MistakePriors.FASTEST_RAD_S else 0.0)
+    )
 
 
 def _log_size(value: float, median: float, spread: float) -> float:
-    off = min(abs(math.log(max(value, 1e-12) / median)) / spread, FAR)
+    off = min(abs(math.log(max(value, 1e-12) / median)) / spread, MistakePriors.FAR)
     return -0.5 * off**2 - math.log(spread * math.sqrt(2.0 * math.pi))
 
 
@@ -286,28 +271,9 @@ def largest(record: Record) -> tuple[float, float]:
 def are_whole_numbers(record: Record) -> bool:
     """Tell whether the torques of a recording are whole numbers, more than a few levels that were asked for."""
     read = record.torque_nm[np.isfinite(record.torque_nm).all(axis=1)]
-    return bool(np.abs(read - np.round(read)).max() <= WHOLE) and np.unique(read).size >= FEWEST_VALUES
-
-
-def tolerance_of(line: DrivelineModel) -> float:
-    """Return the tolerance of the nominal inertia; of a line without one, the largest tolerance."""
-    inertias = [each.tolerance for name, each in line.parameters.items() if name.startswith("J")]
-    return max(inertias or [each.tolerance for each in line.parameters.values()])
-
-
-def is_within_tolerance(found: Inertia, line: DrivelineModel) -> bool:
-    """Tell whether an inertia is within reach of re-tuning; one that nothing tells is not."""
-    return found.tells and 1.0 - tolerance_of(line) <= found.ratio <= 1.0 + tolerance_of(line)
-
-
-def ratio_off(found: Sequence[Inertia], line: Line) -> tuple[float, int]:
-    """Return the middle one of the inertias' ratios beyond their tolerance, and of which recording; 1 of the first."""
-    off = [
-        (each.ratio, i)
-        for i, each in enumerate(found)
-        if each.tells and line is not None and not is_within_tolerance(each, line)
-    ]
-    return sorted(off)[len(off) // 2] if off else (1.0, 0)
+    return (
+        bool(np.abs(read - np.round(read)).max() <= Mistakes.WHOLE) and np.unique(read).size >= Mistakes.FEWEST_VALUES
+    )
 
 
 def changed_by(record: Record, change: Change) -> Record:

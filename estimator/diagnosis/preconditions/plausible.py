@@ -14,47 +14,22 @@ import numpy as np
 
 from estimator.diagnosis.inference.wording import times as multiple
 from estimator.diagnosis.preconditions.candidates import Line, Part, of_one_unit
-from estimator.diagnosis.preconditions.inertia import BODY, Inertia, fitted_inertia, held_by_friction
-from estimator.diagnosis.preconditions.odds import (
-    FASTEST_RAD_S,
-    Candidate,
-    changed_by,
+from estimator.diagnosis.preconditions.inertia import (
+    BODY,
+    Inertia,
+    fitted_inertia,
+    held_by_friction,
     is_within_tolerance,
-    largest,
     ratio_off,
     tolerance_of,
-    with_odds,
 )
+from estimator.diagnosis.preconditions.odds import Candidate, changed_by, largest, with_odds
+from estimator.diagnosis.priors import MistakePriors
 from estimator.diagnosis.result import Doubt
+from estimator.diagnosis.thresholds import Mistakes
 from estimator.errors import Implausible
 from estimator.physics.model import DrivelineModel, Motion, parameter_unit
 from estimator.signals.record import OutputKind, Record
-
-BEYOND = 2.5
-"""Factor beyond an inertia's tolerance that is implausible: payloads, derating and closed clutches are less, the
-smallest factor between units (3.6) is more."""
-
-BANDS_BEYOND = math.log(8.0)
-"""Logarithm of the ratio of the inertias seen below and above the first mode from which on inertias are doubted: a
-torque path with a lag of 50 ms, or a filter like it, makes a fifth."""
-
-LEAST_LOG_RATIO = math.log(1.3)
-"""Logarithm of the ratio of the inertias of two recordings from which on they are compared: of one line, bands and
-body differ by less."""
-
-LIKELY, OVER_THE_NEXT = 0.5, 4.0
-"""Odds of a candidate from which on its line is tried, and how much larger than those of the next."""
-
-SURELY = 0.9
-"""Odds that something listed is wrong from which on recordings are refused: with an inertia that can't be, whichever of
-it it is; else where one thing is likely and is no physics. What is less sure is a doubt: a lag looks like a period."""
-
-DOUBTFUL = 0.5  # odds that nothing is wrong below which recordings are doubted
-
-FEWEST_ODDS, MOST_NAMED = 0.01, 7  # odds from which on a candidate is named, and how many are
-
-MOST_LOAD = 10.0
-"""Factor by which a load machine's torque may exceed all torque of the motor: more would turn the motor over."""
 
 
 def doubts_about(records: Sequence[Record], model: DrivelineModel | None) -> list[Doubt]:
@@ -94,23 +69,26 @@ def _judged(records: Sequence[Record], line: Line, is_tried: bool = False) -> tu
     (best, odds), others = ranked[0], [each for each in ranked[1:] if not each[0].is_right]
     is_right = math.fsum(each for candidate, each in ranked if candidate.is_right)
     is_off = line is not None and any(each.tells and not _is_plausible(each, line) for each in found)
-    is_clear = odds >= LIKELY and not (best.is_right or best.is_else)
+    is_clear = odds >= Mistakes.LIKELY and not (best.is_right or best.is_else)
     may_be_physics = best.is_a_factor or best.change.is_open or best.only is not None
-    if best.is_right or is_right >= DOUBTFUL or (line is None and not is_clear):
+    if best.is_right or is_right >= Mistakes.DOUBTFUL or (line is None and not is_clear):
         return None, False
     if best.is_else and not is_off:  # a road, a brake or a driver moved the line
         return None, False
     cure = None
-    if is_clear and not is_tried and odds >= OVER_THE_NEXT * max((each for _, each in others), default=0.0):
+    if is_clear and not is_tried and odds >= Mistakes.OVER_THE_NEXT * max((each for _, each in others), default=0.0):
         cure = best.cure(records[0])
         if cure is not None and not _passes(best, records, line, found):
             cure = None
     is_wrong = 1.0 - is_right - math.fsum(each for candidate, each in ranked if candidate.is_else)
     is_one_of_all = best.only is None and not best.change.is_open
-    # a gear ratio or a scale of any size may be physics as well, such as gravity: it is doubted
-    is_of_any_size = any(row.low < row.high and not row.whole and row.part is not Part.MODEL for row, _ in best.rows)
+    # a scale of any size may be physics, too, such as gravity: it is doubted, as an inertia next to another mistake is
+    open_parts = {Part.TORQUE, Part.OUTPUT} | ({Part.MODEL} if best.change.question else set())
+    is_of_any_size = any(row.low < row.high and not row.whole and row.part in open_parts for row, _ in best.rows)
     may_be_refused = is_one_of_all and not is_of_any_size
-    is_refused = may_be_refused and is_wrong >= SURELY and (is_off or (is_clear and not may_be_physics))
+    fits_as_read = line is not None and any(is_within_tolerance(each, line) for each in found)
+    is_sure = odds >= Mistakes.SURELY if fits_as_read else is_clear
+    is_refused = may_be_refused and is_wrong >= Mistakes.SURELY and (is_off or (is_sure and not may_be_physics))
     if line is None and best.is_a_factor and not is_clear:
         return None, False
     about = ", ".join(record.name for record in _blamed(records, found, line, best))
@@ -141,8 +119,8 @@ def _is_suspicious(found: Sequence[Inertia], line: DrivelineModel) -> bool:
     counted = [math.log(abs(each.ratio)) for each in found if each.tells]
     return (
         any(not each.tells or not is_within_tolerance(each, line) for each in found)
-        or any(abs(each.log_ratio) > BANDS_BEYOND for each in found)
-        or (bool(counted) and max(counted) - min(counted) > LEAST_LOG_RATIO)
+        or any(abs(each.log_ratio) > Mistakes.BANDS_BEYOND for each in found)
+        or (bool(counted) and max(counted) - min(counted) > Mistakes.LEAST_LOG_RATIO)
     )
 
 
@@ -165,10 +143,10 @@ def _text(
     falls = f"is the sign of {torque} or {'motion' if records[0].imposed is not None else 'output'} turned round"
     named = [
         f"{each.question(records, falls)} ({odds:.0%}{_follows(each, records, is_turn)})"
-        for each, odds in ranked[:MOST_NAMED]
-        if odds >= FEWEST_ODDS or each.is_else
+        for each, odds in ranked[: Mistakes.MOST_NAMED]
+        if odds >= Mistakes.FEWEST_ODDS or each.is_else
     ]
-    if not any(each.is_else for each, _ in ranked[:MOST_NAMED]):
+    if not any(each.is_else for each, _ in ranked[: Mistakes.MOST_NAMED]):
         named.append("something else? (under 1%)")
     names = ", ".join(record.name for record in blamed)
     one = len(blamed) == 1
@@ -183,7 +161,7 @@ def _misfit(records: Sequence[Record], line: Line, shown: Sequence[Inertia]) -> 
     """Say what does not fit."""
     counted = [each for each in shown if each.tells]
     most = max(largest(record)[1] for record in records)
-    if line is None and records[0].kind is OutputKind.SPEED and most > FASTEST_RAD_S:
+    if line is None and records[0].kind is OutputKind.SPEED and most > MistakePriors.FASTEST_RAD_S:
         return f"a speed of {most:.0f} rad/s is more than a drive reaches"
     if line is None or not counted:
         return "the motion does not follow from the torque as read"
@@ -192,10 +170,10 @@ def _misfit(records: Sequence[Record], line: Line, shown: Sequence[Inertia]) -> 
     if records[0].imposed is not None:
         return f"its {torque} is {ratios} times what the nominal k and c make of the motion, expected 1"
     falls = f"the {records[0].kind.value} falls where the {torque} rises, and " if counted[0].ratio < 0.0 else ""
-    bands = [math.exp(each.log_ratio) for each in counted if abs(each.log_ratio) > BANDS_BEYOND]
+    bands = [math.exp(each.log_ratio) for each in counted if abs(each.log_ratio) > Mistakes.BANDS_BEYOND]
     above = f"; above the first mode it fits {multiple(1.0 / bands[0])} times that" if bands else ""
     fits = "it fits an inertia" if len(counted) == 1 else "they fit inertias"
-    expected = f"expected 1 within its tolerance and a factor of {BEYOND:g}"
+    expected = f"expected 1 within its tolerance and a factor of {Mistakes.BEYOND:g}"
     return f"{falls}{fits} {ratios} times the nominal {_nominal(line)}, {expected}{above}"
 
 
@@ -223,7 +201,7 @@ def _require_plausible_load(record: Record) -> None:
     if record.load_nm is None:
         return
     load, torque = (float(np.abs(each).max()) for each in (record.load_nm, record.total_torque_nm))
-    if load > MOST_LOAD * torque:
+    if load > Mistakes.MOST_LOAD * torque:
         raise Implausible(
             f"recording {record.name} is implausible: its measured load torque reaches {load:.3g} Nm, its torque "
             f"{torque:.3g} Nm. Is load in another unit, or not reflected to the motor shaft? Divide its scale in "
@@ -234,7 +212,7 @@ def _require_plausible_load(record: Record) -> None:
 def _is_plausible(found: Inertia, line: DrivelineModel) -> bool:
     """Tell whether an inertia is within reach of re-tuning, or of physics missing."""
     tolerance = tolerance_of(line)
-    return (1.0 - tolerance) / BEYOND <= found.ratio <= (1.0 + tolerance) * BEYOND
+    return (1.0 - tolerance) / Mistakes.BEYOND <= found.ratio <= (1.0 + tolerance) * Mistakes.BEYOND
 
 
 def _nominal(line: DrivelineModel) -> str:

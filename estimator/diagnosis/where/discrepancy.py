@@ -9,20 +9,19 @@ import numpy as np
 from scipy import stats
 
 from estimator.diagnosis.assemble import Z95
-from estimator.diagnosis.line.blocks import (
+from estimator.diagnosis.line.equivalent import (
     DRIVES,
     ELEMENTS,
     PLACES,
-    BlockedRecording,
+    Explanation,
     InputPlace,
-    Motion,
-    block_mean_of,
-    lines,
-    size_at,
+    explain,
+    explain_all,
+    smoothed,
 )
-from estimator.diagnosis.line.equivalent import Explanation, Input, explain, explain_all, smooth
-from estimator.diagnosis.noise import VERY_STRONG
+from estimator.diagnosis.line.line import Motion, motion_of
 from estimator.diagnosis.result import Course, Discrepancy, Equivalent, LawPicture
+from estimator.diagnosis.thresholds import Noise, Places
 from estimator.diagnosis.where.locate import error_spectrum, responses
 from estimator.physics import model
 from estimator.physics.catalogue import EFFECTS
@@ -31,13 +30,7 @@ from estimator.physics.fit import FitResult
 from estimator.physics.layout import slot
 from estimator.physics.model import Motion as Kind, unit
 from estimator.physics.problem import outputs_at
-from estimator.signals.record import BoolArray, FloatArray
-
-BINS = 24
-
-FEWEST_PASSES = 3  # a bin that the signal passes less often says nothing of its own scatter
-
-FUNCTION = 0.5  # share of a law's power that must be a function of one signal to be drawn over it
+from estimator.signals.record import BoolArray, FloatArray, Record
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +39,7 @@ class Axis:
 
     name: str  # in words, for a label
     dimension: str  # key of the units
-    values: Callable[[Motion, FitResult], FloatArray]  # by motion and fit, (B,)
+    values: Callable[[Motion, FitResult], FloatArray]  # by motion and fit, (N,)
     without: Callable[[Motion, FitResult], FloatArray] | None = None  # the torque there without the law, drawn with it
 
 
@@ -119,14 +112,14 @@ def binned_by_pass(
         return None
     edges = _edges(every, float(low), float(high))
     passes = [
-        _passes(np.where(good, np.clip(np.digitize(each, edges) - 1, -1, BINS), -1), (each, value, curve))
+        _passes(np.where(good, np.clip(np.digitize(each, edges) - 1, -1, Places.BINS), -1), (each, value, curve))
         for each, value, curve, good in zip(x, data, law, okay, strict=True)
     ]
     where = np.concatenate([bins for bins, _ in passes])
     means = np.concatenate([values for _, values in passes])
-    rows = [means[where == each] for each in range(BINS)]
-    rows = [row for row in rows if row.shape[0] >= FEWEST_PASSES]
-    if len(rows) < 4:
+    rows = [means[where == each] for each in range(Places.BINS)]
+    rows = [row for row in rows if row.shape[0] >= Places.FEWEST_PASSES]
+    if len(rows) < Places.FEWEST_BINS:
         return None
     centres, values, curves = (np.array([np.average(r[:, i], weights=r[:, 3]) for r in rows]) for i in range(3))
     spread = np.array([_half_width(r[:, 1]) for r in rows])
@@ -138,10 +131,10 @@ def binned_by_pass(
 
 def _edges(values: FloatArray, low: float, high: float) -> FloatArray:
     """Return bin edges, half as bins of one width would have them and half as bins of one count would."""
-    grid = np.linspace(low, high, 20 * BINS + 1)
+    grid = np.linspace(low, high, 20 * Places.BINS + 1)
     counted = np.searchsorted(np.sort(values), grid) / values.size
     share = 0.5 * (grid - low) / (high - low) + 0.5 * (counted - counted[0]) / (counted[-1] - counted[0])
-    return np.interp(np.linspace(0.0, 1.0, BINS + 1), share, grid)
+    return np.interp(np.linspace(0.0, 1.0, Places.BINS + 1), share, grid)
 
 
 def _half_width(values: FloatArray) -> float:
@@ -166,18 +159,16 @@ def picture(
     motions: Sequence[Motion],
     floor: float,
     kind: Kind,
-    length: int,
 ) -> LawPicture | None:
     """Return a law over its own variable, or else over what it is most nearly a function of; None without either."""
-    cut = lines(without, length=length)
     place = PLACES[element]
-    found = explain(without, cut, place, floor)
-    size = size_at(without, place)
+    found = explain(without, place, floor)
     sign = DRIVES.get(element, 1.0)
     data = [sign * each.value for each in found.inputs]
-    difference = [_as_error(line, outputs[i] - without.outputs[i]) for i, line in enumerate(cut)]
-    law = [sign * smooth(line, place, found.rate, size, floor).value for line in difference]
-    okay = [line.okay for line in cut]
+    differences = [output - its for output, its in zip(outputs, without.outputs, strict=True)]
+    everywhere = [np.ones(each.size, dtype=np.bool_) for each in differences]
+    law = [sign * each.value for each in smoothed(without, differences, everywhere, place, found.rate, floor)]
+    okay = without.problem.use
     best: LawPicture | None = None
     own = OWN_AXES.get(name)
     for axis in AXES[element] if own is None else (own,):
@@ -190,28 +181,22 @@ def picture(
         if binned is not None and (best is None or binned.explained > best.explained + 1e-9):
             labels = (name, element, axis.name, signal_unit(axis.dimension, kind), input_unit(place, without, kind))
             best = LawPicture(*labels, *binned.arrays, binned.explained)
-    return best if best is not None and (own is not None or best.explained >= FUNCTION) else None
+    return best if best is not None and (own is not None or best.explained >= Places.FUNCTION) else None
 
 
 def _sums(first: Sequence[FloatArray], second: Sequence[FloatArray]) -> list[FloatArray]:
     return [a + b for a, b in zip(first, second, strict=True)]
 
 
-def _as_error(line: BlockedRecording, difference: FloatArray) -> BlockedRecording:
-    good = np.ones(difference.size, dtype=np.bool_)
-    return replace(line, error=block_mean_of(difference, good, line.length)[0])
-
-
 def discrepancy(
     retuned: FitResult, final: FitResult, floor: float, motion: model.Motion = model.Motion.ROTATION
 ) -> Discrepancy:
     """Look at what a re-tuned model lacks, with the effects found."""
-    cut = lines(retuned)
-    inputs = explain_all(retuned, cut, floor)
+    inputs = explain_all(retuned, floor)
     likeliest = max(inputs.values(), key=lambda each: each.log_likelihood)
     return Discrepancy(
         element=ELEMENTS[likeliest.place],
-        equivalents=_equivalents(retuned, cut, inputs, likeliest.log_likelihood, motion),
+        equivalents=_equivalents(retuned, inputs, likeliest.log_likelihood, motion),
         spectrum=error_spectrum(retuned, final, floor),
         responses=responses(retuned, final),
         pictures=_pictures_of_effects(effects_added(retuned, final), final, floor, motion),
@@ -227,7 +212,6 @@ def effects_added(retuned: FitResult, final: FitResult) -> tuple[str, ...]:
 
 def _equivalents(
     retuned: FitResult,
-    cut: Sequence[BlockedRecording],
     inputs: Mapping[InputPlace, Explanation],
     most: float,
     motion: model.Motion,
@@ -236,36 +220,30 @@ def _equivalents(
         Equivalent(
             place.value,
             input_unit(place, retuned, motion),
-            _courses(cut, explanation),
+            _courses(retuned.problem.records, explanation),
             explanation.log_likelihood,
-            2.0 * (most - explanation.log_likelihood) <= VERY_STRONG,
+            2.0 * (most - explanation.log_likelihood) <= Noise.VERY_STRONG,
         )
         for place, explanation in inputs.items()
     )
 
 
-def _courses(cut: Sequence[BlockedRecording], explanation: Explanation) -> Mapping[str, Course]:
-    return {line.record.name: _course(line, found) for line, found in zip(cut, explanation.inputs, strict=True)}
-
-
-def _course(line: BlockedRecording, found: Input) -> Course:
-    spread = Z95 * found.std
-    return Course(line.reading.time_s, found.value, found.value - spread, found.value + spread)
+def _courses(records: Sequence[Record], explanation: Explanation) -> Mapping[str, Course]:
+    return {
+        record.name: Course(record.time_s, found.value, found.value - Z95 * found.std, found.value + Z95 * found.std)
+        for record, found in zip(records, explanation.inputs, strict=True)
+    }
 
 
 def _pictures_of_effects(
     named: Sequence[str], final: FitResult, floor: float, motion: model.Motion
 ) -> tuple[LawPicture, ...]:
-    cut = lines(final)
-    drawn = [_picture_of_effect(name, final, cut, floor, motion) for name in named]
+    motions = [motion_of(final, i, is_between=True) for i in range(len(final.problem.records))]
+    drawn = [
+        picture(name, EFFECTS[name].element, without_effect(final, name), final.outputs, motions, floor, motion)
+        for name in named
+    ]
     return tuple(each for each in drawn if each is not None)
-
-
-def _picture_of_effect(
-    name: str, final: FitResult, cut: Sequence[BlockedRecording], floor: float, motion: model.Motion
-) -> LawPicture | None:
-    without, motions = without_effect(final, name), [line.motion for line in cut]
-    return picture(name, EFFECTS[name].element, without, final.outputs, motions, floor, motion, cut[0].length)
 
 
 def without_effect(result: FitResult, name: str) -> FitResult:

@@ -10,8 +10,9 @@ import numpy as np
 from scipy import signal, stats
 
 from estimator.diagnosis.acquisition.finding import runs
-from estimator.diagnosis.line.blocks import Motion, motion_of
+from estimator.diagnosis.line.line import Motion, motion_of
 from estimator.diagnosis.result import BandTest, ErrorSpectrum, Interval, Region, Response
+from estimator.diagnosis.thresholds import Places
 from estimator.errors import NotExciting
 from estimator.identification.spectral import SpectralEstimate, spectral_estimate
 from estimator.physics.effect import Element
@@ -19,20 +20,6 @@ from estimator.physics.fit import FitResult
 from estimator.physics.layout import slot
 from estimator.physics.model import Structure
 from estimator.signals.record import FloatArray, Record
-
-SEGMENT = 256  # samples of a segment: 2.56 s at 10 ms, long enough to resolve a driveline's first mode
-FEWEST_PER_BAND = 3  # frequencies in a band at least
-
-COHERENT = 0.5  # share of the output's power that the torque must explain before a response is compared there
-
-WINDOW_S = 0.5  # errors are averaged over this time before they are called a mismatch
-FALSE_ALARM = 0.01  # probability that noise alone is called a mismatch anywhere in a recording
-
-SMALLEST_RATIO = 1.2
-"""Mean square, in floors, that a window must reach at least: the floor itself is known to about a tenth."""
-
-CENTRAL = 0.8  # share of the mismatch's power that band and region hold
-LONGEST_SEGMENT = 512  # samples of a segment of Welch's average
 
 _SIGNAL_NAMES = {
     Element.TORQUE_PATH: "torque",
@@ -47,9 +34,9 @@ _SIGNAL_NAMES = {
 def error_spectrum(before: FitResult, after: FitResult, floor: float) -> ErrorSpectrum:
     """Return the density of the error of two fits, and where the first stands above the floor."""
     records = before.problem.records
-    length = min(SEGMENT, *(record.okay.size for record in records))
-    frequency, first, averages = _density(records, before.outputs, length)
-    _, second, _ = _density(records, after.outputs, length)
+    length = min(Places.SEGMENT, *(record.okay.size for record in records))
+    frequency, first, averages = _density(before, length)
+    _, second, _ = _density(after, length)
     density = 2.0 * floor**2 * records[0].sample_time_s
     return ErrorSpectrum(
         frequency[1:],
@@ -60,14 +47,13 @@ def error_spectrum(before: FitResult, after: FitResult, floor: float) -> ErrorSp
     )
 
 
-def _density(
-    records: Sequence[Record], outputs: Sequence[FloatArray], length: int
-) -> tuple[FloatArray, FloatArray, float]:
+def _density(result: FitResult, length: int) -> tuple[FloatArray, FloatArray, float]:
     """Return frequencies [Hz], mean density and the number of independent averages behind it."""
+    records = result.problem.records
     total, weight = np.zeros(length // 2 + 1), 0.0
     frequency = np.fft.rfftfreq(length, records[0].sample_time_s).astype(np.float64)
-    for record, output in zip(records, outputs, strict=True):
-        error = np.where(record.okay, record.output - output, 0.0)
+    for i, record in enumerate(records):
+        error = _error(result, i)
         _, density = signal.welch(error, 1.0 / record.sample_time_s, nperseg=length)
         segments = max(2.0 * error.size / length - 1.0, 1.0)
         total += segments * density * record.okay.size / max(int(record.okay.sum()), 1)
@@ -92,7 +78,7 @@ def _octaves(frequency: FloatArray) -> FloatArray:
     """Return band edges at octaves, each band with a few frequencies; the last holds the highest."""
     edges = [float(frequency[-1]) * (1.0 + 1e-9)]
     step = float(frequency[1] - frequency[0])
-    while 0.5 * edges[-1] >= max(float(frequency[0]), FEWEST_PER_BAND * step):
+    while 0.5 * edges[-1] >= max(float(frequency[0]), Places.FEWEST_PER_BAND * step):
         edges.append(0.5 * edges[-1])
     return np.array([*edges, float(frequency[0])][::-1]) if edges[-1] > frequency[0] else np.array(edges[::-1])
 
@@ -146,7 +132,7 @@ def _response(measured: SpectralEstimate, before: SpectralEstimate, after: Spect
 
 def _p_value(measured: SpectralEstimate, model: SpectralEstimate) -> float:
     """Return how probable so large a difference of two responses is by chance, where the estimate is coherent."""
-    good = (measured.coherence > COHERENT) & (measured.coherence < 1.0)
+    good = (measured.coherence > Places.COHERENT) & (measured.coherence < 1.0)
     if not good.any():
         return 1.0
     deviation = np.abs(measured.response - model.response)[good] / measured.magnitude_std[good]
@@ -154,7 +140,7 @@ def _p_value(measured: SpectralEstimate, model: SpectralEstimate) -> float:
     return float(stats.chi2.sf(float(deviation @ deviation), degrees))
 
 
-def _errors(result: FitResult, index: int) -> FloatArray:
+def _error(result: FitResult, index: int) -> FloatArray:
     record = result.problem.records[index]
     return np.where(record.okay, result.outputs[index] - record.output, 0.0)
 
@@ -162,10 +148,10 @@ def _errors(result: FitResult, index: int) -> FloatArray:
 def _window_power(result: FitResult, index: int) -> tuple[FloatArray, FloatArray]:
     """Return the mean square error around each sample, and from how many good samples it is; shapes (N,)."""
     record = result.problem.records[index]
-    width = min(max(1, round(WINDOW_S / record.sample_time_s)), record.okay.size)
+    width = min(max(1, round(Places.WINDOW_S / record.sample_time_s)), record.okay.size)
     window = np.ones(width)
     count = np.convolve(record.okay.astype(float), window, mode="same")
-    power = np.convolve(_errors(result, index) ** 2, window, mode="same") / np.maximum(count, 1.0)
+    power = np.convolve(_error(result, index) ** 2, window, mode="same") / np.maximum(count, 1.0)
     return power, np.rint(count).astype(np.float64)
 
 
@@ -174,7 +160,7 @@ def excess(result: FitResult, index: int, floor: float) -> FloatArray:
     power, count = _window_power(result, index)
     windows = max(power.size / max(float(count.max()), 1.0), 1.0)
     degrees, where = np.unique(np.maximum(count, 1.0), return_inverse=True)
-    ratio = np.maximum(stats.chi2.isf(FALSE_ALARM / windows, degrees) / degrees, SMALLEST_RATIO)[where]
+    ratio = np.maximum(stats.chi2.isf(Places.FALSE_ALARM / windows, degrees) / degrees, Places.SMALLEST_RATIO)[where]
     return np.where(power > ratio * floor**2, power - floor**2, 0.0)
 
 
@@ -187,7 +173,7 @@ def intervals(result: FitResult, floor: float) -> dict[str, tuple[Interval, ...]
     for i, record in enumerate(result.problem.records):
         above = excess(result, i, floor) > 0.0
         spans = [(float(record.time_s[a]), float(record.time_s[b - 1])) for a, b in runs(above)]
-        shortest = 0.5 * min(WINDOW_S, float(record.time_s[-1] - record.time_s[0]))
+        shortest = 0.5 * min(Places.WINDOW_S, float(record.time_s[-1] - record.time_s[0]))
         kept = [span for span in _merged(spans) if span[1] - span[0] >= shortest]
         if kept:
             found[record.name] = tuple(kept)
@@ -197,26 +183,29 @@ def intervals(result: FitResult, floor: float) -> dict[str, tuple[Interval, ...]
 def _merged(spans: Sequence[Interval]) -> list[Interval]:
     joined: list[Interval] = []
     for low, high in spans:
-        if joined and low - joined[-1][1] < WINDOW_S:
+        if joined and low - joined[-1][1] < Places.WINDOW_S:
             joined[-1] = (joined[-1][0], high)
         else:
             joined.append((low, high))
     return joined
 
 
-def band_hz(mismatch: Sequence[FloatArray], sample_times_s: Sequence[float], noise: float) -> Interval | None:
-    """Return the band that holds the central part of a mismatch's power [Hz]; None where noise could be all."""
-    frequency: FloatArray = np.fft.rfftfreq(min(LONGEST_SEGMENT, mismatch[0].size), sample_times_s[0]).astype(float)
+def band_hz(result: FitResult, noise: float) -> Interval | None:
+    """Return the band that holds the central part of an error's power [Hz]; None where noise could be all."""
+    records = result.problem.records
+    length = min(Places.LONGEST_SEGMENT, records[0].okay.size)
+    frequency: FloatArray = np.fft.rfftfreq(length, records[0].sample_time_s).astype(float)
     density: FloatArray = np.zeros(frequency.size)
     white, averages = 0.0, 0.0
-    for errors, sample_time_s in zip(mismatch, sample_times_s, strict=True):
-        length = min(LONGEST_SEGMENT, errors.size)
-        segments = max(2.0 * errors.size / length - 1.0, 1.0)
-        density += segments * np.interp(frequency, *signal.welch(errors, 1.0 / sample_time_s, nperseg=length))
-        white += segments * 2.0 * noise**2 * sample_time_s
+    for i, record in enumerate(records):
+        error = _error(result, i)
+        length = min(Places.LONGEST_SEGMENT, error.size)
+        segments = max(2.0 * error.size / length - 1.0, 1.0)
+        density += segments * np.interp(frequency, *signal.welch(error, 1.0 / record.sample_time_s, nperseg=length))
+        white += segments * 2.0 * noise**2 * record.sample_time_s
         averages += segments
     degrees = 2.0 * averages / (1.0 + 2.0 / 36.0)  # neighbours share half their samples (Welch)
-    stands = density > white * stats.chi2.isf(FALSE_ALARM / frequency.size, degrees) / degrees
+    stands = density > white * stats.chi2.isf(Places.FALSE_ALARM / frequency.size, degrees) / degrees
     weight = np.where(stands, density - white, 0.0)
     return _central(frequency, weight) if weight.any() else None
 
@@ -247,6 +236,6 @@ def _central(x: FloatArray, weight: FloatArray) -> Interval:
     """Return the values of sorted ``x`` between which the central part of the weight lies."""
     cumulative = np.cumsum(weight)
     share = cumulative / cumulative[-1]
-    tail = 0.5 * (1.0 - CENTRAL)
+    tail = 0.5 * (1.0 - Places.CENTRAL)
     low, high = np.searchsorted(share, [tail, 1.0 - tail])
     return float(x[low]), float(x[min(high, x.size - 1)])

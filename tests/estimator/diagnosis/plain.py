@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from estimator.diagnosis.inference.hypotheses import NOTHING, Effects, unknowns_of
+from estimator.diagnosis.inference.fits import unknowns_of
+from estimator.diagnosis.inference.hypotheses import NOTHING, Effects
 from estimator.diagnosis.inference.score_tests import Screen, promising
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import FitResult, best_fit, fit, make_problem

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from estimator.diagnosis import diagnose
-from estimator.diagnosis.inference.standing import ALIKE_SHARE
 from estimator.diagnosis.result import Diagnosis, Verdict
+from estimator.diagnosis.thresholds import Judging
 from estimator.physics.effect import Element
 from estimator.physics.model import DrivelineModel, Parameter, Structure
 from tests.estimator.diagnosis.bench_joint import Joint
@@ -46,7 +46,7 @@ def test_a_damper_whose_sheet_has_a_stiffness_is_given_no_law_for_it() -> None:
 def test_what_was_planted_is_named_and_nothing_else(joint: Joint, named: set[str]) -> None:
     found = diagnosed(joint)
     assert found.verdict in (Verdict.EXPLAINED, Verdict.PARTLY_EXPLAINED), found.statement
-    assert found.remainder is None or found.remainder.share < ALIKE_SHARE  # by the form of the law
+    assert found.remainder is None or found.remainder.share < Judging.ALIKE_SHARE  # by the form of the law
     assert {effect.name for effect in found.effects} == named
     if joint.gap:
         gap = next(effect for effect in found.effects if effect.name == "backlash").parameters["gap_rad"]

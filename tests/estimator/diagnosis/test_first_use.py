@@ -57,7 +57,7 @@ def test_it_is_the_first_use_where_nothing_has_been_kept_for_this_place(tmp_path
 def test_a_diagnosis_says_at_every_stage_that_it_compiles(first: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     """And compiles before all else."""
     stages: list[str] = []
-    job = import_module("estimator.diagnosis.diagnose")
+    job = import_module("estimator.diagnosis.first_use")
     monkeypatch.setattr(job, "is_first_use", lambda masses: first)
     monkeypatch.setattr(job, "compile_kernels", lambda masses: stages.append(f"compiling itself ({COMPILING})"))
     diagnose(quiet(values=ONE_MASS, samples=1200), model(ONE_MASS), (), lambda stage, _: stages.append(stage))

@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from estimator.diagnosis.inference.hypotheses import open_hypotheses, with_effect
+from estimator.diagnosis.inference.fits import with_effect
+from estimator.diagnosis.inference.hypotheses import open_hypotheses
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.driveline import InitialCondition
 from tests.estimator.physics.bench import ONE_MASS, TWO_MASS, linear_record, model, random_steps

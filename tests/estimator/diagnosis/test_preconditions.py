@@ -8,16 +8,11 @@ import numpy as np
 import pytest
 
 from estimator.diagnosis import diagnose
-from estimator.diagnosis.preconditions.channels import clipped, unwrapped, without_clipped
-from estimator.diagnosis.preconditions.inertia import model_warnings
-from estimator.diagnosis.preconditions.prepare import (
-    FEWEST_SAMPLES,
-    not_read,
-    prepare,
-    require_excitation,
-    without_not_read,
-)
+from estimator.diagnosis.preconditions.channels import clipped, not_read, unwrapped, without_clipped, without_not_read
+from estimator.diagnosis.preconditions.inertia import model_warnings, require_excitation
+from estimator.diagnosis.preconditions.prepare import prepare
 from estimator.diagnosis.result import Verdict
+from estimator.diagnosis.thresholds import Recordings
 from estimator.errors import BadShape, NotExciting
 from estimator.physics.driveline import InitialCondition
 from estimator.signals.record import FloatArray, OutputKind, Record
@@ -53,9 +48,9 @@ def test_different_outputs() -> None:
         prepare([drive()], LINE, [position])
 
 
-@pytest.mark.parametrize("samples", [FEWEST_SAMPLES - 1, 20])
+@pytest.mark.parametrize("samples", [Recordings.FEWEST_SAMPLES - 1, 20])
 def test_too_short(samples: int) -> None:
-    message = f"recording run_1: {samples} good samples, expected at least {FEWEST_SAMPLES}. Record longer."
+    message = f"recording run_1: {samples} good samples, expected at least {Recordings.FEWEST_SAMPLES}. Record longer."
     with pytest.raises(NotExciting, match=message):
         prepare([drive(samples=samples)], LINE, [])
 

@@ -9,12 +9,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.diagnosis.preconditions.plausible import BEYOND, doubts_about
+from estimator.diagnosis.preconditions.plausible import doubts_about
+from estimator.diagnosis.thresholds import Mistakes
 from estimator.errors import Cure, Implausible
 from estimator.physics.driveline import InitialCondition, Parameter, Structure
 from estimator.physics.effect import Element
 from estimator.physics.model import DrivelineModel
 from estimator.signals.record import FloatArray, OutputKind, Record
+from tests.campaigns.worlds import world_of
 from tests.estimator.diagnosis.planted import Moved, recordings
 from tests.estimator.physics.bench import ONE_MASS, TWO_MASS, linear_record, model, random_steps, scaled
 
@@ -117,10 +119,17 @@ def test_missing_physics_passes(law: str) -> None:
     assert doubts_about(recordings(*LAWS[law]), model(TWO_MASS)) == []
 
 
+@pytest.mark.parametrize("seed", [60002, 60023], ids=["a belt that slips", "a shaft softer one way"])
+def test_what_two_mistakes_or_one_of_two_would_explain_is_not_refused(seed: int) -> None:
+    """As a position, with another inertia, or at one of two other periods: both are rather a law without a name."""
+    world = world_of("engine_outside", seed)
+    assert len(doubts_about(world.records, world.model)) == 1
+
+
 @pytest.mark.parametrize(("factor", "refused"), [(0.95, False), (1.05, True)])
 def test_the_tolerance_widens_what_is_plausible(factor: float, refused: bool) -> None:
     """A model trusted to a factor is taken at its word."""
-    wrong = output(1.0 / (1.5 * BEYOND * factor))(drive(ONE_MASS))
+    wrong = output(1.0 / (1.5 * Mistakes.BEYOND * factor))(drive(ONE_MASS))
     if refused:
         assert judged(wrong, model(ONE_MASS, 0.5))[0]
     else:

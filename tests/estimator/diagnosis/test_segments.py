@@ -13,9 +13,10 @@ from estimator.diagnosis import diagnose
 from estimator.diagnosis.acquisition.chain import replay
 from estimator.diagnosis.inference.figures import foreign_outputs
 from estimator.diagnosis.inference.hypotheses import NOTHING, Effects, all_good_samples
-from estimator.diagnosis.noise import LONGEST_S, MOST_SAMPLES, noise_floor, share_of, stretches
+from estimator.diagnosis.noise import noise_floor
 from estimator.diagnosis.result import Course, Discrepancy, Equivalent, Estimated, Profile, Response, Verdict
-from estimator.diagnosis.segments import FEWEST_SAMPLES, LONG_S, cut, joined, segments
+from estimator.diagnosis.segments import cut, joined, segments, share_of, stretches
+from estimator.diagnosis.thresholds import Noise, Segments
 from estimator.errors import NotExciting
 from estimator.physics.driveline import InitialCondition
 from estimator.physics.fit import FitResult
@@ -26,7 +27,7 @@ from tests.estimator.physics.bench import ONE_MASS, SAMPLE_TIME_S, linear_record
 
 Rows = Sequence[tuple[int, int]]
 LINE = model(ONE_MASS)
-LONG = round(LONG_S / SAMPLE_TIME_S)
+LONG = round(Segments.LONG_S / SAMPLE_TIME_S)
 
 
 def drive(samples: int = 3000, bad: Rows = (), name: str = "run", load_nm: float = 5.0) -> Record:
@@ -75,7 +76,7 @@ def test_a_gap_at_an_end_makes_no_other_recording_of_it() -> None:
     assert found.warnings == ()
 
 
-@pytest.mark.parametrize(("period_s", "least"), [(0.01, 200), (0.1, FEWEST_SAMPLES)])
+@pytest.mark.parametrize(("period_s", "least"), [(0.01, 200), (0.1, Segments.FEWEST_SAMPLES)])
 def test_short_segments_are_left_out(period_s: float, least: int) -> None:
     def kept(samples: int) -> list[str]:
         bad = [(samples, 1000)]
@@ -179,10 +180,10 @@ def lasting(samples: int, name: str = "run") -> Record:
 
 
 def test_of_what_is_longer_stretches_from_beginning_to_end_are_used() -> None:
-    rec = lasting(10 * MOST_SAMPLES)
+    rec = lasting(10 * Noise.MOST_SAMPLES)
     parts = stretches(rec, [slice(0, rec.output.size)], share_of([rec]))
-    assert sum(part.stop - part.start for part in parts) == pytest.approx(MOST_SAMPLES, rel=0.01)
-    assert max(part.stop - part.start for part in parts) <= LONGEST_S / rec.sample_time_s
+    assert sum(part.stop - part.start for part in parts) == pytest.approx(Noise.MOST_SAMPLES, rel=0.01)
+    assert max(part.stop - part.start for part in parts) <= Noise.LONGEST_S / rec.sample_time_s
     assert (parts[0].start, parts[-1].stop) == (0, rec.output.size)
     gaps = [after.start - before.stop for before, after in pairwise(parts)]
     assert min(gaps) > 0
@@ -190,14 +191,14 @@ def test_of_what_is_longer_stretches_from_beginning_to_end_are_used() -> None:
 
 
 def test_recordings_share_what_may_be_used_by_their_length() -> None:
-    found = cut([lasting(3 * MOST_SAMPLES, "long"), lasting(MOST_SAMPLES, "short")])
+    found = cut([lasting(3 * Noise.MOST_SAMPLES, "long"), lasting(Noise.MOST_SAMPLES, "short")])
     used = {name: sum(r.output.size for r in found.records if r.name.startswith(name)) for name in ("long", "short")}
     assert used["long"] == pytest.approx(3 * used["short"], rel=0.01)
 
 
 def test_many_short_recordings_stay_whole() -> None:
-    samples = round(0.5 * LONGEST_S / 0.01)
-    records = [lasting(samples, f"run_{i}") for i in range(2 * MOST_SAMPLES // samples)]
+    samples = round(0.5 * Noise.LONGEST_S / 0.01)
+    records = [lasting(samples, f"run_{i}") for i in range(2 * Noise.MOST_SAMPLES // samples)]
     found = cut(records)
     assert [each.output.size for each in found.records] == [samples] * len(records)
     assert found.warnings == ()

@@ -11,8 +11,8 @@ import pytest
 from estimator.diagnosis.diagnose import diagnose
 from estimator.diagnosis.noise import noise_floor
 from estimator.diagnosis.preconditions.channels import with_usable_channels
-from estimator.diagnosis.preconditions.prepare import as_slow_as_needed
 from estimator.diagnosis.result import Verdict
+from estimator.diagnosis.segments import as_slow_as_needed
 from estimator.physics.driveline import InitialCondition
 from estimator.physics.fit import fit
 from estimator.physics.layout import flat_values, grid_for

@@ -25,14 +25,16 @@ class Fitted:
 
 @dataclass
 class Found:
-    table: Table = field(default_factory=lambda: Table("motor_speed", (0.0, 1.0), (0.0, 2.0)))
+    effects: dict[str, Any] = field(
+        default_factory=lambda: {"table_motor_speed": Table("motor_speed", (0.0, 1.0), (0.0, 2.0)).effect()}
+    )
 
 
 def test_a_value_that_a_law_moves_out_of_its_interval_widens_it() -> None:
     unused: Any = None
     fitted: Any = Fitted({"J_L": 139.0, "J_M": 3.9, "k": 7700.0})
     found: Any = Found()
-    law = Law(unused, unused, found, fitted, unused)
+    law = Law(unused, found, fitted, unused)
     after = law.augmented(DrivelineModel(Structure.TWO_MASS, LINE)).parameters
     assert (after["J_L"].value, after["J_L"].ci95) == (139.0, (92.7, 139.0))
     assert (after["J_M"].value, after["J_M"].ci95) == (3.9, (3.0, 4.5))

@@ -8,14 +8,8 @@ import numpy as np
 import pytest
 
 from estimator.diagnosis.inference.hypotheses import NOTHING, all_good_samples
-from estimator.diagnosis.noise import MOST_SAMPLES
-from estimator.diagnosis.preconditions.prepare import (
-    LONGEST_OF_RIGID_S,
-    LONGEST_S,
-    as_slow_as_needed,
-    factor_for,
-    thinned,
-)
+from estimator.diagnosis.segments import as_slow_as_needed, factor_for, thinned
+from estimator.diagnosis.thresholds import Noise, Recordings
 from estimator.physics.driveline import InitialCondition
 from estimator.physics.layout import flat, grid_for
 from estimator.physics.model import DrivelineModel, Parameter, Structure
@@ -33,7 +27,7 @@ def test_one_in_as_many_samples_as_the_line_allows(period_s: float, factor: int)
     torque = random_steps(500, 1)
     read = replace(record(torque, np.zeros(500)), sample_time_s=period_s)
     assert factor_for([read], LINE) == factor
-    assert factor * period_s <= max(LONGEST_S, period_s)
+    assert factor * period_s <= max(Recordings.LONGEST_S, period_s)
 
 
 def test_a_stiff_line_keeps_twelve_samples_a_period() -> None:
@@ -54,9 +48,9 @@ def test_a_joint_keeps_twelve_samples_a_period_of_what_it_takes() -> None:
     fast = replace(record(force, force), sample_time_s=0.001, time_s=time_s, imposed=motion, kind=OutputKind.FORCE)
     joint = DrivelineModel(Structure.JOINT, {"k": Parameter(1.0, 0.5), "c": Parameter(1.0, 0.5)})
     (thin,) = as_slow_as_needed([fast], joint)
-    assert thin.sample_time_s == pytest.approx(LONGEST_OF_RIGID_S)
+    assert thin.sample_time_s == pytest.approx(Recordings.LONGEST_OF_RIGID_S)
     assert thin.imposed is not None
-    np.testing.assert_array_equal(thin.imposed, motion[:: round(LONGEST_OF_RIGID_S / 0.001)])
+    np.testing.assert_array_equal(thin.imposed, motion[:: round(Recordings.LONGEST_OF_RIGID_S / 0.001)])
     ringing = replace(fast, output=motion + 0.3 * np.sin(2.0 * np.pi * 50.0 * time_s))
     (thin,) = as_slow_as_needed([ringing], joint)
     assert 1.0 / (12.0 * 50.0) >= thin.sample_time_s > 0.5 / (12.0 * 50.0)
@@ -64,7 +58,7 @@ def test_a_joint_keeps_twelve_samples_a_period_of_what_it_takes() -> None:
 
 def test_the_line_found_is_the_same() -> None:
     """Torque that changes every 10 ms, read every millisecond, more often than is used."""
-    torque = np.repeat(random_steps(MOST_SAMPLES // 10 + 1, 1, mean_nm=20.0), 10)
+    torque = np.repeat(random_steps(Noise.MOST_SAMPLES // 10 + 1, 1, mean_nm=20.0), 10)
     time_s = 0.001 * np.arange(torque.size)
     blank = replace(record(torque, np.zeros(torque.size)), sample_time_s=0.001, time_s=time_s)
     clean = simulate(grid_for(LINE, [blank]), blank, flat(LINE), InitialCondition(5.0, 0.0, 5.0, 0.001, 5.0))

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.diagnosis.preconditions.prepare import MOST_SAMPLES_TIMES_RECORDINGS, shortened_to_memory
-from estimator.diagnosis.segments import cut
+from estimator.diagnosis.segments import cut, shortened_to_memory
+from estimator.diagnosis.thresholds import Recordings
 from estimator.errors import BadSetting
 from estimator.identification.identify import identify
 from estimator.signals.decimate import HALF_LENGTH, MOST_FACTOR, Decimated, Decimator, decimate, low_pass_taps
@@ -154,7 +154,11 @@ def test_of_more_recordings_than_a_fit_can_hold_some_of_every_part_are_used(coun
     segments, (warning,) = shortened_to_memory(cut(records), [each.name for each in records])
     used = [int(each.name.removeprefix("run_")) for each in segments.records]
     assert used == sorted(set(used))
-    assert MOST_SAMPLES_TIMES_RECORDINGS / 2 < len(used) ** 2 * samples <= MOST_SAMPLES_TIMES_RECORDINGS
+    assert (
+        Recordings.MOST_SAMPLES_TIMES_RECORDINGS / 2
+        < len(used) ** 2 * samples
+        <= Recordings.MOST_SAMPLES_TIMES_RECORDINGS
+    )
     assert max(np.diff([-1, *used, count])) <= 2 * math.ceil(count / len(used))
     assert warning.startswith(f"{len(used)} of {count} recordings are used")
     assert len({i % 2 for i in used}) == len({i % 3 for i in used}) - 1 == 2  # kinds that take turns are all there

@@ -7,9 +7,10 @@ from dataclasses import replace
 
 import pytest
 
-from estimator.diagnosis.inference.checks import LOOSE, is_plausible, widened
+from estimator.diagnosis.inference.checks import is_plausible, widened
 from estimator.diagnosis.inference.disturbances import Limits, limits_for
 from estimator.diagnosis.inference.hypotheses import Hypothesis
+from estimator.diagnosis.thresholds import Checks
 from estimator.physics.fit import FitResult, not_fitted
 from estimator.physics.problem import make_problem, start_vector
 from estimator.physics.unknowns import effect_unknowns, nominal_unknowns
@@ -64,6 +65,6 @@ def test_friction_that_warms_is_described_somewhere_between_cold_and_warm() -> N
     loose = widened(at_bound, BENCH.model)
     assert loose is not None
     (low,) = [each.low for each in loose.problem.shared if each.name == "b_L"]
-    assert low == pytest.approx((1.0 - BENCH.model.parameters["b_L"].tolerance) / LOOSE)
+    assert low == pytest.approx((1.0 - BENCH.model.parameters["b_L"].tolerance) / Checks.LOOSE)
     assert is_plausible(at(at_bound, "b_L", 0.2), BENCH.model, BENCH.records)  # 1.2 when cold
     assert not is_plausible(at(at_bound, "b_L", 2.0), BENCH.model, BENCH.records)  # 2 to 3

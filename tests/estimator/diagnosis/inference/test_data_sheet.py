@@ -8,9 +8,9 @@ from collections.abc import Mapping
 import pytest
 
 from estimator.diagnosis.diagnose import diagnose
+from estimator.diagnosis.inference.decide import free_line
 from estimator.diagnosis.inference.fits import Fits
 from estimator.diagnosis.inference.hypotheses import all_good_samples, open_hypotheses
-from estimator.diagnosis.inference.sheet import free_line
 from estimator.diagnosis.inference.wording import Context, statement
 from estimator.diagnosis.result import Effort, Fit, OffNominal, Verdict
 from estimator.physics.effect import Element

@@ -12,18 +12,8 @@ import pytest
 
 from estimator.diagnosis.inference.decide import _needed_beyond as needed_beyond
 from estimator.diagnosis.inference.hypotheses import GRADE, Hypothesis
-from estimator.diagnosis.inference.standing import LEAST_NECESSITY
-from estimator.diagnosis.inference.trials import (
-    BLOCK_S,
-    COURSE,
-    EVERY_S,
-    FEWEST_BLOCKS,
-    Trial,
-    blocks,
-    necessity,
-    quantile,
-    size_of,
-)
+from estimator.diagnosis.inference.trials import Trial, blocks, necessity, quantile, size_of
+from estimator.diagnosis.thresholds import Judging
 from estimator.physics.effects.load import KNOT_SPACING_S
 from estimator.physics.fit import FitResult
 from tests.estimator.physics.bench import record
@@ -71,7 +61,7 @@ def test_a_set_beats_a_larger_one_that_simulates_no_better_and_one_of_as_many_th
 
 def test_a_course_of_the_load_counts_for_several_laws() -> None:
     assert size_of(frozenset({"backlash"})) == 1
-    assert size_of(frozenset({"backlash", GRADE})) == 1 + COURSE
+    assert size_of(frozenset({"backlash", GRADE})) == 1 + Judging.COURSE
 
 
 def test_a_set_needs_what_brings_the_error_beyond_the_noise_back() -> None:
@@ -109,7 +99,7 @@ def test_a_larger_set_is_needed_only_where_half_of_the_error_goes_with_it() -> N
     assert needed_beyond(nothing, [nothing, lag, both], 0.0) is lag
     assert needed_beyond(lag, [nothing, lag, both], 0.0) is None  # a quarter of the error, however probable
     more = trial("lag brake", [5.0] * 4, 10.0)
-    assert LEAST_NECESSITY < 0.75
+    assert Judging.LEAST_NECESSITY < 0.75
     assert needed_beyond(lag, [nothing, lag, more], 0.0) is more
 
 
@@ -128,10 +118,10 @@ def test_of_several_sets_that_simulate_alike_the_most_probable_is_taken() -> Non
 
 def test_blocks_are_held_out_all_along_and_none_at_the_ends() -> None:
     out = blocks(record(np.zeros(2000), np.zeros(2000)))
-    assert out.mean() == pytest.approx(BLOCK_S / EVERY_S, abs=0.01)
+    assert out.mean() == pytest.approx(Judging.BLOCK_S / Judging.EVERY_S, abs=0.01)
     assert not out[0]
     assert not out[-1]
     short = blocks(record(np.zeros(100), np.zeros(100)))
-    assert short.mean() == pytest.approx(BLOCK_S / EVERY_S, abs=0.05)
-    assert np.count_nonzero(np.diff(short.astype(int)) == 1) == FEWEST_BLOCKS
-    assert BLOCK_S < KNOT_SPACING_S  # so that the profile on both sides can predict it
+    assert short.mean() == pytest.approx(Judging.BLOCK_S / Judging.EVERY_S, abs=0.05)
+    assert np.count_nonzero(np.diff(short.astype(int)) == 1) == Judging.FEWEST_BLOCKS
+    assert Judging.BLOCK_S < KNOT_SPACING_S  # so that the profile on both sides can predict it

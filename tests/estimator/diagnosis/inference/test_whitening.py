@@ -23,7 +23,7 @@ from estimator.diagnosis.inference.disturbances import (
     starts,
     whitener,
 )
-from estimator.diagnosis.line.blocks import LASTS
+from estimator.diagnosis.line.line import LASTS
 from estimator.physics.driveline import InitialCondition
 from estimator.physics.fit import FitResult, fit
 from estimator.physics.problem import make_problem

@@ -6,55 +6,53 @@ import numpy as np
 import pytest
 from scipy.linalg import block_diag
 
-from estimator.diagnosis.line.blocks import InputPlace, lines
-from estimator.diagnosis.line.equivalent import Chain, Filtered, explain, run_filter, run_smoother
-from estimator.physics.driveline import InitialCondition
+from estimator.diagnosis.line.equivalent import Filtered, InputPlace, explain, run_filter, run_smoother
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult, fit
 from estimator.physics.problem import make_problem
 from estimator.signals.record import FloatArray
-from tests.estimator.diagnosis.planted import SIGMA, Moved, drive_torque, recordings
-from tests.estimator.physics.bench import TWIST, TWO_MASS, exact_states, linear_record, model
+from tests.estimator.diagnosis.planted import SIGMA, Moved, recordings
+from tests.estimator.physics.bench import TWO_MASS, model
 
 
 def test_filter_and_smoother_are_the_conditional_normal_distribution() -> None:
-    """Against the joint normal distribution of 30 blocks, inverted as a whole."""
+    """Against the joint normal distribution of 30 samples, inverted as a whole."""
     rng = np.random.default_rng(2)
-    blocks, n = 30, 2
+    samples, n = 30, 2
     phi = np.array([[0.9, 0.2], [-0.3, 0.8]])
     drive, c, direct = np.array([0.5, 0.1]), np.array([1.0, 0.3]), 0.2
     memory, walk, noise = 0.97, 0.3, 0.1
-    weight = np.where(np.arange(blocks) % 7 == 3, 0.0, 2.0)
+    okay = np.arange(samples) % 7 != 3
     f = np.block([[phi, drive[:, None]], [np.zeros((1, n)), np.array([[memory]])]])
     prior = np.diag([1.0, 2.0, 3.0])
-    move = np.eye(3 * blocks)
-    for b in range(1, blocks):
+    move = np.eye(3 * samples)
+    for b in range(1, samples):
         move[3 * b : 3 * b + 3] = f @ move[3 * b - 3 : 3 * b]
         move[3 * b : 3 * b + 3, 3 * b : 3 * b + 3] = np.eye(3)
-    covariance = move @ block_diag(prior, *[np.diag([0.0, 0.0, walk])] * (blocks - 1)) @ move.T
-    seen = np.flatnonzero(weight)
-    h = np.zeros((seen.size, 3 * blocks))
+    covariance = move @ block_diag(prior, *[np.diag([0.0, 0.0, walk])] * (samples - 1)) @ move.T
+    seen = np.flatnonzero(okay)
+    h = np.zeros((seen.size, 3 * samples))
     for row, b in enumerate(seen):
         h[row, 3 * b : 3 * b + 3] = [*c, direct]
-    spread = h @ covariance @ h.T + 0.5 * noise * np.eye(seen.size)
-    error = rng.standard_normal(blocks)
+    spread = h @ covariance @ h.T + noise * np.eye(seen.size)
+    error = rng.standard_normal(samples)
     gain = covariance @ h.T @ np.linalg.inv(spread)
-    mean = (gain @ error[seen]).reshape(blocks, 3)
-    variance = np.diag(covariance - gain @ h @ covariance).reshape(blocks, 3)
+    mean = (gain @ error[seen]).reshape(samples, 3)
+    variance = np.diag(covariance - gain @ h @ covariance).reshape(samples, 3)
     likelihood = -0.5 * (
         error[seen] @ np.linalg.solve(spread, error[seen])
         + np.linalg.slogdet(spread)[1]
         + seen.size * np.log(2.0 * np.pi)
     )
 
-    chain = Chain(phi[None], drive[None], c[None], np.array([direct]), memory, walk)
+    shown = np.array([*c, direct])
     kept = Filtered(
-        np.zeros((blocks, 3)), np.zeros((blocks, 3, 3)), np.zeros((blocks, 3)), np.zeros(blocks), np.zeros(blocks)
+        np.zeros((samples, 3)), np.zeros((samples, 3, 3)), np.zeros((samples, 3)), np.zeros(samples), np.zeros(samples)
     )
-    estimates, spreads = np.zeros((blocks, 3)), np.zeros(blocks)
-    assert run_filter(chain, error, weight, noise, prior, kept) == pytest.approx(likelihood)
-    run_smoother(chain, kept, estimates, spreads)
-    np.testing.assert_allclose(estimates, mean, atol=1e-9)
+    value, spreads = np.zeros(samples), np.zeros(samples)
+    assert run_filter(f, shown, walk, noise, prior, error, okay, kept) == pytest.approx(likelihood)
+    run_smoother(f, shown, kept, value, spreads)
+    np.testing.assert_allclose(value, mean[:, 2], atol=1e-9)
     np.testing.assert_allclose(spreads, variance[:, 2], atol=1e-9)
 
 
@@ -82,7 +80,7 @@ PLANTED = [
 def test_a_planted_input_is_found_within_its_band(element: Element, place: InputPlace, size: float) -> None:
     """But for its mean: a constant torque is the constant load's, a constant twist is invisible."""
     result = nominal(element, size)
-    (first, _) = explain(result, lines(result), place, SIGMA).inputs
+    (first, _) = explain(result, place, SIGMA).inputs
     time_s = result.problem.records[0].time_s
     planted = size * stairs(Moved(time_s, *[np.zeros_like(time_s)] * 5))
     apart = first.value - planted
@@ -91,15 +89,3 @@ def test_a_planted_input_is_found_within_its_band(element: Element, place: Input
     assert np.std(apart) < (0.6 if place is InputPlace.SHAFT else 0.4) * np.std(
         planted
     )  # the shaft's slow part is invisible
-
-
-def test_the_motion_that_goes_with_the_input_is_the_true_one() -> None:
-    """A load step: the twist that the nominal simulation lacks is in the motion of the load's input."""
-    torque, start = drive_torque(1), InitialCondition(5.0, 0.0, 2.0, 0.0, 2.0)
-    extra = np.where(np.arange(torque.size) >= 700, 40.0, 0.0)
-    rec = linear_record(TWO_MASS, torque, start, sigma=SIGMA, seed=1, extra_load_nm=extra)
-    result = fit(make_problem(model(TWO_MASS), [rec], ()))
-    (found,) = explain(result, lines(result), InputPlace.LOAD, SIGMA).inputs
-    twist = exact_states(TWO_MASS, torque, start, extra_load_nm=extra)[:, TWIST]
-    middle = 0.5 * (twist + np.append(twist[1:], twist[-1]))
-    assert np.std(found.motion.twist - middle) < 0.03 * np.std(middle)

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.diagnosis.where.locate import WINDOW_S, band_hz, intervals, region
+from estimator.diagnosis.thresholds import Places
+from estimator.diagnosis.where.locate import band_hz, intervals, region
 from estimator.physics.driveline import InitialCondition
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult, fit
@@ -41,8 +42,8 @@ class TestTime:
         found = intervals(fitted(drive(burst(5.0, 8.0)), drive(np.zeros(2000), "run_2", 2)), SIGMA)
         assert list(found) == ["run_1"]
         ((low, high),) = found["run_1"]
-        assert low == pytest.approx(5.0, abs=WINDOW_S)
-        assert high == pytest.approx(8.0, abs=WINDOW_S)
+        assert low == pytest.approx(5.0, abs=Places.WINDOW_S)
+        assert high == pytest.approx(8.0, abs=Places.WINDOW_S)
 
     def test_noise_is_no_mismatch(self) -> None:
         assert intervals(fitted(drive(np.zeros(2000))), SIGMA) == {}
@@ -53,9 +54,7 @@ class TestTime:
 
 
 def band_of(*records: Record, noise: float = SIGMA) -> tuple[float, float] | None:
-    result = fitted(*records)
-    errors = [np.where(r.okay, output - r.output, 0.0) for r, output in zip(records, result.outputs, strict=True)]
-    return band_hz(errors, [r.sample_time_s for r in records], noise)
+    return band_hz(fitted(*records), noise)
 
 
 class TestBand:
