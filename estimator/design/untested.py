@@ -29,6 +29,10 @@ from estimator.signals.record import FloatArray
 
 SUPPOSED = Effort(derivatives=2, steps=6)  # of a fit of what is nearly a change of the other unknowns
 
+MOSTLY = 0.5
+"""Share of what an effect changes that must be left behind a linear change of the other unknowns for it to be seen
+without a fit: of a large effect, such as an inverter's gain, the rest may be what is not linear in it."""
+
 MOST_UNSEEN = 4
 """Effects that could show and do not, those that move a value most: each is tried with every experiment on paper."""
 
@@ -51,7 +55,8 @@ def _unseen(known: Open) -> Iterator[Untested]:
         if begun is None:
             continue
         change = first.filter(begun.residual - first.result.residual)
-        if float(change @ change - np.sum((taken.T @ change) ** 2)) >= LEAST_DIFFERENCE:
+        whole = float(change @ change)
+        if whole - float(np.sum((taken.T @ change) ** 2)) >= max(LEAST_DIFFERENCE, MOSTLY * whole):
             continue
         found = _settled(known, name, begun)
         if (

@@ -43,7 +43,7 @@ def covariance(result: FitResult) -> FloatArray:
     parameter at a bound of its law is held there and has no variance. A nominal parameter at the edge of its tolerance
     is not: the tolerance is a belief about it, and how well the data determine it does not change there.
     """
-    free = _free(result)
+    free = free_unknowns(result)
     j = result.jacobian[:, free]
     bread = _bread(j)
     full = np.zeros((result.x.size, result.x.size))
@@ -58,7 +58,7 @@ def reported_covariance(result: FitResult) -> FloatArray:
     noise. It pulls the unknowns as an error would that keeps its value for ``COHERENT_S``: its mean square times that
     many samples takes the place of the noise's variance in ``sigma^2 (J'J)^-1``.
     """
-    free = _free(result)
+    free = free_unknowns(result)
     full = covariance(result)
     full[np.ix_(free, free)] += coherent_variance(result) * _bread(result.jacobian[:, free])
     return full
@@ -70,7 +70,8 @@ def coherent_variance(result: FitResult) -> float:
     return coherent * Telling.COHERENT_S / min(record.sample_time_s for record in result.problem.records)
 
 
-def _free(result: FitResult) -> BoolArray:
+def free_unknowns(result: FitResult) -> BoolArray:
+    """Return which unknowns have a variance, shape (U,): all but parameters of effects at a bound of their law."""
     held = result.pinned
     of_effects = np.array([bool(shared.effect) for shared in result.problem.shared], dtype=np.bool_)
     held[: of_effects.size] &= of_effects
@@ -310,12 +311,11 @@ def moved_values(of: Hypothesis, other: FitResult) -> dict[str, float]:
     return moved
 
 
-def retuned_parameters(result: FitResult, model: DrivelineModel, whole: bool) -> dict[str, Retuned]:
+def retuned_parameters(result: FitResult, cov: FloatArray, model: DrivelineModel, whole: bool) -> dict[str, Retuned]:
     """Return every nominal parameter before and after; one trusted exactly stays what it was.
 
     Of a plant simulated elsewhere there are those that it can be given.
     """
-    cov = reported_covariance(result)
     fitted = {
         shared.name: (
             float(result.x[i]) * shared.scale,
@@ -333,12 +333,11 @@ def retuned_parameters(result: FitResult, model: DrivelineModel, whole: bool) ->
     return parameters
 
 
-def load_torques(result: FitResult, model: DrivelineModel) -> dict[str, Estimated]:
+def load_torques(result: FitResult, cov: FloatArray, model: DrivelineModel) -> dict[str, Estimated]:
     """Return the constant load torque of each recording (translation: the offset force), by name.
 
     One that all recordings share, or that the model gives, is every recording's.
     """
-    cov = reported_covariance(result)
     torques = {}
     first = len(result.problem.shared)
     shared = {unknown.name: (k, unknown.scale) for k, unknown in enumerate(result.problem.shared) if not unknown.effect}
@@ -352,24 +351,25 @@ def load_torques(result: FitResult, model: DrivelineModel) -> dict[str, Estimate
     return torques
 
 
-def augmented_model(result: FitResult, model: DrivelineModel, effects: Sequence[FoundEffect]) -> DrivelineModel:
+def augmented_model(
+    result: FitResult, cov: FloatArray, model: DrivelineModel, effects: Sequence[FoundEffect]
+) -> DrivelineModel:
     """Return the model with re-tuned parameters and the effects found in addition to those it had."""
-    parameters = {**model.parameters, **_retuned_line(result, model)}
+    parameters = {**model.parameters, **_retuned_line(result, cov, model)}
     added: dict[str, Mapping[str, EffectValue]] = {
         effect.name: {name: EffectValue(p.value, p.ci95) for name, p in effect.parameters.items()} for effect in effects
     }
     return replace(model, parameters=parameters, effects={**_retuned_effects(result, model), **added})
 
 
-def _retuned_line(result: FitResult, model: DrivelineModel) -> dict[str, Parameter]:
+def _retuned_line(result: FitResult, cov: FloatArray, model: DrivelineModel) -> dict[str, Parameter]:
     """Return the nominal parameters that were fitted; one that was unknown, with the interval that it has now."""
-    unknown = any(parameter.is_unknown for parameter in model.parameters.values())
-    cov, found = reported_covariance(result) if unknown else None, dict[str, Parameter]()
+    found = dict[str, Parameter]()
     for i, shared in enumerate(result.problem.shared):
         if shared.effect or shared.name not in model.parameters:
             continue
         value, known = float(result.x[i]) * shared.scale, model.parameters[shared.name]
-        if known.is_unknown and cov is not None:
+        if known.is_unknown:
             known = replace(known, ci95=interval(result, cov, i))
         found[shared.name] = known.at(value)
     return found

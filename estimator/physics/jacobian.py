@@ -1,5 +1,8 @@
 """The Jacobian of a free run by differences: a simulation with each unknown moved.
 
+Next to the derivative at a point there is the one over a width (`secants_at`): where a law switches, the free run has
+kinks at every moment at which it does, and the slope between two of them says nothing of the next ones.
+
 A local unknown moves its own recording only. Recordings that can be simulated as if they were one fill the lanes of
 the kernel together: each has some dozen unknowns, which leave lanes empty where it goes alone.
 """
@@ -71,20 +74,40 @@ class _Moved:
 
 
 def jacobian_at(
-    problem: Problem, x: FloatArray, outputs: Sequence[FloatArray], among: BoolArray | None = None
+    problem: Problem,
+    x: FloatArray,
+    outputs: Sequence[FloatArray],
+    among: BoolArray | None = None,
+    steps: FloatArray | None = None,
 ) -> FloatArray:
     """Return the derivative of the errors by the scaled unknowns, shape (R, U), by differences inside the bounds.
 
-    It is 0 by what can't change, and by what is not ``among`` those asked for, shape (U,).
+    It is 0 by what can't change, and by what is not ``among`` those asked for, shape (U,). ``steps``, of that shape,
+    are by how much each is moved; `STEP` by default.
     """
     low, high = bounds(problem)
     wanted = (low < high) if among is None else (low < high) & among
     moving = [np.flatnonzero(_moves(problem, wanted, drive[0])) for drive in problem.drives]
-    around = _Around(problem, x, outputs, problem.drives)
+    around = _Around(problem, x, outputs, problem.drives, steps)
     parts = _together(problem, moving) if around.is_one else _separately(moving)
     found = np.zeros((x.size, around.firsts[-1]))
     concurrently(lambda part: around.fill(part, found), parts)
     return found.T
+
+
+def secants_at(problem: Problem, x: FloatArray, outputs: Sequence[FloatArray], widths: FloatArray) -> FloatArray:
+    """Return the slope of the errors over so much of each scaled unknown to both sides, shape (R, U).
+
+    ``widths`` is of shape (U,), above 0. A bound cuts a side off: beyond it there is nothing to be said.
+    """
+    low, high = bounds(problem)
+    up, down = np.minimum(widths, high - x), np.minimum(widths, x - low)
+    both = np.maximum(up + down, STEP)
+    found = np.zeros((sum(int(use.sum()) for use in problem.use), x.size))
+    for side, steps in ((up, up), (down, -down)):
+        moved = side > 0.0
+        found += jacobian_at(problem, x, outputs, moved, np.where(moved, steps, STEP)) * (side / both)
+    return found
 
 
 def changes(
@@ -133,11 +156,16 @@ class _Around:
     """
 
     def __init__(
-        self, problem: Problem, x: FloatArray, outputs: Sequence[FloatArray], drives: Sequence[tuple[int, ...]]
+        self,
+        problem: Problem,
+        x: FloatArray,
+        outputs: Sequence[FloatArray],
+        drives: Sequence[tuple[int, ...]],
+        steps: FloatArray | None = None,
     ) -> None:
         self._problem, self._x = problem, x
         _, high = bounds(problem)
-        self._steps = np.where(x + STEP <= high, STEP, -STEP)
+        self._steps = np.where(x + STEP <= high, STEP, -STEP) if steps is None else steps
         p = parameters(problem, x)
         self._members = drives
         self._drives = [[problem.records[i] for i in drive] for drive in drives]

@@ -132,7 +132,7 @@ def _summary(model: DrivelineModel, result: FitResult) -> PhysicalFit:
     parameters = {name: Parameter.measured(*values[name], TRUSTED) for name in model.parameters}
     loads = {
         name: Measured(load.value, 0.5 * (load.ci95[1] - load.ci95[0]))
-        for name, load in load_torques(result, model).items()
+        for name, load in load_torques(result, covariance, model).items()
     }
     return PhysicalFit(DrivelineModel(model.structure, parameters), values, loads, result.rms)
 

@@ -23,10 +23,10 @@ from estimator.physics.problem import make_problem
 from estimator.physics.simulate import simulate
 from estimator.physics.unknowns import own_unknowns
 from estimator.signals.record import Record, separated_outputs
-from tests.estimator.diagnosis.one_effect import Bench, bench_with
-from tests.estimator.diagnosis.planted import SIGMA
+from tests.estimator.diagnosis.one_effect import SEEDS, Bench, bench_with
+from tests.estimator.diagnosis.planted import SAMPLES, SIGMA, drive_torque
 from tests.estimator.diagnosis.test_several_outputs import SHAFT_TORQUE, with_output
-from tests.estimator.physics.bench import record
+from tests.estimator.physics.bench import random_steps, record
 
 NAMES = ["coulomb_friction_motor", "coulomb_friction_load"]
 
@@ -169,6 +169,20 @@ def test_what_the_noise_conceals_is_untested_where_it_moves_a_value_and_an_exper
     assert all(each.moves for each in found.supposed.values())
     assert law not in shown(found, driven(found, 60.0))
     assert law in shown(found, driven(found, 1000.0, 1600))
+
+
+def test_a_gain_that_the_other_values_take_up_is_untested_however_large_it_is() -> None:
+    """All that is fast is shared by both inverters, all that is slow comes from one: J_M and k are off by as much."""
+    fast = [random_steps(SAMPLES, seed, 60.0) for seed in SEEDS]
+    slow = [np.zeros(SAMPLES), drive_torque(SEEDS[1]) - random_steps(SAMPLES, SEEDS[1])]
+    bench = bench_with(NAMES[0], {"friction_nm": 8.0}, [0.95 * f + s for f, s in zip(fast, slow, strict=True)])
+    read = [
+        replace(each, torque_nm=np.column_stack([0.5 * f, 0.5 * f + s]))
+        for each, f, s in zip(bench.records, fast, slow, strict=True)
+    ]
+    found = with_untested(left_by(replace(bench, records=read), NAMES[0]))
+    assert GAIN in found.untested
+    assert found.supposed[GAIN].moves["J_M"] == pytest.approx(-0.05, abs=0.02)
 
 
 FILTER = ("speed_filter", {"time_constant_s": 0.01, "shape": 0.0})

@@ -12,6 +12,7 @@ import numpy as np
 from estimator.diagnosis.acquisition.chain import Chain
 from estimator.diagnosis.assemble import (
     acquired_effects,
+    free_unknowns,
     moments_in,
     parameters_of,
     profile_size,
@@ -20,7 +21,7 @@ from estimator.diagnosis.assemble import (
     rms_of,
 )
 from estimator.diagnosis.inference.descent import descended
-from estimator.diagnosis.inference.disturbances import reading_noise, whitener_of
+from estimator.diagnosis.inference.disturbances import Size, reading_noise, whitener_of
 from estimator.diagnosis.inference.hypotheses import (
     GRADE,
     NOTHING,
@@ -28,8 +29,8 @@ from estimator.diagnosis.inference.hypotheses import (
     Effects,
     Hypothesis,
     all_good_samples,
-    covariance,
 )
+from estimator.diagnosis.inference.spread import beyond_the_line, with_secants
 from estimator.diagnosis.inference.trials import Standing, blocks
 from estimator.diagnosis.result import Evidence, Fit, FoundEffect, OutputFit, Trace
 from estimator.diagnosis.thresholds import Judging, Noise
@@ -203,12 +204,25 @@ class FreeRuns:
     @cached_property
     def estimate(self) -> FitResult:
         """The fit that values and intervals are taken from: of independent innovations, or of the free run."""
-        return self.believed.white if self.is_whole else self.after
+        return replace(self.believed, result=self._errors).white if self.is_whole else self._errors
 
     @cached_property
     def covariance(self) -> FloatArray:
-        """Covariance of its scaled unknowns, shape (U, U); where more than noise is left, of correlated errors."""
-        return covariance(self.believed) if self.is_whole else reported_covariance(self.after)
+        """Covariance of its scaled unknowns, shape (U, U): of correlated errors, and of disturbances that grow."""
+        free = free_unknowns(self.estimate)
+        fitted_s, period_s = (fit.problem.records[0].sample_time_s for fit in (self.believed.result, self._errors))
+        sizes = self.believed.sizes.copy()
+        sizes[Size.TORQUE] += 0.5 * math.log(fitted_s / period_s)  # of one sample, where these are closer together
+        return reported_covariance(self.estimate) + beyond_the_line(self._errors, self._weigh, sizes, free)
+
+    @cached_property
+    def _errors(self) -> FitResult:
+        """The same fit in its plain errors, its derivative over the width of the intervals."""
+        return with_secants(self.believed.result if self.is_whole else self.after, self._weigh)
+
+    def _weigh(self, errors: FloatArray) -> FloatArray:
+        """Return errors of the fit with a variance of 1."""
+        return self.believed.filter(errors) if self.is_whole else errors / self.after.rms
 
 
 def free_runs(nothing: Hypothesis, believed: Hypothesis, is_whole: bool, chain: Chain, unseen: Unseen) -> FreeRuns:

@@ -7,7 +7,13 @@ from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 
 from estimator.diagnosis.acquisition.chain import Chain
-from estimator.diagnosis.assemble import augmented_model, load_torques, moved_values, retuned_parameters
+from estimator.diagnosis.assemble import (
+    augmented_model,
+    load_torques,
+    moved_values,
+    reported_covariance,
+    retuned_parameters,
+)
 from estimator.diagnosis.inference.checks import tests_in_words
 from estimator.diagnosis.inference.decide import Decision, Judged
 from estimator.diagnosis.inference.figures import courses_of, figures_without, first_figures, found_effect
@@ -74,7 +80,7 @@ def said(basis: Basis) -> Diagnosis:
     traces = judged.traces if is_explained else ()
     added = [*effects, *(found_effect(each, runs) for each in traces)]
     slight = tuple(_slight(each, basis) for each in traces)
-    augmented, courses = augmented_model(runs.estimate, basis.model, added), courses_of(runs)
+    augmented, courses = augmented_model(runs.estimate, runs.covariance, basis.model, added), courses_of(runs)
     seen = None
     if verdict is not Verdict.NO_MISMATCH and line.plant is None:
         nothing, believed = (each.hypothesis.result.first_outputs() for each in (judged.nothing, judged.believed))
@@ -101,8 +107,8 @@ def said(basis: Basis) -> Diagnosis:
         rejected=_rejected(basis),
         untestable=untestable,
         fit=decision.figures if law is None else law.fit,
-        parameters=retuned_parameters(runs.estimate, line, is_explained),
-        load_torque=load_torques(runs.estimate, line),
+        parameters=retuned_parameters(runs.estimate, runs.covariance, line, is_explained),
+        load_torque=load_torques(runs.estimate, runs.covariance, line),
         timing_s={},
         augmented=augmented if law is None else law.augmented(augmented),
         traces=courses if law is None else law.drawn(courses, judged.believed.hypothesis, runs),
@@ -141,8 +147,9 @@ def undecided(
     parameters, loads, augmented = dict[str, Retuned](), dict[str, Estimated](), model
     try:
         fit, estimate = first_figures(chain, line, nothing)
-        augmented = augmented_model(estimate, model, ())
-        parameters, loads = retuned_parameters(estimate, line, False), load_torques(estimate, line)
+        cov = reported_covariance(estimate)
+        augmented = augmented_model(estimate, cov, model, ())
+        parameters, loads = retuned_parameters(estimate, cov, line, False), load_torques(estimate, cov, line)
     except TimeIsUp:  # the whole limit, after which another program simulates no more
         fit = figures_without(chain, line, nothing)
     tried = set() if fits is None else {*fits.scores(), *fits.implausible}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import IntEnum
 
@@ -161,18 +161,27 @@ class FormPlace(IntEnum):
 
 def form_changes(result: FitResult, index: int) -> FloatArray:
     """Return by how much the laws at each place change around each sample of a recording [Nm], shape (3, N)."""
+    return _of_laws(result, index, change_around)
+
+
+def form_shifts(result: FitResult, index: int) -> FloatArray:
+    """Return what is missing at each place around a change of a law that comes late [Nm], shape (3, N)."""
+    return _of_laws(result, index, change_across)
+
+
+def _of_laws(result: FitResult, index: int, change_of: Callable[[FloatArray], FloatArray]) -> FloatArray:
     p, record = result.p_of(index), result.problem.records[index]
     found = np.zeros((len(FormPlace), record.time_s.size))
     structure = result.problem.grid.structure
     if structure is Structure.JOINT or result.problem.grid.plant is not None:
         return found
     if p[list(_MOTOR)].any():
-        found[FormPlace.MOTOR] = change_around(_at_motor(simulated(result, index, state=state_vector.SPEED), p))
+        found[FormPlace.MOTOR] = change_of(_at_motor(simulated(result, index, state=state_vector.SPEED), p))
     if p[list(_LOAD)].any():
         state = state_vector.SPEED if structure is Structure.ONE_MASS else state_vector.LOAD_SPEED
-        found[FormPlace.LOAD] = change_around(_at_load(simulated(result, index, state=state), record.since_start_s, p))
+        found[FormPlace.LOAD] = change_of(_at_load(simulated(result, index, state=state), record.since_start_s, p))
     if p[list(_SHAFT)].any():
-        found[FormPlace.SHAFT] = change_around(_in_shaft(simulated(result, index, state=state_vector.TWIST), p))
+        found[FormPlace.SHAFT] = change_of(_in_shaft(simulated(result, index, state=state_vector.TWIST), p))
     return np.where(np.isfinite(found), found, 0.0)
 
 
@@ -202,3 +211,9 @@ def change_around(law_nm: FloatArray) -> FloatArray:
     padded = np.pad(law_nm, AROUND, mode="edge")
     windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * AROUND + 1)
     return windows.max(axis=1) - windows.min(axis=1)
+
+
+def change_across(law_nm: FloatArray) -> FloatArray:
+    """Return the change of a torque from the first to the last of the samples around each one, shape (N,)."""
+    padded = np.pad(law_nm, AROUND, mode="edge")
+    return padded[2 * AROUND :] - padded[: law_nm.size]

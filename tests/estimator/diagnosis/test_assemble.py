@@ -106,7 +106,7 @@ def test_whichever_inverter_is_wrong_the_intervals_hold_the_line(wrong: str) -> 
     (named,) = found.parameters
     other_way = 1.0 / found.parameters[named].value
     assert (found.parameters[named].value if named == wrong else other_way) == pytest.approx(gain, rel=0.01)
-    for name, parameter in retuned_parameters(result, LINE, whole=True).items():
+    for name, parameter in retuned_parameters(result, reported_covariance(result), LINE, whole=True).items():
         low, high = parameter.ci95
         assert low <= ONE_MASS[name] <= high
         assert high / low >= 1.0 / gain - 0.01
@@ -193,7 +193,7 @@ class TestAcquired:
 
 class TestParameters:
     def test_before_and_after_with_interval_and_unit(self, rubbed: FitResult) -> None:
-        parameters = retuned_parameters(rubbed, LINE, whole=True)
+        parameters = retuned_parameters(rubbed, reported_covariance(rubbed), LINE, whole=True)
         assert list(parameters) == ["J_M", "b_M"]
         inertia = parameters["J_M"]
         assert (inertia.nominal, inertia.unit) == (NOMINAL["J_M"], "kg m^2")
@@ -204,7 +204,8 @@ class TestParameters:
         self,
     ) -> None:
         retuned = assembled(rubbing(lambda speed: FRICTION_NM))
-        by_whole = {whole: retuned_parameters(retuned, LINE, whole)["J_M"] for whole in (True, False)}
+        cov = reported_covariance(retuned)
+        by_whole = {whole: retuned_parameters(retuned, cov, LINE, whole)["J_M"] for whole in (True, False)}
         assert by_whole[False].value == by_whole[True].value
         tolerance = LINE.parameters["J_M"].tolerance
         edges = (NOMINAL["J_M"] * (1.0 - tolerance), NOMINAL["J_M"] * (1.0 + tolerance))
@@ -213,7 +214,7 @@ class TestParameters:
 
 class TestAugmentedModel:
     def test_it_has_the_new_values_and_the_effect(self, rubbed: FitResult, friction: FoundEffect) -> None:
-        found = augmented_model(rubbed, LINE, [friction])
+        found = augmented_model(rubbed, reported_covariance(rubbed), LINE, [friction])
         assert found.values()["J_M"] == pytest.approx(ONE_MASS["J_M"], rel=0.01)
         assert found.parameters["J_M"].tolerance == LINE.parameters["J_M"].tolerance
         estimate = friction.parameters["friction_nm"]
@@ -221,7 +222,7 @@ class TestAugmentedModel:
 
     def test_it_simulates_what_was_found(self, rubbed: FitResult, friction: FoundEffect) -> None:
         """On a recording it has not seen the error is the noise."""
-        found = augmented_model(rubbed, LINE, [friction])
+        found = augmented_model(rubbed, reported_covariance(rubbed), LINE, [friction])
         (unseen,) = rubbing(lambda speed: FRICTION_NM, seeds=(9,))
         assert free_run(found, unseen).rms < 1.3 * SIGMA
         assert free_run(LINE, unseen).rms > 3.0 * SIGMA

@@ -7,7 +7,7 @@ import pytest
 
 from estimator.lanes import LANES
 from estimator.physics import simulate as simulate_module, simulate as together_module
-from estimator.physics.jacobian import fill_differences, jacobian_at
+from estimator.physics.jacobian import fill_differences, jacobian_at, secants_at
 from estimator.physics.layout import Grid
 from estimator.physics.model import DrivelineModel
 from estimator.physics.problem import Problem, make_problem, outputs_at, own_part, start_vector
@@ -162,3 +162,27 @@ def test_derivatives_are_those_of_each_recording_by_itself(
     size = np.abs(alone).max(axis=0)
     assert (size > 0.0).sum() >= x.size - 2 * len(sizes)  # a moment that is nowhere moves nothing
     assert (np.abs(found - alone) <= 1e-5 * size + 1e-6).all()  # rounding, of outputs of some rad/s over the step
+
+
+def test_a_slope_over_a_width_is_the_difference_of_two_runs_over_it() -> None:
+    problem = problem_of(model(TWO_MASS, effects=GAP), recordings(300, 300))
+    x = start_vector(problem)
+    outputs = outputs_at(problem, x)
+    widths = np.full(x.size, 2e-3)
+    found = secants_at(problem, x, outputs, widths)
+    for column in (0, 2):
+        step = widths[column] * np.eye(x.size)[column]
+        up, down = outputs_at(problem, x + step), outputs_at(problem, x - step)
+        expected = np.concatenate([(a - b)[use] for a, b, use in zip(up, down, problem.use, strict=True)]) / 4e-3
+        np.testing.assert_allclose(found[:, column], expected, atol=1e-9 * np.abs(expected).max())
+
+
+def test_a_bound_cuts_a_side_off() -> None:
+    problem = problem_of(model(TWO_MASS, effects=GAP), recordings(300))
+    x = start_vector(problem)
+    x[0] = problem.shared[0].high
+    outputs = outputs_at(problem, x)
+    found = secants_at(problem, x, outputs, np.full(x.size, 2e-3))
+    (down,) = outputs_at(problem, x - 2e-3 * np.eye(x.size)[0])
+    expected = (outputs[0] - down)[problem.use[0]] / 2e-3
+    np.testing.assert_allclose(found[:, 0], expected, atol=1e-9 * np.abs(expected).max())

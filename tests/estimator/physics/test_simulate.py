@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.diagnosis.assemble import load_torques
+from estimator.diagnosis.assemble import load_torques, reported_covariance
 from estimator.diagnosis.inference.hypotheses import open_hypotheses
 from estimator.errors import BadModel
 from estimator.physics.driveline import Case, InitialCondition
@@ -62,7 +62,7 @@ def count_free(result: FitResult) -> int:
 
 def test_its_own_takes_up_dry_friction_in_each_direction() -> None:
     result = fitted(Load.OWN)
-    loads = [each.value for each in load_torques(result, with_load(Load.OWN)).values()]
+    loads = [each.value for each in load_torques(result, reported_covariance(result), with_load(Load.OWN)).values()]
     assert loads == pytest.approx([26.0, 14.0], abs=1.0)
     assert result.rms == pytest.approx(SIGMA, rel=0.1)
 
@@ -70,7 +70,7 @@ def test_its_own_takes_up_dry_friction_in_each_direction() -> None:
 @pytest.mark.parametrize("load", [Load.SHARED, 20.0])
 def test_shared_or_known_it_leaves_dry_friction_to_be_seen(load: Load | float) -> None:
     result = fitted(load)
-    loads = load_torques(result, with_load(load))
+    loads = load_torques(result, reported_covariance(result), with_load(load))
     assert len({each.value for each in loads.values()}) == 1
     assert result.rms > 5.0 * SIGMA
     low, high = loads["run_1"].ci95
