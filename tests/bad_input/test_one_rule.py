@@ -86,7 +86,7 @@ AROUND_THE_FILES = {
 AROUND_THE_PROCESSES = {
     "hil.child.start": "the rule",
     "hil.fleet.run._own_cluster": "Dask's own, with safe_path",
-    "hil.monitor.live_estimation._run": "this program's own, with safe_path",
+    "hil.monitor.live_estimation.__init__": "this program's own, with safe_path",
     "hil.monitor.source.__init__": "this program's own, with safe_path",
     "hil.version._git": "git, asked of this program's own checkout",
 }
