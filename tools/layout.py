@@ -18,7 +18,7 @@ from figures import unexplained_fields
 
 ROOT = Path(__file__).parent.parent
 ROOMS = ("hil", "drivers", "estimator", "tools")
-EXPLAINED = ("drivers", "estimator")  # where every field has a comment or a docstring
+EXPLAINED = ("drivers", "estimator", "hil")  # where every field has a comment or a docstring
 DEFINITIONS = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
 
 Finding = tuple[int, str]

@@ -48,7 +48,7 @@ class Limits:
     """What the next experiment may ask of the vehicle, at the motor shaft."""
 
     torque_nm: float  # Largest base torque of both inverters together
-    slew_nm_per_s: float
+    slew_nm_per_s: float  # fastest change of the base torque
     speed_rad_s: float  # Fastest speed, either way
     duration_s: float  # Longest recorded part
     angle_rad: float  # Farthest from where the recorded part begins

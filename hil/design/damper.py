@@ -57,9 +57,9 @@ SHOWN_S = 1.0
 class Order:
     """What is asked, at the rig's period; without a rig there is no limit of the torque."""
 
-    period_s: float
-    demand: Demand
-    rig: DesignedFor | None = None
+    period_s: float  # of the loop [s]
+    demand: Demand  # damping that is asked for, and the torque it may take
+    rig: DesignedFor | None = None  # None: it is designed for no rig, and drives none
 
 
 def asked(path: Path | None, target: float, share: float) -> Order:

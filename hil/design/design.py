@@ -50,10 +50,10 @@ class Aim(Enum):
 class Planned:
     """An experiment as the most probable hypothesis drives it on paper."""
 
-    name: str
-    table: ExperimentDict
-    record: Record
-    prediction: Prediction
+    name: str  # in words, for the operator
+    table: ExperimentDict  # as it stands in a rig file
+    record: Record  # its recorded part, simulated
+    prediction: Prediction  # of the whole run
 
     @property
     def seconds(self) -> float:
@@ -80,9 +80,9 @@ class Planned:
 class Design:
     """The experiment that was chosen, and what it is expected to bring."""
 
-    aim: Aim
+    aim: Aim  # what it is to bring
     key: str  # name of its table in a rig file
-    planned: Planned
+    planned: Planned  # the experiment itself
     decides: Expected | None  # where it is to decide between hypotheses
     widths: tuple[Width, ...]  # of the most probable hypothesis' values, now and after it
     shows: tuple[str, ...]  # effects that no recording so far shows or excludes, and this experiment does

@@ -39,19 +39,19 @@ class Solving:
     """One call: from where the last one ended to a verdict, or to what keeps it from there."""
 
     folder: Path  # where the verdict is published; recordings are in the runner's
-    source: RigSource
-    file: ModelFile
-    model: Path
-    runner: Runner
+    source: RigSource  # the user's rig file
+    file: ModelFile  # the nominal model
+    model: Path  # its file, for its digest and for what a result names
+    runner: Runner  # drives an order and keeps its recording
     may_command: Callable[[str], Answer]  # asks the operator
-    state: SolveState
+    state: SolveState  # what was driven so far; changed in place
     given: Sequence[Path]  # recordings of the rig from before
-    effort: str
+    effort: str  # of each diagnosis, as --effort has it
     most_vehicle_s: float  # time that the vehicle may be needed for in all [s]
     rolling_rad_s: float  # speed of the vehicle before the next run
     keep: Callable[[dict[str, Any]], None]  # keeps the state
-    say: Callable[[str], None]
-    progress: Callable[[str, float], None]
+    say: Callable[[str], None]  # shows a line to the operator
+    progress: Callable[[str, float], None]  # stage, and the share of it that is done
     note: Callable[[RunRecord], None] = lambda _: None  # called after each run, also of one that was ended early
 
     def run(self) -> End:

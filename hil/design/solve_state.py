@@ -35,38 +35,38 @@ class End(Enum):
 class Driven:
     """One experiment that was driven: why, what was promised of it, and its recording next to the state file."""
 
-    name: str
-    table: dict[str, Any]
-    recording: str
-    seconds: float
+    name: str  # of the experiment, and part of the recording's
+    table: dict[str, Any]  # as it stands in a rig file
+    recording: str  # name of its file
+    seconds: float  # that the vehicle was needed for
     last_rad_s: float  # Speed at its end: the next one begins there
-    promised_factor: float | None
-    promised_probability: float | None
+    promised_factor: float | None  # by which the odds were to change; None where it was to decide nothing
+    promised_probability: float | None  # of a decision, for campaigns that count how often it came
 
 
 @dataclass(frozen=True, slots=True)
 class Odds:
     """What is left open after so many recordings: the probability of each, of those that are open."""
 
-    recordings: int
-    probabilities: dict[str, float]
+    recordings: int  # how many had been driven
+    probabilities: dict[str, float]  # by name of the effect, or of several
 
 
 @dataclass(slots=True)
 class SolveState:
     """A search for a verdict as far as it is."""
 
-    schema: Literal["hil.solve/1"]
-    rig_sha256: str
-    model_sha256: str
-    driven: list[Driven] = field(default_factory=list)
-    odds: list[Odds] = field(default_factory=list)
-    end: End | None = None
+    schema: Literal["hil.solve/1"]  # version of the file's form
+    rig_sha256: str  # of what the rig file says
+    model_sha256: str  # of the model file; another one is refused
+    driven: list[Driven] = field(default_factory=list)  # in the order of driving
+    odds: list[Odds] = field(default_factory=list)  # after each
+    end: End | None = None  # None: under way, or interrupted
     because: str = ""  # what kept it from a decision: a limit, the time, the operator's reason
     provided: list[str] = field(default_factory=list)  # what a decision takes for granted: effects not tested
-    verdict: str = ""
-    statement: str = ""
-    updated_utc: Annotated[str, Field(max_length=40)] = ""
+    verdict: str = ""  # of the last diagnosis; empty before the first
+    statement: str = ""  # its words
+    updated_utc: Annotated[str, Field(max_length=40)] = ""  # ISO 8601
 
     @property
     def vehicle_s(self) -> float:

@@ -60,13 +60,13 @@ VALUES = PARAMETER + SIZE
 class Driveline:
     """A line to be written as C."""
 
-    name: str
-    structure: Structure
-    motion: Motion
+    name: str  # of the model, as an FMU has it
+    structure: Structure  # masses and shafts of the line
+    motion: Motion  # rotation or translation, by which units go
     p: FloatArray  # (layout.SIZE,): Parameters of the superset model
     effects: tuple[str, ...]  # those that the line has, by name
-    sensor_at: str
-    period_s: float
+    sensor_at: str  # mass whose motion is the output
+    period_s: float  # of one step of the communication [s]
     step_s: float  # longest integration step [s]
     sign_width: float  # speed within which dry friction changes sign
     load: float  # load torque at the beginning [Nm]
@@ -147,13 +147,13 @@ def started(d: Driveline, grid: Grid, case: Case, record: Record) -> tuple[Drive
 class Variable:
     """A variable of modelDescription.xml."""
 
-    name: str
+    name: str  # of the variable
     reference: int  # place in the C array
-    causality: str  # as FMI has them
-    variability: str  # as FMI has them
-    unit: str
-    description: str
-    start: float | bool | None = None
+    causality: str  # input, output, parameter, … as FMI has them
+    variability: str  # fixed, tunable, continuous, … as FMI has them
+    unit: str  # as FMI writes units; empty for a number
+    description: str  # in words
+    start: float | bool | None = None  # None where FMI allows none
 
 
 def place(name: str) -> int:
