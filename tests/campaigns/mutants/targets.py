@@ -26,8 +26,12 @@ TARGETS: dict[str, Target] = {
         },
     ),
     "drivers.guard_limits": Target(("tests/drivers/test_torque_guard.py", "tests/drivers/test_supervision.py")),
-    "drivers.inverter.supervision": Target(("tests/drivers/test_supervision.py", "tests/drivers/test_observer.py")),
-    "drivers.inverter.drive_supervision": Target(("tests/drivers/test_supervision.py",)),
+    "drivers.inverter.supervision": Target(
+        ("tests/drivers/test_supervision.py", "tests/drivers/test_prbs_of_plc.py", "tests/drivers/test_observer.py")
+    ),
+    "drivers.inverter.drive_supervision": Target(
+        ("tests/drivers/test_supervision.py", "tests/drivers/test_prbs_of_plc.py")
+    ),
     "drivers.inverter.observer": Target(("tests/drivers/test_observer.py", "tests/drivers/test_supervision.py")),
     "drivers.scaling": Target(("tests/drivers/test_scaling.py",)),
     "drivers.inverter.cia402": Target(
