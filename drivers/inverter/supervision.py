@@ -112,12 +112,12 @@ def speed_tolerance_rad_s(one_rad_s: float, other_rad_s: float, counts_rad_s: fl
 class PlcPart(NamedTuple):
     """What the PLC adds to both commands by itself: up to its amplitudes, either way."""
 
-    m1_nm: float = 0.0  # amplitude at m1
-    m2_nm: float = 0.0  # amplitude at m2
-    is_on: bool = False  # whether its generator is confirmed on, and not just being switched
+    m1_nm: float  # amplitude at m1
+    m2_nm: float  # amplitude at m2
+    is_on: bool  # whether its generator is confirmed on, and not just being switched
 
 
-NO_PART: Final = PlcPart()
+NO_PART: Final = PlcPart(0.0, 0.0, is_on=False)
 """Of a PLC whose generator is confirmed off."""
 
 

@@ -141,7 +141,7 @@ class PlcPrbs:
         parts_nm = abs(self._order.m1.prbs_nm), abs(self._order.m2.prbs_nm)
         settled = self._since_ns is None or tick.now_ns - self._since_ns > SETTLED_S * NS_PER_S
         if self._change is not None or not settled:
-            return PlcPart(*parts_nm)
+            return PlcPart(*parts_nm, is_on=False)
         return PlcPart(*parts_nm, is_on=True) if self._holds.enabled else NO_PART
 
     def known_nm(self, news: PlcStatus | None) -> float:
