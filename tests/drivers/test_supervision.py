@@ -382,3 +382,22 @@ def test_the_first_end_is_kept() -> None:
 def test_the_table_of_the_documentation_is_that_of_the_rules() -> None:
     page = (Path(__file__).parents[2] / "docs" / "reliability.md").read_text("utf-8")
     assert rules_table() in page
+
+
+@pytest.mark.parametrize(("speed_rad_s", "is_doubtful"), [(1.2, False), (1.4, True)])
+def test_speeds_may_differ_by_a_count_of_each_drive(speed_rad_s: float, is_doubtful: bool) -> None:
+    """0.5 rad/s of noise, counts of 0.4 and 0.3 rad/s, and 5 % of the greater reading: 1.26 and 1.27 rad/s."""
+    made = Supervision(SupervisionLimits(GUARD, 0.4, 0.3), M1, M2)
+    for k in range(300):
+        drives = [DriveRecord(0.0, answer(0.0, speed)) for speed in (speed_rad_s, 0.0)]
+        doubts = made.take(CycleRecord(k * PERIOD_NS, *drives))
+        if made.ended is not None:
+            break
+    assert doubts == (is_doubtful, is_doubtful)
+
+
+def test_both_drives_are_doubtful_where_their_sum_is_wrong_and_neither_alone() -> None:
+    made = supervised()
+    drives = [DriveRecord(100.0, answer(125.0)) for _ in range(2)]
+    assert made.take(CycleRecord(0, *drives)) == (True, True)
+    assert supervised().take(CycleRecord(0, drives[0], DriveRecord(100.0, answer(100.0)))) == (False, False)
