@@ -363,12 +363,12 @@ def require_plausible_torques(
             f"column {twice}: expected every torque once, got it twice in [signals] torque: it would count double. "
             "Name the other inverter's column, or leave one out and give scale = 2.",
         )
-    spreads = [float(np.nanstd(values[name])) for name in names]
-    if len(names) == 2 and min(spreads) > 0.0:
-        first, second = (values[name] for name in names)
-        off = max(float(np.nanstd(first + second)), abs(float(np.nanmean(first + second))))
-        if off < CANCELS * min(spreads):
-            alike = 0.0 if speed is None else _drives(first, speed)
+    both = np.column_stack([values[name] for name in names])
+    both = both[np.isfinite(both).all(axis=1)]
+    if len(names) == 2 and both.size and both.std(axis=0).min() > 0.0:
+        total = both.sum(axis=1)
+        if max(float(total.std()), abs(float(total.mean()))) < CANCELS * both.std(axis=0).min():
+            alike = 0.0 if speed is None else _drives(values[names[0]], speed)
             turned = names[alike > 0.0] if abs(alike) > FOLLOWS else ""
             cure = f"write {{ column = {turned!r}, scale = -1.0 }}" if turned else "give the one that is scale = -1.0"
             raise RecordingError(

@@ -401,3 +401,16 @@ def test_both_drives_are_doubtful_where_their_sum_is_wrong_and_neither_alone() -
     drives = [DriveRecord(100.0, answer(125.0)) for _ in range(2)]
     assert made.take(CycleRecord(0, *drives)) == (True, True)
     assert supervised().take(CycleRecord(0, drives[0], DriveRecord(100.0, answer(100.0)))) == (False, False)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_speed_that_both_read_is_compared_with_what_both_torques_make_of_the_vehicle(sign: float) -> None:
+    made, speed_rad_s = supervised(inertia_kg_m2=100.0), 0.0
+    for k in range(3000):
+        torque_nm = 100.0 if k // 500 % 2 else -100.0
+        speed_rad_s += 2.0 * torque_nm / 100.0 * PERIOD_S
+        drives = [DriveRecord(torque_nm, answer(torque_nm, sign * speed_rad_s)) for _ in range(2)]
+        made.take(CycleRecord(k * PERIOD_NS, *drives))
+        if made.ended is not None:
+            break
+    assert (made.ended is None) == (sign > 0.0), made.ended
