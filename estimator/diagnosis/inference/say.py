@@ -305,22 +305,28 @@ def _rejected(basis: Basis) -> tuple[RejectedEffect, ...]:
     ):
         for name, score in sorted(scores.items(), key=lambda item: item[::-1]):  # not as cores came to their end
             if name not in found and name not in known:
-                worse = _simulates_worse(name, judged.tried.values(), judged.believed)
-                text = worse if worse and score < best else reason.format(_compared(score - best))
+                seen = _as_tried(name, judged.tried.values(), judged.believed)
+                text = seen if seen and score < best else reason.format(_compared(score - best))
                 found[name] = RejectedEffect(name, text, min(best - score, 0.0))
     return tuple(sorted(found.values(), key=lambda each: -each.delta_bic))
 
 
-def _simulates_worse(name: str, tried: Iterable[Trial], believed: Trial) -> str:
-    """Say that the best set with an effect was tried and simulates worse; "" where none was."""
+def _as_tried(name: str, tried: Iterable[Trial], believed: Trial) -> str:
+    """Say what the best set with an effect leaves in the free run; "" where none was tried."""
     holding = [each for each in tried if name in each.effects]
     if not holding:
         return ""
     best = min(holding, key=lambda each: each.rms)
-    return (
-        f"tried: it leaves {best.rms:.3g} on samples not used for the fit, with {best.size} effects; what is believed "
-        f"leaves {believed.rms:.3g} with {believed.size}"
+    count, of_believed = (f"{len(each.effects)} effect{'s' * (len(each.effects) != 1)}" for each in (best, believed))
+    said = (
+        f"tried: it leaves {best.rms:.3g} on samples not used for the fit, with {count}; what is believed leaves "
+        f"{believed.rms:.3g} with {of_believed}"
     )
+    if best.rms >= believed.rms:
+        return said
+    if best.clearly_beats(believed):
+        return f"{said}: less, but not by enough to establish it"
+    return f"{said}: less, but by no more than the scatter from block to block"
 
 
 def _compared(worse: float) -> str:

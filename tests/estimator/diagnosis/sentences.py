@@ -79,8 +79,6 @@ def _rejected(found: Diagnosis) -> Iterator[str]:
     for each in found.rejected:
         if "better by" in each.reason or each.delta_bic > 0.0:
             yield f"{each.name} is rejected: {each.reason} ({each.delta_bic:+.3g})"
-        for left, size, believed, size_of in re.findall(
-            rf"it leaves {NUMBER} on .* with (\d+) effects; what is believed leaves {NUMBER} with (\d+)", each.reason
-        ):
-            if float(left) < float(believed) and int(size) <= int(size_of):
+        for left, believed in re.findall(rf"it leaves {NUMBER} on .*; what is believed leaves {NUMBER} ", each.reason):
+            if (float(left) < float(believed)) and ": less, but" not in each.reason:
                 yield f"{each.name} is rejected: {each.reason}"
