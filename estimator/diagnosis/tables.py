@@ -167,7 +167,7 @@ def best_table(hypothesis: Hypothesis, line: DrivelineModel, holdout: Sequence[R
     alike_places = [each.descent.curve.place for each in others if each.chosen_by < LOOK_ALIKE_SHARE * best.chosen_by]
     rivals = [PLACES[place].over for place in alike_places if place != best.descent.curve.place]
     not_carried = [name for name, (without, with_law) in zip(firsts, kept, strict=False) if with_law > without]
-    table, at = as_different_as(table, torques), PLACES[table.place]
+    table, at = widened_by_jackknife(table, torques), PLACES[table.place]
     slope = last.curve.own * last.curve.slope_of(result.p)
     effects, alike, formula = {table.name: table.effect()}, looks_like(table, slope), shortest_formula(table, slope)
     if last.curve.yields:
@@ -224,10 +224,11 @@ def _left_out(
     return found, torques
 
 
-def as_different_as(table: Table, torques: Sequence[FloatArray]) -> Table:
+def widened_by_jackknife(table: Table, torques: Sequence[FloatArray]) -> Table:
     """Widen the intervals of a curve to those by the jackknife, of the torques without one recording each.
 
-    Where an error grows along a simulation, as behind a freewheel, its derivative holds for the smallest changes alone.
+    ``torques`` has the curve at its K knots for each recording left out, each (K,) [Nm] (Efron and Tibshirani, An
+    Introduction to the Bootstrap, 1993, ch. 11). Where an error grows along a simulation, as behind a freewheel, its derivative holds for the smallest changes alone.
     """
     if table.ci95 is None or not torques:
         return table

@@ -220,8 +220,8 @@ class Stale:
     # A change is the clock's step if it differs from it by at most this share: the base torque may drift meanwhile
     SAME_STEP = 0.2
     # A step tells whether it was answered where the answer is this many times the predictor's error. Torques found
-    # stale are mended and the predictor fitted again, for wrong torques blur it; each pass asks for more, the last one
-    # counts.
+    # stale are corrected and the predictor fitted again, for wrong torques blur it; each pass asks for more, the last
+    # one counts.
     CLEAR = (2.0, 3.0, 4.0)
     ANSWERED = 0.5  # share of the answer that must have come early: half way between none and all of it
 
@@ -414,6 +414,6 @@ class Telling:
     LEVELS: Mapping[str, int] = {"quick": 3_000, "normal": 10_000, "thorough": 100_000}
     MOST_NAMES = 4  # untried effects that a headline lists
     STAYS = 1e-3  # an error that changes by less does not change to anyone who reads it
-    TO_SEARCH = 0.92  # share of a limit of time after which no simulation is begun: the rest is for saying so
+    TO_SEARCH = 0.92  # share of a limit of time after which no simulation is started: the rest is for saying so
     # How long an error that is no noise keeps its value: the pace at which a test changes what it excites
     COHERENT_S = 1.0

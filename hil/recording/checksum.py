@@ -61,7 +61,7 @@ class DataDigest:
         self._digest.update(_length(size))
 
     def take(self, cells: Column) -> None:
-        """Take the next cells of the column that was begun."""
+        """Take the next cells of the column that was started."""
         self._digest.update(_cells(cells, ColumnKind.of(cells)))
 
     def hexdigest(self) -> str:

@@ -49,7 +49,7 @@ def rows_of(seed: int) -> Iterator[Row]:
                 "on line, damping": row.online_damping / row.reference_damping - 1.0,
                 "off line, frequency": row.offline_hz / row.reference_hz - 1.0,
                 "off line, damping": row.offline_damping / row.reference_damping - 1.0,
-                "apart_db": row.offline_db,
+                "difference_db": row.offline_db,
                 "traces": by_trace(model, row.reference_damping),
             }
 
@@ -80,9 +80,10 @@ def report(rows: Sequence[Row]) -> str:
     wheres = [f"{where}, {what}" for where in ("on line", "off line") for what in ("frequency", "damping")]
     lines = [(where, *_cells([row[where] for row in rows])) for where in wheres]
     errors = table((f"of {len(rows)} experiments", "bias", "RMS error", "largest"), lines)
-    apart = np.array([row["apart_db"] for row in rows])
+    difference_db = np.array([row["difference_db"] for row in rows])
     agree = (
-        f"Responses apart by at most 1 dB: {np.sum(apart <= 1.0)} of {apart.size}; the largest {apart.max():.1f} dB.\n"
+        f"Responses that differ by at most 1 dB: {np.sum(difference_db <= 1.0)} of {difference_db.size}; "
+        f"the largest difference {difference_db.max():.1f} dB.\n"
     )
     kept = [
         (f"{trace:g}", *(_cells([row["traces"][f"{trace:g}"][k] for row in rows])[0] for k in range(len(COUNTS))))

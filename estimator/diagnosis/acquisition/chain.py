@@ -208,7 +208,7 @@ def _read_rows(record: Record, findings: Iterable[AcquisitionFinding]) -> BoolAr
 
 
 def without_acquisition_effects(model: DrivelineModel) -> DrivelineModel:
-    """Return a model without the effects that are recognised before a fit: these are mended in the recordings."""
+    """Return a model without the effects that are recognised before a fit: these are corrected in the recordings."""
     return replace(model, effects={name: v for name, v in model.effects.items() if not EFFECTS[name].recognised})
 
 

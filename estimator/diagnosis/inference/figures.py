@@ -182,7 +182,7 @@ def found_effect(standing: Standing, runs: FreeRuns) -> FoundEffect:
 class FreeRuns:
     """Free runs before and after, on the recordings at their own rate."""
 
-    chain: Chain  # recordings of the fit, as read and as mended
+    chain: Chain  # recordings of the fit, as read and as corrected
     unseen: Unseen  # samples that judge
     believed: Hypothesis  # set of effects
     is_whole: bool  # whether what is believed leaves nothing but its disturbances

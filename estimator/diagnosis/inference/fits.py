@@ -284,8 +284,8 @@ def with_effect(effects: Effects, name: str) -> Effects:
 def inheriting(name: str, release: Release, previous: FitResult) -> Release:
     """Return a start of a general law that keeps what a fit of its special case has found out by another telling.
 
-    Friction that was seen to bend before it slides does so with a Stribeck range, too: begun without, such a fit is far
-    behind the special case and would be given up.
+    Friction that was seen to bend before it slides does so with a Stribeck range, too: started without, such a fit is
+    far behind the special case and would be given up.
     """
     found = {
         key: value for special in EFFECTS[name].contains for key, value in previous.values_of(special).items() if value

@@ -1,1 +1,1 @@
-"""What is asked of recordings and model before anything is fitted: refused, mended with a warning, or passed on."""
+"""What is asked of recordings and model before anything is fitted: refused, corrected with a warning, or passed on."""

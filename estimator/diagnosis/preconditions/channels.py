@@ -42,21 +42,21 @@ def _motion(steps: FloatArray, jumps: BoolArray, at: int) -> float:
 
 def unwrapped(records: Sequence[Record]) -> tuple[list[Record], list[str]]:
     """Put wrapped positions together again; say so."""
-    mended, warnings = [], []
+    corrected, warnings = [], []
     for record in records:
         seen = record.okay & np.isfinite(record.output)
         period = period_of(record.output, seen) if record.kind is OutputKind.POSITION and seen.any() else None
         if period is None:
-            mended.append(record)
+            corrected.append(record)
             continue
         output = record.output.copy()
         output[seen] = np.unwrap(output[seen], period=period)
-        mended.append(replace(record, output=output))
+        corrected.append(replace(record, output=output))
         warnings.append(
             f"recording {record.name}: the position wraps after {period:.6g} and was unwrapped. If it is no wrapped "
             "angle, give it as it was read, without jumps."
         )
-    return mended, warnings
+    return corrected, warnings
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,7 +101,7 @@ def without_clipped(records: Sequence[Record]) -> tuple[list[Record], list[str]]
     A torque that stands at its limit may be cut off in the reading or held there by the drive; the reading
     alone doesn't show which, so its rows stay.
     """
-    mended, warnings = [], []
+    corrected, warnings = [], []
     for record in records:
         okay = record.okay.copy()
         for found in clipped(record.kind.value, record.output, record.okay & np.isfinite(record.output)):
@@ -111,9 +111,9 @@ def without_clipped(records: Sequence[Record]) -> tuple[list[Record], list[str]]
                 f"{found.rows.mean():.1%} of the rows: its reading is cut off there; these rows are not used. "
                 "Widen the range of the sensor or of its scale."
             )
-        mended.append(record if np.array_equal(okay, record.okay) else replace(record, okay=okay))
+        corrected.append(record if np.array_equal(okay, record.okay) else replace(record, okay=okay))
         warnings += [*_torques(record), *dead_torques(record)]
-    return mended, warnings
+    return corrected, warnings
 
 
 def _torques(record: Record) -> list[str]:
@@ -343,7 +343,7 @@ def without_not_read(records: Sequence[Record]) -> tuple[list[Record], list[str]
 
     A torque that lies on straight lines may be one that was commanded: ramps, and levels.
     """
-    mended, warnings = [], []
+    corrected, warnings = [], []
     for record in records:
         okay = record.okay.copy()
         seen = record.okay & np.isfinite(record.output)
@@ -355,5 +355,5 @@ def without_not_read(records: Sequence[Record]) -> tuple[list[Record], list[str]
                 f"recording {record.name}: the {found.channel} {what} in {found.rows.mean():.1%} of the rows: {why} "
                 "there; these rows are not used. Give the raw recording, with its gaps."
             )
-        mended.append(record if np.array_equal(okay, record.okay) else replace(record, okay=okay))
-    return mended, warnings
+        corrected.append(record if np.array_equal(okay, record.okay) else replace(record, okay=okay))
+    return corrected, warnings

@@ -72,11 +72,11 @@ class Prepared:
 def with_motion_corrected(records: Sequence[Record]) -> tuple[list[Record], list[str]]:
     """Return recordings unwrapped and without what no sensor has read, and a warning for each change."""
     warnings: list[str] = []
-    mended = list(records)
-    for mend in (unwrapped, without_clipped, without_not_read, with_usable_channels):
-        mended, notes = mend(mended)
+    corrected = list(records)
+    for correct in (unwrapped, without_clipped, without_not_read, with_usable_channels):
+        corrected, notes = correct(corrected)
         warnings += notes
-    return mended, warnings
+    return corrected, warnings
 
 
 def doubtful(records: Sequence[Record], model: DrivelineModel | None) -> list[Doubt]:
@@ -85,12 +85,12 @@ def doubtful(records: Sequence[Record], model: DrivelineModel | None) -> list[Do
     The longest stretch of each is asked; where units and signs leave no doubt, also whether they are of one line.
     Raises `Implausible` where they can't be of a drive.
     """
-    mended, _ = with_motion_corrected(records)
-    thin_ones = mended if model is None else thinned(mended, model)
+    corrected, _ = with_motion_corrected(records)
+    thin_ones = corrected if model is None else thinned(corrected, model)
     doubts = doubts_about(without_lost_samples([_longest(record) for record in thin_ones]), model)
     if doubts or model is None:
         return doubts
-    return disagreements(without_lost_samples([_longest(record) for record in mended]), model)
+    return disagreements(without_lost_samples([_longest(record) for record in corrected]), model)
 
 
 def _longest(record: Record) -> Record:
@@ -98,15 +98,15 @@ def _longest(record: Record) -> Record:
 
 
 def prepare(records: Sequence[Record], model: DrivelineModel, holdout: Sequence[Record] = ()) -> Prepared:
-    """Check and mend recordings before anything is fitted."""
+    """Check and correct recordings before anything is fitted."""
     require_together([*records, *holdout] if records else records)
-    mended, warnings = with_motion_corrected([*records, *holdout])
-    for record in mended:
+    corrected, warnings = with_motion_corrected([*records, *holdout])
+    for record in corrected:
         for each in separated_outputs([record], lambda _: 1.0):
             output_state(each, model.structure)
-    made_of_each(mended, require_signals, NotExciting, NotExciting)
+    made_of_each(corrected, require_signals, NotExciting, NotExciting)
     names = [record.name for record in records]
-    pieces, few = shortened_to_memory(cut(thinned(mended, model)), names)
+    pieces, few = shortened_to_memory(cut(thinned(corrected, model)), names)
     training = pieces.of(names)
     if not training:
         raise NotExciting(" ".join(pieces.warnings), tuple(names))

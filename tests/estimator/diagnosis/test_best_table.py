@@ -8,7 +8,7 @@ import pytest
 from estimator.diagnosis.inference.disturbances import Limits
 from estimator.diagnosis.inference.hypotheses import NOTHING, Hypothesis
 from estimator.diagnosis.table_words import looks_like, shortest_formula
-from estimator.diagnosis.tables import as_different_as, best_table, table_at
+from estimator.diagnosis.tables import best_table, table_at, widened_by_jackknife
 from estimator.physics.driveline import InitialCondition
 from estimator.physics.layout import flat_values, grid_for
 from estimator.physics.simulate import simulate
@@ -100,10 +100,10 @@ def test_a_curve_is_fitted_next_to_a_limit_that_is_infinite() -> None:
 def test_intervals_hold_what_the_curve_is_without_one_recording_each() -> None:
     """Of 10, 12 and 14 Nm the squared error by the jackknife is 2/3 of 8 Nm^2 (Efron and Tibshirani, 1993, ch. 11)."""
     table = Table("torque", (0.0, 1.0), (0.0, 12.0), ((0.0, 0.0), (11.0, 13.0)))
-    apart = as_different_as(table, [np.array([0.0, torque]) for torque in (10.0, 12.0, 14.0)])
-    assert apart.ci95 is not None
-    np.testing.assert_allclose(apart.ci95[1], (12.0 - 1.96 * np.sqrt(16.0 / 3.0), 12.0 + 1.96 * np.sqrt(16.0 / 3.0)))
-    assert as_different_as(table, [np.array([0.0, 12.0])] * 3) == table
+    wider = widened_by_jackknife(table, [np.array([0.0, torque]) for torque in (10.0, 12.0, 14.0)])
+    assert wider.ci95 is not None
+    np.testing.assert_allclose(wider.ci95[1], (12.0 - 1.96 * np.sqrt(16.0 / 3.0), 12.0 + 1.96 * np.sqrt(16.0 / 3.0)))
+    assert widened_by_jackknife(table, [np.array([0.0, 12.0])] * 3) == table
 
 
 def total_of(total: FloatArray, place: str = "shaft_twist", slope: float = 4000.0) -> Table:
