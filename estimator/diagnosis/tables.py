@@ -228,7 +228,8 @@ def widened_by_jackknife(table: Table, torques: Sequence[FloatArray]) -> Table:
     """Widen the intervals of a curve to those by the jackknife, of the torques without one recording each.
 
     ``torques`` has the curve at its K knots for each recording left out, each (K,) [Nm] (Efron and Tibshirani, An
-    Introduction to the Bootstrap, 1993, ch. 11). Where an error grows along a simulation, as behind a freewheel, its derivative holds for the smallest changes alone.
+    Introduction to the Bootstrap, 1993, ch. 11). Where an error grows along a simulation, as behind a freewheel, its
+    derivative holds for the smallest changes alone.
     """
     if table.ci95 is None or not torques:
         return table
